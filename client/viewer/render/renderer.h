@@ -1,0 +1,26 @@
+// The one interface of both display renderers.
+#pragma once
+
+#include <memory>
+
+#include "common/splat/cpu_splatter.h"
+
+namespace telesplat::viewer {
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  /// "cpu" or "gl".
+  virtual const char* name() const = 0;
+  /// Draws one frame into target (host memory). Called from one thread, the one that made the renderer.
+  virtual splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+                                   const image::Shading& shading, const splat::FrameTarget& target) = 0;
+};
+
+std::unique_ptr<Renderer> make_cpu_renderer(int threads);
+/// EGL, off-screen (device or Mesa surfaceless platform), OpenGL 4.3 or later. Fails with what was tried.
+Result<std::unique_ptr<Renderer>> make_gl_renderer();
+/// kind: "auto" (gl on a hardware GPU, else cpu), "cpu", "gl".
+Result<std::unique_ptr<Renderer>> make_renderer(const std::string& kind, int threads);
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,29 @@
+# Language level, warnings, sanitizers and fuzzing, for every target.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+option(TELESPLAT_TESTS "Build the tests and benchmarks" ON)
+option(TELESPLAT_FUZZ "Build the libFuzzer targets (needs clang)" OFF)
+set(TELESPLAT_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=")
+
+# -ffp-contract=off: packer and viewers must compute identical points, whatever instruction set they dispatch to.
+add_compile_options(-Wall -Wextra -Wno-missing-field-initializers -ffp-contract=off -fno-math-errno)
+if(TELESPLAT_SANITIZE)
+  add_compile_options(-fsanitize=${TELESPLAT_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${TELESPLAT_SANITIZE})
+endif()
+if(TELESPLAT_FUZZ)
+  add_compile_options(-fsanitize=fuzzer-no-link)
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()

@@ -1,0 +1,35 @@
+// Lossless codec for depth images, a tile at a time: depth, colour, normal and coverage mask.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/image/depth_image.h"
+
+namespace telesplat::codec {
+
+/// Largest image a stream may describe; decode() refuses more before it allocates.
+inline constexpr size_t kMaxPixels = size_t{1} << 24;
+
+/// Encodes a canonical depth image (image/depth_image.h) of 1..kMaxPixels pixels. Fully and sparsely covered images are
+/// both coded well: a patch after redundancy elimination is a depth image with most pixels masked out.
+/// Deterministic: the same image gives the same bytes. Thread-safe.
+std::vector<uint8_t> encode(const image::DepthImage& image);
+
+/// Decodes what encode() made: decode(encode(x)) == x. Any other bytes give an error or some canonical image, never more than
+/// kMaxPixels pixels, never a read or write out of bounds; memory stays proportional to the pixels of the stream's header,
+/// which must be plausible for the stream's length. `expected_width`/`expected_height`: refuse other sizes (0 = any).
+Result<image::DepthImage> decode(std::span<const uint8_t> bytes, int expected_width = 0, int expected_height = 0);
+
+/// For `telesplat inspect`: size and parts of a stream without decoding its pixels.
+struct StreamInfo {
+  int width = 0, height = 0;
+  size_t covered_pixels = 0;
+  size_t mask_bytes = 0, depth_bytes = 0, colour_bytes = 0, normal_bytes = 0;
+};
+Result<StreamInfo> inspect(std::span<const uint8_t> bytes);
+
+}  // namespace telesplat::codec

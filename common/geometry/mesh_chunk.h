@@ -1,0 +1,82 @@
+// Mesh chunks: the blocks that a data server stores and serves and a sampler traces.
+//
+// One chunk is one contiguous block of bytes, the same in the chunk store's file, on the wire and in a sampler's memory, so
+// that it is memory-mapped, sent and handed to Embree without a copy. Little-endian. All positions are in room space.
+//
+//   offset                          type            what
+//   0                               ChunkHeader     64 bytes
+//   64                              float[3][V]     positions, metres
+//   64 + 12 V                       uint32[V]       normals, two 16-bit octahedral coordinates (image/normal.h: encode_normal32)
+//   64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo
+//   64 + 20 V                       uint32[3][T]    vertex indices, each < V
+//   64 + 20 V + 12 T                zero bytes      padding to a multiple of 64, at least 16 (Embree reads past the last vertex)
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/core/ids.h"
+#include "common/core/result.h"
+#include "common/geometry/box.h"
+
+namespace telesplat::geometry {
+
+inline constexpr uint32_t kChunkMagic = 0x4b435354;  // "TSCK"
+inline constexpr uint32_t kMaxChunkVertices = 1u << 22;
+inline constexpr uint32_t kMaxChunkTriangles = 1u << 22;
+inline constexpr size_t kMaxChunks = 1u << 16;
+
+struct ChunkHeader {
+  uint32_t magic = kChunkMagic;
+  uint32_t vertices = 0;
+  uint32_t triangles = 0;
+  uint32_t reserved0 = 0;
+  float lo[3] = {}, hi[3] = {};
+  uint32_t reserved1[6] = {};
+};
+static_assert(sizeof(ChunkHeader) == 64);
+
+/// Bytes of a chunk of V vertices and T triangles, padding included.
+constexpr size_t chunk_bytes(size_t vertices, size_t triangles) {
+  return (64 + 20 * vertices + 12 * triangles + 16 + 63) / 64 * 64;
+}
+
+/// A validated chunk: spans into bytes that somebody else keeps alive (4-byte aligned).
+struct MeshChunkView {
+  Box box_room;
+  std::span<const float> positions_room;  ///< 3 V
+  std::span<const uint32_t> normals;      ///< V
+  std::span<const uint32_t> colours;      ///< V
+  std::span<const uint32_t> indices;      ///< 3 T
+  size_t vertices() const { return normals.size(); }
+  size_t triangles() const { return indices.size() / 3; }
+
+  /// Checks magic, counts against the limits and against bytes.size(), every index < V, every position finite.
+  /// Nothing is allocated. Precondition: none on the content; bytes.data() must be 4-byte aligned.
+  static Result<MeshChunkView> validate(std::span<const std::byte> bytes);
+};
+
+/// What a data server says of a chunk before anyone fetches it.
+struct ChunkInfo {
+  ChunkId id;
+  Box box_room;
+  uint64_t triangles = 0;
+  uint64_t bytes = 0;
+  bool operator==(const ChunkInfo&) const = default;
+};
+
+/// Lays out one chunk. normals and colours have one entry a vertex, as in the table above.
+/// Preconditions: counts within the limits, indices < vertices.
+std::vector<std::byte> build_chunk(std::span<const float> positions_room, std::span<const uint32_t> normals,
+                                   std::span<const uint32_t> colours, std::span<const uint32_t> indices);
+
+/// Bytes of a chunk with whatever keeps them alive (a mapped file, a received message, a vector).
+struct ChunkBytes {
+  std::span<const std::byte> bytes;
+  std::shared_ptr<const void> owner;
+};
+
+}  // namespace telesplat::geometry

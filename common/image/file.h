@@ -1,0 +1,28 @@
+// Image files, through OpenImageIO.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/core/result.h"
+
+namespace telesplat::image {
+
+/// A displayed frame. colour: 0x00RRGGBB row-major from the upper left; depth_m: metres along the view axis, +infinity where
+/// nothing is, empty if the frame has no depth.
+struct View {
+  int width = 0, height = 0;
+  std::vector<uint32_t> colour;
+  std::vector<float> depth_m;
+};
+
+/// 8-bit RGB PNG. The file appears whole or not at all. Errors name the path.
+Status write_png(const std::string& path, const View& view);
+/// R, G, B as linearised half floats and Z as float (depth_m; +infinity = nothing). Precondition: view has depth.
+Status write_exr(const std::string& path, const View& view);
+/// Reads any picture OpenImageIO knows; channel Z becomes depth_m. At most 16384 pixels a side.
+Result<View> read_view(const std::string& path);
+
+}  // namespace telesplat::image

@@ -1,0 +1,134 @@
+// The point model (T4.3): a level-limited octree of clusters, each a list of mosaics. The packer owns the authoritative one;
+// every viewer replicates it by applying the same events in the same order. No sockets, no clocks, no threads inside.
+//
+// Determinism: the same events give the same bytes on every machine and instruction set (IEEE arithmetic without contraction).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "common/core/ids.h"
+#include "common/core/result.h"
+#include "common/geometry/box.h"
+#include "common/geometry/camera.h"
+#include "common/image/depth_image.h"
+
+namespace telesplat::points {
+
+inline constexpr int kLevels = 3;           ///< level 0 = every sample, 1 = one of 2x2 pixels, 2 = one of 4x4
+inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
+
+/// Where a cluster's leaf lies: its integer coordinates, `depth` bits each, in the octree's cube; x in the low bits
+/// (x | y << 10 | z << 20).
+using ClusterKey = uint32_t;
+
+struct ModelConfig {
+  geometry::Box box_room;  ///< the data set's box; the octree's cube is its smallest enclosing cube about the same centre, grown
+                           ///< by 1/1000, so that points on the boundary lie inside
+  int depth = 6;           ///< octree depth: 2^depth leaves a side
+  bool operator==(const ModelConfig&) const = default;
+};
+
+/// The part of one patch (of one tile) inside one cluster: one allocation with three levels of detail, each an SoA block.
+///   level block of n points: uint16 x[n], y[n], z[n], normal[n], then uint32 colour[n] (0x00RRGGBB; top byte = flags, 0).
+/// 12 bytes a point. Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size.
+/// Blocks of a level start at multiples of 4 bytes (n is not padded; colour follows at the next multiple of 4).
+class Mosaic {
+ public:
+  struct Level {
+    uint32_t count = 0;
+    const uint16_t *x = nullptr, *y = nullptr, *z = nullptr, *normal = nullptr;
+    const uint32_t* colour = nullptr;
+  };
+  Level level(int l) const;
+  uint32_t count(int l) const { return counts_[l]; }
+
+  Sequence sequence() const { return sequence_; }
+  /// Projected pixels across the cluster's cube in the sampling view: leaf size * focal / depth of the leaf's centre
+  /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l.
+  float pixel_range() const { return pixel_range_; }
+  /// Normal cone [Shirman 93]: every normal n of the mosaic has dot(n, axis) >= cosine. cosine = -1: no cone.
+  glm::vec3 cone_axis() const;
+  float cone_cosine() const;
+  /// Mean position of the level-0 points, room space, to 1/256 of the leaf.
+  glm::vec3 centroid_room(const geometry::Box& leaf) const;
+  /// Bytes this mosaic occupies: header and points.
+  size_t bytes() const;
+
+ private:
+  friend class PointModel;
+  friend struct MosaicBuilder;
+  std::unique_ptr<std::byte[]> data_;
+  Sequence sequence_;
+  std::array<uint32_t, kLevels> counts_{};
+  float pixel_range_ = 0;
+  uint16_t cone_axis_ = 0;
+  int8_t cone_cosine_ = -127;
+  std::array<uint8_t, 3> centroid_{};
+};
+
+struct Cluster {
+  ClusterKey key = 0;
+  geometry::Box leaf_room;  ///< the leaf's cube
+  std::vector<Mosaic> mosaics;  ///< in order of sequence
+};
+
+/// The points of one patch part, sorted into leaves and levels, ready to be inserted. Made without touching a model, so a
+/// viewer's worker makes it while its display thread reads the model.
+struct PreparedPatch {
+  Sequence sequence;
+  std::vector<std::pair<ClusterKey, Mosaic>> mosaics;  ///< ascending keys
+  uint64_t points = 0;   ///< level-0 points
+  uint64_t outside = 0;  ///< samples outside the octree's cube: dropped (none if the data set's box is true)
+};
+
+/// Unprojects the covered pixels of a depth-image tile, sorts them into leaves, decimates (T4.3.2, T7.2) and computes each
+/// mosaic's attributes.
+///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
+///   Level l+1 takes of each block of 2x2 pixels of level l (blocks aligned to the frame's pixel grid) the covered pixels that
+///   fall in the same leaf and lie within 2 % of depth of its first, as one point: the sample nearest the block's centre, with
+///   the mean colour of them all. So coverage never vanishes at coarse levels.
+///   threads: oneTBB threads to use at most; the result does not depend on it.
+PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const geometry::Camera& camera,
+                            const geometry::Rect& tile, const image::DepthImage& image);
+
+class PointModel {
+ public:
+  explicit PointModel(const ModelConfig& config);
+
+  const ModelConfig& config() const { return config_; }
+  /// Event "patch". Sequences must rise; O(mosaics).
+  void insert(PreparedPatch patch);
+  /// Event "forget": drops whole clusters. Unknown keys are ignored. Returns the dropped clusters, so that a viewer can keep
+  /// them alive until its frame is drawn.
+  std::vector<Cluster> forget(std::span<const ClusterKey> keys);
+  /// Event "new epoch": drops everything.
+  void clear();
+
+  /// All clusters, in no particular order. Pointers are stable until that cluster is forgotten; a cluster's mosaic vector
+  /// grows on insert.
+  const std::unordered_map<ClusterKey, std::unique_ptr<Cluster>>& clusters() const { return clusters_; }
+  const Cluster* find(ClusterKey key) const;
+
+  uint64_t points() const { return points_; }             ///< level-0 points held
+  uint64_t bytes() const;                                 ///< memory of the whole model: points, headers, containers
+  uint64_t points_in(ClusterKey key) const;
+  /// Order-independent digest of every cluster's key and every mosaic's bytes: equal models have equal digests.
+  uint64_t digest() const;
+
+ private:
+  ModelConfig config_;
+  std::unordered_map<ClusterKey, std::unique_ptr<Cluster>> clusters_;
+  uint64_t points_ = 0;
+};
+
+/// The octree's cube and a leaf's cube.
+geometry::Box octree_cube(const ModelConfig& config);
+geometry::Box leaf_box(const ModelConfig& config, ClusterKey key);
+
+}  // namespace telesplat::points

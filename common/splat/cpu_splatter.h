@@ -1,0 +1,42 @@
+// The CPU splatter: Highway SIMD, run-time dispatch, one screen band a task, no lock in the hot path.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/image/file.h"
+#include "common/image/shading.h"
+#include "common/splat/view_selection.h"
+
+namespace telesplat::splat {
+
+enum class Kernel { kSquare, kDisc };
+
+/// Where a frame goes. colour: width * height of 0x00RRGGBB (alpha byte 0xff), row-major; depth_m: the same shape, or null.
+struct FrameTarget {
+  int width = 0, height = 0;
+  uint32_t* colour = nullptr;
+  float* depth_m = nullptr;  ///< metres along the view axis; +infinity where nothing is
+};
+
+struct SplatStats {
+  uint64_t points_projected = 0, points_drawn = 0;
+  double project_ms = 0, resolve_ms = 0;  ///< summed over threads
+};
+
+class CpuSplatter {
+ public:
+  /// threads: 0 = all cores.
+  explicit CpuSplatter(int threads = 0);
+  ~CpuSplatter();
+
+  /// Clears, splats and resolves one frame. Points are shaded with shading.table(). camera.width/height are target's.
+  SplatStats render(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading,
+                    const FrameTarget& target);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace telesplat::splat

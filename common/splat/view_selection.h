@@ -1,0 +1,41 @@
+// What of a point model is drawn for a view, at which level and splat size (T4.4.3).
+#pragma once
+
+#include <vector>
+
+#include "common/geometry/camera.h"
+#include "common/points/point_model.h"
+
+namespace telesplat::splat {
+
+struct SelectionOptions {
+  float scale = 1.0f;              ///< the "scale factor" of T eq. 4.8
+  float hide_ratio = 1.5f;         ///< "ratio" of T4.4.3: a splat larger than this times the best one's size is revised ...
+  float hide_epsilon = 0.25f;      ///< ... to best + epsilon * its size
+  float max_splat_px = 16.0f;      ///< no splat is larger
+  float detail = 1.0f;             ///< < 1 lowers the desired pixel range (speed-dependent detail, T4.4.3.1)
+  bool cone_culling = true;
+};
+
+/// One mosaic level to draw. Pointers live as long as the model is not changed (or the viewer's frame lasts).
+struct DrawItem {
+  const points::Cluster* cluster;
+  points::Mosaic::Level level;
+  float splat_px;  ///< side (square) or diameter (disc) in display pixels, >= 1
+};
+
+struct DrawList {
+  std::vector<DrawItem> items;
+  std::vector<points::ClusterKey> clusters_seen;  ///< clusters that passed culling: for access reports
+  uint64_t points = 0;
+};
+
+/// Culls clusters by frustum, mosaics by normal cone; chooses each mosaic's level as the one whose pixel range is closest (in
+/// ratio) to the desired one; splat size = scale * desired range / the level's range (T eq. 4.8), revised as in T4.4.3.
+void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options, DrawList& out);
+
+/// True if every point of the mosaic faces away from the camera. The packer's reference depth map and the viewers use this one
+/// test, so that what viewers cull is not taken as seen.
+bool faces_away(const points::Mosaic& mosaic, const geometry::Box& leaf_room, const glm::vec3& eye_room);
+
+}  // namespace telesplat::splat

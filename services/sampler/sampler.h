@@ -1,0 +1,45 @@
+// The one interface of all mesh samplers (DESIGN section 3): chunks in, depth images of tiles out. No sockets, no clocks.
+#pragma once
+
+#include <memory>
+
+#include "common/core/ids.h"
+#include "common/core/result.h"
+#include "common/geometry/camera.h"
+#include "common/geometry/mesh_chunk.h"
+#include "common/image/depth_image.h"
+#include "common/image/file.h"
+#include "common/image/shading.h"
+
+namespace telesplat::sampler {
+
+class Sampler {
+ public:
+  virtual ~Sampler() = default;
+
+  /// "ray" or "raster".
+  virtual const char* name() const = 0;
+
+  /// Adds a chunk, building what it needs (a BVH, GL buffers); the sampler keeps chunk.owner alive as long as it holds it.
+  /// Replaces a chunk of the same id. Bytes that do not validate are refused and nothing changes.
+  virtual Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) = 0;
+  /// Adds several chunks at once, in parallel where that helps; refuses as add_chunk does, keeping those that were good.
+  virtual Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) = 0;
+  virtual void remove_chunk(ChunkId id) = 0;
+
+  /// Samples the pixels `tile` of the frame `camera` at their centres. Colours are unlit albedo interpolated over the
+  /// triangle; normals are interpolated, in room space, flipped to the side on which the camera sees the triangle.
+  /// Returns a canonical image of tile.width x tile.height. Precondition: tile lies in the camera's image.
+  virtual image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) = 0;
+};
+
+/// Embree 3 ray packets on `threads` oneTBB threads (0 = all cores).
+std::unique_ptr<Sampler> make_ray_sampler(int threads);
+/// EGL off-screen G-buffer. Fails where no OpenGL 4.3 context can be made, saying what was tried.
+Result<std::unique_ptr<Sampler>> make_raster_sampler();
+
+/// Direct rendering for verification: every pixel of `camera` traced from the data, shaded with unquantised normals.
+/// Uses the chunks of a ray sampler. Depth in metres.
+image::View render_directly(Sampler& ray_sampler, const geometry::Camera& camera, const image::Shading& shading);
+
+}  // namespace telesplat::sampler
