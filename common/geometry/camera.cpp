@@ -51,7 +51,8 @@ Status validate(const Camera& c) {
 
 Frustum::Frustum(const Camera& c) {
   const auto t = c.room_to_pixel();
-  const glm::dvec4 planes[5] = {t.x, c.width * t.w - t.x, c.height * t.w - t.y, t.y, t.w - glm::dvec4(0, 0, 0, c.near_m)};
+  const double width = c.width, height = c.height;
+  const glm::dvec4 planes[5] = {t.x, width * t.w - t.x, height * t.w - t.y, t.y, t.w - glm::dvec4(0, 0, 0, c.near_m)};
   for (int i = 0; i < 5; ++i) planes_[i] = glm::vec4(planes[i] / glm::length(glm::dvec3(planes[i])));
 }
 
