@@ -1,0 +1,131 @@
+#include "common/image/file.h"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "common/geometry/camera.h"
+
+namespace telesplat::image {
+namespace {
+
+// sRGB (IEC 61966-2-1): 8-bit code -> linear, for all 256 codes.
+const std::array<float, 256>& linear_of_srgb() {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> t{};
+    for (int i = 0; i < 256; ++i) {
+      const double c = i / 255.0;
+      t[i] = static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
+    }
+    return t;
+  }();
+  return table;
+}
+
+uint32_t srgb_of_linear(float v) {
+  const double c = v <= 0.0031308f ? 12.92 * v : 1.055 * std::pow(static_cast<double>(v), 1 / 2.4) - 0.055;
+  return c > 0 ? static_cast<uint32_t>(std::min(c, 1.0) * 255.0 + 0.5) : 0;  // NaN becomes 0
+}
+
+uint32_t byte_of(float v) { return v > 0 ? static_cast<uint32_t>(std::min(v, 1.0f) * 255.0f + 0.5f) : 0; }
+
+// Writes under a temporary name beside `path`, then renames, so that no reader ever sees half a file.
+Status write_whole(const std::string& path, const char* format, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
+                   const void* pixels) {
+  const std::string part = path + ".part";
+  const auto fail = [&](const std::string& why) {
+    std::remove(part.c_str());
+    return Error{fmt::format("cannot write {}: {}", path, why)};
+  };
+  const auto output = OIIO::ImageOutput::create(format);
+  if (!output) return fail(OIIO::geterror());
+  if (!output->open(part, spec)) return fail(output->geterror());
+  const bool written = output->write_image(type, pixels);
+  const bool closed = output->close();
+  if (!written || !closed) return fail(output->geterror());
+  if (std::rename(part.c_str(), path.c_str()) != 0) return fail("renaming " + part + " failed");
+  return ok_status();
+}
+
+// Which channels of a file are red, green, blue and depth; -1 = none.
+struct Channels {
+  int r = -1, g = -1, b = -1, z = -1;
+};
+
+Channels find_channels(const OIIO::ImageSpec& spec) {
+  Channels c{spec.channelindex("R"), spec.channelindex("G"), spec.channelindex("B"), spec.channelindex("Z")};
+  if (c.r < 0 && c.g < 0 && c.b < 0 && c.z != 0) c.r = c.g = c.b = 0;  // grey
+  return c;
+}
+
+}  // namespace
+
+Status write_png(const std::string& path, const View& view) {
+  std::vector<uint8_t> rgb(view.colour.size() * 3);
+  for (size_t i = 0; i < view.colour.size(); ++i)
+    for (int c = 0; c < 3; ++c) rgb[3 * i + c] = static_cast<uint8_t>(view.colour[i] >> (16 - 8 * c));
+  OIIO::ImageSpec spec(view.width, view.height, 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("png:compressionLevel", 2);  // frames are recorded while the viewer runs: four times faster than 6, 5 % larger
+  return write_whole(path, "png", spec, OIIO::TypeDesc::UINT8, rgb.data());
+}
+
+Status write_exr(const std::string& path, const View& view) {
+  CHECK(view.depth_m.size() == view.colour.size());
+  const auto& linear = linear_of_srgb();
+  std::vector<float> rgbz(view.colour.size() * 4);
+  for (size_t i = 0; i < view.colour.size(); ++i) {
+    for (int c = 0; c < 3; ++c) rgbz[4 * i + c] = linear[view.colour[i] >> (16 - 8 * c) & 255];
+    rgbz[4 * i + 3] = view.depth_m[i];
+  }
+  OIIO::ImageSpec spec(view.width, view.height, 4, OIIO::TypeDesc::HALF);
+  spec.channelnames = {"R", "G", "B", "Z"};
+  spec.channelformats = {OIIO::TypeDesc::HALF, OIIO::TypeDesc::HALF, OIIO::TypeDesc::HALF, OIIO::TypeDesc::FLOAT};
+  spec.alpha_channel = -1;
+  spec.z_channel = 3;
+  spec.attribute("compression", "zip");
+  return write_whole(path, "openexr", spec, OIIO::TypeDesc::FLOAT, rgbz.data());
+}
+
+Result<View> read_view(const std::string& path) {
+  const auto input = OIIO::ImageInput::open(path);
+  if (!input) return Error{fmt::format("cannot read picture {}: {}", path, OIIO::geterror())};
+  const OIIO::ImageSpec spec = input->spec();
+  if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.width > geometry::kMaxImageSide ||
+      spec.height > geometry::kMaxImageSide)
+    return Error{fmt::format("picture {} has {}x{}x{} pixels, limit is {} a side and one slice", path, spec.width,
+                             spec.height, spec.depth, geometry::kMaxImageSide)};
+  if (spec.nchannels < 1 || spec.nchannels > 64)
+    return Error{fmt::format("picture {} has {} channels, limits are 1..64", path, spec.nchannels)};
+
+  const Channels at = find_channels(spec);
+  const bool linear = spec.format == OIIO::TypeDesc::HALF || spec.format == OIIO::TypeDesc::FLOAT;
+  const auto code = [linear](float v) { return linear ? srgb_of_linear(v) : byte_of(v); };
+  View view{spec.width, 0, {}, {}};
+  // A few rows at a time: what is allocated follows what the file really holds, not what its header claims.
+  const int step = spec.tile_width > 0 ? std::max(1, std::min(spec.tile_height, 1024)) : 16;
+  std::vector<float> rows(size_t(step) * spec.width * spec.nchannels);
+  for (int y = 0; y < spec.height; y += step) {
+    const int y0 = spec.y + y, y1 = spec.y + std::min(y + step, spec.height);
+    const bool good = spec.tile_width > 0
+                          ? input->read_tiles(0, 0, spec.x, spec.x + spec.width, y0, y1, 0, 1, 0, spec.nchannels,
+                                              OIIO::TypeDesc::FLOAT, rows.data())
+                          : input->read_scanlines(0, 0, y0, y1, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, rows.data());
+    if (!good) return Error{fmt::format("cannot read row {} of picture {}: {}", y, path, input->geterror())};
+    const size_t pixels = size_t(y1 - y0) * spec.width;
+    for (size_t i = 0; i < pixels; ++i) {
+      const float* p = rows.data() + i * spec.nchannels;
+      const auto channel = [&](int c) { return c < 0 ? 0u : code(p[c]); };
+      view.colour.push_back(channel(at.r) << 16 | channel(at.g) << 8 | channel(at.b));
+      if (at.z >= 0) view.depth_m.push_back(p[at.z]);
+    }
+  }
+  view.height = spec.height;
+  return view;
+}
+
+}  // namespace telesplat::image
