@@ -1,0 +1,54 @@
+// The client side of the master, the same for data, sampler, packer, viewer and ctl: hello until welcomed, a status report a
+// second, hello again when the master asks, a clock offset, shutdown.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "common/net/socket.h"
+
+namespace telesplat::net {
+
+class MasterLink {
+ public:
+  using Values = std::map<std::string, double>;
+
+  /// Connects to the master at `endpoint`; nothing is sent before the first tick().
+  MasterLink(Context& context, const std::string& endpoint, wire::Hello hello);
+
+  Socket& socket() { return socket_; }
+  InstanceId instance() const { return hello_.instance; }
+
+  /// To be called at least every 100 ms: says hello until welcomed (every 250 ms), then reports status (every second);
+  /// `status` is asked for its values then.
+  void tick(double now_s, const std::function<Values()>& status);
+
+  /// Handles welcome, who_are_you and shutdown, rejects other unknown types unless the caller knows them: returns true if the
+  /// message was one of these.
+  bool handle(const Message& message, double now_s);
+
+  /// The newest session, once there is one; version() rises with each.
+  const std::optional<wire::Welcome>& session() const { return session_; }
+  int version() const { return version_; }
+  bool shutdown_requested() const { return shutdown_; }
+  /// This machine's monotonic time on the master's clock.
+  double to_master_s(double local_s) const { return local_s + offset_s_; }
+
+  /// Last report and goodbye.
+  void leave(const std::function<Values()>& status);
+
+ private:
+  void report(const std::function<Values()>& status);
+
+  wire::Hello hello_;
+  Socket socket_;
+  std::optional<wire::Welcome> session_;
+  int version_ = 0;
+  bool shutdown_ = false, welcomed_ = false;
+  double offset_s_ = 0, best_round_trip_s_ = 1e9;
+  double last_hello_s_ = -1e9, last_status_s_ = -1e9;
+};
+
+}  // namespace telesplat::net

@@ -1,0 +1,97 @@
+// ZeroMQ sockets that carry wire messages. Every queue is bounded, every message size limited; bad input is dropped, counted
+// and logged (at most once a second a socket), never thrown.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/log.h"
+#include "common/core/result.h"
+#include "common/wire/serial.h"
+
+namespace telesplat::net {
+
+enum class Kind { kRouter, kDealer, kPush, kPull, kPub, kSub };
+
+/// One a process: ZeroMQ's I/O threads. Sockets must not outlive it.
+class Context {
+ public:
+  Context();
+  ~Context();
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A received message. body points into memory that `owner` keeps alive.
+struct Message {
+  std::string peer;  ///< routing id of the sender (ROUTER only)
+  std::string type;
+  wire::Bytes body;
+  std::shared_ptr<const void> owner;
+};
+
+struct SocketOptions {
+  int high_water_mark = 1000;  ///< messages queued each way before ROUTER, PUB drop and PUSH, DEALER refuse
+  size_t max_message_bytes = wire::kMaxControlBytes;  ///< larger bodies are dropped; a peer sending over 256 MiB + 2 MiB is disconnected
+};
+
+class Socket {
+ public:
+  Socket(Context& context, Kind kind, std::string name, const SocketOptions& options = {});
+  ~Socket();
+  Socket(Socket&&) noexcept;
+  Socket& operator=(Socket&&) noexcept;
+
+  /// Binds to tcp://ADDRESS:PORT (PORT may be *), ipc:// or inproc://. Returns the endpoint with its real port. An address
+  /// other than loopback is refused unless `insecure`.
+  Result<std::string> bind(const std::string& endpoint, bool insecure = false);
+  /// Connects; the peer need not exist yet and may come back after being away.
+  Status connect(const std::string& endpoint);
+  void disconnect(const std::string& endpoint);
+
+  /// Queues a message without waiting (ROUTER: for `peer`). False: dropped, because the queue is full or the peer is gone.
+  template <class M>
+  bool send(const M& message, std::string_view peer = {}) { return send_frames(peer, M::kName, wire::encode(message)); }
+  /// Sends an already encoded message, shared by several receivers.
+  bool send_frames(std::string_view peer, std::string_view type, std::string body);
+
+  /// Next message, without waiting. Messages that are not [peer,] type, body within the limits are dropped and counted.
+  std::optional<Message> receive();
+
+  /// Decodes a message of known type; a bad one is counted and logged, naming its peer, and nothing comes back.
+  template <class M>
+  std::optional<M> decode(const Message& message) {
+    auto result = wire::decode<M>(message.body);
+    if (result) return std::move(*result);
+    reject(message, result.error().text);
+    return std::nullopt;
+  }
+  /// Counts and logs a message that cannot be used.
+  void reject(const Message& message, const std::string& why);
+
+  /// Messages dropped for being malformed, oversized or unexpected, and peers refused in their handshake.
+  uint64_t rejected() const;
+  const std::string& name() const;
+
+  struct Impl;
+  Impl& impl() const { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Waits until one of the sockets has a message, `timeout_ms` passed, or a signal came. True if a message is there.
+bool wait_readable(const std::vector<Socket*>& sockets, int timeout_ms);
+
+/// A random, non-zero instance id.
+InstanceId make_instance_id();
+
+}  // namespace telesplat::net
