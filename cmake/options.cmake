@@ -14,7 +14,7 @@ option(TELESPLAT_FUZZ "Build the libFuzzer targets (needs clang)" OFF)
 set(TELESPLAT_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=")
 
 # -ffp-contract=off: packer and viewers must compute identical points, whatever instruction set they dispatch to.
-add_compile_options(-Wall -Wextra -Wno-missing-field-initializers -ffp-contract=off -fno-math-errno)
+add_compile_options(-Wall -Wextra -Wno-missing-field-initializers -Wno-restrict -ffp-contract=off -fno-math-errno)
 if(TELESPLAT_SANITIZE)
   add_compile_options(-fsanitize=${TELESPLAT_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${TELESPLAT_SANITIZE})

@@ -1,0 +1,41 @@
+// What a process measures before it is sent to the master: rows of a table, and spans for the trace. Thread-safe.
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/wire/messages.h"
+
+namespace telesplat::metrics {
+
+/// Rows of numbers with fixed columns (docs/metrics.md).
+class TableRecorder {
+ public:
+  TableRecorder(std::string table, std::vector<std::string> columns) : table_(std::move(table)), columns_(std::move(columns)) {}
+  /// Precondition: row has one value a column.
+  void add(std::initializer_list<double> row);
+  /// The rows since the last call, if any.
+  std::optional<wire::MetricRows> flush(InstanceId instance);
+
+ private:
+  std::string table_;
+  std::vector<std::string> columns_;
+  std::mutex mutex_;
+  std::vector<double> values_;
+};
+
+/// Spans "name, from, to, lane" in seconds of the master's clock; lane tells a process's threads apart.
+class SpanRecorder {
+ public:
+  void add(const char* name, double begin_s, double end_s, int lane = 0);
+  std::optional<wire::MetricRows> flush(InstanceId instance);
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::string> names_;
+  std::vector<double> values_;  // rows of name index, begin, end, lane
+};
+
+}  // namespace telesplat::metrics

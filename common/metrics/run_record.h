@@ -1,0 +1,62 @@
+// The record of a run (DESIGN section 6): frames.csv, updates.csv, tiles.csv, trace.json, summary.json in one folder. Written by
+// the master as rows arrive, so that what was measured survives whatever ends the run.
+#pragma once
+
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/metrics/statistics.h"
+#include "common/wire/messages.h"
+
+namespace telesplat::metrics {
+
+/// A process as the record knows it.
+struct Process {
+  std::string role, name;
+  uint64_t pid = 0;
+  std::map<std::string, std::string> facts;
+  std::map<std::string, double> values;  ///< newest status report
+};
+
+class RunRecord {
+ public:
+  /// Opens a folder for writing, making it if need be; `directory` may be empty: nothing is written, summaries still work.
+  static Result<std::unique_ptr<RunRecord>> open(const std::string& directory);
+  ~RunRecord();
+
+  /// Rows of "frames", "updates" or "spans" from `process`. Refuses unknown tables and shapes that do not fit.
+  Status add_rows(const Process& process, const wire::MetricRows& rows);
+  void add_tile(const std::string& sampler, const wire::TileDone& tile);
+
+  /// The summary of DESIGN section 6 from everything so far. processes: all that took part; counters: "leases_expired",
+  /// "tiles_released".
+  nlohmann::ordered_json summary(const std::vector<Process>& processes, const std::map<std::string, double>& counters) const;
+
+  /// Writes summary.json and ends trace.json.
+  Status finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters);
+
+ private:
+  struct Table {
+    std::vector<std::string> columns;
+    std::vector<double> values;
+    FILE* file = nullptr;
+  };
+  RunRecord() = default;
+  std::vector<double> column(const std::string& table, const std::string& name) const;
+  Status write_row_table(const std::string& process, const wire::MetricRows& rows);
+  void write_spans(const Process& process, const wire::MetricRows& rows);
+
+  std::string directory_;
+  std::map<std::string, Table> tables_;
+  std::vector<wire::TileDone> tiles_;
+  FILE* tiles_file_ = nullptr;
+  FILE* trace_file_ = nullptr;
+  bool trace_has_events_ = false;
+  std::map<std::string, int> trace_names_;
+};
+
+}  // namespace telesplat::metrics

@@ -1,0 +1,28 @@
+#include "common/metrics/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace telesplat::metrics {
+
+Distribution distribution(std::vector<double> values) {
+  std::erase_if(values, [](double v) { return !std::isfinite(v); });
+  if (values.empty()) return {};
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double p) {
+    const double rank = p * static_cast<double>(values.size() - 1);
+    const auto below = static_cast<size_t>(rank);
+    const size_t above = std::min(below + 1, values.size() - 1);
+    return values[below] + (rank - static_cast<double>(below)) * (values[above] - values[below]);
+  };
+  return {std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size()), at(0.5), at(0.95), at(0.99),
+          values.back()};
+}
+
+nlohmann::ordered_json to_json(const Distribution& d) {
+  const auto rounded = [](double v) { return std::round(v * 1000) / 1000; };
+  return {{"mean", rounded(d.mean)}, {"median", rounded(d.median)}, {"p95", rounded(d.p95)}, {"p99", rounded(d.p99)}, {"max", rounded(d.max)}};
+}
+
+}  // namespace telesplat::metrics

@@ -1,0 +1,18 @@
+// Distributions of measured values.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+namespace telesplat::metrics {
+
+struct Distribution {
+  double mean = 0, median = 0, p95 = 0, p99 = 0, max = 0;
+};
+
+/// Percentiles by linear interpolation between the nearest ranks; all 0 for no values. Values that are not finite are left out.
+Distribution distribution(std::vector<double> values);
+
+nlohmann::ordered_json to_json(const Distribution& d);
+
+}  // namespace telesplat::metrics
