@@ -34,12 +34,19 @@ struct ModelConfig {
   bool operator==(const ModelConfig&) const = default;
 };
 
-/// The part of one patch (of one tile) inside one cluster: one allocation with three levels of detail, each an SoA block.
-///   level block of n points: uint16 x[n], y[n], z[n], normal[n], then uint32 colour[n] (0x00RRGGBB; top byte = flags, 0).
-/// 12 bytes a point. Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size.
-/// Blocks of a level start at multiples of 4 bytes (n is not padded; colour follows at the next multiple of 4).
+/// Refuses boxes that are empty, not finite or beyond 1e6 m, and depths outside [0, kMaxOctreeDepth]. For configurations that
+/// arrive from outside; every other function here requires a configuration that passed.
+Status validate(const ModelConfig& config);
+
+/// The part of one patch (of one tile) inside one cluster: one allocation with three levels of detail.
+/// Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB (top
+/// byte = flags, 0). A coarse level's points are the first ones of the finer level, so that it shares their positions and
+/// normals and adds its mean colours alone. With n0 >= n1 >= n2 points the allocation holds
+///   uint16 x[n0], y[n0], z[n0], normal[n0]; uint32 colour0[n0]; colour1[n1] if n1 < n0; colour2[n2] if n2 < n1
+/// (where two levels have equally many points they are the same points): 12 to 14 bytes a point.
 class Mosaic {
  public:
+  /// Arrays of `count` elements; colour starts at a multiple of 4 bytes, the others of 2.
   struct Level {
     uint32_t count = 0;
     const uint16_t *x = nullptr, *y = nullptr, *z = nullptr, *normal = nullptr;
@@ -57,12 +64,14 @@ class Mosaic {
   float cone_cosine() const;
   /// Mean position of the level-0 points, room space, to 1/256 of the leaf.
   glm::vec3 centroid_room(const geometry::Box& leaf) const;
-  /// Bytes this mosaic occupies: header and points.
+  /// Bytes this mosaic occupies: header, points and what the allocator adds.
   size_t bytes() const;
+  /// Hash of everything in it.
+  uint64_t digest() const;
 
  private:
-  friend class PointModel;
-  friend struct MosaicBuilder;
+  friend class MosaicBuilder;
+  size_t data_bytes() const;
   std::unique_ptr<std::byte[]> data_;
   Sequence sequence_;
   std::array<uint32_t, kLevels> counts_{};
@@ -91,18 +100,23 @@ struct PreparedPatch {
 /// mosaic's attributes.
 ///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
 ///   Level l+1 takes of each block of 2x2 pixels of level l (blocks aligned to the frame's pixel grid) the covered pixels that
-///   fall in the same leaf and lie within 2 % of depth of its first, as one point: the sample nearest the block's centre, with
-///   the mean colour of them all. So coverage never vanishes at coarse levels.
-///   threads: oneTBB threads to use at most; the result does not depend on it.
+///   fall in the same leaf and lie within 2 % of depth of its first, as one point: the sample nearest the block's centre (the
+///   upper, then the left one of several), with the mean colour of them all; and so on with the pixels that are left, if any.
+///   So coverage never vanishes at coarse levels, neither of a surface nor of what is behind its edge.
+/// Runs in the calling thread; several threads may prepare several tiles at once.
+/// Preconditions: valid(config), valid(camera), tile inside the camera's image, image canonical and of the tile's size.
 PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const geometry::Camera& camera,
                             const geometry::Rect& tile, const image::DepthImage& image);
+
+/// Projected pixels across a leaf's cube: leaf_size * focal_x / depth of its centre (of half a leaf where it is less).
+float pixel_range(const geometry::Camera& camera, const glm::dvec3& leaf_centre_room, double leaf_size_m);
 
 class PointModel {
  public:
   explicit PointModel(const ModelConfig& config);
 
   const ModelConfig& config() const { return config_; }
-  /// Event "patch". Sequences must rise; O(mosaics).
+  /// Event "patch": takes every mosaic over, without copying points. Sequences must rise; O(mosaics).
   void insert(PreparedPatch patch);
   /// Event "forget": drops whole clusters. Unknown keys are ignored. Returns the dropped clusters, so that a viewer can keep
   /// them alive until its frame is drawn.
@@ -125,10 +139,19 @@ class PointModel {
   ModelConfig config_;
   std::unordered_map<ClusterKey, std::unique_ptr<Cluster>> clusters_;
   uint64_t points_ = 0;
+  uint64_t cluster_bytes_ = 0;  // of all clusters and what they hold
 };
 
 /// The octree's cube and a leaf's cube.
 geometry::Box octree_cube(const ModelConfig& config);
 geometry::Box leaf_box(const ModelConfig& config, ClusterKey key);
+
+/// The same cube, unrounded: points are sorted into leaves with these. leaf = floor((p - lo) / leaf_size) on each axis.
+struct OctreeGrid {
+  glm::dvec3 lo{0};
+  double leaf_size = 0;
+  int depth = 0;
+};
+OctreeGrid octree_grid(const ModelConfig& config);
 
 }  // namespace telesplat::points

@@ -1,0 +1,135 @@
+// Based on: L. Shirman, S. Abi-Ezzi, "The cone of normals technique for fast processing of curved patches", Eurographics 1993.
+#include <xxhash.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/image/normal.h"
+#include "common/points/mosaic_builder.h"
+
+namespace telesplat::points {
+namespace {
+
+// Decoded normals in 1/32767, so that sums do not depend on their order.
+struct IntegerNormal {
+  int16_t x, y, z, unused;
+};
+const std::vector<IntegerNormal>& integer_normals() {
+  static const std::vector<IntegerNormal> table = [] {
+    std::vector<IntegerNormal> out(65536);
+    const auto at = [](float v) { return static_cast<int16_t>(std::floor(v * 32767.0f + 0.5f)); };
+    for (uint32_t code = 0; code < 65536; ++code) {
+      const glm::vec3 n = image::decode_normal16(static_cast<uint16_t>(code));
+      out[code] = {at(n.x), at(n.y), at(n.z), 0};
+    }
+    return out;
+  }();
+  return table;
+}
+
+struct Cone {
+  uint16_t axis;
+  int8_t cosine;  // in 1/127, rounded down; -127 = no cone
+};
+
+Cone normal_cone(const uint16_t* normals, uint32_t n) {
+  const IntegerNormal* table = integer_normals().data();
+  int64_t sx = 0, sy = 0, sz = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    const IntegerNormal v = table[normals[i]];
+    sx += v.x, sy += v.y, sz += v.z;
+  }
+  const glm::dvec3 sum(static_cast<double>(sx), static_cast<double>(sy), static_cast<double>(sz));
+  const double length = std::sqrt(glm::dot(sum, sum));
+  if (!(length > 0)) return {0, -127};
+  Cone cone{image::encode_normal16(glm::vec3(sum / length)), -127};
+
+  const IntegerNormal a = table[cone.axis];
+  int32_t least = INT32_MAX;  // |a . v| < 2^31, as are its partial sums
+  for (uint32_t i = 0; i < n; ++i) {
+    const IntegerNormal v = table[normals[i]];
+    least = std::min(least, a.x * v.x + a.y * v.y + a.z * v.z);
+  }
+  // 1e-4 covers the rounding of both vectors, so that the promise of cone_cosine() holds for the decoded ones.
+  const double cosine = least / (32767.0 * 32767.0) - 1e-4;
+  cone.cosine = static_cast<int8_t>(std::clamp(std::floor(cosine * 127.0), -127.0, 127.0));
+  return cone;
+}
+
+uint8_t mean_position(const uint16_t* q, uint32_t n) {
+  uint64_t sum = 0;
+  for (uint32_t i = 0; i < n; ++i) sum += q[i];
+  return static_cast<uint8_t>(sum / n >> 8);
+}
+
+}  // namespace
+
+size_t Mosaic::data_bytes() const {
+  const size_t words = size_t{3} * counts_[0] + (counts_[1] < counts_[0] ? counts_[1] : 0) +
+                       (counts_[2] < counts_[1] ? counts_[2] : 0);
+  return words * 4;
+}
+
+Mosaic::Level Mosaic::level(int l) const {
+  const uint32_t n = counts_[0];
+  const auto* positions = reinterpret_cast<const uint16_t*>(data_.get());
+  const auto* colour = reinterpret_cast<const uint32_t*>(positions + size_t{4} * n);
+  if (l >= 1 && counts_[1] < counts_[0]) colour += counts_[0];
+  if (l >= 2 && counts_[2] < counts_[1]) colour += counts_[1];
+  return {counts_[l], positions, positions + n, positions + size_t{2} * n, positions + size_t{3} * n, colour};
+}
+
+glm::vec3 Mosaic::cone_axis() const { return image::decode_normal16(cone_axis_); }
+
+float Mosaic::cone_cosine() const { return static_cast<float>(cone_cosine_) / 127.0f; }
+
+glm::vec3 Mosaic::centroid_room(const geometry::Box& leaf) const {
+  const glm::vec3 fraction((static_cast<float>(centroid_[0]) + 0.5f) / 256.0f,
+                           (static_cast<float>(centroid_[1]) + 0.5f) / 256.0f,
+                           (static_cast<float>(centroid_[2]) + 0.5f) / 256.0f);
+  return leaf.lo + fraction * leaf.size();
+}
+
+size_t Mosaic::bytes() const {
+  // glibc: 8 bytes before each block, multiples of 16, at least 32.
+  return sizeof(Mosaic) + std::max<size_t>(32, (data_bytes() + 8 + 15) / 16 * 16);
+}
+
+uint64_t Mosaic::digest() const {
+  struct {
+    uint64_t sequence;
+    uint32_t counts[kLevels];
+    float pixel_range;
+    uint16_t cone_axis;
+    int8_t cone_cosine;
+    uint8_t centroid[3];
+    uint16_t zero;
+  } header{sequence_.value, {counts_[0], counts_[1], counts_[2]}, pixel_range_,
+           cone_axis_,      cone_cosine_,                         {centroid_[0], centroid_[1], centroid_[2]}, 0};
+  static_assert(std::has_unique_object_representations_v<decltype(header.counts)> && sizeof header == 32);
+  return XXH3_64bits_withSeed(data_.get(), data_bytes(), XXH3_64bits(&header, sizeof header));
+}
+
+MosaicBuilder::MosaicBuilder(Sequence sequence, const std::array<uint32_t, kLevels>& counts) {
+  mosaic_.sequence_ = sequence;
+  mosaic_.counts_ = counts;
+  mosaic_.data_ = std::make_unique_for_overwrite<std::byte[]>(mosaic_.data_bytes());
+  const size_t n = counts[0];
+  x = reinterpret_cast<uint16_t*>(mosaic_.data_.get());
+  y = x + n, z = y + n, normal = z + n;
+  colour = reinterpret_cast<uint32_t*>(normal + n);
+  mean1 = counts[1] < counts[0] ? const_cast<uint32_t*>(mosaic_.level(1).colour) : nullptr;
+  mean2 = counts[2] < counts[1] ? const_cast<uint32_t*>(mosaic_.level(2).colour) : nullptr;
+}
+
+Mosaic MosaicBuilder::finish(float pixel_range) {
+  const uint32_t n = mosaic_.counts_[0];
+  const Cone cone = normal_cone(normal, n);
+  mosaic_.pixel_range_ = pixel_range;
+  mosaic_.cone_axis_ = cone.axis;
+  mosaic_.cone_cosine_ = cone.cosine;
+  mosaic_.centroid_ = {mean_position(x, n), mean_position(y, n), mean_position(z, n)};
+  return std::move(mosaic_);
+}
+
+}  // namespace telesplat::points

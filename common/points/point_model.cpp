@@ -1,0 +1,127 @@
+#include "common/points/point_model.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <cmath>
+#include <glm/common.hpp>
+
+namespace telesplat::points {
+namespace {
+
+// glibc: 8 bytes before each block, multiples of 16, at least 32.
+constexpr uint64_t allocated(uint64_t bytes) { return bytes == 0 ? 0 : std::max<uint64_t>(32, (bytes + 8 + 15) / 16 * 16); }
+
+// A node of the map (link, key, pointer) and the cluster it points to, without its mosaics.
+constexpr uint64_t kClusterBytes = allocated(3 * sizeof(void*)) + allocated(sizeof(Cluster));
+
+// Makes room for one more, by a quarter instead of doubling: most clusters hold many small mosaics.
+void reserve_one_more(std::vector<Mosaic>& mosaics) {
+  if (mosaics.size() == mosaics.capacity()) mosaics.reserve(mosaics.size() + 1 + mosaics.size() / 4);
+}
+
+uint64_t header_bytes(const std::vector<Mosaic>& mosaics) { return allocated(mosaics.capacity() * sizeof(Mosaic)); }
+
+}  // namespace
+
+Status validate(const ModelConfig& config) {
+  const geometry::Box& b = config.box_room;
+  for (const float v : {b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z})
+    if (!(std::abs(v) <= 1e6f)) return Error{fmt::format("the model's box has a coordinate {} m outside [-1e6, 1e6]", v)};
+  if (b.empty()) return Error{"the model's box is empty: its lower corner lies above its upper one"};
+  if (config.depth < 0 || config.depth > kMaxOctreeDepth)
+    return Error{fmt::format("octree depth {} is outside 0..{}", config.depth, kMaxOctreeDepth)};
+  return ok_status();
+}
+
+OctreeGrid octree_grid(const ModelConfig& config) {
+  CHECK(config.depth >= 0 && config.depth <= kMaxOctreeDepth && !config.box_room.empty());
+  const glm::dvec3 lo(config.box_room.lo), hi(config.box_room.hi), extent = hi - lo;
+  // A box that is a single point still gets leaves with a size.
+  const double side = std::max(1.001 * std::max(extent.x, std::max(extent.y, extent.z)), 1e-6);
+  return {(lo + hi) * 0.5 - glm::dvec3(side * 0.5), side / (1 << config.depth), config.depth};
+}
+
+geometry::Box octree_cube(const ModelConfig& config) {
+  const OctreeGrid grid = octree_grid(config);
+  return {glm::vec3(grid.lo), glm::vec3(grid.lo + grid.leaf_size * (1 << grid.depth))};
+}
+
+geometry::Box leaf_box(const ModelConfig& config, ClusterKey key) {
+  const OctreeGrid grid = octree_grid(config);
+  const glm::dvec3 cell(key & 1023, key >> 10 & 1023, key >> 20 & 1023);
+  return {glm::vec3(grid.lo + cell * grid.leaf_size), glm::vec3(grid.lo + (cell + 1.0) * grid.leaf_size)};
+}
+
+PointModel::PointModel(const ModelConfig& config) : config_(config) { CHECK(validate(config).ok()); }
+
+void PointModel::insert(PreparedPatch patch) {
+  for (auto& [key, mosaic] : patch.mosaics) {
+    auto& cluster = clusters_[key];
+    if (!cluster) {
+      cluster = std::make_unique<Cluster>(Cluster{key, leaf_box(config_, key), {}});
+      cluster_bytes_ += kClusterBytes;
+    }
+    points_ += mosaic.count(0);
+    cluster_bytes_ += mosaic.bytes() - sizeof(Mosaic);
+    cluster_bytes_ -= header_bytes(cluster->mosaics);
+    reserve_one_more(cluster->mosaics);
+    cluster->mosaics.push_back(std::move(mosaic));
+    cluster_bytes_ += header_bytes(cluster->mosaics);
+  }
+}
+
+std::vector<Cluster> PointModel::forget(std::span<const ClusterKey> keys) {
+  std::vector<Cluster> dropped;
+  dropped.reserve(keys.size());
+  for (const ClusterKey key : keys) {
+    const auto found = clusters_.find(key);
+    if (found == clusters_.end()) continue;
+    Cluster& cluster = *found->second;
+    for (const Mosaic& mosaic : cluster.mosaics) {
+      points_ -= mosaic.count(0);
+      cluster_bytes_ -= mosaic.bytes() - sizeof(Mosaic);
+    }
+    cluster_bytes_ -= kClusterBytes + header_bytes(cluster.mosaics);
+    dropped.push_back(std::move(cluster));
+    clusters_.erase(found);
+  }
+  return dropped;
+}
+
+void PointModel::clear() {
+  clusters_.clear();
+  points_ = cluster_bytes_ = 0;
+}
+
+const Cluster* PointModel::find(ClusterKey key) const {
+  const auto found = clusters_.find(key);
+  return found == clusters_.end() ? nullptr : found->second.get();
+}
+
+uint64_t PointModel::bytes() const {
+  return sizeof(PointModel) + cluster_bytes_ + allocated(clusters_.bucket_count() * sizeof(void*));
+}
+
+uint64_t PointModel::points_in(ClusterKey key) const {
+  const Cluster* cluster = find(key);
+  uint64_t n = 0;
+  if (cluster)
+    for (const Mosaic& mosaic : cluster->mosaics) n += mosaic.count(0);
+  return n;
+}
+
+uint64_t PointModel::digest() const {
+  uint64_t sum = 0;
+  for (const auto& [key, cluster] : clusters_) {
+    uint64_t hash = key;
+    for (const Mosaic& mosaic : cluster->mosaics) {
+      const uint64_t pair[2] = {hash, mosaic.digest()};
+      hash = XXH3_64bits(pair, sizeof pair);
+    }
+    sum += hash;
+  }
+  return sum;
+}
+
+}  // namespace telesplat::points

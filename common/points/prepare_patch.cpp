@@ -1,0 +1,122 @@
+// A depth-image tile becomes mosaics: unproject, decimate, sort into leaves (T4.3.2, T7.2).
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+#include "common/points/decimate.h"
+#include "common/points/mosaic_builder.h"
+
+namespace telesplat::points {
+namespace {
+
+// Where each pixel of the tile lies; no value is written twice, so nothing is cleared first.
+struct UnprojectedTile {
+  std::unique_ptr<ClusterKey[]> keys;
+  std::unique_ptr<uint16_t[]> x, y, z;
+};
+
+UnprojectedTile unproject(const OctreeGrid& grid, const geometry::Camera& camera, const geometry::Rect& tile,
+                          const image::DepthImage& image) {
+  const size_t pixels = image.pixels();
+  UnprojectedTile out{std::make_unique_for_overwrite<ClusterKey[]>(pixels),
+                      std::make_unique_for_overwrite<uint16_t[]>(pixels), std::make_unique_for_overwrite<uint16_t[]>(pixels),
+                      std::make_unique_for_overwrite<uint16_t[]>(pixels)};
+  for (int row = 0; row < tile.height; ++row) {
+    const size_t first = static_cast<size_t>(row) * tile.width;
+    unproject_row(row_rays(grid, camera, tile.x, tile.y + row), image.depth.data() + first, tile.width,
+                  out.keys.get() + first, out.x.get() + first, out.y.get() + first, out.z.get() + first);
+  }
+  return out;
+}
+
+// A mosaic being filled: the next free place of each rank.
+struct OpenMosaic {
+  MosaicBuilder arrays;
+  std::array<uint32_t, kRanks> next;
+
+  uint32_t place(int rank, const UnprojectedTile& tile, const image::DepthImage& image, size_t pixel) {
+    const uint32_t at = next[rank]++;
+    arrays.x[at] = tile.x[pixel], arrays.y[at] = tile.y[pixel], arrays.z[at] = tile.z[pixel];
+    arrays.normal[at] = image.normal[pixel];
+    arrays.colour[at] = image.colour[pixel];
+    return at;
+  }
+};
+
+std::vector<OpenMosaic> open_mosaics(const std::vector<DecimatedTile::Leaf>& leaves, Sequence sequence) {
+  std::vector<OpenMosaic> out;
+  out.reserve(leaves.size());
+  for (const auto& leaf : leaves) {
+    const auto& c = leaf.count;
+    const uint32_t n2 = c[0], n1 = n2 + c[1], n0 = n1 + c[2] + c[3] + c[4];
+    out.push_back({MosaicBuilder(sequence, {n0, n1, n2}), {0, n2, n1, n1 + c[2], n1 + c[2] + c[3]}});
+  }
+  return out;
+}
+
+void place_block(const BlockEntry& block, const UnprojectedTile& tile, const image::DepthImage& image, OpenMosaic& m) {
+  const size_t w = image.width;
+  // First pixels of the four 2x2 blocks: the one near the centre is of all levels. A mosaic that holds a block has coarser
+  // levels of fewer points, hence mean colours.
+  const uint32_t centre = m.place(0, tile, image, block.pixel + 2 * w + 2);
+  m.arrays.mean1[centre] = block.mean[3];
+  m.arrays.mean2[centre] = block.mean[4];
+  m.arrays.mean1[m.place(1, tile, image, block.pixel)] = block.mean[0];
+  m.arrays.mean1[m.place(1, tile, image, block.pixel + 2)] = block.mean[1];
+  m.arrays.mean1[m.place(1, tile, image, block.pixel + 2 * w)] = block.mean[2];
+  const size_t offset[3] = {1, w, w + 1};
+  for (int rank = 2; rank < kRanks; ++rank) {
+    const size_t p = block.pixel + offset[rank - 2];
+    m.place(rank, tile, image, p);
+    m.place(rank, tile, image, p + 2);
+    m.place(rank, tile, image, p + 2 * w);
+    m.place(rank, tile, image, p + 2 * w + 2);
+  }
+}
+
+void place_sample(const SampleEntry& sample, const UnprojectedTile& tile, const image::DepthImage& image, OpenMosaic& m) {
+  const uint32_t at = m.place(static_cast<int>(sample.rank), tile, image, sample.pixel);
+  if (sample.rank <= 1 && m.arrays.mean1) m.arrays.mean1[at] = sample.mean[0];
+  if (sample.rank == 0 && m.arrays.mean2) m.arrays.mean2[at] = sample.mean[1];
+}
+
+}  // namespace
+
+float pixel_range(const geometry::Camera& camera, const glm::dvec3& leaf_centre_room, double leaf_size_m) {
+  const glm::dvec3 backward = camera.pose.orientation * glm::dvec3(0, 0, 1);
+  const double depth = glm::dot(camera.pose.position_room - leaf_centre_room, backward);
+  return static_cast<float>(leaf_size_m * camera.focal_x() / std::max(depth, 0.5 * leaf_size_m));
+}
+
+PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const geometry::Camera& camera,
+                            const geometry::Rect& tile, const image::DepthImage& image) {
+  CHECK(tile.width == image.width && tile.height == image.height);
+  CHECK(tile.x >= 0 && tile.y >= 0 && tile.x + tile.width <= camera.width && tile.y + tile.height <= camera.height);
+  const OctreeGrid grid = octree_grid(config);
+  const UnprojectedTile unprojected = unproject(grid, camera, tile, image);
+  const DecimatedTile decimated = decimate(tile, image, unprojected.keys.get());
+
+  // Counting sort by leaf and rank.
+  std::vector<OpenMosaic> open = open_mosaics(decimated.leaves, sequence);
+  for (const BlockEntry& block : decimated.blocks) place_block(block, unprojected, image, open[block.leaf]);
+  for (const SampleEntry& sample : decimated.samples) place_sample(sample, unprojected, image, open[sample.leaf]);
+
+  std::vector<uint32_t> by_key(open.size());
+  std::iota(by_key.begin(), by_key.end(), 0u);
+  std::sort(by_key.begin(), by_key.end(),
+            [&](uint32_t a, uint32_t b) { return decimated.leaves[a].key < decimated.leaves[b].key; });
+  PreparedPatch patch{sequence};
+  patch.mosaics.reserve(open.size());
+  for (const uint32_t i : by_key) {
+    const ClusterKey key = decimated.leaves[i].key;
+    const glm::dvec3 cell(key & 1023, key >> 10 & 1023, key >> 20 & 1023);
+    const glm::dvec3 centre = grid.lo + (cell + 0.5) * grid.leaf_size;
+    patch.mosaics.emplace_back(key, open[i].arrays.finish(pixel_range(camera, centre, grid.leaf_size)));
+    patch.points += patch.mosaics.back().second.count(0);
+  }
+  const auto nothing = std::count(image.depth.begin(), image.depth.end(), 0u);
+  patch.outside = image.pixels() - static_cast<uint64_t>(nothing) - patch.points;
+  return patch;
+}
+
+}  // namespace telesplat::points
