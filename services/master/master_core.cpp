@@ -1,0 +1,221 @@
+#include "services/master/master_core.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/core/log.h"
+
+namespace telesplat::master {
+namespace {
+constexpr size_t kMaxPeers = 4096;         // remembered processes, the departed included
+constexpr int kMaxWaitingLeases = 64;      // lease requests of one sampler
+}  // namespace
+
+MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
+    : options_(options), instance_(instance), record_(record), schedule_(options.schedule) {}
+
+MasterCore::Peer* MasterCore::known(const std::string& peer, double now_s) {
+  const auto it = peers_.find(peer);
+  if (it == peers_.end() || it->second.gone) {
+    emit(peer, wire::WhoAreYou{instance_});
+    return nullptr;
+  }
+  it->second.seen_s = now_s;
+  return &it->second;
+}
+
+MasterCore::Peer* MasterCore::find_role(const std::string& role) {
+  for (auto& [id, p] : peers_)
+    if (!p.gone && p.hello.role == role) return &p;
+  return nullptr;
+}
+
+wire::Welcome MasterCore::welcome(double now_s) const {
+  wire::Welcome w{instance_, 0, now_s, epoch_, options_.octree_depth, {}, {}, {}, options_.settings};
+  for (const auto& [id, p] : peers_) {
+    if (p.gone) continue;
+    w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
+    if (p.hello.role == "data") {
+      w.box_room = p.hello.box_room;
+      w.facts = p.hello.facts;
+    }
+  }
+  return w;
+}
+
+void MasterCore::announce(double now_s) {
+  for (const auto& [id, p] : peers_)
+    if (!p.gone && p.hello.role != "ctl") emit(id, welcome(now_s));
+}
+
+void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
+  if (peers_.size() >= kMaxPeers && !peers_.contains(peer)) {
+    const auto departed = std::find_if(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone; });
+    if (departed == peers_.end()) return;
+    peers_.erase(departed);
+  }
+  // A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet.
+  for (auto& [id, p] : peers_)
+    if (!p.gone && id != peer && p.hello.role == m.role && (p.hello.instance == m.instance || (m.role != "ctl" && p.hello.name == m.name)))
+      lose(p, id, "was replaced");
+  Peer& p = peers_[peer];
+  const bool changed = p.hello.instance != m.instance || p.gone || p.hello.endpoints != m.endpoints;
+  if (changed && m.role == "packer") schedule_.drop_frames();  // a new packer has none of the tiles that the old one had
+  p.hello = m;
+  p.process.role = m.role;
+  p.process.name = m.name;
+  p.process.pid = m.pid;
+  p.process.facts = m.facts;
+  p.seen_s = now_s;
+  p.gone = false;
+  if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
+  wire::Welcome w = welcome(now_s);
+  w.hello_sent_s = m.sent_s;
+  emit(peer, w);
+  if (changed && (!m.endpoints.empty() || m.role == "data")) announce(now_s);
+}
+
+void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
+  if (Peer* p = known(peer, now_s)) p->process.values = m.values;
+}
+
+void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double now_s) {
+  Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
+  schedule_.request_view(m);
+  dispatch(now_s);
+}
+
+void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double now_s) {
+  Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "sampler" || p->waiting_leases >= kMaxWaitingLeases) return;
+  ++p->waiting_leases;
+  idle_.push_back(peer);
+  dispatch(now_s);
+}
+
+void MasterCore::on(const std::string& peer, const wire::LeaseExtend& m, double now_s) {
+  if (known(peer, now_s)) schedule_.extend(m.lease, now_s);
+}
+
+void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now_s) {
+  Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "packer") return;
+  if (!schedule_.tile_done(m.frame, m.tile, now_s)) return;
+  std::string sampler = "?";
+  for (const auto& [id, s] : peers_)
+    if (s.hello.instance == m.sampler) sampler = s.hello.name;
+  record_.add_tile(sampler, m);
+  dispatch(now_s);
+}
+
+void MasterCore::on(const std::string& peer, const wire::Goodbye&, double) {
+  const auto it = peers_.find(peer);
+  if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "left");
+}
+
+Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double now_s) {
+  Peer* p = known(peer, now_s);
+  if (!p) return ok_status();
+  return record_.add_rows(p->process, m);
+}
+
+void MasterCore::on(const std::string& peer, const wire::Control& m, double now_s) {
+  if (m.command == "status") return emit(peer, wire::ControlReply{true, status_json(now_s)});
+  if (m.command == "stop") {
+    emit(peer, wire::ControlReply{true, "stopping"});
+    stop_ = true;
+    return;
+  }
+  if (m.command == "epoch") {
+    epoch_ = epoch_.next();
+    schedule_.drop_frames();
+    announce(now_s);
+    return emit(peer, wire::ControlReply{true, fmt::format("epoch {}", epoch_.value)});
+  }
+  emit(peer, wire::ControlReply{false, fmt::format("unknown command '{}'; known: status, stop, epoch", m.command.substr(0, 64))});
+}
+
+void MasterCore::undeliverable(const std::string& peer) {
+  const auto it = peers_.find(peer);
+  if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "cannot be reached");
+}
+
+void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why) {
+  p.gone = true;
+  p.waiting_leases = 0;
+  std::erase(idle_, routing_id);
+  schedule_.release_sampler(routing_id);
+  if (p.hello.role == "viewer") schedule_.forget_viewer(p.hello.instance);
+  if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
+}
+
+void MasterCore::tick(double now_s) {
+  for (auto& [id, p] : peers_)
+    if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
+  const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
+    const auto it = peers_.find(sampler);
+    log::warn("a lease of sampler {} expired; its tile goes to another", it == peers_.end() ? "?" : it->second.hello.name);
+  });
+  leases_expired_ += uint64_t(expired);
+  if (expired || schedule_.view_waiting()) dispatch(now_s);
+}
+
+void MasterCore::dispatch(double now_s) {
+  if (stop_ || !find_role("packer")) return;
+  while (!idle_.empty()) {
+    const std::string sampler = idle_.front();
+    const auto lease = schedule_.lease(sampler, epoch_, now_s);
+    if (!lease) return;
+    idle_.pop_front();
+    --peers_[sampler].waiting_leases;
+    emit(sampler, *lease);
+  }
+}
+
+void MasterCore::shut_down(const std::string& reason) {
+  stop_ = true;
+  for (const auto& [id, p] : peers_)
+    if (!p.gone) emit(id, wire::Shutdown{reason});
+}
+
+bool MasterCore::everyone_left() const {
+  return std::all_of(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone || p.second.hello.role == "ctl"; });
+}
+
+std::vector<Outgoing> MasterCore::take_outgoing() { return std::exchange(outgoing_, {}); }
+
+std::vector<metrics::Process> MasterCore::processes() const {
+  std::vector<metrics::Process> out;
+  for (const auto& [id, p] : peers_)
+    if (p.hello.role != "ctl") out.push_back(p.process);
+  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  return out;
+}
+
+std::map<std::string, double> MasterCore::counters() const {
+  return {{"leases_expired", double(leases_expired_)}, {"tiles_released", double(schedule_.tiles_released())},
+          {"frames_completed", double(schedule_.frames_completed())}};
+}
+
+std::string MasterCore::status_json(double now_s) const {
+  nlohmann::ordered_json out;
+  out["epoch"] = epoch_.value;
+  out["frames_completed"] = schedule_.frames_completed();
+  out["frames_in_flight"] = schedule_.frames_in_flight();
+  out["leases_expired"] = leases_expired_;
+  out["tiles_released"] = schedule_.tiles_released();
+  out["processes"] = nlohmann::ordered_json::array();
+  for (const auto& [id, p] : peers_) {
+    if (p.hello.role == "ctl") continue;
+    nlohmann::ordered_json e{{"role", p.hello.role}, {"name", p.hello.name}, {"pid", p.hello.pid}, {"alive", !p.gone},
+                             {"silent_s", std::max(0.0, now_s - p.seen_s)}};
+    for (const auto& [key, value] : p.hello.facts) e["facts"][key] = value;
+    for (const auto& [key, value] : p.process.values) e["values"][key] = value;
+    out["processes"].push_back(e);
+  }
+  return out.dump();
+}
+
+}  // namespace telesplat::master
