@@ -1,0 +1,110 @@
+#include "services/data/data_service.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+
+#include "common/core/clock.h"
+#include "common/net/dispatch.h"
+#include "common/net/master_link.h"
+
+namespace telesplat::data {
+namespace {
+
+// Progress goes to the launcher's pipe, or to the log every two seconds.
+Progress make_progress(bool to_stdout) {
+  return [to_stdout, last_s = monotonic_s()](const char* stage, double fraction) mutable {
+    const double now = monotonic_s();
+    if (to_stdout) {
+      std::printf("progress %s %.3f\n", stage, fraction);
+      std::fflush(stdout);
+    } else if (now - last_s >= 2.0) {
+      log::info("{}: {:.0f} %", stage, fraction * 100);
+      last_s = now;
+    }
+  };
+}
+
+wire::Hello make_hello(const DataServiceOptions& o, const MeshStore& store, const std::string& endpoint) {
+  const MeshStoreInfo& info = store.info();
+  wire::Hello hello;
+  hello.role = "data";
+  hello.name = o.service.name;
+  hello.endpoints = {{"chunks", endpoint}};
+  hello.facts = {{"scene", std::filesystem::path(o.scene).filename().string()},
+                 {"kind", "mesh"},
+                 {"format", info.format},
+                 {"triangles", std::to_string(info.triangles)},
+                 {"vertices", std::to_string(info.vertices)},
+                 {"degenerate_dropped", std::to_string(info.degenerate_dropped)},
+                 {"up", info.up},
+                 {"from_cache", info.from_cache ? "true" : "false"},
+                 {"content_hash", fmt::format("{:016x}", info.content_hash)}};
+  hello.box_room = info.box_room;
+  return hello;
+}
+
+}  // namespace
+
+void add_flags(CLI::App& app, DataServiceOptions& o) {
+  net::add_service_flags(app, o.service, true);
+  app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)")->required();
+  app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")->capture_default_str()->check(CLI::Range(1e-3, 1e3));
+  app.add_option("--up", o.mesh.up, "data axis that points up: x, y, z, -x, -y, -z or auto")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
+  app.add_option("--cache", o.mesh.cache_dir, "folder of the chunk store; default: telesplat in the user's cache folder");
+  app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
+  app.add_flag("--report-progress", o.report_progress, "print progress lines on stdout");
+}
+
+int run(const DataServiceOptions& o) {
+  log::initialise(o.service.name, o.service.log_level);
+  net::install_signal_handlers();
+  const auto store = MeshStore::open(o.scene, o.mesh, make_progress(o.report_progress));
+  if (!store) {
+    std::fprintf(stderr, "telesplat: %s\n", store.error().text.c_str());
+    return 2;
+  }
+  const MeshStoreInfo& info = (*store)->info();
+  if (info.degenerate_dropped) log::info("{} degenerate triangles dropped", info.degenerate_dropped);
+  log::info("{}: {} triangles in {} chunks{}", o.scene, info.triangles, (*store)->chunks().size(), info.from_cache ? " (from the chunk store)" : "");
+
+  net::Context context;
+  net::Socket blocks(context, net::Kind::kRouter, o.service.name + ":chunks", {.high_water_mark = 4096});
+  const auto endpoint = blocks.bind(o.service.bind, o.service.insecure);
+  if (!endpoint) {
+    log::error("{}", endpoint.error().text);
+    return 2;
+  }
+  net::MasterLink link(context, o.service.master, make_hello(o, **store, *endpoint));
+  const auto status = [&] {
+    return net::MasterLink::Values{{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(blocks.rejected())}};
+  };
+
+  const auto answer = [&](const std::string& peer, const auto& request) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(request)>, wire::ChunkListRequest>) {
+      blocks.send(wire::ChunkList{request.epoch, (*store)->chunks()}, peer);
+    } else {
+      const bool exists = request.chunk.value < (*store)->chunks().size();
+      const auto bytes = exists ? (*store)->chunk(request.chunk) : geometry::ChunkBytes{};
+      blocks.send(wire::Chunk{request.epoch, request.chunk, bytes.bytes}, peer);
+    }
+  };
+  while (!net::stop_requested() && !link.shutdown_requested()) {
+    const double now = monotonic_s();
+    link.tick(now, status);
+    net::wait_readable({&blocks, &link.socket()}, 50);
+    while (const auto message = link.socket().receive())
+      if (!link.handle(*message, monotonic_s())) link.socket().reject(*message, "its type is not expected here");
+    for (int n = 0; n < 64; ++n) {
+      const auto message = blocks.receive();
+      if (!message) break;
+      net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(blocks, *message, [&](const auto& request) { answer(message->peer, request); });
+    }
+  }
+  link.leave(status);
+  return 0;
+}
+
+}  // namespace telesplat::data
