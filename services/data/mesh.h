@@ -1,0 +1,33 @@
+// A triangle mesh as the readers leave it: in the file's own coordinates, in double precision.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "common/core/result.h"
+
+namespace telesplat::data {
+
+inline constexpr uint64_t kMaxTriangles = uint64_t{1} << 31;
+inline constexpr uint64_t kMaxVertices = (uint64_t{1} << 32) - 2;
+inline constexpr uint32_t kNeutralAlbedo = 0xc8c8c8;  ///< the colour of data without colours
+
+struct Mesh {
+  std::string format;                 ///< "ply", "obj", "stl", "off", "vtp", "vtk", "gltf"
+  std::vector<glm::dvec3> positions;  ///< in the file's units
+  std::vector<glm::vec3> normals;     ///< empty, or one a vertex; of any length; (0, 0, 0): to be computed
+  std::vector<uint32_t> colours;      ///< empty, or one a vertex: 0x00RRGGBB
+  std::vector<uint32_t> indices;      ///< three a triangle
+  uint64_t degenerate_dropped = 0;    ///< faces with fewer than three corners
+};
+
+/// What every reader promises and validate_mesh checks: at least one triangle, no more than kMaxTriangles, every index below the number of
+/// vertices, every position finite, normals and colours absent or one a vertex. Errors start with `name`.
+Status validate_mesh(const Mesh& mesh, const std::string& name);
+
+/// 8-bit channels -> 0x00RRGGBB.
+constexpr uint32_t pack_rgb(uint32_t r, uint32_t g, uint32_t b) { return r << 16 | g << 8 | b; }
+
+}  // namespace telesplat::data

@@ -1,0 +1,182 @@
+#include "services/data/mesh_store.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include "common/core/log.h"
+#include "services/data/mesh_reader.h"
+#include "services/data/placement.h"
+#include "services/data/store_file.h"
+
+namespace telesplat::data {
+namespace {
+
+namespace fs = std::filesystem;
+
+// An open file descriptor.
+class Descriptor {
+ public:
+  explicit Descriptor(int value = -1) : value_(value) {}
+  ~Descriptor() { if (value_ >= 0) close(value_); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return value_; }
+  bool valid() const { return value_ >= 0; }
+
+ private:
+  int value_;
+};
+
+class Store : public MeshStore {
+ public:
+  explicit Store(StoreContent content) : content_(std::move(content)) {}
+  const MeshStoreInfo& info() const override { return content_.info; }
+  const std::vector<geometry::ChunkInfo>& chunks() const override { return content_.chunks; }
+  geometry::ChunkBytes chunk(ChunkId id) const override {
+    CHECK(id.value < content_.chunks.size());
+    return {content_.file->bytes().subspan(content_.offsets[id.value], content_.chunks[id.value].bytes), content_.file};
+  }
+
+ private:
+  StoreContent content_;
+};
+
+std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& path, bool from_cache) {
+  content.info.source = path;
+  content.info.from_cache = from_cache;
+  return std::make_shared<Store>(std::move(content));
+}
+
+fs::path default_cache_dir() {
+  if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg && *xdg) return fs::path(xdg) / "telesplat";
+  if (const char* home = std::getenv("HOME"); home && *home) return fs::path(home) / ".cache" / "telesplat";
+  return fs::temp_directory_path() / fmt::format("telesplat-{}", getuid());
+}
+
+// The content of the file and of those it pulls in.
+uint64_t hash_content(const MappedFile& file, const std::string& format, const std::string& path, const Progress& progress) {
+  constexpr size_t kStep = 64 << 20;
+  XXH3_state_t* state = XXH3_createState();
+  XXH3_64bits_reset(state);
+  const auto bytes = file.bytes();
+  for (size_t at = 0; at < bytes.size(); at += kStep) {
+    progress("hash", static_cast<double>(at) / static_cast<double>(bytes.size()));
+    XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
+  }
+  for (const std::string& companion : companion_files(file.text(), format, path))
+    if (const auto other = MappedFile::open(companion)) XXH3_64bits_update(state, (*other)->bytes().data(), (*other)->bytes().size());
+  const uint64_t hash = XXH3_64bits_digest(state);
+  XXH3_freeState(state);
+  progress("hash", 1.0);
+  return hash;
+}
+
+Status validate_options(const MeshOptions& options) {
+  if (!(options.room_size_m >= 1e-3 && options.room_size_m <= 1e4))
+    return Error{fmt::format("room size {} m is outside [0.001, 10000]", options.room_size_m)};
+  if (options.up != "auto")
+    if (auto rotation = rotation_for_up(options.up); !rotation) return rotation.error();
+  return ok_status();
+}
+
+// Reads the mesh file and writes its store into the descriptor.
+Status build_store(int descriptor, const std::string& path, const MeshOptions& options, uint64_t content_hash, const Progress& progress) {
+  auto mesh = read_mesh(path, [&](double fraction) { progress("read", fraction); });
+  if (!mesh) return mesh.error();
+  progress("read", 1.0);
+  MeshStoreInfo info;
+  info.format = mesh->format;
+  info.vertices = mesh->positions.size();
+  info.had_normals = !mesh->normals.empty();
+  info.had_colours = !mesh->colours.empty();
+  info.content_hash = content_hash;
+  progress("normals", 0.0);
+  const auto placed = place_mesh(std::move(*mesh), options.room_size_m, options.up, path);
+  if (!placed) return placed.error();
+  progress("normals", 1.0);
+  info.triangles = placed->indices.size() / 3;
+  info.degenerate_dropped = placed->degenerate_dropped;
+  info.box_data = placed->box_data;
+  info.box_room = placed->box_room;
+  info.up = placed->up;
+  return write_store(descriptor, path, *placed, info, progress);
+}
+
+// Without a cache: a file that has no name and goes away with its last mapping.
+Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const MeshOptions& options, uint64_t hash, const Progress& progress) {
+  std::error_code ignored;
+  std::string name = (fs::temp_directory_path(ignored) / "telesplat-XXXXXX").string();
+  const Descriptor file(mkostemp(name.data(), O_CLOEXEC));
+  if (!file.valid()) return Error{fmt::format("{}: no temporary file {} for its chunks: {}", path, name, std::strerror(errno))};
+  unlink(name.c_str());
+  if (auto status = build_store(file.get(), path, options, hash, progress); !status) return status.error();
+  auto content = read_store(file.get(), name);
+  if (!content) return content.error();
+  return make_store(std::move(*content), path, false);
+}
+
+Result<StoreContent> open_existing(const std::string& name) {
+  const Descriptor file(open(name.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file.valid()) return Error{fmt::format("{}: {}", name, std::strerror(errno))};
+  return read_store(file.get(), name);
+}
+
+}  // namespace
+
+Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, const MeshOptions& options, const Progress& user_progress) {
+  const Progress progress = user_progress ? user_progress : [](const char*, double) {};
+  if (auto status = validate_options(options); !status) return status.error();
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  const DetectedFormat detected = detect_format((*file)->text(), path);
+  if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
+  const uint64_t hash = hash_content(**file, detected.format, path, progress);
+  if (!options.use_cache) return open_unnamed(path, options, hash, progress);
+
+  const fs::path folder = options.cache_dir.empty() ? default_cache_dir() : fs::path(options.cache_dir);
+  const std::string stem = (folder / fmt::format("{:016x}-{}-{}", hash, options.up, options.room_size_m)).string();
+  const std::string name = stem + ".mesh", part = stem + ".part";
+  if (auto content = open_existing(name)) return make_store(std::move(*content), path, true);
+
+  std::error_code error;
+  fs::create_directories(folder, error);
+  // One process at a time makes this store; others wait for it here and then find it. The lock ends with its holder.
+  const Descriptor lock(::open((stem + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  if (!lock.valid() || flock(lock.get(), LOCK_EX) != 0) {
+    log::warn("cache folder {} cannot be written ({}); going on without", folder.string(), std::strerror(errno));
+    return open_unnamed(path, options, hash, progress);
+  }
+  auto content = open_existing(name);
+  if (content) return make_store(std::move(*content), path, true);
+  if (fs::exists(name, error)) {
+    log::warn("{}; making it anew", content.error().text);
+    fs::remove(name, error);
+  }
+  {
+    const Descriptor out(::open(part.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (!out.valid()) {
+      log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
+      return open_unnamed(path, options, hash, progress);
+    }
+    const Status built = build_store(out.get(), path, options, hash, progress);
+    if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
+      const std::string reason = built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
+      fs::remove(part, error);
+      return Error{reason};
+    }
+  }
+  content = open_existing(name);
+  if (!content) return content.error();
+  return make_store(std::move(*content), path, false);
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,71 @@
+// Walking over the words and numbers of a text file in memory. Never reads past its end, never throws.
+#pragma once
+
+#include <charconv>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+#include <type_traits>
+
+namespace telesplat::data {
+
+class TextScanner {
+ public:
+  explicit TextScanner(std::string_view text) : at_(text.data()), end_(text.data() + text.size()), begin_(at_) {}
+
+  bool at_end() const { return at_ == end_; }
+  size_t offset() const { return static_cast<size_t>(at_ - begin_); }
+  size_t line_number() const {  // counted on demand: for error texts
+    size_t lines = 1;
+    for (const char* p = begin_; p < at_; ++p) lines += *p == '\n';
+    return lines;
+  }
+
+  /// Skips blanks within the line. Returns true if something other than a line's end (or a comment's start) follows.
+  bool skip_blanks(char comment = '\0') {
+    while (at_ < end_ && (*at_ == ' ' || *at_ == '\t' || *at_ == '\r')) ++at_;
+    return at_ < end_ && *at_ != '\n' && (comment == '\0' || *at_ != comment);
+  }
+  /// Skips white space over line ends, and comments up to their line's end. Returns true if something follows.
+  bool skip_space(char comment = '\0') {
+    while (at_ < end_) {
+      if (static_cast<unsigned char>(*at_) <= ' ') ++at_;
+      else if (comment != '\0' && *at_ == comment) next_line();
+      else return true;
+    }
+    return false;
+  }
+  void next_line() {
+    while (at_ < end_ && *at_ != '\n') ++at_;
+    if (at_ < end_) ++at_;
+  }
+  /// The characters up to the next white space; empty at a line's end. Call skip_blanks or skip_space before.
+  std::string_view word() {
+    const char* start = at_;
+    while (at_ < end_ && static_cast<unsigned char>(*at_) > ' ') ++at_;
+    return {start, static_cast<size_t>(at_ - start)};
+  }
+  /// A number here: decimal, exponent, nan, inf, with or without a leading plus. What follows must not belong to a word.
+  bool number(double& out) { return parse(out); }
+  bool integer(int64_t& out) { return parse(out); }
+  bool skip_char(char c) { return at_ < end_ && *at_ == c ? (++at_, true) : false; }
+
+ private:
+  template <class T>
+  bool parse(T& out) {
+    const char* start = at_ < end_ && *at_ == '+' ? at_ + 1 : at_;
+    const auto [next, error] = std::from_chars(start, end_, out);
+    if (error == std::errc::result_out_of_range && std::is_floating_point_v<T>)  // 1e-999 is zero, 1e999 infinite
+      out = std::string_view(start, next).find("e-") == std::string_view::npos && std::string_view(start, next).find("E-") == std::string_view::npos
+                ? std::numeric_limits<T>::infinity() : T(0);
+    else if (error != std::errc()) return false;
+    at_ = next;
+    return true;
+  }
+
+  const char* at_;
+  const char* end_;
+  const char* begin_;
+};
+
+}  // namespace telesplat::data
