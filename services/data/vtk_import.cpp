@@ -13,7 +13,6 @@
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataReader.h>
-#include <vtkSMPTools.h>
 #include <vtkSmartPointer.h>
 #include <vtkStringOutputWindow.h>
 #include <vtkUnsignedCharArray.h>
@@ -206,7 +205,6 @@ void read_gltf(const std::string& path, Collector& collector) {
 }  // namespace
 
 Result<Mesh> import_with_vtk(const std::string& path, const std::string& format) {
-  vtkSMPTools::SetBackend("Sequential");  // a forked child has no worker threads
   vtkNew<vtkStringOutputWindow> output;
   vtkOutputWindow::SetInstance(output);
   Collector collector(format);

@@ -1,0 +1,59 @@
+// telesplat-import FORMAT FILE: reads a mesh file with VTK and leaves it on standard output for the process that asked (vtk_reader.cpp). A
+// program of its own so that neither a crash of VTK, nor its messages, nor the time that its libraries take to load reach anyone.
+#include <fmt/format.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <new>
+
+#include "services/data/import_report.h"
+#include "services/data/vtk_import.h"
+
+namespace {
+
+// A reader may take what this process has mapped already, a gigabyte, and a hundred times the file. Sanitizers map terabytes
+// of shadow, so there the limit is left out.
+void limit_memory(uint64_t file_bytes) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t bytes = pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + (uint64_t{1} << 30) + 100 * file_bytes;
+  const rlimit limit{bytes, bytes};
+  setrlimit(RLIMIT_AS, &limit);
+#else
+  static_cast<void>(file_bytes);
+#endif
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fputs("usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n", stderr);
+    return 2;
+  }
+  const std::string format = argv[1], path = argv[2];
+  struct stat status {};
+  stat(path.c_str(), &status);
+  const auto file_bytes = static_cast<uint64_t>(status.st_size);
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);                        // nobody waits any more
+  alarm(static_cast<unsigned>(60 + file_bytes / 1'000'000));  // a hostile file must not keep us for ever
+  limit_memory(file_bytes);
+  const int out = dup(STDOUT_FILENO);
+  dup2(STDERR_FILENO, STDOUT_FILENO);  // whatever VTK prints must not get between
+  try {
+    return telesplat::data::write_import_report(out, telesplat::data::import_with_vtk(path, format)) ? 0 : 1;
+  } catch (const std::bad_alloc&) {
+    const telesplat::Error error{fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};
+    return telesplat::data::write_import_report(out, error) ? 0 : 1;
+  } catch (...) {
+    return 1;
+  }
+}
