@@ -95,16 +95,17 @@ class Decimator {
   bool take_whole(int x, int y) {
     const uint32_t pixel = static_cast<uint32_t>(y * width_ + x);
     const ClusterKey key = keys_[pixel];
-    uint32_t differs = 0, least = ~0u, most = 0;
+    uint32_t differs = 0, nothing = kNoCluster, least = ~0u, most = 0;
     for (int j = 0; j < 4; ++j) {
       for (int i = 0; i < 4; ++i) {
         const size_t p = pixel + static_cast<size_t>(j) * width_ + i;
         differs |= keys_[p] ^ key;
+        nothing &= keys_[p];
         least = std::min(least, depth_[p]), most = std::max(most, depth_[p]);
       }
     }
+    if (nothing == kNoCluster) return true;
     if (differs != 0) return false;
-    if (key == kNoCluster) return true;
     // Stricter than asking each against its first: whatever passes here is one group at every level.
     if (!near_in_depth(most, least)) return false;
 

@@ -101,7 +101,7 @@ struct PreparedPatch {
 ///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
 ///   Level l+1 takes of each block of 2x2 pixels of level l (blocks aligned to the frame's pixel grid) the covered pixels that
 ///   fall in the same leaf and lie within 2 % of depth of its first, as one point: the sample nearest the block's centre (the
-///   upper, then the left one of several), with the mean colour of them all; and so on with the pixels that are left, if any.
+///   first in Z order of several), with the mean colour of them all; and so on with the pixels that are left, if any.
 ///   So coverage never vanishes at coarse levels, neither of a surface nor of what is behind its edge.
 /// Runs in the calling thread; several threads may prepare several tiles at once.
 /// Preconditions: valid(config), valid(camera), tile inside the camera's image, image canonical and of the tile's size.
