@@ -1,0 +1,65 @@
+// Puts point-model events in order (the "clone" pattern of the ZeroMQ guide, chapter 5): applies what follows, drops what is
+// known, notices gaps and new packers, and asks for what is missing. No sockets, no clocks.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <variant>
+
+#include "common/wire/messages.h"
+
+namespace telesplat::viewer {
+
+/// A received event; bulk fields point into what `owner` keeps alive.
+struct ModelEvent {
+  std::variant<wire::Patch, wire::Forget, wire::EpochBegin> body;
+  std::shared_ptr<const void> owner;
+  InstanceId packer() const { return std::visit([](const auto& e) { return e.packer; }, body); }
+  Sequence sequence() const { return std::visit([](const auto& e) { return e.sequence; }, body); }
+  size_t bytes() const;
+};
+
+class EventSequencer {
+ public:
+  struct Callbacks {
+    std::function<void(const ModelEvent&)> apply;        ///< the next event of the current packer
+    std::function<void()> begin_replica;                 ///< a packer we have nothing of: start from nothing
+    std::function<void(InstanceId packer, Sequence after)> request_state;
+  };
+  explicit EventSequencer(Callbacks callbacks) : callbacks_(std::move(callbacks)) {}
+
+  /// Forget which packer we followed and ask whatever packer is there for everything (at start, or when its endpoint changes).
+  void start();
+  /// An event from the publisher.
+  void on_published(ModelEvent event);
+  /// An event that answers request_state; they come in order and may skip what has been forgotten since.
+  void on_replayed(const ModelEvent& event);
+  /// The publisher's or the answer's mark.
+  void on_mark(const wire::StateMark& mark);
+  /// An answer takes too long (a packer that died): ask again.
+  void retry();
+
+  bool synchronised() const { return !waiting_ && packer_.value != 0; }
+  bool waiting() const { return waiting_; }
+  InstanceId packer() const { return packer_; }
+  Sequence applied() const { return applied_; }
+  uint64_t gaps() const { return gaps_; }
+
+ private:
+  void follow(InstanceId packer);
+  void ask();
+  void keep(ModelEvent event);
+  void drain();
+
+  Callbacks callbacks_;
+  InstanceId packer_;
+  Sequence applied_;
+  bool waiting_ = false;
+  std::deque<ModelEvent> kept_;  // published while an answer is awaited
+  size_t kept_bytes_ = 0;
+  uint64_t gaps_ = 0;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,102 @@
+#include "client/viewer/coupling/view_requester.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr double kVelocityWindow_s = 0.15, kMaxMove_m = 0.3, kMaxTurn_rad = 0.6;
+constexpr size_t kMaxOpen = 256;
+
+// Rotation vector of a unit quaternion.
+glm::dvec3 rotation_vector(glm::dquat q) {
+  if (q.w < 0) q = -q;
+  const glm::dvec3 v(q.x, q.y, q.z);
+  const double s = glm::length(v);
+  return s < 1e-9 ? 2.0 * v : v / s * 2.0 * std::atan2(s, q.w);
+}
+
+glm::dquat rotation(const glm::dvec3& v) {
+  const double angle = glm::length(v);
+  return angle < 1e-9 ? glm::dquat(1, 0, 0, 0) : glm::angleAxis(angle, v / angle);
+}
+
+glm::dvec3 clamp_length(const glm::dvec3& v, double limit) {
+  const double length = glm::length(v);
+  return length > limit ? v * (limit / length) : v;
+}
+
+}  // namespace
+
+void PosePredictor::add(double t_s, const geometry::Pose& pose) {
+  if (!samples_.empty() && t_s <= samples_.back().t_s) return;
+  samples_.push_back({t_s, pose});
+  while (samples_.size() > 2 && samples_[1].t_s < t_s - kVelocityWindow_s) samples_.pop_front();
+}
+
+PosePredictor::Velocity PosePredictor::velocity() const {
+  if (samples_.size() < 2) return {};
+  const Sample &a = samples_.front(), &b = samples_.back();
+  const double dt = b.t_s - a.t_s;
+  if (dt < 1e-3) return {};
+  return {(b.pose.position_room - a.pose.position_room) / dt, rotation_vector(b.pose.orientation * glm::conjugate(a.pose.orientation)) / dt};
+}
+
+double PosePredictor::speed_m_s() const { return glm::length(velocity().linear); }
+double PosePredictor::turn_rad_s() const { return glm::length(velocity().angular); }
+
+geometry::Pose PosePredictor::predict(double t_s) const {
+  if (samples_.empty()) return {};
+  const Sample& last = samples_.back();
+  const double dt = std::max(0.0, t_s - last.t_s);
+  const Velocity v = velocity();
+  return {last.pose.position_room + clamp_length(v.linear * dt, kMaxMove_m),
+          glm::normalize(rotation(clamp_length(v.angular * dt, kMaxTurn_rad)) * last.pose.orientation)};
+}
+
+void ViewRequester::on_pose(double t_s, const geometry::Camera& display) {
+  predictor_.add(t_s, display.pose);
+  display_ = display;
+}
+
+std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
+  if (!display_ || now_s - last_sent_s_ < 1.0 / options_.max_rate_hz) return std::nullopt;
+  last_sent_s_ = now_s;
+  const double horizon_s = latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
+  geometry::Camera camera = *display_;
+  camera.pose = predictor_.predict(now_s + horizon_s);
+  camera.width = options_.sampling_width;
+  camera.height = options_.sampling_height;
+  // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
+  const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
+  const double margin = motion < 0.002 ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
+  const double du = (camera.right - camera.left) * margin / 2, dv = (camera.top - camera.bottom) * margin / 2;
+  camera.left -= du, camera.right += du, camera.bottom -= dv, camera.top += dv;
+  const RequestId id = next_;
+  next_ = next_.next();
+  open_[id] = {id, now_s, 0, 0, camera};
+  while (open_.size() > kMaxOpen) open_.erase(open_.begin());
+  return wire::ViewRequest{viewer_, id, camera, now_s};
+}
+
+std::optional<ViewRequester::Update> ViewRequester::on_applied(const wire::Patch& patch, double now_s) {
+  if (patch.viewer != viewer_) return std::nullopt;
+  const auto it = open_.find(patch.request);
+  if (it == open_.end()) return std::nullopt;
+  Update& u = it->second;
+  if (u.tiles++ == 0) u.first_s = now_s;
+  u.points += patch.kept;
+  u.samples += patch.samples;
+  u.bytes += patch.image.size();
+  if (!patch.frame_complete) return std::nullopt;
+  u.complete_s = now_s;
+  const double latency_s = now_s - u.requested_s;
+  latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
+  const Update done = u;
+  // Requests before this one were replaced at the master and will never be answered.
+  open_.erase(open_.begin(), std::next(it));
+  return done;
+}
+
+}  // namespace telesplat::viewer

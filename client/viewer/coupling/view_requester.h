@@ -1,0 +1,66 @@
+// Asynchronous coupling (T6.5): which view to ask for next, and when. Poses of the past are all it knows.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+
+#include "common/geometry/camera.h"
+#include "common/wire/messages.h"
+
+namespace telesplat::viewer {
+
+struct RequestOptions {
+  int sampling_width = 1280, sampling_height = 800;
+  double max_rate_hz = 12;           ///< requests a second at most; the master keeps only the newest
+  double max_margin = 0.3;           ///< the sampled frustum is at most this fraction wider than the displayed one
+  double initial_latency_s = 0.25;   ///< assumed until one was measured
+};
+
+/// Extrapolates a head pose with its recent velocity.
+class PosePredictor {
+ public:
+  void add(double t_s, const geometry::Pose& pose);
+  /// Constant velocity from the poses of the last 0.15 s; at most 0.3 m and 0.6 rad away from the newest pose.
+  geometry::Pose predict(double t_s) const;
+  double speed_m_s() const;
+  double turn_rad_s() const;
+
+ private:
+  struct Sample { double t_s; geometry::Pose pose; };
+  struct Velocity { glm::dvec3 linear{0.0}, angular{0.0}; };  // room space
+  Velocity velocity() const;
+  std::deque<Sample> samples_;
+};
+
+class ViewRequester {
+ public:
+  ViewRequester(const RequestOptions& options, InstanceId viewer) : options_(options), viewer_(viewer) {}
+
+  /// A displayed pose; display: the camera it was shown with.
+  void on_pose(double t_s, const geometry::Camera& display);
+  /// The next request, if one is due.
+  std::optional<wire::ViewRequest> next(double now_s);
+
+  struct Update {
+    RequestId request;
+    double requested_s = 0, first_s = 0, complete_s = 0;
+    geometry::Camera camera;
+    uint64_t points = 0, samples = 0, bytes = 0, tiles = 0;
+  };
+  /// Part of a frame was applied. Returns the finished update when it was its last part and the frame was asked for by us.
+  std::optional<Update> on_applied(const wire::Patch& patch, double now_s);
+
+  double latency_s() const { return latency_s_; }
+
+ private:
+  RequestOptions options_;
+  InstanceId viewer_;
+  PosePredictor predictor_;
+  std::optional<geometry::Camera> display_;
+  RequestId next_{1};
+  double last_sent_s_ = -1e9, latency_s_ = 0;
+  std::map<RequestId, Update> open_;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,100 @@
+#include "client/viewer/display/display_loop.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "common/core/clock.h"
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr double kPicturePeriod_s = 2.5;
+
+bool told_to_stop(const ReplicaWorker& worker) { return net::stop_requested() || worker.shutdown_requested(); }
+
+void sleep_until(double t_s) {
+  const double wait_s = t_s - monotonic_s();
+  if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
+}
+
+double angle_deg(const glm::dquat& a, const glm::dquat& b) {
+  return 2 * std::acos(std::min(1.0, std::abs(glm::dot(a, b)))) * 180 / 3.14159265358979323846;
+}
+
+}  // namespace
+
+const std::vector<std::string>& frame_columns() {
+  static const std::vector<std::string> columns{
+      "frame", "t_s", "inter_frame_ms", "construction_ms", "select_ms", "render_ms", "project_cpu_ms", "resolve_cpu_ms", "points_selected",
+      "points_drawn", "items", "points_cached", "update_age_ms", "view_error_m", "view_error_deg", "px", "py", "pz", "qw", "qx", "qy", "qz"};
+  return columns;
+}
+
+DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& trajectory, Renderer& renderer, ModelCache& cache,
+                          ReplicaWorker& worker, metrics::TableRecorder& frames, metrics::SpanRecorder& spans, FrameSpool* spool) {
+  const auto camera_at = [&](double t_s) {
+    const double moving_s = o.duration_s > 0 ? std::min(t_s, o.duration_s - o.hold_s) : t_s;
+    return geometry::make_camera(trajectory.at(moving_s), o.fov_deg, o.width, o.height, o.near_m);
+  };
+
+  // Start-up: nothing to show yet; let the server know where the head is.
+  while (!worker.first_update_complete()) {
+    if (told_to_stop(worker)) return {0, true};
+    worker.on_frame(monotonic_s(), camera_at(0), {});
+    sleep_until(monotonic_s() + 1.0 / 30);
+  }
+
+  const size_t pixels = size_t(o.width) * size_t(o.height);
+  image::View view{o.width, o.height, std::vector<uint32_t>(pixels), std::vector<float>(spool ? pixels : 0)};
+  splat::DrawList list;
+  DisplayResult result;
+  const double start_s = monotonic_s();
+  double previous_s = 0, next_picture_s = 0;
+  bool last = false;
+  while (!last) {
+    const double begin_s = monotonic_s(), t_s = begin_s - start_s;
+    if (told_to_stop(worker)) {
+      result.interrupted = true;
+      last = true;
+    }
+    last = last || (o.duration_s > 0 && t_s >= o.duration_s) || (o.frames > 0 && result.frames + 1 >= o.frames);
+
+    // The view of now, from what is cached now.
+    const geometry::Camera camera = camera_at(t_s);
+    const image::Shading shading(o.shading, camera);
+    cache.select(camera, o.selection, list);
+    const double selected_s = monotonic_s();
+    uint32_t use = 0;
+    if (spool) {
+      if (o.picture_every ? result.frames % o.picture_every == 0 : t_s >= next_picture_s || last) use |= kPicture | (o.exr ? kExr : 0);
+      if (o.verify_every && (result.frames % o.verify_every == 0 || last)) use |= kVerify;
+    }
+    const bool with_depth = use & (kVerify | kExr);
+    const auto stats = renderer.render(list, camera, o.kernel, shading, {o.width, o.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
+    cache.end_frame();
+    const double end_s = monotonic_s();
+    worker.on_frame(end_s, camera, list.clusters_seen);
+
+    const auto update = worker.last_update();
+    const auto figures = cache.figures();
+    const auto &p = camera.pose.position_room;
+    const auto &q = camera.pose.orientation;
+    frames.add({double(result.frames), t_s, previous_s > 0 ? (end_s - previous_s) * 1e3 : 0.0, (end_s - begin_s) * 1e3, (selected_s - begin_s) * 1e3,
+                (end_s - selected_s) * 1e3, stats.project_ms, stats.resolve_ms, double(list.points), double(stats.points_drawn),
+                double(list.items.size()), double(figures.points), (worker.to_master_s(end_s) - update.requested_s) * 1e3,
+                glm::distance(p, update.pose.position_room), angle_deg(q, update.pose.orientation), p.x, p.y, p.z, q.w, q.x, q.y, q.z});
+    spans.add("display frame", worker.to_master_s(begin_s), worker.to_master_s(end_s), 0);
+    previous_s = end_s;
+    if (use) {
+      if (use & kPicture) next_picture_s = t_s + kPicturePeriod_s;
+      view = spool->exchange({result.frames, t_s, use, camera, std::move(view)});
+    }
+    ++result.frames;
+    if (o.target_fps > 0) sleep_until(begin_s + 1.0 / o.target_fps);
+  }
+  return result;
+}
+
+}  // namespace telesplat::viewer

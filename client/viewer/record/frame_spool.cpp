@@ -1,0 +1,177 @@
+#include "client/viewer/record/frame_spool.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "common/core/log.h"
+
+namespace telesplat::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A spool file: this header, then colour (u32) and depth (f32) of width x height pixels.
+struct FileHeader {
+  char magic[8] = {'T', 'S', 'F', 'R', 'A', 'M', 'E', '1'};
+  uint64_t number = 0;
+  double t_s = 0;
+  double camera[12] = {};
+  int32_t width = 0, height = 0;
+  uint32_t use = 0, has_depth = 0;
+};
+
+using FilePtr = std::unique_ptr<FILE, int (*)(FILE*)>;
+FilePtr open_file(const std::string& path, const char* mode) { return {std::fopen(path.c_str(), mode), std::fclose}; }
+
+bool write_frame(const std::string& directory, const SpooledFrame& f) {
+  FileHeader h;
+  const auto& c = f.camera;
+  const auto &p = c.pose.position_room;
+  const auto &q = c.pose.orientation;
+  h.number = f.number;
+  h.t_s = f.t_s;
+  const double camera[12] = {p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m};
+  std::copy(camera, camera + 12, h.camera);
+  h.width = c.width;
+  h.height = c.height;
+  h.use = f.use;
+  h.has_depth = !f.view.depth_m.empty();
+  const std::string path = fmt::format("{}/{:08d}.frame", directory, f.number);
+  const FilePtr out = open_file(path + ".part", "wb");
+  if (!out) return false;
+  bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
+  ok = ok && std::fwrite(f.view.colour.data(), 4, f.view.colour.size(), out.get()) == f.view.colour.size();
+  ok = ok && std::fwrite(f.view.depth_m.data(), 4, f.view.depth_m.size(), out.get()) == f.view.depth_m.size();
+  ok = ok && std::fflush(out.get()) == 0;
+  std::error_code error;
+  if (ok) fs::rename(path + ".part", path, error);
+  else fs::remove(path + ".part", error);
+  return ok && !error;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FrameSpool>> FrameSpool::open(const std::string& directory, size_t max_waiting) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) return Error{fmt::format("{}: cannot be made a folder for frames: {}", directory, error.message())};
+  std::unique_ptr<FrameSpool> out(new FrameSpool);
+  out->directory_ = directory;
+  out->max_waiting_ = max_waiting;
+  out->thread_ = std::thread([spool = out.get()] { spool->write_loop(); });
+  return out;
+}
+
+FrameSpool::~FrameSpool() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+image::View FrameSpool::exchange(SpooledFrame frame) {
+  const int width = frame.view.width, height = frame.view.height;
+  image::View out;
+  {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.size() >= max_waiting_) {
+      ++dropped_;
+      return std::move(frame.view);
+    }
+    const bool depth = !frame.view.depth_m.empty();
+    waiting_.push_back(std::move(frame));
+    if (!free_.empty()) {
+      out = std::move(free_.back());
+      free_.pop_back();
+    }
+    out.width = width;
+    out.height = height;
+    out.colour.resize(size_t(width) * height);
+    out.depth_m.resize(depth ? size_t(width) * height : 0);
+  }
+  changed_.notify_all();
+  return out;
+}
+
+void FrameSpool::write_loop() {
+  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 10);  // the display comes first
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [&] { return stop_ || !waiting_.empty(); });
+    if (waiting_.empty()) return;
+    SpooledFrame frame = std::move(waiting_.front());
+    waiting_.pop_front();
+    writing_ = true;
+    lock.unlock();
+    const bool ok = write_frame(directory_, frame);
+    if (!ok) log::error("frame {} could not be written to {}", frame.number, directory_);
+    lock.lock();
+    writing_ = false;
+    if (!ok) ++dropped_;
+    free_.push_back(std::move(frame.view));
+    changed_.notify_all();
+  }
+}
+
+void FrameSpool::flush() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return waiting_.empty() && !writing_; });
+}
+
+std::vector<std::string> spooled_frames(const std::string& directory) {
+  std::vector<std::string> out;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(directory, error))
+    if (entry.path().extension() == ".frame") out.push_back(entry.path().string());
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+Result<SpooledFrame> read_spooled_frame(const std::string& path) {
+  const FilePtr in = open_file(path, "rb");
+  FileHeader h;
+  if (!in || std::fread(&h, sizeof h, 1, in.get()) != 1 || std::memcmp(h.magic, FileHeader{}.magic, 8) != 0)
+    return Error{fmt::format("{}: is not a recorded frame", path)};
+  SpooledFrame f{h.number, h.t_s, h.use, {}, {}};
+  const double* c = h.camera;
+  f.camera = {{{c[0], c[1], c[2]}, glm::dquat(c[3], c[4], c[5], c[6])}, c[7], c[8], c[9], c[10], c[11], h.width, h.height};
+  if (const Status s = geometry::validate(f.camera); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
+  const size_t pixels = size_t(h.width) * size_t(h.height);
+  std::error_code error;
+  if (fs::file_size(path, error) != sizeof h + pixels * (h.has_depth ? 8 : 4))
+    return Error{fmt::format("{}: its size does not fit {}x{} pixels", path, h.width, h.height)};
+  f.view = {h.width, h.height, std::vector<uint32_t>(pixels), std::vector<float>(h.has_depth ? pixels : 0)};
+  if (std::fread(f.view.colour.data(), 4, pixels, in.get()) != pixels ||
+      std::fread(f.view.depth_m.data(), 4, f.view.depth_m.size(), in.get()) != f.view.depth_m.size())
+    return Error{fmt::format("{}: cannot be read", path)};
+  return f;
+}
+
+Status develop_frames(const std::string& spool_directory, const std::string& picture_directory, const std::function<void(size_t, size_t)>& progress) {
+  std::error_code error;
+  fs::create_directories(picture_directory, error);
+  const auto paths = spooled_frames(spool_directory);
+  for (size_t i = 0; i < paths.size(); ++i) {
+    auto frame = read_spooled_frame(paths[i]);
+    if (!frame) return frame.error();
+    const std::string base = fmt::format("{}/frame-{:06d}", picture_directory, frame->number);
+    if (frame->use & kPicture)
+      if (const Status s = image::write_png(base + ".png", frame->view); !s) return s;
+    if ((frame->use & kExr) && !frame->view.depth_m.empty())
+      if (const Status s = image::write_exr(base + ".exr", frame->view); !s) return s;
+    if (!(frame->use & kVerify)) fs::remove(paths[i], error);
+    if (progress) progress(i + 1, paths.size());
+  }
+  return ok_status();
+}
+
+}  // namespace telesplat::viewer

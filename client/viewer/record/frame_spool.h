@@ -1,0 +1,66 @@
+// Recorded frames: taken from the display thread without copying, written raw by a thread of their own, turned into pictures after
+// the run, so that recording never stalls the display.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/geometry/camera.h"
+#include "common/image/file.h"
+
+namespace telesplat::viewer {
+
+/// Why a frame is kept: any combination.
+enum FrameUse : uint32_t { kPicture = 1, kVerify = 2, kExr = 4 };
+
+struct SpooledFrame {
+  uint64_t number = 0;
+  double t_s = 0;  ///< seconds since the first displayed frame
+  uint32_t use = 0;
+  geometry::Camera camera;
+  image::View view;
+};
+
+class FrameSpool {
+ public:
+  /// Spools into `directory` (made if need be); at most `max_waiting` frames wait to be written, more are dropped and counted.
+  static Result<std::unique_ptr<FrameSpool>> open(const std::string& directory, size_t max_waiting = 4);
+  ~FrameSpool();
+
+  /// Takes the frame; hands back a view of the same size to draw the next one into.
+  image::View exchange(SpooledFrame frame);
+  /// Waits until everything is on disk.
+  void flush();
+  uint64_t dropped() const { return dropped_; }
+
+ private:
+  FrameSpool() = default;
+  void write_loop();
+
+  std::string directory_;
+  size_t max_waiting_ = 4;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<SpooledFrame> waiting_;
+  std::vector<image::View> free_;
+  bool stop_ = false, writing_ = false;
+  uint64_t dropped_ = 0;
+  std::thread thread_;
+};
+
+/// Paths of the spooled frames of a folder, by frame number.
+std::vector<std::string> spooled_frames(const std::string& directory);
+/// Reads one spooled frame; refuses files that are not one.
+Result<SpooledFrame> read_spooled_frame(const std::string& path);
+/// Turns frames marked kPicture into directory/frame-NNNNNN.png (kExr: .exr too) and deletes spooled frames that are not also
+/// marked kVerify. progress: done, of.
+Status develop_frames(const std::string& spool_directory, const std::string& picture_directory, const std::function<void(size_t, size_t)>& progress);
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,209 @@
+#include "client/viewer/replica_worker.h"
+
+#include <algorithm>
+
+#include "common/codec/depth_codec.h"
+#include "common/core/clock.h"
+#include "common/net/dispatch.h"
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr double kReportPeriod_s = 1.0, kAnswerPatience_s = 2.0;
+constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
+
+wire::Hello make_hello(const ReplicaWorker::Options& o) {
+  wire::Hello hello;
+  hello.role = "viewer";
+  hello.name = o.service.name;
+  hello.instance = net::make_instance_id();
+  hello.facts = o.facts;
+  return hello;
+}
+
+}  // namespace
+
+ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, ModelCache& cache, metrics::TableRecorder& frames, metrics::SpanRecorder& spans)
+    : context_(context), options_(options), cache_(cache), frames_(frames), spans_(spans),
+      updates_table_("updates", {"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles", "samples", "points", "bytes", "eliminated"}),
+      link_(context, options.service.master, make_hello(options)),
+      sequencer_({[this](const ModelEvent& e) { apply(e); },
+                  [this] {
+                    points::ModelConfig config{link_.session()->box_room, int(link_.session()->octree_depth)};
+                    cache_.begin_replica(config);
+                  },
+                  [this](InstanceId packer, Sequence after) {
+                    asked_s_ = monotonic_s();
+                    if (state_) state_->send(wire::StateRequest{link_.instance(), packer, after});
+                  }}),
+      requester_(options.requests, link_.instance()),
+      started_s_(monotonic_s()),
+      thread_([this] { loop(); }) {}
+
+ReplicaWorker::~ReplicaWorker() {
+  stop_ = true;
+  thread_.join();
+}
+
+void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen) {
+  const std::lock_guard lock(mutex_);
+  poses_.emplace_back(now_s, camera);
+  if (seen_.size() < wire::kMaxKeys) seen_.insert(seen_.end(), seen.begin(), seen.end());
+}
+
+ReplicaWorker::LastUpdate ReplicaWorker::last_update() const {
+  const std::lock_guard lock(mutex_);
+  return last_update_;
+}
+
+void ReplicaWorker::loop() {
+  try {
+    while (!stop_) {
+      const double now = monotonic_s();
+      link_.tick(now, [this] { return status(); });
+      connect_if_changed();
+      request_view(now);
+      report(now, false);
+      if (sequencer_.waiting() && now - asked_s_ > kAnswerPatience_s) sequencer_.retry();
+      std::vector<net::Socket*> sockets{&link_.socket()};
+      if (patches_) sockets.push_back(&*patches_);
+      if (state_) sockets.push_back(&*state_);
+      net::wait_readable(sockets, 10);
+      receive_control();
+      receive_answers();
+      receive_events();
+    }
+    report(monotonic_s(), true);
+    link_.leave([this] { return status(); });
+  } catch (const std::exception& e) {
+    log::error("the viewer's worker failed: {}", e.what());
+    shutdown_ = true;
+  }
+}
+
+void ReplicaWorker::connect_if_changed() {
+  if (link_.version() == seen_version_) return;
+  seen_version_ = link_.version();
+  const auto& session = *link_.session();
+  offset_s_ = link_.to_master_s(0);
+  const auto endpoint = [&](const char* key) { const auto it = session.endpoints.find(key); return it == session.endpoints.end() ? std::string() : it->second; };
+  const std::string patches = endpoint("patches"), state = endpoint("state");
+  if (patches.empty() || state.empty() || session.box_room.empty()) return;
+  if (patches == patches_endpoint_ && state == state_endpoint_) return;
+  patches_endpoint_ = patches;
+  state_endpoint_ = state;
+  const net::SocketOptions bulk{.high_water_mark = 4096, .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes};
+  patches_.emplace(context_, net::Kind::kSub, options_.service.name + ":patches", bulk);
+  state_.emplace(context_, net::Kind::kDealer, options_.service.name + ":state", bulk);
+  for (const auto& [socket, address] : {std::pair{&*patches_, patches}, std::pair{&*state_, state}})
+    if (const Status s = socket->connect(address); !s) log::error("{}", s.error().text);
+  sequencer_.start();
+}
+
+void ReplicaWorker::receive_control() {
+  while (const auto message = link_.socket().receive())
+    if (!link_.handle(*message, monotonic_s())) link_.socket().reject(*message, "its type is not expected here");
+  if (link_.shutdown_requested()) shutdown_ = true;
+}
+
+void ReplicaWorker::receive_events() {
+  if (!patches_) return;
+  for (int n = 0; n < kMessagesAtOnce; ++n) {
+    const auto message = patches_->receive();
+    if (!message) return;
+    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(*patches_, *message, [&](auto& m) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>) sequencer_.on_mark(m);
+      else sequencer_.on_published({m, message->owner});
+    });
+  }
+}
+
+void ReplicaWorker::receive_answers() {
+  if (!state_) return;
+  for (int n = 0; n < kMessagesAtOnce; ++n) {
+    const auto message = state_->receive();
+    if (!message) return;
+    asked_s_ = monotonic_s();  // an answer that is coming in is not late
+    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(*state_, *message, [&](auto& m) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>) sequencer_.on_mark(m);
+      else sequencer_.on_replayed({m, message->owner});
+    });
+  }
+}
+
+void ReplicaWorker::apply(const ModelEvent& event) {
+  std::visit([this](const auto& e) {
+    using E = std::decay_t<decltype(e)>;
+    if constexpr (std::is_same_v<E, wire::Patch>) apply_patch(e);
+    else if constexpr (std::is_same_v<E, wire::Forget>) cache_.forget(e.clusters);
+    else cache_.clear();
+  }, event.body);
+}
+
+void ReplicaWorker::apply_patch(const wire::Patch& patch) {
+  const double begin = monotonic_s();
+  const auto bytes = std::span(reinterpret_cast<const uint8_t*>(patch.image.data()), patch.image.size());
+  const auto image = codec::decode(bytes, patch.rect.width, patch.rect.height);
+  if (!image) {
+    ++decode_errors_;
+    log::warn("patch {} cannot be decoded: {}", patch.sequence.value, image.error().text);
+    return;
+  }
+  const double decoded = monotonic_s();
+  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, *image));
+  const double inserted = monotonic_s();
+  spans_.add("decode", to_master_s(begin), to_master_s(decoded), 1);
+  spans_.add("insert", to_master_s(decoded), to_master_s(inserted), 1);
+  points_received_ += patch.kept;
+  bytes_received_ += patch.image.size();
+  if (first_points_s_ == 0 && patch.kept) first_points_s_ = inserted - started_s_;
+  if (patch.frame_complete) cache_.show_newest();
+
+  if (const auto u = requester_.on_applied(patch, to_master_s(inserted))) {
+    updates_table_.add({double(u->request.value), double(patch.frame.value), u->requested_s, u->first_s, u->complete_s,
+                        (u->complete_s - u->requested_s) * 1e3, (u->first_s - u->requested_s) * 1e3, double(u->tiles), double(u->samples),
+                        double(u->points), double(u->bytes), u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0});
+    spans_.add("view update", u->requested_s, u->complete_s, 2);
+    const std::lock_guard lock(mutex_);
+    last_update_ = {u->requested_s, u->camera.pose, patch.sequence.value};
+    ++updates_;
+  }
+}
+
+void ReplicaWorker::request_view(double now_s) {
+  std::vector<std::pair<double, geometry::Camera>> poses;
+  {
+    const std::lock_guard lock(mutex_);
+    poses.swap(poses_);
+  }
+  for (const auto& [t, camera] : poses) requester_.on_pose(to_master_s(t), camera);
+  if (!link_.session() || !patches_) return;
+  if (const auto request = requester_.next(to_master_s(now_s))) link_.socket().send(*request);
+}
+
+void ReplicaWorker::report(double now_s, bool last) {
+  if (!last && now_s - last_report_s_ < kReportPeriod_s) return;
+  last_report_s_ = now_s;
+  for (const auto& rows : {frames_.flush(link_.instance()), updates_table_.flush(link_.instance()), spans_.flush(link_.instance())})
+    if (rows) link_.socket().send(*rows);
+  std::vector<points::ClusterKey> seen;
+  {
+    const std::lock_guard lock(mutex_);
+    seen.swap(seen_);
+  }
+  if (seen.empty() || !state_) return;
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  state_->send(wire::AccessReport{link_.instance(), seen});
+}
+
+net::MasterLink::Values ReplicaWorker::status() const {
+  const auto figures = cache_.figures();
+  return {{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"points", double(figures.points)},
+          {"model_bytes", double(figures.bytes)}, {"points_received", double(points_received_)}, {"bytes_received", double(bytes_received_)},
+          {"gaps_resynced", double(sequencer_.gaps())}, {"updates", double(updates_)}, {"first_points_s", first_points_s_},
+          {"sequence", double(sequencer_.applied().value)},
+          {"messages_rejected", double((patches_ ? patches_->rejected() : 0) + (state_ ? state_->rejected() : 0) + decode_errors_)}};
+}
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,80 @@
+// The viewer's network side, on a thread of its own: receives point-model events, decodes and applies them to the cache, asks for
+// views, reports what was drawn, measures updates. It never holds up a display frame.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "client/viewer/cache/event_sequencer.h"
+#include "client/viewer/cache/model_cache.h"
+#include "client/viewer/coupling/view_requester.h"
+#include "common/metrics/recorder.h"
+#include "common/net/master_link.h"
+#include "common/net/service.h"
+
+namespace telesplat::viewer {
+
+class ReplicaWorker {
+ public:
+  struct Options {
+    net::ServiceOptions service;
+    RequestOptions requests;
+    std::map<std::string, std::string> facts;  ///< for the hello
+  };
+
+  /// Starts the thread.
+  ReplicaWorker(net::Context& context, const Options& options, ModelCache& cache, metrics::TableRecorder& frames, metrics::SpanRecorder& spans);
+  /// Stops it, after a last flush of metrics and a goodbye.
+  ~ReplicaWorker();
+
+  // ---- display thread ----
+  /// A frame was displayed with this camera; `seen`: the clusters it drew.
+  void on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen);
+  /// Events applied so far tell a first update: true once one frame was applied completely.
+  bool first_update_complete() const { return updates_ > 0; }
+  bool shutdown_requested() const { return shutdown_; }
+  double to_master_s(double local_s) const { return local_s + offset_s_; }
+
+  struct LastUpdate { double requested_s = 0; geometry::Pose pose; uint64_t sequence = 0; };
+  LastUpdate last_update() const;
+
+ private:
+  void loop();
+  void connect_if_changed();
+  void receive_control();
+  void receive_events();
+  void receive_answers();
+  void apply(const ModelEvent& event);
+  void apply_patch(const wire::Patch& patch);
+  void request_view(double now_s);
+  void report(double now_s, bool last);
+  net::MasterLink::Values status() const;
+
+  net::Context& context_;
+  Options options_;
+  ModelCache& cache_;
+  metrics::TableRecorder& frames_;
+  metrics::SpanRecorder& spans_;
+  metrics::TableRecorder updates_table_;
+  net::MasterLink link_;
+  std::optional<net::Socket> patches_, state_;
+  std::string patches_endpoint_, state_endpoint_;
+  EventSequencer sequencer_;
+  ViewRequester requester_;
+  int seen_version_ = 0;
+  double started_s_ = 0, last_report_s_ = 0, asked_s_ = 0, first_points_s_ = 0;
+  uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0;
+
+  mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
+  std::vector<std::pair<double, geometry::Camera>> poses_;
+  std::vector<points::ClusterKey> seen_;
+  LastUpdate last_update_;
+
+  std::atomic<uint64_t> updates_{0};
+  std::atomic<bool> shutdown_{false}, stop_{false};
+  std::atomic<double> offset_s_{0};
+  std::thread thread_;
+};
+
+}  // namespace telesplat::viewer

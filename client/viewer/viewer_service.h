@@ -1,0 +1,29 @@
+// The viewer process (T3.3.3): a replica of the point model, a display that never waits, measurements of itself.
+#pragma once
+
+#include "client/viewer/display/display_loop.h"
+
+namespace telesplat::viewer {
+
+struct ViewerOptions {
+  net::ServiceOptions service;
+  DisplayOptions display;
+  RequestOptions requests;
+  std::string size = "1280x800", sampling_size = "1280x800";  ///< pixels, WxH
+  std::string trajectory = "orbit";  ///< "orbit", "still" or a CSV file
+  std::string renderer = "auto", splat = "disc", coupling = "async";
+  int threads = 0;
+  std::string out;                   ///< run folder; empty: nothing is recorded
+};
+
+/// Flags that `telesplat run` has too: size, trajectory, renderer and the like.
+void add_view_flags(CLI::App& app, ViewerOptions& options);
+void add_flags(CLI::App& app, ViewerOptions& options);
+
+/// "WxH" with both in 16..16384.
+Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag);
+
+/// Exit code: 0 done, 1 failed while running, 2 bad usage or input.
+int run(ViewerOptions options);
+
+}  // namespace telesplat::viewer
