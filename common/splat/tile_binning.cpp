@@ -1,0 +1,92 @@
+#include "common/splat/tile_binning.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace telesplat::splat {
+namespace {
+
+// Where a leaf's cube projects: bounds in pixels, or unbounded where it reaches nearer than the near plane.
+struct Footprint {
+  float x0, x1, y0, y1;
+  float nearest, farthest;
+};
+
+Footprint project_cube(const LeafTransform& t) {
+  // Corners 0 and 65536 on each axis: the eight sums of the rows' entries.
+  float x[8], y[8], w[8];
+  for (int i = 0; i < 8; ++i) {
+    const float cx = i & 1 ? 65536.0f : 0.0f, cy = i & 2 ? 65536.0f : 0.0f, cz = i & 4 ? 65536.0f : 0.0f;
+    x[i] = t.x[0] * cx + t.x[1] * cy + t.x[2] * cz + t.x[3];
+    y[i] = t.y[0] * cx + t.y[1] * cy + t.y[2] * cz + t.y[3];
+    w[i] = t.w[0] * cx + t.w[1] * cy + t.w[2] * cz + t.w[3];
+  }
+  Footprint f{INFINITY, -INFINITY, INFINITY, -INFINITY, INFINITY, -INFINITY};
+  for (int i = 0; i < 8; ++i) {
+    const float inverse = 1.0f / w[i];
+    f.x0 = std::min(f.x0, x[i] * inverse), f.x1 = std::max(f.x1, x[i] * inverse);
+    f.y0 = std::min(f.y0, y[i] * inverse), f.y1 = std::max(f.y1, y[i] * inverse);
+    f.nearest = std::min(f.nearest, w[i]), f.farthest = std::max(f.farthest, w[i]);
+  }
+  return f;
+}
+
+}  // namespace
+
+geometry::Rect TileGrid::rect(int index) const {
+  const int x = index % columns() * tile_width, y = index / columns() * tile_height;
+  return {x, y, std::min(tile_width, width - x), std::min(tile_height, height - y)};
+}
+
+LeafTransform leaf_transform(const geometry::Camera::PixelTransform& t, const geometry::Box& leaf) {
+  const glm::dvec3 step = (glm::dvec3(leaf.hi) - glm::dvec3(leaf.lo)) / 65536.0;
+  const glm::dvec3 first = glm::dvec3(leaf.lo) + 0.5 * step;
+  const auto fold = [&](const glm::dvec4& row) {
+    return std::array<float, 4>{static_cast<float>(row.x * step.x), static_cast<float>(row.y * step.y),
+                                static_cast<float>(row.z * step.z),
+                                static_cast<float>(row.x * first.x + row.y * first.y + row.z * first.z + row.w)};
+  };
+  return {fold(t.x), fold(t.y), fold(t.w)};
+}
+
+void TileBinning::build(const TileGrid& grid, std::span<const LeafTransform> transforms, float near_m, float margin_px) {
+  const float margin = margin_px + 1.0f;  // 1: rounding, here and where the points are projected
+  const auto last_column = static_cast<float>(grid.columns() - 1), last_row = static_cast<float>(grid.rows() - 1);
+  const float per_column = 1.0f / static_cast<float>(grid.tile_width), per_row = 1.0f / static_cast<float>(grid.tile_height);
+  const auto whole_image = Range{0, static_cast<int16_t>(last_column), 0, static_cast<int16_t>(last_row), false};
+
+  ranges_.resize(transforms.size());
+  first_.assign(static_cast<size_t>(grid.count()) + 1, 0);
+  for (size_t i = 0; i < transforms.size(); ++i) {
+    const Footprint f = project_cube(transforms[i]);
+    Range& r = ranges_[i];
+    r = {1, 0, 1, 0, false};
+    if (!(f.farthest >= near_m)) continue;
+    // A cube that reaches nearer than half the near plane has no bounded footprint. It is rare: such cubes are in your face.
+    if (!(f.nearest > 0.5f * near_m)) {
+      r = whole_image;
+    } else {
+      const float x0 = f.x0 - margin, x1 = f.x1 + margin, y0 = f.y0 - margin, y1 = f.y1 + margin;
+      if (x1 < 0 || y1 < 0 || x0 > static_cast<float>(grid.width) || y0 > static_cast<float>(grid.height)) continue;
+      const float c0 = std::floor(x0 * per_column), c1 = std::floor(x1 * per_column);
+      const float r0 = std::floor(y0 * per_row), r1 = std::floor(y1 * per_row);
+      r = {static_cast<int16_t>(std::max(c0, 0.0f)), static_cast<int16_t>(std::min(c1, last_column)),
+           static_cast<int16_t>(std::max(r0, 0.0f)), static_cast<int16_t>(std::min(r1, last_row)), false};
+      r.whole = c0 == c1 && r0 == r1 && c0 >= 0 && r0 >= 0 && x1 < static_cast<float>(grid.width) &&
+                y1 < static_cast<float>(grid.height) && f.nearest > near_m * 1.0001f;
+    }
+    for (int row = r.row0; row <= r.row1; ++row)
+      for (int column = r.column0; column <= r.column1; ++column) ++first_[row * grid.columns() + column + 1];
+  }
+  for (size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+  next_.assign(first_.begin(), first_.end() - 1);
+  entries_.resize(first_.back());
+  for (size_t i = 0; i < ranges_.size(); ++i) {
+    const Range& r = ranges_[i];
+    for (int row = r.row0; row <= r.row1; ++row)
+      for (int column = r.column0; column <= r.column1; ++column)
+        entries_[next_[row * grid.columns() + column]++] = {static_cast<uint32_t>(i), r.whole};
+  }
+}
+
+}  // namespace telesplat::splat

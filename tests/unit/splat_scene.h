@@ -1,0 +1,134 @@
+// Points for splatting tests: clusters made by hand, and an oracle that splats them in the plainest way.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "common/image/normal.h"
+#include "common/splat/cpu_splatter.h"
+#include "common/splat/splat_table.h"
+#include "common/splat/tile_binning.h"
+
+namespace telesplat::testing {
+
+/// One mosaic level with its cluster, filled point by point, each array in an allocation of just its size.
+class HandMadeItem {
+ public:
+  explicit HandMadeItem(const geometry::Box& leaf) : cluster_(std::make_unique<points::Cluster>()) { cluster_->leaf_room = leaf; }
+
+  void add(uint16_t x, uint16_t y, uint16_t z, uint32_t colour, uint16_t normal = image::encode_normal16({0, 0, 1})) {
+    x_.push_back(x), y_.push_back(y), z_.push_back(z), normal_.push_back(normal), colour_.push_back(colour);
+  }
+  /// The point of the leaf's grid nearest to `position_room`, which must lie in the leaf.
+  void add_at(const glm::dvec3& position_room, uint32_t colour, uint16_t normal = image::encode_normal16({0, 0, 1})) {
+    const geometry::Box& b = cluster_->leaf_room;
+    const auto q = [](double p, float lo, float hi) {
+      return static_cast<uint16_t>(std::clamp(std::floor((p - lo) / (double(hi) - lo) * 65536.0), 0.0, 65535.0));
+    };
+    add(q(position_room.x, b.lo.x, b.hi.x), q(position_room.y, b.lo.y, b.hi.y), q(position_room.z, b.lo.z, b.hi.z), colour, normal);
+  }
+  splat::DrawItem item(float splat_px) {
+    x_.shrink_to_fit(), y_.shrink_to_fit(), z_.shrink_to_fit(), normal_.shrink_to_fit(), colour_.shrink_to_fit();
+    return {cluster_.get(), {static_cast<uint32_t>(x_.size()), x_.data(), y_.data(), z_.data(), normal_.data(), colour_.data()}, splat_px};
+  }
+
+ private:
+  std::unique_ptr<points::Cluster> cluster_;
+  std::vector<uint16_t> x_, y_, z_, normal_;
+  std::vector<uint32_t> colour_;
+};
+
+inline splat::DrawList draw_list(std::vector<splat::DrawItem> items) {
+  splat::DrawList list;
+  list.items = std::move(items);
+  for (const auto& item : list.items) list.points += item.level.count;
+  return list;
+}
+
+struct Frame {
+  int width, height;
+  std::vector<uint32_t> colour;
+  std::vector<float> depth_m;
+  Frame(int w, int h) : width(w), height(h), colour(size_t(w) * h, 0x12345678), depth_m(size_t(w) * h, -1.0f) {}
+  splat::FrameTarget target() { return {width, height, colour.data(), depth_m.data()}; }
+  uint32_t at(int x, int y) const { return colour[size_t(y) * width + x]; }
+  bool operator==(const Frame&) const = default;
+};
+
+/// Looks along -z from the origin, 90 degrees wide.
+inline geometry::Camera front_camera(int width, int height) { return geometry::make_camera({}, 90, width, height, 0.1); }
+
+inline image::Shading unlit(const geometry::Camera& camera, uint32_t background = 0x00010203) {
+  image::ShadingParameters p;
+  p.lit = false;
+  p.background = background;
+  return {p, camera};
+}
+
+/// `count` items of random points in boxes around the camera's axis, some reaching behind it; sizes from `sizes`.
+inline std::vector<HandMadeItem> random_items(uint32_t seed, int count, int most_points) {
+  std::mt19937 rng(seed);
+  const auto uniform = [&](float lo, float hi) { return std::uniform_real_distribution<float>(lo, hi)(rng); };
+  std::vector<HandMadeItem> items;
+  for (int i = 0; i < count; ++i) {
+    const glm::vec3 lo(uniform(-1.2f, 1.0f), uniform(-0.9f, 0.7f), uniform(-2.0f, 0.1f));
+    HandMadeItem item({lo, lo + glm::vec3(uniform(0.01f, 0.4f))});
+    const int n = std::uniform_int_distribution<int>(1, most_points)(rng);
+    for (int j = 0; j < n; ++j)
+      item.add(uint16_t(rng()), uint16_t(rng()), uint16_t(rng()), rng() & 0xffffff, uint16_t(rng()));
+    items.push_back(std::move(item));
+  }
+  return items;
+}
+
+/// One point after the other, one pixel after the other, by the formulas of splat_kernels.h and splat_table.h.
+inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+                           const image::Shading& shading) {
+  Frame frame(camera.width, camera.height);
+  std::vector<uint64_t> keys(frame.colour.size(), ~uint64_t{0});
+  const auto near_m = static_cast<float>(camera.near_m);
+  for (const splat::DrawItem& item : list.items) {
+    const splat::LeafTransform t = splat::leaf_transform(camera.room_to_pixel(), item.cluster->leaf_room);
+    const bool disc = kernel == splat::Kernel::kDisc;
+    const float diameter = splat::disc_diameter(item.splat_px);
+    const int side = disc ? int(std::ceil(diameter)) : splat::square_side(item.splat_px);
+    const int steps = side == 1 ? 1 : side <= 4 ? 8 : 4;
+    for (uint32_t i = 0; i < item.level.count; ++i) {
+      const float p[3] = {float(item.level.x[i]), float(item.level.y[i]), float(item.level.z[i])};
+      const auto row = [&](const std::array<float, 4>& r) { return ((p[0] * r[0] + p[1] * r[1]) + p[2] * r[2]) + r[3]; };
+      const float w = row(t.w);
+      if (!(w >= near_m)) continue;
+      const float shift = float(steps) * 0.5f * float(1 - side);
+      const float fixed_x = row(t.x) * (float(steps) / w) + shift, fixed_y = row(t.y) * (float(steps) / w) + shift;
+      if (!(std::abs(fixed_x) < 1e6f && std::abs(fixed_y) < 1e6f)) continue;
+      const int fx = int(std::floor(fixed_x)), fy = int(std::floor(fixed_y));
+      const int x0 = int(std::floor(double(fx) / steps)), y0 = int(std::floor(double(fy) / steps));
+      const double cx = (fx - x0 * steps + 0.5) / steps + 0.5 * (side - 1), cy = (fy - y0 * steps + 0.5) / steps + 0.5 * (side - 1);
+      const uint32_t colour = image::Shading::apply(item.level.colour[i], shading.table()[item.level.normal[i]]);
+      for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+          if (x0 + x < 0 || y0 + y < 0 || x0 + x >= frame.width || y0 + y >= frame.height) continue;
+          const double r2 = (x + 0.5 - cx) * (x + 0.5 - cx) + (y + 0.5 - cy) * (y + 0.5 - cy);
+          if (disc && side > 1 && r2 > 0.25 * diameter * diameter && !(x == int(cx) && y == int(cy))) continue;
+          const uint64_t bias = side > 1 ? splat::splat_bias(r2, side, camera.focal_x()) : 0;
+          const uint64_t depth = (std::bit_cast<uint32_t>(w) | 0x80000000u) + (bias << splat::kBiasShift);
+          uint64_t& key = keys[size_t(y0 + y) * frame.width + x0 + x];
+          key = std::min(key, depth << 32 | bias << 24 | colour);
+        }
+    }
+  }
+  for (size_t i = 0; i < keys.size(); ++i) {
+    const bool empty = keys[i] == ~uint64_t{0};
+    frame.colour[i] = 0xff000000u | (empty ? shading.background() : uint32_t(keys[i]));
+    frame.depth_m[i] = empty ? std::numeric_limits<float>::infinity()
+                             : std::bit_cast<float>((uint32_t(keys[i] >> 32) & 0x7fffffffu) - (uint32_t(keys[i]) >> 24 << splat::kBiasShift));
+  }
+  return frame;
+}
+
+}  // namespace telesplat::testing
