@@ -1,0 +1,136 @@
+// The packer without its sockets and clocks (T4.3): sampled tiles and access reports come in, point-model events go out.
+// One thread at a time.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/core/ids.h"
+#include "common/core/result.h"
+#include "common/geometry/camera.h"
+#include "common/image/depth_image.h"
+#include "common/points/point_model.h"
+#include "common/splat/reference_depth.h"
+
+namespace telesplat::packer {
+
+/// More tiles than this a frame are refused.
+inline constexpr uint32_t kMaxTilesInFrame = 1u << 20;
+/// A forget event names at most this many clusters; more become several events.
+inline constexpr size_t kMaxForgetKeys = 1u << 16;
+
+enum class Redundancy {
+  kEliminate,  ///< T4.3.1: only what the model does not show yet is packed
+  kKeep,       ///< everything is packed; viewers choose the best patch per cluster (T4.4.3)
+};
+
+struct Config {
+  points::ModelConfig model;
+  Redundancy redundancy = Redundancy::kEliminate;
+  float relative_epsilon = 0.005f;    ///< of T4.3.1, as a fraction of the depth
+  double obsolete_after_s = 0;        ///< clusters that nobody drew for so long are forgotten; 0 = never (T4.3.3)
+  uint64_t max_points = 0;            ///< above it, least recently drawn clusters are forgotten down to 90 % of it; 0 = no limit
+  uint64_t max_log_bytes = 0;         ///< above it, least recently drawn patches are forgotten down to 90 % of it; 0 = no limit
+  int threads = 1;                    ///< for reference depth maps; 0 = all cores
+};
+
+/// A tile as a sampler sent it, decoded.
+struct SampledTile {
+  FrameId frame;
+  EpochId epoch;
+  uint32_t tile = 0, tiles_in_frame = 0;
+  geometry::Camera camera;  ///< of the whole frame
+  geometry::Rect rect;      ///< the tile in it
+  InstanceId viewer;        ///< who asked, and with which request: handed through to the event
+  RequestId request;
+  image::DepthImage image;  ///< canonical, of rect's size
+};
+
+/// What replicas apply, in order of sequence.
+struct Event {
+  enum class Kind { kPatch, kForget, kEpoch };
+
+  Sequence sequence;
+  Kind kind = Kind::kPatch;
+  EpochId epoch;
+
+  // kPatch
+  FrameId frame;
+  InstanceId viewer;
+  RequestId request;
+  uint32_t tile = 0, tiles_in_frame = 0;
+  bool frame_complete = false;         ///< the last tile of its frame to be packed
+  geometry::Camera camera;             ///< of the whole frame
+  geometry::Rect rect;                 ///< the tile in it
+  std::shared_ptr<const std::vector<uint8_t>> blob;  ///< codec stream of the tile, eliminated pixels not covered
+  uint64_t samples = 0, kept = 0;              ///< covered pixels before and after elimination, of this tile
+  uint64_t frame_samples = 0, frame_kept = 0;  ///< the same of the frame's tiles so far: elimination = 1 - kept / samples
+
+  // kForget
+  std::vector<points::ClusterKey> clusters;  ///< ascending, at most kMaxForgetKeys
+};
+
+struct Statistics {
+  uint64_t tiles = 0;              ///< packed
+  uint64_t tiles_duplicate = 0;    ///< dropped: had that tile of that frame already
+  uint64_t tiles_other_epoch = 0;  ///< dropped: sampled from another version of the data set
+  uint64_t tiles_refused = 0;      ///< dropped: contradict themselves or their frame
+  uint64_t frames_complete = 0;
+  uint64_t samples = 0, kept = 0;  ///< covered pixels before and after elimination
+  uint64_t points_outside = 0;     ///< kept samples outside the octree's cube
+  uint64_t clusters_forgotten = 0, points_forgotten = 0;
+};
+
+class PackerCore {
+ public:
+  /// The two steps of redundancy elimination; tests replace them.
+  struct Hooks {
+    std::function<void(const points::PointModel&, const geometry::Camera&, int threads, std::vector<float>& depth_m)> reference_depth =
+        splat::render_reference_depth;
+    std::function<splat::Elimination(const geometry::Camera&, const geometry::Rect&, const std::vector<float>& reference_depth_m,
+                                     float relative_epsilon, image::DepthImage&)>
+        eliminate = splat::eliminate_redundancy;
+  };
+
+  /// Precondition: points::validate(config.model). Sequences start at 1.
+  PackerCore(const Config& config, EpochId epoch);
+  PackerCore(const Config& config, EpochId epoch, Hooks hooks);
+  ~PackerCore();
+
+  /// Packs a tile: eliminates what the model shows, inserts the rest, returns the event to publish. A tile of which nothing is
+  /// left is an event too (of no points), so that viewers can tell when a frame is complete. Nothing: the tile was dropped and
+  /// counted (duplicate, other epoch). Error: camera, rectangle, image or frame do not fit together; dropped and counted.
+  /// now_s: any steady clock; the same one in all calls.
+  Result<std::optional<Event>> submit(SampledTile tile, double now_s);
+
+  /// A viewer drew these clusters. Unknown keys are ignored.
+  void accessed(std::span<const points::ClusterKey> clusters, double now_s);
+
+  /// Decides what is obsolete (T4.3.3) or too much. Returns the forget events to publish, most often none.
+  std::vector<Event> tick(double now_s);
+
+  /// A new version of the data set: forgets everything. Nothing if that is the epoch already.
+  std::optional<Event> begin_epoch(EpochId epoch);
+
+  /// What brings a replica that has applied every event up to `after` (0: an empty one) to the present state, in order of
+  /// sequence. Patches of which every point is forgotten are left out, as are forgets that change nothing for anyone who
+  /// applies this list; so sequences rise but may have holes. A replica that has applied the list is as of sequence().
+  std::vector<Event> events_since(Sequence after) const;
+
+  /// Of the newest event; 0 before the first.
+  Sequence sequence() const;
+  EpochId epoch() const;
+  const points::PointModel& model() const;
+  const Statistics& statistics() const;
+  /// Memory of the events kept for events_since(), estimated.
+  uint64_t log_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace telesplat::packer
