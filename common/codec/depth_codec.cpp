@@ -1,145 +1,94 @@
 #include "common/codec/depth_codec.h"
 
-#include <algorithm>
-#include <array>
-#include <string>
+#include <fmt/format.h>
 
-#include "common/codec/entropy.h"
+#include "common/codec/tile.h"
 
 namespace telesplat::codec {
 namespace {
 
 using detail::Reader;
+using detail::TileGrid;
 using image::DepthImage;
 
-constexpr uint8_t kMagic = 0xD7, kVersion = 1;
+// stream = magic, version, varint width, varint height, tiles of TileGrid row by row (tile.h); nothing after them.
+constexpr uint8_t kMagic = 0xD7, kVersion = 2;
 
-Error damaged(const char* what) { return Error{std::string("depth image stream: ") + what}; }
+Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 
-// Channels of one pixel as the predictor sees them: depth, green, red - green, blue - green, normal x, normal y.
-constexpr int kChannels = 6;
-constexpr int kStreams = 8;  // depth takes three byte planes
-using Pixel = std::array<uint32_t, kChannels>;
-
-uint32_t zigzag(uint32_t v, int bits) {
-  const uint32_t mask = (1u << bits) - 1, sign = v >> (bits - 1) & 1;
-  return ((v << 1) ^ (0 - sign)) & mask;
-}
-uint32_t unzigzag(uint32_t v, int bits) { return ((v >> 1) ^ (0 - (v & 1))) & ((1u << bits) - 1); }
-
-Pixel split(uint32_t depth, uint32_t colour, uint16_t normal) {
-  const uint32_t r = colour >> 16 & 255, g = colour >> 8 & 255, b = colour & 255;
-  return {depth, g, (r - g) & 255, (b - g) & 255, normal & 255u, uint32_t{normal} >> 8};
-}
-
-// Walks the image with a filled copy of the last row, where holes hold their prediction; `code(i, prediction)` gives the
-// pixel's channels for covered pixels.
-template <class Covered, class Code>
-void walk(int width, int height, Covered covered, Code code) {
-  std::vector<Pixel> row(size_t(width) + 1, Pixel{});
-  for (int y = 0; y < height; ++y) {
-    Pixel left = row[1], up_left = row[1];
-    for (int x = 0; x < width; ++x) {
-      Pixel& up = row[x + 1];
-      Pixel prediction;
-      for (int c = 0; c < kChannels; ++c) prediction[c] = c == 0 ? (left[c] + up[c] - up_left[c]) & image::kMaxDepthCode : left[c];
-      up_left = up;
-      const size_t i = size_t(y) * width + x;
-      if (covered(i)) left = code(i, prediction);
-      up = left;
-    }
-  }
-}
-
-struct Header {
-  int width = 0, height = 0;
-  size_t pixels() const { return size_t(width) * height; }
+struct Size {
+  int width, height;
 };
 
-Result<Header> read_header(Reader& in, size_t stream_bytes) {
+// Refuses sizes that the rest of the stream cannot hold: every tile, of at most kMaxTilePixels pixels, takes a byte or more.
+Result<Size> read_header(Reader& in) {
   const auto magic = in.u8(), version = in.u8();
   if (!version) return damaged("shorter than its header");
-  if (*magic != kMagic) return damaged("wrong magic byte");
-  if (*version != kVersion) return Error{"depth image stream: version " + std::to_string(*version) + ", expected " + std::to_string(kVersion)};
+  if (*magic != kMagic) return damaged(fmt::format("begins with {:#04x}, not {:#04x}", *magic, kMagic));
+  if (*version != kVersion) return damaged(fmt::format("version {}, expected {}", *version, kVersion));
   const auto width = in.varint(), height = in.varint();
   if (!height) return damaged("shorter than its header");
-  if (*width == 0 || *height == 0 || *width > kMaxPixels || *height > kMaxPixels || *width * *height > kMaxPixels)
-    return Error{"depth image stream: " + std::to_string(*width) + " x " + std::to_string(*height) + " pixels, limit " + std::to_string(kMaxPixels)};
-  (void)stream_bytes;
-  return Header{int(*width), int(*height)};
+  if (*width == 0 || *height == 0 || *width > kMaxPixels || *height > kMaxPixels || uint64_t{*width} * *height > kMaxPixels)
+    return damaged(fmt::format("{} x {} pixels, limit {} in all and at least 1 x 1", *width, *height, kMaxPixels));
+  const Size size{static_cast<int>(*width), static_cast<int>(*height)};
+  const TileGrid grid(size.width, size.height);
+  const size_t tiles = static_cast<size_t>(grid.columns) * static_cast<size_t>(grid.rows);
+  if (in.left() < tiles) return damaged(fmt::format("{} bytes left for {} x {} pixels, which take {} or more", in.left(), *width, *height, tiles));
+  return size;
+}
+
+// f(column, row) -> bool for every tile in order, until one is false.
+template <class F>
+bool for_each_tile(const TileGrid& grid, F f) {
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column)
+      if (!f(column, row)) return false;
+  return true;
 }
 
 }  // namespace
 
 std::vector<uint8_t> encode(const DepthImage& image) {
-  const size_t pixels = image.pixels();
-  CHECK(image.width > 0 && image.height > 0 && pixels <= kMaxPixels && image.colour.size() == pixels && image.normal.size() == pixels);
-  std::vector<uint8_t> out{kMagic, kVersion};
-  detail::put_varint(out, image.width);
-  detail::put_varint(out, image.height);
-
-  std::vector<uint8_t> mask((pixels + 7) / 8);
-  for (size_t i = 0; i < pixels; ++i) mask[i / 8] |= uint8_t(image.depth[i] != 0) << i % 8;
-  detail::put_block(out, mask);
-
-  std::vector<uint8_t> streams[kStreams];
-  walk(image.width, image.height, [&](size_t i) { return image.depth[i] != 0; },
-       [&](size_t i, const Pixel& prediction) {
-         const Pixel actual = split(image.depth[i], image.colour[i], image.normal[i]);
-         const uint32_t d = zigzag(actual[0] - prediction[0], 24);
-         for (int c = 0; c < 3; ++c) streams[c].push_back(uint8_t(d >> 8 * c));
-         for (int c = 1; c < kChannels; ++c) streams[c + 2].push_back(uint8_t(zigzag(actual[c] - prediction[c], 8)));
-         return actual;
-       });
-  for (const auto& stream : streams) detail::put_block(out, stream);
+  CHECK(image.width > 0 && image.height > 0 && image.pixels() <= kMaxPixels);
+  CHECK(image.pixels() == static_cast<size_t>(image.width) * static_cast<size_t>(image.height));
+  CHECK(image.colour.size() == image.pixels() && image.normal.size() == image.pixels());
+  std::vector<uint8_t> out;
+  out.reserve(64 + image.pixels() / 8);
+  out.assign({kMagic, kVersion});
+  detail::put_varint(out, static_cast<uint32_t>(image.width));
+  detail::put_varint(out, static_cast<uint32_t>(image.height));
+  const TileGrid grid(image.width, image.height);
+  for_each_tile(grid, [&](int column, int row) { return detail::put_tile(out, image, grid.rect(column, row)), true; });
   return out;
 }
 
 Result<DepthImage> decode(std::span<const uint8_t> bytes, int expected_width, int expected_height) {
   Reader in(bytes);
-  const auto header = read_header(in, bytes.size());
-  if (!header) return header.error();
-  if ((expected_width && header->width != expected_width) || (expected_height && header->height != expected_height))
-    return Error{"depth image stream: " + std::to_string(header->width) + " x " + std::to_string(header->height) + " pixels, expected " +
-                 std::to_string(expected_width) + " x " + std::to_string(expected_height)};
-  const size_t pixels = header->pixels();
-  std::vector<uint8_t> mask((pixels + 7) / 8);
-  if (!detail::get_block(in, mask)) return damaged("damaged mask");
-  if (pixels % 8) mask.back() &= uint8_t((1 << pixels % 8) - 1);
-  size_t count = 0;
-  for (const uint8_t byte : mask) count += __builtin_popcount(byte);
-
-  std::vector<uint8_t> streams[kStreams];
-  for (auto& stream : streams) {
-    stream.resize(count);
-    if (!detail::get_block(in, stream)) return damaged("damaged plane");
-  }
-  if (in.left() != 0) return damaged("bytes after its end");
-
-  DepthImage image(header->width, header->height);
-  size_t k = 0;
-  bool zero_depth = false;
-  walk(image.width, image.height, [&](size_t i) { return mask[i / 8] >> i % 8 & 1; },
-       [&](size_t i, const Pixel& prediction) {
-         Pixel p;
-         p[0] = (prediction[0] + unzigzag(streams[0][k] | streams[1][k] << 8 | streams[2][k] << 16, 24)) & image::kMaxDepthCode;
-         for (int c = 1; c < kChannels; ++c) p[c] = (prediction[c] + unzigzag(streams[c + 2][k], 8)) & 255;
-         ++k;
-         zero_depth |= p[0] == 0;
-         image.depth[i] = p[0];
-         image.colour[i] = ((p[2] + p[1]) & 255) << 16 | p[1] << 8 | ((p[3] + p[1]) & 255);
-         image.normal[i] = uint16_t(p[4] | p[5] << 8);
-         return p;
-       });
-  if (zero_depth) return damaged("covered pixel of depth 0");
+  const auto size = read_header(in);
+  if (!size) return size.error();
+  if ((expected_width != 0 && size->width != expected_width) || (expected_height != 0 && size->height != expected_height))
+    return damaged(fmt::format("{} x {} pixels, expected {} x {} (0: any)", size->width, size->height, expected_width, expected_height));
+  DepthImage image(size->width, size->height);
+  const TileGrid grid(image.width, image.height);
+  std::string problem;
+  const bool good = for_each_tile(grid, [&](int column, int row) {
+    if (detail::get_tile(in, image, grid.rect(column, row))) return true;
+    problem = fmt::format("damaged or cut off in tile {}, {} of {} x {}", column, row, grid.columns, grid.rows);
+    return false;
+  });
+  if (!good) return damaged(problem);
+  if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
   return image;
 }
 
 Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {
   Reader in(bytes);
-  const auto header = read_header(in, bytes.size());
-  if (!header) return header.error();
-  return StreamInfo{header->width, header->height};
+  const auto size = read_header(in);
+  if (!size) return size.error();
+  StreamInfo info{size->width, size->height};
+  if (!for_each_tile(TileGrid(info.width, info.height), [&](int, int) { return detail::skip_tile(in, info); })) return damaged("damaged or cut off");
+  if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
+  return info;
 }
 
 }  // namespace telesplat::codec

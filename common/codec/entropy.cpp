@@ -3,7 +3,6 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <cstring>
 #include <memory>
 
 #include "common/core/check.h"
@@ -11,13 +10,23 @@
 namespace telesplat::codec::detail {
 namespace {
 
-enum BlockKind : uint8_t { kConstant = 0, kStored = 1, kZstd = 2 };
+// Bench codec/*: see depth_codec.cpp, "Candidates".
+constexpr int kZstdLevel = 1;
+
+// A block is varint(size << 2 | kind) and then `size` bytes.
+enum BlockKind : uint32_t { kConstant = 0, kStored = 1, kZstd = 2 };
 
 // Making a context costs as much as coding a small tile, so each thread keeps its own.
 ZSTD_CCtx* compressor() {
   struct Free { void operator()(ZSTD_CCtx* c) const { ZSTD_freeCCtx(c); } };
-  static thread_local const std::unique_ptr<ZSTD_CCtx, Free> context(ZSTD_createCCtx());
-  CHECK(context != nullptr);
+  static thread_local const std::unique_ptr<ZSTD_CCtx, Free> context([] {
+    ZSTD_CCtx* c = ZSTD_createCCtx();
+    CHECK(c != nullptr);
+    ZSTD_CCtx_setParameter(c, ZSTD_c_compressionLevel, kZstdLevel);
+    ZSTD_CCtx_setParameter(c, ZSTD_c_experimentalParam5, 1);  // literalCompressionMode = on, also at negative levels
+    ZSTD_CCtx_setParameter(c, ZSTD_c_contentSizeFlag, 0);     // the decoder knows the size
+    return c;
+  }());
   return context.get();
 }
 ZSTD_DCtx* decompressor() {
@@ -25,6 +34,22 @@ ZSTD_DCtx* decompressor() {
   static thread_local const std::unique_ptr<ZSTD_DCtx, Free> context(ZSTD_createDCtx());
   CHECK(context != nullptr);
   return context.get();
+}
+
+struct Block {
+  uint32_t kind;
+  std::span<const uint8_t> bytes;
+};
+std::optional<Block> next_block(Reader& in) {
+  const auto head = in.varint();
+  const auto bytes = head ? in.bytes(*head >> 2) : std::nullopt;
+  if (!bytes) return std::nullopt;
+  return Block{*head & 3, *bytes};
+}
+
+void append(std::vector<uint8_t>& out, uint32_t kind, std::span<const uint8_t> bytes) {
+  put_varint(out, static_cast<uint32_t>(bytes.size()) << 2 | kind);
+  out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
 }  // namespace
@@ -36,13 +61,14 @@ std::optional<uint8_t> Reader::u8() {
   return value;
 }
 
-std::optional<uint64_t> Reader::varint() {
+std::optional<uint32_t> Reader::varint() {
   uint64_t value = 0;
   for (int shift = 0; shift < 35; shift += 7) {
     const auto byte = u8();
     if (!byte) break;
     value |= uint64_t{*byte & 127u} << shift;
-    if (*byte < 128) return value;
+    if (*byte < 128 && value <= UINT32_MAX) return static_cast<uint32_t>(value);
+    if (*byte < 128) break;
   }
   rest_ = {};
   return std::nullopt;
@@ -58,47 +84,50 @@ std::optional<std::span<const uint8_t>> Reader::bytes(size_t count) {
   return part;
 }
 
-void put_varint(std::vector<uint8_t>& out, uint64_t value) {
+void put_varint(std::vector<uint8_t>& out, uint32_t value) {
   for (; value >= 128; value >>= 7) out.push_back(static_cast<uint8_t>(value | 128));
   out.push_back(static_cast<uint8_t>(value));
 }
 
 void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
-  if (raw.empty()) return;
-  if (std::memcmp(raw.data(), raw.data() + 1, raw.size() - 1) == 0) {
-    out.insert(out.end(), {kConstant, raw[0]});
-    return;
-  }
+  if (raw.size() < 2) return append(out, kStored, raw);
+  if (std::memcmp(raw.data(), raw.data() + 1, raw.size() - 1) == 0) return append(out, kConstant, raw.first(1));
   static thread_local std::vector<uint8_t> packed;
-  packed.resize(ZSTD_compressBound(raw.size()));
-  const size_t size = ZSTD_compressCCtx(compressor(), packed.data(), packed.size(), raw.data(), raw.size(), 1);
+  packed.resize(std::max(packed.size(), ZSTD_compressBound(raw.size())));
+  const size_t size = ZSTD_compress2(compressor(), packed.data(), packed.size(), raw.data(), raw.size());
   CHECK(!ZSTD_isError(size));
-  const bool stored = size >= raw.size();
-  out.push_back(stored ? kStored : kZstd);
-  if (!stored) put_varint(out, size);
-  const auto best = stored ? raw : std::span<const uint8_t>(packed).first(size);
-  out.insert(out.end(), best.begin(), best.end());
+  if (size < raw.size()) append(out, kZstd, std::span(packed).first(size));
+  else append(out, kStored, raw);
 }
 
+void put_stored_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) { append(out, kStored, raw); }
+
 bool get_block(Reader& in, std::span<uint8_t> raw) {
-  if (raw.empty()) return true;
-  const auto kind = in.u8();
-  if (!kind) return false;
-  if (*kind == kConstant) {
-    const auto value = in.u8();
-    if (value) std::fill(raw.begin(), raw.end(), *value);
-    return value.has_value();
+  const auto block = next_block(in);
+  if (!block) return false;
+  switch (block->kind) {
+    case kConstant:
+      if (block->bytes.size() == 1) std::fill(raw.begin(), raw.end(), block->bytes[0]);
+      return block->bytes.size() == 1;
+    case kStored:
+      if (block->bytes.size() == raw.size()) std::copy(block->bytes.begin(), block->bytes.end(), raw.begin());
+      return block->bytes.size() == raw.size();
+    case kZstd:
+      return ZSTD_decompressDCtx(decompressor(), raw.data(), raw.size(), block->bytes.data(), block->bytes.size()) == raw.size();
+    default: return false;
   }
-  if (*kind == kStored) {
-    const auto bytes = in.bytes(raw.size());
-    if (bytes) std::copy(bytes->begin(), bytes->end(), raw.begin());
-    return bytes.has_value();
-  }
-  if (*kind != kZstd) return false;
-  const auto size = in.varint();
-  const auto bytes = size ? in.bytes(*size) : std::nullopt;
-  if (!bytes) return false;
-  return ZSTD_decompressDCtx(decompressor(), raw.data(), raw.size(), bytes->data(), bytes->size()) == raw.size();
+}
+
+std::optional<std::span<const uint8_t>> get_stored_block(Reader& in) {
+  const auto block = next_block(in);
+  if (!block || block->kind != kStored) return std::nullopt;
+  return block->bytes;
+}
+
+std::optional<size_t> skip_block(Reader& in) {
+  const size_t before = in.left();
+  if (!next_block(in)) return std::nullopt;
+  return before - in.left();
 }
 
 }  // namespace telesplat::codec::detail

@@ -1,0 +1,187 @@
+#include "common/codec/mask.h"
+
+#include <algorithm>
+
+#include "common/codec/tokens.h"
+
+namespace telesplat::codec::detail {
+namespace {
+
+// kRuns: lengths of the alternating runs of empty and covered pixels, rows joined: few pixels, or long runs.
+// kBytes: eight pixels a byte. kBytesAbove: the same, exclusive or with the row above, for outlines that run downwards.
+enum Coding : uint8_t { kRuns = 0, kBytes = 1, kBytesAbove = 2 };
+
+size_t bytes_per_row(const Mask& mask) { return (static_cast<size_t>(mask.width()) + 7) / 8; }
+
+// Lengths of runs in scan order, beginning with an empty one that may have length 0; the last run is left out.
+void run_lengths(const Mask& mask, std::vector<uint32_t>& lengths) {
+  lengths.clear();
+  uint64_t last = 0;
+  size_t begin = 0;
+  for (int y = 0; y < mask.height(); ++y)
+    for (size_t w = 0; w < mask.words_per_row(); ++w) {
+      const size_t first = static_cast<size_t>(y) * mask.width() + w * 64, bits = std::min<size_t>(64, mask.width() - w * 64);
+      const uint64_t word = mask.row(y)[w];
+      uint64_t changes = word ^ (word << 1 | last);
+      if (bits < 64) changes &= (uint64_t{1} << bits) - 1;
+      for (; changes != 0; changes &= changes - 1) {
+        const size_t at = first + static_cast<size_t>(std::countr_zero(changes));
+        lengths.push_back(static_cast<uint32_t>(at - begin));
+        begin = at;
+      }
+      last = word >> (bits - 1) & 1;
+    }
+}
+
+void set_bits(Mask& mask, size_t begin, size_t end) {
+  const size_t width = static_cast<size_t>(mask.width());
+  while (begin < end) {
+    const size_t y = begin / width, x = begin % width, take = std::min(end - begin, std::min(width - x, 64 - x % 64));
+    const uint64_t ones = take == 64 ? ~uint64_t{0} : ((uint64_t{1} << take) - 1);
+    mask.row(static_cast<int>(y))[x / 64] |= ones << x % 64;
+    begin += take;
+  }
+}
+
+struct Scratch {
+  std::vector<uint32_t> lengths;
+  std::vector<uint8_t> tokens[2], bytes, packed[2];
+  BitWriter writer;
+  BitReader reader;
+};
+Scratch& scratch() {
+  static thread_local Scratch s;
+  return s;
+}
+
+void put_runs(std::vector<uint8_t>& out, const std::vector<uint32_t>& lengths, Scratch& s) {
+  for (auto& tokens : s.tokens) tokens.clear();
+  s.writer.start(lengths.size() * NumberToken::kMaxBits);
+  for (size_t i = 0; i < lengths.size(); ++i) {
+    uint8_t token;
+    NumberToken::put(lengths[i], &token, s.writer);
+    s.tokens[i & 1].push_back(token);
+  }
+  put_varint(out, static_cast<uint32_t>(lengths.size()));
+  for (auto& tokens : s.tokens) put_block(out, tokens);
+  put_stored_block(out, s.writer.bytes());
+}
+
+bool get_runs(Reader& in, Mask& mask, Scratch& s) {
+  const size_t pixels = static_cast<size_t>(mask.width()) * static_cast<size_t>(mask.height());
+  const auto count = in.varint();
+  if (!count || *count > pixels) return false;
+  for (size_t parity = 0; parity < 2; ++parity) {
+    s.tokens[parity].resize((*count + 1 - parity) / 2);
+    if (!get_block(in, s.tokens[parity])) return false;
+  }
+  const auto bits = get_stored_block(in);
+  if (!bits) return false;
+  s.reader.start(*bits, 64);
+  size_t at = 0;
+  for (size_t i = 0; i < *count; ++i) {
+    const uint8_t token = s.tokens[i & 1][i / 2];
+    if (token >= NumberToken::kCount) return false;
+    const size_t end = at + NumberToken::get(token, s.reader);
+    if (end >= pixels || (end == at && i != 0) || s.reader.overrun()) return false;
+    if (i & 1) set_bits(mask, at, end);
+    at = end;
+  }
+  if (*count & 1) set_bits(mask, at, pixels);
+  return s.reader.finished();
+}
+
+void put_bytes(std::vector<uint8_t>& out, const Mask& mask, bool above, Scratch& s) {
+  const size_t row_bytes = bytes_per_row(mask);
+  s.bytes.resize(row_bytes * static_cast<size_t>(mask.height()));
+  for (int y = 0; y < mask.height(); ++y) std::memcpy(s.bytes.data() + row_bytes * y, mask.row(y), row_bytes);
+  if (above)
+    for (size_t i = s.bytes.size(); i-- > row_bytes;) s.bytes[i] ^= s.bytes[i - row_bytes];
+  put_block(out, s.bytes);
+}
+
+bool get_bytes(Reader& in, Mask& mask, bool above, Scratch& s) {
+  const size_t row_bytes = bytes_per_row(mask);
+  s.bytes.resize(row_bytes * static_cast<size_t>(mask.height()));
+  if (!get_block(in, s.bytes)) return false;
+  if (above)
+    for (size_t i = row_bytes; i < s.bytes.size(); ++i) s.bytes[i] ^= s.bytes[i - row_bytes];
+  const uint8_t padding = mask.width() % 8 == 0 ? 0 : static_cast<uint8_t>(0xFF << mask.width() % 8);
+  for (int y = 0; y < mask.height(); ++y) {
+    std::memcpy(mask.row(y), s.bytes.data() + row_bytes * y, row_bytes);
+    if (s.bytes[row_bytes * (y + 1) - 1] & padding) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+size_t Mask::count() const {
+  size_t n = 0;
+  for (const uint64_t word : words_) n += static_cast<size_t>(std::popcount(word));
+  return n;
+}
+
+size_t Mask::runs() const {
+  size_t n = 0;
+  for (int y = 0; y < height_; ++y)
+    for (size_t w = 0; w < words_per_row_; ++w) {
+      const uint64_t word = row(y)[w], last = w == 0 ? 0 : row(y)[w - 1] >> 63;
+      n += static_cast<size_t>(std::popcount(word & ~(word << 1 | last)));
+    }
+  return n;
+}
+
+void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) {
+  for (size_t x = 0; x < count; x += 64) {
+    const size_t bits = std::min<size_t>(64, count - x);
+    uint64_t word = 0;
+    for (size_t i = 0; i < bits; ++i) word |= uint64_t{depth[x + i] != 0} << i;
+    words[x / 64] = word;
+  }
+}
+
+void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
+  // The shortest of those that can be worth a try: lengths of runs take about a byte each, bytes of pixels at least a bit.
+  Scratch& s = scratch();
+  run_lengths(mask, s.lengths);
+  const size_t bytes = bytes_per_row(mask) * static_cast<size_t>(mask.height());
+  const bool try_runs = s.lengths.size() < bytes, try_bytes = s.lengths.size() > bytes / 64;
+  const size_t begin = out.size();
+  if (try_runs) {
+    out.push_back(kRuns);
+    put_runs(out, s.lengths, s);
+  }
+  if (!try_bytes) return;
+  for (const Coding coding : {kBytes, kBytesAbove}) {
+    auto& packed = s.packed[coding - 1];
+    packed.assign(1, coding);
+    put_bytes(packed, mask, coding == kBytesAbove, s);
+    if (out.size() == begin || packed.size() < out.size() - begin) {
+      out.resize(begin);
+      out.insert(out.end(), packed.begin(), packed.end());
+    }
+  }
+}
+
+bool get_mask(Reader& in, Mask& mask) {
+  const auto coding = in.u8();
+  if (!coding) return false;
+  switch (*coding) {
+    case kRuns: return get_runs(in, mask, scratch());
+    case kBytes: case kBytesAbove: return get_bytes(in, mask, *coding == kBytesAbove, scratch());
+    default: return false;
+  }
+}
+
+std::optional<size_t> skip_mask(Reader& in) {
+  const size_t before = in.left();
+  const auto coding = in.u8();
+  if (!coding || *coding > kBytesAbove) return std::nullopt;
+  if (*coding == kRuns && !in.varint()) return std::nullopt;
+  for (int block = *coding == kRuns ? 3 : 1; block > 0; --block)
+    if (!skip_block(in)) return std::nullopt;
+  return before - in.left();
+}
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,136 @@
+#include "common/codec/tile.h"
+
+#include <algorithm>
+
+#include "common/codec/walk.h"
+
+namespace telesplat::codec::detail {
+namespace {
+
+enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kPlainColour = 8, kKnownBits = 15 };
+
+TileScratch& scratch() {
+  static thread_local TileScratch s;
+  return s;
+}
+
+void put_base(std::vector<uint8_t>& out, const Pixel& base) {
+  for (int shift = 0; shift < 24; shift += 8) out.push_back(static_cast<uint8_t>(base.depth >> shift));
+  for (int shift = 0; shift < 24; shift += 8) out.push_back(static_cast<uint8_t>(base.colour >> shift));
+  for (int shift = 0; shift < 16; shift += 8) out.push_back(static_cast<uint8_t>(base.normal >> shift));
+}
+std::optional<Pixel> get_base(Reader& in) {
+  const auto b = in.bytes(8);
+  if (!b) return std::nullopt;
+  const auto at = [&](int i) { return uint32_t{(*b)[static_cast<size_t>(i)]}; };
+  return Pixel{at(0) | at(1) << 8 | at(2) << 16, at(3) | at(4) << 8 | at(5) << 16, static_cast<uint16_t>(at(6) | at(7) << 8)};
+}
+
+// Bench codec/patch*: where few pixels are covered, in short runs, nearest neighbours predict better than filled rows.
+bool is_sparse(size_t covered, size_t runs, size_t pixels) { return covered * 2 < pixels && covered < runs * 4; }
+
+// Smooth colour goes into joint tokens, rough colour into a stream per component. Judged by neighbours in a few rows.
+bool is_rough(const image::DepthImage& image, const TileRect& rect) {
+  size_t pairs = 0, rough = 0;
+  for (int y = 0; y < rect.height; y += 8) {
+    const size_t first = rect.first + rect.stride * static_cast<size_t>(y);
+    for (size_t i = first + 1; i < first + static_cast<size_t>(rect.width); i += 2) {
+      if (image.depth[i] == 0 || image.depth[i - 1] == 0) continue;
+      const uint32_t z = fold_bytes(image.colour[i], image.colour[i - 1]);
+      ++pairs;
+      rough += (z & 0xF8F8F8) != 0;
+    }
+  }
+  return rough * 10 > pairs * 3;
+}
+
+}  // namespace
+
+TileGrid::TileGrid(int width, int height) : width(width), height(height) {
+  // About 256 x 256, longer where the image is narrow; of equal size up to rounding, so that none is a sliver.
+  constexpr int kSide = 256, kPixels = static_cast<int>(kMaxTilePixels);
+  const int most_rows = width < kSide ? kPixels / width : kSide, most_columns = height < kSide ? kPixels / height : kSide;
+  const auto equal_parts = [](int size, int most) {
+    const int parts = (size + most - 1) / most;
+    return (size + parts - 1) / parts;
+  };
+  tile_width = equal_parts(width, most_columns), tile_height = equal_parts(height, most_rows);
+  columns = (width + tile_width - 1) / tile_width, rows = (height + tile_height - 1) / tile_height;
+}
+
+TileRect TileGrid::rect(int column, int row) const {
+  const int x = column * tile_width, y = row * tile_height;
+  return {static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x), static_cast<size_t>(width),
+          std::min(tile_width, width - x), std::min(tile_height, height - y)};
+}
+
+size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect) {
+  TileScratch& s = scratch();
+  s.mask.reset(rect.width, rect.height);
+  for (int y = 0; y < rect.height; ++y)
+    covered_bits(image.depth.data() + rect.first + rect.stride * static_cast<size_t>(y), static_cast<size_t>(rect.width), s.mask.row(y));
+  const size_t pixels = static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height), covered = s.mask.count();
+  if (covered == 0) {
+    out.push_back(kEmpty);
+    return 0;
+  }
+  const bool full = covered == pixels, sparse = !full && is_sparse(covered, s.mask.runs(), pixels), rough = is_rough(image, rect);
+  out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked) | (rough ? kPlainColour : 0)));
+
+  size_t first = rect.first;  // of the covered pixels
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t row = rect.first + rect.stride * static_cast<size_t>(y), end = row + static_cast<size_t>(rect.width);
+    for (first = row; first < end && image.depth[first] == 0;) ++first;
+    if (first < end) break;
+  }
+  const Pixel base{image.depth[first], image.colour[first], image.normal[first]};
+  put_base(out, base);
+  if (!full) put_mask(out, s.mask);
+
+  s.reset(static_cast<size_t>(rect.width));
+  s.writer.start(covered, rough);
+  if (sparse) encode_sparse(s, image, rect, base);
+  else encode_dense(s, image, rect, base, full);
+  s.writer.finish(out);
+  return covered;
+}
+
+std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect) {
+  const auto kind = in.u8();
+  if (kind == kEmpty) return 0;
+  if (!kind || *kind & ~kKnownBits) return std::nullopt;
+  const int predictor = *kind & kPredictorBits;
+  const bool full = !(*kind & kMasked), sparse = predictor == kSparse;
+  if ((!sparse && predictor != kDense) || (sparse && full)) return std::nullopt;
+
+  TileScratch& s = scratch();
+  const auto base = get_base(in);
+  if (!base) return std::nullopt;
+  size_t covered = static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
+  if (!full) {
+    s.mask.reset(rect.width, rect.height);
+    if (!get_mask(in, s.mask)) return std::nullopt;
+    covered = s.mask.count();
+  }
+  s.reset(static_cast<size_t>(rect.width));
+  if (!s.reader.start(in, covered, static_cast<size_t>(rect.width), *kind & kPlainColour)) return std::nullopt;
+  const bool good = sparse ? decode_sparse(s, image, rect, *base) : decode_dense(s, image, rect, *base, full);
+  if (!good || !s.reader.finished()) return std::nullopt;
+  return covered;
+}
+
+bool skip_tile(Reader& in, StreamInfo& info) {
+  const auto kind = in.u8();
+  if (kind == kEmpty) return true;
+  if (!kind || *kind & ~kKnownBits || !get_base(in)) return false;
+  const auto add = [&](size_t& total, std::optional<size_t> bytes) {
+    if (bytes) total += *bytes;
+    return bytes.has_value();
+  };
+  if (*kind & kMasked && !add(info.mask_bytes, skip_mask(in))) return false;
+  for (size_t* total : {&info.depth_bytes, &info.depth_bytes, &info.normal_bytes, &info.normal_bytes, &info.colour_bytes, &info.colour_bytes})
+    if (!add(*total, skip_block(in))) return false;
+  return !(*kind & kPlainColour) || add(info.colour_bytes, skip_block(in));
+}
+
+}  // namespace telesplat::codec::detail

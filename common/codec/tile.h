@@ -1,0 +1,38 @@
+// One tile's pixels <-> bytes: mask, prediction, tokens, blocks.
+//   tile    = u8 kind, and unless it is empty: base, [mask], depth, colour, normal
+//   kind    = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered, + kPlainColour
+//   base    = depth (3 bytes), colour (3), normal (2) of the first covered pixel
+//   depth   = block of NumberTokens, block of raw bits;  normal = block of NormalTokens, block of raw bits
+//   colour  = block of ColourTokens, block of raw bits; or, plain: blocks of residuals of green, red - green, blue - green
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/codec/depth_codec.h"
+#include "common/codec/entropy.h"
+#include "common/codec/walk.h"
+#include "common/image/depth_image.h"
+
+namespace telesplat::codec::detail {
+
+/// Most pixels of a tile; every tile takes at least a byte.
+inline constexpr size_t kMaxTilePixels = size_t{1} << 16;
+
+/// How an image of width x height pixels is divided: tiles of tile_width x tile_height, those at the right and below cut off.
+struct TileGrid {
+  TileGrid(int width, int height);
+  TileRect rect(int column, int row) const;
+  int width, height, tile_width, tile_height, columns, rows;
+};
+
+/// Appends the pixels of `rect`; returns the number of covered ones.
+size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect);
+/// Writes the covered pixels of `rect`, which must be zero before; returns their number, or nothing where the stream is damaged.
+std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect);
+/// Adds the bytes of a tile to `info`; false where the stream is damaged.
+[[nodiscard]] bool skip_tile(Reader& in, StreamInfo& info);
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,43 @@
+// From a tile's pixels to token streams and back, in scan order: dense tiles by rows (predict.h), sparse ones by neighbours.
+#pragma once
+
+#include <cstddef>
+
+#include "common/codec/mask.h"
+#include "common/codec/predict.h"
+#include "common/codec/sparse.h"
+#include "common/codec/streams.h"
+#include "common/image/depth_image.h"
+
+namespace telesplat::codec::detail {
+
+/// A rectangle of an image. `first`: index of its upper left pixel; `stride`: the image's width.
+struct TileRect {
+  size_t first, stride;
+  int width, height;
+};
+
+/// Buffers that one thread keeps: a tile is too small to allocate them anew.
+struct TileScratch {
+  void reset(size_t width) {
+    for (FilledRow& row : rows) row.reset(width);
+    residuals.reset(width);
+    packed.reset(width);
+  }
+  Mask mask;
+  FilledRow rows[2];
+  Residuals residuals, packed;  ///< of a row; of its covered pixels alone
+  Neighbours neighbours;
+  TokenWriter writer;
+  TokenReader reader;
+};
+
+/// Pixels covered by s.mask -> s.writer, which was started. `base`: what predicts the first pixel. `full`: the mask is all ones.
+void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full);
+void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base);
+
+/// s.reader, which was started -> pixels covered by s.mask; others are left alone. False where the stream is damaged.
+[[nodiscard]] bool decode_dense(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full);
+[[nodiscard]] bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
+
+}  // namespace telesplat::codec::detail
