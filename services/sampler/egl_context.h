@@ -1,0 +1,53 @@
+// An OpenGL context without a window.
+#pragma once
+
+#include <epoxy/egl.h>
+
+#include <memory>
+#include <string>
+
+#include "common/core/result.h"
+
+namespace telesplat::sampler {
+
+/// OpenGL 4.3 core on the first that works: every EGL device, then Mesa's surfaceless platform.
+/// Bound to no thread until a Current is made.
+class EglContext {
+ public:
+  /// Fails saying what was tried and why each attempt failed. Leaves nothing current.
+  static Result<std::unique_ptr<EglContext>> make();
+  ~EglContext();
+  EglContext(const EglContext&) = delete;
+  EglContext& operator=(const EglContext&) = delete;
+
+  /// GL_RENDERER, for logs.
+  const std::string& renderer() const { return renderer_; }
+  /// True where the renderer runs on the processor (llvmpipe, softpipe, SwiftShader).
+  bool software() const;
+
+  /// Makes the context current in this thread for a scope, and then what was current before.
+  class Current {
+   public:
+    explicit Current(const EglContext& context);
+    ~Current();
+    Current(const Current&) = delete;
+    Current& operator=(const Current&) = delete;
+    bool ok() const { return ok_; }
+
+   private:
+    EGLDisplay display_, previous_display_;
+    EGLContext previous_context_;
+    EGLSurface previous_draw_, previous_read_;
+    bool ok_;
+  };
+
+ private:
+  EglContext(EGLDisplay display, EGLContext context) : display_(display), context_(context) {}
+  static Result<std::unique_ptr<EglContext>> make_on(EGLDisplay display);
+
+  EGLDisplay display_;
+  EGLContext context_;
+  std::string renderer_;
+};
+
+}  // namespace telesplat::sampler
