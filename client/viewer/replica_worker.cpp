@@ -45,9 +45,15 @@ ReplicaWorker::~ReplicaWorker() {
   thread_.join();
 }
 
-void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen) {
+void ReplicaWorker::on_pose(double now_s, const geometry::Camera& camera) {
   const std::lock_guard lock(mutex_);
   poses_.emplace_back(now_s, camera);
+}
+
+void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen) {
+  on_pose(now_s, camera);
+  ++frames_shown_;
+  const std::lock_guard lock(mutex_);
   if (seen_.size() < wire::kMaxKeys) seen_.insert(seen_.end(), seen.begin(), seen.end());
 }
 
@@ -201,7 +207,7 @@ net::MasterLink::Values ReplicaWorker::status() const {
   const auto figures = cache_.figures();
   return {{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"points", double(figures.points)},
           {"model_bytes", double(figures.bytes)}, {"points_received", double(points_received_)}, {"bytes_received", double(bytes_received_)},
-          {"gaps_resynced", double(sequencer_.gaps())}, {"updates", double(updates_)}, {"first_points_s", first_points_s_},
+          {"gaps_resynced", double(sequencer_.gaps())}, {"updates", double(updates_)}, {"frames", double(frames_shown_)}, {"first_points_s", first_points_s_},
           {"sequence", double(sequencer_.applied().value)},
           {"messages_rejected", double((patches_ ? patches_->rejected() : 0) + (state_ ? state_->rejected() : 0) + decode_errors_)}};
 }

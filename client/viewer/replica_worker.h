@@ -29,6 +29,8 @@ class ReplicaWorker {
   ~ReplicaWorker();
 
   // ---- display thread ----
+  /// The head is here; nothing is displayed yet.
+  void on_pose(double now_s, const geometry::Camera& camera);
   /// A frame was displayed with this camera; `seen`: the clusters it drew.
   void on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen);
   /// Events applied so far tell a first update: true once one frame was applied completely.
@@ -71,7 +73,7 @@ class ReplicaWorker {
   std::vector<points::ClusterKey> seen_;
   LastUpdate last_update_;
 
-  std::atomic<uint64_t> updates_{0};
+  std::atomic<uint64_t> updates_{0}, frames_shown_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};
   std::atomic<double> offset_s_{0};
   std::thread thread_;

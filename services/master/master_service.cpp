@@ -34,6 +34,10 @@ void write_session(const std::string& directory, const MasterServiceOptions& o, 
 void add_flags(CLI::App& app, MasterServiceOptions& o) {
   net::add_service_flags(app, o.service, true);
   app.add_option("--out", o.out, "folder for the run's record");
+  add_session_flags(app, o);
+}
+
+void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
   app.add_option("--tile-size", o.master.schedule.tile_size, "pixels a side of a tile")->capture_default_str()->check(CLI::Range(16, 4096));
   app.add_option("--frames-in-flight", o.master.schedule.frames_in_flight, "sampling frames begun and not complete")
       ->capture_default_str()

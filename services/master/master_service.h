@@ -12,7 +12,8 @@ struct MasterServiceOptions {
   std::string out;              ///< run folder; empty: no record is written
 };
 
-/// Adds the master's flags.
+/// Flags that `telesplat run` has too: tiles, leases, packing.
+void add_session_flags(CLI::App& app, MasterServiceOptions& options);
 void add_flags(CLI::App& app, MasterServiceOptions& options);
 
 /// Serves until SIGINT, SIGTERM or a "stop" command; then tells everyone to finish, waits for them (3 s at most) and writes the

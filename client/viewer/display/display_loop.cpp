@@ -42,7 +42,7 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
   // Start-up: nothing to show yet; let the server know where the head is.
   while (!worker.first_update_complete()) {
     if (told_to_stop(worker)) return {0, true};
-    worker.on_frame(monotonic_s(), camera_at(0), {});
+    worker.on_pose(monotonic_s(), camera_at(0));
     sleep_until(monotonic_s() + 1.0 / 30);
   }
 

@@ -1,0 +1,214 @@
+#include "services/packer/packer_service.h"
+
+#include <CLI/CLI.hpp>
+#include <optional>
+
+#include "common/codec/depth_codec.h"
+#include "common/core/clock.h"
+#include "common/metrics/recorder.h"
+#include "common/net/dispatch.h"
+#include "common/net/master_link.h"
+#include "services/packer/packer_core.h"
+
+namespace telesplat::packer {
+namespace {
+
+constexpr double kMarkPeriod_s = 0.5, kTickPeriod_s = 1.0;
+constexpr int kTilesAtOnce = 8;  // then control and state requests get their turn
+
+class PackerService {
+ public:
+  PackerService(const PackerServiceOptions& o, net::Context& context)
+      : options_(o),
+        tiles_(context, net::Kind::kPull, o.service.name + ":tiles", {.high_water_mark = 256, .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes}),
+        patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),
+        state_(context, net::Kind::kRouter, o.service.name + ":state", {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
+
+  /// Binds the three sockets and says hello with their addresses.
+  Status open(net::Context& context) {
+    wire::Hello hello;
+    hello.role = "packer";
+    hello.name = options_.service.name;
+    for (const auto& [socket, key] : {std::pair{&tiles_, "tiles"}, {&patches_, "patches"}, {&state_, "state"}}) {
+      const auto endpoint = socket->bind(options_.service.bind, options_.service.insecure);
+      if (!endpoint) return endpoint.error();
+      hello.endpoints[key] = *endpoint;
+    }
+    link_.emplace(context, options_.service.master, hello);
+    return ok_status();
+  }
+
+  int serve() {
+    while (!net::stop_requested() && !link_->shutdown_requested()) {
+      const double now = monotonic_s();
+      link_->tick(now, [&] { return status(); });
+      follow_session();
+      periodic(now);
+      net::wait_readable({&link_->socket(), &tiles_, &state_}, 50);
+      while (const auto message = link_->socket().receive())
+        if (!link_->handle(*message, monotonic_s())) link_->socket().reject(*message, "its type is not expected here");
+      receive_state_requests();
+      receive_tiles();
+    }
+    flush_spans();
+    link_->leave([&] { return status(); });
+    return 0;
+  }
+
+ private:
+  double master_now() const { return link_->to_master_s(monotonic_s()); }
+
+  // The model's box comes with the data server; another box means another model.
+  void follow_session() {
+    if (!link_->session() || link_->version() == seen_version_) return;
+    seen_version_ = link_->version();
+    const wire::Welcome& s = *link_->session();
+    if (s.box_room.empty()) return;
+    const auto setting = [&](const char* key, double fallback) { const auto it = s.settings.find(key); return it == s.settings.end() ? fallback : it->second; };
+    Config config;
+    config.model = {s.box_room, int(s.octree_depth)};
+    if (const Status valid = points::validate(config.model); !valid) {
+      log::error("the master's session cannot be packed: {}", valid.error().text);
+      return;
+    }
+    config.redundancy = setting("packing.keep_redundant", 0) != 0 ? Redundancy::kKeep : Redundancy::kEliminate;
+    config.relative_epsilon = float(setting("packing.epsilon", config.relative_epsilon));
+    config.obsolete_after_s = setting("packing.obsolete_after_s", 0);
+    config.max_points = uint64_t(setting("packing.max_points", 0));
+    config.max_log_bytes = uint64_t(options_.log_limit_mb * 1e6);
+    config.threads = options_.threads;
+    if (!core_ || model_ != config.model) {
+      if (core_) instance_ = net::make_instance_id();  // viewers start anew
+      model_ = config.model;
+      core_.emplace(config, s.epoch);
+    } else if (const auto event = core_->begin_epoch(s.epoch)) {
+      publish(*event);
+    }
+  }
+
+  void periodic(double now_s) {
+    if (!core_) return;
+    if (now_s - last_tick_s_ >= kTickPeriod_s) {
+      last_tick_s_ = now_s;
+      for (const auto& event : core_->tick(now_s)) publish(event);
+      flush_spans();
+    }
+    if (now_s - last_mark_s_ >= kMarkPeriod_s) {
+      last_mark_s_ = now_s;
+      patches_.send(mark(false));
+    }
+  }
+
+  wire::StateMark mark(bool answer) const { return {instance_, core_->sequence(), core_->epoch(), answer, core_->model().points()}; }
+
+  template <class Send> void send_event(const Event& e, Send&& send) {
+    switch (e.kind) {
+      case Event::Kind::kPatch:
+        return send(wire::Patch{instance_, e.sequence, e.epoch, e.frame, e.viewer, e.request, e.tile, e.tiles_in_frame, e.frame_complete, e.samples,
+                                e.kept, e.camera, e.rect, std::as_bytes(std::span(*e.blob))});
+      case Event::Kind::kForget: return send(wire::Forget{instance_, e.sequence, e.epoch, e.clusters});
+      case Event::Kind::kEpoch: return send(wire::EpochBegin{instance_, e.sequence, e.epoch});
+    }
+  }
+  void publish(const Event& e) {
+    send_event(e, [&](const auto& m) { patches_.send(m); });
+  }
+
+  void receive_tiles() {
+    for (int n = 0; n < kTilesAtOnce; ++n) {
+      const auto message = tiles_.receive();
+      if (!message) return;
+      net::dispatch<wire::DepthTile>(tiles_, *message, [&](const wire::DepthTile& tile) { pack(*message, tile); });
+    }
+  }
+
+  void pack(const net::Message& message, const wire::DepthTile& m) {
+    if (!core_) return;
+    const double received = master_now();
+    const auto& lease = m.lease;
+    auto image = codec::decode({reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size()}, lease.rect.width, lease.rect.height);
+    if (!image) return tiles_.reject(message, image.error().text);
+    const double decoded = master_now();
+    auto event = core_->submit({lease.frame, lease.epoch, uint32_t(lease.tile), uint32_t(lease.tiles_in_frame), lease.camera, lease.rect, lease.viewer,
+                                lease.request, std::move(*image)}, monotonic_s());
+    if (!event) return tiles_.reject(message, event.error().text);
+    if (!*event) return;
+    const Event& e = **event;
+    publish(e);
+    const double packed = master_now();
+    spans_.add("decode", received, decoded);
+    spans_.add("pack", decoded, packed);
+    bytes_sent_ += e.blob->size();
+    link_->socket().send(wire::TileDone{lease.frame, lease.tile, lease.lease, m.sampler, e.samples, e.kept, m.image.size(), e.blob->size(), lease.leased_s,
+                                        m.sample_begin_s, m.sample_end_s, m.encode_end_s, received, packed});
+  }
+
+  void receive_state_requests() {
+    for (int n = 0; n < 64; ++n) {
+      const auto message = state_.receive();
+      if (!message) return;
+      net::dispatch<wire::StateRequest, wire::AccessReport>(state_, *message, [&](const auto& m) {
+        if (!core_) return;
+        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>) core_->accessed(m.clusters, monotonic_s());
+        else answer(message->peer, m);
+      });
+    }
+  }
+
+  void answer(const std::string& peer, const wire::StateRequest& request) {
+    const Sequence after = request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
+    const auto events = core_->events_since(after);
+    for (const auto& e : events) send_event(e, [&](const auto& m) { state_.send(m, peer); });
+    state_.send(mark(true), peer);
+    log::info("a viewer caught up: {} events after {}", events.size(), after.value);
+  }
+
+  net::MasterLink::Values status() const {
+    net::MasterLink::Values v{{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"bytes_sent", double(bytes_sent_)},
+                              {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())}};
+    if (core_) {
+      const auto& s = core_->statistics();
+      v.insert({{"points", double(core_->model().points())}, {"model_bytes", double(core_->model().bytes())}, {"log_bytes", double(core_->log_bytes())},
+                {"sequence", double(core_->sequence().value)}, {"tiles", double(s.tiles)}, {"tiles_duplicate", double(s.tiles_duplicate)},
+                {"frames_complete", double(s.frames_complete)}, {"points_forgotten", double(s.points_forgotten)}, {"points_outside", double(s.points_outside)}});
+    }
+    return v;
+  }
+
+  void flush_spans() {
+    if (const auto rows = spans_.flush(link_->instance())) link_->socket().send(*rows);
+  }
+
+  const PackerServiceOptions& options_;
+  net::Socket tiles_, patches_, state_;
+  std::optional<net::MasterLink> link_;
+  InstanceId instance_ = net::make_instance_id();
+  std::optional<PackerCore> core_;
+  points::ModelConfig model_;
+  metrics::SpanRecorder spans_;
+  int seen_version_ = 0;
+  uint64_t bytes_sent_ = 0;
+  double last_mark_s_ = 0, last_tick_s_ = 0;
+};
+
+}  // namespace
+
+void add_flags(CLI::App& app, PackerServiceOptions& o) {
+  net::add_service_flags(app, o.service, true);
+  app.add_option("--threads", o.threads, "threads for reference depth maps; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
+  app.add_option("--log-limit-mb", o.log_limit_mb, "memory for the events that late joiners get")->capture_default_str()->check(CLI::Range(1.0, 1e6));
+}
+
+int run(const PackerServiceOptions& o) {
+  log::initialise(o.service.name, o.service.log_level);
+  net::install_signal_handlers();
+  net::Context context;
+  PackerService service(o, context);
+  if (const Status s = service.open(context); !s) {
+    log::error("{}", s.error().text);
+    return 2;
+  }
+  return service.serve();
+}
+
+}  // namespace telesplat::packer

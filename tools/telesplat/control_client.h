@@ -1,0 +1,27 @@
+// Asks the master things over its control socket.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "common/net/socket.h"
+
+namespace telesplat::launcher {
+
+class ControlClient {
+ public:
+  explicit ControlClient(const std::string& master_endpoint);
+
+  /// Sends a command and waits for its answer.
+  Result<std::string> ask(const std::string& command, double timeout_s, const std::map<std::string, std::string>& arguments = {});
+  /// Sends "status" without waiting; poll_status() gives the answer once it is there.
+  void request_status();
+  std::optional<nlohmann::json> poll_status();
+
+ private:
+  std::string endpoint_;
+  net::Context context_;
+  net::Socket socket_;
+};
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,54 @@
+// telesplat: the launcher. `run` starts a whole pipeline on this machine and records it.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "tools/telesplat/control_client.h"
+#include "tools/telesplat/inspect_command.h"
+#include "tools/telesplat/run_command.h"
+
+namespace {
+
+using namespace telesplat;
+
+int control(const std::string& master, const std::string& command) {
+  log::initialise("ctl", "warn");
+  launcher::ControlClient client(master);
+  const auto answer = client.ask(command, 5.0);
+  if (!answer) {
+    std::fprintf(stderr, "telesplat: %s\n", answer.error().text.c_str());
+    return 1;
+  }
+  const auto json = nlohmann::ordered_json::parse(*answer, nullptr, false);
+  std::printf("%s\n", json.is_object() ? json.dump(2).c_str() : answer->c_str());
+  return 0;
+}
+
+int telesplat_main(int argc, char** argv) {
+  CLI::App app{"telesplat: explore data sets that are too large for this machine"};
+  app.require_subcommand(1);
+  launcher::RunOptions run_options;
+  auto* run = app.add_subcommand("run", "run the whole pipeline on this machine, headless, and record it");
+  launcher::add_run_flags(*run, run_options);
+
+  std::string command, master = "tcp://127.0.0.1:7700";
+  auto* ctl = app.add_subcommand("ctl", "ask or tell a running session's master");
+  ctl->add_option("command", command, "status: who takes part and what they count; stop: end the session; epoch: drop all points")
+      ->required()
+      ->check(CLI::IsMember({"status", "stop", "epoch"}));
+  ctl->add_option("--master", master, "address of the master")->capture_default_str();
+
+  std::string path;
+  data::MeshOptions mesh;
+  auto* inspect = app.add_subcommand("inspect", "tell what a data file, a run folder, a recorded frame or a depth image holds");
+  inspect->add_option("path", path, "file or folder")->required();
+  inspect->add_option("--cache", mesh.cache_dir, "folder of the chunk store");
+
+  net::parse_or_exit(app, argc, argv);
+  if (*run) return launcher::run(run_options);
+  if (*ctl) return control(master, command);
+  return launcher::inspect(path, mesh);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) { return net::guarded_main(telesplat_main, argc, argv); }
