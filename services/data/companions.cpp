@@ -27,20 +27,7 @@ std::vector<std::string> material_libraries(std::string_view content) {
   return names;
 }
 
-// %20 and its like.
-std::string percent_decoded(const std::string& uri) {
-  std::string out;
-  for (size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] == '%' && i + 2 < uri.size() && std::isxdigit(static_cast<unsigned char>(uri[i + 1])) && std::isxdigit(static_cast<unsigned char>(uri[i + 2]))) {
-      out += static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16));
-      i += 2;
-    } else {
-      out += uri[i];
-    }
-  }
-  return out;
-}
-
+// The uris of buffers and images, as VTK looks for them: without undoing %20 and its like.
 std::vector<std::string> gltf_uris(std::string_view content) {
   std::vector<std::string> names;
   const nlohmann::json document = nlohmann::json::parse(gltf_json(content), nullptr, false);
@@ -51,7 +38,7 @@ std::vector<std::string> gltf_uris(std::string_view content) {
     for (const auto& item : *list) {
       const auto uri = item.is_object() ? item.find("uri") : item.end();
       if (!item.is_object() || uri == item.end() || !uri->is_string() || names.size() == kMaxCompanions) continue;
-      if (const auto& text = uri->get_ref<const std::string&>(); !text.starts_with("data:")) names.push_back(percent_decoded(text));
+      if (const auto& text = uri->get_ref<const std::string&>(); !text.starts_with("data:")) names.push_back(text);
     }
   }
   return names;

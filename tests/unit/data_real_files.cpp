@@ -1,0 +1,86 @@
+// Real meshes of every format, where they are present.
+#include <cstdlib>
+
+#include "common/core/clock.h"
+#include "tests/unit/data_files.h"
+
+namespace telesplat::data::test {
+namespace {
+
+std::string data_folder() {
+  if (const char* folder = std::getenv("TELESPLAT_DATA")) return folder;
+  const char* home = std::getenv("HOME");
+  return std::string(home ? home : "") + "/.cache/telesplat-data";
+}
+
+struct RealFile {
+  std::string name, format;
+  uint64_t triangles;  // in the file, degenerate ones included
+  bool normals, colours;
+  std::string up;
+};
+
+class RealFiles : public testing::TestWithParam<RealFile> {};
+
+TEST_P(RealFiles, OpenWithAllTheirTriangles) {
+  const RealFile& expected = GetParam();
+  const std::string path = data_folder() + "/" + expected.name;
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
+  const auto store = open_or_fail(path, plain_options("auto"));
+  ASSERT_TRUE(store);
+  const MeshStoreInfo& info = store->info();
+  EXPECT_EQ(info.format, expected.format);
+  EXPECT_EQ(info.triangles + info.degenerate_dropped, expected.triangles);
+  EXPECT_EQ(info.had_normals, expected.normals);
+  EXPECT_EQ(info.had_colours, expected.colours);
+  EXPECT_EQ(info.up, expected.up);
+  const glm::vec3 size = info.box_room.size();
+  EXPECT_NEAR(std::max({size.x, size.y, size.z}), 0.8, 1e-6);
+  uint64_t triangles = 0;
+  for (const auto& chunk : store->chunks()) {
+    EXPECT_TRUE(geometry::MeshChunkView::validate(store->chunk(chunk.id).bytes).ok());
+    triangles += chunk.triangles;
+  }
+  EXPECT_EQ(triangles, info.triangles);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, RealFiles, testing::Values(
+    RealFile{"meshes/colorado-5760k.ply", "ply", 5760000, false, true, "z"},
+    RealFile{"meshes/head-t1-4100k.ply", "ply", 4099618, false, false, "z"},
+    RealFile{"meshes/crater-lake-srtm3-2880k.ply", "ply", 2880000, false, true, "z"},
+    RealFile{"meshes/alderson-bone-718k.ply", "ply", 717558, false, false, "z"},
+    RealFile{"formats/stanford-bunny.ply", "ply", 69451, false, false, "y"},
+    RealFile{"formats/lucy-100k.ply", "ply", 99970, false, false, "y"},
+    RealFile{"formats/nefertiti.obj", "obj", 99938, false, false, "y"},
+    RealFile{"formats/grey-nurse-shark.stl", "stl", 49702, false, false, "y"},
+    RealFile{"formats/camelhead.off", "off", 22704, false, false, "y"},
+    RealFile{"formats/cranium-bone.vtp", "vtp", 399757, true, false, "z"},
+    RealFile{"formats/space-exploration.glb", "gltf", 50003, true, true, "y"}),
+    [](const auto& info) { auto n = info.param.name; std::replace_if(n.begin(), n.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_'); return n; });
+
+TEST(RealRasters, AreRefusedByKind) {
+  for (const char* name : {"formats/N42W123.hgt", "formats/andes-srtm3.tif"}) {
+    const std::string path = data_folder() + "/" + name;
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
+    const auto store = MeshStore::open(path, plain_options(), nullptr);
+    ASSERT_FALSE(store.ok());
+    EXPECT_NE(store.error().text.find("elevation raster"), std::string::npos) << store.error().text;
+  }
+}
+
+TEST(RealCache, SecondOpenOfFiveMillionTrianglesIsQuick) {
+  const std::string path = data_folder() + "/meshes/colorado-5760k.ply";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
+  const TempFolder folder;
+  const MeshOptions options{.cache_dir = folder / "cache"};
+  ASSERT_TRUE(open_or_fail(path, options));
+  const double start_s = monotonic_s();
+  const auto again = open_or_fail(path, options);
+  const double took_s = monotonic_s() - start_s;
+  ASSERT_TRUE(again);
+  EXPECT_TRUE(again->info().from_cache);
+  EXPECT_LT(took_s, 0.5);
+}
+
+}  // namespace
+}  // namespace telesplat::data::test
