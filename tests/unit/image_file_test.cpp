@@ -1,0 +1,113 @@
+// Pictures to files and back.
+#include "common/image/file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+namespace telesplat::image {
+namespace {
+
+class ImageFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("image_file_test." + std::to_string(getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string path(const char* name) const { return (folder_ / name).string(); }
+  size_t files() const { return size_t(std::distance(std::filesystem::directory_iterator(folder_), std::filesystem::directory_iterator{})); }
+
+  std::filesystem::path folder_;
+};
+
+// Every value of every channel; an odd size.
+View all_values() {
+  View v{37, 29, {}, {}};
+  for (uint32_t i = 0; i < 37 * 29; ++i) {
+    v.colour.push_back((i & 255) << 16 | (i * 7 & 255) << 8 | (i * 31 & 255));
+    v.depth_m.push_back(i % 5 == 0 ? std::numeric_limits<float>::infinity() : 0.02f + 0.001234567f * float(i));
+  }
+  return v;
+}
+
+TEST_F(ImageFile, PngKeepsEveryColour) {
+  const View v = all_values();
+  ASSERT_TRUE(write_png(path("a.png"), v).ok());
+  const auto read = read_view(path("a.png"));
+  ASSERT_TRUE(read.ok()) << read.error().text;
+  EXPECT_EQ(read->width, v.width);
+  EXPECT_EQ(read->height, v.height);
+  EXPECT_EQ(read->colour, v.colour);
+  EXPECT_TRUE(read->depth_m.empty());
+  EXPECT_EQ(files(), 1u);  // nothing else is left behind
+}
+
+TEST_F(ImageFile, ExrKeepsEveryColourAndEveryDepthBit) {
+  const View v = all_values();
+  ASSERT_TRUE(write_exr(path("a.exr"), v).ok());
+  const auto read = read_view(path("a.exr"));
+  ASSERT_TRUE(read.ok()) << read.error().text;
+  EXPECT_EQ(read->colour, v.colour);
+  EXPECT_EQ(read->depth_m, v.depth_m);
+}
+
+TEST_F(ImageFile, WritingReplacesWhatWasThere) {
+  View v = all_values();
+  ASSERT_TRUE(write_png(path("a.png"), v).ok());
+  v.colour[3] ^= 0xff;
+  ASSERT_TRUE(write_png(path("a.png"), v).ok());
+  EXPECT_EQ(read_view(path("a.png"))->colour, v.colour);
+}
+
+TEST_F(ImageFile, UnwritablePathsAreNamedAndNothingIsLeft) {
+  const std::string bad = path("no/such/folder/a.png");
+  const Status written = write_png(bad, all_values());
+  ASSERT_FALSE(written.ok());
+  EXPECT_NE(written.error().text.find(bad), std::string::npos) << written.error().text;
+  EXPECT_FALSE(write_exr(path("no/such/folder/a.exr"), all_values()).ok());
+  EXPECT_EQ(files(), 0u);
+
+  // A folder stands where the file should go: the rename fails, and the temporary file goes away.
+  std::filesystem::create_directories(path("taken.png") + "/inside");
+  EXPECT_FALSE(write_png(path("taken.png"), all_values()).ok());
+  EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(ImageFile, UnreadableFilesAreNamed) {
+  std::ofstream(path("text.png")) << "this is not a picture";
+  for (const char* name : {"missing.png", "text.png", "."}) {
+    const auto read = read_view(path(name));
+    ASSERT_FALSE(read.ok()) << name;
+    EXPECT_NE(read.error().text.find(path(name)), std::string::npos) << read.error().text;
+  }
+}
+
+TEST_F(ImageFile, TruncatedFilesAreRefusedAtEveryLength) {
+  View v{8, 8, std::vector<uint32_t>(64), std::vector<float>(64, 1.0f)};
+  for (uint32_t i = 0; i < 64; ++i) v.colour[i] = i * 0x051709;
+  ASSERT_TRUE(write_exr(path("whole.exr"), v).ok());
+  std::ifstream in(path("whole.exr"), std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  for (size_t length = 0; length < bytes.size(); length += 7) {
+    std::ofstream(path("cut.exr"), std::ios::binary) << bytes.substr(0, length);
+    EXPECT_FALSE(read_view(path("cut.exr")).ok()) << length;
+  }
+}
+
+TEST_F(ImageFile, AHeaderThatClaimsTooMuchIsRefused) {
+  // A portable pixmap of 100,000 x 100,000 pixels with three bytes of them.
+  std::ofstream(path("huge.ppm"), std::ios::binary) << "P6\n100000 100000\n255\nabc";
+  const auto read = read_view(path("huge.ppm"));
+  ASSERT_FALSE(read.ok());
+  EXPECT_NE(read.error().text.find("16384"), std::string::npos) << read.error().text;
+  std::ofstream(path("large.ppm"), std::ios::binary) << "P6\n16384 16384\n255\nabc";  // within the limit, but not there
+  EXPECT_FALSE(read_view(path("large.ppm")).ok());
+}
+
+}  // namespace
+}  // namespace telesplat::image
