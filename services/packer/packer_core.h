@@ -18,7 +18,7 @@
 namespace telesplat::packer {
 
 /// More tiles than this a frame are refused.
-inline constexpr uint32_t kMaxTilesInFrame = 1u << 20;
+inline constexpr uint32_t kMaxTilesInFrame = 1u << 16;
 /// A forget event names at most this many clusters; more become several events.
 inline constexpr size_t kMaxForgetKeys = 1u << 16;
 
@@ -33,7 +33,8 @@ struct Config {
   float relative_epsilon = 0.005f;    ///< of T4.3.1, as a fraction of the depth
   double obsolete_after_s = 0;        ///< clusters that nobody drew for so long are forgotten; 0 = never (T4.3.3)
   uint64_t max_points = 0;            ///< above it, least recently drawn clusters are forgotten down to 90 % of it; 0 = no limit
-  uint64_t max_log_bytes = 0;         ///< above it, least recently drawn patches are forgotten down to 90 % of it; 0 = no limit
+  uint64_t max_log_bytes = 0;         ///< of the patches kept for events_since(): above it, those least recently drawn are
+                                      ///< forgotten with their clusters, down to 90 % of it; 0 = no limit
   int threads = 1;                    ///< for reference depth maps; 0 = all cores
 };
 
@@ -125,7 +126,7 @@ class PackerCore {
   EpochId epoch() const;
   const points::PointModel& model() const;
   const Statistics& statistics() const;
-  /// Memory of the events kept for events_since(), estimated.
+  /// Memory of the events kept for events_since(), estimated. Forgets kept are at most as many as leaves were ever touched.
   uint64_t log_bytes() const;
 
  private:

@@ -1,0 +1,94 @@
+#include "services/packer/event_log.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace telesplat::packer {
+namespace {
+
+// A map node's links and the allocator's headers of node and blob.
+constexpr uint64_t kNodeBytes = 96;
+constexpr uint64_t kForgetBytes = 40;  // a hash node and its bucket
+
+bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequence; }
+
+}  // namespace
+
+uint64_t EventLog::Patch::bytes() const {
+  return sizeof(Patch) + kNodeBytes + event.blob->capacity() + forgotten.capacity() * sizeof(points::ClusterKey);
+}
+
+uint64_t EventLog::bytes() const { return patch_bytes_ + last_forget_.size() * kForgetBytes; }
+
+void EventLog::add_patch(const Event& event, size_t mosaics) {
+  if (mosaics == 0) return;
+  const Patch& patch = patches_.emplace_hint(patches_.end(), event.sequence, Patch{event, mosaics})->second;
+  patch_bytes_ += patch.bytes();
+}
+
+void EventLog::add_forget(Sequence sequence, std::span<const points::Cluster> dropped) {
+  for (const points::Cluster& cluster : dropped) {
+    last_forget_[cluster.key] = sequence;
+    for (const points::Mosaic& mosaic : cluster.mosaics) {
+      const auto found = patches_.find(mosaic.sequence());
+      CHECK(found != patches_.end());  // a patch stays as long as it has a mosaic in the model
+      Patch& patch = found->second;
+      patch_bytes_ -= patch.bytes();
+      if (--patch.alive == 0) {
+        patches_.erase(found);
+      } else {
+        patch.forgotten.push_back(cluster.key);
+        patch_bytes_ += patch.bytes();
+      }
+    }
+  }
+}
+
+void EventLog::add_epoch(const Event& event) {
+  patches_.clear();
+  last_forget_.clear();
+  patch_bytes_ = 0;
+  epoch_ = event;
+}
+
+std::vector<Event> EventLog::since(Sequence after) const {
+  std::vector<Event> out;
+  bool from_nothing = after.value == 0;
+  if (epoch_ && after < epoch_->sequence) {
+    out.push_back(*epoch_);
+    after = epoch_->sequence;
+    from_nothing = true;
+  }
+  std::vector<Event> live;
+  for (auto patch = patches_.upper_bound(after); patch != patches_.end(); ++patch) live.push_back(patch->second.event);
+  const std::vector<Event> wiping = forgets(after, from_nothing);
+  std::merge(live.begin(), live.end(), wiping.begin(), wiping.end(), std::back_inserter(out), by_sequence);
+  return out;
+}
+
+// from_nothing: the replica holds nothing but what it will get from the patches kept.
+std::vector<Event> EventLog::forgets(Sequence after, bool from_nothing) const {
+  std::vector<std::pair<Sequence, points::ClusterKey>> keys;
+  if (from_nothing) {
+    for (const auto& [sequence, patch] : patches_)
+      for (const points::ClusterKey key : patch.forgotten) keys.emplace_back(last_forget_.at(key), key);
+  } else {
+    for (const auto& [key, sequence] : last_forget_)
+      if (sequence > after) keys.emplace_back(sequence, key);
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+
+  std::vector<Event> out;
+  for (const auto& [sequence, key] : keys) {
+    if (out.empty() || out.back().sequence != sequence) {
+      Event& event = out.emplace_back();
+      event.sequence = sequence;
+      event.kind = Event::Kind::kForget;
+    }
+    out.back().clusters.push_back(key);
+  }
+  return out;
+}
+
+}  // namespace telesplat::packer

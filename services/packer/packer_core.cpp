@@ -1,0 +1,172 @@
+#include "services/packer/packer_core.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/codec/depth_codec.h"
+#include "services/packer/event_log.h"
+#include "services/packer/frame_book.h"
+#include "services/packer/obsolescence.h"
+
+namespace telesplat::packer {
+namespace {
+
+Status check(const SampledTile& t) {
+  if (Status camera = geometry::validate(t.camera); !camera)
+    return Error{fmt::format("tile {} of frame {}: {}", t.tile, t.frame.value, camera.error().text)};
+  if (t.tiles_in_frame > kMaxTilesInFrame || t.tile >= t.tiles_in_frame)
+    return Error{fmt::format("frame {} has no tile {} of {} (at most {})", t.frame.value, t.tile, t.tiles_in_frame, kMaxTilesInFrame)};
+  const geometry::Rect& r = t.rect;
+  if (r.x < 0 || r.y < 0 || r.width < 1 || r.height < 1 || r.width > t.camera.width || r.height > t.camera.height ||
+      r.x > t.camera.width - r.width || r.y > t.camera.height - r.height)
+    return Error{fmt::format("tile {} of frame {}: {}x{} pixels at ({}, {}) do not lie in the frame's {}x{}", t.tile, t.frame.value,
+                             r.width, r.height, r.x, r.y, t.camera.width, t.camera.height)};
+  const size_t pixels = static_cast<size_t>(r.width) * r.height;
+  if (pixels > codec::kMaxPixels)
+    return Error{fmt::format("tile {} of frame {} has {} pixels, at most {} are coded", t.tile, t.frame.value, pixels, codec::kMaxPixels)};
+  if (t.image.width != r.width || t.image.height != r.height || t.image.depth.size() != pixels ||
+      t.image.colour.size() != pixels || t.image.normal.size() != pixels)
+    return Error{fmt::format("tile {} of frame {}: its image has {}x{} pixels, its rectangle {}x{}", t.tile, t.frame.value,
+                             t.image.width, t.image.height, r.width, r.height)};
+  return ok_status();
+}
+
+}  // namespace
+
+struct PackerCore::Impl {
+  const Config config;
+  const Hooks hooks;
+  EpochId epoch;
+  Sequence sequence;  // of the newest event
+  points::PointModel model{config.model};
+  EventLog log;
+  FrameBook frames;
+  Obsolescence obsolescence;
+  Statistics statistics;
+  std::vector<float> reference_depth_m;  // kept for its memory
+
+  Event next_event(Event::Kind kind) {
+    Event event;
+    event.sequence = sequence = sequence.next();
+    event.kind = kind;
+    event.epoch = epoch;
+    return event;
+  }
+
+  splat::Elimination eliminate(SampledTile& tile) {
+    if (config.redundancy == Redundancy::kKeep) {
+      const auto nothing = static_cast<uint64_t>(std::count(tile.image.depth.begin(), tile.image.depth.end(), 0u));
+      return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
+    }
+    // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters outside
+    // the tile's frustum cost next to nothing.
+    const geometry::Camera view = geometry::crop(tile.camera, tile.rect);
+    hooks.reference_depth(model, view, config.threads, reference_depth_m);
+    return hooks.eliminate(view, {0, 0, tile.rect.width, tile.rect.height}, reference_depth_m, config.relative_epsilon, tile.image);
+  }
+
+  Event pack(SampledTile& tile, double now_s) {
+    const splat::Elimination elimination = eliminate(tile);
+    Event event = next_event(Event::Kind::kPatch);
+    const FrameBook::Frame frame = frames.add(tile, elimination);
+    event.frame = tile.frame, event.viewer = tile.viewer, event.request = tile.request;
+    event.tile = tile.tile, event.tiles_in_frame = tile.tiles_in_frame;
+    event.frame_complete = frame.tiles_left == 0;
+    event.camera = tile.camera, event.rect = tile.rect;
+    event.samples = elimination.samples, event.kept = elimination.kept;
+    event.frame_samples = frame.samples, event.frame_kept = frame.kept;
+    event.blob = std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
+
+    points::PreparedPatch patch = points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image);
+    for (const auto& [key, mosaic] : patch.mosaics) obsolescence.accessed(key, now_s);
+    log.add_patch(event, patch.mosaics.size());
+    statistics.points_outside += patch.outside;
+    model.insert(std::move(patch));
+
+    ++statistics.tiles;
+    statistics.frames_complete += event.frame_complete;
+    statistics.samples += event.samples;
+    statistics.kept += event.kept;
+    return event;
+  }
+
+  void forget(std::span<const points::ClusterKey> keys, std::vector<Event>& out) {
+    while (!keys.empty()) {
+      const auto some = keys.first(std::min(keys.size(), kMaxForgetKeys));
+      keys = keys.subspan(some.size());
+      Event event = next_event(Event::Kind::kForget);
+      event.clusters.assign(some.begin(), some.end());
+      const uint64_t points = model.points();
+      const std::vector<points::Cluster> dropped = model.forget(some);
+      log.add_forget(event.sequence, dropped);
+      for (const points::ClusterKey key : some) obsolescence.forgotten(key);
+      statistics.clusters_forgotten += dropped.size();
+      statistics.points_forgotten += points - model.points();
+      out.push_back(std::move(event));
+    }
+  }
+};
+
+PackerCore::PackerCore(const Config& config, EpochId epoch) : PackerCore(config, epoch, Hooks{}) {}
+PackerCore::PackerCore(const Config& config, EpochId epoch, Hooks hooks)
+    : impl_(new Impl{.config = config, .hooks = std::move(hooks), .epoch = epoch}) {}
+PackerCore::~PackerCore() = default;
+
+Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s) {
+  Impl& i = *impl_;
+  if (tile.epoch != i.epoch) {
+    ++i.statistics.tiles_other_epoch;
+    return std::optional<Event>();
+  }
+  Status good = check(tile);
+  if (good && i.frames.is_duplicate(tile)) {
+    ++i.statistics.tiles_duplicate;
+    return std::optional<Event>();
+  }
+  if (good) good = i.frames.check(tile);
+  if (!good) {
+    ++i.statistics.tiles_refused;
+    return good.error();
+  }
+  return std::optional<Event>(i.pack(tile, now_s));
+}
+
+void PackerCore::accessed(std::span<const points::ClusterKey> clusters, double now_s) {
+  for (const points::ClusterKey key : clusters)
+    if (impl_->obsolescence.knows(key)) impl_->obsolescence.accessed(key, now_s);
+}
+
+std::vector<Event> PackerCore::tick(double now_s) {
+  Impl& i = *impl_;
+  std::vector<Event> out;
+  i.forget(i.obsolescence.choose(i.model, now_s, i.config.obsolete_after_s, i.config.max_points), out);
+  if (i.config.max_log_bytes > 0) i.forget(i.obsolescence.choose_patches(i.model, i.log, i.config.max_log_bytes), out);
+  return out;
+}
+
+std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
+  Impl& i = *impl_;
+  if (epoch == i.epoch) return std::nullopt;
+  i.epoch = epoch;
+  Event event = i.next_event(Event::Kind::kEpoch);
+  i.model.clear();
+  i.frames.clear();
+  i.obsolescence.clear();
+  i.log.add_epoch(event);
+  return event;
+}
+
+std::vector<Event> PackerCore::events_since(Sequence after) const {
+  std::vector<Event> events = impl_->log.since(after);
+  for (Event& event : events) event.epoch = impl_->epoch;
+  return events;
+}
+
+Sequence PackerCore::sequence() const { return impl_->sequence; }
+EpochId PackerCore::epoch() const { return impl_->epoch; }
+const points::PointModel& PackerCore::model() const { return impl_->model; }
+const Statistics& PackerCore::statistics() const { return impl_->statistics; }
+uint64_t PackerCore::log_bytes() const { return impl_->log.bytes(); }
+
+}  // namespace telesplat::packer
