@@ -1,0 +1,85 @@
+// Mesh samplers on a terrain of about a million triangles, whole frames of 1280 x 800. Baselines in the same run: the same
+// rays through Embree without attributes, and the OpenGL rasteriser.
+#include <benchmark/benchmark.h>
+
+#include "common/geometry/trajectory.h"
+#include "services/sampler/ray_packets.h"
+#include "services/sampler/ray_sampler.h"
+#include "tests/support/mesh_chunks.h"
+
+namespace telesplat::sampler {
+namespace {
+
+constexpr geometry::Rect kFrame{0, 0, 1280, 800};
+
+// 90 degrees as in a session (the terrain covers a quarter of the frame), 40 degrees for a frame full of it.
+geometry::Camera view(double fov_deg) {
+  return geometry::make_camera(geometry::Trajectory::orbit().at(3), fov_deg, kFrame.width, kFrame.height);
+}
+
+const test::ChunkList& terrain() {
+  static const test::ChunkList chunks = test::terrain(724, 181);
+  return chunks;
+}
+
+void count(benchmark::State& state, double rays) {
+  state.counters["Mrays/s"] = benchmark::Counter(rays / 1e6 * double(state.iterations()), benchmark::Counter::kIsRate);
+}
+
+void sample_frames(benchmark::State& state, Sampler& sampler) {
+  if (!sampler.add_chunks(terrain()).ok()) return state.SkipWithError("chunks refused");
+  const geometry::Camera camera = view(double(state.range(0)));
+  size_t covered = 0;
+  for (auto _ : state) {
+    const image::DepthImage image = sampler.sample(camera, kFrame);
+    covered = size_t(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; }));
+  }
+  state.counters["covered"] = double(covered) / (kFrame.width * kFrame.height);
+  count(state, kFrame.width * kFrame.height);
+}
+
+void SamplerRay(benchmark::State& state) { sample_frames(state, *make_ray_sampler(0)); }
+
+void SamplerRayWithoutAttributes(benchmark::State& state) {
+  RayScene scene(0);
+  if (!scene.add(terrain()).ok()) return state.SkipWithError("chunks refused");
+  const geometry::Camera camera = view(double(state.range(0)));
+  for (auto _ : state) trace_tile(scene, camera, kFrame, [](const RTCRayHit8& packet, int, int) { benchmark::DoNotOptimize(packet); });
+  count(state, kFrame.width * kFrame.height);
+}
+
+void SamplerRaster(benchmark::State& state) {
+  auto sampler = make_raster_sampler();
+  if (!sampler) return state.SkipWithError(sampler.error().text.c_str());
+  sample_frames(state, **sampler);
+}
+
+void SamplerRenderDirectly(benchmark::State& state) {
+  auto sampler = make_ray_sampler(0);
+  if (!sampler->add_chunks(terrain()).ok()) return state.SkipWithError("chunks refused");
+  geometry::Camera camera = view(double(state.range(0)));
+  camera.width = 2560, camera.height = 1600;
+  const image::Shading shading({}, camera);
+  for (auto _ : state) benchmark::DoNotOptimize(render_directly(*sampler, camera, shading).colour.data());
+  count(state, 2560.0 * 1600);
+}
+
+// From chunks in memory to the first ray.
+void SamplerBuild(benchmark::State& state) {
+  const geometry::Camera camera = view(90);
+  for (auto _ : state) {
+    auto sampler = make_ray_sampler(0);
+    if (!sampler->add_chunks(terrain()).ok()) return state.SkipWithError("chunks refused");
+    benchmark::DoNotOptimize(sampler->sample(camera, {640, 400, 1, 1}).depth[0]);
+  }
+  state.counters["Mtriangles/s"] = benchmark::Counter(2 * 724 * 724 / 1e6 * double(state.iterations()), benchmark::Counter::kIsRate);
+}
+
+BENCHMARK(SamplerRay)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(SamplerRayWithoutAttributes)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(SamplerRaster)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(SamplerRenderDirectly)->Arg(90)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(SamplerBuild)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace telesplat::sampler
