@@ -63,12 +63,29 @@ std::vector<uint8_t> encode(const DepthImage& image) {
 }
 
 Result<DepthImage> decode(std::span<const uint8_t> bytes, int expected_width, int expected_height) {
+  DepthImage image;
+  if (const Status status = decode_into(image, bytes, expected_width, expected_height); !status) return status.error();
+  return image;
+}
+
+Status decode_into(DepthImage& image, std::span<const uint8_t> bytes, int expected_width, int expected_height) {
+  const auto fail = [&](std::string_view what) {
+    image = {};
+    return damaged(what);
+  };
   Reader in(bytes);
   const auto size = read_header(in);
-  if (!size) return size.error();
+  if (!size) {
+    image = {};
+    return size.error();
+  }
   if ((expected_width != 0 && size->width != expected_width) || (expected_height != 0 && size->height != expected_height))
-    return damaged(fmt::format("{} x {} pixels, expected {} x {} (0: any)", size->width, size->height, expected_width, expected_height));
-  DepthImage image(size->width, size->height);
+    return fail(fmt::format("{} x {} pixels, expected {} x {} (0: any)", size->width, size->height, expected_width, expected_height));
+  const size_t pixels = static_cast<size_t>(size->width) * static_cast<size_t>(size->height);
+  image.width = size->width, image.height = size->height;
+  image.depth.resize(pixels);  // not cleared: every tile writes all its pixels
+  image.colour.resize(pixels);
+  image.normal.resize(pixels);
   const TileGrid grid(image.width, image.height);
   std::string problem;
   const bool good = for_each_tile(grid, [&](int column, int row) {
@@ -76,9 +93,9 @@ Result<DepthImage> decode(std::span<const uint8_t> bytes, int expected_width, in
     problem = fmt::format("damaged or cut off in tile {}, {} of {} x {}", column, row, grid.columns, grid.rows);
     return false;
   });
-  if (!good) return damaged(problem);
-  if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
-  return image;
+  if (!good) return fail(problem);
+  if (in.left() != 0) return fail(fmt::format("{} bytes after its end", in.left()));
+  return ok_status();
 }
 
 Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {

@@ -24,6 +24,10 @@ std::vector<uint8_t> encode(const image::DepthImage& image);
 /// which must be plausible for the stream's length. `expected_width`/`expected_height`: refuse other sizes (0 = any).
 Result<image::DepthImage> decode(std::span<const uint8_t> bytes, int expected_width = 0, int expected_height = 0);
 
+/// The same into `image`, reusing its memory: several hundred kilobytes a tile, whose page faults would cost about as much as
+/// a sixth of the decoding. On failure `image` is left empty, 0 x 0.
+Status decode_into(image::DepthImage& image, std::span<const uint8_t> bytes, int expected_width = 0, int expected_height = 0);
+
 /// For `telesplat inspect`: size and parts of a stream without decoding its pixels.
 struct StreamInfo {
   int width = 0, height = 0;

@@ -26,7 +26,8 @@ class Reader {
 
 void put_varint(std::vector<uint8_t>& out, uint32_t value);
 
-/// Appends `raw` as one self-delimiting block: constant, stored or zstd, whichever is shorter.
+/// Appends `raw` as one self-delimiting block: constant, stored or zstd, whichever is shorter. Looks for repeated strings only
+/// where one byte value is so frequent that a Huffman code, of a bit at least, would waste much on it.
 void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
 /// Appends `raw` as a stored block: for bits known to be random.
 void put_stored_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
@@ -38,33 +39,56 @@ std::optional<std::span<const uint8_t>> get_stored_block(Reader& in);
 /// Passes over any block; nothing where it is damaged, else the bytes it takes in the stream.
 std::optional<size_t> skip_block(Reader& in);
 
-/// Packs numbers of up to 32 bits, least significant bit first.
+/// Packs numbers, least significant bit first, into a buffer that must have 16 bytes to spare. Loops copy it into a local
+/// variable and back, so that it stays in registers.
+struct BitSink {
+  uint8_t* at = nullptr;
+  uint64_t pending = 0;
+  unsigned filled = 0;
+
+  /// Precondition: value < 2^count, count <= 32.
+  void put(uint64_t value, unsigned count) {
+    pending |= value << filled;
+    filled += count;
+    std::memcpy(at, &pending, 8);  // whole words; the next write overlaps the unfinished byte
+    at += filled >> 3;
+    pending >>= filled & ~7u;
+    filled &= 7;
+  }
+};
+
+/// A BitSink and its buffer.
 class BitWriter {
  public:
   /// Forgets what was written; until the next call at most `max_bits` bits follow.
   void start(size_t max_bits) {
     if (buffer_.size() < max_bits / 8 + 16) buffer_.resize(max_bits / 8 + 16);
-    at_ = buffer_.data(), pending_ = 0, filled_ = 0;
+    sink = {buffer_.data()};
   }
-  /// Precondition: value < 2^count, count <= 32.
-  void put(uint64_t value, unsigned count) {
-    pending_ |= value << filled_;
-    filled_ += count;
-    std::memcpy(at_, &pending_, 8);  // whole words; the next write overlaps the unfinished byte
-    at_ += filled_ >> 3;
-    pending_ >>= filled_ & ~7u;
-    filled_ &= 7;
-  }
-  std::span<const uint8_t> bytes() const { return {buffer_.data(), size_t(at_ - buffer_.data()) + (filled_ != 0)}; }
+  std::span<const uint8_t> bytes() const { return {buffer_.data(), size_t(sink.at - buffer_.data()) + (sink.filled != 0)}; }
+
+  BitSink sink;
 
  private:
   std::vector<uint8_t> buffer_;
-  uint8_t* at_ = nullptr;
-  uint64_t pending_ = 0;
-  unsigned filled_ = 0;
 };
 
-/// The other direction. Reading past the end gives zeros for a while, and is found by overrun().
+/// The inverse of BitSink; 16 bytes after the data must be readable.
+struct BitSource {
+  const uint8_t* data = nullptr;
+  size_t position = 0;  ///< in bits
+
+  /// Precondition: count <= 32.
+  uint32_t take(unsigned count) {
+    uint64_t word;
+    std::memcpy(&word, data + (position >> 3), 8);
+    word >>= position & 7;
+    position += count;
+    return static_cast<uint32_t>(word & ((uint64_t{1} << count) - 1));
+  }
+};
+
+/// A BitSource and its buffer. Reading past the end gives zeros for a while, and is found by overrun().
 class BitReader {
  public:
   /// Copies `bytes`. Between two calls of overrun() at most `max_bits_unchecked` bits may be taken.
@@ -73,23 +97,18 @@ class BitReader {
     if (buffer_.size() < padded) buffer_.resize(padded);
     if (!bytes.empty()) std::memcpy(buffer_.data(), bytes.data(), bytes.size());
     std::memset(buffer_.data() + bytes.size(), 0, padded - bytes.size());
-    position_ = 0, end_ = bytes.size() * 8;
+    source = {buffer_.data()};
+    end_ = bytes.size() * 8;
   }
-  /// Precondition: count <= 32.
-  uint32_t take(unsigned count) {
-    uint64_t word;
-    std::memcpy(&word, buffer_.data() + (position_ >> 3), 8);
-    word >>= position_ & 7;
-    position_ += count;
-    return static_cast<uint32_t>(word & ((uint64_t{1} << count) - 1));
-  }
-  [[nodiscard]] bool overrun() const { return position_ > end_; }
+  [[nodiscard]] bool overrun() const { return source.position > end_; }
   /// True when all bits but the padding of the last byte were taken.
-  [[nodiscard]] bool finished() const { return position_ <= end_ && end_ - position_ < 8; }
+  [[nodiscard]] bool finished() const { return source.position <= end_ && end_ - source.position < 8; }
+
+  BitSource source;
 
  private:
   std::vector<uint8_t> buffer_;
-  size_t position_ = 0, end_ = 0;
+  size_t end_ = 0;
 };
 
 static_assert(std::endian::native == std::endian::little, "the streams are little-endian and are read in place");

@@ -4,6 +4,38 @@
 
 #include "common/codec/tokens.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "common/codec/mask.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace telesplat::codec::detail::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Bit x of `words` = depth[x] != 0.
+void CoveredBits(const uint32_t* HWY_RESTRICT depth, size_t count, uint64_t* HWY_RESTRICT words) {
+  [[maybe_unused]] const hn::CappedTag<uint32_t, 16> d;
+  for (size_t x = 0; x < count; x += 64) {
+    const size_t bits = HWY_MIN(size_t{64}, count - x);
+    uint64_t word = 0;
+    size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR
+    for (; i + hn::Lanes(d) <= bits; i += hn::Lanes(d)) {
+      uint8_t part[8] = {};  // as StoreMaskBits wants
+      hn::StoreMaskBits(d, hn::Ne(hn::LoadU(d, depth + x + i), hn::Zero(d)), part);
+      word |= (uint64_t{part[0]} | uint64_t{part[1]} << 8) << i;
+    }
+#endif
+    for (; i < bits; ++i) word |= uint64_t{depth[x + i] != 0} << i;
+    words[x / 64] = word;
+  }
+}
+
+}  // namespace telesplat::codec::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace telesplat::codec::detail {
 namespace {
 
@@ -45,7 +77,7 @@ void set_bits(Mask& mask, size_t begin, size_t end) {
 
 struct Scratch {
   std::vector<uint32_t> lengths;
-  std::vector<uint8_t> tokens[2], bytes, packed[2];
+  std::vector<uint8_t> tokens[2], bytes, packed;
   BitWriter writer;
   BitReader reader;
 };
@@ -59,7 +91,7 @@ void put_runs(std::vector<uint8_t>& out, const std::vector<uint32_t>& lengths, S
   s.writer.start(lengths.size() * NumberToken::kMaxBits);
   for (size_t i = 0; i < lengths.size(); ++i) {
     uint8_t token;
-    NumberToken::put(lengths[i], &token, s.writer);
+    NumberToken::put(lengths[i], &token, s.writer.sink);
     s.tokens[i & 1].push_back(token);
   }
   put_varint(out, static_cast<uint32_t>(lengths.size()));
@@ -82,7 +114,7 @@ bool get_runs(Reader& in, Mask& mask, Scratch& s) {
   for (size_t i = 0; i < *count; ++i) {
     const uint8_t token = s.tokens[i & 1][i / 2];
     if (token >= NumberToken::kCount) return false;
-    const size_t end = at + NumberToken::get(token, s.reader);
+    const size_t end = at + NumberToken::get(token, s.reader.source);
     if (end >= pixels || (end == at && i != 0) || s.reader.overrun()) return false;
     if (i & 1) set_bits(mask, at, end);
     at = end;
@@ -132,36 +164,32 @@ size_t Mask::runs() const {
   return n;
 }
 
-void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) {
-  for (size_t x = 0; x < count; x += 64) {
-    const size_t bits = std::min<size_t>(64, count - x);
-    uint64_t word = 0;
-    for (size_t i = 0; i < bits; ++i) word |= uint64_t{depth[x + i] != 0} << i;
-    words[x / 64] = word;
-  }
-}
+HWY_EXPORT(CoveredBits);
+void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) { HWY_DYNAMIC_DISPATCH(CoveredBits)(depth, count, words); }
 
 void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
-  // The shortest of those that can be worth a try: lengths of runs take about a byte each, bytes of pixels at least a bit.
+  // A run takes a byte or so, a byte of pixels at least a bit and few more where it is the usual one. Bench codec/patch*.
   Scratch& s = scratch();
   run_lengths(mask, s.lengths);
-  const size_t bytes = bytes_per_row(mask) * static_cast<size_t>(mask.height());
-  const bool try_runs = s.lengths.size() < bytes, try_bytes = s.lengths.size() > bytes / 64;
-  const size_t begin = out.size();
-  if (try_runs) {
+  const size_t pixels = static_cast<size_t>(mask.width()) * static_cast<size_t>(mask.height());
+  const size_t begin = out.size(), runs = s.lengths.size();
+  if (runs < pixels / 10) {
     out.push_back(kRuns);
     put_runs(out, s.lengths, s);
+    if (runs <= pixels / 512) return;
   }
-  if (!try_bytes) return;
-  for (const Coding coding : {kBytes, kBytesAbove}) {
-    auto& packed = s.packed[coding - 1];
-    packed.assign(1, coding);
-    put_bytes(packed, mask, coding == kBytesAbove, s);
-    if (out.size() == begin || packed.size() < out.size() - begin) {
-      out.resize(begin);
-      out.insert(out.end(), packed.begin(), packed.end());
+  size_t plain = 0, above = 0;  // changes of pixels within rows, and of those changes from row to row
+  for (int y = 1; y < mask.height(); ++y)
+    for (size_t w = 0; w < mask.words_per_row(); ++w) {
+      const uint64_t here = mask.row(y)[w], changed = here ^ mask.row(y - 1)[w];
+      plain += static_cast<size_t>(std::popcount(here ^ here << 1));
+      above += static_cast<size_t>(std::popcount(changed ^ changed << 1));
     }
-  }
+  s.packed.assign(1, above < plain ? kBytesAbove : kBytes);
+  put_bytes(s.packed, mask, above < plain, s);
+  if (out.size() != begin && out.size() - begin <= s.packed.size()) return;
+  out.resize(begin);
+  out.insert(out.end(), s.packed.begin(), s.packed.end());
 }
 
 bool get_mask(Reader& in, Mask& mask) {
@@ -185,3 +213,4 @@ std::optional<size_t> skip_mask(Reader& in) {
 }
 
 }  // namespace telesplat::codec::detail
+#endif  // HWY_ONCE

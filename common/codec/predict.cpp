@@ -38,6 +38,30 @@ void PredictBytes(const uint8_t* HWY_RESTRICT above, const uint8_t* HWY_RESTRICT
   }
 }
 
+// row = above + running sum of unfolded residuals: U - UL + L = U + (L - UL), the same difference as one pixel to the left.
+void ReconstructDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT residuals, size_t width, uint32_t* HWY_RESTRICT row) {
+#if HWY_TARGET == HWY_SCALAR
+  uint32_t difference = 0;
+  for (size_t x = 0; x < width; ++x) {
+    difference += unfold_depth(residuals[x]);
+    row[x] = (above[x] + difference) & image::kMaxDepthCode;
+  }
+#else
+  const hn::FixedTag<uint32_t, 4> d;
+  const auto one = hn::Set(d, 1u), most = hn::Set(d, image::kMaxDepthCode);
+  auto before = hn::Zero(d);
+  for (size_t x = 0; x < width; x += 4) {
+    const auto z = hn::LoadU(d, residuals + x);
+    auto sum = hn::Xor(hn::ShiftRight<1>(z), hn::Sub(hn::Zero(d), hn::And(z, one)));
+    sum = hn::Add(sum, hn::ShiftLeftLanes<1>(d, sum));
+    sum = hn::Add(sum, hn::ShiftLeftLanes<2>(d, sum));
+    sum = hn::Add(sum, before);
+    before = hn::Broadcast<3>(sum);
+    hn::StoreU(hn::And(hn::Add(hn::LoadU(d, above + x), sum), most), d, row + x);
+  }
+#endif
+}
+
 // colour and normal [0, width) from their residuals; index -1 is set. A pixel waits for its left neighbour, five operations
 // long, so all its bytes go through at once: colour in bytes 0-3, normal in bytes 4-5.
 void ReconstructBytes(const uint32_t* HWY_RESTRICT above_colour, const uint16_t* HWY_RESTRICT above_normal,
@@ -76,6 +100,7 @@ namespace telesplat::codec::detail {
 
 HWY_EXPORT(PredictDepth);
 HWY_EXPORT(PredictBytes);
+HWY_EXPORT(ReconstructDepth);
 HWY_EXPORT(ReconstructBytes);
 
 namespace {
@@ -112,12 +137,7 @@ void predict_row(FilledRow& above, FilledRow& row, size_t width, Residuals& resi
 
 void reconstruct_row(FilledRow& above, FilledRow& row, size_t width, const Residuals& residuals) {
   set_edge(above, row);
-  // U - UL + L = U + (L - UL): the difference to the row above is a running sum of residuals.
-  uint32_t difference = 0;
-  for (size_t x = 0; x < width; ++x) {
-    difference += unfold_depth(residuals.depth[x]);
-    row.depth()[x] = (above.depth()[x] + difference) & image::kMaxDepthCode;
-  }
+  HWY_DYNAMIC_DISPATCH(ReconstructDepth)(above.depth(), residuals.depth.data(), width, row.depth());
   HWY_DYNAMIC_DISPATCH(ReconstructBytes)
   (above.colour(), above.normal(), residuals.colour.data(), residuals.normal.data(), width, row.colour(), row.normal());
 }

@@ -24,6 +24,9 @@ class FilledRow {
   uint32_t* depth() { return depth_.data() + kLead; }
   uint32_t* colour() { return colour_.data() + kLead; }
   uint16_t* normal() { return normal_.data() + kLead; }
+  const uint32_t* depth() const { return depth_.data() + kLead; }
+  const uint32_t* colour() const { return colour_.data() + kLead; }
+  const uint16_t* normal() const { return normal_.data() + kLead; }
 
  private:
   static constexpr size_t kLead = 1, kPad = kLead + 63;  // kernels may read and write to the end of a vector

@@ -26,8 +26,19 @@ std::optional<Pixel> get_base(Reader& in) {
   return Pixel{at(0) | at(1) << 8 | at(2) << 16, at(3) | at(4) << 8 | at(5) << 16, static_cast<uint16_t>(at(6) | at(7) << 8)};
 }
 
-// Bench codec/patch*: where few pixels are covered, in short runs, nearest neighbours predict better than filled rows.
-bool is_sparse(size_t covered, size_t runs, size_t pixels) { return covered * 2 < pixels && covered < runs * 4; }
+void clear(image::DepthImage& image, const TileRect& rect) {
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t first = rect.first + rect.stride * static_cast<size_t>(y), width = static_cast<size_t>(rect.width);
+    std::fill_n(image.depth.begin() + static_cast<ptrdiff_t>(first), width, 0u);
+    std::fill_n(image.colour.begin() + static_cast<ptrdiff_t>(first), width, 0u);
+    std::fill_n(image.normal.begin() + static_cast<ptrdiff_t>(first), width, uint16_t{0});
+  }
+}
+
+// Bench codec/patch*: filled rows predict better where runs are long, but walk over every pixel of the tile.
+bool is_sparse(size_t covered, size_t runs, size_t pixels) {
+  return covered * 8 < pixels || (covered * 2 < pixels && covered < runs * 4);
+}
 
 // Smooth colour goes into joint tokens, rough colour into a stream per component. Judged by neighbours in a few rows.
 bool is_rough(const image::DepthImage& image, const TileRect& rect) {
@@ -97,7 +108,10 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
 
 std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect) {
   const auto kind = in.u8();
-  if (kind == kEmpty) return 0;
+  if (kind == kEmpty) {
+    clear(image, rect);
+    return 0;
+  }
   if (!kind || *kind & ~kKnownBits) return std::nullopt;
   const int predictor = *kind & kPredictorBits;
   const bool full = !(*kind & kMasked), sparse = predictor == kSparse;
@@ -111,6 +125,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
     s.mask.reset(rect.width, rect.height);
     if (!get_mask(in, s.mask)) return std::nullopt;
     covered = s.mask.count();
+    clear(image, rect);
   }
   s.reset(static_cast<size_t>(rect.width));
   if (!s.reader.start(in, covered, static_cast<size_t>(rect.width), *kind & kPlainColour)) return std::nullopt;

@@ -30,7 +30,7 @@ struct TileGrid {
 
 /// Appends the pixels of `rect`; returns the number of covered ones.
 size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect);
-/// Writes the covered pixels of `rect`, which must be zero before; returns their number, or nothing where the stream is damaged.
+/// Writes all pixels of `rect`; returns the number of covered ones, or nothing where the stream is damaged.
 std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect);
 /// Adds the bytes of a tile to `info`; false where the stream is damaged.
 [[nodiscard]] bool skip_tile(Reader& in, StreamInfo& info);

@@ -15,13 +15,13 @@ namespace telesplat::codec::detail {
 /// Any z < 2^24: eight tokens per factor of two.
 struct NumberToken {
   static constexpr unsigned kCount = 8 * 22, kMaxBits = 21;
-  static void put(uint32_t z, uint8_t* token, BitWriter& bits) {
+  static void put(uint32_t z, uint8_t* token, BitSink& bits) {
     const uint32_t v = z + 8, shift = 28 - static_cast<uint32_t>(std::countl_zero(v));
     *token = static_cast<uint8_t>(8 * shift + (v >> shift & 7));
     bits.put(v & ((1u << shift) - 1), shift);
   }
   /// Tokens of kCount and more give nonsense, and take up to 31 bits.
-  static uint32_t get(uint8_t token, BitReader& bits) {
+  static uint32_t get(uint8_t token, BitSource& bits) {
     const unsigned shift = token >> 3;
     return ((8u + (token & 7)) << shift) - 8 + bits.take(shift);
   }
@@ -57,14 +57,14 @@ struct NormalToken {
     return table;
   }();
 
-  static void put(uint16_t z, uint8_t* token, BitWriter& bits) {
+  static void put(uint16_t z, uint8_t* token, BitSink& bits) {
     const unsigned t = kClassOf[z & 255] | kClassOf[z >> 8] << 4;
     const Entry e = kEntries[t];
     const unsigned over = z - e.base;  // both bytes at once: neither is below its base
     *token = static_cast<uint8_t>(t);
     bits.put((over & 255) | over >> 8 << e.low_bits, e.bits);
   }
-  static uint16_t get(uint8_t token, BitReader& bits) {
+  static uint16_t get(uint8_t token, BitSource& bits) {
     const Entry e = kEntries[token];
     const uint32_t over = bits.take(e.bits);
     return static_cast<uint16_t>(e.base + (over & ((1u << e.low_bits) - 1)) + (over >> e.low_bits << 8));
@@ -89,7 +89,7 @@ struct ColourToken {
     return table;
   }();
 
-  static void put(uint32_t z, uint8_t* token, BitWriter& bits) {
+  static void put(uint32_t z, uint8_t* token, BitSink& bits) {
     if ((z & 0xFCFCFC) == 0) [[likely]] {
       *token = static_cast<uint8_t>(z * (36u + (6u << 8) + (1u << 16)) >> 16);  // b + 6 g + 36 r; no carries come in
       return;
@@ -102,7 +102,7 @@ struct ColourToken {
       bits.put((z >> shift & 255) - c.base, c.bits);
     }
   }
-  static uint32_t get(uint8_t token, BitReader& bits) {
+  static uint32_t get(uint8_t token, BitSource& bits) {
     uint32_t z = kSmall[token];
     if (kBits[token] == 0) [[likely]] return z;
     for (unsigned shift = 0, t = token; shift <= 16; shift += 8, t /= 6) z += bits.take(kClasses[t % 6].bits) << shift;

@@ -20,13 +20,17 @@ void fill(FilledRow& row, size_t width, const Pixel& pixel) {
 
 // Gives the pixels of `row` without coverage their predictions, as reconstruct_row does for residuals of zero.
 void fill_holes(FilledRow& above, FilledRow& row, const uint64_t* covered, size_t width) {
-  for (size_t x = 0; x < width; ++x) {
-    if (covered[x / 64] >> x % 64 & 1) continue;
-    const bool edge = x == 0;
-    row.depth()[x] = edge ? above.depth()[0] : predict_depth(row.depth()[x - 1], above.depth()[x], above.depth()[x - 1]);
-    row.colour()[x] = edge ? above.colour()[0] : predict_bytes(row.colour()[x - 1], above.colour()[x], above.colour()[x - 1]);
-    row.normal()[x] = edge ? above.normal()[0]
-                           : static_cast<uint16_t>(predict_bytes(row.normal()[x - 1], above.normal()[x], above.normal()[x - 1]));
+  for (size_t w = 0; w * 64 < width; ++w) {
+    uint64_t holes = ~covered[w];
+    if (width - w * 64 < 64) holes &= (uint64_t{1} << (width - w * 64)) - 1;
+    for_each_set(&holes, 1, [&](size_t bit) {
+      const size_t x = w * 64 + bit;
+      const size_t left = x == 0 ? 0 : x - 1;
+      const FilledRow& beside = x == 0 ? above : row;
+      row.depth()[x] = predict_depth(beside.depth()[left], above.depth()[x], above.depth()[left]);
+      row.colour()[x] = predict_bytes(beside.colour()[left], above.colour()[x], above.colour()[left]);
+      row.normal()[x] = static_cast<uint16_t>(predict_bytes(beside.normal()[left], above.normal()[x], above.normal()[left]));
+    });
   }
 }
 
@@ -34,6 +38,17 @@ void load_row(FilledRow& row, const image::DepthImage& image, size_t first, size
   std::copy_n(image.depth.data() + first, width, row.depth());
   std::copy_n(image.colour.data() + first, width, row.colour());
   std::copy_n(image.normal.data() + first, width, row.normal());
+}
+
+Pixel at(const image::DepthImage& image, size_t i) { return {image.depth[i], image.colour[i], image.normal[i]}; }
+
+// Pixel i = (x, y) of a sparse tile: as in a filled row where the three neighbours are covered, else the nearest pixel.
+Pixel predict_sparse(const TileScratch& s, const image::DepthImage& image, size_t x, int y, size_t i, size_t stride) {
+  const auto covered = [&](size_t column, int row) { return (s.mask.row(row)[column / 64] >> column % 64 & 1) != 0; };
+  if (x == 0 || y == 0 || !covered(x - 1, y) || !covered(x, y - 1) || !covered(x - 1, y - 1)) return s.neighbours.predict(static_cast<int>(x), y);
+  const Pixel left = at(image, i - 1), up = at(image, i - stride), up_left = at(image, i - stride - 1);
+  return {predict_depth(left.depth, up.depth, up_left.depth), predict_bytes(left.colour, up.colour, up_left.colour),
+          static_cast<uint16_t>(predict_bytes(left.normal, up.normal, up_left.normal))};
 }
 
 }  // namespace
@@ -44,9 +59,11 @@ void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect
   fill(*above, width, base);
   for (int y = 0; y < rect.height; ++y, std::swap(above, row)) {
     load_row(*row, image, rect.first + rect.stride * static_cast<size_t>(y), width);
-    if (!full) fill_holes(*above, *row, s.mask.row(y), width);
+    const size_t covered = full ? width : count_bits(s.mask.row(y), s.mask.words_per_row());
+    if (covered != width) fill_holes(*above, *row, s.mask.row(y), width);
+    if (covered == 0) continue;
     predict_row(*above, *row, width, s.residuals);
-    if (full) {
+    if (covered == width) {
       s.writer.add(s.residuals, width);
       continue;
     }
@@ -67,23 +84,23 @@ bool decode_dense(TileScratch& s, image::DepthImage& image, const TileRect& rect
   bool good = true;
   for (int y = 0; y < rect.height; ++y, std::swap(above, row)) {
     const size_t first = rect.first + rect.stride * static_cast<size_t>(y);
-    if (full) {
+    const size_t covered = full ? width : count_bits(s.mask.row(y), s.mask.words_per_row());
+    if (covered == width) {
       if (!s.reader.take(s.residuals, width)) return false;
       reconstruct_row(*above, *row, width, s.residuals);
-      uint32_t least = 1;
-      for (size_t x = 0; x < width; ++x) least = std::min(least, row->depth()[x]);
-      good &= least != 0;
+      bool all = true;
+      for (size_t x = 0; x < width; ++x) all &= row->depth()[x] != 0;
+      good &= all;
       std::copy_n(row->depth(), width, image.depth.data() + first);
       std::copy_n(row->colour(), width, image.colour.data() + first);
       std::copy_n(row->normal(), width, image.normal.data() + first);
       continue;
     }
-    size_t n = count_bits(s.mask.row(y), s.mask.words_per_row());
-    if (!s.reader.take(s.packed, n)) return false;
+    if (!s.reader.take(s.packed, covered)) return false;
     std::fill_n(s.residuals.depth.data(), width, 0u);
     std::fill_n(s.residuals.colour.data(), width, 0u);
     std::fill_n(s.residuals.normal.data(), width, uint16_t{0});
-    n = 0;
+    size_t n = 0;
     for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
       s.residuals.depth[x] = s.packed.depth[n];
       s.residuals.colour[x] = s.packed.colour[n];
@@ -106,7 +123,7 @@ void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRec
     size_t n = 0;
     for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
       const size_t i = rect.first + rect.stride * static_cast<size_t>(y) + x;
-      const Pixel pixel{image.depth[i], image.colour[i], image.normal[i]}, guess = s.neighbours.predict(static_cast<int>(x), y);
+      const Pixel pixel = at(image, i), guess = predict_sparse(s, image, x, y, i, rect.stride);
       s.packed.depth[n] = fold_depth(pixel.depth - guess.depth);
       s.packed.colour[n] = fold_bytes(pixel.colour, guess.colour);
       s.packed.normal[n++] = static_cast<uint16_t>(fold_bytes(pixel.normal, guess.normal));
@@ -125,11 +142,11 @@ bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rec
     if (!s.reader.take(s.packed, n)) return false;
     n = 0;
     for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
-      const Pixel guess = s.neighbours.predict(static_cast<int>(x), y);
+      const size_t i = rect.first + rect.stride * static_cast<size_t>(y) + x;
+      const Pixel guess = predict_sparse(s, image, x, y, i, rect.stride);
       const Pixel pixel{(guess.depth + unfold_depth(s.packed.depth[n])) & image::kMaxDepthCode, add_bytes(guess.colour, s.packed.colour[n]),
                         static_cast<uint16_t>(add_bytes(guess.normal, s.packed.normal[n]))};
       ++n;
-      const size_t i = rect.first + rect.stride * static_cast<size_t>(y) + x;
       image.depth[i] = pixel.depth, image.colour[i] = pixel.colour, image.normal[i] = pixel.normal;
       good &= pixel.depth != 0;
       s.neighbours.add(static_cast<int>(x), y, pixel);

@@ -36,7 +36,7 @@ struct TileScratch {
 void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full);
 void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base);
 
-/// s.reader, which was started -> pixels covered by s.mask; others are left alone. False where the stream is damaged.
+/// s.reader, which was started -> pixels covered by s.mask; others are left alone (they are zero). False where the stream is damaged.
 [[nodiscard]] bool decode_dense(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full);
 [[nodiscard]] bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
 
