@@ -5,9 +5,13 @@
 #include <cmath>
 
 #include "common/image/normal.h"
+#include "common/points/allocation.h"
 #include "common/points/mosaic_builder.h"
 
 namespace telesplat::points {
+
+static_assert(sizeof(Mosaic) == 40, "most mosaics hold a few points: their headers count");
+
 namespace {
 
 // Decoded normals in 1/32767, so that sums do not depend on their order.
@@ -90,10 +94,7 @@ glm::vec3 Mosaic::centroid_room(const geometry::Box& leaf) const {
   return leaf.lo + fraction * leaf.size();
 }
 
-size_t Mosaic::bytes() const {
-  // glibc: 8 bytes before each block, multiples of 16, at least 32.
-  return sizeof(Mosaic) + std::max<size_t>(32, (data_bytes() + 8 + 15) / 16 * 16);
-}
+size_t Mosaic::bytes() const { return sizeof(Mosaic) + allocated_bytes(data_bytes()); }
 
 uint64_t Mosaic::digest() const {
   struct {

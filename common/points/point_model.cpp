@@ -6,21 +6,20 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "common/points/allocation.h"
+
 namespace telesplat::points {
 namespace {
 
-// glibc: 8 bytes before each block, multiples of 16, at least 32.
-constexpr uint64_t allocated(uint64_t bytes) { return bytes == 0 ? 0 : std::max<uint64_t>(32, (bytes + 8 + 15) / 16 * 16); }
-
 // A node of the map (link, key, pointer) and the cluster it points to, without its mosaics.
-constexpr uint64_t kClusterBytes = allocated(3 * sizeof(void*)) + allocated(sizeof(Cluster));
+constexpr uint64_t kClusterBytes = allocated_bytes(3 * sizeof(void*)) + allocated_bytes(sizeof(Cluster));
 
 // Makes room for one more, by a quarter instead of doubling: most clusters hold many small mosaics.
 void reserve_one_more(std::vector<Mosaic>& mosaics) {
   if (mosaics.size() == mosaics.capacity()) mosaics.reserve(mosaics.size() + 1 + mosaics.size() / 4);
 }
 
-uint64_t header_bytes(const std::vector<Mosaic>& mosaics) { return allocated(mosaics.capacity() * sizeof(Mosaic)); }
+uint64_t header_bytes(const std::vector<Mosaic>& mosaics) { return allocated_bytes(mosaics.capacity() * sizeof(Mosaic)); }
 
 }  // namespace
 
@@ -71,21 +70,26 @@ void PointModel::insert(PreparedPatch patch) {
   }
 }
 
-std::vector<Cluster> PointModel::forget(std::span<const ClusterKey> keys) {
-  std::vector<Cluster> dropped;
+std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const ClusterKey> keys) {
+  std::vector<std::unique_ptr<Cluster>> dropped;
   dropped.reserve(keys.size());
   for (const ClusterKey key : keys) {
     const auto found = clusters_.find(key);
     if (found == clusters_.end()) continue;
-    Cluster& cluster = *found->second;
-    for (const Mosaic& mosaic : cluster.mosaics) {
+    for (const Mosaic& mosaic : found->second->mosaics) {
       points_ -= mosaic.count(0);
       cluster_bytes_ -= mosaic.bytes() - sizeof(Mosaic);
     }
-    cluster_bytes_ -= kClusterBytes + header_bytes(cluster.mosaics);
-    dropped.push_back(std::move(cluster));
+    cluster_bytes_ -= kClusterBytes + header_bytes(found->second->mosaics);
+    dropped.push_back(std::move(found->second));
     clusters_.erase(found);
   }
+  return dropped;
+}
+
+std::vector<Cluster> PointModel::forget(std::span<const ClusterKey> keys) {
+  std::vector<Cluster> dropped;
+  for (const auto& cluster : take_out(keys)) dropped.push_back(std::move(*cluster));
   return dropped;
 }
 
@@ -100,7 +104,7 @@ const Cluster* PointModel::find(ClusterKey key) const {
 }
 
 uint64_t PointModel::bytes() const {
-  return sizeof(PointModel) + cluster_bytes_ + allocated(clusters_.bucket_count() * sizeof(void*));
+  return sizeof(PointModel) + cluster_bytes_ + allocated_bytes(clusters_.bucket_count() * sizeof(void*));
 }
 
 uint64_t PointModel::points_in(ClusterKey key) const {

@@ -118,9 +118,11 @@ class PointModel {
   const ModelConfig& config() const { return config_; }
   /// Event "patch": takes every mosaic over, without copying points. Sequences must rise; O(mosaics).
   void insert(PreparedPatch patch);
-  /// Event "forget": drops whole clusters. Unknown keys are ignored. Returns the dropped clusters, so that a viewer can keep
-  /// them alive until its frame is drawn.
+  /// Event "forget": drops whole clusters. Unknown keys are ignored. Returns what was dropped.
   std::vector<Cluster> forget(std::span<const ClusterKey> keys);
+  /// The same, but the clusters stay where they are in memory: a viewer keeps them alive until its frame is drawn, since draw
+  /// lists point to clusters and not only to their points.
+  std::vector<std::unique_ptr<Cluster>> take_out(std::span<const ClusterKey> keys);
   /// Event "new epoch": drops everything.
   void clear();
 

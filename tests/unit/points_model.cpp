@@ -78,6 +78,20 @@ TEST(PointModel, ForgetDropsClustersWholeAndHandsThemOut) {
   EXPECT_EQ(model.find(key), nullptr);
 }
 
+TEST(PointModel, ClustersTakenOutStayDrawable) {
+  PointModel model(test::scene_config());
+  model.insert(patch(1));
+  const ClusterKey key = model.clusters().begin()->first;
+  const Cluster* cluster = model.find(key);
+  const Mosaic::Level level = cluster->mosaics[0].level(0);
+  const auto dropped = model.take_out(std::vector<ClusterKey>{key});
+  ASSERT_EQ(dropped.size(), 1u);
+  EXPECT_EQ(dropped[0].get(), cluster);
+  EXPECT_EQ(cluster->leaf_room, leaf_box(model.config(), key));
+  EXPECT_EQ(cluster->mosaics[0].level(0).x, level.x);
+  EXPECT_EQ(model.find(key), nullptr);
+}
+
 TEST(PointModel, ForgettingEverythingIsAnEmptyModel) {
   PointModel model(test::scene_config()), cleared(test::scene_config());
   model.insert(patch(1));
