@@ -37,7 +37,7 @@ ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, Mode
                     if (state_) state_->send(wire::StateRequest{link_.instance(), packer, after});
                   }}),
       requester_(options.requests, link_.instance()),
-      started_s_(monotonic_s()),
+      started_s_(options.started_s > 0 ? options.started_s : monotonic_s()),
       thread_([this] { loop(); }) {}
 
 ReplicaWorker::~ReplicaWorker() {
@@ -48,6 +48,10 @@ ReplicaWorker::~ReplicaWorker() {
 void ReplicaWorker::on_pose(double now_s, const geometry::Camera& camera) {
   const std::lock_guard lock(mutex_);
   poses_.emplace_back(now_s, camera);
+}
+
+void ReplicaWorker::on_first_points(double now_s) {
+  if (first_points_s_ == 0) first_points_s_ = now_s - started_s_;
 }
 
 void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen) {
@@ -162,7 +166,6 @@ void ReplicaWorker::apply_patch(const wire::Patch& patch) {
   spans_.add("insert", to_master_s(decoded), to_master_s(inserted), 1);
   points_received_ += patch.kept;
   bytes_received_ += patch.image.size();
-  if (first_points_s_ == 0 && patch.kept) first_points_s_ = inserted - started_s_;
   if (patch.frame_complete) cache_.show_newest();
 
   if (const auto u = requester_.on_applied(patch, to_master_s(inserted))) {

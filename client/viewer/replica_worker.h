@@ -21,6 +21,7 @@ class ReplicaWorker {
     net::ServiceOptions service;
     RequestOptions requests;
     std::map<std::string, std::string> facts;  ///< for the hello
+    double started_s = 0;  ///< when the session was started, on the monotonic clock; 0: now
   };
 
   /// Starts the thread.
@@ -31,6 +32,8 @@ class ReplicaWorker {
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.
   void on_pose(double now_s, const geometry::Camera& camera);
+  /// Points were displayed for the first time (later calls change nothing).
+  void on_first_points(double now_s);
   /// A frame was displayed with this camera; `seen`: the clusters it drew.
   void on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen);
   /// Events applied so far tell a first update: true once one frame was applied completely.
@@ -65,7 +68,7 @@ class ReplicaWorker {
   EventSequencer sequencer_;
   ViewRequester requester_;
   int seen_version_ = 0;
-  double started_s_ = 0, last_report_s_ = 0, asked_s_ = 0, first_points_s_ = 0;
+  double started_s_ = 0, last_report_s_ = 0, asked_s_ = 0;
   uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0;
 
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
@@ -75,7 +78,7 @@ class ReplicaWorker {
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};
-  std::atomic<double> offset_s_{0};
+  std::atomic<double> offset_s_{0}, first_points_s_{0};
   std::thread thread_;
 };
 

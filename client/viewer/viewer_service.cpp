@@ -59,6 +59,7 @@ void add_flags(CLI::App& app, ViewerOptions& o) {
   net::add_service_flags(app, o.service, false);
   add_view_flags(app, o);
   app.add_option("--threads", o.threads, "threads to draw with; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
+  app.add_option("--started-at", o.started_s, "monotonic clock when the session was started, for start-up times; 0: now")->capture_default_str();
   app.add_option("--out", o.out, "run folder for pictures and frames to verify");
 }
 
@@ -98,7 +99,8 @@ int run(ViewerOptions o) {
                                          {"sampling_height", std::to_string(o.requests.sampling_height)},
                                          {"trajectory", o.trajectory}, {"fov_deg", fmt::format("{}", o.display.fov_deg)},
                                          {"target_fps", fmt::format("{}", o.display.target_fps)}, {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
-                                         {"splat_scale", fmt::format("{}", o.display.selection.scale)}}};
+                                         {"splat_scale", fmt::format("{}", o.display.selection.scale)}},
+                                        o.started_s};
   DisplayResult result;
   {
     ReplicaWorker worker(context, worker_options, cache, frames, spans);

@@ -13,6 +13,7 @@ struct ViewerOptions {
   std::string trajectory = "orbit";  ///< "orbit", "still" or a CSV file
   std::string renderer = "auto", splat = "disc", coupling = "async";
   int threads = 0;
+  double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
   std::string out;                   ///< run folder; empty: nothing is recorded
 };
 

@@ -8,6 +8,7 @@
 #include "common/metrics/recorder.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
+#include "services/packer/depth_recorder.h"
 #include "services/packer/packer_core.h"
 
 namespace telesplat::packer {
@@ -33,6 +34,11 @@ class PackerService {
       const auto endpoint = socket->bind(options_.service.bind, options_.service.insecure);
       if (!endpoint) return endpoint.error();
       hello.endpoints[key] = *endpoint;
+    }
+    if (!options_.record_depth.empty()) {
+      auto recorder = DepthRecorder::open(options_.record_depth, options_.record_depth_frames);
+      if (!recorder) return recorder.error();
+      recorder_ = std::move(*recorder);
     }
     link_.emplace(context, options_.service.master, hello);
     return ok_status();
@@ -129,6 +135,11 @@ class PackerService {
     auto image = codec::decode({reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size()}, lease.rect.width, lease.rect.height);
     if (!image) return tiles_.reject(message, image.error().text);
     const double decoded = master_now();
+    if (recorder_)
+      if (const Status s = recorder_->add(lease.frame, lease.camera, lease.rect, lease.tiles_in_frame, *image); !s) {
+        log::error("{}", s.error().text);
+        recorder_.reset();
+      }
     auto event = core_->submit({lease.frame, lease.epoch, uint32_t(lease.tile), uint32_t(lease.tiles_in_frame), lease.camera, lease.rect, lease.viewer,
                                 lease.request, std::move(*image)}, monotonic_s());
     if (!event) return tiles_.reject(message, event.error().text);
@@ -184,6 +195,7 @@ class PackerService {
   std::optional<net::MasterLink> link_;
   InstanceId instance_ = net::make_instance_id();
   std::optional<PackerCore> core_;
+  std::optional<DepthRecorder> recorder_;
   points::ModelConfig model_;
   metrics::SpanRecorder spans_;
   int seen_version_ = 0;
@@ -196,6 +208,8 @@ class PackerService {
 void add_flags(CLI::App& app, PackerServiceOptions& o) {
   net::add_service_flags(app, o.service, true);
   app.add_option("--threads", o.threads, "threads for reference depth maps; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
+  app.add_option("--record-depth", o.record_depth, "folder to keep sampled depth images in");
+  app.add_option("--record-depth-frames", o.record_depth_frames, "depth images to keep at most")->capture_default_str()->check(CLI::Range(1, 1000000));
   app.add_option("--log-limit-mb", o.log_limit_mb, "memory for the events that late joiners get")->capture_default_str()->check(CLI::Range(1.0, 1e6));
 }
 

@@ -16,7 +16,7 @@
 namespace telesplat::sampler {
 namespace {
 
-constexpr size_t kChunksInFlight = 16;   // requests to the data server not yet answered
+constexpr size_t kChunksInFlight = 8;    // requests to the data server not yet answered
 constexpr int kLeasesAhead = 2;          // one being sampled, one to go on with at once
 constexpr double kRetry_s = 2.0;         // a data server that does not answer is asked again
 
@@ -150,8 +150,8 @@ class SamplerService {
   }
 
   void ask_for_leases() {
-    // Before the first chunks are here a lease would only wait.
-    if (!prefetched_ || !tiles_) return;
+    // A lease may have to wait for its chunks, but then they come first: the earliest tiles need not wait for the whole mesh.
+    if (!cache_.known() || !tiles_) return;
     while (leases_asked_ + int(leases_.size()) < kLeasesAhead) {
       link_.socket().send(wire::LeaseRequest{link_.instance()});
       ++leases_asked_;

@@ -5,6 +5,7 @@
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/inspect_command.h"
 #include "tools/telesplat/run_command.h"
+#include "tools/telesplat/scene_file.h"
 
 namespace {
 
@@ -26,6 +27,7 @@ int control(const std::string& master, const std::string& command) {
 int telesplat_main(int argc, char** argv) {
   CLI::App app{"telesplat: explore data sets that are too large for this machine"};
   app.require_subcommand(1);
+  app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);  // the command line wins over a scene file
   launcher::RunOptions run_options;
   auto* run = app.add_subcommand("run", "run the whole pipeline on this machine, headless, and record it");
   launcher::add_run_flags(*run, run_options);
@@ -43,7 +45,14 @@ int telesplat_main(int argc, char** argv) {
   inspect->add_option("path", path, "file or folder")->required();
   inspect->add_option("--cache", mesh.cache_dir, "folder of the chunk store");
 
-  net::parse_or_exit(app, argc, argv);
+  auto arguments = launcher::expand_scene_file(argc, argv);
+  if (!arguments) {
+    std::fprintf(stderr, "telesplat: %s\n", arguments.error().text.c_str());
+    return 2;
+  }
+  std::vector<char*> pointers{argv[0]};
+  for (auto& a : *arguments) pointers.push_back(a.data());
+  net::parse_or_exit(app, int(pointers.size()), pointers.data());
   if (*run) return launcher::run(run_options);
   if (*ctl) return control(master, command);
   return launcher::inspect(path, mesh);

@@ -37,6 +37,11 @@ std::vector<std::string> data_arguments(const RunOptions& o) {
   return a;
 }
 
+std::vector<std::string> packer_arguments(const RunOptions& o) {
+  if (!o.record_depth) return {};
+  return {"--record-depth", o.out + "/depth"};
+}
+
 std::vector<std::string> viewer_arguments(const RunOptions& o) {
   const auto &v = o.viewer;
   const auto &d = v.display;
@@ -44,7 +49,7 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--frames", text(double(d.frames)), "--hold", text(d.hold_s), "--fov", text(d.fov_deg), "--near", text(d.near_m),
                              "--target-fps", text(d.target_fps), "--renderer", v.renderer, "--splat", v.splat, "--splat-scale", text(d.selection.scale),
                              "--coupling", v.coupling, "--update-rate", text(v.requests.max_rate_hz), "--record-every", text(double(d.picture_every)),
-                             "--verify", text(double(d.verify_every)), "--out", o.out};
+                             "--verify", text(double(d.verify_every)), "--out", o.out, "--started-at", text(o.started_s)};
   if (d.exr) a.push_back("--exr");
   return a;
 }
@@ -80,7 +85,7 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     p.members_.push_back({"data", "telesplat-data", common(data_arguments(o), "data"), background});
-    p.members_.push_back({"packer", "telesplat-packer", common({}, "packer"), background / 2});
+    p.members_.push_back({"packer", "telesplat-packer", common(packer_arguments(o), "packer"), background / 2});
     const int cores = int(std::max(1u, std::thread::hardware_concurrency()));
     const int threads = o.sampler_threads ? o.sampler_threads : std::max(1, cores / o.samplers);
     for (int i = 1; i <= o.samplers; ++i)

@@ -146,6 +146,7 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--cache", o.mesh.cache_dir, "folder of the chunk store; default: telesplat in the user's cache folder");
   app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
   app.add_flag("!--same-priority", o.background_servers, "run samplers, packer and data at the viewer's priority");
+  app.add_flag("--record-depth", o.record_depth, "keep the first 50 sampled depth images (telesplat inspect reads them)");
   app.add_option("--seed", o.seed, "seed of whatever is random in a run; nothing is, in mesh runs")->capture_default_str();
   viewer::add_view_flags(app, o.viewer);
   master::add_session_flags(app, o.master);
@@ -156,6 +157,7 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
 
 int run(const RunOptions& given) {
   RunOptions o = given;
+  o.started_s = monotonic_s();
   if (o.out.empty()) o.out = default_out();
   const auto refuse = [](const Error& e) {
     std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());

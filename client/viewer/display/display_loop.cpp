@@ -39,16 +39,25 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
     return geometry::make_camera(trajectory.at(moving_s), o.fov_deg, o.width, o.height, o.near_m);
   };
 
-  // Start-up: nothing to show yet; let the server know where the head is.
-  while (!worker.first_update_complete()) {
-    if (told_to_stop(worker)) return {0, true};
-    worker.on_pose(monotonic_s(), camera_at(0));
-    sleep_until(monotonic_s() + 1.0 / 30);
-  }
-
   const size_t pixels = size_t(o.width) * size_t(o.height);
   image::View view{o.width, o.height, std::vector<uint32_t>(pixels), std::vector<float>(spool ? pixels : 0)};
   splat::DrawList list;
+
+  // Start-up: the head rests until the first view is complete, its points are shown as they come.
+  while (!worker.first_update_complete()) {
+    if (told_to_stop(worker)) return {0, true};
+    const geometry::Camera camera = camera_at(0);
+    worker.on_pose(monotonic_s(), camera);
+    cache.select(camera, o.selection, list);
+    if (list.points > 0) {
+      renderer.render(list, camera, o.kernel, image::Shading(o.shading, camera), {o.width, o.height, view.colour.data(), nullptr});
+      worker.on_first_points(monotonic_s());
+    }
+    cache.end_frame();
+    sleep_until(monotonic_s() + 1.0 / 30);
+  }
+  worker.on_first_points(monotonic_s());
+
   DisplayResult result;
   const double start_s = monotonic_s();
   double previous_s = 0, next_picture_s = 0;
