@@ -39,57 +39,91 @@ void PredictBytes(const uint8_t* HWY_RESTRICT above, const uint8_t* HWY_RESTRICT
 }
 
 // row = above + running sum of unfolded residuals: U - UL + L = U + (L - UL), the same difference as one pixel to the left.
-void ReconstructDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT residuals, size_t width, uint32_t* HWY_RESTRICT row) {
-#if HWY_TARGET == HWY_SCALAR
+bool ReconstructDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT residuals, size_t width, uint32_t* HWY_RESTRICT row) {
+  size_t x = 0;
   uint32_t difference = 0;
-  for (size_t x = 0; x < width; ++x) {
-    difference += unfold_depth(residuals[x]);
-    row[x] = (above[x] + difference) & image::kMaxDepthCode;
-  }
-#else
+  bool good = true;
+#if HWY_TARGET != HWY_SCALAR
   const hn::FixedTag<uint32_t, 4> d;
   const auto one = hn::Set(d, 1u), most = hn::Set(d, image::kMaxDepthCode);
-  auto before = hn::Zero(d);
-  for (size_t x = 0; x < width; x += 4) {
+  auto before = hn::Zero(d), least = most;
+  for (; x + 4 <= width; x += 4) {
     const auto z = hn::LoadU(d, residuals + x);
     auto sum = hn::Xor(hn::ShiftRight<1>(z), hn::Sub(hn::Zero(d), hn::And(z, one)));
     sum = hn::Add(sum, hn::ShiftLeftLanes<1>(d, sum));
     sum = hn::Add(sum, hn::ShiftLeftLanes<2>(d, sum));
     sum = hn::Add(sum, before);
     before = hn::Broadcast<3>(sum);
-    hn::StoreU(hn::And(hn::Add(hn::LoadU(d, above + x), sum), most), d, row + x);
+    const auto v = hn::And(hn::Add(hn::LoadU(d, above + x), sum), most);
+    least = hn::Min(least, v);
+    hn::StoreU(v, d, row + x);
+  }
+  difference = hn::GetLane(before);
+  good = hn::AllTrue(d, hn::Ne(least, hn::Zero(d)));
+#endif
+  for (; x < width; ++x) {
+    difference += unfold_depth(residuals[x]);
+    row[x] = (above[x] + difference) & image::kMaxDepthCode;
+    good &= row[x] != 0;
+  }
+  return good;
+}
+
+// The median predictor's inverse. Pixels wait for their left neighbour, five operations long; all the rest is off that path.
+void ReconstructAttributes(const uint64_t* HWY_RESTRICT above, const uint64_t* HWY_RESTRICT residuals, size_t width, uint64_t* HWY_RESTRICT row) {
+#if HWY_TARGET == HWY_SCALAR
+  for (size_t x = 0; x < width; ++x) {
+    const uint64_t up = above[x], left = x == 0 ? up : row[x - 1], up_left = x == 0 ? up : above[x - 1];
+    const auto half = [&](int shift) {
+      const auto part = [&](uint64_t v) { return static_cast<uint32_t>(v >> shift); };
+      return uint64_t{add_bytes(predict_bytes(part(left), part(up), part(up_left)), part(residuals[x]))} << shift;
+    };
+    row[x] = half(0) | half(32);
+  }
+#else
+  const hn::FixedTag<uint8_t, 16> pair;
+  const hn::RebindToSigned<decltype(pair)> signed_pair;
+  const hn::Repartition<uint16_t, decltype(pair)> pair16;
+  const hn::Repartition<uint64_t, decltype(pair)> pair64;
+  const auto one = hn::Set(pair, uint8_t{1}), low7 = hn::Set(pair, uint8_t{0x7F});
+  auto left = hn::BitCast(pair, hn::Set(pair64, above[0])), up_left = left;
+  const auto step = [&](hn::VFromD<decltype(pair)> up, hn::VFromD<decltype(pair)> residual_and_up) HWY_ATTR {
+    const auto lo = hn::Min(left, up), hi = hn::Max(left, up);
+    left = hn::Add(residual_and_up, hn::Sub(left, hn::Min(hn::Max(up_left, lo), hi)));
+    up_left = up;
+  };
+  size_t x = 0;
+  for (; x + 2 <= width; x += 2) {
+    const auto z = hn::BitCast(pair, hn::LoadU(pair64, residuals + x)), up = hn::BitCast(pair, hn::LoadU(pair64, above + x));
+    const auto half = hn::And(hn::BitCast(pair, hn::ShiftRight<1>(hn::BitCast(pair16, z))), low7);
+    const auto sign = hn::BitCast(pair, hn::Neg(hn::BitCast(signed_pair, hn::And(z, one))));
+    const auto known = hn::Add(hn::Xor(half, sign), up);
+    step(up, known);  // only the lower half counts
+    const auto first = left;
+    step(hn::BitCast(pair, hn::ShiftRightBytes<8>(pair64, hn::BitCast(pair64, up))),
+         hn::BitCast(pair, hn::ShiftRightBytes<8>(pair64, hn::BitCast(pair64, known))));
+    hn::StoreU(hn::InterleaveLower(pair64, hn::BitCast(pair64, first), hn::BitCast(pair64, left)), pair64, row + x);
+  }
+  if (x < width) {
+    const auto up = hn::BitCast(pair, hn::Set(pair64, above[x]));
+    step(up, hn::Add(hn::BitCast(pair, hn::Set(pair64, unfold_bytes(residuals[x]))), up));
+    row[x] = hn::GetLane(hn::BitCast(pair64, left));
   }
 #endif
 }
 
-// colour and normal [0, width) from their residuals; index -1 is set. A pixel waits for its left neighbour, five operations
-// long, so all its bytes go through at once: colour in bytes 0-3, normal in bytes 4-5.
-void ReconstructBytes(const uint32_t* HWY_RESTRICT above_colour, const uint16_t* HWY_RESTRICT above_normal,
-                      const uint32_t* HWY_RESTRICT colour_residuals, const uint16_t* HWY_RESTRICT normal_residuals, size_t width,
-                      uint32_t* HWY_RESTRICT colour, uint16_t* HWY_RESTRICT normal) {
-#if HWY_TARGET == HWY_SCALAR
-  for (size_t x = 0; x < width; ++x) {
-    colour[x] = add_bytes(predict_bytes(colour[x - 1], above_colour[x], above_colour[x - 1]), colour_residuals[x]);
-    normal[x] = static_cast<uint16_t>(add_bytes(predict_bytes(normal[x - 1], above_normal[x], above_normal[x - 1]), normal_residuals[x]));
-  }
-#else
-  const hn::FixedTag<uint8_t, 8> d;
-  const hn::FixedTag<uint64_t, 1> word;
-  const auto join = [](uint32_t c, uint16_t n) { return c | uint64_t{n} << 32; };
-  const auto vector = [&](uint64_t v) { return hn::BitCast(d, hn::Set(word, v)); };
-  auto left = vector(join(colour[-1], normal[-1])), up_left = left;
-  for (size_t x = 0; x < width; ++x) {
-    const auto residual = vector(unfold_bytes(join(colour_residuals[x], normal_residuals[x])));
-    const auto up = vector(join(above_colour[x], above_normal[x]));
-    const auto lo = hn::Min(left, up), hi = hn::Max(left, up);
-    const auto known = hn::Add(residual, up);  // off the critical path
-    left = hn::Add(known, hn::Sub(left, hn::Min(hn::Max(up_left, lo), hi)));
-    up_left = up;
-    const uint64_t value = hn::GetLane(hn::BitCast(word, left));
-    colour[x] = static_cast<uint32_t>(value);
-    normal[x] = static_cast<uint16_t>(value >> 32);
+void SplitAttributes(const uint64_t* HWY_RESTRICT row, size_t width, uint32_t* HWY_RESTRICT colour, uint16_t* HWY_RESTRICT normal) {
+  size_t x = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::FixedTag<uint32_t, 4> d;
+  const hn::FixedTag<uint16_t, 4> d16;
+  for (; x + 4 <= width; x += 4) {
+    const auto a = hn::LoadU(d, reinterpret_cast<const uint32_t*>(row + x)), b = hn::LoadU(d, reinterpret_cast<const uint32_t*>(row + x + 2));
+    hn::StoreU(hn::ConcatEven(d, b, a), d, colour + x);
+    hn::StoreU(hn::TruncateTo(d16, hn::ConcatOdd(d, b, a)), d16, normal + x);
   }
 #endif
+  for (; x < width; ++x) colour[x] = colour_of(row[x]), normal[x] = normal_of(row[x]);
 }
 
 }  // namespace telesplat::codec::detail::HWY_NAMESPACE
@@ -101,7 +135,8 @@ namespace telesplat::codec::detail {
 HWY_EXPORT(PredictDepth);
 HWY_EXPORT(PredictBytes);
 HWY_EXPORT(ReconstructDepth);
-HWY_EXPORT(ReconstructBytes);
+HWY_EXPORT(ReconstructAttributes);
+HWY_EXPORT(SplitAttributes);
 
 namespace {
 
@@ -135,11 +170,14 @@ void predict_row(FilledRow& above, FilledRow& row, size_t width, Residuals& resi
   predict(bytes(above.normal()), bytes(row.normal()), width * 2, 2, reinterpret_cast<uint8_t*>(residuals.normal.data()));
 }
 
-void reconstruct_row(FilledRow& above, FilledRow& row, size_t width, const Residuals& residuals) {
-  set_edge(above, row);
-  HWY_DYNAMIC_DISPATCH(ReconstructDepth)(above.depth(), residuals.depth.data(), width, row.depth());
-  HWY_DYNAMIC_DISPATCH(ReconstructBytes)
-  (above.colour(), above.normal(), residuals.colour.data(), residuals.normal.data(), width, row.colour(), row.normal());
+bool reconstruct_depth(const uint32_t* above, const uint32_t* residuals, size_t width, uint32_t* row) {
+  return HWY_DYNAMIC_DISPATCH(ReconstructDepth)(above, residuals, width, row);
+}
+void reconstruct_attributes(const uint64_t* above, const uint64_t* residuals, size_t width, uint64_t* row) {
+  HWY_DYNAMIC_DISPATCH(ReconstructAttributes)(above, residuals, width, row);
+}
+void split_attributes(const uint64_t* row, size_t width, uint32_t* colour, uint16_t* normal) {
+  HWY_DYNAMIC_DISPATCH(SplitAttributes)(row, width, colour, normal);
 }
 
 }  // namespace telesplat::codec::detail

@@ -48,8 +48,28 @@ struct Residuals {
 
 /// residuals[x] = zigzag(row[x] - prediction) for x in [0, width), the row and the one above being filled.
 void predict_row(FilledRow& above, FilledRow& row, size_t width, Residuals& residuals);
-/// The inverse: fills row [0, width).
-void reconstruct_row(FilledRow& above, FilledRow& row, size_t width, const Residuals& residuals);
+
+/// What decoding works on: colour and normal joined, colour in bytes 0-3 and normal in bytes 4-5, so that the median
+/// predictor, whose pixels wait for each other, takes all of them in one step. Pixels or residuals.
+struct JoinedRow {
+  void reset(size_t width) {
+    depth.resize(width + kPad);
+    attributes.resize(width + kPad);
+  }
+  static constexpr size_t kPad = 64;  // kernels may read and write to the end of a vector
+  std::vector<uint32_t> depth;
+  std::vector<uint64_t> attributes;
+};
+inline uint64_t join(uint32_t colour, uint16_t normal) { return colour | uint64_t{normal} << 32; }
+inline uint32_t colour_of(uint64_t joined) { return static_cast<uint32_t>(joined); }
+inline uint16_t normal_of(uint64_t joined) { return static_cast<uint16_t>(joined >> 32); }
+
+/// The inverse of predict_row: row[x] from residuals[x] and the row above, for x in [0, width). Neither writes past the end.
+/// The first returns false if a depth is zero.
+[[nodiscard]] bool reconstruct_depth(const uint32_t* above, const uint32_t* residuals, size_t width, uint32_t* row);
+void reconstruct_attributes(const uint64_t* above, const uint64_t* residuals, size_t width, uint64_t* row);
+/// Joined pixels -> planes.
+void split_attributes(const uint64_t* row, size_t width, uint32_t* colour, uint16_t* normal);
 
 /// Scalar forms of the two parts of predict_row that have vector kernels: what tests compare those with.
 uint32_t predict_depth(uint32_t left, uint32_t up, uint32_t up_left);

@@ -19,19 +19,25 @@ void PutAll(const T* HWY_RESTRICT z, size_t n, uint8_t* HWY_RESTRICT tokens, Bit
   for (size_t i = 0; i < n; ++i) Token::put(z[i], tokens + i, sink);
   bits = sink;
 }
-template <class Token, class T>
-void GetAll(const uint8_t* HWY_RESTRICT tokens, size_t n, BitSource& bits, T* HWY_RESTRICT z) {
-  BitSource source = bits;
-  for (size_t i = 0; i < n; ++i) z[i] = Token::get(tokens[i], source);
-  bits = source;
-}
-
 void PutNumbers(const uint32_t* z, size_t n, uint8_t* tokens, BitSink& bits) { PutAll<NumberToken>(z, n, tokens, bits); }
 void PutNormals(const uint16_t* z, size_t n, uint8_t* tokens, BitSink& bits) { PutAll<NormalToken>(z, n, tokens, bits); }
 void PutColours(const uint32_t* z, size_t n, uint8_t* tokens, BitSink& bits) { PutAll<ColourToken>(z, n, tokens, bits); }
-void GetNumbers(const uint8_t* tokens, size_t n, BitSource& bits, uint32_t* z) { GetAll<NumberToken>(tokens, n, bits, z); }
-void GetNormals(const uint8_t* tokens, size_t n, BitSource& bits, uint16_t* z) { GetAll<NormalToken>(tokens, n, bits, z); }
-void GetColours(const uint8_t* tokens, size_t n, BitSource& bits, uint32_t* z) { GetAll<ColourToken>(tokens, n, bits, z); }
+void GetNumbers(const uint8_t* HWY_RESTRICT tokens, size_t n, BitSource& bits, uint32_t* HWY_RESTRICT z) {
+  BitSource source = bits;
+  for (size_t i = 0; i < n; ++i) z[i] = NumberToken::get(tokens[i], source);
+  bits = source;
+}
+// Normals of joined pixels, colours left 0; and colours added to them.
+void GetNormals(const uint8_t* HWY_RESTRICT tokens, size_t n, BitSource& bits, uint64_t* HWY_RESTRICT z) {
+  BitSource source = bits;
+  for (size_t i = 0; i < n; ++i) z[i] = join(0, NormalToken::get(tokens[i], source));
+  bits = source;
+}
+void GetColours(const uint8_t* HWY_RESTRICT tokens, size_t n, BitSource& bits, uint64_t* HWY_RESTRICT z) {
+  BitSource source = bits;
+  for (size_t i = 0; i < n; ++i) z[i] |= ColourToken::get(tokens[i], source);
+  bits = source;
+}
 
 }  // namespace telesplat::codec::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -67,6 +73,13 @@ void TokenWriter::add(const Residuals& residuals, size_t n) {
       colour_[1][done_ + i] = static_cast<uint8_t>(z >> 16);
       colour_[2][done_ + i] = static_cast<uint8_t>(z);
     }
+    done_ += n;
+    return;
+  }
+  uint32_t any_colour = 0;
+  for (size_t i = 0; i < n; ++i) any_colour |= residuals.colour[i];
+  if (any_colour == 0) {
+    std::fill_n(colour_[0].begin() + static_cast<ptrdiff_t>(done_), n, uint8_t{0});
   } else {
     HWY_DYNAMIC_DISPATCH(PutColours)(residuals.colour.data(), n, &colour_[0][done_], colour_bits_.sink);
   }
@@ -101,21 +114,22 @@ bool TokenReader::start(Reader& in, size_t count, size_t row, bool plain_colour)
   return block(colour_[1]) && block(colour_[2]);
 }
 
-bool TokenReader::take(Residuals& residuals, size_t n) {
+bool TokenReader::take(JoinedRow& residuals, size_t n) {
   if (n > count_ - done_) return false;
-  uint8_t largest = 0;
+  uint8_t largest = 0, any_colour = 0;
   for (size_t i = 0; i < n; ++i) largest = std::max(largest, depth_[done_ + i]);
   if (largest >= NumberToken::kCount) return false;
   HWY_DYNAMIC_DISPATCH(GetNumbers)(&depth_[done_], n, depth_bits_.source, residuals.depth.data());
-  HWY_DYNAMIC_DISPATCH(GetNormals)(&normal_[done_], n, normal_bits_.source, residuals.normal.data());
+  HWY_DYNAMIC_DISPATCH(GetNormals)(&normal_[done_], n, normal_bits_.source, residuals.attributes.data());
   if (plain_colour_) {
     for (size_t i = 0; i < n; ++i) {
       const uint32_t green_z = colour_[0][done_ + i], green = static_cast<uint32_t>(unfold_bytes(green_z)) & 255;
       const uint32_t z = green_z << 8 | uint32_t{colour_[1][done_ + i]} << 16 | colour_[2][done_ + i];
-      residuals.colour[i] = fold_bytes(add_bytes(green << 16 | green, z), 0);
+      residuals.attributes[i] |= fold_bytes(add_bytes(green << 16 | green, z), 0);
     }
   } else {
-    HWY_DYNAMIC_DISPATCH(GetColours)(&colour_[0][done_], n, colour_bits_.source, residuals.colour.data());
+    for (size_t i = 0; i < n; ++i) any_colour |= colour_[0][done_ + i];
+    if (any_colour != 0) HWY_DYNAMIC_DISPATCH(GetColours)(&colour_[0][done_], n, colour_bits_.source, residuals.attributes.data());
   }
   done_ += n;
   return !depth_bits_.overrun() && !normal_bits_.overrun() && !colour_bits_.overrun();

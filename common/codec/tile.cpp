@@ -129,7 +129,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   }
   s.reset(static_cast<size_t>(rect.width));
   if (!s.reader.start(in, covered, static_cast<size_t>(rect.width), *kind & kPlainColour)) return std::nullopt;
-  const bool good = sparse ? decode_sparse(s, image, rect, *base) : decode_dense(s, image, rect, *base, full);
+  const bool good = full ? decode_full(s, image, rect, *base) : sparse ? decode_sparse(s, image, rect, *base) : decode_masked(s, image, rect, *base);
   if (!good || !s.reader.finished()) return std::nullopt;
   return covered;
 }

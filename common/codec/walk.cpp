@@ -18,7 +18,7 @@ void fill(FilledRow& row, size_t width, const Pixel& pixel) {
   std::fill_n(row.normal(), width, pixel.normal);
 }
 
-// Gives the pixels of `row` without coverage their predictions, as reconstruct_row does for residuals of zero.
+// Gives the pixels of `row` without coverage their predictions, as decoding does with residuals of zero.
 void fill_holes(FilledRow& above, FilledRow& row, const uint64_t* covered, size_t width) {
   for (size_t w = 0; w * 64 < width; ++w) {
     uint64_t holes = ~covered[w];
@@ -77,41 +77,57 @@ void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect
   }
 }
 
-bool decode_dense(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full) {
+bool decode_full(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
   const size_t width = static_cast<size_t>(rect.width);
-  FilledRow *above = &s.rows[0], *row = &s.rows[1];
-  fill(*above, width, base);
+  JoinedRow *above = &s.decoded[0], *row = &s.decoded[1], &residuals = s.decoded_residuals;
+  std::fill_n(above->depth.data(), width, base.depth);
+  std::fill_n(above->attributes.data(), width, join(base.colour, base.normal));
+  bool good = true;
+  const uint32_t* depth_above = above->depth.data();
+  for (int y = 0; y < rect.height; ++y, std::swap(above, row)) {
+    if (!s.reader.take(residuals, width)) return false;
+    const size_t first = rect.first + rect.stride * static_cast<size_t>(y);
+    uint32_t* const depth = image.depth.data() + first;  // in place: nothing is hidden here
+    good &= reconstruct_depth(depth_above, residuals.depth.data(), width, depth);
+    depth_above = depth;
+    reconstruct_attributes(above->attributes.data(), residuals.attributes.data(), width, row->attributes.data());
+    split_attributes(row->attributes.data(), width, image.colour.data() + first, image.normal.data() + first);
+  }
+  return good;
+}
+
+bool decode_masked(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+  const size_t width = static_cast<size_t>(rect.width);
+  JoinedRow *above = &s.decoded[0], *row = &s.decoded[1], &residuals = s.decoded_residuals, &packed = s.decoded_packed;
+  std::fill_n(above->depth.data(), width, base.depth);
+  std::fill_n(above->attributes.data(), width, join(base.colour, base.normal));
   bool good = true;
   for (int y = 0; y < rect.height; ++y, std::swap(above, row)) {
     const size_t first = rect.first + rect.stride * static_cast<size_t>(y);
-    const size_t covered = full ? width : count_bits(s.mask.row(y), s.mask.words_per_row());
+    const size_t covered = count_bits(s.mask.row(y), s.mask.words_per_row());
+    if (!s.reader.take(covered == width ? residuals : packed, covered)) return false;
+    if (covered != width) {  // a residual of zero leaves a hole its prediction
+      std::fill_n(residuals.depth.data(), width, 0u);
+      std::fill_n(residuals.attributes.data(), width, uint64_t{0});
+      size_t n = 0;
+      for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
+        residuals.depth[x] = packed.depth[n];
+        residuals.attributes[x] = packed.attributes[n++];
+      });
+    }
+    const bool no_zeros = reconstruct_depth(above->depth.data(), residuals.depth.data(), width, row->depth.data());
+    reconstruct_attributes(above->attributes.data(), residuals.attributes.data(), width, row->attributes.data());
     if (covered == width) {
-      if (!s.reader.take(s.residuals, width)) return false;
-      reconstruct_row(*above, *row, width, s.residuals);
-      bool all = true;
-      for (size_t x = 0; x < width; ++x) all &= row->depth()[x] != 0;
-      good &= all;
-      std::copy_n(row->depth(), width, image.depth.data() + first);
-      std::copy_n(row->colour(), width, image.colour.data() + first);
-      std::copy_n(row->normal(), width, image.normal.data() + first);
+      good &= no_zeros;
+      std::copy_n(row->depth.data(), width, image.depth.data() + first);
+      split_attributes(row->attributes.data(), width, image.colour.data() + first, image.normal.data() + first);
       continue;
     }
-    if (!s.reader.take(s.packed, covered)) return false;
-    std::fill_n(s.residuals.depth.data(), width, 0u);
-    std::fill_n(s.residuals.colour.data(), width, 0u);
-    std::fill_n(s.residuals.normal.data(), width, uint16_t{0});
-    size_t n = 0;
     for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
-      s.residuals.depth[x] = s.packed.depth[n];
-      s.residuals.colour[x] = s.packed.colour[n];
-      s.residuals.normal[x] = s.packed.normal[n++];
-    });
-    reconstruct_row(*above, *row, width, s.residuals);
-    for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
-      image.depth[first + x] = row->depth()[x];
-      image.colour[first + x] = row->colour()[x];
-      image.normal[first + x] = row->normal()[x];
-      good &= row->depth()[x] != 0;
+      image.depth[first + x] = row->depth[x];
+      image.colour[first + x] = colour_of(row->attributes[x]);
+      image.normal[first + x] = normal_of(row->attributes[x]);
+      good &= row->depth[x] != 0;
     });
   }
   return good;
@@ -135,17 +151,18 @@ void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRec
 
 bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
   s.neighbours.reset(rect.width, rect.height, base);
+  JoinedRow& packed = s.decoded_packed;
   bool good = true;
   for (int y = 0; y < rect.height; ++y) {
     size_t n = count_bits(s.mask.row(y), s.mask.words_per_row());
     if (n == 0) continue;
-    if (!s.reader.take(s.packed, n)) return false;
+    if (!s.reader.take(packed, n)) return false;
     n = 0;
     for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
       const size_t i = rect.first + rect.stride * static_cast<size_t>(y) + x;
       const Pixel guess = predict_sparse(s, image, x, y, i, rect.stride);
-      const Pixel pixel{(guess.depth + unfold_depth(s.packed.depth[n])) & image::kMaxDepthCode, add_bytes(guess.colour, s.packed.colour[n]),
-                        static_cast<uint16_t>(add_bytes(guess.normal, s.packed.normal[n]))};
+      const Pixel pixel{(guess.depth + unfold_depth(packed.depth[n])) & image::kMaxDepthCode, add_bytes(guess.colour, colour_of(packed.attributes[n])),
+                        static_cast<uint16_t>(add_bytes(guess.normal, normal_of(packed.attributes[n])))};
       ++n;
       image.depth[i] = pixel.depth, image.colour[i] = pixel.colour, image.normal[i] = pixel.normal;
       good &= pixel.depth != 0;

@@ -23,10 +23,12 @@ struct TileScratch {
     for (FilledRow& row : rows) row.reset(width);
     residuals.reset(width);
     packed.reset(width);
+    for (JoinedRow* row : {&decoded[0], &decoded[1], &decoded_residuals, &decoded_packed}) row->reset(width);
   }
   Mask mask;
   FilledRow rows[2];
   Residuals residuals, packed;  ///< of a row; of its covered pixels alone
+  JoinedRow decoded[2], decoded_residuals, decoded_packed;
   Neighbours neighbours;
   TokenWriter writer;
   TokenReader reader;
@@ -37,7 +39,8 @@ void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect
 void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base);
 
 /// s.reader, which was started -> pixels covered by s.mask; others are left alone (they are zero). False where the stream is damaged.
-[[nodiscard]] bool decode_dense(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full);
+[[nodiscard]] bool decode_full(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
+[[nodiscard]] bool decode_masked(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
 [[nodiscard]] bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
 
 }  // namespace telesplat::codec::detail
