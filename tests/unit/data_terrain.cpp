@@ -12,7 +12,7 @@ namespace {
 using data::test::TempFolder;
 
 TEST(Terrain, HasExactlyTheTrianglesAskedFor) {
-  for (uint64_t triangles : {2u, 3u, 7u, 99u, 1000u, 4999u}) {
+  for (uint64_t triangles : {2u, 3u, 7u, 4999u}) {
     const Terrain land = make_terrain(triangles, 3);
     ASSERT_EQ(land.indices.size(), 3 * triangles);
     ASSERT_EQ(land.colours.size(), land.positions.size());

@@ -1,0 +1,24 @@
+// What all fuzz targets of mesh readers do with a result: whatever passes validation must go through placement and chunking, too.
+#pragma once
+
+#include <cstdlib>
+
+#include "common/geometry/mesh_chunk.h"
+#include "services/data/chunker.h"
+#include "services/data/mesh_reader.h"
+
+namespace telesplat::data {
+
+inline int use(Result<Mesh> mesh) {
+  if (!mesh.ok() || !validate_mesh(*mesh, "fuzz").ok()) return 0;
+  const auto placed = place_mesh(std::move(*mesh), 0.8, "auto", "fuzz");
+  if (!placed.ok()) return 0;
+  const ChunkPlan plan = plan_chunks(*placed, 64);
+  for (size_t c = 0; c < plan.chunks(); ++c) {
+    const auto bytes = make_chunk(*placed, std::span(plan.order).subspan(plan.begin[c], plan.begin[c + 1] - plan.begin[c]));
+    if (!geometry::MeshChunkView::validate(bytes).ok()) std::abort();
+  }
+  return 0;
+}
+
+}  // namespace telesplat::data
