@@ -7,6 +7,8 @@
 namespace telesplat::points {
 
 /// Bytes that glibc takes for a block: 8 before each, multiples of 16, at least 32.
-constexpr size_t allocated_bytes(size_t bytes) { return bytes == 0 ? 0 : std::max<size_t>(32, (bytes + 8 + 15) / 16 * 16); }
+constexpr size_t allocated_bytes(size_t bytes) {
+  return bytes == 0 ? 0 : std::max<size_t>(32, (bytes + 8 + 15) / 16 * 16);
+}
 
 }  // namespace telesplat::points

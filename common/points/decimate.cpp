@@ -66,7 +66,11 @@ class LeafTable {
 class Decimator {
  public:
   Decimator(const image::DepthImage& image, const ClusterKey* keys)
-      : width_(image.width), height_(image.height), depth_(image.depth.data()), colour_(image.colour.data()), keys_(keys) {
+      : width_(image.width),
+        height_(image.height),
+        depth_(image.depth.data()),
+        colour_(image.colour.data()),
+        keys_(keys) {
     out_.blocks.reserve(image.pixels() / 16);
   }
 
@@ -176,7 +180,11 @@ class Decimator {
         const int dx = 2 * i - 3, dy = 2 * j - 3;
         // The rank is that of a sample which is not the first of its group, until it turns out to be one.
         out[n++] = {{pixel, leaves_.index_of(keys_[pixel]), static_cast<uint32_t>(1 + p), {}},
-                    keys_[pixel], depth_[pixel], s, dx * dx + dy * dy, false};
+                    keys_[pixel],
+                    depth_[pixel],
+                    s,
+                    dx * dx + dy * dy,
+                    false};
       }
     }
     return n;

@@ -1,4 +1,5 @@
-// Decimation (T4.3.2, T7.2): which samples of a tile stand for their neighbourhood at the coarser levels, in which colour.
+// Decimation (T4.3.2, T7.2): which samples of a tile stand for their neighbourhood at the coarser levels, in which
+// colour.
 #pragma once
 
 #include <array>
@@ -11,16 +12,16 @@
 
 namespace telesplat::points {
 
-/// Points lie in a mosaic by rank, then in the order in which their 4x4 blocks are scanned. Rank 0: points of all three levels;
-/// 1: of levels 0 and 1; 2, 3, 4: of level 0 alone, the right, lower, and lower right pixels of their 2x2 blocks. Coarse levels
-/// are then prefixes, and consecutive points lie two or four pixels apart: a splatter that draws neighbouring pixels one after
-/// the other waits for its own stores.
+/// Points lie in a mosaic by rank, then in the order in which their 4x4 blocks are scanned. Rank 0: points of all three
+/// levels; 1: of levels 0 and 1; 2, 3, 4: of level 0 alone, the right, lower, and lower right pixels of their 2x2
+/// blocks. Coarse levels are then prefixes, and consecutive points lie two or four pixels apart: a splatter that draws
+/// neighbouring pixels one after the other waits for its own stores.
 inline constexpr int kRanks = 5;
 
 /// One sample, or a whole 4x4 block of one leaf and of nearly one depth (the common case).
 struct SampleEntry {
-  uint32_t pixel;   ///< index in the tile
-  uint32_t leaf;    ///< index in DecimatedTile::leaves
+  uint32_t pixel;  ///< index in the tile
+  uint32_t leaf;   ///< index in DecimatedTile::leaves
   uint32_t rank;
   uint32_t mean[2];  ///< colours at levels 1 (ranks 0, 1) and 2 (rank 0)
 };

@@ -1,4 +1,5 @@
-// Based on: L. Shirman, S. Abi-Ezzi, "The cone of normals technique for fast processing of curved patches", Eurographics 1993.
+// Based on: L. Shirman, S. Abi-Ezzi, "The cone of normals technique for fast processing of curved patches",
+// Eurographics 1993.
 #include <xxhash.h>
 
 #include <algorithm>
@@ -69,8 +70,8 @@ uint8_t mean_position(const uint16_t* q, uint32_t n) {
 }  // namespace
 
 size_t Mosaic::data_bytes() const {
-  const size_t words = size_t{3} * counts_[0] + (counts_[1] < counts_[0] ? counts_[1] : 0) +
-                       (counts_[2] < counts_[1] ? counts_[2] : 0);
+  const size_t words =
+      size_t{3} * counts_[0] + (counts_[1] < counts_[0] ? counts_[1] : 0) + (counts_[2] < counts_[1] ? counts_[2] : 0);
   return words * 4;
 }
 
@@ -105,8 +106,13 @@ uint64_t Mosaic::digest() const {
     int8_t cone_cosine;
     uint8_t centroid[3];
     uint16_t zero;
-  } header{sequence_.value, {counts_[0], counts_[1], counts_[2]}, pixel_range_,
-           cone_axis_,      cone_cosine_,                         {centroid_[0], centroid_[1], centroid_[2]}, 0};
+  } header{sequence_.value,
+           {counts_[0], counts_[1], counts_[2]},
+           pixel_range_,
+           cone_axis_,
+           cone_cosine_,
+           {centroid_[0], centroid_[1], centroid_[2]},
+           0};
   static_assert(std::has_unique_object_representations_v<decltype(header.counts)> && sizeof header == 32);
   return XXH3_64bits_withSeed(data_.get(), data_bytes(), XXH3_64bits(&header, sizeof header));
 }

@@ -13,7 +13,8 @@ class MosaicBuilder {
   /// Allocates a mosaic of counts[l] points at level l. Precondition: counts[0] >= counts[1] >= counts[2] > 0.
   MosaicBuilder(Sequence sequence, const std::array<uint32_t, kLevels>& counts);
 
-  /// Where the points go: arrays of counts[0]; mean colours of counts[1] and counts[2], null where the level is as the finer one.
+  /// Where the points go: arrays of counts[0]; mean colours of counts[1] and counts[2], null where the level is as the
+  /// finer one.
   uint16_t *x, *y, *z, *normal;
   uint32_t *colour, *mean1, *mean2;
 

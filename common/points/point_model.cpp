@@ -19,14 +19,17 @@ void reserve_one_more(std::vector<Mosaic>& mosaics) {
   if (mosaics.size() == mosaics.capacity()) mosaics.reserve(mosaics.size() + 1 + mosaics.size() / 4);
 }
 
-uint64_t header_bytes(const std::vector<Mosaic>& mosaics) { return allocated_bytes(mosaics.capacity() * sizeof(Mosaic)); }
+uint64_t header_bytes(const std::vector<Mosaic>& mosaics) {
+  return allocated_bytes(mosaics.capacity() * sizeof(Mosaic));
+}
 
 }  // namespace
 
 Status validate(const ModelConfig& config) {
   const geometry::Box& b = config.box_room;
   for (const float v : {b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z})
-    if (!(std::abs(v) <= 1e6f)) return Error{fmt::format("the model's box has a coordinate {} m outside [-1e6, 1e6]", v)};
+    if (!(std::abs(v) <= 1e6f))
+      return Error{fmt::format("the model's box has a coordinate {} m outside [-1e6, 1e6]", v)};
   if (b.empty()) return Error{"the model's box is empty: its lower corner lies above its upper one"};
   if (config.depth < 0 || config.depth > kMaxOctreeDepth)
     return Error{fmt::format("octree depth {} is outside 0..{}", config.depth, kMaxOctreeDepth)};

@@ -18,9 +18,9 @@ struct UnprojectedTile {
 UnprojectedTile unproject(const OctreeGrid& grid, const geometry::Camera& camera, const geometry::Rect& tile,
                           const image::DepthImage& image) {
   const size_t pixels = image.pixels();
-  UnprojectedTile out{std::make_unique_for_overwrite<ClusterKey[]>(pixels),
-                      std::make_unique_for_overwrite<uint16_t[]>(pixels), std::make_unique_for_overwrite<uint16_t[]>(pixels),
-                      std::make_unique_for_overwrite<uint16_t[]>(pixels)};
+  UnprojectedTile out{
+      std::make_unique_for_overwrite<ClusterKey[]>(pixels), std::make_unique_for_overwrite<uint16_t[]>(pixels),
+      std::make_unique_for_overwrite<uint16_t[]>(pixels), std::make_unique_for_overwrite<uint16_t[]>(pixels)};
   for (int row = 0; row < tile.height; ++row) {
     const size_t first = static_cast<size_t>(row) * tile.width;
     unproject_row(row_rays(grid, camera, tile.x, tile.y + row), image.depth.data() + first, tile.width,
@@ -56,8 +56,8 @@ std::vector<OpenMosaic> open_mosaics(const std::vector<DecimatedTile::Leaf>& lea
 
 void place_block(const BlockEntry& block, const UnprojectedTile& tile, const image::DepthImage& image, OpenMosaic& m) {
   const size_t w = image.width;
-  // First pixels of the four 2x2 blocks: the one near the centre is of all levels. A mosaic that holds a block has coarser
-  // levels of fewer points, hence mean colours.
+  // First pixels of the four 2x2 blocks: the one near the centre is of all levels. A mosaic that holds a block has
+  // coarser levels of fewer points, hence mean colours.
   const uint32_t centre = m.place(0, tile, image, block.pixel + 2 * w + 2);
   m.arrays.mean1[centre] = block.mean[3];
   m.arrays.mean2[centre] = block.mean[4];
@@ -74,7 +74,8 @@ void place_block(const BlockEntry& block, const UnprojectedTile& tile, const ima
   }
 }
 
-void place_sample(const SampleEntry& sample, const UnprojectedTile& tile, const image::DepthImage& image, OpenMosaic& m) {
+void place_sample(const SampleEntry& sample, const UnprojectedTile& tile, const image::DepthImage& image,
+                  OpenMosaic& m) {
   const uint32_t at = m.place(static_cast<int>(sample.rank), tile, image, sample.pixel);
   if (sample.rank <= 1 && m.arrays.mean1) m.arrays.mean1[at] = sample.mean[0];
   if (sample.rank == 0 && m.arrays.mean2) m.arrays.mean2[at] = sample.mean[1];

@@ -12,8 +12,8 @@ namespace telesplat::points {
 /// Key of a pixel without a point: nothing there, or outside the octree's cube.
 inline constexpr ClusterKey kNoCluster = 0xffffffffu;
 
-/// A row's rays in grid units (1/65536 of a leaf's side, from the cube's low corner). The point at depth z (metres) of pixel i
-/// has the grid coordinates
+/// A row's rays in grid units (1/65536 of a leaf's side, from the cube's low corner). The point at depth z (metres) of
+/// pixel i has the grid coordinates
 ///   g[a] = origin[a] + z * (row[a] + (x_first + i) * step[a]),   z = depth_scale / code
 /// in IEEE double precision, one operation after the other, no contraction: the same bits on every instruction set.
 struct RowRays {
@@ -26,8 +26,8 @@ struct RowRays {
 /// The rays of row `y` of the frame, from pixel `x` on.
 RowRays row_rays(const OctreeGrid& grid, const geometry::Camera& camera, int x, int y);
 
-/// For each of n depth codes: its leaf's key, or kNoCluster if it is 0 or outside the cube, and the position in the leaf (16
-/// bits an axis; undefined where there is no key). Arrays of n elements each. SIMD, run-time dispatch.
+/// For each of n depth codes: its leaf's key, or kNoCluster if it is 0 or outside the cube, and the position in the
+/// leaf (16 bits an axis; undefined where there is no key). Arrays of n elements each. SIMD, run-time dispatch.
 void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, ClusterKey* keys, uint16_t* x, uint16_t* y,
                    uint16_t* z);
 /// The same, plainly: the oracle of the SIMD one.

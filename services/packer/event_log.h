@@ -1,8 +1,8 @@
 // The events that late joiners and viewers with gaps still need.
 //
-// Forgetting a cluster wipes what patches put there before. So a replica comes to the present state by applying, in order,
-// every patch that has a point left and, for each cluster, its last forget: earlier forgets of it are covered by the last one,
-// and a patch whose every cluster was forgotten later leaves nothing behind.
+// Forgetting a cluster wipes what patches put there before. So a replica comes to the present state by applying, in
+// order, every patch that has a point left and, for each cluster, its last forget: earlier forgets of it are covered by
+// the last one, and a patch whose every cluster was forgotten later leaves nothing behind.
 #pragma once
 
 #include <map>

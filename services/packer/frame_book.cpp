@@ -21,8 +21,8 @@ Status FrameBook::check(const SampledTile& tile) const {
   const Frame* frame = find(tile.frame);
   if (!frame) return ok_status();
   if (frame->has_tile.size() != tile.tiles_in_frame)
-    return Error{fmt::format("tile {} of frame {} says its frame has {} tiles, earlier ones said {}", tile.tile, tile.frame.value,
-                             tile.tiles_in_frame, frame->has_tile.size())};
+    return Error{fmt::format("tile {} of frame {} says its frame has {} tiles, earlier ones said {}", tile.tile,
+                             tile.frame.value, tile.tiles_in_frame, frame->has_tile.size())};
   if (!(frame->camera == tile.camera))
     return Error{fmt::format("tile {} of frame {} has another camera than its frame", tile.tile, tile.frame.value)};
   return ok_status();

@@ -24,7 +24,8 @@ std::vector<points::ClusterKey> Obsolescence::choose(const points::PointModel& m
   uint64_t limit = ~uint64_t{0};
   for (const auto& [access_s, key] : oldest_first) {
     if (!(after_s > 0 && now_s - access_s > after_s)) {
-      if (limit == ~uint64_t{0} && max_points > 0 && points > max_points) limit = max_points / 10 * 9 + max_points % 10 * 9 / 10;
+      if (limit == ~uint64_t{0} && max_points > 0 && points > max_points)
+        limit = max_points / 10 * 9 + max_points % 10 * 9 / 10;
       if (points <= limit) break;
     }
     points -= model.points_in(key);

@@ -1,4 +1,5 @@
-// Which clusters to forget (T4.3.3): by time since anybody drew them, and least recently drawn first where there is too much.
+// Which clusters to forget (T4.3.3): by time since anybody drew them, and least recently drawn first where there is too
+// much.
 #pragma once
 
 #include <unordered_map>
@@ -15,13 +16,16 @@ class Obsolescence {
   void clear() { access_s_.clear(); }
   bool knows(points::ClusterKey key) const { return access_s_.count(key) != 0; }
 
-  /// Clusters not accessed for more than `after_s`, and then, if what is left has more than max_points points (0 = no limit),
-  /// the least recently accessed ones (of equals, the lowest keys) until at most 90 % of that is left. Ascending.
-  std::vector<points::ClusterKey> choose(const points::PointModel& model, double now_s, double after_s, uint64_t max_points) const;
+  /// Clusters not accessed for more than `after_s`, and then, if what is left has more than max_points points (0 = no
+  /// limit), the least recently accessed ones (of equals, the lowest keys) until at most 90 % of that is left.
+  /// Ascending.
+  std::vector<points::ClusterKey> choose(const points::PointModel& model, double now_s, double after_s,
+                                         uint64_t max_points) const;
 
-  /// Every cluster of the least recently accessed patches, until the patches left have at most 90 % of max_bytes; none if they
-  /// have no more than max_bytes. Ascending.
-  std::vector<points::ClusterKey> choose_patches(const points::PointModel& model, const EventLog& log, uint64_t max_bytes) const;
+  /// Every cluster of the least recently accessed patches, until the patches left have at most 90 % of max_bytes; none
+  /// if they have no more than max_bytes. Ascending.
+  std::vector<points::ClusterKey> choose_patches(const points::PointModel& model, const EventLog& log,
+                                                 uint64_t max_bytes) const;
 
  private:
   std::unordered_map<points::ClusterKey, double> access_s_;  // of every cluster of the model

@@ -16,19 +16,21 @@ Status check(const SampledTile& t) {
   if (Status camera = geometry::validate(t.camera); !camera)
     return Error{fmt::format("tile {} of frame {}: {}", t.tile, t.frame.value, camera.error().text)};
   if (t.tiles_in_frame > kMaxTilesInFrame || t.tile >= t.tiles_in_frame)
-    return Error{fmt::format("frame {} has no tile {} of {} (at most {})", t.frame.value, t.tile, t.tiles_in_frame, kMaxTilesInFrame)};
+    return Error{fmt::format("frame {} has no tile {} of {} (at most {})", t.frame.value, t.tile, t.tiles_in_frame,
+                             kMaxTilesInFrame)};
   const geometry::Rect& r = t.rect;
   if (r.x < 0 || r.y < 0 || r.width < 1 || r.height < 1 || r.width > t.camera.width || r.height > t.camera.height ||
       r.x > t.camera.width - r.width || r.y > t.camera.height - r.height)
-    return Error{fmt::format("tile {} of frame {}: {}x{} pixels at ({}, {}) do not lie in the frame's {}x{}", t.tile, t.frame.value,
-                             r.width, r.height, r.x, r.y, t.camera.width, t.camera.height)};
+    return Error{fmt::format("tile {} of frame {}: {}x{} pixels at ({}, {}) do not lie in the frame's {}x{}", t.tile,
+                             t.frame.value, r.width, r.height, r.x, r.y, t.camera.width, t.camera.height)};
   const size_t pixels = static_cast<size_t>(r.width) * r.height;
   if (pixels > codec::kMaxPixels)
-    return Error{fmt::format("tile {} of frame {} has {} pixels, at most {} are coded", t.tile, t.frame.value, pixels, codec::kMaxPixels)};
+    return Error{fmt::format("tile {} of frame {} has {} pixels, at most {} are coded", t.tile, t.frame.value, pixels,
+                             codec::kMaxPixels)};
   if (t.image.width != r.width || t.image.height != r.height || t.image.depth.size() != pixels ||
       t.image.colour.size() != pixels || t.image.normal.size() != pixels)
-    return Error{fmt::format("tile {} of frame {}: its image has {}x{} pixels, its rectangle {}x{}", t.tile, t.frame.value,
-                             t.image.width, t.image.height, r.width, r.height)};
+    return Error{fmt::format("tile {} of frame {}: its image has {}x{} pixels, its rectangle {}x{}", t.tile,
+                             t.frame.value, t.image.width, t.image.height, r.width, r.height)};
   return ok_status();
 }
 
@@ -59,11 +61,12 @@ struct PackerCore::Impl {
       const auto nothing = static_cast<uint64_t>(std::count(tile.image.depth.begin(), tile.image.depth.end(), 0u));
       return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
     }
-    // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters outside
-    // the tile's frustum cost next to nothing.
+    // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters
+    // outside the tile's frustum cost next to nothing.
     const geometry::Camera view = geometry::crop(tile.camera, tile.rect);
     hooks.reference_depth(model, view, config.threads, reference_depth_m);
-    return hooks.eliminate(view, {0, 0, tile.rect.width, tile.rect.height}, reference_depth_m, config.relative_epsilon, tile.image);
+    return hooks.eliminate(view, {0, 0, tile.rect.width, tile.rect.height}, reference_depth_m, config.relative_epsilon,
+                           tile.image);
   }
 
   Event pack(SampledTile& tile, double now_s) {
@@ -78,7 +81,8 @@ struct PackerCore::Impl {
     event.frame_samples = frame.samples, event.frame_kept = frame.kept;
     event.blob = std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
 
-    points::PreparedPatch patch = points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image);
+    points::PreparedPatch patch =
+        points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image);
     for (const auto& [key, mosaic] : patch.mosaics) obsolescence.accessed(key, now_s);
     log.add_patch(event, patch.mosaics.size());
     statistics.points_outside += patch.outside;

@@ -1,5 +1,5 @@
-// The packer without its sockets and clocks (T4.3): sampled tiles and access reports come in, point-model events go out.
-// One thread at a time.
+// The packer without its sockets and clocks (T4.3): sampled tiles and access reports come in, point-model events go
+// out. One thread at a time.
 #pragma once
 
 #include <functional>
@@ -30,12 +30,12 @@ enum class Redundancy {
 struct Config {
   points::ModelConfig model;
   Redundancy redundancy = Redundancy::kEliminate;
-  float relative_epsilon = 0.005f;    ///< of T4.3.1, as a fraction of the depth
-  double obsolete_after_s = 0;        ///< clusters that nobody drew for so long are forgotten; 0 = never (T4.3.3)
-  uint64_t max_points = 0;            ///< above it, least recently drawn clusters are forgotten down to 90 % of it; 0 = no limit
-  uint64_t max_log_bytes = 0;         ///< of the patches kept for events_since(): above it, those least recently drawn are
-                                      ///< forgotten with their clusters, down to 90 % of it; 0 = no limit
-  int threads = 1;                    ///< for reference depth maps; 0 = all cores
+  float relative_epsilon = 0.005f;  ///< of T4.3.1, as a fraction of the depth
+  double obsolete_after_s = 0;      ///< clusters that nobody drew for so long are forgotten; 0 = never (T4.3.3)
+  uint64_t max_points = 0;  ///< above it, least recently drawn clusters are forgotten down to 90 % of it; 0 = no limit
+  uint64_t max_log_bytes = 0;  ///< of the patches kept for events_since(): above it, those least recently drawn are
+                               ///< forgotten with their clusters, down to 90 % of it; 0 = no limit
+  int threads = 1;             ///< for reference depth maps; 0 = all cores
 };
 
 /// A tile as a sampler sent it, decoded.
@@ -63,12 +63,13 @@ struct Event {
   InstanceId viewer;
   RequestId request;
   uint32_t tile = 0, tiles_in_frame = 0;
-  bool frame_complete = false;         ///< the last tile of its frame to be packed
-  geometry::Camera camera;             ///< of the whole frame
-  geometry::Rect rect;                 ///< the tile in it
+  bool frame_complete = false;                       ///< the last tile of its frame to be packed
+  geometry::Camera camera;                           ///< of the whole frame
+  geometry::Rect rect;                               ///< the tile in it
   std::shared_ptr<const std::vector<uint8_t>> blob;  ///< codec stream of the tile, eliminated pixels not covered
-  uint64_t samples = 0, kept = 0;              ///< covered pixels before and after elimination, of this tile
-  uint64_t frame_samples = 0, frame_kept = 0;  ///< the same of the frame's tiles so far: elimination = 1 - kept / samples
+  uint64_t samples = 0, kept = 0;                    ///< covered pixels before and after elimination, of this tile
+  uint64_t frame_samples = 0,
+           frame_kept = 0;  ///< the same of the frame's tiles so far: elimination = 1 - kept / samples
 
   // kForget
   std::vector<points::ClusterKey> clusters;  ///< ascending, at most kMaxForgetKeys
@@ -89,10 +90,11 @@ class PackerCore {
  public:
   /// The two steps of redundancy elimination; tests replace them.
   struct Hooks {
-    std::function<void(const points::PointModel&, const geometry::Camera&, int threads, std::vector<float>& depth_m)> reference_depth =
-        splat::render_reference_depth;
-    std::function<splat::Elimination(const geometry::Camera&, const geometry::Rect&, const std::vector<float>& reference_depth_m,
-                                     float relative_epsilon, image::DepthImage&)>
+    std::function<void(const points::PointModel&, const geometry::Camera&, int threads, std::vector<float>& depth_m)>
+        reference_depth = splat::render_reference_depth;
+    std::function<splat::Elimination(const geometry::Camera&, const geometry::Rect&,
+                                     const std::vector<float>& reference_depth_m, float relative_epsilon,
+                                     image::DepthImage&)>
         eliminate = splat::eliminate_redundancy;
   };
 
@@ -101,10 +103,10 @@ class PackerCore {
   PackerCore(const Config& config, EpochId epoch, Hooks hooks);
   ~PackerCore();
 
-  /// Packs a tile: eliminates what the model shows, inserts the rest, returns the event to publish. A tile of which nothing is
-  /// left is an event too (of no points), so that viewers can tell when a frame is complete. Nothing: the tile was dropped and
-  /// counted (duplicate, other epoch). Error: camera, rectangle, image or frame do not fit together; dropped and counted.
-  /// now_s: any steady clock; the same one in all calls.
+  /// Packs a tile: eliminates what the model shows, inserts the rest, returns the event to publish. A tile of which
+  /// nothing is left is an event too (of no points), so that viewers can tell when a frame is complete. Nothing: the
+  /// tile was dropped and counted (duplicate, other epoch). Error: camera, rectangle, image or frame do not fit
+  /// together; dropped and counted. now_s: any steady clock; the same one in all calls.
   Result<std::optional<Event>> submit(SampledTile tile, double now_s);
 
   /// A viewer drew these clusters. Unknown keys are ignored.
@@ -116,9 +118,10 @@ class PackerCore {
   /// A new version of the data set: forgets everything. Nothing if that is the epoch already.
   std::optional<Event> begin_epoch(EpochId epoch);
 
-  /// What brings a replica that has applied every event up to `after` (0: an empty one) to the present state, in order of
-  /// sequence. Patches of which every point is forgotten are left out, as are forgets that change nothing for anyone who
-  /// applies this list; so sequences rise but may have holes. A replica that has applied the list is as of sequence().
+  /// What brings a replica that has applied every event up to `after` (0: an empty one) to the present state, in order
+  /// of sequence. Patches of which every point is forgotten are left out, as are forgets that change nothing for anyone
+  /// who applies this list; so sequences rise but may have holes. A replica that has applied the list is as of
+  /// sequence().
   std::vector<Event> events_since(Sequence after) const;
 
   /// Of the newest event; 0 before the first.
@@ -126,7 +129,8 @@ class PackerCore {
   EpochId epoch() const;
   const points::PointModel& model() const;
   const Statistics& statistics() const;
-  /// Memory of the events kept for events_since(), estimated. Forgets kept are at most as many as leaves were ever touched.
+  /// Memory of the events kept for events_since(), estimated. Forgets kept are at most as many as leaves were ever
+  /// touched.
   uint64_t log_bytes() const;
 
  private:

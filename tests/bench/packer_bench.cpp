@@ -1,4 +1,5 @@
-// Packing a frame of 1280x800 in tiles of 256x256, without the network: reference depth, elimination, encoding, insertion.
+// Packing a frame of 1280x800 in tiles of 256x256, without the network: reference depth, elimination, encoding,
+// insertion.
 #include <benchmark/benchmark.h>
 
 #include "tests/unit/packer_scenes.h"
@@ -11,8 +12,8 @@ std::vector<packer::SampledTile> frame(uint64_t id, double turn) {
   return test::sampled_frame({id}, geometry::make_camera(geometry::look_at(eye, {0, -0.1, 0}), 60, 1280, 800), 256);
 }
 
-// Argument: 0 = redundancy elimination, 1 = none (the baseline). Each iteration packs a view 3 degrees on from the last, on top
-// of eight such frames.
+// Argument: 0 = redundancy elimination, 1 = none (the baseline). Each iteration packs a view 3 degrees on from the
+// last, on top of eight such frames.
 void packer_frame(benchmark::State& state) {
   packer::Config config = test::packer_config();
   config.redundancy = state.range(0) ? packer::Redundancy::kKeep : packer::Redundancy::kEliminate;
@@ -37,7 +38,8 @@ void packer_frame(benchmark::State& state) {
     submit(std::move(tiles));
   }
   state.counters["kept"] = static_cast<double>(kept) / static_cast<double>(samples);
-  state.counters["bytes_point"] = static_cast<double>(core->model().bytes()) / static_cast<double>(core->model().points());
+  state.counters["bytes_point"] =
+      static_cast<double>(core->model().bytes()) / static_cast<double>(core->model().points());
   state.counters["per_sample"] =
       benchmark::Counter(static_cast<double>(samples) / static_cast<double>(id),
                          benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);

@@ -19,7 +19,8 @@ struct Tile {
 
 struct Frame {
   points::ModelConfig config = test::scene_config();
-  geometry::Camera camera = geometry::make_camera(geometry::look_at({0.05, 0.55, 0.05}, {0.0, -0.29, 0.0}), 50, 1280, 800);
+  geometry::Camera camera =
+      geometry::make_camera(geometry::look_at({0.05, 0.55, 0.05}, {0.0, -0.29, 0.0}), 50, 1280, 800);
   std::vector<Tile> tiles;
   uint64_t samples = 0;
 
@@ -50,12 +51,14 @@ void finish(benchmark::State& state, uint64_t samples) {
 void points_prepare(benchmark::State& state) {
   const Frame& f = frame(static_cast<int>(state.range(0)));
   for (auto _ : state)
-    for (const Tile& t : f.tiles) benchmark::DoNotOptimize(points::prepare_patch(f.config, {1}, f.camera, t.rect, t.image));
+    for (const Tile& t : f.tiles)
+      benchmark::DoNotOptimize(points::prepare_patch(f.config, {1}, f.camera, t.rect, t.image));
   finish(state, f.samples);
 }
 BENCHMARK(points_prepare)->Arg(100)->Arg(20)->Arg(1)->Unit(benchmark::kMillisecond);
 
-// Baseline: the obvious way: unproject each sample, sort the points by leaf, copy them leaf by leaf. Level 0 only, no attributes.
+// Baseline: the obvious way: unproject each sample, sort the points by leaf, copy them leaf by leaf. Level 0 only, no
+// attributes.
 void points_baseline_std_sort(benchmark::State& state) {
   struct Point {
     points::ClusterKey key;
@@ -74,8 +77,8 @@ void points_baseline_std_sort(benchmark::State& state) {
           const double depth = image::decode_depth(t.image.depth[i], f.camera.near_m);
           const glm::dvec3 p = f.camera.unproject(t.rect.x + column + 0.5, t.rect.y + row + 0.5, depth);
           const glm::uvec3 q((p - grid.lo) * (65536 / grid.leaf_size));
-          all.push_back({q.x >> 16 | q.y >> 16 << 10 | q.z >> 16 << 20, static_cast<uint16_t>(q.x), static_cast<uint16_t>(q.y),
-                         static_cast<uint16_t>(q.z), t.image.normal[i], t.image.colour[i]});
+          all.push_back({q.x >> 16 | q.y >> 16 << 10 | q.z >> 16 << 20, static_cast<uint16_t>(q.x),
+                         static_cast<uint16_t>(q.y), static_cast<uint16_t>(q.z), t.image.normal[i], t.image.colour[i]});
         }
       }
       std::sort(all.begin(), all.end(), [](const Point& a, const Point& b) { return a.key < b.key; });
@@ -113,13 +116,16 @@ void points_unproject(benchmark::State& state) {
   for (auto _ : state)
     for (const Tile& t : f.tiles)
       for (int row = 0; row < t.rect.height; ++row)
-        kUnproject(points::row_rays(grid, f.camera, t.rect.x, t.rect.y + row), &t.image.depth[static_cast<size_t>(row) * t.rect.width],
-                   static_cast<size_t>(t.rect.width), keys.data(), x.data(), y.data(), z.data());
+        kUnproject(points::row_rays(grid, f.camera, t.rect.x, t.rect.y + row),
+                   &t.image.depth[static_cast<size_t>(row) * t.rect.width], static_cast<size_t>(t.rect.width),
+                   keys.data(), x.data(), y.data(), z.data());
   benchmark::DoNotOptimize(keys.data());
   finish(state, f.samples);
 }
 BENCHMARK(points_unproject<points::unproject_row>)->Name("points_unproject_simd")->Unit(benchmark::kMillisecond);
-BENCHMARK(points_unproject<points::unproject_row_scalar>)->Name("points_unproject_scalar")->Unit(benchmark::kMillisecond);
+BENCHMARK(points_unproject<points::unproject_row_scalar>)
+    ->Name("points_unproject_scalar")
+    ->Unit(benchmark::kMillisecond);
 
 // Inserting a prepared frame: what viewers do under their lock, into a model of 20 earlier frames.
 void points_insert(benchmark::State& state) {
@@ -127,11 +133,13 @@ void points_insert(benchmark::State& state) {
   points::PointModel model(f.config);
   uint64_t sequence = 0;
   for (int i = 0; i < 20; ++i)
-    for (const Tile& t : frame(1).tiles) model.insert(points::prepare_patch(f.config, {++sequence}, f.camera, t.rect, t.image));
+    for (const Tile& t : frame(1).tiles)
+      model.insert(points::prepare_patch(f.config, {++sequence}, f.camera, t.rect, t.image));
   for (auto _ : state) {
     state.PauseTiming();
     std::vector<points::PreparedPatch> patches;
-    for (const Tile& t : f.tiles) patches.push_back(points::prepare_patch(f.config, {++sequence}, f.camera, t.rect, t.image));
+    for (const Tile& t : f.tiles)
+      patches.push_back(points::prepare_patch(f.config, {++sequence}, f.camera, t.rect, t.image));
     state.ResumeTiming();
     for (auto& patch : patches) model.insert(std::move(patch));
   }

@@ -1,4 +1,5 @@
-// Replicated state: whatever happens, a viewer that applies the packer's events holds the packer's clusters, byte for byte.
+// Replicated state: whatever happens, a viewer that applies the packer's events holds the packer's clusters, byte for
+// byte.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -85,7 +86,8 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
       for (const auto& event : core.tick(now_s)) publish(event);
     } else {
       if (waiting.empty()) {
-        waiting = test::sampled_frame({next_frame++}, test::scene_camera(test::random_eye(random), 160, 100), 64, core.epoch());
+        waiting = test::sampled_frame({next_frame++}, test::scene_camera(test::random_eye(random), 160, 100), 64,
+                                      core.epoch());
         std::shuffle(waiting.begin(), waiting.end(), random);
         if (chance(0.3)) waiting.push_back(waiting.front());  // a duplicate
       }
@@ -125,7 +127,8 @@ TEST(ReplicaResume, FromEverySequence) {
   std::vector<packer::Event> events;
   for (uint64_t frame = 1; frame <= 12; ++frame) {
     const double now_s = static_cast<double>(frame);
-    for (auto& tile : test::sampled_frame({frame}, test::scene_camera(test::random_eye(random), 96, 64), 48, core.epoch()))
+    for (auto& tile :
+         test::sampled_frame({frame}, test::scene_camera(test::random_eye(random), 96, 64), 48, core.epoch()))
       events.push_back(**core.submit(std::move(tile), now_s));
     std::vector<points::ClusterKey> seen;
     for (const auto& [key, cluster] : core.model().clusters())

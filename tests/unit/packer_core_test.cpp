@@ -58,7 +58,8 @@ TEST(PackerCore, AFrameBecomesEventsOfEveryTile) {
     EXPECT_EQ(e.frame_samples, samples);
   }
   const auto covered = [](const SampledTile& t) {
-    return static_cast<uint64_t>(std::count_if(t.image.depth.begin(), t.image.depth.end(), [](uint32_t d) { return d != 0; }));
+    return static_cast<uint64_t>(
+        std::count_if(t.image.depth.begin(), t.image.depth.end(), [](uint32_t d) { return d != 0; }));
   };
   uint64_t expected = 0;
   for (const auto& t : tiles) expected += covered(t);
@@ -89,7 +90,8 @@ TEST(PackerCore, DuplicateTilesAreDroppedAndCounted) {
 
 TEST(PackerCore, TilesOfOtherEpochsAreDroppedAndCounted) {
   PackerCore core(packer_config(), kEpoch);
-  for (const uint64_t epoch : {2, 4}) EXPECT_FALSE(core.submit(sampled_frame({1}, camera(), 320, {epoch})[0], 0)->has_value());
+  for (const uint64_t epoch : {2, 4})
+    EXPECT_FALSE(core.submit(sampled_frame({1}, camera(), 320, {epoch})[0], 0)->has_value());
   EXPECT_EQ(core.statistics().tiles_other_epoch, 2u);
   EXPECT_EQ(core.sequence().value, 0u);
   EXPECT_EQ(core.model().points(), 0u);
@@ -132,7 +134,8 @@ TEST(PackerCore, TheSameViewAgainIsRedundant) {
     const std::vector<Event> events = submit_all(core, sampled_frame({frame}, camera(), 64));
     const Event& last = events.back();
     EXPECT_EQ(last.frame_samples, first);
-    EXPECT_LT(static_cast<double>(last.frame_kept), 0.01 * static_cast<double>(last.frame_samples)) << "frame " << frame;
+    EXPECT_LT(static_cast<double>(last.frame_kept), 0.01 * static_cast<double>(last.frame_samples))
+        << "frame " << frame;
   }
 }
 

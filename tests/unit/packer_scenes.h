@@ -16,7 +16,8 @@ inline packer::Config packer_config() {
 }
 
 /// The tiles of one frame, `side` pixels a side (the last ones less).
-inline std::vector<packer::SampledTile> sampled_frame(FrameId id, const geometry::Camera& camera, int side, EpochId epoch = kEpoch) {
+inline std::vector<packer::SampledTile> sampled_frame(FrameId id, const geometry::Camera& camera, int side,
+                                                      EpochId epoch = kEpoch) {
   std::vector<packer::SampledTile> tiles;
   for (int y = 0; y < camera.height; y += side) {
     for (int x = 0; x < camera.width; x += side) {

@@ -129,7 +129,10 @@ TEST(PointModel, DigestTellsModelsApartAndNotTheOrderOfTheirClusters) {
 
 TEST(PointModel, BytesAreWhatTheAllocatorGaveOut) {
   const auto in_use = [] { return mallinfo2().uordblks + mallinfo2().hblkhd; };
-  { std::vector<PreparedPatch> warm; warm.push_back(patch(1)); }  // tables that are built once
+  {
+    std::vector<PreparedPatch> warm;
+    warm.push_back(patch(1));
+  }  // tables that are built once
   if (in_use() == 0) GTEST_SKIP() << "this allocator does not count (sanitizers)";
   for (const double fraction : {1.0, 0.02}) {
     const size_t before = in_use();

@@ -79,7 +79,8 @@ TEST(PreparePatch, PositionsLieWithinOneStepOfTheSample) {
       }
     }
     EXPECT_EQ(seen.size(), patch.points);
-    EXPECT_EQ(patch.points, static_cast<uint64_t>(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; })));
+    EXPECT_EQ(patch.points, static_cast<uint64_t>(std::count_if(image.depth.begin(), image.depth.end(),
+                                                                [](uint32_t d) { return d != 0; })));
   }
 }
 
@@ -152,7 +153,8 @@ TEST(PreparePatch, EveryCoveredBlockHasAPointAtItsLevel) {
       for (int y = 0; y < kTile.height; ++y) {
         for (int x = 0; x < kTile.width; ++x) {
           if (image.depth[static_cast<size_t>(y) * kTile.width + x] == 0) continue;
-          ASSERT_TRUE(blocks.count({(kTile.x + x) >> l, (kTile.y + y) >> l})) << "level " << l << " at " << x << "," << y;
+          ASSERT_TRUE(blocks.count({(kTile.x + x) >> l, (kTile.y + y) >> l}))
+              << "level " << l << " at " << x << "," << y;
         }
       }
       // Not many more points than blocks: only where leaves or surfaces meet.
@@ -233,7 +235,8 @@ TEST(PreparePatch, CoarseColoursAreMeansAndStayOnTheirSideOfAnEdge) {
     const Mosaic::Level level = patch.mosaics[0].second.level(l);
     std::set<uint32_t> colours;
     for (uint32_t i = 0; i < level.count; ++i) colours.insert(level.colour[i]);
-    for (const uint32_t colour : colours) EXPECT_TRUE(colour == 0xff || (colour >= 0xfd0000 && (colour & 0xffff) == 0)) << std::hex << colour;
+    for (const uint32_t colour : colours)
+      EXPECT_TRUE(colour == 0xff || (colour >= 0xfd0000 && (colour & 0xffff) == 0)) << std::hex << colour;
     // The blocks across the edge have a point on each side.
     constexpr uint32_t kExpected[kLevels] = {64, 16 + 4, 4 + 2};
     EXPECT_EQ(level.count, kExpected[l]);
@@ -247,10 +250,12 @@ TEST(PreparePatch, TilesOfAFrameMayBePreparedInAnyCutAndGiveTheSamePoints) {
   const auto points_of = [&](const std::vector<geometry::Rect>& cut, int l) {
     std::multiset<std::array<uint64_t, 2>> out;
     for (const geometry::Rect& rect : cut)
-      for (const auto& [key, m] : prepare_patch(config, {1}, camera(), rect, test::sample_scene(camera(), rect)).mosaics)
+      for (const auto& [key, m] :
+           prepare_patch(config, {1}, camera(), rect, test::sample_scene(camera(), rect)).mosaics)
         for (uint32_t i = 0; i < m.count(l); ++i) {
           const Mosaic::Level v = m.level(l);
-          out.insert({uint64_t{key} << 32 | v.colour[i], uint64_t{v.x[i]} | uint64_t{v.y[i]} << 16 | uint64_t{v.z[i]} << 32});
+          out.insert(
+              {uint64_t{key} << 32 | v.colour[i], uint64_t{v.x[i]} | uint64_t{v.y[i]} << 16 | uint64_t{v.z[i]} << 32});
         }
     return out;
   };

@@ -66,7 +66,8 @@ inline void mask_randomly(image::DepthImage& image, double fraction, uint64_t se
 /// An eye on a ball of 0.5 to 0.9 m around the scene, above its floor.
 inline glm::dvec3 random_eye(std::mt19937_64& random) {
   std::uniform_real_distribution<double> uniform(0, 1);
-  const double turn = 6.28318530718 * uniform(random), height = 0.05 + 0.4 * uniform(random), radius = 0.5 + 0.4 * uniform(random);
+  const double turn = 6.28318530718 * uniform(random), height = 0.05 + 0.4 * uniform(random),
+               radius = 0.5 + 0.4 * uniform(random);
   return {radius * std::cos(turn), height, radius * std::sin(turn)};
 }
 
