@@ -22,7 +22,7 @@ void ModelCache::insert(points::PreparedPatch patch) {
 
 void ModelCache::forget(std::span<const points::ClusterKey> keys) {
   const std::lock_guard lock(mutex_);
-  auto dropped = newest_->forget(keys);
+  auto dropped = newest_->take_out(keys);
   std::move(dropped.begin(), dropped.end(), std::back_inserter(retired_clusters_));
 }
 
@@ -50,7 +50,7 @@ void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOp
 }
 
 void ModelCache::end_frame() {
-  std::vector<points::Cluster> clusters;
+  std::vector<std::unique_ptr<points::Cluster>> clusters;
   std::vector<std::unique_ptr<points::PointModel>> models;
   const std::lock_guard lock(mutex_);
   clusters.swap(retired_clusters_);

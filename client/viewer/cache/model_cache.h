@@ -38,7 +38,7 @@ class ModelCache {
  private:
   mutable std::mutex mutex_;
   std::unique_ptr<points::PointModel> newest_, shown_;  // shown_ only while it is not the newest
-  std::vector<points::Cluster> retired_clusters_;
+  std::vector<std::unique_ptr<points::Cluster>> retired_clusters_;  // where they were: draw lists point to them
   std::vector<std::unique_ptr<points::PointModel>> retired_models_;
   uint64_t patches_ = 0;
 };
