@@ -13,8 +13,7 @@ SplatShape build(Kernel kernel, int side, double diameter, double focal_px) {
   SplatShape s;
   s.side = side;
   if (side == 1) return s;
-  // Finer steps are not seen, but finer tables would leave the first-level cache: 8 KiB at side 4, 32 KiB at side 16.
-  s.sub_bits = side <= 4 ? 3 : 2;
+  s.sub_bits = sub_bits(side);
   const int steps = 1 << s.sub_bits;
   s.scale = static_cast<float>(steps);
   s.shift = static_cast<float>(steps) * 0.5f * static_cast<float>(1 - side);
@@ -44,13 +43,21 @@ float disc_diameter(float splat_px) {
   return std::clamp(std::ceil(splat_px * 4.0f) * 0.25f, 1.0f, static_cast<float>(kMaxSplatSide));
 }
 
-uint32_t splat_bias(double r2, int side, double focal_px) {
+int sub_bits(int side) {
+  // Finer steps are not seen, but finer tables would leave the first-level cache: 8 KiB at side 4, 32 KiB at side 16.
+  return side == 1 ? 0 : side <= 4 ? 3 : 2;
+}
+
+double splat_bias_growth(int side, double focal_px) {
   // Depth changes by `gradient` of itself from pixel to pixel on the steepest resolved slope. Centres a splat apart then part
   // their overlap within a quarter of a splat of the middle if k >= 2 gradient / side.
   const double gradient = kResolvedSlope / focal_px;
-  const double cap = kMaxBias / (0.5 * side * side);  // in steps a squared pixel: kMaxBias in the square's corner
-  const double steps = 2.0 * gradient / side * (1 << 23) / (1 << kBiasShift);
-  return std::min(static_cast<uint32_t>(std::lround(std::min(steps, cap) * r2)), kMaxBias);
+  const double cap = kMaxBias / (0.5 * side * side);  // kMaxBias in the square's corner
+  return std::min(2.0 * gradient / side * (1 << 23) / (1 << kBiasShift), cap);
+}
+
+uint32_t splat_bias(double r2, int side, double focal_px) {
+  return std::min(static_cast<uint32_t>(std::lround(splat_bias_growth(side, focal_px) * r2)), kMaxBias);
 }
 
 void SplatTable::set_focal(double focal_px) {

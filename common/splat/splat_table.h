@@ -51,6 +51,10 @@ class SplatTable {
   std::unique_ptr<SplatShape> shapes_[2][kMaxSplatSide * 4 + 1];
 };
 
+/// The projected centre's place within a pixel is told to 2^-sub_bits pixels, for a splat of this side.
+int sub_bits(int side);
+/// The bias grows by this many steps a squared pixel; it ends at kMaxBias.
+double splat_bias_growth(int side, double focal_px);
 /// Bias in steps of 2^kBiasShift units of the last place, at squared distance r2 (pixels) from the centre of a splat.
 uint32_t splat_bias(double r2, int side, double focal_px);
 

@@ -103,7 +103,8 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     for (const Chosen& c : chosen) {
       const points::Mosaic::Level level = c.mosaic->level(c.level);
       if (level.count == 0) continue;
-      out.items.push_back({cluster.get(), level, std::clamp(c.size, 1.0f, std::max(1.0f, options.max_splat_px))});
+      out.items.push_back({cluster.get(), level, std::clamp(c.size, 1.0f, std::max(1.0f, options.max_splat_px)),
+                           c.mosaic->sequence()});
       out.points += level.count;
     }
   }

@@ -22,6 +22,7 @@ struct DrawItem {
   const points::Cluster* cluster;
   points::Mosaic::Level level;
   float splat_px;  ///< side (square) or diameter (disc) in display pixels, >= 1
+  Sequence sequence{};  ///< the mosaic's; with cluster->key it names the points, for renderers that keep copies. 0: do not keep
 };
 
 struct DrawList {

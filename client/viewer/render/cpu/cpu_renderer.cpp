@@ -1,0 +1,23 @@
+#include "client/viewer/render/renderer.h"
+
+namespace telesplat::viewer {
+namespace {
+
+class CpuRenderer final : public Renderer {
+ public:
+  explicit CpuRenderer(int threads) : splatter_(threads) {}
+  const char* name() const override { return "cpu"; }
+  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+                           const image::Shading& shading, const splat::FrameTarget& target) override {
+    return splatter_.render(list, camera, kernel, shading, target);
+  }
+
+ private:
+  splat::CpuSplatter splatter_;
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_cpu_renderer(int threads) { return std::make_unique<CpuRenderer>(threads); }
+
+}  // namespace telesplat::viewer
