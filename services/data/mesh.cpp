@@ -19,6 +19,7 @@ Status validate_mesh(const Mesh& mesh, const std::string& name) {
   if (largest >= vertices) {
     size_t at = 0;
     while (mesh.indices[at] < vertices) ++at;
+    if (mesh.indices[at] == ~uint32_t{0}) return Error{fmt::format("{}: triangle {} names a vertex that is not one of the {}", name, at / 3, vertices)};
     return Error{fmt::format("{}: triangle {} names vertex {}, there are {}", name, at / 3, mesh.indices[at], vertices)};
   }
   for (size_t i = 0; i < vertices; ++i) {
