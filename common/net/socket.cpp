@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <random>
+#include <unordered_map>
 #include <zmq.hpp>
 
 #include "common/core/clock.h"
@@ -11,8 +14,13 @@
 namespace telesplat::net {
 namespace {
 
-constexpr int64_t kDisconnectBytes = static_cast<int64_t>(wire::kMaxBulkBytes) + (2 << 20);
+// A frame that is this much over a socket's limit is still read, so that it can be dropped and counted with its peer named; one that
+// claims more ends its connection before anything is allocated for it.
+constexpr int64_t kOversizedBytes = 16 << 20;
+constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads; handshakes fit
 constexpr size_t kMaxTypeBytes = 64;
+constexpr double kQuietPusher_s = 1.0;
+constexpr size_t kMaxClosed = 4096;
 
 zmq::socket_type zmq_type(Kind kind) {
   switch (kind) {
@@ -20,7 +28,7 @@ zmq::socket_type zmq_type(Kind kind) {
     case Kind::kDealer: return zmq::socket_type::dealer;
     case Kind::kPush: return zmq::socket_type::push;
     case Kind::kPull: return zmq::socket_type::pull;
-    case Kind::kPub: return zmq::socket_type::pub;
+    case Kind::kPub: return zmq::socket_type::xpub;  // shows subscriptions, so that strange ones can be counted
     case Kind::kSub: return zmq::socket_type::sub;
   }
   return zmq::socket_type::dealer;
@@ -53,7 +61,7 @@ struct Socket::Impl {
       : context(context), kind(kind), name(std::move(name)), options(options), socket(context, zmq_type(kind)) {
     socket.set(zmq::sockopt::sndhwm, options.high_water_mark);
     socket.set(zmq::sockopt::rcvhwm, options.high_water_mark);
-    socket.set(zmq::sockopt::maxmsgsize, kDisconnectBytes);
+    socket.set(zmq::sockopt::maxmsgsize, kind == Kind::kPub ? kSubscriptionBytes : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes);
     socket.set(zmq::sockopt::linger, 500);
     socket.set(zmq::sockopt::reconnect_ivl, 50);
     socket.set(zmq::sockopt::reconnect_ivl_max, 500);
@@ -61,16 +69,18 @@ struct Socket::Impl {
     socket.set(zmq::sockopt::heartbeat_timeout, 10000);
     if (kind == Kind::kSub) socket.set(zmq::sockopt::subscribe, "");
     if (kind == Kind::kRouter) socket.set(zmq::sockopt::router_mandatory, 1);
+    if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);
   }
 
-  // Peers that fail their handshake (random bytes, another protocol) are seen by a monitor only.
-  void watch_handshakes() {
+  // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too much are seen
+  // by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed handshake is certain to be told.
+  void watch_connections() {
     static std::atomic<int> counter{0};
     const std::string address = fmt::format("inproc://monitor-{}", ++counter);
-    const int events = ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
-    if (zmq_socket_monitor(socket.handle(), address.c_str(), events) != 0) return;
+    if (zmq_socket_monitor(socket.handle(), address.c_str(), ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED) != 0) return;
     monitor.emplace(context, zmq::socket_type::pair);
     monitor->set(zmq::sockopt::linger, 0);
+    monitor->set(zmq::sockopt::rcvhwm, 10000);
     monitor->connect(address);
   }
 
@@ -79,8 +89,56 @@ struct Socket::Impl {
     zmq::message_t event, address;
     while (monitor->recv(event, zmq::recv_flags::dontwait)) {
       if (event.more() && monitor->recv(address)) {}
+      if (event.size() < 6) continue;
+      uint16_t what = 0;
+      int32_t fd = -1;
+      std::memcpy(&what, event.data(), 2);
+      std::memcpy(&fd, static_cast<const char*>(event.data()) + 2, 4);
+      if (what == ZMQ_EVENT_ACCEPTED) {
+        connections[fd] = {fd, monotonic_s(), false};
+      } else if (const auto it = connections.find(fd); it != connections.end()) {
+        closed.push_back(it->second);
+        connections.erase(it);
+        if (closed.size() >= kMaxClosed) judge_closed();
+      }
+    }
+  }
+
+  void note_spoken(zmq::message_t& message) {
+    if (!monitor) return;
+    drain_monitor();  // its connection's acceptance came first
+    const int fd = zmq_msg_get(message.handle(), ZMQ_SRCFD);
+    const auto gone = std::find_if(closed.begin(), closed.end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
+    if (gone != closed.end()) gone->has_spoken = true;
+    else if (const auto it = connections.find(fd); it != connections.end()) it->second.has_spoken = true;
+  }
+
+  // A connection that ends without ever having brought a whole message counts as one rejected: everyone of ours speaks as soon as it
+  // is connected, but for samplers, who push no tile before they have one. To be called when all messages of `closed` are received.
+  void judge_closed() {
+    for (const Connection& c : closed) {
+      if (c.has_spoken || (kind == Kind::kPull && monotonic_s() - c.accepted_s > kQuietPusher_s)) continue;
       ++rejected;
-      log_rejection("a peer that failed its handshake", "not a ZeroMQ peer of ours");
+      log_rejection("a connection", "it brought nothing that is a ZeroMQ message");
+    }
+    closed.clear();
+  }
+
+  // What viewers send to a publisher: that they want everything, or no longer do.
+  void drain_subscriptions() {
+    zmq::message_t message;
+    drain_monitor();
+    for (int n = 0; n < 1000; ++n) {
+      try {
+        if (!socket.recv(message, zmq::recv_flags::dontwait)) return judge_closed();
+      } catch (const zmq::error_t&) {
+        return;
+      }
+      note_spoken(message);
+      const char first = message.size() ? *static_cast<const char*>(message.data()) : '?';
+      if (message.size() == 1 && (first == 0 || first == 1)) continue;
+      ++rejected;
+      log_rejection(fmt::format("a subscription of {} bytes", message.size()), "viewers subscribe to everything");
     }
   }
 
@@ -97,6 +155,13 @@ struct Socket::Impl {
   SocketOptions options;
   zmq::socket_t socket;
   std::optional<zmq::socket_t> monitor;
+  struct Connection {
+    int fd = -1;
+    double accepted_s = 0;
+    bool has_spoken = false;
+  };
+  std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
+  std::vector<Connection> closed;                   // not judged yet
   uint64_t rejected = 0;
   log::RateLimiter limiter;
 };
@@ -111,7 +176,7 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
   if (!insecure && !is_local(endpoint))
     return Error{fmt::format("{}: {} is not a loopback or ipc address; others need --insecure", impl_->name, endpoint)};
   try {
-    impl_->watch_handshakes();
+    impl_->watch_connections();
     impl_->socket.bind(endpoint);
     return impl_->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& e) {
@@ -136,6 +201,7 @@ void Socket::disconnect(const std::string& endpoint) {
 }
 
 bool Socket::send_frames(std::string_view peer, std::string_view type, std::string body) {
+  if (impl_->kind == Kind::kPub) impl_->drain_subscriptions();
   try {
     using zmq::send_flags;
     auto& s = impl_->socket;
@@ -151,6 +217,10 @@ bool Socket::send_frames(std::string_view peer, std::string_view type, std::stri
 }
 
 std::optional<Message> Socket::receive() {
+  if (impl_->kind == Kind::kPub) {
+    impl_->drain_subscriptions();
+    return std::nullopt;
+  }
   impl_->drain_monitor();
   // A flood of bad messages must not keep the caller from its other sockets.
   for (int bad = 0; bad < 100; ++bad) {
@@ -158,7 +228,10 @@ std::optional<Message> Socket::receive() {
     try {
       do {
         zmq::message_t frame;
-        if (!impl_->socket.recv(frame, zmq::recv_flags::dontwait)) return std::nullopt;
+        if (!impl_->socket.recv(frame, zmq::recv_flags::dontwait)) {
+          impl_->judge_closed();
+          return std::nullopt;
+        }
         if (frames.size() < 4) frames.push_back(std::move(frame));
       } while (impl_->socket.get(zmq::sockopt::rcvmore));
     } catch (const zmq::error_t& e) {
@@ -166,6 +239,7 @@ std::optional<Message> Socket::receive() {
       log::error("{}: {}", impl_->name, e.what());
       return std::nullopt;
     }
+    impl_->note_spoken(frames.back());
     Message out;
     size_t next = 0;
     if (impl_->kind == Kind::kRouter) out.peer = frames[next++].to_string();
@@ -192,7 +266,7 @@ void Socket::reject(const Message& message, const std::string& why) {
 }
 
 uint64_t Socket::rejected() const {
-  impl_->drain_monitor();
+  if (impl_->kind == Kind::kPub) impl_->drain_subscriptions();
   return impl_->rejected;
 }
 const std::string& Socket::name() const { return impl_->name; }

@@ -40,7 +40,7 @@ struct Message {
 
 struct SocketOptions {
   int high_water_mark = 1000;  ///< messages queued each way before ROUTER, PUB drop and PUSH, DEALER refuse
-  size_t max_message_bytes = wire::kMaxControlBytes;  ///< larger bodies are dropped; a peer sending over 256 MiB + 2 MiB is disconnected
+  size_t max_message_bytes = wire::kMaxControlBytes;  ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
 };
 
 class Socket {
@@ -63,7 +63,7 @@ class Socket {
   /// Sends an already encoded message, shared by several receivers.
   bool send_frames(std::string_view peer, std::string_view type, std::string body);
 
-  /// Next message, without waiting. Messages that are not [peer,] type, body within the limits are dropped and counted.
+  /// Next message, without waiting (PUB: never one, but viewers' subscriptions are looked at). Messages that are not [peer,] type, body within the limits are dropped and counted.
   std::optional<Message> receive();
 
   /// Decodes a message of known type; a bad one is counted and logged, naming its peer, and nothing comes back.
@@ -77,7 +77,8 @@ class Socket {
   /// Counts and logs a message that cannot be used.
   void reject(const Message& message, const std::string& why);
 
-  /// Messages dropped for being malformed, oversized or unexpected, and peers refused in their handshake.
+  /// Messages dropped for being malformed, oversized or unexpected, and connections accepted that ended without having brought one
+  /// message: random bytes, other protocols, failed handshakes, frames that claim more than is ever read.
   uint64_t rejected() const;
   const std::string& name() const;
 
