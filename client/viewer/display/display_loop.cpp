@@ -77,7 +77,7 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
     const double selected_s = monotonic_s();
     uint32_t use = 0;
     if (spool) {
-      if (o.picture_every ? result.frames % o.picture_every == 0 : t_s >= next_picture_s || last) use |= kPicture | (o.exr ? kExr : 0);
+      if (o.picture_every ? result.frames % o.picture_every == 0 : t_s >= next_picture_s || last) use |= o.exr ? kPicture | kExr : kPicture;
       if (o.verify_every && (result.frames % o.verify_every == 0 || last)) use |= kVerify;
     }
     const bool with_depth = use & (kVerify | kExr);
