@@ -103,7 +103,9 @@ Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {
   const auto size = read_header(in);
   if (!size) return size.error();
   StreamInfo info{size->width, size->height};
-  if (!for_each_tile(TileGrid(info.width, info.height), [&](int, int) { return detail::skip_tile(in, info); })) return damaged("damaged or cut off");
+  const TileGrid grid(info.width, info.height);
+  if (!for_each_tile(grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info); }))
+    return damaged("damaged or cut off");
   if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
   return info;
 }

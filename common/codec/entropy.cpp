@@ -135,10 +135,6 @@ std::optional<std::span<const uint8_t>> get_stored_block(Reader& in) {
   return block->bytes;
 }
 
-std::optional<size_t> skip_block(Reader& in) {
-  const size_t before = in.left();
-  if (!next_block(in)) return std::nullopt;
-  return before - in.left();
-}
+bool skip_block(Reader& in) { return next_block(in).has_value(); }
 
 }  // namespace telesplat::codec::detail

@@ -36,8 +36,8 @@ void put_stored_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
 [[nodiscard]] bool get_block(Reader& in, std::span<uint8_t> raw);
 /// The content of a stored block, in place; nothing where the block is damaged or of another kind.
 std::optional<std::span<const uint8_t>> get_stored_block(Reader& in);
-/// Passes over any block; nothing where it is damaged, else the bytes it takes in the stream.
-std::optional<size_t> skip_block(Reader& in);
+/// Passes over any block; false where it is cut off.
+[[nodiscard]] bool skip_block(Reader& in);
 
 /// Packs numbers, least significant bit first, into a buffer that must have 16 bytes to spare. Loops copy it into a local
 /// variable and back, so that it stays in registers.

@@ -202,15 +202,5 @@ bool get_mask(Reader& in, Mask& mask) {
   }
 }
 
-std::optional<size_t> skip_mask(Reader& in) {
-  const size_t before = in.left();
-  const auto coding = in.u8();
-  if (!coding || *coding > kBytesAbove) return std::nullopt;
-  if (*coding == kRuns && !in.varint()) return std::nullopt;
-  for (int block = *coding == kRuns ? 3 : 1; block > 0; --block)
-    if (!skip_block(in)) return std::nullopt;
-  return before - in.left();
-}
-
 }  // namespace telesplat::codec::detail
 #endif  // HWY_ONCE

@@ -46,7 +46,5 @@ void covered_bits(const uint32_t* depth, size_t count, uint64_t* words);
 void put_mask(std::vector<uint8_t>& out, const Mask& mask);
 /// Fills a mask whose size was set by reset(); false where the stream is damaged.
 [[nodiscard]] bool get_mask(Reader& in, Mask& mask);
-/// Passes over a mask; nothing where it is damaged, else the bytes it takes.
-std::optional<size_t> skip_mask(Reader& in);
 
 }  // namespace telesplat::codec::detail

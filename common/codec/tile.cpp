@@ -134,18 +134,28 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   return covered;
 }
 
-bool skip_tile(Reader& in, StreamInfo& info) {
+bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
   const auto kind = in.u8();
   if (kind == kEmpty) return true;
   if (!kind || *kind & ~kKnownBits || !get_base(in)) return false;
-  const auto add = [&](size_t& total, std::optional<size_t> bytes) {
-    if (bytes) total += *bytes;
-    return bytes.has_value();
+  size_t covered = static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
+  if (*kind & kMasked) {
+    Mask& mask = scratch().mask;
+    mask.reset(rect.width, rect.height);
+    const size_t before = in.left();
+    if (!get_mask(in, mask)) return false;
+    info.mask_bytes += before - in.left();
+    covered = mask.count();
+  }
+  info.covered_pixels += covered;
+  const auto skip = [&](size_t& total, int blocks) {
+    const size_t before = in.left();
+    for (; blocks > 0; --blocks)
+      if (!skip_block(in)) return false;
+    total += before - in.left();
+    return true;
   };
-  if (*kind & kMasked && !add(info.mask_bytes, skip_mask(in))) return false;
-  for (size_t* total : {&info.depth_bytes, &info.depth_bytes, &info.normal_bytes, &info.normal_bytes, &info.colour_bytes, &info.colour_bytes})
-    if (!add(*total, skip_block(in))) return false;
-  return !(*kind & kPlainColour) || add(info.colour_bytes, skip_block(in));
+  return skip(info.depth_bytes, 2) && skip(info.normal_bytes, 2) && skip(info.colour_bytes, *kind & kPlainColour ? 3 : 2);
 }
 
 }  // namespace telesplat::codec::detail

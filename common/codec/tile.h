@@ -32,7 +32,7 @@ struct TileGrid {
 size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect);
 /// Writes all pixels of `rect`; returns the number of covered ones, or nothing where the stream is damaged.
 std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect);
-/// Adds the bytes of a tile to `info`; false where the stream is damaged.
-[[nodiscard]] bool skip_tile(Reader& in, StreamInfo& info);
+/// Adds the covered pixels and the bytes of a tile of the size of `rect` to `info`; false where the stream is damaged.
+[[nodiscard]] bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info);
 
 }  // namespace telesplat::codec::detail

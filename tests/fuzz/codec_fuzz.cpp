@@ -1,0 +1,22 @@
+// Any bytes through the depth-image decoder: an error, or a canonical image that survives another round trip.
+#include <cstdlib>
+
+#include "common/codec/depth_codec.h"
+#include "tests/support/depth_images.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace telesplat;
+  const std::span<const uint8_t> bytes(data, size);
+  const auto info = codec::inspect(bytes);
+  // Large sizes are legal in small streams, but slow to fuzz.
+  if (info.ok() && size_t(info->width) * size_t(info->height) > size_t{1} << 18) return 0;
+  const auto image = codec::decode(bytes);
+  if (!image.ok()) return 0;
+  if (!info.ok() || info->width != image->width || info->height != image->height) std::abort();
+  size_t covered = 0;
+  for (const uint32_t depth : image->depth) covered += depth != 0;
+  if (covered != info->covered_pixels || !test::is_canonical(*image)) std::abort();
+  const auto again = codec::decode(codec::encode(*image), image->width, image->height);
+  if (!again.ok() || !(*again == *image)) std::abort();
+  return 0;
+}

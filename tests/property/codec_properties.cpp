@@ -1,0 +1,124 @@
+// What must hold for any image and any bytes, over many seeded ones, on every instruction set this machine has.
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <random>
+
+#include "common/codec/depth_codec.h"
+#include "tests/support/depth_images.h"
+
+namespace telesplat::codec {
+namespace {
+
+using image::DepthImage;
+
+// One image of each kind there is, small enough to try many.
+std::vector<DepthImage> images(uint32_t seed) {
+  std::mt19937 random(seed);
+  const auto side = [&] { return 1 + static_cast<int>(random() % 90); };
+  std::vector<DepthImage> all;
+  all.push_back(test::plane(side(), side(), static_cast<double>(random() % 2000) - 1000, static_cast<double>(random() % 2000) - 1000));
+  for (const bool rough : {false, true})
+    for (const bool constant : {false, true})
+      all.push_back(test::render({.width = side(), .height = side(), .seed = seed, .rough = rough, .constant_albedo = constant, .covers_all = (seed & 1) != 0}));
+  for (const double density : {0.001, 0.01, 0.1, 0.3, 0.6, 0.9, 1.0}) {
+    all.push_back(test::random_pixels(side(), side(), density, seed));
+    all.push_back(test::render({.width = side(), .height = side(), .seed = seed}));
+    test::keep_random(all.back(), density, seed);
+  }
+  all.push_back(test::render({.width = side(), .height = side(), .seed = seed, .covers_all = false}));
+  test::keep_outlines(all.back());
+  return all;
+}
+
+TEST(CodecProperties, RoundTrip) {
+  for (uint32_t seed = 1; seed <= 15; ++seed)
+    for (const DepthImage& image : images(seed)) {
+      ASSERT_TRUE(test::is_canonical(image));
+      const auto back = decode(encode(image), image.width, image.height);
+      ASSERT_TRUE(back.ok()) << back.error().text;
+      ASSERT_TRUE(*back == image) << "seed " << seed << ", " << image.width << " x " << image.height;
+    }
+}
+
+TEST(CodecProperties, RoundTripOfSeveralTiles) {
+  for (const double density : {0.001, 0.02, 0.15, 0.7, 1.0}) {
+    for (const auto& [width, height] : {std::pair{700, 300}, {513, 257}, {20, 9000}, {9000, 20}}) {
+      DepthImage image = test::plane(width, height, 40, 90);
+      test::keep_random(image, density, 3);
+      const auto back = decode(encode(image));
+      ASSERT_TRUE(back.ok()) << back.error().text;
+      ASSERT_TRUE(*back == image) << density << ", " << width << " x " << height;
+    }
+  }
+}
+
+TEST(CodecProperties, EveryTruncationIsAnError) {
+  for (uint32_t seed = 1; seed <= 2; ++seed)
+    for (const DepthImage& image : images(seed)) {
+      const auto bytes = encode(image);
+      for (size_t length = 0; length < bytes.size(); ++length) {
+        const std::vector<uint8_t> part(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(length));  // its own memory: overruns are seen
+        ASSERT_FALSE(decode(part).ok()) << "seed " << seed << ", " << length << " of " << bytes.size();
+      }
+    }
+}
+
+TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
+  std::mt19937 random(11);
+  size_t refused = 0, accepted = 0;
+  for (uint32_t seed = 1; seed <= 10; ++seed)
+    for (const DepthImage& image : images(seed)) {
+      const auto bytes = encode(image);
+      for (int trial = 0; trial < 60; ++trial) {
+        auto bad = bytes;
+        for (uint32_t flips = 1 + random() % 3; flips > 0; --flips) bad[random() % bad.size()] ^= static_cast<uint8_t>(1u << random() % 8);
+        const auto back = decode(bad);
+        (back.ok() ? accepted : refused) += 1;
+        if (!back.ok()) continue;
+        ASSERT_TRUE(test::is_canonical(*back)) << "seed " << seed;
+        ASSERT_TRUE(decode(encode(*back)).value() == *back) << "seed " << seed;
+      }
+    }
+  EXPECT_GT(refused, accepted / 10);
+  EXPECT_GT(accepted, 0u);
+}
+
+TEST(CodecProperties, RandomBytesAfterAGoodHeader) {
+  std::mt19937 random(12);
+  for (int trial = 0; trial < 20000; ++trial) {
+    std::vector<uint8_t> bytes{0xD7, 2, static_cast<uint8_t>(1 + random() % 100), static_cast<uint8_t>(1 + random() % 100)};
+    for (uint32_t n = random() % 80; n > 0; --n) bytes.push_back(static_cast<uint8_t>(random() % (random() % 2 != 0 ? 256 : 16)));
+    const auto image = decode(bytes);
+    ASSERT_TRUE(!image.ok() || test::is_canonical(*image));
+  }
+}
+
+TEST(CodecProperties, EveryInstructionSetGivesTheSameBytesAndPixels) {
+  // Widths around vector lengths, all densities: heads, bodies and tails of every kernel.
+  std::vector<DepthImage> all;
+  for (int width = 1; width <= 70; ++width) {
+    all.push_back(test::render({.width = width, .height = 11, .seed = static_cast<uint32_t>(width), .rough = true}));
+    all.push_back(test::random_pixels(width, 9, 1, static_cast<uint32_t>(width)));
+    all.push_back(test::random_pixels(width, 9, 0.8, static_cast<uint32_t>(width)));
+    all.push_back(test::random_pixels(width, 9, 0.05, static_cast<uint32_t>(width)));
+  }
+  std::vector<std::vector<uint8_t>> reference;
+  for (const DepthImage& image : all) reference.push_back(encode(image));
+  const auto targets = hwy::SupportedAndGeneratedTargets();
+  for (const int64_t target : targets) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    for (size_t i = 0; i < all.size(); ++i) {
+      EXPECT_EQ(encode(all[i]), reference[i]) << hwy::TargetName(target) << ", image " << i;
+      EXPECT_TRUE(decode(reference[i]).value() == all[i]) << hwy::TargetName(target) << ", image " << i;
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  EXPECT_GE(targets.size(), 2u) << "the scalar one, and this machine's";
+}
+
+}  // namespace
+}  // namespace telesplat::codec

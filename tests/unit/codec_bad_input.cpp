@@ -1,0 +1,81 @@
+// Streams that lie: each refused with a reason, none allocating by what it claims.
+#include <gtest/gtest.h>
+
+#include "common/codec/depth_codec.h"
+#include "tests/support/depth_images.h"
+
+namespace telesplat::codec {
+namespace {
+
+std::string refusal(const std::vector<uint8_t>& bytes, int width = 0, int height = 0) {
+  const auto image = decode(bytes, width, height);
+  return image.ok() ? "" : image.error().text;
+}
+
+TEST(CodecBadInput, Headers) {
+  EXPECT_NE(refusal({}).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal({0xD7}).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 2, 5}).find("shorter than its header"), std::string::npos);
+  EXPECT_NE(refusal({'P', 'N', 'G', 0, 0}).find("begins with 0x50"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 99, 1, 1, 0}).find("version 99, expected 2"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 2, 0, 1, 0}).find("0 x 1 pixels"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 2, 1, 0, 0}).find("1 x 0 pixels"), std::string::npos);
+}
+
+TEST(CodecBadInput, SizesBeyondTheLimit) {
+  // 2^31 x 2^31, 4097 x 4096, and numbers that do not end.
+  EXPECT_NE(refusal({0xD7, 2, 0x80, 0x80, 0x80, 0x80, 8, 0x80, 0x80, 0x80, 0x80, 8, 0}).find("limit 16777216"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 2, 0x81, 0x20, 0x80, 0x20, 0}).find("4097 x 4096"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1, 1}), "");
+  EXPECT_NE(refusal({0xD7, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0x7F, 1, 0}), "");
+}
+
+TEST(CodecBadInput, SizesThatTheStreamCannotHold) {
+  // 4096 x 4096 pixels are 256 tiles, which take 256 bytes at least.
+  std::vector<uint8_t> bytes{0xD7, 2, 0x80, 0x20, 0x80, 0x20};
+  bytes.resize(6 + 255);
+  EXPECT_NE(refusal(bytes).find("255 bytes left for 4096 x 4096 pixels, which take 256 or more"), std::string::npos);
+  bytes.push_back(0);
+  EXPECT_EQ(refusal(bytes), "");
+  bytes.push_back(0);
+  EXPECT_NE(refusal(bytes).find("1 bytes after its end"), std::string::npos);
+}
+
+TEST(CodecBadInput, UnexpectedSizes) {
+  const auto bytes = encode(image::DepthImage(30, 20));
+  EXPECT_EQ(refusal(bytes, 30, 20), "");
+  EXPECT_NE(refusal(bytes, 31, 20).find("30 x 20 pixels, expected 31 x 20"), std::string::npos);
+  EXPECT_NE(refusal(bytes, 0, 21), "");
+}
+
+TEST(CodecBadInput, CoveredPixelsOfDepthZero) {
+  // A full tile of one pixel whose base is 0 and whose residual is 0. With base 1 the same bytes are good.
+  std::vector<uint8_t> bytes = encode([] {
+    image::DepthImage image(1, 1);
+    image.depth[0] = 1;
+    return image;
+  }());
+  ASSERT_EQ(refusal(bytes), "");
+  ASSERT_EQ(bytes[5], 1) << "the base depth's low byte follows magic, version, width, height, kind";
+  bytes[5] = 0;
+  EXPECT_NE(refusal(bytes).find("tile 0, 0"), std::string::npos);
+}
+
+TEST(CodecBadInput, EveryTileKind) {
+  auto bytes = encode(test::random_pixels(20, 20, 1, 1));
+  for (int kind = 0; kind < 256; ++kind) {
+    bytes[4] = static_cast<uint8_t>(kind);
+    if (kind == 9 || kind == 1) continue;  // dense, with and without plain colour: the stream's own, or found by its blocks
+    EXPECT_NE(refusal(bytes), "") << kind;
+  }
+}
+
+TEST(CodecBadInput, InspectRefusesToo) {
+  const auto bytes = encode(test::random_pixels(40, 30, 0.5, 2));
+  for (size_t length = 0; length < bytes.size(); ++length)
+    EXPECT_FALSE(inspect(std::span(bytes).first(length)).ok()) << length;
+  EXPECT_TRUE(inspect(bytes).ok());
+}
+
+}  // namespace
+}  // namespace telesplat::codec

@@ -1,0 +1,152 @@
+// Small and extreme images through the codec, sizes of streams, and the bytes of the format.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "common/codec/depth_codec.h"
+#include "tests/support/depth_images.h"
+
+namespace telesplat::codec {
+namespace {
+
+using image::DepthImage;
+
+void expect_round_trip(const DepthImage& image) {
+  const auto bytes = encode(image);
+  const auto back = decode(bytes, image.width, image.height);
+  ASSERT_TRUE(back.ok()) << back.error().text;
+  EXPECT_TRUE(*back == image) << image.width << " x " << image.height;
+  EXPECT_EQ(encode(image), bytes) << "not deterministic";
+}
+
+DepthImage filled(int width, int height, uint32_t depth, uint32_t colour, uint16_t normal) {
+  DepthImage image(width, height);
+  std::fill(image.depth.begin(), image.depth.end(), depth);
+  std::fill(image.colour.begin(), image.colour.end(), colour);
+  std::fill(image.normal.begin(), image.normal.end(), normal);
+  return image;
+}
+
+TEST(CodecRoundTrip, EmptyImagesTakeAByteATile) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {256, 256}, {1280, 800}, {65536, 256}}) {
+    const DepthImage image(width, height);
+    expect_round_trip(image);
+    EXPECT_LE(encode(image).size(), 8 + (image.pixels() + 40959) / 40960);
+  }
+  EXPECT_LE(encode(DepthImage(256, 256)).size(), 8u);
+}
+
+TEST(CodecRoundTrip, SinglePixels) {
+  for (const uint32_t depth : {1u, 2u, 0x800000u, image::kMaxDepthCode}) expect_round_trip(filled(1, 1, depth, 0xFFFFFF, 0xFFFF));
+  for (const size_t at : {size_t{0}, size_t{77}, size_t{300 * 200 - 1}}) {
+    DepthImage image(300, 200);
+    image.depth[at] = 12345, image.colour[at] = 0x010203, image.normal[at] = 0x0405;
+    expect_round_trip(image);
+    EXPECT_LT(encode(image).size(), 64u);
+  }
+}
+
+TEST(CodecRoundTrip, LinesOfPixels) {
+  for (const int n : {2, 3, 7, 8, 9, 63, 64, 65, 255, 256, 257, 1000, 70000}) {
+    expect_round_trip(test::random_pixels(n, 1, 1, static_cast<uint32_t>(n)));
+    expect_round_trip(test::random_pixels(1, n, 1, static_cast<uint32_t>(n)));
+    expect_round_trip(test::random_pixels(n, 1, 0.3, static_cast<uint32_t>(n)));
+    expect_round_trip(test::random_pixels(1, n, 0.3, static_cast<uint32_t>(n)));
+  }
+}
+
+TEST(CodecRoundTrip, ConstantImagesCostNearlyNothing) {
+  for (const uint32_t depth : {1u, 0x123456u, image::kMaxDepthCode}) {
+    const DepthImage image = filled(256, 256, depth, 0xA0B0C0, 0x1234);
+    expect_round_trip(image);
+    EXPECT_LT(encode(image).size(), 64u);
+  }
+}
+
+TEST(CodecRoundTrip, ConstantAlbedoCostsNearlyNothing) {
+  DepthImage image = test::random_pixels(256, 256, 1, 5);
+  std::fill(image.colour.begin(), image.colour.end(), 0x808080);
+  expect_round_trip(image);
+  EXPECT_LT(inspect(encode(image)).value().colour_bytes, 16u);
+}
+
+TEST(CodecRoundTrip, Checkerboards) {
+  for (const int step : {1, 2, 5}) {
+    DepthImage image = test::random_pixels(130, 67, 1, 3);
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 0; x < image.width; ++x)
+        if ((x / step + y / step) % 2 != 0) {
+          const size_t i = static_cast<size_t>(y * image.width + x);
+          image.depth[i] = image.colour[i] = image.normal[i] = 0;
+        }
+    expect_round_trip(image);
+    EXPECT_LT(inspect(encode(image)).value().mask_bytes, 130u * 67 / 8) << "the mask's pattern is not used";
+  }
+}
+
+TEST(CodecRoundTrip, NoiseGrowsLittle) {
+  const DepthImage image = test::random_pixels(256, 256, 1, 9);
+  expect_round_trip(image);
+  EXPECT_LT(encode(image).size(), image.pixels() * image::kRawBytesPerPixel * 102 / 100);
+}
+
+TEST(CodecRoundTrip, ExtremeSteps) {
+  // Largest differences in both directions, in every channel.
+  DepthImage image = filled(64, 64, 1, 0, 0);
+  for (size_t i = 0; i < image.pixels(); i += 3) image.depth[i] = image::kMaxDepthCode, image.colour[i] = 0xFFFFFF, image.normal[i] = 0xFFFF;
+  expect_round_trip(image);
+  expect_round_trip(filled(64, 64, image::kMaxDepthCode, 0xFFFFFF, 0xFFFF));
+}
+
+TEST(CodecRoundTrip, PlanesLeaveOnlyRounding) {
+  const DepthImage image = test::plane(256, 256, 301.7, -129.3);
+  expect_round_trip(image);
+  EXPECT_LT(inspect(encode(image)).value().depth_bytes, image.pixels() * 5 / 16) << "2.5 bits a pixel";
+}
+
+TEST(CodecRoundTrip, DecodesIntoUsedMemory) {
+  DepthImage image = test::random_pixels(300, 200, 1, 1);
+  for (const double density : {0.0, 0.02, 0.5, 1.0}) {
+    const DepthImage next = test::random_pixels(200, 280, density, 4);
+    const Status status = decode_into(image, encode(next));
+    ASSERT_TRUE(status.ok()) << status.error().text;
+    EXPECT_TRUE(image == next) << density;
+  }
+  EXPECT_FALSE(decode_into(image, {}).ok());
+  EXPECT_TRUE(image == DepthImage());
+}
+
+TEST(CodecRoundTrip, InspectAddsUp) {
+  const DepthImage image = test::random_pixels(700, 300, 0.4, 8);
+  const auto bytes = encode(image);
+  const StreamInfo info = inspect(bytes).value();
+  EXPECT_EQ(info.width, 700);
+  EXPECT_EQ(info.height, 300);
+  EXPECT_EQ(info.covered_pixels, static_cast<size_t>(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; })));
+  const size_t parts = info.mask_bytes + info.depth_bytes + info.colour_bytes + info.normal_bytes;
+  EXPECT_LE(parts, bytes.size());
+  EXPECT_GE(parts + 9 * 6 + 8, bytes.size()) << "six tiles of a kind and a base, and a header";
+}
+
+// A change of the format changes its version, docs/protocol.md and these bytes.
+TEST(CodecFormat, GoldenBytes) {
+  DepthImage image(4, 3);
+  const uint32_t depth[] = {1000, 1010, 1020, 0, 1100, 1110, 1125, 0, 1200, 1210, 1220, 1231};
+  for (size_t i = 0; i < image.pixels(); ++i)
+    if (depth[i] != 0) {
+      image.depth[i] = depth[i];
+      image.colour[i] = 0x102030 + static_cast<uint32_t>(i % 4) * 0x010203;
+      image.normal[i] = static_cast<uint16_t>(0x8040 + i);
+    }
+  const std::vector<uint8_t> golden{215, 2, 4, 3, 5, 232, 3, 0, 48, 32, 16, 64, 128, 2, 13, 7, 0, 8, 41, 0,
+                                    14, 14, 37, 0, 9, 37, 0, 8, 15, 9, 0, 8, 41, 0, 2, 2, 8, 2, 2, 8,
+                                    2, 2, 2, 5, 0, 41, 0, 100, 100, 0, 0, 0, 0, 0, 0, 100, 9, 34, 2};
+  EXPECT_EQ(encode(image), golden);
+  const auto back = decode(golden);
+  ASSERT_TRUE(back.ok()) << back.error().text;
+  EXPECT_TRUE(*back == image);
+}
+
+}  // namespace
+}  // namespace telesplat::codec
