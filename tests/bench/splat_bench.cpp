@@ -7,6 +7,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "client/viewer/render/renderer.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/normal.h"
 #include "common/splat/cpu_splatter.h"
@@ -133,6 +134,21 @@ void splat_eliminate_redundancy(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<int64_t>(image.pixels()) * state.iterations());
 }
 BENCHMARK(splat_eliminate_redundancy)->Unit(benchmark::kMillisecond);
+
+// Baseline: the same frames as GL_POINTS (on a machine without GPU: Mesa's llvmpipe on all cores), read back included.
+void splat_baseline_gl_points(benchmark::State& state) {
+  auto gl = viewer::make_gl_renderer();
+  if (!gl) return state.SkipWithError(gl.error().text.c_str());
+  const geometry::Camera camera = display_camera();
+  const image::Shading shading({}, camera);
+  const splat::DrawList list = draw_list(1, static_cast<float>(state.range(0)));
+  std::vector<uint32_t> colour(size_t{kDisplayWidth} * kDisplayHeight);
+  const splat::FrameTarget target{kDisplayWidth, kDisplayHeight, colour.data(), nullptr};
+  (*gl)->render(list, camera, splat::Kernel::kSquare, shading, target);  // uploads
+  for (auto _ : state) (*gl)->render(list, camera, splat::Kernel::kSquare, shading, target);
+  state.SetItemsProcessed(static_cast<int64_t>(list.points) * state.iterations());
+}
+BENCHMARK(splat_baseline_gl_points)->ArgName("px")->Arg(1)->Arg(3)->Arg(5)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 // Baseline: what merely clearing a frame of 64-bit keys in memory and writing its colours costs.
 void splat_baseline_memset(benchmark::State& state) {
