@@ -56,7 +56,7 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
 }
 
 void add_flags(CLI::App& app, ViewerOptions& o) {
-  net::add_service_flags(app, o.service, false);
+  net::add_service_flags(app, o.service, net::Ends::kConnects);
   add_view_flags(app, o);
   app.add_option("--threads", o.threads, "threads to draw with; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
   app.add_option("--started-at", o.started_s, "monotonic clock when the session was started, for start-up times; 0: now")->capture_default_str();

@@ -15,10 +15,10 @@ std::atomic<bool> stop_flag{false};
 void on_signal(int) { stop_flag = true; }
 }  // namespace
 
-void add_service_flags(CLI::App& app, ServiceOptions& o, bool binds) {
-  app.add_option("--master", o.master, "address of the master")->capture_default_str();
+void add_service_flags(CLI::App& app, ServiceOptions& o, Ends ends) {
+  if (ends != Ends::kBinds) app.add_option("--master", o.master, "address of the master")->capture_default_str();
   app.add_option("--name", o.name, "name in logs and metrics")->capture_default_str();
-  if (binds) app.add_option("--bind", o.bind, "address to bind to; port * takes a free one")->capture_default_str();
+  if (ends != Ends::kConnects) app.add_option("--bind", o.bind, "address to bind to; port * takes a free one")->capture_default_str();
   app.add_flag("--insecure", o.insecure, "allow addresses other than loopback without encryption");
   app.add_option("--log-level", o.log_level, "trace, debug, info, warn, error or off")
       ->capture_default_str()
@@ -55,9 +55,9 @@ double peak_resident_mb() {
   return static_cast<double>(usage.ru_maxrss) * 1024 / 1e6;
 }
 
-int guarded_main(int (*body)(int, char**), int argc, char** argv) {
+int guarded_main(const std::function<int()>& body) {
   try {
-    return body(argc, argv);
+    return body();
   } catch (const std::exception& e) {
     std::fprintf(stderr, "telesplat: %s\n", e.what());
     return 1;

@@ -1,6 +1,7 @@
 // What all service programs share: common flags, signals, process figures.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "common/core/result.h"
@@ -17,8 +18,9 @@ struct ServiceOptions {
   std::string log_level = "info";
 };
 
-/// Adds --master, --name, --bind (if `binds`), --insecure, --log-level.
-void add_service_flags(CLI::App& app, ServiceOptions& options, bool binds);
+/// Adds --name, --log-level, --insecure; --bind if the program binds, --master if it connects to one.
+enum class Ends { kConnects, kBinds, kBoth };
+void add_service_flags(CLI::App& app, ServiceOptions& options, Ends ends);
 
 /// Parses; --help prints and exits 0, bad usage prints what is wrong and exits 2.
 void parse_or_exit(CLI::App& app, int argc, char** argv);
@@ -32,6 +34,6 @@ double resident_mb();
 double peak_resident_mb();
 
 /// Runs a program's body: exceptions that escape become one line and exit code 1.
-int guarded_main(int (*body)(int, char**), int argc, char** argv);
+int guarded_main(const std::function<int()>& body);
 
 }  // namespace telesplat::net

@@ -47,7 +47,7 @@ wire::Hello make_hello(const DataServiceOptions& o, const MeshStore& store, cons
 }  // namespace
 
 void add_flags(CLI::App& app, DataServiceOptions& o) {
-  net::add_service_flags(app, o.service, true);
+  net::add_service_flags(app, o.service, net::Ends::kBoth);
   app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)")->required();
   app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")->capture_default_str()->check(CLI::Range(1e-3, 1e3));
   app.add_option("--up", o.mesh.up, "data axis that points up: x, y, z, -x, -y, -z or auto")

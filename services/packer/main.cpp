@@ -1,18 +1,10 @@
 // telesplat-packer: gathers depth images, keeps the authoritative point model, publishes what viewers lack.
-#include <CLI/CLI.hpp>
-
+#include "common/net/service_main.h"
 #include "services/packer/packer_service.h"
 
 int main(int argc, char** argv) {
   using namespace telesplat;
-  return net::guarded_main(
-      [](int n, char** arguments) {
-        CLI::App app{"telesplat-packer: eliminates redundant samples, keeps the point model, publishes patches"};
-        packer::PackerServiceOptions options;
-        options.service.name = "packer";
-        packer::add_flags(app, options);
-        net::parse_or_exit(app, n, arguments);
-        return packer::run(options);
-      },
-      argc, argv);
+  packer::PackerServiceOptions options;
+  options.service.name = "packer";
+  return net::service_main(argc, argv, "telesplat-packer: eliminates redundant samples, keeps the point model, publishes patches", options, packer::add_flags, packer::run);
 }

@@ -206,7 +206,7 @@ class PackerService {
 }  // namespace
 
 void add_flags(CLI::App& app, PackerServiceOptions& o) {
-  net::add_service_flags(app, o.service, true);
+  net::add_service_flags(app, o.service, net::Ends::kBoth);
   app.add_option("--threads", o.threads, "threads for reference depth maps; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
   app.add_option("--record-depth", o.record_depth, "folder to keep sampled depth images in");
   app.add_option("--record-depth-frames", o.record_depth_frames, "depth images to keep at most")->capture_default_str()->check(CLI::Range(1, 1000000));

@@ -241,7 +241,7 @@ Result<std::unique_ptr<Sampler>> make_sampler(const SamplerServiceOptions& o) {
 }  // namespace
 
 void add_flags(CLI::App& app, SamplerServiceOptions& o) {
-  net::add_service_flags(app, o.service, false);
+  net::add_service_flags(app, o.service, net::Ends::kConnects);
   app.add_option("--sampler", o.kind, "ray (Embree) or raster (OpenGL)")->capture_default_str()->check(CLI::IsMember({"ray", "raster"}));
   app.add_option("--threads", o.threads, "threads to sample with; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
   app.add_option("--chunk-cache-mb", o.chunk_cache_mb, "memory for chunks, MB")->capture_default_str()->check(CLI::Range(1.0, 1e6));

@@ -60,4 +60,4 @@ int telesplat_main(int argc, char** argv) {
 
 }  // namespace
 
-int main(int argc, char** argv) { return net::guarded_main(telesplat_main, argc, argv); }
+int main(int argc, char** argv) { return net::guarded_main([&] { return telesplat_main(argc, argv); }); }

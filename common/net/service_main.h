@@ -1,0 +1,22 @@
+// The main() of every service program: parse the configuration, serve until told to stop.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "common/net/service.h"
+
+namespace telesplat::net {
+
+/// Options has a member `service`; add_flags(app, options) declares its flags, run(options) serves and returns the exit code.
+/// Bad usage exits 2; exceptions that escape become one line and exit code 1.
+template <class Options>
+int service_main(int argc, char** argv, const char* about, Options options, void (*add_flags)(CLI::App&, Options&), auto run) {
+  return guarded_main([&] {
+    CLI::App app{about};
+    add_flags(app, options);
+    parse_or_exit(app, argc, argv);
+    return run(options);
+  });
+}
+
+}  // namespace telesplat::net
