@@ -62,21 +62,24 @@ class PixelRays {
   std::vector<glm::dvec3> columns_, rows_;
 };
 
-/// Traces every packet that touches `tile` and calls consume(packet, x, y) for those in which something was hit; (x, y) is
-/// the packet's upper left pixel, which may lie outside the tile. Calls come from several threads at once.
+/// Traces every packet that touches `tile`. Each task (several run at once) starts with task = begin(), calls
+/// consume(task, packet, x, y) for the packets in which something was hit, and ends with end(task); (x, y) is the packet's
+/// upper left pixel, and its pixels may lie outside the tile.
 /// Packets lie on a grid fixed to the whole image and are always traced whole, so that a pixel's result does not depend on
 /// the tile that asks for it (where two triangles are equally near, the packet decides).
-template <class Consume>
-void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile, const Consume& consume) {
+template <class Begin, class Consume, class End>
+void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile, const Begin& begin,
+                const Consume& consume, const End& end) {
   if (tile.width <= 0 || tile.height <= 0) return;
   const int column0 = tile.x / kPacketWidth, column1 = (tile.x + tile.width - 1) / kPacketWidth + 1;
   const int row0 = tile.y / kPacketHeight, row1 = (tile.y + tile.height - 1) / kPacketHeight + 1;
   const PixelRays rays(camera, column0 * kPacketWidth, row0 * kPacketHeight, column1 * kPacketWidth, row1 * kPacketHeight);
   scene.commit();
 
-  // Tasks of 32 x 16 pixels: neighbours share the hierarchy's nodes in the cache.
+  // Tasks of up to 32 x 16 pixels: neighbours share the hierarchy's nodes in the cache.
   scene.arena().execute([&] {
     tbb::parallel_for(tbb::blocked_range2d<int>(row0, row1, 8, column0, column1, 8), [&](const tbb::blocked_range2d<int>& part) {
+      auto task = begin();
       RTCRayHit8 packet;
       rays.begin(packet);
       alignas(32) static constexpr int kAll[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
@@ -89,10 +92,18 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
           rtcIntersect8(kAll, scene.scene(), &context, &packet);
           bool any = false;
           for (int k = 0; k < kPacket; ++k) any |= packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
-          if (any) consume(packet, column * kPacketWidth, row * kPacketHeight);
+          if (any) consume(task, packet, column * kPacketWidth, row * kPacketHeight);
         }
+      end(task);
     });
   });
+}
+
+/// The same without a state per task: consume(packet, x, y).
+template <class Consume>
+void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile, const Consume& consume) {
+  trace_tile(
+      scene, camera, tile, [] { return 0; }, [&](int, const RTCRayHit8& packet, int x, int y) { consume(packet, x, y); }, [](int) {});
 }
 
 }  // namespace telesplat::sampler
