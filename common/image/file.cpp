@@ -70,7 +70,7 @@ Status write_png(const std::string& path, const View& view) {
   for (size_t i = 0; i < view.colour.size(); ++i)
     for (int c = 0; c < 3; ++c) rgb[3 * i + c] = static_cast<uint8_t>(view.colour[i] >> (16 - 8 * c));
   OIIO::ImageSpec spec(view.width, view.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("png:compressionLevel", 2);  // frames are recorded while the viewer runs: four times faster than 6, 5 % larger
+  spec.attribute("png:compressionLevel", 2);  // recorded while the viewer runs: 117 ms instead of 255 at level 6 (2560x1600), 16 % larger
   return write_whole(path, "png", spec, OIIO::TypeDesc::UINT8, rgb.data());
 }
 
