@@ -21,7 +21,8 @@ class Sampler {
   virtual const char* name() const = 0;
 
   /// Adds a chunk, building what it needs (a BVH, GL buffers); the sampler keeps chunk.owner alive as long as it reads
-  /// its bytes (the raster sampler only until they are uploaded). Replaces a chunk of the same id. Bytes that do not validate are refused and nothing changes.
+  /// its bytes (the raster sampler only until they are uploaded). Replaces a chunk of the same id. Bytes that do not
+  /// validate are refused and nothing changes.
   virtual Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) = 0;
   /// Adds several chunks at once, in parallel where that helps; refuses as add_chunk does, keeping those that were good.
   virtual Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) = 0;
