@@ -67,6 +67,7 @@ ReplicaWorker::LastUpdate ReplicaWorker::last_update() const {
 }
 
 void ReplicaWorker::loop() {
+  net::lower_thread_priority(5);  // the display comes first
   try {
     while (!stop_) {
       const double now = monotonic_s();

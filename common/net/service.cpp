@@ -1,6 +1,7 @@
 #include "common/net/service.h"
 
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -41,6 +42,11 @@ void install_signal_handlers() {
   signal(SIGPIPE, SIG_IGN);
 }
 bool stop_requested() { return stop_flag; }
+
+void lower_thread_priority(int levels) {
+  const auto thread = static_cast<id_t>(syscall(SYS_gettid));
+  setpriority(PRIO_PROCESS, thread, getpriority(PRIO_PROCESS, thread) + levels);
+}
 
 double resident_mb() {
   std::ifstream statm("/proc/self/statm");

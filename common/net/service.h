@@ -29,6 +29,9 @@ void parse_or_exit(CLI::App& app, int argc, char** argv);
 void install_signal_handlers();
 bool stop_requested();
 
+/// Lowers the calling thread's priority by `levels` of nice: for work that must not take the processor from a display.
+void lower_thread_priority(int levels);
+
 /// Resident memory of this process now / at most so far, MB.
 double resident_mb();
 double peak_resident_mb();

@@ -1,16 +1,13 @@
 #include "client/viewer/record/frame_spool.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 
 #include "common/core/log.h"
+#include "common/net/service.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -103,7 +100,7 @@ image::View FrameSpool::exchange(SpooledFrame frame) {
 }
 
 void FrameSpool::write_loop() {
-  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 10);  // the display comes first
+  net::lower_thread_priority(10);  // the display comes first
   std::unique_lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, [&] { return stop_ || !waiting_.empty(); });
