@@ -15,7 +15,7 @@
 namespace telesplat::splat {
 namespace {
 
-constexpr int kTileWidth = 256, kTileHeight = 128;
+constexpr int kTileWidth = 256, kTileHeight = 256;  // 256 KiB of depths
 
 std::vector<DrawItem> visible_items(const points::PointModel& model, const geometry::Camera& camera) {
   std::vector<DrawItem> items;

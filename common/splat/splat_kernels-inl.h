@@ -175,8 +175,14 @@ HWY_INLINE void PrefetchLevel(const points::Mosaic::Level& level) {
   for (size_t i = 0; i < bytes; i += 64) hwy::Prefetch(p + i);
 }
 HWY_INLINE void PrefetchRun(const TileInput& input, const TileBinning::Entry* entry) {
-  if (entry == input.entries.data() + input.entries.size()) return;
+  const TileBinning::Entry* end = input.entries.data() + input.entries.size();
+  if (entry == end) return;
   const ItemRun run = input.runs[entry->box];
+  // The run after it: its items, so that its points can be asked for without waiting.
+  if (entry + 1 != end) {
+    const auto* items = reinterpret_cast<const std::byte*>(input.items + input.runs[entry[1].box].first);
+    for (size_t i = 0; i < kItemsAhead * sizeof(DrawItem); i += 64) hwy::Prefetch(items + i);
+  }
   for (uint32_t i = run.first; i < std::min(run.first + kItemsAhead, run.last); ++i) PrefetchLevel(input.items[i].level);
 }
 
