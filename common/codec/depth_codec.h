@@ -19,14 +19,16 @@ inline constexpr size_t kMaxPixels = size_t{1} << 24;
 /// Deterministic: the same image gives the same bytes. Thread-safe.
 std::vector<uint8_t> encode(const image::DepthImage& image);
 
-/// Decodes what encode() made: decode(encode(x)) == x. Any other bytes give an error or some canonical image, never more than
-/// kMaxPixels pixels, never a read or write out of bounds; memory stays proportional to the pixels of the stream's header,
-/// which must be plausible for the stream's length. `expected_width`/`expected_height`: refuse other sizes (0 = any).
+/// Decodes what encode() made: decode(encode(x)) == x. Any other bytes give an error or some canonical image, never
+/// more than kMaxPixels pixels, never a read or write out of bounds; memory stays proportional to the pixels of the
+/// stream's header, which must be plausible for the stream's length. `expected_width`/`expected_height`: refuse other
+/// sizes (0 = any).
 Result<image::DepthImage> decode(std::span<const uint8_t> bytes, int expected_width = 0, int expected_height = 0);
 
-/// The same into `image`, reusing its memory: several hundred kilobytes a tile, whose page faults would cost about as much as
-/// a sixth of the decoding. On failure `image` is left empty, 0 x 0.
-Status decode_into(image::DepthImage& image, std::span<const uint8_t> bytes, int expected_width = 0, int expected_height = 0);
+/// The same into `image`, reusing its memory: several hundred kilobytes a tile, whose page faults would cost about as
+/// much as a sixth of the decoding. On failure `image` is left empty, 0 x 0.
+Status decode_into(image::DepthImage& image, std::span<const uint8_t> bytes, int expected_width = 0,
+                   int expected_height = 0);
 
 /// For `telesplat inspect`: size and parts of a stream without decoding its pixels.
 struct StreamInfo {

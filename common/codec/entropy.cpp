@@ -13,8 +13,8 @@ namespace {
 // A block is varint(size << 2 | kind) and then `size` bytes.
 enum BlockKind : uint32_t { kConstant = 0, kStored = 1, kZstd = 2 };
 
-// Level 1 looks for strings; a very negative level finds next to none, which is faster, and also shorter: short strings
-// in noise cost more than their Huffman codes (bench codec/*: level 1 takes 3 to 7 % more bytes and 15 to 40 % more time).
+// Level 1 looks for strings; a very negative level finds next to none, which is faster, and mostly shorter, too: short
+// strings in noise cost more than their Huffman codes (figures in depth_codec.cpp).
 constexpr int kStringsLevel = 1, kHuffmanOnlyLevel = -1000;
 
 using Compressor = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
@@ -22,18 +22,22 @@ Compressor make_compressor(int level) {
   Compressor c(ZSTD_createCCtx(), &ZSTD_freeCCtx);
   CHECK(c != nullptr);
   ZSTD_CCtx_setParameter(c.get(), ZSTD_c_compressionLevel, level);
-  ZSTD_CCtx_setParameter(c.get(), ZSTD_c_experimentalParam5, 1);  // literalCompressionMode = on, also at negative levels
-  ZSTD_CCtx_setParameter(c.get(), ZSTD_c_contentSizeFlag, 0);     // the decoder knows the size
+  ZSTD_CCtx_setParameter(c.get(), ZSTD_c_experimentalParam5,
+                         1);                                   // literalCompressionMode = on, also at negative levels
+  ZSTD_CCtx_setParameter(c.get(), ZSTD_c_contentSizeFlag, 0);  // the decoder knows the size
   return c;
 }
 
 // Making a context costs as much as coding a small tile, so each thread keeps its own.
 ZSTD_CCtx* compressor(bool strings) {
-  static thread_local const Compressor with_strings = make_compressor(kStringsLevel), huffman_only = make_compressor(kHuffmanOnlyLevel);
+  static thread_local const Compressor with_strings = make_compressor(kStringsLevel),
+                                       huffman_only = make_compressor(kHuffmanOnlyLevel);
   return strings ? with_strings.get() : huffman_only.get();
 }
 ZSTD_DCtx* decompressor() {
-  struct Free { void operator()(ZSTD_DCtx* c) const { ZSTD_freeDCtx(c); } };
+  struct Free {
+    void operator()(ZSTD_DCtx* c) const { ZSTD_freeDCtx(c); }
+  };
   static thread_local const std::unique_ptr<ZSTD_DCtx, Free> context(ZSTD_createDCtx());
   CHECK(context != nullptr);
   return context.get();
@@ -105,10 +109,13 @@ void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
   if (std::memcmp(raw.data(), raw.data() + 1, raw.size() - 1) == 0) return append(out, kConstant, raw.first(1));
   static thread_local std::vector<uint8_t> packed;
   packed.resize(std::max(packed.size(), ZSTD_compressBound(raw.size())));
-  const size_t size = ZSTD_compress2(compressor(is_repetitive(raw)), packed.data(), packed.size(), raw.data(), raw.size());
+  const size_t size =
+      ZSTD_compress2(compressor(is_repetitive(raw)), packed.data(), packed.size(), raw.data(), raw.size());
   CHECK(!ZSTD_isError(size));
-  if (size < raw.size()) append(out, kZstd, std::span(packed).first(size));
-  else append(out, kStored, raw);
+  if (size < raw.size())
+    append(out, kZstd, std::span(packed).first(size));
+  else
+    append(out, kStored, raw);
 }
 
 void put_stored_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) { append(out, kStored, raw); }
@@ -124,8 +131,10 @@ bool get_block(Reader& in, std::span<uint8_t> raw) {
       if (block->bytes.size() == raw.size()) std::copy(block->bytes.begin(), block->bytes.end(), raw.begin());
       return block->bytes.size() == raw.size();
     case kZstd:
-      return ZSTD_decompressDCtx(decompressor(), raw.data(), raw.size(), block->bytes.data(), block->bytes.size()) == raw.size();
-    default: return false;
+      return ZSTD_decompressDCtx(decompressor(), raw.data(), raw.size(), block->bytes.data(), block->bytes.size()) ==
+             raw.size();
+    default:
+      return false;
   }
 }
 

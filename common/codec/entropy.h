@@ -26,21 +26,22 @@ class Reader {
 
 void put_varint(std::vector<uint8_t>& out, uint32_t value);
 
-/// Appends `raw` as one self-delimiting block: constant, stored or zstd, whichever is shorter. Looks for repeated strings only
-/// where one byte value is so frequent that a Huffman code, of a bit at least, would waste much on it.
+/// Appends `raw` as one self-delimiting block: constant, stored or zstd, whichever is shorter. Looks for repeated
+/// strings only where one byte value is so frequent that a Huffman code, of a bit at least, would waste much on it.
 void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
 /// Appends `raw` as a stored block: for bits known to be random.
 void put_stored_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
 
-/// Fills all of `raw` from the block at the reader's place; false where the block is damaged or holds another number of bytes.
+/// Fills all of `raw` from the block at the reader's place; false where the block is damaged or holds another number of
+/// bytes.
 [[nodiscard]] bool get_block(Reader& in, std::span<uint8_t> raw);
 /// The content of a stored block, in place; nothing where the block is damaged or of another kind.
 std::optional<std::span<const uint8_t>> get_stored_block(Reader& in);
 /// Passes over any block; false where it is cut off.
 [[nodiscard]] bool skip_block(Reader& in);
 
-/// Packs numbers, least significant bit first, into a buffer that must have 16 bytes to spare. Loops copy it into a local
-/// variable and back, so that it stays in registers.
+/// Packs numbers, least significant bit first, into a buffer that must have 16 bytes to spare. Loops copy it into a
+/// local variable and back, so that it stays in registers.
 struct BitSink {
   uint8_t* at = nullptr;
   uint64_t pending = 0;
@@ -65,7 +66,9 @@ class BitWriter {
     if (buffer_.size() < max_bits / 8 + 16) buffer_.resize(max_bits / 8 + 16);
     sink = {buffer_.data()};
   }
-  std::span<const uint8_t> bytes() const { return {buffer_.data(), size_t(sink.at - buffer_.data()) + (sink.filled != 0)}; }
+  std::span<const uint8_t> bytes() const {
+    return {buffer_.data(), size_t(sink.at - buffer_.data()) + (sink.filled != 0)};
+  }
 
   BitSink sink;
 

@@ -52,7 +52,8 @@ void run_lengths(const Mask& mask, std::vector<uint32_t>& lengths) {
   size_t begin = 0;
   for (int y = 0; y < mask.height(); ++y)
     for (size_t w = 0; w < mask.words_per_row(); ++w) {
-      const size_t first = static_cast<size_t>(y) * mask.width() + w * 64, bits = std::min<size_t>(64, mask.width() - w * 64);
+      const size_t first = static_cast<size_t>(y) * mask.width() + w * 64,
+                   bits = std::min<size_t>(64, mask.width() - w * 64);
       const uint64_t word = mask.row(y)[w];
       uint64_t changes = word ^ (word << 1 | last);
       if (bits < 64) changes &= (uint64_t{1} << bits) - 1;
@@ -165,10 +166,13 @@ size_t Mask::runs() const {
 }
 
 HWY_EXPORT(CoveredBits);
-void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) { HWY_DYNAMIC_DISPATCH(CoveredBits)(depth, count, words); }
+void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) {
+  HWY_DYNAMIC_DISPATCH(CoveredBits)(depth, count, words);
+}
 
 void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
-  // A run takes a byte or so, a byte of pixels at least a bit and few more where it is the usual one. Bench codec/patch*.
+  // A run takes a byte or so, a byte of pixels at least a bit and few more where it is the usual one. Bench
+  // codec/patch*.
   Scratch& s = scratch();
   run_lengths(mask, s.lengths);
   const size_t pixels = static_cast<size_t>(mask.width()) * static_cast<size_t>(mask.height());
@@ -196,9 +200,13 @@ bool get_mask(Reader& in, Mask& mask) {
   const auto coding = in.u8();
   if (!coding) return false;
   switch (*coding) {
-    case kRuns: return get_runs(in, mask, scratch());
-    case kBytes: case kBytesAbove: return get_bytes(in, mask, *coding == kBytesAbove, scratch());
-    default: return false;
+    case kRuns:
+      return get_runs(in, mask, scratch());
+    case kBytes:
+    case kBytesAbove:
+      return get_bytes(in, mask, *coding == kBytesAbove, scratch());
+    default:
+      return false;
   }
 }
 

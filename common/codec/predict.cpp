@@ -12,11 +12,13 @@ namespace telesplat::codec::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // residuals = fold(row - (L + U - UL)); writes up to the end of the last vector.
-void PredictDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT row, size_t width, uint32_t* HWY_RESTRICT residuals) {
+void PredictDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT row, size_t width,
+                  uint32_t* HWY_RESTRICT residuals) {
   const hn::CappedTag<uint32_t, 16> d;
   const hn::RebindToSigned<decltype(d)> di;
   for (size_t x = 0; x < width; x += hn::Lanes(d)) {
-    const auto prediction = hn::Sub(hn::Add(hn::LoadU(d, row + x - 1), hn::LoadU(d, above + x)), hn::LoadU(d, above + x - 1));
+    const auto prediction =
+        hn::Sub(hn::Add(hn::LoadU(d, row + x - 1), hn::LoadU(d, above + x)), hn::LoadU(d, above + x - 1));
     const auto v = hn::ShiftLeft<8>(hn::Sub(hn::LoadU(d, row + x), prediction));
     const auto sign = hn::BitCast(d, hn::ShiftRight<31>(hn::BitCast(di, v)));
     hn::StoreU(hn::ShiftRight<8>(hn::Xor(hn::ShiftLeft<1>(v), sign)), d, residuals + x);
@@ -24,11 +26,13 @@ void PredictDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRI
 }
 
 // The same with the median predictor on bytes; the left neighbour is `step` bytes away.
-void PredictBytes(const uint8_t* HWY_RESTRICT above, const uint8_t* HWY_RESTRICT row, size_t count, size_t step, uint8_t* HWY_RESTRICT residuals) {
+void PredictBytes(const uint8_t* HWY_RESTRICT above, const uint8_t* HWY_RESTRICT row, size_t count, size_t step,
+                  uint8_t* HWY_RESTRICT residuals) {
   const hn::CappedTag<uint8_t, 64> d;
   const hn::RebindToSigned<decltype(d)> di;
   for (size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto left = hn::LoadU(d, row + i - step), up = hn::LoadU(d, above + i), up_left = hn::LoadU(d, above + i - step);
+    const auto left = hn::LoadU(d, row + i - step), up = hn::LoadU(d, above + i),
+               up_left = hn::LoadU(d, above + i - step);
     const auto lo = hn::Min(left, up), hi = hn::Max(left, up);
     // Median of L, U, L + U - UL  =  L + U - clamp(UL to [min(L, U), max(L, U)]), exact mod 2^8.
     const auto prediction = hn::Sub(hn::Add(left, up), hn::Min(hn::Max(up_left, lo), hi));
@@ -38,8 +42,10 @@ void PredictBytes(const uint8_t* HWY_RESTRICT above, const uint8_t* HWY_RESTRICT
   }
 }
 
-// row = above + running sum of unfolded residuals: U - UL + L = U + (L - UL), the same difference as one pixel to the left.
-bool ReconstructDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT residuals, size_t width, uint32_t* HWY_RESTRICT row) {
+// row = above + running sum of unfolded residuals: U - UL + L = U + (L - UL), the same difference as one pixel to the
+// left.
+bool ReconstructDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RESTRICT residuals, size_t width,
+                      uint32_t* HWY_RESTRICT row) {
   size_t x = 0;
   uint32_t difference = 0;
   bool good = true;
@@ -69,8 +75,10 @@ bool ReconstructDepth(const uint32_t* HWY_RESTRICT above, const uint32_t* HWY_RE
   return good;
 }
 
-// The median predictor's inverse. Pixels wait for their left neighbour, five operations long; all the rest is off that path.
-void ReconstructAttributes(const uint64_t* HWY_RESTRICT above, const uint64_t* HWY_RESTRICT residuals, size_t width, uint64_t* HWY_RESTRICT row) {
+// The median predictor's inverse. Pixels wait for their left neighbour, five operations long; all the rest is off that
+// path.
+void ReconstructAttributes(const uint64_t* HWY_RESTRICT above, const uint64_t* HWY_RESTRICT residuals, size_t width,
+                           uint64_t* HWY_RESTRICT row) {
 #if HWY_TARGET == HWY_SCALAR
   for (size_t x = 0; x < width; ++x) {
     const uint64_t up = above[x], left = x == 0 ? up : row[x - 1], up_left = x == 0 ? up : above[x - 1];
@@ -94,7 +102,8 @@ void ReconstructAttributes(const uint64_t* HWY_RESTRICT above, const uint64_t* H
   };
   size_t x = 0;
   for (; x + 2 <= width; x += 2) {
-    const auto z = hn::BitCast(pair, hn::LoadU(pair64, residuals + x)), up = hn::BitCast(pair, hn::LoadU(pair64, above + x));
+    const auto z = hn::BitCast(pair, hn::LoadU(pair64, residuals + x)),
+               up = hn::BitCast(pair, hn::LoadU(pair64, above + x));
     const auto half = hn::And(hn::BitCast(pair, hn::ShiftRight<1>(hn::BitCast(pair16, z))), low7);
     const auto sign = hn::BitCast(pair, hn::Neg(hn::BitCast(signed_pair, hn::And(z, one))));
     const auto known = hn::Add(hn::Xor(half, sign), up);
@@ -112,13 +121,15 @@ void ReconstructAttributes(const uint64_t* HWY_RESTRICT above, const uint64_t* H
 #endif
 }
 
-void SplitAttributes(const uint64_t* HWY_RESTRICT row, size_t width, uint32_t* HWY_RESTRICT colour, uint16_t* HWY_RESTRICT normal) {
+void SplitAttributes(const uint64_t* HWY_RESTRICT row, size_t width, uint32_t* HWY_RESTRICT colour,
+                     uint16_t* HWY_RESTRICT normal) {
   size_t x = 0;
 #if HWY_TARGET != HWY_SCALAR
   const hn::FixedTag<uint32_t, 4> d;
   const hn::FixedTag<uint16_t, 4> d16;
   for (; x + 4 <= width; x += 4) {
-    const auto a = hn::LoadU(d, reinterpret_cast<const uint32_t*>(row + x)), b = hn::LoadU(d, reinterpret_cast<const uint32_t*>(row + x + 2));
+    const auto a = hn::LoadU(d, reinterpret_cast<const uint32_t*>(row + x)),
+               b = hn::LoadU(d, reinterpret_cast<const uint32_t*>(row + x + 2));
     hn::StoreU(hn::ConcatEven(d, b, a), d, colour + x);
     hn::StoreU(hn::TruncateTo(d16, hn::ConcatOdd(d, b, a)), d16, normal + x);
   }
@@ -149,7 +160,9 @@ void set_edge(FilledRow& above, FilledRow& row) {
 
 }  // namespace
 
-uint32_t predict_depth(uint32_t left, uint32_t up, uint32_t up_left) { return (left + up - up_left) & image::kMaxDepthCode; }
+uint32_t predict_depth(uint32_t left, uint32_t up, uint32_t up_left) {
+  return (left + up - up_left) & image::kMaxDepthCode;
+}
 
 uint32_t predict_bytes(uint32_t left, uint32_t up, uint32_t up_left) {
   uint32_t prediction = 0;
@@ -166,8 +179,10 @@ void predict_row(FilledRow& above, FilledRow& row, size_t width, Residuals& resi
   const auto bytes = [](const auto* p) { return reinterpret_cast<const uint8_t*>(p); };
   HWY_DYNAMIC_DISPATCH(PredictDepth)(above.depth(), row.depth(), width, residuals.depth.data());
   const auto predict = HWY_DYNAMIC_DISPATCH(PredictBytes);
-  predict(bytes(above.colour()), bytes(row.colour()), width * 4, 4, reinterpret_cast<uint8_t*>(residuals.colour.data()));
-  predict(bytes(above.normal()), bytes(row.normal()), width * 2, 2, reinterpret_cast<uint8_t*>(residuals.normal.data()));
+  predict(bytes(above.colour()), bytes(row.colour()), width * 4, 4,
+          reinterpret_cast<uint8_t*>(residuals.colour.data()));
+  predict(bytes(above.normal()), bytes(row.normal()), width * 2, 2,
+          reinterpret_cast<uint8_t*>(residuals.normal.data()));
 }
 
 bool reconstruct_depth(const uint32_t* above, const uint32_t* residuals, size_t width, uint32_t* row) {

@@ -1,6 +1,7 @@
 // Prediction of rows of pixels from the row above and the pixel to the left, and its inverse.
-//   depth:            L + U - UL (mod 2^24). Reciprocal depth is linear in screen space, so that a plane leaves only rounding.
-//   colour, normals:  the median of L, U and L + U - UL, byte by byte (M. Weinberger, G. Seroussi, G. Sapiro, "The LOCO-I
+//   depth:            L + U - UL (mod 2^24). Reciprocal depth is linear in screen space, so that a plane leaves only
+//   rounding. colour, normals:  the median of L, U and L + U - UL, byte by byte (M. Weinberger, G. Seroussi, G. Sapiro,
+//   "The LOCO-I
 //                     lossless image compression algorithm", IEEE Transactions on Image Processing 9(8), 2000, eq. 1).
 // L, U, UL: neighbours to the left, above, above left. Pixels without coverage hold their own prediction ("filled").
 #pragma once
@@ -64,8 +65,8 @@ inline uint64_t join(uint32_t colour, uint16_t normal) { return colour | uint64_
 inline uint32_t colour_of(uint64_t joined) { return static_cast<uint32_t>(joined); }
 inline uint16_t normal_of(uint64_t joined) { return static_cast<uint16_t>(joined >> 32); }
 
-/// The inverse of predict_row: row[x] from residuals[x] and the row above, for x in [0, width). Neither writes past the end.
-/// The first returns false if a depth is zero.
+/// The inverse of predict_row: row[x] from residuals[x] and the row above, for x in [0, width). Neither writes past the
+/// end. The first returns false if a depth is zero.
 [[nodiscard]] bool reconstruct_depth(const uint32_t* above, const uint32_t* residuals, size_t width, uint32_t* row);
 void reconstruct_attributes(const uint64_t* above, const uint64_t* residuals, size_t width, uint64_t* row);
 /// Joined pixels -> planes.
@@ -78,7 +79,7 @@ uint32_t predict_bytes(uint32_t left, uint32_t up, uint32_t up_left);
 /// Zigzag folding mod 2^24, and of every byte of a word mod 2^8.
 inline uint32_t fold_depth(uint32_t difference) {
   const uint32_t v = difference << 8;  // sign to the top
-  return ((v << 1) ^ (0 - (v >> 31)) ) >> 8 & image::kMaxDepthCode;
+  return ((v << 1) ^ (0 - (v >> 31))) >> 8 & image::kMaxDepthCode;
 }
 inline uint32_t unfold_depth(uint32_t z) { return (z >> 1) ^ (0 - (z & 1)); }  // mod 2^24
 inline uint32_t fold_bytes(uint32_t value, uint32_t prediction) {

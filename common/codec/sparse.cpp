@@ -9,7 +9,8 @@ constexpr int kFar = -1000000;  // where the pixel of an empty cell stands
 
 void Neighbours::reset(int width, int height, const Pixel& base) {
   cells_per_row_ = (width + kCell - 1) / kCell + 2;
-  cells_.assign(static_cast<size_t>(cells_per_row_) * static_cast<size_t>((height + kCell - 1) / kCell + 1), Entry{kFar, kFar, base});
+  cells_.assign(static_cast<size_t>(cells_per_row_) * static_cast<size_t>((height + kCell - 1) / kCell + 1),
+                Entry{kFar, kFar, base});
   last_ = {kFar, kFar, base};
 }
 
@@ -22,7 +23,9 @@ Pixel Neighbours::predict(int x, int y) const {
     best = distance < best_distance ? entry : best;
     best_distance = distance < best_distance ? distance : best_distance;
   };
-  for (const Entry* entry : {here, here - 1, here + 1, here - cells_per_row_, here - cells_per_row_ - 1, here - cells_per_row_ + 1}) consider(entry);
+  for (const Entry* entry :
+       {here, here - 1, here + 1, here - cells_per_row_, here - cells_per_row_ - 1, here - cells_per_row_ + 1})
+    consider(entry);
   return best->pixel;
 }
 

@@ -14,7 +14,8 @@ struct Pixel {
   uint16_t normal = 0;
 };
 
-/// The covered pixels of a tile seen so far, in scan order. A grid of cells of kCell x kCell pixels keeps the last pixel in each.
+/// The covered pixels of a tile seen so far, in scan order. A grid of cells of kCell x kCell pixels keeps the last
+/// pixel in each.
 class Neighbours {
  public:
   /// `base` predicts the first pixel.

@@ -19,9 +19,15 @@ void PutAll(const T* HWY_RESTRICT z, size_t n, uint8_t* HWY_RESTRICT tokens, Bit
   for (size_t i = 0; i < n; ++i) Token::put(z[i], tokens + i, sink);
   bits = sink;
 }
-void PutNumbers(const uint32_t* z, size_t n, uint8_t* tokens, BitSink& bits) { PutAll<NumberToken>(z, n, tokens, bits); }
-void PutNormals(const uint16_t* z, size_t n, uint8_t* tokens, BitSink& bits) { PutAll<NormalToken>(z, n, tokens, bits); }
-void PutColours(const uint32_t* z, size_t n, uint8_t* tokens, BitSink& bits) { PutAll<ColourToken>(z, n, tokens, bits); }
+void PutNumbers(const uint32_t* z, size_t n, uint8_t* tokens, BitSink& bits) {
+  PutAll<NumberToken>(z, n, tokens, bits);
+}
+void PutNormals(const uint16_t* z, size_t n, uint8_t* tokens, BitSink& bits) {
+  PutAll<NormalToken>(z, n, tokens, bits);
+}
+void PutColours(const uint32_t* z, size_t n, uint8_t* tokens, BitSink& bits) {
+  PutAll<ColourToken>(z, n, tokens, bits);
+}
 void GetNumbers(const uint8_t* HWY_RESTRICT tokens, size_t n, BitSource& bits, uint32_t* HWY_RESTRICT z) {
   BitSource source = bits;
   for (size_t i = 0; i < n; ++i) z[i] = NumberToken::get(tokens[i], source);
@@ -67,7 +73,8 @@ void TokenWriter::add(const Residuals& residuals, size_t n) {
   HWY_DYNAMIC_DISPATCH(PutNormals)(residuals.normal.data(), n, &normal_[done_], normal_bits_.sink);
   if (plain_colour_) {
     for (size_t i = 0; i < n; ++i) {
-      const uint32_t difference = static_cast<uint32_t>(unfold_bytes(residuals.colour[i])), green = difference >> 8 & 255;
+      const uint32_t difference = static_cast<uint32_t>(unfold_bytes(residuals.colour[i])),
+                     green = difference >> 8 & 255;
       const uint32_t z = fold_bytes(difference, green << 16 | green);
       colour_[0][done_ + i] = static_cast<uint8_t>(z >> 8);
       colour_[1][done_ + i] = static_cast<uint8_t>(z >> 16);
@@ -108,7 +115,8 @@ bool TokenReader::start(Reader& in, size_t count, size_t row, bool plain_colour)
     if (bytes) reader.start(*bytes, row * 32);
     return bytes.has_value();
   };
-  if (!block(depth_) || !bits(depth_bits_) || !block(normal_) || !bits(normal_bits_) || !block(colour_[0])) return false;
+  if (!block(depth_) || !bits(depth_bits_) || !block(normal_) || !bits(normal_bits_) || !block(colour_[0]))
+    return false;
   if (!plain_colour) return bits(colour_bits_);
   colour_bits_.start({}, 0);
   return block(colour_[1]) && block(colour_[2]);
@@ -129,7 +137,8 @@ bool TokenReader::take(JoinedRow& residuals, size_t n) {
     }
   } else {
     for (size_t i = 0; i < n; ++i) any_colour |= colour_[0][done_ + i];
-    if (any_colour != 0) HWY_DYNAMIC_DISPATCH(GetColours)(&colour_[0][done_], n, colour_bits_.source, residuals.attributes.data());
+    if (any_colour != 0)
+      HWY_DYNAMIC_DISPATCH(GetColours)(&colour_[0][done_], n, colour_bits_.source, residuals.attributes.data());
   }
   done_ += n;
   return !depth_bits_.overrun() && !normal_bits_.overrun() && !colour_bits_.overrun();

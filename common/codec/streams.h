@@ -29,7 +29,8 @@ class TokenWriter {
 
 class TokenReader {
  public:
-  /// Reads the blocks of `count` residuals, of which at most `row` at a time will be taken; false where they are damaged.
+  /// Reads the blocks of `count` residuals, of which at most `row` at a time will be taken; false where they are
+  /// damaged.
   [[nodiscard]] bool start(Reader& in, size_t count, size_t row, bool plain_colour);
   /// Fills the first n of `residuals`; false where the stream is damaged.
   [[nodiscard]] bool take(JoinedRow& residuals, size_t n);

@@ -7,7 +7,15 @@
 namespace telesplat::codec::detail {
 namespace {
 
-enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kPlainColour = 8, kKnownBits = 15 };
+enum Kind : uint8_t {
+  kEmpty = 0,
+  kDense = 1,
+  kSparse = 2,
+  kPredictorBits = 3,
+  kMasked = 4,
+  kPlainColour = 8,
+  kKnownBits = 15
+};
 
 TileScratch& scratch() {
   static thread_local TileScratch s;
@@ -23,7 +31,8 @@ std::optional<Pixel> get_base(Reader& in) {
   const auto b = in.bytes(8);
   if (!b) return std::nullopt;
   const auto at = [&](int i) { return uint32_t{(*b)[static_cast<size_t>(i)]}; };
-  return Pixel{at(0) | at(1) << 8 | at(2) << 16, at(3) | at(4) << 8 | at(5) << 16, static_cast<uint16_t>(at(6) | at(7) << 8)};
+  return Pixel{at(0) | at(1) << 8 | at(2) << 16, at(3) | at(4) << 8 | at(5) << 16,
+               static_cast<uint16_t>(at(6) | at(7) << 8)};
 }
 
 void clear(image::DepthImage& image, const TileRect& rect) {
@@ -60,7 +69,8 @@ bool is_rough(const image::DepthImage& image, const TileRect& rect) {
 TileGrid::TileGrid(int width, int height) : width(width), height(height) {
   // About 256 x 256, longer where the image is narrow; of equal size up to rounding, so that none is a sliver.
   constexpr int kSide = 256, kPixels = static_cast<int>(kMaxTilePixels);
-  const int most_rows = width < kSide ? kPixels / width : kSide, most_columns = height < kSide ? kPixels / height : kSide;
+  const int most_rows = width < kSide ? kPixels / width : kSide,
+            most_columns = height < kSide ? kPixels / height : kSide;
   const auto equal_parts = [](int size, int most) {
     const int parts = (size + most - 1) / most;
     return (size + parts - 1) / parts;
@@ -79,13 +89,15 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
   TileScratch& s = scratch();
   s.mask.reset(rect.width, rect.height);
   for (int y = 0; y < rect.height; ++y)
-    covered_bits(image.depth.data() + rect.first + rect.stride * static_cast<size_t>(y), static_cast<size_t>(rect.width), s.mask.row(y));
+    covered_bits(image.depth.data() + rect.first + rect.stride * static_cast<size_t>(y),
+                 static_cast<size_t>(rect.width), s.mask.row(y));
   const size_t pixels = static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height), covered = s.mask.count();
   if (covered == 0) {
     out.push_back(kEmpty);
     return 0;
   }
-  const bool full = covered == pixels, sparse = !full && is_sparse(covered, s.mask.runs(), pixels), rough = is_rough(image, rect);
+  const bool full = covered == pixels, sparse = !full && is_sparse(covered, s.mask.runs(), pixels),
+             rough = is_rough(image, rect);
   out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked) | (rough ? kPlainColour : 0)));
 
   size_t first = rect.first;  // of the covered pixels
@@ -100,8 +112,10 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
 
   s.reset(static_cast<size_t>(rect.width));
   s.writer.start(covered, rough);
-  if (sparse) encode_sparse(s, image, rect, base);
-  else encode_dense(s, image, rect, base, full);
+  if (sparse)
+    encode_sparse(s, image, rect, base);
+  else
+    encode_dense(s, image, rect, base, full);
   s.writer.finish(out);
   return covered;
 }
@@ -129,7 +143,9 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   }
   s.reset(static_cast<size_t>(rect.width));
   if (!s.reader.start(in, covered, static_cast<size_t>(rect.width), *kind & kPlainColour)) return std::nullopt;
-  const bool good = full ? decode_full(s, image, rect, *base) : sparse ? decode_sparse(s, image, rect, *base) : decode_masked(s, image, rect, *base);
+  const bool good = full     ? decode_full(s, image, rect, *base)
+                    : sparse ? decode_sparse(s, image, rect, *base)
+                             : decode_masked(s, image, rect, *base);
   if (!good || !s.reader.finished()) return std::nullopt;
   return covered;
 }
@@ -155,7 +171,8 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
     total += before - in.left();
     return true;
   };
-  return skip(info.depth_bytes, 2) && skip(info.normal_bytes, 2) && skip(info.colour_bytes, *kind & kPlainColour ? 3 : 2);
+  return skip(info.depth_bytes, 2) && skip(info.normal_bytes, 2) &&
+         skip(info.colour_bytes, *kind & kPlainColour ? 3 : 2);
 }
 
 }  // namespace telesplat::codec::detail

@@ -3,7 +3,8 @@
 //   kind    = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered, + kPlainColour
 //   base    = depth (3 bytes), colour (3), normal (2) of the first covered pixel
 //   depth   = block of NumberTokens, block of raw bits;  normal = block of NormalTokens, block of raw bits
-//   colour  = block of ColourTokens, block of raw bits; or, plain: blocks of residuals of green, red - green, blue - green
+//   colour  = block of ColourTokens, block of raw bits; or, plain: blocks of residuals of green, red - green, blue -
+//   green
 #pragma once
 
 #include <cstddef>
@@ -21,7 +22,8 @@ namespace telesplat::codec::detail {
 /// Most pixels of a tile; every tile takes at least a byte.
 inline constexpr size_t kMaxTilePixels = size_t{1} << 16;
 
-/// How an image of width x height pixels is divided: tiles of tile_width x tile_height, those at the right and below cut off.
+/// How an image of width x height pixels is divided: tiles of tile_width x tile_height, those at the right and below
+/// cut off.
 struct TileGrid {
   TileGrid(int width, int height);
   TileRect rect(int column, int row) const;

@@ -1,7 +1,7 @@
 // Residuals <-> one byte to be Huffman coded ("token") + a few raw bits that carry no redundancy worth coding.
-// Log-linear classes, as in the hybrid integers of JPEG XL (ISO/IEC 18181-1, C.3.3): small values have their own token, larger
-// ones share it with neighbours of about the same size, so that tables stay small and any spread of values codes well.
-// Signed residuals come zigzag-folded: 0, -1, 1, -2, ... -> 0, 1, 2, 3, ...
+// Log-linear classes, as in the hybrid integers of JPEG XL (ISO/IEC 18181-1, C.3.3): small values have their own token,
+// larger ones share it with neighbours of about the same size, so that tables stay small and any spread of values codes
+// well. Signed residuals come zigzag-folded: 0, -1, 1, -2, ... -> 0, 1, 2, 3, ...
 #pragma once
 
 #include <array>
@@ -35,8 +35,22 @@ struct ByteClass {
 /// A normal's two byte residuals in one token, 16 classes each, so that their sizes' correlation is used.
 struct NormalToken {
   static constexpr unsigned kMaxBits = 14;
-  static constexpr std::array<ByteClass, 16> kClasses{{{0, 0}, {1, 0}, {2, 0}, {3, 0}, {4, 0}, {5, 0}, {6, 0}, {7, 0}, {8, 2},
-                                                       {12, 2}, {16, 3}, {24, 3}, {32, 4}, {48, 4}, {64, 6}, {128, 7}}};
+  static constexpr std::array<ByteClass, 16> kClasses{{{0, 0},
+                                                       {1, 0},
+                                                       {2, 0},
+                                                       {3, 0},
+                                                       {4, 0},
+                                                       {5, 0},
+                                                       {6, 0},
+                                                       {7, 0},
+                                                       {8, 2},
+                                                       {12, 2},
+                                                       {16, 3},
+                                                       {24, 3},
+                                                       {32, 4},
+                                                       {48, 4},
+                                                       {64, 6},
+                                                       {128, 7}}};
   static constexpr auto kClassOf = [] {
     std::array<uint8_t, 256> table{};
     for (unsigned z = 0; z < 256; ++z)
@@ -104,7 +118,8 @@ struct ColourToken {
   }
   static uint32_t get(uint8_t token, BitSource& bits) {
     uint32_t z = kSmall[token];
-    if (kBits[token] == 0) [[likely]] return z;
+    if (kBits[token] == 0) [[likely]]
+      return z;
     for (unsigned shift = 0, t = token; shift <= 16; shift += 8, t /= 6) z += bits.take(kClasses[t % 6].bits) << shift;
     return z;
   }

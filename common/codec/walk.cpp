@@ -29,7 +29,8 @@ void fill_holes(FilledRow& above, FilledRow& row, const uint64_t* covered, size_
       const FilledRow& beside = x == 0 ? above : row;
       row.depth()[x] = predict_depth(beside.depth()[left], above.depth()[x], above.depth()[left]);
       row.colour()[x] = predict_bytes(beside.colour()[left], above.colour()[x], above.colour()[left]);
-      row.normal()[x] = static_cast<uint16_t>(predict_bytes(beside.normal()[left], above.normal()[x], above.normal()[left]));
+      row.normal()[x] =
+          static_cast<uint16_t>(predict_bytes(beside.normal()[left], above.normal()[x], above.normal()[left]));
     });
   }
 }
@@ -45,7 +46,8 @@ Pixel at(const image::DepthImage& image, size_t i) { return {image.depth[i], ima
 // Pixel i = (x, y) of a sparse tile: as in a filled row where the three neighbours are covered, else the nearest pixel.
 Pixel predict_sparse(const TileScratch& s, const image::DepthImage& image, size_t x, int y, size_t i, size_t stride) {
   const auto covered = [&](size_t column, int row) { return (s.mask.row(row)[column / 64] >> column % 64 & 1) != 0; };
-  if (x == 0 || y == 0 || !covered(x - 1, y) || !covered(x, y - 1) || !covered(x - 1, y - 1)) return s.neighbours.predict(static_cast<int>(x), y);
+  if (x == 0 || y == 0 || !covered(x - 1, y) || !covered(x, y - 1) || !covered(x - 1, y - 1))
+    return s.neighbours.predict(static_cast<int>(x), y);
   const Pixel left = at(image, i - 1), up = at(image, i - stride), up_left = at(image, i - stride - 1);
   return {predict_depth(left.depth, up.depth, up_left.depth), predict_bytes(left.colour, up.colour, up_left.colour),
           static_cast<uint16_t>(predict_bytes(left.normal, up.normal, up_left.normal))};
@@ -161,7 +163,8 @@ bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rec
     for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
       const size_t i = rect.first + rect.stride * static_cast<size_t>(y) + x;
       const Pixel guess = predict_sparse(s, image, x, y, i, rect.stride);
-      const Pixel pixel{(guess.depth + unfold_depth(packed.depth[n])) & image::kMaxDepthCode, add_bytes(guess.colour, colour_of(packed.attributes[n])),
+      const Pixel pixel{(guess.depth + unfold_depth(packed.depth[n])) & image::kMaxDepthCode,
+                        add_bytes(guess.colour, colour_of(packed.attributes[n])),
                         static_cast<uint16_t>(add_bytes(guess.normal, normal_of(packed.attributes[n])))};
       ++n;
       image.depth[i] = pixel.depth, image.colour[i] = pixel.colour, image.normal[i] = pixel.normal;

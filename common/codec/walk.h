@@ -1,4 +1,5 @@
-// From a tile's pixels to token streams and back, in scan order: dense tiles by rows (predict.h), sparse ones by neighbours.
+// From a tile's pixels to token streams and back, in scan order: dense tiles by rows (predict.h), sparse ones by
+// neighbours.
 #pragma once
 
 #include <cstddef>
@@ -34,11 +35,13 @@ struct TileScratch {
   TokenReader reader;
 };
 
-/// Pixels covered by s.mask -> s.writer, which was started. `base`: what predicts the first pixel. `full`: the mask is all ones.
+/// Pixels covered by s.mask -> s.writer, which was started. `base`: what predicts the first pixel. `full`: the mask is
+/// all ones.
 void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full);
 void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base);
 
-/// s.reader, which was started -> pixels covered by s.mask; others are left alone (they are zero). False where the stream is damaged.
+/// s.reader, which was started -> pixels covered by s.mask; others are left alone (they are zero). False where the
+/// stream is damaged.
 [[nodiscard]] bool decode_full(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
 [[nodiscard]] bool decode_masked(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
 [[nodiscard]] bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);

@@ -18,10 +18,16 @@ std::vector<DepthImage> images(uint32_t seed) {
   std::mt19937 random(seed);
   const auto side = [&] { return 1 + static_cast<int>(random() % 90); };
   std::vector<DepthImage> all;
-  all.push_back(test::plane(side(), side(), static_cast<double>(random() % 2000) - 1000, static_cast<double>(random() % 2000) - 1000));
+  all.push_back(test::plane(side(), side(), static_cast<double>(random() % 2000) - 1000,
+                            static_cast<double>(random() % 2000) - 1000));
   for (const bool rough : {false, true})
     for (const bool constant : {false, true})
-      all.push_back(test::render({.width = side(), .height = side(), .seed = seed, .rough = rough, .constant_albedo = constant, .covers_all = (seed & 1) != 0}));
+      all.push_back(test::render({.width = side(),
+                                  .height = side(),
+                                  .seed = seed,
+                                  .rough = rough,
+                                  .constant_albedo = constant,
+                                  .covers_all = (seed & 1) != 0}));
   for (const double density : {0.001, 0.01, 0.1, 0.3, 0.6, 0.9, 1.0}) {
     all.push_back(test::random_pixels(side(), side(), density, seed));
     all.push_back(test::render({.width = side(), .height = side(), .seed = seed}));
@@ -59,7 +65,8 @@ TEST(CodecProperties, EveryTruncationIsAnError) {
     for (const DepthImage& image : images(seed)) {
       const auto bytes = encode(image);
       for (size_t length = 0; length < bytes.size(); ++length) {
-        const std::vector<uint8_t> part(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(length));  // its own memory: overruns are seen
+        const std::vector<uint8_t> part(
+            bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(length));  // its own memory: overruns are seen
         ASSERT_FALSE(decode(part).ok()) << "seed " << seed << ", " << length << " of " << bytes.size();
       }
     }
@@ -73,7 +80,8 @@ TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
       const auto bytes = encode(image);
       for (int trial = 0; trial < 60; ++trial) {
         auto bad = bytes;
-        for (uint32_t flips = 1 + random() % 3; flips > 0; --flips) bad[random() % bad.size()] ^= static_cast<uint8_t>(1u << random() % 8);
+        for (uint32_t flips = 1 + random() % 3; flips > 0; --flips)
+          bad[random() % bad.size()] ^= static_cast<uint8_t>(1u << random() % 8);
         const auto back = decode(bad);
         (back.ok() ? accepted : refused) += 1;
         if (!back.ok()) continue;
@@ -88,8 +96,10 @@ TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
 TEST(CodecProperties, RandomBytesAfterAGoodHeader) {
   std::mt19937 random(12);
   for (int trial = 0; trial < 20000; ++trial) {
-    std::vector<uint8_t> bytes{0xD7, 2, static_cast<uint8_t>(1 + random() % 100), static_cast<uint8_t>(1 + random() % 100)};
-    for (uint32_t n = random() % 80; n > 0; --n) bytes.push_back(static_cast<uint8_t>(random() % (random() % 2 != 0 ? 256 : 16)));
+    std::vector<uint8_t> bytes{0xD7, 2, static_cast<uint8_t>(1 + random() % 100),
+                               static_cast<uint8_t>(1 + random() % 100)};
+    for (uint32_t n = random() % 80; n > 0; --n)
+      bytes.push_back(static_cast<uint8_t>(random() % (random() % 2 != 0 ? 256 : 16)));
     const auto image = decode(bytes);
     ASSERT_TRUE(!image.ok() || test::is_canonical(*image));
   }

@@ -26,7 +26,9 @@ double lattice(int32_t x, int32_t y, uint32_t seed) {
 
 double smooth_noise(double x, double y, uint32_t seed) {
   const double fx = std::floor(x), fy = std::floor(y), u = x - fx, v = y - fy;
-  const auto at = [&](int i, int j) { return lattice(static_cast<int32_t>(fx) + i, static_cast<int32_t>(fy) + j, seed); };
+  const auto at = [&](int i, int j) {
+    return lattice(static_cast<int32_t>(fx) + i, static_cast<int32_t>(fy) + j, seed);
+  };
   const double a = u * u * (3 - 2 * u), b = v * v * (3 - 2 * v);
   return (at(0, 0) * (1 - a) + at(1, 0) * a) * (1 - b) + (at(0, 1) * (1 - a) + at(1, 1) * a) * b;
 }
@@ -50,7 +52,8 @@ class Terrain {
 
   glm::dvec3 normal(double x, double z) const {
     constexpr double kStep = 5e-4;
-    return glm::normalize(glm::dvec3(height(x - kStep, z) - height(x + kStep, z), 2 * kStep, height(x, z - kStep) - height(x, z + kStep)));
+    return glm::normalize(glm::dvec3(height(x - kStep, z) - height(x + kStep, z), 2 * kStep,
+                                     height(x, z - kStep) - height(x, z + kStep)));
   }
 
   // Distance along `direction` (in units of its length) to the first hit, and the normal there.
@@ -78,7 +81,8 @@ class Terrain {
     }
     for (const Sphere& s : spheres_) {
       const glm::dvec3 to = origin - s.centre;
-      const double a = glm::dot(direction, direction), b = glm::dot(to, direction), c = glm::dot(to, to) - s.radius * s.radius;
+      const double a = glm::dot(direction, direction), b = glm::dot(to, direction),
+                   c = glm::dot(to, to) - s.radius * s.radius;
       const double root = b * b - a * c;
       if (root < 0) continue;
       const double at = (-b - std::sqrt(root)) / a;
@@ -92,7 +96,9 @@ class Terrain {
     if (view_.constant_albedo) return 0xC0B8A8;
     const double h = std::clamp(p.y * 12 + 0.5, 0.0, 1.0), patch = smooth_noise(p.x * 40, p.z * 40, view_.seed + 99);
     const double grain = view_.rough ? smooth_noise(p.x * 300, p.z * 300, view_.seed + 98) * 12 : 0;
-    const auto channel = [&](double low, double high) { return static_cast<uint32_t>(low + (high - low) * h + 20 * patch + grain); };
+    const auto channel = [&](double low, double high) {
+      return static_cast<uint32_t>(low + (high - low) * h + 20 * patch + grain);
+    };
     return channel(60, 190) << 16 | channel(100, 180) << 8 | channel(50, 150);
   }
 
@@ -134,8 +140,10 @@ DepthImage plane(int width, int height, double slope_x, double slope_y) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
-      image.depth[i] = static_cast<uint32_t>(std::clamp(4e6 + slope_x * x + slope_y * y, 1.0, double{image::kMaxDepthCode}));
-      image.colour[i] = static_cast<uint32_t>(x & 255) << 16 | static_cast<uint32_t>(y & 255) << 8 | static_cast<uint32_t>((x + y) / 2 & 255);
+      image.depth[i] =
+          static_cast<uint32_t>(std::clamp(4e6 + slope_x * x + slope_y * y, 1.0, double{image::kMaxDepthCode}));
+      image.colour[i] = static_cast<uint32_t>(x & 255) << 16 | static_cast<uint32_t>(y & 255) << 8 |
+                        static_cast<uint32_t>((x + y) / 2 & 255);
       image.normal[i] = 0x7F90;
     }
   return image;
@@ -164,12 +172,14 @@ void keep_outlines(DepthImage& image) {
   const DepthImage whole = image;
   const auto depth = [&](int x, int y) {
     const int u = std::clamp(x, 0, image.width - 1), v = std::clamp(y, 0, image.height - 1);
-    return static_cast<int64_t>(whole.depth[static_cast<size_t>(v) * static_cast<size_t>(image.width) + static_cast<size_t>(u)]);
+    return static_cast<int64_t>(
+        whole.depth[static_cast<size_t>(v) * static_cast<size_t>(image.width) + static_cast<size_t>(u)]);
   };
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       const int64_t here = depth(x, y);
-      const int64_t across = 2 * here - depth(x - 1, y) - depth(x + 1, y), down = 2 * here - depth(x, y - 1) - depth(x, y + 1);
+      const int64_t across = 2 * here - depth(x - 1, y) - depth(x + 1, y),
+                    down = 2 * here - depth(x, y - 1) - depth(x, y + 1);
       if (std::max(std::abs(across), std::abs(down)) * 50 <= here)
         clear(image, static_cast<size_t>(y) * static_cast<size_t>(image.width) + static_cast<size_t>(x));
     }
@@ -180,16 +190,21 @@ DepthImage crop(const DepthImage& image, int x, int y, int width, int height) {
   for (int row = 0; row < height; ++row) {
     const size_t from = static_cast<size_t>(y + row) * static_cast<size_t>(image.width) + static_cast<size_t>(x);
     const size_t to = static_cast<size_t>(row) * static_cast<size_t>(width);
-    std::copy_n(image.depth.begin() + static_cast<ptrdiff_t>(from), width, part.depth.begin() + static_cast<ptrdiff_t>(to));
-    std::copy_n(image.colour.begin() + static_cast<ptrdiff_t>(from), width, part.colour.begin() + static_cast<ptrdiff_t>(to));
-    std::copy_n(image.normal.begin() + static_cast<ptrdiff_t>(from), width, part.normal.begin() + static_cast<ptrdiff_t>(to));
+    std::copy_n(image.depth.begin() + static_cast<ptrdiff_t>(from), width,
+                part.depth.begin() + static_cast<ptrdiff_t>(to));
+    std::copy_n(image.colour.begin() + static_cast<ptrdiff_t>(from), width,
+                part.colour.begin() + static_cast<ptrdiff_t>(to));
+    std::copy_n(image.normal.begin() + static_cast<ptrdiff_t>(from), width,
+                part.normal.begin() + static_cast<ptrdiff_t>(to));
   }
   return part;
 }
 
 bool is_canonical(const DepthImage& image) {
   const size_t pixels = static_cast<size_t>(image.width) * static_cast<size_t>(image.height);
-  if (image.width < 1 || image.height < 1 || image.depth.size() != pixels || image.colour.size() != pixels || image.normal.size() != pixels) return false;
+  if (image.width < 1 || image.height < 1 || image.depth.size() != pixels || image.colour.size() != pixels ||
+      image.normal.size() != pixels)
+    return false;
   for (size_t i = 0; i < pixels; ++i) {
     if (image.depth[i] > image::kMaxDepthCode || image.colour[i] > 0xFFFFFF) return false;
     if (image.depth[i] == 0 && (image.colour[i] != 0 || image.normal[i] != 0)) return false;

@@ -24,8 +24,8 @@ image::DepthImage random_pixels(int width, int height, double density, uint32_t 
 
 /// Removes pixels at random until about `density` of them are left.
 void keep_random(image::DepthImage& image, double density, uint32_t seed);
-/// Keeps pixels whose depth code is off the line between two opposite neighbours by 1 % or more: outlines, as redundancy
-/// elimination leaves them when the camera moves a little.
+/// Keeps pixels whose depth code is off the line between two opposite neighbours by 1 % or more: outlines, as
+/// redundancy elimination leaves them when the camera moves a little.
 void keep_outlines(image::DepthImage& image);
 
 /// The rectangle at (x, y), which must lie in the image.

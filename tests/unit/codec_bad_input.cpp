@@ -24,7 +24,8 @@ TEST(CodecBadInput, Headers) {
 
 TEST(CodecBadInput, SizesBeyondTheLimit) {
   // 2^31 x 2^31, 4097 x 4096, and numbers that do not end.
-  EXPECT_NE(refusal({0xD7, 2, 0x80, 0x80, 0x80, 0x80, 8, 0x80, 0x80, 0x80, 0x80, 8, 0}).find("limit 16777216"), std::string::npos);
+  EXPECT_NE(refusal({0xD7, 2, 0x80, 0x80, 0x80, 0x80, 8, 0x80, 0x80, 0x80, 0x80, 8, 0}).find("limit 16777216"),
+            std::string::npos);
   EXPECT_NE(refusal({0xD7, 2, 0x81, 0x20, 0x80, 0x20, 0}).find("4097 x 4096"), std::string::npos);
   EXPECT_NE(refusal({0xD7, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1, 1}), "");
   EXPECT_NE(refusal({0xD7, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0x7F, 1, 0}), "");
@@ -65,7 +66,8 @@ TEST(CodecBadInput, EveryTileKind) {
   auto bytes = encode(test::random_pixels(20, 20, 1, 1));
   for (int kind = 0; kind < 256; ++kind) {
     bytes[4] = static_cast<uint8_t>(kind);
-    if (kind == 9 || kind == 1) continue;  // dense, with and without plain colour: the stream's own, or found by its blocks
+    if (kind == 9 || kind == 1)
+      continue;  // dense, with and without plain colour: the stream's own, or found by its blocks
     EXPECT_NE(refusal(bytes), "") << kind;
   }
 }

@@ -38,7 +38,8 @@ TEST(CodecRoundTrip, EmptyImagesTakeAByteATile) {
 }
 
 TEST(CodecRoundTrip, SinglePixels) {
-  for (const uint32_t depth : {1u, 2u, 0x800000u, image::kMaxDepthCode}) expect_round_trip(filled(1, 1, depth, 0xFFFFFF, 0xFFFF));
+  for (const uint32_t depth : {1u, 2u, 0x800000u, image::kMaxDepthCode})
+    expect_round_trip(filled(1, 1, depth, 0xFFFFFF, 0xFFFF));
   for (const size_t at : {size_t{0}, size_t{77}, size_t{300 * 200 - 1}}) {
     DepthImage image(300, 200);
     image.depth[at] = 12345, image.colour[at] = 0x010203, image.normal[at] = 0x0405;
@@ -94,7 +95,8 @@ TEST(CodecRoundTrip, NoiseGrowsLittle) {
 TEST(CodecRoundTrip, ExtremeSteps) {
   // Largest differences in both directions, in every channel.
   DepthImage image = filled(64, 64, 1, 0, 0);
-  for (size_t i = 0; i < image.pixels(); i += 3) image.depth[i] = image::kMaxDepthCode, image.colour[i] = 0xFFFFFF, image.normal[i] = 0xFFFF;
+  for (size_t i = 0; i < image.pixels(); i += 3)
+    image.depth[i] = image::kMaxDepthCode, image.colour[i] = 0xFFFFFF, image.normal[i] = 0xFFFF;
   expect_round_trip(image);
   expect_round_trip(filled(64, 64, image::kMaxDepthCode, 0xFFFFFF, 0xFFFF));
 }
@@ -123,7 +125,8 @@ TEST(CodecRoundTrip, InspectAddsUp) {
   const StreamInfo info = inspect(bytes).value();
   EXPECT_EQ(info.width, 700);
   EXPECT_EQ(info.height, 300);
-  EXPECT_EQ(info.covered_pixels, static_cast<size_t>(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; })));
+  EXPECT_EQ(info.covered_pixels, static_cast<size_t>(std::count_if(image.depth.begin(), image.depth.end(),
+                                                                   [](uint32_t d) { return d != 0; })));
   const size_t parts = info.mask_bytes + info.depth_bytes + info.colour_bytes + info.normal_bytes;
   EXPECT_LE(parts, bytes.size());
   EXPECT_GE(parts + 9 * 6 + 8, bytes.size()) << "six tiles of a kind and a base, and a header";
@@ -139,9 +142,9 @@ TEST(CodecFormat, GoldenBytes) {
       image.colour[i] = 0x102030 + static_cast<uint32_t>(i % 4) * 0x010203;
       image.normal[i] = static_cast<uint16_t>(0x8040 + i);
     }
-  const std::vector<uint8_t> golden{215, 2, 4, 3, 5, 232, 3, 0, 48, 32, 16, 64, 128, 2, 13, 7, 0, 8, 41, 0,
-                                    14, 14, 37, 0, 9, 37, 0, 8, 15, 9, 0, 8, 41, 0, 2, 2, 8, 2, 2, 8,
-                                    2, 2, 2, 5, 0, 41, 0, 100, 100, 0, 0, 0, 0, 0, 0, 100, 9, 34, 2};
+  const std::vector<uint8_t> golden{215, 2,  4,  3, 5, 232, 3, 0,   48,  32, 16, 64, 128, 2, 13, 7,   0, 8,  41, 0,
+                                    14,  14, 37, 0, 9, 37,  0, 8,   15,  9,  0,  8,  41,  0, 2,  2,   8, 2,  2,  8,
+                                    2,   2,  2,  5, 0, 41,  0, 100, 100, 0,  0,  0,  0,   0, 0,  100, 9, 34, 2};
   EXPECT_EQ(encode(image), golden);
   const auto back = decode(golden);
   ASSERT_TRUE(back.ok()) << back.error().text;

@@ -1,0 +1,166 @@
+// The depth-image codec beside LZW (TIFF with predictor), PNG and zstd, on the same whole images of 1280 x 800 pixels.
+// B/px: bytes per covered pixel. Mpx/s: pixels of the image per second, on one core.
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <benchmark/benchmark.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <map>
+#include <string>
+
+#include "common/codec/depth_codec.h"
+#include "tests/support/depth_images.h"
+
+namespace telesplat::codec {
+namespace {
+
+using image::DepthImage;
+using Bytes = std::vector<uint8_t>;
+
+// Name -> image, rendered once. full_*: all covered. patch_*: what redundancy elimination may leave of one.
+const DepthImage& test_image(const std::string& name) {
+  static std::map<std::string, DepthImage> cache;
+  if (const auto known = cache.find(name); known != cache.end()) return known->second;
+  const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
+  DepthImage image =
+      test::render({.rough = has("rough"), .constant_albedo = has("albedo"), .covers_all = !has("object")});
+  if (has("outlines")) test::keep_outlines(image);
+  if (const size_t at = name.find("random_"); at != std::string::npos)
+    test::keep_random(image, std::atof(name.c_str() + at + 7), 1);
+  return cache.emplace(name, std::move(image)).first->second;
+}
+
+// As a session cuts its frames: 20 tiles of 256 x 200.
+std::vector<DepthImage> tiles_of(const DepthImage& image) {
+  std::vector<DepthImage> tiles;
+  for (int y = 0; y < image.height; y += 200)
+    for (int x = 0; x < image.width; x += 256) tiles.push_back(test::crop(image, x, y, 256, 200));
+  return tiles;
+}
+
+void report(benchmark::State& state, const DepthImage& image, size_t bytes) {
+  const auto covered = std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; });
+  const double pixels = static_cast<double>(image.pixels());
+  state.counters["B/px"] = static_cast<double>(bytes) / static_cast<double>(covered);
+  state.counters["covered"] = static_cast<double>(covered) / pixels;
+  state.counters["Mpx/s"] =
+      benchmark::Counter(pixels * 1e-6 * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+
+void encode_tiles(benchmark::State& state, const std::string& name) {
+  const auto tiles = tiles_of(test_image(name));
+  size_t bytes = 0;
+  for (auto _ : state) {
+    bytes = 0;
+    for (const DepthImage& tile : tiles) bytes += encode(tile).size();
+  }
+  report(state, test_image(name), bytes);
+}
+
+void decode_tiles(benchmark::State& state, const std::string& name) {
+  std::vector<Bytes> streams;
+  size_t bytes = 0;
+  for (const DepthImage& tile : tiles_of(test_image(name))) bytes += streams.emplace_back(encode(tile)).size();
+  DepthImage image;
+  for (auto _ : state)
+    for (const Bytes& stream : streams)
+      if (!decode_into(image, stream).ok()) return state.SkipWithError("not decoded");
+  report(state, test_image(name), bytes);
+}
+
+// Byte planes, interleaved by `channels`.
+Bytes depth_bytes(const DepthImage& image) {
+  Bytes out;
+  for (const uint32_t d : image.depth)
+    for (int shift = 16; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(d >> shift));
+  return out;
+}
+Bytes colour_bytes(const DepthImage& image) {
+  Bytes out;
+  for (const uint32_t c : image.colour)
+    for (int shift = 16; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(c >> shift));
+  return out;
+}
+Bytes normal_bytes(const DepthImage& image) {
+  Bytes out;
+  for (const uint16_t n : image.normal)
+    for (int shift = 0; shift <= 8; shift += 8) out.push_back(static_cast<uint8_t>(n >> shift));
+  return out;
+}
+
+// Size of one picture in an image file format, written to memory; 0 if it could not be written.
+size_t file_size(const char* extension, const char* compression, const DepthImage& image, int channels,
+                 OIIO::TypeDesc type, const void* data) {
+  const auto out = OIIO::ImageOutput::create(extension);
+  if (!out || !out->supports("ioproxy")) return 0;
+  OIIO::Filesystem::IOVecOutput memory;
+  if (!out->set_ioproxy(&memory)) return 0;
+  OIIO::ImageSpec spec(image.width, image.height, channels, type);
+  spec.alpha_channel = -1;  // planes, not premultiplied colour
+  spec.attribute("oiio:UnassociatedAlpha", 1);
+  if (compression != nullptr) spec.attribute("compression", compression);
+  if (!out->open(std::string("memory.") + extension, spec) || !out->write_image(type, data) || !out->close()) return 0;
+  return memory.buffer().size();
+}
+
+void image_file(benchmark::State& state, const std::string& name, const char* extension, const char* compression) {
+  const DepthImage& image = test_image(name);
+  const Bytes depth = depth_bytes(image), colour = colour_bytes(image), normal = normal_bytes(image);
+  size_t bytes = 0;
+  for (auto _ : state) {
+    size_t depth_size = file_size(extension, compression, image, 3, OIIO::TypeUInt8, depth.data());
+    const size_t colour_size = file_size(extension, compression, image, 3, OIIO::TypeUInt8, colour.data());
+    const size_t normal_size = file_size(extension, compression, image, 2, OIIO::TypeUInt8, normal.data());
+    // Whichever suits the format better: three bytes, or one number.
+    if (const size_t whole = file_size(extension, compression, image, 1, OIIO::TypeUInt32, image.depth.data());
+        std::string(extension) == "tif" && whole != 0)
+      depth_size = std::min(depth_size, whole);
+    if (depth_size == 0 || colour_size == 0 || normal_size == 0) return state.SkipWithError("not written");
+    bytes = depth_size + colour_size + normal_size;
+  }
+  report(state, image, bytes);
+}
+
+void zstd_planes(benchmark::State& state, const std::string& name, int level) {
+  const DepthImage& image = test_image(name);
+  Bytes planes;  // one byte plane after the other
+  const std::pair<Bytes, size_t> parts[] = {
+      {depth_bytes(image), 3}, {colour_bytes(image), 3}, {normal_bytes(image), 2}};
+  for (const auto& [bytes, channels] : parts)
+    for (size_t c = 0; c < channels; ++c)
+      for (size_t i = c; i < bytes.size(); i += channels) planes.push_back(bytes[i]);
+  Bytes packed(ZSTD_compressBound(planes.size()));
+  size_t bytes = 0;
+  for (auto _ : state) bytes = ZSTD_compress(packed.data(), packed.size(), planes.data(), planes.size(), level);
+  report(state, image, bytes);
+}
+
+const bool registered = [] {
+  const auto add = [](const std::string& name, auto function) {
+    benchmark::RegisterBenchmark(name.c_str(), function)->Unit(benchmark::kMillisecond);
+  };
+  for (const std::string image :
+       {"full_smooth", "full_smooth_albedo", "full_rough", "full_rough_albedo", "object_rough"}) {
+    const std::string name = "codec/" + image + "/";
+    add(name + "encode", [image](benchmark::State& s) { encode_tiles(s, image); });
+    add(name + "decode", [image](benchmark::State& s) { decode_tiles(s, image); });
+    add(name + "tiff_lzw", [image](benchmark::State& s) { image_file(s, image, "tif", "lzw"); });
+    add(name + "png", [image](benchmark::State& s) { image_file(s, image, "png", nullptr); });
+    for (const int level : {1, 3})
+      add(name + "zstd_" + std::to_string(level),
+          [image, level](benchmark::State& s) { zstd_planes(s, image, level); });
+  }
+  for (const std::string image : {"patch_outlines", "patch_random_0.3", "patch_random_0.03", "patch_random_0.001"}) {
+    const std::string name = "codec/" + image + "/";
+    add(name + "encode", [image](benchmark::State& s) { encode_tiles(s, image); });
+    add(name + "decode", [image](benchmark::State& s) { decode_tiles(s, image); });
+    add(name + "zstd_1", [image](benchmark::State& s) { zstd_planes(s, image, 1); });
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace telesplat::codec
