@@ -7,8 +7,8 @@
 #include <unordered_map>
 
 #include "common/core/log.h"
+#include "common/gl/egl_context.h"
 #include "services/sampler/chunk_input.h"
-#include "services/sampler/egl_context.h"
 #include "services/sampler/raster_shaders.h"
 #include "services/sampler/sampler.h"
 
@@ -37,7 +37,7 @@ class RasterSampler final : public Sampler {
     geometry::Box box_room;
   };
 
-  explicit RasterSampler(std::unique_ptr<EglContext> context) : context_(std::move(context)) {}
+  explicit RasterSampler(std::unique_ptr<gl::EglContext> context) : context_(std::move(context)) {}
   Status build_program();
   void reserve_targets(int width, int height);
   Status upload(ChunkId id, geometry::ChunkBytes chunk);
@@ -45,7 +45,7 @@ class RasterSampler final : public Sampler {
   void draw(const geometry::Camera& camera);
   GLint uniform(const char* name) const { return glGetUniformLocation(program_, name); }
 
-  std::unique_ptr<EglContext> context_;
+  std::unique_ptr<gl::EglContext> context_;
   GLuint program_ = 0, framebuffer_ = 0;
   GLuint targets_[4] = {};  // depth in metres, colour, normal, the rasteriser's depth buffer
   int target_width_ = 0, target_height_ = 0, largest_part_ = kLargestPart;
@@ -67,10 +67,10 @@ Result<GLuint> compile(GLenum stage, const char* source) {
 }
 
 Result<std::unique_ptr<Sampler>> RasterSampler::make() {
-  auto context = EglContext::make();
+  auto context = gl::EglContext::make();
   if (!context) return context.error();
   std::unique_ptr<RasterSampler> sampler(new RasterSampler(std::move(*context)));
-  const EglContext::Current current(*sampler->context_);
+  const gl::EglContext::Current current(*sampler->context_);
   if (!current.ok()) return Error{"the off-screen OpenGL context cannot be made current"};
   if (const Status built = sampler->build_program(); !built.ok()) return built.error();
 
@@ -103,7 +103,7 @@ Status RasterSampler::build_program() {
 }
 
 RasterSampler::~RasterSampler() {
-  const EglContext::Current current(*context_);
+  const gl::EglContext::Current current(*context_);
   if (!current.ok()) return;
   for (auto& [id, drawable] : chunks_) release(drawable);
   glDeleteRenderbuffers(4, targets_);
@@ -148,13 +148,13 @@ Status RasterSampler::upload(ChunkId id, geometry::ChunkBytes chunk) {
 }
 
 Status RasterSampler::add_chunk(ChunkId id, geometry::ChunkBytes chunk) {
-  const EglContext::Current current(*context_);
+  const gl::EglContext::Current current(*context_);
   if (!current.ok()) return Error{"the off-screen OpenGL context is lost"};
   return upload(id, std::move(chunk));
 }
 
 Status RasterSampler::add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) {
-  const EglContext::Current current(*context_);
+  const gl::EglContext::Current current(*context_);
   if (!current.ok()) return Error{"the off-screen OpenGL context is lost"};
   Refusals refusals(chunks.size());
   for (auto& [id, chunk] : chunks)
@@ -165,7 +165,7 @@ Status RasterSampler::add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkB
 void RasterSampler::remove_chunk(ChunkId id) {
   const auto found = chunks_.find(id);
   if (found == chunks_.end()) return;
-  const EglContext::Current current(*context_);
+  const gl::EglContext::Current current(*context_);
   if (current.ok()) release(found->second);
   chunks_.erase(found);
 }
@@ -227,7 +227,7 @@ void RasterSampler::draw(const geometry::Camera& camera) {
 
 image::DepthImage RasterSampler::sample(const geometry::Camera& camera, const geometry::Rect& tile) {
   image::DepthImage out(tile.width, tile.height);
-  const EglContext::Current current(*context_);
+  const gl::EglContext::Current current(*context_);
   if (!current.ok()) return out;
   std::vector<float> depth_m(out.pixels());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
@@ -256,5 +256,14 @@ image::DepthImage RasterSampler::sample(const geometry::Camera& camera, const ge
 }  // namespace
 
 Result<std::unique_ptr<Sampler>> make_raster_sampler() { return RasterSampler::make(); }
+
+Result<std::unique_ptr<Sampler>> make_sampler(const std::string& kind, int threads) {
+  if (kind == "ray") return make_ray_sampler(threads);
+  if (kind == "raster") return make_raster_sampler();
+  if (kind != "auto") return Error{fmt::format("sampler is \"{}\" instead of auto, ray or raster", kind)};
+  const auto context = gl::EglContext::make();
+  if (context && !(*context)->software()) return make_raster_sampler();
+  return make_ray_sampler(threads);
+}
 
 }  // namespace telesplat::sampler

@@ -38,6 +38,8 @@ class Sampler {
 std::unique_ptr<Sampler> make_ray_sampler(int threads);
 /// EGL off-screen G-buffer. Fails where no OpenGL 4.3 context can be made, saying what was tried.
 Result<std::unique_ptr<Sampler>> make_raster_sampler();
+/// kind: "ray", "raster", or "auto": raster where OpenGL runs on a GPU, else ray.
+Result<std::unique_ptr<Sampler>> make_sampler(const std::string& kind, int threads);
 
 /// Direct rendering for verification: every pixel of `camera` traced from the data, shaded with unquantised normals.
 /// Uses the chunks of a ray sampler. Depth in metres.

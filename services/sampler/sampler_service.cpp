@@ -233,16 +233,11 @@ class SamplerService {
   double last_request_s_ = -1e9, last_extend_s_ = -1e9, last_flush_s_ = 0;
 };
 
-Result<std::unique_ptr<Sampler>> make_sampler(const SamplerServiceOptions& o) {
-  if (o.kind == "raster") return make_raster_sampler();
-  return make_ray_sampler(o.threads);
-}
-
 }  // namespace
 
 void add_flags(CLI::App& app, SamplerServiceOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kConnects);
-  app.add_option("--sampler", o.kind, "ray (Embree) or raster (OpenGL)")->capture_default_str()->check(CLI::IsMember({"ray", "raster"}));
+  app.add_option("--sampler", o.kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")->capture_default_str()->check(CLI::IsMember({"auto", "ray", "raster"}));
   app.add_option("--threads", o.threads, "threads to sample with; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
   app.add_option("--chunk-cache-mb", o.chunk_cache_mb, "memory for chunks, MB")->capture_default_str()->check(CLI::Range(1.0, 1e6));
 }
@@ -250,7 +245,7 @@ void add_flags(CLI::App& app, SamplerServiceOptions& o) {
 int run(const SamplerServiceOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
-  auto sampler = make_sampler(o);
+  auto sampler = make_sampler(o.kind, o.threads);
   if (!sampler) {
     log::error("{}", sampler.error().text);
     return 1;

@@ -7,7 +7,7 @@ namespace telesplat::sampler {
 
 struct SamplerServiceOptions {
   net::ServiceOptions service;
-  std::string kind = "ray";        ///< "ray", "raster" or "auto" (raster on a hardware GPU, else ray)
+  std::string kind = "auto";       ///< "ray", "raster" or "auto" (raster on a hardware GPU, else ray)
   int threads = 0;                 ///< 0: all cores
   double chunk_cache_mb = 8192;    ///< bytes of chunks held at most, unless one view needs more
 };

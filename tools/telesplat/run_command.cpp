@@ -138,7 +138,7 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
   app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)");
   app.add_option("--out", o.out, "run folder; default: runs/DATE-TIME");
   app.add_option("--samplers", o.samplers, "sampler processes")->capture_default_str()->check(CLI::Range(1, 64));
-  app.add_option("--sampler", o.sampler_kind, "ray (Embree) or raster (OpenGL)")->capture_default_str()->check(CLI::IsMember({"ray", "raster"}));
+  app.add_option("--sampler", o.sampler_kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")->capture_default_str()->check(CLI::IsMember({"auto", "ray", "raster"}));
   app.add_option("--sampler-threads", o.sampler_threads, "threads of each sampler; 0: the cores shared among them")->capture_default_str()->check(CLI::Range(0, 1024));
   app.add_option("--master", o.join_master, "join the running session at this address instead of starting one");
   app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")->capture_default_str()->check(CLI::Range(1e-3, 1e3));

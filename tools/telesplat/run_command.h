@@ -13,7 +13,7 @@ struct RunOptions {
   master::MasterServiceOptions master;
   viewer::ViewerOptions viewer;
   int samplers = 1;
-  std::string sampler_kind = "ray";
+  std::string sampler_kind = "auto";
   int sampler_threads = 0;        ///< a sampler's; 0: the machine's cores shared among the samplers
   std::string join_master;        ///< --master: join a running session instead of starting one
   std::string out;

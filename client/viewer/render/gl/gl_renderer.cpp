@@ -26,15 +26,17 @@ void stream(GLenum target, uint32_t buffer, const std::vector<T>& data) {
 }  // namespace
 
 Result<std::unique_ptr<GlRenderer>> GlRenderer::make() {
-  auto context = EglContext::make();
+  auto context = gl::EglContext::make();
   if (!context) return context.error();
+  auto current = std::make_unique<Current>(**context);
+  if (!current->ok()) return Error{(*context)->renderer() + ": cannot be made current"};
   const auto program = make_splat_program();
-  if (!program) return Error{context->device() + ": " + program.error().text};
-  return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), *program));
+  if (!program) return Error{(*context)->renderer() + ": " + program.error().text};
+  return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), std::move(current), *program));
 }
 
-GlRenderer::GlRenderer(EglContext context, const SplatProgram& program)
-    : context_(std::move(context)), program_(program), arenas_(std::make_unique<PointArenas>()) {
+GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current, const SplatProgram& program)
+    : context_(std::move(context)), current_(std::move(current)), program_(program), arenas_(std::make_unique<PointArenas>()) {
   glGenFramebuffers(1, &framebuffer_);
   glGenVertexArrays(1, &vertex_array_);
   for (uint32_t* buffer : {&draw_numbers_, &draw_records_, &commands_, &intensities_}) glGenBuffers(1, buffer);

@@ -4,11 +4,11 @@
 #include <memory>
 #include <vector>
 
-#include "client/viewer/render/gl/egl_context.h"
 #include "client/viewer/render/gl/point_arena.h"
 #include "client/viewer/render/gl/program.h"
 #include "client/viewer/render/renderer.h"
 #include "common/core/log.h"
+#include "common/gl/egl_context.h"
 #include "common/splat/item_runs.h"
 
 namespace telesplat::viewer {
@@ -24,11 +24,12 @@ class GlRenderer final : public Renderer {
   splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                            const image::Shading& shading, const splat::FrameTarget& target) override;
 
-  const std::string& device() const { return context_.device(); }
-  bool is_software() const { return context_.is_software(); }
+  const std::string& device() const { return context_->renderer(); }
+  bool is_software() const { return context_->software(); }
 
  private:
-  GlRenderer(EglContext context, const SplatProgram& program);
+  using Current = gl::EglContext::Current;
+  GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current, const SplatProgram& program);
   Status resize(int width, int height);
   void prepare_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
   void draw(const geometry::Camera& camera, const image::Shading& shading, bool with_depth);
@@ -38,7 +39,8 @@ class GlRenderer final : public Renderer {
     uint32_t count, instances, first, base_instance;
   };
 
-  EglContext context_;  // first in, last out: the rest needs it
+  std::unique_ptr<gl::EglContext> context_;  // first in, last out: the rest needs it
+  std::unique_ptr<Current> current_;         // in the thread that made the renderer, as long as it lives
   SplatProgram program_;
   std::unique_ptr<PointArenas> arenas_;
   int width_ = 0, height_ = 0;  // of the frame buffer, without its margin

@@ -1,11 +1,11 @@
-#include "services/sampler/egl_context.h"
+#include "common/gl/egl_context.h"
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
 
 #include <array>
 
-namespace telesplat::sampler {
+namespace telesplat::gl {
 namespace {
 
 Error egl_error(const char* what) { return Error{fmt::format("{} failed with {:#x}", what, eglGetError())}; }
@@ -83,4 +83,4 @@ Result<std::unique_ptr<EglContext>> EglContext::make() {
   return Error{fmt::format("no off-screen OpenGL 4.3 context: {}", tried.empty() ? "EGL has neither devices nor a surfaceless platform" : tried)};
 }
 
-}  // namespace telesplat::sampler
+}  // namespace telesplat::gl

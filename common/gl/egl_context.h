@@ -8,7 +8,7 @@
 
 #include "common/core/result.h"
 
-namespace telesplat::sampler {
+namespace telesplat::gl {
 
 /// OpenGL 4.3 core on the first that works: every EGL device, then Mesa's surfaceless platform.
 /// Bound to no thread until a Current is made.
@@ -50,4 +50,4 @@ class EglContext {
   std::string renderer_;
 };
 
-}  // namespace telesplat::sampler
+}  // namespace telesplat::gl
