@@ -122,10 +122,10 @@ std::vector<double> RunRecord::column(const std::string& table, const std::strin
 
 nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes, const std::map<std::string, double>& counters) const {
   using nlohmann::ordered_json;
-  const auto count_of = [&](const std::string& role) { return std::count_if(processes.begin(), processes.end(), [&](const Process& p) { return p.role == role; }); };
+  const auto count_of = [&](const std::string& role) { return std::count_if(processes.begin(), processes.end(), [&](const Process& p) { return p.role == role && !p.replaced; }); };
   const auto fact = [&](const std::string& role, const std::string& key) -> std::string {
     for (const Process& p : processes)
-      if (const auto it = p.facts.find(key); p.role == role && it != p.facts.end()) return it->second;
+      if (const auto it = p.facts.find(key); p.role == role && !p.replaced && it != p.facts.end()) return it->second;
     return "";
   };
   const auto number = [&](const std::string& role, const std::string& key) {
@@ -136,6 +136,13 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
     double sum = 0;
     for (const Process& p : processes)
       if (const auto it = p.values.find(key); (role.empty() || p.role == role) && it != p.values.end()) sum += it->second;
+    return sum;
+  };
+  // What is held now is held by the living; what was counted adds up over all lives.
+  const auto sum_present = [&](const std::string& role, const std::string& key) {
+    double sum = 0;
+    for (const Process& p : processes)
+      if (const auto it = p.values.find(key); p.role == role && !p.replaced && it != p.values.end()) sum += it->second;
     return sum;
   };
   const auto counter = [&](const std::string& key) { const auto it = counters.find(key); return it == counters.end() ? 0.0 : it->second; };
@@ -176,7 +183,7 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
     for (const Process& p : processes)
       if (const auto it = p.values.find("peak_rss_mb"); p.role == role && it != p.values.end()) rss[role].push_back(std::round(it->second * 10) / 10);
   }
-  const double points = sum_status("packer", "points");
+  const double points = sum_present("packer", "points");
   return {{"schema", 1},
           {"scene", fact("data", "scene")},
           {"kind", fact("data", "kind")},
@@ -208,10 +215,10 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
           {"compression_ratio", bytes_sent > 0 ? bytes_raw / bytes_sent : 0.0},
           {"redundancy_eliminated", samples > 0 ? 1 - kept / samples : 0.0},
           {"points_cached", uint64_t(points)},
-          {"bytes_per_cached_point", points > 0 ? sum_status("packer", "model_bytes") / points : 0.0},
+          {"bytes_per_cached_point", points > 0 ? sum_present("packer", "model_bytes") / points : 0.0},
           {"points_drawn", to_json(distribution(column("frames", "points_drawn")))},
           {"update_age_ms", to_json(distribution(column("frames", "update_age_ms")))},
-          {"first_points_s", sum_status("viewer", "first_points_s") / viewers},
+          {"first_points_s", sum_present("viewer", "first_points_s") / viewers},
           {"tiles_released", uint64_t(counter("tiles_released"))},
           {"quality", nullptr},
           {"peak_rss_mb", rss},

@@ -20,6 +20,7 @@ struct Process {
   uint64_t pid = 0;
   std::map<std::string, std::string> facts;
   std::map<std::string, double> values;  ///< newest status report
+  bool replaced = false;                 ///< it died and another of its name took its place
 };
 
 class RunRecord {

@@ -109,6 +109,13 @@ int FrameSchedule::release_sampler(const std::string& sampler) {
   return count;
 }
 
+size_t FrameSchedule::leases_of(const std::string& sampler) const {
+  size_t count = 0;
+  for (const Frame& f : frames_)
+    count += size_t(std::count_if(f.tiles.begin(), f.tiles.end(), [&](const Tile& t) { return t.state == State::kLeased && t.sampler == sampler; }));
+  return count;
+}
+
 void FrameSchedule::drop_frames() { frames_.clear(); }
 
 }  // namespace telesplat::master

@@ -40,6 +40,7 @@ class FrameSchedule {
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
   /// Takes back all leases of a sampler that left. Returns how many.
   int release_sampler(const std::string& sampler);
+  size_t leases_of(const std::string& sampler) const;
   /// Drops all frames (new epoch, new packer); waiting view requests stay.
   void drop_frames();
 

@@ -57,8 +57,10 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   }
   // A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet.
   for (auto& [id, p] : peers_)
-    if (!p.gone && id != peer && p.hello.role == m.role && (p.hello.instance == m.instance || (m.role != "ctl" && p.hello.name == m.name)))
-      lose(p, id, "was replaced");
+    if (id != peer && p.hello.role == m.role && (p.hello.instance == m.instance || (m.role != "ctl" && p.hello.name == m.name))) {
+      if (!p.gone) lose(p, id, "was replaced");
+      p.process.replaced = true;
+    }
   Peer& p = peers_[peer];
   const bool changed = p.hello.instance != m.instance || p.gone || p.hello.endpoints != m.endpoints;
   if (changed && m.role == "packer") schedule_.drop_frames();  // a new packer has none of the tiles that the old one had
@@ -112,7 +114,7 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
 
 void MasterCore::on(const std::string& peer, const wire::Goodbye&, double) {
   const auto it = peers_.find(peer);
-  if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "left");
+  if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "left", true);
 }
 
 Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double now_s) {
@@ -142,11 +144,12 @@ void MasterCore::undeliverable(const std::string& peer) {
   if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "cannot be reached");
 }
 
-void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why) {
+void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
   p.gone = true;
   p.waiting_leases = 0;
   std::erase(idle_, routing_id);
-  schedule_.release_sampler(routing_id);
+  const int leases = schedule_.release_sampler(routing_id);
+  if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
   if (p.hello.role == "viewer") schedule_.forget_viewer(p.hello.instance);
   if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
 }
@@ -159,7 +162,7 @@ void MasterCore::tick(double now_s) {
     log::warn("a lease of sampler {} expired; its tile goes to another", it == peers_.end() ? "?" : it->second.hello.name);
   });
   leases_expired_ += uint64_t(expired);
-  if (expired || schedule_.view_waiting()) dispatch(now_s);
+  if (expired || schedule_.tile_open() || schedule_.view_waiting()) dispatch(now_s);
 }
 
 void MasterCore::dispatch(double now_s) {
@@ -211,6 +214,8 @@ std::string MasterCore::status_json(double now_s) const {
     if (p.hello.role == "ctl") continue;
     nlohmann::ordered_json e{{"role", p.hello.role}, {"name", p.hello.name}, {"pid", p.hello.pid}, {"alive", !p.gone},
                              {"silent_s", std::max(0.0, now_s - p.seen_s)}};
+    if (p.hello.role == "sampler") e["leases"] = schedule_.leases_of(id);
+    for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
     for (const auto& [key, value] : p.hello.facts) e["facts"][key] = value;
     for (const auto& [key, value] : p.process.values) e["values"][key] = value;
     out["processes"].push_back(e);

@@ -68,7 +68,7 @@ class MasterCore {
   wire::Welcome welcome(double now_s) const;
   void announce(double now_s);
   void dispatch(double now_s);
-  void lose(Peer& peer, const std::string& routing_id, const char* why);
+  void lose(Peer& peer, const std::string& routing_id, const char* why, bool said_goodbye = false);
   std::string status_json(double now_s) const;
 
   MasterOptions options_;

@@ -32,7 +32,7 @@ void write_session(const std::string& directory, const MasterServiceOptions& o, 
 }  // namespace
 
 void add_flags(CLI::App& app, MasterServiceOptions& o) {
-  net::add_service_flags(app, o.service, true);
+  net::add_service_flags(app, o.service, net::Ends::kBinds);
   app.add_option("--out", o.out, "folder for the run's record");
   add_session_flags(app, o);
 }
@@ -69,6 +69,7 @@ int run(const MasterServiceOptions& o) {
     log::error("{}", endpoint.error().text);
     return 2;
   }
+  log::info("listening on {}", endpoint->c_str());
   std::printf("listening on %s\n", endpoint->c_str());
   std::fflush(stdout);
 
