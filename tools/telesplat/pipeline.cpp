@@ -129,6 +129,10 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
       news.push_back(fmt::format("{} ended with code {}: {}", name, code, last_log_line(name)));
       return code == 2 ? State::kBadInput : State::kFailed;
     }
+    if (code == 0) {  // told to finish, by `telesplat ctl stop`; the viewer finishes too
+      if (m.role == "master") return State::kFinished;
+      continue;
+    }
     if (code == 2 || m.role == "master" || m.restarts >= kMaxRestarts) {
       news.push_back(code == 2 ? last_log_line(name) : fmt::format("{} ended with code {}: {}", name, code, last_log_line(name)));
       return code == 2 ? State::kBadInput : State::kFailed;
@@ -156,7 +160,11 @@ void Pipeline::finish() {
   if (members_.front().role == "master" && members_.front().process && !members_.front().process->ended() && !master_endpoint_.empty()) {
     ControlClient control(master_endpoint_);
     if (!control.ask("stop", 2)) members_.front().process->signal(SIGTERM);
+    members_.front().process->finish(kFarewell_s);
   }
+  // Whom the master could not tell, because it is dead or they had not said hello yet.
+  for (auto& m : members_)
+    if (m.process) m.process->signal(SIGTERM);
   for (auto& m : members_)
     if (m.process) m.process->finish(kFarewell_s);
 }
