@@ -1,0 +1,146 @@
+// Processes that die in mid-run: what must go on goes on, what must end ends, nothing is left behind.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+pid_t pid_of(const nlohmann::json& status, const std::string& name) {
+  const auto p = process(status, name);
+  return p.is_object() ? p["pid"].get<pid_t>() : 0;
+}
+
+// Kills a process and returns its pid.
+pid_t kill_process(PipelineRun& run, const std::string& name) {
+  pid_t pid = 0;
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return (pid = pid_of(s, name)) > 0; })) << name;
+  if (pid > 0) ::kill(pid, SIGKILL);
+  return pid;
+}
+
+TEST(Faults, ASamplerKilledInMidFrameCostsItsLeases) {
+  PipelineRun run({"--duration", "6", "--samplers", "2"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  // Stopped first, so that it cannot finish what it holds; a sampler that waits gets a lease with the next frame.
+  pid_t victim = 0;
+  ASSERT_TRUE(run.wait_status([&](const auto& s) { return (victim = pid_of(s, "sampler-2")) > 0; }));
+  ::kill(victim, SIGSTOP);
+  EXPECT_TRUE(run.wait_status([](const auto& s) {
+    const auto p = process(s, "sampler-2");
+    return s["leases_expired"] > 0 || (p.is_object() && p["leases"] > 0);
+  }));
+  ::kill(victim, SIGKILL);
+  // Another life takes its place, and frames go on.
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return pid_of(s, "sampler-2") > 0 && pid_of(s, "sampler-2") != victim; }));
+  double completed = -1;
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    if (completed < 0) completed = s["frames_completed"];
+    return s["frames_completed"] > completed;
+  }));
+  ASSERT_EQ(run.program().wait(60), 0) << run.program().err();
+  const auto s = run.summary();
+  EXPECT_GE(s["errors"]["leases_expired"], 1);
+  EXPECT_GE(s["tiles_released"], 1);
+  EXPECT_EQ(s["samplers"], 2);
+  EXPECT_NE(run.program().err().find("sampler-2 died"), std::string::npos);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Faults, APackerKilledIsStartedAgainAndViewersResynchronise) {
+  PipelineRun run({"--duration", "7"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  double frames = 0, updates = 0;
+  ASSERT_TRUE(run.wait_status([&](const auto& s) { return (updates = value(s, "viewer-1", "updates")) > 0; }));
+  const pid_t victim = kill_process(run, "packer");
+  ASSERT_TRUE(run.wait_status([&](const auto& s) { return pid_of(s, "packer") > 0 && pid_of(s, "packer") != victim && value(s, "packer", "points") > 0; }));
+  const auto now = run.status();
+  frames = value(now, "viewer-1", "frames"), updates = value(now, "viewer-1", "updates");
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    return value(s, "viewer-1", "frames") > frames && value(s, "viewer-1", "updates") > updates && value(s, "viewer-1", "points") > 0;
+  }));
+  ASSERT_EQ(run.program().wait(60), 0) << run.program().err();
+  const auto delays = run.column("frames.csv", "inter_frame_ms");
+  ASSERT_FALSE(delays.empty());
+  EXPECT_LT(*std::max_element(delays.begin(), delays.end()), 1000) << "the display stood still";
+  EXPECT_GT(run.summary()["points_cached"], 0);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Faults, ADataServerKilledIsStartedAgain) {
+  PipelineRun run({"--duration", "4"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  const pid_t victim = kill_process(run, "data");
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return pid_of(s, "data") > 0 && pid_of(s, "data") != victim; }));
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  EXPECT_EQ(run.summary()["primitives"], 20000);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Faults, TheRunEndsWithItsMaster) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  ASSERT_TRUE(wait_until([&] { return !run.master().empty(); }));
+  // The master is in no status answer: it is the launcher's child that listens.
+  const std::string children = read_text("/proc/" + std::to_string(run.program().pid()) + "/task/" + std::to_string(run.program().pid()) + "/children");
+  const pid_t master = std::atoi(children.c_str());  // started first
+  ASSERT_NE(read_text("/proc/" + std::to_string(master) + "/cmdline").find("telesplat-master"), std::string::npos);
+  ::kill(master, SIGKILL);
+  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
+  EXPECT_NE(run.program().err().find("master ended"), std::string::npos);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Faults, TheRunEndsWithItsViewer) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  kill_process(run, "viewer-1");
+  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
+  EXPECT_TRUE(std::filesystem::exists(run.out() + "/summary.json"));
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Faults, CtrlCEndsTheRunProperly) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  run.program().signal(SIGINT);
+  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  const auto s = run.summary();
+  ASSERT_TRUE(s.is_object());
+  EXPECT_GT(s["frames"], 0);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+}
+
+TEST(Faults, CtrlCWhileStartingLeavesNothingRunning) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_FALSE(run.master().empty());
+  run.program().signal(SIGINT);
+  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Faults, ALauncherKilledTakesItsChildrenAlong) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  run.program().signal(SIGKILL);
+  EXPECT_EQ(run.program().wait(), 128 + SIGKILL);
+  EXPECT_TRUE(run.all_gone(30));
+}
+
+TEST(Faults, StopEndsTheRun) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  Program stop("telesplat", {"ctl", "stop", "--master", run.master()}, run.folder() / "stop");
+  EXPECT_EQ(stop.wait(), 0) << stop.err();
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  EXPECT_EQ(run.program().err().find("died"), std::string::npos) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+}
+
+}  // namespace
+}  // namespace telesplat::test

@@ -1,0 +1,207 @@
+#include "tests/support/pipeline_run.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "common/core/clock.h"
+#include "tools/telesplat/control_client.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <class T>
+void put(std::string& out, T value) {
+  out.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+// Processes whose command line holds `text`.
+std::vector<pid_t> running_with(const std::string& text) {
+  std::vector<pid_t> out;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator("/proc", error)) {
+    const pid_t pid = std::atoi(entry.path().filename().c_str());
+    if (pid > 0 && pid != getpid() && read_text(entry.path() / "cmdline").find(text) != std::string::npos && is_running(pid)) out.push_back(pid);
+  }
+  return out;
+}
+
+}  // namespace
+
+TemporaryFolder::TemporaryFolder() {
+  std::string pattern = (fs::temp_directory_path() / "telesplat-test-XXXXXX").string();
+  path_ = mkdtemp(pattern.data());
+}
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code error;
+  fs::remove_all(path_, error);
+}
+
+void write_terrain(const std::string& path, int cells) {
+  const int side = cells + 1;
+  std::string out = fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n"
+      "property uchar green\nproperty uchar blue\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      side * side, 2 * cells * cells);
+  for (int j = 0; j < side; ++j)
+    for (int i = 0; i < side; ++i) {
+      const float x = float(i) / cells, y = float(j) / cells;
+      const float z = 0.08f * std::sin(9 * x) * std::cos(7 * y) + 0.02f * std::sin(31 * x + 17 * y);
+      put(out, x), put(out, y), put(out, z);
+      put(out, uint8_t(80 + 150 * x)), put(out, uint8_t(200 - 900 * std::abs(z))), put(out, uint8_t(60 + 150 * y));
+    }
+  for (int j = 0; j < cells; ++j)
+    for (int i = 0; i < cells; ++i) {
+      const int a = j * side + i;
+      for (const auto& [p, q, r] : {std::tuple{a, a + 1, a + side + 1}, {a, a + side + 1, a + side}}) put(out, uint8_t(3)), put(out, p), put(out, q), put(out, r);
+    }
+  std::ofstream(path, std::ios::binary) << out;
+}
+
+std::string read_text(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+bool wait_until(const std::function<bool()>& condition, double deadline_s) {
+  for (const double until = monotonic_s() + deadline_s;;) {
+    if (condition()) return true;
+    if (monotonic_s() > until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));  // between two looks, never instead of one
+  }
+}
+
+bool is_running(pid_t pid) {
+  const std::string stat = read_text(fmt::format("/proc/{}/stat", pid));
+  const size_t name_end = stat.rfind(')');
+  return name_end != std::string::npos && name_end + 2 < stat.size() && stat[name_end + 2] != 'Z' && stat[name_end + 2] != 'X';
+}
+
+Program::Program(const std::string& name, std::vector<std::string> arguments, const std::string& prefix) : prefix_(prefix) {
+  arguments.insert(arguments.begin(), std::string(TELESPLAT_BIN) + "/" + name);
+  std::vector<char*> argv;
+  for (auto& a : arguments) argv.push_back(a.data());
+  argv.push_back(nullptr);
+  pid_ = fork();
+  if (pid_ != 0) return;
+  dup2(::open((prefix + ".out").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), 1);
+  dup2(::open((prefix + ".err").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), 2);
+  execv(argv[0], argv.data());
+  _exit(127);
+}
+
+Program::~Program() {
+  if (exit_code_ >= 0) return;
+  ::kill(pid_, SIGTERM);
+  if (wait(10) >= 0) return;
+  ::kill(pid_, SIGKILL);
+  wait(10);
+}
+
+int Program::wait(double deadline_s) {
+  wait_until([&] {
+    int status = 0;
+    if (exit_code_ < 0 && waitpid(pid_, &status, WNOHANG) == pid_) exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    return exit_code_ >= 0;
+  }, deadline_s);
+  return exit_code_;
+}
+
+void Program::signal(int number) {
+  if (exit_code_ < 0) ::kill(pid_, number);
+}
+
+PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh) : out_(folder_ / "run") {
+  const std::string terrain = mesh.empty() ? folder_ / "terrain.ply" : mesh;
+  if (mesh.empty()) write_terrain(terrain);
+  std::vector<std::string> a{"run",    terrain,       "--out",           out_,      "--cache",       folder_ / "cache", "--size",
+                             "480x300", "--sampling-size", "320x200", "--tile-size", "64",              "--sampler-threads", "1"};
+  a.insert(a.end(), arguments.begin(), arguments.end());
+  program_ = std::make_unique<Program>("telesplat", a, folder_ / "telesplat");
+}
+
+PipelineRun::~PipelineRun() {
+  control_.reset();
+  program_.reset();
+  for (const pid_t pid : running_with(folder_.path())) ::kill(pid, SIGKILL);
+  if (!master_.empty())
+    for (const pid_t pid : running_with(master_)) ::kill(pid, SIGKILL);
+}
+
+const std::string& PipelineRun::master() {
+  if (master_.empty())
+    wait_until([&] {
+      const std::string log = read_text(out_ + "/logs/master.log"), words = "listening on ";
+      const size_t begin = log.find(words), end = log.find('\n', begin);
+      if (begin == std::string::npos || end == std::string::npos) return false;
+      master_ = log.substr(begin + words.size(), end - begin - words.size());
+      return true;
+    });
+  return master_;
+}
+
+nlohmann::json PipelineRun::status() {
+  if (master().empty()) return {};
+  if (!control_) control_ = std::make_unique<launcher::ControlClient>(master());
+  const auto answer = control_->ask("status", 2);
+  return answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
+}
+
+bool PipelineRun::wait_status(const std::function<bool(const nlohmann::json&)>& condition, double deadline_s) {
+  return wait_until([&] {
+    const auto s = status();
+    return s.is_object() && condition(s);
+  }, deadline_s);
+}
+
+bool PipelineRun::wait_showing() {
+  return wait_status([](const auto& s) { return value(s, "viewer-1", "points") > 0 && value(s, "viewer-1", "frames") > 0; });
+}
+
+bool PipelineRun::all_gone(double deadline_s) {
+  return wait_until([&] { return running_with(folder_.path()).empty() && (master_.empty() || running_with(master_).empty()); }, deadline_s);
+}
+
+nlohmann::json PipelineRun::summary() const { return nlohmann::json::parse(read_text(out_ + "/summary.json"), nullptr, false); }
+
+std::vector<double> PipelineRun::column(const std::string& file, const std::string& name) const {
+  std::vector<double> out;
+  std::ifstream in(out_ + "/" + file);
+  std::string line, cell;
+  std::getline(in, line);
+  int wanted = -1, index = 0;
+  for (std::istringstream header(line); std::getline(header, cell, ','); ++index)
+    if (cell == name) wanted = index;
+  while (wanted >= 0 && std::getline(in, line)) {
+    index = 0;
+    for (std::istringstream row(line); std::getline(row, cell, ','); ++index)
+      if (index == wanted) out.push_back(std::strtod(cell.c_str(), nullptr));
+  }
+  return out;
+}
+
+nlohmann::json process(const nlohmann::json& status, const std::string& name) {
+  if (status.is_object())
+    for (const auto& p : status["processes"])
+      if (p["name"] == name && p["alive"] == true) return p;
+  return {};
+}
+
+double value(const nlohmann::json& status, const std::string& name, const std::string& key) {
+  const auto p = process(status, name);
+  return p.is_object() && p.contains("values") ? p["values"].value(key, 0.0) : 0.0;
+}
+
+}  // namespace telesplat::test

@@ -1,0 +1,97 @@
+// A `telesplat run` in processes of its own, for end-to-end tests: started, watched, hurt, and always ended.
+#pragma once
+
+#include <sys/types.h>
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace telesplat::launcher { class ControlClient; }
+
+namespace telesplat::test {
+
+/// A folder that goes when the object does.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  const std::string& path() const { return path_; }
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+/// Writes a coloured, bumpy terrain of 2 * cells^2 triangles as binary PLY.
+void write_terrain(const std::string& path, int cells = 100);
+
+std::string read_text(const std::string& path);
+
+/// Asks `condition` until it holds. False: it did not within `deadline_s`.
+bool wait_until(const std::function<bool()>& condition, double deadline_s = 30);
+
+/// Whether a process runs (a zombie does not).
+bool is_running(pid_t pid);
+
+/// A program of the build's bin folder.
+class Program {
+ public:
+  /// stdout and stderr go to `prefix`.out and `prefix`.err.
+  Program(const std::string& name, std::vector<std::string> arguments, const std::string& prefix);
+  ~Program();  ///< kills it if it still runs
+  pid_t pid() const { return pid_; }
+  /// Exit code or 128 + signal; -1: it still runs after `deadline_s`.
+  int wait(double deadline_s = 60);
+  void signal(int number);
+  std::string out() const { return read_text(prefix_ + ".out"); }
+  std::string err() const { return read_text(prefix_ + ".err"); }
+
+ private:
+  std::string prefix_;
+  pid_t pid_ = -1;
+  int exit_code_ = -1;
+};
+
+/// `telesplat run` of a small terrain at a small size with its cache and record in a temporary folder.
+class PipelineRun {
+ public:
+  /// `arguments` are added; `mesh`: another mesh than the terrain.
+  explicit PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh = "");
+  ~PipelineRun();
+
+  Program& program() { return *program_; }
+  const std::string& out() const { return out_; }
+  const TemporaryFolder& folder() const { return folder_; }
+  /// The master's address; waits for it.
+  const std::string& master();
+  /// `telesplat ctl status`; empty if there is no answer.
+  nlohmann::json status();
+  /// Polls status until `condition` holds.
+  bool wait_status(const std::function<bool(const nlohmann::json&)>& condition, double deadline_s = 40);
+  /// Waits until the viewer shows points.
+  bool wait_showing();
+  /// Whether none of the processes that took part runs any more, within `deadline_s`.
+  bool all_gone(double deadline_s = 20);
+
+  nlohmann::json summary() const;
+  /// A column of a CSV file of the record, as numbers.
+  std::vector<double> column(const std::string& file, const std::string& name) const;
+
+ private:
+  TemporaryFolder folder_;
+  std::string out_, master_;
+  std::unique_ptr<Program> program_;
+  std::unique_ptr<launcher::ControlClient> control_;
+};
+
+/// Looks into a status answer: the living process of this name, or null.
+nlohmann::json process(const nlohmann::json& status, const std::string& name);
+/// Its value, 0 if it has none.
+double value(const nlohmann::json& status, const std::string& name, const std::string& key);
+
+}  // namespace telesplat::test
