@@ -16,6 +16,11 @@ Result<geometry::Trajectory> make_trajectory(const std::string& name) {
   return geometry::Trajectory::read_csv(name);
 }
 
+// Splats larger than their samples leave no cracks when the head moves; the nearest centre wins where they overlap, so they do not
+// blur. Set by runs along walk-around-a.csv at 2560x1600: discs of scale 1.0 / 1.5 gave 20.2 / 32.6 dB and 13.6 / 0.0 % holes, squares
+// of 1.3 gave 32.6 dB and 0.0 %.
+float suitable_scale(splat::Kernel kernel) { return kernel == splat::Kernel::kDisc ? 1.5f : 1.3f; }
+
 int refuse(const Error& error) {
   std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
   return 2;
@@ -47,7 +52,7 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--target-fps", d.target_fps, "display rate aimed at; 0: as fast as possible")->capture_default_str()->check(CLI::Range(0.0, 1000.0));
   app.add_option("--renderer", o.renderer, "auto, cpu or gl")->capture_default_str()->check(CLI::IsMember({"auto", "cpu", "gl"}));
   app.add_option("--splat", o.splat, "kernel: square or disc")->capture_default_str()->check(CLI::IsMember({"square", "disc"}));
-  app.add_option("--splat-scale", d.selection.scale, "the scale factor of splat sizes")->capture_default_str()->check(CLI::Range(0.1, 10.0));
+  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")->capture_default_str()->check(CLI::Range(0.0, 10.0));
   app.add_option("--coupling", o.coupling, "async: the display never waits for the server")->capture_default_str()->check(CLI::IsMember({"async"}));
   app.add_option("--update-rate", o.requests.max_rate_hz, "view requests a second at most")->capture_default_str()->check(CLI::Range(0.1, 1000.0));
   app.add_option("--record-every", d.picture_every, "record every N-th frame as a PNG; 0: one every 2.5 s and the last")->capture_default_str();
@@ -72,6 +77,7 @@ int run(ViewerOptions o) {
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
   o.display.kernel = o.splat == "square" ? splat::Kernel::kSquare : splat::Kernel::kDisc;
+  o.display.selection.scale = o.splat_scale > 0 ? float(o.splat_scale) : suitable_scale(o.display.kernel);
   if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
   const auto trajectory = make_trajectory(o.trajectory);
   if (!trajectory) return refuse(trajectory.error());

@@ -47,7 +47,7 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
   const auto &d = v.display;
   std::vector<std::string> a{"--size", v.size, "--sampling-size", v.sampling_size, "--trajectory", v.trajectory, "--duration", text(d.duration_s),
                              "--frames", text(double(d.frames)), "--hold", text(d.hold_s), "--fov", text(d.fov_deg), "--near", text(d.near_m),
-                             "--target-fps", text(d.target_fps), "--renderer", v.renderer, "--splat", v.splat, "--splat-scale", text(d.selection.scale),
+                             "--target-fps", text(d.target_fps), "--renderer", v.renderer, "--splat", v.splat, "--splat-scale", text(v.splat_scale),
                              "--coupling", v.coupling, "--update-rate", text(v.requests.max_rate_hz), "--record-every", text(double(d.picture_every)),
                              "--verify", text(double(d.verify_every)), "--out", o.out, "--started-at", text(o.started_s)};
   if (d.exr) a.push_back("--exr");

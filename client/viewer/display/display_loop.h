@@ -18,9 +18,7 @@ struct DisplayOptions {
   uint64_t frames = 0;             ///< frames to display; 0: no limit
   double hold_s = 0;               ///< the head stands still for the last so many seconds of duration_s
   splat::Kernel kernel = splat::Kernel::kDisc;
-  // Splats half as large again as their samples leave no cracks when the head moves; the nearest centre wins where they overlap, so
-  // they do not blur. Set by runs along walk-around-a.csv at 2560x1600: scale 1.0 / 1.5 gave 20.2 / 32.6 dB and 13.6 / 0.0 % holes.
-  splat::SelectionOptions selection{.scale = 1.5f};
+  splat::SelectionOptions selection;
   image::ShadingParameters shading;
   uint64_t picture_every = 0;      ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one
   uint64_t verify_every = 0;       ///< keep every N-th frame for verification; 0: none
