@@ -154,14 +154,13 @@ void ReplicaWorker::apply(const ModelEvent& event) {
 void ReplicaWorker::apply_patch(const wire::Patch& patch) {
   const double begin = monotonic_s();
   const auto bytes = std::span(reinterpret_cast<const uint8_t*>(patch.image.data()), patch.image.size());
-  const auto image = codec::decode(bytes, patch.rect.width, patch.rect.height);
-  if (!image) {
+  if (const Status decoded = codec::decode_into(tile_, bytes, patch.rect.width, patch.rect.height); !decoded) {
     ++decode_errors_;
-    log::warn("patch {} cannot be decoded: {}", patch.sequence.value, image.error().text);
+    log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
     return;
   }
   const double decoded = monotonic_s();
-  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, *image));
+  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, tile_));
   const double inserted = monotonic_s();
   spans_.add("decode", to_master_s(begin), to_master_s(decoded), 1);
   spans_.add("insert", to_master_s(decoded), to_master_s(inserted), 1);

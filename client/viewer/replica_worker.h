@@ -67,6 +67,7 @@ class ReplicaWorker {
   std::string patches_endpoint_, state_endpoint_;
   EventSequencer sequencer_;
   ViewRequester requester_;
+  image::DepthImage tile_;  // memory that decoding reuses
   int seen_version_ = 0;
   double started_s_ = 0, last_report_s_ = 0, asked_s_ = 0;
   uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0;
