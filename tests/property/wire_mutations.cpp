@@ -1,0 +1,56 @@
+// Damaged messages: whatever is done to the bytes, decoding ends with a message or an error, and a message that was accepted is
+// within its limits: it survives another round trip.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/support/wire_samples.h"
+
+namespace telesplat::wire {
+namespace {
+
+using namespace telesplat::test;
+
+TEST(WireMutations, EndInAMessageOrAnError) {
+  std::mt19937 random(7);
+  size_t accepted = 0, refused = 0;
+  for_each_message([&]<class M>(M*) {
+    const std::string original = encode(sample_message<M>());
+    for (int round = 0; round < 2000; ++round) {
+      std::string body = original;
+      for (int changes = 1 + int(random() % 4); changes > 0 && !body.empty(); --changes) {
+        const size_t at = random() % body.size();
+        switch (random() % 5) {
+          case 0: body[at] = char(random()); break;
+          case 1: body[at] = char(body[at] ^ (1 << random() % 8)); break;
+          case 2: body.erase(at, 1 + random() % 8); break;
+          case 3: body.insert(at, 1 + random() % 8, char(0xc0 + random() % 64)); break;  // msgpack's types
+          case 4: body.insert(at, original.substr(random() % original.size(), random() % 32)); break;
+        }
+      }
+      const auto decoded = decode<M>(bytes_of(body));
+      ++(decoded ? accepted : refused);
+      if (!decoded) {
+        ASSERT_FALSE(decoded.error().text.empty());
+        continue;
+      }
+      const auto again = decode<M>(bytes_of(encode(*decoded)));
+      ASSERT_TRUE(again) << M::kName << ": " << again.error().text;
+    }
+  });
+  EXPECT_GT(accepted, 1000u);  // changed values are still values
+  EXPECT_GT(refused, 10000u);
+}
+
+TEST(WireMutations, RandomBytesAreRefused) {
+  std::mt19937 random(8);
+  for (int round = 0; round < 20000; ++round) {
+    std::string body(random() % 200, '\0');
+    for (char& c : body) c = char(random());
+    EXPECT_FALSE(decode<Hello>(bytes_of(body)));
+    EXPECT_FALSE(decode<DepthTile>(bytes_of(body)));
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::wire

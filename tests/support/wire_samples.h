@@ -1,0 +1,118 @@
+// One valid message of every type, and just enough of msgpack to damage it.
+#pragma once
+
+#include <array>
+#include <string>
+#include <tuple>
+
+#include "common/wire/serial.h"
+
+namespace telesplat::test {
+
+using AllMessages = std::tuple<wire::Hello, wire::Welcome, wire::WhoAreYou, wire::ViewRequest, wire::LeaseRequest, wire::Lease, wire::LeaseExtend, wire::TileDone,
+                               wire::StatusReport, wire::MetricRows, wire::Control, wire::ControlReply, wire::Shutdown, wire::Goodbye, wire::ChunkListRequest,
+                               wire::ChunkList, wire::ChunkRequest, wire::Chunk, wire::DepthTile, wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark,
+                               wire::StateRequest, wire::AccessReport>;
+
+inline constexpr std::array<std::byte, 5> kBulk{std::byte{1}, std::byte{2}, std::byte{0}, std::byte{255}, std::byte{5}};
+
+// Gives every field, whatever its type, a value that is not the default one.
+struct Filler {
+  void operator()(const char*, bool& v, size_t = 0) { v = true; }
+  void operator()(const char*, uint64_t& v, size_t = 0) { v = 1000 + ++n_; }
+  void operator()(const char*, double& v, size_t = 0) { v = 0.25 + ++n_; }
+  void operator()(const char* name, std::string& v, size_t = 0) { v = std::string("some ") + name; }
+  void operator()(const char*, std::vector<std::string>& v, size_t = 0) { v = {"a", "", "b"}; }
+  void operator()(const char*, std::map<std::string, std::string>& v, size_t = 0) { v = {{"key", "value"}, {"other", ""}}; }
+  void operator()(const char*, std::map<std::string, double>& v, size_t = 0) { v = {{"points", 1e6}, {"small", -1e-9}}; }
+  template <class Tag> void operator()(const char*, Id<Tag>& v, size_t = 0) { v.value = (uint64_t(1) << 40) + ++n_; }
+  void operator()(const char*, wire::Bytes& v, size_t = 0) { v = kBulk; }
+  void operator()(const char*, std::vector<uint32_t>& v, size_t = 0) { v = {1, 2, 0xffffffff}; }
+  void operator()(const char*, std::vector<double>& v, size_t = 0) { v = {1.5, -2, 3e300}; }
+  void operator()(const char*, geometry::Box& v, size_t = 0) { v = {{-1, -2, -3}, {1, 2, 3.5}}; }
+  void operator()(const char*, geometry::Rect& v, size_t = 0) { v = {64, 32, 100, 50}; }
+  void operator()(const char*, geometry::Camera& v, size_t = 0) { v = {{{0.1, 0.2, 0.3}, {0.6, 0, 0.8, 0}}, -1, 1, -0.5, 0.75, 0.01, 320, 200}; }
+  void operator()(const char*, std::vector<geometry::ChunkInfo>& v, size_t = 0) {
+    v = {{ChunkId{0}, {{-1, -1, -1}, {0, 0, 0}}, 12, 500}, {ChunkId{1}, {{0, 0, 0}, {1, 1, 1}}, 7, 300}};
+  }
+  void operator()(const char*, wire::Lease& v, size_t = 0) { fill(v); }
+  template <class M> void fill(M& m) {
+    M::fields(*this, m);
+    if constexpr (requires { m.tiles_in_frame; }) m.tile = 3, m.tiles_in_frame = 8;
+  }
+
+ private:
+  uint64_t n_ = 0;
+};
+
+template <class M>
+M sample_message() {
+  M m;
+  Filler().fill(m);
+  return m;
+}
+
+template <class M>
+M message_sample_of(const M*) { return sample_message<M>(); }
+
+inline wire::Bytes bytes_of(const std::string& s) { return std::as_bytes(std::span(s)); }
+
+/// Calls f(M*) for every message type.
+template <class F>
+void for_each_message(F&& f) {
+  [&]<class... M>(std::tuple<M...>*) { (f(static_cast<M*>(nullptr)), ...); }(static_cast<AllMessages*>(nullptr));
+}
+
+/// One past the msgpack value at `at`; bytes must be well-formed.
+inline size_t value_end(const std::string& bytes, size_t at) {
+  const auto u8 = [&](size_t i) { return static_cast<unsigned char>(bytes.at(i)); };
+  const auto number = [&](size_t i, int n) {
+    size_t v = 0;
+    for (int k = 0; k < n; ++k) v = v << 8 | u8(i + static_cast<size_t>(k));
+    return v;
+  };
+  const auto values = [&](size_t i, size_t count) {
+    while (count--) i = value_end(bytes, i);
+    return i;
+  };
+  const unsigned t = u8(at);
+  if (t < 0x80 || t >= 0xe0 || t == 0xc0 || t == 0xc2 || t == 0xc3) return at + 1;
+  if (t < 0x90) return values(at + 1, 2 * (t & 15));
+  if (t < 0xa0) return values(at + 1, t & 15);
+  if (t < 0xc0) return at + 1 + (t & 31);
+  if (t <= 0xc6) return at + 1 + (size_t{1} << (t - 0xc4)) + number(at + 1, 1 << (t - 0xc4));  // bin
+  if (t == 0xca || t == 0xce || t == 0xd2) return at + 5;
+  if (t == 0xcb || t == 0xcf || t == 0xd3) return at + 9;
+  if (t == 0xcc || t == 0xd0) return at + 2;
+  if (t == 0xcd || t == 0xd1) return at + 3;
+  if (t >= 0xd9 && t <= 0xdb) return at + 1 + (size_t{1} << (t - 0xd9)) + number(at + 1, 1 << (t - 0xd9));  // str
+  const int width = t & 1 ? 4 : 2;
+  return values(at + 1 + static_cast<size_t>(width), number(at + 1, width) * (t >= 0xde ? 2 : 1));  // array, map
+}
+
+struct Field {
+  std::string name;
+  size_t key = 0, value = 0, end = 0;  // offsets in the body
+};
+
+/// The fields of an encoded message's map.
+inline std::vector<Field> fields_of(const std::string& body) {
+  std::vector<Field> out;
+  const unsigned first = static_cast<unsigned char>(body.at(0));
+  const size_t count = first == 0xde ? static_cast<unsigned char>(body[1]) * 256u + static_cast<unsigned char>(body[2]) : first & 15;
+  for (size_t i = 0, at = first == 0xde ? 3 : 1; i < count; ++i) {
+    const size_t value = value_end(body, at), end = value_end(body, value);
+    out.push_back({body.substr(at + 1, value - at - 1), at, value, end});
+    at = end;
+  }
+  return out;
+}
+
+/// `body` with the value of a field replaced.
+inline std::string with_value(const std::string& body, const std::string& field, const std::string& value) {
+  for (const Field& f : fields_of(body))
+    if (f.name == field) return body.substr(0, f.value) + value + body.substr(f.end);
+  return body;
+}
+
+}  // namespace telesplat::test
