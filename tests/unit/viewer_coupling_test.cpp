@@ -1,0 +1,103 @@
+// Pose prediction and view requests.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "client/viewer/coupling/view_requester.h"
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr InstanceId kMe{5}, kOther{6};
+
+geometry::Pose turned(double yaw_rad, const glm::dvec3& p) { return {p, glm::angleAxis(yaw_rad, glm::dvec3(0, 1, 0))}; }
+
+TEST(PosePredictor, FollowsConstantVelocity) {
+  PosePredictor predictor;
+  for (int i = 0; i <= 20; ++i) predictor.add(i * 0.01, turned(0.5 * i * 0.01, {0.4 * i * 0.01, 0, 0}));
+  const geometry::Pose p = predictor.predict(0.3);
+  EXPECT_NEAR(p.position_room.x, 0.4 * 0.3, 1e-9);
+  EXPECT_NEAR(glm::angle(p.orientation), 0.5 * 0.3, 1e-6);
+  EXPECT_NEAR(predictor.speed_m_s(), 0.4, 1e-9);
+  EXPECT_NEAR(predictor.turn_rad_s(), 0.5, 1e-6);
+}
+
+TEST(PosePredictor, StaysNearWhateverTheSpeed) {
+  PosePredictor predictor;
+  for (int i = 0; i <= 5; ++i) predictor.add(i * 0.01, turned(20.0 * i * 0.01, {100.0 * i * 0.01, 0, 0}));
+  const geometry::Pose last = turned(1.0, {5, 0, 0}), p = predictor.predict(10);
+  EXPECT_LE(glm::distance(p.position_room, last.position_room), 0.3 + 1e-9);
+  EXPECT_LE(2 * std::acos(std::abs(glm::dot(p.orientation, last.orientation))), 0.6 + 1e-6);
+}
+
+TEST(PosePredictor, ARestingHeadStaysWhereItIs) {
+  PosePredictor predictor;
+  const geometry::Pose pose = turned(0.3, {1, 2, 3});
+  predictor.add(0, pose);
+  EXPECT_TRUE(predictor.predict(1).position_room == pose.position_room);
+  EXPECT_NEAR(std::abs(glm::dot(predictor.predict(1).orientation, pose.orientation)), 1, 1e-15);
+  predictor.add(0.1, pose);
+  EXPECT_NEAR(glm::distance(predictor.predict(1).position_room, pose.position_room), 0, 1e-12);
+}
+
+class Requester : public testing::Test {
+ protected:
+  ViewRequester requester{{.sampling_width = 640, .sampling_height = 400, .max_rate_hz = 10}, kMe};
+  geometry::Camera display = geometry::make_camera({}, 90, 1280, 800);
+
+  wire::Patch part(RequestId request, uint64_t tile, uint64_t tiles, InstanceId viewer = kMe) {
+    wire::Patch p;
+    p.viewer = viewer;
+    p.request = request;
+    p.tile = tile;
+    p.tiles_in_frame = tiles;
+    p.frame_complete = tile + 1 == tiles;
+    p.samples = 100;
+    p.kept = 10;
+    return p;
+  }
+};
+
+TEST_F(Requester, AStillHeadGetsExactlyWhatItLooksAt) {
+  EXPECT_FALSE(requester.next(0).has_value());  // no pose yet
+  for (int i = 0; i < 5; ++i) requester.on_pose(i * 0.02, display);
+  const auto request = requester.next(0.1);
+  ASSERT_TRUE(request.has_value());
+  EXPECT_EQ(request->camera.width, 640);
+  EXPECT_DOUBLE_EQ(request->camera.left, display.left);
+  EXPECT_DOUBLE_EQ(request->camera.top, display.top);
+  EXPECT_FALSE(requester.next(0.15).has_value());  // ten a second
+  EXPECT_TRUE(requester.next(0.21).has_value());
+}
+
+TEST_F(Requester, AMovingHeadGetsAWiderViewWithinTheLimit) {
+  for (int i = 0; i < 10; ++i) {
+    display.pose = turned(2.0 * i * 0.02, {0, 0, 0});
+    requester.on_pose(i * 0.02, display);
+  }
+  const auto request = requester.next(0.2);
+  ASSERT_TRUE(request.has_value());
+  const double ratio = (request->camera.right - request->camera.left) / (display.right - display.left);
+  EXPECT_GT(ratio, 1.05);
+  EXPECT_LE(ratio, 1.3 + 1e-9);
+  EXPECT_TRUE(geometry::validate(request->camera).ok());
+}
+
+TEST_F(Requester, AnUpdateIsMeasuredFromRequestToItsLastPart) {
+  requester.on_pose(0, display);
+  const RequestId first = requester.next(0)->request, second = requester.next(1)->request;
+  EXPECT_FALSE(requester.on_applied(part(second, 1, 3, kOther), 1.1).has_value());  // somebody else's
+  EXPECT_FALSE(requester.on_applied(part(second, 0, 2), 1.2).has_value());
+  const auto update = requester.on_applied(part(second, 1, 2), 1.5);
+  ASSERT_TRUE(update.has_value());
+  EXPECT_DOUBLE_EQ(update->requested_s, 1);
+  EXPECT_DOUBLE_EQ(update->first_s, 1.2);
+  EXPECT_DOUBLE_EQ(update->complete_s, 1.5);
+  EXPECT_EQ(update->points, 20u);
+  EXPECT_EQ(update->tiles, 2u);
+  EXPECT_DOUBLE_EQ(requester.latency_s(), 0.5);
+  EXPECT_FALSE(requester.on_applied(part(first, 0, 1), 2).has_value());  // replaced at the master: will not be answered
+}
+
+}  // namespace
+}  // namespace telesplat::viewer

@@ -1,0 +1,85 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <limits>
+
+#include "client/viewer/record/frame_spool.h"
+#include "client/viewer/viewer_service.h"
+
+namespace telesplat::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Spool : public testing::Test {
+ protected:
+  const std::string directory_ = (fs::temp_directory_path() / (std::string("telesplat-spool-") + testing::UnitTest::GetInstance()->current_test_info()->name())).string();
+  Spool() { fs::remove_all(directory_); }
+  ~Spool() override { fs::remove_all(directory_); }
+
+  static SpooledFrame frame(uint64_t number, uint32_t use) {
+    SpooledFrame f{number, 0.25 * double(number), use, geometry::make_camera({}, 90, 20, 10), {20, 10, std::vector<uint32_t>(200, 0x102030), std::vector<float>(200, 1.5f)}};
+    f.view.depth_m[7] = std::numeric_limits<float>::infinity();
+    f.view.colour[9] = uint32_t(number);
+    return f;
+  }
+};
+
+TEST_F(Spool, FramesComeBackAsTheyWere) {
+  auto spool = FrameSpool::open(directory_);
+  ASSERT_TRUE(spool.ok());
+  const image::View next = (*spool)->exchange(frame(3, kVerify));
+  EXPECT_EQ(next.colour.size(), 200u);
+  EXPECT_EQ(next.depth_m.size(), 200u);
+  (*spool)->flush();
+  const auto paths = spooled_frames(directory_);
+  ASSERT_EQ(paths.size(), 1u);
+  const auto back = read_spooled_frame(paths[0]);
+  ASSERT_TRUE(back.ok()) << back.error().text;
+  const SpooledFrame expected = frame(3, kVerify);
+  EXPECT_EQ(back->number, 3u);
+  EXPECT_EQ(back->use, kVerify);
+  EXPECT_TRUE(back->camera == expected.camera);
+  EXPECT_EQ(back->view.colour, expected.view.colour);
+  EXPECT_EQ(back->view.depth_m, expected.view.depth_m);
+}
+
+TEST_F(Spool, PicturesAreDevelopedAndOnlyFramesToVerifyStay) {
+  {
+    auto spool = FrameSpool::open(directory_);
+    for (const auto& [number, use] : {std::pair{1, uint32_t(kPicture)}, {2, uint32_t(kVerify)}, {3, uint32_t(kPicture | kVerify | kExr)}}) {
+      (*spool)->exchange(frame(uint64_t(number), use));
+      (*spool)->flush();
+    }
+  }
+  ASSERT_TRUE(develop_frames(directory_, directory_ + "/images", nullptr).ok());
+  EXPECT_TRUE(fs::exists(directory_ + "/images/frame-000001.png"));
+  EXPECT_FALSE(fs::exists(directory_ + "/images/frame-000002.png"));
+  EXPECT_TRUE(fs::exists(directory_ + "/images/frame-000003.exr"));
+  EXPECT_EQ(spooled_frames(directory_).size(), 2u);
+}
+
+TEST_F(Spool, FilesThatAreNoFramesAreRefused) {
+  {
+    auto spool = FrameSpool::open(directory_);
+    (*spool)->exchange(frame(1, kVerify));
+    (*spool)->flush();
+  }
+  const std::string path = spooled_frames(directory_).at(0);
+  const auto size = fs::file_size(path);
+  for (const auto length : {size - 1, size_t{50}, size_t{0}}) {
+    fs::resize_file(path, length);
+    EXPECT_FALSE(read_spooled_frame(path).ok()) << length;
+  }
+  EXPECT_FALSE(read_spooled_frame(directory_).ok());
+  EXPECT_FALSE(FrameSpool::open("/proc/no/such/place").ok());
+}
+
+TEST(ParseSize, TakesWidthAndHeightWithinLimits) {
+  EXPECT_EQ(*parse_size("2560x1600", "--size"), (std::pair{2560, 1600}));
+  for (const char* bad : {"", "x", "100", "100x", "x100", "100x100x100", "0x100", "100x8", "20000x100", "-100x100", "1e3x100", "100 x100", "99999999999x100"})
+    EXPECT_FALSE(parse_size(bad, "--size").ok()) << bad;
+}
+
+}  // namespace
+}  // namespace telesplat::viewer
