@@ -1,0 +1,125 @@
+// The client side of the master against a master's socket: hello until welcomed, hello again after the master was restarted.
+#include <gtest/gtest.h>
+
+#include "common/core/clock.h"
+#include "common/net/dispatch.h"
+#include "common/net/master_link.h"
+
+namespace telesplat::net {
+namespace {
+
+constexpr double kDeadline_s = 20;
+
+// A master's socket and what a process said to it.
+struct FakeMaster {
+  FakeMaster(const std::string& address, InstanceId instance) : socket(context, Kind::kRouter, "master"), instance(instance) {
+    const auto bound = socket.bind(address);
+    EXPECT_TRUE(bound) << bound.error().text;
+    if (bound) endpoint = *bound;
+  }
+  // Answers hellos; asks who strangers are.
+  void serve() {
+    while (const auto m = socket.receive()) {
+      if (m->type == wire::Hello::kName) {
+        const auto hello = socket.decode<wire::Hello>(*m);
+        ASSERT_TRUE(hello);
+        ++hellos;
+        known = true;
+        wire::Welcome w;
+        w.master = instance;
+        w.hello_sent_s = hello->sent_s;
+        w.master_s = monotonic_s() + clock_ahead_s;
+        socket.send(w, m->peer);
+      } else if (!known) {
+        socket.send(wire::WhoAreYou{instance}, m->peer);
+      } else if (const auto report = socket.decode<wire::StatusReport>(*m)) {
+        reports.push_back(report->values);
+      }
+      peer = m->peer;
+    }
+  }
+
+  Context context;
+  Socket socket;
+  InstanceId instance;
+  std::string endpoint, peer;
+  bool known = false;
+  int hellos = 0;
+  double clock_ahead_s = 0;
+  std::vector<std::map<std::string, double>> reports;
+};
+
+class Link : public ::testing::Test {
+ protected:
+  MasterLink make_link(const std::string& endpoint) {
+    wire::Hello hello;
+    hello.role = "sampler";
+    hello.name = "sampler-1";
+    return MasterLink(context, endpoint, hello);
+  }
+  // Lets link and master talk until `done`. The link's clock is run fast, so that its second between reports is short.
+  template <class Done>
+  bool talk(MasterLink& link, FakeMaster* master, Done done) {
+    for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
+      link.tick(link_s += 0.02, [] { return MasterLink::Values{{"answer", 42}}; });
+      if (master) master->serve();
+      wait_readable({&link.socket()}, 2);
+      while (const auto m = link.socket().receive()) EXPECT_TRUE(link.handle(*m, link_s));
+      if (done()) return true;
+    }
+    return false;
+  }
+  Context context;
+  double link_s = monotonic_s();
+};
+
+TEST_F(Link, SaysHelloUntilWelcomedThenReports) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  MasterLink link = make_link(master.endpoint);
+  EXPECT_NE(link.instance().value, 0u);
+  ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
+  EXPECT_EQ(link.version(), 1);
+  const int hellos = master.hellos;
+  ASSERT_TRUE(talk(link, &master, [&] { return master.reports.size() >= 2; }));
+  EXPECT_EQ(master.hellos, hellos) << "once welcomed, hello is said no more";
+  EXPECT_EQ(master.reports[0].at("answer"), 42);
+  EXPECT_EQ(master.reports[0].at("messages_rejected"), 0);
+  EXPECT_FALSE(link.shutdown_requested());
+  master.socket.send(wire::Shutdown{"enough"}, master.peer);
+  EXPECT_TRUE(talk(link, &master, [&] { return link.shutdown_requested(); }));
+}
+
+TEST_F(Link, SaysHelloAgainToARestartedMaster) {
+  auto first = std::make_unique<FakeMaster>("tcp://127.0.0.1:*", InstanceId{1});
+  const std::string endpoint = first->endpoint;
+  MasterLink link = make_link(endpoint);
+  ASSERT_TRUE(talk(link, first.get(), [&] { return link.session().has_value(); }));
+  first.reset();
+  FakeMaster second(endpoint, {2});
+  ASSERT_TRUE(talk(link, &second, [&] { return link.session()->master == InstanceId{2}; }));
+  EXPECT_GE(second.hellos, 1);
+  EXPECT_EQ(link.version(), 2);
+  ASSERT_TRUE(talk(link, &second, [&] { return !second.reports.empty(); }));
+}
+
+TEST_F(Link, OutlivesADamagedWelcome) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  MasterLink link = make_link(master.endpoint);
+  ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
+  master.socket.send_frames(master.peer, wire::Welcome::kName, wire::encode(wire::Welcome{}).substr(0, 20));
+  master.socket.send_frames(master.peer, wire::Shutdown::kName, "");
+  EXPECT_TRUE(talk(link, &master, [&] { return link.socket().rejected() == 2; }));
+  EXPECT_EQ(link.version(), 1);
+  EXPECT_FALSE(link.shutdown_requested());
+}
+
+TEST_F(Link, LearnsTheMastersClock) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  master.clock_ahead_s = 1000;
+  MasterLink link = make_link(master.endpoint);
+  ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
+  EXPECT_NEAR(link.to_master_s(link_s), monotonic_s() + 1000, 20) << "its own clock runs fast here";
+}
+
+}  // namespace
+}  // namespace telesplat::net

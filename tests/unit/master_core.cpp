@@ -1,0 +1,308 @@
+// The master without sockets and clocks: who is told what.
+#include <gtest/gtest.h>
+
+#include "services/master/master_core.h"
+
+namespace telesplat::master {
+namespace {
+
+wire::Hello hello(const std::string& role, const std::string& name, uint64_t instance) {
+  wire::Hello h;
+  h.role = role;
+  h.name = name;
+  h.instance = {instance};
+  h.pid = instance * 10;
+  h.sent_s = 0.5;
+  if (role == "packer") h.endpoints = {{"tiles", "t" + name}, {"patches", "p" + name}, {"state", "s" + name}};
+  if (role == "data") h.endpoints = {{"chunks", "c" + name}}, h.facts = {{"scene", "hill"}}, h.box_room = {{-1, -1, -1}, {1, 1, 1}};
+  return h;
+}
+
+class Master : public ::testing::Test {
+ protected:
+  // The messages of type M sent to `peer` since the last call for anyone.
+  template <class M>
+  std::vector<M> sent(const std::string& peer) {
+    for (auto& out : core.take_outgoing()) outbox.push_back(std::move(out));
+    std::vector<M> messages;
+    std::erase_if(outbox, [&](const Outgoing& o) {
+      if (o.peer != peer || o.type != M::kName) return false;
+      auto decoded = wire::decode<M>(std::as_bytes(std::span(o.body)));
+      EXPECT_TRUE(decoded) << o.type;
+      if (decoded) messages.push_back(*decoded);
+      return true;
+    });
+    return messages;
+  }
+  void join_all() {
+    core.on("d", hello("data", "data", 1), 0);
+    core.on("p", hello("packer", "packer", 2), 0);
+    core.on("s1", hello("sampler", "sampler-1", 3), 0);
+    core.on("s2", hello("sampler", "sampler-2", 4), 0);
+    core.on("v", hello("viewer", "viewer-1", 5), 0);
+  }
+  void request(uint64_t id, double now_s = 1) {
+    wire::ViewRequest r;
+    r.viewer = {5};
+    r.request = {id};
+    r.camera.width = r.camera.height = 256;
+    core.on("v", r, now_s);
+  }
+  wire::Lease lease_to(const std::string& sampler, uint64_t id = 1, double now_s = 1) {
+    core.on(sampler, wire::LeaseRequest{}, now_s);
+    request(id, now_s);
+    const auto leases = sent<wire::Lease>(sampler);
+    EXPECT_EQ(leases.size(), 1u);
+    return leases.empty() ? wire::Lease{} : leases[0];
+  }
+  void done(const wire::Lease& l, const std::string& packer = "p", double now_s = 1.1) {
+    wire::TileDone m;
+    m.frame = l.frame;
+    m.tile = l.tile;
+    m.lease = l.lease;
+    m.sampler = {3};
+    core.on(packer, m, now_s);
+  }
+  nlohmann::json status() {
+    core.on("c", wire::Control{"status", {}}, 2);
+    const auto replies = sent<wire::ControlReply>("c");
+    EXPECT_EQ(replies.size(), 1u);
+    return replies.empty() ? nlohmann::json() : nlohmann::json::parse(replies[0].text, nullptr, false);
+  }
+
+  std::unique_ptr<metrics::RunRecord> record = std::move(metrics::RunRecord::open("")).value();
+  MasterCore core{MasterOptions{.schedule = {.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2}, .settings = {{"packing.max_points", 5}}}, {42}, *record};
+  std::vector<Outgoing> outbox;
+};
+
+TEST_F(Master, WelcomesEveryoneAndAnnouncesNewEndpoints) {
+  core.on("v", hello("viewer", "viewer-1", 5), 3);
+  auto welcomes = sent<wire::Welcome>("v");
+  ASSERT_EQ(welcomes.size(), 1u);
+  EXPECT_EQ(welcomes[0].hello_sent_s, 0.5);
+  EXPECT_EQ(welcomes[0].master_s, 3);
+  EXPECT_EQ(welcomes[0].master.value, 42u);
+  EXPECT_EQ(welcomes[0].settings.at("packing.max_points"), 5);
+  EXPECT_TRUE(welcomes[0].box_room.empty());
+  core.on("d", hello("data", "data", 1), 4);
+  core.on("p", hello("packer", "packer", 2), 4);
+  welcomes = sent<wire::Welcome>("v");
+  ASSERT_EQ(welcomes.size(), 2u);
+  EXPECT_EQ(welcomes[1].endpoints.size(), 4u);
+  EXPECT_EQ(welcomes[1].endpoints.at("tiles"), "tpacker");
+  EXPECT_EQ(welcomes[1].hello_sent_s, 0);
+  EXPECT_FALSE(welcomes[1].box_room.empty());
+  EXPECT_EQ(welcomes[1].facts.at("scene"), "hill");
+}
+
+TEST_F(Master, AsksStrangersWhoTheyAre) {
+  core.on("x", wire::StatusReport{}, 0);
+  core.on("x", wire::LeaseRequest{}, 0);
+  core.on("x", wire::ViewRequest{}, 0);
+  core.on("x", wire::TileDone{}, 0);
+  EXPECT_TRUE(core.on("x", wire::MetricRows{}, 0));
+  EXPECT_EQ(sent<wire::WhoAreYou>("x").size(), 5u);
+  // One that fell silent is a stranger too.
+  join_all();
+  core.tick(100);
+  core.on("v", wire::StatusReport{}, 101);
+  EXPECT_EQ(sent<wire::WhoAreYou>("v").size(), 1u);
+}
+
+TEST_F(Master, LeasesArePulled) {
+  join_all();
+  request(1);
+  EXPECT_TRUE(sent<wire::Lease>("s1").empty()) << "nobody asked";
+  core.on("s1", wire::LeaseRequest{}, 1);
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  core.on("s2", wire::LeaseRequest{}, 1);
+  request(2);
+  EXPECT_TRUE(sent<wire::Lease>("s2").empty()) << "one frame is in flight at most";
+  done(leases[0]);
+  const auto next = sent<wire::Lease>("s2");
+  ASSERT_EQ(next.size(), 1u);
+  EXPECT_EQ(next[0].request.value, 2u);
+}
+
+TEST_F(Master, NothingIsLeasedWithoutAPacker) {
+  core.on("s1", hello("sampler", "sampler-1", 3), 0);
+  core.on("v", hello("viewer", "viewer-1", 5), 0);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  request(1);
+  EXPECT_TRUE(sent<wire::Lease>("s1").empty());
+  core.on("p", hello("packer", "packer", 2), 1);
+  core.tick(1.1);
+  EXPECT_EQ(sent<wire::Lease>("s1").size(), 1u);
+}
+
+TEST_F(Master, RolesAreKeptApart) {
+  join_all();
+  wire::ViewRequest forged;
+  forged.viewer = {99};
+  core.on("v", forged, 1);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  EXPECT_TRUE(sent<wire::Lease>("s1").empty()) << "a view was asked for in another's name";
+  core.on("v", wire::LeaseRequest{}, 1);  // viewers sample nothing
+  request(1);
+  EXPECT_TRUE(sent<wire::Lease>("v").empty());
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  done(leases[0], "s1");  // only the packer knows
+  EXPECT_EQ(core.counters().at("frames_completed"), 0);
+  done(leases[0]);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1);
+}
+
+TEST_F(Master, ALeaseThatRunsOutIsCountedAndGoesToAnother) {
+  join_all();
+  const auto l = lease_to("s1");
+  core.on("s2", wire::LeaseRequest{}, 1);
+  core.tick(2.9);
+  EXPECT_TRUE(sent<wire::Lease>("s2").empty());
+  core.on("s1", wire::LeaseExtend{{3}, l.lease}, 2.9);
+  core.tick(4.8);
+  EXPECT_TRUE(sent<wire::Lease>("s2").empty());
+  core.tick(5.0);
+  const auto again = sent<wire::Lease>("s2");
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again[0].tile, l.tile);
+  EXPECT_EQ(again[0].frame, l.frame);
+  EXPECT_EQ(core.counters().at("leases_expired"), 1);
+  EXPECT_EQ(core.counters().at("tiles_released"), 1);
+}
+
+TEST_F(Master, ADeadSamplersLeasesCountAsExpired) {
+  join_all();
+  lease_to("s1");
+  core.on("s2", wire::LeaseRequest{}, 1);
+  core.undeliverable("s1");
+  core.tick(1.05);
+  EXPECT_EQ(sent<wire::Lease>("s2").size(), 1u);
+  EXPECT_EQ(core.counters().at("leases_expired"), 1);
+  // Its next life replaces the one that holds a lease now.
+  core.on("new s2", hello("sampler", "sampler-2", 40), 1.1);
+  EXPECT_EQ(core.counters().at("leases_expired"), 2);
+  core.undeliverable("s2");  // is known to be gone
+  core.undeliverable("never seen");
+  EXPECT_EQ(core.counters().at("leases_expired"), 2);
+  core.on("new s2", wire::LeaseRequest{}, 1.2);
+  ASSERT_EQ(sent<wire::Lease>("new s2").size(), 1u);
+  // One that takes its leave has not failed.
+  core.on("new s2", wire::Goodbye{}, 1.3);
+  EXPECT_EQ(core.counters().at("leases_expired"), 2);
+  EXPECT_EQ(core.counters().at("tiles_released"), 3);
+}
+
+TEST_F(Master, ASilentSamplerIsTakenForDead) {
+  join_all();
+  lease_to("s1", 1, 1);
+  core.on("p", wire::StatusReport{}, 5.9);
+  core.tick(6.1);
+  EXPECT_GE(core.counters().at("leases_expired"), 1);
+  for (const auto& p : status()["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << p["name"];
+}
+
+TEST_F(Master, ANewPackerStartsWithNewFrames) {
+  join_all();
+  const auto old = lease_to("s1");
+  core.on("p2", hello("packer", "packer", 20), 1.2);
+  done(old, "p2", 1.3);
+  EXPECT_EQ(core.counters().at("frames_completed"), 0) << "a tile of a dropped frame";
+  const auto next = lease_to("s2", 2, 1.4);
+  EXPECT_GT(next.frame, old.frame);
+  done(next, "p", 1.5);
+  EXPECT_EQ(core.counters().at("frames_completed"), 0) << "from the packer before";
+  done(next, "p2", 1.5);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1);
+  // The same packer's second hello drops nothing.
+  const auto kept = lease_to("s1", 3, 1.6);
+  core.on("p2", hello("packer", "packer", 20), 1.7);
+  done(kept, "p2", 1.8);
+  EXPECT_EQ(core.counters().at("frames_completed"), 2);
+}
+
+TEST_F(Master, AReplacedProcessIsMarked) {
+  join_all();
+  core.undeliverable("p");
+  core.on("p2", hello("packer", "packer", 20), 1);
+  int replaced = 0;
+  for (const auto& p : core.processes()) {
+    replaced += p.replaced;
+    if (p.replaced) {
+      EXPECT_EQ(p.pid, 20u);
+    }
+  }
+  EXPECT_EQ(replaced, 1);
+}
+
+TEST_F(Master, StatusTellsWhoIsWhere) {
+  join_all();
+  wire::StatusReport report;
+  report.values = {{"points", 123}};
+  core.on("p", report, 1);
+  lease_to("s1");
+  const auto s = status();
+  ASSERT_TRUE(s.is_object());
+  for (const char* key : {"epoch", "frames_completed", "frames_in_flight", "leases_expired", "tiles_released"}) EXPECT_TRUE(s[key].is_number()) << key;
+  EXPECT_EQ(s["frames_in_flight"], 1);
+  ASSERT_EQ(s["processes"].size(), 5u);
+  for (const auto& p : s["processes"]) {
+    EXPECT_EQ(p["alive"], true);
+    if (p["name"] == "packer") {
+      EXPECT_EQ(p["values"]["points"], 123);
+      EXPECT_EQ(p["endpoints"]["state"], "spacker");
+      EXPECT_EQ(p["pid"], 20);
+    }
+    if (p["role"] == "sampler") {
+      EXPECT_EQ(p["leases"], p["name"] == "sampler-1" ? 1 : 0);
+    }
+  }
+}
+
+TEST_F(Master, CommandsAreObeyedOrRefused) {
+  join_all();
+  core.on("c", wire::Control{"dance", {}}, 1);
+  auto replies = sent<wire::ControlReply>("c");
+  ASSERT_EQ(replies.size(), 1u);
+  EXPECT_FALSE(replies[0].ok);
+  EXPECT_NE(replies[0].text.find("dance"), std::string::npos);
+  sent<wire::Welcome>("v");
+  core.on("c", wire::Control{"epoch", {}}, 1);
+  EXPECT_EQ(sent<wire::Welcome>("v").back().epoch.value, 2u);
+  EXPECT_FALSE(core.stop_requested());
+  core.on("c", wire::Control{"stop", {}}, 1);
+  EXPECT_TRUE(core.stop_requested());
+  core.shut_down("done");
+  EXPECT_FALSE(core.everyone_left());
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) {
+    EXPECT_EQ(sent<wire::Shutdown>(peer).size(), 1u) << peer;
+    core.on(peer, wire::Goodbye{}, 2);
+  }
+  EXPECT_TRUE(core.everyone_left());
+}
+
+TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {
+  join_all();
+  wire::MetricRows rows{{5}, "no_such_table", {"a"}, {1}};
+  EXPECT_FALSE(core.on("v", rows, 1));
+  rows.table = "frames";
+  EXPECT_TRUE(core.on("v", rows, 1));
+  rows.columns = {"a", "b"};
+  EXPECT_FALSE(core.on("v", rows, 1));
+}
+
+TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
+  join_all();
+  for (int i = 0; i < 1000; ++i) core.on("s1", wire::LeaseRequest{}, 1);
+  for (uint64_t i = 0; i < 200; ++i) {
+    request(i + 1);
+    for (const auto& l : sent<wire::Lease>("s1")) done(l);
+  }
+  EXPECT_EQ(core.counters().at("frames_completed"), 64);
+  for (uint64_t i = 0; i < 6000; ++i) core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 1000 + i), 1);
+  EXPECT_LE(core.processes().size(), 4096u);
+}
+
+}  // namespace
+}  // namespace telesplat::master

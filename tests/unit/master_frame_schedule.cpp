@@ -1,0 +1,166 @@
+// View requests -> frames -> leases, without sockets and clocks.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "services/master/frame_schedule.h"
+
+namespace telesplat::master {
+namespace {
+
+wire::ViewRequest request(uint64_t viewer, uint64_t id, int width = 256, int height = 128) {
+  wire::ViewRequest r;
+  r.viewer = {viewer};
+  r.request = {id};
+  r.camera.width = width;
+  r.camera.height = height;
+  return r;
+}
+
+const auto kNobody = [](const std::string&) {};
+constexpr EpochId kEpoch{1};
+
+TEST(CutTiles, CoverTheFrameOnceFromTheCentre) {
+  for (const auto& [w, h, size] : {std::tuple{1, 1, 16}, {256, 256, 256}, {257, 255, 64}, {1280, 800, 256}, {33, 900, 32}}) {
+    std::vector<int> covered(size_t(w) * size_t(h), 0);
+    double last = -1;
+    for (const auto& r : cut_tiles(w, h, size)) {
+      EXPECT_LE(r.width, size);
+      EXPECT_LE(r.height, size);
+      for (int y = r.y; y < r.y + r.height; ++y)
+        for (int x = r.x; x < r.x + r.width; ++x) ++covered[size_t(y) * size_t(w) + size_t(x)];
+      const double distance = std::hypot(r.x + r.width / 2.0 - w / 2.0, r.y + r.height / 2.0 - h / 2.0);
+      EXPECT_GE(distance, last - 1e-9);
+      last = distance;
+    }
+    EXPECT_EQ(std::count(covered.begin(), covered.end(), 1), w * h) << w << "x" << h << " by " << size;
+  }
+}
+
+TEST(FrameSchedule, LeasesEveryTileOnceThenCompletes) {
+  FrameSchedule s({.tile_size = 64});
+  EXPECT_FALSE(s.lease("a", kEpoch, 0));
+  s.request_view(request(1, 5));
+  EXPECT_TRUE(s.view_waiting());
+  std::set<uint64_t> tiles, leases;
+  FrameId frame;
+  while (const auto l = s.lease("a", kEpoch, 0)) {
+    EXPECT_EQ(l->tiles_in_frame, 8u);
+    EXPECT_EQ(l->viewer.value, 1u);
+    EXPECT_EQ(l->request.value, 5u);
+    EXPECT_TRUE(tiles.insert(l->tile).second);
+    EXPECT_TRUE(leases.insert(l->lease.value).second);
+    frame = l->frame;
+  }
+  EXPECT_EQ(tiles.size(), 8u);
+  EXPECT_EQ(s.leases_of("a"), 8u);
+  EXPECT_EQ(s.leases_of("b"), 0u);
+  for (uint64_t t = 0; t < 8; ++t) {
+    EXPECT_EQ(s.frames_completed(), 0u);
+    EXPECT_TRUE(s.tile_done(frame, t, 0.1));
+    EXPECT_FALSE(s.tile_done(frame, t, 0.1)) << "a duplicate";
+  }
+  EXPECT_EQ(s.frames_completed(), 1u);
+  EXPECT_EQ(s.frames_in_flight(), 0u);
+  EXPECT_FALSE(s.tile_done(frame, 0, 0.2)) << "of a frame that is complete";
+  EXPECT_FALSE(s.tile_done({99}, 0, 0.2));
+  EXPECT_FALSE(s.tile_done(frame, 1000, 0.2));
+}
+
+TEST(FrameSchedule, ALeaseThatRunsOutGoesToAnother) {
+  FrameSchedule s({.tile_size = 256, .lease_timeout_s = 2});
+  s.request_view(request(1, 1));
+  const auto first = s.lease("slow", kEpoch, 10);
+  ASSERT_TRUE(first);
+  EXPECT_FALSE(s.lease("fast", kEpoch, 11));
+  std::vector<std::string> lost;
+  const auto note = [&](const std::string& name) { lost.push_back(name); };
+  EXPECT_EQ(s.expire(11.9, note), 0);
+  s.extend(first->lease, 11.9);
+  EXPECT_EQ(s.expire(13.8, note), 0) << "it was extended";
+  EXPECT_EQ(s.expire(14, note), 1);
+  EXPECT_EQ(lost, std::vector<std::string>{"slow"});
+  EXPECT_EQ(s.tiles_released(), 1u);
+  const auto second = s.lease("fast", kEpoch, 14);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->frame, first->frame);
+  EXPECT_EQ(second->tile, first->tile);
+  EXPECT_NE(second->lease, first->lease);
+  s.extend(first->lease, 100);  // of the lease before: unknown now
+  EXPECT_EQ(s.expire(17, kNobody), 1);
+  // Whoever's tile comes first counts.
+  EXPECT_TRUE(s.tile_done(first->frame, first->tile, 17.5));
+  EXPECT_FALSE(s.lease("fast", kEpoch, 18));
+}
+
+TEST(FrameSchedule, LeaseTimesFollowTileTimes) {
+  FrameSchedule s({.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2});
+  EXPECT_EQ(s.lease_time_s(), 2);
+  double now = 0;
+  for (uint64_t i = 1; i <= 200; ++i) {
+    s.request_view(request(1, i));
+    const auto l = s.lease("a", kEpoch, now);
+    ASSERT_TRUE(l);
+    s.tile_done(l->frame, l->tile, now += 0.02);
+  }
+  EXPECT_NEAR(s.lease_time_s(), 25 * 0.02, 1e-6);
+}
+
+TEST(FrameSchedule, TheLatestRequestOfAViewerWins) {
+  FrameSchedule s({.tile_size = 256, .frames_in_flight = 1});
+  for (uint64_t i = 1; i <= 5; ++i) s.request_view(request(1, i));
+  EXPECT_EQ(s.lease("a", kEpoch, 0)->request.value, 5u);
+  EXPECT_FALSE(s.view_waiting());
+  s.request_view(request(1, 6));
+  s.forget_viewer({1});
+  EXPECT_FALSE(s.view_waiting());
+}
+
+TEST(FrameSchedule, ViewersTakeTurns) {
+  FrameSchedule s({.tile_size = 256, .frames_in_flight = 1});
+  std::map<uint64_t, int> turns;
+  for (uint64_t i = 1; i <= 30; ++i) {
+    for (uint64_t v : {3, 1, 2}) s.request_view(request(v, i));
+    const auto l = s.lease("a", kEpoch, 0);
+    ASSERT_TRUE(l);
+    ++turns[l->viewer.value];
+    s.tile_done(l->frame, l->tile, 0);
+  }
+  EXPECT_EQ(turns, (std::map<uint64_t, int>{{1, 10}, {2, 10}, {3, 10}}));
+}
+
+TEST(FrameSchedule, FramesInFlightAreBounded) {
+  FrameSchedule s({.tile_size = 256, .frames_in_flight = 2});
+  std::vector<wire::Lease> leases;
+  for (uint64_t i = 1; i <= 3; ++i) {
+    s.request_view(request(1, i));
+    if (const auto l = s.lease("a", kEpoch, 0)) leases.push_back(*l);
+  }
+  ASSERT_EQ(leases.size(), 2u);
+  EXPECT_EQ(s.frames_in_flight(), 2u);
+  EXPECT_TRUE(s.view_waiting());
+  s.tile_done(leases[0].frame, 0, 0);
+  EXPECT_EQ(s.lease("a", kEpoch, 0)->request.value, 3u);
+}
+
+TEST(FrameSchedule, ASamplerThatLeavesGivesItsTilesBack) {
+  FrameSchedule s({.tile_size = 64});
+  s.request_view(request(1, 1));
+  const auto a = s.lease("a", kEpoch, 0), b = s.lease("b", kEpoch, 0);
+  EXPECT_EQ(s.release_sampler("a"), 1);
+  EXPECT_EQ(s.release_sampler("a"), 0);
+  EXPECT_EQ(s.lease("c", kEpoch, 0)->tile, a->tile);
+  EXPECT_EQ(s.leases_of("b"), 1u);
+  s.drop_frames();
+  EXPECT_EQ(s.frames_in_flight(), 0u);
+  EXPECT_FALSE(s.tile_done(b->frame, b->tile, 0));
+}
+
+TEST(FrameSchedule, HugeFramesHaveBoundedTileCounts) {
+  FrameSchedule s({.tile_size = 16});
+  s.request_view(request(1, 1, geometry::kMaxImageSide, geometry::kMaxImageSide));
+  EXPECT_LE(s.lease("a", kEpoch, 0)->tiles_in_frame, 1024u);
+}
+
+}  // namespace
+}  // namespace telesplat::master

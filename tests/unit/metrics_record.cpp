@@ -1,0 +1,188 @@
+// Distributions, recorders and the files of a run.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "common/metrics/recorder.h"
+#include "common/metrics/run_record.h"
+
+namespace telesplat::metrics {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Distribution, PercentilesInterpolateBetweenRanks) {
+  std::vector<double> values;
+  for (int i = 100; i >= 0; --i) values.push_back(i);
+  const auto d = distribution(values);
+  EXPECT_DOUBLE_EQ(d.mean, 50);
+  EXPECT_DOUBLE_EQ(d.median, 50);
+  EXPECT_DOUBLE_EQ(d.p95, 95);
+  EXPECT_DOUBLE_EQ(d.p99, 99);
+  EXPECT_DOUBLE_EQ(d.max, 100);
+  EXPECT_DOUBLE_EQ(distribution({1, 2}).median, 1.5);
+  EXPECT_DOUBLE_EQ(distribution({1, 2}).p95, 1.95);
+  EXPECT_DOUBLE_EQ(distribution({7}).p99, 7);
+  EXPECT_DOUBLE_EQ(distribution({}).max, 0);
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  EXPECT_DOUBLE_EQ(distribution({nan, 3, infinity, -infinity}).mean, 3);
+}
+
+TEST(Recorders, GiveWhatCameSinceTheLastTime) {
+  TableRecorder table("frames", {"a", "b"});
+  EXPECT_FALSE(table.flush({1}));
+  table.add({1, 2});
+  table.add({3, 4});
+  const auto rows = table.flush({9});
+  ASSERT_TRUE(rows);
+  EXPECT_EQ(rows->values, (std::vector<double>{1, 2, 3, 4}));
+  EXPECT_EQ(rows->columns, (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(rows->instance.value, 9u);
+  EXPECT_FALSE(table.flush({9}));
+  SpanRecorder spans;
+  spans.add("one", 1, 2);
+  spans.add("two", 2, 3, 5);
+  spans.add("one", 3, 4);
+  const auto s = spans.flush({9});
+  ASSERT_TRUE(s);
+  EXPECT_EQ(s->columns, (std::vector<std::string>{"one", "two"}));
+  EXPECT_EQ(s->values, (std::vector<double>{0, 1, 2, 0, 1, 2, 3, 5, 0, 3, 4, 0}));
+}
+
+TEST(Recorders, AreBoundedWhileTheMasterIsAway) {
+  TableRecorder table("frames", {"a"});
+  for (int i = 0; i < (1 << 20) + 1000; ++i) table.add({double(i)});
+  EXPECT_EQ(table.flush({1})->values.size(), size_t{1} << 20);
+}
+
+class Record : public ::testing::Test {
+ protected:
+  Record() {
+    std::string pattern = (fs::temp_directory_path() / "telesplat-record-XXXXXX").string();
+    folder = mkdtemp(pattern.data());
+    record = std::move(RunRecord::open(folder + "/run")).value();
+  }
+  ~Record() override { fs::remove_all(folder); }
+  std::string text(const std::string& name) const {
+    std::ifstream in(folder + "/run/" + name);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  static wire::TileDone tile(uint64_t frame, uint64_t number, double begin_s) {
+    wire::TileDone t;
+    t.frame = {frame};
+    t.tile = number;
+    t.samples = 1000;
+    t.kept = 100;
+    t.bytes_sampled = 4000;
+    t.bytes_sent = 500;
+    t.sample_begin_s = begin_s;
+    t.sample_end_s = begin_s + 0.010;
+    t.encode_end_s = begin_s + 0.012;
+    t.receive_s = begin_s + 0.013;
+    t.packed_s = begin_s + 0.018;
+    return t;
+  }
+
+  std::string folder;
+  std::unique_ptr<RunRecord> record;
+  Process viewer{"viewer", "viewer-1", 5, {{"coupling", "async"}, {"width", "640"}}, {{"peak_rss_mb", 20}}};
+};
+
+TEST_F(Record, TablesBecomeCsv) {
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s"}, {0, 0.25, 1, 1e-7}}));
+  viewer.name = "viewer-2";
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s"}, {0, 123456.789}}));
+  EXPECT_EQ(text("frames.csv"), "viewer,frame,t_s\nviewer-1,0,0.25\nviewer-1,1,1e-07\nviewer-2,0,123456.789\n");
+}
+
+TEST_F(Record, BadTablesAreRefusedAndLeaveNothing) {
+  EXPECT_FALSE(record->add_rows(viewer, {{5}, "secrets", {"a"}, {1}}));
+  EXPECT_FALSE(record->add_rows(viewer, {{5}, "../frames", {"a"}, {1}}));
+  EXPECT_FALSE(record->add_rows(viewer, {{5}, "frames", {}, {1}}));
+  EXPECT_FALSE(record->add_rows(viewer, {{5}, "frames", {"a", "b"}, {1, 2, 3}}));
+  EXPECT_FALSE(record->add_rows(viewer, {{5}, "spans", {"a"}, {0, 1, 2}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"a", "b"}, {1, 2}}));
+  EXPECT_FALSE(record->add_rows(viewer, {{5}, "frames", {"a", "c"}, {1, 2}}));
+  EXPECT_EQ(text("frames.csv"), "viewer,a,b\nviewer-1,1,2\n");
+}
+
+TEST_F(Record, TheTraceIsValidWhateverSpansCome) {
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 1, 2, 2.25, 3}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, -1, 1, 2, 0}}));  // names that are not there
+  record.reset();
+  const auto trace = nlohmann::json::parse(text("trace.json"), nullptr, false);
+  ASSERT_TRUE(trace.is_array());
+  ASSERT_EQ(trace.size(), 3u);
+  EXPECT_EQ(trace[0]["ph"], "M");
+  EXPECT_EQ(trace[0]["args"]["name"], "viewer-1");
+  EXPECT_EQ(trace[1]["name"], "sample");
+  EXPECT_EQ(trace[1]["ts"], 1e6);
+  EXPECT_EQ(trace[1]["dur"], 5e5);
+  EXPECT_EQ(trace[1]["pid"], 5);
+  EXPECT_EQ(trace[2]["tid"], 3);
+}
+
+TEST_F(Record, ATraceWithoutSpansIsValidToo) {
+  record.reset();
+  EXPECT_EQ(nlohmann::json::parse(text("trace.json"), nullptr, false), nlohmann::json::array());
+}
+
+TEST_F(Record, TheSummaryIsCompleteAndTrue) {
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s", "inter_frame_ms", "construction_ms", "points_drawn", "update_age_ms"}, {0, 0, 5, 100, 50, 1, 20, 6, 200, 60, 2, 30, 7, 300, 70}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"latency_ms", "start_up_ms"}, {200, 50, 300, 60}}));
+  record->add_tile("sampler-1", tile(1, 0, 1.0));
+  record->add_tile("sampler-2", tile(1, 1, 1.005));
+  record->add_tile("sampler-1", tile(2, 0, 2.0));
+  Process data{"data", "data", 1, {{"scene", "hill.ply"}, {"kind", "mesh"}, {"triangles", "1234"}}, {{"peak_rss_mb", 10}, {"messages_rejected", 2}}};
+  Process old_packer{"packer", "packer", 2, {}, {{"points", 900}, {"model_bytes", 9000}, {"messages_rejected", 3}}, true};
+  Process packer{"packer", "packer", 3, {}, {{"points", 1000}, {"model_bytes", 20000}, {"peak_rss_mb", 30}}};
+  Process sampler{"sampler", "sampler-1", 4, {}, {{"peak_rss_mb", 40}}};
+  ASSERT_TRUE(record->finish({data, old_packer, packer, sampler, viewer}, {{"leases_expired", 4}, {"tiles_released", 6}}));
+  const auto s = nlohmann::json::parse(text("summary.json"), nullptr, false);
+  ASSERT_TRUE(s.is_object());
+  for (const char* key : {"schema", "scene", "kind", "primitives", "samplers", "viewers", "coupling", "buffers", "renderer", "splat", "size", "sampling_size", "frames",
+                          "updates", "fps", "inter_frame_delay_ms", "view_construction_ms", "view_update_latency_ms", "start_up_latency_ms", "sampling_ms",
+                          "packing_ms", "data_generating_rate_mb_s", "data_transfer_rate_mb_s", "data_consuming_rate_mb_s", "bytes_raw", "bytes_sent",
+                          "compression_ratio", "redundancy_eliminated", "points_cached", "points_drawn", "tiles_released", "quality", "peak_rss_mb", "errors"})
+    EXPECT_TRUE(s.contains(key)) << key;
+  EXPECT_EQ(s["primitives"], 1234);
+  EXPECT_EQ(s["samplers"], 1);
+  EXPECT_EQ(s["frames"], 3);
+  EXPECT_EQ(s["fps"], 1.5);
+  EXPECT_EQ(s["inter_frame_delay_ms"]["mean"], 25) << "the first frame has no delay";
+  EXPECT_EQ(s["view_update_latency_ms"]["max"], 300);
+  EXPECT_EQ(s["sampling_ms"]["max"], 17) << "from the frame's first tile to its last";
+  EXPECT_EQ(s["packing_ms"]["max"], 10);
+  EXPECT_NEAR(double(s["redundancy_eliminated"]), 0.9, 1e-12);
+  EXPECT_EQ(s["bytes_sent"], 1500);
+  EXPECT_EQ(s["points_cached"], 1000) << "what the packer's former life held is gone";
+  EXPECT_EQ(s["bytes_per_cached_point"], 20);
+  EXPECT_EQ(s["tiles_released"], 6);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 5) << "what it counted stays counted";
+  EXPECT_EQ(s["errors"]["leases_expired"], 4);
+  EXPECT_EQ(s["peak_rss_mb"]["sampler"], nlohmann::json::array({40.0}));
+  const std::string tiles = text("tiles.csv");
+  EXPECT_EQ(std::count(tiles.begin(), tiles.end(), '\n'), 4);
+}
+
+TEST_F(Record, OfARunWithoutAnythingHoldsZeros) {
+  const auto s = record->summary({}, {});
+  EXPECT_EQ(s["frames"], 0);
+  EXPECT_EQ(s["fps"], 0);
+  EXPECT_EQ(s["redundancy_eliminated"], 0);
+  EXPECT_EQ(s.dump().find("null,\"peak"), s.dump().find("null")) << "only quality is null: " << s.dump();
+}
+
+TEST_F(Record, AFolderThatCannotBeMadeIsNamed) {
+  std::ofstream(folder + "/file") << "x";
+  const auto bad = RunRecord::open(folder + "/file/run");
+  ASSERT_FALSE(bad);
+  EXPECT_NE(bad.error().text.find("/file/run"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace telesplat::metrics
