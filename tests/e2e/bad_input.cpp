@@ -12,7 +12,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kAsciiHeader = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n";
+constexpr const char* kAsciiHeader =
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face "
+    "{}\nproperty list uchar int vertex_indices\nend_header\n";
 
 std::string ascii_ply(const std::string& faces, const std::string& rest) {
   std::string header = kAsciiHeader;
@@ -20,9 +22,9 @@ std::string ascii_ply(const std::string& faces, const std::string& rest) {
 }
 
 struct Case {
-  std::string name, file, content;        // content is written to the file; none: it is not made
+  std::string name, file, content;  // content is written to the file; none: it is not made
   std::vector<std::string> arguments;
-  std::string named;                      // what the line must name
+  std::string named;  // what the line must name
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -33,13 +35,17 @@ TEST_P(BadInput, ExitsWithTwoAndOneLine) {
   const Case& c = GetParam();
   TemporaryFolder folder;
   const std::string path = folder / c.file, out = folder / "out";
-  if (c.content == "FOLDER") fs::create_directory(path);
-  else if (c.content == "TERRAIN") write_terrain(path, 4);
+  if (c.content == "FOLDER")
+    fs::create_directory(path);
+  else if (c.content == "TERRAIN")
+    write_terrain(path, 4);
   else if (c.content == "CUT") {
     write_terrain(path, 40);
     fs::resize_file(path, fs::file_size(path) / 2);
-  } else if (c.content != "NOTHING") std::ofstream(path, std::ios::binary) << c.content;
-  if (c.file != "trajectory.csv") std::ofstream(folder / "trajectory.csv") << "t_s,px,py,pz,qw,qx,qy,qz\n0,0,0,1,1,0,0,0\n1,0,nan,1,1,0,0,0\n";
+  } else if (c.content != "NOTHING")
+    std::ofstream(path, std::ios::binary) << c.content;
+  if (c.file != "trajectory.csv")
+    std::ofstream(folder / "trajectory.csv") << "t_s,px,py,pz,qw,qx,qy,qz\n0,0,0,1,1,0,0,0\n1,0,nan,1,1,0,0,0\n";
   std::vector<std::string> arguments{"run", path, "--out", out, "--cache", folder / "cache", "--duration", "1"};
   for (std::string a : c.arguments) arguments.push_back(a == "TRAJECTORY" ? folder / "trajectory.csv" : a);
   Program program("telesplat", arguments, folder / "telesplat");
@@ -51,7 +57,8 @@ TEST_P(BadInput, ExitsWithTwoAndOneLine) {
   EXPECT_FALSE(fs::exists(out)) << "a run folder was left";
   EXPECT_TRUE(wait_until([&] {
     for (const auto& entry : fs::directory_iterator("/proc"))
-      if (const pid_t pid = std::atoi(entry.path().filename().c_str()); pid > 0 && is_running(pid) && read_text(entry.path() / "cmdline").find(folder.path()) != std::string::npos)
+      if (const pid_t pid = std::atoi(entry.path().filename().c_str());
+          pid > 0 && is_running(pid) && read_text(entry.path() / "cmdline").find(folder.path()) != std::string::npos)
         return false;
     return true;
   }));
@@ -63,7 +70,12 @@ const Case kCases[] = {
     {"EmptyFile", "empty.ply", "", {}, "empty.ply"},
     {"UnknownKind", "text.xyz", "hello", {}, "text.xyz"},
     {"TruncatedPly", "cut.ply", "CUT", {}, "cut.ply"},
-    {"LyingHeader", "lying.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n", {}, "lying.ply"},
+    {"LyingHeader",
+     "lying.ply",
+     "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\nproperty float x\nproperty float y\nproperty "
+     "float z\nend_header\n",
+     {},
+     "lying.ply"},
     {"NotANumber", "nan.ply", ascii_ply("1", "nan 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), {}, "nan.ply"},
     {"NoTriangles", "points.ply", ascii_ply("0", "0 0 0\n1 0 0\n0 1 0\n"), {}, "points.ply"},
     {"IndexOutOfRange", "index.ply", ascii_ply("1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"), {}, "index.ply"},
@@ -72,11 +84,13 @@ const Case kCases[] = {
     {"BadTrajectory", "mesh.ply", "TERRAIN", {"--trajectory", "TRAJECTORY"}, "trajectory.csv:3"},
     {"MissingTrajectory", "mesh.ply", "TERRAIN", {"--trajectory", "no-such.csv"}, "no-such.csv"},
 };
-INSTANTIATE_TEST_SUITE_P(Cases, BadInput, ::testing::ValuesIn(kCases), [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Cases, BadInput, ::testing::ValuesIn(kCases),
+                         [](const auto& info) { return info.param.name; });
 
 TEST(BadUsage, UnknownFlagsAndAbsentScenesAreRefused) {
   TemporaryFolder folder;
-  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"run"}, {"run", "--no-such-flag"}, {"walk"}, {}, {"inspect", folder / "nothing"}}) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"run"}, {"run", "--no-such-flag"}, {"walk"}, {}, {"inspect", folder / "nothing"}}) {
     Program program("telesplat", arguments, folder / "telesplat");
     EXPECT_EQ(program.wait(30), 2) << program.err();
     EXPECT_FALSE(program.err().empty());

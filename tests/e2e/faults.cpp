@@ -24,7 +24,7 @@ pid_t kill_process(PipelineRun& run, const std::string& name) {
 }
 
 TEST(Faults, ASamplerKilledInMidFrameCostsItsLeases) {
-  PipelineRun run({"--duration", "6", "--samplers", "2"});
+  PipelineRun run({"--duration", "0", "--samplers", "2"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   // Stopped first, so that it cannot finish what it holds; a sampler that waits gets a lease with the next frame.
   pid_t victim = 0;
@@ -36,13 +36,14 @@ TEST(Faults, ASamplerKilledInMidFrameCostsItsLeases) {
   }));
   ::kill(victim, SIGKILL);
   // Another life takes its place, and frames go on.
-  EXPECT_TRUE(run.wait_status([&](const auto& s) { return pid_of(s, "sampler-2") > 0 && pid_of(s, "sampler-2") != victim; }));
+  EXPECT_TRUE(
+      run.wait_status([&](const auto& s) { return pid_of(s, "sampler-2") > 0 && pid_of(s, "sampler-2") != victim; }));
   double completed = -1;
   EXPECT_TRUE(run.wait_status([&](const auto& s) {
     if (completed < 0) completed = s["frames_completed"];
     return s["frames_completed"] > completed;
   }));
-  ASSERT_EQ(run.program().wait(60), 0) << run.program().err();
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
   const auto s = run.summary();
   EXPECT_GE(s["errors"]["leases_expired"], 1);
   EXPECT_GE(s["tiles_released"], 1);
@@ -52,31 +53,38 @@ TEST(Faults, ASamplerKilledInMidFrameCostsItsLeases) {
 }
 
 TEST(Faults, APackerKilledIsStartedAgainAndViewersResynchronise) {
-  PipelineRun run({"--duration", "7"});
+  PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   double frames = 0, updates = 0;
   ASSERT_TRUE(run.wait_status([&](const auto& s) { return (updates = value(s, "viewer-1", "updates")) > 0; }));
   const pid_t victim = kill_process(run, "packer");
-  ASSERT_TRUE(run.wait_status([&](const auto& s) { return pid_of(s, "packer") > 0 && pid_of(s, "packer") != victim && value(s, "packer", "points") > 0; }));
+  ASSERT_TRUE(run.wait_status([&](const auto& s) {
+    return pid_of(s, "packer") > 0 && pid_of(s, "packer") != victim && value(s, "packer", "points") > 0;
+  }));
   const auto now = run.status();
   frames = value(now, "viewer-1", "frames"), updates = value(now, "viewer-1", "updates");
   EXPECT_TRUE(run.wait_status([&](const auto& s) {
-    return value(s, "viewer-1", "frames") > frames && value(s, "viewer-1", "updates") > updates && value(s, "viewer-1", "points") > 0;
+    return value(s, "viewer-1", "frames") > frames && value(s, "viewer-1", "updates") > updates &&
+           value(s, "viewer-1", "points") > 0;
   }));
-  ASSERT_EQ(run.program().wait(60), 0) << run.program().err();
-  const auto delays = run.column("frames.csv", "inter_frame_ms");
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  auto delays = run.column("frames.csv", "inter_frame_ms");
   ASSERT_FALSE(delays.empty());
-  EXPECT_LT(*std::max_element(delays.begin(), delays.end()), 1000) << "the display stood still";
+  std::sort(delays.begin(), delays.end());
+  // On a machine that has nothing else to do a second is an age; on a crowded one every frame may take long.
+  EXPECT_LT(delays.back(), std::max(1000.0, 20 * delays[delays.size() / 2])) << "the display stood still";
   EXPECT_GT(run.summary()["points_cached"], 0);
   EXPECT_TRUE(run.all_gone());
 }
 
 TEST(Faults, ADataServerKilledIsStartedAgain) {
-  PipelineRun run({"--duration", "4"});
+  PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   const pid_t victim = kill_process(run, "data");
   EXPECT_TRUE(run.wait_status([&](const auto& s) { return pid_of(s, "data") > 0 && pid_of(s, "data") != victim; }));
-  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  const double updates = value(run.status(), "viewer-1", "updates");
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates; }));
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_EQ(run.summary()["primitives"], 20000);
   EXPECT_TRUE(run.all_gone());
 }
@@ -86,7 +94,8 @@ TEST(Faults, TheRunEndsWithItsMaster) {
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   ASSERT_TRUE(wait_until([&] { return !run.master().empty(); }));
   // The master is in no status answer: it is the launcher's child that listens.
-  const std::string children = read_text("/proc/" + std::to_string(run.program().pid()) + "/task/" + std::to_string(run.program().pid()) + "/children");
+  const std::string children = read_text("/proc/" + std::to_string(run.program().pid()) + "/task/" +
+                                         std::to_string(run.program().pid()) + "/children");
   const pid_t master = std::atoi(children.c_str());  // started first
   ASSERT_NE(read_text("/proc/" + std::to_string(master) + "/cmdline").find("telesplat-master"), std::string::npos);
   ::kill(master, SIGKILL);
@@ -135,9 +144,7 @@ TEST(Faults, ALauncherKilledTakesItsChildrenAlong) {
 TEST(Faults, StopEndsTheRun) {
   PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  Program stop("telesplat", {"ctl", "stop", "--master", run.master()}, run.folder() / "stop");
-  EXPECT_EQ(stop.wait(), 0) << stop.err();
-  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_EQ(run.program().err().find("died"), std::string::npos) << run.program().err();
   EXPECT_TRUE(run.all_gone());
 }

@@ -13,8 +13,10 @@ bool same_points(const nlohmann::json& status, const std::string& viewer) {
   return points > 0 && value(status, viewer, "points") == points;
 }
 
-std::vector<std::string> viewer_arguments(PipelineRun& run, const std::string& name, const std::string& trajectory, const std::string& duration) {
-  return {"--master", run.master(), "--name", name, "--size", "160x100", "--sampling-size", "320x200", "--trajectory", trajectory, "--duration", duration, "--target-fps", "10"};
+std::vector<std::string> viewer_arguments(PipelineRun& run, const std::string& name, const std::string& trajectory,
+                                          const std::string& duration) {
+  return {"--master", run.master(),   "--name",   name,         "--size", "160x100",      "--sampling-size",
+          "320x200",  "--trajectory", trajectory, "--duration", duration, "--target-fps", "10"};
 }
 
 TEST(Viewers, AViewerThatWasStoppedResynchronises) {
@@ -26,16 +28,22 @@ TEST(Viewers, AViewerThatWasStoppedResynchronises) {
     return same_points(s, "viewer-1") && (viewer = p["pid"].template get<pid_t>()) > 0;
   }));
   double sequence = 0, points = 0;
-  ASSERT_TRUE(run.wait_status([&](const auto& s) { return points = value(s, "packer", "points"), (sequence = value(s, "packer", "sequence")) > 0; }));
+  ASSERT_TRUE(run.wait_status([&](const auto& s) {
+    return points = value(s, "packer", "points"), (sequence = value(s, "packer", "sequence")) > 0;
+  }));
   ::kill(viewer, SIGSTOP);
   {
     // Another one walks around meanwhile, so that there is something to miss.
     Program other("telesplat-viewer", viewer_arguments(run, "viewer-2", "orbit", "3"), run.folder() / "viewer-2");
     EXPECT_EQ(other.wait(60), 0) << other.err();
   }
-  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "packer", "points") > points && value(s, "packer", "sequence") > sequence; }));
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    return value(s, "packer", "points") > points && value(s, "packer", "sequence") > sequence;
+  }));
   ::kill(viewer, SIGCONT);
-  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "points") > points && same_points(s, "viewer-1"); })) << run.status().dump(1);
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    return value(s, "viewer-1", "points") > points && same_points(s, "viewer-1");
+  })) << run.status().dump(1);
   run.program().signal(SIGINT);
   EXPECT_EQ(run.program().wait(60), 1);
   EXPECT_TRUE(run.all_gone());
@@ -45,17 +53,19 @@ TEST(Viewers, ALateViewerGetsThePackersPoints) {
   PipelineRun run({"--duration", "0", "--trajectory", "still"});
   ASSERT_TRUE(run.wait_status([](const auto& s) { return same_points(s, "viewer-1"); })) << run.program().err();
   Program late("telesplat-viewer", viewer_arguments(run, "viewer-2", "still", "0"), run.folder() / "viewer-2");
-  EXPECT_TRUE(run.wait_status([](const auto& s) { return same_points(s, "viewer-2") && value(s, "viewer-2", "frames") > 0; })) << run.status().dump(1);
+  EXPECT_TRUE(run.wait_status([](const auto& s) {
+    return same_points(s, "viewer-2") && value(s, "viewer-2", "frames") > 0;
+  })) << run.status().dump(1);
   late.signal(SIGINT);
   EXPECT_EQ(late.wait(), 0) << late.err();
   // So does one that the launcher starts.
-  Program joined("telesplat", {"run", "--master", run.master(), "--trajectory", "still", "--duration", "1", "--size", "160x100", "--sampling-size", "320x200", "--out",
-                               run.folder() / "joined"}, run.folder() / "joined");
+  Program joined("telesplat",
+                 {"run", "--master", run.master(), "--trajectory", "still", "--duration", "1", "--size", "160x100",
+                  "--sampling-size", "320x200", "--out", run.folder() / "joined"},
+                 run.folder() / "joined");
   EXPECT_EQ(joined.wait(60), 0) << joined.err();
   EXPECT_TRUE(is_running(run.program().pid())) << "a guest ended the session";
-  Program stop("telesplat", {"ctl", "stop", "--master", run.master()}, run.folder() / "stop");
-  EXPECT_EQ(stop.wait(), 0);
-  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
   EXPECT_TRUE(run.all_gone());
 }

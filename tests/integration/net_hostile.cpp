@@ -38,7 +38,9 @@ struct Bound {
     EXPECT_TRUE(bound.ok());
     endpoint = bound->c_str();
   }
-  bool rejects(uint64_t n) { return receive_until(socket, [&] { return socket.rejected() >= n; }); }
+  bool rejects(uint64_t n) {
+    return receive_until(socket, [&] { return socket.rejected() >= n; });
+  }
 
   Context context;
   Socket socket;
@@ -54,7 +56,8 @@ void expect_served(Bound& bound) {
   ASSERT_TRUE(friendly.connect(bound.endpoint).ok());
   ASSERT_TRUE(friendly.send(kGoodbye));
   std::vector<Message> got;
-  EXPECT_TRUE(receive_until(bound.socket, [&] { return !got.empty(); }, &got));
+  EXPECT_TRUE(receive_until(
+      bound.socket, [&] { return !got.empty(); }, &got));
   ASSERT_FALSE(got.empty());
   EXPECT_EQ(got.back().type, wire::Goodbye::kName);
 }
@@ -72,7 +75,8 @@ TEST(HostilePeers, FrameCountsAndSizesAreLimited) {
   ASSERT_TRUE(bound.rejects(3));
   peer.send(zmtp_frame("", true) + zmtp_frame("", false));  // an empty type and body: whole, but of no known type
   std::vector<Message> got;
-  ASSERT_TRUE(receive_until(bound.socket, [&] { return !got.empty(); }, &got));
+  ASSERT_TRUE(receive_until(
+      bound.socket, [&] { return !got.empty(); }, &got));
   dispatch<wire::Goodbye>(bound.socket, got[0], [](const auto&) { FAIL(); });
   EXPECT_EQ(bound.socket.rejected(), 4u);
   expect_served(bound);
@@ -96,8 +100,11 @@ TEST(HostilePeers, UnknownTypesWrongVersionsAndBadBodiesAreCounted) {
   peer.send(kGoodbye);
   int served = 0;
   std::vector<Message> got;
-  ASSERT_TRUE(receive_until(bound.socket, [&] { return got.size() == 6; }, &got));
-  for (const auto& m : got) dispatch<wire::Goodbye>(bound.socket, m, [&](const wire::Goodbye& g) { served += g.instance == kGoodbye.instance; });
+  ASSERT_TRUE(receive_until(
+      bound.socket, [&] { return got.size() == 6; }, &got));
+  for (const auto& m : got)
+    dispatch<wire::Goodbye>(bound.socket, m,
+                            [&](const wire::Goodbye& g) { served += g.instance == kGoodbye.instance; });
   EXPECT_EQ(served, 1);
   EXPECT_EQ(bound.socket.rejected(), 5u);
 }
@@ -116,8 +123,9 @@ TEST_P(RawBytes, RandomBytesAreCountedOnceAConnection) {
   for (uint64_t n = 1; n <= 40; ++n) {
     std::string bytes(1 + random() % 300, '\0');
     for (char& c : bytes) c = static_cast<char>(random());
-    if (n % 4 == 0) bytes[0] = '\xff';                                // looks like a later protocol
-    if (n % 4 == 1) bytes[0] = 1, bytes.resize(std::max<size_t>(bytes.size(), 2)), bytes[1] = 0;  // an empty ZMTP 1.0 routing id
+    if (n % 4 == 0) bytes[0] = '\xff';  // looks like a later protocol
+    if (n % 4 == 1)
+      bytes[0] = 1, bytes.resize(std::max<size_t>(bytes.size(), 2)), bytes[1] = 0;  // an empty ZMTP 1.0 routing id
     const uint64_t before = bound.socket.rejected();
     {
       RawPeer peer(bound.endpoint);
@@ -131,8 +139,10 @@ TEST_P(RawBytes, RandomBytesAreCountedOnceAConnection) {
 TEST_P(RawBytes, OtherProtocolsAndSilenceAreCounted) {
   Bound bound(GetParam());
   uint64_t n = 0;
-  for (const std::string& bytes : {std::string("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"), std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11), std::string(),
-                                   std::string(100000, '\0'), std::string(100000, '\xff'), zmtp_opening("REQ"), zmtp_opening("DEALER").substr(0, 70)}) {
+  for (const std::string& bytes :
+       {std::string("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+        std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11), std::string(), std::string(100000, '\0'),
+        std::string(100000, '\xff'), zmtp_opening("REQ"), zmtp_opening("DEALER").substr(0, 70)}) {
     {
       RawPeer peer(bound.endpoint);
       peer.send(bytes);
@@ -145,7 +155,8 @@ TEST_P(RawBytes, ClaimsOfHugeFramesAllocateNothingAndAreCounted) {
   Bound bound(GetParam());
   const double before_mb = resident_mb();
   uint64_t n = 0;
-  for (const uint64_t claim : {uint64_t(1) << 62, ~uint64_t(0), uint64_t(1) << 40, uint64_t(1) << 31, uint64_t(100) << 20}) {
+  for (const uint64_t claim :
+       {uint64_t(1) << 62, ~uint64_t(0), uint64_t(1) << 40, uint64_t(1) << 31, uint64_t(100) << 20}) {
     RawPeer peer(bound.endpoint);
     ASSERT_TRUE(peer.shake_hands(friends_type()));
     peer.send(zmtp_claim(claim) + "abc");
@@ -156,7 +167,9 @@ TEST_P(RawBytes, ClaimsOfHugeFramesAllocateNothingAndAreCounted) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, RawBytes, ::testing::Values(Kind::kRouter, Kind::kPull, Kind::kPub),
-                         [](const auto& info) { return info.param == Kind::kRouter ? "Router" : info.param == Kind::kPull ? "Pull" : "Pub"; });
+                         [](const auto& info) {
+                           return info.param == Kind::kRouter ? "Router" : info.param == Kind::kPull ? "Pull" : "Pub";
+                         });
 
 TEST(HostilePeers, StrangeSubscriptionsAreCounted) {
   Bound bound(Kind::kPub);
@@ -170,14 +183,19 @@ TEST(HostilePeers, FriendsWhoComeAndGoAreNotCounted) {
   Bound router(Kind::kRouter), pull(Kind::kPull), pub(Kind::kPub);
   for (int i = 0; i < 5; ++i) {
     Context context;
-    Socket dealer(context, Kind::kDealer, "dealer"), push(context, Kind::kPush, "push"), sub(context, Kind::kSub, "sub");
-    ASSERT_TRUE(dealer.connect(router.endpoint).ok() && push.connect(pull.endpoint).ok() && sub.connect(pub.endpoint).ok());
+    Socket dealer(context, Kind::kDealer, "dealer"), push(context, Kind::kPush, "push"),
+        sub(context, Kind::kSub, "sub");
+    ASSERT_TRUE(dealer.connect(router.endpoint).ok() && push.connect(pull.endpoint).ok() &&
+                sub.connect(pub.endpoint).ok());
     dealer.send(kGoodbye);
     push.send(kGoodbye);
     std::vector<Message> a, b, c;
-    ASSERT_TRUE(receive_until(router.socket, [&] { return !a.empty(); }, &a));
-    ASSERT_TRUE(receive_until(pull.socket, [&] { return !b.empty(); }, &b));
-    ASSERT_TRUE(receive_until(sub, [&] { return pub.socket.send(kGoodbye), !c.empty(); }, &c));
+    ASSERT_TRUE(receive_until(
+        router.socket, [&] { return !a.empty(); }, &a));
+    ASSERT_TRUE(receive_until(
+        pull.socket, [&] { return !b.empty(); }, &b));
+    ASSERT_TRUE(receive_until(
+        sub, [&] { return pub.socket.send(kGoodbye), !c.empty(); }, &c));
   }
   // Their hanging up is told in order, so that a stranger's after theirs is the first to count.
   for (Bound* b : {&router, &pull, &pub}) {
@@ -195,7 +213,8 @@ TEST(HostilePeers, AFloodFromOneLeavesRoomForOthers) {
     peer.shake_hands("DEALER");
     std::string batch;
     for (int i = 0; i < 1000; ++i) batch += zmtp_frame("goodbye", false);
-    while (!stop && peer.send(batch)) {}
+    while (!stop && peer.send(batch)) {
+    }
     stopped = true;
   });
   EXPECT_TRUE(bound.rejects(1000));
@@ -205,13 +224,17 @@ TEST(HostilePeers, AFloodFromOneLeavesRoomForOthers) {
   for (int i = 0; i < 20; ++i) {
     friendly.send(kGoodbye);
     std::vector<Message> got, answer;
-    EXPECT_TRUE(receive_until(bound.socket, [&] { return !got.empty(); }, &got)) << "message " << i;
+    EXPECT_TRUE(receive_until(
+        bound.socket, [&] { return !got.empty(); }, &got))
+        << "message " << i;
     if (got.empty()) break;
     EXPECT_TRUE(bound.socket.send(wire::Shutdown{"thanks"}, got[0].peer));
-    EXPECT_TRUE(receive_until(friendly, [&] { return !answer.empty(); }, &answer));
+    EXPECT_TRUE(receive_until(
+        friendly, [&] { return !answer.empty(); }, &answer));
   }
   stop = true;
-  EXPECT_TRUE(receive_until(bound.socket, [&] { return stopped.load(); }));  // it may be waiting for room in its connection
+  EXPECT_TRUE(
+      receive_until(bound.socket, [&] { return stopped.load(); }));  // it may be waiting for room in its connection
   flood.join();
 }
 
@@ -220,9 +243,11 @@ TEST(HostilePeers, BytesThatTrickleInMakeAMessage) {
   RawPeer peer(bound.endpoint);
   for (const char c : zmtp_opening("DEALER")) ASSERT_TRUE(peer.send({&c, 1}));
   ASSERT_TRUE(peer.wait_ready());
-  for (const char c : zmtp_frame("goodbye", true) + zmtp_frame(wire::encode(kGoodbye), false)) ASSERT_TRUE(peer.send({&c, 1}));
+  for (const char c : zmtp_frame("goodbye", true) + zmtp_frame(wire::encode(kGoodbye), false))
+    ASSERT_TRUE(peer.send({&c, 1}));
   std::vector<Message> got;
-  ASSERT_TRUE(receive_until(bound.socket, [&] { return !got.empty(); }, &got));
+  ASSERT_TRUE(receive_until(
+      bound.socket, [&] { return !got.empty(); }, &got));
   EXPECT_TRUE(bound.socket.decode<wire::Goodbye>(got[0]));
   EXPECT_EQ(bound.socket.rejected(), 0u);
 }

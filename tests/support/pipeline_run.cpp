@@ -33,7 +33,9 @@ std::vector<pid_t> running_with(const std::string& text) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator("/proc", error)) {
     const pid_t pid = std::atoi(entry.path().filename().c_str());
-    if (pid > 0 && pid != getpid() && read_text(entry.path() / "cmdline").find(text) != std::string::npos && is_running(pid)) out.push_back(pid);
+    if (pid > 0 && pid != getpid() && read_text(entry.path() / "cmdline").find(text) != std::string::npos &&
+        is_running(pid))
+      out.push_back(pid);
   }
   return out;
 }
@@ -52,8 +54,10 @@ TemporaryFolder::~TemporaryFolder() {
 void write_terrain(const std::string& path, int cells) {
   const int side = cells + 1;
   std::string out = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n"
-      "property uchar green\nproperty uchar blue\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty uchar red\n"
+      "property uchar green\nproperty uchar blue\nelement face {}\nproperty list uchar int "
+      "vertex_indices\nend_header\n",
       side * side, 2 * cells * cells);
   for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {
@@ -65,7 +69,8 @@ void write_terrain(const std::string& path, int cells) {
   for (int j = 0; j < cells; ++j)
     for (int i = 0; i < cells; ++i) {
       const int a = j * side + i;
-      for (const auto& [p, q, r] : {std::tuple{a, a + 1, a + side + 1}, {a, a + side + 1, a + side}}) put(out, uint8_t(3)), put(out, p), put(out, q), put(out, r);
+      for (const auto& [p, q, r] : {std::tuple{a, a + 1, a + side + 1}, {a, a + side + 1, a + side}})
+        put(out, uint8_t(3)), put(out, p), put(out, q), put(out, r);
     }
   std::ofstream(path, std::ios::binary) << out;
 }
@@ -86,10 +91,12 @@ bool wait_until(const std::function<bool()>& condition, double deadline_s) {
 bool is_running(pid_t pid) {
   const std::string stat = read_text(fmt::format("/proc/{}/stat", pid));
   const size_t name_end = stat.rfind(')');
-  return name_end != std::string::npos && name_end + 2 < stat.size() && stat[name_end + 2] != 'Z' && stat[name_end + 2] != 'X';
+  return name_end != std::string::npos && name_end + 2 < stat.size() && stat[name_end + 2] != 'Z' &&
+         stat[name_end + 2] != 'X';
 }
 
-Program::Program(const std::string& name, std::vector<std::string> arguments, const std::string& prefix) : prefix_(prefix) {
+Program::Program(const std::string& name, std::vector<std::string> arguments, const std::string& prefix)
+    : prefix_(prefix) {
   arguments.insert(arguments.begin(), std::string(TELESPLAT_BIN) + "/" + name);
   std::vector<char*> argv;
   for (auto& a : arguments) argv.push_back(a.data());
@@ -111,11 +118,14 @@ Program::~Program() {
 }
 
 int Program::wait(double deadline_s) {
-  wait_until([&] {
-    int status = 0;
-    if (exit_code_ < 0 && waitpid(pid_, &status, WNOHANG) == pid_) exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    return exit_code_ >= 0;
-  }, deadline_s);
+  wait_until(
+      [&] {
+        int status = 0;
+        if (exit_code_ < 0 && waitpid(pid_, &status, WNOHANG) == pid_)
+          exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+        return exit_code_ >= 0;
+      },
+      deadline_s);
   return exit_code_;
 }
 
@@ -126,8 +136,9 @@ void Program::signal(int number) {
 PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh) : out_(folder_ / "run") {
   const std::string terrain = mesh.empty() ? folder_ / "terrain.ply" : mesh;
   if (mesh.empty()) write_terrain(terrain);
-  std::vector<std::string> a{"run",    terrain,       "--out",           out_,      "--cache",       folder_ / "cache", "--size",
-                             "480x300", "--sampling-size", "320x200", "--tile-size", "64",              "--sampler-threads", "1"};
+  std::vector<std::string> a{
+      "run",     terrain,           "--out",   out_,          "--cache", folder_ / "cache",   "--size",
+      "480x300", "--sampling-size", "320x200", "--tile-size", "64",      "--sampler-threads", "1"};
   a.insert(a.end(), arguments.begin(), arguments.end());
   program_ = std::make_unique<Program>("telesplat", a, folder_ / "telesplat");
 }
@@ -160,21 +171,33 @@ nlohmann::json PipelineRun::status() {
 }
 
 bool PipelineRun::wait_status(const std::function<bool(const nlohmann::json&)>& condition, double deadline_s) {
-  return wait_until([&] {
-    const auto s = status();
-    return s.is_object() && condition(s);
-  }, deadline_s);
+  return wait_until(
+      [&] {
+        const auto s = status();
+        return s.is_object() && condition(s);
+      },
+      deadline_s);
 }
 
 bool PipelineRun::wait_showing() {
-  return wait_status([](const auto& s) { return value(s, "viewer-1", "points") > 0 && value(s, "viewer-1", "frames") > 0; });
+  return wait_status(
+      [](const auto& s) { return value(s, "viewer-1", "points") > 0 && value(s, "viewer-1", "frames") > 0; });
+}
+
+int PipelineRun::stop() {
+  Program command("telesplat", {"ctl", "stop", "--master", master()}, folder_ / "stop");
+  return command.wait() == 0 ? program_->wait(60) : -1;
 }
 
 bool PipelineRun::all_gone(double deadline_s) {
-  return wait_until([&] { return running_with(folder_.path()).empty() && (master_.empty() || running_with(master_).empty()); }, deadline_s);
+  return wait_until(
+      [&] { return running_with(folder_.path()).empty() && (master_.empty() || running_with(master_).empty()); },
+      deadline_s);
 }
 
-nlohmann::json PipelineRun::summary() const { return nlohmann::json::parse(read_text(out_ + "/summary.json"), nullptr, false); }
+nlohmann::json PipelineRun::summary() const {
+  return nlohmann::json::parse(read_text(out_ + "/summary.json"), nullptr, false);
+}
 
 std::vector<double> PipelineRun::column(const std::string& file, const std::string& name) const {
   std::vector<double> out;

@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
-namespace telesplat::launcher { class ControlClient; }
+namespace telesplat::launcher {
+class ControlClient;
+}
 
 namespace telesplat::test {
 
@@ -75,6 +77,8 @@ class PipelineRun {
   bool wait_status(const std::function<bool(const nlohmann::json&)>& condition, double deadline_s = 40);
   /// Waits until the viewer shows points.
   bool wait_showing();
+  /// Commands the session to stop; the run's exit code.
+  int stop();
   /// Whether none of the processes that took part runs any more, within `deadline_s`.
   bool all_gone(double deadline_s = 20);
 
