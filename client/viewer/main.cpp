@@ -1,12 +1,14 @@
 // telesplat-viewer: shows a session's points from wherever the head is, and records what it showed.
 #include <unistd.h>
 
-#include "common/net/service_main.h"
 #include "client/viewer/viewer_service.h"
+#include "common/net/service_main.h"
 
 int main(int argc, char** argv) {
   using namespace telesplat;
   viewer::ViewerOptions options;
   options.service.name = "viewer-" + std::to_string(getpid());
-  return net::service_main(argc, argv, "telesplat-viewer: headless viewer; caches points, splats them at display rate, records frames", options, viewer::add_flags, viewer::run);
+  return net::service_main(
+      argc, argv, "telesplat-viewer: headless viewer; caches points, splats them at display rate, records frames",
+      options, viewer::add_flags, viewer::run);
 }

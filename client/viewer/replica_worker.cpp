@@ -23,9 +23,15 @@ wire::Hello make_hello(const ReplicaWorker::Options& o) {
 
 }  // namespace
 
-ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, ModelCache& cache, metrics::TableRecorder& frames, metrics::SpanRecorder& spans)
-    : context_(context), options_(options), cache_(cache), frames_(frames), spans_(spans),
-      updates_table_("updates", {"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles", "samples", "points", "bytes", "eliminated"}),
+ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, ModelCache& cache,
+                             metrics::TableRecorder& frames, metrics::SpanRecorder& spans)
+    : context_(context),
+      options_(options),
+      cache_(cache),
+      frames_(frames),
+      spans_(spans),
+      updates_table_("updates", {"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms",
+                                 "start_up_ms", "tiles", "samples", "points", "bytes", "eliminated"}),
       link_(context, options.service.master, make_hello(options)),
       sequencer_({[this](const ModelEvent& e) { apply(e); },
                   [this] {
@@ -54,7 +60,8 @@ void ReplicaWorker::on_first_points(double now_s) {
   if (first_points_s_ == 0) first_points_s_ = now_s - started_s_;
 }
 
-void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, const std::vector<points::ClusterKey>& seen) {
+void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera,
+                             const std::vector<points::ClusterKey>& seen) {
   on_pose(now_s, camera);
   ++frames_shown_;
   const std::lock_guard lock(mutex_);
@@ -97,13 +104,17 @@ void ReplicaWorker::connect_if_changed() {
   seen_version_ = link_.version();
   const auto& session = *link_.session();
   offset_s_ = link_.to_master_s(0);
-  const auto endpoint = [&](const char* key) { const auto it = session.endpoints.find(key); return it == session.endpoints.end() ? std::string() : it->second; };
+  const auto endpoint = [&](const char* key) {
+    const auto it = session.endpoints.find(key);
+    return it == session.endpoints.end() ? std::string() : it->second;
+  };
   const std::string patches = endpoint("patches"), state = endpoint("state");
   if (patches.empty() || state.empty() || session.box_room.empty()) return;
   if (patches == patches_endpoint_ && state == state_endpoint_) return;
   patches_endpoint_ = patches;
   state_endpoint_ = state;
-  const net::SocketOptions bulk{.high_water_mark = 4096, .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes};
+  const net::SocketOptions bulk{.high_water_mark = 4096,
+                                .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes};
   patches_.emplace(context_, net::Kind::kSub, options_.service.name + ":patches", bulk);
   state_.emplace(context_, net::Kind::kDealer, options_.service.name + ":state", bulk);
   for (const auto& [socket, address] : {std::pair{&*patches_, patches}, std::pair{&*state_, state}})
@@ -123,8 +134,10 @@ void ReplicaWorker::receive_events() {
     const auto message = patches_->receive();
     if (!message) return;
     net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(*patches_, *message, [&](auto& m) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>) sequencer_.on_mark(m);
-      else sequencer_.on_published({m, message->owner});
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
+        sequencer_.on_mark(m);
+      else
+        sequencer_.on_published({m, message->owner});
     });
   }
 }
@@ -136,19 +149,26 @@ void ReplicaWorker::receive_answers() {
     if (!message) return;
     asked_s_ = monotonic_s();  // an answer that is coming in is not late
     net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(*state_, *message, [&](auto& m) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>) sequencer_.on_mark(m);
-      else sequencer_.on_replayed({m, message->owner});
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
+        sequencer_.on_mark(m);
+      else
+        sequencer_.on_replayed({m, message->owner});
     });
   }
 }
 
 void ReplicaWorker::apply(const ModelEvent& event) {
-  std::visit([this](const auto& e) {
-    using E = std::decay_t<decltype(e)>;
-    if constexpr (std::is_same_v<E, wire::Patch>) apply_patch(e);
-    else if constexpr (std::is_same_v<E, wire::Forget>) cache_.forget(e.clusters);
-    else cache_.clear();
-  }, event.body);
+  std::visit(
+      [this](const auto& e) {
+        using E = std::decay_t<decltype(e)>;
+        if constexpr (std::is_same_v<E, wire::Patch>)
+          apply_patch(e);
+        else if constexpr (std::is_same_v<E, wire::Forget>)
+          cache_.forget(e.clusters);
+        else
+          cache_.clear();
+      },
+      event.body);
 }
 
 void ReplicaWorker::apply_patch(const wire::Patch& patch) {
@@ -170,8 +190,9 @@ void ReplicaWorker::apply_patch(const wire::Patch& patch) {
 
   if (const auto u = requester_.on_applied(patch, to_master_s(inserted))) {
     updates_table_.add({double(u->request.value), double(patch.frame.value), u->requested_s, u->first_s, u->complete_s,
-                        (u->complete_s - u->requested_s) * 1e3, (u->first_s - u->requested_s) * 1e3, double(u->tiles), double(u->samples),
-                        double(u->points), double(u->bytes), u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0});
+                        (u->complete_s - u->requested_s) * 1e3, (u->first_s - u->requested_s) * 1e3, double(u->tiles),
+                        double(u->samples), double(u->points), double(u->bytes),
+                        u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0});
     spans_.add("view update", u->requested_s, u->complete_s, 2);
     const std::lock_guard lock(mutex_);
     last_update_ = {u->requested_s, u->camera.pose, patch.sequence.value};
@@ -193,7 +214,8 @@ void ReplicaWorker::request_view(double now_s) {
 void ReplicaWorker::report(double now_s, bool last) {
   if (!last && now_s - last_report_s_ < kReportPeriod_s) return;
   last_report_s_ = now_s;
-  for (const auto& rows : {frames_.flush(link_.instance()), updates_table_.flush(link_.instance()), spans_.flush(link_.instance())})
+  for (const auto& rows :
+       {frames_.flush(link_.instance()), updates_table_.flush(link_.instance()), spans_.flush(link_.instance())})
     if (rows) link_.socket().send(*rows);
   std::vector<points::ClusterKey> seen;
   {
@@ -208,11 +230,19 @@ void ReplicaWorker::report(double now_s, bool last) {
 
 net::MasterLink::Values ReplicaWorker::status() const {
   const auto figures = cache_.figures();
-  return {{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"points", double(figures.points)},
-          {"model_bytes", double(figures.bytes)}, {"points_received", double(points_received_)}, {"bytes_received", double(bytes_received_)},
-          {"gaps_resynced", double(sequencer_.gaps())}, {"updates", double(updates_)}, {"frames", double(frames_shown_)}, {"first_points_s", first_points_s_},
+  return {{"rss_mb", net::resident_mb()},
+          {"peak_rss_mb", net::peak_resident_mb()},
+          {"points", double(figures.points)},
+          {"model_bytes", double(figures.bytes)},
+          {"points_received", double(points_received_)},
+          {"bytes_received", double(bytes_received_)},
+          {"gaps_resynced", double(sequencer_.gaps())},
+          {"updates", double(updates_)},
+          {"frames", double(frames_shown_)},
+          {"first_points_s", first_points_s_},
           {"sequence", double(sequencer_.applied().value)},
-          {"messages_rejected", double((patches_ ? patches_->rejected() : 0) + (state_ ? state_->rejected() : 0) + decode_errors_)}};
+          {"messages_rejected",
+           double((patches_ ? patches_->rejected() : 0) + (state_ ? state_->rejected() : 0) + decode_errors_)}};
 }
 
 }  // namespace telesplat::viewer

@@ -21,11 +21,12 @@ class ReplicaWorker {
     net::ServiceOptions service;
     RequestOptions requests;
     std::map<std::string, std::string> facts;  ///< for the hello
-    double started_s = 0;  ///< when the session was started, on the monotonic clock; 0: now
+    double started_s = 0;                      ///< when the session was started, on the monotonic clock; 0: now
   };
 
   /// Starts the thread.
-  ReplicaWorker(net::Context& context, const Options& options, ModelCache& cache, metrics::TableRecorder& frames, metrics::SpanRecorder& spans);
+  ReplicaWorker(net::Context& context, const Options& options, ModelCache& cache, metrics::TableRecorder& frames,
+                metrics::SpanRecorder& spans);
   /// Stops it, after a last flush of metrics and a goodbye.
   ~ReplicaWorker();
 
@@ -41,7 +42,11 @@ class ReplicaWorker {
   bool shutdown_requested() const { return shutdown_; }
   double to_master_s(double local_s) const { return local_s + offset_s_; }
 
-  struct LastUpdate { double requested_s = 0; geometry::Pose pose; uint64_t sequence = 0; };
+  struct LastUpdate {
+    double requested_s = 0;
+    geometry::Pose pose;
+    uint64_t sequence = 0;
+  };
   LastUpdate last_update() const;
 
  private:

@@ -34,7 +34,8 @@ Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag
   const auto first = std::from_chars(text.data(), end, w);
   const bool cross = first.ec == std::errc() && first.ptr != end && *first.ptr == 'x';
   const auto second = cross ? std::from_chars(first.ptr + 1, end, h) : first;
-  if (!cross || second.ec != std::errc() || second.ptr != end || w < 16 || h < 16 || w > geometry::kMaxImageSide || h > geometry::kMaxImageSide)
+  if (!cross || second.ec != std::errc() || second.ptr != end || w < 16 || h < 16 || w > geometry::kMaxImageSide ||
+      h > geometry::kMaxImageSide)
     return Error{fmt::format("{} {}: not WIDTHxHEIGHT with both in 16..{}", flag, text, geometry::kMaxImageSide)};
   return std::pair{w, h};
 }
@@ -43,28 +44,53 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   auto& d = o.display;
   app.add_option("--size", o.size, "display size in pixels, WxH")->capture_default_str();
   app.add_option("--sampling-size", o.sampling_size, "sampling size in pixels, WxH")->capture_default_str();
-  app.add_option("--trajectory", o.trajectory, "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)")->capture_default_str();
-  app.add_option("--duration", d.duration_s, "seconds from the first displayed frame; 0: until stopped")->capture_default_str()->check(CLI::Range(0.0, 1e6));
+  app.add_option("--trajectory", o.trajectory, "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)")
+      ->capture_default_str();
+  app.add_option("--duration", d.duration_s, "seconds from the first displayed frame; 0: until stopped")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e6));
   app.add_option("--frames", d.frames, "frames to display; 0: no limit")->capture_default_str();
-  app.add_option("--hold", d.hold_s, "the head stands still for the last so many seconds")->capture_default_str()->check(CLI::Range(0.0, 1e6));
-  app.add_option("--fov", d.fov_deg, "horizontal field of view, degrees")->capture_default_str()->check(CLI::Range(1.0, 170.0));
+  app.add_option("--hold", d.hold_s, "the head stands still for the last so many seconds")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e6));
+  app.add_option("--fov", d.fov_deg, "horizontal field of view, degrees")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 170.0));
   app.add_option("--near", d.near_m, "nearest depth seen, metres")->capture_default_str()->check(CLI::Range(1e-5, 1e3));
-  app.add_option("--target-fps", d.target_fps, "display rate aimed at; 0: as fast as possible")->capture_default_str()->check(CLI::Range(0.0, 1000.0));
-  app.add_option("--renderer", o.renderer, "auto, cpu or gl")->capture_default_str()->check(CLI::IsMember({"auto", "cpu", "gl"}));
-  app.add_option("--splat", o.splat, "kernel: square or disc")->capture_default_str()->check(CLI::IsMember({"square", "disc"}));
-  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")->capture_default_str()->check(CLI::Range(0.0, 10.0));
-  app.add_option("--coupling", o.coupling, "async: the display never waits for the server")->capture_default_str()->check(CLI::IsMember({"async"}));
-  app.add_option("--update-rate", o.requests.max_rate_hz, "view requests a second at most")->capture_default_str()->check(CLI::Range(0.1, 1000.0));
-  app.add_option("--record-every", d.picture_every, "record every N-th frame as a PNG; 0: one every 2.5 s and the last")->capture_default_str();
+  app.add_option("--target-fps", d.target_fps, "display rate aimed at; 0: as fast as possible")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+  app.add_option("--renderer", o.renderer, "auto, cpu or gl")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "cpu", "gl"}));
+  app.add_option("--splat", o.splat, "kernel: square or disc")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"square", "disc"}));
+  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 10.0));
+  app.add_option("--coupling", o.coupling, "async: the display never waits for the server")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"async"}));
+  app.add_option("--update-rate", o.requests.max_rate_hz, "view requests a second at most")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1000.0));
+  app.add_option("--record-every", d.picture_every, "record every N-th frame as a PNG; 0: one every 2.5 s and the last")
+      ->capture_default_str();
   app.add_flag("--exr", d.exr, "record pictures as EXR with depth too");
-  app.add_option("--verify", d.verify_every, "compare every N-th frame with direct rendering after the run; 0: none")->capture_default_str();
+  app.add_option("--verify", d.verify_every, "compare every N-th frame with direct rendering after the run; 0: none")
+      ->capture_default_str();
 }
 
 void add_flags(CLI::App& app, ViewerOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kConnects);
   add_view_flags(app, o);
-  app.add_option("--threads", o.threads, "threads to draw with; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
-  app.add_option("--started-at", o.started_s, "monotonic clock when the session was started, for start-up times; 0: now")->capture_default_str();
+  app.add_option("--threads", o.threads, "threads to draw with; 0: one a core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--started-at", o.started_s,
+                 "monotonic clock when the session was started, for start-up times; 0: now")
+      ->capture_default_str();
   app.add_option("--out", o.out, "run folder for pictures and frames to verify");
 }
 
@@ -98,13 +124,20 @@ int run(ViewerOptions o) {
   ModelCache cache;
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
-  ReplicaWorker::Options worker_options{o.service, o.requests,
-                                        {{"coupling", o.coupling}, {"buffers", "0"}, {"renderer", (*renderer)->name()}, {"splat", o.splat},
-                                         {"width", std::to_string(o.display.width)}, {"height", std::to_string(o.display.height)},
+  ReplicaWorker::Options worker_options{o.service,
+                                        o.requests,
+                                        {{"coupling", o.coupling},
+                                         {"buffers", "0"},
+                                         {"renderer", (*renderer)->name()},
+                                         {"splat", o.splat},
+                                         {"width", std::to_string(o.display.width)},
+                                         {"height", std::to_string(o.display.height)},
                                          {"sampling_width", std::to_string(o.requests.sampling_width)},
                                          {"sampling_height", std::to_string(o.requests.sampling_height)},
-                                         {"trajectory", o.trajectory}, {"fov_deg", fmt::format("{}", o.display.fov_deg)},
-                                         {"target_fps", fmt::format("{}", o.display.target_fps)}, {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
+                                         {"trajectory", o.trajectory},
+                                         {"fov_deg", fmt::format("{}", o.display.fov_deg)},
+                                         {"target_fps", fmt::format("{}", o.display.target_fps)},
+                                         {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
                                          {"splat_scale", fmt::format("{}", o.display.selection.scale)}},
                                         o.started_s};
   DisplayResult result;

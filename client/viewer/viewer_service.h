@@ -10,12 +10,12 @@ struct ViewerOptions {
   DisplayOptions display;
   RequestOptions requests;
   std::string size = "1280x800", sampling_size = "1280x800";  ///< pixels, WxH
-  std::string trajectory = "orbit";  ///< "orbit", "still" or a CSV file
+  std::string trajectory = "orbit";                           ///< "orbit", "still" or a CSV file
   std::string renderer = "auto", splat = "disc", coupling = "async";
-  double splat_scale = 0;            ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
+  double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
-  double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
-  std::string out;                   ///< run folder; empty: nothing is recorded
+  double started_s = 0;  ///< when the session was started (monotonic clock), for start-up times; 0: now
+  std::string out;       ///< run folder; empty: nothing is recorded
 };
 
 /// Flags that `telesplat run` has too: size, trajectory, renderer and the like.

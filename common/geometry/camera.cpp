@@ -41,9 +41,12 @@ Status validate(const Camera& c) {
     if (std::abs(v) > 1e6) return Error{fmt::format("camera position {} m is farther than 1e6 m from the origin", v)};
   if (std::abs(glm::length(q) - 1.0) > 0.01)
     return Error{fmt::format("camera orientation has length {} instead of 1", glm::length(q))};
-  if (!(c.right - c.left > 1e-6) || !(c.top - c.bottom > 1e-6) || c.right > 1e3 || c.left < -1e3 || c.top > 1e3 || c.bottom < -1e3)
-    return Error{fmt::format("camera frustum [{}, {}] x [{}, {}] is empty or beyond 1000", c.left, c.right, c.bottom, c.top)};
-  if (!(c.near_m >= 1e-6 && c.near_m <= 1e6)) return Error{fmt::format("camera near {} m is outside [1e-6, 1e6]", c.near_m)};
+  if (!(c.right - c.left > 1e-6) || !(c.top - c.bottom > 1e-6) || c.right > 1e3 || c.left < -1e3 || c.top > 1e3 ||
+      c.bottom < -1e3)
+    return Error{
+        fmt::format("camera frustum [{}, {}] x [{}, {}] is empty or beyond 1000", c.left, c.right, c.bottom, c.top)};
+  if (!(c.near_m >= 1e-6 && c.near_m <= 1e6))
+    return Error{fmt::format("camera near {} m is outside [1e-6, 1e6]", c.near_m)};
   if (c.width < 1 || c.height < 1 || c.width > kMaxImageSide || c.height > kMaxImageSide)
     return Error{fmt::format("camera size {}x{} is outside 1..{}", c.width, c.height, kMaxImageSide)};
   return ok_status();

@@ -49,7 +49,9 @@ struct Camera {
 
   /// Room space -> homogeneous pixels: (x_pix * w, y_pix * w, w) with w = depth; pixel centres lie at +0.5.
   /// Rows, not columns: result[i] . (X, Y, Z, 1).
-  struct PixelTransform { glm::dvec4 x, y, w; };
+  struct PixelTransform {
+    glm::dvec4 x, y, w;
+  };
   PixelTransform room_to_pixel() const;
 
   /// Room-space point at depth `depth_m` on the ray through continuous pixel position (x_pix, y_pix).

@@ -40,7 +40,8 @@ Result<Trajectory> Trajectory::read_csv(const std::string& path) {
   for (int number = 2; std::getline(in, line); ++number) {
     if (line.empty() || line == "\r") continue;
     double v[8];
-    if (!parse_row(line, v)) return Error{fmt::format("{}:{}: not eight finite numbers separated by commas", path, number)};
+    if (!parse_row(line, v))
+      return Error{fmt::format("{}:{}: not eight finite numbers separated by commas", path, number)};
     const glm::dquat q(v[4], v[5], v[6], v[7]);
     if (std::abs(glm::length(q) - 1.0) > 0.05)
       return Error{fmt::format("{}:{}: quaternion has length {:.3f} instead of 1", path, number, glm::length(q))};
@@ -70,11 +71,13 @@ Trajectory Trajectory::still(const Pose& pose) {
 Pose Trajectory::at(double t_s) const {
   if (samples_.empty()) {
     const double angle = t_s / orbit_period_s_ * 2.0 * 3.14159265358979323846;
-    return look_at({orbit_radius_m_ * std::sin(angle), orbit_height_m_, orbit_radius_m_ * std::cos(angle)}, glm::dvec3(0));
+    return look_at({orbit_radius_m_ * std::sin(angle), orbit_height_m_, orbit_radius_m_ * std::cos(angle)},
+                   glm::dvec3(0));
   }
   // Sample times count from the first one.
   const double t = t_s + samples_.front().t_s;
-  const auto after = std::upper_bound(samples_.begin(), samples_.end(), t, [](double v, const Sample& s) { return v < s.t_s; });
+  const auto after =
+      std::upper_bound(samples_.begin(), samples_.end(), t, [](double v, const Sample& s) { return v < s.t_s; });
   if (after == samples_.begin()) return samples_.front().pose;
   if (after == samples_.end()) return samples_.back().pose;
   const Sample &a = *(after - 1), &b = *after;

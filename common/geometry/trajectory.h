@@ -26,7 +26,10 @@ class Trajectory {
   double duration_s() const;
 
  private:
-  struct Sample { double t_s; Pose pose; };
+  struct Sample {
+    double t_s;
+    Pose pose;
+  };
   std::vector<Sample> samples_;
   double orbit_radius_m_ = 0, orbit_height_m_ = 0, orbit_period_s_ = 0;
 };

@@ -45,8 +45,9 @@ Result<std::unique_ptr<EglContext>> EglContext::make_on(EGLDisplay display) {
   EGLConfig config = nullptr;
   EGLint found = 0;
   if (!eglChooseConfig(display, kConfig, &config, 1, &found) || found == 0) return egl_error("eglChooseConfig");
-  constexpr EGLint kVersion[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                 EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+  constexpr EGLint kVersion[] = {
+      EGL_CONTEXT_MAJOR_VERSION,           4,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+      EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
   const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, kVersion);
   if (context == EGL_NO_CONTEXT) return egl_error("eglCreateContext for OpenGL 4.3 core");
   std::unique_ptr<EglContext> made(new EglContext(display, context));
@@ -78,9 +79,11 @@ Result<std::unique_ptr<EglContext>> EglContext::make() {
     if (count == 0) tried = "no EGL devices";
   }
   if (epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless"))
-    if (auto made = attempt("Mesa surfaceless", eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr)))
+    if (auto made = attempt("Mesa surfaceless",
+                            eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr)))
       return made;
-  return Error{fmt::format("no off-screen OpenGL 4.3 context: {}", tried.empty() ? "EGL has neither devices nor a surfaceless platform" : tried)};
+  return Error{fmt::format("no off-screen OpenGL 4.3 context: {}",
+                           tried.empty() ? "EGL has neither devices nor a surfaceless platform" : tried)};
 }
 
 }  // namespace telesplat::gl

@@ -70,7 +70,8 @@ Status write_png(const std::string& path, const View& view) {
   for (size_t i = 0; i < view.colour.size(); ++i)
     for (int c = 0; c < 3; ++c) rgb[3 * i + c] = static_cast<uint8_t>(view.colour[i] >> (16 - 8 * c));
   OIIO::ImageSpec spec(view.width, view.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("png:compressionLevel", 2);  // recorded while the viewer runs: 117 ms instead of 255 at level 6 (2560x1600), 16 % larger
+  spec.attribute("png:compressionLevel",
+                 2);  // recorded while the viewer runs: 117 ms instead of 255 at level 6 (2560x1600), 16 % larger
   return write_whole(path, "png", spec, OIIO::TypeDesc::UINT8, rgb.data());
 }
 
@@ -111,10 +112,10 @@ Result<View> read_view(const std::string& path) {
   std::vector<float> rows(size_t(step) * spec.width * spec.nchannels);
   for (int y = 0; y < spec.height; y += step) {
     const int y0 = spec.y + y, y1 = spec.y + std::min(y + step, spec.height);
-    const bool good = spec.tile_width > 0
-                          ? input->read_tiles(0, 0, spec.x, spec.x + spec.width, y0, y1, 0, 1, 0, spec.nchannels,
-                                              OIIO::TypeDesc::FLOAT, rows.data())
-                          : input->read_scanlines(0, 0, y0, y1, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, rows.data());
+    const bool good = spec.tile_width > 0 ? input->read_tiles(0, 0, spec.x, spec.x + spec.width, y0, y1, 0, 1, 0,
+                                                              spec.nchannels, OIIO::TypeDesc::FLOAT, rows.data())
+                                          : input->read_scanlines(0, 0, y0, y1, 0, 0, spec.nchannels,
+                                                                  OIIO::TypeDesc::FLOAT, rows.data());
     if (!good) return Error{fmt::format("cannot read row {} of picture {}: {}", y, path, input->geterror())};
     const size_t pixels = size_t(y1 - y0) * spec.width;
     for (size_t i = 0; i < pixels; ++i) {

@@ -29,7 +29,8 @@ inline glm::vec3 from_octahedron(float x, float y) {
 }
 
 inline uint32_t quantise(float v, uint32_t levels) {  // [-1, 1] -> 0..levels
-  return static_cast<uint32_t>(std::clamp((v * 0.5f + 0.5f) * static_cast<float>(levels) + 0.5f, 0.0f, static_cast<float>(levels)));
+  return static_cast<uint32_t>(
+      std::clamp((v * 0.5f + 0.5f) * static_cast<float>(levels) + 0.5f, 0.0f, static_cast<float>(levels)));
 }
 
 }  // namespace detail

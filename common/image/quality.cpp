@@ -30,7 +30,8 @@ struct Sums {
 
 std::array<float, 2 * kRadius + 1> gaussian() {
   std::array<float, 2 * kRadius + 1> w{};
-  for (int i = -kRadius; i <= kRadius; ++i) w[i + kRadius] = static_cast<float>(std::exp(-i * i / (2 * kSigma * kSigma)));
+  for (int i = -kRadius; i <= kRadius; ++i)
+    w[i + kRadius] = static_cast<float>(std::exp(-i * i / (2 * kSigma * kSigma)));
   return w;
 }
 
@@ -113,7 +114,8 @@ Quality compare(const View& reference, const View& reconstruction) {
 
   std::vector<float> x(pixels), y(pixels);
   tbb::parallel_for(tbb::blocked_range<size_t>(0, pixels, 65536), [&](const tbb::blocked_range<size_t>& range) {
-    for (size_t i = range.begin(); i < range.end(); ++i) x[i] = luma(reference.colour[i]), y[i] = luma(reconstruction.colour[i]);
+    for (size_t i = range.begin(); i < range.end(); ++i)
+      x[i] = luma(reference.colour[i]), y[i] = luma(reconstruction.colour[i]);
   });
 
   const auto w = gaussian();
@@ -122,7 +124,9 @@ Quality compare(const View& reference, const View& reconstruction) {
     RowMoments moments(width);
     for (int row = range.begin(); row < range.end(); ++row) {
       const size_t at = size_t(row) * width;
-      const auto in_union = [&](int i) { return shows(reference.depth_m[at + i]) || shows(reconstruction.depth_m[at + i]); };
+      const auto in_union = [&](int i) {
+        return shows(reference.depth_m[at + i]) || shows(reconstruction.depth_m[at + i]);
+      };
       int first = 0;
       while (first < width && !in_union(first)) ++first;
       if (first == width) continue;  // background only

@@ -13,7 +13,8 @@ namespace telesplat::metrics {
 /// Rows of numbers with fixed columns (docs/metrics.md).
 class TableRecorder {
  public:
-  TableRecorder(std::string table, std::vector<std::string> columns) : table_(std::move(table)), columns_(std::move(columns)) {}
+  TableRecorder(std::string table, std::vector<std::string> columns)
+      : table_(std::move(table)), columns_(std::move(columns)) {}
   /// Precondition: row has one value a column.
   void add(std::initializer_list<double> row);
   /// The rows since the last call, if any.

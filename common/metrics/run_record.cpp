@@ -34,12 +34,16 @@ Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory)
   const auto open_file = [&](const std::string& name) { return std::fopen((directory + "/" + name).c_str(), "w"); };
   for (const char* table : {"frames", "updates"}) {
     out->tables_[table].file = open_file(std::string(table) + ".csv");
-    if (!out->tables_[table].file) return Error{fmt::format("{}: cannot write into it: {}", directory, std::strerror(errno))};
+    if (!out->tables_[table].file)
+      return Error{fmt::format("{}: cannot write into it: {}", directory, std::strerror(errno))};
   }
   out->tiles_file_ = open_file("tiles.csv");
   out->trace_file_ = open_file("trace.json");
-  if (!out->tiles_file_ || !out->trace_file_) return Error{fmt::format("{}: cannot write into it: {}", directory, std::strerror(errno))};
-  write_text(out->tiles_file_, "frame,tile,lease,sampler,samples,kept,bytes_sampled,bytes_sent,leased_s,sample_begin_s,sample_end_s,encode_end_s,receive_s,packed_s\n");
+  if (!out->tiles_file_ || !out->trace_file_)
+    return Error{fmt::format("{}: cannot write into it: {}", directory, std::strerror(errno))};
+  write_text(out->tiles_file_,
+             "frame,tile,lease,sampler,samples,kept,bytes_sampled,bytes_sent,leased_s,sample_begin_s,sample_end_s,"
+             "encode_end_s,receive_s,packed_s\n");
   write_text(out->trace_file_, "[\n");
   return out;
 }
@@ -56,7 +60,8 @@ RunRecord::~RunRecord() {
 
 Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows) {
   if (rows.table == "spans") {
-    if (rows.values.size() % 4) return Error{fmt::format("spans hold {} values, not a multiple of 4", rows.values.size())};
+    if (rows.values.size() % 4)
+      return Error{fmt::format("spans hold {} values, not a multiple of 4", rows.values.size())};
     write_spans(process, rows);
     return ok_status();
   }
@@ -68,15 +73,18 @@ Status RunRecord::write_row_table(const std::string& process, const wire::Metric
   Table& table = tables_[rows.table];
   const size_t width = rows.columns.size();
   if (width == 0 || rows.values.size() % width)
-    return Error{fmt::format("table {}: {} values do not fill rows of {} columns", rows.table, rows.values.size(), width)};
+    return Error{
+        fmt::format("table {}: {} values do not fill rows of {} columns", rows.table, rows.values.size(), width)};
   if (table.columns.empty()) {
     table.columns = rows.columns;
     std::string header = "viewer";
     for (const auto& c : table.columns) header += "," + c;
     write_text(table.file, header + "\n");
   }
-  if (table.columns != rows.columns) return Error{fmt::format("table {}: columns differ from those of its first rows", rows.table)};
-  if (table.values.size() + rows.values.size() > kMaxRows) return Error{fmt::format("table {}: more than {} values", rows.table, kMaxRows)};
+  if (table.columns != rows.columns)
+    return Error{fmt::format("table {}: columns differ from those of its first rows", rows.table)};
+  if (table.values.size() + rows.values.size() > kMaxRows)
+    return Error{fmt::format("table {}: more than {} values", rows.table, kMaxRows)};
   for (size_t i = 0; i < rows.values.size(); i += width) {
     std::string line = process;
     for (size_t c = 0; c < width; ++c) line += "," + shortest(rows.values[i + c]);
@@ -97,16 +105,21 @@ void RunRecord::write_spans(const Process& process, const wire::MetricRows& rows
   for (size_t i = 0; i + 3 < rows.values.size(); i += 4) {
     const double name = rows.values[i];
     if (!(name >= 0 && name < double(rows.columns.size()))) continue;
-    event({{"ph", "X"}, {"name", rows.columns[size_t(name)]}, {"pid", process.pid}, {"tid", int(rows.values[i + 3])},
-           {"ts", std::round(rows.values[i + 1] * 1e6)}, {"dur", std::round((rows.values[i + 2] - rows.values[i + 1]) * 1e6)}});
+    event({{"ph", "X"},
+           {"name", rows.columns[size_t(name)]},
+           {"pid", process.pid},
+           {"tid", int(rows.values[i + 3])},
+           {"ts", std::round(rows.values[i + 1] * 1e6)},
+           {"dur", std::round((rows.values[i + 2] - rows.values[i + 1]) * 1e6)}});
   }
 }
 
 void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& t) {
   tiles_.push_back(t);
-  write_text(tiles_file_, fmt::format("{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", t.frame.value, t.tile,
-                                      t.lease.value, sampler, t.samples, t.kept, t.bytes_sampled, t.bytes_sent, t.leased_s,
-                                      t.sample_begin_s, t.sample_end_s, t.encode_end_s, t.receive_s, t.packed_s));
+  write_text(tiles_file_,
+             fmt::format("{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", t.frame.value, t.tile,
+                         t.lease.value, sampler, t.samples, t.kept, t.bytes_sampled, t.bytes_sent, t.leased_s,
+                         t.sample_begin_s, t.sample_end_s, t.encode_end_s, t.receive_s, t.packed_s));
 }
 
 std::vector<double> RunRecord::column(const std::string& table, const std::string& name) const {
@@ -116,13 +129,18 @@ std::vector<double> RunRecord::column(const std::string& table, const std::strin
   const auto& columns = it->second.columns;
   const auto c = std::find(columns.begin(), columns.end(), name);
   if (c == columns.end()) return out;
-  for (size_t i = size_t(c - columns.begin()); i < it->second.values.size(); i += columns.size()) out.push_back(it->second.values[i]);
+  for (size_t i = size_t(c - columns.begin()); i < it->second.values.size(); i += columns.size())
+    out.push_back(it->second.values[i]);
   return out;
 }
 
-nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes, const std::map<std::string, double>& counters) const {
+nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
+                                          const std::map<std::string, double>& counters) const {
   using nlohmann::ordered_json;
-  const auto count_of = [&](const std::string& role) { return std::count_if(processes.begin(), processes.end(), [&](const Process& p) { return p.role == role && !p.replaced; }); };
+  const auto count_of = [&](const std::string& role) {
+    return std::count_if(processes.begin(), processes.end(),
+                         [&](const Process& p) { return p.role == role && !p.replaced; });
+  };
   const auto fact = [&](const std::string& role, const std::string& key) -> std::string {
     for (const Process& p : processes)
       if (const auto it = p.facts.find(key); p.role == role && !p.replaced && it != p.facts.end()) return it->second;
@@ -135,7 +153,8 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
   const auto sum_status = [&](const std::string& role, const std::string& key) {
     double sum = 0;
     for (const Process& p : processes)
-      if (const auto it = p.values.find(key); (role.empty() || p.role == role) && it != p.values.end()) sum += it->second;
+      if (const auto it = p.values.find(key); (role.empty() || p.role == role) && it != p.values.end())
+        sum += it->second;
     return sum;
   };
   // What is held now is held by the living; what was counted adds up over all lives.
@@ -145,10 +164,15 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       if (const auto it = p.values.find(key); p.role == role && !p.replaced && it != p.values.end()) sum += it->second;
     return sum;
   };
-  const auto counter = [&](const std::string& key) { const auto it = counters.find(key); return it == counters.end() ? 0.0 : it->second; };
+  const auto counter = [&](const std::string& key) {
+    const auto it = counters.find(key);
+    return it == counters.end() ? 0.0 : it->second;
+  };
 
   // Per frame: sampling from the first tile's begin to the last one's end; packing is the sum over its tiles.
-  struct FrameTimes { double begin = 1e300, end = 0, packing_s = 0; };
+  struct FrameTimes {
+    double begin = 1e300, end = 0, packing_s = 0;
+  };
   std::map<uint64_t, FrameTimes> frames;
   double bytes_raw = 0, bytes_sent = 0, samples = 0, kept = 0;
   for (const auto& t : tiles_) {
@@ -170,62 +194,66 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
   const auto times = column("frames", "t_s");
   auto delays = column("frames", "inter_frame_ms");
   std::erase_if(delays, [](double d) { return d <= 0; });  // the first frame of a viewer has none
-  const double span_s = times.empty() ? 0 : *std::max_element(times.begin(), times.end()) - *std::min_element(times.begin(), times.end());
+  const double span_s =
+      times.empty() ? 0 : *std::max_element(times.begin(), times.end()) - *std::min_element(times.begin(), times.end());
   const double viewers = std::max<double>(1, double(count_of("viewer")));
   const double run_s = std::max(span_s, 1e-9);
 
   ordered_json rss = ordered_json::object();
   for (const char* role : {"master", "data", "packer"})
     for (const Process& p : processes)
-      if (const auto it = p.values.find("peak_rss_mb"); p.role == role && it != p.values.end()) rss[role] = std::round(it->second * 10) / 10;
+      if (const auto it = p.values.find("peak_rss_mb"); p.role == role && it != p.values.end())
+        rss[role] = std::round(it->second * 10) / 10;
   for (const char* role : {"sampler", "viewer"}) {
     rss[role] = ordered_json::array();
     for (const Process& p : processes)
-      if (const auto it = p.values.find("peak_rss_mb"); p.role == role && it != p.values.end()) rss[role].push_back(std::round(it->second * 10) / 10);
+      if (const auto it = p.values.find("peak_rss_mb"); p.role == role && it != p.values.end())
+        rss[role].push_back(std::round(it->second * 10) / 10);
   }
   const double points = sum_present("packer", "points");
-  return {{"schema", 1},
-          {"scene", fact("data", "scene")},
-          {"kind", fact("data", "kind")},
-          {"primitives", uint64_t(number("data", "triangles"))},
-          {"samplers", count_of("sampler")},
-          {"viewers", count_of("viewer")},
-          {"coupling", fact("viewer", "coupling")},
-          {"buffers", uint64_t(number("viewer", "buffers"))},
-          {"renderer", fact("viewer", "renderer")},
-          {"splat", fact("viewer", "splat")},
-          {"size", {uint64_t(number("viewer", "width")), uint64_t(number("viewer", "height"))}},
-          {"sampling_size", {uint64_t(number("viewer", "sampling_width")), uint64_t(number("viewer", "sampling_height"))}},
-          {"frames", times.size()},
-          {"updates", column("updates", "latency_ms").size()},
-          {"duration_s", std::round(span_s * 1000) / 1000},
-          {"fps", std::round(double(times.size()) / viewers / run_s * 100) / 100},
-          {"updates_per_s", std::round(double(column("updates", "latency_ms").size()) / viewers / run_s * 100) / 100},
-          {"inter_frame_delay_ms", to_json(distribution(delays))},
-          {"view_construction_ms", to_json(distribution(column("frames", "construction_ms")))},
-          {"view_update_latency_ms", to_json(distribution(column("updates", "latency_ms")))},
-          {"start_up_latency_ms", to_json(distribution(column("updates", "start_up_ms")))},
-          {"sampling_ms", to_json(distribution(sampling_ms))},
-          {"packing_ms", to_json(distribution(packing_ms))},
-          {"data_generating_rate_mb_s", bytes_raw / 1e6 / run_s},
-          {"data_transfer_rate_mb_s", bytes_sent / 1e6 / run_s},
-          {"data_consuming_rate_mb_s", sum_status("viewer", "points_received") * 12 / 1e6 / viewers / run_s},
-          {"bytes_raw", uint64_t(bytes_raw)},
-          {"bytes_sent", uint64_t(bytes_sent)},
-          {"compression_ratio", bytes_sent > 0 ? bytes_raw / bytes_sent : 0.0},
-          {"redundancy_eliminated", samples > 0 ? 1 - kept / samples : 0.0},
-          {"points_cached", uint64_t(points)},
-          {"bytes_per_cached_point", points > 0 ? sum_present("packer", "model_bytes") / points : 0.0},
-          {"points_drawn", to_json(distribution(column("frames", "points_drawn")))},
-          {"update_age_ms", to_json(distribution(column("frames", "update_age_ms")))},
-          {"first_points_s", sum_present("viewer", "first_points_s") / viewers},
-          {"tiles_released", uint64_t(counter("tiles_released"))},
-          {"quality", nullptr},
-          {"peak_rss_mb", rss},
-          {"errors",
-           {{"messages_rejected", uint64_t(sum_status("", "messages_rejected"))},
-            {"gaps_resynced", uint64_t(sum_status("viewer", "gaps_resynced"))},
-            {"leases_expired", uint64_t(counter("leases_expired"))}}}};
+  return {
+      {"schema", 1},
+      {"scene", fact("data", "scene")},
+      {"kind", fact("data", "kind")},
+      {"primitives", uint64_t(number("data", "triangles"))},
+      {"samplers", count_of("sampler")},
+      {"viewers", count_of("viewer")},
+      {"coupling", fact("viewer", "coupling")},
+      {"buffers", uint64_t(number("viewer", "buffers"))},
+      {"renderer", fact("viewer", "renderer")},
+      {"splat", fact("viewer", "splat")},
+      {"size", {uint64_t(number("viewer", "width")), uint64_t(number("viewer", "height"))}},
+      {"sampling_size", {uint64_t(number("viewer", "sampling_width")), uint64_t(number("viewer", "sampling_height"))}},
+      {"frames", times.size()},
+      {"updates", column("updates", "latency_ms").size()},
+      {"duration_s", std::round(span_s * 1000) / 1000},
+      {"fps", std::round(double(times.size()) / viewers / run_s * 100) / 100},
+      {"updates_per_s", std::round(double(column("updates", "latency_ms").size()) / viewers / run_s * 100) / 100},
+      {"inter_frame_delay_ms", to_json(distribution(delays))},
+      {"view_construction_ms", to_json(distribution(column("frames", "construction_ms")))},
+      {"view_update_latency_ms", to_json(distribution(column("updates", "latency_ms")))},
+      {"start_up_latency_ms", to_json(distribution(column("updates", "start_up_ms")))},
+      {"sampling_ms", to_json(distribution(sampling_ms))},
+      {"packing_ms", to_json(distribution(packing_ms))},
+      {"data_generating_rate_mb_s", bytes_raw / 1e6 / run_s},
+      {"data_transfer_rate_mb_s", bytes_sent / 1e6 / run_s},
+      {"data_consuming_rate_mb_s", sum_status("viewer", "points_received") * 12 / 1e6 / viewers / run_s},
+      {"bytes_raw", uint64_t(bytes_raw)},
+      {"bytes_sent", uint64_t(bytes_sent)},
+      {"compression_ratio", bytes_sent > 0 ? bytes_raw / bytes_sent : 0.0},
+      {"redundancy_eliminated", samples > 0 ? 1 - kept / samples : 0.0},
+      {"points_cached", uint64_t(points)},
+      {"bytes_per_cached_point", points > 0 ? sum_present("packer", "model_bytes") / points : 0.0},
+      {"points_drawn", to_json(distribution(column("frames", "points_drawn")))},
+      {"update_age_ms", to_json(distribution(column("frames", "update_age_ms")))},
+      {"first_points_s", sum_present("viewer", "first_points_s") / viewers},
+      {"tiles_released", uint64_t(counter("tiles_released"))},
+      {"quality", nullptr},
+      {"peak_rss_mb", rss},
+      {"errors",
+       {{"messages_rejected", uint64_t(sum_status("", "messages_rejected"))},
+        {"gaps_resynced", uint64_t(sum_status("viewer", "gaps_resynced"))},
+        {"leases_expired", uint64_t(counter("leases_expired"))}}}};
 }
 
 Status RunRecord::finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters) {

@@ -35,7 +35,8 @@ class RunRecord {
 
   /// The summary of DESIGN section 6 from everything so far. processes: all that took part; counters: "leases_expired",
   /// "tiles_released".
-  nlohmann::ordered_json summary(const std::vector<Process>& processes, const std::map<std::string, double>& counters) const;
+  nlohmann::ordered_json summary(const std::vector<Process>& processes,
+                                 const std::map<std::string, double>& counters) const;
 
   /// Writes summary.json and ends trace.json.
   Status finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters);

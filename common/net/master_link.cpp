@@ -10,7 +10,8 @@ constexpr double kHelloPeriod_s = 0.25, kStatusPeriod_s = 1.0;
 }
 
 MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello)
-    : hello_(std::move(hello)), socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes}) {
+    : hello_(std::move(hello)),
+      socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes}) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.pid = static_cast<uint64_t>(getpid());
   if (const Status s = socket_.connect(endpoint); !s) log::error("{}", s.error().text);

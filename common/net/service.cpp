@@ -19,7 +19,8 @@ void on_signal(int) { stop_flag = true; }
 void add_service_flags(CLI::App& app, ServiceOptions& o, Ends ends) {
   if (ends != Ends::kBinds) app.add_option("--master", o.master, "address of the master")->capture_default_str();
   app.add_option("--name", o.name, "name in logs and metrics")->capture_default_str();
-  if (ends != Ends::kConnects) app.add_option("--bind", o.bind, "address to bind to; port * takes a free one")->capture_default_str();
+  if (ends != Ends::kConnects)
+    app.add_option("--bind", o.bind, "address to bind to; port * takes a free one")->capture_default_str();
   app.add_flag("--insecure", o.insecure, "allow addresses other than loopback without encryption");
   app.add_option("--log-level", o.log_level, "trace, debug, info, warn, error or off")
       ->capture_default_str()

@@ -6,7 +6,9 @@
 
 #include "common/core/result.h"
 
-namespace CLI { class App; }
+namespace CLI {
+class App;
+}
 
 namespace telesplat::net {
 

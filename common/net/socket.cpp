@@ -24,12 +24,18 @@ constexpr size_t kMaxClosed = 4096;
 
 zmq::socket_type zmq_type(Kind kind) {
   switch (kind) {
-    case Kind::kRouter: return zmq::socket_type::router;
-    case Kind::kDealer: return zmq::socket_type::dealer;
-    case Kind::kPush: return zmq::socket_type::push;
-    case Kind::kPull: return zmq::socket_type::pull;
-    case Kind::kPub: return zmq::socket_type::xpub;  // shows subscriptions, so that strange ones can be counted
-    case Kind::kSub: return zmq::socket_type::sub;
+    case Kind::kRouter:
+      return zmq::socket_type::router;
+    case Kind::kDealer:
+      return zmq::socket_type::dealer;
+    case Kind::kPush:
+      return zmq::socket_type::push;
+    case Kind::kPull:
+      return zmq::socket_type::pull;
+    case Kind::kPub:
+      return zmq::socket_type::xpub;  // shows subscriptions, so that strange ones can be counted
+    case Kind::kSub:
+      return zmq::socket_type::sub;
   }
   return zmq::socket_type::dealer;
 }
@@ -43,7 +49,8 @@ bool is_local(const std::string& endpoint) {
 // For log lines: routing ids are binary.
 std::string printable(std::string_view bytes) {
   std::string out;
-  for (unsigned char c : bytes.substr(0, 24)) out += c >= 32 && c < 127 ? std::string(1, char(c)) : fmt::format("\\x{:02x}", c);
+  for (unsigned char c : bytes.substr(0, 24))
+    out += c >= 32 && c < 127 ? std::string(1, char(c)) : fmt::format("\\x{:02x}", c);
   return out;
 }
 
@@ -61,7 +68,9 @@ struct Socket::Impl {
       : context(context), kind(kind), name(std::move(name)), options(options), socket(context, zmq_type(kind)) {
     socket.set(zmq::sockopt::sndhwm, options.high_water_mark);
     socket.set(zmq::sockopt::rcvhwm, options.high_water_mark);
-    socket.set(zmq::sockopt::maxmsgsize, kind == Kind::kPub ? kSubscriptionBytes : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes);
+    socket.set(zmq::sockopt::maxmsgsize, kind == Kind::kPub
+                                             ? kSubscriptionBytes
+                                             : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes);
     socket.set(zmq::sockopt::linger, 500);
     socket.set(zmq::sockopt::reconnect_ivl, 50);
     socket.set(zmq::sockopt::reconnect_ivl_max, 500);
@@ -88,7 +97,8 @@ struct Socket::Impl {
     if (!monitor) return;
     zmq::message_t event, address;
     while (monitor->recv(event, zmq::recv_flags::dontwait)) {
-      if (event.more() && monitor->recv(address)) {}
+      if (event.more() && monitor->recv(address)) {
+      }
       if (event.size() < 6) continue;
       uint16_t what = 0;
       int32_t fd = -1;
@@ -108,9 +118,12 @@ struct Socket::Impl {
     if (!monitor) return;
     drain_monitor();  // its connection's acceptance came first
     const int fd = zmq_msg_get(message.handle(), ZMQ_SRCFD);
-    const auto gone = std::find_if(closed.begin(), closed.end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
-    if (gone != closed.end()) gone->has_spoken = true;
-    else if (const auto it = connections.find(fd); it != connections.end()) it->second.has_spoken = true;
+    const auto gone =
+        std::find_if(closed.begin(), closed.end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
+    if (gone != closed.end())
+      gone->has_spoken = true;
+    else if (const auto it = connections.find(fd); it != connections.end())
+      it->second.has_spoken = true;
   }
 
   // A connection that ends without ever having brought a whole message counts as one rejected: everyone of ours speaks as soon as it
@@ -144,7 +157,8 @@ struct Socket::Impl {
 
   void log_rejection(const std::string& what, const std::string& why) {
     if (limiter.allow(monotonic_s())) {
-      const std::string more = limiter.suppressed() ? fmt::format(" ({} more since the last such line)", limiter.suppressed()) : "";
+      const std::string more =
+          limiter.suppressed() ? fmt::format(" ({} more since the last such line)", limiter.suppressed()) : "";
       log::warn("{}: dropped {}: {}{}", name, what, why, more);
     }
   }
@@ -205,11 +219,13 @@ bool Socket::send_frames(std::string_view peer, std::string_view type, std::stri
   try {
     using zmq::send_flags;
     auto& s = impl_->socket;
-    if (impl_->kind == Kind::kRouter && !s.send(zmq::buffer(peer), send_flags::sndmore | send_flags::dontwait)) return false;
+    if (impl_->kind == Kind::kRouter && !s.send(zmq::buffer(peer), send_flags::sndmore | send_flags::dontwait))
+      return false;
     if (!s.send(zmq::buffer(type), send_flags::sndmore | send_flags::dontwait)) return false;
     // ZeroMQ takes the body over without copying it.
     auto* owned = new std::string(std::move(body));
-    zmq::message_t frame(owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
+    zmq::message_t frame(
+        owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
     return s.send(frame, send_flags::dontwait).has_value();
   } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
     return false;
@@ -262,7 +278,8 @@ std::optional<Message> Socket::receive() {
 
 void Socket::reject(const Message& message, const std::string& why) {
   ++impl_->rejected;
-  impl_->log_rejection(fmt::format("message '{}' from peer '{}'", printable(message.type), printable(message.peer)), why);
+  impl_->log_rejection(fmt::format("message '{}' from peer '{}'", printable(message.type), printable(message.peer)),
+                       why);
 }
 
 uint64_t Socket::rejected() const {

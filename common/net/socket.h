@@ -40,7 +40,8 @@ struct Message {
 
 struct SocketOptions {
   int high_water_mark = 1000;  ///< messages queued each way before ROUTER, PUB drop and PUSH, DEALER refuse
-  size_t max_message_bytes = wire::kMaxControlBytes;  ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
+  size_t max_message_bytes =
+      wire::kMaxControlBytes;  ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
 };
 
 class Socket {
@@ -59,7 +60,9 @@ class Socket {
 
   /// Queues a message without waiting (ROUTER: for `peer`). False: dropped, because the queue is full or the peer is gone.
   template <class M>
-  bool send(const M& message, std::string_view peer = {}) { return send_frames(peer, M::kName, wire::encode(message)); }
+  bool send(const M& message, std::string_view peer = {}) {
+    return send_frames(peer, M::kName, wire::encode(message));
+  }
   /// Sends an already encoded message, shared by several receivers.
   bool send_frames(std::string_view peer, std::string_view type, std::string body);
 

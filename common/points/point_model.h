@@ -28,9 +28,10 @@ inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
 using ClusterKey = uint32_t;
 
 struct ModelConfig {
-  geometry::Box box_room;  ///< the data set's box; the octree's cube is its smallest enclosing cube about the same centre, grown
-                           ///< by 1/1000, so that points on the boundary lie inside
-  int depth = 6;           ///< octree depth: 2^depth leaves a side
+  geometry::Box
+      box_room;   ///< the data set's box; the octree's cube is its smallest enclosing cube about the same centre, grown
+                  ///< by 1/1000, so that points on the boundary lie inside
+  int depth = 6;  ///< octree depth: 2^depth leaves a side
   bool operator==(const ModelConfig&) const = default;
 };
 
@@ -83,7 +84,7 @@ class Mosaic {
 
 struct Cluster {
   ClusterKey key = 0;
-  geometry::Box leaf_room;  ///< the leaf's cube
+  geometry::Box leaf_room;      ///< the leaf's cube
   std::vector<Mosaic> mosaics;  ///< in order of sequence
 };
 
@@ -92,7 +93,7 @@ struct Cluster {
 struct PreparedPatch {
   Sequence sequence;
   std::vector<std::pair<ClusterKey, Mosaic>> mosaics;  ///< ascending keys
-  uint64_t points = 0;   ///< level-0 points
+  uint64_t points = 0;                                 ///< level-0 points
   uint64_t outside = 0;  ///< samples outside the octree's cube: dropped (none if the data set's box is true)
 };
 
@@ -131,8 +132,8 @@ class PointModel {
   const std::unordered_map<ClusterKey, std::unique_ptr<Cluster>>& clusters() const { return clusters_; }
   const Cluster* find(ClusterKey key) const;
 
-  uint64_t points() const { return points_; }             ///< level-0 points held
-  uint64_t bytes() const;                                 ///< memory of the whole model: points, headers, containers
+  uint64_t points() const { return points_; }  ///< level-0 points held
+  uint64_t bytes() const;                      ///< memory of the whole model: points, headers, containers
   uint64_t points_in(ClusterKey key) const;
   /// Order-independent digest of every cluster's key and every mosaic's bytes: equal models have equal digests.
   uint64_t digest() const;

@@ -42,8 +42,9 @@ void unproject_row(const RowRays& rays, const uint32_t* codes, size_t n, Cluster
       const auto g = hn::Add(hn::Set(df, rays.origin[a]), hn::Mul(depth, direction));
       inside = hn::And(inside, hn::And(hn::Ge(g, zero), hn::Lt(g, limit)));
       const auto q = hn::DemoteTo(di, g);  // truncates
-      key = hn::Or(key, a == 0 ? hn::ShiftRight<16>(q) : a == 1 ? hn::ShiftLeft<10>(hn::ShiftRight<16>(q))
-                                                                : hn::ShiftLeft<20>(hn::ShiftRight<16>(q)));
+      key = hn::Or(key, a == 0   ? hn::ShiftRight<16>(q)
+                        : a == 1 ? hn::ShiftLeft<10>(hn::ShiftRight<16>(q))
+                                 : hn::ShiftLeft<20>(hn::ShiftRight<16>(q)));
       hn::StoreU(hn::DemoteTo(dh, hn::And(q, hn::Set(di, 0xffff))), dh, positions[a] + i);
     }
     const auto outside = hn::DemoteTo(di, hn::IfThenElse(inside, zero, hn::Set(df, -1.0)));  // 0 or all ones

@@ -41,7 +41,8 @@ void empty_beyond(const KeyBuffer& buffer, const geometry::Rect& rect) {
 
 struct CpuSplatter::Impl {
   explicit Impl(int threads)
-      : arena(threads > 0 ? threads : tbb::task_arena::automatic), workspaces(static_cast<size_t>(arena.max_concurrency())) {}
+      : arena(threads > 0 ? threads : tbb::task_arena::automatic),
+        workspaces(static_cast<size_t>(arena.max_concurrency())) {}
 
   void prepare(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading);
   void draw_tile(int index, const DrawList& list, const geometry::Camera& camera, const image::Shading& shading,
@@ -58,7 +59,8 @@ struct CpuSplatter::Impl {
   int margin = 4;  // of the tiles' buffers: the widest row of all shapes in this frame
 };
 
-void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading) {
+void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, Kernel kernel,
+                                const image::Shading& shading) {
   grid = {camera.width, camera.height, kTileWidth, kTileHeight};
   std::memcpy(intensity.data(), shading.table().data(), shading.table().size());
   table.set_focal(camera.focal_x());
@@ -72,8 +74,8 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
   binning.build(grid, runs.transforms, static_cast<float>(camera.near_m), static_cast<float>(margin));
 }
 
-void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const geometry::Camera& camera, const image::Shading& shading,
-                                  const FrameTarget& target, Workspace& workspace) {
+void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const geometry::Camera& camera,
+                                  const image::Shading& shading, const FrameTarget& target, Workspace& workspace) {
   const geometry::Rect rect = grid.rect(index);
   uint32_t* colour = target.colour + static_cast<size_t>(rect.y) * target.width + rect.x;
   float* depth = target.depth_m ? target.depth_m + static_cast<size_t>(rect.y) * target.width + rect.x : nullptr;
@@ -83,8 +85,8 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const geometr
   // Buffers are empty between tiles: resolving empties them. Their margins need not be.
   const KeyBuffer buffer{workspace.keys.get(), kTileWidth + 2 * margin, margin};
   if (!entries.empty()) {
-    const TileInput input{rect, static_cast<float>(camera.near_m), entries, runs.runs.data(), runs.transforms.data(),
-                          list.items.data()};
+    const TileInput input{
+        rect, static_cast<float>(camera.near_m), entries, runs.runs.data(), runs.transforms.data(), list.items.data()};
     const TileCounts counts = splat_tile(input, shapes.data(), intensity.data(), buffer);
     workspace.stats.points_projected += counts.projected;
     workspace.stats.points_drawn += counts.drawn;
@@ -99,8 +101,8 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const geometr
 CpuSplatter::CpuSplatter(int threads) : impl_(std::make_unique<Impl>(threads)) {}
 CpuSplatter::~CpuSplatter() = default;
 
-SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading,
-                               const FrameTarget& target) {
+SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, Kernel kernel,
+                               const image::Shading& shading, const FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
   Impl& m = *impl_;
   m.prepare(list, camera, kernel, shading);

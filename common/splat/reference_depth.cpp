@@ -31,7 +31,8 @@ std::vector<DrawItem> visible_items(const points::PointModel& model, const geome
 
 }  // namespace
 
-void render_reference_depth(const points::PointModel& model, const geometry::Camera& camera, int threads, std::vector<float>& depth_m) {
+void render_reference_depth(const points::PointModel& model, const geometry::Camera& camera, int threads,
+                            std::vector<float>& depth_m) {
   const TileGrid grid{camera.width, camera.height, kTileWidth, kTileHeight};
   depth_m.resize(static_cast<size_t>(camera.width) * camera.height);
   const std::vector<DrawItem> items = visible_items(model, camera);
@@ -44,8 +45,9 @@ void render_reference_depth(const points::PointModel& model, const geometry::Cam
     const geometry::Rect rect = grid.rect(index);
     std::vector<uint32_t> bits(static_cast<size_t>(rect.width) * rect.height,
                                std::bit_cast<uint32_t>(std::numeric_limits<float>::infinity()));
-    const TileInput input{rect, static_cast<float>(camera.near_m), binning.tile(index), runs.runs.data(), runs.transforms.data(),
-                          items.data()};
+    const TileInput input{
+        rect,        static_cast<float>(camera.near_m), binning.tile(index), runs.runs.data(), runs.transforms.data(),
+        items.data()};
     depth_tile(input, bits.data());
     for (int y = 0; y < rect.height; ++y)
       std::memcpy(depth_m.data() + static_cast<size_t>(rect.y + y) * camera.width + rect.x,
@@ -56,7 +58,8 @@ void render_reference_depth(const points::PointModel& model, const geometry::Cam
 }
 
 Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry::Rect& tile,
-                                 const std::vector<float>& reference_depth_m, float relative_epsilon, image::DepthImage& image) {
+                                 const std::vector<float>& reference_depth_m, float relative_epsilon,
+                                 image::DepthImage& image) {
   CHECK(reference_depth_m.size() == static_cast<size_t>(camera.width) * camera.height);
   CHECK(image.width == tile.width && image.height == tile.height);
   CHECK(tile.x >= 0 && tile.y >= 0 && tile.x + tile.width <= camera.width && tile.y + tile.height <= camera.height);

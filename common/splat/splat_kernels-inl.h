@@ -25,9 +25,11 @@ using I32 = hn::RebindToSigned<F32>;
 using U32 = hn::RebindToUnsigned<F32>;
 using U16 = hn::Rebind<uint16_t, F32>;
 
-constexpr size_t kBatch = 512;      // projected points held before they are splatted: their arrays stay in the first-level cache
-constexpr size_t kMaxLanes = 64;    // float lanes of the widest vectors there are
-constexpr size_t kPiece = 384;      // points of an item taken at once: room for a whole piece is made before it is projected
+constexpr size_t kBatch =
+    512;  // projected points held before they are splatted: their arrays stay in the first-level cache
+constexpr size_t kMaxLanes = 64;  // float lanes of the widest vectors there are
+constexpr size_t kPiece =
+    384;  // points of an item taken at once: room for a whole piece is made before it is projected
 
 // Positions of a vector of points, in steps of the leaf's grid.
 struct Lanes {
@@ -65,7 +67,8 @@ HWY_INLINE Projected Project(const LeafTransform& t, const Lanes& p, float near_
   const auto w = Row(t.w, p);
   const auto inverse = hn::Div(hn::Set(d, scale), hn::Max(w, hn::Set(d, near_m)));
   const auto s = hn::Set(d, shift);
-  return {FloorToInt(hn::Add(hn::Mul(Row(t.x, p), inverse), s)), FloorToInt(hn::Add(hn::Mul(Row(t.y, p), inverse), s)), w};
+  return {FloorToInt(hn::Add(hn::Mul(Row(t.x, p), inverse), s)), FloorToInt(hn::Add(hn::Mul(Row(t.y, p), inverse), s)),
+          w};
 }
 
 // image::Shading::apply on each lane: (c * i + 127) / 255 for each channel; v / 255 = (v + 1 + (v >> 8)) >> 8 for v < 65535.
@@ -123,7 +126,8 @@ class Stage {
   void clear() { count_ = 0; }
   HWY_INLINE void append(const points::Mosaic::Level& l) {
     const size_t n = l.count;
-    copy(l.x, x_ + count_, n), copy(l.y, y_ + count_, n), copy(l.z, z_ + count_, n), copy(l.normal, normal_ + count_, n);
+    copy(l.x, x_ + count_, n), copy(l.y, y_ + count_, n), copy(l.z, z_ + count_, n),
+        copy(l.normal, normal_ + count_, n);
     copy(l.colour, colour_ + count_, n);
     count_ += n;
   }
@@ -136,10 +140,14 @@ class Stage {
   // Few elements go by two moves of fixed size that overlap, instead of a loop.
   template <class T>
   static HWY_INLINE void copy(const T* HWY_RESTRICT from, T* HWY_RESTRICT to, size_t n) {
-    if (n >= 8) std::memcpy(to, from, n * sizeof(T));
-    else if (n >= 4) move_ends<4>(from, to, n);
-    else if (n >= 2) move_ends<2>(from, to, n);
-    else if (n == 1) *to = *from;
+    if (n >= 8)
+      std::memcpy(to, from, n * sizeof(T));
+    else if (n >= 4)
+      move_ends<4>(from, to, n);
+    else if (n >= 2)
+      move_ends<2>(from, to, n);
+    else if (n == 1)
+      *to = *from;
   }
   template <size_t kElements, class T>
   static HWY_INLINE void move_ends(const T* HWY_RESTRICT from, T* HWY_RESTRICT to, size_t n) {
@@ -162,8 +170,10 @@ HWY_INLINE void ForVectors(size_t first, size_t last, const Visit& visit) {
   size_t i = first;
   for (; i + lanes <= last; i += lanes) visit(i, size_t{0}, lanes);
   if (i == last) return;
-  if (last >= lanes) visit(last - lanes, i - (last - lanes), lanes);
-  else visit(i, size_t{0}, last - i);
+  if (last >= lanes)
+    visit(last - lanes, i - (last - lanes), lanes);
+  else
+    visit(i, size_t{0}, last - i);
 }
 
 // Mosaics lie scattered in memory, and what comes next is known: asks for it in time. A level's arrays lie next to each other,
@@ -183,7 +193,8 @@ HWY_INLINE void PrefetchRun(const TileInput& input, const TileBinning::Entry* en
     const auto* items = reinterpret_cast<const std::byte*>(input.items + input.runs[entry[1].box].first);
     for (size_t i = 0; i < kItemsAhead * sizeof(DrawItem); i += 64) hwy::Prefetch(items + i);
   }
-  for (uint32_t i = run.first; i < std::min(run.first + kItemsAhead, run.last); ++i) PrefetchLevel(input.items[i].level);
+  for (uint32_t i = run.first; i < std::min(run.first + kItemsAhead, run.last); ++i)
+    PrefetchLevel(input.items[i].level);
 }
 
 // Projected points, waiting to be splatted.
@@ -196,7 +207,8 @@ struct Batch {
 
 // One row of a splat after the other, whole vectors: what lies beyond the splat's side is written back unchanged.
 template <int kSide>
-HWY_INLINE void SplatOne(uint64_t* HWY_RESTRICT pixels, size_t stride, const uint64_t* HWY_RESTRICT addends, int64_t key) {
+HWY_INLINE void SplatOne(uint64_t* HWY_RESTRICT pixels, size_t stride, const uint64_t* HWY_RESTRICT addends,
+                         int64_t key) {
   constexpr size_t kRow = (kSide + 3) / 4 * 4;
   const hn::CappedTag<int64_t, kSide <= 2 ? 2 : 4> d;
   const auto k = hn::Set(d, key);
@@ -228,8 +240,9 @@ void SplatBatch(const SplatShape& shape, const KeyBuffer& buffer, const Batch& b
 
 using SplatBatchFunction = void (*)(const SplatShape&, const KeyBuffer&, const Batch&);
 constexpr SplatBatchFunction kSplatBatch[kMaxSplatSide] = {
-    SplatBatch<1>,  SplatBatch<2>,  SplatBatch<3>,  SplatBatch<4>,  SplatBatch<5>,  SplatBatch<6>,  SplatBatch<7>,  SplatBatch<8>,
-    SplatBatch<9>,  SplatBatch<10>, SplatBatch<11>, SplatBatch<12>, SplatBatch<13>, SplatBatch<14>, SplatBatch<15>, SplatBatch<16>};
+    SplatBatch<1>,  SplatBatch<2>,  SplatBatch<3>,  SplatBatch<4>,  SplatBatch<5>,  SplatBatch<6>,
+    SplatBatch<7>,  SplatBatch<8>,  SplatBatch<9>,  SplatBatch<10>, SplatBatch<11>, SplatBatch<12>,
+    SplatBatch<13>, SplatBatch<14>, SplatBatch<15>, SplatBatch<16>};
 
 class TileSplatter {
  public:
@@ -281,14 +294,16 @@ class TileSplatter {
     for (size_t first = 0; first < level.count; first += kPiece) {
       const size_t last = std::min<size_t>(first + kPiece, level.count);
       if (batch_.count + (last - first) > kBatch) flush();
-      if (whole) add_piece<true>(transform, level, first, last);
-      else add_piece<false>(transform, level, first, last);
+      if (whole)
+        add_piece<true>(transform, level, first, last);
+      else
+        add_piece<false>(transform, level, first, last);
     }
   }
 
   template <bool kWhole>
-  HWY_NOINLINE void add_piece(const LeafTransform& transform_reference, const points::Mosaic::Level& level_reference, size_t first,
-                              size_t last) {
+  HWY_NOINLINE void add_piece(const LeafTransform& transform_reference, const points::Mosaic::Level& level_reference,
+                              size_t first, size_t last) {
     const I32 di;
     const U32 du;
     // Copies, which no store can change: the compiler need not read them again.
@@ -311,7 +326,8 @@ class TileSplatter {
       const auto px = hn::Sub(hn::ShiftRightSame(p.x, bits), x0), py = hn::Sub(hn::ShiftRightSame(p.y, bits), y0);
       hn::Mask<I32> keep;
       if (!kWhole) {
-        const auto in_x = hn::And(hn::Gt(px, outside), hn::Lt(px, width)), in_y = hn::And(hn::Gt(py, outside), hn::Lt(py, height));
+        const auto in_x = hn::And(hn::Gt(px, outside), hn::Lt(px, width)),
+                   in_y = hn::And(hn::Gt(py, outside), hn::Lt(py, height));
         const auto beyond_near = hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m)));
         keep = hn::And(hn::And(in_x, in_y), beyond_near);
         if (valid - skip < hn::Lanes(di)) keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
@@ -325,7 +341,8 @@ class TileSplatter {
 
       const auto normal = hn::BitCast(di, hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset)));
       const auto light = hn::GatherOffset(di, reinterpret_cast<const int32_t*>(intensity), normal);
-      const auto colour = Shade(hn::LoadU(du, level.colour + offset), hn::And(hn::BitCast(du, light), hn::Set(du, 255)));
+      const auto colour =
+          Shade(hn::LoadU(du, level.colour + offset), hn::And(hn::BitCast(du, light), hn::Set(du, 255)));
       const auto depth = hn::Or(hn::BitCast(du, p.w), hn::Set(du, 0x80000000u));
 
       if (kWhole) {
@@ -355,7 +372,8 @@ class TileSplatter {
   Batch batch_;
 };
 
-TileCounts SplatTile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity, const KeyBuffer& buffer) {
+TileCounts SplatTile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity,
+                     const KeyBuffer& buffer) {
   return TileSplatter(input, intensity, buffer).run(shapes);
 }
 
@@ -370,7 +388,8 @@ void ResolvePixel(uint64_t& key, uint32_t background, uint32_t* colour, float* d
   key = static_cast<uint64_t>(kEmptyKey);
 }
 
-void ResolveTile(const KeyBuffer& buffer, int width, int height, uint32_t background, uint32_t* colour, float* depth_m, size_t pitch) {
+void ResolveTile(const KeyBuffer& buffer, int width, int height, uint32_t background, uint32_t* colour, float* depth_m,
+                 size_t pitch) {
   const U32 d;
   const F32 df;
   const size_t lanes = hn::Lanes(d);
@@ -440,7 +459,8 @@ void DepthTile(const TileInput& input, uint32_t* depth_bits) {
   Stage stage;
   for (const TileBinning::Entry& entry : input.entries) {
     const auto draw = [&](const points::Mosaic::Level& level) {
-      (entry.whole ? DepthLevel<true> : DepthLevel<false>)(input.transforms[entry.box], level, input.rect, input.near_m, depth_bits);
+      (entry.whole ? DepthLevel<true> : DepthLevel<false>)(input.transforms[entry.box], level, input.rect, input.near_m,
+                                                           depth_bits);
     };
     const auto drain = [&] {
       draw(stage.level());

@@ -14,7 +14,8 @@ HWY_EXPORT(ResolveTile);
 HWY_EXPORT(DepthTile);
 HWY_EXPORT(TargetName);
 
-TileCounts splat_tile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity, const KeyBuffer& buffer) {
+TileCounts splat_tile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity,
+                      const KeyBuffer& buffer) {
   return HWY_DYNAMIC_DISPATCH(SplatTile)(input, shapes, intensity, buffer);
 }
 

@@ -25,16 +25,17 @@ struct TileInput {
   geometry::Rect rect;  ///< the tile, inside the image
   float near_m = 0;     ///< nearer points are not drawn
   std::span<const TileBinning::Entry> entries;
-  const ItemRun* runs = nullptr;                ///< one a box of the binning
-  const LeafTransform* transforms = nullptr;    ///< likewise
+  const ItemRun* runs = nullptr;              ///< one a box of the binning
+  const LeafTransform* transforms = nullptr;  ///< likewise
   const DrawItem* items = nullptr;
 };
 
 /// Pixel keys of one tile with a margin on all sides, so that splats are not clipped: the margin is written, never read.
 struct KeyBuffer {
-  uint64_t* keys = nullptr;  ///< (rect.height + 2 margin) rows of `stride`; pixel (x, y) at (y + margin) * stride + x + margin
-  int stride = 0;            ///< at least rect.width + 2 margin
-  int margin = 0;            ///< at least the largest row_stride of the shapes
+  uint64_t* keys =
+      nullptr;     ///< (rect.height + 2 margin) rows of `stride`; pixel (x, y) at (y + margin) * stride + x + margin
+  int stride = 0;  ///< at least rect.width + 2 margin
+  int margin = 0;  ///< at least the largest row_stride of the shapes
 };
 
 struct TileCounts {
@@ -44,7 +45,8 @@ struct TileCounts {
 
 /// Splats into buffer, whose pixels were kEmptyKey or hold what is there already.
 ///   shapes: one an item.  intensity: 65536 of 1/255, followed by 3 readable bytes.
-TileCounts splat_tile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity, const KeyBuffer& buffer);
+TileCounts splat_tile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity,
+                      const KeyBuffer& buffer);
 
 /// Keys to colours (0xff000000 | 0x00RRGGBB, background where empty) and, if depth_m is not null, depths in metres (+infinity
 /// where empty) of the points' centres. Sets the pixels to kEmptyKey again.

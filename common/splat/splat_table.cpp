@@ -22,7 +22,8 @@ SplatShape build(Kernel kernel, int side, double diameter, double focal_px) {
   const double reach = kernel == Kernel::kDisc ? 0.25 * diameter * diameter : INFINITY;
   for (int sub = 0; sub < steps * steps; ++sub) {
     // The centre, from the square's upper left corner.
-    const double cx = (sub % steps + 0.5) / steps + 0.5 * (side - 1), cy = (sub / steps + 0.5) / steps + 0.5 * (side - 1);
+    const double cx = (sub % steps + 0.5) / steps + 0.5 * (side - 1),
+                 cy = (sub / steps + 0.5) / steps + 0.5 * (side - 1);
     const int nearest_x = static_cast<int>(cx), nearest_y = static_cast<int>(cy);
     for (int y = 0; y < side; ++y)
       for (int x = 0; x < side; ++x) {

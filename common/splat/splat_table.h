@@ -17,19 +17,20 @@
 namespace telesplat::splat {
 
 inline constexpr int kMaxSplatSide = 16;
-inline constexpr int kBiasShift = 8;                      ///< one bias step = 2^8 units of a float's last place
-inline constexpr uint32_t kMaxBias = 163;                 ///< 163 * 2^8 / 2^23 = 0.5 % of depth at most
-inline constexpr uint64_t kOutsideSplat = 1ull << 63;     ///< turns a key's sign: larger than every key, as signed numbers
-inline constexpr int64_t kEmptyKey = -1;                  ///< nothing there: larger than every key
+inline constexpr int kBiasShift = 8;                   ///< one bias step = 2^8 units of a float's last place
+inline constexpr uint32_t kMaxBias = 163;              ///< 163 * 2^8 / 2^23 = 0.5 % of depth at most
+inline constexpr uint64_t kOutsideSplat = 1ull << 63;  ///< turns a key's sign: larger than every key, as signed numbers
+inline constexpr int64_t kEmptyKey = -1;               ///< nothing there: larger than every key
 
 /// One kernel at one size.
 struct SplatShape {
-  int side = 1;             ///< the square of pixels that it is cut from, 1..kMaxSplatSide
-  int sub_bits = 0;         ///< the projected centre's place within a pixel is told to 2^-sub_bits pixels on each axis
-  float scale = 1;          ///< 2^sub_bits
-  float shift = 0;          ///< added to the centre's position in 2^-sub_bits pixels: (1 - side) / 2 pixels. The square's first pixel is
-                            ///< floor(x_pix + (1 - side) / 2), so that even sides cover the pixels nearest the centre
-  int row_stride = 4;       ///< side rounded up to a multiple of 4
+  int side = 1;      ///< the square of pixels that it is cut from, 1..kMaxSplatSide
+  int sub_bits = 0;  ///< the projected centre's place within a pixel is told to 2^-sub_bits pixels on each axis
+  float scale = 1;   ///< 2^sub_bits
+  float shift =
+      0;  ///< added to the centre's position in 2^-sub_bits pixels: (1 - side) / 2 pixels. The square's first pixel is
+          ///< floor(x_pix + (1 - side) / 2), so that even sides cover the pixels nearest the centre
+  int row_stride = 4;             ///< side rounded up to a multiple of 4
   std::vector<uint64_t> addends;  ///< [sub_y][sub_x][side][row_stride], padded with kOutsideSplat; empty if side == 1
 };
 

@@ -49,10 +49,12 @@ LeafTransform leaf_transform(const geometry::Camera::PixelTransform& t, const ge
   return {fold(t.x), fold(t.y), fold(t.w)};
 }
 
-void TileBinning::build(const TileGrid& grid, std::span<const LeafTransform> transforms, float near_m, float margin_px) {
+void TileBinning::build(const TileGrid& grid, std::span<const LeafTransform> transforms, float near_m,
+                        float margin_px) {
   const float margin = margin_px + 1.0f;  // 1: rounding, here and where the points are projected
   const auto last_column = static_cast<float>(grid.columns() - 1), last_row = static_cast<float>(grid.rows() - 1);
-  const float per_column = 1.0f / static_cast<float>(grid.tile_width), per_row = 1.0f / static_cast<float>(grid.tile_height);
+  const float per_column = 1.0f / static_cast<float>(grid.tile_width),
+              per_row = 1.0f / static_cast<float>(grid.tile_height);
   const auto whole_image = Range{0, static_cast<int16_t>(last_column), 0, static_cast<int16_t>(last_row), false};
 
   ranges_.resize(transforms.size());

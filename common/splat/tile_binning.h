@@ -34,9 +34,10 @@ LeafTransform leaf_transform(const geometry::Camera::PixelTransform& room_to_pix
 class TileBinning {
  public:
   struct Entry {
-    uint32_t box;       ///< index of the box
-    uint32_t whole;     ///< 1: the box with its margin lies wholly inside the tile and beyond the near plane, so no point of
-                        ///< it needs a test
+    uint32_t box;  ///< index of the box
+    uint32_t
+        whole;  ///< 1: the box with its margin lies wholly inside the tile and beyond the near plane, so no point of
+                ///< it needs a test
   };
 
   /// Conservative: a box is listed in every tile that any of its points, grown by margin_px to each side, can touch.

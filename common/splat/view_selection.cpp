@@ -12,8 +12,9 @@ constexpr float kCosMargin = 0.98480775f, kSinMargin = 0.17364818f;
 
 // A leaf's cube as seen from the eye: what of the cone test is the same for all its mosaics.
 struct LeafView {
-  glm::vec3 to_eye;         // from the cube's centre
-  float sin_beta, cos_beta; // beta = margin + half the angle under which the cube's sphere is seen; cos_beta < 0: never away
+  glm::vec3 to_eye;  // from the cube's centre
+  float sin_beta,
+      cos_beta;  // beta = margin + half the angle under which the cube's sphere is seen; cos_beta < 0: never away
   float distance;
 };
 
@@ -57,8 +58,10 @@ struct Chosen {
 // least as much of the cluster as the low-rate one does.
 void revise_sizes(const SelectionOptions& options, std::vector<Chosen>& chosen) {
   const auto mismatch = [&](const Chosen& c) { return std::abs(std::log(c.size / options.scale)); };
-  const float smallest = std::min_element(chosen.begin(), chosen.end(), [](auto& a, auto& b) { return a.size < b.size; })->size;
-  const float largest = std::max_element(chosen.begin(), chosen.end(), [](auto& a, auto& b) { return a.size < b.size; })->size;
+  const float smallest =
+      std::min_element(chosen.begin(), chosen.end(), [](auto& a, auto& b) { return a.size < b.size; })->size;
+  const float largest =
+      std::max_element(chosen.begin(), chosen.end(), [](auto& a, auto& b) { return a.size < b.size; })->size;
   if (largest <= options.hide_ratio * smallest) return;
   const float best =
       std::min_element(chosen.begin(), chosen.end(), [&](auto& a, auto& b) { return mismatch(a) < mismatch(b); })->size;
@@ -87,8 +90,8 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     const geometry::Box& leaf = cluster->leaf_room;
     if (!frustum.may_contain(leaf)) continue;
     out.clusters_seen.push_back(key);
-    const float desired =
-        options.detail * points::pixel_range(camera, glm::dvec3(leaf.centre()), static_cast<double>(leaf.hi.x - leaf.lo.x));
+    const float desired = options.detail * points::pixel_range(camera, glm::dvec3(leaf.centre()),
+                                                               static_cast<double>(leaf.hi.x - leaf.lo.x));
     const LeafView view = leaf_view(leaf, eye);
     chosen.clear();
     for (const points::Mosaic& m : cluster->mosaics) {
@@ -103,8 +106,8 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     for (const Chosen& c : chosen) {
       const points::Mosaic::Level level = c.mosaic->level(c.level);
       if (level.count == 0) continue;
-      out.items.push_back({cluster.get(), level, std::clamp(c.size, 1.0f, std::max(1.0f, options.max_splat_px)),
-                           c.mosaic->sequence()});
+      out.items.push_back(
+          {cluster.get(), level, std::clamp(c.size, 1.0f, std::max(1.0f, options.max_splat_px)), c.mosaic->sequence()});
       out.points += level.count;
     }
   }

@@ -9,11 +9,11 @@
 namespace telesplat::splat {
 
 struct SelectionOptions {
-  float scale = 1.0f;              ///< the "scale factor" of T eq. 4.8
-  float hide_ratio = 1.5f;         ///< "ratio" of T4.4.3: a splat larger than this times the best one's size is revised ...
-  float hide_epsilon = 0.25f;      ///< ... to best + epsilon * its size
-  float max_splat_px = 16.0f;      ///< no splat is larger
-  float detail = 1.0f;             ///< < 1 lowers the desired pixel range (speed-dependent detail, T4.4.3.1)
+  float scale = 1.0f;          ///< the "scale factor" of T eq. 4.8
+  float hide_ratio = 1.5f;     ///< "ratio" of T4.4.3: a splat larger than this times the best one's size is revised ...
+  float hide_epsilon = 0.25f;  ///< ... to best + epsilon * its size
+  float max_splat_px = 16.0f;  ///< no splat is larger
+  float detail = 1.0f;         ///< < 1 lowers the desired pixel range (speed-dependent detail, T4.4.3.1)
   bool cone_culling = true;
 };
 
@@ -22,7 +22,8 @@ struct DrawItem {
   const points::Cluster* cluster;
   points::Mosaic::Level level;
   float splat_px;  ///< side (square) or diameter (disc) in display pixels, >= 1
-  Sequence sequence{};  ///< the mosaic's; with cluster->key it names the points, for renderers that keep copies. 0: do not keep
+  Sequence
+      sequence{};  ///< the mosaic's; with cluster->key it names the points, for renderers that keep copies. 0: do not keep
 };
 
 struct DrawList {
@@ -33,7 +34,8 @@ struct DrawList {
 
 /// Culls clusters by frustum, mosaics by normal cone; chooses each mosaic's level as the one whose pixel range is closest (in
 /// ratio) to the desired one; splat size = scale * desired range / the level's range (T eq. 4.8), revised as in T4.4.3.
-void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options, DrawList& out);
+void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
+                 DrawList& out);
 
 /// True if every point of the mosaic faces away from the camera. The packer's reference depth map and the viewers use this one
 /// test, so that what viewers cull is not taken as seen.

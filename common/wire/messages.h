@@ -20,6 +20,9 @@
 
 namespace telesplat::wire {
 
+// Structs and their fields() stand as tables.
+// clang-format off
+
 inline constexpr uint64_t kProtocolVersion = 1;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
@@ -295,5 +298,7 @@ struct AccessReport {
   std::vector<uint32_t> clusters;
   template <class F> static void fields(F& f, auto& m) { f("viewer", m.viewer); f("clusters", m.clusters); }
 };
+
+// clang-format on
 
 }  // namespace telesplat::wire

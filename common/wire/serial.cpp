@@ -39,23 +39,30 @@ class Encoder {
   void put(double v) { p_.pack(v); }
   void put(const std::string& v) { p_.pack(v); }
   void put(const std::vector<std::string>& v) { p_.pack(v); }
-  template <class V> void put(const std::map<std::string, V>& v) { p_.pack(v); }
-  template <class Tag> void put(Id<Tag> v) { p_.pack(v.value); }
+  template <class V>
+  void put(const std::map<std::string, V>& v) {
+    p_.pack(v);
+  }
+  template <class Tag>
+  void put(Id<Tag> v) {
+    p_.pack(v.value);
+  }
   void put(Bytes v) { pack_bin(p_, v); }
   void put(const std::vector<uint32_t>& v) { pack_bin(p_, std::span(v)); }
   void put(const std::vector<double>& v) { pack_bin(p_, std::span(v)); }
   void put(const geometry::Box& b) { numbers({b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z}); }
   void put(const geometry::Rect& r) { numbers({double(r.x), double(r.y), double(r.width), double(r.height)}); }
   void put(const geometry::Camera& c) {
-    const auto &p = c.pose.position_room;
-    const auto &q = c.pose.orientation;
-    numbers({p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m, double(c.width), double(c.height)});
+    const auto& p = c.pose.position_room;
+    const auto& q = c.pose.orientation;
+    numbers({p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m, double(c.width),
+             double(c.height)});
   }
   void put(const std::vector<geometry::ChunkInfo>& chunks) {
     p_.pack_array(static_cast<uint32_t>(chunks.size()));
     for (const auto& c : chunks)
-      numbers({double(c.id.value), double(c.triangles), double(c.bytes), c.box_room.lo.x, c.box_room.lo.y, c.box_room.lo.z,
-               c.box_room.hi.x, c.box_room.hi.y, c.box_room.hi.z});
+      numbers({double(c.id.value), double(c.triangles), double(c.bytes), c.box_room.lo.x, c.box_room.lo.y,
+               c.box_room.lo.z, c.box_room.hi.x, c.box_room.hi.y, c.box_room.hi.z});
   }
   void put(const Lease& lease);
   void numbers(std::initializer_list<double> values) {
@@ -68,7 +75,10 @@ class Encoder {
 
 struct FieldCounter {
   uint32_t count = 0;
-  template <class T> void operator()(const char*, const T&, size_t = 0) { ++count; }
+  template <class T>
+  void operator()(const char*, const T&, size_t = 0) {
+    ++count;
+  }
 };
 
 template <class M>
@@ -91,7 +101,8 @@ void Encoder::put(const Lease& lease) { pack_map(p_, lease, false); }
 const msgpack::object* find(const msgpack::object& map, std::string_view name) {
   for (uint32_t i = 0; i < map.via.map.size; ++i) {
     const auto& key = map.via.map.ptr[i].key;
-    if (key.type == msgpack::type::STR && std::string_view(key.via.str.ptr, key.via.str.size) == name) return &map.via.map.ptr[i].val;
+    if (key.type == msgpack::type::STR && std::string_view(key.via.str.ptr, key.via.str.size) == name)
+      return &map.via.map.ptr[i].val;
   }
   return nullptr;
 }
@@ -115,7 +126,9 @@ class Decoder {
   }
 
  private:
-  void fail(std::string_view why) { if (!error) error = Error{fmt::format("field {} {}", name_, why)}; }
+  void fail(std::string_view why) {
+    if (!error) error = Error{fmt::format("field {} {}", name_, why)};
+  }
   bool within(size_t size, size_t limit) {
     if (size <= limit) return true;
     fail(fmt::format("has {} entries or bytes, limit {}", size, limit));
@@ -131,24 +144,33 @@ class Decoder {
     v = o.via.u64;
   }
   void get(const msgpack::object& o, double& v) {
-    if (o.type == msgpack::type::FLOAT64 || o.type == msgpack::type::FLOAT32) v = o.via.f64;
-    else if (o.type == msgpack::type::POSITIVE_INTEGER) v = static_cast<double>(o.via.u64);
-    else if (o.type == msgpack::type::NEGATIVE_INTEGER) v = static_cast<double>(o.via.i64);
-    else return fail("is not a number");
+    if (o.type == msgpack::type::FLOAT64 || o.type == msgpack::type::FLOAT32)
+      v = o.via.f64;
+    else if (o.type == msgpack::type::POSITIVE_INTEGER)
+      v = static_cast<double>(o.via.u64);
+    else if (o.type == msgpack::type::NEGATIVE_INTEGER)
+      v = static_cast<double>(o.via.i64);
+    else
+      return fail("is not a number");
     if (!std::isfinite(v)) fail("is not finite");
   }
   void get(const msgpack::object& o, std::string& v) {
     if (o.type != msgpack::type::STR) return fail("is not a string");
     if (within(o.via.str.size, limit_ ? limit_ : kMaxString)) v.assign(o.via.str.ptr, o.via.str.size);
   }
-  template <class Tag> void get(const msgpack::object& o, Id<Tag>& v) { get(o, v.value); }
+  template <class Tag>
+  void get(const msgpack::object& o, Id<Tag>& v) {
+    get(o, v.value);
+  }
   void get(const msgpack::object& o, Bytes& v) {
     if (o.type != msgpack::type::BIN) return fail("is not binary");
     if (within(o.via.bin.size, limit_)) v = {reinterpret_cast<const std::byte*>(o.via.bin.ptr), o.via.bin.size};
   }
-  template <class T> void get_bin(const msgpack::object& o, std::vector<T>& v, size_t max_entries) {
+  template <class T>
+  void get_bin(const msgpack::object& o, std::vector<T>& v, size_t max_entries) {
     if (o.type != msgpack::type::BIN) return fail("is not binary");
-    if (o.via.bin.size % sizeof(T)) return fail(fmt::format("has {} bytes, not a multiple of {}", o.via.bin.size, sizeof(T)));
+    if (o.via.bin.size % sizeof(T))
+      return fail(fmt::format("has {} bytes, not a multiple of {}", o.via.bin.size, sizeof(T)));
     if (!within(o.via.bin.size / sizeof(T), max_entries)) return;
     v.resize(o.via.bin.size / sizeof(T));
     if (!v.empty()) std::memcpy(v.data(), o.via.bin.ptr, o.via.bin.size);
@@ -161,7 +183,8 @@ class Decoder {
     v.resize(o.via.array.size);
     for (uint32_t i = 0; i < o.via.array.size && !error; ++i) get(o.via.array.ptr[i], v[i]);
   }
-  template <class V> void get(const msgpack::object& o, std::map<std::string, V>& v) {
+  template <class V>
+  void get(const msgpack::object& o, std::map<std::string, V>& v) {
     if (o.type != msgpack::type::MAP) return fail("is not a map");
     if (!within(o.via.map.size, kMaxEntries)) return;
     for (uint32_t i = 0; i < o.via.map.size && !error; ++i) {
@@ -170,7 +193,8 @@ class Decoder {
       if (!error) get(o.via.map.ptr[i].val, v[key]);
     }
   }
-  template <size_t N> bool numbers(const msgpack::object& o, double (&v)[N]) {
+  template <size_t N>
+  bool numbers(const msgpack::object& o, double (&v)[N]) {
     if (o.type != msgpack::type::ARRAY || o.via.array.size != N) {
       fail(fmt::format("is not a list of {} numbers", N));
       return false;
@@ -190,7 +214,8 @@ class Decoder {
     double v[4];
     if (!numbers(o, v)) return;
     const double side = geometry::kMaxImageSide;
-    if (!is_integer(v[0], 0, side) || !is_integer(v[1], 0, side) || !is_integer(v[2], 1, side) || !is_integer(v[3], 1, side))
+    if (!is_integer(v[0], 0, side) || !is_integer(v[1], 0, side) || !is_integer(v[2], 1, side) ||
+        !is_integer(v[3], 1, side))
       return fail(fmt::format("{}x{}+{}+{} is not a rectangle within {}", v[2], v[3], v[0], v[1], side));
     r = {int(v[0]), int(v[1]), int(v[2]), int(v[3])};
   }
@@ -199,7 +224,14 @@ class Decoder {
     if (!numbers(o, v)) return;
     if (!is_integer(v[12], 1, geometry::kMaxImageSide) || !is_integer(v[13], 1, geometry::kMaxImageSide))
       return fail(fmt::format("has size {}x{}, limit {}", v[12], v[13], geometry::kMaxImageSide));
-    c = {{{v[0], v[1], v[2]}, glm::dquat(v[3], v[4], v[5], v[6])}, v[7], v[8], v[9], v[10], v[11], int(v[12]), int(v[13])};
+    c = {{{v[0], v[1], v[2]}, glm::dquat(v[3], v[4], v[5], v[6])},
+         v[7],
+         v[8],
+         v[9],
+         v[10],
+         v[11],
+         int(v[12]),
+         int(v[13])};
     if (const auto valid = geometry::validate(c); !valid) fail(": " + valid.error().text);
   }
   void get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks) {
@@ -211,7 +243,8 @@ class Decoder {
       if (!is_integer(v[0], 0, geometry::kMaxChunks) || !is_integer(v[1], 0, geometry::kMaxChunkTriangles) ||
           !is_integer(v[2], 0, kMaxBulkBytes))
         return fail("holds a chunk whose id, triangles or bytes are out of range");
-      chunks.push_back({ChunkId{uint64_t(v[0])}, {{v[3], v[4], v[5]}, {v[6], v[7], v[8]}}, uint64_t(v[1]), uint64_t(v[2])});
+      chunks.push_back(
+          {ChunkId{uint64_t(v[0])}, {{v[3], v[4], v[5]}, {v[6], v[7], v[8]}}, uint64_t(v[1]), uint64_t(v[2])});
     }
   }
   void get(const msgpack::object& o, Lease& lease) {
@@ -231,18 +264,25 @@ std::optional<Error> check_tile(const geometry::Camera& c, const geometry::Rect&
   if (tiles < 1 || tiles > kMaxTiles || tile >= tiles)
     return Error{fmt::format("tile {} of {} is out of range, limit {}", tile, tiles, kMaxTiles)};
   if (r.x + r.width > c.width || r.y + r.height > c.height)
-    return Error{fmt::format("tile {}x{}+{}+{} is not inside its {}x{} frame", r.width, r.height, r.x, r.y, c.width, c.height)};
+    return Error{
+        fmt::format("tile {}x{}+{}+{} is not inside its {}x{} frame", r.width, r.height, r.x, r.y, c.width, c.height)};
   return std::nullopt;
 }
-template <class M> std::optional<Error> check(const M&) { return std::nullopt; }
+template <class M>
+std::optional<Error> check(const M&) {
+  return std::nullopt;
+}
 std::optional<Error> check(const Lease& m) { return check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame); }
 std::optional<Error> check(const DepthTile& m) { return check(m.lease); }
 std::optional<Error> check(const Patch& m) { return check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame); }
 
 template <class M>
 constexpr size_t body_limit() {
-  constexpr bool bulk = requires(M m) { m.image; } || requires(M m) { m.data; } || requires(M m) { m.chunks; } ||
-                        requires(M m) { m.clusters; } || requires(M m) { m.columns; };
+  constexpr bool bulk = requires(M m) { m.image; }
+  || requires(M m) { m.data; }
+  || requires(M m) { m.chunks; }
+  || requires(M m) { m.clusters; }
+  || requires(M m) { m.columns; };
   return bulk ? kMaxBulkBytes + kMaxControlBytes : kMaxControlBytes;
 }
 
@@ -264,15 +304,16 @@ Result<M> decode(Bytes body) {
     // Strings and binaries are referenced in place; claimed sizes of lists and maps are limited before they are allocated.
     const msgpack::unpack_limit limit(geometry::kMaxChunks, kMaxEntries, kMaxControlBytes, kMaxBulkBytes, 0, 8);
     size_t offset = 0;
-    const msgpack::object_handle handle =
-        msgpack::unpack(reinterpret_cast<const char*>(body.data()), body.size(), offset,
-                        [](msgpack::type::object_type, size_t, void*) { return true; }, nullptr, limit);
+    const msgpack::object_handle handle = msgpack::unpack(
+        reinterpret_cast<const char*>(body.data()), body.size(), offset,
+        [](msgpack::type::object_type, size_t, void*) { return true; }, nullptr, limit);
     if (offset != body.size()) return refuse(fmt::format("{} bytes follow the map", body.size() - offset));
     const msgpack::object& map = handle.get();
     if (map.type != msgpack::type::MAP) return refuse("is not a map");
     const msgpack::object* version = find(map, "v");
     if (!version || version->type != msgpack::type::POSITIVE_INTEGER) return refuse("has no version");
-    if (version->via.u64 != kProtocolVersion) return refuse(fmt::format("has version {} instead of {}", version->via.u64, kProtocolVersion));
+    if (version->via.u64 != kProtocolVersion)
+      return refuse(fmt::format("has version {} instead of {}", version->via.u64, kProtocolVersion));
     M message;
     Decoder decoder(map);
     M::fields(decoder, message);
@@ -284,7 +325,7 @@ Result<M> decode(Bytes body) {
   }
 }
 
-#define TELESPLAT_MESSAGE(M)                     \
+#define TELESPLAT_MESSAGE(M)                \
   template std::string encode<M>(const M&); \
   template Result<M> decode<M>(Bytes);
 TELESPLAT_MESSAGE(Hello)

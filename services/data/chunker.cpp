@@ -44,8 +44,9 @@ void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> 
   std::nth_element(items.begin(), items.begin() + middle, items.end(), [axis](const Item& a, const Item& b) {
     return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis] : a.triangle < b.triangle;
   });
-  tbb::parallel_invoke([&] { split(items.first(middle), first, left_parts, starts.first(left_parts)); },
-                       [&] { split(items.subspan(middle), first + middle, parts - left_parts, starts.subspan(left_parts)); });
+  tbb::parallel_invoke(
+      [&] { split(items.first(middle), first, left_parts, starts.first(left_parts)); },
+      [&] { split(items.subspan(middle), first + middle, parts - left_parts, starts.subspan(left_parts)); });
 }
 
 // Spreads the lower 10 bits, two zeros between each.
@@ -66,7 +67,8 @@ std::vector<uint32_t> morton_order(const PlacedMesh& mesh, std::span<const uint3
   keys.reserve(triangles.size());
   for (uint32_t t : triangles) {
     const glm::vec3 cell = glm::min((item_of(mesh, t).centroid - box.lo) * scale, glm::vec3(1023.0f));
-    const uint32_t code = spread(static_cast<uint32_t>(cell.x)) | spread(static_cast<uint32_t>(cell.y)) << 1 | spread(static_cast<uint32_t>(cell.z)) << 2;
+    const uint32_t code = spread(static_cast<uint32_t>(cell.x)) | spread(static_cast<uint32_t>(cell.y)) << 1 |
+                          spread(static_cast<uint32_t>(cell.z)) << 2;
     keys.push_back(uint64_t{code} << 32 | t);
   }
   std::sort(keys.begin(), keys.end());

@@ -15,7 +15,8 @@ constexpr size_t kMaxCompanions = 64;
 std::vector<std::string> material_libraries(std::string_view content) {
   std::vector<std::string> names;
   constexpr std::string_view kWord = "mtllib";
-  for (size_t at = content.find(kWord); at != content.npos && names.size() < kMaxCompanions; at = content.find(kWord, at)) {
+  for (size_t at = content.find(kWord); at != content.npos && names.size() < kMaxCompanions;
+       at = content.find(kWord, at)) {
     const bool starts_line = at == 0 || content[at - 1] == '\n';
     at += kWord.size();
     if (!starts_line) continue;

@@ -49,11 +49,14 @@ wire::Hello make_hello(const DataServiceOptions& o, const MeshStore& store, cons
 void add_flags(CLI::App& app, DataServiceOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kBoth);
   app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)")->required();
-  app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")->capture_default_str()->check(CLI::Range(1e-3, 1e3));
+  app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e3));
   app.add_option("--up", o.mesh.up, "data axis that points up: x, y, z, -x, -y, -z or auto")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
-  app.add_option("--cache", o.mesh.cache_dir, "folder of the chunk store; default: telesplat in the user's cache folder");
+  app.add_option("--cache", o.mesh.cache_dir,
+                 "folder of the chunk store; default: telesplat in the user's cache folder");
   app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
   app.add_flag("--report-progress", o.report_progress, "print progress lines on stdout");
 }
@@ -68,7 +71,8 @@ int run(const DataServiceOptions& o) {
   }
   const MeshStoreInfo& info = (*store)->info();
   if (info.degenerate_dropped) log::info("{} degenerate triangles dropped", info.degenerate_dropped);
-  log::info("{}: {} triangles in {} chunks{}", o.scene, info.triangles, (*store)->chunks().size(), info.from_cache ? " (from the chunk store)" : "");
+  log::info("{}: {} triangles in {} chunks{}", o.scene, info.triangles, (*store)->chunks().size(),
+            info.from_cache ? " (from the chunk store)" : "");
 
   net::Context context;
   net::Socket blocks(context, net::Kind::kRouter, o.service.name + ":chunks", {.high_water_mark = 4096});
@@ -79,7 +83,9 @@ int run(const DataServiceOptions& o) {
   }
   net::MasterLink link(context, o.service.master, make_hello(o, **store, *endpoint));
   const auto status = [&] {
-    return net::MasterLink::Values{{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(blocks.rejected())}};
+    return net::MasterLink::Values{{"rss_mb", net::resident_mb()},
+                                   {"peak_rss_mb", net::peak_resident_mb()},
+                                   {"messages_rejected", double(blocks.rejected())}};
   };
 
   const auto answer = [&](const std::string& peer, const auto& request) {
@@ -100,7 +106,8 @@ int run(const DataServiceOptions& o) {
     for (int n = 0; n < 64; ++n) {
       const auto message = blocks.receive();
       if (!message) break;
-      net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(blocks, *message, [&](const auto& request) { answer(message->peer, request); });
+      net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(
+          blocks, *message, [&](const auto& request) { answer(message->peer, request); });
     }
   }
   link.leave(status);

@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   const auto file_bytes = static_cast<uint64_t>(status.st_size);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
-  prctl(PR_SET_PDEATHSIG, SIGKILL);                        // nobody waits any more
+  prctl(PR_SET_PDEATHSIG, SIGKILL);                           // nobody waits any more
   alarm(static_cast<unsigned>(60 + file_bytes / 1'000'000));  // a hostile file must not keep us for ever
   limit_memory(file_bytes);
   const int out = dup(STDOUT_FILENO);
@@ -51,7 +51,8 @@ int main(int argc, char** argv) {
   try {
     return telesplat::data::write_import_report(out, telesplat::data::import_with_vtk(path, format)) ? 0 : 1;
   } catch (const std::bad_alloc&) {
-    const telesplat::Error error{fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};
+    const telesplat::Error error{
+        fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};
     return telesplat::data::write_import_report(out, error) ? 0 : 1;
   } catch (...) {
     return 1;

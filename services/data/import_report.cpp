@@ -49,9 +49,17 @@ bool write_import_report(int descriptor, const Result<Mesh>& result) {
     return write_all(descriptor, &report, sizeof report) && write_all(descriptor, text.data(), text.size());
   }
   const Mesh& mesh = *result;
-  report = {0, mesh.positions.size(), mesh.indices.size() / 3, mesh.degenerate_dropped, !mesh.normals.empty(), !mesh.colours.empty()};
-  const auto put = [&](const auto& array) { return write_all(descriptor, array.data(), array.size() * sizeof(array[0])); };
-  return write_all(descriptor, &report, sizeof report) && put(mesh.positions) && put(mesh.normals) && put(mesh.colours) && put(mesh.indices);
+  report = {0,
+            mesh.positions.size(),
+            mesh.indices.size() / 3,
+            mesh.degenerate_dropped,
+            !mesh.normals.empty(),
+            !mesh.colours.empty()};
+  const auto put = [&](const auto& array) {
+    return write_all(descriptor, array.data(), array.size() * sizeof(array[0]));
+  };
+  return write_all(descriptor, &report, sizeof report) && put(mesh.positions) && put(mesh.normals) &&
+         put(mesh.colours) && put(mesh.indices);
 }
 
 Result<Mesh> read_import_report(int descriptor, const std::string& path, const std::string& format) {
@@ -65,9 +73,10 @@ Result<Mesh> read_import_report(int descriptor, const std::string& path, const s
   Mesh mesh;
   mesh.format = format;
   mesh.degenerate_dropped = report.degenerate;
-  const bool whole = take(rest, report.vertices, mesh.positions) && take(rest, report.normals ? report.vertices : 0, mesh.normals) &&
-                     take(rest, report.colours ? report.vertices : 0, mesh.colours) && report.triangles <= kMaxTriangles &&
-                     take(rest, 3 * report.triangles, mesh.indices);
+  const bool whole = take(rest, report.vertices, mesh.positions) &&
+                     take(rest, report.normals ? report.vertices : 0, mesh.normals) &&
+                     take(rest, report.colours ? report.vertices : 0, mesh.colours) &&
+                     report.triangles <= kMaxTriangles && take(rest, 3 * report.triangles, mesh.indices);
   if (!whole) return incomplete;
   return mesh;
 }

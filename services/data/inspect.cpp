@@ -30,13 +30,14 @@ std::string describe(const MeshFileFacts& facts) {
   out += fmt::format("format      {}, {} bytes, content {:016x}\n", i.format, facts.file_bytes, i.content_hash);
   out += fmt::format("triangles   {} ({} degenerate ones left out)\n", i.triangles, i.degenerate_dropped);
   out += fmt::format("vertices    {}\n", i.vertices);
-  out += fmt::format("box         ({}, {}, {}) .. ({}, {}, {}), in the file's units\n", i.box_data.lo.x, i.box_data.lo.y, i.box_data.lo.z,
-                     i.box_data.hi.x, i.box_data.hi.y, i.box_data.hi.z);
+  out += fmt::format("box         ({}, {}, {}) .. ({}, {}, {}), in the file's units\n", i.box_data.lo.x,
+                     i.box_data.lo.y, i.box_data.lo.z, i.box_data.hi.x, i.box_data.hi.y, i.box_data.hi.z);
   out += fmt::format("size        {} x {} x {}\n", size.x, size.y, size.z);
   out += fmt::format("in the room {:.3f} x {:.3f} x {:.3f} m, {} up\n", room.x, room.y, room.z, i.up);
   out += fmt::format("normals     {}\n", i.had_normals ? "in the file" : "computed");
   out += fmt::format("colours     {}\n", i.had_colours ? "in the file" : "none: neutral");
-  out += fmt::format("chunks      {}, {:.1f} MB{}\n", facts.chunks, static_cast<double>(facts.chunk_bytes) * 1e-6, i.from_cache ? ", from the cache" : "");
+  out += fmt::format("chunks      {}, {:.1f} MB{}\n", facts.chunks, static_cast<double>(facts.chunk_bytes) * 1e-6,
+                     i.from_cache ? ", from the cache" : "");
   return out;
 }
 

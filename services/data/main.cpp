@@ -6,5 +6,6 @@ int main(int argc, char** argv) {
   using namespace telesplat;
   data::DataServiceOptions options;
   options.service.name = "data";
-  return net::service_main(argc, argv, "telesplat-data: reads a data set and serves its blocks to samplers", options, data::add_flags, data::run);
+  return net::service_main(argc, argv, "telesplat-data: reads a data set and serves its blocks to samplers", options,
+                           data::add_flags, data::run);
 }

@@ -19,7 +19,8 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::map(int descriptor, const 
   if (status.st_size <= 0) return Error{fmt::format("{}: is empty (0 bytes)", name)};
   const auto size = static_cast<size_t>(status.st_size);
   void* data = mmap(nullptr, size, PROT_READ, MAP_SHARED, descriptor, 0);
-  if (data == MAP_FAILED) return Error{fmt::format("{}: {} bytes cannot be mapped: {}", name, size, std::strerror(errno))};
+  if (data == MAP_FAILED)
+    return Error{fmt::format("{}: {} bytes cannot be mapped: {}", name, size, std::strerror(errno))};
   return std::shared_ptr<const MappedFile>(new MappedFile(static_cast<const std::byte*>(data), size));
 }
 

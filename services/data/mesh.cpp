@@ -12,15 +12,19 @@ Status validate_mesh(const Mesh& mesh, const std::string& name) {
   CHECK(mesh.normals.empty() || mesh.normals.size() == vertices);
   CHECK(mesh.colours.empty() || mesh.colours.size() == vertices);
   if (triangles == 0) return Error{fmt::format("{}: holds no triangles ({} vertices)", name, vertices)};
-  if (triangles > kMaxTriangles) return Error{fmt::format("{}: {} triangles, the limit is {}", name, triangles, kMaxTriangles)};
-  if (vertices > kMaxVertices) return Error{fmt::format("{}: {} vertices, the limit is {}", name, vertices, kMaxVertices)};
+  if (triangles > kMaxTriangles)
+    return Error{fmt::format("{}: {} triangles, the limit is {}", name, triangles, kMaxTriangles)};
+  if (vertices > kMaxVertices)
+    return Error{fmt::format("{}: {} vertices, the limit is {}", name, vertices, kMaxVertices)};
   uint32_t largest = 0;
   for (uint32_t i : mesh.indices) largest = std::max(largest, i);
   if (largest >= vertices) {
     size_t at = 0;
     while (mesh.indices[at] < vertices) ++at;
-    if (mesh.indices[at] == ~uint32_t{0}) return Error{fmt::format("{}: triangle {} names a vertex that is not one of the {}", name, at / 3, vertices)};
-    return Error{fmt::format("{}: triangle {} names vertex {}, there are {}", name, at / 3, mesh.indices[at], vertices)};
+    if (mesh.indices[at] == ~uint32_t{0})
+      return Error{fmt::format("{}: triangle {} names a vertex that is not one of the {}", name, at / 3, vertices)};
+    return Error{
+        fmt::format("{}: triangle {} names vertex {}, there are {}", name, at / 3, mesh.indices[at], vertices)};
   }
   for (size_t i = 0; i < vertices; ++i) {
     const glm::dvec3& p = mesh.positions[i];

@@ -11,11 +11,13 @@
 namespace telesplat::data {
 namespace {
 
-constexpr const char* kSupported = "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTK (polygonal data), glTF and GLB";
+constexpr const char* kSupported =
+    "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTK (polygonal data), glTF and GLB";
 
 std::string extension_of(const std::string& path) {
   std::string out = std::filesystem::path(path).extension().string();
-  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return out;
 }
 
@@ -33,7 +35,9 @@ std::string other_kind(std::string_view content, const std::string& extension) {
       is_one_of(extension, {".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".raw", ".dcm", ".vti"}) ||
       (content.size() > 132 && content.substr(128, 4) == "DICM"))
     return "a volume";
-  if (content.starts_with("\x1f\x8b"sv) || content.starts_with("PK\3\4"sv) || content.starts_with("\xfd" "7zXZ"sv))
+  if (content.starts_with("\x1f\x8b"sv) || content.starts_with("PK\3\4"sv) ||
+      content.starts_with("\xfd"
+                          "7zXZ"sv))
     return "a compressed file (unpack it first)";
   return "";
 }
@@ -73,11 +77,13 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
     if (start.find("type=\"PolyData\"") != start.npos) return {"vtp", ""};
     return {"", fmt::format("is a VTK file, but not of polygonal data (type=\"PolyData\"); {}", kSupported)};
   }
-  if (const std::string kind = other_kind(content, extension); !kind.empty()) return {"", fmt::format("is {}, not a mesh; {}", kind, kSupported)};
+  if (const std::string kind = other_kind(content, extension); !kind.empty())
+    return {"", fmt::format("is {}, not a mesh; {}", kind, kSupported)};
   if (is_binary_stl(content)) return {"stl", ""};
   for (const char* start : {"OFF", "COFF", "NOFF", "CNOFF", "STOFF", "STCOFF", "STNOFF", "STCNOFF"})
     if (content.starts_with(start)) return {"off", ""};
-  if (content.starts_with("solid") && (extension == ".stl" || content.substr(0, 4096).find("facet") != content.npos)) return {"stl", ""};
+  if (content.starts_with("solid") && (extension == ".stl" || content.substr(0, 4096).find("facet") != content.npos))
+    return {"stl", ""};
   // By name, where the content says nothing (or is broken, which the reader will say better).
   if (is_one_of(extension, {".ply", ".off", ".stl", ".obj", ".vtp", ".vtk"})) return {extension.substr(1), ""};
   if (is_one_of(extension, {".gltf", ".glb"})) return {"gltf", ""};

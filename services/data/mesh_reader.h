@@ -39,7 +39,8 @@ Result<Mesh> read_stl(std::string_view content, const std::string& name, const R
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress);
 /// VTP, legacy VTK and glTF, through VTK, in the program telesplat-import, which must lie beside this process's own program or in
 /// $PATH: neither VTK's messages nor a crash on a hostile file reach us. Claimed counts are checked here before VTK sees the file.
-Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path, const ReadProgress& progress);
+Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
+                           const ReadProgress& progress);
 
 /// Other files that `path` pulls in (material libraries of an OBJ, buffers and images of a glTF), as paths; existing or not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);

@@ -26,7 +26,9 @@ namespace fs = std::filesystem;
 class Descriptor {
  public:
   explicit Descriptor(int value = -1) : value_(value) {}
-  ~Descriptor() { if (value_ >= 0) close(value_); }
+  ~Descriptor() {
+    if (value_ >= 0) close(value_);
+  }
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   int get() const { return value_; }
@@ -63,7 +65,8 @@ fs::path default_cache_dir() {
 }
 
 // The content of the file and of those it pulls in.
-uint64_t hash_content(const MappedFile& file, const std::string& format, const std::string& path, const Progress& progress) {
+uint64_t hash_content(const MappedFile& file, const std::string& format, const std::string& path,
+                      const Progress& progress) {
   constexpr size_t kStep = 64 << 20;
   XXH3_state_t* state = XXH3_createState();
   XXH3_64bits_reset(state);
@@ -73,7 +76,8 @@ uint64_t hash_content(const MappedFile& file, const std::string& format, const s
     XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
   }
   for (const std::string& companion : companion_files(file.text(), format, path))
-    if (const auto other = MappedFile::open(companion)) XXH3_64bits_update(state, (*other)->bytes().data(), (*other)->bytes().size());
+    if (const auto other = MappedFile::open(companion))
+      XXH3_64bits_update(state, (*other)->bytes().data(), (*other)->bytes().size());
   const uint64_t hash = XXH3_64bits_digest(state);
   XXH3_freeState(state);
   progress("hash", 1.0);
@@ -89,7 +93,8 @@ Status validate_options(const MeshOptions& options) {
 }
 
 // Reads the mesh file and writes its store into the descriptor.
-Status build_store(int descriptor, const std::string& path, const MeshOptions& options, uint64_t content_hash, const Progress& progress) {
+Status build_store(int descriptor, const std::string& path, const MeshOptions& options, uint64_t content_hash,
+                   const Progress& progress) {
   auto mesh = read_mesh(path, [&](double fraction) { progress("read", fraction); });
   if (!mesh) return mesh.error();
   progress("read", 1.0);
@@ -112,11 +117,13 @@ Status build_store(int descriptor, const std::string& path, const MeshOptions& o
 }
 
 // Without a cache: a file that has no name and goes away with its last mapping.
-Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const MeshOptions& options, uint64_t hash, const Progress& progress) {
+Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const MeshOptions& options, uint64_t hash,
+                                                const Progress& progress) {
   std::error_code ignored;
   std::string name = (fs::temp_directory_path(ignored) / "telesplat-XXXXXX").string();
   const Descriptor file(mkostemp(name.data(), O_CLOEXEC));
-  if (!file.valid()) return Error{fmt::format("{}: no temporary file {} for its chunks: {}", path, name, std::strerror(errno))};
+  if (!file.valid())
+    return Error{fmt::format("{}: no temporary file {} for its chunks: {}", path, name, std::strerror(errno))};
   unlink(name.c_str());
   if (auto status = build_store(file.get(), path, options, hash, progress); !status) return status.error();
   auto content = read_store(file.get(), name);
@@ -132,7 +139,8 @@ Result<StoreContent> open_existing(const std::string& name) {
 
 }  // namespace
 
-Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, const MeshOptions& options, const Progress& user_progress) {
+Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, const MeshOptions& options,
+                                                   const Progress& user_progress) {
   const Progress progress = user_progress ? user_progress : [](const char*, double) {};
   if (auto status = validate_options(options); !status) return status.error();
   const auto file = MappedFile::open(path);
@@ -169,7 +177,8 @@ Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, cons
     }
     const Status built = build_store(out.get(), path, options, hash, progress);
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
-      const std::string reason = built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
+      const std::string reason =
+          built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
       fs::remove(part, error);
       return Error{reason};
     }

@@ -12,20 +12,21 @@ namespace telesplat::data {
 
 struct MeshOptions {
   double room_size_m = 0.8;  ///< the largest extent of the data set's box in room space
-  std::string up = "auto";   ///< x, y, z, -x, -y, -z: the data axis that points up; auto: z for terrains and medical data, else y
-  std::string cache_dir;     ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
+  std::string up =
+      "auto";  ///< x, y, z, -x, -y, -z: the data axis that points up; auto: z for terrains and medical data, else y
+  std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
   bool use_cache = true;
 };
 
 struct MeshStoreInfo {
-  std::string source;              ///< path of the file it was made from
-  std::string format;              ///< "ply", "obj", ...
+  std::string source;  ///< path of the file it was made from
+  std::string format;  ///< "ply", "obj", ...
   uint64_t triangles = 0, vertices = 0;
   uint64_t degenerate_dropped = 0;
   bool had_normals = false, had_colours = false;
-  geometry::DBox box_data;         ///< in the file's own units
+  geometry::DBox box_data;  ///< in the file's own units
   geometry::Box box_room;
-  std::string up;                  ///< the axis chosen
+  std::string up;  ///< the axis chosen
   bool from_cache = false;
   uint64_t content_hash = 0;
 };
@@ -37,7 +38,8 @@ using Progress = std::function<void(const char* stage, double fraction)>;
 class MeshStore {
  public:
   /// Opens the store of this mesh file, making it first if the cache has none. Errors (exit code 2 for a user) name the file.
-  static Result<std::shared_ptr<MeshStore>> open(const std::string& path, const MeshOptions& options, const Progress& progress);
+  static Result<std::shared_ptr<MeshStore>> open(const std::string& path, const MeshOptions& options,
+                                                 const Progress& progress);
   virtual ~MeshStore() = default;
 
   virtual const MeshStoreInfo& info() const = 0;

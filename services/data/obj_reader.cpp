@@ -27,7 +27,8 @@ void read_materials(const std::string& path, std::unordered_map<std::string, uin
     const std::string_view word = scan.word();
     if (word == "newmtl" && scan.skip_blanks()) material = scan.word();
     double c[3];
-    if (word == "Kd" && scan.skip_blanks() && scan.number(c[0]) && scan.skip_blanks() && scan.number(c[1]) && scan.skip_blanks() && scan.number(c[2]))
+    if (word == "Kd" && scan.skip_blanks() && scan.number(c[0]) && scan.skip_blanks() && scan.number(c[1]) &&
+        scan.skip_blanks() && scan.number(c[2]))
       colours[material] = colour_of(c);
   }
 }
@@ -44,10 +45,14 @@ class ObjReader {
     mesh_.format = "obj";
     for (size_t lines = 0; scan_.skip_space('#'); scan_.next_line(), ++lines) {
       const std::string_view word = scan_.word();
-      const Status status = word == "v" ? read_vertex() : word == "vn" ? read_normal() : word == "f" ? read_face() : ok_status();
+      const Status status = word == "v"    ? read_vertex()
+                            : word == "vn" ? read_normal()
+                            : word == "f"  ? read_face()
+                                           : ok_status();
       if (!status.ok()) return status.error();
       if (word == "usemtl") use_material();
-      if ((lines & 0xffff) == 0 && progress_) progress_(static_cast<double>(scan_.offset()) / static_cast<double>(content_.size()));
+      if ((lines & 0xffff) == 0 && progress_)
+        progress_(static_cast<double>(scan_.offset()) / static_cast<double>(content_.size()));
     }
     finish();
     return std::move(mesh_);
@@ -102,7 +107,8 @@ class ObjReader {
     int64_t index = 0, ignored = 0;
     uint32_t position = 0, normal = kNone;
     if (!scan_.integer(index)) return bad("a face's corner is no number");
-    if (!resolve(index, positions_.size(), position)) return bad(fmt::format("a face names vertex {}, there are {} so far", index, positions_.size()));
+    if (!resolve(index, positions_.size(), position))
+      return bad(fmt::format("a face names vertex {}, there are {} so far", index, positions_.size()));
     if (scan_.skip_char('/')) {
       scan_.integer(ignored);
       if (scan_.skip_char('/') && scan_.integer(index) && !resolve(index, normals_.size(), normal))
@@ -149,7 +155,8 @@ class ObjReader {
     for (const Variant& v : variants_) {
       mesh_.positions.push_back(positions_[v.vertex]);
       if (any_colour) mesh_.colours.push_back(!own_colours && v.colour != kNone ? v.colour : vertex_colours_[v.vertex]);
-      if (any_normal) mesh_.normals.push_back(v.normal != kNone ? normals_[v.normal] : glm::vec3(0));  // without one: computed later
+      if (any_normal)
+        mesh_.normals.push_back(v.normal != kNone ? normals_[v.normal] : glm::vec3(0));  // without one: computed later
     }
   }
 

@@ -45,7 +45,9 @@ class OffReader {
     // Each number takes a digit and a separator, but for the last.
     const auto check = [&](const char* what, double count, size_t numbers) -> Status {
       const double most = static_cast<double>((bytes_ + 1) / (2 * numbers));
-      if (count > most) return bad(fmt::format("header claims {:.0f} {}, a file of {} bytes holds at most {:.0f}", count, what, bytes_, most));
+      if (count > most)
+        return bad(
+            fmt::format("header claims {:.0f} {}, a file of {} bytes holds at most {:.0f}", count, what, bytes_, most));
       return ok_status();
     };
     if (auto status = check("vertices", counts[0], 3); !status) return status;
@@ -88,7 +90,9 @@ class OffReader {
     double largest = 0;
     for (const glm::dvec3& c : raw) largest = std::max({largest, c.x, c.y, c.z});
     const double scale = largest <= 1.0 ? 255.0 : 1.0;
-    const auto channel = [scale](double v) { return v > 0 ? static_cast<uint32_t>(std::min(v * scale + 0.5, 255.0)) : 0; };
+    const auto channel = [scale](double v) {
+      return v > 0 ? static_cast<uint32_t>(std::min(v * scale + 0.5, 255.0)) : 0;
+    };
     mesh_.colours.reserve(raw.size());
     for (const glm::dvec3& c : raw) mesh_.colours.push_back(pack_rgb(channel(c.x), channel(c.y), channel(c.z)));
   }

@@ -59,7 +59,8 @@ std::vector<glm::vec3> vertex_normals(const PlacedMesh& mesh) {
 }
 
 bool has_direction(const glm::vec3& n) {
-  return std::isfinite(n.x) && std::isfinite(n.y) && std::isfinite(n.z) && std::abs(n.x) + std::abs(n.y) + std::abs(n.z) > 1e-20f;
+  return std::isfinite(n.x) && std::isfinite(n.y) && std::isfinite(n.z) &&
+         std::abs(n.x) + std::abs(n.y) + std::abs(n.z) > 1e-20f;
 }
 
 // Normals of any length lose nothing in float if their largest component is near 1.
@@ -110,7 +111,8 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string
 
   // Vertices that no triangle uses may lie anywhere; they are not kept, so they need not be placed well.
   placed.positions_room.resize(mesh.positions.size());
-  parallel(mesh.positions.size(), [&](size_t i) { placed.positions_room[i] = glm::vec3(*rotation * ((mesh.positions[i] - centre) * scale)); });
+  parallel(mesh.positions.size(),
+           [&](size_t i) { placed.positions_room[i] = glm::vec3(*rotation * ((mesh.positions[i] - centre) * scale)); });
   mesh.positions = {};
   placed.indices = std::move(mesh.indices);
   placed.degenerate_dropped = mesh.degenerate_dropped;

@@ -18,7 +18,7 @@ struct PlacedMesh {
   std::vector<uint32_t> indices;  ///< three a triangle
   geometry::DBox box_data;        ///< of the vertices that triangles use
   geometry::Box box_room;
-  std::string up;                 ///< x, y, z, -x, -y or -z
+  std::string up;  ///< x, y, z, -x, -y or -z
   uint64_t degenerate_dropped = 0;
 };
 

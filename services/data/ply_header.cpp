@@ -15,10 +15,12 @@ constexpr size_t kMaxHeaderBytes = 1 << 20, kMaxElements = 64, kMaxProperties = 
 
 std::optional<PlyType> parse_type(std::string_view word) {
   constexpr std::pair<std::string_view, PlyType> kNames[] = {
-      {"char", PlyType::kInt8},     {"int8", PlyType::kInt8},       {"uchar", PlyType::kUint8},   {"uint8", PlyType::kUint8},
-      {"short", PlyType::kInt16},   {"int16", PlyType::kInt16},     {"ushort", PlyType::kUint16}, {"uint16", PlyType::kUint16},
-      {"int", PlyType::kInt32},     {"int32", PlyType::kInt32},     {"uint", PlyType::kUint32},   {"uint32", PlyType::kUint32},
-      {"float", PlyType::kFloat32}, {"float32", PlyType::kFloat32}, {"double", PlyType::kFloat64}, {"float64", PlyType::kFloat64}};
+      {"char", PlyType::kInt8},      {"int8", PlyType::kInt8},       {"uchar", PlyType::kUint8},
+      {"uint8", PlyType::kUint8},    {"short", PlyType::kInt16},     {"int16", PlyType::kInt16},
+      {"ushort", PlyType::kUint16},  {"uint16", PlyType::kUint16},   {"int", PlyType::kInt32},
+      {"int32", PlyType::kInt32},    {"uint", PlyType::kUint32},     {"uint32", PlyType::kUint32},
+      {"float", PlyType::kFloat32},  {"float32", PlyType::kFloat32}, {"double", PlyType::kFloat64},
+      {"float64", PlyType::kFloat64}};
   for (const auto& [name, type] : kNames)
     if (name == word) return type;
   return std::nullopt;
@@ -38,7 +40,8 @@ std::vector<std::string_view> split(TextScanner& scan) {
 Status parse_property(const std::vector<std::string_view>& words, PlyElement& element, const std::string& where) {
   PlyProperty property;
   property.is_list = words.size() == 5 && words[1] == "list";
-  if (!property.is_list && words.size() != 3) return Error{where + ": a property line is 'property TYPE NAME' or 'property list TYPE TYPE NAME'"};
+  if (!property.is_list && words.size() != 3)
+    return Error{where + ": a property line is 'property TYPE NAME' or 'property list TYPE TYPE NAME'"};
   const auto type = parse_type(words[words.size() - 2]);
   const auto count_type = property.is_list ? parse_type(words[2]) : PlyType::kUint8;
   if (!type || !count_type || !is_integer(*count_type))
@@ -61,11 +64,14 @@ Status check_counts(const PlyHeader& header, size_t file_bytes, const std::strin
     if (element.count == 0) continue;
     if (least == 0) return Error{fmt::format("{}: element '{}' has no properties", name, element.name)};
     if (element.count > data_bytes / least + 1)
-      return Error{fmt::format("{}: header claims {} of element '{}' ({} bytes or more each), but only {} bytes follow it", name,
-                               element.count, element.name, least, data_bytes)};
+      return Error{
+          fmt::format("{}: header claims {} of element '{}' ({} bytes or more each), but only {} bytes follow it", name,
+                      element.count, element.name, least, data_bytes)};
     needed += element.count * least;
     if (needed > data_bytes + 1)  // the last number of a text file need not be followed by a separator
-      return Error{fmt::format("{}: is truncated: header claims elements of {} bytes or more, but only {} bytes follow it", name, needed, data_bytes)};
+      return Error{
+          fmt::format("{}: is truncated: header claims elements of {} bytes or more, but only {} bytes follow it", name,
+                      needed, data_bytes)};
   }
   return ok_status();
 }
@@ -104,17 +110,22 @@ Result<PlyHeader> parse_ply_header(std::string_view content, const std::string& 
     if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
     if (words[0] == "end_header") break;
     if (words[0] == "format" && words.size() >= 2) {
-      if (words[1] == "ascii") header.encoding = PlyEncoding::kAscii;
-      else if (words[1] == "binary_little_endian") header.encoding = PlyEncoding::kLittleEndian;
-      else if (words[1] == "binary_big_endian") header.encoding = PlyEncoding::kBigEndian;
-      else return Error{fmt::format("{}: unknown PLY format '{}'", where, words[1])};
+      if (words[1] == "ascii")
+        header.encoding = PlyEncoding::kAscii;
+      else if (words[1] == "binary_little_endian")
+        header.encoding = PlyEncoding::kLittleEndian;
+      else if (words[1] == "binary_big_endian")
+        header.encoding = PlyEncoding::kBigEndian;
+      else
+        return Error{fmt::format("{}: unknown PLY format '{}'", where, words[1])};
       has_format = true;
     } else if (words[0] == "element" && words.size() == 3) {
       TextScanner number(words[2]);
       int64_t count = -1;
       if (!number.integer(count) || !number.at_end() || count < 0)
         return Error{fmt::format("{}: element count '{}' is not a number from 0 on", where, words[2])};
-      if (header.elements.size() == kMaxElements) return Error{fmt::format("{}: more than {} elements", where, kMaxElements)};
+      if (header.elements.size() == kMaxElements)
+        return Error{fmt::format("{}: more than {} elements", where, kMaxElements)};
       header.elements.push_back({std::string(words[1]), static_cast<uint64_t>(count), {}});
     } else if (words[0] == "property" && !header.elements.empty()) {
       if (auto status = parse_property(words, header.elements.back(), where); !status) return status.error();

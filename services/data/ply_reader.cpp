@@ -25,17 +25,26 @@ class AsciiCursor {
 template <bool kSwap>
 class BinaryCursor {
  public:
-  BinaryCursor(std::string_view content, size_t offset) : at_(content.data() + offset), end_(content.data() + content.size()) {}
+  BinaryCursor(std::string_view content, size_t offset)
+      : at_(content.data() + offset), end_(content.data() + content.size()) {}
   bool read(PlyType type, double& out) {
     switch (type) {
-      case PlyType::kInt8: return take<int8_t>(out);
-      case PlyType::kUint8: return take<uint8_t>(out);
-      case PlyType::kInt16: return take<int16_t>(out);
-      case PlyType::kUint16: return take<uint16_t>(out);
-      case PlyType::kInt32: return take<int32_t>(out);
-      case PlyType::kUint32: return take<uint32_t>(out);
-      case PlyType::kFloat32: return take<float>(out);
-      case PlyType::kFloat64: return take<double>(out);
+      case PlyType::kInt8:
+        return take<int8_t>(out);
+      case PlyType::kUint8:
+        return take<uint8_t>(out);
+      case PlyType::kInt16:
+        return take<int16_t>(out);
+      case PlyType::kUint16:
+        return take<uint16_t>(out);
+      case PlyType::kInt32:
+        return take<int32_t>(out);
+      case PlyType::kUint32:
+        return take<uint32_t>(out);
+      case PlyType::kFloat32:
+        return take<float>(out);
+      case PlyType::kFloat64:
+        return take<double>(out);
     }
     return false;
   }
@@ -61,12 +70,21 @@ class BinaryCursor {
 enum class Target : uint8_t { kNone, kX, kY, kZ, kNormalX, kNormalY, kNormalZ, kRed, kGreen, kBlue, kCount };
 
 Target target_of(std::string_view name) {
-  constexpr std::pair<std::string_view, Target> kTargets[] = {
-      {"x", Target::kX},         {"y", Target::kY},            {"z", Target::kZ},
-      {"nx", Target::kNormalX},  {"ny", Target::kNormalY},     {"nz", Target::kNormalZ},
-      {"red", Target::kRed},     {"green", Target::kGreen},    {"blue", Target::kBlue},
-      {"r", Target::kRed},       {"g", Target::kGreen},        {"b", Target::kBlue},
-      {"diffuse_red", Target::kRed}, {"diffuse_green", Target::kGreen}, {"diffuse_blue", Target::kBlue}};
+  constexpr std::pair<std::string_view, Target> kTargets[] = {{"x", Target::kX},
+                                                              {"y", Target::kY},
+                                                              {"z", Target::kZ},
+                                                              {"nx", Target::kNormalX},
+                                                              {"ny", Target::kNormalY},
+                                                              {"nz", Target::kNormalZ},
+                                                              {"red", Target::kRed},
+                                                              {"green", Target::kGreen},
+                                                              {"blue", Target::kBlue},
+                                                              {"r", Target::kRed},
+                                                              {"g", Target::kGreen},
+                                                              {"b", Target::kBlue},
+                                                              {"diffuse_red", Target::kRed},
+                                                              {"diffuse_green", Target::kGreen},
+                                                              {"diffuse_blue", Target::kBlue}};
   for (const auto& [word, target] : kTargets)
     if (word == name) return target;
   return Target::kNone;
@@ -84,15 +102,19 @@ template <class Cursor>
 class PlyBody {
  public:
   PlyBody(const PlyHeader& header, std::string_view content, const std::string& name, const ReadProgress& progress)
-      : header_(header), name_(name), progress_(progress), content_bytes_(content.size()), cursor_(content, header.bytes) {
+      : header_(header),
+        name_(name),
+        progress_(progress),
+        content_bytes_(content.size()),
+        cursor_(content, header.bytes) {
     for (const PlyElement& e : header.elements) total_ += e.count;
   }
 
   Result<Mesh> read() {
     mesh_.format = "ply";
     for (const PlyElement& element : header_.elements) {
-      const Status status = element.name == "vertex" ? read_vertices(element)
-                            : element.name == "face" ? read_faces(element, false)
+      const Status status = element.name == "vertex"      ? read_vertices(element)
+                            : element.name == "face"      ? read_faces(element, false)
                             : element.name == "tristrips" ? read_faces(element, true)
                                                           : skip(element);
       if (!status.ok()) return status.error();
@@ -102,7 +124,8 @@ class PlyBody {
 
  private:
   Error ended(const PlyElement& element, uint64_t at) const {
-    return Error{fmt::format("{}: is truncated or damaged: {} {} of {} cannot be read", name_, element.name, at, element.count)};
+    return Error{
+        fmt::format("{}: is truncated or damaged: {} {} of {} cannot be read", name_, element.name, at, element.count)};
   }
   void tick() {
     if ((++done_ & 0x3ffff) == 0 && progress_) progress_(static_cast<double>(done_) / static_cast<double>(total_));
@@ -111,7 +134,8 @@ class PlyBody {
   // Reads a list's items into list_.
   bool read_list(const PlyProperty& property) {
     double count = 0;
-    if (!cursor_.read(property.count_type, count) || count < 0 || count > static_cast<double>(content_bytes_)) return false;
+    if (!cursor_.read(property.count_type, count) || count < 0 || count > static_cast<double>(content_bytes_))
+      return false;
     list_.clear();
     for (double i = 0; i < count; ++i) {  // grows as items arrive, so a lying count ends at the file's end
       double item;
@@ -131,10 +155,14 @@ class PlyBody {
       has[static_cast<int>(targets.back())] = true;
       if (targets.back() == Target::kRed) scale = channel_scale(p.type);
     }
-    const auto all = [&](Target a, Target b, Target c) { return has[static_cast<int>(a)] && has[static_cast<int>(b)] && has[static_cast<int>(c)]; };
+    const auto all = [&](Target a, Target b, Target c) {
+      return has[static_cast<int>(a)] && has[static_cast<int>(b)] && has[static_cast<int>(c)];
+    };
     if (!all(Target::kX, Target::kY, Target::kZ)) return Error{name_ + ": element 'vertex' lacks x, y or z"};
-    if (element.count > kMaxVertices) return Error{fmt::format("{}: {} vertices, the limit is {}", name_, element.count, kMaxVertices)};
-    const bool normals = all(Target::kNormalX, Target::kNormalY, Target::kNormalZ), colours = all(Target::kRed, Target::kGreen, Target::kBlue);
+    if (element.count > kMaxVertices)
+      return Error{fmt::format("{}: {} vertices, the limit is {}", name_, element.count, kMaxVertices)};
+    const bool normals = all(Target::kNormalX, Target::kNormalY, Target::kNormalZ),
+               colours = all(Target::kRed, Target::kGreen, Target::kBlue);
     mesh_.positions.reserve(element.count);
     if (normals) mesh_.normals.reserve(element.count);
     if (colours) mesh_.colours.reserve(element.count);
@@ -142,13 +170,15 @@ class PlyBody {
       double value[static_cast<int>(Target::kCount)] = {};
       for (size_t i = 0; i < targets.size(); ++i) {
         const PlyProperty& p = element.properties[i];
-        if (p.is_list ? !read_list(p) : !cursor_.read(p.type, value[static_cast<int>(targets[i])])) return ended(element, v);
+        if (p.is_list ? !read_list(p) : !cursor_.read(p.type, value[static_cast<int>(targets[i])]))
+          return ended(element, v);
       }
       const auto at = [&](Target t) { return value[static_cast<int>(t)]; };
       mesh_.positions.emplace_back(at(Target::kX), at(Target::kY), at(Target::kZ));
       if (normals) mesh_.normals.emplace_back(at(Target::kNormalX), at(Target::kNormalY), at(Target::kNormalZ));
       if (colours)
-        mesh_.colours.push_back(pack_rgb(channel(at(Target::kRed) * scale), channel(at(Target::kGreen) * scale), channel(at(Target::kBlue) * scale)));
+        mesh_.colours.push_back(pack_rgb(channel(at(Target::kRed) * scale), channel(at(Target::kGreen) * scale),
+                                         channel(at(Target::kBlue) * scale)));
     }
     return ok_status();
   }
@@ -181,7 +211,8 @@ class PlyBody {
         if (static_cast<int>(i) == corners)
           if (auto status = strips ? add_strip(element, f) : add_polygon(element, f); !status) return status;
       }
-      if (mesh_.indices.size() > 3 * kMaxTriangles) return Error{fmt::format("{}: more than {} triangles", name_, kMaxTriangles)};
+      if (mesh_.indices.size() > 3 * kMaxTriangles)
+        return Error{fmt::format("{}: more than {} triangles", name_, kMaxTriangles)};
     }
     return ok_status();
   }
@@ -197,10 +228,13 @@ class PlyBody {
   Status add_strip(const PlyElement& element, uint64_t face) {
     size_t start = 0;
     for (size_t i = 0; i < list_.size(); ++i) {
-      if (list_[i] == -1) start = i + 1;
+      if (list_[i] == -1)
+        start = i + 1;
       else if (i >= start + 2) {
         const bool odd = (i - start) % 2 == 1;
-        if (auto status = add_triangle(list_[i - 2], list_[odd ? i : i - 1], list_[odd ? i - 1 : i], element, face); !status) return status;
+        if (auto status = add_triangle(list_[i - 2], list_[odd ? i : i - 1], list_[odd ? i - 1 : i], element, face);
+            !status)
+          return status;
       }
     }
     return ok_status();
@@ -232,9 +266,12 @@ Result<Mesh> read_ply(std::string_view content, const std::string& name, const R
   if (!header) return header.error();
   constexpr bool kLittle = std::endian::native == std::endian::little;
   switch (header->encoding) {
-    case PlyEncoding::kAscii: return PlyBody<AsciiCursor>(*header, content, name, progress).read();
-    case PlyEncoding::kLittleEndian: return PlyBody<BinaryCursor<!kLittle>>(*header, content, name, progress).read();
-    case PlyEncoding::kBigEndian: return PlyBody<BinaryCursor<kLittle>>(*header, content, name, progress).read();
+    case PlyEncoding::kAscii:
+      return PlyBody<AsciiCursor>(*header, content, name, progress).read();
+    case PlyEncoding::kLittleEndian:
+      return PlyBody<BinaryCursor<!kLittle>>(*header, content, name, progress).read();
+    case PlyEncoding::kBigEndian:
+      return PlyBody<BinaryCursor<kLittle>>(*header, content, name, progress).read();
   }
   return Error{name + ": unknown PLY encoding"};
 }

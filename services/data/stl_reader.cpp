@@ -56,7 +56,8 @@ Result<Mesh> read_binary(std::string_view content, const std::string& name, cons
   std::memcpy(&triangles, content.data() + 80, 4);
   const uint64_t room = (content.size() - kBinaryHeader) / kBinaryTriangle;
   if (triangles > room)
-    return Error{fmt::format("{}: STL header claims {} triangles, its {} bytes hold {}", name, triangles, content.size(), room)};
+    return Error{
+        fmt::format("{}: STL header claims {} triangles, its {} bytes hold {}", name, triangles, content.size(), room)};
   Mesh mesh;
   mesh.format = "stl";
   mesh.indices.reserve(3 * size_t{triangles});
@@ -82,17 +83,21 @@ Result<Mesh> read_ascii(std::string_view content, const std::string& name, const
     if (word == "vertex" || word == "VERTEX") {
       glm::dvec3 p;
       for (int a = 0; a < 3; ++a)
-        if (!scan.skip_blanks() || !scan.number(p[a])) return Error{fmt::format("{}:{}: a vertex is not three numbers", name, scan.line_number())};
+        if (!scan.skip_blanks() || !scan.number(p[a]))
+          return Error{fmt::format("{}:{}: a vertex is not three numbers", name, scan.line_number())};
       mesh.indices.push_back(weld(p));
     } else if (word == "endfacet" || word == "ENDFACET") {
-      if (mesh.indices.size() % 3 != 0) return Error{fmt::format("{}:{}: a facet does not have three vertices", name, scan.line_number())};
+      if (mesh.indices.size() % 3 != 0)
+        return Error{fmt::format("{}:{}: a facet does not have three vertices", name, scan.line_number())};
     } else if (word == "endsolid" || word == "ENDSOLID") {
       ended = true;
     }
     scan.next_line();
-    if ((lines & 0xffff) == 0 && progress) progress(static_cast<double>(scan.offset()) / static_cast<double>(content.size()));
+    if ((lines & 0xffff) == 0 && progress)
+      progress(static_cast<double>(scan.offset()) / static_cast<double>(content.size()));
   }
-  if (!ended || mesh.indices.size() % 3 != 0) return Error{fmt::format("{}: is truncated: no 'endsolid' at its end", name)};
+  if (!ended || mesh.indices.size() % 3 != 0)
+    return Error{fmt::format("{}: is truncated: no 'endsolid' at its end", name)};
   return mesh;
 }
 
@@ -102,9 +107,11 @@ Result<Mesh> read_stl(std::string_view content, const std::string& name, const R
   uint32_t triangles = 0;
   if (content.size() >= kBinaryHeader) std::memcpy(&triangles, content.data() + 80, 4);
   const bool exact = content.size() == kBinaryHeader + kBinaryTriangle * uint64_t{triangles};
-  if (content.starts_with("solid") && !(exact && content.size() >= kBinaryHeader)) return read_ascii(content, name, progress);
+  if (content.starts_with("solid") && !(exact && content.size() >= kBinaryHeader))
+    return read_ascii(content, name, progress);
   if (content.size() < kBinaryHeader)
-    return Error{fmt::format("{}: {} bytes are too few for an STL file, its header alone has {}", name, content.size(), kBinaryHeader)};
+    return Error{fmt::format("{}: {} bytes are too few for an STL file, its header alone has {}", name, content.size(),
+                             kBinaryHeader)};
   return read_binary(content, name, progress);
 }
 

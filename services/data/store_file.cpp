@@ -88,7 +88,8 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   progress("chunk", 0.0);
   const ChunkPlan plan = plan_chunks(mesh);
   if (plan.chunks() > geometry::kMaxChunks)
-    return Error{fmt::format("{}: would be split into {} chunks, the limit is {}", name, plan.chunks(), geometry::kMaxChunks)};
+    return Error{
+        fmt::format("{}: would be split into {} chunks, the limit is {}", name, plan.chunks(), geometry::kMaxChunks)};
   progress("chunk", 1.0);
   std::vector<StoreEntry> entries(plan.chunks());
   std::atomic<size_t> end = kPage + round_up(entries.size() * sizeof(StoreEntry));
@@ -118,7 +119,9 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   if (failure == 0 && ftruncate(descriptor, static_cast<off_t>(header.file_bytes)) != 0) failure = errno;
   if (failure == 0) failure = write_at(descriptor, entries.data(), entries.size() * sizeof(StoreEntry), kPage);
   if (failure == 0) failure = write_at(descriptor, &header, sizeof header, 0);
-  if (failure != 0) return Error{fmt::format("{}: chunk store of {} bytes cannot be written: {}", name, header.file_bytes, std::strerror(failure))};
+  if (failure != 0)
+    return Error{fmt::format("{}: chunk store of {} bytes cannot be written: {}", name, header.file_bytes,
+                             std::strerror(failure))};
   progress("write", 1.0);
   return ok_status();
 }
@@ -133,25 +136,30 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
   if (header.magic != kStoreMagic || header.version != kStoreVersion)
     return Error{fmt::format("{}: is no chunk store of version {}", name, kStoreVersion)};
   if (header.file_bytes != bytes.size())
-    return Error{fmt::format("{}: chunk store has {} bytes, its header says {}", name, bytes.size(), header.file_bytes)};
-  if (header.chunks == 0 || header.chunks > geometry::kMaxChunks || kPage + header.chunks * sizeof(StoreEntry) > bytes.size())
+    return Error{
+        fmt::format("{}: chunk store has {} bytes, its header says {}", name, bytes.size(), header.file_bytes)};
+  if (header.chunks == 0 || header.chunks > geometry::kMaxChunks ||
+      kPage + header.chunks * sizeof(StoreEntry) > bytes.size())
     return Error{fmt::format("{}: chunk store claims {} chunks in {} bytes", name, header.chunks, bytes.size())};
   const std::span entries(reinterpret_cast<const StoreEntry*>(bytes.data() + kPage), header.chunks);
-  if (checksum_of(header, entries) != header.checksum) return Error{fmt::format("{}: chunk store's table of contents is damaged", name)};
+  if (checksum_of(header, entries) != header.checksum)
+    return Error{fmt::format("{}: chunk store's table of contents is damaged", name)};
 
   StoreContent out{*mapped, info_of(header), {}, {}};
   for (size_t i = 0; i < entries.size(); ++i) {
     const StoreEntry& e = entries[i];
     if (e.offset % kPage != 0 || e.offset > bytes.size() || e.bytes > bytes.size() - e.offset)
       return Error{fmt::format("{}: chunk {} lies outside its store", name, i)};
-    out.chunks.push_back({ChunkId{i}, {{e.lo[0], e.lo[1], e.lo[2]}, {e.hi[0], e.hi[1], e.hi[2]}}, e.triangles, e.bytes});
+    out.chunks.push_back(
+        {ChunkId{i}, {{e.lo[0], e.lo[1], e.lo[2]}, {e.hi[0], e.hi[1], e.hi[2]}}, e.triangles, e.bytes});
     out.offsets.push_back(e.offset);
   }
   std::atomic<size_t> damaged = entries.size();
   tbb::parallel_for(size_t{0}, entries.size(), [&](size_t i) {
     if (XXH3_64bits(bytes.data() + entries[i].offset, entries[i].bytes) != entries[i].checksum) damaged = i;
   });
-  if (damaged != entries.size()) return Error{fmt::format("{}: chunk {} of the store is damaged", name, damaged.load())};
+  if (damaged != entries.size())
+    return Error{fmt::format("{}: chunk {} of the store is damaged", name, damaged.load())};
   return out;
 }
 

@@ -20,7 +20,8 @@
 namespace telesplat::data {
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
-inline constexpr uint32_t kStoreVersion = 2;  ///< goes up whenever readers, placement or layout would make another file of the same mesh
+inline constexpr uint32_t kStoreVersion =
+    2;  ///< goes up whenever readers, placement or layout would make another file of the same mesh
 
 /// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken from there.
 /// On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages "chunk" and "write") is called on this thread.
@@ -29,9 +30,9 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
 
 struct StoreContent {
   std::shared_ptr<const MappedFile> file;
-  MeshStoreInfo info;                         ///< without source and from_cache
+  MeshStoreInfo info;  ///< without source and from_cache
   std::vector<geometry::ChunkInfo> chunks;
-  std::vector<size_t> offsets;                ///< of each chunk in the file
+  std::vector<size_t> offsets;  ///< of each chunk in the file
 };
 
 /// Maps a store and checks all of it before anything is believed: magic, version, size, the checksum over header and table of contents,

@@ -29,9 +29,12 @@ class TextScanner {
   /// Skips white space over line ends, and comments up to their line's end. Returns true if something follows.
   bool skip_space(char comment = '\0') {
     while (at_ < end_) {
-      if (static_cast<unsigned char>(*at_) <= ' ') ++at_;
-      else if (comment != '\0' && *at_ == comment) next_line();
-      else return true;
+      if (static_cast<unsigned char>(*at_) <= ' ')
+        ++at_;
+      else if (comment != '\0' && *at_ == comment)
+        next_line();
+      else
+        return true;
     }
     return false;
   }
@@ -42,7 +45,7 @@ class TextScanner {
   /// The characters up to the next white space; empty at a line's end. Call skip_blanks or skip_space before.
   std::string_view word() {
     const char* start = at_;
-    while (at_ < end_ && static_cast<unsigned char>(*at_) > ' ') ++at_;
+    while (at_<end_&& static_cast<unsigned char>(*at_)> ' ') ++at_;
     return {start, static_cast<size_t>(at_ - start)};
   }
   /// A number here: decimal, exponent, nan, inf, with or without a leading plus. What follows must not belong to a word.
@@ -56,9 +59,12 @@ class TextScanner {
     const char* start = at_ < end_ && *at_ == '+' ? at_ + 1 : at_;
     const auto [next, error] = std::from_chars(start, end_, out);
     if (error == std::errc::result_out_of_range && std::is_floating_point_v<T>)  // 1e-999 is zero, 1e999 infinite
-      out = std::string_view(start, next).find("e-") == std::string_view::npos && std::string_view(start, next).find("E-") == std::string_view::npos
-                ? std::numeric_limits<T>::infinity() : T(0);
-    else if (error != std::errc()) return false;
+      out = std::string_view(start, next).find("e-") == std::string_view::npos &&
+                    std::string_view(start, next).find("E-") == std::string_view::npos
+                ? std::numeric_limits<T>::infinity()
+                : T(0);
+    else if (error != std::errc())
+      return false;
     at_ = next;
     return true;
   }

@@ -38,9 +38,12 @@ uint32_t to_rgb(const Linear& c) { return pack_rgb(to_srgb8(c[0]), to_srgb8(c[1]
 // A point data array that holds colours, or null.
 vtkDataArray* find_colours(vtkPointData* data) {
   vtkDataArray* scalars = data->GetScalars();
-  const auto fits = [](vtkDataArray* a) { return a && (a->GetNumberOfComponents() == 3 || a->GetNumberOfComponents() == 4); };
+  const auto fits = [](vtkDataArray* a) {
+    return a && (a->GetNumberOfComponents() == 3 || a->GetNumberOfComponents() == 4);
+  };
   if (fits(scalars) && scalars->GetDataType() == VTK_UNSIGNED_CHAR) return scalars;
-  for (const char* name : {"RGB", "RGBA", "rgb", "rgba", "Color", "color", "Colors", "colors", "Colours", "colours", "COLOR_0", "color_0"})
+  for (const char* name :
+       {"RGB", "RGBA", "rgb", "rgba", "Color", "color", "Colors", "colors", "Colours", "colours", "COLOR_0", "color_0"})
     if (vtkDataArray* array = data->GetArray(name); fits(array)) return array;
   return nullptr;
 }
@@ -48,9 +51,13 @@ vtkDataArray* find_colours(vtkPointData* data) {
 // What a channel must be multiplied with to lie in 0..1.
 double channel_scale(vtkDataArray* colours) {
   switch (colours->GetDataType()) {
-    case VTK_UNSIGNED_CHAR: return 1 / 255.0;
-    case VTK_UNSIGNED_SHORT: return 1 / 65535.0;
-    default: return colours->GetMaxNorm() > 2.0 ? 1 / 255.0 : 1.0;  // of three fractions, the norm is at most 1.73 (with alpha, 2)
+    case VTK_UNSIGNED_CHAR:
+      return 1 / 255.0;
+    case VTK_UNSIGNED_SHORT:
+      return 1 / 65535.0;
+    default:
+      return colours->GetMaxNorm() > 2.0 ? 1 / 255.0
+                                         : 1.0;  // of three fractions, the norm is at most 1.73 (with alpha, 2)
   }
 }
 
@@ -61,14 +68,17 @@ struct Material {
 
   Material(vtkPolyData* block, vtkGLTFReader& reader) {
     vtkFieldData* fields = block->GetFieldData();
-    if (vtkDataArray* a = fields->GetArray("BaseColorMultiplier"); a && a->GetNumberOfComponents() >= 3 && a->GetNumberOfTuples() > 0)
+    if (vtkDataArray* a = fields->GetArray("BaseColorMultiplier");
+        a && a->GetNumberOfComponents() >= 3 && a->GetNumberOfTuples() > 0)
       for (int k = 0; k < 3; ++k) factor[k] = a->GetComponent(0, k);
     vtkDataArray* index = fields->GetArray("BaseColorTextureIndex");
     if (!index || index->GetNumberOfTuples() == 0) return;
     const auto i = static_cast<vtkIdType>(index->GetTuple1(0));
     if (i < 0 || i >= reader.GetNumberOfTextures()) return;
     const auto found = reader.GetGLTFTexture(i);
-    if (found.Image && found.Image->GetScalarType() == VTK_UNSIGNED_CHAR && found.Image->GetNumberOfScalarComponents() >= 3) texture = found.Image;
+    if (found.Image && found.Image->GetScalarType() == VTK_UNSIGNED_CHAR &&
+        found.Image->GetNumberOfScalarComponents() >= 3)
+      texture = found.Image;
   }
 
   // Repeats in both directions, as glTF does unless told otherwise; nearest texel.
@@ -77,7 +87,8 @@ struct Material {
     int size[3];
     texture->GetDimensions(size);
     const auto texel = [](double t, int n) { return std::min(static_cast<int>((t - std::floor(t)) * n), n - 1); };
-    const auto* p = static_cast<const unsigned char*>(texture->GetScalarPointer(texel(u, size[0]), texel(v, size[1]), 0));
+    const auto* p =
+        static_cast<const unsigned char*>(texture->GetScalarPointer(texel(u, size[0]), texel(v, size[1]), 0));
     if (!p) return {1, 1, 1};
     return {to_linear(p[0] / 255.0), to_linear(p[1] / 255.0), to_linear(p[2] / 255.0)};
   }
@@ -137,7 +148,8 @@ class Collector {
       Linear c{1, 1, 1};
       // glTF says that its vertex colours are linear; everyone else's are what the screen shall show.
       if (colours)
-        for (int k = 0; k < 3; ++k) c[k] = colours->GetComponent(i, k) * scale, c[k] = material ? c[k] : to_linear(c[k]);
+        for (int k = 0; k < 3; ++k)
+          c[k] = colours->GetComponent(i, k) * scale, c[k] = material ? c[k] : to_linear(c[k]);
       if (material) {
         const Linear texel = uv ? material->sample(uv->GetComponent(i, 0), uv->GetComponent(i, 1)) : Linear{1, 1, 1};
         for (int k = 0; k < 3; ++k) c[k] *= material->factor[k] * texel[k];
@@ -149,7 +161,9 @@ class Collector {
   // Polygons as fans, strips with alternating orientation. An index that is out of range stays so, for validate_mesh to name.
   void add_cells(vtkCellArray* cells, uint32_t base, vtkIdType points, bool strips) {
     if (!cells) return;
-    const auto corner = [&](vtkIdType i) { return i >= 0 && i < points ? base + static_cast<uint32_t>(i) : ~uint32_t{0}; };
+    const auto corner = [&](vtkIdType i) {
+      return i >= 0 && i < points ? base + static_cast<uint32_t>(i) : ~uint32_t{0};
+    };
     const auto iterator = vtk::TakeSmartPointer(cells->NewIterator());
     for (iterator->GoToFirstCell(); !iterator->IsDoneWithTraversal(); iterator->GoToNextCell()) {
       vtkIdType count = 0;
@@ -159,7 +173,8 @@ class Collector {
       for (vtkIdType k = 2; k < count; ++k) {
         const bool odd = strips && k % 2 == 1;
         const vtkIdType a = strips ? ids[k - 2] : ids[0];
-        mesh_.indices.insert(mesh_.indices.end(), {corner(a), corner(ids[odd ? k : k - 1]), corner(ids[odd ? k - 1 : k])});
+        mesh_.indices.insert(mesh_.indices.end(),
+                             {corner(a), corner(ids[odd ? k : k - 1]), corner(ids[odd ? k - 1 : k])});
       }
     }
   }
@@ -175,7 +190,8 @@ std::string first_complaint(const std::string& output) {
   size_t start = output.find("): ", error);
   start = start == std::string::npos ? error + 6 : start + 3;
   std::string line = output.substr(start, std::min(output.find('\n', start), start + 200) - start);
-  std::replace_if(line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
   return line;
 }
 
@@ -208,9 +224,12 @@ Result<Mesh> import_with_vtk(const std::string& path, const std::string& format)
   vtkNew<vtkStringOutputWindow> output;
   vtkOutputWindow::SetInstance(output);
   Collector collector(format);
-  if (format == "gltf") read_gltf(path, collector);
-  else if (format == "vtp") read_poly_data<vtkXMLPolyDataReader>(path, collector);
-  else read_poly_data<vtkPolyDataReader>(path, collector);
+  if (format == "gltf")
+    read_gltf(path, collector);
+  else if (format == "vtp")
+    read_poly_data<vtkXMLPolyDataReader>(path, collector);
+  else
+    read_poly_data<vtkPolyDataReader>(path, collector);
   const std::string complaint = first_complaint(output->GetOutput());
   if (!complaint.empty()) return Error{fmt::format("{}: {}", path, complaint)};
   return collector.finish();

@@ -33,12 +33,14 @@ uint64_t number_after(std::string_view content, std::string_view key, size_t& at
 }
 
 // Counts in a header that no file of this size can hold. `expansion`: the most that a byte of the file can become.
-Status check_counts(std::string_view content, const std::string& name, std::initializer_list<const char*> keys, uint64_t expansion) {
+Status check_counts(std::string_view content, const std::string& name, std::initializer_list<const char*> keys,
+                    uint64_t expansion) {
   for (const char* key : keys)
     for (size_t at = 0; at != content.npos;) {
       const uint64_t claimed = number_after(content, key, at);
       if (claimed > content.size() * expansion)
-        return Error{fmt::format("{}: claims {} {} in a file of {} bytes", name, claimed, key[0] == '\n' ? key + 1 : key, content.size())};
+        return Error{fmt::format("{}: claims {} {} in a file of {} bytes", name, claimed,
+                                 key[0] == '\n' ? key + 1 : key, content.size())};
     }
   return ok_status();
 }
@@ -55,16 +57,22 @@ Status check_before(std::string_view content, const std::string& format, const s
   }
   if (format == "vtp") {
     // zlib packs at most 1032 to 1.
-    return check_counts(content, path, {"NumberOfPoints=", "NumberOfPolys=", "NumberOfStrips=", "NumberOfVerts=", "NumberOfLines=", "NumberOfTuples="}, 1032);
+    return check_counts(
+        content, path,
+        {"NumberOfPoints=", "NumberOfPolys=", "NumberOfStrips=", "NumberOfVerts=", "NumberOfLines=", "NumberOfTuples="},
+        1032);
   }
   const size_t dataset = content.substr(0, 4096).find("DATASET");
-  if (dataset == content.npos || !content.starts_with("# vtk DataFile")) return Error{path + ": is no legacy VTK file: no DATASET near its start"};
+  if (dataset == content.npos || !content.starts_with("# vtk DataFile"))
+    return Error{path + ": is no legacy VTK file: no DATASET near its start"};
   std::string_view kind = content.substr(dataset + 7, 40);
   while (!kind.empty() && kind.front() == ' ') kind.remove_prefix(1);
   kind = kind.substr(0, kind.find_first_of(" \r\n"));
   if (kind != "POLYDATA" && kind != "polydata")
-    return Error{fmt::format("{}: is a VTK file of {} (a volume or grid), not of POLYDATA: only polygonal meshes are read", path, kind)};
-  return check_counts(content, path, {"\nPOINTS ", "\nPOLYGONS ", "\nTRIANGLE_STRIPS ", "\nPOINT_DATA ", "\nCELL_DATA "}, 1);
+    return Error{fmt::format(
+        "{}: is a VTK file of {} (a volume or grid), not of POLYDATA: only polygonal meshes are read", path, kind)};
+  return check_counts(content, path,
+                      {"\nPOINTS ", "\nPOLYGONS ", "\nTRIANGLE_STRIPS ", "\nPOINT_DATA ", "\nCELL_DATA "}, 1);
 }
 
 // The import program lies beside this one; else it is looked for in $PATH.
@@ -86,7 +94,9 @@ Result<int> run_import(int output, const std::string& format, const std::string&
   pid_t child = -1;
   const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments, environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (failed) return Error{fmt::format("{}: the program that reads {} files, {}, cannot be started: {}", path, format, program, std::strerror(failed))};
+  if (failed)
+    return Error{fmt::format("{}: the program that reads {} files, {}, cannot be started: {}", path, format, program,
+                             std::strerror(failed))};
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) return Error{fmt::format("{}: lost the process that reads it: {}", path, std::strerror(errno))};
@@ -95,7 +105,8 @@ Result<int> run_import(int output, const std::string& format, const std::string&
 
 }  // namespace
 
-Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path, const ReadProgress& progress) {
+Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
+                           const ReadProgress& progress) {
   if (auto status = check_before(content, format, path); !status) return status.error();
   if (progress) progress(0.0);
   const int output = memfd_create("telesplat-import", MFD_CLOEXEC);
@@ -104,9 +115,12 @@ Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, 
     const auto status = run_import(output, format, path);
     if (!status) return status.error();
     if (WIFSIGNALED(*status))
-      return Error{fmt::format("{}: is damaged: VTK's {} reader {}", path, format, WTERMSIG(*status) == SIGALRM ? "did not end" : "crashed on it")};
-    if (WEXITSTATUS(*status) == 127) return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
-    if (WEXITSTATUS(*status) != 0) return Error{fmt::format("{}: is damaged: VTK's {} reader gave up on it", path, format)};
+      return Error{fmt::format("{}: is damaged: VTK's {} reader {}", path, format,
+                               WTERMSIG(*status) == SIGALRM ? "did not end" : "crashed on it")};
+    if (WEXITSTATUS(*status) == 127)
+      return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
+    if (WEXITSTATUS(*status) != 0)
+      return Error{fmt::format("{}: is damaged: VTK's {} reader gave up on it", path, format)};
     return read_import_report(output, path, format);
   }();
   close(output);

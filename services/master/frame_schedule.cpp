@@ -10,7 +10,9 @@ std::vector<geometry::Rect> cut_tiles(int width, int height, int tile_size) {
   for (int y = 0; y < height; y += tile_size)
     for (int x = 0; x < width; x += tile_size)
       out.push_back({x, y, std::min(tile_size, width - x), std::min(tile_size, height - y)});
-  const auto distance = [&](const geometry::Rect& r) { return std::hypot(r.x + r.width / 2.0 - width / 2.0, r.y + r.height / 2.0 - height / 2.0); };
+  const auto distance = [&](const geometry::Rect& r) {
+    return std::hypot(r.x + r.width / 2.0 - width / 2.0, r.y + r.height / 2.0 - height / 2.0);
+  };
   std::stable_sort(out.begin(), out.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
   return out;
 }
@@ -54,7 +56,8 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, Epoc
         t.leased_s = now_s;
         t.expires_s = now_s + lease_time_s();
         next_lease_ = next_lease_.next();
-        return wire::Lease{t.lease, f.id, f.epoch, f.request.viewer, f.request.request, i, f.tiles.size(), f.request.camera, t.rect, now_s};
+        return wire::Lease{t.lease, f.id,           f.epoch,          f.request.viewer, f.request.request,
+                           i,       f.tiles.size(), f.request.camera, t.rect,           now_s};
       }
   } while (begin_frame(epoch));
   return std::nullopt;
@@ -70,7 +73,8 @@ bool FrameSchedule::tile_done(FrameId id, uint64_t tile, double now_s) {
   const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == id; });
   if (f == frames_.end() || tile >= f->tiles.size() || f->tiles[tile].state == State::kDone) return false;
   Tile& t = f->tiles[tile];
-  if (t.state == State::kLeased) tile_time_s_ = tile_time_s_ == 0 ? now_s - t.leased_s : 0.95 * tile_time_s_ + 0.05 * (now_s - t.leased_s);
+  if (t.state == State::kLeased)
+    tile_time_s_ = tile_time_s_ == 0 ? now_s - t.leased_s : 0.95 * tile_time_s_ + 0.05 * (now_s - t.leased_s);
   t.state = State::kDone;
   if (++f->done == f->tiles.size()) {
     frames_.erase(f);
@@ -112,7 +116,8 @@ int FrameSchedule::release_sampler(const std::string& sampler) {
 size_t FrameSchedule::leases_of(const std::string& sampler) const {
   size_t count = 0;
   for (const Frame& f : frames_)
-    count += size_t(std::count_if(f.tiles.begin(), f.tiles.end(), [&](const Tile& t) { return t.state == State::kLeased && t.sampler == sampler; }));
+    count += size_t(std::count_if(f.tiles.begin(), f.tiles.end(),
+                                  [&](const Tile& t) { return t.state == State::kLeased && t.sampler == sampler; }));
   return count;
 }
 

@@ -13,9 +13,10 @@
 namespace telesplat::master {
 
 struct ScheduleOptions {
-  int tile_size = 256;          ///< pixels a side; the last column and row may be smaller
-  int frames_in_flight = 2;     ///< frames begun and not complete, at most
-  double lease_timeout_s = 2.0; ///< longest time before a lease goes to another sampler; shorter once tile times are known
+  int tile_size = 256;       ///< pixels a side; the last column and row may be smaller
+  int frames_in_flight = 2;  ///< frames begun and not complete, at most
+  double lease_timeout_s =
+      2.0;  ///< longest time before a lease goes to another sampler; shorter once tile times are known
 };
 
 /// Cuts a frame into tiles of tile_size, those nearest the centre first (that is where the person looks).

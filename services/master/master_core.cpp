@@ -8,8 +8,8 @@
 
 namespace telesplat::master {
 namespace {
-constexpr size_t kMaxPeers = 4096;         // remembered processes, the departed included
-constexpr int kMaxWaitingLeases = 64;      // lease requests of one sampler
+constexpr size_t kMaxPeers = 4096;     // remembered processes, the departed included
+constexpr int kMaxWaitingLeases = 64;  // lease requests of one sampler
 }  // namespace
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
@@ -57,13 +57,15 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   }
   // A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet.
   for (auto& [id, p] : peers_)
-    if (id != peer && p.hello.role == m.role && (p.hello.instance == m.instance || (m.role != "ctl" && p.hello.name == m.name))) {
+    if (id != peer && p.hello.role == m.role &&
+        (p.hello.instance == m.instance || (m.role != "ctl" && p.hello.name == m.name))) {
       if (!p.gone) lose(p, id, "was replaced");
       p.process.replaced = true;
     }
   Peer& p = peers_[peer];
   const bool changed = p.hello.instance != m.instance || p.gone || p.hello.endpoints != m.endpoints;
-  if (changed && m.role == "packer") schedule_.drop_frames();  // a new packer has none of the tiles that the old one had
+  if (changed && m.role == "packer")
+    schedule_.drop_frames();  // a new packer has none of the tiles that the old one had
   p.hello = m;
   p.process.role = m.role;
   p.process.name = m.name;
@@ -136,7 +138,8 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
     announce(now_s);
     return emit(peer, wire::ControlReply{true, fmt::format("epoch {}", epoch_.value)});
   }
-  emit(peer, wire::ControlReply{false, fmt::format("unknown command '{}'; known: status, stop, epoch", m.command.substr(0, 64))});
+  emit(peer, wire::ControlReply{
+                 false, fmt::format("unknown command '{}'; known: status, stop, epoch", m.command.substr(0, 64))});
 }
 
 void MasterCore::undeliverable(const std::string& peer) {
@@ -159,7 +162,8 @@ void MasterCore::tick(double now_s) {
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
   const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
     const auto it = peers_.find(sampler);
-    log::warn("a lease of sampler {} expired; its tile goes to another", it == peers_.end() ? "?" : it->second.hello.name);
+    log::warn("a lease of sampler {} expired; its tile goes to another",
+              it == peers_.end() ? "?" : it->second.hello.name);
   });
   leases_expired_ += uint64_t(expired);
   if (expired || schedule_.tile_open() || schedule_.view_waiting()) dispatch(now_s);
@@ -184,7 +188,8 @@ void MasterCore::shut_down(const std::string& reason) {
 }
 
 bool MasterCore::everyone_left() const {
-  return std::all_of(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone || p.second.hello.role == "ctl"; });
+  return std::all_of(peers_.begin(), peers_.end(),
+                     [](const auto& p) { return p.second.gone || p.second.hello.role == "ctl"; });
 }
 
 std::vector<Outgoing> MasterCore::take_outgoing() { return std::exchange(outgoing_, {}); }
@@ -198,7 +203,8 @@ std::vector<metrics::Process> MasterCore::processes() const {
 }
 
 std::map<std::string, double> MasterCore::counters() const {
-  return {{"leases_expired", double(leases_expired_)}, {"tiles_released", double(schedule_.tiles_released())},
+  return {{"leases_expired", double(leases_expired_)},
+          {"tiles_released", double(schedule_.tiles_released())},
           {"frames_completed", double(schedule_.frames_completed())}};
 }
 
@@ -212,7 +218,10 @@ std::string MasterCore::status_json(double now_s) const {
   out["processes"] = nlohmann::ordered_json::array();
   for (const auto& [id, p] : peers_) {
     if (p.hello.role == "ctl") continue;
-    nlohmann::ordered_json e{{"role", p.hello.role}, {"name", p.hello.name}, {"pid", p.hello.pid}, {"alive", !p.gone},
+    nlohmann::ordered_json e{{"role", p.hello.role},
+                             {"name", p.hello.name},
+                             {"pid", p.hello.pid},
+                             {"alive", !p.gone},
                              {"silent_s", std::max(0.0, now_s - p.seen_s)}};
     if (p.hello.role == "sampler") e["leases"] = schedule_.leases_of(id);
     for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;

@@ -62,7 +62,10 @@ class MasterCore {
     bool gone = false;
     int waiting_leases = 0;
   };
-  template <class M> void emit(const std::string& peer, const M& m) { outgoing_.push_back({peer, std::string(M::kName), wire::encode(m)}); }
+  template <class M>
+  void emit(const std::string& peer, const M& m) {
+    outgoing_.push_back({peer, std::string(M::kName), wire::encode(m)});
+  }
   Peer* known(const std::string& peer, double now_s);
   Peer* find_role(const std::string& role);
   wire::Welcome welcome(double now_s) const;

@@ -13,17 +13,20 @@ namespace {
 constexpr double kFarewell_s = 3.0;
 
 // The effective configuration of everyone who took part.
-void write_session(const std::string& directory, const MasterServiceOptions& o, const std::vector<metrics::Process>& processes) {
+void write_session(const std::string& directory, const MasterServiceOptions& o,
+                   const std::vector<metrics::Process>& processes) {
   std::ofstream out(directory + "/session.toml");
   out << "# The effective configuration of this run.\n[session]\ntile_size = " << o.master.schedule.tile_size
-      << "\nframes_in_flight = " << o.master.schedule.frames_in_flight << "\nlease_timeout_s = " << o.master.schedule.lease_timeout_s
-      << "\noctree_depth = " << o.master.octree_depth << "\n\n[settings]\n";
+      << "\nframes_in_flight = " << o.master.schedule.frames_in_flight
+      << "\nlease_timeout_s = " << o.master.schedule.lease_timeout_s << "\noctree_depth = " << o.master.octree_depth
+      << "\n\n[settings]\n";
   for (const auto& [key, value] : o.master.settings) out << '"' << key << "\" = " << fmt::format("{}", value) << "\n";
   for (const auto& p : processes) {
     out << "\n[[process]]\nrole = \"" << p.role << "\"\nname = \"" << p.name << "\"\n";
     for (const auto& [key, value] : p.facts) {
       std::string escaped;
-      for (char c : value) (c == '"' || c == '\\' ? escaped += '\\' : escaped) += (static_cast<unsigned char>(c) < 32 ? ' ' : c);
+      for (char c : value)
+        (c == '"' || c == '\\' ? escaped += '\\' : escaped) += (static_cast<unsigned char>(c) < 32 ? ' ' : c);
       out << '"' << key << "\" = \"" << escaped << "\"\n";
     }
   }
@@ -38,19 +41,27 @@ void add_flags(CLI::App& app, MasterServiceOptions& o) {
 }
 
 void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
-  app.add_option("--tile-size", o.master.schedule.tile_size, "pixels a side of a tile")->capture_default_str()->check(CLI::Range(16, 4096));
+  app.add_option("--tile-size", o.master.schedule.tile_size, "pixels a side of a tile")
+      ->capture_default_str()
+      ->check(CLI::Range(16, 4096));
   app.add_option("--frames-in-flight", o.master.schedule.frames_in_flight, "sampling frames begun and not complete")
       ->capture_default_str()
       ->check(CLI::Range(1, 16));
   app.add_option("--lease-timeout", o.master.schedule.lease_timeout_s, "seconds before a lease goes to another sampler")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 3600.0));
-  app.add_option("--octree-depth", o.master.octree_depth, "levels of the point model's octree")->capture_default_str()->check(CLI::Range(1, 10));
+  app.add_option("--octree-depth", o.master.octree_depth, "levels of the point model's octree")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10));
   for (const auto& [name, text, value] :
-       {std::tuple{"packing.max_points", "points the model holds at most", 20e6}, {"packing.obsolete_after_s", "forget clusters not seen for so long; 0: never", 0.0},
-        {"packing.epsilon", "redundancy threshold, relative to depth", 0.004}, {"packing.keep_redundant", "1: no redundancy elimination", 0.0}}) {
+       {std::tuple{"packing.max_points", "points the model holds at most", 20e6},
+        {"packing.obsolete_after_s", "forget clusters not seen for so long; 0: never", 0.0},
+        {"packing.epsilon", "redundancy threshold, relative to depth", 0.004},
+        {"packing.keep_redundant", "1: no redundancy elimination", 0.0}}) {
     o.master.settings[name] = value;
-    app.add_option(std::string("--") + name, o.master.settings[name], text)->capture_default_str()->check(CLI::Range(0.0, 1e12));
+    app.add_option(std::string("--") + name, o.master.settings[name], text)
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1e12));
   }
 }
 
@@ -63,7 +74,8 @@ int run(const MasterServiceOptions& o) {
     return 2;
   }
   net::Context context;
-  net::Socket control(context, net::Kind::kRouter, "master", {.high_water_mark = 10000, .max_message_bytes = 16u << 20});
+  net::Socket control(context, net::Kind::kRouter, "master",
+                      {.high_water_mark = 10000, .max_message_bytes = 16u << 20});
   const auto endpoint = control.bind(o.service.bind, o.service.insecure);
   if (!endpoint) {
     log::error("{}", endpoint.error().text);
@@ -80,14 +92,15 @@ int run(const MasterServiceOptions& o) {
       const auto message = control.receive();
       if (!message) break;
       const double now = monotonic_s();
-      net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend, wire::TileDone, wire::MetricRows,
-                    wire::Goodbye, wire::Control>(control, *message, [&](const auto& m) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::MetricRows>) {
-          if (const Status s = core.on(message->peer, m, now); !s) control.reject(*message, s.error().text);
-        } else {
-          core.on(message->peer, m, now);
-        }
-      });
+      net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
+                    wire::TileDone, wire::MetricRows, wire::Goodbye, wire::Control>(
+          control, *message, [&](const auto& m) {
+            if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::MetricRows>) {
+              if (const Status s = core.on(message->peer, m, now); !s) control.reject(*message, s.error().text);
+            } else {
+              core.on(message->peer, m, now);
+            }
+          });
     }
     core.tick(monotonic_s());
     for (auto& out : core.take_outgoing())
@@ -99,7 +112,11 @@ int run(const MasterServiceOptions& o) {
   for (const double until = monotonic_s() + kFarewell_s; !core.everyone_left() && monotonic_s() < until;) serve_for(10);
 
   auto processes = core.processes();
-  processes.push_back({"master", o.service.name, uint64_t(getpid()), {}, {{"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(control.rejected())}}});
+  processes.push_back({"master",
+                       o.service.name,
+                       uint64_t(getpid()),
+                       {},
+                       {{"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(control.rejected())}}});
   if (!o.out.empty()) write_session(o.out, o, processes);
   if (const Status s = (*record)->finish(processes, core.counters()); !s) {
     log::error("{}", s.error().text);

@@ -9,7 +9,7 @@ namespace telesplat::master {
 struct MasterServiceOptions {
   net::ServiceOptions service;  ///< bind: the control socket's address
   MasterOptions master;
-  std::string out;              ///< run folder; empty: no record is written
+  std::string out;  ///< run folder; empty: no record is written
 };
 
 /// Flags that `telesplat run` has too: tiles, leases, packing.

@@ -23,7 +23,8 @@ Result<DepthRecorder> DepthRecorder::open(const std::string& directory, int max_
   return out;
 }
 
-Status DepthRecorder::add(FrameId id, const geometry::Camera& camera, const geometry::Rect& rect, size_t tiles_in_frame, const image::DepthImage& tile) {
+Status DepthRecorder::add(FrameId id, const geometry::Camera& camera, const geometry::Rect& rect, size_t tiles_in_frame,
+                          const image::DepthImage& tile) {
   if (left_ <= 0 || size_t(camera.width) * camera.height > codec::kMaxPixels) return ok_status();
   Frame& frame = open_.try_emplace(id, Frame{image::DepthImage(camera.width, camera.height)}).first->second;
   if (frame.image.width != camera.width || frame.image.height != camera.height) return ok_status();

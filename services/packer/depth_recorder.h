@@ -17,7 +17,8 @@ class DepthRecorder {
   static Result<DepthRecorder> open(const std::string& directory, int max_frames);
 
   /// Adds a tile as sampled; the frame is written when its last tile is here. Frames never completed are dropped.
-  Status add(FrameId frame, const geometry::Camera& camera, const geometry::Rect& rect, size_t tiles_in_frame, const image::DepthImage& tile);
+  Status add(FrameId frame, const geometry::Camera& camera, const geometry::Rect& rect, size_t tiles_in_frame,
+             const image::DepthImage& tile);
 
  private:
   struct Frame {

@@ -21,9 +21,11 @@ class PackerService {
  public:
   PackerService(const PackerServiceOptions& o, net::Context& context)
       : options_(o),
-        tiles_(context, net::Kind::kPull, o.service.name + ":tiles", {.high_water_mark = 256, .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes}),
+        tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
+               {.high_water_mark = 256, .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes}),
         patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),
-        state_(context, net::Kind::kRouter, o.service.name + ":state", {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
+        state_(context, net::Kind::kRouter, o.service.name + ":state",
+               {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
 
   /// Binds the three sockets and says hello with their addresses.
   Status open(net::Context& context) {
@@ -70,7 +72,10 @@ class PackerService {
     seen_version_ = link_->version();
     const wire::Welcome& s = *link_->session();
     if (s.box_room.empty()) return;
-    const auto setting = [&](const char* key, double fallback) { const auto it = s.settings.find(key); return it == s.settings.end() ? fallback : it->second; };
+    const auto setting = [&](const char* key, double fallback) {
+      const auto it = s.settings.find(key);
+      return it == s.settings.end() ? fallback : it->second;
+    };
     Config config;
     config.model = {s.box_room, int(s.octree_depth)};
     if (const Status valid = points::validate(config.model); !valid) {
@@ -105,15 +110,21 @@ class PackerService {
     }
   }
 
-  wire::StateMark mark(bool answer) const { return {instance_, core_->sequence(), core_->epoch(), answer, core_->model().points()}; }
+  wire::StateMark mark(bool answer) const {
+    return {instance_, core_->sequence(), core_->epoch(), answer, core_->model().points()};
+  }
 
-  template <class Send> void send_event(const Event& e, Send&& send) {
+  template <class Send>
+  void send_event(const Event& e, Send&& send) {
     switch (e.kind) {
       case Event::Kind::kPatch:
-        return send(wire::Patch{instance_, e.sequence, e.epoch, e.frame, e.viewer, e.request, e.tile, e.tiles_in_frame, e.frame_complete, e.samples,
-                                e.kept, e.camera, e.rect, std::as_bytes(std::span(*e.blob))});
-      case Event::Kind::kForget: return send(wire::Forget{instance_, e.sequence, e.epoch, e.clusters});
-      case Event::Kind::kEpoch: return send(wire::EpochBegin{instance_, e.sequence, e.epoch});
+        return send(wire::Patch{instance_, e.sequence, e.epoch, e.frame, e.viewer, e.request, e.tile, e.tiles_in_frame,
+                                e.frame_complete, e.samples, e.kept, e.camera, e.rect,
+                                std::as_bytes(std::span(*e.blob))});
+      case Event::Kind::kForget:
+        return send(wire::Forget{instance_, e.sequence, e.epoch, e.clusters});
+      case Event::Kind::kEpoch:
+        return send(wire::EpochBegin{instance_, e.sequence, e.epoch});
     }
   }
   void publish(const Event& e) {
@@ -132,7 +143,8 @@ class PackerService {
     if (!core_) return;
     const double received = master_now();
     const auto& lease = m.lease;
-    auto image = codec::decode({reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size()}, lease.rect.width, lease.rect.height);
+    auto image = codec::decode({reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size()}, lease.rect.width,
+                               lease.rect.height);
     if (!image) return tiles_.reject(message, image.error().text);
     const double decoded = master_now();
     if (recorder_)
@@ -140,8 +152,9 @@ class PackerService {
         log::error("{}", s.error().text);
         recorder_.reset();
       }
-    auto event = core_->submit({lease.frame, lease.epoch, uint32_t(lease.tile), uint32_t(lease.tiles_in_frame), lease.camera, lease.rect, lease.viewer,
-                                lease.request, std::move(*image)}, monotonic_s());
+    auto event = core_->submit({lease.frame, lease.epoch, uint32_t(lease.tile), uint32_t(lease.tiles_in_frame),
+                                lease.camera, lease.rect, lease.viewer, lease.request, std::move(*image)},
+                               monotonic_s());
     if (!event) return tiles_.reject(message, event.error().text);
     if (!*event) return;
     const Event& e = **event;
@@ -150,8 +163,9 @@ class PackerService {
     spans_.add("decode", received, decoded);
     spans_.add("pack", decoded, packed);
     bytes_sent_ += e.blob->size();
-    link_->socket().send(wire::TileDone{lease.frame, lease.tile, lease.lease, m.sampler, e.samples, e.kept, m.image.size(), e.blob->size(), lease.leased_s,
-                                        m.sample_begin_s, m.sample_end_s, m.encode_end_s, received, packed});
+    link_->socket().send(wire::TileDone{lease.frame, lease.tile, lease.lease, m.sampler, e.samples, e.kept,
+                                        m.image.size(), e.blob->size(), lease.leased_s, m.sample_begin_s,
+                                        m.sample_end_s, m.encode_end_s, received, packed});
   }
 
   void receive_state_requests() {
@@ -160,14 +174,17 @@ class PackerService {
       if (!message) return;
       net::dispatch<wire::StateRequest, wire::AccessReport>(state_, *message, [&](const auto& m) {
         if (!core_) return;
-        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>) core_->accessed(m.clusters, monotonic_s());
-        else answer(message->peer, m);
+        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>)
+          core_->accessed(m.clusters, monotonic_s());
+        else
+          answer(message->peer, m);
       });
     }
   }
 
   void answer(const std::string& peer, const wire::StateRequest& request) {
-    const Sequence after = request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
+    const Sequence after =
+        request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
     const auto events = core_->events_since(after);
     for (const auto& e : events) send_event(e, [&](const auto& m) { state_.send(m, peer); });
     state_.send(mark(true), peer);
@@ -175,13 +192,22 @@ class PackerService {
   }
 
   net::MasterLink::Values status() const {
-    net::MasterLink::Values v{{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"bytes_sent", double(bytes_sent_)},
-                              {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())}};
+    net::MasterLink::Values v{
+        {"rss_mb", net::resident_mb()},
+        {"peak_rss_mb", net::peak_resident_mb()},
+        {"bytes_sent", double(bytes_sent_)},
+        {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())}};
     if (core_) {
       const auto& s = core_->statistics();
-      v.insert({{"points", double(core_->model().points())}, {"model_bytes", double(core_->model().bytes())}, {"log_bytes", double(core_->log_bytes())},
-                {"sequence", double(core_->sequence().value)}, {"tiles", double(s.tiles)}, {"tiles_duplicate", double(s.tiles_duplicate)},
-                {"frames_complete", double(s.frames_complete)}, {"points_forgotten", double(s.points_forgotten)}, {"points_outside", double(s.points_outside)}});
+      v.insert({{"points", double(core_->model().points())},
+                {"model_bytes", double(core_->model().bytes())},
+                {"log_bytes", double(core_->log_bytes())},
+                {"sequence", double(core_->sequence().value)},
+                {"tiles", double(s.tiles)},
+                {"tiles_duplicate", double(s.tiles_duplicate)},
+                {"frames_complete", double(s.frames_complete)},
+                {"points_forgotten", double(s.points_forgotten)},
+                {"points_outside", double(s.points_outside)}});
     }
     return v;
   }
@@ -207,10 +233,16 @@ class PackerService {
 
 void add_flags(CLI::App& app, PackerServiceOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kBoth);
-  app.add_option("--threads", o.threads, "threads for reference depth maps; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
+  app.add_option("--threads", o.threads, "threads for reference depth maps; 0: one a core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
   app.add_option("--record-depth", o.record_depth, "folder to keep sampled depth images in");
-  app.add_option("--record-depth-frames", o.record_depth_frames, "depth images to keep at most")->capture_default_str()->check(CLI::Range(1, 1000000));
-  app.add_option("--log-limit-mb", o.log_limit_mb, "memory for the events that late joiners get")->capture_default_str()->check(CLI::Range(1.0, 1e6));
+  app.add_option("--record-depth-frames", o.record_depth_frames, "depth images to keep at most")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
+  app.add_option("--log-limit-mb", o.log_limit_mb, "memory for the events that late joiners get")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1e6));
 }
 
 int run(const PackerServiceOptions& o) {

@@ -7,8 +7,8 @@ namespace telesplat::packer {
 
 struct PackerServiceOptions {
   net::ServiceOptions service;
-  int threads = 0;            ///< for reference depth maps; 0: all cores
-  std::string record_depth;   ///< folder for sampled depth images; empty: none are kept
+  int threads = 0;           ///< for reference depth maps; 0: all cores
+  std::string record_depth;  ///< folder for sampled depth images; empty: none are kept
   int record_depth_frames = 50;
   double log_limit_mb = 512;  ///< events kept for late joiners
 };

@@ -19,8 +19,10 @@ std::vector<ChunkId> ChunkCache::missing(const geometry::Camera& camera) {
   std::vector<std::pair<float, ChunkId>> order;
   for (const auto& c : chunks_) {
     if (!frustum.may_contain(c.box_room)) continue;
-    if (const auto it = held_.find(c.id); it != held_.end()) it->second = use_;
-    else order.emplace_back(glm::distance(c.box_room.centre(), glm::vec3(camera.pose.position_room)), c.id);
+    if (const auto it = held_.find(c.id); it != held_.end())
+      it->second = use_;
+    else
+      order.emplace_back(glm::distance(c.box_room.centre(), glm::vec3(camera.pose.position_room)), c.id);
   }
   std::sort(order.begin(), order.end());
   std::vector<ChunkId> out;
@@ -43,13 +45,15 @@ std::vector<ChunkId> ChunkCache::prefetch() const {
 std::vector<ChunkId> ChunkCache::insert(ChunkId id) {
   waiting_.erase(id);
   const auto size_of = [&](ChunkId c) {
-    const auto it = std::lower_bound(chunks_.begin(), chunks_.end(), c, [](const auto& info, ChunkId v) { return info.id < v; });
+    const auto it =
+        std::lower_bound(chunks_.begin(), chunks_.end(), c, [](const auto& info, ChunkId v) { return info.id < v; });
     return it != chunks_.end() && it->id == c ? it->bytes : 0;
   };
   if (held_.emplace(id, use_).second) bytes_ += size_of(id);
   std::vector<ChunkId> removed;
   while (bytes_ > budget_bytes_) {
-    const auto oldest = std::min_element(held_.begin(), held_.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto oldest =
+        std::min_element(held_.begin(), held_.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
     if (oldest->second == use_) break;
     removed.push_back(oldest->first);
     bytes_ -= size_of(oldest->first);

@@ -19,7 +19,9 @@ Result<HeldChunk> hold(ChunkId id, geometry::ChunkBytes chunk);
 class Refusals {
  public:
   explicit Refusals(size_t batch) : batch_(batch) {}
-  void add(const Error& error) { if (count_++ == 0) first_ = error.text; }
+  void add(const Error& error) {
+    if (count_++ == 0) first_ = error.text;
+  }
   Status status() const;
 
  private:

@@ -46,7 +46,8 @@ HWY_INLINE V3 decode32(VU code) {
 
 // image/normal.h: encode_normal16
 HWY_INLINE VU quantise(VF v) {
-  const VF scaled = hn::Add(hn::Mul(hn::Add(hn::Mul(v, hn::Set(f, 0.5f)), hn::Set(f, 0.5f)), hn::Set(f, 254.0f)), hn::Set(f, 0.5f));
+  const VF scaled =
+      hn::Add(hn::Mul(hn::Add(hn::Mul(v, hn::Set(f, 0.5f)), hn::Set(f, 0.5f)), hn::Set(f, 254.0f)), hn::Set(f, 0.5f));
   return to_unsigned(hn::Min(hn::Max(scaled, hn::Zero(f)), hn::Set(f, 254.0f)));
 }
 HWY_INLINE VU encode16(const V3& n) {
@@ -77,7 +78,8 @@ void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* H
     n = {hn::IfThenElse(cancelled, g.x, n.x), hn::IfThenElse(cancelled, g.y, n.y), hn::IfThenElse(cancelled, g.z, n.z)};
 
     // Flip: the signs of n . g and d . g are equal where n points away from the viewer's side.
-    const V3 d{hn::Load(f, hits.direction[0] + lane), hn::Load(f, hits.direction[1] + lane), hn::Load(f, hits.direction[2] + lane)};
+    const V3 d{hn::Load(f, hits.direction[0] + lane), hn::Load(f, hits.direction[1] + lane),
+               hn::Load(f, hits.direction[2] + lane)};
     const VF sign = hn::And(hn::Xor(hn::Xor(dot(n, g), dot(d, g)), hn::Set(f, -0.0f)), hn::Set(f, -0.0f));
     n = {hn::Xor(n.x, sign), hn::Xor(n.y, sign), hn::Xor(n.z, sign)};
     hn::Store(encode16(n), un, normal + lane);
@@ -87,7 +89,8 @@ void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* H
              c2 = hn::Load(un, hits.corner_colour[2] + lane);
     const VU mask = hn::Set(un, 255);
     const auto channel = [&](VU a, VU b, VU c) {
-      const VF v = hn::Add(blend(to_float(hn::And(a, mask)), to_float(hn::And(b, mask)), to_float(hn::And(c, mask))), hn::Set(f, 0.5f));
+      const VF v = hn::Add(blend(to_float(hn::And(a, mask)), to_float(hn::And(b, mask)), to_float(hn::And(c, mask))),
+                           hn::Set(f, 0.5f));
       return to_unsigned(hn::Min(hn::Max(v, hn::Zero(f)), hn::Set(f, 255.0f)));
     };
     const VU red = channel(hn::ShiftRight<16>(c0), hn::ShiftRight<16>(c1), hn::ShiftRight<16>(c2));
@@ -109,8 +112,8 @@ void shade_hits(const HitPacket& hits, uint32_t* colour, uint32_t* normal) {
   HWY_DYNAMIC_DISPATCH(ShadeHits)(hits, colour, normal);
 }
 
-SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, float u, float v, const glm::vec3& g,
-                           const glm::vec3& direction) {
+SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, float u, float v,
+                           const glm::vec3& g, const glm::vec3& direction) {
   const float weight[3] = {1 - u - v, u, v};
   SurfacePoint out{glm::vec3(0), glm::vec3(0)};
   for (int corner = 0; corner < 3; ++corner) {

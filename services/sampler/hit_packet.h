@@ -16,10 +16,10 @@ inline constexpr int kPacket = 8;
 
 /// What is known of up to eight hits. Lanes without a hit may hold anything finite.
 struct HitPacket {
-  alignas(32) float u[kPacket], v[kPacket];                         ///< barycentric weights of corners 1 and 2
+  alignas(32) float u[kPacket], v[kPacket];  ///< barycentric weights of corners 1 and 2
   alignas(32) float geometric_normal[3][kPacket], direction[3][kPacket];
-  alignas(32) uint32_t corner_normal[3][kPacket];                   ///< [corner], image/normal.h: encode_normal32
-  alignas(32) uint32_t corner_colour[3][kPacket];                   ///< [corner], 0x00RRGGBB
+  alignas(32) uint32_t corner_normal[3][kPacket];  ///< [corner], image/normal.h: encode_normal32
+  alignas(32) uint32_t corner_colour[3][kPacket];  ///< [corner], 0x00RRGGBB
 };
 
 /// Interpolated attributes in every lane. SIMD, chosen for the processor at run time.

@@ -8,5 +8,7 @@ int main(int argc, char** argv) {
   using namespace telesplat;
   sampler::SamplerServiceOptions options;
   options.service.name = "sampler-" + std::to_string(getpid());
-  return net::service_main(argc, argv, "telesplat-sampler: samples tiles of requested views; run as many as there are machines", options, sampler::add_flags, sampler::run);
+  return net::service_main(argc, argv,
+                           "telesplat-sampler: samples tiles of requested views; run as many as there are machines",
+                           options, sampler::add_flags, sampler::run);
 }

@@ -122,7 +122,8 @@ Status RasterSampler::upload(ChunkId id, geometry::ChunkBytes chunk) {
   const geometry::MeshChunkView& view = held->view;
   const size_t bytes = geometry::chunk_bytes(view.vertices(), view.triangles());
   if (static_cast<GLint64>(bytes) > largest_chunk_bytes_)
-    return Error{fmt::format("chunk {} of {} bytes refused: the graphics card's limit is {}", id.value, bytes, largest_chunk_bytes_)};
+    return Error{fmt::format("chunk {} of {} bytes refused: the graphics card's limit is {}", id.value, bytes,
+                             largest_chunk_bytes_)};
 
   Drawable made{0, 0, static_cast<GLuint>(view.vertices()), static_cast<GLsizei>(view.indices.size()), {}};
   for (size_t i = 0; i < view.positions_room.size(); i += 3)
@@ -247,8 +248,10 @@ image::DepthImage RasterSampler::sample(const geometry::Camera& camera, const ge
       read(GL_COLOR_ATTACHMENT2, GL_RED_INTEGER, GL_UNSIGNED_SHORT, out.normal.data() + at);
     }
   for (size_t i = 0; i < depth_m.size(); ++i) {
-    if (depth_m[i] > 0) out.depth[i] = image::encode_depth(depth_m[i], camera.near_m);
-    else out.colour[i] = 0, out.normal[i] = 0;  // nothing there; or a driver's NaN
+    if (depth_m[i] > 0)
+      out.depth[i] = image::encode_depth(depth_m[i], camera.near_m);
+    else
+      out.colour[i] = 0, out.normal[i] = 0;  // nothing there; or a driver's NaN
   }
   return out;
 }

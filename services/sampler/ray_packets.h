@@ -73,29 +73,31 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
   if (tile.width <= 0 || tile.height <= 0) return;
   const int column0 = tile.x / kPacketWidth, column1 = (tile.x + tile.width - 1) / kPacketWidth + 1;
   const int row0 = tile.y / kPacketHeight, row1 = (tile.y + tile.height - 1) / kPacketHeight + 1;
-  const PixelRays rays(camera, column0 * kPacketWidth, row0 * kPacketHeight, column1 * kPacketWidth, row1 * kPacketHeight);
+  const PixelRays rays(camera, column0 * kPacketWidth, row0 * kPacketHeight, column1 * kPacketWidth,
+                       row1 * kPacketHeight);
   scene.commit();
 
   // Tasks of up to 32 x 16 pixels: neighbours share the hierarchy's nodes in the cache.
   scene.arena().execute([&] {
-    tbb::parallel_for(tbb::blocked_range2d<int>(row0, row1, 8, column0, column1, 8), [&](const tbb::blocked_range2d<int>& part) {
-      auto task = begin();
-      RTCRayHit8 packet;
-      rays.begin(packet);
-      alignas(32) static constexpr int kAll[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
-      RTCIntersectContext context;
-      rtcInitIntersectContext(&context);
-      context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-      for (int row = part.rows().begin(); row < part.rows().end(); ++row)
-        for (int column = part.cols().begin(); column < part.cols().end(); ++column) {
-          rays.aim(column * kPacketWidth, row * kPacketHeight, packet);
-          rtcIntersect8(kAll, scene.scene(), &context, &packet);
-          bool any = false;
-          for (int k = 0; k < kPacket; ++k) any |= packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
-          if (any) consume(task, packet, column * kPacketWidth, row * kPacketHeight);
-        }
-      end(task);
-    });
+    tbb::parallel_for(tbb::blocked_range2d<int>(row0, row1, 8, column0, column1, 8),
+                      [&](const tbb::blocked_range2d<int>& part) {
+                        auto task = begin();
+                        RTCRayHit8 packet;
+                        rays.begin(packet);
+                        alignas(32) static constexpr int kAll[kPacket] = {-1, -1, -1, -1, -1, -1, -1, -1};
+                        RTCIntersectContext context;
+                        rtcInitIntersectContext(&context);
+                        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+                        for (int row = part.rows().begin(); row < part.rows().end(); ++row)
+                          for (int column = part.cols().begin(); column < part.cols().end(); ++column) {
+                            rays.aim(column * kPacketWidth, row * kPacketHeight, packet);
+                            rtcIntersect8(kAll, scene.scene(), &context, &packet);
+                            bool any = false;
+                            for (int k = 0; k < kPacket; ++k) any |= packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
+                            if (any) consume(task, packet, column * kPacketWidth, row * kPacketHeight);
+                          }
+                        end(task);
+                      });
   });
 }
 
@@ -103,7 +105,8 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
 template <class Consume>
 void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile, const Consume& consume) {
   trace_tile(
-      scene, camera, tile, [] { return 0; }, [&](int, const RTCRayHit8& packet, int x, int y) { consume(packet, x, y); }, [](int) {});
+      scene, camera, tile, [] { return 0; },
+      [&](int, const RTCRayHit8& packet, int x, int y) { consume(packet, x, y); }, [](int) {});
 }
 
 }  // namespace telesplat::sampler

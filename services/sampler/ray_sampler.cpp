@@ -10,14 +10,16 @@ namespace {
 // step by step, and eight at a time are shaded when it has arrived.
 class PendingHits {
  public:
-  PendingHits(const RayScene& scene, double near_m, image::DepthImage& out) : scene_(scene), near_m_(near_m), out_(out) {}
+  PendingHits(const RayScene& scene, double near_m, image::DepthImage& out)
+      : scene_(scene), near_m_(near_m), out_(out) {}
 
   /// Keeps the hits of a packet that lie in the tile.
   void add(const RTCRayHit8& packet, int x, int y, const geometry::Rect& tile) {
     if (count_ + kPacket > kCapacity) flush();
     for (int k = 0; k < kPacket; ++k) {
       const int px = x + k % kPacketWidth - tile.x, py = y + k / kPacketWidth - tile.y;
-      if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID || px < 0 || py < 0 || px >= tile.width || py >= tile.height) continue;
+      if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID || px < 0 || py < 0 || px >= tile.width || py >= tile.height)
+        continue;
       const geometry::MeshChunkView& chunk = scene_.chunk(packet.hit.instID[0][k]);
       const int i = count_++, group = i / kPacket, lane = i % kPacket;
       corners_[i] = chunk.indices.data() + 3 * size_t{packet.hit.primID[k]};
@@ -66,7 +68,8 @@ class PendingHits {
   }
 
  private:
-  static constexpr int kCapacity = 64;  // eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet
+  static constexpr int kCapacity =
+      64;  // eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet
 
   const RayScene& scene_;
   double near_m_;

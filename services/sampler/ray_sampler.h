@@ -12,7 +12,9 @@ class RaySampler final : public Sampler {
 
   const char* name() const override { return "ray"; }
   Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) override;
-  Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override { return scene_.add(std::move(chunks)); }
+  Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override {
+    return scene_.add(std::move(chunks));
+  }
   void remove_chunk(ChunkId id) override { scene_.remove(id); }
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) override;
 

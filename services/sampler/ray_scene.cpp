@@ -13,7 +13,8 @@ RayScene::RayScene(int threads)
     : arena_(threads > 0 ? threads : tbb::task_arena::automatic), device_(rtcNewDevice(nullptr)) {
   CHECK(device_ != nullptr);
   rtcSetDeviceErrorFunction(
-      device_.get(), [](void*, RTCError code, const char* text) { log::error("Embree error {}: {}", int(code), text); }, nullptr);
+      device_.get(), [](void*, RTCError code, const char* text) { log::error("Embree error {}: {}", int(code), text); },
+      nullptr);
   top_.reset(rtcNewScene(device_.get()));
 }
 
@@ -25,13 +26,15 @@ Result<RayScene::Slot> RayScene::build(ChunkId id, geometry::ChunkBytes chunk) c
   RTCGeometry mesh = rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, view.positions_room.data(), 0, 12,
                              view.vertices());
-  rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, view.indices.data(), 0, 12, view.triangles());
+  rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, view.indices.data(), 0, 12,
+                             view.triangles());
   rtcCommitGeometry(mesh);
   rtcAttachGeometry(slot.scene.get(), mesh);
   rtcReleaseGeometry(mesh);
   rtcCommitScene(slot.scene.get());
   if (const RTCError error = rtcGetDeviceError(device_.get()); error != RTC_ERROR_NONE)
-    return Error{fmt::format("chunk {} of {} triangles refused: Embree error {}", id.value, view.triangles(), int(error))};
+    return Error{
+        fmt::format("chunk {} of {} triangles refused: Embree error {}", id.value, view.triangles(), int(error))};
   return slot;
 }
 
@@ -56,12 +59,15 @@ void RayScene::install(ChunkId id, Slot slot) {
 Status RayScene::add(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) {
   std::vector<std::optional<Result<Slot>>> built(chunks.size());
   arena_.execute([&] {
-    tbb::parallel_for(size_t{0}, chunks.size(), [&](size_t i) { built[i].emplace(build(chunks[i].first, std::move(chunks[i].second))); });
+    tbb::parallel_for(size_t{0}, chunks.size(),
+                      [&](size_t i) { built[i].emplace(build(chunks[i].first, std::move(chunks[i].second))); });
   });
   Refusals refusals(chunks.size());
   for (size_t i = 0; i < chunks.size(); ++i) {
-    if (built[i]->ok()) install(chunks[i].first, std::move(**built[i]));
-    else refusals.add(built[i]->error());
+    if (built[i]->ok())
+      install(chunks[i].first, std::move(**built[i]));
+    else
+      refusals.add(built[i]->error());
   }
   return refusals.status();
 }

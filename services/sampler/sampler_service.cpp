@@ -16,9 +16,9 @@
 namespace telesplat::sampler {
 namespace {
 
-constexpr size_t kChunksInFlight = 8;    // requests to the data server not yet answered
-constexpr int kLeasesAhead = 2;          // one being sampled, one to go on with at once
-constexpr double kRetry_s = 2.0;         // a data server that does not answer is asked again
+constexpr size_t kChunksInFlight = 8;  // requests to the data server not yet answered
+constexpr int kLeasesAhead = 2;        // one being sampled, one to go on with at once
+constexpr double kRetry_s = 2.0;       // a data server that does not answer is asked again
 
 // Chunk bytes must be 4-byte aligned to be used in place; a received field may lie anywhere.
 geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
@@ -30,7 +30,10 @@ geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
 class SamplerService {
  public:
   SamplerService(const SamplerServiceOptions& o, std::unique_ptr<Sampler> sampler, net::Context& context)
-      : options_(o), context_(context), sampler_(std::move(sampler)), cache_(uint64_t(o.chunk_cache_mb * 1e6)),
+      : options_(o),
+        context_(context),
+        sampler_(std::move(sampler)),
+        cache_(uint64_t(o.chunk_cache_mb * 1e6)),
         link_(context, o.service.master, make_hello(o, *sampler_)) {}
 
   int serve() {
@@ -42,7 +45,8 @@ class SamplerService {
       fetch(now);
       ask_for_leases();
       // With a tile to sample there is nothing to wait for.
-      const bool ready = !leases_.empty() && cache_.known() && tiles_ && cache_.missing(geometry::crop(leases_.front().camera, leases_.front().rect)).empty();
+      const bool ready = !leases_.empty() && cache_.known() && tiles_ &&
+                         cache_.missing(geometry::crop(leases_.front().camera, leases_.front().rect)).empty();
       std::vector<net::Socket*> sockets{&link_.socket()};
       if (blocks_) sockets.push_back(&*blocks_);
       if (!ready) net::wait_readable(sockets, 50);
@@ -65,8 +69,11 @@ class SamplerService {
   }
 
   net::MasterLink::Values status() const {
-    return {{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}, {"tiles_sampled", double(tiles_sampled_)},
-            {"chunk_mb", double(cache_.bytes()) / 1e6}, {"messages_rejected", blocks_ ? double(blocks_->rejected()) : 0.0}};
+    return {{"rss_mb", net::resident_mb()},
+            {"peak_rss_mb", net::peak_resident_mb()},
+            {"tiles_sampled", double(tiles_sampled_)},
+            {"chunk_mb", double(cache_.bytes()) / 1e6},
+            {"messages_rejected", blocks_ ? double(blocks_->rejected()) : 0.0}};
   }
 
   void flush_metrics(double now_s) {
@@ -80,7 +87,10 @@ class SamplerService {
     if (link_.version() == seen_version_) return;
     seen_version_ = link_.version();
     const auto& session = *link_.session();
-    const auto endpoint = [&](const char* key) { const auto it = session.endpoints.find(key); return it == session.endpoints.end() ? std::string() : it->second; };
+    const auto endpoint = [&](const char* key) {
+      const auto it = session.endpoints.find(key);
+      return it == session.endpoints.end() ? std::string() : it->second;
+    };
     if (session.master != master_) {  // another master knows nothing of the leases we asked for
       master_ = session.master;
       leases_asked_ = 0;
@@ -88,14 +98,17 @@ class SamplerService {
     }
     if (const std::string tiles = endpoint("tiles"); tiles != tiles_endpoint_ && !tiles.empty()) {
       tiles_endpoint_ = tiles;
-      tiles_.emplace(context_, net::Kind::kPush, options_.service.name + ":tiles", net::SocketOptions{.high_water_mark = 64});
+      tiles_.emplace(context_, net::Kind::kPush, options_.service.name + ":tiles",
+                     net::SocketOptions{.high_water_mark = 64});
       if (const Status s = tiles_->connect(tiles); !s) log::error("{}", s.error().text);
     }
     const std::string hash = session.facts.contains("content_hash") ? session.facts.at("content_hash") : "";
-    if (const std::string chunks = endpoint("chunks"); !chunks.empty() && (chunks != chunks_endpoint_ || session.epoch != epoch_)) {
+    if (const std::string chunks = endpoint("chunks");
+        !chunks.empty() && (chunks != chunks_endpoint_ || session.epoch != epoch_)) {
       chunks_endpoint_ = chunks;
       epoch_ = session.epoch;
-      blocks_.emplace(context_, net::Kind::kDealer, options_.service.name + ":chunks", net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes});
+      blocks_.emplace(context_, net::Kind::kDealer, options_.service.name + ":chunks",
+                      net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes});
       if (const Status s = blocks_->connect(chunks); !s) log::error("{}", s.error().text);
       // A restarted data server with the same data has the same chunks: keep what we hold.
       if (hash.empty() || hash != content_hash_) {
@@ -132,7 +145,8 @@ class SamplerService {
       wanted = cache_.prefetch();
       if (wanted.empty()) {
         prefetched_ = true;
-        log::info("{} of {} chunks held ({:.0f} MB)", cache_.chunks().size() - missing_count(), cache_.chunks().size(), double(cache_.bytes()) / 1e6);
+        log::info("{} of {} chunks held ({:.0f} MB)", cache_.chunks().size() - missing_count(), cache_.chunks().size(),
+                  double(cache_.bytes()) / 1e6);
       }
     }
     for (const ChunkId id : wanted) {
@@ -189,7 +203,8 @@ class SamplerService {
     const double begin = monotonic_s();
     for (const auto& [id, bytes] : batch)
       for (const ChunkId old : cache_.insert(id)) sampler_->remove_chunk(old);
-    if (const Status s = sampler_->add_chunks(std::move(batch)); !s) log::warn("a chunk from {} was refused: {}", chunks_endpoint_, s.error().text);
+    if (const Status s = sampler_->add_chunks(std::move(batch)); !s)
+      log::warn("a chunk from {} was refused: {}", chunks_endpoint_, s.error().text);
     spans_.add("add chunks", link_.to_master_s(begin), link_.to_master_s(monotonic_s()));
   }
 
@@ -237,9 +252,15 @@ class SamplerService {
 
 void add_flags(CLI::App& app, SamplerServiceOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kConnects);
-  app.add_option("--sampler", o.kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")->capture_default_str()->check(CLI::IsMember({"auto", "ray", "raster"}));
-  app.add_option("--threads", o.threads, "threads to sample with; 0: one a core")->capture_default_str()->check(CLI::Range(0, 1024));
-  app.add_option("--chunk-cache-mb", o.chunk_cache_mb, "memory for chunks, MB")->capture_default_str()->check(CLI::Range(1.0, 1e6));
+  app.add_option("--sampler", o.kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "ray", "raster"}));
+  app.add_option("--threads", o.threads, "threads to sample with; 0: one a core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--chunk-cache-mb", o.chunk_cache_mb, "memory for chunks, MB")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1e6));
 }
 
 int run(const SamplerServiceOptions& o) {

@@ -7,9 +7,9 @@ namespace telesplat::sampler {
 
 struct SamplerServiceOptions {
   net::ServiceOptions service;
-  std::string kind = "auto";       ///< "ray", "raster" or "auto" (raster on a hardware GPU, else ray)
-  int threads = 0;                 ///< 0: all cores
-  double chunk_cache_mb = 8192;    ///< bytes of chunks held at most, unless one view needs more
+  std::string kind = "auto";     ///< "ray", "raster" or "auto" (raster on a hardware GPU, else ray)
+  int threads = 0;               ///< 0: all cores
+  double chunk_cache_mb = 8192;  ///< bytes of chunks held at most, unless one view needs more
 };
 
 void add_flags(CLI::App& app, SamplerServiceOptions& options);

@@ -44,7 +44,8 @@ void SamplerRayWithoutAttributes(benchmark::State& state) {
   RayScene scene(0);
   if (!scene.add(terrain()).ok()) return state.SkipWithError("chunks refused");
   const geometry::Camera camera = view(double(state.range(0)));
-  for (auto _ : state) trace_tile(scene, camera, kFrame, [](const RTCRayHit8& packet, int, int) { benchmark::DoNotOptimize(packet); });
+  for (auto _ : state)
+    trace_tile(scene, camera, kFrame, [](const RTCRayHit8& packet, int, int) { benchmark::DoNotOptimize(packet); });
   count(state, kFrame.width * kFrame.height);
 }
 
@@ -72,7 +73,8 @@ void SamplerBuild(benchmark::State& state) {
     if (!sampler->add_chunks(terrain()).ok()) return state.SkipWithError("chunks refused");
     benchmark::DoNotOptimize(sampler->sample(camera, {640, 400, 1, 1}).depth[0]);
   }
-  state.counters["Mtriangles/s"] = benchmark::Counter(2 * 724 * 724 / 1e6 * double(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["Mtriangles/s"] =
+      benchmark::Counter(2 * 724 * 724 / 1e6 * double(state.iterations()), benchmark::Counter::kIsRate);
 }
 
 BENCHMARK(SamplerRay)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();

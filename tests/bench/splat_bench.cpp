@@ -55,8 +55,8 @@ const points::PointModel& model(int patches) {
   if (m.points() == 0) {
     const geometry::Camera camera = sampling_camera();
     for (int i = 0; i < patches; ++i)
-      m.insert(points::prepare_patch(m.config(), Sequence{static_cast<uint64_t>(i) + 1}, camera, {0, 0, camera.width, camera.height},
-                                     wavy_image(camera, patches == 1 ? -1 : i)));
+      m.insert(points::prepare_patch(m.config(), Sequence{static_cast<uint64_t>(i) + 1}, camera,
+                                     {0, 0, camera.width, camera.height}, wavy_image(camera, patches == 1 ? -1 : i)));
   }
   return m;
 }
@@ -98,7 +98,8 @@ void splat_disc(benchmark::State& state) { splat_points(state, splat::Kernel::kD
 void splat_square_64_patches(benchmark::State& state) { splat_points(state, splat::Kernel::kSquare, 64); }
 
 #define SPLAT_ARGS ->ArgNames({"px", "threads", "depth"})->UseRealTime()->Unit(benchmark::kMillisecond)
-BENCHMARK(splat_square) SPLAT_ARGS->Args({1, 1, 0})->Args({2, 1, 0})->Args({3, 1, 0})->Args({5, 1, 0})->Args({3, 2, 0})->Args({3, 2, 1});
+BENCHMARK(splat_square)
+SPLAT_ARGS->Args({1, 1, 0})->Args({2, 1, 0})->Args({3, 1, 0})->Args({5, 1, 0})->Args({3, 2, 0})->Args({3, 2, 1});
 BENCHMARK(splat_disc) SPLAT_ARGS->Args({3, 1, 0})->Args({5, 1, 0})->Args({3, 2, 0});
 BENCHMARK(splat_square_64_patches) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0});
 
@@ -117,7 +118,13 @@ void splat_reference_depth(benchmark::State& state) {
   for (auto _ : state) splat::render_reference_depth(m, sampling_camera(), static_cast<int>(state.range(0)), depth);
   state.SetItemsProcessed(static_cast<int64_t>(m.points()) * state.iterations());
 }
-BENCHMARK(splat_reference_depth)->ArgNames({"threads", "patches"})->Args({1, 1})->Args({2, 1})->Args({1, 64})->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(splat_reference_depth)
+    ->ArgNames({"threads", "patches"})
+    ->Args({1, 1})
+    ->Args({2, 1})
+    ->Args({1, 64})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 void splat_eliminate_redundancy(benchmark::State& state) {
   const geometry::Camera camera = sampling_camera();
@@ -129,7 +136,8 @@ void splat_eliminate_redundancy(benchmark::State& state) {
     state.PauseTiming();
     image = original;
     state.ResumeTiming();
-    benchmark::DoNotOptimize(splat::eliminate_redundancy(camera, {0, 0, camera.width, camera.height}, depth, 0.002f, image));
+    benchmark::DoNotOptimize(
+        splat::eliminate_redundancy(camera, {0, 0, camera.width, camera.height}, depth, 0.002f, image));
   }
   state.SetItemsProcessed(static_cast<int64_t>(image.pixels()) * state.iterations());
 }
@@ -148,7 +156,13 @@ void splat_baseline_gl_points(benchmark::State& state) {
   for (auto _ : state) (*gl)->render(list, camera, splat::Kernel::kSquare, shading, target);
   state.SetItemsProcessed(static_cast<int64_t>(list.points) * state.iterations());
 }
-BENCHMARK(splat_baseline_gl_points)->ArgName("px")->Arg(1)->Arg(3)->Arg(5)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(splat_baseline_gl_points)
+    ->ArgName("px")
+    ->Arg(1)
+    ->Arg(3)
+    ->Arg(5)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 // Baseline: what merely clearing a frame of 64-bit keys in memory and writing its colours costs.
 void splat_baseline_memset(benchmark::State& state) {

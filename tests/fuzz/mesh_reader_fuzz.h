@@ -15,7 +15,8 @@ inline int use(Result<Mesh> mesh) {
   if (!placed.ok()) return 0;
   const ChunkPlan plan = plan_chunks(*placed, 64);
   for (size_t c = 0; c < plan.chunks(); ++c) {
-    const auto bytes = make_chunk(*placed, std::span(plan.order).subspan(plan.begin[c], plan.begin[c + 1] - plan.begin[c]));
+    const auto bytes =
+        make_chunk(*placed, std::span(plan.order).subspan(plan.begin[c], plan.begin[c + 1] - plan.begin[c]));
     if (!geometry::MeshChunkView::validate(bytes).ok()) std::abort();
   }
   return 0;

@@ -23,7 +23,9 @@ test::ChunkList scene() {
   constexpr float kTurn = 6.2831853f;
   std::vector<test::Vertex> vertices;
   std::vector<uint32_t> indices;
-  const auto quad = [&](uint32_t a, uint32_t b, uint32_t c, uint32_t d) { indices.insert(indices.end(), {a, b, c, a, c, d}); };
+  const auto quad = [&](uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
+    indices.insert(indices.end(), {a, b, c, a, c, d});
+  };
   for (int i = 0; i <= kAround; ++i)
     for (int k = 0; k <= kAcross; ++k) {
       const float s = kTurn * i / kAround, t = kTurn * k / kAcross;
@@ -95,7 +97,8 @@ void expect_golden(const std::string& name, const image::View& rendered, size_t 
   if (different <= allowed_pixels && mean <= 0.05) return;
   const std::filesystem::path folder = std::filesystem::path(TELESPLAT_GOLDEN_OUT) / "golden-failures";
   std::filesystem::create_directories(folder);
-  for (const auto& [what, view] : {std::pair{"reference", &*reference}, {"rendered", &rendered}, {"difference", &difference}})
+  for (const auto& [what, view] :
+       {std::pair{"reference", &*reference}, {"rendered", &rendered}, {"difference", &difference}})
     EXPECT_TRUE(image::write_png((folder / (name + "-" + what + ".png")).string(), *view).ok());
 }
 

@@ -40,7 +40,9 @@ Hit trace(const geometry::Camera& camera, int x, int y) {
     if (d < 1e-6) {
       if (std::max(std::abs(p.x), std::abs(p.z)) > 0.4) return {};  // beyond the floor
       const double e = 1e-5;
-      const auto slope = [&](const glm::dvec3& axis) { return distance_to_scene(p + axis * e) - distance_to_scene(p - axis * e); };
+      const auto slope = [&](const glm::dvec3& axis) {
+        return distance_to_scene(p + axis * e) - distance_to_scene(p - axis * e);
+      };
       const glm::dvec3 n(slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1}));
       const bool chequer = (int(std::floor(p.x * 20)) + int(std::floor(p.z * 20))) & 1;
       const uint32_t floor_albedo = chequer ? 0xc8c0b0 : 0x405060;
@@ -70,8 +72,8 @@ const points::PointModel& model() {
   if (m.points() == 0)
     for (int i = 0; i < 3; ++i) {
       const double angle = 0.5 + 1.2 * i;
-      const geometry::Camera camera =
-          geometry::make_camera(geometry::look_at({0.6 * std::sin(angle), 0.4, 0.6 * std::cos(angle)}, {0, -0.03, 0}), 75, 160, 100);
+      const geometry::Camera camera = geometry::make_camera(
+          geometry::look_at({0.6 * std::sin(angle), 0.4, 0.6 * std::cos(angle)}, {0, -0.03, 0}), 75, 160, 100);
       m.insert(points::prepare_patch(m.config(), Sequence{uint64_t(i) + 1}, camera, {0, 0, 160, 100}, sample(camera)));
     }
   return m;
@@ -104,17 +106,18 @@ image::View render(viewer::Renderer& renderer, splat::Kernel kernel, float scale
   options.scale = scale;
   splat::DrawList list;
   splat::select_view(model(), camera, options, list);
-  image::View out{kWidth, kHeight, std::vector<uint32_t>(size_t{kWidth} * kHeight), std::vector<float>(size_t{kWidth} * kHeight)};
+  image::View out{kWidth, kHeight, std::vector<uint32_t>(size_t{kWidth} * kHeight),
+                  std::vector<float>(size_t{kWidth} * kHeight)};
   renderer.render(list, camera, kernel, shading, {kWidth, kHeight, out.colour.data(), out.depth_m.data()});
   for (uint32_t& c : out.colour) c &= 0xffffff;
   return out;
 }
 
 struct Difference {
-  int largest = 0;             ///< of a channel
-  double mean = 0;             ///< of all channels
-  double largest_window = 0;   ///< mean over the worst 8x8 window
-  double pixels = 0;           ///< share that differs at all
+  int largest = 0;            ///< of a channel
+  double mean = 0;            ///< of all channels
+  double largest_window = 0;  ///< mean over the worst 8x8 window
+  double pixels = 0;          ///< share that differs at all
   std::vector<uint32_t> image;
 };
 
@@ -148,11 +151,12 @@ struct Tolerance {
   double mean, window, pixels;
 };
 
-void expect_like(const image::View& reference, const image::View& rendered, const Tolerance& tolerance, const std::string& name) {
+void expect_like(const image::View& reference, const image::View& rendered, const Tolerance& tolerance,
+                 const std::string& name) {
   const Difference d = difference(reference, rendered);
   const bool good = d.mean <= tolerance.mean && d.largest_window <= tolerance.window && d.pixels <= tolerance.pixels;
-  EXPECT_TRUE(good) << name << ": mean " << d.mean << ", worst window " << d.largest_window << ", share of pixels " << d.pixels
-                    << ", largest " << d.largest;
+  EXPECT_TRUE(good) << name << ": mean " << d.mean << ", worst window " << d.largest_window << ", share of pixels "
+                    << d.pixels << ", largest " << d.largest;
   if (good) return;
   const std::filesystem::path folder = std::filesystem::path(TELESPLAT_GOLDEN_OUT) / "golden-failures";
   std::filesystem::create_directories(folder);
@@ -183,7 +187,8 @@ TEST_P(SplatGolden, LooksAsCommitted) {
     GTEST_SKIP() << why_not;
   }
   const image::View rendered = render(*renderer, kernel, splat_scale(kernel));
-  const std::string shape = kernel == splat::Kernel::kSquare ? "square" : "disc", path = "tests/golden/images/splat-" + shape + ".png";
+  const std::string shape = kernel == splat::Kernel::kSquare ? "square" : "disc",
+                    path = "tests/golden/images/splat-" + shape + ".png";
   if (std::getenv("TELESPLAT_UPDATE_GOLDEN") && kind == "cpu") {
     ASSERT_TRUE(image::write_png(path, rendered).ok());
   }
@@ -220,7 +225,8 @@ INSTANTIATE_TEST_SUITE_P(Renderers, SplatGolden,
                          ::testing::Combine(::testing::Values("cpu", "gl"),
                                             ::testing::Values(splat::Kernel::kSquare, splat::Kernel::kDisc)),
                          [](const auto& info) {
-                           return std::get<0>(info.param) + (std::get<1>(info.param) == splat::Kernel::kSquare ? "_square" : "_disc");
+                           return std::get<0>(info.param) +
+                                  (std::get<1>(info.param) == splat::Kernel::kSquare ? "_square" : "_disc");
                          });
 
 // The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept copies, items
@@ -233,7 +239,8 @@ TEST(RenderersAgree, FrameAfterFrame) {
   for (int frame = 0; frame < 24; ++frame) {
     const int width = frame % 5 == 4 ? 133 : 200, height = frame % 5 == 4 ? 77 : 120;
     const geometry::Camera camera = geometry::make_camera(
-        geometry::look_at({0.6 * std::sin(0.3 * frame), 0.3, 0.6 * std::cos(0.3 * frame)}, {0, 0, 0}), 70, width, height);
+        geometry::look_at({0.6 * std::sin(0.3 * frame), 0.3, 0.6 * std::cos(0.3 * frame)}, {0, 0, 0}), 70, width,
+        height);
     const image::Shading shading({}, camera);
     splat::SelectionOptions options;
     options.scale = 0.9f + 0.3f * float(frame % 7);

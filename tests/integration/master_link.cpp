@@ -12,7 +12,8 @@ constexpr double kDeadline_s = 20;
 
 // A master's socket and what a process said to it.
 struct FakeMaster {
-  FakeMaster(const std::string& address, InstanceId instance) : socket(context, Kind::kRouter, "master"), instance(instance) {
+  FakeMaster(const std::string& address, InstanceId instance)
+      : socket(context, Kind::kRouter, "master"), instance(instance) {
     const auto bound = socket.bind(address);
     EXPECT_TRUE(bound) << bound.error().text;
     if (bound) endpoint = *bound;

@@ -48,7 +48,9 @@ TEST(Chunks, HoldEveryTriangleOnceForRandomMeshes) {
     EXPECT_EQ(placed->indices.size() / 3 + placed->degenerate_dropped, mesh.indices.size() / 3);
     std::map<std::array<uint32_t, 3>, int> count;
     double area = 0, chunk_area = 0;
-    const auto area_of = [](glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) { return 0.5 * glm::length(glm::cross(b - a, c - a)); };
+    const auto area_of = [](glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
+      return 0.5 * glm::length(glm::cross(b - a, c - a));
+    };
     for (size_t t = 0; t < placed->indices.size(); t += 3) {
       const uint32_t* v = &placed->indices[t];
       ++count[key_of({placed->colours[v[0]], placed->colours[v[1]], placed->colours[v[2]]})];
@@ -78,7 +80,8 @@ TEST(Chunks, HoldEveryTriangleOnceForRandomMeshes) {
         glm::vec3 p[3];
         for (int k = 0; k < 3; ++k) {
           used[v[k]] = true;
-          p[k] = {view->positions_room[3 * v[k]], view->positions_room[3 * v[k] + 1], view->positions_room[3 * v[k] + 2]};
+          p[k] = {view->positions_room[3 * v[k]], view->positions_room[3 * v[k] + 1],
+                  view->positions_room[3 * v[k] + 2]};
           EXPECT_EQ(p[k], placed->positions_room[view->colours[v[k]]]);
           EXPECT_EQ(view->normals[v[k]], placed->normals[view->colours[v[k]]]);
           box.extend(p[k]);
@@ -104,7 +107,8 @@ TEST(Chunks, AreCompact) {
   const ChunkPlan plan = plan_chunks(*placed, 2048);
   ASSERT_EQ(plan.chunks(), 64u);
   for (size_t c = 0; c < plan.chunks(); ++c) {
-    const auto bytes = make_chunk(*placed, std::span(plan.order).subspan(plan.begin[c], plan.begin[c + 1] - plan.begin[c]));
+    const auto bytes =
+        make_chunk(*placed, std::span(plan.order).subspan(plan.begin[c], plan.begin[c + 1] - plan.begin[c]));
     const glm::vec3 size = geometry::MeshChunkView::validate(bytes)->box_room.size();
     EXPECT_LT(size.x * size.z, 1.25f / 64);
     EXPECT_LT(std::max(size.x, size.z), 2.2f * std::min(size.x, size.z));

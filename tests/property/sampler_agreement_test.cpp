@@ -42,7 +42,8 @@ std::vector<Camera> cameras(uint32_t seed, int count) {
   std::vector<Camera> out;
   for (int i = 0; i < count; ++i) {
     const glm::dvec3 direction = glm::normalize(glm::dvec3(unit(random), unit(random), unit(random)));
-    const auto pose = geometry::look_at(direction * (0.5 + 0.4 * (unit(random) + 1)), 0.1 * glm::dvec3(unit(random), unit(random), 0));
+    const auto pose = geometry::look_at(direction * (0.5 + 0.4 * (unit(random) + 1)),
+                                        0.1 * glm::dvec3(unit(random), unit(random), 0));
     Camera c = geometry::make_camera(pose, 50 + 30 * (unit(random) + 1), 320, 200, i % 2 ? 0.02 : 0.1);
     if (i % 3 == 2) c.left -= 0.4, c.right -= 0.1, c.top += 0.2;  // off axis
     out.push_back(c);
@@ -65,7 +66,10 @@ Difference compare(const DepthImage& a, const DepthImage& b) {
   for (size_t i = 0; i < a.pixels(); ++i) {
     if (a.depth[i] == 0 && b.depth[i] == 0) continue;
     ++d.covered;
-    if ((a.depth[i] == 0) != (b.depth[i] == 0)) { ++d.coverage; continue; }
+    if ((a.depth[i] == 0) != (b.depth[i] == 0)) {
+      ++d.coverage;
+      continue;
+    }
     d.depth += std::abs(int64_t(a.depth[i]) - int64_t(b.depth[i])) > 8;
     d.colour += channel_distance(a.colour[i], b.colour[i]) > 1;
     d.normal += glm::dot(image::decode_normal16(a.normal[i]), image::decode_normal16(b.normal[i])) < 0.999f;
@@ -90,7 +94,8 @@ class RaysAndRaster : public testing::Test {
     for (const Camera& c : views) {
       const geometry::Rect whole{0, 0, c.width, c.height};
       const Difference d = compare(ray_->sample(c, whole), raster_->sample(c, whole));
-      sum.covered += d.covered, sum.coverage += d.coverage, sum.depth += d.depth, sum.colour += d.colour, sum.normal += d.normal;
+      sum.covered += d.covered, sum.coverage += d.coverage, sum.depth += d.depth, sum.colour += d.colour,
+          sum.normal += d.normal;
     }
     RecordProperty("covered", int(sum.covered));
     ASSERT_GT(sum.covered, views.size() * 320 * 200 / 10);
@@ -134,7 +139,8 @@ TEST_F(RaysAndRaster, RasterTilesAreThePartsOfItsFrame) {
       for (int row = 0; row < 40; ++row)
         for (int column = 0; column < 64; ++column) {
           const size_t from = size_t(row) * 64 + column, to = size_t(y + row) * c.width + x + column;
-          assembled.depth[to] = part.depth[from], assembled.colour[to] = part.colour[from], assembled.normal[to] = part.normal[from];
+          assembled.depth[to] = part.depth[from], assembled.colour[to] = part.colour[from],
+          assembled.normal[to] = part.normal[from];
         }
     }
   const Difference d = compare(frame, assembled);
@@ -160,12 +166,17 @@ TEST(SampledPoints, LieOnTheMeshAndInFrontOfNothing) {
     const auto chunks = random_triangles(seed, 24);
     auto ray = make_ray_sampler(2);
     ASSERT_TRUE(ray->add_chunks(chunks).ok());
-    struct Triangle { glm::dvec3 a, e1, e2; };
+    struct Triangle {
+      glm::dvec3 a, e1, e2;
+    };
     std::vector<Triangle> triangles;
     for (const auto& [id, chunk] : chunks) {
       const auto view = geometry::MeshChunkView::validate(chunk.bytes);
       ASSERT_TRUE(view.ok());
-      const auto at = [&](uint32_t i) { const float* p = &view->positions_room[3 * size_t{i}]; return glm::dvec3(p[0], p[1], p[2]); };
+      const auto at = [&](uint32_t i) {
+        const float* p = &view->positions_room[3 * size_t{i}];
+        return glm::dvec3(p[0], p[1], p[2]);
+      };
       for (size_t t = 0; t < view->triangles(); ++t) {
         const glm::dvec3 a = at(view->indices[3 * t]);
         triangles.push_back({a, at(view->indices[3 * t + 1]) - a, at(view->indices[3 * t + 2]) - a});
@@ -191,7 +202,8 @@ TEST(SampledPoints, LieOnTheMeshAndInFrontOfNothing) {
           const uint32_t code = image.depth[size_t(y) * c.width + x];
           ASSERT_EQ(code != 0, std::isfinite(nearest)) << "seed " << seed << " pixel " << x << "," << y;
           if (code == 0) continue;
-          const double depth = image::decode_depth(code, c.near_m), step = nearest * nearest / (c.near_m * image::kMaxDepthCode);
+          const double depth = image::decode_depth(code, c.near_m),
+                       step = nearest * nearest / (c.near_m * image::kMaxDepthCode);
           // Half a code, and the slope of the triangle times what single precision makes of ray and corners.
           EXPECT_NEAR(depth, nearest, step + 2e-5 * nearest) << "seed " << seed << " pixel " << x << "," << y;
           EXPECT_LT(glm::length(c.unproject(x + 0.5, y + 0.5, depth) - (o + d * nearest)), 2 * (step + 2e-5 * nearest));

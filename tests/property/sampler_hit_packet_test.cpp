@@ -36,7 +36,8 @@ TEST(HitPacket, SimdEqualsScalarOnEveryTarget) {
     indices.push_back(i);
   }
   // Axis-aligned normals sit on the folds of the octahedron.
-  for (uint32_t i = 0; i < 300; ++i) vertices[i].normal = glm::vec3(i % 3 == 0, i % 3 == 1, i % 3 == 2) * (i % 2 ? 1.0f : -1.0f);
+  for (uint32_t i = 0; i < 300; ++i)
+    vertices[i].normal = glm::vec3(i % 3 == 0, i % 3 == 1, i % 3 == 2) * (i % 2 ? 1.0f : -1.0f);
   const auto chunk = test::chunk_of(vertices, indices);
   const auto view = geometry::MeshChunkView::validate(chunk.bytes);
   ASSERT_TRUE(view.ok());

@@ -12,7 +12,8 @@ namespace telesplat {
 namespace {
 
 geometry::Camera camera_at(double angle, int width = 333, int height = 211) {
-  return geometry::make_camera(geometry::look_at({0.9 * std::sin(angle), 0.5, 0.9 * std::cos(angle)}, {0, 0, 0}), 70, width, height);
+  return geometry::make_camera(geometry::look_at({0.9 * std::sin(angle), 0.5, 0.9 * std::cos(angle)}, {0, 0, 0}), 70,
+                               width, height);
 }
 
 // A bumpy slab seen by the camera; odd seeds leave holes.
@@ -26,7 +27,8 @@ image::DepthImage bumpy_image(const geometry::Camera& camera, uint32_t seed) {
       const size_t i = size_t(y) * camera.width + x;
       out.depth[i] = image::encode_depth(depth, camera.near_m);
       out.colour[i] = rng() & 0xffffff;
-      out.normal[i] = image::encode_normal16(glm::vec3(camera.pose.orientation * glm::dvec3(0.3 * std::cos(0.05 * x), 0.2, 1)));
+      out.normal[i] =
+          image::encode_normal16(glm::vec3(camera.pose.orientation * glm::dvec3(0.3 * std::cos(0.05 * x), 0.2, 1)));
     }
   return out;
 }
@@ -35,7 +37,8 @@ points::PointModel bumpy_model() {
   points::PointModel model({{{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}, 5});
   for (uint32_t i = 0; i < 5; ++i) {
     const geometry::Camera camera = camera_at(1.3 * i);
-    model.insert(points::prepare_patch(model.config(), Sequence{i + 1}, camera, {0, 0, camera.width, camera.height}, bumpy_image(camera, i)));
+    model.insert(points::prepare_patch(model.config(), Sequence{i + 1}, camera, {0, 0, camera.width, camera.height},
+                                       bumpy_image(camera, i)));
   }
   return model;
 }
@@ -55,7 +58,8 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
         const points::Mosaic::Level level = m.level(0);
         for (uint32_t i = 0; i < level.count; ++i) {
           const glm::dvec3 q(level.x[i], level.y[i], level.z[i]);
-          const glm::dvec4 p(glm::dvec3(cluster->leaf_room.lo) + (q + 0.5) / 65536.0 * glm::dvec3(cluster->leaf_room.size()), 1.0);
+          const glm::dvec4 p(
+              glm::dvec3(cluster->leaf_room.lo) + (q + 0.5) / 65536.0 * glm::dvec3(cluster->leaf_room.size()), 1.0);
           const double w = glm::dot(t.w, p), x = glm::dot(t.x, p) / w, y = glm::dot(t.y, p) / w;
           if (w < camera.near_m) continue;
           for (const double dx : {-0.01, 0.0, 0.01})
@@ -64,7 +68,8 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
               if (px < 0 || py < 0 || px >= camera.width || py >= camera.height) continue;
               const size_t at = size_t(py) * camera.width + size_t(px);
               nearest[at] = std::min(nearest[at], w);
-              const bool sure = std::floor(x - 0.01) == std::floor(x + 0.01) && std::floor(y - 0.01) == std::floor(y + 0.01);
+              const bool sure =
+                  std::floor(x - 0.01) == std::floor(x + 0.01) && std::floor(y - 0.01) == std::floor(y + 0.01);
               if (sure) farthest[at] = std::min(farthest[at], w);
             }
         }
@@ -112,7 +117,8 @@ TEST(Elimination, KeepsWhatIsNearerByMoreThanEpsilonInCanonicalForm) {
   std::mt19937 rng(3);
   std::uniform_real_distribution<double> uniform(0.5, 1.5);
   std::vector<float> reference(64 * 48);
-  for (float& d : reference) d = rng() % 5 == 0 ? std::numeric_limits<float>::infinity() : static_cast<float>(uniform(rng));
+  for (float& d : reference)
+    d = rng() % 5 == 0 ? std::numeric_limits<float>::infinity() : static_cast<float>(uniform(rng));
   image::DepthImage image(tile.width, tile.height);
   for (size_t i = 0; i < image.pixels(); ++i) {
     if (rng() % 4 == 0) continue;
@@ -138,10 +144,17 @@ TEST(Elimination, KeepsWhatIsNearerByMoreThanEpsilonInCanonicalForm) {
         EXPECT_EQ(image.colour[i], 0u);
         EXPECT_EQ(image.normal[i], 0u);
       }
-      if (before.depth[i] == 0) { EXPECT_EQ(image.depth[i], 0u); continue; }
+      if (before.depth[i] == 0) {
+        EXPECT_EQ(image.depth[i], 0u);
+        continue;
+      }
       const double depth = image::decode_depth(before.depth[i], camera.near_m);
-      if (depth * (1 + kEpsilon) < shown * (1 - 1e-6)) { EXPECT_NE(image.depth[i], 0u) << depth << " before " << shown; }
-      if (depth * (1 + kEpsilon) > shown * (1 + 1e-6)) { EXPECT_EQ(image.depth[i], 0u) << depth << " before " << shown; }
+      if (depth * (1 + kEpsilon) < shown * (1 - 1e-6)) {
+        EXPECT_NE(image.depth[i], 0u) << depth << " before " << shown;
+      }
+      if (depth * (1 + kEpsilon) > shown * (1 + 1e-6)) {
+        EXPECT_EQ(image.depth[i], 0u) << depth << " before " << shown;
+      }
     }
   EXPECT_EQ(result.samples, samples);
   EXPECT_EQ(result.kept, kept);

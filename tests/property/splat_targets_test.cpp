@@ -27,8 +27,8 @@ class OnTarget {
 
 const std::vector<int64_t> kTargets = hwy::SupportedAndGeneratedTargets();
 
-Frame render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel, const image::Shading& shading,
-             int threads = 1) {
+Frame render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+             const image::Shading& shading, int threads = 1) {
   Frame frame(camera.width, camera.height);
   splat::CpuSplatter(threads).render(list, camera, kernel, shading, frame.target());
   return frame;
@@ -54,7 +54,8 @@ TEST_P(SplatTargets, RandomScenesEqualThePlainLoop) {
     for (size_t i = 0; i < made.size(); ++i) items.push_back(made[i].item(1.0f + 0.26f * float(i)));
     const auto list = testing::draw_list(std::move(items));
     const Frame expected = testing::splat_plainly(list, camera, GetParam(), shading);
-    ASSERT_NE(std::count_if(expected.depth_m.begin(), expected.depth_m.end(), [](float d) { return std::isfinite(d); }), 0);
+    ASSERT_NE(std::count_if(expected.depth_m.begin(), expected.depth_m.end(), [](float d) { return std::isfinite(d); }),
+              0);
     for (int64_t target : kTargets) {
       const OnTarget on(target);
       expect_equal(expected, render(list, camera, GetParam(), shading), hwy::TargetName(target));
@@ -84,7 +85,8 @@ TEST_P(SplatTargets, EveryTailLength) {
       for (int64_t target : kTargets) {
         const OnTarget on(target);
         expect_equal(expected, render(list, camera, GetParam(), shading),
-                     std::string(hwy::TargetName(target)) + ", " + std::to_string(n) + " points of size " + std::to_string(size));
+                     std::string(hwy::TargetName(target)) + ", " + std::to_string(n) + " points of size " +
+                         std::to_string(size));
       }
     }
 }
@@ -97,7 +99,8 @@ TEST_P(SplatTargets, ThreadsAndReuseDoNotChangeThePicture) {
   for (auto& m : made) items.push_back(m.item(3.0f)), large.push_back(m.item(12.0f));
   const auto list = testing::draw_list(items);
   const Frame expected = testing::splat_plainly(list, camera, GetParam(), shading);
-  for (int threads : {1, 2, 3, 8}) expect_equal(expected, render(list, camera, GetParam(), shading, threads), std::to_string(threads));
+  for (int threads : {1, 2, 3, 8})
+    expect_equal(expected, render(list, camera, GetParam(), shading, threads), std::to_string(threads));
 
   // One splatter, frames of other sizes and splats in between.
   splat::CpuSplatter splatter(2);

@@ -33,12 +33,13 @@ struct Session {
   std::deque<uint64_t> asked;  // "after" of each unanswered request
   std::vector<uint64_t> applied;
   int replicas = 0;
-  EventSequencer sequencer{{[this](const ModelEvent& e) { applied.push_back(e.sequence().value); },
-                            [this] {
-                              ++replicas;
-                              applied.clear();
-                            },
-                            [this](InstanceId of, Sequence after) { asked.push_back(of == packer ? after.value : 0); }}};
+  EventSequencer sequencer{
+      {[this](const ModelEvent& e) { applied.push_back(e.sequence().value); },
+       [this] {
+         ++replicas;
+         applied.clear();
+       },
+       [this](InstanceId of, Sequence after) { asked.push_back(of == packer ? after.value : 0); }}};
 
   void answer() {
     const uint64_t after = asked.front();

@@ -21,11 +21,21 @@ TEST(WireMutations, EndInAMessageOrAnError) {
       for (int changes = 1 + int(random() % 4); changes > 0 && !body.empty(); --changes) {
         const size_t at = random() % body.size();
         switch (random() % 5) {
-          case 0: body[at] = char(random()); break;
-          case 1: body[at] = char(body[at] ^ (1 << random() % 8)); break;
-          case 2: body.erase(at, 1 + random() % 8); break;
-          case 3: body.insert(at, 1 + random() % 8, char(0xc0 + random() % 64)); break;  // msgpack's types
-          case 4: body.insert(at, original.substr(random() % original.size(), random() % 32)); break;
+          case 0:
+            body[at] = char(random());
+            break;
+          case 1:
+            body[at] = char(body[at] ^ (1 << random() % 8));
+            break;
+          case 2:
+            body.erase(at, 1 + random() % 8);
+            break;
+          case 3:
+            body.insert(at, 1 + random() % 8, char(0xc0 + random() % 64));
+            break;  // msgpack's types
+          case 4:
+            body.insert(at, original.substr(random() % original.size(), random() % 32));
+            break;
         }
       }
       const auto decoded = decode<M>(bytes_of(body));

@@ -27,12 +27,15 @@ inline geometry::ChunkBytes chunk_of(const std::vector<Vertex>& vertices, const 
     normals.push_back(image::encode_normal32(v.normal));
     colours.push_back(v.colour);
   }
-  const auto bytes = std::make_shared<std::vector<std::byte>>(geometry::build_chunk(positions, normals, colours, indices));
+  const auto bytes =
+      std::make_shared<std::vector<std::byte>>(geometry::build_chunk(positions, normals, colours, indices));
   return {*bytes, bytes};
 }
 
 /// One triangle, counter-clockwise seen from its normal.
-inline geometry::ChunkBytes triangle(const Vertex& a, const Vertex& b, const Vertex& c) { return chunk_of({a, b, c}, {0, 1, 2}); }
+inline geometry::ChunkBytes triangle(const Vertex& a, const Vertex& b, const Vertex& c) {
+  return chunk_of({a, b, c}, {0, 1, 2});
+}
 
 /// A hilly square of 0.8 m around the origin: 2 * side * side triangles in chunks of up to 2 * part * part.
 /// Heights, normals and colours are smooth functions, so that neighbouring chunks meet.
@@ -40,7 +43,8 @@ inline ChunkList terrain(int side, int part) {
   const auto height = [](float x, float z) {
     float sum = 0, amplitude = 0.05f, frequency = 8;
     for (int octave = 0; octave < 6; ++octave, amplitude *= 0.45f, frequency *= 2.1f)
-      sum += amplitude * std::sin(frequency * x + 1.3f * octave + std::sin(0.7f * frequency * z)) * std::cos(frequency * z + 2.1f * octave);
+      sum += amplitude * std::sin(frequency * x + 1.3f * octave + std::sin(0.7f * frequency * z)) *
+             std::cos(frequency * z + 2.1f * octave);
     return sum;
   };
   const auto vertex = [&](int i, int k) {

@@ -55,7 +55,8 @@ class RawPeer {
  private:
   bool read(size_t n) {
     char buffer[256];
-    return n <= sizeof buffer && ::recv(fd_, buffer, n, MSG_WAITALL) == static_cast<ssize_t>(n) && (last_byte_ = static_cast<unsigned char>(buffer[n - 1]), true);
+    return n <= sizeof buffer && ::recv(fd_, buffer, n, MSG_WAITALL) == static_cast<ssize_t>(n) &&
+           (last_byte_ = static_cast<unsigned char>(buffer[n - 1]), true);
   }
 
   int fd_;
@@ -73,7 +74,8 @@ inline std::string big_endian(uint64_t value, int bytes) {
 inline std::string zmtp_opening(std::string_view socket_type) {
   std::string greeting = "\xff" + std::string(8, '\0') + "\x7f" + std::string("\x03\x00", 2) + "NULL";
   greeting.resize(64, '\0');
-  const std::string ready = std::string("\x05READY\x0bSocket-Type") + big_endian(socket_type.size(), 4) + std::string(socket_type);
+  const std::string ready =
+      std::string("\x05READY\x0bSocket-Type") + big_endian(socket_type.size(), 4) + std::string(socket_type);
   return greeting + '\x04' + static_cast<char>(ready.size()) + ready;
 }
 
@@ -83,7 +85,8 @@ inline bool RawPeer::shake_hands(std::string_view socket_type) {
 
 /// A message frame.
 inline std::string zmtp_frame(std::string_view body, bool more) {
-  if (body.size() < 256) return std::string{static_cast<char>(more ? 1 : 0), static_cast<char>(body.size())} + std::string(body);
+  if (body.size() < 256)
+    return std::string{static_cast<char>(more ? 1 : 0), static_cast<char>(body.size())} + std::string(body);
   return static_cast<char>(more ? 3 : 2) + big_endian(body.size(), 8) + std::string(body);
 }
 

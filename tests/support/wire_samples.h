@@ -9,10 +9,11 @@
 
 namespace telesplat::test {
 
-using AllMessages = std::tuple<wire::Hello, wire::Welcome, wire::WhoAreYou, wire::ViewRequest, wire::LeaseRequest, wire::Lease, wire::LeaseExtend, wire::TileDone,
-                               wire::StatusReport, wire::MetricRows, wire::Control, wire::ControlReply, wire::Shutdown, wire::Goodbye, wire::ChunkListRequest,
-                               wire::ChunkList, wire::ChunkRequest, wire::Chunk, wire::DepthTile, wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark,
-                               wire::StateRequest, wire::AccessReport>;
+using AllMessages = std::tuple<wire::Hello, wire::Welcome, wire::WhoAreYou, wire::ViewRequest, wire::LeaseRequest,
+                               wire::Lease, wire::LeaseExtend, wire::TileDone, wire::StatusReport, wire::MetricRows,
+                               wire::Control, wire::ControlReply, wire::Shutdown, wire::Goodbye, wire::ChunkListRequest,
+                               wire::ChunkList, wire::ChunkRequest, wire::Chunk, wire::DepthTile, wire::Patch,
+                               wire::Forget, wire::EpochBegin, wire::StateMark, wire::StateRequest, wire::AccessReport>;
 
 inline constexpr std::array<std::byte, 5> kBulk{std::byte{1}, std::byte{2}, std::byte{0}, std::byte{255}, std::byte{5}};
 
@@ -23,20 +24,30 @@ struct Filler {
   void operator()(const char*, double& v, size_t = 0) { v = 0.25 + ++n_; }
   void operator()(const char* name, std::string& v, size_t = 0) { v = std::string("some ") + name; }
   void operator()(const char*, std::vector<std::string>& v, size_t = 0) { v = {"a", "", "b"}; }
-  void operator()(const char*, std::map<std::string, std::string>& v, size_t = 0) { v = {{"key", "value"}, {"other", ""}}; }
-  void operator()(const char*, std::map<std::string, double>& v, size_t = 0) { v = {{"points", 1e6}, {"small", -1e-9}}; }
-  template <class Tag> void operator()(const char*, Id<Tag>& v, size_t = 0) { v.value = (uint64_t(1) << 40) + ++n_; }
+  void operator()(const char*, std::map<std::string, std::string>& v, size_t = 0) {
+    v = {{"key", "value"}, {"other", ""}};
+  }
+  void operator()(const char*, std::map<std::string, double>& v, size_t = 0) {
+    v = {{"points", 1e6}, {"small", -1e-9}};
+  }
+  template <class Tag>
+  void operator()(const char*, Id<Tag>& v, size_t = 0) {
+    v.value = (uint64_t(1) << 40) + ++n_;
+  }
   void operator()(const char*, wire::Bytes& v, size_t = 0) { v = kBulk; }
   void operator()(const char*, std::vector<uint32_t>& v, size_t = 0) { v = {1, 2, 0xffffffff}; }
   void operator()(const char*, std::vector<double>& v, size_t = 0) { v = {1.5, -2, 3e300}; }
   void operator()(const char*, geometry::Box& v, size_t = 0) { v = {{-1, -2, -3}, {1, 2, 3.5}}; }
   void operator()(const char*, geometry::Rect& v, size_t = 0) { v = {64, 32, 100, 50}; }
-  void operator()(const char*, geometry::Camera& v, size_t = 0) { v = {{{0.1, 0.2, 0.3}, {0.6, 0, 0.8, 0}}, -1, 1, -0.5, 0.75, 0.01, 320, 200}; }
+  void operator()(const char*, geometry::Camera& v, size_t = 0) {
+    v = {{{0.1, 0.2, 0.3}, {0.6, 0, 0.8, 0}}, -1, 1, -0.5, 0.75, 0.01, 320, 200};
+  }
   void operator()(const char*, std::vector<geometry::ChunkInfo>& v, size_t = 0) {
     v = {{ChunkId{0}, {{-1, -1, -1}, {0, 0, 0}}, 12, 500}, {ChunkId{1}, {{0, 0, 0}, {1, 1, 1}}, 7, 300}};
   }
   void operator()(const char*, wire::Lease& v, size_t = 0) { fill(v); }
-  template <class M> void fill(M& m) {
+  template <class M>
+  void fill(M& m) {
     M::fields(*this, m);
     if constexpr (requires { m.tiles_in_frame; }) m.tile = 3, m.tiles_in_frame = 8;
   }
@@ -53,7 +64,9 @@ M sample_message() {
 }
 
 template <class M>
-M message_sample_of(const M*) { return sample_message<M>(); }
+M message_sample_of(const M*) {
+  return sample_message<M>();
+}
 
 inline wire::Bytes bytes_of(const std::string& s) { return std::as_bytes(std::span(s)); }
 
@@ -99,7 +112,8 @@ struct Field {
 inline std::vector<Field> fields_of(const std::string& body) {
   std::vector<Field> out;
   const unsigned first = static_cast<unsigned char>(body.at(0));
-  const size_t count = first == 0xde ? static_cast<unsigned char>(body[1]) * 256u + static_cast<unsigned char>(body[2]) : first & 15;
+  const size_t count =
+      first == 0xde ? static_cast<unsigned char>(body[1]) * 256u + static_cast<unsigned char>(body[2]) : first & 15;
   for (size_t i = 0, at = first == 0xde ? 3 : 1; i < count; ++i) {
     const size_t value = value_end(body, at), end = value_end(body, value);
     out.push_back({body.substr(at + 1, value - at - 1), at, value, end});

@@ -64,21 +64,27 @@ inline Mesh wavy_grid(uint32_t n, double height = 0.3) {
 
 /// Ascii PLY of the mesh, with colours if it has any, in full precision.
 inline std::string ply_of(const Mesh& mesh) {
-  std::string out = fmt::format("ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n", mesh.positions.size());
+  std::string out =
+      fmt::format("ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n",
+                  mesh.positions.size());
   if (!mesh.colours.empty()) out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   out += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.indices.size() / 3);
   for (size_t i = 0; i < mesh.positions.size(); ++i) {
     const auto& p = mesh.positions[i];
     out += fmt::format("{} {} {}", p.x, p.y, p.z);
-    if (!mesh.colours.empty()) out += fmt::format(" {} {} {}", mesh.colours[i] >> 16, mesh.colours[i] >> 8 & 255, mesh.colours[i] & 255);
+    if (!mesh.colours.empty())
+      out += fmt::format(" {} {} {}", mesh.colours[i] >> 16, mesh.colours[i] >> 8 & 255, mesh.colours[i] & 255);
     out += '\n';
   }
-  for (size_t t = 0; t < mesh.indices.size(); t += 3) out += fmt::format("3 {} {} {}\n", mesh.indices[t], mesh.indices[t + 1], mesh.indices[t + 2]);
+  for (size_t t = 0; t < mesh.indices.size(); t += 3)
+    out += fmt::format("3 {} {} {}\n", mesh.indices[t], mesh.indices[t + 1], mesh.indices[t + 2]);
   return out;
 }
 
 /// Options for a test: no cache, data axes kept unless told otherwise.
-inline MeshOptions plain_options(const std::string& up = "y") { return {.room_size_m = 0.8, .up = up, .cache_dir = "", .use_cache = false}; }
+inline MeshOptions plain_options(const std::string& up = "y") {
+  return {.room_size_m = 0.8, .up = up, .cache_dir = "", .use_cache = false};
+}
 
 /// Everything a store holds, triangle by triangle.
 struct Corner {
@@ -90,7 +96,8 @@ struct Contents {
   double area() const {
     double sum = 0;
     for (const auto& t : triangles)
-      sum += 0.5 * glm::length(glm::cross(glm::dvec3(t[1].position) - glm::dvec3(t[0].position), glm::dvec3(t[2].position) - glm::dvec3(t[0].position)));
+      sum += 0.5 * glm::length(glm::cross(glm::dvec3(t[1].position) - glm::dvec3(t[0].position),
+                                          glm::dvec3(t[2].position) - glm::dvec3(t[0].position)));
     return sum;
   }
 };
@@ -112,7 +119,8 @@ inline Contents contents_of(const MeshStore& store) {
       for (int k = 0; k < 3; ++k) {
         const uint32_t v = view->indices[3 * t + k];
         corners[k] = {{view->positions_room[3 * v], view->positions_room[3 * v + 1], view->positions_room[3 * v + 2]},
-                      image::decode_normal32(view->normals[v]), view->colours[v]};
+                      image::decode_normal32(view->normals[v]),
+                      view->colours[v]};
         box.extend(corners[k].position);
       }
       out.triangles.push_back(corners);

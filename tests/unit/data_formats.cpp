@@ -21,8 +21,10 @@ Mesh read(const std::string& path) {
 void expect_square(const Mesh& mesh, bool coloured) {
   EXPECT_EQ(mesh.positions, kPositions);
   EXPECT_EQ(mesh.indices, kIndices);
-  if (coloured) EXPECT_EQ(mesh.colours, kColours);
-  else EXPECT_TRUE(mesh.colours.empty());
+  if (coloured)
+    EXPECT_EQ(mesh.colours, kColours);
+  else
+    EXPECT_TRUE(mesh.colours.empty());
 }
 
 class Ply : public testing::TestWithParam<std::tuple<std::string, std::string, std::string>> {};
@@ -33,16 +35,21 @@ TEST_P(Ply, ReadsPositionsNormalsColoursAndFaces) {
   const bool ascii = encoding == "ascii", big = encoding == "binary_big_endian";
   std::string file = fmt::format(
       "ply\nformat {} 1.0\ncomment by hand\nelement vertex 4\nproperty {} x\nproperty {} y\nproperty {} z\n"
-      "property float nx\nproperty float ny\nproperty float nz\nproperty float confidence\nproperty uchar red\nproperty uchar green\n"
-      "property uchar blue\nproperty uchar alpha\nelement face 2\nproperty uchar flags\nproperty list uchar {} vertex_indices\n"
+      "property float nx\nproperty float ny\nproperty float nz\nproperty float confidence\nproperty uchar "
+      "red\nproperty uchar green\n"
+      "property uchar blue\nproperty uchar alpha\nelement face 2\nproperty uchar flags\nproperty list uchar {} "
+      "vertex_indices\n"
       "element edge 1\nproperty int a\nproperty int b\nend_header\n",
       encoding, real, real, real, index);
   const auto put = [&](auto value) { file += ascii ? fmt::format("{} ", +value) : raw(value, big); };
   const auto put_real = [&](double v) { real == "double" ? put(v) : put(static_cast<float>(v)); };
   const auto put_index = [&](uint32_t v) {
-    if (index == "uchar") put(static_cast<uint8_t>(v));
-    else if (index == "ushort") put(static_cast<uint16_t>(v));
-    else put(v);
+    if (index == "uchar")
+      put(static_cast<uint8_t>(v));
+    else if (index == "ushort")
+      put(static_cast<uint16_t>(v));
+    else
+      put(v);
   };
   for (int v = 0; v < 4; ++v) {
     for (int a = 0; a < 3; ++a) put_real(kPositions[v][a]);
@@ -61,26 +68,33 @@ TEST_P(Ply, ReadsPositionsNormalsColoursAndFaces) {
   ASSERT_EQ(mesh.normals.size(), 4u);
   EXPECT_EQ(mesh.normals[3], glm::vec3(0, 0, 2));
 }
-INSTANTIATE_TEST_SUITE_P(All, Ply, testing::Combine(testing::Values("ascii", "binary_little_endian", "binary_big_endian"),
-                                                    testing::Values("float", "double"), testing::Values("uchar", "ushort", "int", "uint")));
+INSTANTIATE_TEST_SUITE_P(All, Ply,
+                         testing::Combine(testing::Values("ascii", "binary_little_endian", "binary_big_endian"),
+                                          testing::Values("float", "double"),
+                                          testing::Values("uchar", "ushort", "int", "uint")));
 
 TEST(PlyReader, PolygonsBecomeFansAndStripsTriangles) {
   const TempFolder folder;
   const std::string vertices = "property float x\nproperty float y\nproperty float z\n";
   const std::string five = "0 0 0\n1 0 0\n1 1 0\n0.5 1.5 0\n0 1 0\n";
-  const Mesh polygon = read(folder.write("polygon.ply", "ply\r\nformat ascii 1.0\r\nelement vertex 5\r\n" + vertices +
-                                                            "element face 2\nproperty list uchar int vertex_index\nend_header\r\n" + five + "5 0 1 2 3 4\n2 0 1"));
+  const Mesh polygon =
+      read(folder.write("polygon.ply", "ply\r\nformat ascii 1.0\r\nelement vertex 5\r\n" + vertices +
+                                           "element face 2\nproperty list uchar int vertex_index\nend_header\r\n" +
+                                           five + "5 0 1 2 3 4\n2 0 1"));
   EXPECT_EQ(polygon.indices, (std::vector<uint32_t>{0, 1, 2, 0, 2, 3, 0, 3, 4}));
   EXPECT_EQ(polygon.degenerate_dropped, 1u);
-  const Mesh strip = read(folder.write("strip.ply", "ply\nformat ascii 1.0\nelement vertex 5\n" + vertices +
-                                                        "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" + five + "8 0 1 2 3 -1 2 3 4\n"));
+  const Mesh strip =
+      read(folder.write("strip.ply", "ply\nformat ascii 1.0\nelement vertex 5\n" + vertices +
+                                         "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" +
+                                         five + "8 0 1 2 3 -1 2 3 4\n"));
   EXPECT_EQ(strip.indices, (std::vector<uint32_t>{0, 1, 2, 1, 3, 2, 2, 3, 4}));
 }
 
 TEST(PlyReader, ColoursOfOtherTypes) {
   const TempFolder folder;
   const auto with = [&](const std::string& type, const std::string& colour) {
-    std::string file = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+    std::string file =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
     for (const char* channel : {"red", "green", "blue"}) file += "property " + type + " diffuse_" + channel + "\n";
     file += "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
     for (const char* p : {"0 0 0 ", "1 0 0 ", "0 1 0 "}) file += p + colour + "\n";
@@ -93,16 +107,30 @@ TEST(PlyReader, ColoursOfOtherTypes) {
 
 TEST(OffReader, PlainWithCommentsAndCrLf) {
   const TempFolder folder;
-  expect_square(read(folder.write("a.off", "OFF\r\n# a comment\r\n4 2 0 # counts\r\n0 0 0\r\n1 0 0.5\r\n\r\n1 1 0\r\n0 1 .5\r\n3 0 1 2\r\n3 0 2 3\r\n")), false);
-  expect_square(read(folder.write("b.off", "OFF 4 2 5\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n3 0 1 2 255 0 0\n3 0 2 3 0.1 0.2 0.3")), false);
+  expect_square(
+      read(folder.write(
+          "a.off",
+          "OFF\r\n# a comment\r\n4 2 0 # counts\r\n0 0 0\r\n1 0 0.5\r\n\r\n1 1 0\r\n0 1 .5\r\n3 0 1 2\r\n3 0 2 3\r\n")),
+      false);
+  expect_square(
+      read(folder.write("b.off", "OFF 4 2 5\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n3 0 1 2 255 0 0\n3 0 2 3 0.1 0.2 0.3")),
+      false);
   expect_square(read(folder.write("quad.off", "OFF\n4 1 0\n0 0 0\n1 0 0.5\n1 1 0\n0 1 0.5\n4 0 1 2 3\n")), false);
 }
 
 TEST(OffReader, ColoursAndNormals) {
   const TempFolder folder;
-  expect_square(read(folder.write("c.off", "COFF\n4 2 0\n0 0 0 255 0 0 255\n1 0 .5 0 255 0 255\n1 1 0 0 0 255 255\n0 1 .5 16 32 48 255\n3 0 1 2\n3 0 2 3\n")), true);
-  expect_square(read(folder.write("f.off", "COFF\n4 2 0\n0 0 0 1.0 0 0\n1 0 .5 0 1 0\n1 1 0 0 0 1\n0 1 .5 .063 .1255 .188 # rgb\n3 0 1 2\n3 0 2 3\n")), true);
-  const Mesh both = read(folder.write("cn.off", "CNOFF\n3 1 0\n0 0 0 0 0 1 255 0 0\n1 0 0 0 0 1 255 0 0\n0 1 0 0 0 1 0 255 0\n3 0 1 2\n"));
+  expect_square(read(folder.write("c.off",
+                                  "COFF\n4 2 0\n0 0 0 255 0 0 255\n1 0 .5 0 255 0 255\n1 1 0 0 0 255 255\n0 1 .5 16 32 "
+                                  "48 255\n3 0 1 2\n3 0 2 3\n")),
+                true);
+  expect_square(
+      read(folder.write(
+          "f.off",
+          "COFF\n4 2 0\n0 0 0 1.0 0 0\n1 0 .5 0 1 0\n1 1 0 0 0 1\n0 1 .5 .063 .1255 .188 # rgb\n3 0 1 2\n3 0 2 3\n")),
+      true);
+  const Mesh both = read(
+      folder.write("cn.off", "CNOFF\n3 1 0\n0 0 0 0 0 1 255 0 0\n1 0 0 0 0 1 255 0 0\n0 1 0 0 0 1 0 255 0\n3 0 1 2\n"));
   EXPECT_EQ(both.normals, std::vector<glm::vec3>(3, {0, 0, 1}));
   EXPECT_EQ(both.colours, (std::vector<uint32_t>{0xff0000, 0xff0000, 0x00ff00}));
 }
@@ -148,9 +176,13 @@ TEST(ObjReader, FacesInAllTheirForms) {
 
 TEST(ObjReader, ColoursOfVerticesAndOfMaterials) {
   const TempFolder folder;
-  expect_square(read(folder.write("v.obj", "v 0 0 0 1 0 0\nv 1 0 .5 0 1 0\nv 1 1 0 0 0 1\nv 0 1 .5 .0628 .1255 .1883\nf 1 2 3 4\n")), true);
+  expect_square(read(folder.write(
+                    "v.obj", "v 0 0 0 1 0 0\nv 1 0 .5 0 1 0\nv 1 1 0 0 0 1\nv 0 1 .5 .0628 .1255 .1883\nf 1 2 3 4\n")),
+                true);
   folder.write("colours.mtl", "newmtl red\nKa 0 0 0\nKd 1 0 0\nnewmtl grey\nKd 0.5 0.5 0.5\n");
-  const Mesh mesh = read(folder.write("m.obj", "mtllib colours.mtl\nv 0 0 0\nv 1 0 .5\nv 1 1 0\nv 0 1 .5\nusemtl red\nf 1 2 3\nusemtl grey\nf 1 3 4\n"));
+  const Mesh mesh = read(folder.write(
+      "m.obj",
+      "mtllib colours.mtl\nv 0 0 0\nv 1 0 .5\nv 1 1 0\nv 0 1 .5\nusemtl red\nf 1 2 3\nusemtl grey\nf 1 3 4\n"));
   ASSERT_EQ(mesh.positions.size(), 6u);  // the corners that two materials share are there twice
   EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0xff0000, 0xff0000, 0xff0000, 0x808080, 0x808080, 0x808080}));
 }
@@ -158,8 +190,10 @@ TEST(ObjReader, ColoursOfVerticesAndOfMaterials) {
 TEST(VtkReader, LegacyPolyData) {
   const TempFolder folder;
   const std::string file =
-      "# vtk DataFile Version 3.0\nsquare\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n0 0 0 1 0 0.5 1 1 0 0 1 0.5\nPOLYGONS 2 8\n3 0 1 2\n3 0 2 3\n"
-      "POINT_DATA 4\nCOLOR_SCALARS colours 3\n1 0 0 0 1 0 0 0 1 0.0628 0.1255 0.1883\nNORMALS n float\n0 0 1 0 0 1 0 0 1 0 0 1\n";
+      "# vtk DataFile Version 3.0\nsquare\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n0 0 0 1 0 0.5 1 1 0 0 1 "
+      "0.5\nPOLYGONS 2 8\n3 0 1 2\n3 0 2 3\n"
+      "POINT_DATA 4\nCOLOR_SCALARS colours 3\n1 0 0 0 1 0 0 0 1 0.0628 0.1255 0.1883\nNORMALS n float\n0 0 1 0 0 1 0 0 "
+      "1 0 0 1\n";
   const Mesh mesh = read(folder.write("square.vtk", file));
   expect_square(mesh, true);
   EXPECT_EQ(mesh.format, "vtk");
@@ -171,10 +205,14 @@ TEST(VtkReader, XmlPolyDataWithStrips) {
   const std::string file =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\"><PolyData>"
       "<Piece NumberOfPoints=\"4\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"1\" NumberOfPolys=\"1\">"
-      "<PointData Scalars=\"rgb\"><DataArray type=\"UInt8\" Name=\"rgb\" NumberOfComponents=\"3\" format=\"ascii\">255 0 0 0 255 0 0 0 255 16 32 48</DataArray></PointData>"
-      "<Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0.5 1 1 0 0 1 0.5</DataArray></Points>"
-      "<Strips><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 2 3</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">3</DataArray></Strips>"
-      "<Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">3</DataArray></Polys>"
+      "<PointData Scalars=\"rgb\"><DataArray type=\"UInt8\" Name=\"rgb\" NumberOfComponents=\"3\" format=\"ascii\">255 "
+      "0 0 0 255 0 0 0 255 16 32 48</DataArray></PointData>"
+      "<Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0.5 1 1 0 0 1 "
+      "0.5</DataArray></Points>"
+      "<Strips><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 2 3</DataArray><DataArray "
+      "type=\"Int32\" Name=\"offsets\" format=\"ascii\">3</DataArray></Strips>"
+      "<Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2</DataArray><DataArray "
+      "type=\"Int32\" Name=\"offsets\" format=\"ascii\">3</DataArray></Polys>"
       "</Piece></PolyData></VTKFile>\n";
   const Mesh mesh = read(folder.write("square.vtp", file));
   expect_square(mesh, true);
@@ -201,7 +239,8 @@ TEST(VtkReader, GltfNodesAndMaterials) {
   ASSERT_EQ(mesh.indices.size(), 6u);
   const std::vector<glm::dvec3> expected = {{10, 0, 0}, {11, 0, 0}, {10, 1, 0}, {0, 0, 0}, {0, 2, 0}, {-2, 0, 0}};
   for (int i = 0; i < 6; ++i) EXPECT_LT(glm::distance(mesh.positions[i], expected[i]), 1e-6) << i;
-  EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0xff0000, 0xff0000, 0xff0000, 0x0080ff, 0x0080ff, 0x0080ff}));  // factors are linear light
+  EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0xff0000, 0xff0000, 0xff0000, 0x0080ff, 0x0080ff,
+                                                 0x0080ff}));  // factors are linear light
 
   std::filesystem::remove(folder / "ab.bin");
   const auto missing = read_mesh(folder / "two.gltf", nullptr);

@@ -8,10 +8,13 @@
 namespace telesplat::data::test {
 namespace {
 
-Result<PlacedMesh> place(Mesh mesh, const std::string& up = "y", double room_size_m = 0.8) { return place_mesh(std::move(mesh), room_size_m, up, "test"); }
+Result<PlacedMesh> place(Mesh mesh, const std::string& up = "y", double room_size_m = 0.8) {
+  return place_mesh(std::move(mesh), room_size_m, up, "test");
+}
 
 TEST(RotationForUp, TurnsThatAxisToYWithoutMirroring) {
-  const std::vector<std::pair<std::string, glm::dvec3>> axes = {{"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}, {"-x", {-1, 0, 0}}, {"-y", {0, -1, 0}}, {"-z", {0, 0, -1}}};
+  const std::vector<std::pair<std::string, glm::dvec3>> axes = {
+      {"x", {1, 0, 0}}, {"y", {0, 1, 0}}, {"z", {0, 0, 1}}, {"-x", {-1, 0, 0}}, {"-y", {0, -1, 0}}, {"-z", {0, 0, -1}}};
   for (const auto& [name, axis] : axes) {
     const auto rotation = rotation_for_up(name);
     ASSERT_TRUE(rotation.ok());
@@ -42,14 +45,16 @@ TEST(PlaceMesh, LargeOffsetsLoseNothing) {
     const auto a = place(near_origin, "z"), b = place(far, "z");
     ASSERT_TRUE(a.ok() && b.ok());
     for (size_t i = 0; i < a->positions_room.size(); ++i)
-      EXPECT_LT(glm::distance(a->positions_room[i], b->positions_room[i]), offset > 1e8 ? 2e-6f : 2e-8f) << i << " at offset " << offset;
+      EXPECT_LT(glm::distance(a->positions_room[i], b->positions_room[i]), offset > 1e8 ? 2e-6f : 2e-8f)
+          << i << " at offset " << offset;
   }
 }
 
 TEST(PlaceMesh, DropsAndCountsDegenerateTriangles) {
   Mesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 0, 0}, {1, 0, 0}};
-  mesh.indices = {0, 1, 2, 0, 1, 1, 0, 1, 3, 1, 4, 2, 0, 3, 2};  // good, repeated index, a line, two corners at one place, good
+  mesh.indices = {0, 1, 2, 0, 1, 1, 0, 1,
+                  3, 1, 4, 2, 0, 3, 2};  // good, repeated index, a line, two corners at one place, good
   mesh.degenerate_dropped = 5;
   const auto placed = place(mesh);
   ASSERT_TRUE(placed.ok());
@@ -58,7 +63,8 @@ TEST(PlaceMesh, DropsAndCountsDegenerateTriangles) {
 }
 
 TEST(PlaceMesh, NormalsAreMeansOverTrianglesWeightedByArea) {
-  Mesh mesh;  // one edge, a large triangle on one side (normal +z), one of a quarter of its area on the other (normal +y)
+  Mesh
+      mesh;  // one edge, a large triangle on one side (normal +z), one of a quarter of its area on the other (normal +y)
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 4, 0}, {0, 0, -1}};
   mesh.indices = {0, 1, 2, 0, 1, 3};
   const auto placed = place(mesh);
@@ -111,7 +117,8 @@ Mesh sphere(int n) {
   for (int j = 0; j <= n; ++j)
     for (int i = 0; i <= n; ++i) {
       const double a = 2 * 3.14159265 * i / n, b = 3.14159265 * j / n;
-      mesh.positions.emplace_back(std::cos(a + 0.1 * j) * std::sin(b), std::cos(b) * 1.7, std::sin(a + 0.1 * j) * std::sin(b));
+      mesh.positions.emplace_back(std::cos(a + 0.1 * j) * std::sin(b), std::cos(b) * 1.7,
+                                  std::sin(a + 0.1 * j) * std::sin(b));
     }
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {

@@ -45,7 +45,8 @@ TEST_F(StoreTest, KeepsEveryTriangleColourAndBox) {
   for (const auto& triangle : contents.triangles)
     for (const Corner& c : triangle) {
       // Data (i, j, h) with z up lies at ((i - 20), h, (20 - j)) * 0.8 / 40.
-      const auto i = static_cast<uint32_t>(std::lround(c.position.x * 50 + 20)), j = static_cast<uint32_t>(std::lround(20 - c.position.z * 50));
+      const auto i = static_cast<uint32_t>(std::lround(c.position.x * 50 + 20)),
+                 j = static_cast<uint32_t>(std::lround(20 - c.position.z * 50));
       EXPECT_EQ(c.colour, pack_rgb(i, j, i + j));
       EXPECT_NEAR(glm::length(c.normal), 1.0, 1e-4);
       EXPECT_GT(c.normal.y, 0.5f);
@@ -169,7 +170,8 @@ TEST_F(StoreTest, InspectSumsUp) {
   EXPECT_EQ(facts->chunks, 1u);
   EXPECT_GT(facts->chunk_bytes, 3200u * 12);
   const std::string text = describe(*facts);
-  for (const char* part : {"grid.ply", "triangles   3200", "1681", "z up", "computed"}) EXPECT_NE(text.find(part), std::string::npos) << text;
+  for (const char* part : {"grid.ply", "triangles   3200", "1681", "z up", "computed"})
+    EXPECT_NE(text.find(part), std::string::npos) << text;
   EXPECT_TRUE(is_mesh_file(path_));
 }
 

@@ -24,7 +24,8 @@ TEST(Terrain, HasExactlyTheTrianglesAskedFor) {
         used[v[k]] = true;
       }
       const glm::vec3 a = land.positions[v[0]], b = land.positions[v[1]], c = land.positions[v[2]];
-      EXPECT_GT(glm::cross(b - a, c - a).z, 0) << "triangle " << t / 3 << " of " << triangles << " faces down or is degenerate";
+      EXPECT_GT(glm::cross(b - a, c - a).z, 0)
+          << "triangle " << t / 3 << " of " << triangles << " faces down or is degenerate";
     }
     EXPECT_TRUE(std::all_of(used.begin(), used.end(), [](bool u) { return u; })) << triangles;
   }
@@ -47,7 +48,8 @@ TEST(Terrain, IsACalderaWithALake) {
       ++heights[p.z];
       lowest = std::min(lowest, p.z), highest = std::max(highest, p.z);
     }
-    const auto lake = std::max_element(heights.begin(), heights.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    const auto lake = std::max_element(heights.begin(), heights.end(),
+                                       [](const auto& a, const auto& b) { return a.second < b.second; });
     EXPECT_FLOAT_EQ(lake->first, 1883.0f);  // its level, and flat
     const double share = static_cast<double>(lake->second) / static_cast<double>(land.positions.size());
     EXPECT_GT(share, 0.05);

@@ -57,7 +57,8 @@ TEST(Camera, TheFrustumHoldsWhatIsSeenAndNotWhatLiesBehind) {
     const Camera c = random_camera(random);
     const Frustum frustum(c);
     const auto box_at = [](const glm::dvec3& p) { return Box{glm::vec3(p) - 1e-3f, glm::vec3(p) + 1e-3f}; };
-    EXPECT_TRUE(frustum.may_contain(box_at(c.unproject(unit(random) * c.width, unit(random) * c.height, 0.1 + unit(random)))));
+    EXPECT_TRUE(
+        frustum.may_contain(box_at(c.unproject(unit(random) * c.width, unit(random) * c.height, 0.1 + unit(random)))));
     EXPECT_FALSE(frustum.may_contain(box_at(c.unproject(0.5 * c.width, 0.5 * c.height, -1.0))));
     EXPECT_FALSE(frustum.may_contain(box_at(c.unproject(-0.2 * c.width, 0.5 * c.height, 1.0))));
     EXPECT_FALSE(frustum.may_contain(box_at(c.unproject(0.5 * c.width, 1.2 * c.height, 1.0))));

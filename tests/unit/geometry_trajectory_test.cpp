@@ -12,8 +12,9 @@ namespace {
 constexpr const char* kHeader = "t_s,px,py,pz,qw,qx,qy,qz\n";
 
 Result<Trajectory> read(const std::string& text) {
-  const auto path = std::filesystem::temp_directory_path() /
-                    (std::string("telesplat-trajectory-") + testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv");
+  const auto path =
+      std::filesystem::temp_directory_path() /
+      (std::string("telesplat-trajectory-") + testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv");
   std::ofstream(path) << text;
   auto result = Trajectory::read_csv(path.string());
   std::filesystem::remove(path);
@@ -32,8 +33,12 @@ TEST(Trajectory, InterpolatesBetweenSamplesAndHoldsBeyondThem) {
 
 TEST(Trajectory, NamesTheLineThatIsWrong) {
   const std::string good = "0,0,0,0,1,0,0,0\n";
-  for (const auto& [bad, why] : {std::pair{"1,0,0,0,1,0,0", "seven numbers"}, {"1,0,0,0,1,0,0,0,0", "nine numbers"}, {"1,0,x,0,1,0,0,0", "a word"},
-                                 {"1,0,nan,0,1,0,0,0", "not a number"}, {"1,0,0,0,0,0,0,0", "no rotation"}, {"0,0,0,0,1,0,0,0", "time stands still"}}) {
+  for (const auto& [bad, why] : {std::pair{"1,0,0,0,1,0,0", "seven numbers"},
+                                 {"1,0,0,0,1,0,0,0,0", "nine numbers"},
+                                 {"1,0,x,0,1,0,0,0", "a word"},
+                                 {"1,0,nan,0,1,0,0,0", "not a number"},
+                                 {"1,0,0,0,0,0,0,0", "no rotation"},
+                                 {"0,0,0,0,1,0,0,0", "time stands still"}}) {
     const auto t = read(kHeader + good + bad + "\n");
     ASSERT_FALSE(t.ok()) << why;
     EXPECT_NE(t.error().text.find(".csv:3:"), std::string::npos) << t.error().text;

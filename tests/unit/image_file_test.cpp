@@ -20,7 +20,9 @@ class ImageFile : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
   std::string path(const char* name) const { return (folder_ / name).string(); }
-  size_t files() const { return size_t(std::distance(std::filesystem::directory_iterator(folder_), std::filesystem::directory_iterator{})); }
+  size_t files() const {
+    return size_t(std::distance(std::filesystem::directory_iterator(folder_), std::filesystem::directory_iterator{}));
+  }
 
   std::filesystem::path folder_;
 };

@@ -43,7 +43,8 @@ double ssim_at(const View& a, const View& b, int px, int py) {
     for (int y = std::max(0, py - 5); y <= std::min(a.height - 1, py + 5); ++y)
       for (int x = std::max(0, px - 5); x <= std::min(a.width - 1, px + 5); ++x) {
         const size_t at = size_t(y) * a.width + x;
-        visit(std::exp(-((x - px) * (x - px) + (y - py) * (y - py)) / (2 * 1.5 * 1.5)), luma(a.colour[at]), luma(b.colour[at]));
+        visit(std::exp(-((x - px) * (x - px) + (y - py) * (y - py)) / (2 * 1.5 * 1.5)), luma(a.colour[at]),
+              luma(b.colour[at]));
       }
   };
   double w = 0, ma = 0, mb = 0, va = 0, vb = 0, cov = 0;
@@ -114,10 +115,10 @@ TEST(Quality, SsimIsTheFormulasMeanOverTheUnion) {
 TEST(Quality, HolesAreBackgroundOrFartherByMoreThanOnePercent) {
   const View a = flat(10, 10, 0x808080, 2);
   View b = a;
-  b.depth_m[0] = kNothing;  // hole
-  b.depth_m[1] = 2.03f;     // hole: 1.5 % farther
-  b.depth_m[2] = 2.01f;     // 0.5 % farther: not
-  b.depth_m[3] = 1.0f;      // something in front: not
+  b.depth_m[0] = kNothing;                                 // hole
+  b.depth_m[1] = 2.03f;                                    // hole: 1.5 % farther
+  b.depth_m[2] = 2.01f;                                    // 0.5 % farther: not
+  b.depth_m[3] = 1.0f;                                     // something in front: not
   b.depth_m[4] = std::numeric_limits<float>::quiet_NaN();  // no depth: hole
   EXPECT_DOUBLE_EQ(compare(a, b).hole_fraction, 0.03);
 }

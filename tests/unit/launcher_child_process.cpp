@@ -52,7 +52,8 @@ TEST_F(Child, LinesAndExitCodesComeBack) {
 }
 
 TEST_F(Child, MuchOutputDoesNotBlockIt) {
-  auto child = shell("i=0; while [ $i -lt 5000 ]; do echo 'a line of some length, five thousand times'; i=$((i+1)); done");
+  auto child =
+      shell("i=0; while [ $i -lt 5000 ]; do echo 'a line of some length, five thousand times'; i=$((i+1)); done");
   EXPECT_EQ(all_lines(child).size(), 5000u);
   EXPECT_EQ(child.exit_code(), 0);
 }
@@ -113,7 +114,8 @@ TEST_F(Child, AProgramThatIsNotThereIsToldInItsLog) {
 TEST_F(Child, HasAProcessGroupOfItsOwn) {
   auto child = shell("exec sleep 60");
   // Made by the child itself before it becomes its program.
-  for (const double until = monotonic_s() + 20; getpgid(child.pid()) != child.pid() && monotonic_s() < until;) {}
+  for (const double until = monotonic_s() + 20; getpgid(child.pid()) != child.pid() && monotonic_s() < until;) {
+  }
   EXPECT_EQ(getpgid(child.pid()), child.pid());
 }
 

@@ -14,7 +14,8 @@ wire::Hello hello(const std::string& role, const std::string& name, uint64_t ins
   h.pid = instance * 10;
   h.sent_s = 0.5;
   if (role == "packer") h.endpoints = {{"tiles", "t" + name}, {"patches", "p" + name}, {"state", "s" + name}};
-  if (role == "data") h.endpoints = {{"chunks", "c" + name}}, h.facts = {{"scene", "hill"}}, h.box_room = {{-1, -1, -1}, {1, 1, 1}};
+  if (role == "data")
+    h.endpoints = {{"chunks", "c" + name}}, h.facts = {{"scene", "hill"}}, h.box_room = {{-1, -1, -1}, {1, 1, 1}};
   return h;
 }
 
@@ -71,7 +72,10 @@ class Master : public ::testing::Test {
   }
 
   std::unique_ptr<metrics::RunRecord> record = std::move(metrics::RunRecord::open("")).value();
-  MasterCore core{MasterOptions{.schedule = {.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2}, .settings = {{"packing.max_points", 5}}}, {42}, *record};
+  MasterCore core{MasterOptions{.schedule = {.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2},
+                                .settings = {{"packing.max_points", 5}}},
+                  {42},
+                  *record};
   std::vector<Outgoing> outbox;
 };
 
@@ -244,7 +248,8 @@ TEST_F(Master, StatusTellsWhoIsWhere) {
   lease_to("s1");
   const auto s = status();
   ASSERT_TRUE(s.is_object());
-  for (const char* key : {"epoch", "frames_completed", "frames_in_flight", "leases_expired", "tiles_released"}) EXPECT_TRUE(s[key].is_number()) << key;
+  for (const char* key : {"epoch", "frames_completed", "frames_in_flight", "leases_expired", "tiles_released"})
+    EXPECT_TRUE(s[key].is_number()) << key;
   EXPECT_EQ(s["frames_in_flight"], 1);
   ASSERT_EQ(s["processes"].size(), 5u);
   for (const auto& p : s["processes"]) {
@@ -300,7 +305,8 @@ TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
     for (const auto& l : sent<wire::Lease>("s1")) done(l);
   }
   EXPECT_EQ(core.counters().at("frames_completed"), 64);
-  for (uint64_t i = 0; i < 6000; ++i) core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 1000 + i), 1);
+  for (uint64_t i = 0; i < 6000; ++i)
+    core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 1000 + i), 1);
   EXPECT_LE(core.processes().size(), 4096u);
 }
 

@@ -21,7 +21,8 @@ const auto kNobody = [](const std::string&) {};
 constexpr EpochId kEpoch{1};
 
 TEST(CutTiles, CoverTheFrameOnceFromTheCentre) {
-  for (const auto& [w, h, size] : {std::tuple{1, 1, 16}, {256, 256, 256}, {257, 255, 64}, {1280, 800, 256}, {33, 900, 32}}) {
+  for (const auto& [w, h, size] :
+       {std::tuple{1, 1, 16}, {256, 256, 256}, {257, 255, 64}, {1280, 800, 256}, {33, 900, 32}}) {
     std::vector<int> covered(size_t(w) * size_t(h), 0);
     double last = -1;
     for (const auto& r : cut_tiles(w, h, size)) {

@@ -111,8 +111,10 @@ TEST_F(Record, BadTablesAreRefusedAndLeaveNothing) {
 }
 
 TEST_F(Record, TheTraceIsValidWhateverSpansCome) {
-  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 1, 2, 2.25, 3}}));
-  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, -1, 1, 2, 0}}));  // names that are not there
+  ASSERT_TRUE(
+      record->add_rows(viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 1, 2, 2.25, 3}}));
+  ASSERT_TRUE(
+      record->add_rows(viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, -1, 1, 2, 0}}));  // names that are not there
   record.reset();
   const auto trace = nlohmann::json::parse(text("trace.json"), nullptr, false);
   ASSERT_TRUE(trace.is_array());
@@ -132,22 +134,61 @@ TEST_F(Record, ATraceWithoutSpansIsValidToo) {
 }
 
 TEST_F(Record, TheSummaryIsCompleteAndTrue) {
-  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s", "inter_frame_ms", "construction_ms", "points_drawn", "update_age_ms"}, {0, 0, 5, 100, 50, 1, 20, 6, 200, 60, 2, 30, 7, 300, 70}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5},
+                                        "frames",
+                                        {"t_s", "inter_frame_ms", "construction_ms", "points_drawn", "update_age_ms"},
+                                        {0, 0, 5, 100, 50, 1, 20, 6, 200, 60, 2, 30, 7, 300, 70}}));
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"latency_ms", "start_up_ms"}, {200, 50, 300, 60}}));
   record->add_tile("sampler-1", tile(1, 0, 1.0));
   record->add_tile("sampler-2", tile(1, 1, 1.005));
   record->add_tile("sampler-1", tile(2, 0, 2.0));
-  Process data{"data", "data", 1, {{"scene", "hill.ply"}, {"kind", "mesh"}, {"triangles", "1234"}}, {{"peak_rss_mb", 10}, {"messages_rejected", 2}}};
-  Process old_packer{"packer", "packer", 2, {}, {{"points", 900}, {"model_bytes", 9000}, {"messages_rejected", 3}}, true};
+  Process data{"data",
+               "data",
+               1,
+               {{"scene", "hill.ply"}, {"kind", "mesh"}, {"triangles", "1234"}},
+               {{"peak_rss_mb", 10}, {"messages_rejected", 2}}};
+  Process old_packer{"packer", "packer", 2, {}, {{"points", 900}, {"model_bytes", 9000}, {"messages_rejected", 3}},
+                     true};
   Process packer{"packer", "packer", 3, {}, {{"points", 1000}, {"model_bytes", 20000}, {"peak_rss_mb", 30}}};
   Process sampler{"sampler", "sampler-1", 4, {}, {{"peak_rss_mb", 40}}};
-  ASSERT_TRUE(record->finish({data, old_packer, packer, sampler, viewer}, {{"leases_expired", 4}, {"tiles_released", 6}}));
+  ASSERT_TRUE(
+      record->finish({data, old_packer, packer, sampler, viewer}, {{"leases_expired", 4}, {"tiles_released", 6}}));
   const auto s = nlohmann::json::parse(text("summary.json"), nullptr, false);
   ASSERT_TRUE(s.is_object());
-  for (const char* key : {"schema", "scene", "kind", "primitives", "samplers", "viewers", "coupling", "buffers", "renderer", "splat", "size", "sampling_size", "frames",
-                          "updates", "fps", "inter_frame_delay_ms", "view_construction_ms", "view_update_latency_ms", "start_up_latency_ms", "sampling_ms",
-                          "packing_ms", "data_generating_rate_mb_s", "data_transfer_rate_mb_s", "data_consuming_rate_mb_s", "bytes_raw", "bytes_sent",
-                          "compression_ratio", "redundancy_eliminated", "points_cached", "points_drawn", "tiles_released", "quality", "peak_rss_mb", "errors"})
+  for (const char* key : {"schema",
+                          "scene",
+                          "kind",
+                          "primitives",
+                          "samplers",
+                          "viewers",
+                          "coupling",
+                          "buffers",
+                          "renderer",
+                          "splat",
+                          "size",
+                          "sampling_size",
+                          "frames",
+                          "updates",
+                          "fps",
+                          "inter_frame_delay_ms",
+                          "view_construction_ms",
+                          "view_update_latency_ms",
+                          "start_up_latency_ms",
+                          "sampling_ms",
+                          "packing_ms",
+                          "data_generating_rate_mb_s",
+                          "data_transfer_rate_mb_s",
+                          "data_consuming_rate_mb_s",
+                          "bytes_raw",
+                          "bytes_sent",
+                          "compression_ratio",
+                          "redundancy_eliminated",
+                          "points_cached",
+                          "points_drawn",
+                          "tiles_released",
+                          "quality",
+                          "peak_rss_mb",
+                          "errors"})
     EXPECT_TRUE(s.contains(key)) << key;
   EXPECT_EQ(s["primitives"], 1234);
   EXPECT_EQ(s["samplers"], 1);

@@ -17,7 +17,8 @@ TEST(DepthRecorder, ComposesTilesInAnyOrderAndKeepsAsManyFramesAsAsked) {
   ASSERT_TRUE(recorder.ok());
   const geometry::Camera camera = geometry::make_camera({}, 90, 48, 32);
   image::DepthImage whole(48, 32);
-  for (size_t i = 0; i < whole.pixels(); i += 3) whole.depth[i] = uint32_t(1 + i), whole.colour[i] = uint32_t(i), whole.normal[i] = uint16_t(7 * i);
+  for (size_t i = 0; i < whole.pixels(); i += 3)
+    whole.depth[i] = uint32_t(1 + i), whole.colour[i] = uint32_t(i), whole.normal[i] = uint16_t(7 * i);
   const auto cut = [&](const geometry::Rect& r) {
     image::DepthImage out(r.width, r.height);
     for (int y = 0; y < r.height; ++y)

@@ -52,8 +52,8 @@ TEST(ChunkCache, LetsGoOfTheLeastRecentlyUsed) {
       for (const ChunkId old : cache.insert(id)) removed.push_back(old.value);
     return removed;
   };
-  EXPECT_TRUE(view(8).empty());  // 8, 9
-  EXPECT_TRUE(view(9).empty());  // uses 9 again
+  EXPECT_TRUE(view(8).empty());                                                                     // 8, 9
+  EXPECT_TRUE(view(9).empty());                                                                     // uses 9 again
   cache.missing(geometry::make_camera(geometry::look_at({-4.5, 0, 5}, {-4.5, 0, 0}), 10, 64, 64));  // sees chunk 0
   EXPECT_TRUE(cache.insert({0}).empty());
   cache.missing(geometry::make_camera(geometry::look_at({-3.5, 0, 5}, {-3.5, 0, 0}), 10, 64, 64));  // sees chunk 1

@@ -87,7 +87,8 @@ TEST(RaySampler, OppositeCornerNormalsFallBackToThePlane) {
 }
 
 TEST(RaySampler, ColoursAreInterpolatedAndRounded) {
-  auto s = sampler_with(test::triangle({{-1, -1, -1}, kUp, 0x000000}, {{1, -1, -1}, kUp, 0xff0000}, {{-1, 1, -1}, kUp, 0x00ff64}));
+  auto s = sampler_with(
+      test::triangle({{-1, -1, -1}, kUp, 0x000000}, {{1, -1, -1}, kUp, 0xff0000}, {{-1, 1, -1}, kUp, 0x00ff64}));
   const Camera camera = camera_8x8();
   const image::DepthImage image = s->sample(camera, whole(camera));
   for (int y = 0; y < 8; ++y)
@@ -172,12 +173,15 @@ TEST(RaySampler, OffAxisFrustumSeesWhatItShould) {
   // A frustum wholly to the right of the axis: 1 <= u <= 2, 0.5 <= v <= 1.
   Camera camera = camera_8x8();
   camera.left = 1, camera.right = 2, camera.bottom = 0.5, camera.top = 1;
-  auto s = sampler_with(test::chunk_of({{{1.25f, 0.5f, -1}, kUp, 0x00ff00}, {{1.75f, 0.5f, -1}, kUp, 0x00ff00},
-                                        {{1.75f, 0.75f, -1}, kUp, 0x00ff00}, {{1.25f, 0.75f, -1}, kUp, 0x00ff00}},
+  auto s = sampler_with(test::chunk_of({{{1.25f, 0.5f, -1}, kUp, 0x00ff00},
+                                        {{1.75f, 0.5f, -1}, kUp, 0x00ff00},
+                                        {{1.75f, 0.75f, -1}, kUp, 0x00ff00},
+                                        {{1.25f, 0.75f, -1}, kUp, 0x00ff00}},
                                        {0, 1, 2, 0, 2, 3}));
   const image::DepthImage image = s->sample(camera, whole(camera));
   for (int y = 0; y < 8; ++y)
-    for (int x = 0; x < 8; ++x) EXPECT_EQ(image.depth[size_t(y) * 8 + x] != 0, x >= 2 && x < 6 && y >= 4) << x << "," << y;
+    for (int x = 0; x < 8; ++x)
+      EXPECT_EQ(image.depth[size_t(y) * 8 + x] != 0, x >= 2 && x < 6 && y >= 4) << x << "," << y;
 }
 
 TEST(RaySampler, ATileIsExactlyTheSamePartOfTheWholeFrame) {
@@ -187,7 +191,8 @@ TEST(RaySampler, ATileIsExactlyTheSamePartOfTheWholeFrame) {
   camera.pose.orientation = glm::normalize(camera.pose.orientation);
   const image::DepthImage frame = s->sample(camera, whole(camera));
   EXPECT_GT(std::count_if(frame.depth.begin(), frame.depth.end(), [](uint32_t d) { return d != 0; }), 8000);
-  for (const Rect& tile : {Rect{0, 0, 203, 1}, Rect{0, 130, 203, 1}, Rect{3, 5, 1, 1}, Rect{65, 33, 64, 63}, Rect{201, 7, 2, 120}}) {
+  for (const Rect& tile :
+       {Rect{0, 0, 203, 1}, Rect{0, 130, 203, 1}, Rect{3, 5, 1, 1}, Rect{65, 33, 64, 63}, Rect{201, 7, 2, 120}}) {
     const image::DepthImage part = s->sample(camera, tile);
     ASSERT_EQ(part.width, tile.width);
     for (int y = 0; y < tile.height; ++y)

@@ -19,7 +19,9 @@ namespace telesplat::testing {
 /// One mosaic level with its cluster, filled point by point, each array in an allocation of just its size.
 class HandMadeItem {
  public:
-  explicit HandMadeItem(const geometry::Box& leaf) : cluster_(std::make_unique<points::Cluster>()) { cluster_->leaf_room = leaf; }
+  explicit HandMadeItem(const geometry::Box& leaf) : cluster_(std::make_unique<points::Cluster>()) {
+    cluster_->leaf_room = leaf;
+  }
 
   void add(uint16_t x, uint16_t y, uint16_t z, uint32_t colour, uint16_t normal = image::encode_normal16({0, 0, 1})) {
     x_.push_back(x), y_.push_back(y), z_.push_back(z), normal_.push_back(normal), colour_.push_back(colour);
@@ -30,11 +32,14 @@ class HandMadeItem {
     const auto q = [](double p, float lo, float hi) {
       return static_cast<uint16_t>(std::clamp(std::floor((p - lo) / (double(hi) - lo) * 65536.0), 0.0, 65535.0));
     };
-    add(q(position_room.x, b.lo.x, b.hi.x), q(position_room.y, b.lo.y, b.hi.y), q(position_room.z, b.lo.z, b.hi.z), colour, normal);
+    add(q(position_room.x, b.lo.x, b.hi.x), q(position_room.y, b.lo.y, b.hi.y), q(position_room.z, b.lo.z, b.hi.z),
+        colour, normal);
   }
   splat::DrawItem item(float splat_px) {
     x_.shrink_to_fit(), y_.shrink_to_fit(), z_.shrink_to_fit(), normal_.shrink_to_fit(), colour_.shrink_to_fit();
-    return {cluster_.get(), {static_cast<uint32_t>(x_.size()), x_.data(), y_.data(), z_.data(), normal_.data(), colour_.data()}, splat_px};
+    return {cluster_.get(),
+            {static_cast<uint32_t>(x_.size()), x_.data(), y_.data(), z_.data(), normal_.data(), colour_.data()},
+            splat_px};
   }
 
  private:
@@ -61,7 +66,9 @@ struct Frame {
 };
 
 /// Looks along -z from the origin, 90 degrees wide.
-inline geometry::Camera front_camera(int width, int height) { return geometry::make_camera({}, 90, width, height, 0.1); }
+inline geometry::Camera front_camera(int width, int height) {
+  return geometry::make_camera({}, 90, width, height, 0.1);
+}
 
 inline image::Shading unlit(const geometry::Camera& camera, uint32_t background = 0x00010203) {
   image::ShadingParameters p;
@@ -100,7 +107,9 @@ inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& 
     const int steps = side == 1 ? 1 : side <= 4 ? 8 : 4;
     for (uint32_t i = 0; i < item.level.count; ++i) {
       const float p[3] = {float(item.level.x[i]), float(item.level.y[i]), float(item.level.z[i])};
-      const auto row = [&](const std::array<float, 4>& r) { return ((p[0] * r[0] + p[1] * r[1]) + p[2] * r[2]) + r[3]; };
+      const auto row = [&](const std::array<float, 4>& r) {
+        return ((p[0] * r[0] + p[1] * r[1]) + p[2] * r[2]) + r[3];
+      };
       const float w = row(t.w);
       if (!(w >= near_m)) continue;
       const float shift = float(steps) * 0.5f * float(1 - side);
@@ -108,7 +117,8 @@ inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& 
       if (!(std::abs(fixed_x) < 1e6f && std::abs(fixed_y) < 1e6f)) continue;
       const int fx = int(std::floor(fixed_x)), fy = int(std::floor(fixed_y));
       const int x0 = int(std::floor(double(fx) / steps)), y0 = int(std::floor(double(fy) / steps));
-      const double cx = (fx - x0 * steps + 0.5) / steps + 0.5 * (side - 1), cy = (fy - y0 * steps + 0.5) / steps + 0.5 * (side - 1);
+      const double cx = (fx - x0 * steps + 0.5) / steps + 0.5 * (side - 1),
+                   cy = (fy - y0 * steps + 0.5) / steps + 0.5 * (side - 1);
       const uint32_t colour = image::Shading::apply(item.level.colour[i], shading.table()[item.level.normal[i]]);
       for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x) {
@@ -126,7 +136,8 @@ inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& 
     const bool empty = keys[i] == ~uint64_t{0};
     frame.colour[i] = 0xff000000u | (empty ? shading.background() : uint32_t(keys[i]));
     frame.depth_m[i] = empty ? std::numeric_limits<float>::infinity()
-                             : std::bit_cast<float>((uint32_t(keys[i] >> 32) & 0x7fffffffu) - (uint32_t(keys[i]) >> 24 << splat::kBiasShift));
+                             : std::bit_cast<float>((uint32_t(keys[i] >> 32) & 0x7fffffffu) -
+                                                    (uint32_t(keys[i]) >> 24 << splat::kBiasShift));
   }
   return frame;
 }

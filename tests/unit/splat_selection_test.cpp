@@ -38,14 +38,17 @@ points::PointModel sphere_model() {
   for (int i = 0; i < 9; ++i) {
     const double angle = i * 2.1, distance = 0.5 + 0.2 * i;
     const geometry::Camera camera = geometry::make_camera(
-        geometry::look_at({distance * std::sin(angle), 0.2 * (i % 3), distance * std::cos(angle)}, {0, 0, 0}), 60, 160, 120);
-    model.insert(points::prepare_patch(model.config(), Sequence{++sequence}, camera, {0, 0, 160, 120}, sphere_image(camera, i % 2, 2)));
+        geometry::look_at({distance * std::sin(angle), 0.2 * (i % 3), distance * std::cos(angle)}, {0, 0, 0}), 60, 160,
+        120);
+    model.insert(points::prepare_patch(model.config(), Sequence{++sequence}, camera, {0, 0, 160, 120},
+                                       sphere_image(camera, i % 2, 2)));
   }
   return model;
 }
 
 geometry::Camera view(double angle, double distance) {
-  return geometry::make_camera(geometry::look_at({distance * std::sin(angle), 0.1, distance * std::cos(angle)}, {0.05, 0, 0}), 40, 320, 240);
+  return geometry::make_camera(
+      geometry::look_at({distance * std::sin(angle), 0.1, distance * std::cos(angle)}, {0.05, 0, 0}), 40, 320, 240);
 }
 
 const splat::DrawItem* find(const DrawList& list, const points::Mosaic& m) {
@@ -71,7 +74,8 @@ TEST(ViewSelection, ChoosesTheClosestPixelRangeAndItsSize) {
     for (const auto& [key, cluster] : model.clusters()) {
       if (!frustum.may_contain(cluster->leaf_room)) continue;
       ++expected_clusters;
-      const float desired = points::pixel_range(camera, glm::dvec3(cluster->leaf_room.centre()), cluster->leaf_room.size().x);
+      const float desired =
+          points::pixel_range(camera, glm::dvec3(cluster->leaf_room.centre()), cluster->leaf_room.size().x);
       for (const points::Mosaic& m : cluster->mosaics) {
         const auto mismatch = [&](int l) { return std::abs(std::log2(m.pixel_range() / float(1 << l) / desired)); };
         int best = 0;
@@ -118,7 +122,9 @@ TEST(ViewSelection, CulledMosaicsHaveOnlyNormalsThatFaceAway) {
       for (const points::Mosaic& m : cluster->mosaics) {
         ++all;
         const bool away = splat::faces_away(m, cluster->leaf_room, eye);
-        if (away) { EXPECT_FALSE(find(list, m)) << "drawn though it faces away"; }
+        if (away) {
+          EXPECT_FALSE(find(list, m)) << "drawn though it faces away";
+        }
         if (!away) continue;
         ++culled;
         const points::Mosaic::Level level = m.level(0);
@@ -153,7 +159,8 @@ Revised revise(int coarse_pixels, int fine_pixels, const SelectionOptions& optio
   insert(1, 4.0, coarse_pixels);
   insert(2, 1.0, fine_pixels);
   DrawList list;
-  splat::select_view(model, geometry::make_camera(geometry::look_at({0, 0, 1.0}, {0, 0, 0}), 60, 128, 128), options, list);
+  splat::select_view(model, geometry::make_camera(geometry::look_at({0, 0, 1.0}, {0, 0, 0}), 60, 128, 128), options,
+                     list);
   EXPECT_EQ(list.items.size(), 2u);
   return {list.items.at(0).splat_px, list.items.at(1).splat_px};
 }

@@ -20,7 +20,8 @@ const geometry::Box kLeaf{{-1.5f, -1.5f, -3.0f}, {1.5f, 1.5f, 0.0f}};
 Frame render(std::vector<splat::DrawItem> items, Kernel kernel = Kernel::kSquare, splat::SplatStats* stats = nullptr) {
   const geometry::Camera camera = testing::front_camera(kWidth, kHeight);
   Frame frame(kWidth, kHeight);
-  const auto s = splat::CpuSplatter(2).render(testing::draw_list(std::move(items)), camera, kernel, testing::unlit(camera), frame.target());
+  const auto s = splat::CpuSplatter(2).render(testing::draw_list(std::move(items)), camera, kernel,
+                                              testing::unlit(camera), frame.target());
   if (stats) *stats = s;
   return frame;
 }
@@ -64,8 +65,12 @@ TEST(CpuSplatter, DiscCoversThePixelsWithinItsRadius) {
     for (int y = 180; y < 220; ++y)
       for (int x = 280; x < 320; ++x) {
         const double r = std::hypot(x + 0.5 - cx, y + 0.5 - cy);
-        if (r < 0.5 * size - 0.2) { EXPECT_TRUE(pixels.contains({x, y})) << size << ": " << x << ", " << y; }
-        if (r > 0.5 * size + 0.2) { EXPECT_FALSE(pixels.contains({x, y})) << size << ": " << x << ", " << y; }
+        if (r < 0.5 * size - 0.2) {
+          EXPECT_TRUE(pixels.contains({x, y})) << size << ": " << x << ", " << y;
+        }
+        if (r > 0.5 * size + 0.2) {
+          EXPECT_FALSE(pixels.contains({x, y})) << size << ": " << x << ", " << y;
+        }
       }
     EXPECT_NEAR(double(pixels.size()), 0.25 * 3.14159 * size * size, 0.15 * size * size + 1);
   }
@@ -117,10 +122,10 @@ TEST(CpuSplatter, HalfResolutionSamplesFillTheirBlocks) {
 
 TEST(CpuSplatter, NothingBehindTheCameraOrOffScreen) {
   HandMadeItem item({{-3, -3, -3}, {3, 3, 3}});
-  item.add_at({0, 0, 1}, 0xffffff);        // behind
-  item.add_at({0, 0, -0.05}, 0xffffff);    // nearer than the near plane
-  item.add_at({0, 0, 0}, 0xffffff);        // at the eye
-  item.add_at({2.5, 0, -1}, 0xffffff);     // right of the frustum
+  item.add_at({0, 0, 1}, 0xffffff);      // behind
+  item.add_at({0, 0, -0.05}, 0xffffff);  // nearer than the near plane
+  item.add_at({0, 0, 0}, 0xffffff);      // at the eye
+  item.add_at({2.5, 0, -1}, 0xffffff);   // right of the frustum
   item.add_at({0, -2.5, -1}, 0xffffff);
   splat::SplatStats stats;
   EXPECT_TRUE(covered(render({item.item(7)}, Kernel::kSquare, &stats)).empty());
@@ -165,7 +170,8 @@ TEST(CpuSplatter, EveryPointOnScreenIsCountedOnce) {
     const auto& level = items.back().level;
     for (uint32_t i = 0; i < level.count; ++i) {
       const glm::dvec3 q(level.x[i], level.y[i], level.z[i]);
-      const glm::dvec4 p(glm::dvec3(cluster->leaf_room.lo) + (q + 0.5) / 65536.0 * glm::dvec3(cluster->leaf_room.size()), 1.0);
+      const glm::dvec4 p(
+          glm::dvec3(cluster->leaf_room.lo) + (q + 0.5) / 65536.0 * glm::dvec3(cluster->leaf_room.size()), 1.0);
       const double w = glm::dot(t.w, p), x = glm::dot(t.x, p) / w, y = glm::dot(t.y, p) / w;
       on_screen += w >= camera.near_m && x >= 0 && x < kWidth && y >= 0 && y < kHeight;
     }

@@ -13,12 +13,19 @@ namespace fs = std::filesystem;
 
 class Spool : public testing::Test {
  protected:
-  const std::string directory_ = (fs::temp_directory_path() / (std::string("telesplat-spool-") + testing::UnitTest::GetInstance()->current_test_info()->name())).string();
+  const std::string directory_ =
+      (fs::temp_directory_path() /
+       (std::string("telesplat-spool-") + testing::UnitTest::GetInstance()->current_test_info()->name()))
+          .string();
   Spool() { fs::remove_all(directory_); }
   ~Spool() override { fs::remove_all(directory_); }
 
   static SpooledFrame frame(uint64_t number, uint32_t use) {
-    SpooledFrame f{number, 0.25 * double(number), use, geometry::make_camera({}, 90, 20, 10), {20, 10, std::vector<uint32_t>(200, 0x102030), std::vector<float>(200, 1.5f)}};
+    SpooledFrame f{number,
+                   0.25 * double(number),
+                   use,
+                   geometry::make_camera({}, 90, 20, 10),
+                   {20, 10, std::vector<uint32_t>(200, 0x102030), std::vector<float>(200, 1.5f)}};
     f.view.depth_m[7] = std::numeric_limits<float>::infinity();
     f.view.colour[9] = uint32_t(number);
     return f;
@@ -47,7 +54,8 @@ TEST_F(Spool, FramesComeBackAsTheyWere) {
 TEST_F(Spool, PicturesAreDevelopedAndOnlyFramesToVerifyStay) {
   {
     auto spool = FrameSpool::open(directory_);
-    for (const auto& [number, use] : {std::pair{1, uint32_t(kPicture)}, {2, uint32_t(kVerify)}, {3, uint32_t(kPicture | kVerify | kExr)}}) {
+    for (const auto& [number, use] :
+         {std::pair{1, uint32_t(kPicture)}, {2, uint32_t(kVerify)}, {3, uint32_t(kPicture | kVerify | kExr)}}) {
       (*spool)->exchange(frame(uint64_t(number), use));
       (*spool)->flush();
     }
@@ -77,7 +85,8 @@ TEST_F(Spool, FilesThatAreNoFramesAreRefused) {
 
 TEST(ParseSize, TakesWidthAndHeightWithinLimits) {
   EXPECT_EQ(*parse_size("2560x1600", "--size"), (std::pair{2560, 1600}));
-  for (const char* bad : {"", "x", "100", "100x", "x100", "100x100x100", "0x100", "100x8", "20000x100", "-100x100", "1e3x100", "100 x100", "99999999999x100"})
+  for (const char* bad : {"", "x", "100", "100x", "x100", "100x100x100", "0x100", "100x8", "20000x100", "-100x100",
+                          "1e3x100", "100 x100", "99999999999x100"})
     EXPECT_FALSE(parse_size(bad, "--size").ok()) << bad;
 }
 

@@ -15,8 +15,12 @@ using namespace telesplat::test;
 
 template <class M>
 class EveryMessage : public ::testing::Test {};
-template <class T> struct AsTypes;
-template <class... M> struct AsTypes<std::tuple<M...>> { using type = ::testing::Types<M...>; };
+template <class T>
+struct AsTypes;
+template <class... M>
+struct AsTypes<std::tuple<M...>> {
+  using type = ::testing::Types<M...>;
+};
 TYPED_TEST_SUITE(EveryMessage, AsTypes<AllMessages>::type);
 
 // Refused, with the message and `named` in the text.
@@ -40,7 +44,8 @@ TYPED_TEST(EveryMessage, SurvivesTheRoundTrip) {
 
 TYPED_TEST(EveryMessage, IsRefusedTruncatedAtEveryLength) {
   const std::string body = encode(sample_message<TypeParam>());
-  for (size_t n = 0; n < body.size(); ++n) EXPECT_TRUE(refused<TypeParam>(body.substr(0, n))) << n << " of " << body.size() << " bytes";
+  for (size_t n = 0; n < body.size(); ++n)
+    EXPECT_TRUE(refused<TypeParam>(body.substr(0, n))) << n << " of " << body.size() << " bytes";
 }
 
 TYPED_TEST(EveryMessage, IsRefusedWithBytesAfterIt) {
@@ -54,7 +59,10 @@ TYPED_TEST(EveryMessage, IsRefusedInAnotherVersion) {
   EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", "\x02"), "version 2"));
   EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", std::string(1, '\0')), "version 0"));
   EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", "\xff"), "version"));
-  EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", "\xa1" "1"), "version"));
+  EXPECT_TRUE(refused<TypeParam>(with_value(body, "v",
+                                            "\xa1"
+                                            "1"),
+                                 "version"));
 }
 
 TYPED_TEST(EveryMessage, NeedsEveryField) {
@@ -69,14 +77,17 @@ TYPED_TEST(EveryMessage, NeedsEveryField) {
 TYPED_TEST(EveryMessage, IgnoresFieldsItDoesNotKnow) {
   const std::string body = encode(sample_message<TypeParam>());
   const auto fields = fields_of(body);
-  const std::string more = std::string("\xde\0", 2) + char(fields.size() + 1) + body.substr(fields[0].key) + "\xa3new\x93\x01\x02\xc0";
+  const std::string more =
+      std::string("\xde\0", 2) + char(fields.size() + 1) + body.substr(fields[0].key) + "\xa3new\x93\x01\x02\xc0";
   EXPECT_TRUE(decode<TypeParam>(bytes_of(more)));
 }
 
 TYPED_TEST(EveryMessage, RefusesValuesOfOtherTypesAndClaimsOfHugeOnes) {
   const std::string body = encode(sample_message<TypeParam>());
-  const std::string nothing = "\xc0", extension("\xd4\x05\x01", 3), infinite("\xcb\x7f\xf0\0\0\0\0\0\0", 9), undefined("\xcb\x7f\xf8\0\0\0\0\0\0", 9),
-                    huge_list = "\xdd\xff\xff\xff\xff", huge_map = "\xdf\xff\xff\xff\xff", huge_string = "\xdb\xff\xff\xff\xff", huge_binary = "\xc6\xff\xff\xff\xff";
+  const std::string nothing = "\xc0", extension("\xd4\x05\x01", 3), infinite("\xcb\x7f\xf0\0\0\0\0\0\0", 9),
+                    undefined("\xcb\x7f\xf8\0\0\0\0\0\0", 9), huge_list = "\xdd\xff\xff\xff\xff",
+                    huge_map = "\xdf\xff\xff\xff\xff", huge_string = "\xdb\xff\xff\xff\xff",
+                    huge_binary = "\xc6\xff\xff\xff\xff";
   for (const Field& f : fields_of(body))
     for (const auto& value : {nothing, extension, infinite, undefined, huge_list, huge_map, huge_string, huge_binary})
       EXPECT_TRUE(refused<TypeParam>(with_value(body, f.name, value))) << f.name;
@@ -90,8 +101,11 @@ TYPED_TEST(EveryMessage, IsRefusedWhenNested) {
 }
 
 TYPED_TEST(EveryMessage, IsRefusedBeyondItsSize) {
-  constexpr bool kHasBulk = requires(TypeParam m) { m.image; } || requires(TypeParam m) { m.data; } || requires(TypeParam m) { m.chunks; } ||
-                            requires(TypeParam m) { m.clusters; } || requires(TypeParam m) { m.columns; };
+  constexpr bool kHasBulk = requires(TypeParam m) { m.image; }
+  || requires(TypeParam m) { m.data; }
+  || requires(TypeParam m) { m.chunks; }
+  || requires(TypeParam m) { m.clusters; }
+  || requires(TypeParam m) { m.columns; };
   const size_t limit = kHasBulk ? kMaxBulkBytes + kMaxControlBytes : kMaxControlBytes;
   // The size is looked at before the bytes are, so that these need not be there.
   const auto result = decode<TypeParam>(Bytes(kBulk.data(), limit + 1));
@@ -112,14 +126,20 @@ std::string hex(const std::string& bytes) {
   return out;
 }
 TEST(GoldenBytes, OfAMark) {
-  EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000})), 
-            "86a17601a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e7473ce00011170");
+  EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000})),
+            "86a17601a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
+            "73ce00011170");
 }
-TEST(GoldenBytes, OfALease) { EXPECT_EQ(hex(encode(sample_message<Lease>())), 
-            "8ba17601a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6766965776572cf00000100000000"
-            "04a772657175657374cf0000010000000005a474696c6503ae74696c65735f696e5f6672616d6508a663616d6572619ecb3fb999999999999acb3fc999999999"
-            "999acb3fd3333333333333cb3fe333333333333300cb3fe999999999999a00ff01cbbfe0000000000000cb3fe8000000000000cb3f847ae147ae147bcd0140cc"
-            "c8a4726563749440206432a86c65617365645f73cb4020800000000000"); }
+TEST(GoldenBytes, OfALease) {
+  EXPECT_EQ(hex(encode(sample_message<Lease>())),
+            "8ba17601a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6766965"
+            "776572cf00000100000000"
+            "04a772657175657374cf0000010000000005a474696c6503ae74696c65735f696e5f6672616d6508a663616d6572619ecb3fb99999"
+            "9999999acb3fc999999999"
+            "999acb3fd3333333333333cb3fe333333333333300cb3fe999999999999a00ff01cbbfe0000000000000cb3fe8000000000000cb3f"
+            "847ae147ae147bcd0140cc"
+            "c8a4726563749440206432a86c65617365645f73cb4020800000000000");
+}
 
 // ---- limits of single fields -----------------------------------------------------------------------------------------------
 
@@ -151,8 +171,14 @@ TEST(Limits, OfKeysAndNumbersInBinary) {
   EXPECT_TRUE(decode<Forget>(bytes_of(encode(forget))));
   forget.clusters.push_back(7);
   EXPECT_TRUE(refused<Forget>(encode(forget), "clusters"));
-  EXPECT_TRUE(refused<Forget>(with_value(encode(sample_message<Forget>()), "clusters", std::string("\xc4\x03" "abc")), "multiple of 4"));
-  EXPECT_TRUE(refused<MetricRows>(with_value(encode(sample_message<MetricRows>()), "values", std::string("\xc4\x07" "abcdefg")), "multiple of 8"));
+  EXPECT_TRUE(refused<Forget>(with_value(encode(sample_message<Forget>()), "clusters",
+                                         std::string("\xc4\x03"
+                                                     "abc")),
+                              "multiple of 4"));
+  EXPECT_TRUE(refused<MetricRows>(with_value(encode(sample_message<MetricRows>()), "values",
+                                             std::string("\xc4\x07"
+                                                         "abcdefg")),
+                                  "multiple of 8"));
 }
 
 TEST(Limits, OfCameras) {
@@ -163,12 +189,14 @@ TEST(Limits, OfCameras) {
   };
   using C = geometry::Camera;
   EXPECT_TRUE(refused_camera([](C& c) { c.width = 0; }, "camera"));
-  EXPECT_TRUE(refused_camera([](C& c) { c.height = geometry::kMaxImageSide + 1; }, std::to_string(geometry::kMaxImageSide).c_str()));
+  EXPECT_TRUE(refused_camera([](C& c) { c.height = geometry::kMaxImageSide + 1; },
+                             std::to_string(geometry::kMaxImageSide).c_str()));
   EXPECT_TRUE(refused_camera([](C& c) { c.left = c.right; }, "frustum"));
   EXPECT_TRUE(refused_camera([](C& c) { c.near_m = 0; }, "near"));
   EXPECT_TRUE(refused_camera([](C& c) { c.pose.orientation = {0, 0, 0, 0}; }, "orientation"));
   EXPECT_TRUE(refused_camera([](C& c) { c.pose.position_room.x = 1e9; }, "position"));
-  EXPECT_TRUE(refused_camera([](C& c) { c.pose.position_room.y = std::numeric_limits<double>::quiet_NaN(); }, "finite"));
+  EXPECT_TRUE(
+      refused_camera([](C& c) { c.pose.position_room.y = std::numeric_limits<double>::quiet_NaN(); }, "finite"));
   EXPECT_TRUE(refused_camera([](C& c) { c.top = std::numeric_limits<double>::infinity(); }, "finite"));
 }
 
@@ -176,8 +204,10 @@ template <class M>
 void expect_tiles_checked() {
   const auto change = [](auto how) {
     M m = sample_message<M>();
-    if constexpr (requires { m.lease.rect; }) how(m.lease);
-    else how(m);
+    if constexpr (requires { m.lease.rect; })
+      how(m.lease);
+    else
+      how(m);
     return encode(m);
   };
   EXPECT_TRUE(decode<M>(bytes_of(change([](auto& m) { m.rect = {0, 0, 320, 200}; }))));

@@ -14,7 +14,8 @@ constexpr double kTalus = 0.9;      // slopes above slide
 
 class Eroder {
  public:
-  Eroder(HeightMap& map, const std::vector<uint8_t>& fixed) : map_(map), fixed_(fixed), n_(map.side), cells_(map.height_m.size()) {}
+  Eroder(HeightMap& map, const std::vector<uint8_t>& fixed)
+      : map_(map), fixed_(fixed), n_(map.side), cells_(map.height_m.size()) {}
 
   void step(double k) {
     flood();
@@ -116,7 +117,8 @@ class Eroder {
 
 }  // namespace
 
-void erode(HeightMap& map, const std::vector<uint8_t>& fixed, int steps, double k, const std::function<void(double)>& progress) {
+void erode(HeightMap& map, const std::vector<uint8_t>& fixed, int steps, double k,
+           const std::function<void(double)>& progress) {
   Eroder eroder(map, fixed);
   for (int i = 0; i < steps; ++i) {
     progress(static_cast<double>(i) / steps);

@@ -18,10 +18,13 @@ class ProgressLine {
     const double now = monotonic_s();
     if (now - start_s_ < 2.0 || now - last_s_ < (terminal_ ? 0.1 : 2.0)) return;
     last_s_ = now;
-    fmt::print(stderr, "{}make-terrain: {} {:.0f} %{}", terminal_ ? "\r" : "", what, 100 * fraction, terminal_ ? "   " : "\n");
+    fmt::print(stderr, "{}make-terrain: {} {:.0f} %{}", terminal_ ? "\r" : "", what, 100 * fraction,
+               terminal_ ? "   " : "\n");
     shown_ = true;
   }
-  ~ProgressLine() { if (shown_ && terminal_) fmt::print(stderr, "\n"); }
+  ~ProgressLine() {
+    if (shown_ && terminal_) fmt::print(stderr, "\n");
+  }
 
  private:
   bool terminal_ = isatty(STDERR_FILENO), shown_ = false;
@@ -31,10 +34,14 @@ class ProgressLine {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Writes a caldera landscape with a lake as a binary PLY file: metres, z up, coloured by height and slope.", "make-terrain");
+  CLI::App app(
+      "Writes a caldera landscape with a lake as a binary PLY file: metres, z up, coloured by height and slope.",
+      "make-terrain");
   uint64_t triangles = 2'000'000, seed = 1;
   std::string output;
-  app.add_option("--triangles", triangles, "number of triangles")->check(CLI::Range(terrain::kMinTriangles, terrain::kMaxTriangles))->capture_default_str();
+  app.add_option("--triangles", triangles, "number of triangles")
+      ->check(CLI::Range(terrain::kMinTriangles, terrain::kMaxTriangles))
+      ->capture_default_str();
   app.add_option("--seed", seed, "which land; the same seed makes the same one")->capture_default_str();
   app.add_option("-o,--output", output, "the file to write")->required();
   try {

@@ -15,14 +15,16 @@ class Noise {
     const double fx = std::floor(x), fy = std::floor(y), u = x - fx, v = y - fy;
     const auto ix = static_cast<int64_t>(fx), iy = static_cast<int64_t>(fy);
     const double su = fade(u), sv = fade(v);
-    const double a = gradient(ix, iy, u, v), b = gradient(ix + 1, iy, u - 1, v), c = gradient(ix, iy + 1, u, v - 1), d = gradient(ix + 1, iy + 1, u - 1, v - 1);
+    const double a = gradient(ix, iy, u, v), b = gradient(ix + 1, iy, u - 1, v), c = gradient(ix, iy + 1, u, v - 1),
+                 d = gradient(ix + 1, iy + 1, u - 1, v - 1);
     return 1.5 * (a + su * (b - a) + sv * (c - a + su * (a - b - c + d)));
   }
 
   /// Sum of octaves, each of half the size and `gain` times the height of the one before. About -1..1.
   double fractal(double x, double y, int octaves, double gain = 0.5) const {
     double sum = 0, amplitude = 1, total = 0;
-    for (int i = 0; i < octaves; ++i, amplitude *= gain, x = 2 * x + 17.3, y = 2 * y - 9.1) sum += amplitude * (*this)(x, y), total += amplitude;
+    for (int i = 0; i < octaves; ++i, amplitude *= gain, x = 2 * x + 17.3, y = 2 * y - 9.1)
+      sum += amplitude * (*this)(x, y), total += amplitude;
     return sum / total;
   }
 
@@ -48,17 +50,26 @@ class Noise {
   }
   // One of eight directions for each lattice point.
   double gradient(int64_t ix, int64_t iy, double u, double v) const {
-    const uint64_t h = mix(seed_ + static_cast<uint64_t>(ix) * 0x9e3779b97f4a7c15 + static_cast<uint64_t>(iy) * 0xd1b54a32d192ed03);
+    const uint64_t h =
+        mix(seed_ + static_cast<uint64_t>(ix) * 0x9e3779b97f4a7c15 + static_cast<uint64_t>(iy) * 0xd1b54a32d192ed03);
     constexpr double kD = 0.70710678118654752;
     switch (h >> 61) {
-      case 0: return u;
-      case 1: return -u;
-      case 2: return v;
-      case 3: return -v;
-      case 4: return kD * (u + v);
-      case 5: return kD * (u - v);
-      case 6: return kD * (v - u);
-      default: return -kD * (u + v);
+      case 0:
+        return u;
+      case 1:
+        return -u;
+      case 2:
+        return v;
+      case 3:
+        return -v;
+      case 4:
+        return kD * (u + v);
+      case 5:
+        return kD * (u - v);
+      case 6:
+        return kD * (v - u);
+      default:
+        return -kD * (u + v);
     }
   }
   uint64_t seed_;

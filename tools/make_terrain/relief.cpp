@@ -10,7 +10,7 @@
 namespace telesplat::terrain {
 namespace {
 
-constexpr int kSide = 560;             // 25 m: finer forms are noise (terrain.cpp)
+constexpr int kSide = 560;  // 25 m: finer forms are noise (terrain.cpp)
 constexpr double kRimRadiusM = 3300, kFloorM = 1480, kRimM = 2330, kFootM = 1050;
 constexpr double kPi = 3.14159265358979323846;
 
@@ -29,18 +29,22 @@ double cone(double distance, double radius, double height) {
 double initial_height(double x, double y, uint64_t seed) {
   const Noise noise(seed), warp(seed + 1), rough(seed + 2);
   // Bend the coordinates so that nothing is round or straight.
-  const double wx = x + 420 * warp.fractal(x / 2600, y / 2600, 4), wy = y + 420 * warp.fractal(x / 2600 + 40, y / 2600 + 40, 4);
+  const double wx = x + 420 * warp.fractal(x / 2600, y / 2600, 4),
+               wy = y + 420 * warp.fractal(x / 2600 + 40, y / 2600 + 40, 4);
   const double c = kExtentM / 2, r = caldera_radius(x, y, seed), angle = std::atan2(y - c, x - c);
-  const double rim = kRimM + 330 * noise.fractal(2 + 1.1 * std::cos(angle), 5 + 1.1 * std::sin(angle), 2) + 140 * noise.fractal(wx / 1100, wy / 1100, 4);
+  const double rim = kRimM + 330 * noise.fractal(2 + 1.1 * std::cos(angle), 5 + 1.1 * std::sin(angle), 2) +
+                     140 * noise.fractal(wx / 1100, wy / 1100, 4);
   const double outside = kFootM + (rim - kFootM) * std::exp(-std::max(r - 1, 0.0) * 1.15);
   const double inside = kFloorM + (rim - kFloorM) * smooth(0.66, 1.0, r);
   double h = r < 1 ? inside : outside;
   // Ridges on the flanks, less in the lake.
   const double flank = smooth(0.95, 1.3, r);
-  h += flank * (460 * (rough.ridged(wx / 3000, wy / 3000, 5) - 0.55)) + (20 + 60 * flank) * rough.fractal(wx / 700, wy / 700, 5);
+  h += flank * (460 * (rough.ridged(wx / 3000, wy / 3000, 5) - 0.55)) +
+       (20 + 60 * flank) * rough.fractal(wx / 700, wy / 700, 5);
   // Side cones around the caldera, and the island in it.
   for (uint64_t i = 0; i < 9; ++i) {
-    const double a = 2 * kPi * (static_cast<double>(i) / 9 + 0.08 * noise.uniform(3 * i)), d = kRimRadiusM * (1.35 + 0.75 * noise.uniform(3 * i + 1));
+    const double a = 2 * kPi * (static_cast<double>(i) / 9 + 0.08 * noise.uniform(3 * i)),
+                 d = kRimRadiusM * (1.35 + 0.75 * noise.uniform(3 * i + 1));
     const double size = 700 + 900 * noise.uniform(3 * i + 2);
     h += cone(std::hypot(wx - c - d * std::cos(a), wy - c - d * std::sin(a)), size, 0.36 * size);
   }
@@ -55,21 +59,23 @@ double caldera_radius(double x, double y, uint64_t seed) {
   const Noise noise(seed + 3);
   const double c = kExtentM / 2, dx = (x - c) * 0.93, dy = (y - c) * 1.05, distance = std::hypot(dx, dy);
   const double angle = std::atan2(dy, dx);
-  const double outline = 1 + 0.2 * noise.fractal(1.3 * std::cos(angle) + 7, 1.3 * std::sin(angle) + 7, 3) + 0.05 * noise.fractal(x / 800, y / 800, 4);
+  const double outline = 1 + 0.2 * noise.fractal(1.3 * std::cos(angle) + 7, 1.3 * std::sin(angle) + 7, 3) +
+                         0.05 * noise.fractal(x / 800, y / 800, 4);
   return distance / (kRimRadiusM * outline);
 }
 
 double HeightMap::sample(double x_m, double y_m) const {
   const double gx = std::clamp(x_m / cell_m(), 0.0, side - 1.0), gy = std::clamp(y_m / cell_m(), 0.0, side - 1.0);
   const int ix = std::min(static_cast<int>(gx), side - 2), iy = std::min(static_cast<int>(gy), side - 2);
-  const auto weights = [](double t, double (&w)[4]) {
+  const auto weights = [](double t, double(&w)[4]) {
     w[0] = 0.5 * (-t + 2 * t * t - t * t * t), w[1] = 0.5 * (2 - 5 * t * t + 3 * t * t * t);
     w[2] = 0.5 * (t + 4 * t * t - 3 * t * t * t), w[3] = 0.5 * (-t * t + t * t * t);
   };
   double wx[4], wy[4], sum = 0;
   weights(gx - ix, wx), weights(gy - iy, wy);
   for (int j = 0; j < 4; ++j)
-    for (int i = 0; i < 4; ++i) sum += wy[j] * wx[i] * at(std::clamp(ix + i - 1, 0, side - 1), std::clamp(iy + j - 1, 0, side - 1));
+    for (int i = 0; i < 4; ++i)
+      sum += wy[j] * wx[i] * at(std::clamp(ix + i - 1, 0, side - 1), std::clamp(iy + j - 1, 0, side - 1));
   return sum;
 }
 

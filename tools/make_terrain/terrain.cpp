@@ -24,7 +24,8 @@ Rgb mix(const Rgb& a, const Rgb& b, double t) { return a + (b - a) * t; }
 struct Grid {
   uint64_t columns, rows, rest;
   explicit Grid(uint64_t triangles)
-      : columns(std::max<uint64_t>(static_cast<uint64_t>(std::sqrt(static_cast<double>(triangles) / 2)), 1)), rows(triangles / (2 * columns)),
+      : columns(std::max<uint64_t>(static_cast<uint64_t>(std::sqrt(static_cast<double>(triangles) / 2)), 1)),
+        rows(triangles / (2 * columns)),
         rest(triangles - rows * 2 * columns) {}
   uint64_t vertex_rows() const { return rows + 1; }
   uint64_t rest_vertices() const { return rest == 0 ? 0 : rest / 2 + 1; }
@@ -65,27 +66,33 @@ class Land {
       return mix({78, 152, 168}, deep, smooth(0, 55, depth)) * (1 + 0.02 * patchy);
     }
     const double z = point.height_m, hollow = smooth(-25, 25, mean_around(x, y) - z);
-    const Rgb rock = mix(mix({118, 108, 98}, {150, 128, 104}, smooth(-0.5, 0.5, patchy)), {92, 84, 80}, smooth(0.0, 0.6, fine));
+    const Rgb rock =
+        mix(mix({118, 108, 98}, {150, 128, 104}, smooth(-0.5, 0.5, patchy)), {92, 84, 80}, smooth(0.0, 0.6, fine));
     const Rgb pumice = mix({176, 158, 126}, {150, 140, 112}, smooth(-0.4, 0.4, fine));
     const Rgb meadow = mix({112, 132, 62}, {140, 142, 82}, smooth(-0.4, 0.5, patchy + 0.4 * fine));
     const Rgb forest = mix({48, 80, 46}, {82, 108, 58}, smooth(-0.5, 0.5, fine + 0.3 * patchy));
     const Rgb snow = {238, 242, 247};
     // From the valleys upwards: meadows, forest, the timber line, bare pumice; rock where it is steep; snow on what is high and not steep.
-    Rgb c = mix(meadow, forest, smooth(-0.25, 0.15, patchy + 0.35 * fine + 0.5 * smooth(1050, 1500, z) - 0.1 + 0.2 * hollow));
+    Rgb c = mix(meadow, forest,
+                smooth(-0.25, 0.15, patchy + 0.35 * fine + 0.5 * smooth(1050, 1500, z) - 0.1 + 0.2 * hollow));
     c = mix(c, pumice, smooth(-60, 60, z - 2120 - 130 * patchy - 60 * hollow));
     c = mix(c, rock, smooth(0.52, 0.8, slope + 0.12 * fine));
-    if (const double shore = z - kLakeLevelM; shore < 12 && caldera_radius(x, y, seed_) < 1.02) c = mix({188, 174, 146}, c, smooth(0, 12, shore));
+    if (const double shore = z - kLakeLevelM; shore < 12 && caldera_radius(x, y, seed_) < 1.02)
+      c = mix({188, 174, 146}, c, smooth(0, 12, shore));
     const double cover = z - 2270 - 170 * patchy - 60 * fine + 150 * hollow - 300 * smooth(0.45, 0.9, slope);
     return mix(c, snow, smooth(-60, 60, cover));
   }
 
  private:
   static double slope_of(const HeightMap& map, double x, double y, double reach) {
-    return std::hypot(map.sample(x + reach, y) - map.sample(x - reach, y), map.sample(x, y + reach) - map.sample(x, y - reach)) / (2 * reach);
+    return std::hypot(map.sample(x + reach, y) - map.sample(x - reach, y),
+                      map.sample(x, y + reach) - map.sample(x, y - reach)) /
+           (2 * reach);
   }
   double mean_around(double x, double y) const {
     constexpr double kReach = 110;
-    return 0.25 * (relief_.sample(x + kReach, y) + relief_.sample(x - kReach, y) + relief_.sample(x, y + kReach) + relief_.sample(x, y - kReach));
+    return 0.25 * (relief_.sample(x + kReach, y) + relief_.sample(x - kReach, y) + relief_.sample(x, y + kReach) +
+                   relief_.sample(x, y - kReach));
   }
 
   uint64_t seed_;
@@ -108,7 +115,9 @@ void add_triangles(const Grid& grid, std::vector<uint32_t>& indices) {
 
 Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void(double)>& user_progress) {
   CHECK(triangles >= kMinTriangles && triangles <= kMaxTriangles);
-  const auto progress = [&](double fraction) { if (user_progress) user_progress(fraction); };
+  const auto progress = [&](double fraction) {
+    if (user_progress) user_progress(fraction);
+  };
   const Grid grid(triangles);
   const double step = grid.step_m();
   const Land land(seed, step, [&](double f) { progress(0.3 * f); });
@@ -138,10 +147,14 @@ Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void
   });
   sweep(0.7, 1.0, [&](uint64_t v, double x, double y) {
     const double z = out.positions[v].z;
-    const auto rise = [&](bool ahead, uint64_t next, uint64_t before) { return (out.positions[ahead ? next : before].z - z) / step; };
+    const auto rise = [&](bool ahead, uint64_t next, uint64_t before) {
+      return (out.positions[ahead ? next : before].z - z) / step;
+    };
     const bool last_column = v % stride == grid.columns;
-    const double dx = rise(!last_column && v + 1 < vertices, v + 1, v % stride > 0 ? v - 1 : v), dy = rise(v + stride < vertices, v + stride, v - stride);
-    const Rgb c = glm::clamp(land.colour(x, y, {z, ground_m[v], water[v] != 0}, water[v] ? 0 : std::hypot(dx, dy)) + 0.5, 0.0, 255.0);
+    const double dx = rise(!last_column && v + 1 < vertices, v + 1, v % stride > 0 ? v - 1 : v),
+                 dy = rise(v + stride < vertices, v + stride, v - stride);
+    const Rgb c = glm::clamp(
+        land.colour(x, y, {z, ground_m[v], water[v] != 0}, water[v] ? 0 : std::hypot(dx, dy)) + 0.5, 0.0, 255.0);
     out.colours[v] = static_cast<uint32_t>(c.r) << 16 | static_cast<uint32_t>(c.g) << 8 | static_cast<uint32_t>(c.b);
   });
   add_triangles(grid, out.indices);

@@ -25,6 +25,7 @@ struct Terrain {
 Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void(double fraction)>& progress = {});
 
 /// Binary little-endian PLY with float positions and uchar colours. The file appears whole or not at all. Errors name the path.
-Status write_ply(const Terrain& terrain, const std::string& path, const std::function<void(double fraction)>& progress = {});
+Status write_ply(const Terrain& terrain, const std::string& path,
+                 const std::function<void(double fraction)>& progress = {});
 
 }  // namespace telesplat::terrain

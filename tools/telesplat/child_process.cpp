@@ -18,8 +18,9 @@
 
 namespace telesplat::launcher {
 
-Result<ChildProcess> ChildProcess::start(const std::string& name, const std::string& program, const std::vector<std::string>& arguments,
-                                         const std::string& log_path, int nice_value) {
+Result<ChildProcess> ChildProcess::start(const std::string& name, const std::string& program,
+                                         const std::vector<std::string>& arguments, const std::string& log_path,
+                                         int nice_value) {
   int out[2];
   const int log = ::open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (log < 0) return Error{fmt::format("{}: {}", log_path, std::strerror(errno))};
@@ -85,8 +86,10 @@ std::vector<std::string> ChildProcess::read_lines() {
   ssize_t n = 0;
   while ((n = ::read(stdout_fd_, buffer, sizeof buffer)) > 0) {
     for (ssize_t i = 0; i < n; ++i) {
-      if (buffer[i] == '\n') lines.push_back(std::exchange(partial_line_, {}));
-      else if (partial_line_.size() < 4096) partial_line_ += buffer[i];
+      if (buffer[i] == '\n')
+        lines.push_back(std::exchange(partial_line_, {}));
+      else if (partial_line_.size() < 4096)
+        partial_line_ += buffer[i];
     }
   }
   return lines;
@@ -95,7 +98,8 @@ std::vector<std::string> ChildProcess::read_lines() {
 bool ChildProcess::ended() {
   if (exit_code_ || pid_ <= 0) return true;
   int status = 0;
-  if (waitpid(pid_, &status, WNOHANG) == pid_) exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  if (waitpid(pid_, &status, WNOHANG) == pid_)
+    exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return exit_code_.has_value();
 }
 

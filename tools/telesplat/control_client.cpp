@@ -7,12 +7,16 @@
 namespace telesplat::launcher {
 
 ControlClient::ControlClient(const std::string& master_endpoint)
-    : endpoint_(master_endpoint), socket_(context_, net::Kind::kDealer, "ctl", {.high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes}) {
+    : endpoint_(master_endpoint),
+      socket_(context_, net::Kind::kDealer, "ctl",
+              {.high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes}) {
   if (const Status s = socket_.connect(master_endpoint); !s) log::error("{}", s.error().text);
 }
 
-Result<std::string> ControlClient::ask(const std::string& command, double timeout_s, const std::map<std::string, std::string>& arguments) {
-  while (socket_.receive()) {}  // answers to what was asked before
+Result<std::string> ControlClient::ask(const std::string& command, double timeout_s,
+                                       const std::map<std::string, std::string>& arguments) {
+  while (socket_.receive()) {
+  }  // answers to what was asked before
   socket_.send(wire::Control{command, arguments});
   for (const double until = monotonic_s() + timeout_s; monotonic_s() < until;) {
     net::wait_readable({&socket_}, 20);

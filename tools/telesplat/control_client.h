@@ -13,7 +13,8 @@ class ControlClient {
   explicit ControlClient(const std::string& master_endpoint);
 
   /// Sends a command and waits for its answer.
-  Result<std::string> ask(const std::string& command, double timeout_s, const std::map<std::string, std::string>& arguments = {});
+  Result<std::string> ask(const std::string& command, double timeout_s,
+                          const std::map<std::string, std::string>& arguments = {});
   /// Sends "status" without waiting; poll_status() gives the answer once it is there.
   void request_status();
   std::optional<nlohmann::json> poll_status();

@@ -29,11 +29,15 @@ int refuse(const std::string& why) {
 int inspect_run(const std::string& directory) {
   std::ifstream in(directory + "/summary.json");
   const auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
-  if (!summary.is_object()) return refuse(fmt::format("{}: is a folder without a readable summary.json, so it is not a finished run", directory));
+  if (!summary.is_object())
+    return refuse(
+        fmt::format("{}: is a folder without a readable summary.json, so it is not a finished run", directory));
   std::printf("%s: a run\n%s\n", directory.c_str(), summary.dump(2).c_str());
   std::error_code error;
   for (const auto& entry : fs::recursive_directory_iterator(directory, error))
-    if (entry.is_regular_file(error)) std::printf("  %-40s %12ju bytes\n", fs::relative(entry.path(), directory, error).c_str(), entry.file_size(error));
+    if (entry.is_regular_file(error))
+      std::printf("  %-40s %12ju bytes\n", fs::relative(entry.path(), directory, error).c_str(),
+                  entry.file_size(error));
   return 0;
 }
 
@@ -44,7 +48,8 @@ int inspect_view(const std::string& path, const image::View& view, const char* w
   size_t covered = 0;
   for (float d : view.depth_m)
     if (std::isfinite(d)) nearest = std::min(nearest, d), farthest = std::max(farthest, d), ++covered;
-  std::printf("  covered %.1f %% of the pixels, depth %.4f to %.4f m\n", 100.0 * double(covered) / double(view.depth_m.size()), covered ? nearest : 0.0f, farthest);
+  std::printf("  covered %.1f %% of the pixels, depth %.4f to %.4f m\n",
+              100.0 * double(covered) / double(view.depth_m.size()), covered ? nearest : 0.0f, farthest);
   return 0;
 }
 
@@ -56,10 +61,13 @@ int inspect_depth_image(const std::string& path, const std::vector<uint8_t>& byt
   uint32_t lowest = image::kMaxDepthCode, highest = 0;
   for (uint32_t d : image->depth)
     if (d) lowest = std::min(lowest, d), highest = std::max(highest, d);
-  std::printf("%s: a depth image, %dx%d pixels, %zu covered, %zu bytes (%.2f a covered pixel)\n", path.c_str(), info->width, info->height, info->covered_pixels,
-              bytes.size(), info->covered_pixels ? double(bytes.size()) / double(info->covered_pixels) : 0.0);
-  std::printf("  mask %zu, depth %zu, colour %zu, normals %zu bytes\n", info->mask_bytes, info->depth_bytes, info->colour_bytes, info->normal_bytes);
-  if (info->covered_pixels) std::printf("  reciprocal depth codes %u to %u of %u\n", lowest, highest, image::kMaxDepthCode);
+  std::printf("%s: a depth image, %dx%d pixels, %zu covered, %zu bytes (%.2f a covered pixel)\n", path.c_str(),
+              info->width, info->height, info->covered_pixels, bytes.size(),
+              info->covered_pixels ? double(bytes.size()) / double(info->covered_pixels) : 0.0);
+  std::printf("  mask %zu, depth %zu, colour %zu, normals %zu bytes\n", info->mask_bytes, info->depth_bytes,
+              info->colour_bytes, info->normal_bytes);
+  if (info->covered_pixels)
+    std::printf("  reciprocal depth codes %u to %u of %u\n", lowest, highest, image::kMaxDepthCode);
   return 0;
 }
 
@@ -77,7 +85,8 @@ int inspect(const std::string& path, const data::MeshOptions& options) {
   if (!fs::exists(path, error)) return refuse(fmt::format("{}: no such file", path));
   if (fs::is_directory(path, error)) return inspect_run(path);
   std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return char(std::tolower(c)); });
   if (extension == ".frame") {
     const auto frame = viewer::read_spooled_frame(path);
     if (!frame) return refuse(frame.error().text);
@@ -89,7 +98,8 @@ int inspect(const std::string& path, const data::MeshOptions& options) {
     return inspect_view(path, *view, view->depth_m.empty() ? "a picture" : "a picture with depth");
   }
   if (extension == ".depth") {
-    if (fs::file_size(path, error) > kMaxDepthImageBytes) return refuse(fmt::format("{}: {} bytes, limit {}", path, fs::file_size(path, error), kMaxDepthImageBytes));
+    if (fs::file_size(path, error) > kMaxDepthImageBytes)
+      return refuse(fmt::format("{}: {} bytes, limit {}", path, fs::file_size(path, error), kMaxDepthImageBytes));
     std::ifstream in(path, std::ios::binary);
     const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(in)), {});
     return inspect_depth_image(path, bytes);

@@ -27,21 +27,24 @@ int control(const std::string& master, const std::string& command) {
 int telesplat_main(int argc, char** argv) {
   CLI::App app{"telesplat: explore data sets that are too large for this machine"};
   app.require_subcommand(1);
-  app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);  // the command line wins over a scene file
+  app.option_defaults()->multi_option_policy(
+      CLI::MultiOptionPolicy::TakeLast);  // the command line wins over a scene file
   launcher::RunOptions run_options;
   auto* run = app.add_subcommand("run", "run the whole pipeline on this machine, headless, and record it");
   launcher::add_run_flags(*run, run_options);
 
   std::string command, master = "tcp://127.0.0.1:7700";
   auto* ctl = app.add_subcommand("ctl", "ask or tell a running session's master");
-  ctl->add_option("command", command, "status: who takes part and what they count; stop: end the session; epoch: drop all points")
+  ctl->add_option("command", command,
+                  "status: who takes part and what they count; stop: end the session; epoch: drop all points")
       ->required()
       ->check(CLI::IsMember({"status", "stop", "epoch"}));
   ctl->add_option("--master", master, "address of the master")->capture_default_str();
 
   std::string path;
   data::MeshOptions mesh;
-  auto* inspect = app.add_subcommand("inspect", "tell what a data file, a run folder, a recorded frame or a depth image holds");
+  auto* inspect =
+      app.add_subcommand("inspect", "tell what a data file, a run folder, a recorded frame or a depth image holds");
   inspect->add_option("path", path, "file or folder")->required();
   inspect->add_option("--cache", mesh.cache_dir, "folder of the chunk store");
 
@@ -60,4 +63,6 @@ int telesplat_main(int argc, char** argv) {
 
 }  // namespace
 
-int main(int argc, char** argv) { return net::guarded_main([&] { return telesplat_main(argc, argv); }); }
+int main(int argc, char** argv) {
+  return net::guarded_main([&] { return telesplat_main(argc, argv); });
+}

@@ -23,15 +23,29 @@ std::string text(double v) { return fmt::format("{}", v); }
 
 std::vector<std::string> master_arguments(const RunOptions& o) {
   const auto& s = o.master.master.schedule;
-  std::vector<std::string> a{"--name", "master", "--bind", "tcp://127.0.0.1:*", "--tile-size", text(s.tile_size), "--frames-in-flight", text(s.frames_in_flight),
-                             "--lease-timeout", text(s.lease_timeout_s), "--octree-depth", text(double(o.master.master.octree_depth)),
-                             "--out", o.out, "--log-level", o.master.service.log_level};
+  std::vector<std::string> a{"--name",
+                             "master",
+                             "--bind",
+                             "tcp://127.0.0.1:*",
+                             "--tile-size",
+                             text(s.tile_size),
+                             "--frames-in-flight",
+                             text(s.frames_in_flight),
+                             "--lease-timeout",
+                             text(s.lease_timeout_s),
+                             "--octree-depth",
+                             text(double(o.master.master.octree_depth)),
+                             "--out",
+                             o.out,
+                             "--log-level",
+                             o.master.service.log_level};
   for (const auto& [key, value] : o.master.master.settings) a.insert(a.end(), {"--" + key, text(value)});
   return a;
 }
 
 std::vector<std::string> data_arguments(const RunOptions& o) {
-  std::vector<std::string> a{o.scene, "--room-size", text(o.mesh.room_size_m), "--up=" + o.mesh.up, "--report-progress"};
+  std::vector<std::string> a{o.scene, "--room-size", text(o.mesh.room_size_m), "--up=" + o.mesh.up,
+                             "--report-progress"};
   if (!o.mesh.cache_dir.empty()) a.insert(a.end(), {"--cache", o.mesh.cache_dir});
   if (!o.mesh.use_cache) a.push_back("--no-cache");
   return a;
@@ -43,13 +57,26 @@ std::vector<std::string> packer_arguments(const RunOptions& o) {
 }
 
 std::vector<std::string> viewer_arguments(const RunOptions& o) {
-  const auto &v = o.viewer;
-  const auto &d = v.display;
-  std::vector<std::string> a{"--size", v.size, "--sampling-size", v.sampling_size, "--trajectory", v.trajectory, "--duration", text(d.duration_s),
-                             "--frames", text(double(d.frames)), "--hold", text(d.hold_s), "--fov", text(d.fov_deg), "--near", text(d.near_m),
-                             "--target-fps", text(d.target_fps), "--renderer", v.renderer, "--splat", v.splat, "--splat-scale", text(v.splat_scale),
-                             "--coupling", v.coupling, "--update-rate", text(v.requests.max_rate_hz), "--record-every", text(double(d.picture_every)),
-                             "--verify", text(double(d.verify_every)), "--out", o.out, "--started-at", text(o.started_s)};
+  const auto& v = o.viewer;
+  const auto& d = v.display;
+  std::vector<std::string> a{"--size",          v.size,
+                             "--sampling-size", v.sampling_size,
+                             "--trajectory",    v.trajectory,
+                             "--duration",      text(d.duration_s),
+                             "--frames",        text(double(d.frames)),
+                             "--hold",          text(d.hold_s),
+                             "--fov",           text(d.fov_deg),
+                             "--near",          text(d.near_m),
+                             "--target-fps",    text(d.target_fps),
+                             "--renderer",      v.renderer,
+                             "--splat",         v.splat,
+                             "--splat-scale",   text(v.splat_scale),
+                             "--coupling",      v.coupling,
+                             "--update-rate",   text(v.requests.max_rate_hz),
+                             "--record-every",  text(double(d.picture_every)),
+                             "--verify",        text(double(d.verify_every)),
+                             "--out",           o.out,
+                             "--started-at",    text(o.started_s)};
   if (d.exr) a.push_back("--exr");
   return a;
 }
@@ -81,7 +108,8 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
     for (const double until = monotonic_s() + kMasterPatience_s; p.master_endpoint_.empty();) {
       for (const auto& line : master.read_lines())
         if (line.starts_with("listening on ")) p.master_endpoint_ = line.substr(13);
-      if (master.ended() || monotonic_s() > until) return Error{"the master did not start: " + p.last_log_line("master")};
+      if (master.ended() || monotonic_s() > until)
+        return Error{"the master did not start: " + p.last_log_line("master")};
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     p.members_.push_back({"data", "telesplat-data", common(data_arguments(o), "data"), background});
@@ -89,8 +117,10 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
     const int cores = int(std::max(1u, std::thread::hardware_concurrency()));
     const int threads = o.sampler_threads ? o.sampler_threads : std::max(1, cores / o.samplers);
     for (int i = 1; i <= o.samplers; ++i)
-      p.members_.push_back({"sampler", "telesplat-sampler",
-                            common({"--sampler", o.sampler_kind, "--threads", std::to_string(threads)}, fmt::format("sampler-{}", i)), background});
+      p.members_.push_back(
+          {"sampler", "telesplat-sampler",
+           common({"--sampler", o.sampler_kind, "--threads", std::to_string(threads)}, fmt::format("sampler-{}", i)),
+           background});
   }
   p.members_.push_back({"viewer", "telesplat-viewer", common(viewer_arguments(o), "viewer-1"), 0});
   for (auto& m : p.members_)
@@ -102,7 +132,8 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
 Status Pipeline::launch(Member& m) {
   const auto named = std::find(m.arguments.begin(), m.arguments.end(), "--name");
   const std::string name = *(named + 1);
-  auto child = ChildProcess::start(name, program_directory() + "/" + m.program, m.arguments, fmt::format("{}/{}.log", log_directory_, name), m.nice);
+  auto child = ChildProcess::start(name, program_directory() + "/" + m.program, m.arguments,
+                                   fmt::format("{}/{}.log", log_directory_, name), m.nice);
   if (!child) return child.error();
   m.process.reset();
   m.process.emplace(std::move(*child));
@@ -134,12 +165,14 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
       continue;
     }
     if (code == 2 || m.role == "master" || m.restarts >= kMaxRestarts) {
-      news.push_back(code == 2 ? last_log_line(name) : fmt::format("{} ended with code {}: {}", name, code, last_log_line(name)));
+      news.push_back(code == 2 ? last_log_line(name)
+                               : fmt::format("{} ended with code {}: {}", name, code, last_log_line(name)));
       return code == 2 ? State::kBadInput : State::kFailed;
     }
     ++m.restarts;
     ++restarts_;
-    news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again", name, code > 128 ? "signal" : "code", code > 128 ? code - 128 : code));
+    news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again", name,
+                               code > 128 ? "signal" : "code", code > 128 ? code - 128 : code));
     if (const Status s = launch(m); !s) {
       news.push_back(s.error().text);
       return State::kFailed;
@@ -157,7 +190,8 @@ void Pipeline::finish() {
       m.process->signal(SIGTERM);
       m.process->finish(20);
     }
-  if (members_.front().role == "master" && members_.front().process && !members_.front().process->ended() && !master_endpoint_.empty()) {
+  if (members_.front().role == "master" && members_.front().process && !members_.front().process->ended() &&
+      !master_endpoint_.empty()) {
     ControlClient control(master_endpoint_);
     if (!control.ask("stop", 2)) members_.front().process->signal(SIGTERM);
     members_.front().process->finish(kFarewell_s);

@@ -55,7 +55,9 @@ class LiveFigures {
     double updates = 0, points = 0, bytes = 0, frames = 0;
     int samplers = 0;
     for (const auto& p : status["processes"]) {
-      const auto value = [&](const char* key) { return p.contains("values") && p["values"].contains(key) ? p["values"][key].get<double>() : 0.0; };
+      const auto value = [&](const char* key) {
+        return p.contains("values") && p["values"].contains(key) ? p["values"][key].get<double>() : 0.0;
+      };
       if (p["role"] == "sampler" && p["alive"] == true) ++samplers;
       if (p["role"] != "viewer") continue;
       updates += value("updates");
@@ -65,8 +67,9 @@ class LiveFigures {
     }
     const double dt = now_s - last_s_;
     if (last_s_ > 0 && dt > 0.5 && frames > 0)
-      text_ = fmt::format("{:5.1f} fps  {:4.1f} updates/s  {:5.2f} M points  {:5.2f} MB/s  {} sampler{}", (frames - frames_) / dt, (updates - updates_) / dt,
-                          points / 1e6, (bytes - bytes_) / 1e6 / dt, samplers, samplers == 1 ? "" : "s");
+      text_ = fmt::format("{:5.1f} fps  {:4.1f} updates/s  {:5.2f} M points  {:5.2f} MB/s  {} sampler{}",
+                          (frames - frames_) / dt, (updates - updates_) / dt, points / 1e6, (bytes - bytes_) / 1e6 / dt,
+                          samplers, samplers == 1 ? "" : "s");
     if (dt > 0.5) last_s_ = now_s, updates_ = updates, bytes_ = bytes, frames_ = frames;
     return text_;
   }
@@ -100,36 +103,52 @@ void print_report(const std::string& directory) {
   std::ifstream in(directory + "/summary.json");
   const auto s = nlohmann::json::parse(in, nullptr, false);
   if (!s.is_object()) return;
-  const auto line = [](const std::string& what, const std::string& value) { std::printf("  %-34s %s\n", what.c_str(), value.c_str()); };
+  const auto line = [](const std::string& what, const std::string& value) {
+    std::printf("  %-34s %s\n", what.c_str(), value.c_str());
+  };
   const auto dist = [&](const char* key, const char* unit) {
     const auto& d = s[key];
-    return fmt::format("median {:.1f}  p95 {:.1f}  max {:.1f} {}", d["median"].get<double>(), d["p95"].get<double>(), d["max"].get<double>(), unit);
+    return fmt::format("median {:.1f}  p95 {:.1f}  max {:.1f} {}", d["median"].get<double>(), d["p95"].get<double>(),
+                       d["max"].get<double>(), unit);
   };
-  std::printf("\n%s: %llu triangles, display %dx%d, sampling %dx%d, %d sampler(s), %s renderer, %s splats\n", s["scene"].get<std::string>().c_str(),
-              (unsigned long long)s["primitives"].get<uint64_t>(), s["size"][0].get<int>(), s["size"][1].get<int>(), s["sampling_size"][0].get<int>(),
-              s["sampling_size"][1].get<int>(), s["samplers"].get<int>(), s["renderer"].get<std::string>().c_str(), s["splat"].get<std::string>().c_str());
+  std::printf("\n%s: %llu triangles, display %dx%d, sampling %dx%d, %d sampler(s), %s renderer, %s splats\n",
+              s["scene"].get<std::string>().c_str(), (unsigned long long)s["primitives"].get<uint64_t>(),
+              s["size"][0].get<int>(), s["size"][1].get<int>(), s["sampling_size"][0].get<int>(),
+              s["sampling_size"][1].get<int>(), s["samplers"].get<int>(), s["renderer"].get<std::string>().c_str(),
+              s["splat"].get<std::string>().c_str());
   line("display", fmt::format("{:.1f} fps over {} frames", s["fps"].get<double>(), s["frames"].get<uint64_t>()));
   line("inter-frame delay", dist("inter_frame_delay_ms", "ms"));
   line("view construction", dist("view_construction_ms", "ms"));
-  line("view updates", fmt::format("{:.2f} per second, {} in all", s["updates_per_s"].get<double>(), s["updates"].get<uint64_t>()));
+  line("view updates",
+       fmt::format("{:.2f} per second, {} in all", s["updates_per_s"].get<double>(), s["updates"].get<uint64_t>()));
   line("view update latency", dist("view_update_latency_ms", "ms"));
-  line("sampling / packing of a frame", fmt::format("median {:.1f} / {:.1f} ms", s["sampling_ms"]["median"].get<double>(), s["packing_ms"]["median"].get<double>()));
-  line("points cached", fmt::format("{:.2f} M, {:.1f} bytes each", s["points_cached"].get<double>() / 1e6, s["bytes_per_cached_point"].get<double>()));
+  line("sampling / packing of a frame",
+       fmt::format("median {:.1f} / {:.1f} ms", s["sampling_ms"]["median"].get<double>(),
+                   s["packing_ms"]["median"].get<double>()));
+  line("points cached", fmt::format("{:.2f} M, {:.1f} bytes each", s["points_cached"].get<double>() / 1e6,
+                                    s["bytes_per_cached_point"].get<double>()));
   line("redundancy eliminated", fmt::format("{:.2f} %", s["redundancy_eliminated"].get<double>() * 100));
-  line("sent to viewers", fmt::format("{:.2f} MB of {:.0f} MB sampled ({:.0f} : 1), {:.2f} MB/s", s["bytes_sent"].get<double>() / 1e6, s["bytes_raw"].get<double>() / 1e6,
-                                      s["compression_ratio"].get<double>(), s["data_transfer_rate_mb_s"].get<double>()));
+  line("sent to viewers",
+       fmt::format("{:.2f} MB of {:.0f} MB sampled ({:.0f} : 1), {:.2f} MB/s", s["bytes_sent"].get<double>() / 1e6,
+                   s["bytes_raw"].get<double>() / 1e6, s["compression_ratio"].get<double>(),
+                   s["data_transfer_rate_mb_s"].get<double>()));
   if (s["quality"].is_object()) {
     const auto& q = s["quality"];
-    line("PSNR against direct rendering", fmt::format("median {:.2f} dB over {} views", q["psnr_db"]["median"].get<double>(), q["views"].get<int>()));
+    line("PSNR against direct rendering",
+         fmt::format("median {:.2f} dB over {} views", q["psnr_db"]["median"].get<double>(), q["views"].get<int>()));
     line("SSIM", fmt::format("median {:.4f}", q["ssim"]["median"].get<double>()));
-    line("hole fraction", fmt::format("median {:.3f} %  p95 {:.3f} %", q["hole_fraction"]["median"].get<double>() * 100, q["hole_fraction"]["p95"].get<double>() * 100));
+    line("hole fraction", fmt::format("median {:.3f} %  p95 {:.3f} %", q["hole_fraction"]["median"].get<double>() * 100,
+                                      q["hole_fraction"]["p95"].get<double>() * 100));
     if (q.contains("last_view"))
-      line("last view", fmt::format("PSNR {:.2f} dB, holes {:.3f} %", q["last_view"]["psnr_db"].get<double>(), q["last_view"]["hole_fraction"].get<double>() * 100));
+      line("last view", fmt::format("PSNR {:.2f} dB, holes {:.3f} %", q["last_view"]["psnr_db"].get<double>(),
+                                    q["last_view"]["hole_fraction"].get<double>() * 100));
   }
   const auto& e = s["errors"];
-  line("errors", fmt::format("{} messages rejected, {} gaps resynchronised, {} leases expired", e["messages_rejected"].get<uint64_t>(),
-                             e["gaps_resynced"].get<uint64_t>(), e["leases_expired"].get<uint64_t>()));
-  std::printf("\nEverything lies in %s (summary.json, frames.csv, updates.csv, tiles.csv, trace.json, images/)\n", directory.c_str());
+  line("errors", fmt::format("{} messages rejected, {} gaps resynchronised, {} leases expired",
+                             e["messages_rejected"].get<uint64_t>(), e["gaps_resynced"].get<uint64_t>(),
+                             e["leases_expired"].get<uint64_t>()));
+  std::printf("\nEverything lies in %s (summary.json, frames.csv, updates.csv, tiles.csv, trace.json, images/)\n",
+              directory.c_str());
 }
 
 }  // namespace
@@ -138,16 +157,27 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
   app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)");
   app.add_option("--out", o.out, "run folder; default: runs/DATE-TIME");
   app.add_option("--samplers", o.samplers, "sampler processes")->capture_default_str()->check(CLI::Range(1, 64));
-  app.add_option("--sampler", o.sampler_kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")->capture_default_str()->check(CLI::IsMember({"auto", "ray", "raster"}));
-  app.add_option("--sampler-threads", o.sampler_threads, "threads of each sampler; 0: the cores shared among them")->capture_default_str()->check(CLI::Range(0, 1024));
+  app.add_option("--sampler", o.sampler_kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "ray", "raster"}));
+  app.add_option("--sampler-threads", o.sampler_threads, "threads of each sampler; 0: the cores shared among them")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
   app.add_option("--master", o.join_master, "join the running session at this address instead of starting one");
-  app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")->capture_default_str()->check(CLI::Range(1e-3, 1e3));
-  app.add_option("--up", o.mesh.up, "data axis that points up")->capture_default_str()->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
-  app.add_option("--cache", o.mesh.cache_dir, "folder of the chunk store; default: telesplat in the user's cache folder");
+  app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e3));
+  app.add_option("--up", o.mesh.up, "data axis that points up")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
+  app.add_option("--cache", o.mesh.cache_dir,
+                 "folder of the chunk store; default: telesplat in the user's cache folder");
   app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
   app.add_flag("!--same-priority", o.background_servers, "run samplers, packer and data at the viewer's priority");
-  app.add_flag("--record-depth", o.record_depth, "keep the first 50 sampled depth images (telesplat inspect reads them)");
-  app.add_option("--seed", o.seed, "seed of whatever is random in a run; nothing is, in mesh runs")->capture_default_str();
+  app.add_flag("--record-depth", o.record_depth,
+               "keep the first 50 sampled depth images (telesplat inspect reads them)");
+  app.add_option("--seed", o.seed, "seed of whatever is random in a run; nothing is, in mesh runs")
+      ->capture_default_str();
   viewer::add_view_flags(app, o.viewer);
   master::add_session_flags(app, o.master);
   app.add_option("--log-level", o.master.service.log_level, "trace, debug, info, warn, error or off")
@@ -207,8 +237,10 @@ int run(const RunOptions& given) {
   if (o.viewer.display.verify_every && !interrupted && o.join_master.empty()) {
     const auto store = data::MeshStore::open(o.scene, o.mesh, [](const char*, double) {});
     if (!store) return refuse(store.error());
-    const Status verified = verify_run(o.out, **store, o.viewer.display.shading,
-                                       [&](size_t done, size_t of) { progress.show(fmt::format("verifying view {} of {}", done, of)); }, net::stop_requested);
+    const Status verified = verify_run(
+        o.out, **store, o.viewer.display.shading,
+        [&](size_t done, size_t of) { progress.show(fmt::format("verifying view {} of {}", done, of)); },
+        net::stop_requested);
     progress.close();
     if (!verified) {
       std::fprintf(stderr, "telesplat: %s\n", verified.error().text.c_str());

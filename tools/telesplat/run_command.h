@@ -14,13 +14,13 @@ struct RunOptions {
   viewer::ViewerOptions viewer;
   int samplers = 1;
   std::string sampler_kind = "auto";
-  int sampler_threads = 0;        ///< a sampler's; 0: the machine's cores shared among the samplers
-  std::string join_master;        ///< --master: join a running session instead of starting one
+  int sampler_threads = 0;  ///< a sampler's; 0: the machine's cores shared among the samplers
+  std::string join_master;  ///< --master: join a running session instead of starting one
   std::string out;
-  double started_s = 0;           ///< when the command began, on the monotonic clock: start-up times count from there
+  double started_s = 0;  ///< when the command began, on the monotonic clock: start-up times count from there
   uint64_t seed = 0;
-  bool record_depth = false;      ///< keep sampled depth images in OUT/depth
-  bool background_servers = true; ///< samplers, packer and data run at lower priority than the viewer
+  bool record_depth = false;       ///< keep sampled depth images in OUT/depth
+  bool background_servers = true;  ///< samplers, packer and data run at lower priority than the viewer
 };
 
 void add_run_flags(CLI::App& app, RunOptions& options);

@@ -2,14 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <toml++/toml.h>
 #include <algorithm>
 #include <filesystem>
-#include <toml++/toml.h>
 
 namespace telesplat::launcher {
 namespace {
 
-Status collect(const std::string& path, const std::string& prefix, const toml::table& table, std::vector<std::string>& flags, std::string& file) {
+Status collect(const std::string& path, const std::string& prefix, const toml::table& table,
+               std::vector<std::string>& flags, std::string& file) {
   for (const auto& [key, node] : table) {
     const std::string name(key.str());
     if (const auto* inner = node.as_table()) {
@@ -18,8 +19,10 @@ Status collect(const std::string& path, const std::string& prefix, const toml::t
       continue;
     }
     std::string flag = name;
-    if (prefix == "packing") flag = "packing." + name;
-    else std::replace(flag.begin(), flag.end(), '_', '-');
+    if (prefix == "packing")
+      flag = "packing." + name;
+    else
+      std::replace(flag.begin(), flag.end(), '_', '-');
     if (name == "file" && node.is_string()) {
       file = (std::filesystem::path(path).parent_path() / **node.as_string()).string();
     } else if (node.is_boolean()) {
@@ -56,7 +59,8 @@ Result<std::vector<std::string>> read_scene_file(const std::string& path) {
 Result<std::vector<std::string>> expand_scene_file(int argc, char** argv) {
   std::vector<std::string> arguments(argv + 1, argv + argc);
   // The sub-command comes first; the scene is its one argument that ends in .toml.
-  const auto scene = std::find_if(arguments.begin(), arguments.end(), [](const std::string& a) { return a.ends_with(".toml") && !a.starts_with("-"); });
+  const auto scene = std::find_if(arguments.begin(), arguments.end(),
+                                  [](const std::string& a) { return a.ends_with(".toml") && !a.starts_with("-"); });
   if (arguments.empty() || arguments.front() != "run" || scene == arguments.end()) return arguments;
   auto flags = read_scene_file(*scene);
   if (!flags) return flags;

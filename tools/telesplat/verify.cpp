@@ -55,13 +55,18 @@ Status write_summary(const std::string& directory, const std::vector<Verified>& 
     holes.push_back(v.quality.hole_fraction);
   }
   const auto precise = [](const metrics::Distribution& d) {
-    return nlohmann::ordered_json{{"mean", d.mean}, {"median", d.median}, {"p95", d.p95}, {"p99", d.p99}, {"max", d.max}};
+    return nlohmann::ordered_json{
+        {"mean", d.mean}, {"median", d.median}, {"p95", d.p95}, {"p99", d.p99}, {"max", d.max}};
   };
-  summary["quality"] = {{"views", psnr.size()}, {"views_without_object", views.size() - psnr.size()},
-                        {"psnr_db", metrics::to_json(metrics::distribution(psnr))}, {"ssim", precise(metrics::distribution(ssim))},
+  summary["quality"] = {{"views", psnr.size()},
+                        {"views_without_object", views.size() - psnr.size()},
+                        {"psnr_db", metrics::to_json(metrics::distribution(psnr))},
+                        {"ssim", precise(metrics::distribution(ssim))},
                         {"hole_fraction", precise(metrics::distribution(holes))}};
   if (!views.empty())
-    summary["quality"]["last_view"] = {{"psnr_db", views.back().quality.psnr_db}, {"ssim", views.back().quality.ssim}, {"hole_fraction", views.back().quality.hole_fraction}};
+    summary["quality"]["last_view"] = {{"psnr_db", views.back().quality.psnr_db},
+                                       {"ssim", views.back().quality.ssim},
+                                       {"hole_fraction", views.back().quality.hole_fraction}};
   std::ofstream out(path + ".part");
   out << summary.dump(2) << "\n";
   out.close();
@@ -73,7 +78,8 @@ Status write_summary(const std::string& directory, const std::vector<Verified>& 
 
 }  // namespace
 
-Status verify_run(const std::string& directory, const data::MeshStore& store, const image::ShadingParameters& shading_parameters,
+Status verify_run(const std::string& directory, const data::MeshStore& store,
+                  const image::ShadingParameters& shading_parameters,
                   const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& should_stop) {
   const std::string spool = directory + "/spool";
   const auto paths = viewer::spooled_frames(spool);
@@ -83,7 +89,9 @@ Status verify_run(const std::string& directory, const data::MeshStore& store, co
   if (const Status s = sampler->add_chunks(std::move(chunks)); !s) return s;
 
   std::vector<Verified> views;
-  const auto reference_of = [&](const geometry::Camera& camera) { return sampler::render_directly(*sampler, camera, image::Shading(shading_parameters, camera)); };
+  const auto reference_of = [&](const geometry::Camera& camera) {
+    return sampler::render_directly(*sampler, camera, image::Shading(shading_parameters, camera));
+  };
   for (size_t i = 0; i < paths.size() && !should_stop(); ++i) {
     const auto frame = viewer::read_spooled_frame(paths[i]);
     if (!frame) return frame.error();
@@ -95,17 +103,24 @@ Status verify_run(const std::string& directory, const data::MeshStore& store, co
   std::ofstream csv(directory + "/quality.csv");
   csv << "frame,t_s,psnr_db,ssim,hole_fraction,object_pixels\n";
   for (const auto& v : views)
-    csv << fmt::format("{},{:.4f},{:.3f},{:.5f},{:.6f},{}\n", v.frame, v.t_s, v.quality.psnr_db, v.quality.ssim, v.quality.hole_fraction, v.quality.object_pixels);
+    csv << fmt::format("{},{:.4f},{:.3f},{:.5f},{:.6f},{}\n", v.frame, v.t_s, v.quality.psnr_db, v.quality.ssim,
+                       v.quality.hole_fraction, v.quality.object_pixels);
 
   std::vector<Verified> seen;
-  std::copy_if(views.begin(), views.end(), std::back_inserter(seen), [](const Verified& v) { return v.quality.object_pixels > 0; });
+  std::copy_if(views.begin(), views.end(), std::back_inserter(seen),
+               [](const Verified& v) { return v.quality.object_pixels > 0; });
   if (!seen.empty()) {
     const Verified last = seen.back();
-    std::sort(seen.begin(), seen.end(), [](const auto& a, const auto& b) { return a.quality.psnr_db < b.quality.psnr_db; });
-    for (const auto& [name, v] : {std::pair{"worst", seen.front()}, {"median", seen[seen.size() / 2]}, {"last", last}}) {
+    std::sort(seen.begin(), seen.end(),
+              [](const auto& a, const auto& b) { return a.quality.psnr_db < b.quality.psnr_db; });
+    for (const auto& [name, v] :
+         {std::pair{"worst", seen.front()}, {"median", seen[seen.size() / 2]}, {"last", last}}) {
       const auto frame = viewer::read_spooled_frame(v.path);
       if (!frame) return frame.error();
-      if (const Status s = image::write_png(fmt::format("{}/images/verify-{}-{:06d}.png", directory, name, v.frame), side_by_side(reference_of(frame->camera), frame->view)); !s) return s;
+      if (const Status s = image::write_png(fmt::format("{}/images/verify-{}-{:06d}.png", directory, name, v.frame),
+                                            side_by_side(reference_of(frame->camera), frame->view));
+          !s)
+        return s;
     }
   }
   std::error_code error;

@@ -14,7 +14,8 @@ namespace telesplat::launcher {
 /// same shading; writes quality.csv, comparison pictures (reference | displayed | difference) of the worst, the median and the
 /// last view into images/, fills "quality" in summary.json, and deletes the spooled frames.
 /// progress(done, of) is called after each view. should_stop() ends it early; what was compared so far counts.
-Status verify_run(const std::string& run_directory, const data::MeshStore& store, const image::ShadingParameters& shading,
-                  const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& should_stop);
+Status verify_run(const std::string& run_directory, const data::MeshStore& store,
+                  const image::ShadingParameters& shading, const std::function<void(size_t, size_t)>& progress,
+                  const std::function<bool()>& should_stop);
 
 }  // namespace telesplat::launcher

@@ -16,16 +16,20 @@ namespace telesplat::viewer {
 struct ModelEvent {
   std::variant<wire::Patch, wire::Forget, wire::EpochBegin> body;
   std::shared_ptr<const void> owner;
-  InstanceId packer() const { return std::visit([](const auto& e) { return e.packer; }, body); }
-  Sequence sequence() const { return std::visit([](const auto& e) { return e.sequence; }, body); }
+  InstanceId packer() const {
+    return std::visit([](const auto& e) { return e.packer; }, body);
+  }
+  Sequence sequence() const {
+    return std::visit([](const auto& e) { return e.sequence; }, body);
+  }
   size_t bytes() const;
 };
 
 class EventSequencer {
  public:
   struct Callbacks {
-    std::function<void(const ModelEvent&)> apply;        ///< the next event of the current packer
-    std::function<void()> begin_replica;                 ///< a packer we have nothing of: start from nothing
+    std::function<void(const ModelEvent&)> apply;  ///< the next event of the current packer
+    std::function<void()> begin_replica;           ///< a packer we have nothing of: start from nothing
     std::function<void(InstanceId packer, Sequence after)> request_state;
   };
   explicit EventSequencer(Callbacks callbacks) : callbacks_(std::move(callbacks)) {}

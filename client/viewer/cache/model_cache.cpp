@@ -8,8 +8,10 @@ void ModelCache::begin_replica(const points::ModelConfig& config) {
   auto fresh = std::make_unique<points::PointModel>(config);
   const std::lock_guard lock(mutex_);
   if (newest_) {
-    if (!shown_) shown_ = std::move(newest_);
-    else retired_models_.push_back(std::move(newest_));
+    if (!shown_)
+      shown_ = std::move(newest_);
+    else
+      retired_models_.push_back(std::move(newest_));
   }
   newest_ = std::move(fresh);
 }
@@ -45,8 +47,10 @@ uint64_t ModelCache::digest() const {
 void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {
   const std::lock_guard lock(mutex_);
   const points::PointModel* model = shown_ ? shown_.get() : newest_.get();
-  if (model) splat::select_view(*model, camera, options, out);
-  else out = {};
+  if (model)
+    splat::select_view(*model, camera, options, out);
+  else
+    out = {};
 }
 
 void ModelCache::end_frame() {

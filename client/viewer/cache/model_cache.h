@@ -32,12 +32,14 @@ class ModelCache {
   void end_frame();
 
   // ---- any thread ----
-  struct Figures { uint64_t points = 0, bytes = 0, patches = 0; };
+  struct Figures {
+    uint64_t points = 0, bytes = 0, patches = 0;
+  };
   Figures figures() const;
 
  private:
   mutable std::mutex mutex_;
-  std::unique_ptr<points::PointModel> newest_, shown_;  // shown_ only while it is not the newest
+  std::unique_ptr<points::PointModel> newest_, shown_;              // shown_ only while it is not the newest
   std::vector<std::unique_ptr<points::Cluster>> retired_clusters_;  // where they were: draw lists point to them
   std::vector<std::unique_ptr<points::PointModel>> retired_models_;
   uint64_t patches_ = 0;

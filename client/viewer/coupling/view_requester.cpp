@@ -40,7 +40,8 @@ PosePredictor::Velocity PosePredictor::velocity() const {
   const Sample &a = samples_.front(), &b = samples_.back();
   const double dt = b.t_s - a.t_s;
   if (dt < 1e-3) return {};
-  return {(b.pose.position_room - a.pose.position_room) / dt, rotation_vector(b.pose.orientation * glm::conjugate(a.pose.orientation)) / dt};
+  return {(b.pose.position_room - a.pose.position_room) / dt,
+          rotation_vector(b.pose.orientation * glm::conjugate(a.pose.orientation)) / dt};
 }
 
 double PosePredictor::speed_m_s() const { return glm::length(velocity().linear); }

@@ -12,9 +12,9 @@ namespace telesplat::viewer {
 
 struct RequestOptions {
   int sampling_width = 1280, sampling_height = 800;
-  double max_rate_hz = 12;           ///< requests a second at most; the master keeps only the newest
-  double max_margin = 0.3;           ///< the sampled frustum is at most this fraction wider than the displayed one
-  double initial_latency_s = 0.25;   ///< assumed until one was measured
+  double max_rate_hz = 12;          ///< requests a second at most; the master keeps only the newest
+  double max_margin = 0.3;          ///< the sampled frustum is at most this fraction wider than the displayed one
+  double initial_latency_s = 0.25;  ///< assumed until one was measured
 };
 
 /// Extrapolates a head pose with its recent velocity.
@@ -27,8 +27,13 @@ class PosePredictor {
   double turn_rad_s() const;
 
  private:
-  struct Sample { double t_s; geometry::Pose pose; };
-  struct Velocity { glm::dvec3 linear{0.0}, angular{0.0}; };  // room space
+  struct Sample {
+    double t_s;
+    geometry::Pose pose;
+  };
+  struct Velocity {
+    glm::dvec3 linear{0.0}, angular{0.0};
+  };  // room space
   Velocity velocity() const;
   std::deque<Sample> samples_;
 };

@@ -26,14 +26,34 @@ double angle_deg(const glm::dquat& a, const glm::dquat& b) {
 }  // namespace
 
 const std::vector<std::string>& frame_columns() {
-  static const std::vector<std::string> columns{
-      "frame", "t_s", "inter_frame_ms", "construction_ms", "select_ms", "render_ms", "project_cpu_ms", "resolve_cpu_ms", "points_selected",
-      "points_drawn", "items", "points_cached", "update_age_ms", "view_error_m", "view_error_deg", "px", "py", "pz", "qw", "qx", "qy", "qz"};
+  static const std::vector<std::string> columns{"frame",
+                                                "t_s",
+                                                "inter_frame_ms",
+                                                "construction_ms",
+                                                "select_ms",
+                                                "render_ms",
+                                                "project_cpu_ms",
+                                                "resolve_cpu_ms",
+                                                "points_selected",
+                                                "points_drawn",
+                                                "items",
+                                                "points_cached",
+                                                "update_age_ms",
+                                                "view_error_m",
+                                                "view_error_deg",
+                                                "px",
+                                                "py",
+                                                "pz",
+                                                "qw",
+                                                "qx",
+                                                "qy",
+                                                "qz"};
   return columns;
 }
 
-DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& trajectory, Renderer& renderer, ModelCache& cache,
-                          ReplicaWorker& worker, metrics::TableRecorder& frames, metrics::SpanRecorder& spans, FrameSpool* spool) {
+DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& trajectory, Renderer& renderer,
+                          ModelCache& cache, ReplicaWorker& worker, metrics::TableRecorder& frames,
+                          metrics::SpanRecorder& spans, FrameSpool* spool) {
   const auto camera_at = [&](double t_s) {
     const double moving_s = o.duration_s > 0 ? std::min(t_s, o.duration_s - o.hold_s) : t_s;
     return geometry::make_camera(trajectory.at(moving_s), o.fov_deg, o.width, o.height, o.near_m);
@@ -50,7 +70,8 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
     worker.on_pose(monotonic_s(), camera);
     cache.select(camera, o.selection, list);
     if (list.points > 0) {
-      renderer.render(list, camera, o.kernel, image::Shading(o.shading, camera), {o.width, o.height, view.colour.data(), nullptr});
+      renderer.render(list, camera, o.kernel, image::Shading(o.shading, camera),
+                      {o.width, o.height, view.colour.data(), nullptr});
       worker.on_first_points(monotonic_s());
     }
     cache.end_frame();
@@ -77,23 +98,44 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
     const double selected_s = monotonic_s();
     uint32_t use = 0;
     if (spool) {
-      if (o.picture_every ? result.frames % o.picture_every == 0 : t_s >= next_picture_s || last) use |= o.exr ? kPicture | kExr : kPicture;
+      if (o.picture_every ? result.frames % o.picture_every == 0 : t_s >= next_picture_s || last)
+        use |= o.exr ? kPicture | kExr : kPicture;
       if (o.verify_every && (result.frames % o.verify_every == 0 || last)) use |= kVerify;
     }
     const bool with_depth = use & (kVerify | kExr);
-    const auto stats = renderer.render(list, camera, o.kernel, shading, {o.width, o.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
+    const auto stats =
+        renderer.render(list, camera, o.kernel, shading,
+                        {o.width, o.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
     cache.end_frame();
     const double end_s = monotonic_s();
     worker.on_frame(end_s, camera, list.clusters_seen);
 
     const auto update = worker.last_update();
     const auto figures = cache.figures();
-    const auto &p = camera.pose.position_room;
-    const auto &q = camera.pose.orientation;
-    frames.add({double(result.frames), t_s, previous_s > 0 ? (end_s - previous_s) * 1e3 : 0.0, (end_s - begin_s) * 1e3, (selected_s - begin_s) * 1e3,
-                (end_s - selected_s) * 1e3, stats.project_ms, stats.resolve_ms, double(list.points), double(stats.points_drawn),
-                double(list.items.size()), double(figures.points), (worker.to_master_s(end_s) - update.requested_s) * 1e3,
-                glm::distance(p, update.pose.position_room), angle_deg(q, update.pose.orientation), p.x, p.y, p.z, q.w, q.x, q.y, q.z});
+    const auto& p = camera.pose.position_room;
+    const auto& q = camera.pose.orientation;
+    frames.add({double(result.frames),
+                t_s,
+                previous_s > 0 ? (end_s - previous_s) * 1e3 : 0.0,
+                (end_s - begin_s) * 1e3,
+                (selected_s - begin_s) * 1e3,
+                (end_s - selected_s) * 1e3,
+                stats.project_ms,
+                stats.resolve_ms,
+                double(list.points),
+                double(stats.points_drawn),
+                double(list.items.size()),
+                double(figures.points),
+                (worker.to_master_s(end_s) - update.requested_s) * 1e3,
+                glm::distance(p, update.pose.position_room),
+                angle_deg(q, update.pose.orientation),
+                p.x,
+                p.y,
+                p.z,
+                q.w,
+                q.x,
+                q.y,
+                q.z});
     spans.add("display frame", worker.to_master_s(begin_s), worker.to_master_s(end_s), 0);
     previous_s = end_s;
     if (use) {

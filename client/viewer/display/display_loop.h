@@ -13,16 +13,16 @@ namespace telesplat::viewer {
 struct DisplayOptions {
   int width = 1280, height = 800;
   double fov_deg = 90, near_m = 0.02;
-  double target_fps = 60;          ///< frames are paced to this; 0: as fast as possible
-  double duration_s = 10;          ///< seconds from the first displayed frame; 0: until told to stop
-  uint64_t frames = 0;             ///< frames to display; 0: no limit
-  double hold_s = 0;               ///< the head stands still for the last so many seconds of duration_s
+  double target_fps = 60;  ///< frames are paced to this; 0: as fast as possible
+  double duration_s = 10;  ///< seconds from the first displayed frame; 0: until told to stop
+  uint64_t frames = 0;     ///< frames to display; 0: no limit
+  double hold_s = 0;       ///< the head stands still for the last so many seconds of duration_s
   splat::Kernel kernel = splat::Kernel::kDisc;
   splat::SelectionOptions selection;
   image::ShadingParameters shading;
-  uint64_t picture_every = 0;      ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one
-  uint64_t verify_every = 0;       ///< keep every N-th frame for verification; 0: none
-  bool exr = false;                ///< pictures as EXR with depth too
+  uint64_t picture_every = 0;  ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one
+  uint64_t verify_every = 0;   ///< keep every N-th frame for verification; 0: none
+  bool exr = false;            ///< pictures as EXR with depth too
 };
 
 /// The columns of frames.csv (docs/metrics.md).
@@ -30,12 +30,13 @@ const std::vector<std::string>& frame_columns();
 
 struct DisplayResult {
   uint64_t frames = 0;
-  bool interrupted = false;        ///< told to stop before duration or frames were reached
+  bool interrupted = false;  ///< told to stop before duration or frames were reached
 };
 
 /// Waits for the first complete view update (the head rests at the trajectory's beginning), then displays frames. `spool` may be
 /// null: nothing is recorded.
-DisplayResult run_display(const DisplayOptions& options, const geometry::Trajectory& trajectory, Renderer& renderer, ModelCache& cache,
-                          ReplicaWorker& worker, metrics::TableRecorder& frames, metrics::SpanRecorder& spans, FrameSpool* spool);
+DisplayResult run_display(const DisplayOptions& options, const geometry::Trajectory& trajectory, Renderer& renderer,
+                          ModelCache& cache, ReplicaWorker& worker, metrics::TableRecorder& frames,
+                          metrics::SpanRecorder& spans, FrameSpool* spool);
 
 }  // namespace telesplat::viewer

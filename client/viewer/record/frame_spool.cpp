@@ -30,8 +30,8 @@ FilePtr open_file(const std::string& path, const char* mode) { return {std::fope
 bool write_frame(const std::string& directory, const SpooledFrame& f) {
   FileHeader h;
   const auto& c = f.camera;
-  const auto &p = c.pose.position_room;
-  const auto &q = c.pose.orientation;
+  const auto& p = c.pose.position_room;
+  const auto& q = c.pose.orientation;
   h.number = f.number;
   h.t_s = f.t_s;
   const double camera[12] = {p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m};
@@ -48,8 +48,10 @@ bool write_frame(const std::string& directory, const SpooledFrame& f) {
   ok = ok && std::fwrite(f.view.depth_m.data(), 4, f.view.depth_m.size(), out.get()) == f.view.depth_m.size();
   ok = ok && std::fflush(out.get()) == 0;
   std::error_code error;
-  if (ok) fs::rename(path + ".part", path, error);
-  else fs::remove(path + ".part", error);
+  if (ok)
+    fs::rename(path + ".part", path, error);
+  else
+    fs::remove(path + ".part", error);
   return ok && !error;
 }
 
@@ -140,7 +142,8 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
     return Error{fmt::format("{}: is not a recorded frame", path)};
   SpooledFrame f{h.number, h.t_s, h.use, {}, {}};
   const double* c = h.camera;
-  f.camera = {{{c[0], c[1], c[2]}, glm::dquat(c[3], c[4], c[5], c[6])}, c[7], c[8], c[9], c[10], c[11], h.width, h.height};
+  f.camera = {
+      {{c[0], c[1], c[2]}, glm::dquat(c[3], c[4], c[5], c[6])}, c[7], c[8], c[9], c[10], c[11], h.width, h.height};
   if (const Status s = geometry::validate(f.camera); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
   const size_t pixels = size_t(h.width) * size_t(h.height);
   std::error_code error;
@@ -153,7 +156,8 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
   return f;
 }
 
-Status develop_frames(const std::string& spool_directory, const std::string& picture_directory, const std::function<void(size_t, size_t)>& progress) {
+Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
+                      const std::function<void(size_t, size_t)>& progress) {
   std::error_code error;
   fs::create_directories(picture_directory, error);
   const auto paths = spooled_frames(spool_directory);

@@ -61,6 +61,7 @@ std::vector<std::string> spooled_frames(const std::string& directory);
 Result<SpooledFrame> read_spooled_frame(const std::string& path);
 /// Turns frames marked kPicture into directory/frame-NNNNNN.png (kExr: .exr too) and deletes spooled frames that are not also
 /// marked kVerify. progress: done, of.
-Status develop_frames(const std::string& spool_directory, const std::string& picture_directory, const std::function<void(size_t, size_t)>& progress);
+Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
+                      const std::function<void(size_t, size_t)>& progress);
 
 }  // namespace telesplat::viewer

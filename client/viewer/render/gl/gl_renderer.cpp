@@ -35,8 +35,12 @@ Result<std::unique_ptr<GlRenderer>> GlRenderer::make() {
   return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), std::move(current), *program));
 }
 
-GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current, const SplatProgram& program)
-    : context_(std::move(context)), current_(std::move(current)), program_(program), arenas_(std::make_unique<PointArenas>()) {
+GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current,
+                       const SplatProgram& program)
+    : context_(std::move(context)),
+      current_(std::move(current)),
+      program_(program),
+      arenas_(std::make_unique<PointArenas>()) {
   glGenFramebuffers(1, &framebuffer_);
   glGenVertexArrays(1, &vertex_array_);
   for (uint32_t* buffer : {&draw_numbers_, &draw_records_, &commands_, &intensities_}) glGenBuffers(1, buffer);
@@ -168,7 +172,8 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
     if (refusals_.allow(start)) log::error("{}", resized.error().text);
     std::fill_n(target.colour, static_cast<size_t>(target.width) * target.height, 0xff000000u | shading.background());
     if (target.depth_m)
-      std::fill_n(target.depth_m, static_cast<size_t>(target.width) * target.height, std::numeric_limits<float>::infinity());
+      std::fill_n(target.depth_m, static_cast<size_t>(target.width) * target.height,
+                  std::numeric_limits<float>::infinity());
     return {};
   }
   prepare_draws(list, camera, kernel);

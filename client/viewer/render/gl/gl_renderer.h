@@ -43,7 +43,7 @@ class GlRenderer final : public Renderer {
   std::unique_ptr<Current> current_;         // in the thread that made the renderer, as long as it lives
   SplatProgram program_;
   std::unique_ptr<PointArenas> arenas_;
-  int width_ = 0, height_ = 0;  // of the frame buffer, without its margin
+  int width_ = 0, height_ = 0;                   // of the frame buffer, without its margin
   uint32_t framebuffer_ = 0, textures_[3] = {};  // colour, depth in metres, depth
   uint32_t vertex_array_ = 0, draw_numbers_ = 0, draw_records_ = 0, commands_ = 0, intensities_ = 0;
   size_t draw_number_count_ = 0;

@@ -37,7 +37,8 @@ PointRange PointArenas::place(const splat::DrawItem& item) {
     transient_.push_back(entry);
     return entry.range;
   }
-  const auto [it, is_new] = entries_.try_emplace(Key{item.cluster->key, level.count, item.sequence, level.x, level.colour});
+  const auto [it, is_new] =
+      entries_.try_emplace(Key{item.cluster->key, level.count, item.sequence, level.x, level.colour});
   Entry& entry = it->second;
   if (is_new) {
     entry.range = allocate(words);
@@ -105,7 +106,8 @@ void PointArenas::upload(const points::Mosaic::Level& level, const PointRange& r
   }
   std::memcpy(out, level.colour, n * 4);
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, arenas_[range.arena].buffer);
-  glBufferSubData(GL_SHADER_STORAGE_BUFFER, static_cast<GLintptr>(range.word) * 4, static_cast<GLsizeiptr>(n) * 12, staging_.data());
+  glBufferSubData(GL_SHADER_STORAGE_BUFFER, static_cast<GLintptr>(range.word) * 4, static_cast<GLsizeiptr>(n) * 12,
+                  staging_.data());
 }
 
 }  // namespace telesplat::viewer

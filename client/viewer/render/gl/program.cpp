@@ -105,7 +105,8 @@ Result<uint32_t> compile(GLenum kind, const std::string& source) {
   char log[1024] = {};
   glGetShaderInfoLog(shader, sizeof log, nullptr, log);
   glDeleteShader(shader);
-  return Error{fmt::format("the {} shader does not compile: {}", kind == GL_VERTEX_SHADER ? "vertex" : "fragment", log)};
+  return Error{
+      fmt::format("the {} shader does not compile: {}", kind == GL_VERTEX_SHADER ? "vertex" : "fragment", log)};
 }
 
 std::string with_constants(std::string source) {

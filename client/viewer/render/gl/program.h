@@ -12,10 +12,10 @@ struct DrawRecord {
   float row_x[4], row_y[4], row_w[4];  ///< splat::LeafTransform
   uint32_t word;                       ///< of the points, in their arena
   uint32_t count;
-  int32_t side;        ///< pixels
-  float diameter;      ///< disc: pixels; square: 0
-  float bias_growth;   ///< splat::splat_bias_growth
-  int32_t sub_steps;   ///< 2^sub_bits of the splat's shape
+  int32_t side;       ///< pixels
+  float diameter;     ///< disc: pixels; square: 0
+  float bias_growth;  ///< splat::splat_bias_growth
+  int32_t sub_steps;  ///< 2^sub_bits of the splat's shape
   int32_t unused[2];
 };
 static_assert(sizeof(DrawRecord) == 80);
