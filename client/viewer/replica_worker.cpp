@@ -37,6 +37,7 @@ ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, Mode
                   [this] {
                     points::ModelConfig config{link_.session()->box_room, int(link_.session()->octree_depth)};
                     cache_.begin_replica(config);
+                    if (options_.events) options_.events->begin_replica(config);
                   },
                   [this](InstanceId packer, Sequence after) {
                     asked_s_ = monotonic_s();
@@ -158,15 +159,16 @@ void ReplicaWorker::receive_answers() {
 }
 
 void ReplicaWorker::apply(const ModelEvent& event) {
+  if (options_.events) options_.events->add(event);
   std::visit(
       [this](const auto& e) {
         using E = std::decay_t<decltype(e)>;
         if constexpr (std::is_same_v<E, wire::Patch>)
           apply_patch(e);
         else if constexpr (std::is_same_v<E, wire::Forget>)
-          cache_.forget(e.clusters);
+          cache_.forget(e.sequence, e.clusters);
         else
-          cache_.clear();
+          cache_.clear(e.sequence);
       },
       event.body);
 }

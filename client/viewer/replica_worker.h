@@ -9,6 +9,7 @@
 #include "client/viewer/cache/event_sequencer.h"
 #include "client/viewer/cache/model_cache.h"
 #include "client/viewer/coupling/view_requester.h"
+#include "client/viewer/record/event_record.h"
 #include "common/metrics/recorder.h"
 #include "common/net/master_link.h"
 #include "common/net/service.h"
@@ -21,7 +22,8 @@ class ReplicaWorker {
     net::ServiceOptions service;
     RequestOptions requests;
     std::map<std::string, std::string> facts;  ///< for the hello
-    double started_s = 0;                      ///< when the session was started, on the monotonic clock; 0: now
+    EventRecorder* events = nullptr;  ///< keeps every applied event; null: nothing is kept. Outlives the worker
+    double started_s = 0;             ///< when the session was started, on the monotonic clock; 0: now
   };
 
   /// Starts the thread.

@@ -19,7 +19,7 @@ Result<geometry::Trajectory> make_trajectory(const std::string& name) {
 // Splats larger than their samples leave no cracks when the head moves; the nearest centre wins where they overlap, so they do not
 // blur. Set by runs along walk-around-a.csv at 2560x1600: discs of scale 1.0 / 1.5 gave 20.2 / 32.6 dB and 13.6 / 0.0 % holes, squares
 // of 1.3 gave 32.6 dB and 0.0 %.
-float suitable_scale(splat::Kernel kernel) { return kernel == splat::Kernel::kDisc ? 1.5f : 1.3f; }
+float suitable_scale(splat::Kernel kernel) { return kernel == splat::Kernel::kSquare ? 1.3f : 1.5f; }
 
 int refuse(const Error& error) {
   std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
@@ -63,9 +63,9 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--renderer", o.renderer, "auto, cpu or gl")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "cpu", "gl"}));
-  app.add_option("--splat", o.splat, "kernel: square or disc")
+  app.add_option("--splat", o.splat, "kernel: square, disc, ellipse or ewa")
       ->capture_default_str()
-      ->check(CLI::IsMember({"square", "disc"}));
+      ->check(CLI::IsMember({"square", "disc", "ellipse", "ewa"}));
   app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 10.0));
@@ -77,6 +77,10 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
       ->check(CLI::Range(0.1, 1000.0));
   app.add_option("--record-every", d.picture_every, "record every N-th frame as a PNG; 0: one every 2.5 s and the last")
       ->capture_default_str();
+  app.add_option("--record-points", o.record_points_mb,
+                 "keep the point model's events in OUT/points.events for telesplat compare, MiB at most; 0: do not")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1 << 20));
   app.add_flag("--exr", d.exr, "record pictures as EXR with depth too");
   app.add_option("--verify", d.verify_every, "compare every N-th frame with direct rendering after the run; 0: none")
       ->capture_default_str();
@@ -102,8 +106,8 @@ int run(ViewerOptions o) {
   if (!sampling) return refuse(sampling.error());
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
-  o.display.kernel = o.splat == "square" ? splat::Kernel::kSquare : splat::Kernel::kDisc;
-  o.display.selection.scale = o.splat_scale > 0 ? float(o.splat_scale) : suitable_scale(o.display.kernel);
+  o.display.render.kernel = *splat::kernel_named(o.splat);
+  o.display.selection.scale = o.splat_scale > 0 ? float(o.splat_scale) : suitable_scale(o.display.render.kernel);
   if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
   const auto trajectory = make_trajectory(o.trajectory);
   if (!trajectory) return refuse(trajectory.error());
@@ -118,6 +122,13 @@ int run(ViewerOptions o) {
     auto opened = FrameSpool::open(spool_directory);
     if (!opened) return refuse(opened.error());
     spool = std::move(*opened);
+  }
+
+  std::unique_ptr<EventRecorder> events;
+  if (!o.out.empty() && o.record_points_mb > 0) {
+    auto opened = EventRecorder::open(o.out + "/points.events", o.record_points_mb << 20);
+    if (!opened) return refuse(opened.error());
+    events = std::move(*opened);
   }
 
   net::Context context;
@@ -139,6 +150,7 @@ int run(ViewerOptions o) {
                                          {"target_fps", fmt::format("{}", o.display.target_fps)},
                                          {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
                                          {"splat_scale", fmt::format("{}", o.display.selection.scale)}},
+                                        events.get(),
                                         o.started_s};
   DisplayResult result;
   {

@@ -14,6 +14,7 @@ struct ViewerOptions {
   std::string renderer = "auto", splat = "disc", coupling = "async";
   double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
+  uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none
   double started_s = 0;  ///< when the session was started (monotonic clock), for start-up times; 0: now
   std::string out;       ///< run folder; empty: nothing is recorded
 };

@@ -86,6 +86,8 @@ Mosaic::Level Mosaic::level(int l) const {
 
 glm::vec3 Mosaic::cone_axis() const { return image::decode_normal16(cone_axis_); }
 
+glm::vec3 Mosaic::direction_to_eye() const { return image::decode_normal16(direction_to_eye_); }
+
 float Mosaic::cone_cosine() const { return static_cast<float>(cone_cosine_) / 127.0f; }
 
 glm::vec3 Mosaic::centroid_room(const geometry::Box& leaf) const {
@@ -105,14 +107,14 @@ uint64_t Mosaic::digest() const {
     uint16_t cone_axis;
     int8_t cone_cosine;
     uint8_t centroid[3];
-    uint16_t zero;
+    uint16_t direction_to_eye;
   } header{sequence_.value,
            {counts_[0], counts_[1], counts_[2]},
            pixel_range_,
            cone_axis_,
            cone_cosine_,
            {centroid_[0], centroid_[1], centroid_[2]},
-           0};
+           direction_to_eye_};
   static_assert(std::has_unique_object_representations_v<decltype(header.counts)> && sizeof header == 32);
   return XXH3_64bits_withSeed(data_.get(), data_bytes(), XXH3_64bits(&header, sizeof header));
 }
@@ -129,10 +131,11 @@ MosaicBuilder::MosaicBuilder(Sequence sequence, const std::array<uint32_t, kLeve
   mean2 = counts[2] < counts[1] ? const_cast<uint32_t*>(mosaic_.level(2).colour) : nullptr;
 }
 
-Mosaic MosaicBuilder::finish(float pixel_range) {
+Mosaic MosaicBuilder::finish(float pixel_range, const glm::vec3& direction_to_eye) {
   const uint32_t n = mosaic_.counts_[0];
   const Cone cone = normal_cone(normal, n);
   mosaic_.pixel_range_ = pixel_range;
+  mosaic_.direction_to_eye_ = image::encode_normal16(direction_to_eye);
   mosaic_.cone_axis_ = cone.axis;
   mosaic_.cone_cosine_ = cone.cosine;
   mosaic_.centroid_ = {mean_position(x, n), mean_position(y, n), mean_position(z, n)};

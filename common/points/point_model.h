@@ -63,6 +63,9 @@ class Mosaic {
   /// Normal cone [Shirman 93]: every normal n of the mosaic has dot(n, axis) >= cosine. cosine = -1: no cone.
   glm::vec3 cone_axis() const;
   float cone_cosine() const;
+  /// Unit vector from the leaf's centre towards the eye of the sampling view: with pixel_range() it tells how far apart the samples lie
+  /// on the surface (T4.4.1).
+  glm::vec3 direction_to_eye() const;
   /// Mean position of the level-0 points, room space, to 1/256 of the leaf.
   glm::vec3 centroid_room(const geometry::Box& leaf) const;
   /// Bytes this mosaic occupies: header, points and what the allocator adds.
@@ -80,6 +83,7 @@ class Mosaic {
   uint16_t cone_axis_ = 0;
   int8_t cone_cosine_ = -127;
   std::array<uint8_t, 3> centroid_{};
+  uint16_t direction_to_eye_ = 0;
 };
 
 struct Cluster {

@@ -112,7 +112,8 @@ PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const 
     const ClusterKey key = decimated.leaves[i].key;
     const glm::dvec3 cell(key & 1023, key >> 10 & 1023, key >> 20 & 1023);
     const glm::dvec3 centre = grid.lo + (cell + 0.5) * grid.leaf_size;
-    patch.mosaics.emplace_back(key, open[i].arrays.finish(pixel_range(camera, centre, grid.leaf_size)));
+    const glm::vec3 to_eye(camera.pose.position_room - centre);
+    patch.mosaics.emplace_back(key, open[i].arrays.finish(pixel_range(camera, centre, grid.leaf_size), to_eye));
     patch.points += patch.mosaics.back().second.count(0);
   }
   const auto nothing = std::count(image.depth.begin(), image.depth.end(), 0u);

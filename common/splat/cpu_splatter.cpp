@@ -101,11 +101,11 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const geometr
 CpuSplatter::CpuSplatter(int threads) : impl_(std::make_unique<Impl>(threads)) {}
 CpuSplatter::~CpuSplatter() = default;
 
-SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, Kernel kernel,
+SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                                const image::Shading& shading, const FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
   Impl& m = *impl_;
-  m.prepare(list, camera, kernel, shading);
+  m.prepare(list, camera, options.kernel, shading);
   for (Workspace& w : m.workspaces) {
     // Emptied whole where the margin moves; else every tile leaves its pixels empty.
     const size_t size = static_cast<size_t>(kTileWidth + 2 * m.margin) * (kTileHeight + 2 * m.margin);

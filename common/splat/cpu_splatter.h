@@ -6,11 +6,10 @@
 
 #include "common/image/file.h"
 #include "common/image/shading.h"
+#include "common/splat/render_options.h"
 #include "common/splat/view_selection.h"
 
 namespace telesplat::splat {
-
-enum class Kernel { kSquare, kDisc };
 
 /// Where a frame goes. colour: width * height of 0x00RRGGBB (alpha byte 0xff), row-major; depth_m: the same shape, or null.
 struct FrameTarget {
@@ -21,7 +20,8 @@ struct FrameTarget {
 
 struct SplatStats {
   uint64_t points_projected = 0, points_drawn = 0;
-  double project_ms = 0, resolve_ms = 0;  ///< summed over threads
+  double project_ms = 0, resolve_ms = 0;                ///< splatting and shading, summed over threads
+  double fill_ms = 0, smooth_ms = 0, antialias_ms = 0;  ///< the finish, likewise
 };
 
 class CpuSplatter {
@@ -31,8 +31,13 @@ class CpuSplatter {
   ~CpuSplatter();
 
   /// Clears, splats and resolves one frame. Points are shaded with shading.table(). camera.width/height are target's.
+  SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
+                    const image::Shading& shading, const FrameTarget& target);
+  /// Without any finish.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading,
-                    const FrameTarget& target);
+                    const FrameTarget& target) {
+    return render(list, camera, {kernel, {false, false, false}}, shading, target);
+  }
 
  private:
   struct Impl;

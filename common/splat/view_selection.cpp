@@ -93,6 +93,7 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     const float desired = options.detail * points::pixel_range(camera, glm::dvec3(leaf.centre()),
                                                                static_cast<double>(leaf.hi.x - leaf.lo.x));
     const LeafView view = leaf_view(leaf, eye);
+    const float metres_per_px = (leaf.hi.x - leaf.lo.x) * options.detail / desired;
     chosen.clear();
     for (const points::Mosaic& m : cluster->mosaics) {
       if (options.cone_culling && cone_faces_away(m, view)) continue;
@@ -106,8 +107,9 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     for (const Chosen& c : chosen) {
       const points::Mosaic::Level level = c.mosaic->level(c.level);
       if (level.count == 0) continue;
-      out.items.push_back(
-          {cluster.get(), level, std::clamp(c.size, 1.0f, std::max(1.0f, options.max_splat_px)), c.mosaic->sequence()});
+      const float px = std::min(c.size, std::max(1.0f, options.max_splat_px));
+      out.items.push_back({cluster.get(), level, std::max(px, 1.0f), c.mosaic->sequence(), 0.5f * px * metres_per_px,
+                           c.mosaic->direction_to_eye()});
       out.points += level.count;
     }
   }

@@ -24,12 +24,17 @@ struct DrawItem {
   float splat_px;  ///< side (square) or diameter (disc) in display pixels, >= 1
   Sequence
       sequence{};  ///< the mosaic's; with cluster->key it names the points, for renderers that keep copies. 0: do not keep
+  float radius_m =
+      0;  ///< radius of a splat that faces its sampling view, metres in room space: half of splat_px at the leaf's centre,
+          ///< but not widened to a pixel (ellipse, ewa)
+  glm::vec3 to_eye{0, 0, 1};  ///< from the leaf towards the eye of the sampling view, unit length (ellipse, ewa)
 };
 
 struct DrawList {
   std::vector<DrawItem> items;
   std::vector<points::ClusterKey> clusters_seen;  ///< clusters that passed culling: for access reports
   uint64_t points = 0;
+  Sequence applied;  ///< the newest event of the model they were selected from
 };
 
 /// Culls clusters by frustum, mosaics by normal cone; chooses each mosaic's level as the one whose pixel range is closest (in

@@ -75,6 +75,7 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--update-rate",   text(v.requests.max_rate_hz),
                              "--record-every",  text(double(d.picture_every)),
                              "--verify",        text(double(d.verify_every)),
+                             "--record-points", text(double(v.record_points_mb)),
                              "--out",           o.out,
                              "--started-at",    text(o.started_s)};
   if (d.exr) a.push_back("--exr");

@@ -9,29 +9,33 @@ void ModelCache::begin_replica(const points::ModelConfig& config) {
   const std::lock_guard lock(mutex_);
   if (newest_) {
     if (!shown_)
-      shown_ = std::move(newest_);
+      shown_ = std::move(newest_), applied_shown_ = applied_;
     else
       retired_models_.push_back(std::move(newest_));
   }
   newest_ = std::move(fresh);
+  applied_ = {};
 }
 
 void ModelCache::insert(points::PreparedPatch patch) {
   const std::lock_guard lock(mutex_);
+  applied_ = patch.sequence;
   newest_->insert(std::move(patch));
   ++patches_;
 }
 
-void ModelCache::forget(std::span<const points::ClusterKey> keys) {
+void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys) {
   const std::lock_guard lock(mutex_);
   auto dropped = newest_->take_out(keys);
+  applied_ = sequence;
   std::move(dropped.begin(), dropped.end(), std::back_inserter(retired_clusters_));
 }
 
-void ModelCache::clear() {
+void ModelCache::clear(Sequence sequence) {
   auto fresh = std::make_unique<points::PointModel>(newest_->config());
   const std::lock_guard lock(mutex_);
   retired_models_.push_back(std::exchange(newest_, std::move(fresh)));
+  applied_ = sequence;
 }
 
 void ModelCache::show_newest() {
@@ -51,6 +55,7 @@ void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOp
     splat::select_view(*model, camera, options, out);
   else
     out = {};
+  out.applied = shown_ ? applied_shown_ : applied_;
 }
 
 void ModelCache::end_frame() {

@@ -19,8 +19,8 @@ class ModelCache {
   bool has_replica() const { return newest_ != nullptr; }
   const points::ModelConfig& config() const { return newest_->config(); }
   void insert(points::PreparedPatch patch);
-  void forget(std::span<const points::ClusterKey> keys);
-  void clear();
+  void forget(Sequence sequence, std::span<const points::ClusterKey> keys);
+  void clear(Sequence sequence);
   /// Replaces the older replica on display by the newest. No effect if it is displayed already.
   void show_newest();
   /// Digest of the newest replica, for tests of replication.
@@ -42,6 +42,7 @@ class ModelCache {
   std::unique_ptr<points::PointModel> newest_, shown_;              // shown_ only while it is not the newest
   std::vector<std::unique_ptr<points::Cluster>> retired_clusters_;  // where they were: draw lists point to them
   std::vector<std::unique_ptr<points::PointModel>> retired_models_;
+  Sequence applied_, applied_shown_;  // newest events of newest_ and shown_
   uint64_t patches_ = 0;
 };
 

@@ -38,6 +38,7 @@ const std::vector<std::string>& frame_columns() {
                                                 "points_drawn",
                                                 "items",
                                                 "points_cached",
+                                                "sequence",
                                                 "update_age_ms",
                                                 "view_error_m",
                                                 "view_error_deg",
@@ -70,7 +71,7 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
     worker.on_pose(monotonic_s(), camera);
     cache.select(camera, o.selection, list);
     if (list.points > 0) {
-      renderer.render(list, camera, o.kernel, image::Shading(o.shading, camera),
+      renderer.render(list, camera, o.render, image::Shading(o.shading, camera),
                       {o.width, o.height, view.colour.data(), nullptr});
       worker.on_first_points(monotonic_s());
     }
@@ -104,7 +105,7 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
     }
     const bool with_depth = use & (kVerify | kExr);
     const auto stats =
-        renderer.render(list, camera, o.kernel, shading,
+        renderer.render(list, camera, o.render, shading,
                         {o.width, o.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
     cache.end_frame();
     const double end_s = monotonic_s();
@@ -126,6 +127,7 @@ DisplayResult run_display(const DisplayOptions& o, const geometry::Trajectory& t
                 double(stats.points_drawn),
                 double(list.items.size()),
                 double(figures.points),
+                double(list.applied.value),
                 (worker.to_master_s(end_s) - update.requested_s) * 1e3,
                 glm::distance(p, update.pose.position_room),
                 angle_deg(q, update.pose.orientation),

@@ -17,7 +17,7 @@ struct DisplayOptions {
   double duration_s = 10;  ///< seconds from the first displayed frame; 0: until told to stop
   uint64_t frames = 0;     ///< frames to display; 0: no limit
   double hold_s = 0;       ///< the head stands still for the last so many seconds of duration_s
-  splat::Kernel kernel = splat::Kernel::kDisc;
+  splat::RenderOptions render;
   splat::SelectionOptions selection;
   image::ShadingParameters shading;
   uint64_t picture_every = 0;  ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one

@@ -13,8 +13,14 @@ class Renderer {
   /// "cpu" or "gl".
   virtual const char* name() const = 0;
   /// Draws one frame into target (host memory). Called from one thread, the one that made the renderer.
-  virtual splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
-                                   const image::Shading& shading, const splat::FrameTarget& target) = 0;
+  virtual splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
+                                   const splat::RenderOptions& options, const image::Shading& shading,
+                                   const splat::FrameTarget& target) = 0;
+  /// Without any finish.
+  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+                           const image::Shading& shading, const splat::FrameTarget& target) {
+    return render(list, camera, splat::RenderOptions{kernel, {false, false, false}}, shading, target);
+  }
 };
 
 std::unique_ptr<Renderer> make_cpu_renderer(int threads);

@@ -163,8 +163,8 @@ void GlRenderer::read_back(const splat::FrameTarget& target) const {
   glReadPixels(kMargin, kMargin, width_, height_, GL_RED, GL_FLOAT, target.depth_m);
 }
 
-splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
-                                     const image::Shading& shading, const splat::FrameTarget& target) {
+splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry::Camera& camera,
+                                     const splat::RenderOptions& options, const image::Shading& shading, const splat::FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
   const double start = monotonic_s();
   if (const Status resized = resize(target.width, target.height); !resized) {
@@ -176,7 +176,7 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
                   std::numeric_limits<float>::infinity());
     return {};
   }
-  prepare_draws(list, camera, kernel);
+  prepare_draws(list, camera, options.kernel);
   draw(camera, shading, target.depth_m != nullptr);
   arenas_->end_frame();
   glFinish();

@@ -19,9 +19,10 @@ class GlRenderer final : public Renderer {
   ~GlRenderer() override;
 
   const char* name() const override { return "gl"; }
+  using Renderer::render;
   /// points_drawn counts every point sent: which of them reach the screen only the GPU knows. project_ms is what drawing and resolve_ms
   /// what reading back took.
-  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, const splat::RenderOptions& options,
                            const image::Shading& shading, const splat::FrameTarget& target) override;
 
   const std::string& device() const { return context_->renderer(); }

@@ -1,0 +1,41 @@
+// How splats are drawn and finished: the same for both renderers.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+namespace telesplat::splat {
+
+/// Footprint of a point on the screen.
+enum class Kernel {
+  kSquare,   ///< a square of pixels; one pass, opaque
+  kDisc,     ///< a circle on the screen; one pass, opaque
+  kEllipse,  ///< the sample's disc on the surface, projected exactly (T4.4.1, eq. 4.2-4.7); one pass, opaque
+  kEwa,  ///< the same contour as a Gaussian: visibility with an epsilon, then weighted accumulation and normalisation
+};
+inline constexpr std::array kKernels{Kernel::kSquare, Kernel::kDisc, Kernel::kEllipse, Kernel::kEwa};
+
+constexpr std::string_view kernel_name(Kernel kernel) {
+  constexpr std::string_view names[] = {"square", "disc", "ellipse", "ewa"};
+  return names[static_cast<int>(kernel)];
+}
+constexpr std::optional<Kernel> kernel_named(std::string_view name) {
+  for (const Kernel k : kKernels)
+    if (kernel_name(k) == name) return k;
+  return std::nullopt;
+}
+
+/// Per-pixel work after splatting. Each stage can be switched off; SplatStats tells what each costs.
+struct Finish {
+  bool fill = true;       ///< pin-holes: pixels that show nothing, or something farther, amid a surface
+  bool smooth = true;     ///< ellipse: interpolates between magnified splats of one surface
+  bool antialias = true;  ///< silhouettes
+};
+
+struct RenderOptions {
+  Kernel kernel = Kernel::kEllipse;
+  Finish finish;
+};
+
+}  // namespace telesplat::splat
