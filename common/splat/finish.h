@@ -1,0 +1,70 @@
+// The finish: what happens to a tile's resolved pixels before they are shown. Each stage is optional and works inside the tile, while it
+// is in the cache; every SIMD target computes the same pixels.
+//
+// Two pixels belong to different surfaces if their depth codes (pixel_key.h: 2^14 steps an octave) differ by more than kEdge, about 2 % of
+// depth. An empty pixel counts as farther than everything.
+//
+// Fill (pin-holes): a pixel is a hole if one of its four neighbours is nearer by more than kEdge. On each of the four axes through it (row,
+//   column, both diagonals) the first pixels at most kFillRadius away that are nearer than it by more than kEdge are its supports. An axis
+//   counts if it has a support on both sides, their distances a and b sum to at most kFillRadius + 1, and their codes differ by at most
+//   kEdge (a + b); of these only axes within 2 kEdge of the nearest are used. The hole is closed if two axes are used, or one with
+//   a = b = 1; its colour and depth are the supports' means, weighted with 1 / distance^2. So surfaces grow nowhere outwards: a pixel
+//   outside a silhouette has support on one side alone. (Pull-push after Grossman and Dally 1998 and Marroquim et al. 2007, but gathered
+//   hole by hole over rings of growing radius: holes are few, pyramids would touch every pixel, and their coarse levels bleed outwards
+//   over silhouettes.)
+// Smooth: where splats are magnified their samples are interpolated: [1 2 1] / 4 along rows, then along columns, where the spacing class
+//   says 2 or more (on samples 2 pixels apart that is exactly bilinear interpolation), [1 6 1] / 8 where it says 1; a neighbour of another
+//   surface counts as the pixel itself.
+// Antialias: where the codes of the 3x3 pixels around one range over more than 2 kEdge, its colour becomes their mean with weights
+//   [1 2 1] x [1 2 1] / 16.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/splat/render_options.h"
+
+namespace telesplat::splat {
+
+inline constexpr uint32_t kEdge = 480;   ///< depth codes: 1.5 to 2.9 % of depth
+inline constexpr int kFillRadius = 3;    ///< pixels
+inline constexpr int kFinishSlack = 16;  ///< pixels that vectors may read and write beyond what a stage asks for
+
+/// How many pixels around a tile must be valid for the stages that are on.
+constexpr int finish_reach(const Finish& f) {
+  return (f.fill ? kFillRadius : 0) + (f.smooth ? 1 : 0) + (f.antialias ? 1 : 0);
+}
+
+/// Resolved pixels of a tile and of a margin around it, row by row: `stride` colours (0x00RRGGBB), then `stride` infos (depth code << 8 |
+/// spacing class << 3 | ring; 0xffffffff: empty).
+struct ResolvedTile {
+  uint32_t* rows = nullptr;  ///< (height + 2 margin) rows of 2 stride
+  int stride = 0;            ///< at least width + 2 margin
+  int margin = 0;            ///< at least finish_reach() + kFinishSlack if any stage is on
+  int width = 0, height = 0;
+
+  /// Pixel x = 0 of row y; x in -margin..stride - margin - 1, y in -margin..height + margin - 1.
+  uint32_t* colour(int y) const { return rows + static_cast<size_t>(y + margin) * 2 * stride + margin; }
+  uint32_t* info(int y) const { return colour(y) + stride; }
+};
+
+inline constexpr uint32_t kEmptyInfo = 0xffffffffu;
+
+/// What the stages need besides the tile; its memory is reused.
+struct FinishScratch {
+  struct Pixel {
+    int x, y;
+    uint32_t colour, info;
+  };
+  std::vector<Pixel> pixels;
+  std::vector<uint32_t> rows;
+};
+
+/// Closes the pin-holes of the tile grown by `grow` pixels. Reads kFillRadius pixels more. Returns how many it closed.
+int fill_holes(const ResolvedTile& tile, int grow, FinishScratch& scratch);
+/// Smooths the tile grown by `grow` pixels. Reads one pixel more.
+void smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch);
+/// Antialiases the tile. Reads one pixel more.
+void antialias(const ResolvedTile& tile, FinishScratch& scratch);
+
+}  // namespace telesplat::splat

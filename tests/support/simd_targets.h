@@ -1,0 +1,27 @@
+// Runs a scope of a test on one instruction set.
+#pragma once
+
+#include <hwy/targets.h>
+
+#include <vector>
+
+namespace telesplat::testing {
+
+class OnTarget {
+ public:
+  explicit OnTarget(int64_t target) { use(target); }
+  ~OnTarget() { use(0); }
+  OnTarget(const OnTarget&) = delete;
+  OnTarget& operator=(const OnTarget&) = delete;
+
+ private:
+  static void use(int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
+};
+
+/// Every instruction set that was compiled and that this machine has.
+inline std::vector<int64_t> simd_targets() { return hwy::SupportedAndGeneratedTargets(); }
+
+}  // namespace telesplat::testing
