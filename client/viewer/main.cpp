@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   viewer::ViewerOptions options;
   options.service.name = "viewer-" + std::to_string(getpid());
   return net::service_main(
-      argc, argv, "telesplat-viewer: headless viewer; caches points, splats them at display rate, records frames",
-      options, viewer::add_flags, viewer::run);
+      argc, argv,
+      "telesplat-viewer: caches points, splats them at display rate, headless or in a window, records frames", options,
+      viewer::add_flags, viewer::run);
 }

@@ -74,6 +74,11 @@ ReplicaWorker::LastUpdate ReplicaWorker::last_update() const {
   return last_update_;
 }
 
+ReplicaWorker::Figures ReplicaWorker::figures() const {
+  const std::lock_guard lock(mutex_);
+  return {scene_, extent_m_, updates_, bytes_received_, latency_ms_};
+}
+
 void ReplicaWorker::loop() {
   net::lower_thread_priority(5);  // the display comes first
   try {
@@ -110,6 +115,13 @@ void ReplicaWorker::connect_if_changed() {
     return it == session.endpoints.end() ? std::string() : it->second;
   };
   const std::string patches = endpoint("patches"), state = endpoint("state");
+  if (!session.box_room.empty()) {
+    const auto named = session.facts.find("scene");
+    const glm::vec3 size = session.box_room.size();
+    const std::lock_guard lock(mutex_);
+    scene_ = named == session.facts.end() ? std::string() : named->second;
+    extent_m_ = std::max({size.x, size.y, size.z});
+  }
   if (patches.empty() || state.empty() || session.box_room.empty()) return;
   if (patches == patches_endpoint_ && state == state_endpoint_) return;
   patches_endpoint_ = patches;
@@ -198,6 +210,7 @@ void ReplicaWorker::apply_patch(const wire::Patch& patch) {
     spans_.add("view update", u->requested_s, u->complete_s, 2);
     const std::lock_guard lock(mutex_);
     last_update_ = {u->requested_s, u->camera.pose, patch.sequence.value};
+    latency_ms_ = (u->complete_s - u->requested_s) * 1e3;
     ++updates_;
   }
 }

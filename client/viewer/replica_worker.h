@@ -51,6 +51,15 @@ class ReplicaWorker {
   };
   LastUpdate last_update() const;
 
+  /// For people who watch.
+  struct Figures {
+    std::string scene;    ///< name of the data set; empty until the master told it
+    double extent_m = 0;  ///< its largest extent in the room; 0 until then
+    uint64_t updates = 0, bytes_received = 0;
+    double latency_ms = 0;  ///< of the newest update; 0 before the first
+  };
+  Figures figures() const;
+
  private:
   void loop();
   void connect_if_changed();
@@ -77,14 +86,16 @@ class ReplicaWorker {
   image::DepthImage tile_;  // memory that decoding reuses
   int seen_version_ = 0;
   double started_s_ = 0, last_report_s_ = 0, asked_s_ = 0;
-  uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0;
+  uint64_t points_received_ = 0, decode_errors_ = 0;
 
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
   std::vector<std::pair<double, geometry::Camera>> poses_;
   std::vector<points::ClusterKey> seen_;
   LastUpdate last_update_;
+  std::string scene_;
+  double extent_m_ = 0, latency_ms_ = 0;
 
-  std::atomic<uint64_t> updates_{0}, frames_shown_{0};
+  std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};
   std::atomic<double> offset_s_{0}, first_points_s_{0};
   std::thread thread_;

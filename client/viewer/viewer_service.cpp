@@ -1,11 +1,15 @@
 #include "client/viewer/viewer_service.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
+
+#include "client/viewer/display/headless_surface.h"
+#include "client/viewer/display/window_surface.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -16,14 +20,24 @@ Result<geometry::Trajectory> make_trajectory(const std::string& name) {
   return geometry::Trajectory::read_csv(name);
 }
 
-// Splats larger than their samples leave no cracks when the head moves; the nearest centre wins where they overlap, so they do not
-// blur. Set by runs along walk-around-a.csv at 2560x1600: discs of scale 1.0 / 1.5 gave 20.2 / 32.6 dB and 13.6 / 0.0 % holes, squares
-// of 1.3 gave 32.6 dB and 0.0 %.
-float suitable_scale(splat::Kernel kernel) { return kernel == splat::Kernel::kSquare ? 1.3f : 1.5f; }
-
 int refuse(const Error& error) {
   std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
   return 2;
+}
+
+// To the person: on a terminal as it is, else marked so that the launcher passes it on.
+void tell(const std::string& text) {
+  std::printf("%s%s\n", isatty(1) ? "" : "note ", text.c_str());
+  std::fflush(stdout);
+}
+
+Result<std::unique_ptr<DisplaySurface>> make_surface(const ViewerOptions& o, geometry::Trajectory trajectory) {
+  if (!o.window) return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, std::move(trajectory)));
+  WindowSurface::Options options{o.display, std::nullopt, o.fullscreen, o.out.empty() ? "." : o.out};
+  if (o.trajectory != "still") options.recorded = std::move(trajectory);
+  auto opened = WindowSurface::open(options, tell);
+  if (!opened) return opened.error();
+  return std::unique_ptr<DisplaySurface>(std::move(*opened));
 }
 
 }  // namespace
@@ -96,6 +110,8 @@ void add_flags(CLI::App& app, ViewerOptions& o) {
                  "monotonic clock when the session was started, for start-up times; 0: now")
       ->capture_default_str();
   app.add_option("--out", o.out, "run folder for pictures and frames to verify");
+  app.add_flag("--window", o.window, "show a window; the person at it moves the camera");
+  app.add_flag("--fullscreen", o.fullscreen, "the window fills the screen");
 }
 
 int run(ViewerOptions o) {
@@ -107,10 +123,14 @@ int run(ViewerOptions o) {
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
   o.display.render.kernel = *splat::kernel_named(o.splat);
-  o.display.selection.scale = o.splat_scale > 0 ? float(o.splat_scale) : suitable_scale(o.display.render.kernel);
+  o.display.splat_scale = float(o.splat_scale);
   if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
-  const auto trajectory = make_trajectory(o.trajectory);
+  o.requests.follow_display = o.window;
+  auto trajectory = make_trajectory(o.trajectory);
   if (!trajectory) return refuse(trajectory.error());
+  auto surface =
+      make_surface(o, std::move(*trajectory));  // before the renderer, whose context may depend on the window's
+  if (!surface) return refuse(surface.error());
   auto renderer = make_renderer(o.renderer, o.threads);
   if (!renderer) {
     log::error("{}", renderer.error().text);
@@ -135,28 +155,30 @@ int run(ViewerOptions o) {
   ModelCache cache;
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
-  ReplicaWorker::Options worker_options{o.service,
-                                        o.requests,
-                                        {{"coupling", o.coupling},
-                                         {"buffers", "0"},
-                                         {"renderer", (*renderer)->name()},
-                                         {"splat", o.splat},
-                                         {"width", std::to_string(o.display.width)},
-                                         {"height", std::to_string(o.display.height)},
-                                         {"sampling_width", std::to_string(o.requests.sampling_width)},
-                                         {"sampling_height", std::to_string(o.requests.sampling_height)},
-                                         {"trajectory", o.trajectory},
-                                         {"fov_deg", fmt::format("{}", o.display.fov_deg)},
-                                         {"target_fps", fmt::format("{}", o.display.target_fps)},
-                                         {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
-                                         {"splat_scale", fmt::format("{}", o.display.selection.scale)}},
-                                        events.get(),
-                                        o.started_s};
+  ReplicaWorker::Options worker_options{
+      o.service,
+      o.requests,
+      {{"coupling", o.coupling},
+       {"buffers", "0"},
+       {"renderer", (*renderer)->name()},
+       {"splat", o.splat},
+       {"width", std::to_string(o.display.width)},
+       {"height", std::to_string(o.display.height)},
+       {"sampling_width", std::to_string(o.requests.sampling_width)},
+       {"sampling_height", std::to_string(o.requests.sampling_height)},
+       {"trajectory", o.trajectory},
+       {"fov_deg", fmt::format("{}", o.display.fov_deg)},
+       {"target_fps", fmt::format("{}", o.display.target_fps)},
+       {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
+       {"splat_scale", fmt::format("{}", o.splat_scale > 0 ? o.splat_scale : suitable_scale(o.display.render.kernel))}},
+      events.get(),
+      o.started_s};
   DisplayResult result;
   {
     ReplicaWorker worker(context, worker_options, cache, frames, spans);
-    result = run_display(o.display, *trajectory, **renderer, cache, worker, frames, spans, spool.get());
+    result = run_display(o.display, **surface, **renderer, cache, worker, frames, spans, spool.get());
   }
+  surface->reset();  // the window goes at once, whatever there is to write
   if (spool) {
     spool->flush();
     if (spool->dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool->dropped());

@@ -15,11 +15,13 @@ struct ViewerOptions {
   double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
   uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none
-  double started_s = 0;  ///< when the session was started (monotonic clock), for start-up times; 0: now
-  std::string out;       ///< run folder; empty: nothing is recorded
+  bool window = false;               ///< show a window instead of running headless
+  bool fullscreen = false;           ///< the window fills the screen
+  double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
+  std::string out;                   ///< run folder; empty: nothing is recorded
 };
 
-/// Flags that `telesplat run` has too: size, trajectory, renderer and the like.
+/// Flags that `telesplat run` and `view` have too: size, trajectory, renderer and the like.
 void add_view_flags(CLI::App& app, ViewerOptions& options);
 void add_flags(CLI::App& app, ViewerOptions& options);
 

@@ -1,4 +1,4 @@
-// telesplat: the launcher. `run` starts a whole pipeline on this machine and records it.
+// telesplat: the launcher. `run` starts a whole pipeline on this machine and records it, `view` shows it in a window.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
@@ -32,6 +32,9 @@ int telesplat_main(int argc, char** argv) {
   launcher::RunOptions run_options;
   auto* run = app.add_subcommand("run", "run the whole pipeline on this machine, headless, and record it");
   launcher::add_run_flags(*run, run_options);
+  launcher::RunOptions view_options = launcher::view_defaults();
+  auto* view = app.add_subcommand("view", "open a window on a data set, with the whole pipeline on this machine");
+  launcher::add_run_flags(*view, view_options);
 
   std::string command, master = "tcp://127.0.0.1:7700";
   auto* ctl = app.add_subcommand("ctl", "ask or tell a running session's master");
@@ -57,6 +60,7 @@ int telesplat_main(int argc, char** argv) {
   for (auto& a : *arguments) pointers.push_back(a.data());
   net::parse_or_exit(app, int(pointers.size()), pointers.data());
   if (*run) return launcher::run(run_options);
+  if (*view) return launcher::run(view_options);
   if (*ctl) return control(master, command);
   return launcher::inspect(path, mesh);
 }

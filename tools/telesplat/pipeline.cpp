@@ -35,10 +35,9 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
                              text(s.lease_timeout_s),
                              "--octree-depth",
                              text(double(o.master.master.octree_depth)),
-                             "--out",
-                             o.out,
                              "--log-level",
                              o.master.service.log_level};
+  if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
   for (const auto& [key, value] : o.master.master.settings) a.insert(a.end(), {"--" + key, text(value)});
   return a;
 }
@@ -76,9 +75,10 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--record-every",  text(double(d.picture_every)),
                              "--verify",        text(double(d.verify_every)),
                              "--record-points", text(double(v.record_points_mb)),
-                             "--out",           o.out,
                              "--started-at",    text(o.started_s)};
-  if (d.exr) a.push_back("--exr");
+  if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
+  for (const auto& [set, flag] : {std::pair{d.exr, "--exr"}, {v.window, "--window"}, {v.fullscreen, "--fullscreen"}})
+    if (set) a.push_back(flag);
   return a;
 }
 
@@ -91,10 +91,10 @@ std::string program_directory() {
 
 Result<Pipeline> Pipeline::start(const RunOptions& o) {
   Pipeline p;
-  p.log_directory_ = o.out + "/logs";
+  p.log_directory_ = o.log_directory.empty() ? o.out + "/logs" : o.log_directory;
   std::error_code error;
   fs::create_directories(p.log_directory_, error);
-  if (error) return Error{fmt::format("{}: cannot be made a run folder: {}", o.out, error.message())};
+  if (error) return Error{fmt::format("{}: cannot be made a folder for logs: {}", p.log_directory_, error.message())};
   const int background = o.background_servers ? 10 : 0;
   const auto common = [&](std::vector<std::string> a, const std::string& name) {
     a.insert(a.end(), {"--master", p.master_endpoint_, "--name", name, "--log-level", o.master.service.log_level});
@@ -151,9 +151,9 @@ std::string Pipeline::last_log_line(const std::string& name) const {
 
 Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
   for (auto& m : members_) {
-    for (const auto& line : m.process->read_lines())
-      if (line.starts_with("progress ")) progress_ = line.substr(9);
+    read(m);
     if (!m.process->ended()) continue;
+    read(m);  // its last words
     const std::string name = m.process->name();
     const int code = m.process->exit_code();
     if (m.role == "viewer") {
@@ -180,6 +180,13 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
     }
   }
   return State::kRunning;
+}
+
+void Pipeline::read(Member& m) {
+  for (const auto& line : m.process->read_lines()) {
+    if (line.starts_with("progress ")) progress_ = line.substr(9);
+    if (line.starts_with("note ")) notes_.push_back(line.substr(5));
+  }
 }
 
 std::string Pipeline::progress() { return progress_; }

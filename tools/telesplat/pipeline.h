@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "tools/telesplat/child_process.h"
@@ -22,6 +23,8 @@ class Pipeline {
   State supervise(std::vector<std::string>& news);
   /// "reading 43 %" and the like, from the children's progress lines; empty if there is nothing to tell.
   std::string progress();
+  /// Lines that the viewer told the person, since the last call.
+  std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
   /// Ends everything: the viewer first, then a "stop" to the master, then whoever is left.
   void finish();
   int restarts() const { return restarts_; }
@@ -35,9 +38,11 @@ class Pipeline {
     std::optional<ChildProcess> process;
   };
   Status launch(Member& member);
+  void read(Member& member);
   std::string last_log_line(const std::string& name) const;
 
   std::string log_directory_, master_endpoint_, progress_;
+  std::vector<std::string> notes_;
   std::vector<Member> members_;
   int restarts_ = 0;
 };

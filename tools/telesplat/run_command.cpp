@@ -11,6 +11,7 @@
 #include <fstream>
 #include <thread>
 
+#include "client/viewer/display/window.h"
 #include "common/core/clock.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/pipeline.h"
@@ -79,6 +80,27 @@ class LiveFigures {
   std::string text_;
 };
 
+/// A folder for the logs of a session that leaves nothing behind; kept if something went wrong.
+class PassingFolder {
+ public:
+  Status make() {
+    std::error_code error;
+    std::string pattern = (fs::temp_directory_path(error) / "telesplat-view-XXXXXX").string();
+    if (error || !mkdtemp(pattern.data())) return Error{fmt::format("{}: no folder for logs can be made", pattern)};
+    path_ = pattern;
+    return ok_status();
+  }
+  ~PassingFolder() {
+    std::error_code error;
+    if (!path_.empty()) fs::remove_all(path_, error);
+  }
+  const std::string& path() const { return path_; }
+  void keep() { path_.clear(); }
+
+ private:
+  std::string path_;
+};
+
 std::string default_out() {
   char name[64];
   const std::time_t now = std::time(nullptr);
@@ -87,6 +109,12 @@ std::string default_out() {
 }
 
 Status check_usage(const RunOptions& o) {
+  if (o.viewer.window && o.out.empty())
+    for (const auto& [asked, flag] : {std::pair{o.viewer.display.verify_every > 0, "--verify"},
+                                      {o.viewer.display.picture_every > 0, "--record-every"},
+                                      {o.viewer.display.exr, "--exr"},
+                                      {o.record_depth, "--record-depth"}})
+      if (asked) return Error{fmt::format("{} needs --out: nothing is recorded without a run folder", flag)};
   if (o.join_master.empty()) {
     std::error_code error;
     if (!fs::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
@@ -96,7 +124,7 @@ Status check_usage(const RunOptions& o) {
     if (const auto size = viewer::parse_size(*value, flag); !size) return size.error();
   if (o.viewer.trajectory != "orbit" && o.viewer.trajectory != "still")
     if (const auto t = geometry::Trajectory::read_csv(o.viewer.trajectory); !t) return t.error();
-  return ok_status();
+  return o.viewer.window ? viewer::check_display() : ok_status();
 }
 
 void print_report(const std::string& directory) {
@@ -153,9 +181,20 @@ void print_report(const std::string& directory) {
 
 }  // namespace
 
+RunOptions view_defaults() {
+  RunOptions o;
+  o.viewer.window = true;
+  o.viewer.trajectory = "still";
+  o.viewer.display.duration_s = 0;
+  return o;
+}
+
 void add_run_flags(CLI::App& app, RunOptions& o) {
   app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)");
-  app.add_option("--out", o.out, "run folder; default: runs/DATE-TIME");
+  const bool window = o.viewer.window;
+  app.add_option("--out", o.out,
+                 window ? "run folder; without it nothing is recorded" : "run folder; default: runs/DATE-TIME");
+  if (window) app.add_flag("--fullscreen", o.viewer.fullscreen, "the window fills the screen");
   app.add_option("--samplers", o.samplers, "sampler processes")->capture_default_str()->check(CLI::Range(1, 64));
   app.add_option("--sampler", o.sampler_kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")
       ->capture_default_str()
@@ -183,12 +222,17 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--log-level", o.master.service.log_level, "trace, debug, info, warn, error or off")
       ->capture_default_str()
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
+  if (!window) return;
+  std::string keys = "Keys and mouse in the window:";
+  for (const auto& line : viewer::key_help()) keys += "\n  " + line;
+  app.footer(keys);
 }
 
 int run(const RunOptions& given) {
   RunOptions o = given;
   o.started_s = monotonic_s();
-  if (o.out.empty()) o.out = default_out();
+  const bool window = o.viewer.window;
+  if (o.out.empty() && !window) o.out = default_out();
   const auto refuse = [](const Error& e) {
     std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
     return 2;
@@ -199,7 +243,12 @@ int run(const RunOptions& given) {
   log::initialise("telesplat", "warn");
 
   std::error_code error;
-  const bool folder_existed = fs::exists(o.out, error);
+  const bool folder_existed = o.out.empty() || fs::exists(o.out, error);
+  PassingFolder logs;
+  if (o.out.empty()) {
+    if (const Status s = logs.make(); !s) return refuse(s.error());
+    o.log_directory = logs.path();
+  }
   auto pipeline = Pipeline::start(o);
   if (!pipeline) {
     std::fprintf(stderr, "telesplat: %s\n", pipeline.error().text.c_str());
@@ -216,25 +265,35 @@ int run(const RunOptions& given) {
       std::vector<std::string> news;
       state = pipeline->supervise(news);
       for (const auto& n : news) progress.line("telesplat: " + n);
+      for (const auto& n : pipeline->take_notes()) progress.line(n);
       if (monotonic_s() - asked_s > 0.5) {
         control.request_status();
         asked_s = monotonic_s();
       }
       if (const auto status = control.poll_status()) live = figures.update(*status, monotonic_s());
-      if (!live.empty() || !pipeline->progress().empty()) progress.show(live.empty() ? pipeline->progress() : live);
+      if (window && !live.empty())
+        progress.close();  // the window's title has the figures
+      else if (!live.empty() || !pipeline->progress().empty())
+        progress.show(live.empty() ? pipeline->progress() : live);
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   }
   progress.close();
   pipeline->finish();
+  for (const auto& n : pipeline->take_notes()) progress.line(n);
   if (state == Pipeline::State::kBadInput) {
     if (!folder_existed) fs::remove_all(o.out, error);
     return 2;
   }
-  if (state == Pipeline::State::kFailed) return 1;
+  if (state == Pipeline::State::kFailed) {
+    if (!logs.path().empty()) std::fprintf(stderr, "telesplat: the logs are in %s\n", logs.path().c_str());
+    logs.keep();
+    return 1;
+  }
+  if (o.out.empty()) return 0;
 
   const bool interrupted = state == Pipeline::State::kRunning;
-  if (o.viewer.display.verify_every && !interrupted && o.join_master.empty()) {
+  if (o.viewer.display.verify_every && (window || !interrupted) && o.join_master.empty()) {
     const auto store = data::MeshStore::open(o.scene, o.mesh, [](const char*, double) {});
     if (!store) return refuse(store.error());
     const Status verified = verify_run(
@@ -248,7 +307,7 @@ int run(const RunOptions& given) {
     }
   }
   print_report(o.out);
-  return interrupted ? 1 : 0;
+  return interrupted && !window ? 1 : 0;
 }
 
 }  // namespace telesplat::launcher

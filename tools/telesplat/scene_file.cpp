@@ -61,7 +61,8 @@ Result<std::vector<std::string>> expand_scene_file(int argc, char** argv) {
   // The sub-command comes first; the scene is its one argument that ends in .toml.
   const auto scene = std::find_if(arguments.begin(), arguments.end(),
                                   [](const std::string& a) { return a.ends_with(".toml") && !a.starts_with("-"); });
-  if (arguments.empty() || arguments.front() != "run" || scene == arguments.end()) return arguments;
+  const bool takes_scene = !arguments.empty() && (arguments.front() == "run" || arguments.front() == "view");
+  if (!takes_scene || scene == arguments.end()) return arguments;
   auto flags = read_scene_file(*scene);
   if (!flags) return flags;
   arguments.erase(scene);

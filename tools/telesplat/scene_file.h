@@ -1,4 +1,4 @@
-// Scene files: TOML whose keys are flags of `telesplat run`.
+// Scene files: TOML whose keys are flags of `telesplat run` and `telesplat view`.
 #pragma once
 
 #include <string>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace telesplat::viewer {
 namespace {
@@ -28,6 +29,14 @@ glm::dvec3 clamp_length(const glm::dvec3& v, double limit) {
 }
 
 }  // namespace
+
+std::pair<int, int> sampling_size(const RequestOptions& o, int width, int height) {
+  if (!o.follow_display || width <= 0 || height <= 0) return {o.sampling_width, o.sampling_height};
+  const double side = std::sqrt(double(o.sampling_width) * o.sampling_height);
+  const double stretch = std::sqrt(double(width) / height);
+  const auto whole = [](double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); };
+  return {whole(side * stretch), whole(side / stretch)};
+}
 
 void PosePredictor::add(double t_s, const geometry::Pose& pose) {
   if (!samples_.empty() && t_s <= samples_.back().t_s) return;
@@ -67,8 +76,7 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const double horizon_s = latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
   geometry::Camera camera = *display_;
   camera.pose = predictor_.predict(now_s + horizon_s);
-  camera.width = options_.sampling_width;
-  camera.height = options_.sampling_height;
+  std::tie(camera.width, camera.height) = sampling_size(options_, display_->width, display_->height);
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
   const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
   const double margin = motion < 0.002 ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);

@@ -4,6 +4,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "common/geometry/camera.h"
 #include "common/wire/messages.h"
@@ -15,7 +16,12 @@ struct RequestOptions {
   double max_rate_hz = 12;          ///< requests a second at most; the master keeps only the newest
   double max_margin = 0.3;          ///< the sampled frustum is at most this fraction wider than the displayed one
   double initial_latency_s = 0.25;  ///< assumed until one was measured
+  bool follow_display = false;      ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
+
+/// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's aspect, sides
+/// multiples of 8 and at least 16.
+std::pair<int, int> sampling_size(const RequestOptions& options, int width, int height);
 
 /// Extrapolates a head pose with its recent velocity.
 class PosePredictor {

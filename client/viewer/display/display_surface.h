@@ -1,0 +1,45 @@
+// Where the display's cameras come from and where its frames go: a recorded head and nobody (headless), or a person at a window.
+#pragma once
+
+#include <string>
+
+#include "common/geometry/trajectory.h"
+#include "common/image/file.h"
+#include "common/splat/render_options.h"
+
+namespace telesplat::viewer {
+
+/// How frames are drawn, as far as a person can change it while looking.
+struct Look {
+  splat::RenderOptions render;
+  bool lit = true;
+};
+
+/// What is known after a frame, for people. Counters count from the beginning.
+struct LiveFigures {
+  double now_s = 0;                  ///< monotonic clock
+  std::string scene;                 ///< name of the data set; empty until the master told it
+  double extent_m = 0;               ///< its largest extent in the room; 0 until then
+  uint64_t frames = 0, updates = 0;  ///< displayed; completely received
+  double latency_ms = 0;             ///< of the newest view update, request to complete; 0 before the first
+  uint64_t points_drawn = 0, points_cached = 0, bytes_received = 0;
+};
+
+/// Called by the display loop, in its thread, in this order for every frame.
+class DisplaySurface {
+ public:
+  virtual ~DisplaySurface() = default;
+  /// Takes in what happened since the last frame; returns the camera of the frame that begins, whose size is the frame's, and changes
+  /// `look` to the person's wishes. t_s: seconds since the first displayed frame; negative before it, while the head rests.
+  virtual geometry::Camera begin_frame(double now_s, double t_s, Look& look) = 0;
+  /// Whether frames without points are worth drawing, because somebody sees them.
+  virtual bool visible() const = 0;
+  /// Shows a finished frame, drawn with the camera above.
+  virtual void present(const image::View& view) = 0;
+  /// After the frame's bookkeeping.
+  virtual void report(const LiveFigures& figures) = 0;
+  /// Whether the person is done.
+  virtual bool wants_to_stop() const = 0;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,125 @@
+#include "client/viewer/display/frame_presenter.h"
+
+#include <epoxy/gl.h>
+
+#include <cstring>
+
+namespace telesplat::viewer {
+namespace {
+
+// The first row of a frame is the uppermost one, that of a texture the lowest.
+constexpr const char* kVertexShader = R"(#version 330 core
+out vec2 place;
+void main() {
+  vec2 corner = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0);
+  place = vec2(corner.x, 1.0 - corner.y);
+  gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
+})";
+constexpr const char* kFragmentShader = R"(#version 330 core
+uniform sampler2D frame;
+in vec2 place;
+out vec4 colour;
+void main() { colour = vec4(texture(frame, place).rgb, 1.0); }
+)";
+
+Status compile(GLuint program, GLenum kind, const char* source) {
+  const GLuint shader = glCreateShader(kind);
+  glShaderSource(shader, 1, &source, nullptr);
+  glCompileShader(shader);
+  GLint good = 0;
+  char log[512] = "";
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
+  if (!good) glGetShaderInfoLog(shader, sizeof log, nullptr, log);
+  glAttachShader(program, shader);
+  glDeleteShader(shader);
+  return good ? ok_status() : Status(Error{std::string("the window's shader does not compile: ") + log});
+}
+
+}  // namespace
+
+Result<std::unique_ptr<FramePresenter>> FramePresenter::make() {
+  std::unique_ptr<FramePresenter> out(new FramePresenter);
+  out->program_ = glCreateProgram();
+  if (const Status s = compile(out->program_, GL_VERTEX_SHADER, kVertexShader); !s) return s.error();
+  if (const Status s = compile(out->program_, GL_FRAGMENT_SHADER, kFragmentShader); !s) return s.error();
+  glLinkProgram(out->program_);
+  GLint linked = 0;
+  glGetProgramiv(out->program_, GL_LINK_STATUS, &linked);
+  if (!linked) return Error{"the window's shaders do not link"};
+  glGenVertexArrays(1, &out->vertex_array_);
+  out->has_ring_ = epoxy_gl_version() >= 44 || epoxy_has_gl_extension("GL_ARB_buffer_storage");
+  return out;
+}
+
+FramePresenter::~FramePresenter() {
+  resize(0, 0);
+  glDeleteVertexArrays(1, &vertex_array_);
+  glDeleteProgram(program_);
+}
+
+void FramePresenter::resize(int width, int height) {
+  width_ = width;
+  height_ = height;
+  glDeleteTextures(1, &texture_);
+  texture_ = 0;
+  for (Slot& s : ring_) {
+    if (s.fence) glDeleteSync(static_cast<GLsync>(s.fence));
+    glDeleteBuffers(1, &s.buffer);  // which unmaps it
+    s = {};
+  }
+  if (width == 0) return;
+  glGenTextures(1, &texture_);
+  glBindTexture(GL_TEXTURE_2D, texture_);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  if (!has_ring_) return;
+  const GLsizeiptr bytes = GLsizeiptr(width) * height * 4;
+  constexpr GLbitfield kAccess = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+  for (Slot& s : ring_) {
+    glGenBuffers(1, &s.buffer);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, s.buffer);
+    glBufferStorage(GL_PIXEL_UNPACK_BUFFER, bytes, nullptr, kAccess);
+    s.memory = glMapBufferRange(GL_PIXEL_UNPACK_BUFFER, 0, bytes, kAccess);
+  }
+  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+}
+
+void FramePresenter::upload(const image::View& view) {
+  const auto copy = [&](const void* from) {
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, from);
+  };
+  Slot& s = ring_[slot_];
+  if (!s.memory) return copy(view.colour.data());
+  slot_ = (slot_ + 1) % kRing;
+  if (s.fence) {
+    constexpr GLuint64 kPatience_ns = 1'000'000'000;
+    glClientWaitSync(static_cast<GLsync>(s.fence), GL_SYNC_FLUSH_COMMANDS_BIT, kPatience_ns);
+    glDeleteSync(static_cast<GLsync>(s.fence));
+  }
+  std::memcpy(s.memory, view.colour.data(), view.colour.size() * 4);
+  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, s.buffer);
+  copy(nullptr);
+  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+  s.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+}
+
+void FramePresenter::draw(const image::View& view, int width, int height) {
+  if (view.width != width_ || view.height != height_) resize(view.width, view.height);
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, texture_);
+  upload(view);
+  const GLint filter = view.width == width && view.height == height ? GL_NEAREST : GL_LINEAR;
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, width, height);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_BLEND);
+  glUseProgram(program_);
+  glBindVertexArray(vertex_array_);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+}  // namespace telesplat::viewer

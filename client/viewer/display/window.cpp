@@ -1,0 +1,236 @@
+#include "client/viewer/display/window.h"
+
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <optional>
+#include <utility>
+
+#include "client/viewer/display/frame_presenter.h"
+#include "common/core/log.h"
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr int kSmallestSide = 120;
+
+std::string last_error() {
+  const char* text = nullptr;
+  glfwGetError(&text);
+  return text ? text : "no reason given";
+}
+
+// Initialises GLFW for as long as it lives.
+struct Library {
+  const bool ready = glfwInit() == GLFW_TRUE;
+  ~Library() {
+    if (ready) glfwTerminate();
+  }
+};
+
+std::optional<Key> key_of(int glfw_key) {
+  switch (glfw_key) {
+    case GLFW_KEY_A:
+      return Key::kA;
+    case GLFW_KEY_D:
+      return Key::kD;
+    case GLFW_KEY_E:
+      return Key::kE;
+    case GLFW_KEY_F:
+      return Key::kF;
+    case GLFW_KEY_H:
+      return Key::kH;
+    case GLFW_KEY_P:
+      return Key::kP;
+    case GLFW_KEY_Q:
+      return Key::kQ;
+    case GLFW_KEY_R:
+      return Key::kR;
+    case GLFW_KEY_S:
+      return Key::kS;
+    case GLFW_KEY_T:
+      return Key::kT;
+    case GLFW_KEY_W:
+      return Key::kW;
+    case GLFW_KEY_F12:
+      return Key::kF12;
+    case GLFW_KEY_ESCAPE:
+      return Key::kEscape;
+    case GLFW_KEY_LEFT_SHIFT:
+    case GLFW_KEY_RIGHT_SHIFT:
+      return Key::kShift;
+    default:
+      if (glfw_key >= GLFW_KEY_1 && glfw_key <= GLFW_KEY_8) return Key(int(Key::k1) + glfw_key - GLFW_KEY_1);
+      if (glfw_key >= GLFW_KEY_KP_1 && glfw_key <= GLFW_KEY_KP_8) return Key(int(Key::k1) + glfw_key - GLFW_KEY_KP_1);
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+struct Window::Impl {
+  Library library;
+  GLFWwindow* window = nullptr;
+  std::unique_ptr<FramePresenter> presenter;
+  Interaction* interaction = nullptr;  // while poll() runs
+  bool pointer_caught = false;
+
+  ~Impl() {
+    if (window) glfwDestroyWindow(window);
+  }
+
+  static Impl& of(GLFWwindow* w) { return *static_cast<Impl*>(glfwGetWindowUserPointer(w)); }
+
+  // Screen coordinates to window heights.
+  double per_height() const {
+    int width = 0, height = 0;
+    glfwGetWindowSize(window, &width, &height);
+    return 1.0 / std::max(1, height);
+  }
+
+  void listen() {
+    glfwSetWindowUserPointer(window, this);
+    glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
+      if (const auto known = key_of(key); known && action != GLFW_REPEAT && of(w).interaction)
+        of(w).interaction->key(*known, action == GLFW_PRESS);
+    });
+    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
+      if (!of(w).interaction || (button != GLFW_MOUSE_BUTTON_LEFT && button != GLFW_MOUSE_BUTTON_MIDDLE)) return;
+      of(w).interaction->button(button == GLFW_MOUSE_BUTTON_LEFT ? MouseButton::kLeft : MouseButton::kMiddle,
+                                action == GLFW_PRESS);
+    });
+    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+      if (of(w).interaction) of(w).interaction->move(x * of(w).per_height(), y * of(w).per_height());
+    });
+    glfwSetScrollCallback(window, [](GLFWwindow* w, double, double steps) {
+      if (of(w).interaction) of(w).interaction->wheel(steps);
+    });
+    glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {
+      if (!focused && of(w).interaction) of(w).interaction->focus_lost();
+    });
+  }
+};
+
+Status check_display() {
+  const auto set = [](const char* name) {
+    const char* value = std::getenv(name);
+    return value && *value;
+  };
+  if (!set("DISPLAY") && !set("WAYLAND_DISPLAY"))
+    return Error{"there is no display to open a window on: neither DISPLAY nor WAYLAND_DISPLAY is set"};
+  const Library library;
+  if (library.ready) return ok_status();
+  const char *x11 = std::getenv("DISPLAY"), *wayland = std::getenv("WAYLAND_DISPLAY");
+  return Error{fmt::format("the display cannot be opened (DISPLAY is \"{}\", WAYLAND_DISPLAY \"{}\"): {}",
+                           x11 ? x11 : "", wayland ? wayland : "", last_error())};
+}
+
+Result<std::unique_ptr<Window>> Window::open(const Options& o) {
+  if (const Status s = check_display(); !s) return s.error();
+  auto impl = std::make_unique<Impl>();
+  if (!impl->library.ready) return Error{"no window system: " + last_error()};
+  GLFWmonitor* monitor = o.fullscreen ? glfwGetPrimaryMonitor() : nullptr;
+  const GLFWvidmode* mode = monitor ? glfwGetVideoMode(monitor) : nullptr;
+  if (o.fullscreen && !mode) return Error{"there is no screen to fill: " + last_error()};
+  std::string tried;
+  // EGL first: a renderer's context without a window is EGL's too, and one thread can have current contexts of one of them only.
+  for (const auto& [minor, api] : {std::pair{43, GLFW_EGL_CONTEXT_API},
+                                   {43, GLFW_NATIVE_CONTEXT_API},
+                                   {33, GLFW_EGL_CONTEXT_API},
+                                   {33, GLFW_NATIVE_CONTEXT_API}}) {
+    glfwDefaultWindowHints();
+    glfwWindowHint(GLFW_CONTEXT_CREATION_API, api);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, minor / 10);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, minor % 10);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    for (const int unused : {GLFW_DEPTH_BITS, GLFW_STENCIL_BITS, GLFW_ALPHA_BITS}) glfwWindowHint(unused, 0);
+    glfwWindowHintString(GLFW_X11_CLASS_NAME, "telesplat");
+    glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "telesplat");
+    if (mode) glfwWindowHint(GLFW_REFRESH_RATE, mode->refreshRate);
+    impl->window = glfwCreateWindow(mode ? mode->width : o.width, mode ? mode->height : o.height, o.title.c_str(),
+                                    monitor, nullptr);
+    if (impl->window) break;
+    tried += fmt::format("{}OpenGL {}.{} through {}: {}", tried.empty() ? "" : "; ", minor / 10, minor % 10,
+                         api == GLFW_EGL_CONTEXT_API ? "EGL" : "the window system", last_error());
+  }
+  if (!impl->window) return Error{"no window with OpenGL: " + tried};
+  glfwSetWindowSizeLimits(impl->window, kSmallestSide, kSmallestSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
+  impl->listen();
+  std::unique_ptr<Window> out(new Window(std::move(impl)));
+  {
+    const Current current(*out);
+    glfwSwapInterval(1);
+    auto presenter = FramePresenter::make();
+    if (!presenter) return presenter.error();
+    out->impl_->presenter = std::move(*presenter);
+    log::info("window: {}x{} pixels, {}, {}", out->width(), out->height(),
+              reinterpret_cast<const char*>(glGetString(GL_RENDERER)),
+              out->impl_->presenter->has_pixel_ring() ? "mapped pixel buffers" : "no mapped pixel buffers");
+  }
+  if (glfwGetCurrentContext() == out->impl_->window) glfwMakeContextCurrent(nullptr);
+  return out;
+}
+
+Window::Window(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) { read_size(); }
+
+Window::~Window() {
+  const Current current(*this);
+  impl_->presenter.reset();
+}
+
+Window::Current::Current(const Window& window)
+    : display_(eglGetCurrentDisplay()),
+      context_(eglGetCurrentContext()),
+      draw_(eglGetCurrentSurface(EGL_DRAW)),
+      read_(eglGetCurrentSurface(EGL_READ)) {
+  if (glfwGetCurrentContext() == window.impl_->window) {
+    context_ = EGL_NO_CONTEXT;
+    return;
+  }
+  if (context_ != EGL_NO_CONTEXT) eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  glfwMakeContextCurrent(window.impl_->window);
+}
+
+Window::Current::~Current() {
+  if (context_ == EGL_NO_CONTEXT) return;
+  glfwMakeContextCurrent(nullptr);
+  eglMakeCurrent(display_, draw_, read_, context_);
+}
+
+void Window::read_size() {
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(impl_->window, &width, &height);
+  if (width <= 0 || height <= 0) return;  // minimised
+  width_ = std::min(width, geometry::kMaxImageSide);
+  height_ = std::min(height, geometry::kMaxImageSide);
+}
+
+void Window::poll(Interaction& interaction) {
+  impl_->interaction = &interaction;
+  glfwPollEvents();
+  impl_->interaction = nullptr;
+  if (interaction.wants_pointer() != impl_->pointer_caught) {
+    impl_->pointer_caught = interaction.wants_pointer();
+    glfwSetInputMode(impl_->window, GLFW_CURSOR, impl_->pointer_caught ? GLFW_CURSOR_DISABLED : GLFW_CURSOR_NORMAL);
+  }
+  read_size();
+}
+
+bool Window::closing() const { return glfwWindowShouldClose(impl_->window); }
+void Window::set_title(const std::string& title) { glfwSetWindowTitle(impl_->window, title.c_str()); }
+
+void Window::present(const image::View& view) {
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(impl_->window, &width, &height);
+  if (width <= 0 || height <= 0) return;
+  const Current current(*this);
+  impl_->presenter->draw(view, width, height);
+  glfwSwapBuffers(impl_->window);
+}
+
+}  // namespace telesplat::viewer

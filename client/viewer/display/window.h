@@ -1,0 +1,61 @@
+// A window with an OpenGL context, through GLFW, and the person's keys and mouse. All calls from the main thread.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "client/viewer/input/interaction.h"
+#include "common/core/result.h"
+#include "common/image/file.h"
+
+namespace telesplat::viewer {
+
+/// Whether windows can be opened here; else why not, naming DISPLAY and WAYLAND_DISPLAY. Opens none.
+Status check_display();
+
+class Window {
+ public:
+  struct Options {
+    int width = 1280, height = 800;  ///< of the content, in screen coordinates; ignored if fullscreen
+    bool fullscreen = false;
+    std::string title = "Telesplat";
+  };
+  /// One at a time in a process. The context is OpenGL 4.3 core, or 3.3 where that is not to be had. Nothing is left current.
+  static Result<std::unique_ptr<Window>> open(const Options& options);
+  ~Window();
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
+
+  /// Its context, current in this thread for a scope; then what was current before, be it of another API (a renderer's own context).
+  class Current {
+   public:
+    explicit Current(const Window& window);
+    ~Current();
+    Current(const Current&) = delete;
+    Current& operator=(const Current&) = delete;
+
+   private:
+    void *display_, *context_, *draw_, *read_;  // EGL's; nothing to go back to: the context stays
+  };
+
+  /// Delivers keys, mouse and wheel since the last call; catches the pointer while the person flies.
+  void poll(Interaction& interaction);
+  /// The person closed it.
+  bool closing() const;
+  /// Pixels of the content, which on fine screens are more than screen coordinates; the last ones while it is minimised.
+  int width() const { return width_; }
+  int height() const { return height_; }
+  void set_title(const std::string& title);
+  /// Shows a frame, in time with the screen; nothing happens while the window is minimised.
+  void present(const image::View& view);
+
+ private:
+  struct Impl;
+  explicit Window(std::unique_ptr<Impl> impl);
+  void read_size();
+
+  std::unique_ptr<Impl> impl_;
+  int width_ = 0, height_ = 0;
+};
+
+}  // namespace telesplat::viewer

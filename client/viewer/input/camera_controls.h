@@ -1,0 +1,77 @@
+// A person's hold on the camera: orbit, pan, dolly and flight, in room space, without any window system.
+#pragma once
+
+#include "common/geometry/trajectory.h"
+
+namespace telesplat::viewer {
+
+/// Inputs move a goal; the camera follows it with a short exponential lag that does not depend on the frame rate. Distances on the
+/// screen are in window heights, +x right, +y down. Everything a person does leaves the pose within Limits; numbers that are not
+/// finite are ignored. One thread.
+class CameraControls {
+ public:
+  /// In units of the data set's largest extent.
+  struct Limits {
+    static constexpr double kNearest = 0.03, kFarthest = 10;           ///< eye to pivot
+    static constexpr double kPivot = 2;                                ///< pivot to centre, along each axis
+    static constexpr double kFlight = 10;                              ///< eye to centre in flight, along each axis
+    static constexpr double kSlowest = 0.02, kFastest = 5;             ///< flight, extents a second
+    static constexpr double kPitch_rad = 89 * 3.14159265358979 / 180;  ///< up and down
+  };
+  /// What `home` is made for: 0.8 m, the default size of a data set in the room.
+  static constexpr double kHomeExtent_m = 0.8;
+
+  /// home: where reset() leads to, around a data set of kHomeExtent_m.
+  explicit CameraControls(const geometry::Pose& home = geometry::default_pose());
+
+  /// The data set's largest extent, metres: limits, speeds and home follow. The camera too, if nobody has moved it yet.
+  void set_extent(double extent_m);
+
+  /// Around the pivot (the data set's centre until panned), half a turn a window height. In flight: looks around.
+  void orbit(double dx, double dy);
+  /// Moves the pivot with the pointer; height_tangent: what the window shows, top to bottom, at distance 1.
+  void pan(double dx, double dy, double height_tangent);
+  /// To (> 0) or from the pivot, a tenth a step. In flight: faster or slower.
+  void wheel(double steps);
+
+  /// In flight the camera turns about itself; leaving it, about the point ahead that is as far as the data set's centre. The view
+  /// does not change with either.
+  void set_flying(bool flying);
+  bool flying() const { return flying_; }
+  /// Where to fly while the keys are held, -1 to 1 each: right and forward of the camera, up of the room.
+  struct Flight {
+    double right = 0, up = 0, forward = 0;
+    bool fast = false;
+  };
+  void fly(const Flight& flight) { flight_ = flight; }
+
+  /// Home, orbiting, on the shortest way.
+  void reset();
+  /// Goes on from this pose, at once; a head that is tilted to the side straightens up.
+  void take_over(const geometry::Pose& pose);
+
+  /// `dt_s` later (at most 0.25 s count). The camera of that moment.
+  geometry::Pose advance(double dt_s);
+  geometry::Pose pose() const { return pose_of(now_); }
+
+ private:
+  // eye = anchor + rotation * (0, 0, distance), rotation = yaw about y, then pitch about x, then roll about z.
+  struct State {
+    glm::dvec3 anchor{0.0};
+    double yaw = 0, pitch = 0, roll = 0, distance = 1;
+  };
+  static glm::dquat rotation(const State& s);
+  static geometry::Pose pose_of(const State& s);
+  static State state_at(const geometry::Pose& pose, double distance);
+  double distance_of_interest(const geometry::Pose& pose) const;
+  glm::dvec3 flight_velocity() const;
+  void clamp_goal();
+
+  geometry::Pose home_;
+  double extent_m_ = kHomeExtent_m, speed_ = 0.5;  // extents a second
+  State now_, goal_;
+  Flight flight_;
+  bool flying_ = false, touched_ = false;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,69 @@
+// What a person does at the window - keys, mouse, wheel - and what follows from it. Without any window system, so that it is tested
+// without one.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/viewer/display/display_surface.h"
+#include "client/viewer/input/camera_controls.h"
+
+namespace telesplat::viewer {
+
+/// Keys that mean something here, by what is printed on a US keyboard.
+enum class Key { kA, kD, kE, kF, kH, kP, kQ, kR, kS, kT, kW, k1, k2, k3, k4, k5, k6, k7, k8, kF12, kEscape, kShift };
+enum class MouseButton { kLeft, kMiddle };
+
+/// Keys and mouse, a line each: for H, for --help and for documentation.
+const std::vector<std::string>& key_help();
+
+class Interaction {
+ public:
+  /// recorded: a head movement that T plays; without, T does nothing. It plays from the beginning if there is one.
+  Interaction(std::optional<geometry::Trajectory> recorded, const Look& look);
+
+  // ---- events; positions and movements in window heights, +y down ----
+  void key(Key key, bool down);
+  void button(MouseButton button, bool down);
+  void move(double x, double y);
+  void wheel(double steps);
+  /// Keys and buttons that are released elsewhere are never heard of: all count as released.
+  void focus_lost();
+
+  // ---- every frame ----
+  /// The data set's largest extent, metres.
+  void set_extent(double extent_m) { controls_.set_extent(extent_m); }
+  /// What the window shows, top to bottom, at distance 1: pans follow the pointer.
+  void set_height_tangent(double tangent) { height_tangent_ = tangent; }
+  /// The camera at `now_s`. A recorded movement advances only while `playback` is true.
+  geometry::Pose advance(double now_s, bool playback);
+
+  const Look& look() const { return look_; }
+  bool wants_to_quit() const { return quit_; }
+  /// In flight the mouse turns the head: the pointer should be caught and hidden.
+  bool wants_pointer() const { return controls_.flying(); }
+  bool playing() const { return playing_; }
+  /// True once after each press of the screenshot key.
+  bool take_screenshot_wish();
+  /// Lines to tell the person, since the last call.
+  std::vector<std::string> take_notes();
+
+ private:
+  void pressed(Key key);
+  void take_camera();
+  void toggle(bool& flag, const char* name);
+
+  std::optional<geometry::Trajectory> recorded_;
+  Look look_;
+  CameraControls controls_;
+  bool playing_ = false, quit_ = false, screenshot_ = false;
+  double playback_s_ = 0, height_tangent_ = 1;
+  std::optional<double> last_s_;
+  std::optional<glm::dvec2> pointer_;
+  std::vector<bool> held_;
+  bool left_ = false, middle_ = false;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,42 @@
+#include "client/viewer/record/screenshots.h"
+
+#include <fmt/format.h>
+
+#include <ctime>
+#include <filesystem>
+
+namespace telesplat::viewer {
+
+namespace fs = std::filesystem;
+
+Screenshots::Screenshots(std::string directory, std::function<void(const std::string&)> tell)
+    : directory_(std::move(directory)), tell_(std::move(tell)) {}
+
+Screenshots::~Screenshots() {
+  if (writing_.valid()) writing_.wait();
+}
+
+std::string Screenshots::next_path() {
+  char date[32];
+  const std::time_t now = std::time(nullptr);
+  std::strftime(date, sizeof date, "%Y%m%d-%H%M%S", std::localtime(&now));
+  std::string path;
+  std::error_code error;
+  do {
+    path = fmt::format("{}/telesplat-{}-{:03d}.png", directory_, date, ++count_);
+  } while (fs::exists(path, error));
+  return path;
+}
+
+void Screenshots::take(const image::View& view) {
+  writing_ = std::async(std::launch::async, [this, path = next_path(), before = std::move(writing_),
+                                             copy = image::View{view.width, view.height, view.colour, {}}]() {
+    if (before.valid()) before.wait();
+    std::error_code error;
+    fs::create_directories(directory_, error);
+    const Status written = image::write_png(path, copy);
+    tell_(written ? "screenshot: " + path : written.error().text);
+  });
+}
+
+}  // namespace telesplat::viewer

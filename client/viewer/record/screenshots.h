@@ -1,0 +1,33 @@
+// Pictures of what is on display, taken when the person asks, written in the background.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <future>
+#include <string>
+
+#include "common/image/file.h"
+
+namespace telesplat::viewer {
+
+class Screenshots {
+ public:
+  /// Into `directory` (made if need be). tell: what became of each picture, a line for the person; called from any thread, never
+  /// from two at once.
+  Screenshots(std::string directory, std::function<void(const std::string&)> tell);
+  /// Waits until all are written.
+  ~Screenshots();
+
+  /// Copies the view and writes it as telesplat-YYYYMMDD-HHMMSS-NNN.png; no file is overwritten.
+  void take(const image::View& view);
+
+ private:
+  std::string next_path();
+
+  std::string directory_;
+  std::function<void(const std::string&)> tell_;
+  int count_ = 0;
+  std::future<void> writing_;  // the last one; each waits for the one before
+};
+
+}  // namespace telesplat::viewer
