@@ -16,10 +16,14 @@ Result<geometry::Trajectory> make_trajectory(const std::string& name) {
   return geometry::Trajectory::read_csv(name);
 }
 
+}  // namespace
+
 // Splats larger than their samples leave no cracks when the head moves; the nearest centre wins where they overlap, so they do not
 // blur. Set by runs along walk-around-a.csv at 2560x1600: discs of scale 1.0 / 1.5 gave 20.2 / 32.6 dB and 13.6 / 0.0 % holes, squares
 // of 1.3 gave 32.6 dB and 0.0 %.
 float suitable_scale(splat::Kernel kernel) { return kernel == splat::Kernel::kSquare ? 1.3f : 1.5f; }
+
+namespace {
 
 int refuse(const Error& error) {
   std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());

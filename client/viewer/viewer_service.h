@@ -26,6 +26,9 @@ void add_flags(CLI::App& app, ViewerOptions& options);
 /// "WxH" with both in 16..16384.
 Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag);
 
+/// The scale factor of splat sizes (T eq. 4.8) that is used where none is given.
+float suitable_scale(splat::Kernel kernel);
+
 /// Exit code: 0 done, 1 failed while running, 2 bad usage or input.
 int run(ViewerOptions options);
 
