@@ -170,7 +170,8 @@ int run(ViewerOptions o) {
        {"fov_deg", fmt::format("{}", o.display.fov_deg)},
        {"target_fps", fmt::format("{}", o.display.target_fps)},
        {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
-       {"splat_scale", fmt::format("{}", o.splat_scale > 0 ? o.splat_scale : suitable_scale(o.display.render.kernel))}},
+       {"splat_scale",
+        fmt::format("{}", o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(o.display.render.kernel))}},
       events.get(),
       o.started_s};
   DisplayResult result;

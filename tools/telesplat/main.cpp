@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "tools/telesplat/compare_command.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/inspect_command.h"
 #include "tools/telesplat/run_command.h"
@@ -51,6 +52,11 @@ int telesplat_main(int argc, char** argv) {
   inspect->add_option("path", path, "file or folder")->required();
   inspect->add_option("--cache", mesh.cache_dir, "folder of the chunk store");
 
+  launcher::CompareOptions compare_options;
+  auto* compare = app.add_subcommand(
+      "compare", "draw poses of a recorded run with every kernel and renderer, and directly from the data");
+  launcher::add_compare_flags(*compare, compare_options);
+
   auto arguments = launcher::expand_scene_file(argc, argv);
   if (!arguments) {
     std::fprintf(stderr, "telesplat: %s\n", arguments.error().text.c_str());
@@ -61,6 +67,7 @@ int telesplat_main(int argc, char** argv) {
   net::parse_or_exit(app, int(pointers.size()), pointers.data());
   if (*run) return launcher::run(run_options);
   if (*view) return launcher::run(view_options);
+  if (*compare) return launcher::compare(compare_options);
   if (*ctl) return control(master, command);
   return launcher::inspect(path, mesh);
 }

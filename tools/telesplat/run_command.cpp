@@ -1,8 +1,6 @@
 #include "tools/telesplat/run_command.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
@@ -15,39 +13,13 @@
 #include "common/core/clock.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/pipeline.h"
+#include "tools/telesplat/progress_line.h"
 #include "tools/telesplat/verify.h"
 
 namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// One line that is rewritten on a terminal, or a line every few seconds in a log.
-class ProgressLine {
- public:
-  void show(const std::string& text) {
-    if (terminal_) {
-      std::fprintf(stderr, "\r\033[K%s", text.c_str());
-      std::fflush(stderr);
-      open_ = true;
-    } else if (monotonic_s() - last_s_ >= 2.0) {
-      std::fprintf(stderr, "%s\n", text.c_str());
-      last_s_ = monotonic_s();
-    }
-  }
-  void line(const std::string& text) {
-    close();
-    std::fprintf(stderr, "%s\n", text.c_str());
-  }
-  void close() {
-    if (open_) std::fprintf(stderr, "\n");
-    open_ = false;
-  }
-
- private:
-  bool terminal_ = isatty(2), open_ = false;
-  double last_s_ = monotonic_s();
-};
 
 // fps, updates/s, points, MB/s from two status answers.
 class LiveFigures {
@@ -125,6 +97,29 @@ Status check_usage(const RunOptions& o) {
   if (o.viewer.trajectory != "orbit" && o.viewer.trajectory != "still")
     if (const auto t = geometry::Trajectory::read_csv(o.viewer.trajectory); !t) return t.error();
   return o.viewer.window ? viewer::check_display() : ok_status();
+}
+
+// Adds to the master's session.toml what only the launcher knows: where the scene is, and the display's camera. `telesplat compare`
+// renders a run's frames again with it.
+void complete_session(const RunOptions& o) {
+  std::error_code error;
+  const std::string path = o.out + "/session.toml";
+  if (!fs::exists(path, error)) return;
+  const auto quoted = [](const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) {
+      if (c == '"' || c == '\\') out += '\\';
+      out += static_cast<unsigned char>(c) < 32 ? ' ' : c;
+    }
+    return out + '"';
+  };
+  std::ofstream out(path, std::ios::app);
+  out << "\n[scene]\nfile = " << quoted(fs::absolute(o.scene, error).string())
+      << fmt::format("\nroom_size = {}\nup = \"{}\"\n", o.mesh.room_size_m, o.mesh.up);
+  if (!o.mesh.use_cache) out << "no_cache = true\n";
+  if (!o.mesh.cache_dir.empty()) out << "cache = " << quoted(fs::absolute(o.mesh.cache_dir, error).string()) << "\n";
+  const auto& d = o.viewer.display;
+  out << fmt::format("\n[display]\nsize = \"{}\"\nfov = {}\nnear = {}\n", o.viewer.size, d.fov_deg, d.near_m);
 }
 
 void print_report(const std::string& directory) {
@@ -281,6 +276,7 @@ int run(const RunOptions& given) {
   progress.close();
   pipeline->finish();
   for (const auto& n : pipeline->take_notes()) progress.line(n);
+  if (o.join_master.empty()) complete_session(o);
   if (state == Pipeline::State::kBadInput) {
     if (!folder_existed) fs::remove_all(o.out, error);
     return 2;

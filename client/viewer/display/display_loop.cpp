@@ -43,11 +43,6 @@ LiveFigures live_figures(double now_s, uint64_t frames, uint64_t points_drawn, c
 
 }  // namespace
 
-// Splats larger than their samples leave no cracks when the head moves; the nearest centre wins where they overlap, so they do not
-// blur. Set by runs along walk-around-a.csv at 2560x1600: discs of scale 1.0 / 1.5 gave 20.2 / 32.6 dB and 13.6 / 0.0 % holes, squares
-// of 1.3 gave 32.6 dB and 0.0 %.
-float suitable_scale(splat::Kernel kernel) { return kernel == splat::Kernel::kSquare ? 1.3f : 1.5f; }
-
 const std::vector<std::string>& frame_columns() {
   static const std::vector<std::string> columns{"frame",
                                                 "t_s",
@@ -85,7 +80,7 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
     const geometry::Camera camera = surface.begin_frame(now_s, t_s, look);
     o.render = look.render;
     o.shading.lit = look.lit;
-    o.selection.scale = o.splat_scale > 0 ? o.splat_scale : suitable_scale(look.render.kernel);
+    o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(look.render.kernel);
     return camera;
   };
   image::View view;

@@ -26,9 +26,6 @@ struct DisplayOptions {
   bool exr = false;            ///< pictures as EXR with depth too
 };
 
-/// Scale factor of splat sizes (T eq. 4.8) that suits a kernel.
-float suitable_scale(splat::Kernel kernel);
-
 /// The columns of frames.csv (docs/metrics.md).
 const std::vector<std::string>& frame_columns();
 

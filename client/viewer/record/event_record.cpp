@@ -82,7 +82,8 @@ struct EventReplay::Impl {
   Sequence applied;
   bool at_end = false;
   std::string type, body;
-  bool pending = false;  // type and body hold an event that was read but not applied
+  bool pending = false;     // type and body hold an event that was read but not applied
+  bool has_events = false;  // of the replica at hand
   image::DepthImage tile;
 
   // The next record; false at the end, also if it is cut off.
@@ -110,6 +111,7 @@ struct EventReplay::Impl {
     if (const Status s = points::validate(config); !s) return wrong(s.error().text);
     model = std::make_unique<points::PointModel>(config);
     applied = {};
+    has_events = false;
     return ok_status();
   }
 
@@ -184,10 +186,30 @@ Status EventReplay::advance(Sequence sequence) {
       return i.wrong("is no event");
     }
     if (!applied) return applied.error();
+    if (i.type != kReplica) i.has_events = true;
     if (!*applied) return ok_status();
     i.pending = false;
   }
   return ok_status();
+}
+
+Status EventReplay::next_replica() {
+  Impl& i = *impl_;
+  while (!i.at_end) {
+    if (!i.pending && !i.read()) {
+      i.at_end = true;
+      break;
+    }
+    i.pending = false;
+    if (i.type != kReplica) {
+      i.has_events = true;
+      continue;
+    }
+    const bool follows = i.has_events;
+    if (const Status s = i.begin_replica(); !s) return s;
+    if (follows) return ok_status();
+  }
+  return Error{fmt::format("{}: holds no further replica", i.path)};
 }
 
 const points::PointModel* EventReplay::model() const { return impl_->model.get(); }

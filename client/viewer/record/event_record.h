@@ -46,6 +46,9 @@ class EventReplay {
   /// Applies events until the model holds everything up to and including `sequence`, or the
   /// record ends. Goes forward only. Errors name the file and what is wrong with the event.
   Status advance(Sequence sequence);
+  /// Goes on to where the viewer began its next replica, because another packer took over and numbers began again. A replica that
+  /// holds no event does not count. Fails if there is none.
+  Status next_replica();
   /// Null before the first event. Pointers into it hold until the next advance().
   const points::PointModel* model() const;
   Sequence applied() const;

@@ -1,0 +1,62 @@
+// One picture of a comparison: a point model splatted by one kernel and renderer, and how far it is from direct rendering.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/viewer/render/renderer.h"
+#include "common/image/flip.h"
+#include "common/image/quality.h"
+
+namespace telesplat::launcher {
+
+/// Where the squared error lies, as shares of its sum over pixels where reference or reconstruction shows the data set (1 in all, 0
+/// where the pictures are identical):
+///   silhouette: only one of the two shows it;  depth_edge: both do, but their depths differ by more than 2 % of the reference's;
+///   interior: the rest.
+struct ErrorShares {
+  double silhouette = 0, depth_edge = 0, interior = 0;
+  double silhouette_pixels = 0, depth_edge_pixels = 0;  ///< their shares of the pixels
+  double interior_psnr_db = 0;                          ///< over the interior alone; 99 where identical
+};
+
+/// Preconditions: equal sizes, both with depth.
+ErrorShares error_shares(const image::View& reference, const image::View& reconstruction);
+
+/// Mean of an error map over the pixels where the reference shows the data set; 0 if it does nowhere.
+double mean_over_object(const std::vector<float>& map, const image::View& reference);
+
+struct FrameTimes {
+  double frame_ms =
+      0;  ///< what a viewer waits for: choosing what to draw, drawing and, for gl, reading the picture back
+  double select_ms = 0, render_ms = 0;
+  splat::SplatStats stats;  ///< of the frame of median render_ms
+};
+
+struct Cell {
+  splat::Kernel kernel;
+  std::string renderer;
+  float splat_scale = 0;
+  image::Quality quality;
+  ErrorShares shares;
+  double flip = 0;  ///< mean over object pixels
+  FrameTimes times;
+  uint64_t items = 0;
+  image::View view;             ///< with depth
+  std::vector<float> flip_map;  ///< of its pixels
+};
+
+struct CellOptions {
+  splat::RenderOptions render;
+  float splat_scale = 1;
+  int repeat = 5;  ///< frames timed; one more is drawn before them
+  image::ShadingParameters shading;
+};
+
+/// Draws `model` for `camera` and compares it with `reference`, whose FLIP comparer is `flip`.
+/// applied: the newest event of the model (renderers keep copies of points by it).
+Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, Sequence applied,
+                  const geometry::Camera& camera, const CellOptions& options, const image::View& reference,
+                  const image::Flip& flip);
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,55 @@
+// What is compared: which poses, of which data, and the point model that each of them shows.
+#pragma once
+
+#include <memory>
+
+#include "client/viewer/record/event_record.h"
+#include "services/sampler/sampler.h"
+#include "tools/telesplat/compare_command.h"
+#include "tools/telesplat/recorded_run.h"
+
+namespace telesplat::launcher {
+
+/// The poses to compare, before any data is read.
+struct CompareSubject {
+  std::string name;   ///< for captions
+  std::string scene;  ///< path of the data file
+  data::MeshOptions mesh;
+  std::string out;
+  std::string events;    ///< record of point-model events; empty: poses are sampled
+  std::string sampling;  ///< how the points were sampled, for captions
+  int octree_depth = 6;
+  std::vector<DisplayedFrame> frames;
+};
+
+/// Error texts are for a user: exit code 2.
+Result<CompareSubject> find_subject(const CompareOptions& options);
+
+/// The point models of a subject's poses, one after the other.
+class PoseModels {
+ public:
+  /// Opens the record, if the subject has one. `sampler` and `store` must outlive this.
+  static Result<std::unique_ptr<PoseModels>> open(const CompareSubject& subject, int magnify, sampler::Sampler& sampler,
+                                                  const data::MeshStore& store);
+
+  /// What the frame displayed, or what one sampling frame of its pose gives. Frames come in order of display.
+  /// The model holds until the next call.
+  Result<const points::PointModel*> of(const DisplayedFrame& frame);
+  Sequence applied() const { return applied_; }
+
+ private:
+  PoseModels(const CompareSubject& subject, int magnify, sampler::Sampler& sampler, const data::MeshStore& store)
+      : subject_(subject), magnify_(magnify), sampler_(sampler), store_(store) {}
+  Result<const points::PointModel*> replay(const DisplayedFrame& frame);
+
+  const CompareSubject& subject_;
+  int magnify_;
+  sampler::Sampler& sampler_;
+  const data::MeshStore& store_;
+  std::unique_ptr<viewer::EventReplay> events_;
+  std::unique_ptr<points::PointModel> sampled_;
+  uint32_t replica_ = 0;
+  Sequence applied_;
+};
+
+}  // namespace telesplat::launcher
