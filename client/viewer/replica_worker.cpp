@@ -30,8 +30,9 @@ ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, Mode
       cache_(cache),
       frames_(frames),
       spans_(spans),
-      updates_table_("updates", {"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms",
-                                 "start_up_ms", "tiles", "samples", "points", "bytes", "eliminated"}),
+      updates_table_("updates",
+                     {"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
+                      "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height"}),
       link_(context, options.service.master, make_hello(options)),
       sequencer_({[this](const ModelEvent& e) { apply(e); },
                   [this] {
@@ -206,7 +207,8 @@ void ReplicaWorker::apply_patch(const wire::Patch& patch) {
     updates_table_.add({double(u->request.value), double(patch.frame.value), u->requested_s, u->first_s, u->complete_s,
                         (u->complete_s - u->requested_s) * 1e3, (u->first_s - u->requested_s) * 1e3, double(u->tiles),
                         double(u->samples), double(u->points), double(u->bytes),
-                        u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0});
+                        u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0, double(u->camera.width),
+                        double(u->camera.height)});
     spans_.add("view update", u->requested_s, u->complete_s, 2);
     const std::lock_guard lock(mutex_);
     last_update_ = {u->requested_s, u->camera.pose, patch.sequence.value};

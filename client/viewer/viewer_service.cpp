@@ -20,6 +20,14 @@ Result<geometry::Trajectory> make_trajectory(const std::string& name) {
   return geometry::Trajectory::read_csv(name);
 }
 
+// "fill smooth antialias", or those of them that are on.
+std::string finish_name(const splat::Finish& f) {
+  std::string out;
+  for (const auto& [on, name] : {std::pair{f.fill, "fill"}, {f.smooth, "smooth"}, {f.antialias, "antialias"}})
+    if (on) out += (out.empty() ? "" : " ") + std::string(name);
+  return out.empty() ? "none" : out;
+}
+
 int refuse(const Error& error) {
   std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
   return 2;
@@ -42,6 +50,11 @@ Result<std::unique_ptr<DisplaySurface>> make_surface(const ViewerOptions& o, geo
 
 }  // namespace
 
+Result<std::pair<int, int>> parse_sampling_size(const std::string& text) {
+  if (text == "auto") return std::pair{RequestOptions{}.sampling_width, RequestOptions{}.sampling_height};
+  return parse_size(text, "--sampling-size");
+}
+
 Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag) {
   int w = 0, h = 0;
   const char* end = text.data() + text.size();
@@ -57,7 +70,14 @@ Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag
 void add_view_flags(CLI::App& app, ViewerOptions& o) {
   auto& d = o.display;
   app.add_option("--size", o.size, "display size in pixels, WxH")->capture_default_str();
-  app.add_option("--sampling-size", o.sampling_size, "sampling size in pixels, WxH")->capture_default_str();
+  app.add_option("--sampling-size", o.sampling_size,
+                 "sampling size in pixels, WxH; auto: from half the display's to all of it, as fine as updates of "
+                 "--target-latency allow")
+      ->capture_default_str();
+  app.add_option("--target-latency", o.requests.target_latency_s,
+                 "seconds from request to complete view update that --sampling-size auto aims at")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 10.0));
   app.add_option("--trajectory", o.trajectory, "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)")
       ->capture_default_str();
   app.add_option("--duration", d.duration_s, "seconds from the first displayed frame; 0: until stopped")
@@ -83,6 +103,15 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 10.0));
+  app.add_flag("--fill,!--no-fill", d.render.finish.fill, "close pin-holes (on unless --no-fill)");
+  app.add_flag("--smooth,!--no-smooth", d.render.finish.smooth,
+               "interpolate between magnified discs and ellipses (on unless --no-smooth)");
+  app.add_flag("--antialias,!--no-antialias", d.render.finish.antialias,
+               "antialias silhouettes (on unless --no-antialias)");
+  app.add_option("--shading", o.shading,
+                 "lit: head light, directional light, ambient; head: head light; unlit: colours as they are")
+      ->capture_default_str()
+      ->check(CLI::IsMember(image::kShadingNames));
   app.add_option("--coupling", o.coupling, "async: the display never waits for the server")
       ->capture_default_str()
       ->check(CLI::IsMember({"async"}));
@@ -117,14 +146,16 @@ void add_flags(CLI::App& app, ViewerOptions& o) {
 int run(ViewerOptions o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
-  const auto size = parse_size(o.size, "--size"), sampling = parse_size(o.sampling_size, "--sampling-size");
+  const auto size = parse_size(o.size, "--size"), sampling = parse_sampling_size(o.sampling_size);
   if (!size) return refuse(size.error());
   if (!sampling) return refuse(sampling.error());
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
   o.display.render.kernel = *splat::kernel_named(o.splat);
   o.display.splat_scale = float(o.splat_scale);
+  o.display.shading = *image::shading_named(o.shading);
   if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
+  o.requests.adaptive = o.sampling_size == "auto";
   o.requests.follow_display = o.window;
   auto trajectory = make_trajectory(o.trajectory);
   if (!trajectory) return refuse(trajectory.error());
@@ -162,10 +193,13 @@ int run(ViewerOptions o) {
        {"buffers", "0"},
        {"renderer", (*renderer)->name()},
        {"splat", o.splat},
+       {"finish", finish_name(o.display.render.finish)},
+       {"shading", o.shading},
        {"width", std::to_string(o.display.width)},
        {"height", std::to_string(o.display.height)},
-       {"sampling_width", std::to_string(o.requests.sampling_width)},
-       {"sampling_height", std::to_string(o.requests.sampling_height)},
+       {"sampling_width", std::to_string(o.requests.adaptive ? o.display.width : o.requests.sampling_width)},
+       {"sampling_height", std::to_string(o.requests.adaptive ? o.display.height : o.requests.sampling_height)},
+       {"sampling", o.requests.adaptive ? "adaptive" : "fixed"},
        {"trajectory", o.trajectory},
        {"fov_deg", fmt::format("{}", o.display.fov_deg)},
        {"target_fps", fmt::format("{}", o.display.target_fps)},

@@ -9,9 +9,9 @@ struct ViewerOptions {
   net::ServiceOptions service;
   DisplayOptions display;
   RequestOptions requests;
-  std::string size = "1280x800", sampling_size = "1280x800";  ///< pixels, WxH
+  std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling: or auto
   std::string trajectory = "orbit";                           ///< "orbit", "still" or a CSV file
-  std::string renderer = "auto", splat = "disc", coupling = "async";
+  std::string renderer = "auto", splat = "ellipse", coupling = "async", shading = "lit";
   double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
   uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none
@@ -27,6 +27,9 @@ void add_flags(CLI::App& app, ViewerOptions& options);
 
 /// "WxH" with both in 16..16384.
 Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag);
+
+/// The same, or "auto" (then the value is not used).
+Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
 
 /// Exit code: 0 done, 1 failed while running, 2 bad usage or input.
 int run(ViewerOptions options);

@@ -20,6 +20,21 @@ const std::vector<glm::vec3>& all_normals() {
 
 }  // namespace
 
+std::optional<ShadingParameters> shading_named(std::string_view name) {
+  ShadingParameters p;
+  if (name == "lit") return p;
+  if (name == "head") {
+    p.head += p.key;  // as bright where a surface faces the viewer
+    p.key = 0;
+    return p;
+  }
+  if (name == "unlit") {
+    p.lit = false;
+    return p;
+  }
+  return std::nullopt;
+}
+
 Shading::Shading(const ShadingParameters& parameters, const geometry::Camera& camera)
     : parameters_(parameters),
       head_room_(camera.pose.orientation * glm::dvec3(0, 0, 1)),

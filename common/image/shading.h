@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
+#include <string_view>
 
 #include "common/geometry/camera.h"
 
@@ -18,6 +20,11 @@ struct ShadingParameters {
   uint32_t background = 0x00141820;                          ///< 0x00RRGGBB
   bool lit = true;                                           ///< false: albedo as it is
 };
+
+/// Named ways of shading, as --shading has them: "lit" (both lights and ambient), "head" (the head light alone, so that light follows the
+/// viewer), "unlit" (albedo as it is).
+inline constexpr std::array kShadingNames{"lit", "head", "unlit"};
+std::optional<ShadingParameters> shading_named(std::string_view name);
 
 /// Shading for one view.
 class Shading {

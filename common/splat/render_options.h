@@ -36,7 +36,7 @@ constexpr float suitable_scale(Kernel kernel) {
 /// Per-pixel work after splatting. Each stage can be switched off; SplatStats tells what each costs.
 struct Finish {
   bool fill = true;       ///< pin-holes: pixels that show nothing, or something farther, amid a surface
-  bool smooth = true;     ///< ellipse: interpolates between magnified splats of one surface
+  bool smooth = true;     ///< disc, ellipse: interpolates between magnified splats of one surface
   bool antialias = true;  ///< silhouettes
 };
 

@@ -99,5 +99,53 @@ TEST_F(Requester, AnUpdateIsMeasuredFromRequestToItsLastPart) {
   EXPECT_FALSE(requester.on_applied(part(first, 0, 1), 2).has_value());  // replaced at the master: will not be answered
 }
 
+class AdaptiveRequester : public testing::Test {
+ protected:
+  ViewRequester requester{{.max_rate_hz = 1000, .adaptive = true, .target_latency_s = 0.2}, kMe};
+  geometry::Camera display = geometry::make_camera({}, 90, 2560, 1600);
+  double now_s = 0;
+
+  // One cycle on a machine that samples so many pixels a second; returns what was asked for.
+  geometry::Camera cycle(double pixels_per_s, bool moving) {
+    for (int i = 0; i < 12; ++i, now_s += 0.02) {
+      if (moving) display.pose = turned(0.4 * now_s, {0, 0, 0});
+      requester.on_pose(now_s, display);
+    }
+    const auto request = requester.next(now_s);
+    EXPECT_TRUE(request.has_value());
+    now_s += double(request->camera.width) * request->camera.height / pixels_per_s;
+    wire::Patch last;
+    last.viewer = kMe;
+    last.request = request->request;
+    last.frame_complete = true;
+    EXPECT_TRUE(requester.on_applied(last, now_s).has_value());
+    return request->camera;
+  }
+  double density(const geometry::Camera& c) const { return c.focal_x() / display.focal_x(); }
+};
+
+TEST_F(AdaptiveRequester, AStillHeadSeesEveryPixelsOwnSample) {
+  const geometry::Camera c = cycle(1e6, false);
+  EXPECT_EQ(c.width, 2560);
+  EXPECT_EQ(c.height, 1600);
+  EXPECT_DOUBLE_EQ(c.left, display.left);
+}
+
+TEST_F(AdaptiveRequester, SamplesAsFinelyAsTheLatencyAllows) {
+  geometry::Camera c = cycle(1e7, true);
+  EXPECT_NEAR(density(c), 0.5, 0.01);  // 1280x800 at first
+  for (int i = 0; i < 30; ++i) c = cycle(1e7, true);
+  // 2 million pixels in 0.2 s, in a view wider than the display's.
+  EXPECT_NEAR(double(c.width) * c.height, 2e6, 2e5);
+  EXPECT_GT(c.right, display.right);
+  EXPECT_GT(density(c), 0.6);
+  EXPECT_LT(density(c), 0.72);
+
+  for (int i = 0; i < 30; ++i) c = cycle(1e9, true);
+  EXPECT_NEAR(density(c), 1.0, 0.01);  // no finer than the display
+  for (int i = 0; i < 30; ++i) c = cycle(1e5, true);
+  EXPECT_NEAR(density(c), 0.5, 0.01);  // no coarser than half of it
+}
+
 }  // namespace
 }  // namespace telesplat::viewer

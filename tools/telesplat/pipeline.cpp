@@ -70,6 +70,7 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--renderer",      v.renderer,
                              "--splat",         v.splat,
                              "--splat-scale",   text(v.splat_scale),
+                             "--shading",       v.shading,
                              "--coupling",      v.coupling,
                              "--update-rate",   text(v.requests.max_rate_hz),
                              "--record-every",  text(double(d.picture_every)),
@@ -77,6 +78,10 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--record-points", text(double(v.record_points_mb)),
                              "--started-at",    text(o.started_s)};
   if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
+  const auto& f = d.render.finish;
+  a.push_back(f.fill ? "--fill" : "--no-fill");
+  a.push_back(f.smooth ? "--smooth" : "--no-smooth");
+  a.push_back(f.antialias ? "--antialias" : "--no-antialias");
   for (const auto& [set, flag] : {std::pair{d.exr, "--exr"}, {v.window, "--window"}, {v.fullscreen, "--fullscreen"}})
     if (set) a.push_back(flag);
   return a;

@@ -92,8 +92,8 @@ Status check_usage(const RunOptions& o) {
     if (!fs::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
     if (fs::is_directory(o.scene, error)) return Error{fmt::format("{}: is a folder; a mesh file is needed", o.scene)};
   }
-  for (const auto& [value, flag] : {std::pair{&o.viewer.size, "--size"}, {&o.viewer.sampling_size, "--sampling-size"}})
-    if (const auto size = viewer::parse_size(*value, flag); !size) return size.error();
+  if (const auto size = viewer::parse_size(o.viewer.size, "--size"); !size) return size.error();
+  if (const auto size = viewer::parse_sampling_size(o.viewer.sampling_size); !size) return size.error();
   if (o.viewer.trajectory != "orbit" && o.viewer.trajectory != "still")
     if (const auto t = geometry::Trajectory::read_csv(o.viewer.trajectory); !t) return t.error();
   return o.viewer.window ? viewer::check_display() : ok_status();
@@ -119,7 +119,8 @@ void complete_session(const RunOptions& o) {
   if (!o.mesh.use_cache) out << "no_cache = true\n";
   if (!o.mesh.cache_dir.empty()) out << "cache = " << quoted(fs::absolute(o.mesh.cache_dir, error).string()) << "\n";
   const auto& d = o.viewer.display;
-  out << fmt::format("\n[display]\nsize = \"{}\"\nfov = {}\nnear = {}\n", o.viewer.size, d.fov_deg, d.near_m);
+  out << fmt::format("\n[display]\nsize = \"{}\"\nfov = {}\nnear = {}\nshading = \"{}\"\n", o.viewer.size, d.fov_deg, d.near_m,
+                     o.viewer.shading);
 }
 
 void print_report(const std::string& directory) {
@@ -293,7 +294,7 @@ int run(const RunOptions& given) {
     const auto store = data::MeshStore::open(o.scene, o.mesh, [](const char*, double) {});
     if (!store) return refuse(store.error());
     const Status verified = verify_run(
-        o.out, **store, o.viewer.display.shading,
+        o.out, **store, *image::shading_named(o.viewer.shading),
         [&](size_t done, size_t of) { progress.show(fmt::format("verifying view {} of {}", done, of)); },
         net::stop_requested);
     progress.close();

@@ -9,6 +9,10 @@ namespace {
 
 constexpr double kVelocityWindow_s = 0.15, kMaxMove_m = 0.3, kMaxTurn_rad = 0.6;
 constexpr size_t kMaxOpen = 256;
+constexpr double kFirstPixels = 1280 * 800;  // what adaptive sampling begins with
+
+// Side of a sampled image: a multiple of 8 in range.
+int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }
 
 // Rotation vector of a unit quaternion.
 glm::dvec3 rotation_vector(glm::dquat q) {
@@ -34,8 +38,7 @@ std::pair<int, int> sampling_size(const RequestOptions& o, int width, int height
   if (!o.follow_display || width <= 0 || height <= 0) return {o.sampling_width, o.sampling_height};
   const double side = std::sqrt(double(o.sampling_width) * o.sampling_height);
   const double stretch = std::sqrt(double(width) / height);
-  const auto whole = [](double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); };
-  return {whole(side * stretch), whole(side / stretch)};
+  return {whole_side(side * stretch), whole_side(side / stretch)};
 }
 
 void PosePredictor::add(double t_s, const geometry::Pose& pose) {
@@ -76,15 +79,26 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const double horizon_s = latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
   geometry::Camera camera = *display_;
   camera.pose = predictor_.predict(now_s + horizon_s);
-  std::tie(camera.width, camera.height) = sampling_size(options_, display_->width, display_->height);
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
   const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
   const double margin = motion < 0.002 ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
+  const bool still = margin == 0;
+  if (options_.adaptive) {
+    if (scale_ == 0)
+      scale_ =
+          std::clamp(std::sqrt(kFirstPixels / (double(display_->width) * display_->height)), options_.min_scale, 1.0);
+    // A wider view is sampled as finely; a still head sees every pixel's own sample.
+    const double per_pixel = still ? 1.0 : scale_ * (1 + margin);
+    camera.width = whole_side(display_->width * per_pixel);
+    camera.height = whole_side(display_->height * per_pixel);
+  } else {
+    std::tie(camera.width, camera.height) = sampling_size(options_, display_->width, display_->height);
+  }
   const double du = (camera.right - camera.left) * margin / 2, dv = (camera.top - camera.bottom) * margin / 2;
   camera.left -= du, camera.right += du, camera.bottom -= dv, camera.top += dv;
   const RequestId id = next_;
   next_ = next_.next();
-  open_[id] = {id, now_s, 0, 0, camera};
+  open_[id] = {id, now_s, 0, 0, camera, still};
   while (open_.size() > kMaxOpen) open_.erase(open_.begin());
   return wire::ViewRequest{viewer_, id, camera, now_s};
 }
@@ -102,6 +116,10 @@ std::optional<ViewRequester::Update> ViewRequester::on_applied(const wire::Patch
   u.complete_s = now_s;
   const double latency_s = now_s - u.requested_s;
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
+  // Time goes with the number of pixels, hence the root; by small steps, since views differ.
+  if (options_.adaptive && !u.still)
+    scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / latency_s), 0.85, 1.1),
+                        options_.min_scale, 1.0);
   const Update done = u;
   // Requests before this one were replaced at the master and will never be answered.
   open_.erase(open_.begin(), std::next(it));

@@ -16,7 +16,12 @@ struct RequestOptions {
   double max_rate_hz = 12;          ///< requests a second at most; the master keeps only the newest
   double max_margin = 0.3;          ///< the sampled frustum is at most this fraction wider than the displayed one
   double initial_latency_s = 0.25;  ///< assumed until one was measured
-  bool follow_display = false;      ///< sample as many pixels, in the display's aspect: for windows that change theirs
+  bool adaptive =
+      false;  ///< sample as finely as updates of target_latency_s allow, and a still view exactly; the size above is not
+              ///< used
+  double target_latency_s = 0.2;  ///< adaptive: longer updates make sampling coarser, shorter ones finer
+  double min_scale = 0.5;         ///< adaptive: sampled pixels a displayed pixel, on each axis, at least (at most 1)
+  bool follow_display = false;    ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 
 /// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's aspect, sides
@@ -57,6 +62,7 @@ class ViewRequester {
     RequestId request;
     double requested_s = 0, first_s = 0, complete_s = 0;
     geometry::Camera camera;
+    bool still = false;  ///< asked for while the head rested
     uint64_t points = 0, samples = 0, bytes = 0, tiles = 0;
   };
   /// Part of a frame was applied. Returns the finished update when it was its last part and the frame was asked for by us.
@@ -70,6 +76,7 @@ class ViewRequester {
   PosePredictor predictor_;
   std::optional<geometry::Camera> display_;
   RequestId next_{1};
+  double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
   double last_sent_s_ = -1e9, latency_s_ = 0;
   std::map<RequestId, Update> open_;
 };
