@@ -6,7 +6,9 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <limits>
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
@@ -20,99 +22,179 @@ namespace {
 // more clusters that straddle tiles). 512 KiB of keys.
 constexpr int kTileWidth = 256, kTileHeight = 256;
 
+constexpr int kMargin = kMaxSplatSide;
+
 // What one thread needs, kept from frame to frame.
 struct Workspace {
   hwy::AlignedFreeUniquePtr<uint64_t[]> keys;
-  size_t size = 0;
+  int reach = -1;  // that `keys` was made for
+  std::vector<uint64_t> scratch;
   SplatStats stats;
 };
 
+// Keys of a tile of full size, its reach, and the margin that splats hang over into.
+struct Layout {
+  int reach = 0;
+
+  int stride() const { return kTileWidth + 2 * (reach + kMargin); }
+  size_t size() const { return static_cast<size_t>(stride()) * (kTileHeight + 2 * (reach + kMargin)); }
+  TilePixels pixels(uint64_t* keys, const geometry::Rect& rect) const {
+    return {keys + static_cast<size_t>(reach + kMargin) * (stride() + 1), stride(), rect.width, rect.height, reach};
+  }
+};
+
+geometry::Rect grown(const geometry::Rect& r, int by) {
+  return {r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
+}
+
 // Empties what splats wrote to the right of and below a tile that the image's edge cuts: in a whole tile those are pixels.
-void empty_beyond(const KeyBuffer& buffer, const geometry::Rect& rect) {
+void empty_beyond(const TilePixels& tile) {
+  const int right = tile.width + tile.reach, lower = tile.height + tile.reach;
   const auto fill = [&](int y, int x0, int x1) {
-    uint64_t* row = buffer.keys + static_cast<size_t>(y + buffer.margin) * buffer.stride + buffer.margin;
-    std::fill(row + x0, row + x1, static_cast<uint64_t>(kEmptyKey));
+    std::fill(tile.at(x0, y), tile.at(x1, y), static_cast<uint64_t>(kEmptyKey));
   };
-  for (int y = 0; y < rect.height; ++y) fill(y, rect.width, rect.width + buffer.margin);
-  for (int y = rect.height; y < rect.height + buffer.margin; ++y) fill(y, 0, rect.width + buffer.margin);
+  for (int y = -tile.reach; y < lower; ++y) fill(y, right, right + kMargin);
+  for (int y = lower; y < lower + kMargin; ++y) fill(y, -tile.reach, right + kMargin);
+}
+
+void write_background(const geometry::Rect& rect, uint32_t background, const TileTarget& target) {
+  for (int y = 0; y < rect.height; ++y) {
+    std::fill_n(target.colour + y * target.pitch, rect.width, 0xff000000u | background);
+    if (target.depth_m)
+      std::fill_n(target.depth_m + y * target.pitch, rect.width, std::numeric_limits<float>::infinity());
+  }
 }
 
 }  // namespace
 
 struct CpuSplatter::Impl {
-  explicit Impl(int threads)
+  Impl(int threads, std::span<const FinishStage> stages)
       : arena(threads > 0 ? threads : tbb::task_arena::automatic),
-        workspaces(static_cast<size_t>(arena.max_concurrency())) {}
+        workspaces(static_cast<size_t>(arena.max_concurrency())),
+        all_stages(stages) {}
 
-  void prepare(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading);
-  void draw_tile(int index, const DrawList& list, const geometry::Camera& camera, const image::Shading& shading,
-                 const FrameTarget& target, Workspace& workspace);
+  void prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
+               const image::Shading& shading);
+  void prepare_styles(const DrawList& list, Kernel kernel);
+  void draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace);
+  void finish_tile(const TilePixels& pixels, Workspace& workspace);
 
   tbb::task_arena arena;
   std::vector<Workspace> workspaces;
+  std::span<const FinishStage> all_stages;
+
+  // Of the frame.
+  std::vector<const FinishStage*> stages;  // that are on
+  Layout layout;
+  FinishFrame frame;
+  ResolveInput resolve;
   SplatTable table;
   TileGrid grid;
   ItemRuns runs;
-  std::vector<const SplatShape*> shapes;
+  std::vector<ItemStyle> styles;
   TileBinning binning;
   std::vector<uint8_t> intensity = std::vector<uint8_t>(65536 + 3);
-  int margin = 4;  // of the tiles' buffers: the widest row of all shapes in this frame
 };
 
-void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, Kernel kernel,
+void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                                 const image::Shading& shading) {
   grid = {camera.width, camera.height, kTileWidth, kTileHeight};
+  stages.clear();
+  layout.reach = 0;
+  for (const FinishStage& stage : all_stages)
+    if (options.finish.*stage.on) {
+      stages.push_back(&stage);
+      layout.reach += stage.reach;
+    }
   std::memcpy(intensity.data(), shading.table().data(), shading.table().size());
+  const auto near_m = static_cast<float>(camera.near_m);
+  frame = {near_m, static_cast<float>(camera.focal_x()), shading.background()};
+  resolve = {intensity.data(), shading.background(), near_m, {}};
   table.set_focal(camera.focal_x());
-  shapes.resize(list.items.size());
-  margin = 4;
-  for (size_t i = 0; i < list.items.size(); ++i) {
-    shapes[i] = &table.shape(kernel, list.items[i].splat_px);
-    margin = std::max(margin, shapes[i]->row_stride);
-  }
+  prepare_styles(list, options.kernel);
   runs.build(list.items, camera);
-  binning.build(grid, runs.transforms, static_cast<float>(camera.near_m), static_cast<float>(margin));
+  binning.build(grid, runs.transforms, near_m, static_cast<float>(layout.reach + kMargin));
 }
 
-void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const geometry::Camera& camera,
-                                  const image::Shading& shading, const FrameTarget& target, Workspace& workspace) {
-  const geometry::Rect rect = grid.rect(index);
-  uint32_t* colour = target.colour + static_cast<size_t>(rect.y) * target.width + rect.x;
-  float* depth = target.depth_m ? target.depth_m + static_cast<size_t>(rect.y) * target.width + rect.x : nullptr;
-  const auto entries = binning.tile(index);
-  const double start = monotonic_s();
-
-  // Buffers are empty between tiles: resolving empties them. Their margins need not be.
-  const KeyBuffer buffer{workspace.keys.get(), kTileWidth + 2 * margin, margin};
-  if (!entries.empty()) {
-    const TileInput input{
-        rect, static_cast<float>(camera.near_m), entries, runs.runs.data(), runs.transforms.data(), list.items.data()};
-    const TileCounts counts = splat_tile(input, shapes.data(), intensity.data(), buffer);
-    workspace.stats.points_projected += counts.projected;
-    workspace.stats.points_drawn += counts.drawn;
+void CpuSplatter::Impl::prepare_styles(const DrawList& list, Kernel kernel) {
+  const Kernel shaped = kernel == Kernel::kSquare ? Kernel::kSquare : Kernel::kDisc;
+  styles.resize(list.items.size());
+  std::array<uint64_t, 4> bias{}, points{};
+  for (size_t i = 0; i < list.items.size(); ++i) {
+    const DrawItem& item = list.items[i];
+    const ItemStyle& style =
+        styles[i] = {&table.shape(shaped, item.splat_px), spacing_class(item.splat_px / list.scale)};
+    bias[style.spacing] += uint64_t{style.shape->rim_bias} * item.level.count;
+    points[style.spacing] += item.level.count;
   }
-  const double splatted = monotonic_s();
-  resolve_tile(buffer, rect.width, rect.height, shading.background(), colour, depth, static_cast<size_t>(target.width));
-  if (!entries.empty() && (rect.width < kTileWidth || rect.height < kTileHeight)) empty_beyond(buffer, rect);
-  workspace.stats.project_ms += (splatted - start) * 1e3;
-  workspace.stats.resolve_ms += (monotonic_s() - splatted) * 1e3;
+  for (size_t i = 0; i < 4; ++i)
+    if (points[i] > 0) resolve.rim[i] = static_cast<uint32_t>((bias[i] + points[i] / 2) / points[i]);
 }
 
-CpuSplatter::CpuSplatter(int threads) : impl_(std::make_unique<Impl>(threads)) {}
+void CpuSplatter::Impl::finish_tile(const TilePixels& pixels, Workspace& workspace) {
+  TilePixels valid = pixels;
+  for (const FinishStage* stage : stages) {
+    valid.reach -= stage->reach;
+    const double start = monotonic_s();
+    stage->run(valid, frame, workspace.scratch);
+    workspace.stats.*stage->ms += (monotonic_s() - start) * 1e3;
+  }
+}
+
+void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace) {
+  const geometry::Rect rect = grid.rect(index);
+  const size_t first = static_cast<size_t>(rect.y) * target.width + rect.x;
+  const TileTarget out{target.colour + first, target.depth_m ? target.depth_m + first : nullptr,
+                       static_cast<size_t>(target.width)};
+  const auto entries = binning.tile(index);
+  SplatStats& stats = workspace.stats;
+  const double start = monotonic_s();
+  if (entries.empty()) {
+    write_background(rect, resolve.background, out);
+    stats.resolve_ms += (monotonic_s() - start) * 1e3;
+    return;
+  }
+
+  // Buffers are empty between tiles: writing empties them. Their margins need not be.
+  const TilePixels pixels = layout.pixels(workspace.keys.get(), rect);
+  const TileInput input{
+      grown(rect, layout.reach), rect, frame.near_m, entries, runs.runs.data(), runs.transforms.data(),
+      list.items.data()};
+  const TileCounts counts = splat_tile(input, styles.data(), {workspace.keys.get(), pixels.stride, kMargin});
+  stats.points_projected += counts.projected;
+  stats.points_drawn += counts.drawn;
+  const double splatted = monotonic_s();
+  stats.project_ms += (splatted - start) * 1e3;
+
+  double finished = splatted;
+  if (stages.empty()) {
+    resolve_and_write_tile(pixels, resolve, out);
+  } else {
+    resolve_tile(pixels, resolve);
+    stats.resolve_ms += (monotonic_s() - splatted) * 1e3;
+    finish_tile(pixels, workspace);
+    finished = monotonic_s();
+    write_tile(pixels, resolve, out);
+  }
+  if (rect.width < kTileWidth || rect.height < kTileHeight) empty_beyond(pixels);
+  stats.resolve_ms += (monotonic_s() - finished) * 1e3;
+}
+
+CpuSplatter::CpuSplatter(int threads, std::span<const FinishStage> stages)
+    : impl_(std::make_unique<Impl>(threads, stages)) {}
 CpuSplatter::~CpuSplatter() = default;
 
 SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                                const image::Shading& shading, const FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
   Impl& m = *impl_;
-  m.prepare(list, camera, options.kernel, shading);
+  m.prepare(list, camera, options, shading);
   for (Workspace& w : m.workspaces) {
-    // Emptied whole where the margin moves; else every tile leaves its pixels empty.
-    const size_t size = static_cast<size_t>(kTileWidth + 2 * m.margin) * (kTileHeight + 2 * m.margin);
-    if (w.size != size) {
-      w.keys = hwy::AllocateAligned<uint64_t>(size);
-      std::fill_n(w.keys.get(), size, static_cast<uint64_t>(kEmptyKey));
-      w.size = size;
+    // Emptied whole where the layout changes; else every tile leaves its pixels empty.
+    if (w.reach != m.layout.reach) {
+      w.keys = hwy::AllocateAligned<uint64_t>(m.layout.size());
+      std::fill_n(w.keys.get(), m.layout.size(), static_cast<uint64_t>(kEmptyKey));
+      w.reach = m.layout.reach;
     }
     w.stats = {};
   }
@@ -121,7 +203,7 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
         tbb::blocked_range<int>(0, m.grid.count(), 1),
         [&](const tbb::blocked_range<int>& tiles) {
           Workspace& workspace = m.workspaces[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
-          for (int i = tiles.begin(); i < tiles.end(); ++i) m.draw_tile(i, list, camera, shading, target, workspace);
+          for (int i = tiles.begin(); i < tiles.end(); ++i) m.draw_tile(i, list, target, workspace);
         },
         tbb::simple_partitioner());
   });
@@ -131,6 +213,9 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
     sum.points_drawn += w.stats.points_drawn;
     sum.project_ms += w.stats.project_ms;
     sum.resolve_ms += w.stats.resolve_ms;
+    sum.fill_ms += w.stats.fill_ms;
+    sum.smooth_ms += w.stats.smooth_ms;
+    sum.antialias_ms += w.stats.antialias_ms;
   }
   return sum;
 }

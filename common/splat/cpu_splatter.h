@@ -1,12 +1,13 @@
-// The CPU splatter: Highway SIMD, run-time dispatch, one screen band a task, no lock in the hot path.
+// The CPU splatter: Highway SIMD, run-time dispatch, one screen tile a task, no lock in the hot path.
 #pragma once
 
 #include <memory>
-#include <string>
+#include <span>
 
 #include "common/image/file.h"
 #include "common/image/shading.h"
 #include "common/splat/render_options.h"
+#include "common/splat/tile_pixels.h"
 #include "common/splat/view_selection.h"
 
 namespace telesplat::splat {
@@ -27,10 +28,12 @@ struct SplatStats {
 class CpuSplatter {
  public:
   /// threads: 0 = all cores.
-  explicit CpuSplatter(int threads = 0);
+  /// stages: what a frame's finish is made of, in order; must live as long as the splatter.
+  explicit CpuSplatter(int threads = 0, std::span<const FinishStage> stages = {});
   ~CpuSplatter();
 
-  /// Clears, splats and resolves one frame. Points are shaded with shading.table(). camera.width/height are target's.
+  /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish has on ->
+  /// write. Pixels are shaded with shading.table(). camera.width/height are target's.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                     const image::Shading& shading, const FrameTarget& target);
   /// Without any finish.

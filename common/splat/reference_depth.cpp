@@ -11,6 +11,7 @@
 
 #include "common/core/check.h"
 #include "common/splat/item_runs.h"
+#include "common/splat/view_selection.h"
 
 namespace telesplat::splat {
 namespace {
@@ -45,9 +46,13 @@ void render_reference_depth(const points::PointModel& model, const geometry::Cam
     const geometry::Rect rect = grid.rect(index);
     std::vector<uint32_t> bits(static_cast<size_t>(rect.width) * rect.height,
                                std::bit_cast<uint32_t>(std::numeric_limits<float>::infinity()));
-    const TileInput input{
-        rect,        static_cast<float>(camera.near_m), binning.tile(index), runs.runs.data(), runs.transforms.data(),
-        items.data()};
+    const TileInput input{rect,
+                          rect,
+                          static_cast<float>(camera.near_m),
+                          binning.tile(index),
+                          runs.runs.data(),
+                          runs.transforms.data(),
+                          items.data()};
     depth_tile(input, bits.data());
     for (int y = 0; y < rect.height; ++y)
       std::memcpy(depth_m.data() + static_cast<size_t>(rect.y + y) * camera.width + rect.x,

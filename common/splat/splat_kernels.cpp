@@ -4,24 +4,38 @@
 
 #include <hwy/highway.h>
 
-#include "common/splat/splat_kernels-inl.h"
+#include "common/splat/depth-inl.h"
+#include "common/splat/opaque-inl.h"
+#include "common/splat/resolve-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace telesplat::splat::HWY_NAMESPACE {
+const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
+}  // namespace telesplat::splat::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace telesplat::splat {
 
 HWY_EXPORT(SplatTile);
 HWY_EXPORT(ResolveTile);
+HWY_EXPORT(WriteTile);
+HWY_EXPORT(ResolveAndWriteTile);
 HWY_EXPORT(DepthTile);
 HWY_EXPORT(TargetName);
 
-TileCounts splat_tile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity,
-                      const KeyBuffer& buffer) {
-  return HWY_DYNAMIC_DISPATCH(SplatTile)(input, shapes, intensity, buffer);
+TileCounts splat_tile(const TileInput& input, const ItemStyle* styles, const KeyBuffer& buffer) {
+  return HWY_DYNAMIC_DISPATCH(SplatTile)(input, styles, buffer);
 }
 
-void resolve_tile(const KeyBuffer& buffer, int width, int height, uint32_t background, uint32_t* colour, float* depth_m,
-                  size_t pitch) {
-  HWY_DYNAMIC_DISPATCH(ResolveTile)(buffer, width, height, background, colour, depth_m, pitch);
+void resolve_tile(const TilePixels& tile, const ResolveInput& input) { HWY_DYNAMIC_DISPATCH(ResolveTile)(tile, input); }
+
+void write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target) {
+  HWY_DYNAMIC_DISPATCH(WriteTile)(tile, input, target);
+}
+
+void resolve_and_write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target) {
+  HWY_DYNAMIC_DISPATCH(ResolveAndWriteTile)(tile, input, target);
 }
 
 void depth_tile(const TileInput& input, uint32_t* depth_bits) { HWY_DYNAMIC_DISPATCH(DepthTile)(input, depth_bits); }

@@ -4,14 +4,17 @@
 // A point's position:  h = row . (x, y, z, 1)  for the three rows of its leaf's transform, summed from left to right,
 //   fixed = floor(h.xy * (2^sub_bits / h.w) + shift)      (2^-sub_bits pixels; single precision)
 //   first pixel = fixed >> sub_bits,  place within it = fixed & (2^sub_bits - 1)
-// and its key: see splat_table.h.
+// and its key: see pixel_key.h; what a splat adds to it in each pixel it covers: see splat_table.h.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
+#include "common/splat/pixel_key.h"
 #include "common/splat/splat_table.h"
 #include "common/splat/tile_binning.h"
+#include "common/splat/tile_pixels.h"
+#include "common/splat/view_selection.h"
 
 namespace telesplat::splat {
 
@@ -22,37 +25,65 @@ struct ItemRun {
 
 /// What of a view a tile draws. All arrays belong to the caller and are only read.
 struct TileInput {
-  geometry::Rect rect;  ///< the tile, inside the image
-  float near_m = 0;     ///< nearer points are not drawn
+  geometry::Rect
+      rect;  ///< what is drawn: the tile, grown by the reach of what follows; so it may reach beyond the image
+  geometry::Rect own;  ///< the tile itself, inside the image: points are counted where they fall into it
+  float near_m = 0;    ///< nearer points are not drawn
   std::span<const TileBinning::Entry> entries;
   const ItemRun* runs = nullptr;              ///< one a box of the binning
   const LeafTransform* transforms = nullptr;  ///< likewise
   const DrawItem* items = nullptr;
 };
 
-/// Pixel keys of one tile with a margin on all sides, so that splats are not clipped: the margin is written, never read.
+/// How an item's points are drawn.
+struct ItemStyle {
+  const SplatShape* shape = nullptr;
+  uint32_t spacing = 0;  ///< spacing_class of its samples
+  bool operator==(const ItemStyle&) const = default;
+};
+
+/// Pixel keys of one tile's rect with a margin on all sides, so that splats are not clipped: the margin is written, never read.
 struct KeyBuffer {
   uint64_t* keys =
       nullptr;     ///< (rect.height + 2 margin) rows of `stride`; pixel (x, y) at (y + margin) * stride + x + margin
   int stride = 0;  ///< at least rect.width + 2 margin
-  int margin = 0;  ///< at least the largest row_stride of the shapes
+  int margin = 0;  ///< at least kMaxSplatSide
 };
 
 struct TileCounts {
   uint64_t projected = 0;  ///< points, counted again in each tile that they are tested for
-  uint64_t drawn = 0;      ///< points whose splat's first pixel lies in this tile
+  uint64_t drawn = 0;      ///< points whose splat's first pixel lies in `own`
 };
 
-/// Splats into buffer, whose pixels were kEmptyKey or hold what is there already.
-///   shapes: one an item.  intensity: 65536 of 1/255, followed by 3 readable bytes.
-TileCounts splat_tile(const TileInput& input, const SplatShape* const* shapes, const uint8_t* intensity,
-                      const KeyBuffer& buffer);
+/// Splats squares or discs into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h).
+///   styles: one an item.
+TileCounts splat_tile(const TileInput& input, const ItemStyle* styles, const KeyBuffer& buffer);
 
-/// Keys to colours (0xff000000 | 0x00RRGGBB, background where empty) and, if depth_m is not null, depths in metres (+infinity
-/// where empty) of the points' centres. Sets the pixels to kEmptyKey again.
-///   colour, depth_m: the tile's first pixel in images of `pitch` pixels a row.
-void resolve_tile(const KeyBuffer& buffer, int width, int height, uint32_t background, uint32_t* colour, float* depth_m,
-                  size_t pitch);
+/// How keys become colours and depths.
+struct ResolveInput {
+  const uint8_t* intensity = nullptr;  ///< 65536 of 1/255, followed by 3 readable bytes
+  uint32_t background = 0;             ///< 0x00RRGGBB
+  float near_m = 0;
+  RimBias rim{};
+};
+
+/// The tile's place in the frame: its first pixel in images of `pitch` pixels a row.
+struct TileTarget {
+  uint32_t* colour = nullptr;
+  float* depth_m = nullptr;  ///< may be null
+  size_t pitch = 0;
+};
+
+/// Keys to pairs of colour and info, in place: the tile and its reach. What lies within kMaxSplatSide to the right of that may
+/// change too.
+void resolve_tile(const TilePixels& tile, const ResolveInput& input);
+
+/// Pairs to colours (0xff000000 | 0x00RRGGBB, background where empty) and, if target.depth_m is not null, depths in metres
+/// (+infinity where empty), without the bias. Sets the tile's pixels and its reach to kEmptyKey again.
+void write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target);
+
+/// The same as resolve_tile and write_tile, in one pass, for tiles without reach.
+void resolve_and_write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target);
 
 /// Least depth (bits of a positive float) of all points in each pixel, one pixel a point. depth_bits: rect.width * rect.height,
 /// row-major, holding +infinity or what is there already.

@@ -9,8 +9,9 @@ namespace {
 // Surfaces up to this slope against the screen resolve to the nearest centre: tan(75 degrees).
 constexpr double kResolvedSlope = 3.73;
 
-SplatShape build(Kernel kernel, int side, double diameter, double focal_px) {
+SplatShape build(Kernel kernel, double size, double focal_px) {
   SplatShape s;
+  const int side = static_cast<int>(std::ceil(size));
   s.side = side;
   if (side == 1) return s;
   s.sub_bits = sub_bits(side);
@@ -19,7 +20,12 @@ SplatShape build(Kernel kernel, int side, double diameter, double focal_px) {
   s.shift = static_cast<float>(steps) * 0.5f * static_cast<float>(1 - side);
   s.row_stride = (side + 3) / 4 * 4;
   s.addends.assign(static_cast<size_t>(steps) * steps * side * s.row_stride, kOutsideSplat);
-  const double reach = kernel == Kernel::kDisc ? 0.25 * diameter * diameter : INFINITY;
+  const bool disc = kernel == Kernel::kDisc;
+  const double contour_r2 = (disc ? 0.25 : 0.5) * size * size;
+  s.rim_bias = splat_bias(contour_r2, side, focal_px);
+  const auto inside = [&](double dx, double dy) {
+    return disc ? dx * dx + dy * dy <= contour_r2 : std::max(std::abs(dx), std::abs(dy)) <= 0.5 * size;
+  };
   for (int sub = 0; sub < steps * steps; ++sub) {
     // The centre, from the square's upper left corner.
     const double cx = (sub % steps + 0.5) / steps + 0.5 * (side - 1),
@@ -28,9 +34,10 @@ SplatShape build(Kernel kernel, int side, double diameter, double focal_px) {
     for (int y = 0; y < side; ++y)
       for (int x = 0; x < side; ++x) {
         const double dx = x + 0.5 - cx, dy = y + 0.5 - cy, r2 = dx * dx + dy * dy;
-        if (r2 > reach && !(x == nearest_x && y == nearest_y)) continue;
-        const uint64_t bias = splat_bias(r2, side, focal_px);
-        s.addends[(static_cast<size_t>(sub) * side + y) * s.row_stride + x] = bias << (kBiasShift + 32) | bias << 24;
+        if (!inside(dx, dy) && !(x == nearest_x && y == nearest_y)) continue;
+        const uint64_t bias = splat_bias(r2, side, focal_px), ring = ring_of(r2 / contour_r2);
+        s.addends[(static_cast<size_t>(sub) * side + y) * s.row_stride + x] = bias << kKeyDepthBit | ring
+                                                                                                         << kKeyRingBit;
       }
   }
   return s;
@@ -38,11 +45,11 @@ SplatShape build(Kernel kernel, int side, double diameter, double focal_px) {
 
 }  // namespace
 
-int square_side(float splat_px) { return std::clamp(static_cast<int>(std::ceil(splat_px - 0.2f)), 1, kMaxSplatSide); }
-
-float disc_diameter(float splat_px) {
-  return std::clamp(std::ceil(splat_px * 4.0f) * 0.25f, 1.0f, static_cast<float>(kMaxSplatSide));
+float square_size(float splat_px) {
+  return std::min(std::ceil(std::max(1.0f, splat_px) * 4.0f) * 0.25f, static_cast<float>(kMaxSplatSide));
 }
+float disc_diameter(float splat_px) { return square_size(splat_px); }
+int square_side(float splat_px) { return static_cast<int>(std::ceil(square_size(splat_px))); }
 
 int sub_bits(int side) {
   // Finer steps are not seen, but finer tables would leave the first-level cache: 8 KiB at side 4, 32 KiB at side 16.
@@ -69,10 +76,9 @@ void SplatTable::set_focal(double focal_px) {
 }
 
 const SplatShape& SplatTable::shape(Kernel kernel, float splat_px) {
-  const bool disc = kernel == Kernel::kDisc;
-  const float size = disc ? disc_diameter(splat_px) : static_cast<float>(square_side(splat_px));
-  auto& shape = shapes_[disc][static_cast<int>(size * 4.0f)];
-  if (!shape) shape = std::make_unique<SplatShape>(build(kernel, static_cast<int>(std::ceil(size)), size, focal_px_));
+  const float size = square_size(splat_px);
+  auto& shape = shapes_[kernel == Kernel::kDisc][static_cast<int>(size * 4.0f)];
+  if (!shape) shape = std::make_unique<SplatShape>(build(kernel, size, focal_px_));
   return *shape;
 }
 

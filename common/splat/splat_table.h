@@ -1,26 +1,19 @@
-// Splat shapes: what a splat adds to its centre's depth|colour key in each pixel it covers.
-//
-// A key is (0x80000000 | bits of the depth as float) << 32 | albedo-times-light; the least key wins a pixel, and positive floats
-// are ordered as their bits are. A pixel at distance r from the splat's centre gets the depth  z (1 + k r^2): where splats of one
-// surface overlap the nearest centre wins, not the nearest depth, so that generous splats do not blur.
-// Based on: M. Schuetz, M. Wimmer, "High-quality point-based rendering using fast single-pass interpolation", 2015 (paraboloids).
-// Adding a constant to a float's bits multiplies the float by nearly a constant, so one integer a pixel does it. The bias is
-// noted in the key's top colour byte too, in kBiasUnit steps, and taken off again where depth is written.
+// Splat shapes: what a splat adds to its centre's key (pixel_key.h) in each pixel it covers: a bias of the depth code that grows
+// with the squared distance from the centre, and the ring. Adding steps to a depth code multiplies the depth by nearly a constant,
+// so one integer a pixel does it.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "common/splat/cpu_splatter.h"
+#include "common/splat/pixel_key.h"
+#include "common/splat/render_options.h"
 
 namespace telesplat::splat {
 
 inline constexpr int kMaxSplatSide = 16;
-inline constexpr int kBiasShift = 8;                   ///< one bias step = 2^8 units of a float's last place
-inline constexpr uint32_t kMaxBias = 163;              ///< 163 * 2^8 / 2^23 = 0.5 % of depth at most
-inline constexpr uint64_t kOutsideSplat = 1ull << 63;  ///< turns a key's sign: larger than every key, as signed numbers
-inline constexpr int64_t kEmptyKey = -1;               ///< nothing there: larger than every key
+inline constexpr int kBiasShift = kDepthCodeShift;  ///< one bias step = 2^9 units of a float's last place
 
 /// One kernel at one size.
 struct SplatShape {
@@ -30,17 +23,21 @@ struct SplatShape {
   float shift =
       0;  ///< added to the centre's position in 2^-sub_bits pixels: (1 - side) / 2 pixels. The square's first pixel is
           ///< floor(x_pix + (1 - side) / 2), so that even sides cover the pixels nearest the centre
+  uint32_t rim_bias = 0;          ///< bias on the contour, q = 1
   int row_stride = 4;             ///< side rounded up to a multiple of 4
   std::vector<uint64_t> addends;  ///< [sub_y][sub_x][side][row_stride], padded with kOutsideSplat; empty if side == 1
 };
 
-/// Side of the square splat for a size in pixels: rounded up above a fraction of 0.2, so that neither cracks nor blur win.
-int square_side(float splat_px);
-/// Diameter of the disc for a size in pixels, rounded up to a multiple of 0.25.
+/// Size of the square splat for a size in pixels, and diameter of the disc: rounded up to a multiple of 0.25, 1..kMaxSplatSide.
+float square_size(float splat_px);
 float disc_diameter(float splat_px);
+/// Side of the square of pixels that holds a square splat wherever its centre lies.
+int square_side(float splat_px);
 
-/// The shapes of one view, built when first asked for. A disc covers the pixels whose centres are within its radius of the
-/// projected centre (told to 1/8 or, above 4 pixels, 1/4 of a pixel), and always the pixel nearest to it.
+/// The shapes of one view, built when first asked for. With the projected centre's place told to 1/8 or, above 4 pixels, 1/4 of a
+/// pixel (the middle of that step taken), a splat covers the pixel nearest to it and
+///   square: the pixels whose centres lie within size / 2 of it on both axes; contour (q = 1): the circle through its corners;
+///   disc: the pixels whose centres lie within diameter / 2 of it; contour: that circle.
 class SplatTable {
  public:
   /// focal_px sets the slope up to which neighbours resolve to the nearest centre. Drops shapes made for another focal length.

@@ -83,6 +83,7 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
   out.items.clear();
   out.clusters_seen.clear();
   out.points = 0;
+  out.scale = options.scale;
   const geometry::Frustum frustum(camera);
   const glm::vec3 eye(camera.pose.position_room);
   std::vector<Chosen> chosen;

@@ -34,6 +34,8 @@ struct DrawList {
   std::vector<DrawItem> items;
   std::vector<points::ClusterKey> clusters_seen;  ///< clusters that passed culling: for access reports
   uint64_t points = 0;
+  float scale =
+      1.0f;          ///< SelectionOptions::scale: splat_px / scale is how far apart an item's samples lie on the screen
   Sequence applied;  ///< the newest event of the model they were selected from
 };
 

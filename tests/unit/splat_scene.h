@@ -93,18 +93,22 @@ inline std::vector<HandMadeItem> random_items(uint32_t seed, int count, int most
   return items;
 }
 
-/// One point after the other, one pixel after the other, by the formulas of splat_kernels.h and splat_table.h.
+/// One point after the other, one pixel after the other, by the formulas of splat_kernels.h, splat_table.h and pixel_key.h.
 inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                            const image::Shading& shading) {
   Frame frame(camera.width, camera.height);
   std::vector<uint64_t> keys(frame.colour.size(), ~uint64_t{0});
   const auto near_m = static_cast<float>(camera.near_m);
+  const bool disc = kernel == splat::Kernel::kDisc;
+  double bias_sum[4] = {}, points[4] = {};
   for (const splat::DrawItem& item : list.items) {
     const splat::LeafTransform t = splat::leaf_transform(camera.room_to_pixel(), item.cluster->leaf_room);
-    const bool disc = kernel == splat::Kernel::kDisc;
-    const float diameter = splat::disc_diameter(item.splat_px);
-    const int side = disc ? int(std::ceil(diameter)) : splat::square_side(item.splat_px);
-    const int steps = side == 1 ? 1 : side <= 4 ? 8 : 4;
+    const float size = std::clamp(std::ceil(item.splat_px * 4) / 4, 1.0f, 16.0f);
+    const int side = int(std::ceil(size)), steps = side == 1 ? 1 : side <= 4 ? 8 : 4;
+    const double contour_r2 = (disc ? 0.25 : 0.5) * size * size;
+    const uint32_t spacing = splat::spacing_class(item.splat_px / list.scale);
+    bias_sum[spacing] += item.level.count * (side > 1 ? splat::splat_bias(contour_r2, side, camera.focal_x()) : 0.0);
+    points[spacing] += item.level.count;
     for (uint32_t i = 0; i < item.level.count; ++i) {
       const float p[3] = {float(item.level.x[i]), float(item.level.y[i]), float(item.level.z[i])};
       const auto row = [&](const std::array<float, 4>& r) {
@@ -119,25 +123,31 @@ inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& 
       const int x0 = int(std::floor(double(fx) / steps)), y0 = int(std::floor(double(fy) / steps));
       const double cx = (fx - x0 * steps + 0.5) / steps + 0.5 * (side - 1),
                    cy = (fy - y0 * steps + 0.5) / steps + 0.5 * (side - 1);
-      const uint32_t colour = image::Shading::apply(item.level.colour[i], shading.table()[item.level.normal[i]]);
       for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x) {
           if (x0 + x < 0 || y0 + y < 0 || x0 + x >= frame.width || y0 + y >= frame.height) continue;
-          const double r2 = (x + 0.5 - cx) * (x + 0.5 - cx) + (y + 0.5 - cy) * (y + 0.5 - cy);
-          if (disc && side > 1 && r2 > 0.25 * diameter * diameter && !(x == int(cx) && y == int(cy))) continue;
-          const uint64_t bias = side > 1 ? splat::splat_bias(r2, side, camera.focal_x()) : 0;
-          const uint64_t depth = (std::bit_cast<uint32_t>(w) | 0x80000000u) + (bias << splat::kBiasShift);
+          const double dx = x + 0.5 - cx, dy = y + 0.5 - cy, r2 = dx * dx + dy * dy;
+          const bool inside = disc ? r2 <= contour_r2 : std::abs(dx) <= 0.5 * size && std::abs(dy) <= 0.5 * size;
+          if (side > 1 && !inside && !(x == int(cx) && y == int(cy))) continue;
+          const uint32_t bias = side > 1 ? splat::splat_bias(r2, side, camera.focal_x()) : 0;
           uint64_t& key = keys[size_t(y0 + y) * frame.width + x0 + x];
-          key = std::min(key, depth << 32 | bias << 24 | colour);
+          key = std::min(key, splat::encode_key(splat::encode_depth_code(w, near_m) + bias, spacing,
+                                                side > 1 ? splat::ring_of(r2 / contour_r2) : 0, item.level.normal[i],
+                                                item.level.colour[i] & 0xffffff));
         }
     }
   }
+  splat::RimBias rim{};
+  for (int i = 0; i < 4; ++i)
+    if (points[i] > 0) rim[i] = uint32_t(std::floor(bias_sum[i] / points[i] + 0.5));
   for (size_t i = 0; i < keys.size(); ++i) {
-    const bool empty = keys[i] == ~uint64_t{0};
-    frame.colour[i] = 0xff000000u | (empty ? shading.background() : uint32_t(keys[i]));
+    const uint64_t key = keys[i];
+    const bool empty = key == ~uint64_t{0};
+    frame.colour[i] =
+        0xff000000u | (empty ? shading.background()
+                             : image::Shading::apply(splat::key_albedo(key), shading.table()[splat::key_normal(key)]));
     frame.depth_m[i] = empty ? std::numeric_limits<float>::infinity()
-                             : std::bit_cast<float>((uint32_t(keys[i] >> 32) & 0x7fffffffu) -
-                                                    (uint32_t(keys[i]) >> 24 << splat::kBiasShift));
+                             : splat::decode_depth_code(splat::unbiased_depth_code(splat::key_info(key), rim), near_m);
   }
   return frame;
 }

@@ -51,8 +51,87 @@ TEST(CpuSplatter, SquareCoversThePixelsNearestItsCentre) {
         for (int x = 0; x < size; ++x) expected.insert({x0 + x, y0 + y});
       EXPECT_EQ(covered(frame), expected) << "size " << size << " at " << cx << ", " << cy;
       EXPECT_EQ(frame.at(x0, y0), 0xffabcdefu);
-      EXPECT_NEAR(frame.depth_m[size_t(y0) * kWidth + x0], 1.0, 1e-4) << "the bias must not show";
+      EXPECT_NEAR(frame.depth_m[size_t(y0) * kWidth + x0], 1.0, 4e-4) << "the bias, up to 5e-3, must not show";
     }
+}
+
+TEST(CpuSplatter, SquaresOfFractionalSizeCoverThatAreaOnAverage) {
+  for (const float size : {1.25f, 1.5f, 2.75f, 3.5f}) {
+    double pixels = 0;
+    for (int i = 0; i < 64; ++i) {
+      const double cx = 300.0625 + i % 8 / 8.0, cy = 200.0625 + i / 8 / 8.0;  // amid the eighths of a pixel
+      HandMadeItem item(kLeaf);
+      item.add_at(at_pixel(cx, cy), 0xabcdef);
+      const auto set = covered(render({item.item(size)}));
+      pixels += double(set.size());
+      EXPECT_TRUE(set.contains({int(cx), int(cy)}));
+      for (const auto& [x, y] : set)
+        EXPECT_LE(std::max(std::abs(x + 0.5 - cx), std::abs(y + 0.5 - cy)), 0.5 * size + 0.07) << size;
+    }
+    EXPECT_NEAR(pixels / 64, size * size, 0.07 * size * size) << size;
+  }
+}
+
+TEST(CpuSplatter, SamplesAlignedWithPixelsStayExact) {
+  // As a still camera of the sampling view's size sees them: splats larger than a pixel (scale 1.3) cover their own pixels alone.
+  const geometry::Camera camera = testing::front_camera(kWidth, kHeight);
+  HandMadeItem item(kLeaf);
+  for (int y = 90; y < 130; ++y)
+    for (int x = 120; x < 160; ++x)
+      item.add_at(camera.unproject(x + 0.5, y + 0.5, 1.0 + 0.003 * (x - 120)),
+                  0x010000u + uint32_t(y) * 256 + uint32_t(x));
+  const Frame frame = render({item.item(1.3f)});
+  EXPECT_EQ(covered(frame).size(), 40u * 40u);
+  for (int y = 90; y < 130; ++y)
+    for (int x = 120; x < 160; ++x) ASSERT_EQ(frame.at(x, y), 0xff010000u + uint32_t(y) * 256 + uint32_t(x));
+}
+
+TEST(CpuSplatter, FinishStagesFindTheirReachValidInEveryTile) {
+  // A stage that moves the picture by as much as its reach allows; the tiles' borders must not show.
+  static constexpr int kRight = 5, kDown = 3;
+  const splat::FinishStage move{
+      &splat::Finish::fill, &splat::SplatStats::fill_ms, 5,
+      [](const splat::TilePixels& tile, const splat::FinishFrame&, std::vector<uint64_t>& scratch) {
+        const int w = tile.width + 2 * tile.reach, h = tile.height + 2 * tile.reach;
+        scratch.clear();
+        for (int y = 0; y < h; ++y)
+          for (int x = 0; x < w; ++x) scratch.push_back(*tile.at(x - tile.reach + kRight, y - tile.reach - kDown));
+        for (int y = 0; y < h; ++y)
+          for (int x = 0; x < w; ++x) *tile.at(x - tile.reach, y - tile.reach) = scratch[size_t(y) * w + x];
+      }};
+  splat::FinishStage back = move;
+  back.on = &splat::Finish::smooth;
+  back.ms = &splat::SplatStats::smooth_ms;
+  back.run = [](const splat::TilePixels& tile, const splat::FinishFrame&, std::vector<uint64_t>& scratch) {
+    const int w = tile.width + 2 * tile.reach, h = tile.height + 2 * tile.reach;
+    scratch.clear();
+    for (int y = 0; y < h; ++y)
+      for (int x = 0; x < w; ++x) scratch.push_back(*tile.at(x - tile.reach - kRight, y - tile.reach + kDown));
+    for (int y = 0; y < h; ++y)
+      for (int x = 0; x < w; ++x) *tile.at(x - tile.reach, y - tile.reach) = scratch[size_t(y) * w + x];
+  };
+  const std::vector<splat::FinishStage> stages{move, back};
+  const geometry::Camera camera = testing::front_camera(kWidth, kHeight);
+  auto made = testing::random_items(17, 120, 900);
+  std::vector<splat::DrawItem> items;
+  for (size_t i = 0; i < made.size(); ++i) items.push_back(made[i].item(1.0f + 0.1f * float(i)));
+  const splat::DrawList list = testing::draw_list(std::move(items));
+  for (Kernel kernel : {Kernel::kSquare, Kernel::kDisc}) {
+    const Frame expected = testing::splat_plainly(list, camera, kernel, testing::unlit(camera));
+    splat::CpuSplatter splatter(2, stages);
+    for (const bool both : {true, false, true}) {
+      Frame frame(kWidth, kHeight);
+      splatter.render(list, camera, {kernel, {true, both, false}}, testing::unlit(camera), frame.target());
+      size_t different = 0;
+      for (int y = kDown; y < kHeight; ++y)
+        for (int x = 0; x < kWidth - kRight; ++x) {
+          const size_t i = both ? size_t(y) * kWidth + x : size_t(y - kDown) * kWidth + x + kRight;
+          const size_t j = size_t(y) * kWidth + x;
+          different += frame.colour[j] != expected.colour[i] || frame.depth_m[j] != expected.depth_m[i];
+        }
+      EXPECT_EQ(different, 0u) << "both " << both;
+    }
+  }
 }
 
 TEST(CpuSplatter, DiscCoversThePixelsWithinItsRadius) {
@@ -89,7 +168,7 @@ TEST(CpuSplatter, NearestPointWins) {
   for (const auto& items : {std::vector{far_item.item(3), near_item.item(3)}, {near_item.item(3), far_item.item(3)}}) {
     const Frame frame = render(items);
     EXPECT_EQ(frame.at(50, 50), 0xff222222u);
-    EXPECT_NEAR(frame.depth_m[50 * kWidth + 50], 1.0, 1e-4);
+    EXPECT_NEAR(frame.depth_m[50 * kWidth + 50], 1.0, 4e-4);
   }
 }
 
@@ -182,6 +261,50 @@ TEST(CpuSplatter, EveryPointOnScreenIsCountedOnce) {
   EXPECT_GT(on_screen, 1000u);
 }
 
+TEST(PixelKey, FieldsComeBack) {
+  std::mt19937 rng(3);
+  for (int i = 0; i < 1000; ++i) {
+    const uint32_t code = rng() % (splat::kMaxDepthCode + 1), spacing = rng() % 4, ring = rng() % 8,
+                   normal = rng() & 0xffff, albedo = rng() & 0xffffff;
+    const uint64_t key = splat::encode_key(code, spacing, ring, normal, albedo);
+    EXPECT_EQ(splat::key_depth_code(key), code);
+    EXPECT_EQ(splat::key_spacing(key), spacing);
+    EXPECT_EQ(splat::key_ring(key), ring);
+    EXPECT_EQ(splat::key_normal(key), normal);
+    EXPECT_EQ(splat::key_albedo(key), albedo);
+    const uint32_t info = splat::key_info(key);
+    EXPECT_EQ(splat::info_depth_code(info), code);
+    EXPECT_EQ(splat::info_spacing(info), spacing);
+    EXPECT_EQ(splat::info_ring(info), ring);
+    EXPECT_LT(int64_t(key), splat::kEmptyKey);
+    EXPECT_GT(int64_t(key + splat::kOutsideSplat), splat::kEmptyKey);
+  }
+  EXPECT_NE(splat::encode_key(splat::kMaxDepthCode, 3, 7, 0xffff, 0xffffff), uint64_t(splat::kEmptyKey));
+}
+
+TEST(PixelKey, NearerDepthsHaveLesserKeysAndComeBackWithinHalfAStep) {
+  for (const float near_m : {0.05f, 0.1f, 0.33f}) {
+    int64_t last = -1;
+    for (float z = near_m; z < near_m * 40000; z *= 1.00007f) {
+      const uint32_t code = splat::encode_depth_code(z, near_m);
+      EXPECT_GT(int64_t{code}, last) << z;
+      last = code;
+      EXPECT_NEAR(splat::decode_depth_code(code, near_m), z, z / 32768 * 1.01f);
+    }
+    EXPECT_LE(splat::encode_depth_code(3e38f, near_m) + splat::kMaxBias, splat::kMaxDepthCode);
+  }
+}
+
+TEST(PixelKey, TheMeanBiasComesOff) {
+  const splat::RimBias rim{0, 20, 81, 60};
+  for (uint32_t spacing = 0; spacing < 4; ++spacing)
+    for (int q = 0; q < 100; ++q) {
+      const auto bias = uint32_t(std::lround(q * 0.01 * rim[spacing]));
+      const uint32_t info = splat::key_info(splat::encode_key(5000 + bias, spacing, splat::ring_of(q * 0.01), 0, 0));
+      EXPECT_NEAR(double(splat::unbiased_depth_code(info, rim)), 5000.0, rim[spacing] / 16.0 + 1);
+    }
+}
+
 TEST(SplatTable, BiasGrowsToTheLimitAndNoFurther) {
   for (int side = 2; side <= splat::kMaxSplatSide; ++side) {
     uint32_t last = 0;
@@ -196,11 +319,13 @@ TEST(SplatTable, BiasGrowsToTheLimitAndNoFurther) {
 }
 
 TEST(SplatTable, SizesRoundAsStated) {
+  EXPECT_EQ(splat::square_size(1.0f), 1.0f);
+  EXPECT_EQ(splat::square_size(1.3f), 1.5f);
+  EXPECT_EQ(splat::square_size(0.1f), 1.0f);
+  EXPECT_EQ(splat::square_size(100.0f), float(splat::kMaxSplatSide));
   EXPECT_EQ(splat::square_side(1.0f), 1);
-  EXPECT_EQ(splat::square_side(1.19f), 1);
-  EXPECT_EQ(splat::square_side(1.21f), 2);
+  EXPECT_EQ(splat::square_side(1.01f), 2);
   EXPECT_EQ(splat::square_side(2.0f), 2);
-  EXPECT_EQ(splat::square_side(100.0f), splat::kMaxSplatSide);
   EXPECT_EQ(splat::disc_diameter(2.1f), 2.25f);
   EXPECT_EQ(splat::disc_diameter(0.1f), 1.0f);
 }

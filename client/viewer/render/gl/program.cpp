@@ -10,7 +10,7 @@
 namespace telesplat::viewer {
 namespace {
 
-// The same arithmetic as common/splat/splat_kernels-inl.h, in the same order: `precise` forbids fusing.
+// The same arithmetic as common/splat/projection-inl.h, in the same order: `precise` forbids fusing.
 constexpr const char* kVertexShader = R"(#version 430 core
 struct Draw {
   vec4 row_x, row_y, row_w;

@@ -1,0 +1,211 @@
+// Opaque splats whose shapes come from a table: square and disc.
+// Included once a target, by splat_kernels.cpp.
+#if defined(TELESPLAT_SPLAT_OPAQUE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TELESPLAT_SPLAT_OPAQUE_INL_H_
+#undef TELESPLAT_SPLAT_OPAQUE_INL_H_
+#else
+#define TELESPLAT_SPLAT_OPAQUE_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "common/splat/projection-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace telesplat::splat::HWY_NAMESPACE {
+
+// Projected points held before they are splatted: their arrays stay in the first-level cache.
+constexpr size_t kBatch = 512;
+
+// Projected points, waiting to be splatted.
+struct Batch {
+  // Where: index of the first pixel << 2 sub_bits | sub_y << sub_bits | sub_x.
+  HWY_ALIGN uint32_t place[kBatch + kMaxLanes];
+  HWY_ALIGN uint64_t key[kBatch + kMaxLanes];
+  size_t count = 0;
+};
+
+// One row of a splat after the other, whole vectors: what lies beyond the splat's side is written back unchanged.
+template <int kSide>
+HWY_INLINE void SplatOne(uint64_t* HWY_RESTRICT pixels, size_t stride, const uint64_t* HWY_RESTRICT addends,
+                         int64_t key) {
+  constexpr size_t kRow = (kSide + 3) / 4 * 4;
+  const hn::CappedTag<int64_t, kSide <= 2 ? 2 : 4> d;
+  const auto k = hn::Set(d, key);
+  for (size_t y = 0; y < kSide; ++y)
+    for (size_t x = 0; x < kSide; x += hn::Lanes(d)) {
+      auto* p = reinterpret_cast<int64_t*>(pixels + y * stride + x);
+      const auto* a = reinterpret_cast<const int64_t*>(addends + y * kRow + x);
+      hn::StoreU(hn::Min(hn::LoadU(d, p), hn::Add(k, hn::LoadU(d, a))), d, p);
+    }
+}
+
+template <int kSide>
+void SplatBatch(const SplatShape& shape, const KeyBuffer& buffer, const Batch& batch) {
+  constexpr size_t kStep = kSide * ((kSide + 3) / 4 * 4);
+  const int shift = 2 * shape.sub_bits;
+  const uint32_t sub_mask = (1u << shift) - 1;
+  const auto stride = static_cast<size_t>(buffer.stride);
+  for (size_t i = 0; i < batch.count; ++i) {
+    const uint32_t place = batch.place[i];
+    if constexpr (kSide == 1) {
+      auto& pixel = reinterpret_cast<int64_t&>(buffer.keys[place]);
+      pixel = std::min(pixel, static_cast<int64_t>(batch.key[i]));
+    } else {
+      SplatOne<kSide>(buffer.keys + (place >> shift), stride, shape.addends.data() + (place & sub_mask) * kStep,
+                      static_cast<int64_t>(batch.key[i]));
+    }
+  }
+}
+
+using SplatBatchFunction = void (*)(const SplatShape&, const KeyBuffer&, const Batch&);
+constexpr SplatBatchFunction kSplatBatch[kMaxSplatSide] = {
+    SplatBatch<1>,  SplatBatch<2>,  SplatBatch<3>,  SplatBatch<4>,  SplatBatch<5>,  SplatBatch<6>,
+    SplatBatch<7>,  SplatBatch<8>,  SplatBatch<9>,  SplatBatch<10>, SplatBatch<11>, SplatBatch<12>,
+    SplatBatch<13>, SplatBatch<14>, SplatBatch<15>, SplatBatch<16>};
+
+class TileSplatter {
+ public:
+  TileSplatter(const TileInput& input, const KeyBuffer& buffer) : input_(input), buffer_(buffer) {}
+
+  TileCounts run(const ItemStyle* styles) {
+    const size_t lanes = hn::Lanes(F32());
+    for (const TileBinning::Entry& entry : input_.entries) {
+      const ItemRun run = input_.runs[entry.box];
+      const LeafTransform& transform = input_.transforms[entry.box];
+      PrefetchRun(input_, &entry + 1);
+      for (uint32_t i = run.first; i < run.last; ++i) {
+        if (i + kItemsAhead < run.last) PrefetchLevel(input_.items[i + kItemsAhead].level);
+        if (styles[i] != style_) {
+          drain(transform, entry.whole);
+          if (styles[i].shape != style_.shape) flush();
+          style_ = styles[i];
+        }
+        const points::Mosaic::Level& level = input_.items[i].level;
+        if (level.count >= lanes) {
+          add(transform, level, entry.whole);
+        } else {
+          if (!stage_.has_room(level.count)) drain(transform, entry.whole);
+          stage_.append(level);
+        }
+      }
+      drain(transform, entry.whole);
+    }
+    flush();
+    return counts_;
+  }
+
+ private:
+  void flush() {
+    if (batch_.count > 0) kSplatBatch[style_.shape->side - 1](*style_.shape, buffer_, batch_);
+    batch_.count = 0;
+  }
+
+  // Stage -> batch. What is staged belongs to one cluster and has one shape.
+  void drain(const LeafTransform& transform, bool whole) {
+    const points::Mosaic::Level level = stage_.level();
+    if (level.count > 0) add(transform, level, whole);
+    stage_.clear();
+  }
+
+  void add(const LeafTransform& transform, const points::Mosaic::Level& level, bool whole) {
+    counts_.projected += level.count;
+    for (size_t first = 0; first < level.count; first += kPiece) {
+      const size_t last = std::min<size_t>(first + kPiece, level.count);
+      if (batch_.count + (last - first) > kBatch) flush();
+      if (whole)
+        add_piece<true>(transform, level, first, last);
+      else
+        add_piece<false>(transform, level, first, last);
+    }
+  }
+
+  template <bool kWhole>
+  HWY_NOINLINE void add_piece(const LeafTransform& transform_reference, const points::Mosaic::Level& level_reference,
+                              size_t first, size_t last) {
+    const I32 di;
+    const U32 du;
+    // Copies, which no store can change: the compiler need not read them again.
+    const LeafTransform transform = transform_reference;
+    const points::Mosaic::Level level = level_reference;
+    uint32_t* const places = batch_.place;
+    uint64_t* const keys = batch_.key;
+    const int bits = style_.shape->sub_bits;
+    const float near_m = input_.near_m, scale = style_.shape->scale, shift = style_.shape->shift;
+    const auto x0 = hn::Set(di, input_.rect.x), y0 = hn::Set(di, input_.rect.y);
+    const auto width = hn::Set(di, input_.rect.width), height = hn::Set(di, input_.rect.height);
+    const auto outside = hn::Set(di, -style_.shape->side);
+    const auto own_x0 = hn::Set(di, input_.own.x - input_.rect.x - 1),
+               own_y0 = hn::Set(di, input_.own.y - input_.rect.y - 1);
+    const auto own_x1 = hn::Set(di, input_.own.x + input_.own.width - input_.rect.x),
+               own_y1 = hn::Set(di, input_.own.y + input_.own.height - input_.rect.y);
+    const auto near_bits = hn::Set(du, std::bit_cast<uint32_t>(near_m)), farthest = hn::Set(du, kMaxCentreCode);
+    const auto albedo = hn::Set(du, 0x00ffffffu);
+    const auto head = hn::Set(du, static_cast<uint32_t>(encode_key(0, style_.spacing, 0, 0, 0) >> 32));
+    const auto stride = hn::Set(di, buffer_.stride), origin = hn::Set(di, buffer_.margin * (buffer_.stride + 1));
+    const auto sub_mask = hn::Set(di, (1 << bits) - 1);
+    size_t count = batch_.count, drawn = 0;
+
+    ForVectors(first, last, [&](size_t offset, size_t skip, size_t valid) HWY_ATTR {
+      const Projected p = Project(transform, LoadLanes(level, offset), near_m, scale, shift);
+      const auto px = hn::Sub(hn::ShiftRightSame(p.x, bits), x0), py = hn::Sub(hn::ShiftRightSame(p.y, bits), y0);
+      hn::Mask<I32> keep;
+      if (!kWhole) {
+        const auto in_x = hn::And(hn::Gt(px, outside), hn::Lt(px, width)),
+                   in_y = hn::And(hn::Gt(py, outside), hn::Lt(py, height));
+        const auto beyond_near = hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m)));
+        keep = hn::And(hn::And(in_x, in_y), beyond_near);
+        if (valid - skip < hn::Lanes(di)) keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
+        if (hn::AllFalse(di, keep)) return;
+        const auto own =
+            hn::And(hn::And(hn::Gt(px, own_x0), hn::Lt(px, own_x1)), hn::And(hn::Gt(py, own_y0), hn::Lt(py, own_y1)));
+        drawn += hn::CountTrue(di, hn::And(keep, own));
+      }
+
+      const auto pixel = hn::Add(hn::Add(hn::Mul(py, stride), px), origin);
+      const auto sub = hn::Or(hn::ShiftLeftSame(hn::And(p.y, sub_mask), bits), hn::And(p.x, sub_mask));
+      const auto place = hn::BitCast(du, hn::Or(hn::ShiftLeftSame(pixel, 2 * bits), sub));
+
+      // The key, in halves.
+      const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
+      const auto code = hn::Min(hn::ShiftRight<kDepthCodeShift>(hn::Sub(hn::BitCast(du, p.w), near_bits)), farthest);
+      const auto high = hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(code), hn::ShiftRight<8>(normal)), head);
+      const auto low = hn::Or(hn::ShiftLeft<24>(normal), hn::And(hn::LoadU(du, level.colour + offset), albedo));
+
+      if (kWhole) {
+        // Lanes below `skip` are the batch's last points: they are written once more, as they are. (None are there if the batch
+        // was emptied in between; then they are splatted twice, which changes nothing.)
+        const size_t at = count >= skip ? count - skip : 0;
+        hn::StoreU(place, du, places + at);
+        hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + at));
+        count = at + valid;
+      } else {
+        const Compressor compress(hn::RebindMask(du, keep));
+        hn::StoreU(compress(place), du, places + count);
+        hn::StoreInterleaved2(compress(low), compress(high), du, reinterpret_cast<uint32_t*>(keys + count));
+        count += compress.count();
+      }
+    });
+    batch_.count = count;
+    counts_.drawn += kWhole ? last - first : drawn;
+  }
+
+  const TileInput& input_;
+  const KeyBuffer& buffer_;
+  ItemStyle style_;
+  TileCounts counts_;
+  Stage stage_;
+  Batch batch_;
+};
+
+TileCounts SplatTile(const TileInput& input, const ItemStyle* styles, const KeyBuffer& buffer) {
+  return TileSplatter(input, buffer).run(styles);
+}
+
+}  // namespace telesplat::splat::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,191 @@
+// Points by the vector: loading them, projecting them, putting those that stay side by side; and what makes many short levels fast.
+// Included once a target, by splat_kernels.cpp.
+#if defined(TELESPLAT_SPLAT_PROJECTION_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef TELESPLAT_SPLAT_PROJECTION_INL_H_
+#undef TELESPLAT_SPLAT_PROJECTION_INL_H_
+#else
+#define TELESPLAT_SPLAT_PROJECTION_INL_H_
+#endif
+
+#include <hwy/cache_control.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstring>
+
+#include "common/splat/splat_kernels.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace telesplat::splat::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F32 = hn::ScalableTag<float>;
+using I32 = hn::RebindToSigned<F32>;
+using U32 = hn::RebindToUnsigned<F32>;
+using U16 = hn::Rebind<uint16_t, F32>;
+
+constexpr size_t kMaxLanes = 64;  // float lanes of the widest vectors there are
+constexpr size_t kPiece =
+    384;  // points of an item taken at once: room for a whole piece is made before it is projected
+
+// Positions of a vector of points, in steps of the leaf's grid.
+struct Lanes {
+  hn::Vec<F32> x, y, z;
+};
+
+HWY_INLINE hn::Vec<F32> ToFloat(const uint16_t* p) {
+  return hn::ConvertTo(F32(), hn::BitCast(I32(), hn::PromoteTo(U32(), hn::LoadU(U16(), p))));
+}
+
+HWY_INLINE Lanes LoadLanes(const points::Mosaic::Level& level, size_t offset) {
+  return {ToFloat(level.x + offset), ToFloat(level.y + offset), ToFloat(level.z + offset)};
+}
+
+HWY_INLINE hn::Vec<F32> Row(const std::array<float, 4>& row, const Lanes& p) {
+  const F32 d;
+  const auto xy = hn::Add(hn::Mul(p.x, hn::Set(d, row[0])), hn::Mul(p.y, hn::Set(d, row[1])));
+  return hn::Add(hn::Add(xy, hn::Mul(p.z, hn::Set(d, row[2]))), hn::Set(d, row[3]));
+}
+
+// floor(v), as integers; what does not fit lies far outside every image and must only stay outside.
+HWY_INLINE hn::Vec<I32> FloorToInt(hn::Vec<F32> v) {
+  const F32 d;
+  const auto limit = hn::Set(d, 1e6f);
+  return hn::ConvertTo(I32(), hn::Floor(hn::Max(hn::Min(v, limit), hn::Neg(limit))));
+}
+
+struct Projected {
+  hn::Vec<I32> x, y;  // 2^-sub_bits pixels
+  hn::Vec<F32> w;
+};
+
+HWY_INLINE Projected Project(const LeafTransform& t, const Lanes& p, float near_m, float scale, float shift) {
+  const F32 d;
+  const auto w = Row(t.w, p);
+  const auto inverse = hn::Div(hn::Set(d, scale), hn::Max(w, hn::Set(d, near_m)));
+  const auto s = hn::Set(d, shift);
+  return {FloorToInt(hn::Add(hn::Mul(Row(t.x, p), inverse), s)), FloorToInt(hn::Add(hn::Mul(Row(t.y, p), inverse), s)),
+          w};
+}
+
+// Lane numbers that are set in a mask of 8 bits, in order; 0 beyond.
+struct CompressTable {
+  uint8_t lane[256][8];
+};
+constexpr CompressTable make_compress_table() {
+  CompressTable t{};
+  for (int bits = 0; bits < 256; ++bits)
+    for (int i = 0, n = 0; i < 8; ++i)
+      if (bits >> i & 1) t.lane[bits][n++] = static_cast<uint8_t>(i);
+  return t;
+}
+alignas(64) constexpr CompressTable kCompress = make_compress_table();
+
+// Moves the lanes of a mask to the front, the same for several vectors. (Highway's own Compress in 1.0 copies its 1 KiB table to the
+// stack at each call when GCC compiles it: bench splat_square was 1.7 times slower with it.)
+class Compressor {
+ public:
+  explicit HWY_INLINE Compressor(hn::Mask<U32> mask) : mask_(mask) {
+    if (hn::Lanes(U32()) > 8) return;
+    uint8_t bits[hwy::HWY_NAMESPACE::MaxLanes(U32()) / 8 + 8] = {};
+    hn::StoreMaskBits(U32(), mask, bits);
+    bits_ = bits[0];
+  }
+  HWY_INLINE size_t count() const { return hn::CountTrue(U32(), mask_); }
+  HWY_INLINE hn::Vec<U32> operator()(hn::Vec<U32> v) const {
+    const U32 d;
+    if (hn::Lanes(d) > 8) return hn::Compress(v, mask_);
+    const hn::Rebind<uint8_t, U32> d8;
+    const auto lanes = hn::PromoteTo(d, hn::LoadU(d8, kCompress.lane[bits_]));
+    return hn::TableLookupLanes(v, hn::IndicesFromVec(d, lanes));
+  }
+
+ private:
+  hn::Mask<U32> mask_;
+  uint32_t bits_ = 0;
+};
+
+// Collects the points of levels that have fewer of them than a vector has lanes: after many small updates most mosaics do.
+class Stage {
+ public:
+  bool has_room(size_t n) const { return count_ + n <= kCapacity; }
+  void clear() { count_ = 0; }
+  HWY_INLINE void append(const points::Mosaic::Level& l) {
+    const size_t n = l.count;
+    copy(l.x, x_ + count_, n), copy(l.y, y_ + count_, n), copy(l.z, z_ + count_, n),
+        copy(l.normal, normal_ + count_, n);
+    copy(l.colour, colour_ + count_, n);
+    count_ += n;
+  }
+  /// Whole vectors can be read wherever a point is.
+  points::Mosaic::Level level() const { return {static_cast<uint32_t>(count_), x_, y_, z_, normal_, colour_}; }
+
+ private:
+  static constexpr size_t kCapacity = 128;
+
+  // Few elements go by two moves of fixed size that overlap, instead of a loop.
+  template <class T>
+  static HWY_INLINE void copy(const T* HWY_RESTRICT from, T* HWY_RESTRICT to, size_t n) {
+    if (n >= 8)
+      std::memcpy(to, from, n * sizeof(T));
+    else if (n >= 4)
+      move_ends<4>(from, to, n);
+    else if (n >= 2)
+      move_ends<2>(from, to, n);
+    else if (n == 1)
+      *to = *from;
+  }
+  template <size_t kElements, class T>
+  static HWY_INLINE void move_ends(const T* HWY_RESTRICT from, T* HWY_RESTRICT to, size_t n) {
+    std::memcpy(to, from, kElements * sizeof(T));
+    std::memcpy(to + n - kElements, from + n - kElements, kElements * sizeof(T));
+  }
+
+  uint16_t x_[kCapacity + kMaxLanes] = {}, y_[kCapacity + kMaxLanes] = {}, z_[kCapacity + kMaxLanes] = {};
+  uint16_t normal_[kCapacity + kMaxLanes] = {};
+  uint32_t colour_[kCapacity + kMaxLanes] = {};
+  size_t count_ = 0;
+};
+
+// Calls visit(offset, skip, valid) for vectors that cover the points [first, last) of a level: lanes skip..valid-1 are points not
+// visited yet. The last vector overlaps the one before, so that nothing is read beyond the arrays of a level that has at least a
+// vector of points; a Stage may have fewer.
+template <class Visit>
+HWY_INLINE void ForVectors(size_t first, size_t last, const Visit& visit) {
+  const size_t lanes = hn::Lanes(F32());
+  size_t i = first;
+  for (; i + lanes <= last; i += lanes) visit(i, size_t{0}, lanes);
+  if (i == last) return;
+  if (last >= lanes)
+    visit(last - lanes, i - (last - lanes), lanes);
+  else
+    visit(i, size_t{0}, last - i);
+}
+
+// Mosaics lie scattered in memory, and what comes next is known: asks for it in time. A level's arrays lie next to each other,
+// except for mean colours, so asking for lines from x on finds nearly all.
+constexpr uint32_t kItemsAhead = 8;
+HWY_INLINE void PrefetchLevel(const points::Mosaic::Level& level) {
+  const auto* p = reinterpret_cast<const std::byte*>(level.x);
+  const size_t bytes = std::min<size_t>(size_t{12} * level.count, 2048);
+  for (size_t i = 0; i < bytes; i += 64) hwy::Prefetch(p + i);
+}
+HWY_INLINE void PrefetchRun(const TileInput& input, const TileBinning::Entry* entry) {
+  const TileBinning::Entry* end = input.entries.data() + input.entries.size();
+  if (entry == end) return;
+  const ItemRun run = input.runs[entry->box];
+  // The run after it: its items, so that its points can be asked for without waiting.
+  if (entry + 1 != end) {
+    const auto* items = reinterpret_cast<const std::byte*>(input.items + input.runs[entry[1].box].first);
+    for (size_t i = 0; i < kItemsAhead * sizeof(DrawItem); i += 64) hwy::Prefetch(items + i);
+  }
+  for (uint32_t i = run.first; i < std::min(run.first + kItemsAhead, run.last); ++i)
+    PrefetchLevel(input.items[i].level);
+}
+
+}  // namespace telesplat::splat::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
