@@ -28,7 +28,8 @@ constexpr int kMargin = kMaxSplatSide;
 struct Workspace {
   hwy::AlignedFreeUniquePtr<uint64_t[]> keys;
   int reach = -1;  // that `keys` was made for
-  std::vector<uint64_t> scratch;
+  std::vector<uint64_t> row;
+  FinishScratch finish;
   SplatStats stats;
 };
 
@@ -38,8 +39,8 @@ struct Layout {
 
   int stride() const { return kTileWidth + 2 * (reach + kMargin); }
   size_t size() const { return static_cast<size_t>(stride()) * (kTileHeight + 2 * (reach + kMargin)); }
-  TilePixels pixels(uint64_t* keys, const geometry::Rect& rect) const {
-    return {keys + static_cast<size_t>(reach + kMargin) * (stride() + 1), stride(), rect.width, rect.height, reach};
+  ResolvedTile tile(uint64_t* keys, const geometry::Rect& rect) const {
+    return {reinterpret_cast<uint32_t*>(keys), stride(), reach + kMargin, rect.width, rect.height};
   }
 };
 
@@ -47,14 +48,14 @@ geometry::Rect grown(const geometry::Rect& r, int by) {
   return {r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
 }
 
-// Empties what splats wrote to the right of and below a tile that the image's edge cuts: in a whole tile those are pixels.
-void empty_beyond(const TilePixels& tile) {
-  const int right = tile.width + tile.reach, lower = tile.height + tile.reach;
-  const auto fill = [&](int y, int x0, int x1) {
-    std::fill(tile.at(x0, y), tile.at(x1, y), static_cast<uint64_t>(kEmptyKey));
+// Empties what was written to the right of and below a tile that the image's edge cuts: in a whole tile those are pixels.
+void empty_beyond(const ResolvedTile& tile, int reach) {
+  const int right = tile.width + reach, lower = tile.height + reach;
+  const auto fill = [&](int y, int x0) {
+    std::fill(tile.key(y) + x0, tile.key(y) + kTileWidth + reach, static_cast<uint64_t>(kEmptyKey));
   };
-  for (int y = -tile.reach; y < lower; ++y) fill(y, right, right + kMargin);
-  for (int y = lower; y < lower + kMargin; ++y) fill(y, -tile.reach, right + kMargin);
+  for (int y = -reach; y < lower; ++y) fill(y, right);
+  for (int y = lower; y < std::min(lower + kMargin, kTileHeight + reach); ++y) fill(y, -reach);
 }
 
 void write_background(const geometry::Rect& rect, uint32_t background, const TileTarget& target) {
@@ -68,25 +69,22 @@ void write_background(const geometry::Rect& rect, uint32_t background, const Til
 }  // namespace
 
 struct CpuSplatter::Impl {
-  Impl(int threads, std::span<const FinishStage> stages)
+  explicit Impl(int threads)
       : arena(threads > 0 ? threads : tbb::task_arena::automatic),
-        workspaces(static_cast<size_t>(arena.max_concurrency())),
-        all_stages(stages) {}
+        workspaces(static_cast<size_t>(arena.max_concurrency())) {}
 
   void prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                const image::Shading& shading);
   void prepare_styles(const DrawList& list, Kernel kernel);
   void draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace);
-  void finish_tile(const TilePixels& pixels, Workspace& workspace);
+  void finish_tile(const ResolvedTile& tile, Workspace& workspace);
 
   tbb::task_arena arena;
   std::vector<Workspace> workspaces;
-  std::span<const FinishStage> all_stages;
 
   // Of the frame.
-  std::vector<const FinishStage*> stages;  // that are on
+  Finish finish;
   Layout layout;
-  FinishFrame frame;
   ResolveInput resolve;
   SplatTable table;
   TileGrid grid;
@@ -99,16 +97,10 @@ struct CpuSplatter::Impl {
 void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                                 const image::Shading& shading) {
   grid = {camera.width, camera.height, kTileWidth, kTileHeight};
-  stages.clear();
-  layout.reach = 0;
-  for (const FinishStage& stage : all_stages)
-    if (options.finish.*stage.on) {
-      stages.push_back(&stage);
-      layout.reach += stage.reach;
-    }
+  finish = options.finish;
+  layout.reach = finish_reach(finish);
   std::memcpy(intensity.data(), shading.table().data(), shading.table().size());
   const auto near_m = static_cast<float>(camera.near_m);
-  frame = {near_m, static_cast<float>(camera.focal_x()), shading.background()};
   resolve = {intensity.data(), shading.background(), near_m, {}};
   table.set_focal(camera.focal_x());
   prepare_styles(list, options.kernel);
@@ -117,13 +109,15 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
 }
 
 void CpuSplatter::Impl::prepare_styles(const DrawList& list, Kernel kernel) {
+  // Squares stay as they are: the fast kernel shows its samples plainly.
+  const bool smoothed = kernel != Kernel::kSquare;
   const Kernel shaped = kernel == Kernel::kSquare ? Kernel::kSquare : Kernel::kDisc;
   styles.resize(list.items.size());
   std::array<uint64_t, 4> bias{}, points{};
   for (size_t i = 0; i < list.items.size(); ++i) {
     const DrawItem& item = list.items[i];
     const ItemStyle& style =
-        styles[i] = {&table.shape(shaped, item.splat_px), spacing_class(item.splat_px / list.scale)};
+        styles[i] = {&table.shape(shaped, item.splat_px), smoothed ? spacing_class(item.splat_px / list.scale) : 0};
     bias[style.spacing] += uint64_t{style.shape->rim_bias} * item.level.count;
     points[style.spacing] += item.level.count;
   }
@@ -131,14 +125,20 @@ void CpuSplatter::Impl::prepare_styles(const DrawList& list, Kernel kernel) {
     if (points[i] > 0) resolve.rim[i] = static_cast<uint32_t>((bias[i] + points[i] / 2) / points[i]);
 }
 
-void CpuSplatter::Impl::finish_tile(const TilePixels& pixels, Workspace& workspace) {
-  TilePixels valid = pixels;
-  for (const FinishStage* stage : stages) {
-    valid.reach -= stage->reach;
-    const double start = monotonic_s();
-    stage->run(valid, frame, workspace.scratch);
-    workspace.stats.*stage->ms += (monotonic_s() - start) * 1e3;
-  }
+void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspace) {
+  SplatStats& stats = workspace.stats;
+  double start = monotonic_s();
+  const auto lap = [&](double& ms) {
+    const double now = monotonic_s();
+    ms += (now - start) * 1e3;
+    start = now;
+  };
+  // Each stage leaves as much around the tile as those after it read.
+  const int left_after_fill = finish_reach({false, finish.smooth, finish.antialias});
+  const int left_after_smooth = finish_reach({false, false, finish.antialias});
+  if (finish.fill) fill_holes(tile, left_after_fill, workspace.finish), lap(stats.fill_ms);
+  if (finish.smooth) smooth(tile, left_after_smooth, workspace.finish), lap(stats.smooth_ms);
+  if (finish.antialias) antialias(tile, workspace.finish), lap(stats.antialias_ms);
 }
 
 void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace) {
@@ -156,32 +156,31 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTa
   }
 
   // Buffers are empty between tiles: writing empties them. Their margins need not be.
-  const TilePixels pixels = layout.pixels(workspace.keys.get(), rect);
+  const ResolvedTile tile = layout.tile(workspace.keys.get(), rect);
   const TileInput input{
-      grown(rect, layout.reach), rect, frame.near_m, entries, runs.runs.data(), runs.transforms.data(),
+      grown(rect, layout.reach), rect, resolve.near_m, entries, runs.runs.data(), runs.transforms.data(),
       list.items.data()};
-  const TileCounts counts = splat_tile(input, styles.data(), {workspace.keys.get(), pixels.stride, kMargin});
+  const TileCounts counts = splat_tile(input, styles.data(), {workspace.keys.get(), tile.stride, kMargin});
   stats.points_projected += counts.projected;
   stats.points_drawn += counts.drawn;
   const double splatted = monotonic_s();
   stats.project_ms += (splatted - start) * 1e3;
 
   double finished = splatted;
-  if (stages.empty()) {
-    resolve_and_write_tile(pixels, resolve, out);
+  if (layout.reach == 0) {
+    resolve_and_write_tile(tile, resolve, out);
   } else {
-    resolve_tile(pixels, resolve);
+    resolve_tile(tile, layout.reach, resolve, workspace.row);
     stats.resolve_ms += (monotonic_s() - splatted) * 1e3;
-    finish_tile(pixels, workspace);
+    finish_tile(tile, workspace);
     finished = monotonic_s();
-    write_tile(pixels, resolve, out);
+    write_tile(tile, layout.reach, resolve, out);
   }
-  if (rect.width < kTileWidth || rect.height < kTileHeight) empty_beyond(pixels);
+  if (rect.width < kTileWidth || rect.height < kTileHeight) empty_beyond(tile, layout.reach);
   stats.resolve_ms += (monotonic_s() - finished) * 1e3;
 }
 
-CpuSplatter::CpuSplatter(int threads, std::span<const FinishStage> stages)
-    : impl_(std::make_unique<Impl>(threads, stages)) {}
+CpuSplatter::CpuSplatter(int threads) : impl_(std::make_unique<Impl>(threads)) {}
 CpuSplatter::~CpuSplatter() = default;
 
 SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,

@@ -2,12 +2,10 @@
 #pragma once
 
 #include <memory>
-#include <span>
 
 #include "common/image/file.h"
 #include "common/image/shading.h"
 #include "common/splat/render_options.h"
-#include "common/splat/tile_pixels.h"
 #include "common/splat/view_selection.h"
 
 namespace telesplat::splat {
@@ -28,12 +26,11 @@ struct SplatStats {
 class CpuSplatter {
  public:
   /// threads: 0 = all cores.
-  /// stages: what a frame's finish is made of, in order; must live as long as the splatter.
-  explicit CpuSplatter(int threads = 0, std::span<const FinishStage> stages = {});
+  explicit CpuSplatter(int threads = 0);
   ~CpuSplatter();
 
-  /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish has on ->
-  /// write. Pixels are shaded with shading.table(). camera.width/height are target's.
+  /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish has on
+  /// (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                     const image::Shading& shading, const FrameTarget& target);
   /// Without any finish.

@@ -22,6 +22,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/splat/pixel_key.h"
 #include "common/splat/render_options.h"
 
 namespace telesplat::splat {
@@ -38,17 +39,19 @@ constexpr int finish_reach(const Finish& f) {
 /// Resolved pixels of a tile and of a margin around it, row by row: `stride` colours (0x00RRGGBB), then `stride` infos (depth code << 8 |
 /// spacing class << 3 | ring; 0xffffffff: empty).
 struct ResolvedTile {
-  uint32_t* rows = nullptr;  ///< (height + 2 margin) rows of 2 stride
+  uint32_t* rows = nullptr;  ///< aligned as uint64_t; (height + 2 margin) rows of 2 stride
   int stride = 0;            ///< at least width + 2 margin
   int margin = 0;            ///< at least finish_reach() + kFinishSlack if any stage is on
   int width = 0, height = 0;
 
   /// Pixel x = 0 of row y; x in -margin..stride - margin - 1, y in -margin..height + margin - 1.
+  /// Before the row is resolved: its keys (pixel_key.h), x as below.
+  uint64_t* key(int y) const {
+    return reinterpret_cast<uint64_t*>(rows) + static_cast<size_t>(y + margin) * stride + margin;
+  }
   uint32_t* colour(int y) const { return rows + static_cast<size_t>(y + margin) * 2 * stride + margin; }
   uint32_t* info(int y) const { return colour(y) + stride; }
 };
-
-inline constexpr uint32_t kEmptyInfo = 0xffffffffu;
 
 /// What the stages need besides the tile; its memory is reused.
 struct FinishScratch {

@@ -91,7 +91,7 @@ HWY_INLINE void WritePixels(Pixels colour, Pixels info, hn::Mask<PixelU32> empty
   const PixelU32 d;
   const PixelF32 df;
   const size_t lanes = hn::Lanes(d);
-  const auto shown = hn::Or(hn::IfThenElse(empty, hn::Set(d, input.background), colour), hn::Set(d, 0xff000000u));
+  const auto shown = hn::Or(colour, hn::Set(d, 0xff000000u));
   const auto depth = [&]() HWY_ATTR {
     return hn::IfThenElse(hn::RebindMask(df, empty), hn::Set(df, std::numeric_limits<float>::infinity()),
                           DepthOf(info, input));
@@ -111,43 +111,52 @@ HWY_INLINE void WritePixels(Pixels colour, Pixels info, hn::Mask<PixelU32> empty
   std::memcpy(out_depth_m, last_depth, n * sizeof(float));
 }
 
-void ResolveTile(const TilePixels& tile, const ResolveInput& input) {
+void ResolveTile(const ResolvedTile& tile, int reach, const ResolveInput& input, std::vector<uint64_t>& scratch) {
   const PixelU32 d;
   const int lanes = static_cast<int>(hn::Lanes(d));
-  for (int y = -tile.reach; y < tile.height + tile.reach; ++y) {
-    uint64_t* row = tile.at(0, y);
-    for (int x = -tile.reach; x < tile.width + tile.reach; x += lanes) {
-      const Halves key = LoadHalves(row + x);
+  const auto background = hn::Set(d, input.background), nothing = hn::Set(d, kEmptyInfo);
+  // A row's keys leave their place before its colours and infos take it.
+  const int columns = tile.width + 2 * reach;
+  scratch.resize(std::max(scratch.size(), static_cast<size_t>(columns + lanes)));
+  for (int y = -reach; y < tile.height + reach; ++y) {
+    uint32_t *colour = tile.colour(y) - reach, *info = tile.info(y) - reach;
+    std::memcpy(scratch.data(), tile.key(y) - reach, static_cast<size_t>(columns) * sizeof(uint64_t));
+    for (int x = 0; x < columns; x += lanes) {
+      const Halves key = LoadHalves(scratch.data() + x);
       const auto empty = IsEmpty(key.high);
-      if (hn::AllTrue(d, empty)) continue;  // empty keys are empty pairs
-      const auto colour = hn::Or(ColourOf(key, input.intensity), hn::VecFromMask(d, empty));
-      const auto info = hn::Or(InfoOf(key.high), hn::VecFromMask(d, empty));
-      hn::StoreInterleaved2(colour, info, d, reinterpret_cast<uint32_t*>(row + x));
+      if (hn::AllTrue(d, empty)) {
+        hn::StoreU(background, d, colour + x);
+        hn::StoreU(nothing, d, info + x);
+        continue;
+      }
+      hn::StoreU(hn::IfThenElse(empty, background, ColourOf(key, input.intensity)), d, colour + x);
+      hn::StoreU(hn::IfThenElse(empty, nothing, InfoOf(key.high)), d, info + x);
     }
   }
 }
 
-void WriteTile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target) {
-  const int lanes = static_cast<int>(hn::Lanes(PixelU32()));
+void WriteTile(const ResolvedTile& tile, int reach, const ResolveInput& input, const TileTarget& target) {
+  const PixelU32 d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
   for (int y = 0; y < tile.height; ++y) {
-    const uint64_t* row = tile.at(0, y);
     uint32_t* colour = target.colour + static_cast<size_t>(y) * target.pitch;
     float* depth_m = target.depth_m ? target.depth_m + static_cast<size_t>(y) * target.pitch : nullptr;
     for (int x = 0; x < tile.width; x += lanes) {
-      const Halves pair = LoadHalves(row + x);
-      WritePixels(pair.low, pair.high, IsEmpty(pair.high), input, static_cast<size_t>(tile.width - x), colour + x,
-                  depth_m ? depth_m + x : nullptr);
+      const auto info = hn::LoadU(d, tile.info(y) + x);
+      WritePixels(hn::LoadU(d, tile.colour(y) + x), info, IsEmpty(info), input, static_cast<size_t>(tile.width - x),
+                  colour + x, depth_m ? depth_m + x : nullptr);
     }
   }
-  for (int y = -tile.reach; y < tile.height + tile.reach; ++y)
-    std::fill_n(tile.at(-tile.reach, y), tile.width + 2 * tile.reach, static_cast<uint64_t>(kEmptyKey));
+  for (int y = -reach; y < tile.height + reach; ++y)
+    std::fill_n(tile.key(y) - reach, tile.width + 2 * reach, static_cast<uint64_t>(kEmptyKey));
 }
 
-void ResolveAndWriteTile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target) {
+void ResolveAndWriteTile(const ResolvedTile& tile, const ResolveInput& input, const TileTarget& target) {
   const PixelU32 d;
   const int lanes = static_cast<int>(hn::Lanes(d));
+  const auto background = hn::Set(d, input.background);
   for (int y = 0; y < tile.height; ++y) {
-    uint64_t* row = tile.at(0, y);
+    uint64_t* row = tile.key(y);
     uint32_t* colour = target.colour + static_cast<size_t>(y) * target.pitch;
     float* depth_m = target.depth_m ? target.depth_m + static_cast<size_t>(y) * target.pitch : nullptr;
     for (int x = 0; x < tile.width; x += lanes) {
@@ -156,11 +165,12 @@ void ResolveAndWriteTile(const TilePixels& tile, const ResolveInput& input, cons
       const auto n = static_cast<size_t>(tile.width - x);
       float* out_depth_m = depth_m ? depth_m + x : nullptr;
       if (hn::AllTrue(d, empty)) {
-        WritePixels(key.low, key.high, empty, input, n, colour + x, out_depth_m);
+        WritePixels(background, key.high, empty, input, n, colour + x, out_depth_m);
         continue;
       }
       StoreEmpty(row + x);
-      WritePixels(ColourOf(key, input.intensity), InfoOf(key.high), empty, input, n, colour + x, out_depth_m);
+      WritePixels(hn::IfThenElse(empty, background, ColourOf(key, input.intensity)), InfoOf(key.high), empty, input, n,
+                  colour + x, out_depth_m);
     }
   }
 }

@@ -28,13 +28,15 @@ TileCounts splat_tile(const TileInput& input, const ItemStyle* styles, const Key
   return HWY_DYNAMIC_DISPATCH(SplatTile)(input, styles, buffer);
 }
 
-void resolve_tile(const TilePixels& tile, const ResolveInput& input) { HWY_DYNAMIC_DISPATCH(ResolveTile)(tile, input); }
-
-void write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target) {
-  HWY_DYNAMIC_DISPATCH(WriteTile)(tile, input, target);
+void resolve_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, std::vector<uint64_t>& scratch) {
+  HWY_DYNAMIC_DISPATCH(ResolveTile)(tile, reach, input, scratch);
 }
 
-void resolve_and_write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target) {
+void write_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, const TileTarget& target) {
+  HWY_DYNAMIC_DISPATCH(WriteTile)(tile, reach, input, target);
+}
+
+void resolve_and_write_tile(const ResolvedTile& tile, const ResolveInput& input, const TileTarget& target) {
   HWY_DYNAMIC_DISPATCH(ResolveAndWriteTile)(tile, input, target);
 }
 

@@ -9,11 +9,12 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "common/splat/finish.h"
 #include "common/splat/pixel_key.h"
 #include "common/splat/splat_table.h"
 #include "common/splat/tile_binning.h"
-#include "common/splat/tile_pixels.h"
 #include "common/splat/view_selection.h"
 
 namespace telesplat::splat {
@@ -74,16 +75,16 @@ struct TileTarget {
   size_t pitch = 0;
 };
 
-/// Keys to pairs of colour and info, in place: the tile and its reach. What lies within kMaxSplatSide to the right of that may
-/// change too.
-void resolve_tile(const TilePixels& tile, const ResolveInput& input);
+/// Keys to colours and infos, each row in its keys' place: the tile and `reach` pixels around it. Empty pixels get the background's colour.
+/// tile.margin is at least reach + kFinishSlack. scratch: memory that is used again.
+void resolve_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, std::vector<uint64_t>& scratch);
 
-/// Pairs to colours (0xff000000 | 0x00RRGGBB, background where empty) and, if target.depth_m is not null, depths in metres
-/// (+infinity where empty), without the bias. Sets the tile's pixels and its reach to kEmptyKey again.
-void write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target);
+/// Colours (0xff000000 | 0x00RRGGBB) and, if target.depth_m is not null, depths in metres (+infinity where empty), without the bias.
+/// Makes keys of the tile and of its reach again, all of them empty; what else is in the rows stays as the stages left it.
+void write_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, const TileTarget& target);
 
 /// The same as resolve_tile and write_tile, in one pass, for tiles without reach.
-void resolve_and_write_tile(const TilePixels& tile, const ResolveInput& input, const TileTarget& target);
+void resolve_and_write_tile(const ResolvedTile& tile, const ResolveInput& input, const TileTarget& target);
 
 /// Least depth (bits of a positive float) of all points in each pixel, one pixel a point. depth_bits: rect.width * rect.height,
 /// row-major, holding +infinity or what is there already.

@@ -13,6 +13,7 @@
 #include "common/splat/cpu_splatter.h"
 #include "common/splat/splat_table.h"
 #include "common/splat/tile_binning.h"
+#include "tests/support/finish_plainly.h"
 
 namespace telesplat::testing {
 
@@ -94,8 +95,9 @@ inline std::vector<HandMadeItem> random_items(uint32_t seed, int count, int most
 }
 
 /// One point after the other, one pixel after the other, by the formulas of splat_kernels.h, splat_table.h and pixel_key.h.
+/// With a finish, by tests/support/finish_plainly.h: there, nothing is beyond the image.
 inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
-                           const image::Shading& shading) {
+                           const image::Shading& shading, const splat::Finish& finish = {false, false, false}) {
   Frame frame(camera.width, camera.height);
   std::vector<uint64_t> keys(frame.colour.size(), ~uint64_t{0});
   const auto near_m = static_cast<float>(camera.near_m);
@@ -106,7 +108,7 @@ inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& 
     const float size = std::clamp(std::ceil(item.splat_px * 4) / 4, 1.0f, 16.0f);
     const int side = int(std::ceil(size)), steps = side == 1 ? 1 : side <= 4 ? 8 : 4;
     const double contour_r2 = (disc ? 0.25 : 0.5) * size * size;
-    const uint32_t spacing = splat::spacing_class(item.splat_px / list.scale);
+    const uint32_t spacing = disc ? splat::spacing_class(item.splat_px / list.scale) : 0;
     bias_sum[spacing] += item.level.count * (side > 1 ? splat::splat_bias(contour_r2, side, camera.focal_x()) : 0.0);
     points[spacing] += item.level.count;
     for (uint32_t i = 0; i < item.level.count; ++i) {
@@ -140,14 +142,26 @@ inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& 
   splat::RimBias rim{};
   for (int i = 0; i < 4; ++i)
     if (points[i] > 0) rim[i] = uint32_t(std::floor(bias_sum[i] / points[i] + 0.5));
+  OwnTile tile(frame.width, frame.height);
+  std::fill(tile.words.begin(), tile.words.end(), shading.background());
+  for (int y = -tile.tile.margin; y < frame.height + tile.tile.margin; ++y)
+    for (int x = -tile.tile.margin; x < frame.width + tile.tile.margin; ++x) tile.tile.info(y)[x] = splat::kEmptyInfo;
   for (size_t i = 0; i < keys.size(); ++i) {
-    const uint64_t key = keys[i];
-    const bool empty = key == ~uint64_t{0};
-    frame.colour[i] =
-        0xff000000u | (empty ? shading.background()
-                             : image::Shading::apply(splat::key_albedo(key), shading.table()[splat::key_normal(key)]));
-    frame.depth_m[i] = empty ? std::numeric_limits<float>::infinity()
-                             : splat::decode_depth_code(splat::unbiased_depth_code(splat::key_info(key), rim), near_m);
+    if (keys[i] == ~uint64_t{0}) continue;
+    const int x = int(i) % frame.width, y = int(i) / frame.width;
+    tile.tile.info(y)[x] = splat::key_info(keys[i]);
+    tile.tile.colour(y)[x] =
+        image::Shading::apply(splat::key_albedo(keys[i]), shading.table()[splat::key_normal(keys[i])]);
+  }
+  if (finish.fill) fill_plainly(tile, 2);
+  if (finish.smooth) smooth_plainly(tile, 1);
+  if (finish.antialias) antialias_plainly(tile);
+  for (size_t i = 0; i < keys.size(); ++i) {
+    const int x = int(i) % frame.width, y = int(i) / frame.width;
+    frame.colour[i] = 0xff000000u | tile.colour(x, y);
+    frame.depth_m[i] = tile.empty(x, y)
+                           ? std::numeric_limits<float>::infinity()
+                           : splat::decode_depth_code(splat::unbiased_depth_code(tile.info(x, y), rim), near_m);
   }
   return frame;
 }
