@@ -20,4 +20,5 @@ find_package(glfw3 3.3 REQUIRED)
 if(TELESPLAT_TESTS)
   find_package(GTest REQUIRED)
   find_package(benchmark REQUIRED)
+  pkg_check_modules(x11 REQUIRED IMPORTED_TARGET x11 xtst)  # hands on windows under test
 endif()

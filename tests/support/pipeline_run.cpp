@@ -133,11 +133,12 @@ void Program::signal(int number) {
   if (exit_code_ < 0) ::kill(pid_, number);
 }
 
-PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh) : out_(folder_ / "run") {
+PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh, const std::string& command)
+    : out_(folder_ / "run") {
   const std::string terrain = mesh.empty() ? folder_ / "terrain.ply" : mesh;
   if (mesh.empty()) write_terrain(terrain);
   std::vector<std::string> a{
-      "run",     terrain,           "--out",   out_,          "--cache", folder_ / "cache",   "--size",
+      command,   terrain,           "--out",   out_,          "--cache", folder_ / "cache",   "--size",
       "480x300", "--sampling-size", "320x200", "--tile-size", "64",      "--sampler-threads", "1"};
   a.insert(a.end(), arguments.begin(), arguments.end());
   program_ = std::make_unique<Program>("telesplat", a, folder_ / "telesplat");

@@ -62,8 +62,9 @@ class Program {
 /// `telesplat run` of a small terrain at a small size with its cache and record in a temporary folder.
 class PipelineRun {
  public:
-  /// `arguments` are added; `mesh`: another mesh than the terrain.
-  explicit PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh = "");
+  /// `arguments` are added; `mesh`: another mesh than the terrain; `command`: run or view.
+  explicit PipelineRun(const std::vector<std::string>& arguments, const std::string& mesh = "",
+                       const std::string& command = "run");
   ~PipelineRun();
 
   Program& program() { return *program_; }

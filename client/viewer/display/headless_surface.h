@@ -1,6 +1,9 @@
 // No window: the head follows a trajectory, frames are measured and recorded only.
 #pragma once
 
+#include <algorithm>
+#include <utility>
+
 #include "client/viewer/display/display_loop.h"
 
 namespace telesplat::viewer {

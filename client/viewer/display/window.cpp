@@ -34,41 +34,26 @@ struct Library {
 };
 
 std::optional<Key> key_of(int glfw_key) {
-  switch (glfw_key) {
-    case GLFW_KEY_A:
-      return Key::kA;
-    case GLFW_KEY_D:
-      return Key::kD;
-    case GLFW_KEY_E:
-      return Key::kE;
-    case GLFW_KEY_F:
-      return Key::kF;
-    case GLFW_KEY_H:
-      return Key::kH;
-    case GLFW_KEY_P:
-      return Key::kP;
-    case GLFW_KEY_Q:
-      return Key::kQ;
-    case GLFW_KEY_R:
-      return Key::kR;
-    case GLFW_KEY_S:
-      return Key::kS;
-    case GLFW_KEY_T:
-      return Key::kT;
-    case GLFW_KEY_W:
-      return Key::kW;
-    case GLFW_KEY_F12:
-      return Key::kF12;
-    case GLFW_KEY_ESCAPE:
-      return Key::kEscape;
-    case GLFW_KEY_LEFT_SHIFT:
-    case GLFW_KEY_RIGHT_SHIFT:
-      return Key::kShift;
-    default:
-      if (glfw_key >= GLFW_KEY_1 && glfw_key <= GLFW_KEY_8) return Key(int(Key::k1) + glfw_key - GLFW_KEY_1);
-      if (glfw_key >= GLFW_KEY_KP_1 && glfw_key <= GLFW_KEY_KP_8) return Key(int(Key::k1) + glfw_key - GLFW_KEY_KP_1);
-      return std::nullopt;
-  }
+  static constexpr std::pair<int, Key> kKeys[] = {{GLFW_KEY_A, Key::kA},
+                                                  {GLFW_KEY_D, Key::kD},
+                                                  {GLFW_KEY_E, Key::kE},
+                                                  {GLFW_KEY_F, Key::kF},
+                                                  {GLFW_KEY_H, Key::kH},
+                                                  {GLFW_KEY_P, Key::kP},
+                                                  {GLFW_KEY_Q, Key::kQ},
+                                                  {GLFW_KEY_R, Key::kR},
+                                                  {GLFW_KEY_S, Key::kS},
+                                                  {GLFW_KEY_T, Key::kT},
+                                                  {GLFW_KEY_W, Key::kW},
+                                                  {GLFW_KEY_F12, Key::kF12},
+                                                  {GLFW_KEY_ESCAPE, Key::kEscape},
+                                                  {GLFW_KEY_LEFT_SHIFT, Key::kShift},
+                                                  {GLFW_KEY_RIGHT_SHIFT, Key::kShift}};
+  for (const auto& [code, key] : kKeys)
+    if (code == glfw_key) return key;
+  for (const int first : {GLFW_KEY_1, GLFW_KEY_KP_1})
+    if (glfw_key >= first && glfw_key < first + 8) return Key(int(Key::k1) + glfw_key - first);
+  return std::nullopt;
 }
 
 }  // namespace

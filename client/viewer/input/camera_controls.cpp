@@ -54,6 +54,7 @@ double CameraControls::distance_of_interest(const geometry::Pose& pose) const {
 
 void CameraControls::set_extent(double extent_m) {
   if (!(extent_m > 0) || !std::isfinite(extent_m) || extent_m == extent_m_) return;
+  extent_m = std::clamp(extent_m, Limits::kSmallest_m, Limits::kLargest_m);
   home_.position_room *= extent_m / extent_m_;
   extent_m_ = extent_m;
   if (!touched_) now_ = goal_ = state_at(home_, distance_of_interest(home_));

@@ -10,8 +10,9 @@ namespace telesplat::viewer {
 /// finite are ignored. One thread.
 class CameraControls {
  public:
-  /// In units of the data set's largest extent.
+  /// In units of the data set's largest extent, which itself is taken to be within metres that cameras can have (geometry::validate).
   struct Limits {
+    static constexpr double kSmallest_m = 1e-4, kLargest_m = 1e4;
     static constexpr double kNearest = 0.03, kFarthest = 10;           ///< eye to pivot
     static constexpr double kPivot = 2;                                ///< pivot to centre, along each axis
     static constexpr double kFlight = 10;                              ///< eye to centre in flight, along each axis
