@@ -39,12 +39,15 @@ void tell(const std::string& text) {
   std::fflush(stdout);
 }
 
-Result<std::unique_ptr<DisplaySurface>> make_surface(const ViewerOptions& o, geometry::Trajectory trajectory) {
+// A window may be given another size than it asked for: the options follow.
+Result<std::unique_ptr<DisplaySurface>> make_surface(ViewerOptions& o, geometry::Trajectory trajectory) {
   if (!o.window) return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, std::move(trajectory)));
   WindowSurface::Options options{o.display, std::nullopt, o.fullscreen, o.out.empty() ? "." : o.out};
   if (o.trajectory != "still") options.recorded = std::move(trajectory);
   auto opened = WindowSurface::open(options, tell);
   if (!opened) return opened.error();
+  o.display.width = (*opened)->width();
+  o.display.height = (*opened)->height();
   return std::unique_ptr<DisplaySurface>(std::move(*opened));
 }
 

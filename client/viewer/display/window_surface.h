@@ -22,6 +22,9 @@ class WindowSurface final : public DisplaySurface {
   static Result<std::unique_ptr<WindowSurface>> open(const Options& options,
                                                      std::function<void(const std::string&)> tell);
 
+  int width() const { return window_->width(); }
+  int height() const { return window_->height(); }
+
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   bool visible() const override { return true; }
   void present(const image::View& view) override;
