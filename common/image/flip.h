@@ -22,7 +22,7 @@ inline constexpr double kFlipPixelsPerDegree = 67.02;
 ///     -> L*a*b* with Hunt's adjustment (a, b times L / 100);
 ///     h = |dL| + sqrt(da^2 + db^2) (HyAB), raised to 0.7 and compressed so that 0.4 of the largest (green against blue) becomes
 ///     0.95: dE_c in [0, 1];
-///   features: first (edges) and second (points) derivatives of a Gaussian of 0.082 degrees' width on Yy / 100-like luminance;
+///   features: first (edges) and second (points) derivatives of a Gaussian of 0.082 degrees' width on luminance, (Yy + 16) / 116;
 ///     dE_f = sqrt(max(|difference of edge magnitudes|, |difference of point magnitudes|) / sqrt 2), in [0, 1];
 ///   FLIP = dE_c ^ (1 - dE_f).
 /// At borders the nearest pixel is repeated. The map does not depend on how many threads compute it.

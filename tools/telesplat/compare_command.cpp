@@ -39,26 +39,27 @@ Result<splat::Finish> parse_finish(const std::string& text) {
   return finish;
 }
 
-// The renderers asked for; without a wish, gl only where it can be had.
-Result<std::vector<std::unique_ptr<viewer::Renderer>>> make_renderers(const CompareOptions& o, ProgressLine& progress) {
-  std::vector<std::unique_ptr<viewer::Renderer>> out;
-  const std::vector<std::string> kinds = o.renderers.empty() ? std::vector<std::string>{"cpu", "gl"} : o.renderers;
-  for (const auto& kind : kinds) {
-    auto made = viewer::make_renderer(kind, o.threads);
-    if (made)
-      out.push_back(std::move(*made));
-    else if (o.renderers.empty())
-      progress.line("telesplat: without the gl renderer: " + made.error().text);
-    else
-      return Error{fmt::format("--renderers {}: {}", kind, made.error().text)};
+// Which renderers to use: those asked for; without a wish cpu, and gl where it can be had.
+Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
+  if (!o.renderers.empty()) {
+    for (const auto& kind : o.renderers)
+      if (const auto made = viewer::make_renderer(kind, o.threads); !made)
+        return Error{fmt::format("--renderers {}: {}", kind, made.error().text)};
+    return o.renderers;
   }
-  return out;
+  const auto gl = viewer::make_renderer("gl", o.threads);
+  if (!gl) {
+    std::fprintf(stderr, "telesplat: without the gl renderer: %s\n", gl.error().text.c_str());
+    return std::vector<std::string>{"cpu"};
+  }
+  return std::vector<std::string>{"cpu", "gl"};
 }
 
 class Comparison {
  public:
-  Comparison(const CompareOptions& options, const CompareSubject& subject, const splat::Finish& finish)
-      : options_(options), subject_(subject), finish_(finish) {}
+  Comparison(const CompareOptions& options, const CompareSubject& subject, const splat::Finish& finish,
+             const std::vector<std::string>& renderers)
+      : options_(options), subject_(subject), finish_(finish), renderers_(renderers) {}
 
   /// Reads the data. False texts are about the data file.
   Status open() {
@@ -74,9 +75,6 @@ class Comparison {
     auto models = PoseModels::open(subject_, options_.magnify, *sampler_, *store_);
     if (!models) return models.error();
     models_ = std::move(*models);
-    std::error_code error;
-    fs::create_directories(subject_.out, error);
-    if (error) return Error{fmt::format("{}: cannot be made a folder: {}", subject_.out, error.message())};
     return ok_status();
   }
 
@@ -157,10 +155,14 @@ class Comparison {
 
     ComparedPose pose{frame, (*model)->points(), {}};
     // Renderers of its own: they keep copies of points by event number, and a pose may have another model of the same numbers.
-    auto renderers = make_renderers(options_, progress_);
-    if (!renderers) return renderers.error();
+    std::vector<std::unique_ptr<viewer::Renderer>> renderers;
+    for (const auto& kind : renderers_) {
+      auto made = viewer::make_renderer(kind, options_.threads);
+      if (!made) return made.error();
+      renderers.push_back(std::move(*made));
+    }
     for (const auto& kernel : options_.kernels) {
-      for (const auto& renderer : *renderers) {
+      for (const auto& renderer : renderers) {
         if (net::stop_requested()) return ok_status();
         progress_.show(fmt::format("{}: {} {}", where, kernel, renderer->name()));
         cell_options.render = {*splat::kernel_named(kernel), finish_};
@@ -175,6 +177,9 @@ class Comparison {
   }
 
   Status keep(const image::View& reference, ComparedPose pose) {
+    std::error_code error;
+    fs::create_directories(subject_.out, error);
+    if (error) return Error{fmt::format("{}: cannot be made a folder: {}", subject_.out, error.message())};
     const std::string name = fmt::format("{}/pose-{:06d}", subject_.out, pose.frame.number);
     const auto& f = pose.frame;
     const std::vector<std::string> captions{
@@ -209,6 +214,7 @@ class Comparison {
   const CompareOptions& options_;
   const CompareSubject& subject_;
   splat::Finish finish_;
+  const std::vector<std::string>& renderers_;
   ProgressLine progress_;
   std::shared_ptr<data::MeshStore> store_;
   std::unique_ptr<sampler::Sampler> sampler_;
@@ -290,7 +296,10 @@ int compare(const CompareOptions& o) {
   const auto subject = find_subject(o);
   if (!subject) return refuse(subject.error());
 
-  Comparison comparison(o, *subject, *finish);
+  const auto renderers = choose_renderers(o);
+  if (!renderers) return refuse(renderers.error());
+
+  Comparison comparison(o, *subject, *finish, *renderers);
   if (const Status s = comparison.open(); !s) return refuse(s.error());
   if (const Status s = comparison.compare_poses(); !s) return refuse(s.error());
   if (const Status s = comparison.write(); !s) {

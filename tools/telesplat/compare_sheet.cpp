@@ -9,7 +9,7 @@ namespace {
 
 constexpr uint32_t kPaper = 0x101214, kInk = 0xe8e8e8, kFaint = 0x9aa4ae, kFrame = 0xffd23f;
 constexpr int kGap = 8, kZoom = 4, kTextScale = 2, kLine = image::kGlyphHeight * kTextScale + 8;
-constexpr int kPoseWidth = 480, kStripWidth = 320;
+constexpr int kPoseWidth = 480, kStripWidth = 280;
 
 struct Size {
   int width, height;
@@ -103,11 +103,14 @@ PoseStrip make_strip(const image::View& reference, const std::vector<Cell>& cell
   const auto square = image::worst_square(sum, reference.width, reference.height, square_side(small));
   PoseStrip out;
   out.pictures.push_back(
-      {small_with_frame(reference, small, square), image::magnify(reference, square, kZoom), pose_name});
-  for (const Cell& c : cells)
+      {small_with_frame(reference, small, square), image::magnify(reference, square, kZoom), {}, pose_name});
+  for (const Cell& c : cells) {
+    const image::View errors = image::picture_of_errors(c.flip_map, reference.width, reference.height);
     out.pictures.push_back({small_with_frame(c.view, small, square), image::magnify(c.view, square, kZoom),
+                            small_with_frame(errors, small, square),
                             fmt::format("{:.2f} dB  FLIP {:.4f}  holes {:.2f} %", c.quality.psnr_db, c.flip,
                                         100 * c.quality.hole_fraction)});
+  }
   return out;
 }
 
@@ -121,7 +124,8 @@ image::View run_sheet(const std::vector<PoseStrip>& strips, const std::vector<st
     column_x.push_back(width);
     int content = 0;
     for (const auto& p : s.pictures) {
-      content = std::max({content, p.small.width + kGap + p.square.width, image::text_width(p.label, kTextScale)});
+      content = std::max({content, p.small.width + p.square.width + p.errors.width + 2 * kGap,
+                          image::text_width(p.label, kTextScale)});
       picture_height = std::max({picture_height, p.small.height, p.square.height});
     }
     width += content + 3 * kGap;
@@ -137,6 +141,7 @@ image::View run_sheet(const std::vector<PoseStrip>& strips, const std::vector<st
       const auto& p = strips[s].pictures[r];
       canvas.place(p.small, column_x[s], y + kLine);
       canvas.place(p.square, column_x[s] + p.small.width + kGap, y + kLine);
+      canvas.place(p.errors, column_x[s] + p.small.width + p.square.width + 2 * kGap, y + kLine);
       canvas.text(column_x[s], y + kLine + picture_height + 4, p.label, kFaint);
     }
   }

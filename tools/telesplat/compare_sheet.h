@@ -14,12 +14,12 @@ std::string cell_label(const Cell& cell);
 image::View pose_sheet(const image::View& reference, const std::vector<Cell>& cells,
                        const std::vector<std::string>& captions);
 
-/// What the sheet of a whole run keeps of a pose: small pictures of the reference and of each cell, and the square in which the cells
-/// together differ most from it.
+/// What the sheet of a whole run keeps of a pose: small pictures of the reference and of each cell, with its error map, and the
+/// square in which the cells together differ most from the reference.
 struct PoseStrip {
   struct Picture {
-    image::View small, square;
-    std::string label;  ///< what is written below it
+    image::View small, square, errors;  ///< errors: its FLIP map, as small; none for the reference
+    std::string label;                  ///< what is written below it
   };
   std::vector<Picture> pictures;  ///< the reference, then the cells in their order
 };
