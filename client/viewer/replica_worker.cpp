@@ -195,7 +195,7 @@ void ReplicaWorker::apply_patch(const wire::Patch& patch) {
     return;
   }
   const double decoded = monotonic_s();
-  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, tile_));
+  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, tile_, patch.frame));
   const double inserted = monotonic_s();
   spans_.add("decode", to_master_s(begin), to_master_s(decoded), 1);
   spans_.add("insert", to_master_s(decoded), to_master_s(inserted), 1);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
@@ -44,6 +45,15 @@ inline uint16_t encode_normal16(const glm::vec3& n) {
 inline glm::vec3 decode_normal16(uint16_t code) {
   const auto at = [](uint32_t c) { return static_cast<float>(c) / 127.0f - 1.0f; };
   return detail::from_octahedron(std::min(at(code & 255), 1.0f), std::min(at(code >> 8), 1.0f));
+}
+
+/// A vector along decode_normal16(code), not normalised and free of rounding: its components are integers in [-127, 127]. For
+/// tests that need a direction's side only.
+inline glm::vec3 octahedral16(uint16_t code) {
+  const int x = std::min(code & 255, 254) - 127, y = std::min(code >> 8, 254) - 127;
+  const int z = 127 - std::abs(x) - std::abs(y), fold = std::max(-z, 0);
+  return {static_cast<float>(x + (x >= 0 ? -fold : fold)), static_cast<float>(y + (y >= 0 ? -fold : fold)),
+          static_cast<float>(z)};
 }
 
 /// Two 16-bit coordinates, x in the low half.

@@ -12,6 +12,9 @@ bool near_in_depth(uint32_t code_first, uint32_t code) {
   return difference * 50 <= code;
 }
 
+// First rank of each pixel of a 2x2 block; the upper left one never needs it, being the first of its group.
+constexpr int kRankOfPixel[4] = {0, kFirstRankOfLevel0 + 4, kFirstRankOfLevel0 + 8, kFirstRankOfLevel0};
+
 // Sums of many colours, channel by channel.
 struct ColourSum {
   uint32_t r = 0, g = 0, b = 0, n = 0;
@@ -121,7 +124,7 @@ class Decimator {
     }
     block.mean[4] = mean_of_four(block.mean[0], block.mean[1], block.mean[2], block.mean[3]);
     auto& count = out_.leaves[block.leaf].count;
-    count[0] += 1, count[1] += 3, count[2] += 4, count[3] += 4, count[4] += 4;
+    for (uint32_t& rank : count) ++rank;
     out_.blocks.push_back(block);
     return true;
   }
@@ -142,7 +145,8 @@ class Decimator {
         c[j].taken = true;
         sum.add(colour_[c[j].entry.pixel]);
       }
-      c[i].entry.rank = 1;  // all four lie as near to the 2x2 block's centre; the first is it
+      // All four lie as near to the 2x2 block's centre; the first is it.
+      c[i].entry.rank = static_cast<uint32_t>(std::max(kBlockPlace[c[i].sub], 1));
       c[i].entry.mean[0] = sum.mean();
     }
 
@@ -179,12 +183,13 @@ class Decimator {
         if (keys_[pixel] == kNoCluster) continue;
         const int dx = 2 * i - 3, dy = 2 * j - 3;
         // The rank is that of a sample which is not the first of its group, until it turns out to be one.
-        out[n++] = {{pixel, leaves_.index_of(keys_[pixel]), static_cast<uint32_t>(1 + p), {}},
-                    keys_[pixel],
-                    depth_[pixel],
-                    s,
-                    dx * dx + dy * dy,
-                    false};
+        out[n++] = {
+            {pixel, leaves_.index_of(keys_[pixel]), static_cast<uint32_t>(kRankOfPixel[p] + kBlockPlace[s]), {}},
+            keys_[pixel],
+            depth_[pixel],
+            s,
+            dx * dx + dy * dy,
+            false};
       }
     }
     return n;

@@ -75,21 +75,6 @@ size_t Mosaic::data_bytes() const {
   return words * 4;
 }
 
-Mosaic::Level Mosaic::level(int l) const {
-  const uint32_t n = counts_[0];
-  const auto* positions = reinterpret_cast<const uint16_t*>(data_.get());
-  const auto* colour = reinterpret_cast<const uint32_t*>(positions + size_t{4} * n);
-  if (l >= 1 && counts_[1] < counts_[0]) colour += counts_[0];
-  if (l >= 2 && counts_[2] < counts_[1]) colour += counts_[1];
-  return {counts_[l], positions, positions + n, positions + size_t{2} * n, positions + size_t{3} * n, colour};
-}
-
-glm::vec3 Mosaic::cone_axis() const { return image::decode_normal16(cone_axis_); }
-
-glm::vec3 Mosaic::direction_to_eye() const { return image::decode_normal16(direction_to_eye_); }
-
-float Mosaic::cone_cosine() const { return static_cast<float>(cone_cosine_) / 127.0f; }
-
 glm::vec3 Mosaic::centroid_room(const geometry::Box& leaf) const {
   const glm::vec3 fraction((static_cast<float>(centroid_[0]) + 0.5f) / 256.0f,
                            (static_cast<float>(centroid_[1]) + 0.5f) / 256.0f,
@@ -101,26 +86,22 @@ size_t Mosaic::bytes() const { return sizeof(Mosaic) + allocated_bytes(data_byte
 
 uint64_t Mosaic::digest() const {
   struct {
-    uint64_t sequence;
+    uint64_t sequence_and_frame;
     uint32_t counts[kLevels];
     float pixel_range;
     uint16_t cone_axis;
     int8_t cone_cosine;
     uint8_t centroid[3];
     uint16_t direction_to_eye;
-  } header{sequence_.value,
-           {counts_[0], counts_[1], counts_[2]},
-           pixel_range_,
-           cone_axis_,
-           cone_cosine_,
-           {centroid_[0], centroid_[1], centroid_[2]},
-           direction_to_eye_};
+  } header{sequence_and_frame_, {counts_[0], counts_[1], counts_[2]},       pixel_range_,     cone_axis_,
+           cone_cosine_,        {centroid_[0], centroid_[1], centroid_[2]}, direction_to_eye_};
   static_assert(std::has_unique_object_representations_v<decltype(header.counts)> && sizeof header == 32);
   return XXH3_64bits_withSeed(data_.get(), data_bytes(), XXH3_64bits(&header, sizeof header));
 }
 
-MosaicBuilder::MosaicBuilder(Sequence sequence, const std::array<uint32_t, kLevels>& counts) {
-  mosaic_.sequence_ = sequence;
+MosaicBuilder::MosaicBuilder(Sequence sequence, FrameId frame, const std::array<uint32_t, kLevels>& counts) {
+  const uint64_t sequence_mask = (uint64_t{1} << Mosaic::kSequenceBits) - 1;
+  mosaic_.sequence_and_frame_ = (sequence.value & sequence_mask) | frame.value << Mosaic::kSequenceBits;
   mosaic_.counts_ = counts;
   mosaic_.data_ = std::make_unique_for_overwrite<std::byte[]>(mosaic_.data_bytes());
   const size_t n = counts[0];

@@ -11,7 +11,7 @@ namespace telesplat::points {
 class MosaicBuilder {
  public:
   /// Allocates a mosaic of counts[l] points at level l. Precondition: counts[0] >= counts[1] >= counts[2] > 0.
-  MosaicBuilder(Sequence sequence, const std::array<uint32_t, kLevels>& counts);
+  MosaicBuilder(Sequence sequence, FrameId frame, const std::array<uint32_t, kLevels>& counts);
 
   /// Where the points go: arrays of counts[0]; mean colours of counts[1] and counts[2], null where the level is as the
   /// finer one.

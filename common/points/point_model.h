@@ -17,6 +17,7 @@
 #include "common/geometry/box.h"
 #include "common/geometry/camera.h"
 #include "common/image/depth_image.h"
+#include "common/image/normal.h"
 
 namespace telesplat::points {
 
@@ -53,19 +54,31 @@ class Mosaic {
     const uint16_t *x = nullptr, *y = nullptr, *z = nullptr, *normal = nullptr;
     const uint32_t* colour = nullptr;
   };
-  Level level(int l) const;
+  Level level(int l) const {
+    const uint32_t n = counts_[0];
+    const auto* positions = reinterpret_cast<const uint16_t*>(data_.get());
+    const auto* colour = reinterpret_cast<const uint32_t*>(positions + size_t{4} * n);
+    if (l >= 1 && counts_[1] < counts_[0]) colour += counts_[0];
+    if (l >= 2 && counts_[2] < counts_[1]) colour += counts_[1];
+    return {counts_[l], positions, positions + n, positions + size_t{2} * n, positions + size_t{3} * n, colour};
+  }
   uint32_t count(int l) const { return counts_[l]; }
 
-  Sequence sequence() const { return sequence_; }
+  /// Of the event that brought it, modulo 2^40.
+  Sequence sequence() const { return {sequence_and_frame_ & ((uint64_t{1} << kSequenceBits) - 1)}; }
+  /// The sampling frame's number modulo 2^24: equal for all tiles of one frame, that is, for the mosaics of one patch (T4.3.2).
+  uint32_t frame_tag() const { return static_cast<uint32_t>(sequence_and_frame_ >> kSequenceBits); }
   /// Projected pixels across the cluster's cube in the sampling view: leaf size * focal / depth of the leaf's centre
   /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l.
   float pixel_range() const { return pixel_range_; }
   /// Normal cone [Shirman 93]: every normal n of the mosaic has dot(n, axis) >= cosine. cosine = -1: no cone.
-  glm::vec3 cone_axis() const;
-  float cone_cosine() const;
+  glm::vec3 cone_axis() const { return image::decode_normal16(cone_axis_); }
+  float cone_cosine() const { return static_cast<float>(cone_cosine_) / 127.0f; }
+  /// cone_axis() before it is normalised.
+  glm::vec3 cone_axis_direction() const { return image::octahedral16(cone_axis_); }
   /// Unit vector from the leaf's centre towards the eye of the sampling view: with pixel_range() it tells how far apart the samples lie
   /// on the surface (T4.4.1).
-  glm::vec3 direction_to_eye() const;
+  glm::vec3 direction_to_eye() const { return glm::normalize(image::octahedral16(direction_to_eye_)); }
   /// Mean position of the level-0 points, room space, to 1/256 of the leaf.
   glm::vec3 centroid_room(const geometry::Box& leaf) const;
   /// Bytes this mosaic occupies: header, points and what the allocator adds.
@@ -75,9 +88,10 @@ class Mosaic {
 
  private:
   friend class MosaicBuilder;
+  static constexpr int kSequenceBits = 40;
   size_t data_bytes() const;
   std::unique_ptr<std::byte[]> data_;
-  Sequence sequence_;
+  uint64_t sequence_and_frame_ = 0;  // the frame in the top 24 bits
   std::array<uint32_t, kLevels> counts_{};
   float pixel_range_ = 0;
   uint16_t cone_axis_ = 0;
@@ -103,6 +117,7 @@ struct PreparedPatch {
 
 /// Unprojects the covered pixels of a depth-image tile, sorts them into leaves, decimates (T4.3.2, T7.2) and computes each
 /// mosaic's attributes.
+///   frame: the sampling frame that the tile is of, so that its mosaics know each other.
 ///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
 ///   Level l+1 takes of each block of 2x2 pixels of level l (blocks aligned to the frame's pixel grid) the covered pixels that
 ///   fall in the same leaf and lie within 2 % of depth of its first, as one point: the sample nearest the block's centre (the
@@ -111,7 +126,7 @@ struct PreparedPatch {
 /// Runs in the calling thread; several threads may prepare several tiles at once.
 /// Preconditions: valid(config), valid(camera), tile inside the camera's image, image canonical and of the tile's size.
 PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const geometry::Camera& camera,
-                            const geometry::Rect& tile, const image::DepthImage& image);
+                            const geometry::Rect& tile, const image::DepthImage& image, FrameId frame = {});
 
 /// Projected pixels across a leaf's cube: leaf_size * focal_x / depth of its centre (of half a leaf where it is less).
 float pixel_range(const geometry::Camera& camera, const glm::dvec3& leaf_centre_room, double leaf_size_m);

@@ -43,13 +43,14 @@ struct OpenMosaic {
   }
 };
 
-std::vector<OpenMosaic> open_mosaics(const std::vector<DecimatedTile::Leaf>& leaves, Sequence sequence) {
+std::vector<OpenMosaic> open_mosaics(const std::vector<DecimatedTile::Leaf>& leaves, Sequence sequence, FrameId frame) {
   std::vector<OpenMosaic> out;
   out.reserve(leaves.size());
   for (const auto& leaf : leaves) {
-    const auto& c = leaf.count;
-    const uint32_t n2 = c[0], n1 = n2 + c[1], n0 = n1 + c[2] + c[3] + c[4];
-    out.push_back({MosaicBuilder(sequence, {n0, n1, n2}), {0, n2, n1, n1 + c[2], n1 + c[2] + c[3]}});
+    std::array<uint32_t, kRanks> first;
+    const uint32_t n0 = std::reduce(leaf.count.begin(), leaf.count.end());
+    std::exclusive_scan(leaf.count.begin(), leaf.count.end(), first.begin(), 0u);
+    out.push_back({MosaicBuilder(sequence, frame, {n0, first[kFirstRankOfLevel0], first[1]}), first});
   }
   return out;
 }
@@ -61,23 +62,21 @@ void place_block(const BlockEntry& block, const UnprojectedTile& tile, const ima
   const uint32_t centre = m.place(0, tile, image, block.pixel + 2 * w + 2);
   m.arrays.mean1[centre] = block.mean[3];
   m.arrays.mean2[centre] = block.mean[4];
-  m.arrays.mean1[m.place(1, tile, image, block.pixel)] = block.mean[0];
-  m.arrays.mean1[m.place(1, tile, image, block.pixel + 2)] = block.mean[1];
-  m.arrays.mean1[m.place(1, tile, image, block.pixel + 2 * w)] = block.mean[2];
-  const size_t offset[3] = {1, w, w + 1};
-  for (int rank = 2; rank < kRanks; ++rank) {
-    const size_t p = block.pixel + offset[rank - 2];
-    m.place(rank, tile, image, p);
-    m.place(rank, tile, image, p + 2);
-    m.place(rank, tile, image, p + 2 * w);
-    m.place(rank, tile, image, p + 2 * w + 2);
+  const size_t block_offset[4] = {0, 2, 2 * w, 2 * w + 2};
+  for (int rank = 1; rank < kFirstRankOfLevel0; ++rank) {
+    const int sub = kBlockOrder[rank];
+    m.arrays.mean1[m.place(rank, tile, image, block.pixel + block_offset[sub])] = block.mean[sub];
   }
+  const size_t pixel_offset[4] = {0, 1, w, w + 1};
+  int rank = kFirstRankOfLevel0;
+  for (const int p : kPixelOrder)
+    for (const int sub : kBlockOrder) m.place(rank++, tile, image, block.pixel + block_offset[sub] + pixel_offset[p]);
 }
 
 void place_sample(const SampleEntry& sample, const UnprojectedTile& tile, const image::DepthImage& image,
                   OpenMosaic& m) {
   const uint32_t at = m.place(static_cast<int>(sample.rank), tile, image, sample.pixel);
-  if (sample.rank <= 1 && m.arrays.mean1) m.arrays.mean1[at] = sample.mean[0];
+  if (sample.rank < kFirstRankOfLevel0 && m.arrays.mean1) m.arrays.mean1[at] = sample.mean[0];
   if (sample.rank == 0 && m.arrays.mean2) m.arrays.mean2[at] = sample.mean[1];
 }
 
@@ -90,7 +89,7 @@ float pixel_range(const geometry::Camera& camera, const glm::dvec3& leaf_centre_
 }
 
 PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const geometry::Camera& camera,
-                            const geometry::Rect& tile, const image::DepthImage& image) {
+                            const geometry::Rect& tile, const image::DepthImage& image, FrameId frame) {
   CHECK(tile.width == image.width && tile.height == image.height);
   CHECK(tile.x >= 0 && tile.y >= 0 && tile.x + tile.width <= camera.width && tile.y + tile.height <= camera.height);
   const OctreeGrid grid = octree_grid(config);
@@ -98,7 +97,7 @@ PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const 
   const DecimatedTile decimated = decimate(tile, image, unprojected.keys.get());
 
   // Counting sort by leaf and rank.
-  std::vector<OpenMosaic> open = open_mosaics(decimated.leaves, sequence);
+  std::vector<OpenMosaic> open = open_mosaics(decimated.leaves, sequence, frame);
   for (const BlockEntry& block : decimated.blocks) place_block(block, unprojected, image, open[block.leaf]);
   for (const SampleEntry& sample : decimated.samples) place_sample(sample, unprojected, image, open[sample.leaf]);
 

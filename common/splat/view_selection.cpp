@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/splat/level_choice.h"
+
 namespace telesplat::splat {
 namespace {
 
@@ -29,47 +31,67 @@ LeafView leaf_view(const geometry::Box& leaf, const glm::vec3& eye) {
 
 // Away if the angle between the cone's axis and the direction to the eye exceeds 90 degrees + cone + beta.
 bool cone_faces_away(const points::Mosaic& m, const LeafView& view) {
+  // Most mosaics that are drawn face the eye: they need no root.
+  const glm::vec3 axis = m.cone_axis_direction();
+  const float towards = glm::dot(axis, view.to_eye);
+  if (towards >= 0) return false;
   const float cos_cone = m.cone_cosine();
   if (cos_cone <= 0 || view.cos_beta <= 0) return false;
   const float sin_cone = std::sqrt(1.0f - cos_cone * cos_cone);
   if (cos_cone * view.cos_beta - sin_cone * view.sin_beta <= 0) return false;  // cone + beta >= 90 degrees
   const float sin_sum = sin_cone * view.cos_beta + cos_cone * view.sin_beta;
-  return glm::dot(m.cone_axis(), view.to_eye) < -sin_sum * view.distance;
-}
-
-// Chooses level and splat size of one mosaic. ratio = desired pixel range over level 0's.
-int choose_level(float ratio) {
-  // Level l's range is 2^-l of level 0's; half way in ratio lies a factor of sqrt(2).
-  static_assert(points::kLevels == 3);
-  return ratio >= 0.70710678f ? 0 : ratio >= 0.35355339f ? 1 : 2;
+  return towards < -sin_sum * view.distance * std::sqrt(glm::dot(axis, axis));
 }
 
 // A mosaic chosen from the cluster at hand, before its size is final.
 struct Chosen {
   const points::Mosaic* mosaic;
-  int level;
-  float size;      // splat size by T eq. 4.8, not clamped
+  Drawn drawn;
+  float size;      // splat size by T eq. 4.8 for points spread evenly, not clamped
   float coverage;  // share of the leaf's face that its points cover: points * (sample size / leaf size)^2
 };
 
+// 0 up to `from`, 1 from `to` on.
+float ramp(float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0f, 1.0f); }
+
 // T4.4.3: where a low-rate mosaic would hide high-rate ones its splats shrink.
-// We deviate in one thing: after redundancy elimination a low-rate mosaic may be all there is in most of the cluster, and a
-// handful of high-rate points elsewhere in it would tear holes. So splats shrink only if mosaics of higher rate cover at
-// least as much of the cluster as the low-rate one does.
+// We deviate in two things. After redundancy elimination a low-rate mosaic may be all there is in most of the cluster, and a
+// handful of high-rate points elsewhere in it would tear holes: splats shrink only if mosaics of higher rate cover at least as
+// much of the cluster as the low-rate one does. And nothing jumps: sizes and coverages pass the two thresholds over a quarter of
+// their height.
 void revise_sizes(const SelectionOptions& options, std::vector<Chosen>& chosen) {
-  const auto mismatch = [&](const Chosen& c) { return std::abs(std::log(c.size / options.scale)); };
-  const float smallest =
-      std::min_element(chosen.begin(), chosen.end(), [](auto& a, auto& b) { return a.size < b.size; })->size;
-  const float largest =
-      std::max_element(chosen.begin(), chosen.end(), [](auto& a, auto& b) { return a.size < b.size; })->size;
+  float smallest = chosen.front().size, largest = smallest;
+  for (const Chosen& c : chosen) smallest = std::min(smallest, c.size), largest = std::max(largest, c.size);
   if (largest <= options.hide_ratio * smallest) return;
-  const float best =
-      std::min_element(chosen.begin(), chosen.end(), [&](auto& a, auto& b) { return mismatch(a) < mismatch(b); })->size;
+  const auto mismatch = [&](float size) { return std::max(size, options.scale * options.scale / size); };
+  float best = smallest;
+  for (const Chosen& c : chosen)
+    if (mismatch(c.size) < mismatch(best)) best = c.size;
   const float threshold = options.hide_ratio * best;
   float fine = 0;
-  for (const Chosen& c : chosen) fine += c.size <= threshold ? c.coverage : 0.0f;
-  for (Chosen& c : chosen)
-    if (c.size > threshold && fine >= c.coverage) c.size = std::min(c.size, best + options.hide_epsilon * c.size);
+  for (const Chosen& c : chosen) fine += c.coverage * (1.0f - ramp(c.size, threshold, 1.25f * threshold));
+  for (Chosen& c : chosen) {
+    const float share = ramp(c.size, threshold, 1.25f * threshold) * ramp(fine, c.coverage, 1.25f * c.coverage);
+    c.size += share * std::min(best + options.hide_epsilon * c.size - c.size, 0.0f);
+  }
+}
+
+// In [0, 1), the same in every frame, as if drawn at random for each mosaic.
+float dither_of(points::ClusterKey key, const points::Mosaic& m) {
+  const uint64_t h = (m.sequence().value << 32 ^ key) * 0x9e3779b97f4a7c15ull;
+  return static_cast<float>(h >> 40) * 0x1p-24f;
+}
+
+// Points [first, last) of a mosaic's level.
+DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int l, uint32_t first, uint32_t last) {
+  const points::Mosaic::Level a = m.level(l);
+  return {.cluster = &cluster,
+          .level = {last - first, a.x + first, a.y + first, a.z + first, a.normal + first, a.colour + first},
+          .splat_px = 1,
+          .sequence = m.sequence(),
+          .to_eye = m.direction_to_eye(),
+          .first = first,
+          .of = a.count};
 }
 
 }  // namespace
@@ -91,27 +113,31 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     const geometry::Box& leaf = cluster->leaf_room;
     if (!frustum.may_contain(leaf)) continue;
     out.clusters_seen.push_back(key);
-    const float desired = options.detail * points::pixel_range(camera, glm::dvec3(leaf.centre()),
-                                                               static_cast<double>(leaf.hi.x - leaf.lo.x));
+    const float leaf_m = leaf.hi.x - leaf.lo.x;
+    const float range = points::pixel_range(camera, glm::dvec3(leaf.centre()), static_cast<double>(leaf_m));
+    const float radius_m_of_px = 0.5f * leaf_m / range;
     const LeafView view = leaf_view(leaf, eye);
-    const float metres_per_px = (leaf.hi.x - leaf.lo.x) * options.detail / desired;
     chosen.clear();
     for (const points::Mosaic& m : cluster->mosaics) {
       if (options.cone_culling && cone_faces_away(m, view)) continue;
-      const float ratio = desired / m.pixel_range();
-      const int level = choose_level(ratio);
-      // eq. 4.8, with the display's own pixel size: fewer points (detail < 1) are drawn larger, not farther apart.
-      const float size = options.scale * ratio / options.detail * static_cast<float>(1 << level);
-      chosen.push_back({&m, level, size, static_cast<float>(m.count(0)) / (m.pixel_range() * m.pixel_range())});
+      const float ratio = range / m.pixel_range(), wanted = options.detail * std::min(ratio, 1.0f);
+      const Drawn drawn = options.transitions ? between_levels(m, wanted, dither_of(key, m)) : closest_level(m, wanted);
+      chosen.push_back({&m, drawn, options.scale * ratio * drawn.spacing,
+                        static_cast<float>(m.count(0)) / (m.pixel_range() * m.pixel_range())});
     }
     if (chosen.size() > 1) revise_sizes(options, chosen);
     for (const Chosen& c : chosen) {
-      const points::Mosaic::Level level = c.mosaic->level(c.level);
-      if (level.count == 0) continue;
-      const float px = std::min(c.size, std::max(1.0f, options.max_splat_px));
-      out.items.push_back({cluster.get(), level, std::max(px, 1.0f), c.mosaic->sequence(), 0.5f * px * metres_per_px,
-                           c.mosaic->direction_to_eye()});
-      out.points += level.count;
+      const float size = c.size * c.drawn.widest / c.drawn.spacing;
+      const float px = std::min(size, std::max(1.0f, options.max_splat_px));
+      const auto add = [&](int l, uint32_t first, uint32_t last) {
+        if (first == last) return;
+        DrawItem& item = out.items.emplace_back(make_item(*cluster, *c.mosaic, l, first, last));
+        item.splat_px = std::max(px, 1.0f);
+        item.radius_m = px * radius_m_of_px;
+      };
+      add(c.drawn.fine + 1, 0, c.drawn.mean);
+      add(c.drawn.fine, c.drawn.mean, c.drawn.count);
+      out.points += c.drawn.count;
     }
   }
 }

@@ -13,21 +13,32 @@ struct SelectionOptions {
   float hide_ratio = 1.5f;     ///< "ratio" of T4.4.3: a splat larger than this times the best one's size is revised ...
   float hide_epsilon = 0.25f;  ///< ... to best + epsilon * its size
   float max_splat_px = 16.0f;  ///< no splat is larger
-  float detail = 1.0f;         ///< < 1 lowers the desired pixel range (speed-dependent detail, T4.4.3.1)
+  float detail =
+      1.0f;  ///< in (0, 1]: points drawn a sample or display pixel, whichever is larger, on each axis (T4.4.3.1)
+  bool transitions = true;  ///< between neighbouring levels as many points as wanted; false: the closest level whole
   bool cone_culling = true;
 };
 
-/// One mosaic level to draw. Pointers live as long as the model is not changed (or the viewer's frame lasts).
+/// Consecutive points of one mosaic level to draw. Pointers live as long as the model is not changed (or the viewer's frame lasts).
 struct DrawItem {
   const points::Cluster* cluster;
-  points::Mosaic::Level level;
-  float splat_px;  ///< side (square) or diameter (disc) in display pixels, >= 1
+  points::Mosaic::Level level;  ///< the points drawn
+  float splat_px;               ///< side (square) or diameter (disc) in display pixels, >= 1
   Sequence
       sequence{};  ///< the mosaic's; with cluster->key it names the points, for renderers that keep copies. 0: do not keep
   float radius_m =
       0;  ///< radius of a splat that faces its sampling view, metres in room space: half of splat_px at the leaf's centre,
           ///< but not widened to a pixel (ellipse, ewa)
   glm::vec3 to_eye{0, 0, 1};  ///< from the leaf towards the eye of the sampling view, unit length (ellipse, ewa)
+  uint32_t first = 0;         ///< where level[0] lies in arrays()
+  uint32_t of = 0;            ///< how many points arrays() has; 0: as many as are drawn
+
+  /// The whole level that the points drawn are part of: points [first, first + level.count) of it. It stays the same from frame
+  /// to frame while the part changes, so it is what renderers keep copies of.
+  points::Mosaic::Level arrays() const {
+    return {of ? of : level.count, level.x - first,      level.y - first,
+            level.z - first,       level.normal - first, level.colour - first};
+  }
 };
 
 struct DrawList {
@@ -39,8 +50,10 @@ struct DrawList {
   Sequence applied;  ///< the newest event of the model they were selected from
 };
 
-/// Culls clusters by frustum, mosaics by normal cone; chooses each mosaic's level as the one whose pixel range is closest (in
-/// ratio) to the desired one; splat size = scale * desired range / the level's range (T eq. 4.8), revised as in T4.4.3.
+/// Culls clusters by frustum, mosaics by normal cone; chooses how many of each mosaic's points are drawn (level_choice.h): the
+/// desired pixel range is the display's, or the sampling view's if that is less, times detail. Splat size = scale * display's
+/// pixel range / pixel range of the points drawn (T eq. 4.8), revised as in T4.4.3. A mosaic between two levels becomes two
+/// items, next to each other.
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
                  DrawList& out);
 

@@ -82,7 +82,7 @@ struct PackerCore::Impl {
     event.blob = std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
 
     points::PreparedPatch patch =
-        points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image);
+        points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
     for (const auto& [key, mosaic] : patch.mosaics) obsolescence.accessed(key, now_s);
     log.add_patch(event, patch.mosaics.size());
     statistics.points_outside += patch.outside;

@@ -105,13 +105,13 @@ void GlRenderer::prepare_draws(const splat::DrawList& list, const geometry::Came
       std::copy(t.y.begin(), t.y.end(), d.row_y);
       std::copy(t.w.begin(), t.w.end(), d.row_w);
       d.word = range.word;
-      d.count = item.level.count;
+      d.count = item.arrays().count;
       d.side = side;
       d.diameter = diameter;
       d.bias_growth = static_cast<float>(splat::splat_bias_growth(side, camera.focal_x()));
       d.sub_steps = 1 << splat::sub_bits(side);
       if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
-      commands_by_arena_[range.arena].push_back({item.level.count, 1, 0, i});
+      commands_by_arena_[range.arena].push_back({item.level.count, 1, item.first, i});
     }
   }
 }

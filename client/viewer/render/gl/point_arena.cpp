@@ -29,7 +29,7 @@ size_t PointArenas::KeyHash::operator()(const Key& k) const {
 }
 
 PointRange PointArenas::place(const splat::DrawItem& item) {
-  const points::Mosaic::Level& level = item.level;
+  const points::Mosaic::Level level = item.arrays();
   const uint32_t words = 3 * level.count;
   if (item.sequence.value == 0) {
     const Entry entry{allocate(words), words, frame_};

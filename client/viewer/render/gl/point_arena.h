@@ -24,7 +24,7 @@ class PointArenas {
   PointArenas(const PointArenas&) = delete;
   PointArenas& operator=(const PointArenas&) = delete;
 
-  /// The level's place, uploaded now if it is not there. An entry is taken for the same only if cluster, sequence, count and
+  /// The place of item.arrays(), uploaded now if it is not there. An entry is taken for the same only if cluster, sequence, count and
   /// address are: a freed mosaic's address may come back with other points. Items without a sequence are uploaded every frame.
   PointRange place(const splat::DrawItem& item);
   /// Frees what was not placed during the last kKeptFrames frames (and items without a sequence at once).
