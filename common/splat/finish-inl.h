@@ -24,83 +24,89 @@ HWY_INLINE hn::Vec<U32> Difference(hn::Vec<U32> a, hn::Vec<U32> b) { return hn::
 
 // ---- fill ----
 
-struct Support {
-  uint32_t colour = 0, info = kEmptyInfo;
-  int distance = 0;  // 0: none
-};
-
-inline Support FindSupport(const ResolvedTile& tile, int x, int y, int dx, int dy, uint32_t hole) {
-  for (int r = 1; r <= kFillRadius; ++r) {
-    const uint32_t info = tile.info(y + r * dy)[x + r * dx];
-    if (info < hole && hole - info > kEdgeInfo) return {tile.colour(y + r * dy)[x + r * dx], info, r};
-  }
-  return {};
-}
-
-// True if the hole at (x, y) is to be closed, with what.
-inline bool CloseHole(const ResolvedTile& tile, int x, int y, FinishScratch::Pixel& out) {
-  constexpr int kAxes[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
-  constexpr uint32_t kWeight[kFillRadius + 1] = {0, 36, 9, 4};  // 36 / distance^2
-  const uint32_t hole = tile.info(y)[x];
-  Support pairs[4][2];
-  uint32_t nearest[4];
-  int count = 0;
-  for (const auto& axis : kAxes) {
-    const Support a = FindSupport(tile, x, y, axis[0], axis[1], hole);
-    if (a.distance == 0) continue;
-    const Support b = FindSupport(tile, x, y, -axis[0], -axis[1], hole);
-    if (b.distance == 0 || a.distance + b.distance > kFillRadius + 1) continue;
-    if (std::max(a.info, b.info) - std::min(a.info, b.info) >
-        kEdgeInfo * static_cast<uint32_t>(a.distance + b.distance))
-      continue;
-    pairs[count][0] = a, pairs[count][1] = b;
-    nearest[count++] = std::min(a.info, b.info);
-  }
-  if (count == 0) return false;
-  const uint32_t limit = *std::min_element(nearest, nearest + count) + 2 * kEdgeInfo;
-  uint32_t weights = 0, red = 0, green = 0, blue = 0;
-  uint64_t depth = 0;
-  int used = 0;
-  bool tight = false;
-  for (int i = 0; i < count; ++i) {
-    if (nearest[i] > limit) continue;
-    ++used;
-    tight |= pairs[i][0].distance + pairs[i][1].distance == 2;
-    for (const Support& s : pairs[i]) {
-      const uint32_t w = kWeight[s.distance];
-      weights += w;
-      red += w * (s.colour >> 16 & 255), green += w * (s.colour >> 8 & 255), blue += w * (s.colour & 255);
-      depth += uint64_t{w} * (s.info >> 8);
+// Closes the holes of one vector of pixels.
+HWY_INLINE void CloseHoles(const ResolvedTile& tile, int x, int y, hn::Vec<U32> closed, hn::Mask<U32> holes, int end,
+                           FinishScratch& scratch) {
+  const U32 d;
+  const hn::RebindToFloat<U32> df;
+  const hn::RebindToSigned<U32> di;
+  const auto edge = hn::Set(d, kEdgeInfo);
+  const auto even = hn::Set(d, 0x00ff00ffu), low = hn::Set(d, 255u);
+  auto red_blue = hn::Zero(d), green = hn::Zero(d), depth = hn::Zero(d), weights = hn::Zero(d), count = hn::Zero(d);
+  for (int j = -1; j <= 1; ++j)
+    for (int i = -1; i <= 1; ++i) {
+      if (i == 0 && j == 0) continue;
+      const auto info = hn::LoadU(d, tile.info(y + j) + x + i), colour = hn::LoadU(d, tile.colour(y + j) + x + i);
+      const auto apart = hn::Gt(Difference(info, closed), edge);
+      // Counted once at a corner, twice at a side.
+      const auto rb = hn::IfThenZeroElse(apart, hn::And(colour, even));
+      const auto g = hn::IfThenZeroElse(apart, hn::And(hn::ShiftRight<8>(colour), low));
+      const auto z = hn::IfThenZeroElse(apart, hn::ShiftRight<8>(info));
+      const auto one = hn::IfThenZeroElse(apart, hn::Set(d, 1u));
+      const bool side = i == 0 || j == 0;
+      red_blue = hn::Add(red_blue, side ? hn::Add(rb, rb) : rb);
+      green = hn::Add(green, side ? hn::Add(g, g) : g);
+      depth = hn::Add(depth, side ? hn::Add(z, z) : z);
+      weights = hn::Add(weights, side ? hn::Add(one, one) : one);
+      count = hn::Add(count, one);
     }
-  }
-  if (used < 2 && !tight) return false;
-  const uint32_t half = weights / 2;
-  out.colour = (red + half) / weights << 16 | (green + half) / weights << 8 | (blue + half) / weights;
-  out.info = static_cast<uint32_t>(depth / weights) << 8;
-  return true;
+  const auto enough = hn::And(holes, hn::Gt(count, hn::Set(d, static_cast<uint32_t>(kFillSupports - 1))));
+  if (hn::AllFalse(d, enough)) return;
+  // Quotients of integers below 2^24: exact, since no quotient that is not whole is nearer to one than 1 / 12.
+  const auto divisor = hn::ConvertTo(df, hn::BitCast(di, hn::Max(weights, hn::Set(d, 1u))));
+  const auto over = [&](hn::Vec<U32> v) HWY_ATTR {
+    return hn::BitCast(d, hn::ConvertTo(di, hn::Div(hn::ConvertTo(df, hn::BitCast(di, v)), divisor)));
+  };
+  const auto half = hn::ShiftRight<1>(weights);
+  const auto red = over(hn::Add(hn::ShiftRight<16>(red_blue), half));
+  const auto blue = over(hn::Add(hn::And(red_blue, hn::Set(d, 0xffffu)), half));
+  const auto colour = hn::Or(hn::Or(hn::ShiftLeft<16>(red), blue), hn::ShiftLeft<8>(over(hn::Add(green, half))));
+  HWY_ALIGN uint32_t colours[hwy::HWY_NAMESPACE::MaxLanes(U32())], infos[hwy::HWY_NAMESPACE::MaxLanes(U32())],
+      wanted[hwy::HWY_NAMESPACE::MaxLanes(U32())];
+  hn::Store(colour, d, colours);
+  hn::Store(hn::ShiftLeft<8>(over(depth)), d, infos);
+  hn::Store(hn::VecFromMask(d, enough), d, wanted);
+  const int lanes = std::min(static_cast<int>(hn::Lanes(d)), end - x);
+  for (int i = 0; i < lanes; ++i)
+    if (wanted[i]) scratch.pixels.push_back({x + i, y, colours[i], infos[i]});
 }
 
 int FillHoles(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
   const U32 d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const auto edge = hn::Set(d, kEdgeInfo);
+  const int first = -grow, end = tile.width + grow;
+  // Rows y - 1, y, y + 1 of the least code around each pixel, and of the largest of three of those along the row.
+  const auto row_words = static_cast<size_t>(end - first + 2 + 2 * lanes);
+  scratch.rows.resize(std::max(scratch.rows.size(), 4 * row_words));
   scratch.pixels.clear();
-  const int end = tile.width + grow;
-  for (int y = -grow; y < tile.height + grow; ++y) {
+  uint32_t* const least = scratch.rows.data();  // one row, from pixel first - 1 on
+  const auto most = [&](int y) { return least + (1 + static_cast<size_t>((y + grow + 1) % 3)) * row_words; };
+  const auto scan = [&](int y) HWY_ATTR {
     const uint32_t *above = tile.info(y - 1), *here = tile.info(y), *below = tile.info(y + 1);
-    for (int x = -grow; x < end; x += lanes) {
-      const auto info = hn::LoadU(d, here + x);
-      const auto sides = hn::Min(hn::LoadU(d, here + x - 1), hn::LoadU(d, here + x + 1));
-      const auto nearest = hn::Min(sides, hn::Min(hn::LoadU(d, above + x), hn::LoadU(d, below + x)));
-      // info - nearest > edge where info > nearest; a surface as far as codes go is still nearer than nothing.
-      const auto gap = hn::Sub(hn::Max(info, nearest), nearest);
-      if (hn::AllFalse(d, hn::Gt(gap, edge))) continue;
-      for (int i = x; i < std::min(x + lanes, end); ++i) {
-        const uint32_t n = std::min(std::min(here[i - 1], here[i + 1]), std::min(above[i], below[i]));
-        if (here[i] <= n || here[i] - n <= kEdgeInfo) continue;
-        FinishScratch::Pixel p{i, y, 0, 0};
-        if (CloseHole(tile, i, y, p)) scratch.pixels.push_back(p);
-      }
+    for (int x = first - 1; x < end + 1; x += lanes) {
+      auto v = hn::Set(d, kEmptyInfo);
+      for (const uint32_t* p : {above, here, below})
+        v = hn::Min(hn::Min(v, hn::LoadU(d, p + x - 1)), hn::Min(hn::LoadU(d, p + x), hn::LoadU(d, p + x + 1)));
+      hn::StoreU(v, d, least + (x - first + 1));
+    }
+    uint32_t* out = most(y);
+    for (int x = 0; x < end - first; x += lanes) {
+      const auto v = hn::Max(hn::LoadU(d, least + x), hn::LoadU(d, least + x + 1));
+      hn::StoreU(hn::Max(v, hn::LoadU(d, least + x + 2)), d, out + x);
+    }
+  };
+  scan(-grow - 1);
+  scan(-grow);
+  for (int y = -grow; y < tile.height + grow; ++y) {
+    scan(y + 1);
+    const uint32_t *above = most(y - 1), *here = most(y), *below = most(y + 1), *info = tile.info(y);
+    for (int x = first; x < end; x += lanes) {
+      const int at = x - first;
+      const auto closed = hn::Max(hn::Max(hn::LoadU(d, above + at), hn::LoadU(d, here + at)), hn::LoadU(d, below + at));
+      const auto own = hn::LoadU(d, info + x);
+      const auto holes = hn::Gt(hn::Sub(hn::Max(own, closed), closed), edge);
+      if (!hn::AllFalse(d, holes)) CloseHoles(tile, x, y, closed, holes, end, scratch);
     }
   }
   for (const auto& p : scratch.pixels) tile.colour(p.y)[p.x] = p.colour, tile.info(p.y)[p.x] = p.info;
@@ -155,7 +161,7 @@ void Smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const int first = -grow, end = tile.width + grow;
   const auto row_words = static_cast<size_t>(end - first + lanes);
-  scratch.rows.resize(6 * row_words);
+  scratch.rows.resize(std::max(scratch.rows.size(), 6 * row_words));
   // Rows y - 1, y and y + 1 smoothed along themselves: red and blue, then green.
   const auto row = [&](int y) { return scratch.rows.data() + static_cast<size_t>((y + grow + 1) % 3) * 2 * row_words; };
   const auto along = [&](int y) HWY_ATTR {

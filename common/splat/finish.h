@@ -4,14 +4,13 @@
 // Two pixels belong to different surfaces if their depth codes (pixel_key.h: 2^14 steps an octave) differ by more than kEdge, about 2 % of
 // depth. An empty pixel counts as farther than everything.
 //
-// Fill (pin-holes): a pixel is a hole if one of its four neighbours is nearer by more than kEdge. On each of the four axes through it (row,
-//   column, both diagonals) the first pixels at most kFillRadius away that are nearer than it by more than kEdge are its supports. An axis
-//   counts if it has a support on both sides, their distances a and b sum to at most kFillRadius + 1, and their codes differ by at most
-//   kEdge (a + b); of these only axes within 2 kEdge of the nearest are used. The hole is closed if two axes are used, or one with
-//   a = b = 1; its colour and depth are the supports' means, weighted with 1 / distance^2. So surfaces grow nowhere outwards: a pixel
-//   outside a silhouette has support on one side alone. (Pull-push after Grossman and Dally 1998 and Marroquim et al. 2007, but gathered
-//   hole by hole over rings of growing radius: holes are few, pyramids would touch every pixel, and their coarse levels bleed outwards
-//   over silhouettes.)
+// Fill (pin-holes): the depth map is closed with a 3x3 window: closed(p) = max over the 3x3 pixels q around p of (min over the 3x3 pixels
+//   around q of the code). A pixel is a hole if its code exceeds closed(p) by more than kEdge; if at least kFillSupports of its 8 neighbours
+//   lie within kEdge of closed(p), its colour and depth become their means, those beside it counting twice. So gaps of up to two pixels
+//   are closed, also those through which something farther shows, and surfaces grow nowhere outwards: closing leaves every pixel open
+//   around which a 3x3 window fits into the gap. (Pull-push, after Grossman and Dally 1998, with one level and a window that slides instead
+//   of a pyramid: coarser levels bleed over silhouettes. Gathering along the four axes up to 3 pixels away instead gave 20.0, 36.4 and
+//   36.4 dB where this gives 20.6, 36.5 and 36.2, and took five times as long.)
 // Smooth: where splats are magnified their samples are interpolated: [1 2 1] / 4 along rows, then along columns, where the spacing class
 //   says 2 or more (on samples 2 pixels apart that is exactly bilinear interpolation), [1 6 1] / 8 where it says 1; a neighbour of another
 //   surface counts as the pixel itself.
@@ -27,13 +26,14 @@
 
 namespace telesplat::splat {
 
-inline constexpr uint32_t kEdge = 480;   ///< depth codes: 1.5 to 2.9 % of depth
-inline constexpr int kFillRadius = 3;    ///< pixels
+inline constexpr uint32_t kEdge = 480;  ///< depth codes: 1.5 to 2.9 % of depth
+inline constexpr int kFillReach = 2;    ///< pixels
+inline constexpr int kFillSupports = 4;
 inline constexpr int kFinishSlack = 16;  ///< pixels that vectors may read and write beyond what a stage asks for
 
 /// How many pixels around a tile must be valid for the stages that are on.
 constexpr int finish_reach(const Finish& f) {
-  return (f.fill ? kFillRadius : 0) + (f.smooth ? 1 : 0) + (f.antialias ? 1 : 0);
+  return (f.fill ? kFillReach : 0) + (f.smooth ? 1 : 0) + (f.antialias ? 1 : 0);
 }
 
 /// Resolved pixels of a tile and of a margin around it, row by row: `stride` colours (0x00RRGGBB), then `stride` infos (depth code << 8 |
@@ -63,7 +63,7 @@ struct FinishScratch {
   std::vector<uint32_t> rows;
 };
 
-/// Closes the pin-holes of the tile grown by `grow` pixels. Reads kFillRadius pixels more. Returns how many it closed.
+/// Closes the pin-holes of the tile grown by `grow` pixels. Reads kFillReach pixels more. Returns how many it closed.
 int fill_holes(const ResolvedTile& tile, int grow, FinishScratch& scratch);
 /// Smooths the tile grown by `grow` pixels. Reads one pixel more.
 void smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch);

@@ -10,7 +10,7 @@ namespace telesplat::testing {
 
 /// A tile that owns its pixels, all empty at first.
 struct OwnTile {
-  OwnTile(int width, int height, int margin = splat::kFillRadius + 3 + splat::kFinishSlack)
+  OwnTile(int width, int height, int margin = splat::kFillReach + 3 + splat::kFinishSlack)
       : stride(width + 2 * margin + splat::kFinishSlack),
         words(static_cast<size_t>(height + 2 * margin) * 2 * stride, 0x141820),
         tile{words.data(), stride, margin, width, height} {
@@ -32,54 +32,37 @@ struct OwnTile {
   splat::ResolvedTile tile;
 };
 
-inline int64_t depth_code(uint32_t info) { return info == splat::kEmptyInfo ? 1 << 24 : info >> 8; }
 inline int channel(uint32_t colour, int c) { return static_cast<int>(colour >> 8 * c & 255); }
 
 inline void fill_plainly(OwnTile& t, int grow) {
   const OwnTile before = t;
-  const int64_t edge = splat::kEdge;
   // In whole infos, like everything that the definition calls a code: what lies below the code's bits counts too.
+  const int64_t edge = int64_t{splat::kEdge} * 256;
   const auto code = [&](int x, int y) { return static_cast<int64_t>(before.info(x, y)); };
+  const auto least = [&](int x, int y) {
+    int64_t v = INT64_MAX;
+    for (int j = -1; j <= 1; ++j)
+      for (int i = -1; i <= 1; ++i) v = std::min(v, code(x + i, y + j));
+    return v;
+  };
   for (int y = -grow; y < t.tile.height + grow; ++y)
     for (int x = -grow; x < t.tile.width + grow; ++x) {
-      const auto nearer = [&](int i, int j) { return code(x, y) - code(i, j) > edge * 256; };
-      if (!nearer(x - 1, y) && !nearer(x + 1, y) && !nearer(x, y - 1) && !nearer(x, y + 1)) continue;
-      struct Pair {
-        int x[2], y[2], distance[2];
-        int64_t nearest;
-      };
-      std::vector<Pair> pairs;
-      for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}, {1, 1}, {1, -1}}) {
-        Pair p{};
-        for (int side = 0; side < 2; ++side)
-          for (int r = splat::kFillRadius; r >= 1; --r) {
-            const int i = x + (side ? -r : r) * dx, j = y + (side ? -r : r) * dy;
-            if (nearer(i, j)) p.x[side] = i, p.y[side] = j, p.distance[side] = r;
-          }
-        const int sum = p.distance[0] + p.distance[1];
-        if (!p.distance[0] || !p.distance[1] || sum > splat::kFillRadius + 1) continue;
-        const int64_t a = code(p.x[0], p.y[0]), b = code(p.x[1], p.y[1]);
-        if (std::abs(a - b) > edge * 256 * sum) continue;
-        p.nearest = std::min(a, b);
-        pairs.push_back(p);
-      }
-      int64_t best = INT64_MAX;
-      for (const Pair& p : pairs) best = std::min(best, p.nearest);
-      int axes = 0, sums[3] = {}, weights = 0;
+      int64_t closed = 0;
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) closed = std::max(closed, least(x + i, y + j));
+      if (code(x, y) - closed <= edge) continue;
+      int supports = 0, weights = 0, sums[3] = {};
       int64_t depth = 0;
-      bool tight = false;
-      for (const Pair& p : pairs) {
-        if (p.nearest > best + 2 * edge * 256) continue;
-        ++axes;
-        tight = tight || (p.distance[0] == 1 && p.distance[1] == 1);
-        for (int side = 0; side < 2; ++side) {
-          const int w = 36 / (p.distance[side] * p.distance[side]);
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) {
+          if ((i == 0 && j == 0) || std::abs(code(x + i, y + j) - closed) > edge) continue;
+          const int w = i == 0 || j == 0 ? 2 : 1;
+          ++supports;
           weights += w;
-          for (int c = 0; c < 3; ++c) sums[c] += w * channel(before.colour(p.x[side], p.y[side]), c);
-          depth += w * (code(p.x[side], p.y[side]) >> 8);
+          for (int c = 0; c < 3; ++c) sums[c] += w * channel(before.colour(x + i, y + j), c);
+          depth += w * (code(x + i, y + j) >> 8);
         }
-      }
-      if (axes < 2 && !tight) continue;
+      if (supports < splat::kFillSupports) continue;
       uint32_t colour = 0;
       for (int c = 0; c < 3; ++c) colour |= static_cast<uint32_t>((sums[c] + weights / 2) / weights) << 8 * c;
       t.set(x, y, colour, static_cast<uint32_t>(depth / weights));
