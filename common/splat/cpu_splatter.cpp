@@ -90,6 +90,7 @@ struct CpuSplatter::Impl {
   TileGrid grid;
   ItemRuns runs;
   std::vector<ItemStyle> styles;
+  float overhang = 0;  // how far from its centre the largest splat reaches, pixels
   TileBinning binning;
   std::vector<uint8_t> intensity = std::vector<uint8_t>(65536 + 3);
 };
@@ -104,8 +105,18 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
   resolve = {intensity.data(), shading.background(), near_m, {}};
   table.set_focal(camera.focal_x());
   prepare_styles(list, options.kernel);
-  runs.build(list.items, camera);
-  binning.build(grid, runs.transforms, near_m, static_cast<float>(layout.reach + kMargin));
+  runs.build(list.items);
+  binning.begin(grid, runs.runs.size(), near_m, static_cast<float>(layout.reach) + overhang);
+  const auto room_to_pixel = camera.room_to_pixel();
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
+      for (size_t i = r.begin(); i < r.end(); ++i) {
+        runs.transform(i, list.items, room_to_pixel);
+        binning.place(i, runs.transforms[i]);
+      }
+    });
+  });
+  binning.list();
 }
 
 void CpuSplatter::Impl::prepare_styles(const DrawList& list, Kernel kernel) {
@@ -114,10 +125,12 @@ void CpuSplatter::Impl::prepare_styles(const DrawList& list, Kernel kernel) {
   const Kernel shaped = kernel == Kernel::kSquare ? Kernel::kSquare : Kernel::kDisc;
   styles.resize(list.items.size());
   std::array<uint64_t, 4> bias{}, points{};
+  overhang = 0;
   for (size_t i = 0; i < list.items.size(); ++i) {
     const DrawItem& item = list.items[i];
     const ItemStyle& style =
         styles[i] = {&table.shape(shaped, item.splat_px), smoothed ? spacing_class(item.splat_px / list.scale) : 0};
+    overhang = std::max(overhang, 0.5f * static_cast<float>(style.shape->side) + 0.5f);
     bias[style.spacing] += uint64_t{style.shape->rim_bias} * item.level.count;
     points[style.spacing] += item.level.count;
   }

@@ -19,6 +19,7 @@ namespace telesplat::splat::HWY_NAMESPACE {
 
 // Projected points held before they are splatted: their arrays stay in the first-level cache.
 constexpr size_t kBatch = 512;
+constexpr size_t kApart = 8;
 
 // Projected points, waiting to be splatted.
 struct Batch {
@@ -49,16 +50,20 @@ void SplatBatch(const SplatShape& shape, const KeyBuffer& buffer, const Batch& b
   const int shift = 2 * shape.sub_bits;
   const uint32_t sub_mask = (1u << shift) - 1;
   const auto stride = static_cast<size_t>(buffer.stride);
-  for (size_t i = 0; i < batch.count; ++i) {
-    const uint32_t place = batch.place[i];
-    if constexpr (kSide == 1) {
-      auto& pixel = reinterpret_cast<int64_t&>(buffer.keys[place]);
-      pixel = std::min(pixel, static_cast<int64_t>(batch.key[i]));
-    } else {
-      SplatOne<kSide>(buffer.keys + (place >> shift), stride, shape.addends.data() + (place & sub_mask) * kStep,
-                      static_cast<int64_t>(batch.key[i]));
+  // Neighbours in the batch often overlap on the screen; a row read right after one was written across its ends would wait for that
+  // write to leave the store buffer. So points far apart in the batch follow one another: the least key wins in any order.
+  const size_t step = (batch.count + kApart - 1) / kApart;
+  for (size_t j = 0; j < step; ++j)
+    for (size_t i = j; i < batch.count; i += step) {
+      const uint32_t place = batch.place[i];
+      if constexpr (kSide == 1) {
+        auto& pixel = reinterpret_cast<int64_t&>(buffer.keys[place]);
+        pixel = std::min(pixel, static_cast<int64_t>(batch.key[i]));
+      } else {
+        SplatOne<kSide>(buffer.keys + (place >> shift), stride, shape.addends.data() + (place & sub_mask) * kStep,
+                        static_cast<int64_t>(batch.key[i]));
+      }
     }
-  }
 }
 
 using SplatBatchFunction = void (*)(const SplatShape&, const KeyBuffer&, const Batch&);
@@ -149,46 +154,49 @@ class TileSplatter {
     const auto sub_mask = hn::Set(di, (1 << bits) - 1);
     size_t count = batch_.count, drawn = 0;
 
-    ForVectors(first, last, [&](size_t offset, size_t skip, size_t valid) HWY_ATTR {
-      const Projected p = Project(transform, LoadLanes(level, offset), near_m, scale, shift);
-      const auto px = hn::Sub(hn::ShiftRightSame(p.x, bits), x0), py = hn::Sub(hn::ShiftRightSame(p.y, bits), y0);
-      hn::Mask<I32> keep;
-      if (!kWhole) {
-        const auto in_x = hn::And(hn::Gt(px, outside), hn::Lt(px, width)),
-                   in_y = hn::And(hn::Gt(py, outside), hn::Lt(py, height));
-        const auto beyond_near = hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m)));
-        keep = hn::And(hn::And(in_x, in_y), beyond_near);
-        if (valid - skip < hn::Lanes(di)) keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
-        if (hn::AllFalse(di, keep)) return;
-        const auto own =
-            hn::And(hn::And(hn::Gt(px, own_x0), hn::Lt(px, own_x1)), hn::And(hn::Gt(py, own_y0), hn::Lt(py, own_y1)));
-        drawn += hn::CountTrue(di, hn::And(keep, own));
-      }
+    ForVectors(
+        first, last, [&](size_t offset, size_t skip, size_t valid) HWY_ATTR __attribute__((always_inline)) {
+          const Projected p = Project(transform, LoadLanes(level, offset), near_m, scale, shift);
+          const auto px = hn::Sub(hn::ShiftRightSame(p.x, bits), x0), py = hn::Sub(hn::ShiftRightSame(p.y, bits), y0);
+          hn::Mask<I32> keep;
+          if (!kWhole) {
+            const auto in_x = hn::And(hn::Gt(px, outside), hn::Lt(px, width)),
+                       in_y = hn::And(hn::Gt(py, outside), hn::Lt(py, height));
+            const auto beyond_near = hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m)));
+            keep = hn::And(hn::And(in_x, in_y), beyond_near);
+            if (valid - skip < hn::Lanes(di))
+              keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
+            if (hn::AllFalse(di, keep)) return;
+            const auto own = hn::And(hn::And(hn::Gt(px, own_x0), hn::Lt(px, own_x1)),
+                                     hn::And(hn::Gt(py, own_y0), hn::Lt(py, own_y1)));
+            drawn += hn::CountTrue(di, hn::And(keep, own));
+          }
 
-      const auto pixel = hn::Add(hn::Add(hn::Mul(py, stride), px), origin);
-      const auto sub = hn::Or(hn::ShiftLeftSame(hn::And(p.y, sub_mask), bits), hn::And(p.x, sub_mask));
-      const auto place = hn::BitCast(du, hn::Or(hn::ShiftLeftSame(pixel, 2 * bits), sub));
+          const auto pixel = hn::Add(hn::Add(hn::Mul(py, stride), px), origin);
+          const auto sub = hn::Or(hn::ShiftLeftSame(hn::And(p.y, sub_mask), bits), hn::And(p.x, sub_mask));
+          const auto place = hn::BitCast(du, hn::Or(hn::ShiftLeftSame(pixel, 2 * bits), sub));
 
-      // The key, in halves.
-      const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
-      const auto code = hn::Min(hn::ShiftRight<kDepthCodeShift>(hn::Sub(hn::BitCast(du, p.w), near_bits)), farthest);
-      const auto high = hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(code), hn::ShiftRight<8>(normal)), head);
-      const auto low = hn::Or(hn::ShiftLeft<24>(normal), hn::And(hn::LoadU(du, level.colour + offset), albedo));
+          // The key, in halves.
+          const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
+          const auto code =
+              hn::Min(hn::ShiftRight<kDepthCodeShift>(hn::Sub(hn::BitCast(du, p.w), near_bits)), farthest);
+          const auto high = hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(code), hn::ShiftRight<8>(normal)), head);
+          const auto low = hn::Or(hn::ShiftLeft<24>(normal), hn::And(hn::LoadU(du, level.colour + offset), albedo));
 
-      if (kWhole) {
-        // Lanes below `skip` are the batch's last points: they are written once more, as they are. (None are there if the batch
-        // was emptied in between; then they are splatted twice, which changes nothing.)
-        const size_t at = count >= skip ? count - skip : 0;
-        hn::StoreU(place, du, places + at);
-        hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + at));
-        count = at + valid;
-      } else {
-        const Compressor compress(hn::RebindMask(du, keep));
-        hn::StoreU(compress(place), du, places + count);
-        hn::StoreInterleaved2(compress(low), compress(high), du, reinterpret_cast<uint32_t*>(keys + count));
-        count += compress.count();
-      }
-    });
+          if (kWhole) {
+            // Lanes below `skip` are the batch's last points: they are written once more, as they are. (None are there if the batch
+            // was emptied in between; then they are splatted twice, which changes nothing.)
+            const size_t at = count >= skip ? count - skip : 0;
+            hn::StoreU(place, du, places + at);
+            hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + at));
+            count = at + valid;
+          } else {
+            const Compressor compress(hn::RebindMask(du, keep));
+            hn::StoreU(compress(place), du, places + count);
+            hn::StoreInterleaved2(compress(low), compress(high), du, reinterpret_cast<uint32_t*>(keys + count));
+            count += compress.count();
+          }
+        });
     batch_.count = count;
     counts_.drawn += kWhole ? last - first : drawn;
   }

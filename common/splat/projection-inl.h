@@ -155,13 +155,11 @@ class Stage {
 template <class Visit>
 HWY_INLINE void ForVectors(size_t first, size_t last, const Visit& visit) {
   const size_t lanes = hn::Lanes(F32());
-  size_t i = first;
-  for (; i + lanes <= last; i += lanes) visit(i, size_t{0}, lanes);
-  if (i == last) return;
-  if (last >= lanes)
-    visit(last - lanes, i - (last - lanes), lanes);
-  else
-    visit(i, size_t{0}, last - i);
+  // One call, so that it is compiled into the loop.
+  for (size_t i = first; i < last; i += lanes) {
+    const size_t offset = i + lanes <= last || last < lanes ? i : last - lanes;
+    visit(offset, i - offset, std::min(lanes, last - offset));
+  }
 }
 
 // Mosaics lie scattered in memory, and what comes next is known: asks for it in time. A level's arrays lie next to each other,

@@ -7,6 +7,7 @@
 #define TELESPLAT_SPLAT_RESOLVE_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -43,24 +44,23 @@ HWY_INLINE void StoreEmpty(uint64_t* p) {
 }
 HWY_INLINE hn::Mask<PixelU32> IsEmpty(Pixels high) { return hn::Eq(high, hn::Set(PixelU32(), kEmptyInfo)); }
 
-// image::Shading::apply on each lane: (c * i + 127) / 255 for each channel; v / 255 = (v + 1 + (v >> 8)) >> 8 for v < 65535.
-HWY_INLINE Pixels Shade(Pixels albedo, Pixels i) {
+// image::Shading::apply on each lane, of intensities in bytes: (c * i + 127) / 255 for each channel;
+// v / 255 = (v + 1 + (v >> 8)) >> 8 for v < 65535.
+HWY_INLINE Pixels Shade(Pixels albedo, const uint8_t* HWY_RESTRICT light) {
   const PixelU32 d;
-  const auto red_blue = hn::Set(d, 0x00ff00ff), green = hn::Set(d, 0x000000ff);
-  const auto rb = hn::Add(hn::Mul(hn::And(albedo, red_blue), i), hn::Set(d, 0x007f007f));
-  const auto g = hn::Add(hn::Mul(hn::And(hn::ShiftRight<8>(albedo), green), i), hn::Set(d, 0x7f));
-  const auto rb_over = hn::Add(hn::Add(rb, hn::Set(d, 0x00010001)), hn::And(hn::ShiftRight<8>(rb), red_blue));
-  const auto g_over = hn::Add(hn::Add(g, hn::Set(d, 1)), hn::ShiftRight<8>(g));
-  return hn::Or(hn::And(hn::ShiftRight<8>(rb_over), red_blue), hn::And(g_over, hn::Set(d, 0xff00)));
+  const auto i = hn::PromoteTo(d, hn::LoadU(hn::Rebind<uint8_t, PixelU32>(), light));
+  const auto red_blue = hn::Set(d, 0x00ff00ffu), green = hn::Set(d, 0x000000ffu);
+  const auto rb = hn::Add(hn::Mul(hn::And(albedo, red_blue), i), hn::Set(d, 0x007f007fu));
+  const auto g = hn::Add(hn::Mul(hn::And(hn::ShiftRight<8>(albedo), green), i), hn::Set(d, 0x7fu));
+  const auto rb_over = hn::Add(hn::Add(rb, hn::Set(d, 0x00010001u)), hn::And(hn::ShiftRight<8>(rb), red_blue));
+  const auto g_over = hn::Add(hn::Add(g, hn::Set(d, 1u)), hn::ShiftRight<8>(g));
+  return hn::Or(hn::And(hn::ShiftRight<8>(rb_over), red_blue), hn::And(g_over, hn::Set(d, 0xff00u)));
 }
 
-// Shaded colours of keys; of empty ones, anything.
-HWY_INLINE Pixels ColourOf(const Halves& key, const uint8_t* intensity) {
-  const PixelU32 d;
-  const PixelI32 di;
-  const auto normal = hn::Or(hn::ShiftLeft<8>(hn::And(key.high, hn::Set(d, 0xff))), hn::ShiftRight<24>(key.low));
-  const auto light = hn::GatherOffset(di, reinterpret_cast<const int32_t*>(intensity), hn::BitCast(di, normal));
-  return Shade(key.low, hn::And(hn::BitCast(d, light), hn::Set(d, 255)));
+// Intensities of `n` keys' normals. By scalars: gathers of 8 lanes took longer (bench splat_square, resolve_ms).
+HWY_INLINE void LookUpLight(const uint64_t* HWY_RESTRICT keys, size_t n, const uint8_t* HWY_RESTRICT intensity,
+                            uint8_t* HWY_RESTRICT light) {
+  for (size_t i = 0; i < n; ++i) light[i] = intensity[key_normal(keys[i])];
 }
 
 // key_info of each lane.
@@ -85,94 +85,111 @@ HWY_INLINE hn::Vec<PixelF32> DepthOf(Pixels info, const ResolveInput& input) {
   return hn::BitCast(PixelF32(), hn::Add(hn::ShiftLeft<kDepthCodeShift>(hn::BitCast(d, code)), hn::Set(d, first)));
 }
 
-// Writes one vector of pixels, of which the row has `n` left.
-HWY_INLINE void WritePixels(Pixels colour, Pixels info, hn::Mask<PixelU32> empty, const ResolveInput& input, size_t n,
-                            uint32_t* out_colour, float* out_depth_m) {
+// Pixels are made a chunk at a time in the first-level cache and leave it in whole lines, past the caches: nobody reads them soon,
+// and a line that is not written in one go would first be read from memory.
+constexpr size_t kChunk = 256;
+
+HWY_INLINE void StreamOut(const uint32_t* HWY_RESTRICT from, uint32_t* HWY_RESTRICT to, size_t n) {
   const PixelU32 d;
-  const PixelF32 df;
-  const size_t lanes = hn::Lanes(d);
-  const auto shown = hn::Or(colour, hn::Set(d, 0xff000000u));
-  const auto depth = [&]() HWY_ATTR {
-    return hn::IfThenElse(hn::RebindMask(df, empty), hn::Set(df, std::numeric_limits<float>::infinity()),
-                          DepthOf(info, input));
-  };
-  if (n >= lanes) {
-    // Ordinary stores: past the caches they took three times as long (bench splat_square, resolve_ms).
-    hn::StoreU(shown, d, out_colour);
-    if (out_depth_m) hn::StoreU(depth(), df, out_depth_m);
-    return;
-  }
-  HWY_ALIGN uint32_t last_colour[kMaxSplatSide];
-  HWY_ALIGN float last_depth[kMaxSplatSide];
-  hn::Store(shown, d, last_colour);
-  std::memcpy(out_colour, last_colour, n * sizeof(uint32_t));
-  if (!out_depth_m) return;
-  hn::Store(depth(), df, last_depth);
-  std::memcpy(out_depth_m, last_depth, n * sizeof(float));
+  constexpr size_t kLine = 16;  // words of a cache line
+  const size_t misaligned = reinterpret_cast<uintptr_t>(to) / sizeof(uint32_t) % kLine;
+  const size_t head = std::min(n, misaligned == 0 ? 0 : kLine - misaligned);
+  std::memcpy(to, from, head * sizeof(uint32_t));
+  size_t i = head;
+  for (; i + kLine <= n; i += kLine)
+    for (size_t j = i; j < i + kLine; j += hn::Lanes(d)) hn::Stream(hn::LoadU(d, from + j), d, to + j);
+  std::memcpy(to + i, from + i, (n - i) * sizeof(uint32_t));
 }
+
+// A chunk's way out: put vectors of pixels, then flush.
+class ChunkWriter {
+ public:
+  ChunkWriter(const ResolveInput& input, const TileTarget& target) : input_(input), target_(target) {}
+
+  HWY_INLINE void put(size_t i, Pixels colour, Pixels info, hn::Mask<PixelU32> empty) {
+    const PixelU32 d;
+    hn::Store(hn::Or(colour, hn::Set(d, 0xff000000u)), d, colour_ + i);
+    if (!target_.depth_m) return;
+    const auto infinity = hn::Set(d, std::bit_cast<uint32_t>(std::numeric_limits<float>::infinity()));
+    hn::Store(hn::IfThenElse(empty, infinity, hn::BitCast(d, DepthOf(info, input_))), d, depth_bits_ + i);
+  }
+  HWY_INLINE void flush(int x, int y, size_t n) {
+    const size_t at = static_cast<size_t>(y) * target_.pitch + static_cast<size_t>(x);
+    StreamOut(colour_, target_.colour + at, n);
+    if (target_.depth_m) StreamOut(depth_bits_, reinterpret_cast<uint32_t*>(target_.depth_m) + at, n);
+  }
+
+ private:
+  const ResolveInput& input_;
+  const TileTarget target_;
+  HWY_ALIGN uint32_t colour_[kChunk];
+  HWY_ALIGN uint32_t depth_bits_[kChunk];
+};
 
 void ResolveTile(const ResolvedTile& tile, int reach, const ResolveInput& input, std::vector<uint64_t>& scratch) {
   const PixelU32 d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
+  const size_t lanes = hn::Lanes(d);
   const auto background = hn::Set(d, input.background), nothing = hn::Set(d, kEmptyInfo);
+  HWY_ALIGN uint8_t light[kChunk + kMaxSplatSide];
   // A row's keys leave their place before its colours and infos take it.
-  const int columns = tile.width + 2 * reach;
-  scratch.resize(std::max(scratch.size(), static_cast<size_t>(columns + lanes)));
+  const auto columns = static_cast<size_t>(tile.width + 2 * reach);
+  scratch.resize(std::max(scratch.size(), columns + kMaxSplatSide));
   for (int y = -reach; y < tile.height + reach; ++y) {
     uint32_t *colour = tile.colour(y) - reach, *info = tile.info(y) - reach;
-    std::memcpy(scratch.data(), tile.key(y) - reach, static_cast<size_t>(columns) * sizeof(uint64_t));
-    for (int x = 0; x < columns; x += lanes) {
-      const Halves key = LoadHalves(scratch.data() + x);
-      const auto empty = IsEmpty(key.high);
-      if (hn::AllTrue(d, empty)) {
-        hn::StoreU(background, d, colour + x);
-        hn::StoreU(nothing, d, info + x);
-        continue;
+    std::memcpy(scratch.data(), tile.key(y) - reach, columns * sizeof(uint64_t));
+    for (size_t x = 0; x < columns; x += kChunk) {
+      const uint64_t* keys = scratch.data() + x;
+      const size_t n = std::min(kChunk, columns - x);
+      LookUpLight(keys, n, input.intensity, light);
+      for (size_t i = 0; i < n; i += lanes) {
+        const Halves key = LoadHalves(keys + i);
+        const auto empty = IsEmpty(key.high);
+        hn::StoreU(hn::IfThenElse(empty, background, Shade(key.low, light + i)), d, colour + x + i);
+        hn::StoreU(hn::IfThenElse(empty, nothing, InfoOf(key.high)), d, info + x + i);
       }
-      hn::StoreU(hn::IfThenElse(empty, background, ColourOf(key, input.intensity)), d, colour + x);
-      hn::StoreU(hn::IfThenElse(empty, nothing, InfoOf(key.high)), d, info + x);
     }
   }
 }
 
 void WriteTile(const ResolvedTile& tile, int reach, const ResolveInput& input, const TileTarget& target) {
   const PixelU32 d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  for (int y = 0; y < tile.height; ++y) {
-    uint32_t* colour = target.colour + static_cast<size_t>(y) * target.pitch;
-    float* depth_m = target.depth_m ? target.depth_m + static_cast<size_t>(y) * target.pitch : nullptr;
-    for (int x = 0; x < tile.width; x += lanes) {
-      const auto info = hn::LoadU(d, tile.info(y) + x);
-      WritePixels(hn::LoadU(d, tile.colour(y) + x), info, IsEmpty(info), input, static_cast<size_t>(tile.width - x),
-                  colour + x, depth_m ? depth_m + x : nullptr);
+  const size_t lanes = hn::Lanes(d);
+  ChunkWriter out(input, target);
+  for (int y = 0; y < tile.height; ++y)
+    for (int x = 0; x < tile.width; x += kChunk) {
+      const uint32_t *colour = tile.colour(y) + x, *info = tile.info(y) + x;
+      const size_t n = std::min(kChunk, static_cast<size_t>(tile.width - x));
+      for (size_t i = 0; i < n; i += lanes) {
+        const auto v = hn::LoadU(d, info + i);
+        out.put(i, hn::LoadU(d, colour + i), v, IsEmpty(v));
+      }
+      out.flush(x, y, n);
     }
-  }
+  hwy::FlushStream();
   for (int y = -reach; y < tile.height + reach; ++y)
     std::fill_n(tile.key(y) - reach, tile.width + 2 * reach, static_cast<uint64_t>(kEmptyKey));
 }
 
 void ResolveAndWriteTile(const ResolvedTile& tile, const ResolveInput& input, const TileTarget& target) {
   const PixelU32 d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
+  const size_t lanes = hn::Lanes(d);
   const auto background = hn::Set(d, input.background);
-  for (int y = 0; y < tile.height; ++y) {
-    uint64_t* row = tile.key(y);
-    uint32_t* colour = target.colour + static_cast<size_t>(y) * target.pitch;
-    float* depth_m = target.depth_m ? target.depth_m + static_cast<size_t>(y) * target.pitch : nullptr;
-    for (int x = 0; x < tile.width; x += lanes) {
-      const Halves key = LoadHalves(row + x);
-      const auto empty = IsEmpty(key.high);
-      const auto n = static_cast<size_t>(tile.width - x);
-      float* out_depth_m = depth_m ? depth_m + x : nullptr;
-      if (hn::AllTrue(d, empty)) {
-        WritePixels(background, key.high, empty, input, n, colour + x, out_depth_m);
-        continue;
+  HWY_ALIGN uint8_t light[kChunk + kMaxSplatSide];
+  ChunkWriter out(input, target);
+  for (int y = 0; y < tile.height; ++y)
+    for (int x = 0; x < tile.width; x += kChunk) {
+      uint64_t* keys = tile.key(y) + x;
+      const size_t n = std::min(kChunk, static_cast<size_t>(tile.width - x));
+      LookUpLight(keys, n, input.intensity, light);
+      for (size_t i = 0; i < n; i += lanes) {
+        const Halves key = LoadHalves(keys + i);
+        const auto empty = IsEmpty(key.high);
+        StoreEmpty(keys + i);
+        out.put(i, hn::IfThenElse(empty, background, Shade(key.low, light + i)), InfoOf(key.high), empty);
       }
-      StoreEmpty(row + x);
-      WritePixels(hn::IfThenElse(empty, background, ColourOf(key, input.intensity)), InfoOf(key.high), empty, input, n,
-                  colour + x, out_depth_m);
+      out.flush(x, y, n);
     }
-  }
+  hwy::FlushStream();
 }
 
 }  // namespace telesplat::splat::HWY_NAMESPACE

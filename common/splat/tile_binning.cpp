@@ -51,35 +51,46 @@ LeafTransform leaf_transform(const geometry::Camera::PixelTransform& t, const ge
 
 void TileBinning::build(const TileGrid& grid, std::span<const LeafTransform> transforms, float near_m,
                         float margin_px) {
-  const float margin = margin_px + 1.0f;  // 1: rounding, here and where the points are projected
-  const auto last_column = static_cast<float>(grid.columns() - 1), last_row = static_cast<float>(grid.rows() - 1);
-  const float per_column = 1.0f / static_cast<float>(grid.tile_width),
-              per_row = 1.0f / static_cast<float>(grid.tile_height);
-  const auto whole_image = Range{0, static_cast<int16_t>(last_column), 0, static_cast<int16_t>(last_row), false};
+  begin(grid, transforms.size(), near_m, margin_px);
+  for (size_t i = 0; i < transforms.size(); ++i) place(i, transforms[i]);
+  list();
+}
 
-  ranges_.resize(transforms.size());
-  first_.assign(static_cast<size_t>(grid.count()) + 1, 0);
-  for (size_t i = 0; i < transforms.size(); ++i) {
-    const Footprint f = project_cube(transforms[i]);
-    Range& r = ranges_[i];
-    r = {1, 0, 1, 0, false};
-    if (!(f.farthest >= near_m)) continue;
-    // A cube that reaches nearer than half the near plane has no bounded footprint. It is rare: such cubes are in your face.
-    if (!(f.nearest > 0.5f * near_m)) {
-      r = whole_image;
-    } else {
-      const float x0 = f.x0 - margin, x1 = f.x1 + margin, y0 = f.y0 - margin, y1 = f.y1 + margin;
-      if (x1 < 0 || y1 < 0 || x0 > static_cast<float>(grid.width) || y0 > static_cast<float>(grid.height)) continue;
-      const float c0 = std::floor(x0 * per_column), c1 = std::floor(x1 * per_column);
-      const float r0 = std::floor(y0 * per_row), r1 = std::floor(y1 * per_row);
-      r = {static_cast<int16_t>(std::max(c0, 0.0f)), static_cast<int16_t>(std::min(c1, last_column)),
-           static_cast<int16_t>(std::max(r0, 0.0f)), static_cast<int16_t>(std::min(r1, last_row)), false};
-      r.whole = c0 == c1 && r0 == r1 && c0 >= 0 && r0 >= 0 && x1 < static_cast<float>(grid.width) &&
-                y1 < static_cast<float>(grid.height) && f.nearest > near_m * 1.0001f;
-    }
-    for (int row = r.row0; row <= r.row1; ++row)
-      for (int column = r.column0; column <= r.column1; ++column) ++first_[row * grid.columns() + column + 1];
+void TileBinning::begin(const TileGrid& grid, size_t boxes, float near_m, float margin_px) {
+  grid_ = grid;
+  near_m_ = near_m;
+  margin_px_ = margin_px + 1.0f;  // 1: rounding, here and where the points are projected
+  ranges_.resize(boxes);
+}
+
+void TileBinning::place(size_t box, const LeafTransform& transform) {
+  const Footprint f = project_cube(transform);
+  const auto last_column = static_cast<float>(grid_.columns() - 1), last_row = static_cast<float>(grid_.rows() - 1);
+  const float per_column = 1.0f / static_cast<float>(grid_.tile_width),
+              per_row = 1.0f / static_cast<float>(grid_.tile_height);
+  Range& r = ranges_[box];
+  r = {1, 0, 1, 0, false};
+  if (!(f.farthest >= near_m_)) return;
+  // A cube that reaches nearer than half the near plane has no bounded footprint. It is rare: such cubes are in your face.
+  if (!(f.nearest > 0.5f * near_m_)) {
+    r = {0, static_cast<int16_t>(last_column), 0, static_cast<int16_t>(last_row), false};
+    return;
   }
+  const float x0 = f.x0 - margin_px_, x1 = f.x1 + margin_px_, y0 = f.y0 - margin_px_, y1 = f.y1 + margin_px_;
+  const auto width = static_cast<float>(grid_.width), height = static_cast<float>(grid_.height);
+  if (x1 < 0 || y1 < 0 || x0 > width || y0 > height) return;
+  const float c0 = std::floor(x0 * per_column), c1 = std::floor(x1 * per_column);
+  const float r0 = std::floor(y0 * per_row), r1 = std::floor(y1 * per_row);
+  r = {static_cast<int16_t>(std::max(c0, 0.0f)), static_cast<int16_t>(std::min(c1, last_column)),
+       static_cast<int16_t>(std::max(r0, 0.0f)), static_cast<int16_t>(std::min(r1, last_row)), false};
+  r.whole = c0 == c1 && r0 == r1 && c0 >= 0 && r0 >= 0 && x1 < width && y1 < height && f.nearest > near_m_ * 1.0001f;
+}
+
+void TileBinning::list() {
+  first_.assign(static_cast<size_t>(grid_.count()) + 1, 0);
+  for (const Range& r : ranges_)
+    for (int row = r.row0; row <= r.row1; ++row)
+      for (int column = r.column0; column <= r.column1; ++column) ++first_[row * grid_.columns() + column + 1];
   for (size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
   next_.assign(first_.begin(), first_.end() - 1);
   entries_.resize(first_.back());
@@ -87,7 +98,7 @@ void TileBinning::build(const TileGrid& grid, std::span<const LeafTransform> tra
     const Range& r = ranges_[i];
     for (int row = r.row0; row <= r.row1; ++row)
       for (int column = r.column0; column <= r.column1; ++column)
-        entries_[next_[row * grid.columns() + column]++] = {static_cast<uint32_t>(i), r.whole};
+        entries_[next_[row * grid_.columns() + column]++] = {static_cast<uint32_t>(i), r.whole};
   }
 }
 

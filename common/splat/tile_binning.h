@@ -44,6 +44,11 @@ class TileBinning {
   ///   transforms: one for each box. Boxes wholly nearer than near_m or outside the image are listed nowhere.
   void build(const TileGrid& grid, std::span<const LeafTransform> transforms, float near_m, float margin_px);
 
+  /// The same in three steps; `place` can be called for all boxes at once.
+  void begin(const TileGrid& grid, size_t boxes, float near_m, float margin_px);
+  void place(size_t box, const LeafTransform& transform);
+  void list();
+
   std::span<const Entry> tile(int index) const {
     return {entries_.data() + first_[index], entries_.data() + first_[index + 1]};
   }
@@ -53,6 +58,8 @@ class TileBinning {
     int16_t column0, column1, row0, row1;  // inclusive; column1 < column0: nowhere
     bool whole;
   };
+  TileGrid grid_;
+  float near_m_ = 0, margin_px_ = 0;
   std::vector<Range> ranges_;
   std::vector<uint32_t> first_, next_;
   std::vector<Entry> entries_;

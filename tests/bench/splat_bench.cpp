@@ -1,13 +1,18 @@
-// splat/*: one million points on a display of 2560x1600, beside what clearing such a frame's memory costs on this machine.
+// splat/*: one million points on a display of 2560x1600, beside GL_POINTS and what the machine's memory gives, in the same run.
 // The points are those of one 1280x800 depth image of a wavy surface, seen from where it was sampled. Times are wall-clock; core_ms
-// is what all threads together spent.
+// is what all threads together spent. bytes_floor: what must cross the memory bus for a frame, each point read once (12 bytes) and
+// each pixel written once; floor_ms: the time that takes at the bandwidth measured here on two threads; times_floor: how many times
+// that the frame took. times_gl_points: how many times as long GL_POINTS of that size take.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
 #include <cstring>
 #include <ctime>
+#include <map>
+#include <thread>
 
 #include "client/viewer/render/renderer.h"
+#include "common/core/clock.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/normal.h"
 #include "common/splat/cpu_splatter.h"
@@ -64,43 +69,141 @@ const points::PointModel& model(int patches) {
 splat::DrawList draw_list(int patches, float splat_px) {
   splat::DrawList list;
   splat::select_view(model(patches), display_camera(), {}, list);
-  for (splat::DrawItem& item : list.items) item.splat_px = splat_px;
+  for (splat::DrawItem& item : list.items) {
+    item.radius_m *= splat_px / item.splat_px;
+    item.splat_px = splat_px;
+  }
   return list;
 }
 
-void splat_points(benchmark::State& state, splat::Kernel kernel, int patches) {
+// Every point of one depth image of about that many million pixels, each a pixel large.
+splat::DrawList many_points(int millions) {
+  static std::map<int, points::PointModel> models;
+  const int width = millions == 4 ? 2560 : 3584, height = width * 5 / 8;
+  points::PointModel& m = models.try_emplace(millions, model_config()).first->second;
+  if (m.points() == 0) {
+    const geometry::Camera camera = geometry::make_camera(geometry::default_pose(), 90, width, height);
+    m.insert(points::prepare_patch(m.config(), Sequence{1}, camera, {0, 0, width, height}, wavy_image(camera)));
+  }
+  splat::DrawList list;
+  for (const auto& [key, cluster] : m.clusters())
+    for (const points::Mosaic& mosaic : cluster->mosaics) {
+      list.items.push_back({cluster.get(), mosaic.level(0), 1.0f});
+      list.points += list.items.back().level.count;
+    }
+  return list;
+}
+
+// Bytes a second that two threads read and write, the best of several passes over 128 MiB (after McCalpin's STREAM).
+struct Bandwidth {
+  double read = 0, write = 0, copy = 0;
+};
+const Bandwidth& memory_bandwidth() {
+  static const Bandwidth measured = [] {
+    constexpr size_t kWords = size_t{8} << 20;  // a thread, of 8 bytes
+    constexpr int kThreads = 2;
+    std::vector<uint64_t> from(kThreads * kWords, 1), to(kThreads * kWords, 2);
+    const auto best = [&](double bytes, const auto& pass) {
+      double rate = 0;
+      for (int i = 0; i < 6; ++i) {
+        const double start = monotonic_s();
+        std::vector<std::thread> threads;
+        for (size_t t = 0; t < kThreads; ++t)
+          threads.emplace_back([&, t] { pass(&from[t * kWords], &to[t * kWords]); });
+        for (std::thread& t : threads) t.join();
+        rate = std::max(rate, bytes / (monotonic_s() - start));
+      }
+      return rate;
+    };
+    constexpr double kBytes = 8.0 * kThreads * kWords;
+    Bandwidth b;
+    b.read = best(kBytes, [&](const uint64_t* f, uint64_t*) {
+      uint64_t sums[8] = {};
+      for (size_t i = 0; i < kWords; i += 8)
+        for (size_t j = 0; j < 8; ++j) sums[j] ^= f[i + j];
+      benchmark::DoNotOptimize(sums);
+    });
+    b.write =
+        best(kBytes, [&](const uint64_t*, uint64_t* t) { std::memset(t, 1, kWords * 8), benchmark::ClobberMemory(); });
+    b.copy = best(2 * kBytes,
+                  [&](const uint64_t* f, uint64_t* t) { std::memcpy(t, f, kWords * 8), benchmark::ClobberMemory(); });
+    return b;
+  }();
+  return measured;
+}
+
+// Milliseconds of a frame of draw_list(1, splat_px) as GL_POINTS, read back included; 0 where there is no GL.
+double gl_points_ms(float splat_px) {
+  static std::map<float, double> known;
+  const auto [at, fresh] = known.try_emplace(splat_px, 0.0);
+  if (!fresh) return at->second;
+  auto gl = viewer::make_gl_renderer();
+  if (!gl) return 0;
   const geometry::Camera camera = display_camera();
   const image::Shading shading({}, camera);
-  const splat::DrawList list = draw_list(patches, static_cast<float>(state.range(0)));
-  const int threads = static_cast<int>(state.range(1));
-  const bool with_depth = state.range(2) != 0;
+  const splat::DrawList list = draw_list(1, splat_px);
+  std::vector<uint32_t> colour(size_t{kDisplayWidth} * kDisplayHeight);
+  const splat::FrameTarget target{kDisplayWidth, kDisplayHeight, colour.data(), nullptr};
+  (*gl)->render(list, camera, splat::Kernel::kSquare, shading, target);  // uploads
+  const double start = monotonic_s();
+  for (int i = 0; i < 3; ++i) (*gl)->render(list, camera, splat::Kernel::kSquare, shading, target);
+  return at->second = (monotonic_s() - start) / 3 * 1e3;
+}
+
+void splat_points(benchmark::State& state, splat::Kernel kernel, const splat::DrawList& list, int threads,
+                  bool with_depth) {
+  const geometry::Camera camera = display_camera();
+  const image::Shading shading({}, camera);
   splat::CpuSplatter splatter(threads);
   std::vector<uint32_t> colour(size_t{kDisplayWidth} * kDisplayHeight);
   std::vector<float> depth(with_depth ? colour.size() : 0);
   const splat::FrameTarget target{kDisplayWidth, kDisplayHeight, colour.data(), with_depth ? depth.data() : nullptr};
   splat::SplatStats stats = splatter.render(list, camera, kernel, shading, target);
   double splat_ms = 0, resolve_ms = 0;
-  const double cpu_ms = process_cpu_ms();
+  const double cpu_ms = process_cpu_ms(), start = monotonic_s();
   for (auto _ : state) {
     stats = splatter.render(list, camera, kernel, shading, target);
     splat_ms += stats.project_ms, resolve_ms += stats.resolve_ms;
   }
   const auto frames = static_cast<double>(state.iterations());
+  const double ms = (monotonic_s() - start) * 1e3 / frames, points = static_cast<double>(list.points);
   state.counters["core_ms"] = (process_cpu_ms() - cpu_ms) / frames;
   state.counters["splat_ms"] = splat_ms / frames;
   state.counters["resolve_ms"] = resolve_ms / frames;
-  state.counters["points"] = static_cast<double>(list.points);
-  state.counters["tested_again"] = static_cast<double>(stats.points_projected) / static_cast<double>(list.points) - 1;
+  state.counters["points"] = points;
+  state.counters["tested_again"] = static_cast<double>(stats.points_projected) / points - 1;
+  const double read = 12 * points, written = static_cast<double>(4 * (colour.size() + depth.size()));
+  const double floor_ms = (read / memory_bandwidth().read + written / memory_bandwidth().write) * 1e3;
+  state.counters["bytes_floor"] = read + written;
+  state.counters["floor_ms"] = floor_ms;
+  state.counters["times_floor"] = ms / floor_ms;
+  state.counters["fps"] = 1e3 / ms;
   state.SetItemsProcessed(static_cast<int64_t>(list.points) * state.iterations());
 }
-void splat_square(benchmark::State& state) { splat_points(state, splat::Kernel::kSquare, 1); }
-void splat_disc(benchmark::State& state) { splat_points(state, splat::Kernel::kDisc, 1); }
-void splat_square_64_patches(benchmark::State& state) { splat_points(state, splat::Kernel::kSquare, 64); }
+
+void splat_million(benchmark::State& state, splat::Kernel kernel, int patches) {
+  const auto px = static_cast<float>(state.range(0));
+  const double gl_ms = gl_points_ms(px);
+  splat_points(state, kernel, draw_list(patches, px), static_cast<int>(state.range(1)), state.range(2) != 0);
+  state.counters["times_gl_points"] = gl_ms * state.counters["fps"] / 1e3;
+}
+void splat_square(benchmark::State& state) { splat_million(state, splat::Kernel::kSquare, 1); }
+void splat_disc(benchmark::State& state) { splat_million(state, splat::Kernel::kDisc, 1); }
+void splat_ellipse(benchmark::State& state) { splat_million(state, splat::Kernel::kEllipse, 1); }
+void splat_ewa(benchmark::State& state) { splat_million(state, splat::Kernel::kEwa, 1); }
+void splat_square_64_patches(benchmark::State& state) { splat_million(state, splat::Kernel::kSquare, 64); }
+// How many points of one pixel a second: many in view, so that the frame's own cost does not hide the rate.
+void splat_pixels_rate(benchmark::State& state) {
+  splat_points(state, splat::Kernel::kSquare, many_points(static_cast<int>(state.range(0))), 2, false);
+}
 
 #define SPLAT_ARGS ->ArgNames({"px", "threads", "depth"})->UseRealTime()->Unit(benchmark::kMillisecond)
 BENCHMARK(splat_square)
 SPLAT_ARGS->Args({1, 1, 0})->Args({2, 1, 0})->Args({3, 1, 0})->Args({5, 1, 0})->Args({3, 2, 0})->Args({3, 2, 1});
 BENCHMARK(splat_disc) SPLAT_ARGS->Args({3, 1, 0})->Args({5, 1, 0})->Args({3, 2, 0});
+BENCHMARK(splat_ellipse) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0});
+BENCHMARK(splat_ewa) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0});
+BENCHMARK(splat_pixels_rate)->ArgName("Mpoints")->Arg(4)->Arg(8)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(splat_square_64_patches) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0});
 
 void splat_select_view(benchmark::State& state) {
@@ -164,16 +267,15 @@ BENCHMARK(splat_baseline_gl_points)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
-// Baseline: what merely clearing a frame of 64-bit keys in memory and writing its colours costs.
-void splat_baseline_memset(benchmark::State& state) {
-  std::vector<uint64_t> frame(size_t{kDisplayWidth} * kDisplayHeight * 3 / 2);
-  for (auto _ : state) {
-    std::memset(frame.data(), 0xff, frame.size() * 8);
-    benchmark::ClobberMemory();
-  }
-  state.SetBytesProcessed(static_cast<int64_t>(frame.size()) * 8 * state.iterations());
+// Baseline: bytes a second that two threads move.
+void splat_baseline_memory(benchmark::State& state) {
+  const Bandwidth& b = memory_bandwidth();
+  for (auto _ : state) benchmark::DoNotOptimize(&b);
+  state.counters["read_GB_s"] = b.read * 1e-9;
+  state.counters["write_GB_s"] = b.write * 1e-9;
+  state.counters["copy_GB_s"] = b.copy * 1e-9;
 }
-BENCHMARK(splat_baseline_memset)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(splat_baseline_memory);
 
 }  // namespace
 }  // namespace telesplat
