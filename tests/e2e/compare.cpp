@@ -143,8 +143,8 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   EXPECT_NE(lost.err().find("--scene"), std::string::npos) << lost.err();
   EXPECT_FALSE(fs::exists(run.folder() / "lost"));
   Program found("telesplat",
-                {"compare", run.out(), "--scene", run.folder() / "moved.ply", "--out", run.folder() / "found",
-                 "--poses", "1", "--kernels", "ellipse", "--renderers", "cpu", "--repeat", "1", "--finish", "off"},
+                {"compare", "--scene", run.folder() / "moved.ply", "--out", run.folder() / "found", "--poses", "1",
+                 "--repeat", "1", "--finish", "off", "--renderers", "cpu", "--kernels", "ellipse", run.out()},
                 run.folder() / "found-log");
   EXPECT_EQ(found.wait(60), 0) << found.err();
   const auto found_rows = read_csv(run.folder() / "found/compare.csv");

@@ -227,7 +227,10 @@ class Comparison {
 
 void add_compare_flags(CLI::App& app, CompareOptions& o) {
   const auto list = [&](const char* flag, auto& value, const char* help) {
-    return app.add_option(flag, value, help)->delimiter(',')->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    return app.add_option(flag, value, help)
+        ->delimiter(',')
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->allow_extra_args(false);  // what follows the list may be the path
   };
   app.add_option("path", o.path, "run folder, as telesplat run leaves it; with --still also a mesh file")->required();
   app.add_option("--scene", o.scene, "the data file, if it is no longer where the run found it");
