@@ -110,6 +110,8 @@ void ReplicaWorker::connect_if_changed() {
   if (link_.version() == seen_version_) return;
   seen_version_ = link_.version();
   const auto& session = *link_.session();
+  const auto keep = session.settings.find("packing.keep_redundant");
+  keeps_redundant_ = keep != session.settings.end() && keep->second != 0;
   offset_s_ = link_.to_master_s(0);
   const auto endpoint = [&](const char* key) {
     const auto it = session.endpoints.find(key);

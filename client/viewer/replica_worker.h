@@ -59,6 +59,8 @@ class ReplicaWorker {
     double latency_ms = 0;  ///< of the newest update; 0 before the first
   };
   Figures figures() const;
+  /// The session packs without eliminating redundancy: of each cluster the best patches are to be drawn (T4.4.3.3).
+  bool keeps_redundant() const { return keeps_redundant_; }
 
  private:
   void loop();
@@ -96,7 +98,7 @@ class ReplicaWorker {
   double extent_m_ = 0, latency_ms_ = 0;
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0};
-  std::atomic<bool> shutdown_{false}, stop_{false};
+  std::atomic<bool> shutdown_{false}, stop_{false}, keeps_redundant_{false};
   std::atomic<double> offset_s_{0}, first_points_s_{0};
   std::thread thread_;
 };

@@ -28,6 +28,13 @@ std::string finish_name(const splat::Finish& f) {
   return out.empty() ? "none" : out;
 }
 
+void add_switch(CLI::App& app, const char* flag, bool& value, const char* text) {
+  app.add_option_function<std::string>(
+         flag, [&value](const std::string& v) { value = v == "on"; }, text)
+      ->default_str(value ? "on" : "off")
+      ->check(CLI::IsMember({"on", "off"}));
+}
+
 int refuse(const Error& error) {
   std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
   return 2;
@@ -97,6 +104,9 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--target-fps", d.target_fps, "display rate aimed at; 0: as fast as possible")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1000.0));
+  add_switch(app, "--detail-budget", d.detail_budget,
+             "on: lower detail where a view takes longer to construct than --target-fps leaves time for");
+  add_switch(app, "--speed-detail", d.speed_detail, "on: lower detail while the head moves fast");
   app.add_option("--renderer", o.renderer, "auto, cpu or gl")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "cpu", "gl"}));

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "common/splat/level_choice.h"
+#include "common/splat/patch_choice.h"
 
 namespace telesplat::splat {
 namespace {
@@ -108,7 +109,11 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
   out.scale = options.scale;
   const geometry::Frustum frustum(camera);
   const glm::vec3 eye(camera.pose.position_room);
+  const PatchView patches = patch_view(camera);
+  PatchChooser chooser;
+  std::vector<const points::Mosaic*> visible;
   std::vector<Chosen> chosen;
+  double distance_sum = 0;
   for (const auto& [key, cluster] : model.clusters()) {
     const geometry::Box& leaf = cluster->leaf_room;
     if (!frustum.may_contain(leaf)) continue;
@@ -117,9 +122,13 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     const float range = points::pixel_range(camera, glm::dvec3(leaf.centre()), static_cast<double>(leaf_m));
     const float radius_m_of_px = 0.5f * leaf_m / range;
     const LeafView view = leaf_view(leaf, eye);
+    visible.clear();
+    for (const points::Mosaic& m : cluster->mosaics)
+      if (!(options.cone_culling && cone_faces_away(m, view))) visible.push_back(&m);
+    if (options.best_patch_only) chooser.choose(leaf, patches, visible);
     chosen.clear();
-    for (const points::Mosaic& m : cluster->mosaics) {
-      if (options.cone_culling && cone_faces_away(m, view)) continue;
+    for (const points::Mosaic* mosaic : visible) {
+      const points::Mosaic& m = *mosaic;
       const float ratio = range / m.pixel_range(), wanted = options.detail * std::min(ratio, 1.0f);
       const Drawn drawn = options.transitions ? between_levels(m, wanted, dither_of(key, m)) : closest_level(m, wanted);
       chosen.push_back({&m, drawn, options.scale * ratio * drawn.spacing,
@@ -138,8 +147,10 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
       add(c.drawn.fine + 1, 0, c.drawn.mean);
       add(c.drawn.fine, c.drawn.mean, c.drawn.count);
       out.points += c.drawn.count;
+      distance_sum += static_cast<double>(c.drawn.count) * view.distance;
     }
   }
+  out.distance_m = out.points > 0 ? distance_sum / static_cast<double>(out.points) : 0.0;
 }
 
 }  // namespace telesplat::splat

@@ -17,6 +17,8 @@ struct SelectionOptions {
       1.0f;  ///< in (0, 1]: points drawn a sample or display pixel, whichever is larger, on each axis (T4.4.3.1)
   bool transitions = true;  ///< between neighbouring levels as many points as wanted; false: the closest level whole
   bool cone_culling = true;
+  bool best_patch_only =
+      false;  ///< packing kept redundant patches: of each cluster draw the best ones (patch_choice.h)
 };
 
 /// Consecutive points of one mosaic level to draw. Pointers live as long as the model is not changed (or the viewer's frame lasts).
@@ -46,8 +48,9 @@ struct DrawList {
   std::vector<points::ClusterKey> clusters_seen;  ///< clusters that passed culling: for access reports
   uint64_t points = 0;
   float scale =
-      1.0f;          ///< SelectionOptions::scale: splat_px / scale is how far apart an item's samples lie on the screen
-  Sequence applied;  ///< the newest event of the model they were selected from
+      1.0f;  ///< SelectionOptions::scale: splat_px / scale is how far apart an item's samples lie on the screen
+  double distance_m = 0;  ///< mean distance of the points drawn, by their leaves; 0 if there are none
+  Sequence applied;       ///< the newest event of the model they were selected from
 };
 
 /// Culls clusters by frustum, mosaics by normal cone; chooses how many of each mosaic's points are drawn (level_choice.h): the

@@ -56,13 +56,18 @@ void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
   for (const auto& [name, text, value] :
        {std::tuple{"packing.max_points", "points the model holds at most", 20e6},
         {"packing.obsolete_after_s", "forget clusters not seen for so long; 0: never", 0.0},
-        {"packing.epsilon", "redundancy threshold, relative to depth", 0.004},
-        {"packing.keep_redundant", "1: no redundancy elimination", 0.0}}) {
+        {"packing.epsilon", "redundancy threshold, relative to depth", 0.004}}) {
     o.master.settings[name] = value;
     app.add_option(std::string("--") + name, o.master.settings[name], text)
         ->capture_default_str()
         ->check(CLI::Range(0.0, 1e12));
   }
+  double& keep = o.master.settings["packing.keep_redundant"];
+  keep = 0;
+  app.add_option("--packing.redundancy,--packing.keep_redundant", keep,
+                 "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches")
+      ->default_str("eliminate")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, double>{{"eliminate", 0.0}, {"keep", 1.0}}));
 }
 
 int run(const MasterServiceOptions& o) {

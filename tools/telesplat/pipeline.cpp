@@ -67,6 +67,8 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--fov",           text(d.fov_deg),
                              "--near",          text(d.near_m),
                              "--target-fps",    text(d.target_fps),
+                             "--detail-budget", d.detail_budget ? "on" : "off",
+                             "--speed-detail",  d.speed_detail ? "on" : "off",
                              "--renderer",      v.renderer,
                              "--splat",         v.splat,
                              "--splat-scale",   text(v.splat_scale),

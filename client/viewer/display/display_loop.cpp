@@ -6,11 +6,12 @@
 #include <thread>
 
 #include "common/core/clock.h"
+#include "common/splat/frame_budget.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kPicturePeriod_s = 2.5;
+constexpr double kPicturePeriod_s = 2.5, kBudgetShare = 0.85;
 
 bool told_to_stop(const ReplicaWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
@@ -70,7 +71,9 @@ const std::vector<std::string>& frame_columns() {
                                                 "qx",
                                                 "qy",
                                                 "qz",
-                                                "present_ms"};
+                                                "present_ms",
+                                                "detail",
+                                                "budget_ms"};
   return columns;
 }
 
@@ -108,6 +111,9 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
   }
   worker.on_first_points(monotonic_s());
 
+  // What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
+  splat::FrameBudget budget(o.detail_budget && o.target_fps > 0 ? kBudgetShare * 1e3 / o.target_fps : 0);
+  splat::SpeedDetail speed;
   DisplayResult result;
   const double start_s = monotonic_s();
   double previous_s = 0, next_picture_s = 0;
@@ -123,6 +129,9 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
     // The view of now, from what is cached now.
     const geometry::Camera camera = begin_frame(begin_s, t_s);
     const image::Shading shading(o.shading, camera);
+    if (o.speed_detail) speed.frame(begin_s, camera, list.distance_m > 0 ? list.distance_m : 1);
+    o.selection.detail = float(std::min(budget.detail(), speed.detail()));
+    o.selection.best_patch_only = worker.keeps_redundant();
     cache.select(camera, o.selection, list);
     const double selected_s = monotonic_s();
     uint32_t use = 0;
@@ -138,6 +147,7 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
                         {camera.width, camera.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
     cache.end_frame();
     const double end_s = monotonic_s();
+    budget.frame_done((end_s - begin_s) * 1e3, double(list.points), o.selection.detail);
     worker.on_frame(end_s, camera, list.clusters_seen);
     surface.present(view);
     const double presented_s = monotonic_s();
@@ -172,7 +182,9 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
                 q.x,
                 q.y,
                 q.z,
-                (presented_s - end_s) * 1e3});
+                (presented_s - end_s) * 1e3,
+                o.selection.detail,
+                budget.budget_ms()});
     spans.add("display frame", worker.to_master_s(begin_s), worker.to_master_s(end_s), 0);
     previous_s = end_s;
     if (use) {

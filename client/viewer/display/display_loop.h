@@ -13,10 +13,12 @@ namespace telesplat::viewer {
 struct DisplayOptions {
   int width = 1280, height = 800;  ///< of a window: at first
   double fov_deg = 90, near_m = 0.02;
-  double target_fps = 60;  ///< frames are paced to this; 0: as fast as possible
-  double duration_s = 10;  ///< seconds from the first displayed frame; 0: until told to stop
-  uint64_t frames = 0;     ///< frames to display; 0: no limit
-  double hold_s = 0;       ///< the head stands still for the last so many seconds of duration_s
+  double target_fps = 60;     ///< frames are paced to this; 0: as fast as possible
+  bool detail_budget = true;  ///< lower detail where a view takes longer to construct than target_fps leaves time for
+  bool speed_detail = false;  ///< lower detail while the head moves fast (T4.4.3.1)
+  double duration_s = 10;     ///< seconds from the first displayed frame; 0: until told to stop
+  uint64_t frames = 0;        ///< frames to display; 0: no limit
+  double hold_s = 0;          ///< the head stands still for the last so many seconds of duration_s
   splat::RenderOptions render;
   splat::SelectionOptions selection;
   float splat_scale = 0;  ///< selection.scale; 0: what suits the kernel

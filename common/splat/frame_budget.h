@@ -1,0 +1,53 @@
+// How much detail fits the frame time, and how much a moving head is worth (T4.4.3.1): what SelectionOptions::detail is to be. Times
+// and poses go in, detail comes out; no clocks inside, so that any machine can be simulated.
+#pragma once
+
+#include "common/geometry/camera.h"
+
+namespace telesplat::splat {
+
+inline constexpr double kLeastDetail = 0.3;
+
+/// A controller that keeps the time for constructing a view (selecting, splatting, finishing) within a budget. Between 82 and 100 %
+/// of it nothing changes, so that noise is not seen as a pulsing picture; above, detail falls; below, it rises to 1 again.
+class FrameBudget {
+ public:
+  /// budget_ms <= 0: no limit, detail stays 1.
+  explicit FrameBudget(double budget_ms) : budget_ms_(budget_ms) {}
+
+  /// After each frame: how long it took to construct, how many points were drawn in it, and with what detail: if with less than
+  /// this controller allowed, that it was fast is no reason to allow more. Figures that are not finite, and frames without
+  /// points, tell nothing.
+  void frame_done(double construction_ms, double points, double detail_drawn);
+
+  /// For the next frame, in [kLeastDetail, 1]. Changes by at most 2 % a frame, 6 % while frames take more than twice the budget.
+  double detail() const { return detail_; }
+  double budget_ms() const { return budget_ms_; }
+
+ private:
+  double budget_ms_;
+  double detail_ = 1;
+  double last_[2] = {0, 0};  // loads of the frames before: construction time over budget
+  double load_ = 0;          // smoothed
+};
+
+/// The thesis divides the desired pixel range by the head's velocity. Here: by how fast typical content moves on the screen, over
+/// kFreePixels each 60th of a second; slower movements cost nothing. Detail follows within about 0.3 s.
+class SpeedDetail {
+ public:
+  static constexpr double kFreePixels = 12;
+
+  /// Before each frame. depth_m: how far away typical content is. The first frame, and times that do not advance, are no movement.
+  void frame(double now_s, const geometry::Camera& camera, double depth_m);
+  double detail() const { return detail_; }
+
+ private:
+  bool has_last_ = false;
+  double last_s_ = 0, detail_ = 1;
+  geometry::Pose last_;
+};
+
+/// How far content `depth_m` away moves on the screen between two poses, pixels: at most, over all directions of looking.
+double screen_movement(const geometry::Pose& from, const geometry::Pose& to, double depth_m, double focal_px);
+
+}  // namespace telesplat::splat

@@ -1,0 +1,49 @@
+// Which patches of a cluster are drawn where packing kept redundant ones (T4.4.3.3).
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <vector>
+
+#include "common/points/point_model.h"
+
+namespace telesplat::splat {
+
+/// What of a camera the choice needs, made once a frame.
+struct PatchView {
+  glm::mat4 view;  ///< room -> X right, Y up, Z backward
+  float focal_x, focal_y, near_m;
+};
+PatchView patch_view(const geometry::Camera& camera);
+
+/// Quality of a mosaic's samples as seen by a camera: q = (r1 / r0) (1 / r0), T eq. 4.1, where r0 >= r1 are the radii in pixels of
+/// the output contour (T4.4.1) of a surfel at the mosaic's centroid with its cone's axis as normal and its samples' spacing, low-pass
+/// included: the footprint on its tangent plane is a circle of half the spacing, stretched along the slope by which the sampling
+/// view saw it; its projection's conic is taken in its dual form, and a pixel's own variance is added, so that samples much finer
+/// than a pixel do not count as better. In (0, 2]; 0 where the surfel is behind the camera.
+float surfel_quality(const points::Mosaic& mosaic, const geometry::Box& leaf_room, const PatchView& view);
+
+/// Area of surface that the mosaic's samples cover, in faces of its leaf: count * (spacing / leaf size)^2 / cosine of the slope by
+/// which they were taken.
+float surface_covered(const points::Mosaic& mosaic);
+
+/// Chooses among the patches of one cluster; a patch is all mosaics with one frame tag. In order of falling quality each is drawn
+/// unless one that is drawn already shows what it shows: covers at least nearly as much (1 / 1.1), around a centre so near that the
+/// smaller one's extent lies inside the larger one's, but for a tenth of it. The best patch is always drawn; where it is partial,
+/// others fill what it leaves open.
+class PatchChooser {
+ public:
+  /// Removes from `mosaics` those of patches that are not drawn. Order is kept.
+  void choose(const geometry::Box& leaf_room, const PatchView& view, std::vector<const points::Mosaic*>& mosaics);
+
+ private:
+  struct Patch {
+    uint32_t frame;
+    float quality = 0, covered = 0, points = 0;
+    glm::vec3 centre{0};  // sum of positions while gathering, then mean, in the leaf
+    bool drawn = false;
+  };
+  std::vector<Patch> patches_;  // kept for their memory
+  std::vector<uint32_t> patch_of_, by_quality_;
+};
+
+}  // namespace telesplat::splat

@@ -1,0 +1,184 @@
+// Redundant patches: which of a cluster's are drawn (T4.4.3.3).
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "common/geometry/trajectory.h"
+#include "common/splat/patch_choice.h"
+#include "common/splat/view_selection.h"
+
+namespace telesplat {
+namespace {
+
+constexpr int kSide = 256;
+constexpr double kFov_deg = 60;
+
+geometry::Camera camera_from(const glm::dvec3& eye) {
+  return geometry::make_camera(geometry::look_at(eye, {0, 0, 0}), kFov_deg, kSide, kSide);
+}
+
+// One cluster around the origin, a square of 0.5 m in z = 0 in it, sampled from several eyes.
+class Square {
+ public:
+  explicit Square(int depth = 0) : model_({{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}, depth}) {}
+
+  /// Samples the part of the square with x in [x0, x1); in `tiles` tiles side by side, of one frame.
+  void add(const glm::dvec3& eye, double x0 = -0.25, double x1 = 0.25, int tiles = 1) {
+    const geometry::Camera camera = camera_from(eye);
+    const glm::dvec3 backward = camera.pose.orientation * glm::dvec3(0, 0, 1);
+    ++frame_;
+    for (int tile = 0; tile < tiles; ++tile) {
+      const int width = kSide / tiles;
+      image::DepthImage image(width, kSide);
+      for (int y = 0; y < kSide; ++y)
+        for (int x = 0; x < width; ++x) {
+          const glm::dvec3 ray = camera.unproject(tile * width + x + 0.5, y + 0.5, 1.0) - eye;
+          const glm::dvec3 hit = eye - ray * (eye.z / ray.z);
+          if (hit.x < x0 || hit.x >= x1 || std::abs(hit.y) > 0.25) continue;
+          const size_t i = size_t(y) * width + x;
+          image.depth[i] = image::encode_depth(glm::dot(eye - hit, backward), camera.near_m);
+          image.normal[i] = image::encode_normal16({0, 0, 1});
+        }
+      model_.insert(points::prepare_patch(model_.config(), Sequence{++sequence_}, camera,
+                                          {tile * width, 0, width, kSide}, image, FrameId{frame_}));
+    }
+  }
+  const points::PointModel& model() const { return model_; }
+  const points::Cluster& cluster() const { return *model_.clusters().begin()->second; }
+
+  /// Frames of which something is drawn.
+  std::set<uint32_t> drawn(const glm::dvec3& eye) const {
+    splat::SelectionOptions options;
+    options.best_patch_only = true;
+    splat::DrawList list;
+    splat::select_view(model_, camera_from(eye), options, list);
+    std::set<uint32_t> frames;
+    for (const auto& item : list.items)
+      for (const auto& m : item.cluster->mosaics)
+        if (m.sequence() == item.sequence) frames.insert(m.frame_tag());
+    return frames;
+  }
+
+ private:
+  points::PointModel model_;
+  uint64_t sequence_ = 0, frame_ = 0;
+};
+
+using Frames = std::set<uint32_t>;
+
+TEST(SurfelQuality, IsThatOfTheContoursRadii) {
+  const double focal = camera_from({0, 0, 1}).focal_x();
+  for (const double sampled : {0.8, 1.6, 3.0})
+    for (const double displayed : {0.7, 1.5}) {
+      Square square;
+      square.add({0, 0, sampled});
+      const auto& m = square.cluster().mosaics.at(0);
+      const double q =
+          splat::surfel_quality(m, square.cluster().leaf_room, splat::patch_view(camera_from({0, 0, displayed})));
+      const double radius_px = 0.5 * sampled / focal * focal / displayed, r = std::sqrt(radius_px * radius_px + 0.25);
+      EXPECT_NEAR(q, 1 / r, 0.01 / r) << sampled << " " << displayed;
+    }
+  // Sampled at 45 degrees: stretched by sqrt 2 in one direction; seen from there again it is round.
+  Square square;
+  square.add({std::sqrt(0.5), 0, std::sqrt(0.5)});
+  const auto& m = square.cluster().mosaics.at(0);
+  const auto quality = [&](const glm::dvec3& eye) {
+    return splat::surfel_quality(m, square.cluster().leaf_room, splat::patch_view(camera_from(eye)));
+  };
+  const double r1 = std::sqrt(0.25 + 0.25), r0 = std::sqrt(0.5 + 0.25);
+  EXPECT_NEAR(quality({0, 0, 1}), r1 / r0 / r0, 0.03);
+  EXPECT_NEAR(quality({std::sqrt(0.5), 0, std::sqrt(0.5)}), 1 / r1, 0.1)
+      << "nearer samples being denser, the centroid is nearer too";
+  EXPECT_EQ(splat::surfel_quality(
+                m, square.cluster().leaf_room,
+                splat::patch_view(geometry::make_camera(geometry::look_at({0, 0, 1}, {0, 0, 2}), 60, 64, 64))),
+            0.0f)
+      << "behind the camera";
+}
+
+TEST(SurfelQuality, CoverageIsTheArea) {
+  for (const glm::dvec3& eye : {glm::dvec3(0, 0, 1), {0, 0, 2}, {0.7, 0, 0.7}, {0, 1, 1}}) {
+    Square square;
+    square.add(eye);
+    EXPECT_NEAR(splat::surface_covered(square.cluster().mosaics.at(0)), 0.25 / (0.8008 * 0.8008), 0.04);
+  }
+}
+
+TEST(PatchChoice, TheBestIsDrawnAlone) {
+  Square square;
+  square.add({0, 0, 2});
+  square.add({0, 0, 0.8});
+  square.add({1.9, 0, 0.75});
+  square.add({0, 0, 1.2});
+  EXPECT_EQ(square.drawn({0, 0, 0.7}), Frames{2}) << "the finest that is round";
+  splat::DrawList all;
+  splat::select_view(square.model(), camera_from({0, 0, 0.7}), {}, all);
+  EXPECT_GE(all.items.size(), 4u) << "without the option, all";
+}
+
+TEST(PatchChoice, WhatTheBestDoesNotShowIsShownByOthers) {
+  Square square;
+  square.add({0, 0, 1.6});
+  square.add({0, 0, 0.8}, -0.25, 0.0);  // better, but half of it
+  EXPECT_EQ(square.drawn({0, 0, 0.7}), (Frames{1, 2}));
+  square.add({0, 0, 0.85}, 0.0, 0.25);  // as large as the other half
+  EXPECT_TRUE(square.drawn({0, 0, 0.7}).contains(2));
+  EXPECT_TRUE(square.drawn({0, 0, 0.7}).contains(3));
+  square.add({0, 0, 0.75});
+  EXPECT_EQ(square.drawn({0, 0, 0.7}), Frames{4});
+}
+
+TEST(PatchChoice, TilesOfOneFrameAreOnePatch) {
+  Square square;
+  square.add({0, 0, 1.6});
+  square.add({0, 0, 0.8}, -0.25, 0.25, 4);
+  splat::SelectionOptions options;
+  options.best_patch_only = true;
+  splat::DrawList list;
+  splat::select_view(square.model(), camera_from({0, 0, 0.7}), options, list);
+  std::set<uint64_t> sequences;
+  for (const auto& item : list.items) sequences.insert(item.sequence.value);
+  EXPECT_EQ(sequences, (std::set<uint64_t>{2, 3, 4, 5})) << "all four tiles of the better frame, nothing else";
+}
+
+TEST(PatchChoice, EveryClusterShowsSomething) {
+  Square square(4);
+  for (int i = 0; i < 12; ++i)
+    square.add({std::sin(i * 0.4) * 0.9, 0.3 * std::cos(i * 1.1), 0.5 + 0.1 * i}, -0.25 + 0.02 * i, 0.25 - 0.01 * i);
+  splat::SelectionOptions options;
+  splat::DrawList all, best;
+  splat::select_view(square.model(), camera_from({0.1, 0.1, 0.7}), options, all);
+  options.best_patch_only = true;
+  splat::select_view(square.model(), camera_from({0.1, 0.1, 0.7}), options, best);
+  const auto clusters = [](const splat::DrawList& list) {
+    std::set<points::ClusterKey> keys;
+    for (const auto& item : list.items) keys.insert(item.cluster->key);
+    return keys;
+  };
+  EXPECT_EQ(clusters(best), clusters(all));
+  EXPECT_LT(best.points * 2, all.points) << "of a dozen patches, many of them partial";
+}
+
+TEST(MosaicFrame, IsKeptModulo2To24AndDigested) {
+  const geometry::Camera camera = camera_from({0, 0, 1});
+  image::DepthImage image(8, 8);
+  for (auto& d : image.depth) d = image::encode_depth(1.0, camera.near_m);
+  const points::ModelConfig config{{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}, 0};
+  const auto digest = [&](uint64_t sequence, uint64_t frame) {
+    points::PointModel model(config);
+    model.insert(points::prepare_patch(config, {sequence}, camera, {124, 124, 8, 8}, image, {frame}));
+    const auto& m = model.clusters().begin()->second->mosaics.at(0);
+    EXPECT_EQ(m.sequence().value, sequence % (1ull << 40));
+    EXPECT_EQ(m.frame_tag(), frame % (1u << 24));
+    return model.digest();
+  };
+  EXPECT_EQ(digest(7, 9), digest(7, 9));
+  EXPECT_NE(digest(7, 9), digest(7, 10));
+  EXPECT_NE(digest(7, 9), digest(8, 9));
+  digest((1ull << 40) - 1, (1u << 24) - 1);
+  digest((1ull << 40) + 5, (1ull << 24) + 3);
+}
+
+}  // namespace
+}  // namespace telesplat
