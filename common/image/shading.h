@@ -31,6 +31,7 @@ class Shading {
   /// 0x00RRGGBB of albedo lit by intensity i/255: each channel (c * i + 127) / 255.
   static uint32_t apply(uint32_t albedo, uint32_t i);
   uint32_t background() const { return parameters_.background; }
+  const ShadingParameters& parameters() const { return parameters_; }
 
  private:
   ShadingParameters parameters_;
