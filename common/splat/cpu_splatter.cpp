@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -14,6 +15,7 @@
 #include "common/core/clock.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/splat_kernels.h"
+#include "common/splat/surfel_kernels.h"
 
 namespace telesplat::splat {
 namespace {
@@ -22,25 +24,31 @@ namespace {
 // more clusters that straddle tiles). 512 KiB of keys.
 constexpr int kTileWidth = 256, kTileHeight = 256;
 
+// ewa keeps 36 bytes more a pixel.
+constexpr int kEwaTileWidth = 96, kEwaTileHeight = 64;
+
 constexpr int kMargin = kMaxSplatSide;
+
+// Keys of a tile of full size, its reach, and the margin that splats hang over into.
+struct Layout {
+  int width = 0, height = 0;  // of a tile; 0: none yet
+  int reach = 0;
+
+  int stride() const { return width + 2 * (reach + kMargin); }
+  size_t size() const { return static_cast<size_t>(stride()) * (height + 2 * (reach + kMargin)); }
+  bool operator==(const Layout&) const = default;
+  TilePixels pixels(uint64_t* keys, const geometry::Rect& rect) const {
+    return {keys + static_cast<size_t>(reach + kMargin) * (stride() + 1), stride(), rect.width, rect.height, reach};
+  }
+};
 
 // What one thread needs, kept from frame to frame.
 struct Workspace {
   hwy::AlignedFreeUniquePtr<uint64_t[]> keys;
-  int reach = -1;  // that `keys` was made for
+  Layout layout;  // that `keys` was made for
+  EwaBuffer ewa;
   std::vector<uint64_t> scratch;
   SplatStats stats;
-};
-
-// Keys of a tile of full size, its reach, and the margin that splats hang over into.
-struct Layout {
-  int reach = 0;
-
-  int stride() const { return kTileWidth + 2 * (reach + kMargin); }
-  size_t size() const { return static_cast<size_t>(stride()) * (kTileHeight + 2 * (reach + kMargin)); }
-  TilePixels pixels(uint64_t* keys, const geometry::Rect& rect) const {
-    return {keys + static_cast<size_t>(reach + kMargin) * (stride() + 1), stride(), rect.width, rect.height, reach};
-  }
 };
 
 geometry::Rect grown(const geometry::Rect& r, int by) {
@@ -76,6 +84,8 @@ struct CpuSplatter::Impl {
   void prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                const image::Shading& shading);
   void prepare_styles(const DrawList& list, Kernel kernel);
+  void prepare_surfels(const DrawList& list, const geometry::Camera& camera, const image::Shading& shading);
+  TileCounts splat(const TileInput& input, const TilePixels& pixels, Workspace& workspace);
   void draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace);
   void finish_tile(const TilePixels& pixels, Workspace& workspace);
 
@@ -84,6 +94,10 @@ struct CpuSplatter::Impl {
   std::span<const FinishStage> all_stages;
 
   // Of the frame.
+  Kernel kernel = Kernel::kSquare;
+  SurfelInput surfels;
+  std::vector<SurfelSource> sources;
+  EwaLight light;
   std::vector<const FinishStage*> stages;  // that are on
   Layout layout;
   FinishFrame frame;
@@ -98,9 +112,11 @@ struct CpuSplatter::Impl {
 
 void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                                 const image::Shading& shading) {
-  grid = {camera.width, camera.height, kTileWidth, kTileHeight};
+  kernel = options.kernel;
+  const bool ewa = kernel == Kernel::kEwa;
+  layout = {ewa ? kEwaTileWidth : kTileWidth, ewa ? kEwaTileHeight : kTileHeight, 0};
+  grid = {camera.width, camera.height, layout.width, layout.height};
   stages.clear();
-  layout.reach = 0;
   for (const FinishStage& stage : all_stages)
     if (options.finish.*stage.on) {
       stages.push_back(&stage);
@@ -110,25 +126,59 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
   const auto near_m = static_cast<float>(camera.near_m);
   frame = {near_m, static_cast<float>(camera.focal_x()), shading.background()};
   resolve = {intensity.data(), shading.background(), near_m, {}};
-  table.set_focal(camera.focal_x());
-  prepare_styles(list, options.kernel);
+  if (kernel == Kernel::kEllipse || ewa) {
+    prepare_surfels(list, camera, shading);
+  } else {
+    table.set_focal(camera.focal_x());
+    prepare_styles(list, kernel);
+  }
   runs.build(list.items, camera);
   binning.build(grid, runs.transforms, near_m, static_cast<float>(layout.reach + kMargin));
 }
 
 void CpuSplatter::Impl::prepare_styles(const DrawList& list, Kernel kernel) {
-  const Kernel shaped = kernel == Kernel::kSquare ? Kernel::kSquare : Kernel::kDisc;
   styles.resize(list.items.size());
   std::array<uint64_t, 4> bias{}, points{};
   for (size_t i = 0; i < list.items.size(); ++i) {
     const DrawItem& item = list.items[i];
     const ItemStyle& style =
-        styles[i] = {&table.shape(shaped, item.splat_px), spacing_class(item.splat_px / list.scale)};
+        styles[i] = {&table.shape(kernel, item.splat_px), spacing_class(item.splat_px / list.scale)};
     bias[style.spacing] += uint64_t{style.shape->rim_bias} * item.level.count;
     points[style.spacing] += item.level.count;
   }
   for (size_t i = 0; i < 4; ++i)
     if (points[i] > 0) resolve.rim[i] = static_cast<uint32_t>((bias[i] + points[i] / 2) / points[i]);
+}
+
+// Ellipses differ in bias from point to point: the item's, at its leaf's centre, stands for them. ewa has none.
+void CpuSplatter::Impl::prepare_surfels(const DrawList& list, const geometry::Camera& camera,
+                                        const image::Shading& shading) {
+  surfels.camera = surfel_camera(camera);
+  surfels.limits = spacing_limits(list.scale);
+  light = ewa_light(shading.parameters(), surfels.camera);
+  sources.resize(list.items.size());
+  const glm::dvec4 w = camera.room_to_pixel().w;
+  std::array<double, 4> bias{}, points{};
+  for (size_t i = 0; i < list.items.size(); ++i) {
+    const DrawItem& item = list.items[i];
+    sources[i] = surfel_source(surfels.camera, item.radius_m, item.to_eye);
+    const auto depth_m = static_cast<float>(glm::dot(w, glm::dvec4(item.cluster->leaf_room.centre(), 1)));
+    if (!(depth_m >= frame.near_m)) continue;
+    const uint32_t spacing = spacing_class(item.splat_px / list.scale);
+    bias[spacing] += double{ellipse_bias(item.radius_m, depth_m)} * item.level.count;
+    points[spacing] += item.level.count;
+  }
+  surfels.sources = sources.data();
+  if (kernel == Kernel::kEwa) return;
+  for (size_t i = 0; i < 4; ++i)
+    if (points[i] > 0) resolve.rim[i] = static_cast<uint32_t>(std::lround(bias[i] / points[i]));
+}
+
+TileCounts CpuSplatter::Impl::splat(const TileInput& input, const TilePixels& pixels, Workspace& workspace) {
+  const KeyBuffer keys{workspace.keys.get(), pixels.stride, kMargin};
+  if (kernel == Kernel::kEllipse) return ellipse_tile(input, surfels, keys);
+  if (kernel == Kernel::kEwa) return ewa_tile(input, surfels, light, workspace.ewa, pixels);
+  return splat_tile(input, styles.data(), keys);
 }
 
 void CpuSplatter::Impl::finish_tile(const TilePixels& pixels, Workspace& workspace) {
@@ -160,23 +210,24 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTa
   const TileInput input{
       grown(rect, layout.reach), rect, frame.near_m, entries, runs.runs.data(), runs.transforms.data(),
       list.items.data()};
-  const TileCounts counts = splat_tile(input, styles.data(), {workspace.keys.get(), pixels.stride, kMargin});
+  const TileCounts counts = splat(input, pixels, workspace);
   stats.points_projected += counts.projected;
   stats.points_drawn += counts.drawn;
   const double splatted = monotonic_s();
   stats.project_ms += (splatted - start) * 1e3;
 
   double finished = splatted;
-  if (stages.empty()) {
+  const bool resolved = kernel == Kernel::kEwa;
+  if (stages.empty() && !resolved) {
     resolve_and_write_tile(pixels, resolve, out);
   } else {
-    resolve_tile(pixels, resolve);
+    if (!resolved) resolve_tile(pixels, resolve);
     stats.resolve_ms += (monotonic_s() - splatted) * 1e3;
     finish_tile(pixels, workspace);
     finished = monotonic_s();
     write_tile(pixels, resolve, out);
   }
-  if (rect.width < kTileWidth || rect.height < kTileHeight) empty_beyond(pixels);
+  if (rect.width < layout.width || rect.height < layout.height) empty_beyond(pixels);
   stats.resolve_ms += (monotonic_s() - finished) * 1e3;
 }
 
@@ -191,10 +242,10 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
   m.prepare(list, camera, options, shading);
   for (Workspace& w : m.workspaces) {
     // Emptied whole where the layout changes; else every tile leaves its pixels empty.
-    if (w.reach != m.layout.reach) {
+    if (w.layout != m.layout) {
       w.keys = hwy::AllocateAligned<uint64_t>(m.layout.size());
       std::fill_n(w.keys.get(), m.layout.size(), static_cast<uint64_t>(kEmptyKey));
-      w.reach = m.layout.reach;
+      w.layout = m.layout;
     }
     w.stats = {};
   }

@@ -5,17 +5,14 @@
 #include <bit>
 
 #include "common/splat/pixel_key.h"
+#include "common/splat/splat_table.h"
 #include "common/splat/surfel_contour.h"
 
 namespace telesplat::splat {
 
-/// Splats are cut to this many pixels around their centre on each axis.
-inline constexpr int kMaxSurfelSide = 16;
 /// Low-pass of an opaque ellipse, squared pixels: S' = S + this. At equal sampling and display resolution the contour then still ends
 /// before the next sample; where samples crowd, each still reaches about a third of a pixel.
 inline constexpr float kOpaqueVariance = 0.1f;
-/// Splats overlap: their radius is this times the samples' distance (viewers draw ellipses at 1.5 times the size of T eq. 4.8).
-inline constexpr float kRadiusPerSpacing = 0.75f;
 /// Bias on the contour, as a multiple of radius over depth, and its bounds, as shares of depth.
 inline constexpr float kBiasPerRadius = 1.5f, kLeastBias = 1.0f / 2048, kMostBias = 0.005f;
 
@@ -41,8 +38,9 @@ inline float codes_per_depth(float w) {
 struct SurfelConic {
   float centre_x = 0, centre_y = 0;
   float xx = 0, xy = 0, yy = 0;
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< pixels whose centres lie in its box, [x0, x1) x [y0, y1), cut to kMaxSurfelSide
-  float determinant = 0;               ///< of S
+  int x0 = 0, y0 = 0, x1 = 0,
+      y1 = 0;             ///< pixels whose centres lie in its box, [x0, x1) x [y0, y1), cut to kMaxSplatSide
+  float determinant = 0;  ///< of S
 
   float at(float dx, float dy) const { return dx * (xx * dx + xy * dy) + (yy * dy) * dy; }
 };
@@ -50,12 +48,15 @@ struct SurfelConic {
 /// The conic of grow S + add I.
 inline SurfelConic surfel_conic(const SurfelContour& c, float x_pix, float y_pix, float grow, float add) {
   SurfelConic out;
-  out.centre_x = x_pix + c.offset_x, out.centre_y = y_pix + c.offset_y;
+  constexpr int kHalf = kMaxSplatSide / 2;
+  // No farther than binning allows for.
+  constexpr float kFarthest = kHalf - 1;
+  out.centre_x = x_pix + std::clamp(c.offset_x, -kFarthest, kFarthest);
+  out.centre_y = y_pix + std::clamp(c.offset_y, -kFarthest, kFarthest);
   const float xx = grow * c.xx + add, xy = grow * c.xy, yy = grow * c.yy + add;
   out.determinant = xx * yy - xy * xy;
   const float inverse = 1.0f / out.determinant;
   out.xx = yy * inverse, out.xy = (xy * -2.0f) * inverse, out.yy = xx * inverse;
-  constexpr int kHalf = kMaxSurfelSide / 2;
   const auto bounds = [](float centre, float reach, int& first, int& last) {
     const int pixel = static_cast<int>(std::floor(centre));
     const float from = centre - 0.5f;
@@ -82,18 +83,31 @@ inline float surfel_share(float radius_m, float w, float factor, float least, fl
   return codes_per_depth(w) * std::clamp(factor * std::min(radius_m / w, kMaxRadiusOverDepth), least, most);
 }
 
+/// The bias of an ellipse on its contour, in depth codes.
+inline float ellipse_bias(float radius_m, float w) {
+  return std::min(surfel_share(radius_m, w, kBiasPerRadius, kLeastBias, kMostBias), static_cast<float>(kMaxBias));
+}
+
 /// Factor of S in ewa's support, from det S = radius^4.
 inline float ewa_growth(float determinant_of_s) {
   return std::max(kSupportGrowth - kSupportDrop / std::sqrt(std::max(determinant_of_s, 1e-12f)), 1.0f);
 }
 
-/// spacing_class of the samples' mean distance on the screen, from det S = radius^4.
-inline uint32_t surfel_spacing(float determinant_of_s) {
-  const auto limit = [](float spacing) {
-    const float r = kRadiusPerSpacing * spacing;
+/// spacing_class of the samples' mean distance on the screen, by det S = radius^4: how many of these limits it reaches.
+///   scale: that splats were drawn with (DrawList::scale): their radius is scale / 2 distances.
+using SpacingLimits = std::array<float, 3>;
+inline SpacingLimits spacing_limits(float scale) {
+  const auto limit = [&](float spacing_px) {
+    const float r = 0.5f * scale * spacing_px;
     return (r * r) * (r * r);
   };
-  return (determinant_of_s >= limit(1.3f)) + (determinant_of_s >= limit(1.8f)) + (determinant_of_s >= limit(3.0f));
+  return {limit(1.3f), limit(1.8f), limit(3.0f)};
 }
+inline uint32_t surfel_spacing(float determinant_of_s, const SpacingLimits& limits) {
+  return (determinant_of_s >= limits[0]) + (determinant_of_s >= limits[1]) + (determinant_of_s >= limits[2]);
+}
+
+/// ewa: weight in the splat's centre.
+inline float ewa_peak(float determinant_of_v) { return 1.0f / std::min(determinant_of_v, 1e6f); }
 
 }  // namespace telesplat::splat

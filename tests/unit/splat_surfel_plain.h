@@ -45,32 +45,31 @@ void for_pixels(const splat::SurfelConic& c, int width, int height, bool centre,
   };
   for (int y = c.y0; y < c.y1; ++y)
     for (int x = c.x0; x < c.x1; ++x) visit(x, y, false);
-  if (!centre) return;
-  const float dx = (float(ix) + 0.5f) - c.centre_x, dy = (float(iy) + 0.5f) - c.centre_y;
-  if (!(c.at(dx, dy) <= 1.0f)) visit(ix, iy, true);
+  if (centre) visit(ix, iy, true);
 }
 
 /// Keys of the image (pixel_key.h), row-major; kEmptyKey where nothing is.
 inline std::vector<uint64_t> ellipse_plainly(const splat::DrawList& list, const geometry::Camera& camera) {
   std::vector<uint64_t> keys(size_t(camera.width) * camera.height, uint64_t(splat::kEmptyKey));
   const auto near_m = static_cast<float>(camera.near_m);
-  for_surfels(list, camera, [&](const splat::DrawItem& item, uint32_t i, const splat::SurfelSource& source, float x, float y,
-                                float w, const splat::SurfelContour& contour) {
-    const splat::SurfelConic conic = splat::surfel_conic(contour, x, y, 1.0f, splat::kOpaqueVariance);
-    const splat::SurfelDepth depth = splat::surfel_depth(contour, w, near_m);
-    const float bias = std::min(
-        splat::surfel_share(source.radius_m, w, splat::kBiasPerRadius, splat::kLeastBias, splat::kMostBias),
-        float(splat::kMaxBiasCode));
-    const uint32_t spacing = splat::surfel_spacing(contour.xx * contour.yy - contour.xy * contour.xy);
-    for_pixels(conic, camera.width, camera.height, true, [&](int px, int py, float q, float dx, float dy) {
-      const float code = ((depth.centre + depth.x * dx) + depth.y * dy) + bias * std::min(q, 1.0f);
-      const auto whole = uint32_t(std::clamp(code, 0.0f, float(splat::kMaxDepthCode)));
-      const uint64_t key = splat::encode_key(whole, spacing, uint32_t(std::min(8.0f * q, 7.0f)), item.level.normal[i],
-                                             item.level.colour[i] & 0xffffff);
-      uint64_t& there = keys[size_t(py) * camera.width + px];
-      there = uint64_t(std::min(int64_t(there), int64_t(key)));
-    });
-  });
+  const splat::SpacingLimits limits = splat::spacing_limits(list.scale);
+  for_surfels(list, camera,
+              [&](const splat::DrawItem& item, uint32_t i, const splat::SurfelSource& source, float x, float y, float w,
+                  const splat::SurfelContour& contour) {
+                const splat::SurfelConic conic = splat::surfel_conic(contour, x, y, 1.0f, splat::kOpaqueVariance);
+                const splat::SurfelDepth depth = splat::surfel_depth(contour, w, near_m);
+                const float bias = splat::ellipse_bias(source.radius_m, w);
+                const uint32_t spacing =
+                    splat::surfel_spacing(contour.xx * contour.yy - contour.xy * contour.xy, limits);
+                for_pixels(conic, camera.width, camera.height, true, [&](int px, int py, float q, float dx, float dy) {
+                  const float code = ((depth.centre + depth.x * dx) + depth.y * dy) + bias * std::min(q, 1.0f);
+                  const auto whole = uint32_t(std::clamp(code, 0.0f, float(splat::kMaxDepthCode)));
+                  const uint64_t key = splat::encode_key(whole, spacing, uint32_t(std::min(8.0f * q, 7.0f)),
+                                                         item.level.normal[i], item.level.colour[i] & 0xffffff);
+                  uint64_t& there = keys[size_t(py) * camera.width + px];
+                  there = uint64_t(std::min(int64_t(there), int64_t(key)));
+                });
+              });
   return keys;
 }
 
@@ -80,43 +79,46 @@ inline std::vector<uint64_t> ewa_plainly(const splat::DrawList& list, const geom
   const size_t pixels = size_t(camera.width) * camera.height;
   std::vector<float> visible(pixels, INFINITY);
   const auto near_m = static_cast<float>(camera.near_m);
-  for_surfels(list, camera, [&](const splat::DrawItem&, uint32_t, const splat::SurfelSource&, float x, float y, float w,
-                                const splat::SurfelContour& contour) {
-    const splat::SurfelConic conic = splat::surfel_conic(contour, x, y, 1.0f, splat::kOpaqueVariance);
-    const splat::SurfelDepth depth = splat::surfel_depth(contour, w, near_m);
-    for_pixels(conic, camera.width, camera.height, true, [&](int px, int py, float, float dx, float dy) {
-      float& there = visible[size_t(py) * camera.width + px];
-      there = std::min(there, (depth.centre + depth.x * dx) + depth.y * dy);
-    });
-  });
+  for_surfels(list, camera,
+              [&](const splat::DrawItem&, uint32_t, const splat::SurfelSource&, float x, float y, float w,
+                  const splat::SurfelContour& contour) {
+                const splat::SurfelConic conic = splat::surfel_conic(contour, x, y, 1.0f, splat::kOpaqueVariance);
+                const splat::SurfelDepth depth = splat::surfel_depth(contour, w, near_m);
+                for_pixels(conic, camera.width, camera.height, true, [&](int px, int py, float, float dx, float dy) {
+                  float& there = visible[size_t(py) * camera.width + px];
+                  there = std::min(there, (depth.centre + depth.x * dx) + depth.y * dy);
+                });
+              });
   std::vector<splat::EwaSum> sums(pixels);
-  for_surfels(list, camera, [&](const splat::DrawItem& item, uint32_t i, const splat::SurfelSource& source, float x, float y,
-                                float w, const splat::SurfelContour& contour) {
-    const float det = contour.xx * contour.yy - contour.xy * contour.xy;
-    const splat::SurfelConic conic =
-        splat::surfel_conic(contour, x, y, splat::ewa_growth(det), splat::kFilterVariance);
-    const splat::SurfelDepth depth = splat::surfel_depth(contour, w, near_m);
-    const float epsilon =
-        splat::surfel_share(source.radius_m, w, splat::kEpsilonPerRadius, splat::kLeastEpsilon, splat::kMostEpsilon);
-    const float peak = 1.0f / conic.determinant;
-    const uint32_t albedo = item.level.colour[i];
-    for_pixels(conic, camera.width, camera.height, false, [&](int px, int py, float q, float dx, float dy) {
-      const size_t at = size_t(py) * camera.width + px;
-      const float code = (depth.centre + depth.x * dx) + depth.y * dy;
-      if (!(code - epsilon <= visible[at])) return;
-      const float t = 1.0f - q, t2 = t * t, weight = peak * (t2 * t2);
-      splat::EwaSum& s = sums[at];
-      s.red += weight * float(albedo >> 16 & 255), s.green += weight * float(albedo >> 8 & 255);
-      s.blue += weight * float(albedo & 255), s.weight += weight;
-      s.normal_x += weight * contour.normal[0], s.normal_y += weight * contour.normal[1];
-      s.normal_z += weight * contour.normal[2], s.depth_code += weight * code;
-    });
-  });
+  for_surfels(list, camera,
+              [&](const splat::DrawItem& item, uint32_t i, const splat::SurfelSource& source, float x, float y, float w,
+                  const splat::SurfelContour& contour) {
+                const float det = contour.xx * contour.yy - contour.xy * contour.xy;
+                const splat::SurfelConic conic =
+                    splat::surfel_conic(contour, x, y, splat::ewa_growth(det), splat::kFilterVariance);
+                const splat::SurfelDepth depth = splat::surfel_depth(contour, w, near_m);
+                const float epsilon = splat::surfel_share(source.radius_m, w, splat::kEpsilonPerRadius,
+                                                          splat::kLeastEpsilon, splat::kMostEpsilon);
+                const float peak = splat::ewa_peak(conic.determinant);
+                const uint32_t albedo = item.level.colour[i];
+                for_pixels(conic, camera.width, camera.height, false, [&](int px, int py, float q, float dx, float dy) {
+                  const size_t at = size_t(py) * camera.width + px;
+                  const float code = (depth.centre + depth.x * dx) + depth.y * dy;
+                  if (!(code - epsilon <= visible[at])) return;
+                  const float t = 1.0f - q, t2 = t * t, weight = peak * (t2 * t2);
+                  splat::EwaSum& s = sums[at];
+                  s.red += weight * float(albedo >> 16 & 255), s.green += weight * float(albedo >> 8 & 255);
+                  s.blue += weight * float(albedo & 255), s.weight += weight;
+                  s.normal_x += weight * contour.normal[0], s.normal_y += weight * contour.normal[1];
+                  s.normal_z += weight * contour.normal[2], s.depth_code += weight * code;
+                });
+              });
   const splat::EwaLight light = splat::ewa_light(shading.parameters(), splat::surfel_camera(camera));
   std::vector<uint64_t> pairs(pixels);
   for (size_t i = 0; i < pixels; ++i)
-    pairs[i] = visible[i] < INFINITY ? splat::make_pair(splat::ewa_colour(sums[i], light), splat::ewa_depth_code(sums[i]) << 8)
-                                  : splat::make_pair(0, splat::kEmptyInfo);
+    pairs[i] = visible[i] < INFINITY
+                   ? splat::encode_pair(splat::ewa_colour(sums[i], light), splat::ewa_depth_code(sums[i]) << 8)
+                   : splat::encode_pair(0, splat::kEmptyInfo);
   return pairs;
 }
 

@@ -1,0 +1,35 @@
+// The kernels `ellipse` and `ewa` inside one tile, on the widest vectors the machine has (Highway, chosen at run time). Every target
+// computes the same pixels: those of the plain functions in surfel_contour.h, surfel_splat.h and ewa_shading.h.
+#pragma once
+
+#include <hwy/aligned_allocator.h>
+
+#include "common/splat/ewa_shading.h"
+#include "common/splat/splat_kernels.h"
+#include "common/splat/surfel_splat.h"
+
+namespace telesplat::splat {
+
+/// What of a view these kernels need beside TileInput.
+struct SurfelInput {
+  SurfelCamera camera;
+  const SurfelSource* sources = nullptr;  ///< one an item
+  SpacingLimits limits{};
+};
+
+/// Splats ellipses into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h). One pass.
+TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, const KeyBuffer& buffer);
+
+/// What ewa keeps of a tile beside its pixels: 36 bytes a pixel. One a thread, kept from tile to tile.
+struct EwaBuffer {
+  hwy::AlignedFreeUniquePtr<float[]> visible;  ///< least depth code of the opaque ellipses
+  hwy::AlignedFreeUniquePtr<float[]> sums;     ///< 8 a pixel: EwaSum
+  int width = 0, height = 0, stride = 0;
+};
+
+/// Splats `input.rect` in two passes and writes it as pairs of shaded colour and info into the tile, whose reach makes it
+/// input.rect. What lies within kMaxSplatSide to the right of that may change too. Depth codes carry no bias.
+TileCounts ewa_tile(const TileInput& input, const SurfelInput& surfels, const EwaLight& light, EwaBuffer& buffer,
+                    const TilePixels& tile);
+
+}  // namespace telesplat::splat
