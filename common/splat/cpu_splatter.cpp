@@ -25,7 +25,7 @@ namespace {
 constexpr int kTileWidth = 256, kTileHeight = 256;
 
 // ewa keeps 36 bytes more a pixel.
-constexpr int kEwaTileWidth = 96, kEwaTileHeight = 64;
+constexpr int kEwaTileWidth = 192, kEwaTileHeight = 128;
 
 constexpr int kMargin = kMaxSplatSide;
 
@@ -155,6 +155,7 @@ void CpuSplatter::Impl::prepare_surfels(const DrawList& list, const geometry::Ca
                                         const image::Shading& shading) {
   surfels.camera = surfel_camera(camera);
   surfels.limits = spacing_limits(list.scale);
+  surfels.widest = widest_contour(camera);
   light = ewa_light(shading.parameters(), surfels.camera);
   sources.resize(list.items.size());
   const glm::dvec4 w = camera.room_to_pixel().w;
