@@ -24,7 +24,8 @@ namespace {
 // more clusters that straddle tiles). 512 KiB of keys.
 constexpr int kTileWidth = 256, kTileHeight = 256;
 
-// ewa keeps 36 bytes more a pixel.
+// ewa keeps 36 bytes more a pixel, and meets its points twice. Points across borders cost more than the second-level cache gives: a million
+// splats of one pixel took 107 ms of one core at 96 x 64, 83 ms here.
 constexpr int kEwaTileWidth = 192, kEwaTileHeight = 128;
 
 constexpr int kMargin = kMaxSplatSide;
