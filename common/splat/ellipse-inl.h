@@ -19,6 +19,8 @@ namespace telesplat::splat::HWY_NAMESPACE {
 
 class EllipseSink {
  public:
+  // What bounds the reach: of S and of the low-pass, and a pixel.
+  static constexpr float kGrowth = 1.0f, kLeastReach = 1.5f;
   EllipseSink(const TileInput& input, const SurfelInput& surfels, const KeyBuffer& buffer)
       : rect_(input.rect), near_m_(input.near_m), limits_(surfels.limits), buffer_(buffer) {}
 
@@ -101,10 +103,15 @@ class EllipseSink {
 
   void flush() {
     for (size_t i = 0; i < count_; ++i) {
-      if (batch_[kSize][i] >> 16)
-        draw<true>(i);
+      // Most splats fit into four by four pixels, and are drawn without any loop whose end could be guessed wrong: what lies outside
+      // the ellipse stays as it is.
+      const uint32_t size = batch_[kSize][i];
+      if ((size & 255) <= 4 && size >> 8 <= 4)
+        draw<false>(i, 4, size >> 8 <= 2 ? 2 : 4);
+      else if (size >> 16)
+        draw<true>(i, size & 255, size >> 8 & 255);
       else
-        draw<false>(i);
+        draw<false>(i, size & 255, size >> 8 & 255);
     }
     count_ = 0;
   }
@@ -132,9 +139,8 @@ class EllipseSink {
 
 #if HWY_TARGET == HWY_SCALAR
   template <bool kCut>
-  void draw(size_t i) {
+  void draw(size_t i, uint32_t columns, uint32_t rows) {
     const auto real = [&](Field field) { return std::bit_cast<float>(batch_[field][i]); };
-    const uint32_t size = batch_[kSize][i], columns = size & 255, rows = size >> 8 & 255;
     for (uint32_t y = 0; y < rows; ++y)
       for (uint32_t x = 0; x < columns; ++x) {
         const float dx = (real(kFirstX) + static_cast<float>(x)) - real(kCentreX),
@@ -155,7 +161,7 @@ class EllipseSink {
   // 8 lanes are the pixels 0 1 of both rows, then 2 3. Groups of four pixels on every target: the same pixels are met.
   //   kCut: the box ends before the ellipse does, so its edge is minded.
   template <bool kCut>
-  HWY_INLINE void draw(size_t i) {
+  HWY_INLINE void draw(size_t i, uint32_t columns, uint32_t rows) {
     const hn::CappedTag<float, 8> d;
     const hn::RebindToSigned<decltype(d)> di;
     const hn::RebindToUnsigned<decltype(d)> du;
@@ -163,8 +169,6 @@ class EllipseSink {
     constexpr size_t kHalf = HWY_MAX(MaxLanes(d), 4) / 2;
     alignas(32) static constexpr float kX[8] = {0, 1, 0, 1, 2, 3, 2, 3}, kY[8] = {0, 0, 1, 1, 0, 0, 1, 1};
     const auto real = [&](Field field) HWY_ATTR { return hn::BitCast(d, hn::Set(du, batch_[field][i])); };
-    const uint32_t size = batch_[kSize][i];
-    const int columns = static_cast<int>(size & 255), rows = static_cast<int>(size >> 8 & 255);
     const auto along = hn::Load(d, kX), across = hn::Load(d, kY);
     const auto first_x = hn::Add(real(kFirstX), along), centre_x = real(kCentreX), centre_y = real(kCentreY);
     const auto xx = real(kXX), xy = real(kXY), yy = real(kYY);
@@ -176,11 +180,11 @@ class EllipseSink {
     const auto stride = static_cast<size_t>(buffer_.stride);
     uint64_t* row = buffer_.keys + batch_[kPlace][i];
     auto y = hn::Add(real(kFirstY), across);
-    for (int j = 0; j < rows; j += 2, row += 2 * stride, y = hn::Add(y, two)) {
+    for (uint32_t j = 0; j < rows; j += 2, row += 2 * stride, y = hn::Add(y, two)) {
       const auto dy = hn::Sub(y, centre_y);
       const auto xy_dy = hn::Mul(xy, dy), yy_dy = hn::Mul(hn::Mul(yy, dy), dy), code_dy = hn::Mul(code_y, dy);
       auto x = first_x;
-      for (int k = 0; k < columns; k += 4) {
+      for (uint32_t k = 0; k < columns; k += 4) {
         for (size_t part = 0; part < 4; part += kHalf, x = hn::Add(x, hn::Set(d, static_cast<float>(kHalf)))) {
           const auto dx = hn::Sub(x, centre_x);
           const auto q = hn::Add(hn::Mul(dx, hn::Add(hn::Mul(xx, dx), xy_dy)), yy_dy);

@@ -107,6 +107,9 @@ HWY_INLINE hn::Mask<Quad> InBox(int left) { return hn::FirstN(Quad(), static_cas
 // First pass: the least depth of opaque ellipses.
 class EwaVisibility {
  public:
+  // As EllipseSink's.
+  static constexpr float kGrowth = 1.0f, kLeastReach = 1.5f;
+
   EwaVisibility(const TileInput& input, const EwaBuffer& buffer)
       : rect_(input.rect), near_m_(input.near_m), stride_(buffer.stride), visible_(buffer.visible.get()) {}
 
@@ -169,6 +172,10 @@ class EwaVisibility {
 // Second pass: sums of what lies on the visible surface.
 class EwaAccumulation {
  public:
+  // As EllipseSink's; the square root of kSupportGrowth lies below.
+  static constexpr float kGrowth = 1.6f, kLeastReach = 2.0f;
+  static_assert(kGrowth * kGrowth >= kSupportGrowth);
+
   EwaAccumulation(const TileInput& input, const EwaBuffer& buffer)
       : rect_(input.rect),
         near_m_(input.near_m),
@@ -208,37 +215,31 @@ class EwaAccumulation {
                  code_y = hn::Set(d, batch_.real(kCodeYE, i)), epsilon = hn::Set(d, batch_.real(kEpsilon, i)),
                  peak = hn::Set(d, batch_.real(kPeak, i));
       const uint32_t albedo = batch_.at(kAlbedo, i);
-      // As EwaSum; depth follows pixel by pixel.
+      // As EwaSum.
       HWY_ALIGN const float values[8] = {static_cast<float>(albedo >> 16), static_cast<float>(albedo >> 8 & 255),
                                          static_cast<float>(albedo & 255), 1.0f,
                                          batch_.real(kNormalX, i),         batch_.real(kNormalY, i),
-                                         batch_.real(kNormalZ, i),         0.0f};
+                                         batch_.real(kNormalZ, i),         batch_.real(kCodeE, i)};
       const auto first = hn::Load(d8, values), last = hn::Load(d8, values + 8 - kLanes8);
-      const auto depth_lane = hn::Eq(hn::Iota(d8, 0), hn::Set(d8, static_cast<float>(kLanes8 - 1)));
       ForQuads(batch_, i, stride_, [&](size_t at, int left, QuadV dx, QuadV dy, QuadV q) HWY_ATTR {
         const auto depth = hn::Add(hn::Add(code, hn::Mul(code_x, dx)), hn::Mul(code_y, dy));
         const auto there = hn::LoadU(d, visible_ + at);
         const auto counts =
             hn::And(hn::And(hn::Le(q, hn::Set(d, 1.0f)), hn::Le(hn::Sub(depth, epsilon), there)), InBox(left));
-        if (hn::AllFalse(d, counts)) return;
+        // No branch on whether any counts, nor on how many are in the box: both would be guessed wrong too often.
         const auto t = hn::Sub(hn::Set(d, 1.0f), q), t2 = hn::Mul(t, t);
         HWY_ALIGN float weights[4];
-        HWY_ALIGN float depths[4];
         hn::Store(hn::IfThenElseZero(counts, hn::Mul(peak, hn::Mul(t2, t2))), d, weights);
-        hn::Store(depth, d, depths);
         float* sum = sums_ + 8 * at;
-        const int n = std::min(left, kQuad);
-        for (int k = 0; k < n; ++k, sum += 8) {
+        for (int k = 0; k < kQuad; ++k, sum += 8) {
           if constexpr (kLanes8 < 4) {
-            for (int l = 0; l < 7; ++l) sum[l] += weights[k] * values[l];
-            sum[7] += weights[k] * depths[k];
+            for (int l = 0; l < 8; ++l) sum[l] += weights[k] * values[l];
             continue;
           }
           const auto weight = hn::Set(d8, weights[k]);
-          const auto with_depth = hn::IfThenElse(depth_lane, hn::Set(d8, depths[k]), last);
           if constexpr (kLanes8 == 4) hn::Store(hn::Add(hn::Load(d8, sum), hn::Mul(weight, first)), d8, sum);
           float* second = sum + 8 - kLanes8;
-          hn::Store(hn::Add(hn::Load(d8, second), hn::Mul(weight, with_depth)), d8, second);
+          hn::Store(hn::Add(hn::Load(d8, second), hn::Mul(weight, last)), d8, second);
         }
       });
     }

@@ -33,7 +33,7 @@ struct Sources {
 // A vector of points: what surfel_contour takes and gives.
 struct Surfels {
   VF x, y, w;  // projected centre, depth
-  VF radius;
+  VF rho;      // radius over depth, limited
   VF offset_x, offset_y, xx, xy, yy, slope_x, slope_y;
   VF normal_x, normal_y, normal_z;
   VU normal_code, albedo;
@@ -93,7 +93,7 @@ HWY_INLINE void ContourOf(const SurfelCamera& c, const Sources& e, Surfels& s) {
   const auto a = hn::Div(rho2, hn::IfThenElse(parallel, one, k)), shift = hn::IfThenZeroElse(parallel, a);
   const auto fx = Const(c.focal_x), fy = Const(c.focal_y);
   const auto ax = hn::Mul(a, fx), ay = hn::Mul(a, fy);
-  s.radius = e.radius;
+  s.rho = rho;
   s.offset_x = hn::Neg(hn::Mul(hn::Mul(shift, fx), gxz));
   s.offset_y = hn::Neg(hn::Mul(hn::Mul(shift, fy), gyz));
   s.xx = hn::Add(hn::Mul(hn::Mul(ax, fx), gxx), hn::Mul(s.offset_x, s.offset_x));
@@ -179,8 +179,7 @@ HWY_INLINE Depths DepthsOf(const Surfels& s, float near_m) {
 
 // surfel_share.
 HWY_INLINE VF ShareOf(const Surfels& s, float factor, float least, float most) {
-  const auto rho = hn::Min(hn::Div(s.radius, s.w), Const(kMaxRadiusOverDepth));
-  return hn::Mul(CodesPerDepth(s.w), Clamp(hn::Mul(Const(factor), rho), Const(least), Const(most)));
+  return hn::Mul(CodesPerDepth(s.w), Clamp(hn::Mul(Const(factor), s.rho), Const(least), Const(most)));
 }
 
 HWY_INLINE VF DeterminantOf(const Surfels& s) { return hn::Sub(hn::Mul(s.xx, s.yy), hn::Mul(s.xy, s.xy)); }
@@ -190,7 +189,7 @@ template <class Sink>
 class SurfelStream {
  public:
   SurfelStream(const TileInput& input, const SurfelInput& surfels, Sink& sink)
-      : input_(input), surfels_(surfels), sink_(sink) {}
+      : input_(input), surfels_(surfels), sink_(sink), reach_factor_(Sink::kGrowth * surfels.widest) {}
 
   TileCounts run() {
     const size_t lanes = hn::Lanes(F32());
@@ -230,6 +229,7 @@ class SurfelStream {
     stage_.clear();
   }
 
+  // Projects a level's points, keeps those that may touch the tile, and gives them to the sink by whole vectors.
   template <bool kStaged>
   HWY_NOINLINE void add(const LeafTransform& transform_reference, const points::Mosaic::Level& level_reference,
                         const SurfelSource& source) {
@@ -238,55 +238,96 @@ class SurfelStream {
     // Copies, which no store can change: the compiler need not read them again.
     const LeafTransform transform = transform_reference;
     const points::Mosaic::Level level = level_reference;
-    const SurfelCamera camera = surfels_.camera;
     const auto near_m = Const(input_.near_m);
     const geometry::Rect own = input_.own;
-    // No splat reaches farther.
-    constexpr float kReach = kMaxSplatSide;
-    const auto rect_x0 = Const(static_cast<float>(input_.rect.x) - kReach),
-               rect_y0 = Const(static_cast<float>(input_.rect.y) - kReach),
-               rect_x1 = Const(static_cast<float>(input_.rect.x + input_.rect.width) + kReach),
-               rect_y1 = Const(static_cast<float>(input_.rect.y + input_.rect.height) + kReach);
+    const auto x0 = Const(static_cast<float>(input_.rect.x)), y0 = Const(static_cast<float>(input_.rect.y)),
+               x1 = Const(static_cast<float>(input_.rect.x + input_.rect.width)),
+               y1 = Const(static_cast<float>(input_.rect.y + input_.rect.height));
     const auto own_x0 = Const(static_cast<float>(own.x)), own_y0 = Const(static_cast<float>(own.y)),
                own_x1 = Const(static_cast<float>(own.x + own.width)),
                own_y1 = Const(static_cast<float>(own.y + own.height));
-    Sources sources{Const(source.radius_m), Const(source.to_eye[0]), Const(source.to_eye[1]), Const(source.to_eye[2])};
     counts_.projected += level.count;
     uint64_t drawn = 0;
+    const float reach_factor = reach_factor_;
 
     ForVectors(0, level.count, [&](size_t offset, size_t skip, size_t valid) HWY_ATTR {
+      if (points_.count + kMaxLanes > Points::kCapacity) drain_points<kStaged>(source);
       const Lanes p = LoadLanes(level, offset);
-      Surfels s;
-      s.w = Row(transform.w, p);
-      const auto inverse = hn::Div(Const(1.0f), hn::Max(s.w, near_m));
-      s.x = hn::Mul(Row(transform.x, p), inverse), s.y = hn::Mul(Row(transform.y, p), inverse);
-      const auto in_rect = hn::And(hn::And(hn::Ge(s.x, rect_x0), hn::Lt(s.x, rect_x1)),
-                                   hn::And(hn::Ge(s.y, rect_y0), hn::Lt(s.y, rect_y1)));
-      auto keep = hn::And(hn::Ge(s.w, near_m), in_rect);
+      const auto w = Row(transform.w, p);
+      const auto inverse = hn::Div(Const(1.0f), hn::Max(w, near_m));
+      const auto x = hn::Mul(Row(transform.x, p), inverse), y = hn::Mul(Row(transform.y, p), inverse);
+      const auto radius = kStaged ? hn::LoadU(d, radius_ + offset) : Const(source.radius_m);
+      const auto reach =
+          hn::Min(hn::Add(hn::Mul(hn::Mul(radius, inverse), Const(reach_factor)), Const(Sink::kLeastReach)),
+                  Const(kMaxSplatSide));
+      const auto in_rect = hn::And(hn::And(hn::Ge(x, hn::Sub(x0, reach)), hn::Lt(x, hn::Add(x1, reach))),
+                                   hn::And(hn::Ge(y, hn::Sub(y0, reach)), hn::Lt(y, hn::Add(y1, reach))));
+      auto keep = hn::And(hn::Ge(w, near_m), in_rect);
       if (valid - skip < hn::Lanes(d)) keep = hn::And(keep, hn::AndNot(hn::FirstN(d, skip), hn::FirstN(d, valid)));
       if (hn::AllFalse(d, keep)) return;
-      drawn += hn::CountTrue(d, hn::And(keep, hn::And(hn::And(hn::Ge(s.x, own_x0), hn::Lt(s.x, own_x1)),
-                                                      hn::And(hn::Ge(s.y, own_y0), hn::Lt(s.y, own_y1)))));
-      if (kStaged)
-        sources = {hn::LoadU(d, radius_ + offset), hn::LoadU(d, x_ + offset), hn::LoadU(d, y_ + offset),
-                   hn::LoadU(d, z_ + offset)};
-      // Lanes that are not kept must not become numbers too large to convert.
-      s.x = hn::IfThenElseZero(keep, s.x), s.y = hn::IfThenElseZero(keep, s.y);
-      s.w = hn::IfThenElse(keep, s.w, near_m);
-      s.normal_code = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
-      s.albedo = hn::And(hn::LoadU(du, level.colour + offset), hn::Set(du, 0x00ffffffu));
-      ContourOf(camera, sources, s);
-      sink_.add(s, hn::RebindMask(I32(), keep));
+      drawn += hn::CountTrue(d, hn::And(keep, hn::And(hn::And(hn::Ge(x, own_x0), hn::Lt(x, own_x1)),
+                                                      hn::And(hn::Ge(y, own_y0), hn::Lt(y, own_y1)))));
+      const Compressor compress(hn::RebindMask(du, keep));
+      const auto put = [&](float* to, VF v) HWY_ATTR {
+        hn::StoreU(hn::BitCast(d, compress(hn::BitCast(du, v))), d, to + points_.count);
+      };
+      put(points_.x, x), put(points_.y, y), put(points_.w, w);
+      const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
+      hn::StoreU(compress(normal), du, points_.normal + points_.count);
+      hn::StoreU(compress(hn::LoadU(du, level.colour + offset)), du, points_.colour + points_.count);
+      if (kStaged) {
+        put(points_.radius, radius);
+        put(points_.eye_x, hn::LoadU(d, x_ + offset)), put(points_.eye_y, hn::LoadU(d, y_ + offset));
+        put(points_.eye_z, hn::LoadU(d, z_ + offset));
+      }
+      points_.count += compress.count();
     });
     counts_.drawn += drawn;
+    drain_points<kStaged>(source);
   }
+
+  template <bool kStaged>
+  HWY_NOINLINE void drain_points(const SurfelSource& source) {
+    const F32 d;
+    const I32 di;
+    const U32 du;
+    const SurfelCamera camera = surfels_.camera;
+    Sources sources{Const(source.radius_m), Const(source.to_eye[0]), Const(source.to_eye[1]), Const(source.to_eye[2])};
+    for (size_t i = 0; i < points_.count; i += hn::Lanes(d)) {
+      Surfels s;
+      s.x = hn::LoadU(d, points_.x + i), s.y = hn::LoadU(d, points_.y + i), s.w = hn::LoadU(d, points_.w + i);
+      s.normal_code = hn::LoadU(du, points_.normal + i);
+      s.albedo = hn::And(hn::LoadU(du, points_.colour + i), hn::Set(du, 0x00ffffffu));
+      if (kStaged)
+        sources = {hn::LoadU(d, points_.radius + i), hn::LoadU(d, points_.eye_x + i), hn::LoadU(d, points_.eye_y + i),
+                   hn::LoadU(d, points_.eye_z + i)};
+      // Lanes beyond the last point hold older points, or zeros: whatever they give is not kept.
+      const size_t left = points_.count - i;
+      s.w = hn::Max(s.w, Const(input_.near_m));
+      ContourOf(camera, sources, s);
+      sink_.add(s, hn::FirstN(di, left));
+    }
+    points_.count = 0;
+  }
+
+  // Projected points that may touch the tile, all of one source or, staged, each with its own.
+  struct Points {
+    static constexpr size_t kCapacity = 384;
+    HWY_ALIGN float x[kCapacity + kMaxLanes] = {}, y[kCapacity + kMaxLanes] = {}, w[kCapacity + kMaxLanes] = {};
+    HWY_ALIGN float radius[kCapacity + kMaxLanes] = {}, eye_x[kCapacity + kMaxLanes] = {},
+                                       eye_y[kCapacity + kMaxLanes] = {}, eye_z[kCapacity + kMaxLanes] = {};
+    HWY_ALIGN uint32_t normal[kCapacity + kMaxLanes] = {}, colour[kCapacity + kMaxLanes] = {};
+    size_t count = 0;
+  };
 
   static constexpr size_t kRoom = 128 + kMaxLanes;
   const TileInput& input_;
   const SurfelInput& surfels_;
   Sink& sink_;
+  float reach_factor_;
   TileCounts counts_;
   Stage stage_;
+  Points points_;
   HWY_ALIGN float radius_[kRoom] = {};
   HWY_ALIGN float x_[kRoom] = {}, y_[kRoom] = {}, z_[kRoom] = {};
 };

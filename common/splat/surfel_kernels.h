@@ -15,6 +15,7 @@ struct SurfelInput {
   SurfelCamera camera;
   const SurfelSource* sources = nullptr;  ///< one an item
   SpacingLimits limits{};
+  float widest = 0;  ///< widest_contour(camera)
 };
 
 /// Splats ellipses into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h). One pass.

@@ -20,7 +20,7 @@ inline constexpr float kBiasPerRadius = 1.5f, kLeastBias = 1.0f / 2048, kMostBia
 /// offset d from the ellipse's centre is (1 - d^T V^-1 d)^4 inside, a Gaussian of variance V / 8 cut smoothly where it would be below
 /// 0.02, divided by det V: samples taken more densely count more. It is narrow where samples lie a pixel apart, so that each pixel shows
 /// its own sample, and reaches over the neighbours where they are magnified. V contains S', and every pixel's corner from its centre.
-inline constexpr float kFilterVariance = 0.51f, kSupportGrowth = 3.73f, kSupportDrop = 1.54f;
+inline constexpr float kFilterVariance = 0.51f, kSupportGrowth = 2.5f, kSupportDrop = 0.85f;
 /// How far behind the visible surface a splat still counts, as a multiple of radius over depth, and its bounds, as shares of depth.
 inline constexpr float kEpsilonPerRadius = 2.0f, kLeastEpsilon = 1.0f / 512, kMostEpsilon = 1.0f / 32;
 
@@ -81,6 +81,14 @@ inline SurfelDepth surfel_depth(const SurfelContour& c, float w, float near_m) {
 /// share of depth = clamp(factor * radius / w, least, most), in depth codes.
 inline float surfel_share(float radius_m, float w, float factor, float least, float most) {
   return codes_per_depth(w) * std::clamp(factor * std::min(radius_m / w, kMaxRadiusOverDepth), least, most);
+}
+
+/// No contour in the image reaches farther from its splat's centre than this times radius over depth, in pixels (unless it reaches
+/// farther than kMaxSplatSide): the footprint stretched most, where perspective stretches most; a tenth for its centre's offset.
+inline float widest_contour(const geometry::Camera& c) {
+  const double u = std::max(std::abs(c.left), std::abs(c.right)), v = std::max(std::abs(c.top), std::abs(c.bottom));
+  const double stretch2 = 1.0 + 1.0 / (kMinSampledCosine * kMinSampledCosine);
+  return static_cast<float>(1.1 * std::max(c.focal_x(), c.focal_y()) * std::sqrt((1.0 + u * u + v * v) * stretch2));
 }
 
 /// The bias of an ellipse on its contour, in depth codes.

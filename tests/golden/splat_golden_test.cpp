@@ -1,4 +1,4 @@
-// Both renderers against committed pictures, square and disc. A failing case leaves reference, rendered and difference images in
+// The renderers against committed pictures, kernel by kernel. A failing case leaves reference, rendered and difference images in
 // the build folder (golden-failures/). To accept new pictures, look at them and run with TELESPLAT_UPDATE_GOLDEN=1.
 #include <gtest/gtest.h>
 
@@ -187,8 +187,7 @@ TEST_P(SplatGolden, LooksAsCommitted) {
     GTEST_SKIP() << why_not;
   }
   const image::View rendered = render(*renderer, kernel, splat_scale(kernel));
-  const std::string shape = kernel == splat::Kernel::kSquare ? "square" : "disc",
-                    path = "tests/golden/images/splat-" + shape + ".png";
+  const std::string shape(splat::kernel_name(kernel)), path = "tests/golden/images/splat-" + shape + ".png";
   if (std::getenv("TELESPLAT_UPDATE_GOLDEN") && kind == "cpu") {
     ASSERT_TRUE(image::write_png(path, rendered).ok());
   }
@@ -221,13 +220,17 @@ TEST_P(SplatGolden, IsCloseToTracingTheScene) {
   std::printf("%s: PSNR %.2f dB, SSIM %.3f, holes %.4f\n", kind.c_str(), q.psnr_db, q.ssim, q.hole_fraction);
 }
 
+std::string case_name(const ::testing::TestParamInfo<SplatGolden::ParamType>& info) {
+  return std::get<0>(info.param) + "_" + std::string(splat::kernel_name(std::get<1>(info.param)));
+}
 INSTANTIATE_TEST_SUITE_P(Renderers, SplatGolden,
                          ::testing::Combine(::testing::Values("cpu", "gl"),
                                             ::testing::Values(splat::Kernel::kSquare, splat::Kernel::kDisc)),
-                         [](const auto& info) {
-                           return std::get<0>(info.param) +
-                                  (std::get<1>(info.param) == splat::Kernel::kSquare ? "_square" : "_disc");
-                         });
+                         case_name);
+INSTANTIATE_TEST_SUITE_P(CpuSurfels, SplatGolden,
+                         ::testing::Combine(::testing::Values("cpu"),
+                                            ::testing::Values(splat::Kernel::kEllipse, splat::Kernel::kEwa)),
+                         case_name);
 
 // The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept copies, items
 // that it may not keep, and changes of size are tried too.

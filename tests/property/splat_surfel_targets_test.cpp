@@ -158,6 +158,28 @@ TEST_P(SurfelTargets, ThreadsAndReuseDoNotChangeThePicture) {
   }
 }
 
+TEST(SurfelCoverage, EwaCoversWhatEllipsesCover) {
+  const geometry::Camera camera = testing::front_camera(400, 300);
+  const image::Shading shading({}, camera);
+  for (uint32_t seed = 0; seed < 4; ++seed) {
+    std::mt19937 rng(seed);
+    auto made = testing::random_items(seed, 40, 400);
+    std::vector<splat::DrawItem> items;
+    for (size_t i = 0; i < made.size(); ++i)
+      items.push_back(surfel_item(made[i], 0.0005f * std::exp(0.1f * float(i)), rng));
+    const auto list = testing::draw_list(std::move(items));
+    const Frame ellipse = render(splat::Kernel::kEllipse, list, camera, shading),
+                ewa = render(splat::Kernel::kEwa, list, camera, shading);
+    size_t covered = 0, different = 0;
+    for (size_t i = 0; i < ewa.depth_m.size(); ++i) {
+      covered += std::isfinite(ellipse.depth_m[i]);
+      different += std::isfinite(ellipse.depth_m[i]) != std::isfinite(ewa.depth_m[i]);
+    }
+    EXPECT_GT(covered, 1000u);
+    EXPECT_EQ(different, 0u);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Kernels, SurfelTargets, ::testing::Values(splat::Kernel::kEllipse, splat::Kernel::kEwa),
                          [](const auto& info) { return std::string(splat::kernel_name(info.param)); });
 

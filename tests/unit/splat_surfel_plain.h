@@ -110,7 +110,7 @@ inline std::vector<uint64_t> ewa_plainly(const splat::DrawList& list, const geom
                   s.red += weight * float(albedo >> 16 & 255), s.green += weight * float(albedo >> 8 & 255);
                   s.blue += weight * float(albedo & 255), s.weight += weight;
                   s.normal_x += weight * contour.normal[0], s.normal_y += weight * contour.normal[1];
-                  s.normal_z += weight * contour.normal[2], s.depth_code += weight * code;
+                  s.normal_z += weight * contour.normal[2], s.depth_code += weight * depth.centre;
                 });
               });
   const splat::EwaLight light = splat::ewa_light(shading.parameters(), splat::surfel_camera(camera));
