@@ -7,9 +7,14 @@
 #include <limits>
 #include <vector>
 
+#include "client/viewer/render/gl/programs.h"
+#include "client/viewer/render/gl/read_back.h"
+#include "client/viewer/render/gl/splat_passes.h"
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/gl/stage_timer.h"
 #include "common/splat/finish.h"
+#include "common/splat/splat_table.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -31,43 +36,59 @@ std::string device_name() {
 
 }  // namespace
 
-Result<Programs> GlRenderer::make_programs() {
+struct GlRenderer::Parts {
+  Parts(Programs made, const GlOptions& options)
+      : programs(std::move(made)),
+        splatting(options.persistent),
+        read_back(options.pack_buffers.value_or(!gl::is_software(device_name()))),
+        timer(kStages) {
+    glGenVertexArrays(1, &no_vertices);
+  }
+  ~Parts() { glDeleteVertexArrays(1, &no_vertices); }
+
+  Programs programs;
+  FrameTargets targets;
+  SplatPasses splatting;
+  ReadBack read_back;
+  gl::StageTimer timer;
+  uint32_t no_vertices = 0;  // vertex array of whole-frame passes
+};
+
+Result<std::unique_ptr<GlRenderer::Parts>> GlRenderer::make_parts(const GlOptions& options) {
   if (const Status good = check_limits(); !good) return Error{device_name() + ": " + good.error().text};
   auto programs = Programs::make();
   if (!programs) return Error{device_name() + ": " + programs.error().text};
-  return programs;
+  return std::make_unique<Parts>(std::move(*programs), options);
 }
 
 Result<std::unique_ptr<GlRenderer>> GlRenderer::make(const GlOptions& options) {
   auto context = gl::EglContext::make();
   if (!context) return context.error();
-  auto current = std::make_unique<Current>(**context);
-  if (!current->ok()) return Error{(*context)->renderer() + ": cannot be made current"};
-  auto programs = make_programs();
-  if (!programs) return programs.error();
-  return std::unique_ptr<GlRenderer>(
-      new GlRenderer(std::move(*context), std::move(current), std::move(*programs), options));
+  const gl::EglContext::Current current(**context);
+  if (!current.ok()) return Error{(*context)->renderer() + ": cannot be made current"};
+  auto parts = make_parts(options);
+  if (!parts) return parts.error();
+  std::string device = (*context)->renderer();
+  return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), std::move(*parts), std::move(device)));
 }
 
 Result<std::unique_ptr<GlRenderer>> GlRenderer::make_in_current_context(const GlOptions& options) {
-  auto programs = make_programs();
-  if (!programs) return programs.error();
-  return std::unique_ptr<GlRenderer>(new GlRenderer(nullptr, nullptr, std::move(*programs), options));
+  auto parts = make_parts(options);
+  if (!parts) return parts.error();
+  return std::unique_ptr<GlRenderer>(new GlRenderer(nullptr, std::move(*parts), device_name()));
 }
 
-GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current, Programs programs,
-                       const GlOptions& options)
-    : context_(std::move(context)),
-      current_(std::move(current)),
-      device_(device_name()),
-      programs_(std::move(programs)),
-      splatting_(options.persistent),
-      read_back_(options.pack_buffers.value_or(!gl::is_software(device_))),
-      timer_(kStages) {
-  glGenVertexArrays(1, &no_vertices_);
+GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts, std::string device)
+    : context_(std::move(context)), parts_(std::move(parts)), device_(std::move(device)) {}
+
+GlRenderer::~GlRenderer() {
+  const Current current = use_context();
+  parts_.reset();
 }
 
-GlRenderer::~GlRenderer() { glDeleteVertexArrays(1, &no_vertices_); }
+GlRenderer::Current GlRenderer::use_context() const {
+  return context_ ? std::make_unique<gl::EglContext::Current>(*context_) : nullptr;
+}
 
 void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with_depth) {
   struct Step {
@@ -76,40 +97,40 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
     int reach;  // how far it looks
   };
   const bool ewa = options.kernel == splat::Kernel::kEwa;
-  std::vector<Step> steps{{ewa ? &programs_.ewa : &programs_.keys, kResolving, 0}};
-  if (options.finish.fill) steps.push_back({&programs_.fill, kFilling, splat::kFillRadius});
-  if (options.finish.smooth) steps.push_back({&programs_.smooth, kSmoothing, 1});
-  if (options.finish.antialias) steps.push_back({&programs_.antialias, kAntialiasing, 1});
+  std::vector<Step> steps{{ewa ? &parts_->programs.ewa : &parts_->programs.keys, kResolving, 0}};
+  if (options.finish.fill) steps.push_back({&parts_->programs.fill, kFilling, splat::kFillRadius});
+  if (options.finish.smooth) steps.push_back({&parts_->programs.smooth, kSmoothing, 1});
+  if (options.finish.antialias) steps.push_back({&parts_->programs.antialias, kAntialiasing, 1});
 
   const auto bind = [](uint32_t unit, uint32_t texture) {
     glActiveTexture(GL_TEXTURE0 + unit);
     glBindTexture(GL_TEXTURE_2D, texture);
   };
   if (ewa) {
-    bind(1, targets_.sums(1));
-    bind(0, targets_.sums(0));
+    bind(1, parts_->targets.sums(1));
+    bind(0, parts_->targets.sums(0));
   } else {
-    bind(0, targets_.keys());
+    bind(0, parts_->targets.keys());
   }
-  glBindVertexArray(no_vertices_);
+  glBindVertexArray(parts_->no_vertices);
   glEnable(GL_SCISSOR_TEST);
   int reach = splat::finish_reach(options.finish);  // around the image, that the steps to come look at
   for (size_t i = 0; i < steps.size(); ++i) {
     const bool last = i + 1 == steps.size();
     reach -= steps[i].reach;
     if (last) {
-      targets_.draw_to(with_depth ? FrameTargets::kOutput : FrameTargets::kOutputColour);
-      glScissor(0, 0, targets_.width(), targets_.height());
+      parts_->targets.draw_to(with_depth ? FrameTargets::kOutput : FrameTargets::kOutputColour);
+      glScissor(0, 0, parts_->targets.width(), parts_->targets.height());
       steps[i].pass->to_output.use();
     } else {
-      targets_.draw_to(i % 2 ? FrameTargets::kPair1 : FrameTargets::kPair0);
+      parts_->targets.draw_to(i % 2 ? FrameTargets::kPair1 : FrameTargets::kPair0);
       const int margin = FrameTargets::kMargin - reach;
-      glScissor(margin, margin, targets_.width() + 2 * reach, targets_.height() + 2 * reach);
+      glScissor(margin, margin, parts_->targets.width() + 2 * reach, parts_->targets.height() + 2 * reach);
       steps[i].pass->to_pairs.use();
     }
     glDrawArrays(GL_TRIANGLES, 0, 3);
-    timer_.end_stage(steps[i].stage);
-    if (!last) bind(0, targets_.pairs(i % 2));
+    parts_->timer.end_stage(steps[i].stage);
+    if (!last) bind(0, parts_->targets.pairs(i % 2));
   }
   glDisable(GL_SCISSOR_TEST);
 }
@@ -117,9 +138,9 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
 Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& camera,
                         const splat::RenderOptions& options, const image::Shading& shading, bool with_depth) {
   frame_ = {};
-  if (const Status resized = targets_.resize(camera.width, camera.height); !resized) return resized;
+  if (const Status resized = parts_->targets.resize(camera.width, camera.height); !resized) return resized;
   if (options.kernel == splat::Kernel::kEwa)
-    if (const Status made = targets_.make_sums(); !made) return made;
+    if (const Status made = parts_->targets.make_sums(); !made) return made;
   // What others may have left in a shared context.
   for (const GLenum off : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE,
                            GL_RASTERIZER_DISCARD, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_FRAMEBUFFER_SRGB, GL_DITHER})
@@ -130,14 +151,14 @@ Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& cam
   glDepthRange(0, 1);
 
   const double start = monotonic_s();
-  splatting_.prepare(list, camera, options.kernel, shading);
+  parts_->splatting.prepare(list, camera, options.kernel, shading);
   prepare_ms_ = (monotonic_s() - start) * 1e3;
-  timer_.begin_frame();
-  splatting_.splat(targets_, programs_, options.kernel);
-  timer_.end_stage(kSplatting);
+  parts_->timer.begin_frame();
+  parts_->splatting.splat(parts_->targets, parts_->programs, options.kernel);
+  parts_->timer.end_stage(kSplatting);
   shade_and_finish(options, with_depth);
-  splatting_.end_frame();
-  frame_ = targets_.output(with_depth);
+  parts_->splatting.end_frame();
+  frame_ = parts_->targets.output(with_depth);
   return ok_status();
 }
 
@@ -152,7 +173,7 @@ void GlRenderer::release_state() const {
 splat::SplatStats GlRenderer::stats(const splat::DrawList& list, bool wait) {
   splat::SplatStats out;
   out.points_projected = out.points_drawn = list.points;
-  const std::vector<double>& ms = timer_.results(wait);
+  const std::vector<double>& ms = parts_->timer.results(wait);
   out.project_ms = prepare_ms_ + ms[kSplatting];
   out.resolve_ms = ms[kResolving];
   out.fill_ms = ms[kFilling];
@@ -164,6 +185,7 @@ splat::SplatStats GlRenderer::stats(const splat::DrawList& list, bool wait) {
 Result<splat::SplatStats> GlRenderer::render_on_gpu(const splat::DrawList& list, const geometry::Camera& camera,
                                                     const splat::RenderOptions& options, const image::Shading& shading,
                                                     bool with_depth) {
+  const Current current = use_context();
   if (const Status drawn = draw(list, camera, options, shading, with_depth); !drawn) return drawn.error();
   release_state();
   return stats(list, false);
@@ -173,6 +195,7 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
                                      const splat::RenderOptions& options, const image::Shading& shading,
                                      const splat::FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
+  const Current current = use_context();
   const double start = monotonic_s();
   if (const Status drawn = draw(list, camera, options, shading, target.depth_m != nullptr); !drawn) {
     // A frame that the GPU cannot hold shows nothing, rather than ending the viewer.
@@ -182,13 +205,13 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
     if (target.depth_m) std::fill_n(target.depth_m, pixels, std::numeric_limits<float>::infinity());
     return {};
   }
-  if (!timer_.available()) glFinish();
+  if (!parts_->timer.available()) glFinish();
   const double drawn = monotonic_s();
-  read_back_.read(targets_.framebuffer(FrameTargets::kOutput), target);
+  parts_->read_back.read(parts_->targets.framebuffer(FrameTargets::kOutput), target);
   release_state();
   const double end = monotonic_s();
   splat::SplatStats out = stats(list, true);
-  if (!timer_.available()) out.project_ms = (drawn - start) * 1e3;
+  if (!parts_->timer.available()) out.project_ms = (drawn - start) * 1e3;
   const double rest = (end - start) * 1e3 - out.project_ms - out.fill_ms - out.smooth_ms - out.antialias_ms;
   out.resolve_ms = std::max(out.resolve_ms, rest);
   return out;

@@ -3,13 +3,12 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
-#include "client/viewer/render/gl/read_back.h"
-#include "client/viewer/render/gl/splat_passes.h"
+#include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/renderer.h"
 #include "common/core/log.h"
 #include "common/gl/egl_context.h"
-#include "common/gl/stage_timer.h"
 
 namespace telesplat::viewer {
 
@@ -21,7 +20,7 @@ struct GlOptions {
 
 class GlRenderer final : public Renderer {
  public:
-  /// With a context of its own, off-screen, current in this thread as long as the renderer lives.
+  /// With a context of its own, off-screen, which is current during its calls only.
   static Result<std::unique_ptr<GlRenderer>> make(const GlOptions& options = {});
   /// In the context that is current in this thread (a window's): there must be one, and it must be current at each call and at the
   /// end. Fails where it is older than OpenGL 4.3. Between calls the context may be used for anything: the renderer sets all state that it needs and
@@ -49,26 +48,21 @@ class GlRenderer final : public Renderer {
   bool is_software() const { return gl::is_software(device_); }
 
  private:
-  using Current = gl::EglContext::Current;
   enum Stage { kSplatting, kResolving, kFilling, kSmoothing, kAntialiasing, kStages };
-  GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current, Programs programs,
-             const GlOptions& options);
-  static Result<Programs> make_programs();
+  struct Parts;  // what lives in the context
+  GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts, std::string device);
+  static Result<std::unique_ptr<Parts>> make_parts(const GlOptions& options);
+  using Current = std::unique_ptr<gl::EglContext::Current>;
+  Current use_context() const;
   Status draw(const splat::DrawList& list, const geometry::Camera& camera, const splat::RenderOptions& options,
               const image::Shading& shading, bool with_depth);
   void shade_and_finish(const splat::RenderOptions& options, bool with_depth);
   void release_state() const;
   splat::SplatStats stats(const splat::DrawList& list, bool wait);
 
-  std::unique_ptr<gl::EglContext> context_;  // first in, last out: the rest needs it. Null: somebody else's
-  std::unique_ptr<Current> current_;         // in the thread that made the renderer, as long as it lives
+  std::unique_ptr<gl::EglContext> context_;  // null: somebody else's
+  std::unique_ptr<Parts> parts_;
   std::string device_;
-  Programs programs_;
-  FrameTargets targets_;
-  SplatPasses splatting_;
-  ReadBack read_back_;
-  gl::StageTimer timer_;
-  uint32_t no_vertices_ = 0;  // vertex array of whole-frame passes
   GlFrame frame_;
   double prepare_ms_ = 0;
   log::RateLimiter refusals_;

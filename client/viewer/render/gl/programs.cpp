@@ -12,6 +12,7 @@
 #include "client/viewer/render/gl/shaders/resolve.h"
 #include "client/viewer/render/gl/shaders/surfel.h"
 #include "common/splat/finish.h"
+#include "common/splat/splat_table.h"
 #include "common/splat/surfel_splat.h"
 
 namespace telesplat::viewer {
@@ -34,7 +35,7 @@ std::string constants() {
   add("MAX_SPLAT_SIDE", std::to_string(splat::kMaxSplatSide));
   add_uint("MAX_CENTRE_CODE", splat::kMaxCentreCode);
   add_uint("MAX_DEPTH_CODE", splat::kMaxDepthCode);
-  add_uint("MAX_BIAS_CODE", splat::kMaxBiasCode);
+  add_uint("MAX_BIAS", splat::kMaxBias);
   add_float("MIN_SAMPLED_COSINE", splat::kMinSampledCosine);
   add_float("STEEPEST", splat::kSteepest);
   add_float("MAX_RADIUS_OVER_DEPTH", splat::kMaxRadiusOverDepth);

@@ -21,7 +21,8 @@ void ReadBack::read_image(uint32_t attachment, bool is_colour, const splat::Fram
 void ReadBack::read(uint32_t framebuffer, const splat::FrameTarget& target) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
   glPixelStorei(GL_PACK_ALIGNMENT, 4);
-  glPixelStorei(GL_PACK_ROW_LENGTH, 0);
+  for (const GLenum whole : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS, GL_PACK_SWAP_BYTES})
+    glPixelStorei(whole, 0);
   const int images = target.depth_m ? 2 : 1;
   void* const to[2] = {target.colour, target.depth_m};
   if (!pack_buffers_) {

@@ -24,21 +24,29 @@ void bind(const gl::StreamBuffer& stream, GLenum target, uint32_t binding, const
   glBindBufferRange(target, binding, stream.buffer(), slice.offset, static_cast<GLsizeiptr>(slice.bytes));
 }
 
-// Of one item: what does not depend on where its points lie.
-DrawRecord record(const splat::DrawItem& item, splat::Kernel kernel, const splat::SurfelCamera& camera) {
+// Of one item: what does not depend on where its points lie. spacing_px: between its samples on the screen.
+DrawRecord record(const splat::DrawItem& item, float spacing_px, splat::Kernel kernel,
+                  const splat::SurfelCamera& camera) {
   DrawRecord d{};
+  d.spacing = splat::spacing_class(spacing_px);
   if (kernel == splat::Kernel::kEllipse || kernel == splat::Kernel::kEwa) {
     const splat::SurfelSource source = splat::surfel_source(camera, item.radius_m, item.to_eye);
     std::copy(source.to_eye.begin(), source.to_eye.end(), d.source);
     d.source[3] = source.radius_m;
     return d;
   }
-  const bool disc = kernel == splat::Kernel::kDisc;
-  d.size = disc ? splat::disc_diameter(item.splat_px) : static_cast<float>(splat::square_side(item.splat_px));
+  d.size = splat::square_size(item.splat_px);
   d.side = static_cast<int>(std::ceil(d.size));
-  d.bias_growth = static_cast<float>(splat::splat_bias_growth(d.side, camera.focal_x) * 0.5);
+  d.bias_growth = static_cast<float>(splat::splat_bias_growth(d.side, camera.focal_x));
   d.sub_steps = 1 << splat::sub_bits(d.side);
   return d;
+}
+
+// On the contour, in depth codes.
+uint32_t rim_bias(const DrawRecord& d, splat::Kernel kernel, double focal_px) {
+  if (d.side <= 1) return 0;
+  const double contour_r2 = (kernel == splat::Kernel::kDisc ? 0.25 : 0.5) * double{d.size} * double{d.size};
+  return splat::splat_bias(contour_r2, d.side, focal_px);
 }
 
 void clear_depth_and_test() {
@@ -67,10 +75,12 @@ SplatPasses::~SplatPasses() {
   glDeleteBuffers(1, &draw_numbers_);
 }
 
-void SplatPasses::write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel) {
+splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geometry::Camera& camera,
+                                        splat::Kernel kernel) {
   const splat::SurfelCamera surfel_camera = splat::surfel_camera(camera);
   const auto clusters = take<ClusterRecord>(stream_, runs_.runs.size());
   const auto draws = take<DrawRecord>(stream_, list.items.size());
+  uint64_t bias[4] = {}, points[4] = {};
   for (auto& commands : commands_by_arena_) commands.clear();
   for (uint32_t r = 0; r < runs_.runs.size(); ++r) {
     const splat::LeafTransform& t = runs_.transforms[r];
@@ -83,10 +93,12 @@ void SplatPasses::write_draws(const splat::DrawList& list, const geometry::Camer
       const splat::DrawItem& item = list.items[i];
       if (item.level.count == 0) continue;
       const PointRange range = arenas_.place(item);
-      DrawRecord d = record(item, kernel, surfel_camera);
+      DrawRecord d = record(item, item.splat_px / list.scale, kernel, surfel_camera);
       d.word = range.word;
       d.count = item.level.count;
       d.cluster = r;
+      bias[d.spacing] += uint64_t{rim_bias(d, kernel, camera.focal_x())} * item.level.count;
+      points[d.spacing] += item.level.count;
       std::memcpy(draws.data + i * sizeof d, &d, sizeof d);
       if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
       commands_by_arena_[range.arena].push_back({item.level.count, 1, 0, i});
@@ -104,9 +116,13 @@ void SplatPasses::write_draws(const splat::DrawList& list, const geometry::Camer
     if (bytes) std::memcpy(commands.data + written, of_arena.data(), bytes);
     written += bytes;
   }
+  splat::RimBias rim{};
+  for (size_t i = 0; i < rim.size(); ++i)
+    if (points[i] > 0) rim[i] = static_cast<uint32_t>((bias[i] + points[i] / 2) / points[i]);
+  return rim;
 }
 
-void SplatPasses::write_view(const geometry::Camera& camera, const image::Shading& shading) {
+void SplatPasses::write_view(const geometry::Camera& camera, const image::Shading& shading, const splat::RimBias& rim) {
   const splat::SurfelCamera c = splat::surfel_camera(camera);
   ViewRecord v{};
   std::copy(c.right.begin(), c.right.end(), v.right);
@@ -125,6 +141,7 @@ void SplatPasses::write_view(const geometry::Camera& camera, const image::Shadin
   v.near_bits = std::bit_cast<uint32_t>(v.near_m);
   v.margin = FrameTargets::kMargin;
   v.background = shading.background();
+  std::copy(rim.begin(), rim.end(), v.rim_bias);
   const auto view = take<ViewRecord>(stream_, 1);
   std::memcpy(view.data, &v, sizeof v);
   bind(stream_, GL_UNIFORM_BUFFER, 0, view);
@@ -150,8 +167,8 @@ void SplatPasses::prepare(const splat::DrawList& list, const geometry::Camera& c
                 stream_.padded(items * sizeof(DrawCommand)) + stream_.padded(sizeof(ViewRecord)) +
                 stream_.padded(shading.table().size()));
   number_draws(list.items.size());
-  write_draws(list, camera, kernel);
-  write_view(camera, shading);
+  const splat::RimBias rim = write_draws(list, camera, kernel);
+  write_view(camera, shading, rim);
   stream_.commit();
 }
 

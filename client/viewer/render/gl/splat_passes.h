@@ -9,6 +9,7 @@
 #include "common/gl/stream_buffer.h"
 #include "common/image/shading.h"
 #include "common/splat/item_runs.h"
+#include "common/splat/pixel_key.h"
 #include "common/splat/render_options.h"
 
 namespace telesplat::viewer {
@@ -71,8 +72,8 @@ class SplatPasses {
   struct DrawCommand {
     uint32_t count, instances, first, base_instance;
   };
-  void write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
-  void write_view(const geometry::Camera& camera, const image::Shading& shading);
+  splat::RimBias write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
+  void write_view(const geometry::Camera& camera, const image::Shading& shading, const splat::RimBias& rim);
   void number_draws(size_t count);
   void draw_points(const gl::Program& program);
   void splat_opaque(const FrameTargets& targets, const gl::Program& program);

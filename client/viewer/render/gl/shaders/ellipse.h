@@ -15,7 +15,7 @@ void main() {
   Surfel s = project_surfel(d, i);
   Conic c = surfel_conic(s, 1.0, OPAQUE_VARIANCE);
   send_conic(c, surfel_depth(s));
-  bias = min(surfel_share(d.source.w, s.w, BIAS_PER_RADIUS, LEAST_BIAS, MOST_BIAS), float(MAX_BIAS_CODE));
+  bias = min(surfel_share(d.source.w, s.w, BIAS_PER_RADIUS, LEAST_BIAS, MOST_BIAS), float(MAX_BIAS));
   uint normal = point_normal(d, i);
   splat = uvec2(key_low(normal, point_albedo(d, i)), normal | surfel_spacing(s.determinant) << 16);
   place_conic(c, s.w >= view.near_m);

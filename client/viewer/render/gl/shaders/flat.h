@@ -48,7 +48,7 @@ void main() {
   vec2 d = vec2(pixel) + 0.5 - centre;
   if (shape.y > 0.0 && DISTANCE2(d) > shape.y * shape.y && pixel != ivec2(centre)) discard;
   float r2 = dot(d, d);
-  uint bias = min(uint(floor(shape.x * r2 + 0.5)), MAX_BIAS_CODE);
+  uint bias = min(uint(floor(shape.x * r2 + 0.5)), MAX_BIAS);
   uint ring = shape.y > 0.0 ? ring_of(r2 / shape.z) : 0u;
   uint high = key_high(splat.z + bias, splat.y >> 16, ring, splat.y & 0xffffu);
   gl_FragDepth = depth_test_value(high);
