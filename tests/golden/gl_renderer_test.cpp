@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include "client/viewer/render/gl/gl_renderer.h"
+#include "common/splat/finish.h"
 #include "tests/unit/splat_scene.h"
+#include "tests/unit/splat_surfel_plain.h"
 
 namespace telesplat {
 namespace {
@@ -199,6 +201,67 @@ TEST_F(GlRendererTest, RefusesWhatTheGpuCannotHold) {
   const Scene small;
   const testing::Frame after = render(*renderer, small, {});
   EXPECT_NE(after.colour, std::vector<uint32_t>(after.colour.size(), after.colour[0]));
+}
+
+// ---- the finish, against the CPU's stages on plainly splatted ellipses ----
+
+constexpr int kMargin = 24;  // pixels around the image that the stages may look at
+
+geometry::Camera with_margin(geometry::Camera c) {
+  const double x = kMargin / c.focal_x(), y = kMargin / c.focal_y();
+  c.left -= x, c.right += x, c.top += y, c.bottom -= y;
+  c.width += 2 * kMargin, c.height += 2 * kMargin;
+  return c;
+}
+
+std::vector<uint32_t> finish_plainly(const Scene& scene, const splat::Finish& finish) {
+  const int width = scene.camera.width, height = scene.camera.height, stride = width + 2 * kMargin;
+  const std::vector<uint64_t> keys = testing::ellipse_plainly(scene.list, with_margin(scene.camera));
+  std::vector<uint32_t> rows(2 * keys.size() + 64);
+  for (size_t i = 0; i < keys.size(); ++i) {
+    const size_t at =
+        i / static_cast<size_t>(stride) * 2 * static_cast<size_t>(stride) + i % static_cast<size_t>(stride);
+    const bool empty = static_cast<int64_t>(keys[i]) == splat::kEmptyKey;
+    rows[at] =
+        empty ? scene.shading.background()
+              : image::Shading::apply(splat::key_albedo(keys[i]), scene.shading.table()[splat::key_normal(keys[i])]);
+    rows[at + static_cast<size_t>(stride)] = empty ? splat::kEmptyInfo : splat::key_info(keys[i]);
+  }
+  const splat::ResolvedTile tile{rows.data(), stride, kMargin, width, height};
+  splat::FinishScratch scratch;
+  int grow = splat::finish_reach(finish);
+  if (finish.fill) splat::fill_holes(tile, grow -= splat::kFillRadius, scratch);
+  if (finish.smooth) splat::smooth(tile, grow -= 1, scratch);
+  if (finish.antialias) splat::antialias(tile, scratch);
+  std::vector<uint32_t> out;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) out.push_back(0xff000000u | tile.colour(y)[x]);
+  return out;
+}
+
+TEST_F(GlRendererTest, FinishesAsTheCpuDoes) {
+  const auto renderer = made(GlRenderer::make());
+  ASSERT_TRUE(renderer);
+  const Scene scene(4);
+  const std::vector<uint32_t> unfinished = finish_plainly(scene, kNoFinish);
+  for (const splat::Finish& finish : {kNoFinish, splat::Finish{true, false, false}, splat::Finish{false, true, false},
+                                      splat::Finish{false, false, true}, splat::Finish{}}) {
+    const std::vector<uint32_t> plain = finish_plainly(scene, finish);
+    const testing::Frame drawn = render(*renderer, scene, {splat::Kernel::kEllipse, finish});
+    size_t differing = 0, changed = 0;
+    for (size_t i = 0; i < plain.size(); ++i) {
+      differing += plain[i] != drawn.colour[i];
+      changed += plain[i] != unfinished[i];
+    }
+    const std::string what = std::string(finish.fill ? "fill " : "") + (finish.smooth ? "smooth " : "") +
+                             (finish.antialias ? "antialias" : "");
+    // Other positions on the pixel grid round otherwise: some pixels show another point. A stage changes far more.
+    EXPECT_LE(differing, plain.size() / 100) << what;
+    if (what != "") {
+      EXPECT_GE(changed, plain.size() / 25) << what;
+    }
+    std::printf("%s: %zu differ, %zu changed of %zu\n", what.c_str(), differing, changed, plain.size());
+  }
 }
 
 }  // namespace

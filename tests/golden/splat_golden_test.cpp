@@ -1,4 +1,4 @@
-// Both renderers against committed pictures, square and disc. A failing case leaves reference, rendered and difference images in
+// Both renderers against committed pictures, every kernel. A failing case leaves reference, rendered and difference images in
 // the build folder (golden-failures/). To accept new pictures, look at them and run with TELESPLAT_UPDATE_GOLDEN=1.
 #include <gtest/gtest.h>
 
@@ -190,8 +190,7 @@ TEST_P(SplatGolden, LooksAsCommitted) {
   const auto renderer = make(kind, why_not);
   if (!renderer) GTEST_SKIP() << why_not;
   const image::View rendered = render(*renderer, kernel, splat_scale(kernel));
-  const std::string shape = kernel == splat::Kernel::kSquare ? "square" : "disc",
-                    path = "tests/golden/images/splat-" + shape + ".png";
+  const std::string shape(splat::kernel_name(kernel)), path = "tests/golden/images/splat-" + shape + ".png";
   if (std::getenv("TELESPLAT_UPDATE_GOLDEN") && kind == "cpu") {
     ASSERT_TRUE(image::write_png(path, rendered).ok());
   }
@@ -222,11 +221,10 @@ TEST_P(SplatGolden, IsCloseToTracingTheScene) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Renderers, SplatGolden,
-                         ::testing::Combine(::testing::Values("cpu", "gl"),
-                                            ::testing::Values(splat::Kernel::kSquare, splat::Kernel::kDisc)),
+                         ::testing::Combine(::testing::Values("cpu", "gl"), ::testing::ValuesIn(splat::kKernels)),
                          [](const auto& info) {
-                           return std::get<0>(info.param) +
-                                  (std::get<1>(info.param) == splat::Kernel::kSquare ? "_square" : "_disc");
+                           return std::get<0>(info.param) + "_" +
+                                  std::string(splat::kernel_name(std::get<1>(info.param)));
                          });
 
 // The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept copies, items
@@ -248,7 +246,7 @@ TEST(RenderersAgree, FrameAfterFrame) {
     splat::select_view(model(), camera, options, list);
     auto made = testing::random_items(static_cast<uint32_t>(frame), 12, 60);
     for (auto& m : made) list.items.push_back(m.item(1.0f + 0.7f * float(frame % 12)));
-    const splat::Kernel kernel = frame % 2 ? splat::Kernel::kDisc : splat::Kernel::kSquare;
+    const splat::Kernel kernel = splat::kKernels[static_cast<size_t>(frame) % 4];
     testing::Frame a(width, height), b(width, height);
     cpu->render(list, camera, kernel, shading, a.target());
     gl->render(list, camera, kernel, shading, b.target());

@@ -12,7 +12,6 @@
 #include "client/viewer/render/gl/shaders/resolve.h"
 #include "client/viewer/render/gl/shaders/surfel.h"
 #include "common/splat/finish.h"
-#include "common/splat/splat_table.h"
 #include "common/splat/surfel_splat.h"
 
 namespace telesplat::viewer {
@@ -49,11 +48,6 @@ std::string constants() {
   add_float("EPSILON_PER_RADIUS", splat::kEpsilonPerRadius);
   add_float("LEAST_EPSILON", splat::kLeastEpsilon);
   add_float("MOST_EPSILON", splat::kMostEpsilon);
-  int limit = 0;
-  for (const float spacing : {1.3f, 1.8f, 3.0f}) {
-    const float r = splat::kRadiusPerSpacing * spacing;
-    add_float(fmt::format("SPACING_LIMIT_{}", ++limit), (r * r) * (r * r));
-  }
   return out;
 }
 

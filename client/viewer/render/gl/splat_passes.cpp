@@ -3,14 +3,17 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
 #include <numeric>
 
 #include "common/splat/ewa_shading.h"
 #include "common/splat/splat_table.h"
-#include "common/splat/surfel_contour.h"
+#include "common/splat/surfel_splat.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -42,12 +45,40 @@ DrawRecord record(const splat::DrawItem& item, float spacing_px, splat::Kernel k
   return d;
 }
 
-// On the contour, in depth codes.
-uint32_t rim_bias(const DrawRecord& d, splat::Kernel kernel, double focal_px) {
-  if (d.side <= 1) return 0;
-  const double contour_r2 = (kernel == splat::Kernel::kDisc ? 0.25 : 0.5) * double{d.size} * double{d.size};
-  return splat::splat_bias(contour_r2, d.side, focal_px);
-}
+// Mean bias on the contour for each class of spacing, by points: the same figures as the CPU splatter's.
+class MeanBias {
+ public:
+  MeanBias(splat::Kernel kernel, const geometry::Camera& camera)
+      : kernel_(kernel), camera_(camera), depth_row_(camera.room_to_pixel().w) {}
+
+  void add(const splat::DrawItem& item, const DrawRecord& d) {
+    double bias = 0;
+    if (kernel_ == splat::Kernel::kEwa) return;
+    if (kernel_ == splat::Kernel::kEllipse) {
+      // Ellipses differ from point to point: the item's at its leaf's centre stands for them.
+      const auto depth_m = static_cast<float>(glm::dot(depth_row_, glm::dvec4(item.cluster->leaf_room.centre(), 1)));
+      if (!(depth_m >= static_cast<float>(camera_.near_m))) return;
+      bias = splat::ellipse_bias(item.radius_m, depth_m);
+    } else if (d.side > 1) {
+      const double contour_r2 = (kernel_ == splat::Kernel::kDisc ? 0.25 : 0.5) * double{d.size} * double{d.size};
+      bias = splat::splat_bias(contour_r2, d.side, camera_.focal_x());
+    }
+    bias_[d.spacing] += bias * item.level.count;
+    points_[d.spacing] += item.level.count;
+  }
+  splat::RimBias rim() const {
+    splat::RimBias rim{};
+    for (size_t i = 0; i < rim.size(); ++i)
+      if (points_[i] > 0) rim[i] = static_cast<uint32_t>(std::lround(bias_[i] / points_[i]));
+    return rim;
+  }
+
+ private:
+  splat::Kernel kernel_;
+  const geometry::Camera& camera_;
+  glm::dvec4 depth_row_;
+  std::array<double, 4> bias_{}, points_{};
+};
 
 void clear_depth_and_test() {
   glEnable(GL_DEPTH_TEST);
@@ -80,7 +111,7 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
   const splat::SurfelCamera surfel_camera = splat::surfel_camera(camera);
   const auto clusters = take<ClusterRecord>(stream_, runs_.runs.size());
   const auto draws = take<DrawRecord>(stream_, list.items.size());
-  uint64_t bias[4] = {}, points[4] = {};
+  MeanBias bias(kernel, camera);
   for (auto& commands : commands_by_arena_) commands.clear();
   for (uint32_t r = 0; r < runs_.runs.size(); ++r) {
     const splat::LeafTransform& t = runs_.transforms[r];
@@ -97,8 +128,7 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
       d.word = range.word;
       d.count = item.level.count;
       d.cluster = r;
-      bias[d.spacing] += uint64_t{rim_bias(d, kernel, camera.focal_x())} * item.level.count;
-      points[d.spacing] += item.level.count;
+      bias.add(item, d);
       std::memcpy(draws.data + i * sizeof d, &d, sizeof d);
       if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
       commands_by_arena_[range.arena].push_back({item.level.count, 1, 0, i});
@@ -116,13 +146,11 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
     if (bytes) std::memcpy(commands.data + written, of_arena.data(), bytes);
     written += bytes;
   }
-  splat::RimBias rim{};
-  for (size_t i = 0; i < rim.size(); ++i)
-    if (points[i] > 0) rim[i] = static_cast<uint32_t>((bias[i] + points[i] / 2) / points[i]);
-  return rim;
+  return bias.rim();
 }
 
-void SplatPasses::write_view(const geometry::Camera& camera, const image::Shading& shading, const splat::RimBias& rim) {
+void SplatPasses::write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
+                             const splat::RimBias& rim) {
   const splat::SurfelCamera c = splat::surfel_camera(camera);
   ViewRecord v{};
   std::copy(c.right.begin(), c.right.end(), v.right);
@@ -141,6 +169,8 @@ void SplatPasses::write_view(const geometry::Camera& camera, const image::Shadin
   v.near_bits = std::bit_cast<uint32_t>(v.near_m);
   v.margin = FrameTargets::kMargin;
   v.background = shading.background();
+  const splat::SpacingLimits limits = splat::spacing_limits(scale);
+  std::copy(limits.begin(), limits.end(), v.spacing_limits);
   std::copy(rim.begin(), rim.end(), v.rim_bias);
   const auto view = take<ViewRecord>(stream_, 1);
   std::memcpy(view.data, &v, sizeof v);
@@ -168,7 +198,7 @@ void SplatPasses::prepare(const splat::DrawList& list, const geometry::Camera& c
                 stream_.padded(shading.table().size()));
   number_draws(list.items.size());
   const splat::RimBias rim = write_draws(list, camera, kernel);
-  write_view(camera, shading, rim);
+  write_view(camera, shading, list.scale, rim);
   stream_.commit();
 }
 

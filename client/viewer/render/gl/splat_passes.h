@@ -26,9 +26,10 @@ struct ViewRecord {
   uint32_t background;
   uint32_t unused[2];
   float light[4], light_direction[4];  ///< splat::EwaLight
+  float spacing_limits[4];             ///< splat::SpacingLimits
   uint32_t rim_bias[4];                ///< splat::RimBias
 };
-static_assert(sizeof(ViewRecord) == 160);
+static_assert(sizeof(ViewRecord) == 176);
 
 /// What the draws of one cluster share (std430).
 struct ClusterRecord {
@@ -73,7 +74,8 @@ class SplatPasses {
     uint32_t count, instances, first, base_instance;
   };
   splat::RimBias write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
-  void write_view(const geometry::Camera& camera, const image::Shading& shading, const splat::RimBias& rim);
+  void write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
+                  const splat::RimBias& rim);
   void number_draws(size_t count);
   void draw_points(const gl::Program& program);
   void splat_opaque(const FrameTargets& targets, const gl::Program& program);

@@ -23,6 +23,7 @@ layout(std140, binding = 0) uniform View {
   uint background;            // 0x00RRGGBB
   vec4 light;                 // ambient, head, key
   vec4 light_direction;       // of the key light, camera axes
+  vec4 spacing_limits;        // of det S: ellipse
   uvec4 rim_bias;             // depth codes, for each class of spacing
 } view;
 )";

@@ -35,13 +35,13 @@ void main() {
   Draw d = draws[draw_number];
   uint i = uint(gl_VertexID);
   Surfel s = project_surfel(d, i);
-  float grow = max(1.0, SUPPORT_GROWTH - SUPPORT_DROP / sqrt(s.determinant));
+  precise float grow = max(SUPPORT_GROWTH - SUPPORT_DROP / sqrt(max(s.determinant, 1e-12)), 1.0);
   Conic c = surfel_conic(s, grow, FILTER_VARIANCE);
   send_conic(c, surfel_depth(s));
   uint colour = point_albedo(d, i);
   albedo = vec3(uvec3(colour >> 16, colour >> 8, colour) & 255u);
   normal = s.contour.normal;
-  scale = vec2(1.0 / c.determinant, surfel_share(d.source.w, s.w, EPSILON_PER_RADIUS, LEAST_EPSILON, MOST_EPSILON));
+  scale = vec2(1.0 / min(c.determinant, 1e6), surfel_share(d.source.w, s.w, EPSILON_PER_RADIUS, LEAST_EPSILON, MOST_EPSILON));
   place_conic(c, s.w >= view.near_m);
 }
 )";

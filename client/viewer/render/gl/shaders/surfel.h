@@ -50,7 +50,8 @@ void conic_bounds(float centre, float reach, out int first, out int last) {
 
 Conic surfel_conic(Surfel s, float grow, float add) {
   Conic c;
-  precise vec2 centre = s.place + s.contour.offset;
+  const float kFarthest = float(MAX_SPLAT_SIDE / 2 - 1);
+  precise vec2 centre = s.place + clamp(s.contour.offset, -kFarthest, kFarthest);
   precise float xx = grow * s.contour.xx + add;
   precise float xy = grow * s.contour.xy;
   precise float yy = grow * s.contour.yy + add;
@@ -79,7 +80,8 @@ float surfel_share(float radius_m, float w, float factor, float least, float mos
 }
 
 uint surfel_spacing(float determinant) {
-  return uint(determinant >= SPACING_LIMIT_1) + uint(determinant >= SPACING_LIMIT_2) + uint(determinant >= SPACING_LIMIT_3);
+  bvec3 reached = greaterThanEqual(vec3(determinant), view.spacing_limits.xyz);
+  return uint(reached.x) + uint(reached.y) + uint(reached.z);
 }
 
 void place_conic(Conic c, bool seen) {
