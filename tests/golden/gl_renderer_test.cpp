@@ -207,16 +207,43 @@ TEST_F(GlRendererTest, RefusesWhatTheGpuCannotHold) {
 
 constexpr int kMargin = 24;  // pixels around the image that the stages may look at
 
-geometry::Camera with_margin(geometry::Camera c) {
-  const double x = kMargin / c.focal_x(), y = kMargin / c.focal_y();
-  c.left -= x, c.right += x, c.top += y, c.bottom -= y;
-  c.width += 2 * kMargin, c.height += 2 * kMargin;
-  return c;
+// testing::ellipse_plainly, of the image and a margin around it.
+std::vector<uint64_t> keys_with_margin(const Scene& scene) {
+  const int width = scene.camera.width + 2 * kMargin, height = scene.camera.height + 2 * kMargin;
+  std::vector<uint64_t> keys(size_t(width) * size_t(height), uint64_t(splat::kEmptyKey));
+  const auto near_m = static_cast<float>(scene.camera.near_m);
+  const splat::SpacingLimits limits = splat::spacing_limits(scene.list.scale);
+  testing::for_surfels(
+      scene.list, scene.camera,
+      [&](const splat::DrawItem& item, uint32_t i, const splat::SurfelSource& source, float x, float y, float w,
+          const splat::SurfelContour& contour) {
+        const splat::SurfelConic c = splat::surfel_conic(contour, x, y, 1.0f, splat::kOpaqueVariance);
+        const splat::SurfelDepth depth = splat::surfel_depth(contour, w, near_m);
+        const float bias = splat::ellipse_bias(source.radius_m, w);
+        const uint32_t spacing = splat::surfel_spacing(contour.xx * contour.yy - contour.xy * contour.xy, limits);
+        const int middle_x = int(std::floor(c.centre_x)), middle_y = int(std::floor(c.centre_y));
+        const auto visit = [&](int px, int py, bool always) {
+          const int column = px + kMargin, row = py + kMargin;
+          if (column < 0 || row < 0 || column >= width || row >= height) return;
+          const float dx = (float(px) + 0.5f) - c.centre_x, dy = (float(py) + 0.5f) - c.centre_y, q = c.at(dx, dy);
+          if (q > 1.0f && !always) return;
+          const float code = ((depth.centre + depth.x * dx) + depth.y * dy) + bias * std::min(q, 1.0f);
+          const uint64_t key = splat::encode_key(uint32_t(std::clamp(code, 0.0f, float(splat::kMaxDepthCode))), spacing,
+                                                 uint32_t(std::min(8.0f * q, 7.0f)), item.level.normal[i],
+                                                 item.level.colour[i] & 0xffffff);
+          uint64_t& there = keys[size_t(row) * size_t(width) + size_t(column)];
+          there = uint64_t(std::min(int64_t(there), int64_t(key)));
+        };
+        for (int py = c.y0; py < c.y1; ++py)
+          for (int px = c.x0; px < c.x1; ++px) visit(px, py, false);
+        visit(middle_x, middle_y, true);
+      });
+  return keys;
 }
 
 std::vector<uint32_t> finish_plainly(const Scene& scene, const splat::Finish& finish) {
   const int width = scene.camera.width, height = scene.camera.height, stride = width + 2 * kMargin;
-  const std::vector<uint64_t> keys = testing::ellipse_plainly(scene.list, with_margin(scene.camera));
+  const std::vector<uint64_t> keys = keys_with_margin(scene);
   std::vector<uint32_t> rows(2 * keys.size() + 64);
   for (size_t i = 0; i < keys.size(); ++i) {
     const size_t at =
@@ -255,10 +282,10 @@ TEST_F(GlRendererTest, FinishesAsTheCpuDoes) {
     }
     const std::string what = std::string(finish.fill ? "fill " : "") + (finish.smooth ? "smooth " : "") +
                              (finish.antialias ? "antialias" : "");
-    // Other positions on the pixel grid round otherwise: some pixels show another point. A stage changes far more.
+    // Where depths tie another point may win. A stage changes far more than that.
     EXPECT_LE(differing, plain.size() / 100) << what;
     if (what != "") {
-      EXPECT_GE(changed, plain.size() / 25) << what;
+      EXPECT_GE(changed, plain.size() / 40) << what;
     }
     std::printf("%s: %zu differ, %zu changed of %zu\n", what.c_str(), differing, changed, plain.size());
   }

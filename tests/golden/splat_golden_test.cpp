@@ -155,6 +155,8 @@ void expect_like(const image::View& reference, const image::View& rendered, cons
                  const std::string& name) {
   const Difference d = difference(reference, rendered);
   const bool good = d.mean <= tolerance.mean && d.largest_window <= tolerance.window && d.pixels <= tolerance.pixels;
+  std::printf("%s: mean %.4f, worst window %.3f, share of pixels %.5f\n", name.c_str(), d.mean, d.largest_window,
+              d.pixels);
   EXPECT_TRUE(good) << name << ": mean " << d.mean << ", worst window " << d.largest_window << ", share of pixels "
                     << d.pixels << ", largest " << d.largest;
   if (good) return;
@@ -200,7 +202,7 @@ TEST_P(SplatGolden, LooksAsCommitted) {
   ASSERT_EQ(reference->height, kHeight);
   // The CPU's arithmetic is exact; what the compiler's library does in the scene's sines may move a sample. GPUs round
   // divisions their own way.
-  const Tolerance tolerance = kind == "cpu" ? Tolerance{0.02, 1.0, 0.001} : Tolerance{0.15, 6.0, 0.01};
+  const Tolerance tolerance = kind == "cpu" ? Tolerance{0.02, 1.0, 0.001} : Tolerance{0.03, 4.0, 0.003};
   expect_like(*reference, rendered, tolerance, "splat-" + shape + "-" + kind);
 }
 
@@ -227,6 +229,14 @@ INSTANTIATE_TEST_SUITE_P(Renderers, SplatGolden,
                                   std::string(splat::kernel_name(std::get<1>(info.param)));
                          });
 
+// ewa adds up floats, in another order on each renderer.
+bool same_colour(uint32_t a, uint32_t b, splat::Kernel kernel) {
+  const int tolerance = kernel == splat::Kernel::kEwa ? 2 : 0;
+  for (int shift : {16, 8, 0})
+    if (std::abs(int(a >> shift & 255) - int(b >> shift & 255)) > tolerance) return false;
+  return true;
+}
+
 // The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept copies, items
 // that it may not keep, and changes of size are tried too.
 TEST(RenderersAgree, FrameAfterFrame) {
@@ -234,6 +244,7 @@ TEST(RenderersAgree, FrameAfterFrame) {
   const auto gl = make("gl", why_not);
   if (!gl) GTEST_SKIP() << why_not;
   const auto cpu = viewer::make_cpu_renderer(2);
+  double most[splat::kKernels.size()] = {};
   for (int frame = 0; frame < 24; ++frame) {
     const int width = frame % 5 == 4 ? 133 : 200, height = frame % 5 == 4 ? 77 : 120;
     const geometry::Camera camera = geometry::make_camera(
@@ -252,13 +263,18 @@ TEST(RenderersAgree, FrameAfterFrame) {
     gl->render(list, camera, kernel, shading, b.target());
     size_t colours = 0, depths = 0;
     for (size_t i = 0; i < a.colour.size(); ++i) {
-      colours += a.colour[i] != b.colour[i];
+      colours += !same_colour(a.colour[i], b.colour[i], kernel);
       depths += !(a.depth_m[i] == b.depth_m[i] || std::abs(a.depth_m[i] - b.depth_m[i]) < 1e-4f * a.depth_m[i]);
     }
-    // Stated tolerance: at most 1 % of pixels show another point.
-    EXPECT_LE(colours, a.colour.size() / 100) << "frame " << frame;
-    EXPECT_LE(depths, a.colour.size() / 100) << "frame " << frame;
+    // Stated tolerance: at most 0.5 % of pixels show another point, where depths tie (ewa: another mean).
+    EXPECT_LE(colours, a.colour.size() / 200) << "frame " << frame;
+    EXPECT_LE(depths, a.colour.size() / 200) << "frame " << frame;
+    most[static_cast<size_t>(kernel)] =
+        std::max(most[static_cast<size_t>(kernel)], double(colours) / double(a.colour.size()));
   }
+  for (const splat::Kernel kernel : splat::kKernels)
+    std::printf("%s: at most %.4f of a frame's pixels differ\n", std::string(splat::kernel_name(kernel)).c_str(),
+                most[static_cast<size_t>(kernel)]);
 }
 
 TEST(MakeRenderer, NamesAndRefusals) {

@@ -126,12 +126,12 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
       const PointRange range = arenas_.place(item);
       DrawRecord d = record(item, item.splat_px / list.scale, kernel, surfel_camera);
       d.word = range.word;
-      d.count = item.level.count;
+      d.count = item.arrays().count;
       d.cluster = r;
       bias.add(item, d);
       std::memcpy(draws.data + i * sizeof d, &d, sizeof d);
       if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
-      commands_by_arena_[range.arena].push_back({item.level.count, 1, 0, i});
+      commands_by_arena_[range.arena].push_back({item.level.count, 1, item.first, i});
     }
   }
   bind(stream_, GL_SHADER_STORAGE_BUFFER, 1, draws);

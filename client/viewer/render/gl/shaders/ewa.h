@@ -60,7 +60,8 @@ void main() {
   if (q > 1.0) discard;
   float code = code_at(d);
   precise float foremost = code - scale.y;
-  if (foremost > texelFetch(visible, ivec2(gl_FragCoord.xy), 0).x * 262144.0) discard;
+  float nearest = texelFetch(visible, ivec2(gl_FragCoord.xy), 0).x;
+  if (nearest >= 1.0 || foremost > nearest * 262144.0) discard;  // 1: no opaque ellipse, outside all silhouettes
   precise float inside = 1.0 - q;
   precise float inside2 = inside * inside;
   precise float weight = scale.x * (inside2 * inside2);

@@ -46,6 +46,9 @@ void conic_bounds(float centre, float reach, out int first, out int last) {
   precise float low = from - reach, high = from + reach;
   first = max(int(ceil(low)), pixel - (MAX_SPLAT_SIDE / 2 - 1));
   last = min(int(floor(high)) + 1, pixel + MAX_SPLAT_SIDE / 2 + 1);
+  // The pixel that holds the centre, always: the others that this adds are outside the ellipse.
+  first = min(first, pixel);
+  last = max(last, pixel + 1);
 }
 
 Conic surfel_conic(Surfel s, float grow, float add) {
@@ -86,7 +89,7 @@ uint surfel_spacing(float determinant) {
 
 void place_conic(Conic c, bool seen) {
   ivec2 size = c.last - c.first;
-  place_square(c.first + view.margin, max(size.x, size.y), seen && size.x > 0 && size.y > 0);
+  place_square(c.first + view.margin, max(size.x, size.y), seen);
 }
 )";
 
