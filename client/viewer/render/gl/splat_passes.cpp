@@ -31,7 +31,8 @@ void bind(const gl::StreamBuffer& stream, GLenum target, uint32_t binding, const
 DrawRecord record(const splat::DrawItem& item, float spacing_px, splat::Kernel kernel,
                   const splat::SurfelCamera& camera) {
   DrawRecord d{};
-  d.spacing = splat::spacing_class(spacing_px);
+  // Squares stay as they are, not smoothed: the fast kernel shows its samples plainly.
+  d.spacing = kernel == splat::Kernel::kSquare ? 0 : splat::spacing_class(spacing_px);
   if (kernel == splat::Kernel::kEllipse || kernel == splat::Kernel::kEwa) {
     const splat::SurfelSource source = splat::surfel_source(camera, item.radius_m, item.to_eye);
     std::copy(source.to_eye.begin(), source.to_eye.end(), d.source);

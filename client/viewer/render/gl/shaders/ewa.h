@@ -25,7 +25,7 @@ void main() {
 )";
 
 /// Pass 2: adds up, for each pixel, weight * (albedo, 1) and weight * (normal in camera axes as its 16 bits
-/// give it, depth code).
+/// give it, depth code of the sample).
 inline constexpr std::string_view kEwaSumVertex = R"(
 flat out vec3 albedo;
 flat out vec3 normal;
@@ -66,7 +66,7 @@ void main() {
   precise float inside2 = inside * inside;
   precise float weight = scale.x * (inside2 * inside2);
   colour_sum = weight * vec4(albedo, 1.0);
-  normal_sum = weight * vec4(normal, code);
+  normal_sum = weight * vec4(normal, conic_depth.y);
 }
 )";
 
