@@ -30,9 +30,9 @@ EglContext::Current::~Current() {
 // The display is shared by everyone in this process who asked for the same device, so it is not terminated.
 EglContext::~EglContext() { eglDestroyContext(display_, context_); }
 
-bool EglContext::software() const {
+bool is_software(std::string_view renderer) {
   for (const char* name : {"llvmpipe", "softpipe", "SwiftShader", "Software Rasterizer"})
-    if (renderer_.find(name) != std::string::npos) return true;
+    if (renderer.find(name) != std::string_view::npos) return true;
   return false;
 }
 

@@ -5,10 +5,14 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "common/core/result.h"
 
 namespace telesplat::gl {
+
+/// True of a GL_RENDERER that runs on the processor (llvmpipe, softpipe, SwiftShader).
+bool is_software(std::string_view renderer);
 
 /// OpenGL 4.3 core on the first that works: every EGL device, then Mesa's surfaceless platform.
 /// Bound to no thread until a Current is made.
@@ -22,8 +26,7 @@ class EglContext {
 
   /// GL_RENDERER, for logs.
   const std::string& renderer() const { return renderer_; }
-  /// True where the renderer runs on the processor (llvmpipe, softpipe, SwiftShader).
-  bool software() const;
+  bool software() const { return is_software(renderer_); }
 
   /// Makes the context current in this thread for a scope, and then what was current before.
   class Current {

@@ -1,4 +1,4 @@
-// The renderers against committed pictures, kernel by kernel. A failing case leaves reference, rendered and difference images in
+// Both renderers against committed pictures, every kernel. A failing case leaves reference, rendered and difference images in
 // the build folder (golden-failures/). To accept new pictures, look at them and run with TELESPLAT_UPDATE_GOLDEN=1.
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 
-#include "client/viewer/render/renderer.h"
+#include "client/viewer/render/gl/gl_renderer.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/quality.h"
 #include "tests/unit/splat_scene.h"
@@ -155,6 +155,8 @@ void expect_like(const image::View& reference, const image::View& rendered, cons
                  const std::string& name) {
   const Difference d = difference(reference, rendered);
   const bool good = d.mean <= tolerance.mean && d.largest_window <= tolerance.window && d.pixels <= tolerance.pixels;
+  std::printf("%s: mean %.4f, worst window %.3f, share of pixels %.5f\n", name.c_str(), d.mean, d.largest_window,
+              d.pixels);
   EXPECT_TRUE(good) << name << ": mean " << d.mean << ", worst window " << d.largest_window << ", share of pixels "
                     << d.pixels << ", largest " << d.largest;
   if (good) return;
@@ -169,10 +171,16 @@ void expect_like(const image::View& reference, const image::View& rendered, cons
   keep("difference", {kWidth, kHeight, d.image, {}});
 }
 
+// A renderer that cannot be made fails the test, unless the machine has no OpenGL at all: then it is null, and the reason is told.
 std::unique_ptr<viewer::Renderer> make(const std::string& kind, std::string& why_not) {
+  if (kind == "gl")
+    if (const auto context = gl::EglContext::make(); !context) {
+      why_not = context.error().text;
+      return nullptr;
+    }
   auto made = viewer::make_renderer(kind, 2);
   if (made) return std::move(*made);
-  why_not = made.error().text;
+  ADD_FAILURE() << made.error().text;
   return nullptr;
 }
 
@@ -182,10 +190,7 @@ TEST_P(SplatGolden, LooksAsCommitted) {
   const auto& [kind, kernel] = GetParam();
   std::string why_not;
   const auto renderer = make(kind, why_not);
-  if (!renderer) {
-    ASSERT_EQ(kind, "gl") << why_not;
-    GTEST_SKIP() << why_not;
-  }
+  if (!renderer) GTEST_SKIP() << why_not;
   const image::View rendered = render(*renderer, kernel, splat_scale(kernel));
   const std::string shape(splat::kernel_name(kernel)), path = "tests/golden/images/splat-" + shape + ".png";
   if (std::getenv("TELESPLAT_UPDATE_GOLDEN") && kind == "cpu") {
@@ -197,7 +202,7 @@ TEST_P(SplatGolden, LooksAsCommitted) {
   ASSERT_EQ(reference->height, kHeight);
   // The CPU's arithmetic is exact; what the compiler's library does in the scene's sines may move a sample. GPUs round
   // divisions their own way.
-  const Tolerance tolerance = kind == "cpu" ? Tolerance{0.02, 1.0, 0.001} : Tolerance{0.15, 6.0, 0.01};
+  const Tolerance tolerance = kind == "cpu" ? Tolerance{0.02, 1.0, 0.001} : Tolerance{0.03, 4.0, 0.003};
   expect_like(*reference, rendered, tolerance, "splat-" + shape + "-" + kind);
 }
 
@@ -205,10 +210,7 @@ TEST_P(SplatGolden, IsCloseToTracingTheScene) {
   const auto& [kind, kernel] = GetParam();
   std::string why_not;
   const auto renderer = make(kind, why_not);
-  if (!renderer) {
-    ASSERT_EQ(kind, "gl") << why_not;
-    GTEST_SKIP() << why_not;
-  }
+  if (!renderer) GTEST_SKIP() << why_not;
   const geometry::Camera camera = display_camera();
   const image::View direct = direct_view(camera, image::Shading({}, camera));
   const image::Quality q = image::compare(direct, render(*renderer, kernel, splat_scale(kernel)));
@@ -220,17 +222,20 @@ TEST_P(SplatGolden, IsCloseToTracingTheScene) {
   std::printf("%s: PSNR %.2f dB, SSIM %.3f, holes %.4f\n", kind.c_str(), q.psnr_db, q.ssim, q.hole_fraction);
 }
 
-std::string case_name(const ::testing::TestParamInfo<SplatGolden::ParamType>& info) {
-  return std::get<0>(info.param) + "_" + std::string(splat::kernel_name(std::get<1>(info.param)));
-}
 INSTANTIATE_TEST_SUITE_P(Renderers, SplatGolden,
-                         ::testing::Combine(::testing::Values("cpu", "gl"),
-                                            ::testing::Values(splat::Kernel::kSquare, splat::Kernel::kDisc)),
-                         case_name);
-INSTANTIATE_TEST_SUITE_P(CpuSurfels, SplatGolden,
-                         ::testing::Combine(::testing::Values("cpu"),
-                                            ::testing::Values(splat::Kernel::kEllipse, splat::Kernel::kEwa)),
-                         case_name);
+                         ::testing::Combine(::testing::Values("cpu", "gl"), ::testing::ValuesIn(splat::kKernels)),
+                         [](const auto& info) {
+                           return std::get<0>(info.param) + "_" +
+                                  std::string(splat::kernel_name(std::get<1>(info.param)));
+                         });
+
+// ewa adds up floats, in another order on each renderer.
+bool same_colour(uint32_t a, uint32_t b, splat::Kernel kernel) {
+  const int tolerance = kernel == splat::Kernel::kEwa ? 2 : 0;
+  for (int shift : {16, 8, 0})
+    if (std::abs(int(a >> shift & 255) - int(b >> shift & 255)) > tolerance) return false;
+  return true;
+}
 
 // The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept copies, items
 // that it may not keep, and changes of size are tried too.
@@ -239,6 +244,7 @@ TEST(RenderersAgree, FrameAfterFrame) {
   const auto gl = make("gl", why_not);
   if (!gl) GTEST_SKIP() << why_not;
   const auto cpu = viewer::make_cpu_renderer(2);
+  double most[splat::kKernels.size()] = {};
   for (int frame = 0; frame < 24; ++frame) {
     const int width = frame % 5 == 4 ? 133 : 200, height = frame % 5 == 4 ? 77 : 120;
     const geometry::Camera camera = geometry::make_camera(
@@ -251,19 +257,27 @@ TEST(RenderersAgree, FrameAfterFrame) {
     splat::select_view(model(), camera, options, list);
     auto made = testing::random_items(static_cast<uint32_t>(frame), 12, 60);
     for (auto& m : made) list.items.push_back(m.item(1.0f + 0.7f * float(frame % 12)));
-    const splat::Kernel kernel = frame % 2 ? splat::Kernel::kDisc : splat::Kernel::kSquare;
+    const splat::Kernel kernel = splat::kKernels[static_cast<size_t>(frame) % 4];
     testing::Frame a(width, height), b(width, height);
-    cpu->render(list, camera, kernel, shading, a.target());
-    gl->render(list, camera, kernel, shading, b.target());
+    const splat::Finish finish{frame % 3 == 1, frame % 3 != 0, frame % 5 > 2};
+    cpu->render(list, camera, {kernel, finish}, shading, a.target());
+    gl->render(list, camera, {kernel, finish}, shading, b.target());
     size_t colours = 0, depths = 0;
     for (size_t i = 0; i < a.colour.size(); ++i) {
-      colours += a.colour[i] != b.colour[i];
+      colours += !same_colour(a.colour[i], b.colour[i], kernel);
       depths += !(a.depth_m[i] == b.depth_m[i] || std::abs(a.depth_m[i] - b.depth_m[i]) < 1e-4f * a.depth_m[i]);
     }
-    // Stated tolerance: at most 1 % of pixels show another point.
-    EXPECT_LE(colours, a.colour.size() / 100) << "frame " << frame;
-    EXPECT_LE(depths, a.colour.size() / 100) << "frame " << frame;
+    // Stated tolerance: at most 0.5 % of pixels show another point, where depths tie (ewa: another mean); antialiasing shows it
+    // in the neighbours too.
+    const size_t limit = a.colour.size() / (finish.antialias ? 50 : 200);
+    EXPECT_LE(colours, limit) << "frame " << frame;
+    EXPECT_LE(depths, limit) << "frame " << frame;
+    most[static_cast<size_t>(kernel)] =
+        std::max(most[static_cast<size_t>(kernel)], double(colours) / double(a.colour.size()));
   }
+  for (const splat::Kernel kernel : splat::kKernels)
+    std::printf("%s: at most %.4f of a frame's pixels differ\n", std::string(splat::kernel_name(kernel)).c_str(),
+                most[static_cast<size_t>(kernel)]);
 }
 
 TEST(MakeRenderer, NamesAndRefusals) {

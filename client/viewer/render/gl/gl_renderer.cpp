@@ -3,190 +3,218 @@
 #include <epoxy/gl.h>
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 #include <limits>
-#include <numeric>
+#include <vector>
 
+#include "client/viewer/render/gl/programs.h"
+#include "client/viewer/render/gl/read_back.h"
+#include "client/viewer/render/gl/splat_passes.h"
 #include "common/core/check.h"
 #include "common/core/clock.h"
-#include "common/core/log.h"
+#include "common/gl/stage_timer.h"
+#include "common/splat/finish.h"
 #include "common/splat/splat_table.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr int kMargin = splat::kMaxSplatSide;  // GL drops points whose centre is outside, however large they are
+Status check_limits() {
+  if (epoxy_gl_version() < 43)
+    return Error{fmt::format("OpenGL {}.{} instead of 4.3 or later", epoxy_gl_version() / 10, epoxy_gl_version() % 10)};
+  GLfloat sizes[2] = {};
+  glGetFloatv(GL_POINT_SIZE_RANGE, sizes);
+  if (sizes[1] < static_cast<float>(splat::kMaxSplatSide))
+    return Error{fmt::format("points of {} pixels at most instead of {}", sizes[1], splat::kMaxSplatSide)};
+  return ok_status();
+}
 
-template <class T>
-void stream(GLenum target, uint32_t buffer, const std::vector<T>& data) {
-  glBindBuffer(target, buffer);
-  glBufferData(target, static_cast<GLsizeiptr>(data.size() * sizeof(T)), data.data(), GL_STREAM_DRAW);
+std::string device_name() {
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return name ? name : "no OpenGL context";
 }
 
 }  // namespace
 
-Result<std::unique_ptr<GlRenderer>> GlRenderer::make() {
+struct GlRenderer::Parts {
+  Parts(Programs made, const GlOptions& options)
+      : programs(std::move(made)),
+        splatting(options.persistent),
+        read_back(options.pack_buffers.value_or(!gl::is_software(device_name()))),
+        timer(kStages) {
+    glGenVertexArrays(1, &no_vertices);
+  }
+  ~Parts() { glDeleteVertexArrays(1, &no_vertices); }
+
+  Programs programs;
+  FrameTargets targets;
+  SplatPasses splatting;
+  ReadBack read_back;
+  gl::StageTimer timer;
+  uint32_t no_vertices = 0;  // vertex array of whole-frame passes
+};
+
+Result<std::unique_ptr<GlRenderer::Parts>> GlRenderer::make_parts(const GlOptions& options) {
+  if (const Status good = check_limits(); !good) return Error{device_name() + ": " + good.error().text};
+  auto programs = Programs::make();
+  if (!programs) return Error{device_name() + ": " + programs.error().text};
+  return std::make_unique<Parts>(std::move(*programs), options);
+}
+
+Result<std::unique_ptr<GlRenderer>> GlRenderer::make(const GlOptions& options) {
   auto context = gl::EglContext::make();
   if (!context) return context.error();
-  auto current = std::make_unique<Current>(**context);
-  if (!current->ok()) return Error{(*context)->renderer() + ": cannot be made current"};
-  const auto program = make_splat_program();
-  if (!program) return Error{(*context)->renderer() + ": " + program.error().text};
-  return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), std::move(current), *program));
+  const gl::EglContext::Current current(**context);
+  if (!current.ok()) return Error{(*context)->renderer() + ": cannot be made current"};
+  auto parts = make_parts(options);
+  if (!parts) return parts.error();
+  std::string device = (*context)->renderer();
+  return std::unique_ptr<GlRenderer>(new GlRenderer(std::move(*context), std::move(*parts), std::move(device)));
 }
 
-GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current,
-                       const SplatProgram& program)
-    : context_(std::move(context)),
-      current_(std::move(current)),
-      program_(program),
-      arenas_(std::make_unique<PointArenas>()) {
-  glGenFramebuffers(1, &framebuffer_);
-  glGenVertexArrays(1, &vertex_array_);
-  for (uint32_t* buffer : {&draw_numbers_, &draw_records_, &commands_, &intensities_}) glGenBuffers(1, buffer);
-  glBindVertexArray(vertex_array_);
-  glBindBuffer(GL_ARRAY_BUFFER, draw_numbers_);
-  glEnableVertexAttribArray(0);
-  glVertexAttribIPointer(0, 1, GL_UNSIGNED_INT, 0, nullptr);
-  glVertexAttribDivisor(0, 1);  // one a draw: indirect draws start at their baseInstance
-  glEnable(GL_PROGRAM_POINT_SIZE);
-  glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_GREATER);
+Result<std::unique_ptr<GlRenderer>> GlRenderer::make_in_current_context(const GlOptions& options) {
+  auto parts = make_parts(options);
+  if (!parts) return parts.error();
+  return std::unique_ptr<GlRenderer>(new GlRenderer(nullptr, std::move(*parts), device_name()));
 }
+
+GlRenderer::GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts, std::string device)
+    : context_(std::move(context)), parts_(std::move(parts)), device_(std::move(device)) {}
 
 GlRenderer::~GlRenderer() {
-  arenas_.reset();
-  for (uint32_t buffer : {draw_numbers_, draw_records_, commands_, intensities_}) glDeleteBuffers(1, &buffer);
-  glDeleteTextures(3, textures_);
-  glDeleteFramebuffers(1, &framebuffer_);
-  glDeleteVertexArrays(1, &vertex_array_);
-  glDeleteProgram(program_.program);
+  const Current current = use_context();
+  parts_.reset();
 }
 
-Status GlRenderer::resize(int width, int height) {
-  if (width == width_ && height == height_) return ok_status();
-  width_ = height_ = 0;
-  GLint largest = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
-  if (std::max(width, height) + 2 * kMargin > largest)
-    return Error{fmt::format("a frame of {}x{} pixels and its margin exceed the GPU's {}", width, height, largest)};
-  glDeleteTextures(3, textures_);
-  glGenTextures(3, textures_);
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
-  const GLenum formats[3] = {GL_R32UI, GL_R32F, GL_DEPTH_COMPONENT32F};
-  const GLenum attachments[3] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_DEPTH_ATTACHMENT};
-  for (int i = 0; i < 3; ++i) {
-    glBindTexture(GL_TEXTURE_2D, textures_[i]);
-    glTexStorage2D(GL_TEXTURE_2D, 1, formats[i], width + 2 * kMargin, height + 2 * kMargin);
-    glFramebufferTexture2D(GL_FRAMEBUFFER, attachments[i], GL_TEXTURE_2D, textures_[i], 0);
+GlRenderer::Current GlRenderer::use_context() const {
+  return context_ ? std::make_unique<gl::EglContext::Current>(*context_) : nullptr;
+}
+
+void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with_depth) {
+  struct Step {
+    const Programs::Pass* pass;
+    Stage stage;
+    int reach;  // how far it looks
+  };
+  const bool ewa = options.kernel == splat::Kernel::kEwa;
+  std::vector<Step> steps{{ewa ? &parts_->programs.ewa : &parts_->programs.keys, kResolving, 0}};
+  if (options.finish.fill) steps.push_back({&parts_->programs.fill, kFilling, splat::kFillRadius});
+  if (options.finish.smooth) steps.push_back({&parts_->programs.smooth, kSmoothing, 1});
+  if (options.finish.antialias) steps.push_back({&parts_->programs.antialias, kAntialiasing, 1});
+
+  const auto bind = [](uint32_t unit, uint32_t texture) {
+    glActiveTexture(GL_TEXTURE0 + unit);
+    glBindTexture(GL_TEXTURE_2D, texture);
+  };
+  if (ewa) {
+    bind(1, parts_->targets.sums(1));
+    bind(0, parts_->targets.sums(0));
+  } else {
+    bind(0, parts_->targets.keys());
   }
-  if (const GLenum state = glCheckFramebufferStatus(GL_FRAMEBUFFER); state != GL_FRAMEBUFFER_COMPLETE)
-    return Error{fmt::format("a frame buffer of {}x{} pixels is incomplete: {:#x}", width, height, state)};
-  width_ = width;
-  height_ = height;
+  glBindVertexArray(parts_->no_vertices);
+  glEnable(GL_SCISSOR_TEST);
+  int reach = splat::finish_reach(options.finish);  // around the image, that the steps to come look at
+  for (size_t i = 0; i < steps.size(); ++i) {
+    const bool last = i + 1 == steps.size();
+    reach -= steps[i].reach;
+    if (last) {
+      parts_->targets.draw_to(with_depth ? FrameTargets::kOutput : FrameTargets::kOutputColour);
+      glScissor(0, 0, parts_->targets.width(), parts_->targets.height());
+      steps[i].pass->to_output.use();
+    } else {
+      parts_->targets.draw_to(i % 2 ? FrameTargets::kPair1 : FrameTargets::kPair0);
+      const int margin = FrameTargets::kMargin - reach;
+      glScissor(margin, margin, parts_->targets.width() + 2 * reach, parts_->targets.height() + 2 * reach);
+      steps[i].pass->to_pairs.use();
+    }
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    parts_->timer.end_stage(steps[i].stage);
+    if (!last) bind(0, parts_->targets.pairs(i % 2));
+  }
+  glDisable(GL_SCISSOR_TEST);
+}
+
+Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& camera,
+                        const splat::RenderOptions& options, const image::Shading& shading, bool with_depth) {
+  frame_ = {};
+  if (const Status resized = parts_->targets.resize(camera.width, camera.height); !resized) return resized;
+  if (options.kernel == splat::Kernel::kEwa)
+    if (const Status made = parts_->targets.make_sums(); !made) return made;
+  // What others may have left in a shared context.
+  for (const GLenum off : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE,
+                           GL_RASTERIZER_DISCARD, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_FRAMEBUFFER_SRGB, GL_DITHER})
+    glDisable(off);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+  glPointParameteri(GL_POINT_SPRITE_COORD_ORIGIN, GL_UPPER_LEFT);
+  glDepthRange(0, 1);
+
+  const double start = monotonic_s();
+  parts_->splatting.prepare(list, camera, options.kernel, shading);
+  prepare_ms_ = (monotonic_s() - start) * 1e3;
+  parts_->timer.begin_frame();
+  parts_->splatting.splat(parts_->targets, parts_->programs, options.kernel);
+  parts_->timer.end_stage(kSplatting);
+  shade_and_finish(options, with_depth);
+  parts_->splatting.end_frame();
+  frame_ = parts_->targets.output(with_depth);
   return ok_status();
 }
 
-void GlRenderer::prepare_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel) {
-  const bool disc = kernel == splat::Kernel::kDisc;
-  runs_.build(list.items, camera);
-  records_.resize(list.items.size());
-  for (auto& commands : commands_by_arena_) commands.clear();
-  for (size_t r = 0; r < runs_.runs.size(); ++r) {
-    const splat::LeafTransform& t = runs_.transforms[r];
-    for (uint32_t i = runs_.runs[r].first; i < runs_.runs[r].last; ++i) {
-      const splat::DrawItem& item = list.items[i];
-      if (item.level.count == 0) continue;
-      const PointRange range = arenas_->place(item);
-      const float diameter = disc ? splat::disc_diameter(item.splat_px) : 0.0f;
-      const int side = disc ? static_cast<int>(std::ceil(diameter)) : splat::square_side(item.splat_px);
-      DrawRecord& d = records_[i];
-      std::copy(t.x.begin(), t.x.end(), d.row_x);
-      std::copy(t.y.begin(), t.y.end(), d.row_y);
-      std::copy(t.w.begin(), t.w.end(), d.row_w);
-      d.word = range.word;
-      d.count = item.arrays().count;
-      d.side = side;
-      d.diameter = diameter;
-      d.bias_growth = static_cast<float>(splat::splat_bias_growth(side, camera.focal_x()));
-      d.sub_steps = 1 << splat::sub_bits(side);
-      if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
-      commands_by_arena_[range.arena].push_back({item.level.count, 1, item.first, i});
-    }
-  }
+void GlRenderer::release_state() const {
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glBindVertexArray(0);
+  glUseProgram(0);
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, 0);
 }
 
-void GlRenderer::draw(const geometry::Camera& camera, const image::Shading& shading, bool with_depth) {
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
-  const GLenum buffers[2] = {GL_COLOR_ATTACHMENT0, with_depth ? GLenum{GL_COLOR_ATTACHMENT1} : GLenum{GL_NONE}};
-  glDrawBuffers(2, buffers);
-  glViewport(0, 0, width_ + 2 * kMargin, height_ + 2 * kMargin);
-  const GLuint background[4] = {0xff000000u | shading.background(), 0, 0, 0};
-  const GLfloat nothing[4] = {std::numeric_limits<float>::infinity(), 0, 0, 0}, farthest = 0.0f;
-  glClearBufferuiv(GL_COLOR, 0, background);
-  if (with_depth) glClearBufferfv(GL_COLOR, 1, nothing);
-  glClearBufferfv(GL_DEPTH, 0, &farthest);
-  if (records_.empty()) return;
-
-  glUseProgram(program_.program);
-  glUniform2f(program_.frame_size, static_cast<float>(width_ + 2 * kMargin), static_cast<float>(height_ + 2 * kMargin));
-  glUniform1f(program_.margin, static_cast<float>(kMargin));
-  glUniform1f(program_.near_m, static_cast<float>(camera.near_m));
-  glBindVertexArray(vertex_array_);
-  if (draw_number_count_ < records_.size()) {
-    std::vector<uint32_t> numbers(records_.size() * 2);
-    std::iota(numbers.begin(), numbers.end(), 0u);
-    stream(GL_ARRAY_BUFFER, draw_numbers_, numbers);
-    draw_number_count_ = numbers.size();
-  }
-  stream(GL_SHADER_STORAGE_BUFFER, draw_records_, records_);
-  glBindBuffer(GL_SHADER_STORAGE_BUFFER, intensities_);
-  glBufferData(GL_SHADER_STORAGE_BUFFER, 65536, shading.table().data(), GL_STREAM_DRAW);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, draw_records_);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, intensities_);
-  for (uint32_t arena = 0; arena < commands_by_arena_.size(); ++arena) {
-    const auto& commands = commands_by_arena_[arena];
-    if (commands.empty()) continue;
-    stream(GL_DRAW_INDIRECT_BUFFER, commands_, commands);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, arenas_->buffer(arena));
-    glMultiDrawArraysIndirect(GL_POINTS, nullptr, static_cast<GLsizei>(commands.size()), 0);
-  }
+splat::SplatStats GlRenderer::stats(const splat::DrawList& list, bool wait) {
+  splat::SplatStats out;
+  out.points_projected = out.points_drawn = list.points;
+  const std::vector<double>& ms = parts_->timer.results(wait);
+  out.project_ms = prepare_ms_ + ms[kSplatting];
+  out.resolve_ms = ms[kResolving];
+  out.fill_ms = ms[kFilling];
+  out.smooth_ms = ms[kSmoothing];
+  out.antialias_ms = ms[kAntialiasing];
+  return out;
 }
 
-void GlRenderer::read_back(const splat::FrameTarget& target) const {
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);
-  glPixelStorei(GL_PACK_ALIGNMENT, 4);
-  glReadBuffer(GL_COLOR_ATTACHMENT0);
-  glReadPixels(kMargin, kMargin, width_, height_, GL_RED_INTEGER, GL_UNSIGNED_INT, target.colour);
-  if (!target.depth_m) return;
-  glReadBuffer(GL_COLOR_ATTACHMENT1);
-  glReadPixels(kMargin, kMargin, width_, height_, GL_RED, GL_FLOAT, target.depth_m);
+Result<splat::SplatStats> GlRenderer::render_on_gpu(const splat::DrawList& list, const geometry::Camera& camera,
+                                                    const splat::RenderOptions& options, const image::Shading& shading,
+                                                    bool with_depth) {
+  const Current current = use_context();
+  if (const Status drawn = draw(list, camera, options, shading, with_depth); !drawn) return drawn.error();
+  release_state();
+  return stats(list, false);
 }
 
 splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry::Camera& camera,
-                                     const splat::RenderOptions& options, const image::Shading& shading, const splat::FrameTarget& target) {
+                                     const splat::RenderOptions& options, const image::Shading& shading,
+                                     const splat::FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
+  const Current current = use_context();
   const double start = monotonic_s();
-  if (const Status resized = resize(target.width, target.height); !resized) {
+  if (const Status drawn = draw(list, camera, options, shading, target.depth_m != nullptr); !drawn) {
     // A frame that the GPU cannot hold shows nothing, rather than ending the viewer.
-    if (refusals_.allow(start)) log::error("{}", resized.error().text);
-    std::fill_n(target.colour, static_cast<size_t>(target.width) * target.height, 0xff000000u | shading.background());
-    if (target.depth_m)
-      std::fill_n(target.depth_m, static_cast<size_t>(target.width) * target.height,
-                  std::numeric_limits<float>::infinity());
+    if (refusals_.allow(start)) log::error("{}", drawn.error().text);
+    const size_t pixels = static_cast<size_t>(target.width) * static_cast<size_t>(target.height);
+    std::fill_n(target.colour, pixels, 0xff000000u | shading.background());
+    if (target.depth_m) std::fill_n(target.depth_m, pixels, std::numeric_limits<float>::infinity());
     return {};
   }
-  prepare_draws(list, camera, options.kernel);
-  draw(camera, shading, target.depth_m != nullptr);
-  arenas_->end_frame();
-  glFinish();
+  if (!parts_->timer.available()) glFinish();
   const double drawn = monotonic_s();
-  read_back(target);
-  splat::SplatStats stats;
-  stats.points_projected = stats.points_drawn = list.points;
-  stats.project_ms = (drawn - start) * 1e3;
-  stats.resolve_ms = (monotonic_s() - drawn) * 1e3;
-  return stats;
+  parts_->read_back.read(parts_->targets.framebuffer(FrameTargets::kOutput), target);
+  release_state();
+  const double end = monotonic_s();
+  splat::SplatStats out = stats(list, true);
+  if (!parts_->timer.available()) out.project_ms = (drawn - start) * 1e3;
+  const double rest = (end - start) * 1e3 - out.project_ms - out.fill_ms - out.smooth_ms - out.antialias_ms;
+  out.resolve_ms = std::max(out.resolve_ms, rest);
+  return out;
 }
 
 }  // namespace telesplat::viewer

@@ -2,56 +2,70 @@
 #pragma once
 
 #include <memory>
-#include <vector>
+#include <optional>
+#include <string>
 
-#include "client/viewer/render/gl/point_arena.h"
-#include "client/viewer/render/gl/program.h"
+#include "client/viewer/render/gl/frame_targets.h"
 #include "client/viewer/render/renderer.h"
 #include "common/core/log.h"
 #include "common/gl/egl_context.h"
-#include "common/splat/item_runs.h"
 
 namespace telesplat::viewer {
 
+/// What a context may offer and what need not be used: the defaults are best, tests try the others.
+struct GlOptions {
+  bool persistent = true;            ///< buffers that stay mapped, where there are any
+  std::optional<bool> pack_buffers;  ///< reading back through them: unless the renderer is software
+};
+
 class GlRenderer final : public Renderer {
  public:
-  static Result<std::unique_ptr<GlRenderer>> make();
+  /// With a context of its own, off-screen, which is current during its calls only.
+  static Result<std::unique_ptr<GlRenderer>> make(const GlOptions& options = {});
+  /// In the context that is current in this thread (a window's): there must be one, and it must be current at each call and at the
+  /// end. Fails where it is older than OpenGL 4.3. Between calls the context may be used for anything: the renderer sets all state that it needs and
+  /// leaves no program, vertex array or frame buffer bound, and blending and depth test off.
+  static Result<std::unique_ptr<GlRenderer>> make_in_current_context(const GlOptions& options = {});
   ~GlRenderer() override;
 
   const char* name() const override { return "gl"; }
   using Renderer::render;
-  /// points_drawn counts every point sent: which of them reach the screen only the GPU knows. project_ms is what drawing and resolve_ms
-  /// what reading back took.
-  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, const splat::RenderOptions& options,
-                           const image::Shading& shading, const splat::FrameTarget& target) override;
+  /// points_drawn counts every point sent: which of them reach the screen only the GPU knows. project_ms: preparing (processor) and
+  /// splatting, resolve_ms: shading, reading back and what waiting there was. The GPU's stages by its own clock, where it has one; else
+  /// project_ms is all of drawing.
+  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
+                           const splat::RenderOptions& options, const image::Shading& shading,
+                           const splat::FrameTarget& target) override;
+  /// The same frame, left on the GPU: see last_frame(). Does not wait for it, so the times are those of the newest frame whose
+  /// times are there. Fails, with an empty last_frame(), where the GPU cannot hold such a frame.
+  Result<splat::SplatStats> render_on_gpu(const splat::DrawList& list, const geometry::Camera& camera,
+                                          const splat::RenderOptions& options, const image::Shading& shading,
+                                          bool with_depth = false);
+  /// The frame that render() or render_on_gpu() made last; empty (width 0) before the first.
+  const GlFrame& last_frame() const { return frame_; }
 
-  const std::string& device() const { return context_->renderer(); }
-  bool is_software() const { return context_->software(); }
+  const std::string& device() const { return device_; }
+  bool is_software() const { return gl::is_software(device_); }
 
  private:
-  using Current = gl::EglContext::Current;
-  GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Current> current, const SplatProgram& program);
-  Status resize(int width, int height);
-  void prepare_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
-  void draw(const geometry::Camera& camera, const image::Shading& shading, bool with_depth);
-  void read_back(const splat::FrameTarget& target) const;
+  enum Stage { kSplatting, kResolving, kFilling, kSmoothing, kAntialiasing, kStages };
+  struct Parts;  // what lives in the context
+  GlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts, std::string device);
+  static Result<std::unique_ptr<Parts>> make_parts(const GlOptions& options);
+  using Current = std::unique_ptr<gl::EglContext::Current>;
+  Current use_context() const;
+  Status draw(const splat::DrawList& list, const geometry::Camera& camera, const splat::RenderOptions& options,
+              const image::Shading& shading, bool with_depth);
+  void shade_and_finish(const splat::RenderOptions& options, bool with_depth);
+  void release_state() const;
+  splat::SplatStats stats(const splat::DrawList& list, bool wait);
 
-  struct DrawCommand {
-    uint32_t count, instances, first, base_instance;
-  };
-
-  std::unique_ptr<gl::EglContext> context_;  // first in, last out: the rest needs it
-  std::unique_ptr<Current> current_;         // in the thread that made the renderer, as long as it lives
-  SplatProgram program_;
-  std::unique_ptr<PointArenas> arenas_;
-  int width_ = 0, height_ = 0;                   // of the frame buffer, without its margin
-  uint32_t framebuffer_ = 0, textures_[3] = {};  // colour, depth in metres, depth
-  uint32_t vertex_array_ = 0, draw_numbers_ = 0, draw_records_ = 0, commands_ = 0, intensities_ = 0;
-  size_t draw_number_count_ = 0;
+  std::unique_ptr<gl::EglContext> context_;  // null: somebody else's
+  std::unique_ptr<Parts> parts_;
+  std::string device_;
+  GlFrame frame_;
+  double prepare_ms_ = 0;
   log::RateLimiter refusals_;
-  splat::ItemRuns runs_;
-  std::vector<DrawRecord> records_;
-  std::vector<std::vector<DrawCommand>> commands_by_arena_;
 };
 
 }  // namespace telesplat::viewer

@@ -1,0 +1,63 @@
+// The images that a frame passes through on the GPU.
+#pragma once
+
+#include <cstdint>
+
+#include "common/core/result.h"
+
+namespace telesplat::viewer {
+
+/// A finished frame on the GPU, in the renderer's context, until its next frame.
+struct GlFrame {
+  uint32_t colour_texture =
+      0;                       ///< RGBA8, alpha 1. Row 0 is the upper row of the picture: a window draws it upside down
+  uint32_t depth_texture = 0;  ///< R32F, metres, +infinity where nothing is; 0 if depth was not asked for
+  uint32_t framebuffer = 0;    ///< has the colour texture as attachment 0: for glBlitFramebuffer
+  int width = 0, height = 0;
+};
+
+/// Textures and the frame buffers that they are attached to. "Padded" ones have kMargin more pixels on all sides, since GL drops
+/// points whose centre is outside, however large they are. Needs a current GL context for all it does.
+class FrameTargets {
+ public:
+  static constexpr int kMargin = 16;  // splat::kMaxSplatSide: no splat reaches farther from its centre
+
+  FrameTargets() = default;
+  ~FrameTargets();
+  FrameTargets(const FrameTargets&) = delete;
+  FrameTargets& operator=(const FrameTargets&) = delete;
+
+  /// Keeps what fits. Fails, saying the limit, where the GPU cannot hold such a frame; then width() is 0.
+  Status resize(int width, int height);
+  /// The accumulators of ewa, made when first asked for.
+  Status make_sums();
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int padded_width() const { return width_ + 2 * kMargin; }
+  int padded_height() const { return height_ + 2 * kMargin; }
+
+  // Textures.
+  uint32_t keys() const { return textures_[kKeys]; }            ///< padded, RG32UI: low and high half of a pixel's key
+  uint32_t visible() const { return textures_[kVisible]; }      ///< padded, depth component: the depth test's
+  uint32_t sums(int i) const { return textures_[kSums0 + i]; }  ///< padded, RGBA32F: what ewa adds up, 2 of them
+  uint32_t pairs(int i) const { return textures_[kPairs0 + i]; }  ///< padded, RG32UI: colour and info, 2 of them
+  GlFrame output(bool with_depth) const;
+
+  // Frame buffers.
+  enum Buffer { kSplat, kVisibility, kSumming, kPair0, kPair1, kOutput, kOutputColour, kBuffers };
+  /// Binds it for drawing and sets the viewport.
+  void draw_to(Buffer buffer) const;
+  uint32_t framebuffer(Buffer buffer) const { return framebuffers_[buffer]; }
+
+ private:
+  enum Texture { kKeys, kVisible, kSums0, kSums1, kPairs0, kPairs1, kColour, kDepth, kTextures };
+  void release();
+  void make_texture(Texture which, uint32_t format, bool padded);
+  Status make_framebuffer(Buffer which, const uint32_t* colours, int count, bool with_depth_test);
+
+  int width_ = 0, height_ = 0;
+  uint32_t textures_[kTextures] = {}, framebuffers_[kBuffers] = {};
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,113 @@
+// The finish, as common/splat/finish.h defines it: fill, smooth, antialias. Integers throughout: the same pixels as on the CPU.
+// Each stage takes the pairs that the one before left and gives uvec2 resolve(ivec2 at), `at` with margin.
+#pragma once
+
+#include <string_view>
+
+namespace telesplat::viewer::shaders {
+
+inline constexpr std::string_view kFinish = R"(
+layout(binding = 0) uniform usampler2D pairs;
+const uint kEdgeInfo = EDGE << 8;
+uvec2 pair_at(ivec2 at) { return texelFetch(pairs, at, 0).xy; }
+uvec3 split(uint colour) { return uvec3(colour >> 16, colour >> 8, colour) & 255u; }
+uint join(uvec3 rgb) { return rgb.r << 16 | rgb.g << 8 | rgb.b; }
+)";
+
+inline constexpr std::string_view kFill = R"(
+// The first pixel from `at` along `step` that is nearer than the hole: colour, info, distance; distance 0: none.
+uvec3 support(ivec2 at, ivec2 step, uint hole) {
+  for (int r = 1; r <= FILL_RADIUS; ++r) {
+    uvec2 pair = pair_at(at + r * step);
+    if (pair.y < hole && hole - pair.y > kEdgeInfo) return uvec3(pair, uint(r));
+  }
+  return uvec3(0u, kEmptyInfo, 0u);
+}
+
+uvec2 resolve(ivec2 at) {
+  const ivec2 kAxes[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(1, 1), ivec2(1, -1));
+  uvec2 here = pair_at(at);
+  uint n = min(min(pair_at(at - ivec2(1, 0)).y, pair_at(at + ivec2(1, 0)).y),
+               min(pair_at(at - ivec2(0, 1)).y, pair_at(at + ivec2(0, 1)).y));
+  if (here.y <= n || here.y - n <= kEdgeInfo) return here;
+
+  uvec3 first[4], second[4];
+  uint nearest[4];
+  int count = 0;
+  for (int i = 0; i < 4; ++i) {
+    uvec3 a = support(at, kAxes[i], here.y);
+    if (a.z == 0u) continue;
+    uvec3 b = support(at, -kAxes[i], here.y);
+    if (b.z == 0u || a.z + b.z > uint(FILL_RADIUS + 1)) continue;
+    if (max(a.y, b.y) - min(a.y, b.y) > kEdgeInfo * (a.z + b.z)) continue;
+    first[count] = a, second[count] = b;
+    nearest[count++] = min(a.y, b.y);
+  }
+  if (count == 0) return here;
+  uint limit = nearest[0];
+  for (int i = 1; i < count; ++i) limit = min(limit, nearest[i]);
+  limit += 2u * kEdgeInfo;
+
+  uint weights = 0u, depth = 0u;
+  uvec3 rgb = uvec3(0u);
+  int used = 0;
+  bool tight = false;
+  for (int i = 0; i < count; ++i) {
+    if (nearest[i] > limit) continue;
+    ++used;
+    tight = tight || first[i].z + second[i].z == 2u;
+    uint wa = 36u / (first[i].z * first[i].z), wb = 36u / (second[i].z * second[i].z);
+    weights += wa + wb;
+    rgb += wa * split(first[i].x) + wb * split(second[i].x);
+    depth += wa * (first[i].y >> 8) + wb * (second[i].y >> 8);  // at most 8 * 36 * 2^18
+  }
+  if (used < 2 && !tight) return here;
+  return uvec2(join((rgb + weights / 2u) / weights), depth / weights << 8);
+}
+)";
+
+inline constexpr std::string_view kSmooth = R"(
+uint gap(uint a, uint b) { return max(a, b) - min(a, b); }
+
+// 8 times the centre smoothed with its two neighbours, by its spacing class.
+uvec3 smooth3(uvec3 before, uvec3 centre, uvec3 after, uint info_before, uint info, uint info_after) {
+  uint spacing = info >> 3 & 3u;
+  if (spacing == 0u) return centre * 8u;
+  uvec3 b = gap(info, info_before) > kEdgeInfo ? centre : before;
+  uvec3 a = gap(info, info_after) > kEdgeInfo ? centre : after;
+  uvec3 four = b + a + centre * 2u;
+  return spacing > 1u ? four * 2u : four + centre * 4u;
+}
+
+uvec2 resolve(ivec2 at) {
+  uvec3 rows[3];
+  uint infos[3];
+  uvec2 here = pair_at(at);
+  for (int j = 0; j < 3; ++j) {
+    ivec2 p = at + ivec2(0, j - 1);
+    uvec2 before = pair_at(p - ivec2(1, 0)), centre = pair_at(p), after = pair_at(p + ivec2(1, 0));
+    rows[j] = smooth3(split(before.x), split(centre.x), split(after.x), before.y, centre.y, after.y);
+    infos[j] = centre.y;
+  }
+  uvec3 rgb = smooth3(rows[0], rows[1], rows[2], infos[0], infos[1], infos[2]);
+  return uvec2(join((rgb + 32u) >> 6), here.y);
+}
+)";
+
+inline constexpr std::string_view kAntialias = R"(
+uvec2 resolve(ivec2 at) {
+  uvec2 here = pair_at(at);
+  uint least = here.y, most = here.y;
+  uvec3 sum = uvec3(0u);
+  for (int j = -1; j <= 1; ++j)
+    for (int i = -1; i <= 1; ++i) {
+      uvec2 pair = pair_at(at + ivec2(i, j));
+      least = min(least, pair.y), most = max(most, pair.y);
+      sum += split(pair.x) << uint((i == 0 ? 1 : 0) + (j == 0 ? 1 : 0));
+    }
+  if (most - least <= 2u * kEdgeInfo) return here;
+  return uvec2(join((sum + 8u) >> 4), here.y);
+}
+)";
+
+}  // namespace telesplat::viewer::shaders

@@ -1,0 +1,266 @@
+#include "client/viewer/render/gl/splat_passes.h"
+
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
+#include <numeric>
+
+#include "common/splat/ewa_shading.h"
+#include "common/splat/splat_table.h"
+#include "common/splat/surfel_splat.h"
+
+namespace telesplat::viewer {
+namespace {
+
+template <class T>
+gl::StreamBuffer::Slice take(gl::StreamBuffer& stream, size_t count) {
+  return stream.take(std::max<size_t>(count, 1) * sizeof(T));
+}
+
+void bind(const gl::StreamBuffer& stream, GLenum target, uint32_t binding, const gl::StreamBuffer::Slice& slice) {
+  glBindBufferRange(target, binding, stream.buffer(), slice.offset, static_cast<GLsizeiptr>(slice.bytes));
+}
+
+// Of one item: what does not depend on where its points lie. spacing_px: between its samples on the screen.
+DrawRecord record(const splat::DrawItem& item, float spacing_px, splat::Kernel kernel,
+                  const splat::SurfelCamera& camera) {
+  DrawRecord d{};
+  // Squares stay as they are, not smoothed: the fast kernel shows its samples plainly.
+  d.spacing = kernel == splat::Kernel::kSquare ? 0 : splat::spacing_class(spacing_px);
+  if (kernel == splat::Kernel::kEllipse || kernel == splat::Kernel::kEwa) {
+    const splat::SurfelSource source = splat::surfel_source(camera, item.radius_m, item.to_eye);
+    std::copy(source.to_eye.begin(), source.to_eye.end(), d.source);
+    d.source[3] = source.radius_m;
+    return d;
+  }
+  d.size = splat::square_size(item.splat_px);
+  d.side = static_cast<int>(std::ceil(d.size));
+  d.bias_growth = static_cast<float>(splat::splat_bias_growth(d.side, camera.focal_x));
+  d.sub_steps = 1 << splat::sub_bits(d.side);
+  return d;
+}
+
+// Mean bias on the contour for each class of spacing, by points: the same figures as the CPU splatter's.
+class MeanBias {
+ public:
+  MeanBias(splat::Kernel kernel, const geometry::Camera& camera)
+      : kernel_(kernel), camera_(camera), depth_row_(camera.room_to_pixel().w) {}
+
+  void add(const splat::DrawItem& item, const DrawRecord& d) {
+    double bias = 0;
+    if (kernel_ == splat::Kernel::kEwa) return;
+    if (kernel_ == splat::Kernel::kEllipse) {
+      // Ellipses differ from point to point: the item's at its leaf's centre stands for them.
+      const auto depth_m = static_cast<float>(glm::dot(depth_row_, glm::dvec4(item.cluster->leaf_room.centre(), 1)));
+      if (!(depth_m >= static_cast<float>(camera_.near_m))) return;
+      bias = splat::ellipse_bias(item.radius_m, depth_m);
+    } else if (d.side > 1) {
+      const double contour_r2 = (kernel_ == splat::Kernel::kDisc ? 0.25 : 0.5) * double{d.size} * double{d.size};
+      bias = splat::splat_bias(contour_r2, d.side, camera_.focal_x());
+    }
+    bias_[d.spacing] += bias * item.level.count;
+    points_[d.spacing] += item.level.count;
+  }
+  splat::RimBias rim() const {
+    splat::RimBias rim{};
+    for (size_t i = 0; i < rim.size(); ++i)
+      if (points_[i] > 0) rim[i] = static_cast<uint32_t>(std::lround(bias_[i] / points_[i]));
+    return rim;
+  }
+
+ private:
+  splat::Kernel kernel_;
+  const geometry::Camera& camera_;
+  glm::dvec4 depth_row_;
+  std::array<double, 4> bias_{}, points_{};
+};
+
+void clear_depth_and_test() {
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glDepthMask(GL_TRUE);
+  const GLfloat farthest = 1.0f;
+  glClearBufferfv(GL_DEPTH, 0, &farthest);
+}
+
+}  // namespace
+
+SplatPasses::SplatPasses(bool persistent) : stream_(persistent) {
+  glGenVertexArrays(1, &vertex_array_);
+  glGenBuffers(1, &draw_numbers_);
+  glBindVertexArray(vertex_array_);
+  glBindBuffer(GL_ARRAY_BUFFER, draw_numbers_);
+  glEnableVertexAttribArray(0);
+  glVertexAttribIPointer(0, 1, GL_UNSIGNED_INT, 0, nullptr);
+  glVertexAttribDivisor(0, 1);  // one a draw: indirect draws start at their baseInstance
+  glBindVertexArray(0);
+}
+
+SplatPasses::~SplatPasses() {
+  glDeleteVertexArrays(1, &vertex_array_);
+  glDeleteBuffers(1, &draw_numbers_);
+}
+
+splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geometry::Camera& camera,
+                                        splat::Kernel kernel) {
+  const splat::SurfelCamera surfel_camera = splat::surfel_camera(camera);
+  const auto clusters = take<ClusterRecord>(stream_, runs_.runs.size());
+  const auto draws = take<DrawRecord>(stream_, list.items.size());
+  MeanBias bias(kernel, camera);
+  for (auto& commands : commands_by_arena_) commands.clear();
+  for (uint32_t r = 0; r < runs_.runs.size(); ++r) {
+    const splat::LeafTransform& t = runs_.transforms[r];
+    ClusterRecord cluster;
+    std::copy(t.x.begin(), t.x.end(), cluster.row_x);
+    std::copy(t.y.begin(), t.y.end(), cluster.row_y);
+    std::copy(t.w.begin(), t.w.end(), cluster.row_w);
+    std::memcpy(clusters.data + r * sizeof cluster, &cluster, sizeof cluster);
+    for (uint32_t i = runs_.runs[r].first; i < runs_.runs[r].last; ++i) {
+      const splat::DrawItem& item = list.items[i];
+      if (item.level.count == 0) continue;
+      const PointRange range = arenas_.place(item);
+      DrawRecord d = record(item, item.splat_px / list.scale, kernel, surfel_camera);
+      d.word = range.word;
+      d.count = item.arrays().count;
+      d.cluster = r;
+      bias.add(item, d);
+      std::memcpy(draws.data + i * sizeof d, &d, sizeof d);
+      if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
+      commands_by_arena_[range.arena].push_back({item.level.count, 1, item.first, i});
+    }
+  }
+  bind(stream_, GL_SHADER_STORAGE_BUFFER, 1, draws);
+  bind(stream_, GL_SHADER_STORAGE_BUFFER, 2, clusters);
+
+  const auto commands = take<DrawCommand>(stream_, list.items.size());
+  size_t written = 0;
+  command_offsets_.clear();
+  for (const auto& of_arena : commands_by_arena_) {
+    command_offsets_.push_back(commands.offset + static_cast<intptr_t>(written));
+    const size_t bytes = of_arena.size() * sizeof(DrawCommand);
+    if (bytes) std::memcpy(commands.data + written, of_arena.data(), bytes);
+    written += bytes;
+  }
+  return bias.rim();
+}
+
+void SplatPasses::write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
+                             const splat::RimBias& rim) {
+  const splat::SurfelCamera c = splat::surfel_camera(camera);
+  ViewRecord v{};
+  std::copy(c.right.begin(), c.right.end(), v.right);
+  std::copy(c.down.begin(), c.down.end(), v.down);
+  std::copy(c.forward.begin(), c.forward.end(), v.forward);
+  v.focal[0] = c.focal_x, v.focal[1] = c.focal_y;
+  v.centre[0] = c.centre_x, v.centre[1] = c.centre_y;
+  v.step[0] = c.step_x, v.step[1] = c.step_y;
+  const splat::EwaLight light = splat::ewa_light(shading.parameters(), c);
+  v.light[0] = light.ambient, v.light[1] = light.head, v.light[2] = light.key;
+  std::copy(light.key_direction.begin(), light.key_direction.end(), v.light_direction);
+  v.frame_size[0] = static_cast<float>(camera.width + 2 * FrameTargets::kMargin);
+  v.frame_size[1] = static_cast<float>(camera.height + 2 * FrameTargets::kMargin);
+  v.size[0] = camera.width, v.size[1] = camera.height;
+  v.near_m = static_cast<float>(camera.near_m);
+  v.near_bits = std::bit_cast<uint32_t>(v.near_m);
+  v.margin = FrameTargets::kMargin;
+  v.background = shading.background();
+  const splat::SpacingLimits limits = splat::spacing_limits(scale);
+  std::copy(limits.begin(), limits.end(), v.spacing_limits);
+  std::copy(rim.begin(), rim.end(), v.rim_bias);
+  const auto view = take<ViewRecord>(stream_, 1);
+  std::memcpy(view.data, &v, sizeof v);
+  bind(stream_, GL_UNIFORM_BUFFER, 0, view);
+  const auto intensities = stream_.take(shading.table().size());
+  std::memcpy(intensities.data, shading.table().data(), intensities.bytes);
+  bind(stream_, GL_SHADER_STORAGE_BUFFER, 3, intensities);
+}
+
+void SplatPasses::number_draws(size_t count) {
+  if (draw_number_count_ >= count) return;
+  std::vector<uint32_t> numbers(count * 2);
+  std::iota(numbers.begin(), numbers.end(), 0u);
+  glBindBuffer(GL_ARRAY_BUFFER, draw_numbers_);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(numbers.size() * 4), numbers.data(), GL_STATIC_DRAW);
+  draw_number_count_ = numbers.size();
+}
+
+void SplatPasses::prepare(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+                          const image::Shading& shading) {
+  runs_.build(list.items, camera);
+  const size_t items = std::max<size_t>(list.items.size(), 1), runs = std::max<size_t>(runs_.runs.size(), 1);
+  stream_.begin(stream_.padded(runs * sizeof(ClusterRecord)) + stream_.padded(items * sizeof(DrawRecord)) +
+                stream_.padded(items * sizeof(DrawCommand)) + stream_.padded(sizeof(ViewRecord)) +
+                stream_.padded(shading.table().size()));
+  number_draws(list.items.size());
+  const splat::RimBias rim = write_draws(list, camera, kernel);
+  write_view(camera, shading, list.scale, rim);
+  stream_.commit();
+}
+
+void SplatPasses::draw_points(const gl::Program& program) {
+  program.use();
+  glBindVertexArray(vertex_array_);
+  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, stream_.buffer());
+  for (uint32_t arena = 0; arena < commands_by_arena_.size(); ++arena) {
+    const auto& commands = commands_by_arena_[arena];
+    if (commands.empty()) continue;
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, arenas_.buffer(arena));
+    glMultiDrawArraysIndirect(GL_POINTS, reinterpret_cast<const void*>(command_offsets_[arena]),
+                              static_cast<GLsizei>(commands.size()), 0);
+  }
+}
+
+void SplatPasses::splat_opaque(const FrameTargets& targets, const gl::Program& program) {
+  targets.draw_to(FrameTargets::kSplat);
+  const GLuint empty[4] = {~0u, ~0u, ~0u, ~0u};
+  glClearBufferuiv(GL_COLOR, 0, empty);
+  clear_depth_and_test();
+  draw_points(program);
+  glDisable(GL_DEPTH_TEST);
+}
+
+void SplatPasses::splat_ewa(const FrameTargets& targets, const Programs& programs) {
+  targets.draw_to(FrameTargets::kVisibility);
+  clear_depth_and_test();
+  draw_points(programs.ewa_visibility);
+  glDisable(GL_DEPTH_TEST);
+
+  targets.draw_to(FrameTargets::kSumming);
+  const GLfloat nothing[4] = {};
+  glClearBufferfv(GL_COLOR, 0, nothing);
+  glClearBufferfv(GL_COLOR, 1, nothing);
+  glEnable(GL_BLEND);
+  glBlendEquation(GL_FUNC_ADD);
+  glBlendFunc(GL_ONE, GL_ONE);
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, targets.visible());
+  draw_points(programs.ewa_sum);
+  glDisable(GL_BLEND);
+}
+
+void SplatPasses::splat(const FrameTargets& targets, const Programs& programs, splat::Kernel kernel) {
+  glEnable(GL_PROGRAM_POINT_SIZE);
+  switch (kernel) {
+    case splat::Kernel::kSquare:
+      return splat_opaque(targets, programs.square);
+    case splat::Kernel::kDisc:
+      return splat_opaque(targets, programs.disc);
+    case splat::Kernel::kEllipse:
+      return splat_opaque(targets, programs.ellipse);
+    case splat::Kernel::kEwa:
+      return splat_ewa(targets, programs);
+  }
+}
+
+void SplatPasses::end_frame() {
+  stream_.end();
+  arenas_.end_frame();
+}
+
+}  // namespace telesplat::viewer

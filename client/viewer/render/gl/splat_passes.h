@@ -1,0 +1,93 @@
+// From draw lists to keys on the GPU: the records that shaders read, and the passes that splat.
+#pragma once
+
+#include <vector>
+
+#include "client/viewer/render/gl/frame_targets.h"
+#include "client/viewer/render/gl/point_arena.h"
+#include "client/viewer/render/gl/programs.h"
+#include "common/gl/stream_buffer.h"
+#include "common/image/shading.h"
+#include "common/splat/item_runs.h"
+#include "common/splat/pixel_key.h"
+#include "common/splat/render_options.h"
+
+namespace telesplat::viewer {
+
+/// The view, as all shaders see it (std140, uniform block 0; shaders/common.h).
+struct ViewRecord {
+  float right[4], down[4], forward[4];
+  float focal[2], centre[2], step[2];
+  float frame_size[2];
+  int32_t size[2];
+  float near_m;
+  uint32_t near_bits;
+  int32_t margin;
+  uint32_t background;
+  uint32_t unused[2];
+  float light[4], light_direction[4];  ///< splat::EwaLight
+  float spacing_limits[4];             ///< splat::SpacingLimits
+  uint32_t rim_bias[4];                ///< splat::RimBias
+};
+static_assert(sizeof(ViewRecord) == 176);
+
+/// What the draws of one cluster share (std430).
+struct ClusterRecord {
+  float row_x[4], row_y[4], row_w[4];  ///< splat::LeafTransform
+};
+
+/// What one draw needs (std430).
+struct DrawRecord {
+  uint32_t word;      ///< of the points, in their arena
+  uint32_t count;     ///< of the points that lie there: the distance of its arrays
+  uint32_t cluster;   ///< its ClusterRecord
+  uint32_t spacing;   ///< class of the samples' distance on the screen
+  float size;         ///< square, disc: side or diameter, pixels
+  float bias_growth;  ///< splat::splat_bias_growth
+  int32_t side;       ///< of the square of pixels drawn
+  int32_t sub_steps;  ///< 2^sub_bits of the splat's shape
+  float source[4];    ///< splat::SurfelSource: direction towards the sampling eye in camera axes, radius in metres
+};
+static_assert(sizeof(DrawRecord) == 48);
+
+/// Needs a current GL context for all it does.
+class SplatPasses {
+ public:
+  explicit SplatPasses(bool persistent);
+  ~SplatPasses();
+  SplatPasses(const SplatPasses&) = delete;
+  SplatPasses& operator=(const SplatPasses&) = delete;
+
+  /// Uploads points that are not there yet, and writes and binds what shaders read in this frame: uniform block 0, storage buffers 1
+  /// (draws), 2 (clusters), 3 (intensities).
+  void prepare(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
+               const image::Shading& shading);
+  /// Opaque kernels: clears and writes targets.keys(); ewa: targets.sums().
+  void splat(const FrameTargets& targets, const Programs& programs, splat::Kernel kernel);
+  /// After the frame's last pass.
+  void end_frame();
+
+  const PointArenas& arenas() const { return arenas_; }
+
+ private:
+  struct DrawCommand {
+    uint32_t count, instances, first, base_instance;
+  };
+  splat::RimBias write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
+  void write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
+                  const splat::RimBias& rim);
+  void number_draws(size_t count);
+  void draw_points(const gl::Program& program);
+  void splat_opaque(const FrameTargets& targets, const gl::Program& program);
+  void splat_ewa(const FrameTargets& targets, const Programs& programs);
+
+  PointArenas arenas_;
+  gl::StreamBuffer stream_;
+  uint32_t vertex_array_ = 0, draw_numbers_ = 0;
+  size_t draw_number_count_ = 0;
+  splat::ItemRuns runs_;
+  std::vector<std::vector<DrawCommand>> commands_by_arena_;
+  std::vector<intptr_t> command_offsets_;  // in the stream, one an arena
+};
+
+}  // namespace telesplat::viewer
