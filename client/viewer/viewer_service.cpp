@@ -20,14 +20,6 @@ Result<geometry::Trajectory> make_trajectory(const std::string& name) {
   return geometry::Trajectory::read_csv(name);
 }
 
-// "fill smooth antialias", or those of them that are on.
-std::string finish_name(const splat::Finish& f) {
-  std::string out;
-  for (const auto& [on, name] : {std::pair{f.fill, "fill"}, {f.smooth, "smooth"}, {f.antialias, "antialias"}})
-    if (on) out += (out.empty() ? "" : " ") + std::string(name);
-  return out.empty() ? "none" : out;
-}
-
 void add_switch(CLI::App& app, const char* flag, bool& value, const char* text) {
   app.add_option_function<std::string>(
          flag, [&value](const std::string& v) { value = v == "on"; }, text)
@@ -116,11 +108,11 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 10.0));
-  app.add_flag("--fill,!--no-fill", d.render.finish.fill, "close pin-holes (on unless --no-fill)");
-  app.add_flag("--smooth,!--no-smooth", d.render.finish.smooth,
-               "interpolate between magnified discs and ellipses (on unless --no-smooth)");
-  app.add_flag("--antialias,!--no-antialias", d.render.finish.antialias,
-               "antialias silhouettes (on unless --no-antialias)");
+  app.add_option("--finish", o.finish, "work per pixel after splatting: on, off, or some of fill,smooth,antialias")
+      ->capture_default_str()
+      ->check([](const std::string& v) {
+        return splat::finish_named(v) ? "" : v + ": not on, off or some of fill,smooth,antialias";
+      });
   app.add_option("--shading", o.shading,
                  "lit: head light, directional light, ambient; head: head light; unlit: colours as they are")
       ->capture_default_str()
@@ -167,6 +159,7 @@ int run(ViewerOptions o) {
   o.display.render.kernel = *splat::kernel_named(o.splat);
   o.display.splat_scale = float(o.splat_scale);
   o.display.shading = *image::shading_named(o.shading);
+  o.display.render.finish = *splat::finish_named(o.finish);
   if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
   o.requests.adaptive = o.sampling_size == "auto";
   o.requests.follow_display = o.window;
@@ -206,7 +199,7 @@ int run(ViewerOptions o) {
        {"buffers", "0"},
        {"renderer", (*renderer)->name()},
        {"splat", o.splat},
-       {"finish", finish_name(o.display.render.finish)},
+       {"finish", splat::finish_name(o.display.render.finish)},
        {"shading", o.shading},
        {"width", std::to_string(o.display.width)},
        {"height", std::to_string(o.display.height)},

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace telesplat::splat {
@@ -39,6 +40,10 @@ struct Finish {
   bool smooth = true;     ///< disc, ellipse: interpolates between magnified splats of one surface
   bool antialias = true;  ///< silhouettes
 };
+
+/// "on", "off", or the stages that are on, as in "fill,antialias"; finish_named reads what finish_name makes.
+std::string finish_name(const Finish& finish);
+std::optional<Finish> finish_named(std::string_view name);
 
 struct RenderOptions {
   Kernel kernel = Kernel::kEllipse;

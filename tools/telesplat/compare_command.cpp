@@ -21,24 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr size_t kMaxStrips = 6;  // columns of the run's sheet
 
-Result<splat::Finish> parse_finish(const std::string& text) {
-  if (text == "on") return splat::Finish{};
-  splat::Finish finish{false, false, false};
-  if (text == "off") return finish;
-  for (size_t begin = 0; begin <= text.size();) {
-    const size_t comma = std::min(text.find(',', begin), text.size());
-    const std::string stage = text.substr(begin, comma - begin);
-    bool* which = stage == "fill"        ? &finish.fill
-                  : stage == "smooth"    ? &finish.smooth
-                  : stage == "antialias" ? &finish.antialias
-                                         : nullptr;
-    if (!which) return Error{fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", text)};
-    *which = true;
-    begin = comma + 1;
-  }
-  return finish;
-}
-
 // Which renderers to use: those asked for; without a wish cpu, and gl where it can be had.
 Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
   if (!o.renderers.empty()) {
@@ -114,17 +96,10 @@ class Comparison {
   size_t compared() const { return poses_.size(); }
 
  private:
-  std::string finish_text() const {
-    std::string out;
-    for (const auto& [on, name] :
-         {std::pair{finish_.fill, "fill"}, {finish_.smooth, "smooth"}, {finish_.antialias, "antialias"}})
-      if (on) out += (out.empty() ? "" : ",") + std::string(name);
-    return out.empty() ? "off" : out;
-  }
   std::string caption() const {
     const auto& c = subject_.frames.front().camera;
     return fmt::format("{}: {} triangles, display {}x{}, sampled {}, finish {}", subject_.name,
-                       store_->info().triangles, c.width, c.height, subject_.sampling, finish_text());
+                       store_->info().triangles, c.width, c.height, subject_.sampling, splat::finish_name(finish_));
   }
   nlohmann::ordered_json about() const {
     const auto& c = subject_.frames.front().camera;
@@ -135,7 +110,7 @@ class Comparison {
             {"size", {c.width, c.height}},
             {"sampling", subject_.sampling},
             {"magnify", options_.magnify},
-            {"finish", finish_text()},
+            {"finish", splat::finish_name(finish_)},
             {"pixels_per_degree", options_.pixels_per_degree},
             {"repeat", options_.repeat}};
   }
@@ -190,7 +165,7 @@ class Comparison {
         fmt::format("display {}x{}", f.camera.width, f.camera.height),
         "sampled " + subject_.sampling,
         fmt::format("{} points cached", pose.points_cached),
-        "finish " + finish_text(),
+        "finish " + splat::finish_name(finish_),
         "",
         "below: picture, FLIP error map, the square where it errs most (4x), the reference there"};
     if (const Status s = image::write_png(name + ".png", pose_sheet(reference, pose.cells, captions)); !s) return s;
@@ -294,8 +269,8 @@ int compare(const CompareOptions& o) {
   };
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
-  const auto finish = parse_finish(o.finish);
-  if (!finish) return refuse(finish.error());
+  const auto finish = splat::finish_named(o.finish);
+  if (!finish) return refuse({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
   const auto subject = find_subject(o);
   if (!subject) return refuse(subject.error());
 

@@ -38,7 +38,12 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
                              "--log-level",
                              o.master.service.log_level};
   if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
-  for (const auto& [key, value] : o.master.master.settings) a.insert(a.end(), {"--" + key, text(value)});
+  for (const auto& [key, value] : o.master.master.settings) {
+    if (key == "packing.keep_redundant")
+      a.insert(a.end(), {"--packing.redundancy", value != 0 ? "keep" : "eliminate"});
+    else
+      a.insert(a.end(), {"--" + key, text(value)});
+  }
   return a;
 }
 
@@ -72,6 +77,7 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--renderer",      v.renderer,
                              "--splat",         v.splat,
                              "--splat-scale",   text(v.splat_scale),
+                             "--finish",        v.finish,
                              "--shading",       v.shading,
                              "--coupling",      v.coupling,
                              "--update-rate",   text(v.requests.max_rate_hz),
@@ -80,10 +86,6 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              "--record-points", text(double(v.record_points_mb)),
                              "--started-at",    text(o.started_s)};
   if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
-  const auto& f = d.render.finish;
-  a.push_back(f.fill ? "--fill" : "--no-fill");
-  a.push_back(f.smooth ? "--smooth" : "--no-smooth");
-  a.push_back(f.antialias ? "--antialias" : "--no-antialias");
   for (const auto& [set, flag] : {std::pair{d.exr, "--exr"}, {v.window, "--window"}, {v.fullscreen, "--fullscreen"}})
     if (set) a.push_back(flag);
   return a;

@@ -98,7 +98,7 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
   };
   const bool ewa = options.kernel == splat::Kernel::kEwa;
   std::vector<Step> steps{{ewa ? &parts_->programs.ewa : &parts_->programs.keys, kResolving, 0}};
-  if (options.finish.fill) steps.push_back({&parts_->programs.fill, kFilling, splat::kFillRadius});
+  if (options.finish.fill) steps.push_back({&parts_->programs.fill, kFilling, splat::kFillReach});
   if (options.finish.smooth) steps.push_back({&parts_->programs.smooth, kSmoothing, 1});
   if (options.finish.antialias) steps.push_back({&parts_->programs.antialias, kAntialiasing, 1});
 

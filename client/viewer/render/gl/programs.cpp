@@ -29,7 +29,7 @@ std::string constants() {
   // All digits, and a decimal point always: the shader's constant has the same bits.
   const auto add_float = [&](std::string_view name, float value) { add(name, fmt::format("{:.9e}", value)); };
   add("DEPTH_SHIFT", std::to_string(splat::kDepthCodeShift));
-  add("FILL_RADIUS", std::to_string(splat::kFillRadius));
+  add("FILL_SUPPORTS", std::to_string(splat::kFillSupports));
   add_uint("EDGE", splat::kEdge);
   add("MAX_SPLAT_SIDE", std::to_string(splat::kMaxSplatSide));
   add_uint("MAX_CENTRE_CODE", splat::kMaxCentreCode);

@@ -15,53 +15,37 @@ uint join(uvec3 rgb) { return rgb.r << 16 | rgb.g << 8 | rgb.b; }
 )";
 
 inline constexpr std::string_view kFill = R"(
-// The first pixel from `at` along `step` that is nearer than the hole: colour, info, distance; distance 0: none.
-uvec3 support(ivec2 at, ivec2 step, uint hole) {
-  for (int r = 1; r <= FILL_RADIUS; ++r) {
-    uvec2 pair = pair_at(at + r * step);
-    if (pair.y < hole && hole - pair.y > kEdgeInfo) return uvec3(pair, uint(r));
-  }
-  return uvec3(0u, kEmptyInfo, 0u);
-}
+uint gap(uint a, uint b) { return max(a, b) - min(a, b); }
 
 uvec2 resolve(ivec2 at) {
-  const ivec2 kAxes[4] = ivec2[4](ivec2(1, 0), ivec2(0, 1), ivec2(1, 1), ivec2(1, -1));
+  // Infos of the 5x5 pixels around; the least of each 3x3 window in them, and the largest of those.
+  uint infos[25];
+  for (int i = 0; i < 25; ++i) infos[i] = pair_at(at + ivec2(i % 5 - 2, i / 5 - 2)).y;
+  uint closed = 0u;
+  for (int y = 1; y <= 3; ++y)
+    for (int x = 1; x <= 3; ++x) {
+      uint least = kEmptyInfo;
+      for (int j = -1; j <= 1; ++j)
+        for (int i = -1; i <= 1; ++i) least = min(least, infos[5 * (y + j) + x + i]);
+      closed = max(closed, least);
+    }
   uvec2 here = pair_at(at);
-  uint n = min(min(pair_at(at - ivec2(1, 0)).y, pair_at(at + ivec2(1, 0)).y),
-               min(pair_at(at - ivec2(0, 1)).y, pair_at(at + ivec2(0, 1)).y));
-  if (here.y <= n || here.y - n <= kEdgeInfo) return here;
-
-  uvec3 first[4], second[4];
-  uint nearest[4];
-  int count = 0;
-  for (int i = 0; i < 4; ++i) {
-    uvec3 a = support(at, kAxes[i], here.y);
-    if (a.z == 0u) continue;
-    uvec3 b = support(at, -kAxes[i], here.y);
-    if (b.z == 0u || a.z + b.z > uint(FILL_RADIUS + 1)) continue;
-    if (max(a.y, b.y) - min(a.y, b.y) > kEdgeInfo * (a.z + b.z)) continue;
-    first[count] = a, second[count] = b;
-    nearest[count++] = min(a.y, b.y);
-  }
-  if (count == 0) return here;
-  uint limit = nearest[0];
-  for (int i = 1; i < count; ++i) limit = min(limit, nearest[i]);
-  limit += 2u * kEdgeInfo;
+  if (here.y <= closed || here.y - closed <= kEdgeInfo) return here;
 
   uint weights = 0u, depth = 0u;
   uvec3 rgb = uvec3(0u);
-  int used = 0;
-  bool tight = false;
-  for (int i = 0; i < count; ++i) {
-    if (nearest[i] > limit) continue;
-    ++used;
-    tight = tight || first[i].z + second[i].z == 2u;
-    uint wa = 36u / (first[i].z * first[i].z), wb = 36u / (second[i].z * second[i].z);
-    weights += wa + wb;
-    rgb += wa * split(first[i].x) + wb * split(second[i].x);
-    depth += wa * (first[i].y >> 8) + wb * (second[i].y >> 8);  // at most 8 * 36 * 2^18
-  }
-  if (used < 2 && !tight) return here;
+  int supports = 0;
+  for (int j = -1; j <= 1; ++j)
+    for (int i = -1; i <= 1; ++i) {
+      uvec2 pair = pair_at(at + ivec2(i, j));
+      if ((i == 0 && j == 0) || gap(pair.y, closed) > kEdgeInfo) continue;
+      uint w = i == 0 || j == 0 ? 2u : 1u;
+      ++supports;
+      weights += w;
+      rgb += w * split(pair.x);
+      depth += w * (pair.y >> 8);
+    }
+  if (supports < FILL_SUPPORTS) return here;
   return uvec2(join((rgb + weights / 2u) / weights), depth / weights << 8);
 }
 )";
