@@ -1,6 +1,7 @@
 #include "common/splat/cpu_splatter.h"
 
 #include <hwy/aligned_allocator.h>
+#include <hwy/cache_control.h>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
@@ -28,6 +29,7 @@ constexpr int kTileWidth = 256, kTileHeight = 256;
 constexpr int kEwaTileWidth = 96, kEwaTileHeight = 64;
 
 constexpr int kMargin = kMaxSplatSide;
+constexpr size_t kBoxesAhead = 8;
 
 // Keys of a tile of full size, its reach, and the margin that splats hang over into.
 struct Layout {
@@ -131,6 +133,8 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
       for (size_t i = r.begin(); i < r.end(); ++i) {
+        // Clusters lie scattered in memory.
+        if (i + kBoxesAhead < r.end()) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
         runs.transform(i, list.items, room_to_pixel);
         binning.place(i, runs.transforms[i]);
       }
