@@ -21,9 +21,9 @@
 namespace telesplat::splat {
 namespace {
 
-// Set by bench splat_square, 3 pixels: 14.9 ms at 512 x 64, 13.6 ms at 256 x 128 and 512 x 128, 13.2 ms here (more short rows mean
-// more clusters that straddle tiles). 512 KiB of keys.
-constexpr int kTileWidth = 256, kTileHeight = 256;
+// Set by bench splat_square, 3 pixels, one thread: 14.5 ms at 256 x 256, 13.3 ms here (384 KiB of keys, which leaves the second-level
+// cache some room), 14.0 ms at 256 x 128, 15.1 ms at 128 x 128 (more clusters straddle tiles), 13.4 ms at 320 x 160.
+constexpr int kTileWidth = 256, kTileHeight = 192;
 
 // ewa keeps 36 bytes more a pixel.
 constexpr int kEwaTileWidth = 96, kEwaTileHeight = 64;
