@@ -1,6 +1,7 @@
 #include "common/splat/cpu_splatter.h"
 
 #include <hwy/aligned_allocator.h>
+#include <hwy/cache_control.h>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
@@ -20,15 +21,16 @@
 namespace telesplat::splat {
 namespace {
 
-// Set by bench splat_square, 3 pixels: 14.9 ms at 512 x 64, 13.6 ms at 256 x 128 and 512 x 128, 13.2 ms here (more short rows mean
-// more clusters that straddle tiles). 512 KiB of keys.
-constexpr int kTileWidth = 256, kTileHeight = 256;
+// Set by bench splat_square, 3 pixels, one thread: 14.5 ms at 256 x 256, 13.3 ms here (384 KiB of keys, which leaves the second-level
+// cache some room), 14.0 ms at 256 x 128, 15.1 ms at 128 x 128 (more clusters straddle tiles), 13.4 ms at 320 x 160.
+constexpr int kTileWidth = 256, kTileHeight = 192;
 
 // ewa keeps 36 bytes more a pixel, and meets its points twice. Points across borders cost more than the second-level cache gives: a million
 // splats of one pixel took 107 ms of one core at 96 x 64, 83 ms here.
 constexpr int kEwaTileWidth = 192, kEwaTileHeight = 128;
 
 constexpr int kMargin = kMaxSplatSide;
+constexpr size_t kBoxesAhead = 8;
 
 // Keys of a tile of full size, its reach, and the margin that splats hang over into.
 struct Layout {
@@ -132,6 +134,8 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
       for (size_t i = r.begin(); i < r.end(); ++i) {
+        // Clusters lie scattered in memory.
+        if (i + kBoxesAhead < r.end()) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
         runs.transform(i, list.items, room_to_pixel);
         binning.place(i, runs.transforms[i]);
       }

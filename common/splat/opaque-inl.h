@@ -191,6 +191,13 @@ class TileSplatter {
             hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + at));
             count = at + valid;
           } else {
+            // Mosaics are scanned in order: of a cluster across a tile's border most vectors lie on one side of it.
+            if (hn::AllTrue(di, keep)) {
+              hn::StoreU(place, du, places + count);
+              hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + count));
+              count += hn::Lanes(di);
+              return;
+            }
             const Compressor compress(hn::RebindMask(du, keep));
             hn::StoreU(compress(place), du, places + count);
             hn::StoreInterleaved2(compress(low), compress(high), du, reinterpret_cast<uint32_t*>(keys + count));

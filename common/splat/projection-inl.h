@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstring>
 
@@ -53,7 +54,11 @@ HWY_INLINE hn::Vec<F32> Row(const std::array<float, 4>& row, const Lanes& p) {
 HWY_INLINE hn::Vec<I32> FloorToInt(hn::Vec<F32> v) {
   const F32 d;
   const auto limit = hn::Set(d, 1e6f);
-  return hn::ConvertTo(I32(), hn::Floor(hn::Max(hn::Min(v, limit), hn::Neg(limit))));
+  // Added to 1.5 * 2^23 a whole number below 2^22 stands in the float's last bits: ConvertTo also guards against what cannot be here.
+  constexpr float kWhole = 12582912.0f;
+  const auto floor = hn::Floor(hn::Max(hn::Min(v, limit), hn::Neg(limit)));
+  return hn::Sub(hn::BitCast(I32(), hn::Add(floor, hn::Set(d, kWhole))),
+                 hn::Set(I32(), std::bit_cast<int32_t>(kWhole)));
 }
 
 struct Projected {

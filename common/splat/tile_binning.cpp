@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace telesplat::splat {
 namespace {
@@ -12,23 +13,28 @@ struct Footprint {
   float nearest, farthest;
 };
 
+// Least and greatest of eight; halves are compared whole, which the compiler does by vectors.
+std::pair<float, float> extremes(const float (&v)[8]) {
+  float lo[4], hi[4];
+  for (int i = 0; i < 4; ++i) lo[i] = v[i] < v[i + 4] ? v[i] : v[i + 4];
+  for (int i = 0; i < 4; ++i) hi[i] = v[i] > v[i + 4] ? v[i] : v[i + 4];
+  return {std::min(std::min(lo[0], lo[1]), std::min(lo[2], lo[3])),
+          std::max(std::max(hi[0], hi[1]), std::max(hi[2], hi[3]))};
+}
+
 Footprint project_cube(const LeafTransform& t) {
   // Corners 0 and 65536 on each axis: the eight sums of the rows' entries.
+  static constexpr float kX[8] = {0, 65536, 0, 65536, 0, 65536, 0, 65536},
+                         kY[8] = {0, 0, 65536, 65536, 0, 0, 65536, 65536},
+                         kZ[8] = {0, 0, 0, 0, 65536, 65536, 65536, 65536};
   float x[8], y[8], w[8];
-  for (int i = 0; i < 8; ++i) {
-    const float cx = i & 1 ? 65536.0f : 0.0f, cy = i & 2 ? 65536.0f : 0.0f, cz = i & 4 ? 65536.0f : 0.0f;
-    x[i] = t.x[0] * cx + t.x[1] * cy + t.x[2] * cz + t.x[3];
-    y[i] = t.y[0] * cx + t.y[1] * cy + t.y[2] * cz + t.y[3];
-    w[i] = t.w[0] * cx + t.w[1] * cy + t.w[2] * cz + t.w[3];
-  }
-  Footprint f{INFINITY, -INFINITY, INFINITY, -INFINITY, INFINITY, -INFINITY};
-  for (int i = 0; i < 8; ++i) {
-    const float inverse = 1.0f / w[i];
-    f.x0 = std::min(f.x0, x[i] * inverse), f.x1 = std::max(f.x1, x[i] * inverse);
-    f.y0 = std::min(f.y0, y[i] * inverse), f.y1 = std::max(f.y1, y[i] * inverse);
-    f.nearest = std::min(f.nearest, w[i]), f.farthest = std::max(f.farthest, w[i]);
-  }
-  return f;
+  for (int i = 0; i < 8; ++i) w[i] = t.w[0] * kX[i] + t.w[1] * kY[i] + t.w[2] * kZ[i] + t.w[3];
+  for (int i = 0; i < 8; ++i) x[i] = (t.x[0] * kX[i] + t.x[1] * kY[i] + t.x[2] * kZ[i] + t.x[3]) / w[i];
+  for (int i = 0; i < 8; ++i) y[i] = (t.y[0] * kX[i] + t.y[1] * kY[i] + t.y[2] * kZ[i] + t.y[3]) / w[i];
+  const auto [x0, x1] = extremes(x);
+  const auto [y0, y1] = extremes(y);
+  const auto [nearest, farthest] = extremes(w);
+  return {x0, x1, y0, y1, nearest, farthest};
 }
 
 }  // namespace
