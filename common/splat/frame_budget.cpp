@@ -7,7 +7,7 @@
 namespace telesplat::splat {
 namespace {
 
-constexpr double kIdle = 0.82;
+constexpr double kIdle = 0.82, kLeastShare = 0.4;
 constexpr double kSmallStep = 0.02, kLargeStep = 0.06;
 constexpr double kRise = 0.35, kFall = 0.2;  // the smoothed load takes over this share of what was measured
 constexpr double kFollow_s = 0.07;           // time constant of SpeedDetail: after 0.3 s 1.4 % of a change is left
@@ -16,10 +16,11 @@ double median(double a, double b, double c) { return std::max(std::min(a, b), st
 
 }  // namespace
 
-void FrameBudget::frame_done(double construction_ms, double points, double detail_drawn) {
-  if (!(budget_ms_ > 0) || !std::isfinite(construction_ms) || construction_ms < 0 || !(points > 0)) return;
+void FrameBudget::frame_done(double select_ms, double draw_ms, double points, double detail_drawn) {
+  const auto sound = [](double ms) { return std::isfinite(ms) && ms >= 0; };
+  if (!(budget_ms_ > 0) || !sound(select_ms) || !sound(draw_ms) || !(points > 0)) return;
   // A single slow frame (another process, an upload) says nothing about the next one.
-  const double now = std::min(construction_ms / budget_ms_, 3.0);
+  const double now = std::min(draw_ms / std::max(budget_ms_ - select_ms, kLeastShare * budget_ms_), 3.0);
   const bool first = load_ == 0;
   const double load = first ? now : median(now, last_[0], last_[1]);
   last_[1] = first ? now : last_[0];

@@ -15,10 +15,11 @@ class FrameBudget {
   /// budget_ms <= 0: no limit, detail stays 1.
   explicit FrameBudget(double budget_ms) : budget_ms_(budget_ms) {}
 
-  /// After each frame: how long it took to construct, how many points were drawn in it, and with what detail: if with less than
-  /// this controller allowed, that it was fast is no reason to allow more. Figures that are not finite, and frames without
-  /// points, tell nothing.
-  void frame_done(double construction_ms, double points, double detail_drawn);
+  /// After each frame: how long choosing what to draw took, which detail does not change, and how long drawing it; how many
+  /// points were drawn, and with what detail: if with less than this controller allowed, that it was fast is no reason to allow
+  /// more. Drawing may take what choosing leaves of the budget, but at least 40 % of it: where choosing alone takes too long, to
+  /// coarsen the picture would not help. Figures that are not finite, and frames without points, tell nothing.
+  void frame_done(double select_ms, double draw_ms, double points, double detail_drawn);
 
   /// For the next frame, in [kLeastDetail, 1]. Changes by at most 2 % a frame, 6 % while frames take more than twice the budget.
   double detail() const { return detail_; }
@@ -27,7 +28,7 @@ class FrameBudget {
  private:
   double budget_ms_;
   double detail_ = 1;
-  double last_[2] = {0, 0};  // loads of the frames before: construction time over budget
+  double last_[2] = {0, 0};  // loads of the frames before: time to draw over the time there is for it
   double load_ = 0;          // smoothed
 };
 

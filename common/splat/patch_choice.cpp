@@ -11,6 +11,7 @@ namespace {
 
 constexpr float kMinCosine = 0.35f;     // samples taken at a steeper slope count as taken at this one
 constexpr float kPixelRadius2 = 0.25f;  // of the low-pass
+constexpr size_t kFramesInFlight = 16;  // the most a session may have
 constexpr float kMoreCovered = 1.1f, kApart = 0.1f;
 
 // Of the slope by which the mosaic was sampled, not below kMinCosine.
@@ -67,14 +68,15 @@ void PatchChooser::choose(const geometry::Box& leaf_room, const PatchView& view,
   patches_.clear();
   patch_of_.clear();
   for (const points::Mosaic* m : mosaics) {
-    // Parts of one frame come one after the other, or nearly.
-    auto patch =
-        std::find_if(patches_.rbegin(), patches_.rend(), [&](const Patch& p) { return p.frame == m->frame_tag(); });
-    if (patch == patches_.rend()) {
+    // Mosaics are in order of sequence, and at most kFramesInFlight frames are packed at a time.
+    size_t i = patches_.size();
+    while (i > 0 && patches_.size() - i < kFramesInFlight && patches_[i - 1].frame != m->frame_tag()) --i;
+    if (i == 0 || patches_[i - 1].frame != m->frame_tag()) {
       patches_.push_back({m->frame_tag()});
-      patch = patches_.rbegin();
+      i = patches_.size();
     }
-    patch_of_.push_back(static_cast<uint32_t>(&*patch - patches_.data()));
+    Patch* patch = &patches_[i - 1];
+    patch_of_.push_back(static_cast<uint32_t>(i - 1));
     const auto n = static_cast<float>(m->count(0));
     patch->quality += n * surfel_quality(*m, leaf_room, view);
     patch->covered += surface_covered(*m);

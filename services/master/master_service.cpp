@@ -67,7 +67,8 @@ void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
   app.add_option("--packing.redundancy,--packing.keep_redundant", keep,
                  "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches")
       ->default_str("eliminate")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, double>{{"eliminate", 0.0}, {"keep", 1.0}}));
+      ->check(CLI::Range(0.0, 1.0, "eliminate or keep"))
+      ->transform(CLI::Transformer(std::map<std::string, double>{{"eliminate", 0.0}, {"keep", 1.0}}));
 }
 
 int run(const MasterServiceOptions& o) {

@@ -14,6 +14,7 @@
 #include "common/geometry/trajectory.h"
 #include "common/image/quality.h"
 #include "common/splat/cpu_splatter.h"
+#include "common/splat/frame_budget.h"
 #include "services/packer/packer_core.h"
 #include "services/sampler/ray_sampler.h"
 #include "tests/support/mesh_chunks.h"
@@ -128,6 +129,7 @@ void lod_transitions(benchmark::State& state) {
   size_t pops = 0;
   for (auto _ : state) {
     splat::DrawList list, last_list;
+    splat::SpeedDetail speed;
     image::View last;
     for (size_t i = 0; i < m.cameras.size(); ++i) {
       const auto draw = [&](const splat::DrawList& l) {
@@ -137,6 +139,8 @@ void lod_transitions(benchmark::State& state) {
                         {kWidth, kHeight, view.colour.data(), view.depth_m.data()});
         return view;
       };
+      if (state.range(2)) speed.frame(static_cast<double>(i) / kFrameRate_hz, m.cameras[i], 0.5);
+      options.detail = static_cast<float>(speed.detail());
       splat::select_view(m.packer->model(), m.cameras[i], options, list);
       image::View view = draw(list);
       if (i > 0) {
@@ -165,13 +169,34 @@ void lod_transitions(benchmark::State& state) {
   state.counters["points_median"] = points.quantile(0.5);
 }
 BENCHMARK(lod_transitions)
-    ->ArgNames({"transitions", "recorded"})
-    ->Args({0, 0})
-    ->Args({1, 0})
-    ->Args({0, 1})
-    ->Args({1, 1})
+    ->ArgNames({"transitions", "recorded", "speed_detail"})
+    ->Args({0, 0, 0})
+    ->Args({1, 0, 0})
+    ->Args({0, 1, 0})
+    ->Args({1, 1, 0})
+    ->Args({1, 1, 1})
     ->Iterations(1)
     ->Unit(benchmark::kMillisecond);
+
+// What less detail saves, in percent: of the first view, on a display of 2560x1600, where all samples are magnified.
+void lod_detail(benchmark::State& state) {
+  const Moving& m = moving(0);
+  geometry::Camera camera = m.cameras[0];
+  camera.width = 2560, camera.height = 1600;
+  splat::SelectionOptions options;
+  options.scale = 1.5f;
+  options.detail = static_cast<float>(state.range(0)) / 100;
+  splat::CpuSplatter splatter;
+  std::vector<uint32_t> colour(size_t{2560} * 1600);
+  const image::Shading shading({}, camera);
+  splat::DrawList list;
+  for (auto _ : state) {
+    splat::select_view(m.packer->model(), camera, options, list);
+    splatter.render(list, camera, splat::Kernel::kDisc, shading, {2560, 1600, colour.data(), nullptr});
+  }
+  state.counters["points"] = static_cast<double>(list.points);
+}
+BENCHMARK(lod_detail)->Arg(100)->Arg(70)->Arg(50)->Arg(30)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace telesplat

@@ -55,7 +55,7 @@ Course simulate(FrameBudget& budget, int frames, const std::function<double(doub
     const double detail = budget.detail(), load = machine(detail, i);
     run.detail.push_back(detail);
     run.load.push_back(load);
-    budget.frame_done(load * kBudget_ms, 1e6, detail);
+    budget.frame_done(0, load * kBudget_ms, 1e6, detail);
     const double step = std::abs(std::log(budget.detail() / detail));
     EXPECT_LE(step, 0.0601) << "frame " << i;
     EXPECT_GE(budget.detail(), kLeastDetail);
@@ -117,16 +117,34 @@ TEST(FrameBudget, EndsAtTheLeastDetail) {
 
 TEST(FrameBudget, IsSwitchedOffByNoBudgetAndIgnoresNonsense) {
   FrameBudget off(0);
-  for (int i = 0; i < 50; ++i) off.frame_done(1e6, 1e6, 1);
+  for (int i = 0; i < 50; ++i) off.frame_done(0, 1e6, 1e6, 1);
   EXPECT_EQ(off.detail(), 1.0);
   FrameBudget budget(kBudget_ms);
   for (int i = 0; i < 50; ++i) {
-    budget.frame_done(std::nan(""), 1e6, 1);
-    budget.frame_done(std::numeric_limits<double>::infinity(), 1e6, 1);
-    budget.frame_done(-1, 1e6, 1);
-    budget.frame_done(1e6, 0, 1);
+    budget.frame_done(0, std::nan(""), 1e6, 1);
+    budget.frame_done(0, std::numeric_limits<double>::infinity(), 1e6, 1);
+    budget.frame_done(0, -1, 1e6, 1);
+    budget.frame_done(0, 1e6, 0, 1);
   }
   EXPECT_EQ(budget.detail(), 1.0);
+}
+
+TEST(FrameBudget, WhatDetailCannotChangeIsTakenFromTheBudgetButNotAllOfIt) {
+  const auto settle = [](double select_ms, double draw_ms) {
+    FrameBudget budget(kBudget_ms);
+    double drawn_ms = 0;
+    for (int i = 0; i < 400; ++i) {
+      drawn_ms = draw_ms * points_drawn(budget.detail(), 8) / points_drawn(1, 8);
+      budget.frame_done(select_ms, drawn_ms, 1e6, budget.detail());
+    }
+    return std::pair{budget.detail(), drawn_ms};
+  };
+  EXPECT_EQ(settle(2, 0.5 * kBudget_ms).first, 1.0);
+  const auto [detail, drawn_ms] = settle(0.3 * kBudget_ms, kBudget_ms);
+  EXPECT_LT(detail, 1.0);
+  EXPECT_LE(drawn_ms, 0.705 * kBudget_ms);
+  EXPECT_GT(drawn_ms, 0.5 * kBudget_ms);
+  EXPECT_EQ(settle(1.5 * kBudget_ms, 0.3 * kBudget_ms).first, 1.0) << "too slow, but not for the points' sake";
 }
 
 TEST(FrameBudget, IsNotMisledByFramesDrawnWithLess) {
@@ -134,7 +152,7 @@ TEST(FrameBudget, IsNotMisledByFramesDrawnWithLess) {
   simulate(budget, 200, [](double d, int) { return levels_time(d, 2.0, 0.2, 8); });
   const double settled = budget.detail();
   EXPECT_LT(settled, 0.9);
-  for (int i = 0; i < 200; ++i) budget.frame_done(0.2 * kBudget_ms, 1e5, 0.5 * settled);
+  for (int i = 0; i < 200; ++i) budget.frame_done(0, 0.2 * kBudget_ms, 1e5, 0.5 * settled);
   EXPECT_EQ(budget.detail(), settled);
 }
 

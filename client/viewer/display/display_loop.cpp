@@ -147,7 +147,8 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
                         {camera.width, camera.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
     cache.end_frame();
     const double end_s = monotonic_s();
-    budget.frame_done((end_s - begin_s) * 1e3, double(list.points), o.selection.detail);
+    budget.frame_done((selected_s - begin_s) * 1e3, (end_s - selected_s) * 1e3, double(list.points),
+                      o.selection.detail);
     worker.on_frame(end_s, camera, list.clusters_seen);
     surface.present(view);
     const double presented_s = monotonic_s();
