@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
+#include <thread>
 
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/window_surface.h"
@@ -173,6 +174,8 @@ int run(ViewerOptions o) {
     log::error("{}", renderer.error().text);
     return 1;
   }
+  if (std::string_view((*renderer)->name()) == "cpu")
+    o.display.threads = o.threads > 0 ? o.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   std::unique_ptr<FrameSpool> spool;
   const std::string spool_directory = o.out + "/spool";
   if (!o.out.empty()) {

@@ -35,7 +35,7 @@ void FrameBudget::frame_done(double select_ms, double draw_ms, double points, do
   } else if (load_ < kIdle && detail_drawn > 0.999 * detail_) {
     step = std::min(kSmallStep, 0.1 * 0.5 * std::log(kIdle / std::max(load_, 0.05)) + 0.001);
   }
-  detail_ = std::clamp(detail_ * std::exp(step), kLeastDetail, 1.0);
+  detail_ = std::clamp(detail_ * std::exp(step), least_, 1.0);
 }
 
 double screen_movement(const geometry::Pose& from, const geometry::Pose& to, double depth_m, double focal_px) {

@@ -12,8 +12,8 @@ inline constexpr double kLeastDetail = 0.3;
 /// of it nothing changes, so that noise is not seen as a pulsing picture; above, detail falls; below, it rises to 1 again.
 class FrameBudget {
  public:
-  /// budget_ms <= 0: no limit, detail stays 1.
-  explicit FrameBudget(double budget_ms) : budget_ms_(budget_ms) {}
+  /// budget_ms <= 0: no limit, detail stays 1. least: detail falls no lower.
+  explicit FrameBudget(double budget_ms, double least = kLeastDetail) : budget_ms_(budget_ms), least_(least) {}
 
   /// After each frame: how long choosing what to draw took, which detail does not change, and how long drawing it; how many
   /// points were drawn, and with what detail: if with less than this controller allowed, that it was fast is no reason to allow
@@ -21,12 +21,12 @@ class FrameBudget {
   /// coarsen the picture would not help. Figures that are not finite, and frames without points, tell nothing.
   void frame_done(double select_ms, double draw_ms, double points, double detail_drawn);
 
-  /// For the next frame, in [kLeastDetail, 1]. Changes by at most 2 % a frame, 6 % while frames take more than twice the budget.
+  /// For the next frame, in [least, 1]. Changes by at most 2 % a frame, 6 % while frames take more than twice the budget.
   double detail() const { return detail_; }
   double budget_ms() const { return budget_ms_; }
 
  private:
-  double budget_ms_;
+  double budget_ms_, least_;
   double detail_ = 1;
   double last_[2] = {0, 0};  // loads of the frames before: time to draw over the time there is for it
   double load_ = 0;          // smoothed

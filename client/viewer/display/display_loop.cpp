@@ -112,7 +112,8 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
   worker.on_first_points(monotonic_s());
 
   // What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
-  splat::FrameBudget budget(o.detail_budget && o.target_fps > 0 ? kBudgetShare * 1e3 / o.target_fps : 0);
+  splat::FrameBudget budget(o.detail_budget && o.target_fps > 0 ? kBudgetShare * 1e3 / o.target_fps : 0,
+                            kLeastDetailShown);
   splat::SpeedDetail speed;
   DisplayResult result;
   const double start_s = monotonic_s();
@@ -147,7 +148,11 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
                         {camera.width, camera.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
     cache.end_frame();
     const double end_s = monotonic_s();
-    budget.frame_done((selected_s - begin_s) * 1e3, (end_s - selected_s) * 1e3, double(list.points),
+    // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
+    const double work_ms =
+        (stats.project_ms + stats.resolve_ms + stats.fill_ms + stats.smooth_ms + stats.antialias_ms) /
+        std::max(o.threads, 1);
+    budget.frame_done((selected_s - begin_s) * 1e3, std::min((end_s - selected_s) * 1e3, work_ms), double(list.points),
                       o.selection.detail);
     worker.on_frame(end_s, camera, list.clusters_seen);
     surface.present(view);

@@ -14,6 +14,7 @@ struct DisplayOptions {
   int width = 1280, height = 800;  ///< of a window: at first
   double fov_deg = 90, near_m = 0.02;
   double target_fps = 60;     ///< frames are paced to this; 0: as fast as possible
+  int threads = 1;            ///< that the renderer's stage times are summed over
   bool detail_budget = true;  ///< lower detail where a view takes longer to construct than target_fps leaves time for
   bool speed_detail = false;  ///< lower detail while the head moves fast (T4.4.3.1)
   double duration_s = 10;     ///< seconds from the first displayed frame; 0: until told to stop
