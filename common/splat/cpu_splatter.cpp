@@ -204,12 +204,14 @@ void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspa
     ms += (now - start) * 1e3;
     start = now;
   };
+  const ResolvedTile content = crop_to_content(tile, layout.reach);
+  if (content.width == 0 || content.height == 0) return;
   // Each stage leaves as much around the tile as those after it read.
   const int left_after_fill = finish_reach({false, finish.smooth, finish.antialias});
   const int left_after_smooth = finish_reach({false, false, finish.antialias});
-  if (finish.fill) fill_holes(tile, left_after_fill, workspace.finish), lap(stats.fill_ms);
-  if (finish.smooth) smooth(tile, left_after_smooth, workspace.finish), lap(stats.smooth_ms);
-  if (finish.antialias) antialias(tile, workspace.finish), lap(stats.antialias_ms);
+  if (finish.fill) fill_holes(content, left_after_fill, workspace.finish), lap(stats.fill_ms);
+  if (finish.smooth) smooth(content, left_after_smooth, workspace.finish), lap(stats.smooth_ms);
+  if (finish.antialias) antialias(content, workspace.finish), lap(stats.antialias_ms);
 }
 
 void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace) {

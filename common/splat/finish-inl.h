@@ -22,6 +22,35 @@ constexpr uint32_t kEdgeInfo = kEdge << 8;
 
 HWY_INLINE hn::Vec<U32> Difference(hn::Vec<U32> a, hn::Vec<U32> b) { return hn::Sub(hn::Max(a, b), hn::Min(a, b)); }
 
+// ---- content ----
+
+ResolvedTile FindContent(const ResolvedTile& tile, int reach) {
+  const U32 d;
+  const auto lanes = static_cast<int>(hn::Lanes(d));
+  const auto nothing = hn::Set(d, kEmptyInfo);
+  int left = tile.width + reach, right = -reach, top = tile.height + reach, bottom = -reach;
+  for (int y = -reach; y < tile.height + reach; ++y) {
+    const uint32_t* info = tile.info(y);
+    const auto empty = [&](int x) HWY_ATTR { return hn::AllTrue(d, hn::Eq(hn::LoadU(d, info + x), nothing)); };
+    int first = -reach;
+    while (first < tile.width + reach && empty(first)) first += lanes;
+    if (first >= tile.width + reach) continue;
+    left = std::min(left, first);
+    top = std::min(top, y);
+    bottom = y + 1;
+    // From the right only as far as is not known yet.
+    int last = tile.width + reach;
+    while (last > right && empty(last - lanes)) last -= lanes;
+    right = std::max(right, last);
+  }
+  const int x0 = std::max(left - kFillReach, 0), x1 = std::min(right + kFillReach, tile.width);
+  const int y0 = std::max(top - kFillReach, 0), y1 = std::min(bottom + kFillReach, tile.height);
+  ResolvedTile out = tile;
+  out.rows += static_cast<ptrdiff_t>(y0) * 2 * tile.stride + x0;
+  out.width = std::max(x1 - x0, 0), out.height = std::max(y1 - y0, 0);
+  return out;
+}
+
 // ---- fill ----
 
 // Closes the holes of one vector of pixels.

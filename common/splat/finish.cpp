@@ -11,10 +11,14 @@
 #if HWY_ONCE
 namespace telesplat::splat {
 
+HWY_EXPORT(FindContent);
 HWY_EXPORT(FillHoles);
 HWY_EXPORT(Smooth);
 HWY_EXPORT(Antialias);
 
+ResolvedTile crop_to_content(const ResolvedTile& tile, int reach) {
+  return HWY_DYNAMIC_DISPATCH(FindContent)(tile, reach);
+}
 int fill_holes(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
   return HWY_DYNAMIC_DISPATCH(FillHoles)(tile, grow, scratch);
 }

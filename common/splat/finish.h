@@ -44,14 +44,18 @@ struct ResolvedTile {
   int margin = 0;            ///< at least finish_reach() + kFinishSlack if any stage is on
   int width = 0, height = 0;
 
-  /// Pixel x = 0 of row y; x in -margin..stride - margin - 1, y in -margin..height + margin - 1.
-  /// Before the row is resolved: its keys (pixel_key.h), x as below.
+  /// Pixel x = 0 of row y; x in -margin..stride - margin - 1, y in -margin..height + margin - 1. Before the row is resolved, its keys
+  /// (pixel_key.h) lie where its colours and infos will be.
   uint64_t* key(int y) const {
     return reinterpret_cast<uint64_t*>(rows) + static_cast<size_t>(y + margin) * stride + margin;
   }
   uint32_t* colour(int y) const { return rows + static_cast<size_t>(y + margin) * 2 * stride + margin; }
   uint32_t* info(int y) const { return colour(y) + stride; }
 };
+
+/// The part of the tile in which a stage may change anything: everything farther than kFillReach from what is not empty stays empty. Width or
+/// height 0: there is nothing.
+ResolvedTile crop_to_content(const ResolvedTile& tile, int reach);
 
 /// What the stages need besides the tile; its memory is reused.
 struct FinishScratch {

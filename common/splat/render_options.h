@@ -46,7 +46,7 @@ std::string finish_name(const Finish& finish);
 std::optional<Finish> finish_named(std::string_view name);
 
 struct RenderOptions {
-  Kernel kernel = Kernel::kEllipse;
+  Kernel kernel = Kernel::kDisc;
   Finish finish;
 };
 

@@ -62,6 +62,37 @@ TEST(Finish, EveryStageOnEveryTargetAndWidthEqualsThePlainLoops) {
   }
 }
 
+TEST(Finish, CroppingToContentLosesNothingThatAStageChanges) {
+  std::mt19937 rng(5);
+  for (int round = 0; round < 60; ++round) {
+    // A patch of surface with holes somewhere, maybe in the margin alone, maybe nowhere.
+    OwnTile tile(37, 29);
+    const int reach = splat::finish_reach({});
+    const int x0 = static_cast<int>(rng() % 50) - 10, y0 = static_cast<int>(rng() % 44) - 10;
+    const int w = static_cast<int>(rng() % 20), h = static_cast<int>(rng() % 20);
+    for (int y = std::max(y0, -reach); y < std::min(y0 + h, 29 + reach); ++y)
+      for (int x = std::max(x0, -reach); x < std::min(x0 + w, 37 + reach); ++x)
+        if (rng() % 5) tile.set(x, y, rng() & 0xffffff, (rng() % 9 ? kNear : kFar) + (rng() & 63), rng() & 3);
+    OwnTile whole = tile, part = tile;
+    FinishScratch scratch;
+    const auto finish = [&](const splat::ResolvedTile& t) {
+      splat::fill_holes(t, 2, scratch);
+      splat::smooth(t, 1, scratch);
+      splat::antialias(t, scratch);
+    };
+    finish(whole.tile);
+    for (const int64_t target : testing::simd_targets()) {
+      const testing::OnTarget on(target);
+      OwnTile cropped = part;
+      const splat::ResolvedTile content = splat::crop_to_content(cropped.tile, reach);
+      ASSERT_GE(content.width, 0);
+      ASSERT_LE(content.width, 37);
+      if (content.width > 0 && content.height > 0) finish(content);
+      expect_same(whole, cropped, 0, std::string(hwy::TargetName(target)) + ", round " + std::to_string(round));
+    }
+  }
+}
+
 // A disc of surface of radius 20 in the middle, nothing around it.
 OwnTile disc_tile() {
   OwnTile out(64, 64);

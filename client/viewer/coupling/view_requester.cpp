@@ -82,7 +82,8 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
   const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
   const double margin = motion < 0.002 ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
-  const bool still = margin == 0;
+  // The first view is wanted soon rather than sharp.
+  const bool still = margin == 0 && latency_s_ > 0;
   if (options_.adaptive) {
     if (scale_ == 0)
       scale_ =

@@ -12,6 +12,8 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kPicturePeriod_s = 2.5, kBudgetShare = 0.85;
+// Below, splats get so large that fewer of them hardly save time (bench lod_detail).
+constexpr double kLeastDetailShown = 0.5;
 
 bool told_to_stop(const ReplicaWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
