@@ -99,6 +99,9 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
       ->check(CLI::Range(0.0, 1000.0));
   add_switch(app, "--detail-budget", d.detail_budget,
              "on: lower detail where a view takes longer to construct than --target-fps leaves time for");
+  app.add_option("--least-detail", d.least_detail, "the budget lowers detail no further than this")
+      ->capture_default_str()
+      ->check(CLI::Range(0.3, 1.0));
   add_switch(app, "--speed-detail", d.speed_detail, "on: lower detail while the head moves fast");
   app.add_option("--renderer", o.renderer, "auto, cpu or gl")
       ->capture_default_str()

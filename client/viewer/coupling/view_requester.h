@@ -19,9 +19,9 @@ struct RequestOptions {
   bool adaptive =
       false;  ///< sample as finely as updates of target_latency_s allow, and a still view exactly; the size above is not
               ///< used
-  double target_latency_s = 0.2;  ///< adaptive: longer updates make sampling coarser, shorter ones finer
-  double min_scale = 0.5;         ///< adaptive: sampled pixels a displayed pixel, on each axis, at least (at most 1)
-  bool follow_display = false;    ///< sample as many pixels, in the display's aspect: for windows that change theirs
+  double target_latency_s = 0.15;  ///< adaptive: longer updates make sampling coarser, shorter ones finer
+  double min_scale = 0.5;          ///< adaptive: sampled pixels a displayed pixel, on each axis, at least (at most 1)
+  bool follow_display = false;     ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 
 /// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's aspect, sides

@@ -12,8 +12,6 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kPicturePeriod_s = 2.5, kBudgetShare = 0.85;
-// Below, splats get so large that fewer of them hardly save time (bench lod_detail).
-constexpr double kLeastDetailShown = 0.5;
 
 bool told_to_stop(const ReplicaWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
@@ -115,7 +113,7 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
 
   // What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
   splat::FrameBudget budget(o.detail_budget && o.target_fps > 0 ? kBudgetShare * 1e3 / o.target_fps : 0,
-                            kLeastDetailShown);
+                            o.least_detail);
   splat::SpeedDetail speed;
   DisplayResult result;
   const double start_s = monotonic_s();
