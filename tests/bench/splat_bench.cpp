@@ -13,6 +13,7 @@
 
 #include "client/viewer/render/renderer.h"
 #include "common/core/clock.h"
+#include "common/geometry/stereo.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/normal.h"
 #include "common/splat/cpu_splatter.h"
@@ -214,6 +215,41 @@ void splat_select_view(benchmark::State& state) {
   state.counters["mosaics"] = static_cast<double>(list.items.size());
 }
 BENCHMARK(splat_select_view)->ArgName("patches")->Arg(1)->Arg(64)->Unit(benchmark::kMillisecond);
+
+// A frame as the display makes it, finish included, for one eye or for both: what is drawn is chosen once for the two of them.
+void splat_eyes(benchmark::State& state) {
+  const auto kernel = static_cast<splat::Kernel>(state.range(0));
+  const auto eyes = static_cast<size_t>(state.range(1));
+  constexpr double kEyeDistance_m = 0.064;
+  const geometry::Camera head = display_camera();
+  const auto both = geometry::eye_cameras(head, kEyeDistance_m);
+  const geometry::Camera chooser = eyes == 2 ? geometry::enclosing_camera(head, kEyeDistance_m) : head;
+  const points::PointModel& m = model(1);
+  splat::CpuSplatter splatter(2);
+  std::vector<uint32_t> colour(size_t{kDisplayWidth} * kDisplayHeight);
+  splat::DrawList list;
+  splat::SelectionOptions options;
+  options.scale = splat::suitable_scale(kernel);
+  for (auto _ : state) {
+    splat::select_view(m, chooser, options, list);
+    for (size_t eye = 0; eye < eyes; ++eye) {
+      const geometry::Camera& camera = eyes == 2 ? both[eye] : head;
+      const image::Shading shading({}, camera);
+      splatter.render(list, camera, splat::RenderOptions{kernel, {}}, shading,
+                      {kDisplayWidth, kDisplayHeight, colour.data(), nullptr});
+    }
+  }
+  state.counters["points"] = static_cast<double>(list.points);
+  state.counters["fps"] = benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+BENCHMARK(splat_eyes)
+    ->ArgNames({"kernel", "eyes"})
+    ->Args({1, 1})
+    ->Args({1, 2})
+    ->Args({2, 1})
+    ->Args({2, 2})
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 void splat_reference_depth(benchmark::State& state) {
   const points::PointModel& m = model(static_cast<int>(state.range(1)));
