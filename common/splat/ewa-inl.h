@@ -332,9 +332,10 @@ void ClearEwa(const geometry::Rect& rect, EwaBuffer& buffer) {
   constexpr int kBeyond = 16;
   const int stride = (rect.width + kBeyond + 7) / 8 * 8;
   const size_t pixels = static_cast<size_t>(stride) * rect.height;
-  if (buffer.stride != stride || buffer.height < rect.height) {
+  if (buffer.room < pixels) {
     buffer.visible = hwy::AllocateAligned<float>(pixels);
     buffer.sums = hwy::AllocateAligned<float>(8 * pixels);
+    buffer.room = pixels;
   }
   buffer.width = rect.width, buffer.height = rect.height, buffer.stride = stride;
   std::fill_n(buffer.visible.get(), pixels, kNothingVisible);

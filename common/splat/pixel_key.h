@@ -12,9 +12,10 @@
 // the nearest centre wins, not the nearest depth, and generous splats do not blur.
 // Based on: M. Schuetz, M. Wimmer, "High-quality point-based rendering using fast single-pass interpolation", 2015 (paraboloids).
 //
-// Resolving turns each key, in place, into a pair: low 32 bits the shaded colour 0x00RRGGBB, high 32 bits the info word
-//   depth code << 8 | spacing class << 3 | ring, or kEmptyInfo where nothing is.
-// Finish stages work on pairs; where they are written out the ring's mean bias is taken off the depth again (RimBias).
+// Resolving turns each key into the shaded colour, 0x00RRGGBB, and the info word
+//   depth code << 8 | spacing class << 3 | ring, or kEmptyInfo where nothing is,
+// which take the keys' place row by row (finish.h, ResolvedTile). Finish stages work on these; where they are written out the ring's mean
+// bias is taken off the depth again (RimBias).
 #pragma once
 
 #include <algorithm>
@@ -34,7 +35,7 @@ inline constexpr int kKeyDepthBit = 45, kKeyClassBit = 43, kKeyRingBit = 40, kKe
 inline constexpr uint64_t kKeySign = 1ull << 63;
 inline constexpr uint64_t kOutsideSplat = 1ull << 63;  ///< turns a key's sign: larger than every key, as signed numbers
 inline constexpr int64_t kEmptyKey = -1;               ///< nothing there: larger than every key
-inline constexpr uint32_t kEmptyInfo = 0xffffffffu;    ///< nothing there: a pair's high half
+inline constexpr uint32_t kEmptyInfo = 0xffffffffu;    ///< nothing there
 
 /// Depth code of a depth in metres, for a splat's centre. depth_m >= near_m > 0.
 inline uint32_t encode_depth_code(float depth_m, float near_m) {
@@ -69,6 +70,7 @@ constexpr uint32_t key_albedo(uint64_t key) { return static_cast<uint32_t>(key) 
 constexpr uint32_t key_info(uint64_t key) {
   return key_depth_code(key) << 8 | (static_cast<uint32_t>(key >> kKeyRingBit) & 31);
 }
+/// Colour and info in one word.
 constexpr uint64_t encode_pair(uint32_t colour, uint32_t info) { return uint64_t{info} << 32 | colour; }
 constexpr uint32_t pair_colour(uint64_t pair) { return static_cast<uint32_t>(pair); }
 constexpr uint32_t pair_info(uint64_t pair) { return static_cast<uint32_t>(pair >> 32); }

@@ -27,7 +27,7 @@ using PixelI32 = hn::RebindToSigned<PixelU32>;
 using PixelF32 = hn::RebindToFloat<PixelU32>;
 using Pixels = hn::Vec<PixelU32>;
 
-// Low and high halves of keys or pairs.
+// Low and high halves of keys.
 struct Halves {
   Pixels low, high;
 };

@@ -25,6 +25,7 @@ TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, cons
 struct EwaBuffer {
   hwy::AlignedFreeUniquePtr<float[]> visible;  ///< least depth code of the opaque ellipses
   hwy::AlignedFreeUniquePtr<float[]> sums;     ///< 8 a pixel: EwaSum
+  size_t room = 0;                             ///< pixels that these hold
   int width = 0, height = 0, stride = 0;
 };
 

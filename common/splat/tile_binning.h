@@ -1,5 +1,5 @@
-// The screen cut into tiles, and what of a view falls into which. A tile's depth|colour buffer stays in a core's cache from
-// clearing to resolving, so memory sees the finished colours alone.
+// The screen cut into tiles, and what of a view falls into which. A tile's keys stay in a core's cache from
+// splatting to the end of the finish, so memory sees the finished colours alone.
 #pragma once
 
 #include <array>

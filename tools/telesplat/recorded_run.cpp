@@ -26,13 +26,14 @@ Result<toml::table> read_toml(const std::string& path) {
   }
 }
 
-// A number that may stand as text: the facts of processes are.
+// A finite number that may stand as text: the facts of processes are.
 double number(const toml::node_view<const toml::node>& node, double fallback) {
-  if (const auto v = node.value<double>()) return *v;
-  const auto text = node.value<std::string>();
   double out = fallback;
-  if (text) std::from_chars(text->data(), text->data() + text->size(), out);
-  return out;
+  if (const auto v = node.value<double>())
+    out = *v;
+  else if (const auto text = node.value<std::string>())
+    std::from_chars(text->data(), text->data() + text->size(), out);
+  return std::isfinite(out) ? out : fallback;
 }
 
 // Fills everything but the frames; the name of the run's own viewer is what it returns.

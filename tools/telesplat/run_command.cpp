@@ -277,7 +277,7 @@ int run(const RunOptions& given) {
   progress.close();
   pipeline->finish();
   for (const auto& n : pipeline->take_notes()) progress.line(n);
-  if (o.join_master.empty()) complete_session(o);
+  if (o.join_master.empty() && !o.out.empty()) complete_session(o);
   if (state == Pipeline::State::kBadInput) {
     if (!folder_existed) fs::remove_all(o.out, error);
     return 2;

@@ -89,9 +89,9 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
       scale_ =
           std::clamp(std::sqrt(kFirstPixels / (double(display_->width) * display_->height)), options_.min_scale, 1.0);
     // A wider view is sampled as finely; a still head sees every pixel's own sample.
-    const double per_pixel = still ? 1.0 : scale_ * (1 + margin);
-    camera.width = whole_side(display_->width * per_pixel);
-    camera.height = whole_side(display_->height * per_pixel);
+    const double per_pixel = scale_ * (1 + margin);
+    camera.width = still ? display_->width : whole_side(display_->width * per_pixel);
+    camera.height = still ? display_->height : whole_side(display_->height * per_pixel);
   } else {
     std::tie(camera.width, camera.height) = sampling_size(options_, display_->width, display_->height);
   }
@@ -115,7 +115,8 @@ std::optional<ViewRequester::Update> ViewRequester::on_applied(const wire::Patch
   u.bytes += patch.image.size();
   if (!patch.frame_complete) return std::nullopt;
   u.complete_s = now_s;
-  const double latency_s = now_s - u.requested_s;
+  // The master's clock as seen from here may be set back when the connection is made anew.
+  const double latency_s = std::max(now_s - u.requested_s, 1e-3);
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
   // Time goes with the number of pixels, hence the root; by small steps, since views differ.
   if (options_.adaptive && !u.still)

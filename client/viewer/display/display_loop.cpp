@@ -87,6 +87,7 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
     o.render = look.render;
     o.shading.lit = look.lit;
     o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(look.render.kernel);
+    o.selection.best_patch_only = worker.keeps_redundant();
     return camera;
   };
   image::View view;
@@ -132,7 +133,6 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
     const image::Shading shading(o.shading, camera);
     if (o.speed_detail) speed.frame(begin_s, camera, list.distance_m > 0 ? list.distance_m : 1);
     o.selection.detail = float(std::min(budget.detail(), speed.detail()));
-    o.selection.best_patch_only = worker.keeps_redundant();
     cache.select(camera, o.selection, list);
     const double selected_s = monotonic_s();
     uint32_t use = 0;

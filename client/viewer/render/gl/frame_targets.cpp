@@ -85,7 +85,9 @@ Status FrameTargets::make_sums() {
   if (textures_[kSums0]) return ok_status();
   make_texture(kSums0, GL_RGBA32F, true);
   make_texture(kSums1, GL_RGBA32F, true);
-  return make_framebuffer(kSumming, &textures_[kSums0], 2, false);
+  const Status made = make_framebuffer(kSumming, &textures_[kSums0], 2, false);
+  if (!made) release();  // else the next frame would take them for whole
+  return made;
 }
 
 GlFrame FrameTargets::output(bool with_depth) const {

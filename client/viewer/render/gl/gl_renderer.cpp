@@ -186,8 +186,9 @@ Result<splat::SplatStats> GlRenderer::render_on_gpu(const splat::DrawList& list,
                                                     const splat::RenderOptions& options, const image::Shading& shading,
                                                     bool with_depth) {
   const Current current = use_context();
-  if (const Status drawn = draw(list, camera, options, shading, with_depth); !drawn) return drawn.error();
+  const Status drawn = draw(list, camera, options, shading, with_depth);
   release_state();
+  if (!drawn) return drawn.error();
   return stats(list, false);
 }
 
@@ -199,6 +200,7 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
   const double start = monotonic_s();
   if (const Status drawn = draw(list, camera, options, shading, target.depth_m != nullptr); !drawn) {
     // A frame that the GPU cannot hold shows nothing, rather than ending the viewer.
+    release_state();
     if (refusals_.allow(start)) log::error("{}", drawn.error().text);
     const size_t pixels = static_cast<size_t>(target.width) * static_cast<size_t>(target.height);
     std::fill_n(target.colour, pixels, 0xff000000u | shading.background());

@@ -1,4 +1,4 @@
-// Elliptical weighted average: visibility, weighted sums of what is visible, and their means (common/splat/ewa.h).
+// Elliptical weighted average: visibility, weighted sums of what is visible, and their means (common/splat/ewa-inl.h).
 #pragma once
 
 #include <string_view>
