@@ -121,6 +121,8 @@ class Comparison {
     const auto model = models_->of(frame);
     if (!model) return model.error();
     CellOptions cell_options;
+    cell_options.shading = subject_.shading;
+    cell_options.best_patch_only = subject_.best_patch_only;
     const image::View reference =
         sampler::render_directly(*sampler_, frame.camera, image::Shading(cell_options.shading, frame.camera));
     const bool shows = std::any_of(reference.depth_m.begin(), reference.depth_m.end(),

@@ -51,6 +51,7 @@ struct CellOptions {
   float splat_scale = 1;
   int repeat = 5;  ///< frames timed; one more is drawn before them
   image::ShadingParameters shading;
+  bool best_patch_only = false;  ///< as SelectionOptions has it
 };
 
 /// Draws `model` for `camera` and compares it with `reference`, whose FLIP comparer is `flip`.

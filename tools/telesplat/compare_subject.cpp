@@ -65,6 +65,8 @@ Result<CompareSubject> find_run(const CompareOptions& o) {
                              o.scene.empty() ? "; if it was moved, --scene tells where to" : "")};
   s.name = fs::path(s.scene).filename().string();
   s.octree_depth = run->octree_depth;
+  s.shading = run->shading;
+  s.best_patch_only = run->keeps_redundant;
   s.sampling = run->sampling_size;
   s.out = o.out.empty() ? o.path + (o.still ? "/compare-still" : "/compare") : o.out;
   auto frames = choose_frames(*run, o.poses ? o.poses : o.still ? 1 : kPosesOfARun, o.frames);

@@ -18,6 +18,8 @@ struct CompareSubject {
   std::string out;
   std::string events;    ///< record of point-model events; empty: poses are sampled
   std::string sampling;  ///< how the points were sampled, for captions
+  image::ShadingParameters shading;  ///< as it was displayed
+  bool best_patch_only = false;      ///< the run's packing kept redundant patches
   int octree_depth = 6;
   std::vector<DisplayedFrame> frames;
 };

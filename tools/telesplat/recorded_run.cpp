@@ -62,6 +62,11 @@ Result<std::string> read_session(const std::string& path, RecordedRun& run) {
   run.kernel = fact("splat").value_or(std::string("?"));
   run.sampling_size = fmt::format("{}x{}", number(fact("sampling_width"), 0), number(fact("sampling_height"), 0));
   run.octree_depth = int(std::clamp(number(table["session"]["octree_depth"], 6), 1.0, 10.0));
+  run.keeps_redundant = number(table["settings"]["packing.keep_redundant"], 0) != 0;
+  const std::string shading = table["display"]["shading"].value_or(std::string("lit"));
+  const auto known = image::shading_named(shading);
+  if (!known) return Error{fmt::format("{}: shading is \"{}\", not lit, head or unlit", path, shading)};
+  run.shading = *known;
 
   run.scene = table["scene"]["file"].value_or(std::string());
   run.mesh.room_size_m = number(table["scene"]["room_size"], run.mesh.room_size_m);

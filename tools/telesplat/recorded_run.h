@@ -6,6 +6,7 @@
 
 #include "common/core/ids.h"
 #include "common/geometry/camera.h"
+#include "common/image/shading.h"
 #include "services/data/mesh_store.h"
 
 namespace telesplat::launcher {
@@ -27,6 +28,8 @@ struct RecordedRun {
   int width = 0, height = 0;  ///< of the display
   double fov_deg = 0, near_m = 0;
   std::string sampling_size, renderer, kernel;  ///< as they were, for captions
+  image::ShadingParameters shading;
+  bool keeps_redundant = false;  ///< packed with --packing.redundancy keep
   int octree_depth = 6;
   std::vector<DisplayedFrame> frames;  ///< of the run's own viewer, in order
 };
