@@ -6,6 +6,7 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
+#include "tests/support/simd_targets.h"
 #include "tests/unit/splat_scene.h"
 #include "tests/unit/splat_surfel_plain.h"
 
@@ -13,21 +14,9 @@ namespace telesplat {
 namespace {
 
 using testing::Frame;
+using testing::OnTarget;
 
-// Runs the rest of the scope on one instruction set.
-class OnTarget {
- public:
-  explicit OnTarget(int64_t target) { use(target); }
-  ~OnTarget() { use(0); }
-
- private:
-  static void use(int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
-const std::vector<int64_t> kTargets = hwy::SupportedAndGeneratedTargets();
+const std::vector<int64_t> kTargets = testing::simd_targets();
 
 struct Plain {
   std::vector<uint32_t> colour;

@@ -5,27 +5,16 @@
 
 #include "common/geometry/trajectory.h"
 #include "common/splat/splat_kernels.h"
+#include "tests/support/simd_targets.h"
 #include "tests/unit/splat_scene.h"
 
 namespace telesplat {
 namespace {
 
 using testing::Frame;
+using testing::OnTarget;
 
-// Runs the rest of the scope on one instruction set.
-class OnTarget {
- public:
-  explicit OnTarget(int64_t target) { use(target); }
-  ~OnTarget() { use(0); }
-
- private:
-  static void use(int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
-const std::vector<int64_t> kTargets = hwy::SupportedAndGeneratedTargets();
+const std::vector<int64_t> kTargets = testing::simd_targets();
 
 Frame render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
              const image::Shading& shading, int threads = 1) {
