@@ -174,27 +174,29 @@ void ReplicaWorker::receive_answers() {
 }
 
 void ReplicaWorker::apply(const ModelEvent& event) {
-  if (options_.events) options_.events->add(event);
-  std::visit(
+  const bool applied = std::visit(
       [this](const auto& e) {
         using E = std::decay_t<decltype(e)>;
         if constexpr (std::is_same_v<E, wire::Patch>)
-          apply_patch(e);
+          return apply_patch(e);
         else if constexpr (std::is_same_v<E, wire::Forget>)
           cache_.forget(e.sequence, e.clusters);
         else
           cache_.clear(e.sequence);
+        return true;
       },
       event.body);
+  // After it: points are shown first. What could not be applied could not be replayed either.
+  if (applied && options_.events) options_.events->add(event);
 }
 
-void ReplicaWorker::apply_patch(const wire::Patch& patch) {
+bool ReplicaWorker::apply_patch(const wire::Patch& patch) {
   const double begin = monotonic_s();
   const auto bytes = std::span(reinterpret_cast<const uint8_t*>(patch.image.data()), patch.image.size());
   if (const Status decoded = codec::decode_into(tile_, bytes, patch.rect.width, patch.rect.height); !decoded) {
     ++decode_errors_;
     log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
-    return;
+    return false;
   }
   const double decoded = monotonic_s();
   cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, tile_, patch.frame));
@@ -217,6 +219,7 @@ void ReplicaWorker::apply_patch(const wire::Patch& patch) {
     latency_ms_ = (u->complete_s - u->requested_s) * 1e3;
     ++updates_;
   }
+  return true;
 }
 
 void ReplicaWorker::request_view(double now_s) {

@@ -69,7 +69,8 @@ class ReplicaWorker {
   void receive_events();
   void receive_answers();
   void apply(const ModelEvent& event);
-  void apply_patch(const wire::Patch& patch);
+  /// False if it cannot be decoded.
+  bool apply_patch(const wire::Patch& patch);
   void request_view(double now_s);
   void report(double now_s, bool last);
   net::MasterLink::Values status() const;
