@@ -16,8 +16,8 @@ struct CompareSubject {
   std::string scene;  ///< path of the data file
   data::MeshOptions mesh;
   std::string out;
-  std::string events;    ///< record of point-model events; empty: poses are sampled
-  std::string sampling;  ///< how the points were sampled, for captions
+  std::string events;                ///< record of point-model events; empty: poses are sampled
+  std::string sampling;              ///< how the points were sampled, for captions
   image::ShadingParameters shading;  ///< as it was displayed
   bool best_patch_only = false;      ///< the run's packing kept redundant patches
   int octree_depth = 6;

@@ -119,8 +119,8 @@ void complete_session(const RunOptions& o) {
   if (!o.mesh.use_cache) out << "no_cache = true\n";
   if (!o.mesh.cache_dir.empty()) out << "cache = " << quoted(fs::absolute(o.mesh.cache_dir, error).string()) << "\n";
   const auto& d = o.viewer.display;
-  out << fmt::format("\n[display]\nsize = \"{}\"\nfov = {}\nnear = {}\nshading = \"{}\"\n", o.viewer.size, d.fov_deg, d.near_m,
-                     o.viewer.shading);
+  out << fmt::format("\n[display]\nsize = \"{}\"\nfov = {}\nnear = {}\nshading = \"{}\"\n", o.viewer.size, d.fov_deg,
+                     d.near_m, o.viewer.shading);
 }
 
 void print_report(const std::string& directory) {
