@@ -261,7 +261,9 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
                                const image::Shading& shading, const FrameTarget& target) {
   CHECK(target.width == camera.width && target.height == camera.height && target.colour);
   Impl& m = *impl_;
+  const double start = monotonic_s();
   m.prepare(list, camera, options, shading);
+  const double prepare_ms = (monotonic_s() - start) * 1e3;
   for (Workspace& w : m.workspaces) {
     // Emptied whole where the layout changes; else every tile leaves its pixels empty.
     if (w.layout != m.layout) {
@@ -281,6 +283,7 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
         tbb::simple_partitioner());
   });
   SplatStats sum;
+  sum.prepare_ms = prepare_ms;
   for (const Workspace& w : m.workspaces) {
     sum.points_projected += w.stats.points_projected;
     sum.points_drawn += w.stats.points_drawn;

@@ -19,6 +19,7 @@ struct FrameTarget {
 
 struct SplatStats {
   uint64_t points_projected = 0, points_drawn = 0;
+  double prepare_ms = 0;                                ///< wall-clock: what comes before the first tile
   double project_ms = 0, resolve_ms = 0;                ///< splatting and shading, summed over threads
   double fill_ms = 0, smooth_ms = 0, antialias_ms = 0;  ///< the finish, likewise
 };

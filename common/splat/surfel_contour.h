@@ -18,7 +18,7 @@ namespace telesplat::splat {
 
 /// Cosine below which a sample's footprint grows no longer with the slope at which it was taken: without a limit splats taken at
 /// silhouettes reach far beyond them.
-inline constexpr float kMinSampledCosine = 0.2f;
+inline constexpr float kMinSampledCosine = 0.35f;
 /// Steepest surface, as the tangent of its angle to the screen, whose depth is followed across a splat: tan(78 degrees). Beyond it
 /// normals of 16 bits do not tell the depth any more.
 inline constexpr float kSteepest = 4.7f;

@@ -31,6 +31,15 @@ TEST_F(SceneFile, KeysBecomeFlagsAndTheFileIsRelativeToTheScene) {
     EXPECT_NE(std::find(flags->begin(), flags->end(), flag), flags->end()) << flag;
 }
 
+TEST_F(SceneFile, SwitchesCanBeTurnedOff) {
+  const auto flags = read_scene_file(
+      write("file = \"a.ply\"\n[view]\ndetail_budget = false\nspeed_detail = true\nfinish = false\nexr = false\n"));
+  ASSERT_TRUE(flags.ok()) << flags.error().text;
+  for (const char* flag : {"--detail-budget=off", "--speed-detail=on", "--finish=off"})
+    EXPECT_NE(std::find(flags->begin(), flags->end(), flag), flags->end()) << flag;
+  EXPECT_EQ(flags->size(), 4u);  // and the file; exr = false is no flag
+}
+
 TEST_F(SceneFile, TheCommandLineComesAfterTheFile) {
   std::string program = "telesplat", run = "run", flag = "--frames=9",
               scene = write("file = \"a.ply\"\n[view]\nframes = 7\n");

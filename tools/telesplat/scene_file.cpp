@@ -9,6 +9,11 @@
 namespace telesplat::launcher {
 namespace {
 
+// Flags that take on or off; the others that a boolean can stand for are either there or not.
+bool is_switch(const std::string& flag) {
+  return flag == "detail-budget" || flag == "speed-detail" || flag == "finish";
+}
+
 Status collect(const std::string& path, const std::string& prefix, const toml::table& table,
                std::vector<std::string>& flags, std::string& file) {
   for (const auto& [key, node] : table) {
@@ -26,7 +31,11 @@ Status collect(const std::string& path, const std::string& prefix, const toml::t
     if (name == "file" && node.is_string()) {
       file = (std::filesystem::path(path).parent_path() / **node.as_string()).string();
     } else if (node.is_boolean()) {
-      if (**node.as_boolean()) flags.push_back("--" + flag);
+      const bool on = **node.as_boolean();
+      if (is_switch(flag))
+        flags.push_back(fmt::format("--{}={}", flag, on ? "on" : "off"));
+      else if (on)
+        flags.push_back("--" + flag);
     } else if (const auto text = node.value<std::string>()) {
       flags.push_back(fmt::format("--{}={}", flag, *text));
     } else if (node.is_integer()) {

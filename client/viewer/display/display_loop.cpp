@@ -149,9 +149,9 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
     cache.end_frame();
     const double end_s = monotonic_s();
     // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
-    const double work_ms =
-        (stats.project_ms + stats.resolve_ms + stats.fill_ms + stats.smooth_ms + stats.antialias_ms) /
-        std::max(o.threads, 1);
+    const double work_ms = stats.prepare_ms + (stats.project_ms + stats.resolve_ms + stats.fill_ms + stats.smooth_ms +
+                                               stats.antialias_ms) /
+                                                  std::max(o.threads, 1);
     budget.frame_done((selected_s - begin_s) * 1e3, std::min((end_s - selected_s) * 1e3, work_ms), double(list.points),
                       o.selection.detail);
     worker.on_frame(end_s, camera, list.clusters_seen);
