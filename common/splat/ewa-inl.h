@@ -22,21 +22,62 @@
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
 
+// What splats add to EwaSum: its first four and its last four terms, for a whole batch. Made splat by splat, scalars written and read as
+// a vector, each waited for all stores before it: a seventh of the second pass.
+struct EwaTerms {
+  HWY_ALIGN float low[4 * SumBatch::kCapacity], high[4 * SumBatch::kCapacity];
+};
+HWY_INLINE void TermsOfBatch(const SumBatch& batch, EwaTerms& terms) {
+  const F32 d;
+  const I32 di;
+  const U32 du;
+  // Lanes beyond the last splat hold older ones.
+  for (size_t i = 0; i < batch.count; i += hn::Lanes(d)) {
+    const auto albedo = hn::Load(du, batch.fields[kAlbedoE] + i);
+    const auto real = [&](size_t field) HWY_ATTR { return hn::BitCast(d, hn::Load(du, batch.fields[field] + i)); };
+    const auto channel = [&](VU v)
+                             HWY_ATTR { return hn::ConvertTo(d, hn::BitCast(di, hn::And(v, hn::Set(du, 255u)))); };
+    const VF red = channel(hn::ShiftRight<16>(albedo)), green = channel(hn::ShiftRight<8>(albedo)),
+             blue = channel(albedo);
+#if HWY_TARGET == HWY_SCALAR
+    const float v[8] = {hn::GetLane(red),
+                        hn::GetLane(green),
+                        hn::GetLane(blue),
+                        1.0f,
+                        hn::GetLane(real(kNormalXE)),
+                        hn::GetLane(real(kNormalYE)),
+                        hn::GetLane(real(kNormalZE)),
+                        hn::GetLane(real(kCodeE))};
+    std::copy_n(v, 4, terms.low + 4 * i), std::copy_n(v + 4, 4, terms.high + 4 * i);
+#else
+    hn::StoreInterleaved4(red, green, blue, Const(1.0f), d, terms.low + 4 * i);
+    hn::StoreInterleaved4(real(kNormalXE), real(kNormalYE), real(kNormalZE), real(kCodeE), d, terms.high + 4 * i);
+#endif
+  }
+}
+// All terms of splat i, or half of them where vectors have four lanes.
+template <class D>
+HWY_INLINE hn::Vec<D> TermsOf(D d, const EwaTerms& terms, size_t i, int half) {
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (MaxLanes(D()) == 8) {
+    const hn::CappedTag<float, 4> d4;
+    return hn::Combine(d, hn::Load(d4, terms.high + 4 * i), hn::Load(d4, terms.low + 4 * i));
+  }
+#endif
+  return hn::LoadU(d, (half ? terms.high : terms.low) + 4 * i);
+}
+
 // Second pass: sums of what lies on the visible surface.
 HWY_NOINLINE void EwaDrawSums(const SumBatch& batch, const EwaBuffer& buffer) {
   const hn::CappedTag<float, 8> d8;
   constexpr size_t kLanes8 = MaxLanes(d8);
   const float* const visible = buffer.visible.get();
   float* const sums = buffer.sums.get();
+  EwaTerms terms;
+  TermsOfBatch(batch, terms);
   for (size_t i = 0; i < batch.count; ++i) {
     const float epsilon = batch.real(kEpsilonE, i), peak = batch.real(kPeakE, i);
-    const uint32_t albedo = batch.at(kAlbedoE, i);
-    // As EwaSum.
-    HWY_ALIGN const float values[8] = {static_cast<float>(albedo >> 16), static_cast<float>(albedo >> 8 & 255),
-                                       static_cast<float>(albedo & 255), 1.0f,
-                                       batch.real(kNormalXE, i),         batch.real(kNormalYE, i),
-                                       batch.real(kNormalZE, i),         batch.real(kCodeE, i)};
-    const auto first = hn::Load(d8, values), last = hn::Load(d8, values + 8 - kLanes8);
+    const auto first = TermsOf(d8, terms, i, 0), last = TermsOf(d8, terms, i, 1);
     ForBlocks(batch, i, buffer.stride,
               [&](auto columns, auto d, int part, size_t at, auto inside, auto q, auto depth) HWY_ATTR {
                 const auto there = hn::LoadU(d, visible + at);
@@ -50,7 +91,8 @@ HWY_NOINLINE void EwaDrawSums(const SumBatch& batch, const EwaBuffer& buffer) {
 #pragma GCC unroll 8
                 for (int k = 0; k < n; ++k, sum += 8) {
                   if constexpr (kLanes8 < 4) {
-                    for (int l = 0; l < 8; ++l) sum[l] += weights[k] * values[l];
+                    for (int l = 0; l < 4; ++l)
+                      sum[l] += weights[k] * terms.low[4 * i + l], sum[4 + l] += weights[k] * terms.high[4 * i + l];
                   } else {
                     const auto weight = hn::Set(d8, weights[k]);
                     if constexpr (kLanes8 == 4) hn::Store(hn::Add(hn::Load(d8, sum), hn::Mul(weight, first)), d8, sum);
@@ -126,9 +168,8 @@ class EwaRecord {
 // First pass: the least depth of opaque ellipses. Leaves a record for the second.
 class EwaVisibility {
  public:
-  // Of the second pass, whose splats reach farther; the square root of kSupportGrowth lies below.
-  static constexpr float kGrowth = 1.6f, kLeastReach = 2.0f;
-  static_assert(kGrowth * kGrowth >= kSupportGrowth);
+  // Of the second pass, whose splats reach farther.
+  static constexpr SurfelReach kReach = kEwaReach;
 
   EwaVisibility(const TileInput& input, const EwaBuffer& buffer, EwaRecord& record)
       : rect_(input.rect),
@@ -194,7 +235,7 @@ class EwaVisibility {
 // Second pass where the first could not keep all: from the points again.
 class EwaAccumulation {
  public:
-  static constexpr float kGrowth = EwaVisibility::kGrowth, kLeastReach = EwaVisibility::kLeastReach;
+  static constexpr SurfelReach kReach = kEwaReach;
 
   EwaAccumulation(const TileInput& input, const EwaBuffer& buffer)
       : rect_(input.rect), near_m_(input.near_m), buffer_(buffer) {
