@@ -19,8 +19,7 @@ namespace telesplat::splat::HWY_NAMESPACE {
 
 class EllipseSink {
  public:
-  // What bounds the reach: of S and of the low-pass, and a pixel.
-  static constexpr float kGrowth = 1.0f, kLeastReach = 1.5f;
+  static constexpr SurfelReach kReach = kEllipseReach;
   EllipseSink(const TileInput& input, const SurfelInput& surfels, const KeyBuffer& buffer)
       : rect_(input.rect), near_m_(input.near_m), limits_(surfels.limits), buffer_(buffer) {}
 

@@ -189,7 +189,7 @@ template <class Sink>
 class SurfelStream {
  public:
   SurfelStream(const TileInput& input, const SurfelInput& surfels, Sink& sink)
-      : input_(input), surfels_(surfels), sink_(sink), reach_factor_(Sink::kGrowth * surfels.widest) {}
+      : input_(input), surfels_(surfels), sink_(sink), reach_factor_(Sink::kReach.growth * surfels.widest) {}
 
   TileCounts run() {
     const size_t lanes = hn::Lanes(F32());
@@ -258,7 +258,7 @@ class SurfelStream {
       const auto x = hn::Mul(Row(transform.x, p), inverse), y = hn::Mul(Row(transform.y, p), inverse);
       const auto radius = kStaged ? hn::LoadU(d, radius_ + offset) : Const(source.radius_m);
       const auto reach =
-          hn::Min(hn::Add(hn::Mul(hn::Mul(radius, inverse), Const(reach_factor)), Const(Sink::kLeastReach)),
+          hn::Min(hn::Add(hn::Mul(hn::Mul(radius, inverse), Const(reach_factor)), Const(Sink::kReach.least_px)),
                   Const(kMaxSplatSide));
       const auto in_rect = hn::And(hn::And(hn::Ge(x, hn::Sub(x0, reach)), hn::Lt(x, hn::Add(x1, reach))),
                                    hn::And(hn::Ge(y, hn::Sub(y0, reach)), hn::Lt(y, hn::Add(y1, reach))));

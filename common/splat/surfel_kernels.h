@@ -4,6 +4,8 @@
 
 #include <hwy/aligned_allocator.h>
 
+#include <cstddef>
+
 #include "common/splat/ewa_shading.h"
 #include "common/splat/splat_kernels.h"
 #include "common/splat/surfel_splat.h"
@@ -18,15 +20,27 @@ struct SurfelInput {
   float widest = 0;  ///< widest_contour(camera)
 };
 
+/// No splat touches pixels farther from its projected centre than growth * SurfelInput::widest * radius over depth + least_px, nor farther
+/// than kMaxSplatSide. growth: of S; least_px: the low-pass, and a pixel.
+struct SurfelReach {
+  float growth, least_px;
+};
+inline constexpr SurfelReach kEllipseReach{1.0f, 1.5f}, kEwaReach{1.6f, 2.0f};
+static_assert(kEwaReach.growth * kEwaReach.growth >= kSupportGrowth);
+
 /// Splats ellipses into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h). One pass.
 TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, const KeyBuffer& buffer);
 
-/// What ewa keeps of a tile beside its pixels: 36 bytes a pixel. One a thread, kept from tile to tile.
+/// What ewa keeps of a tile beside its pixels: 36 bytes a pixel, and its splats between its passes. One a thread, kept from tile to tile.
+/// `width` x `height` pixels are empty, nothing visible and sums 0, between tiles; splats hang over to the right and below.
 struct EwaBuffer {
+  /// Splats kept between the passes; a tile with more meets its points twice. 72 bytes each.
+  static constexpr size_t kRecordSplats = 32768;
   hwy::AlignedFreeUniquePtr<float[]> visible;  ///< least depth code of the opaque ellipses
   hwy::AlignedFreeUniquePtr<float[]> sums;     ///< 8 a pixel: EwaSum
-  size_t room = 0;                             ///< pixels that these hold
+  hwy::AlignedFreeUniquePtr<std::byte[]> record;
   int width = 0, height = 0, stride = 0;
+  size_t pixels = 0;  ///< that there is room for
 };
 
 /// Splats `input.rect`, which is the tile and `reach` pixels around it, in two passes and writes it as shaded colours and infos. What lies

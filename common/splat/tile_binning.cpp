@@ -69,7 +69,7 @@ void TileBinning::begin(const TileGrid& grid, size_t boxes, float near_m, float 
   ranges_.resize(boxes);
 }
 
-void TileBinning::place(size_t box, const LeafTransform& transform) {
+void TileBinning::place(size_t box, const LeafTransform& transform, float reach, float most_px) {
   const Footprint f = project_cube(transform);
   const auto last_column = static_cast<float>(grid_.columns() - 1), last_row = static_cast<float>(grid_.rows() - 1);
   const float per_column = 1.0f / static_cast<float>(grid_.tile_width),
@@ -82,7 +82,9 @@ void TileBinning::place(size_t box, const LeafTransform& transform) {
     r = {0, static_cast<int16_t>(last_column), 0, static_cast<int16_t>(last_row), false};
     return;
   }
-  const float x0 = f.x0 - margin_px_, x1 = f.x1 + margin_px_, y0 = f.y0 - margin_px_, y1 = f.y1 + margin_px_;
+  // Points nearer than the near plane are not drawn.
+  const float margin = margin_px_ + std::min(reach / std::max(f.nearest, near_m_), most_px);
+  const float x0 = f.x0 - margin, x1 = f.x1 + margin, y0 = f.y0 - margin, y1 = f.y1 + margin;
   const auto width = static_cast<float>(grid_.width), height = static_cast<float>(grid_.height);
   if (x1 < 0 || y1 < 0 || x0 > width || y0 > height) return;
   const float c0 = std::floor(x0 * per_column), c1 = std::floor(x1 * per_column);

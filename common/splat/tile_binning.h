@@ -45,8 +45,9 @@ class TileBinning {
   void build(const TileGrid& grid, std::span<const LeafTransform> transforms, float near_m, float margin_px);
 
   /// The same in three steps; `place` can be called for all boxes at once.
+  ///   reach: a box's points at depth w touch reach / w pixels more to each side, most_px at most.
   void begin(const TileGrid& grid, size_t boxes, float near_m, float margin_px);
-  void place(size_t box, const LeafTransform& transform);
+  void place(size_t box, const LeafTransform& transform, float reach = 0, float most_px = 0);
   void list();
 
   std::span<const Entry> tile(int index) const {

@@ -202,8 +202,8 @@ void splat_pixels_rate(benchmark::State& state) {
 BENCHMARK(splat_square)
 SPLAT_ARGS->Args({1, 1, 0})->Args({2, 1, 0})->Args({3, 1, 0})->Args({5, 1, 0})->Args({3, 2, 0})->Args({3, 2, 1});
 BENCHMARK(splat_disc) SPLAT_ARGS->Args({3, 1, 0})->Args({5, 1, 0})->Args({3, 2, 0});
-BENCHMARK(splat_ellipse) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0});
-BENCHMARK(splat_ewa) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0});
+BENCHMARK(splat_ellipse) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0})->Args({1, 2, 0});
+BENCHMARK(splat_ewa) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0})->Args({1, 2, 0});
 BENCHMARK(splat_pixels_rate)->ArgName("Mpoints")->Arg(4)->Arg(8)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(splat_square_64_patches) SPLAT_ARGS->Args({3, 1, 0})->Args({3, 2, 0});
 

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
-#include "tests/support/simd_targets.h"
+#include "common/splat/surfel_kernels.h"
 #include "tests/unit/splat_scene.h"
 #include "tests/unit/splat_surfel_plain.h"
 
@@ -14,9 +14,21 @@ namespace telesplat {
 namespace {
 
 using testing::Frame;
-using testing::OnTarget;
 
-const std::vector<int64_t> kTargets = testing::simd_targets();
+// Runs the rest of the scope on one instruction set.
+class OnTarget {
+ public:
+  explicit OnTarget(int64_t target) { use(target); }
+  ~OnTarget() { use(0); }
+
+ private:
+  static void use(int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
+};
+
+const std::vector<int64_t> kTargets = hwy::SupportedAndGeneratedTargets();
 
 struct Plain {
   std::vector<uint32_t> colour;
@@ -144,6 +156,25 @@ TEST_P(SurfelTargets, ThreadsAndReuseDoNotChangeThePicture) {
     splatter.render(testing::draw_list(large), small, between, image::Shading({}, small), other.target());
     splatter.render(list, camera, GetParam(), shading, frame.target());
     expect_equal(expected, frame, camera, "reused");
+  }
+}
+
+// More splats in a tile than ewa keeps between its passes.
+TEST_P(SurfelTargets, CrowdedTileEqualsThePlainLoop) {
+  const geometry::Camera camera = testing::front_camera(90, 60);
+  const image::Shading shading({}, camera);
+  std::mt19937 rng(11);
+  testing::HandMadeItem made(geometry::Box{{-0.15f, -0.1f, -1.2f}, {0.15f, 0.1f, -0.9f}});
+  for (size_t i = 0; i < splat::EwaBuffer::kRecordSplats + 5000; ++i)
+    made.add(uint16_t(rng()), uint16_t(rng()), uint16_t(rng()), rng() & 0xffffff, uint16_t(rng()));
+  const auto list = testing::draw_list({surfel_item(made, 0.01f, rng)});
+  const Plain expected = plainly(GetParam(), list, camera, shading);
+  for (int64_t target : kTargets) {
+    const OnTarget on(target);
+    Frame frame(camera.width, camera.height);
+    const auto stats = splat::CpuSplatter(1).render(list, camera, GetParam(), shading, frame.target());
+    ASSERT_GT(stats.points_drawn, splat::EwaBuffer::kRecordSplats);
+    expect_equal(expected, frame, camera, hwy::TargetName(target));
   }
 }
 
