@@ -146,6 +146,7 @@ class Comparison {
         cell_options.splat_scale =
             options_.splat_scale > 0 ? float(options_.splat_scale) : splat::suitable_scale(cell_options.render.kernel);
         cell_options.repeat = options_.repeat;
+        cell_options.detail = float(frame.detail);
         pose.cells.push_back(
             measure_cell(*renderer, **model, models_->applied(), frame.camera, cell_options, reference, flip));
       }

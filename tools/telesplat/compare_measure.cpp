@@ -73,6 +73,7 @@ Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, S
 
   splat::SelectionOptions selection;
   selection.scale = o.splat_scale;
+  selection.detail = o.detail;
   selection.best_patch_only = o.best_patch_only;
   const image::Shading shading(o.shading, camera);
   splat::DrawList list;

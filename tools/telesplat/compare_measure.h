@@ -52,6 +52,7 @@ struct CellOptions {
   int repeat = 5;  ///< frames timed; one more is drawn before them
   image::ShadingParameters shading;
   bool best_patch_only = false;  ///< as SelectionOptions has it
+  float detail = 1;              ///< SelectionOptions::detail
 };
 
 /// Draws `model` for `camera` and compares it with `reference`, whose FLIP comparer is `flip`.

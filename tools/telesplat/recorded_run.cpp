@@ -13,6 +13,7 @@
 namespace telesplat::launcher {
 namespace {
 
+constexpr double kMaxPixels = 64 << 20;  // a comparison keeps some dozen bytes a pixel
 constexpr size_t kMaxFrames = 10'000'000, kMaxLine = 1 << 16;
 
 Result<toml::table> read_toml(const std::string& path) {
@@ -53,6 +54,9 @@ Result<std::string> read_session(const std::string& path, RecordedRun& run) {
     if (!(side >= 1 && side <= geometry::kMaxImageSide) || side != std::floor(side))
       return Error{fmt::format("{}: the viewer's display has {} x {} pixels, limits are 1..{}", path, width, height,
                                geometry::kMaxImageSide)};
+  if (width * height > kMaxPixels)
+    return Error{fmt::format("{}: the viewer's display has {} x {} pixels, at most {} are compared", path, width,
+                             height, kMaxPixels)};
   run.width = int(width), run.height = int(height);
   run.fov_deg = number(table["display"]["fov"], number(fact("fov_deg"), 90));
   if (!(run.fov_deg > 1 && run.fov_deg < 175))
@@ -105,6 +109,8 @@ Status read_frames(const std::string& path, const std::string& viewer, RecordedR
     at.push_back(size_t(found - header.begin()));
   }
 
+  const auto detail = size_t(std::find(header.begin(), header.end(), "detail") - header.begin());  // none: 1
+
   size_t row = 1;
   while (next_line()) {
     ++row;
@@ -128,6 +134,12 @@ Status read_frames(const std::string& path, const std::string& viewer, RecordedR
                      {uint64_t(v[3])}, 0,
                      uint64_t(v[4]),   geometry::make_camera(pose, run.fov_deg, run.width, run.height, run.near_m)};
     if (const Status s = geometry::validate(f.camera); !s) return wrong(s.error().text);
+    if (detail < columns) {
+      const auto text = fields[detail];
+      const auto read = std::from_chars(text.data(), text.data() + text.size(), f.detail);
+      if (read.ec != std::errc() || !(f.detail > 0 && f.detail <= 1))
+        return wrong(fmt::format("detail is \"{}\", limits are above 0 and 1", text.substr(0, 40)));
+    }
     if (!run.frames.empty()) {
       const DisplayedFrame& before = run.frames.back();
       if (f.number <= before.number)

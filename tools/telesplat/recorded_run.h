@@ -19,6 +19,7 @@ struct DisplayedFrame {
   uint32_t replica = 0;  ///< how many times numbers had begun again by then (another packer)
   uint64_t points_drawn = 0;
   geometry::Camera camera;
+  double detail = 1;  ///< SelectionOptions::detail it was drawn with
 };
 
 struct RecordedRun {
