@@ -10,7 +10,7 @@
 //   are closed, also those through which something farther shows, and surfaces grow nowhere outwards: closing leaves every pixel open
 //   around which a 3x3 window fits into the gap. (Pull-push, after Grossman and Dally 1998, with one level and a window that slides instead
 //   of a pyramid: coarser levels bleed over silhouettes. Gathering along the four axes up to 3 pixels away instead gave 20.0, 36.4 and
-//   36.4 dB where this gives 20.6, 36.5 and 36.2, and took five times as long.)
+//   36.4 dB where this gives 20.6, 36.5 and 36.2, and took about four times as long.)
 // Smooth: where splats are magnified their samples are interpolated: [1 2 1] / 4 along rows, then along columns, where the spacing class
 //   says 2 or more (on samples 2 pixels apart that is exactly bilinear interpolation), [1 6 1] / 8 where it says 1; a neighbour of another
 //   surface counts as the pixel itself.

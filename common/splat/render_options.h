@@ -29,7 +29,7 @@ constexpr std::optional<Kernel> kernel_named(std::string_view name) {
 
 /// Scale factor of splat sizes (T eq. 4.8) that suits a kernel: splats about as large as their samples are apart, since larger ones blur
 /// and grow silhouettes; what gaps that leaves is pin-holes, which the finish fills. Set by comparing frames along walk-around-a.csv at
-/// 2560x1600 (telesplat compare): on a head, discs of 1.5 without finish 31.9 dB, ellipses of 1.0 with finish 36.3 dB.
+/// 2560x1600: on a head, discs of 1.5 without finish 31.9 dB, ellipses of 1.0 with finish 36.3 dB.
 constexpr float suitable_scale(Kernel kernel) {
   return kernel == Kernel::kSquare || kernel == Kernel::kDisc ? 1.1f : 1.0f;
 }
