@@ -79,4 +79,18 @@ Camera crop(const Camera& c, const Rect& r) {
   return out;
 }
 
+Camera subsample(const Camera& c, int step) {
+  Camera out = c;
+  const double du = (c.right - c.left) / c.width, dv = (c.top - c.bottom) / c.height;
+  // Centre of the first pixel of the result, less half of one of its pixels.
+  const double first = step / 2 + 0.5 - step / 2.0;
+  out.width = (c.width + step - 1) / step;
+  out.height = (c.height + step - 1) / step;
+  out.left = c.left + first * du;
+  out.right = out.left + out.width * step * du;
+  out.top = c.top - first * dv;
+  out.bottom = out.top - out.height * step * dv;
+  return out;
+}
+
 }  // namespace telesplat::geometry

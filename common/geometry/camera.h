@@ -79,4 +79,8 @@ class Frustum {
 /// The frustum of a part of the image, as a camera of its own (same pose, off-axis, rect.width x rect.height pixels).
 Camera crop(const Camera& camera, const Rect& rect);
 
+/// The camera whose pixel (i, j) looks where pixel (step * i + step / 2, step * j + step / 2) of `camera` does: ceil(width / step) x
+/// ceil(height / step) pixels, so the last ones may lie outside camera's image. Precondition: step >= 1.
+Camera subsample(const Camera& camera, int step);
+
 }  // namespace telesplat::geometry

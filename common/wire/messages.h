@@ -23,14 +23,15 @@ namespace telesplat::wire {
 // Structs and their fields() stand as tables.
 // clang-format off
 
-inline constexpr uint64_t kProtocolVersion = 1;
+inline constexpr uint64_t kProtocolVersion = 2;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
 inline constexpr size_t kMaxControlBytes = 1u << 20;  ///< whole body of a message without bulk fields
 inline constexpr size_t kMaxBulkBytes = 256u << 20;   ///< whole body of a message with bulk fields
 inline constexpr size_t kMaxKeys = 1u << 21;          ///< cluster keys in one message
 inline constexpr size_t kMaxEntries = 4096;           ///< entries of a map or list
-inline constexpr uint64_t kMaxTiles = 1u << 16;       ///< tiles of a frame
+inline constexpr uint64_t kMaxTiles = 1u << 16;       ///< tiles of a frame, and blocks
+inline constexpr uint64_t kMaxStep = 16;              ///< of a coarse frame
 
 using Bytes = std::span<const std::byte>;
 
@@ -46,10 +47,11 @@ struct Hello {
   double sent_s = 0;     ///< sender's own clock: for the clock offset
   std::map<std::string, std::string> endpoints;  ///< bound sockets others connect to: data {"chunks"}, packer {"tiles","patches","state"}
   std::map<std::string, std::string> facts;      ///< data: "scene", "kind", "triangles"; sampler: "sampler"; viewer: "renderer", ...
+  std::map<std::string, double> parameters;      ///< data: of the scene, as it begins: julia/parameters.h; empty otherwise
   geometry::Box box_room;  ///< data: the data set's box; empty otherwise
   template <class F> static void fields(F& f, auto& m) {
     f("role", m.role); f("name", m.name); f("instance", m.instance); f("pid", m.pid); f("sent_s", m.sent_s);
-    f("endpoints", m.endpoints); f("facts", m.facts); f("box_room", m.box_room);
+    f("endpoints", m.endpoints); f("facts", m.facts); f("parameters", m.parameters); f("box_room", m.box_room);
   }
 };
 
@@ -64,11 +66,12 @@ struct Welcome {
   geometry::Box box_room;                        ///< empty until a data server said hello
   std::map<std::string, std::string> endpoints;  ///< "chunks", "tiles", "patches", "state": as far as known
   std::map<std::string, std::string> facts;      ///< "scene", "kind", "triangles"
+  std::map<std::string, double> parameters;      ///< of the scene in this epoch
   std::map<std::string, double> settings;        ///< packing.* and session.* values
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s); f("epoch", m.epoch);
     f("octree_depth", m.octree_depth); f("box_room", m.box_room); f("endpoints", m.endpoints); f("facts", m.facts);
-    f("settings", m.settings);
+    f("parameters", m.parameters); f("settings", m.settings);
   }
 };
 
@@ -106,13 +109,17 @@ struct Lease {
   EpochId epoch;
   InstanceId viewer;      ///< who asked
   RequestId request;      ///< which of its requests
-  uint64_t tile = 0, tiles_in_frame = 0;
+  uint64_t tile = 0;        ///< its number in the frame; a tile that is leased anew keeps it
+  uint64_t step = 1;        ///< the frame has every step-th pixel of every step-th row of the view (geometry::subsample)
+  uint64_t block = 0, blocks_in_frame = 0;  ///< the packer packs and publishes all tiles of a block as one
   geometry::Camera camera;  ///< of the whole frame
   geometry::Rect rect;      ///< the tile in it
+  geometry::Rect block_rect;  ///< the block in it; the tile lies in the block
   double leased_s = 0;
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request);
-    f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("camera", m.camera); f("rect", m.rect); f("leased_s", m.leased_s);
+    f("tile", m.tile); f("step", m.step); f("block", m.block); f("blocks_in_frame", m.blocks_in_frame); f("camera", m.camera);
+    f("rect", m.rect); f("block_rect", m.block_rect); f("leased_s", m.leased_s);
   }
 };
 
@@ -131,12 +138,14 @@ struct TileDone {
   uint64_t tile = 0;
   LeaseId lease;
   InstanceId sampler;
+  uint64_t step = 1;                           ///< Lease::step
+  geometry::Rect rect;                         ///< Lease::rect
   uint64_t samples = 0, kept = 0;              ///< covered pixels before and after redundancy elimination
   uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< encoded tile as received, as published
   double leased_s = 0, sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0, receive_s = 0, packed_s = 0;
   template <class F> static void fields(F& f, auto& m) {
-    f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler); f("samples", m.samples);
-    f("kept", m.kept); f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent); f("leased_s", m.leased_s);
+    f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler); f("step", m.step); f("rect", m.rect);
+    f("samples", m.samples); f("kept", m.kept); f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent); f("leased_s", m.leased_s);
     f("sample_begin_s", m.sample_begin_s); f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s);
     f("receive_s", m.receive_s); f("packed_s", m.packed_s);
   }
@@ -165,7 +174,8 @@ struct MetricRows {
 /// telesplat ctl -> master, and its answer.
 struct Control {
   static constexpr std::string_view kName = "control";
-  std::string command;  ///< "status", "stop", "epoch"
+  std::string command;  ///< "status", "stop", "epoch", "set" (arguments: parameter -> value), "animate" (argument "timeline": as
+                        ///< julia::parse_timeline takes it, or "off")
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) { f("command", m.command); f("arguments", m.arguments); }
 };
@@ -239,7 +249,8 @@ struct Patch {
   FrameId frame;
   InstanceId viewer;
   RequestId request;
-  uint64_t tile = 0, tiles_in_frame = 0;
+  uint64_t tile = 0, tiles_in_frame = 0;  ///< of what is published of a frame at once: the leases' blocks
+  uint64_t step = 1;                      ///< Lease::step
   bool frame_complete = false;  ///< the last tile of its frame to be packed
   uint64_t samples = 0, kept = 0;
   geometry::Camera camera;  ///< of the whole frame
@@ -247,7 +258,8 @@ struct Patch {
   Bytes image;              ///< codec stream; eliminated pixels are not covered
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
-    f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("frame_complete", m.frame_complete);
+    f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
+    f("frame_complete", m.frame_complete);
     f("samples", m.samples); f("kept", m.kept); f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
   }
 };
@@ -257,8 +269,10 @@ struct Forget {
   Sequence sequence;
   EpochId epoch;
   std::vector<uint32_t> clusters;  ///< keys (as bin, little-endian u32), at most kMaxKeys
+  std::vector<uint32_t> frames;    ///< empty: whole clusters; else one a cluster: only its mosaics with this frame tag
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("clusters", m.clusters);
+    f("frames", m.frames);
   }
 };
 struct EpochBegin {
@@ -296,7 +310,8 @@ struct AccessReport {
   static constexpr std::string_view kName = "access_report";
   InstanceId viewer;
   std::vector<uint32_t> clusters;
-  template <class F> static void fields(F& f, auto& m) { f("viewer", m.viewer); f("clusters", m.clusters); }
+  std::vector<uint32_t> frames;  ///< empty: not told; else one a cluster: the frame tag of mosaics that were drawn of it
+  template <class F> static void fields(F& f, auto& m) { f("viewer", m.viewer); f("clusters", m.clusters); f("frames", m.frames); }
 };
 
 // clang-format on

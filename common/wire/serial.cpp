@@ -272,9 +272,31 @@ template <class M>
 std::optional<Error> check(const M&) {
   return std::nullopt;
 }
-std::optional<Error> check(const Lease& m) { return check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame); }
+std::optional<Error> check_step(uint64_t step) {
+  if (step < 1 || step > kMaxStep)
+    return Error{fmt::format("step {} is out of range, limits 1 and {}", step, kMaxStep)};
+  return std::nullopt;
+}
+std::optional<Error> check(const Lease& m) {
+  if (auto bad = check_tile(m.camera, m.rect, m.tile, kMaxTiles)) return bad;
+  if (auto bad = check_tile(m.camera, m.block_rect, m.block, m.blocks_in_frame)) return bad;
+  const geometry::Rect &r = m.rect, &b = m.block_rect;
+  if (r.x < b.x || r.y < b.y || r.x + r.width > b.x + b.width || r.y + r.height > b.y + b.height)
+    return Error{fmt::format("tile {}x{}+{}+{} is not inside its block {}x{}+{}+{}", r.width, r.height, r.x, r.y,
+                             b.width, b.height, b.x, b.y)};
+  return check_step(m.step);
+}
 std::optional<Error> check(const DepthTile& m) { return check(m.lease); }
-std::optional<Error> check(const Patch& m) { return check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame); }
+std::optional<Error> check(const Patch& m) {
+  if (auto bad = check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame)) return bad;
+  return check_step(m.step);
+}
+std::optional<Error> check_frames(const std::vector<uint32_t>& clusters, const std::vector<uint32_t>& frames) {
+  if (frames.empty() || frames.size() == clusters.size()) return std::nullopt;
+  return Error{fmt::format("{} frames for {} clusters: neither none nor one each", frames.size(), clusters.size())};
+}
+std::optional<Error> check(const Forget& m) { return check_frames(m.clusters, m.frames); }
+std::optional<Error> check(const AccessReport& m) { return check_frames(m.clusters, m.frames); }
 
 template <class M>
 constexpr size_t body_limit() {

@@ -56,8 +56,18 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, Epoc
         t.leased_s = now_s;
         t.expires_s = now_s + lease_time_s();
         next_lease_ = next_lease_.next();
-        return wire::Lease{t.lease, f.id,           f.epoch,          f.request.viewer, f.request.request,
-                           i,       f.tiles.size(), f.request.camera, t.rect,           now_s};
+        return wire::Lease{.lease = t.lease,
+                           .frame = f.id,
+                           .epoch = f.epoch,
+                           .viewer = f.request.viewer,
+                           .request = f.request.request,
+                           .tile = i,
+                           .block = i,
+                           .blocks_in_frame = f.tiles.size(),
+                           .camera = f.request.camera,
+                           .rect = t.rect,
+                           .block_rect = t.rect,
+                           .leased_s = now_s};
       }
   } while (begin_frame(epoch));
   return std::nullopt;

@@ -32,13 +32,14 @@ MasterCore::Peer* MasterCore::find_role(const std::string& role) {
 }
 
 wire::Welcome MasterCore::welcome(double now_s) const {
-  wire::Welcome w{instance_, 0, now_s, epoch_, options_.octree_depth, {}, {}, {}, options_.settings};
+  wire::Welcome w{instance_, 0, now_s, epoch_, options_.octree_depth, {}, {}, {}, {}, options_.settings};
   for (const auto& [id, p] : peers_) {
     if (p.gone) continue;
     w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
     if (p.hello.role == "data") {
       w.box_room = p.hello.box_room;
       w.facts = p.hello.facts;
+      w.parameters = p.hello.parameters;
     }
   }
   return w;

@@ -74,7 +74,7 @@ struct PackerCore::Impl {
     Event event = next_event(Event::Kind::kPatch);
     const FrameBook::Frame frame = frames.add(tile, elimination);
     event.frame = tile.frame, event.viewer = tile.viewer, event.request = tile.request;
-    event.tile = tile.tile, event.tiles_in_frame = tile.tiles_in_frame;
+    event.tile = tile.tile, event.tiles_in_frame = tile.tiles_in_frame, event.step = tile.step;
     event.frame_complete = frame.tiles_left == 0;
     event.camera = tile.camera, event.rect = tile.rect;
     event.samples = elimination.samples, event.kept = elimination.kept;

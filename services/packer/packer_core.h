@@ -43,6 +43,7 @@ struct SampledTile {
   FrameId frame;
   EpochId epoch;
   uint32_t tile = 0, tiles_in_frame = 0;
+  uint32_t step = 1;        ///< the frame has every step-th pixel of every step-th row of the view
   geometry::Camera camera;  ///< of the whole frame
   geometry::Rect rect;      ///< the tile in it
   InstanceId viewer;        ///< who asked, and with which request: handed through to the event
@@ -63,6 +64,7 @@ struct Event {
   InstanceId viewer;
   RequestId request;
   uint32_t tile = 0, tiles_in_frame = 0;
+  uint32_t step = 1;
   bool frame_complete = false;                       ///< the last tile of its frame to be packed
   geometry::Camera camera;                           ///< of the whole frame
   geometry::Rect rect;                               ///< the tile in it
@@ -73,6 +75,7 @@ struct Event {
 
   // kForget
   std::vector<points::ClusterKey> clusters;  ///< ascending, at most kMaxForgetKeys
+  std::vector<uint32_t> frames;              ///< empty: whole clusters; else one a cluster: its mosaics with this frame tag
 };
 
 struct Statistics {

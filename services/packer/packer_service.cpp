@@ -119,10 +119,10 @@ class PackerService {
     switch (e.kind) {
       case Event::Kind::kPatch:
         return send(wire::Patch{instance_, e.sequence, e.epoch, e.frame, e.viewer, e.request, e.tile, e.tiles_in_frame,
-                                e.frame_complete, e.samples, e.kept, e.camera, e.rect,
+                                e.step, e.frame_complete, e.samples, e.kept, e.camera, e.rect,
                                 std::as_bytes(std::span(*e.blob))});
       case Event::Kind::kForget:
-        return send(wire::Forget{instance_, e.sequence, e.epoch, e.clusters});
+        return send(wire::Forget{instance_, e.sequence, e.epoch, e.clusters, e.frames});
       case Event::Kind::kEpoch:
         return send(wire::EpochBegin{instance_, e.sequence, e.epoch});
     }
@@ -148,13 +148,14 @@ class PackerService {
     if (!image) return tiles_.reject(message, image.error().text);
     const double decoded = master_now();
     if (recorder_)
-      if (const Status s = recorder_->add(lease.frame, lease.camera, lease.rect, lease.tiles_in_frame, *image); !s) {
+      if (const Status s = recorder_->add(lease.frame, lease.camera, lease.rect, lease.blocks_in_frame, *image); !s) {
         log::error("{}", s.error().text);
         recorder_.reset();
       }
-    auto event = core_->submit({lease.frame, lease.epoch, uint32_t(lease.tile), uint32_t(lease.tiles_in_frame),
-                                lease.camera, lease.rect, lease.viewer, lease.request, std::move(*image)},
-                               monotonic_s());
+    auto event =
+        core_->submit({lease.frame, lease.epoch, uint32_t(lease.block), uint32_t(lease.blocks_in_frame),
+                       uint32_t(lease.step), lease.camera, lease.rect, lease.viewer, lease.request, std::move(*image)},
+                      monotonic_s());
     if (!event) return tiles_.reject(message, event.error().text);
     if (!*event) return;
     const Event& e = **event;
@@ -163,9 +164,9 @@ class PackerService {
     spans_.add("decode", received, decoded);
     spans_.add("pack", decoded, packed);
     bytes_sent_ += e.blob->size();
-    link_->socket().send(wire::TileDone{lease.frame, lease.tile, lease.lease, m.sampler, e.samples, e.kept,
-                                        m.image.size(), e.blob->size(), lease.leased_s, m.sample_begin_s,
-                                        m.sample_end_s, m.encode_end_s, received, packed});
+    link_->socket().send(wire::TileDone{lease.frame, lease.tile, lease.lease, m.sampler, lease.step, lease.rect,
+                                        e.samples, e.kept, m.image.size(), e.blob->size(), lease.leased_s,
+                                        m.sample_begin_s, m.sample_end_s, m.encode_end_s, received, packed});
   }
 
   void receive_state_requests() {

@@ -50,6 +50,8 @@ struct Filler {
   void fill(M& m) {
     M::fields(*this, m);
     if constexpr (requires { m.tiles_in_frame; }) m.tile = 3, m.tiles_in_frame = 8;
+    if constexpr (requires { m.blocks_in_frame; }) m.tile = 5, m.block = 3, m.blocks_in_frame = 8;
+    if constexpr (requires { m.step; }) m.step = 4;
   }
 
  private:

@@ -84,5 +84,19 @@ TEST(Camera, ValidationRefusesWhatCannotBeACamera) {
   EXPECT_TRUE(refused([](Camera& c) { c.height = 0; }));
 }
 
+TEST(Subsample, LooksWhereTheFullCameraDoes) {
+  const Camera full = make_camera({{0.1, 0.2, 0.9}, {0.6, 0, 0.8, 0}}, 70, 103, 61);
+  for (const int step : {1, 2, 3, 4, 16}) {
+    const Camera coarse = subsample(full, step);
+    EXPECT_EQ(coarse.width, (full.width + step - 1) / step);
+    EXPECT_EQ(coarse.height, (full.height + step - 1) / step);
+    for (const auto& [i, j] : {std::pair{0, 0}, {3, 2}, {coarse.width - 1, coarse.height - 1}}) {
+      const glm::dvec3 a = coarse.unproject(i + 0.5, j + 0.5, 0.7);
+      const glm::dvec3 b = full.unproject(step * i + step / 2 + 0.5, step * j + step / 2 + 0.5, 0.7);
+      EXPECT_LT(glm::distance(a, b), 1e-12) << step << " " << i << " " << j;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace telesplat::geometry

@@ -46,7 +46,7 @@ TEST(FrameSchedule, LeasesEveryTileOnceThenCompletes) {
   std::set<uint64_t> tiles, leases;
   FrameId frame;
   while (const auto l = s.lease("a", kEpoch, 0)) {
-    EXPECT_EQ(l->tiles_in_frame, 8u);
+    EXPECT_EQ(l->blocks_in_frame, 8u);
     EXPECT_EQ(l->viewer.value, 1u);
     EXPECT_EQ(l->request.value, 5u);
     EXPECT_TRUE(tiles.insert(l->tile).second);
@@ -160,7 +160,7 @@ TEST(FrameSchedule, ASamplerThatLeavesGivesItsTilesBack) {
 TEST(FrameSchedule, HugeFramesHaveBoundedTileCounts) {
   FrameSchedule s({.tile_size = 16});
   s.request_view(request(1, 1, geometry::kMaxImageSide, geometry::kMaxImageSide));
-  EXPECT_LE(s.lease("a", kEpoch, 0)->tiles_in_frame, 1024u);
+  EXPECT_LE(s.lease("a", kEpoch, 0)->blocks_in_frame, 1024u);
 }
 
 }  // namespace

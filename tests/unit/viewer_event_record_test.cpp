@@ -21,7 +21,7 @@ constexpr Sequence kAll{std::numeric_limits<uint64_t>::max()};
 ModelEvent as_received(const packer::Event& e) {
   switch (e.kind) {
     case packer::Event::Kind::kForget:
-      return {wire::Forget{{5}, e.sequence, e.epoch, e.clusters}, nullptr};
+      return {wire::Forget{{5}, e.sequence, e.epoch, e.clusters, e.frames}, nullptr};
     case packer::Event::Kind::kEpoch:
       return {wire::EpochBegin{{5}, e.sequence, e.epoch}, nullptr};
     case packer::Event::Kind::kPatch:
@@ -35,6 +35,7 @@ ModelEvent as_received(const packer::Event& e) {
                       e.request,
                       e.tile,
                       e.tiles_in_frame,
+                      e.step,
                       e.frame_complete,
                       e.samples,
                       e.kept,

@@ -56,7 +56,7 @@ TYPED_TEST(EveryMessage, IsRefusedWithBytesAfterIt) {
 
 TYPED_TEST(EveryMessage, IsRefusedInAnotherVersion) {
   const std::string body = encode(sample_message<TypeParam>());
-  EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", "\x02"), "version 2"));
+  EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", "\x01"), "version 1"));
   EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", std::string(1, '\0')), "version 0"));
   EXPECT_TRUE(refused<TypeParam>(with_value(body, "v", "\xff"), "version"));
   EXPECT_TRUE(refused<TypeParam>(with_value(body, "v",
@@ -127,18 +127,16 @@ std::string hex(const std::string& bytes) {
 }
 TEST(GoldenBytes, OfAMark) {
   EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000})),
-            "86a17601a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
+            "86a17602a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
             "73ce00011170");
 }
 TEST(GoldenBytes, OfALease) {
   EXPECT_EQ(hex(encode(sample_message<Lease>())),
-            "8ba17601a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6766965"
-            "776572cf00000100000000"
-            "04a772657175657374cf0000010000000005a474696c6503ae74696c65735f696e5f6672616d6508a663616d6572619ecb3fb99999"
-            "9999999acb3fc999999999"
-            "999acb3fd3333333333333cb3fe333333333333300cb3fe999999999999a00ff01cbbfe0000000000000cb3fe8000000000000cb3f"
-            "847ae147ae147bcd0140cc"
-            "c8a4726563749440206432a86c65617365645f73cb4020800000000000");
+            "8ea17602a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a67669"
+            "65776572cf0000010000000004a772657175657374cf0000010000000005a474696c6505a47374657004a5626c6f636b03af626c"
+            "6f636b735f696e5f6672616d6508a663616d6572619ecb3fb999999999999acb3fc999999999999acb3fd3333333333333cb3fe3"
+            "33333333333300cb3fe999999999999a00ff01cbbfe0000000000000cb3fe8000000000000cb3f847ae147ae147bcd0140ccc8a4"
+            "726563749440206432aa626c6f636b5f726563749440206432a86c65617365645f73cb4024800000000000");
 }
 
 // ---- limits of single fields -----------------------------------------------------------------------------------------------
@@ -168,6 +166,7 @@ TEST(Limits, OfStringsListsAndMaps) {
 TEST(Limits, OfKeysAndNumbersInBinary) {
   Forget forget = sample_message<Forget>();
   forget.clusters.assign(kMaxKeys, 7);
+  forget.frames.clear();
   EXPECT_TRUE(decode<Forget>(bytes_of(encode(forget))));
   forget.clusters.push_back(7);
   EXPECT_TRUE(refused<Forget>(encode(forget), "clusters"));
@@ -200,14 +199,24 @@ TEST(Limits, OfCameras) {
   EXPECT_TRUE(refused_camera([](C& c) { c.top = std::numeric_limits<double>::infinity(); }, "finite"));
 }
 
+// What tells which part of a frame it is: a lease's block, a patch's tile.
+uint64_t& part(Lease& m) { return m.block; }
+uint64_t& part(Patch& m) { return m.tile; }
+uint64_t& parts(Lease& m) { return m.blocks_in_frame; }
+uint64_t& parts(Patch& m) { return m.tiles_in_frame; }
+
 template <class M>
 void expect_tiles_checked() {
   const auto change = [](auto how) {
     M m = sample_message<M>();
+    const auto with_block = [&](auto& part) {
+      if constexpr (requires { part.block_rect; }) part.block_rect = {0, 0, 320, 200};
+      how(part);
+    };
     if constexpr (requires { m.lease.rect; })
-      how(m.lease);
+      with_block(m.lease);
     else
-      how(m);
+      with_block(m);
     return encode(m);
   };
   EXPECT_TRUE(decode<M>(bytes_of(change([](auto& m) { m.rect = {0, 0, 320, 200}; }))));
@@ -216,14 +225,35 @@ void expect_tiles_checked() {
   EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {0, 0, 0, 10}; }), "rect"));
   EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {-1, 0, 10, 10}; }), "rect"));
   EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {2147483647, 0, 2147483647, 10}; }), "rect"));
-  EXPECT_TRUE(refused<M>(change([](auto& m) { m.tile = 8; }), "tile 8 of 8"));
-  EXPECT_TRUE(refused<M>(change([](auto& m) { m.tiles_in_frame = 0; }), "of 0"));
-  EXPECT_TRUE(refused<M>(change([](auto& m) { m.tiles_in_frame = kMaxTiles + 1; }), "65536"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { part(m) = 8; }), "tile 8 of 8"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { parts(m) = 0; }), "of 0"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { parts(m) = kMaxTiles + 1; }), "65536"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.step = 0; }), "step 0"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.step = kMaxStep + 1; }), "step 17"));
 }
 TEST(Limits, OfTiles) {
   expect_tiles_checked<Lease>();
   expect_tiles_checked<DepthTile>();
   expect_tiles_checked<Patch>();
+  Lease lease = sample_message<Lease>();
+  lease.tile = kMaxTiles;
+  EXPECT_TRUE(refused<Lease>(encode(lease), "tile 65536"));
+  lease = sample_message<Lease>();
+  lease.block_rect = {64, 32, 100, 49};
+  EXPECT_TRUE(refused<Lease>(encode(lease), "not inside its block"));
+}
+
+template <class M>
+void expect_frames_checked() {
+  M m = sample_message<M>();
+  m.frames.clear();
+  EXPECT_TRUE(decode<M>(bytes_of(encode(m))));
+  m.frames.resize(m.clusters.size() - 1);
+  EXPECT_TRUE(refused<M>(encode(m), "2 frames for 3 clusters"));
+}
+TEST(Limits, OfFramesOfClusters) {
+  expect_frames_checked<Forget>();
+  expect_frames_checked<AccessReport>();
 }
 
 TEST(Limits, OfChunkLists) {
