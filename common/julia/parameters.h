@@ -50,7 +50,7 @@ struct ParameterInfo {
   std::string_view name;
   double least, most;
   bool whole;             ///< takes whole numbers only
-  bool animates;          ///< may change from one epoch to the next
+  bool animates;          ///< may change from one epoch to the next; those that are not whole can be animated
   std::string_view text;  ///< for --help
 };
 std::span<const ParameterInfo> parameter_infos();
@@ -65,7 +65,8 @@ std::map<std::string, double> to_map(const Parameters& parameters);
 /// Names that are none of ours are ignored (messages hold others too); missing ones keep their default; the rest as set() does.
 Result<Parameters> from_map(const std::map<std::string, double>& values);
 
-/// Each value within its limits, and the slice not so far from 0 that it must be empty. Error texts name parameter, value and limit.
+/// Each value within its limits, the slice not so far from 0 that it must be empty, and the bailout beyond the ball that holds the set.
+/// Error texts name parameter, value and limit.
 Status validate(const Parameters& parameters);
 
 struct Preset {
@@ -90,8 +91,9 @@ Slice slice(const Parameters& parameters);
 /// Radius of a ball about 0 that holds the filled-in set: (1 + sqrt(1 + 4 |c|)) / 2.
 double radius(const glm::dvec4& c);
 
-/// Where the set lies in set space: cells of a grid refined where the distance estimate does not exclude the set, so the box is never too
-/// small. `bound` > 0: that cube instead. Empty where the slice misses the set. About 10 ms.
+/// Where the set lies in set space: cells of a grid refined where not all orbits can be shown to escape, and a cell more on each side, so
+/// the box is never too small. `bound` > 0: that cube instead. Empty where the slice (in that cube) misses the set. About 10 ms.
+/// Precondition: validate(parameters).
 geometry::DBox bounds(const Parameters& parameters);
 
 /// Set space in room space: room = (set - centre) * scale. Fixed for a session, so that an animated set does not jump about.
