@@ -69,6 +69,13 @@ bool MasterLink::handle(const Message& message, double now_s) {
   return false;
 }
 
+void MasterLink::tell(const std::string& fact, const std::string& value) {
+  hello_.facts[fact] = value;
+  if (!welcomed_) return;  // the hello that is due anyway tells it
+  hello_.sent_s = 0;       // no exchange to take the time from
+  socket_.send(hello_);
+}
+
 void MasterLink::leave(const std::function<Values()>& status) {
   report(status);
   socket_.send(wire::Goodbye{hello_.instance});

@@ -36,6 +36,9 @@ class MasterLink {
   /// This machine's monotonic time on the master's clock.
   double to_master_s(double local_s) const { return local_s + offset_s_; }
 
+  /// Sets a fact that was not known at first; the master is told by another hello.
+  void tell(const std::string& fact, const std::string& value);
+
   /// Last report and goodbye.
   void leave(const std::function<Values()>& status);
 

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstring>
 #include <random>
+#include <thread>
 #include <unordered_map>
 #include <zmq.hpp>
 
@@ -296,6 +298,14 @@ bool wait_readable(const std::vector<Socket*>& sockets, int timeout_ms) {
   } catch (const zmq::error_t&) {  // EINTR: a signal; the caller looks at its stop flag
     return false;
   }
+}
+
+bool wait_readable_s(const std::vector<Socket*>& sockets, double timeout_s) {
+  const double until_s = monotonic_s() + timeout_s;
+  if (wait_readable(sockets, static_cast<int>(timeout_s * 1e3))) return true;
+  const double rest_s = std::min(until_s - monotonic_s(), 1e-3);  // ZeroMQ counts whole milliseconds
+  if (rest_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(rest_s));
+  return false;
 }
 
 InstanceId make_instance_id() {

@@ -94,6 +94,8 @@ class Socket {
 
 /// Waits until one of the sockets has a message, `timeout_ms` passed, or a signal came. True if a message is there.
 bool wait_readable(const std::vector<Socket*>& sockets, int timeout_ms);
+/// The same for at most `timeout_s`, to some 50 us; the last part of a millisecond is slept, whatever comes.
+bool wait_readable_s(const std::vector<Socket*>& sockets, double timeout_s);
 
 /// A random, non-zero instance id.
 InstanceId make_instance_id();

@@ -1,0 +1,42 @@
+#include "services/sampler/drain_guard.h"
+
+#include <chrono>
+#include <cstdlib>
+
+#include "common/net/service.h"
+#include "common/net/socket.h"
+
+namespace telesplat::sampler {
+namespace {
+constexpr std::chrono::duration<double> kLook{0.2};  // how late a stop is noticed
+}
+
+DrainGuard::DrainGuard(const std::string& master, InstanceId instance)
+    : thread_([this, master, instance] { watch(master, instance); }) {}
+
+DrainGuard::~DrainGuard() {
+  {
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void DrainGuard::watch(const std::string& master, InstanceId instance) {
+  std::unique_lock lock(mutex_);
+  const auto done = [this] { return done_; };
+  while (!net::stop_requested())
+    if (wake_.wait_for(lock, kLook, done)) return;
+  if (wake_.wait_for(lock, std::chrono::duration<double>(kStop_s), done)) return;
+  log::warn("told to stop, and a lease takes too long: it is given up");
+  {
+    // The service's own socket belongs to the thread that is busy.
+    net::Context context;
+    net::Socket socket(context, net::Kind::kDealer, "goodbye");
+    if (socket.connect(master)) socket.send(wire::Goodbye{instance});
+  }
+  std::_Exit(0);
+}
+
+}  // namespace telesplat::sampler

@@ -1,0 +1,34 @@
+// Sees to it that a sampler that is told to stop does stop in time, even in the middle of a lease that takes for ever.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "common/core/ids.h"
+
+namespace telesplat::sampler {
+
+/// A sampler that was told to stop begins no lease later than this,
+inline constexpr double kDrain_s = 0.8;
+/// and this long after it was told it ends, whatever it does: whoever manages it may wait two seconds before killing it.
+inline constexpr double kStop_s = 1.3;
+
+class DrainGuard {
+ public:
+  /// From then on watches net::stop_requested(). If the process still runs kStop_s after it was told to stop, says goodbye to the
+  /// master in the name of `instance`, so that its leases go to others at once, and ends the process with code 0.
+  DrainGuard(const std::string& master, InstanceId instance);
+  ~DrainGuard();
+
+ private:
+  void watch(const std::string& master, InstanceId instance);
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool done_ = false;
+  std::thread thread_;
+};
+
+}  // namespace telesplat::sampler
