@@ -70,12 +70,12 @@ int run(const DataServiceOptions& o) {
     std::fprintf(stderr, "telesplat: %s: is a file, but a Julia set's parameters are given\n", o.scene.c_str());
     return 2;
   }
-  net::install_signal_handlers();
   const auto store = MeshStore::open(o.scene, o.mesh, make_progress(o.report_progress));
   if (!store) {
     std::fprintf(stderr, "telesplat: %s\n", store.error().text.c_str());
     return 2;
   }
+  net::install_signal_handlers();  // until here a signal ended the process: what was being read is read again next time
   const MeshStoreInfo& info = (*store)->info();
   if (info.degenerate_dropped) log::info("{} degenerate triangles dropped", info.degenerate_dropped);
   log::info("{}: {} triangles in {} chunks{}", o.scene, info.triangles, (*store)->chunks().size(),
@@ -88,7 +88,8 @@ int run(const DataServiceOptions& o) {
     log::error("{}", endpoint.error().text);
     return 2;
   }
-  net::MasterLink link(context, o.service.master, make_hello(o, **store, *endpoint));
+  net::MasterLink link(context, o.service.master,
+                       make_hello(o, **store, net::announced(*endpoint, o.service.advertise)));
   const auto status = [&] {
     return net::MasterLink::Values{{"rss_mb", net::resident_mb()},
                                    {"peak_rss_mb", net::peak_resident_mb()},

@@ -35,7 +35,7 @@ class PackerService {
     for (const auto& [socket, key] : {std::pair{&tiles_, "tiles"}, {&patches_, "patches"}, {&state_, "state"}}) {
       const auto endpoint = socket->bind(options_.service.bind, options_.service.insecure);
       if (!endpoint) return endpoint.error();
-      hello.endpoints[key] = *endpoint;
+      hello.endpoints[key] = net::announced(*endpoint, options_.service.advertise);
     }
     if (!options_.record_depth.empty()) {
       auto recorder = DepthRecorder::open(options_.record_depth, options_.record_depth_frames);

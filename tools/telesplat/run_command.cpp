@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "client/viewer/display/window.h"
+#include "client/viewer/record/frame_spool.h"
 #include "common/core/clock.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/pipeline.h"
@@ -276,6 +277,13 @@ int run(const RunOptions& given) {
   }
   progress.close();
   pipeline->finish();
+  // A viewer that is told to stop does so, whatever pictures are left to make.
+  if (state == Pipeline::State::kRunning && !o.out.empty()) {
+    const std::string spool = o.out + "/spool";
+    if (const Status s = viewer::develop_frames(spool, o.out + "/images", {}); !s)
+      progress.line("telesplat: " + s.error().text);
+    if (fs::is_empty(spool, error)) fs::remove(spool, error);
+  }
   for (const auto& n : pipeline->take_notes()) progress.line(n);
   if (o.join_master.empty() && !o.out.empty()) complete_session(o);
   if (state == Pipeline::State::kBadInput) {

@@ -157,11 +157,12 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
 }
 
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
-                      const std::function<void(size_t, size_t)>& progress) {
+                      const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on) {
   std::error_code error;
   fs::create_directories(picture_directory, error);
   const auto paths = spooled_frames(spool_directory);
   for (size_t i = 0; i < paths.size(); ++i) {
+    if (go_on && !go_on()) break;
     auto frame = read_spooled_frame(paths[i]);
     if (!frame) return frame.error();
     const std::string base = fmt::format("{}/frame-{:06d}", picture_directory, frame->number);

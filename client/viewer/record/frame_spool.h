@@ -60,8 +60,8 @@ std::vector<std::string> spooled_frames(const std::string& directory);
 /// Reads one spooled frame; refuses files that are not one.
 Result<SpooledFrame> read_spooled_frame(const std::string& path);
 /// Turns frames marked kPicture into directory/frame-NNNNNN.png (kExr: .exr too) and deletes spooled frames that are not also
-/// marked kVerify. progress: done, of.
+/// marked kVerify. progress: done, of. go_on: asked before each frame; once it says no, the remaining ones are left as they are.
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
-                      const std::function<void(size_t, size_t)>& progress);
+                      const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on = {});
 
 }  // namespace telesplat::viewer
