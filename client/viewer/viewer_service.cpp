@@ -78,9 +78,14 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   auto& d = o.display;
   app.add_option("--size", o.size, "display size in pixels, WxH")->capture_default_str();
   app.add_option("--sampling-size", o.sampling_size,
-                 "sampling size in pixels, WxH; auto: from half the display's to all of it, as fine as updates of "
+                 "sampling size in pixels, WxH; auto: from --least-sampling of the display's to all of it, as fine as "
+                 "updates of "
                  "--target-latency allow")
       ->capture_default_str();
+  app.add_option("--least-sampling", o.requests.min_scale,
+                 "--sampling-size auto: sampled pixels a displayed pixel, on each axis, at least")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1.0));
   app.add_option("--target-latency", o.requests.target_latency_s,
                  "seconds from request to complete view update that --sampling-size auto aims at")
       ->capture_default_str()

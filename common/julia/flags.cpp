@@ -56,18 +56,22 @@ void add_scene_flags(CLI::App& app, SceneOptions& o) {
   app.add_option("--c", o.c, "the constant: i,j,k,real, each -4..4")->group(group);
   app.add_option("--animate", o.animate,
                  "parameters that change: NAME=FROM:TO:SECONDS (and back, for ever) or NAME=@0s:VALUE@5s:VALUE..., "
-                 "several with ; between them")
+                 "several with ; between them; off: nothing")
       ->group(group);
   o.values.clear();
   for (const auto& info : parameter_infos()) o.values.emplace_back(info.name, "");
-  const Parameters defaults = presets().front().parameters;
+  const auto default_text = [defaults = presets().front().parameters](std::string_view name) {
+    if (name == "palette") return std::string(palette_names()[size_t(defaults.palette)]);
+    if (name == "colour") return std::string(colour_names()[size_t(defaults.colour)]);
+    return fmt::format("{}", get(defaults, name));
+  };
   for (size_t i = 0; i < o.values.size(); ++i) {
     const auto& info = parameter_infos()[i];
     std::string limits = fmt::format("{}..{}", info.least, info.most);
     if (info.name == "palette") limits = joined(palette_names());
     if (info.name == "colour") limits = joined(colour_names());
     std::string text = fmt::format("{}: {}", info.text, limits);
-    if (!info.name.starts_with("c.")) text += fmt::format("; first preset: {}", get(defaults, info.name));
+    if (!info.name.starts_with("c.")) text += fmt::format("; first preset: {}", default_text(info.name));
     app.add_option(fmt::format("--{}", info.name), o.values[i].second, text)->group(group);
   }
 }
@@ -100,10 +104,12 @@ Result<Scene> read_scene(const SceneOptions& o) {
     if (const Status s = set(out.parameters, name, *value); !s) return s.error();
   }
   if (const Status s = validate(out.parameters); !s) return s.error();
-  if (o.animate.empty()) return out;
+  if (o.animate.empty() || o.animate == "off") return out;
   auto timeline = parse_timeline(o.animate);
   if (!timeline) return timeline.error();
   out.timeline = std::move(*timeline);
+  if (const size_t bytes = out.timeline.text().size(); bytes > kMaxAnimation)
+    return Error{fmt::format("the animation is a text of {} bytes, limit {}", bytes, kMaxAnimation)};
   if (const Status s = validate(out.parameters, out.timeline); !s) return s.error();
   out.parameters = *parameters_at(out.parameters, out.timeline, 0);
   return out;

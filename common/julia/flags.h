@@ -16,13 +16,16 @@ namespace telesplat::julia {
 /// The word that stands where a data file would.
 inline constexpr std::string_view kSceneWord = "julia";
 
+inline constexpr size_t kMaxAnimation =
+    4000;  ///< bytes of a scene's animation as text: it travels in one string of a message
+
 /// As given: nothing is read or checked yet.
 struct SceneOptions {
   std::string preset;  ///< empty: the first of presets()
   std::string c;       ///< "i,j,k,real"; empty: not given
   std::vector<std::pair<std::string, std::string>>
       values;           ///< parameter name and text, in the order of parameter_infos()
-  std::string animate;  ///< empty: nothing
+  std::string animate;  ///< empty or "off": nothing
   bool list_presets = false;
   bool any() const;  ///< something was given that only a Julia set takes
 };
