@@ -136,6 +136,10 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--update-rate", o.requests.max_rate_hz, "view requests a second at most")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 1000.0));
+  app.add_option("--epoch-patience", o.epoch_patience_s,
+                 "seconds that a changed scene's last picture is kept while the new one is incomplete")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 60.0));
   app.add_option("--record-every", d.picture_every, "record every N-th frame as a PNG; 0: one every 2.5 s and the last")
       ->capture_default_str();
   app.add_option("--record-points", o.record_points_mb,
@@ -228,6 +232,7 @@ int run(ViewerOptions o) {
        {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
        {"splat_scale",
         fmt::format("{}", o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(o.display.render.kernel))}},
+      o.epoch_patience_s,
       events.get(),
       o.started_s};
   DisplayResult result;

@@ -12,6 +12,8 @@ struct ViewerOptions {
   std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling: or auto
   std::string trajectory = "orbit";                       ///< "orbit", "still" or a CSV file
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
+  double epoch_patience_s =
+      0.15;                ///< a changed scene's old points stay on display for so long if the new ones are late
   double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
   uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none

@@ -109,6 +109,8 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              v.coupling,
                              "--update-rate",
                              text(v.requests.max_rate_hz),
+                             "--epoch-patience",
+                             text(v.epoch_patience_s),
                              "--record-every",
                              text(double(d.picture_every)),
                              "--verify",
