@@ -32,18 +32,19 @@ ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, Mode
       spans_(spans),
       updates_table_("updates",
                      {"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
-                      "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height"}),
+                      "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch"}),
       link_(context, options.service.master, make_hello(options)),
       sequencer_({[this](const ModelEvent& e) { apply(e); },
                   [this] {
                     points::ModelConfig config{link_.session()->box_room, int(link_.session()->octree_depth)};
-                    cache_.begin_replica(config);
+                    begin_replica(config, {}, {});
                     if (options_.events) options_.events->begin_replica(config);
                   },
                   [this](InstanceId packer, Sequence after) {
                     asked_s_ = monotonic_s();
                     if (state_) state_->send(wire::StateRequest{link_.instance(), packer, after});
                   }}),
+      switch_(options.epoch_patience_s),
       requester_(options.requests, link_.instance()),
       started_s_(options.started_s > 0 ? options.started_s : monotonic_s()),
       thread_([this] { loop(); }) {}
@@ -62,12 +63,11 @@ void ReplicaWorker::on_first_points(double now_s) {
   if (first_points_s_ == 0) first_points_s_ = now_s - started_s_;
 }
 
-void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera,
-                             const std::vector<points::ClusterKey>& seen) {
+void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, const splat::DrawList& list) {
   on_pose(now_s, camera);
   ++frames_shown_;
   const std::lock_guard lock(mutex_);
-  if (seen_.size() < wire::kMaxKeys) seen_.insert(seen_.end(), seen.begin(), seen.end());
+  seen_.add(list.clusters_seen, list.frames_seen);
 }
 
 ReplicaWorker::LastUpdate ReplicaWorker::last_update() const {
@@ -77,7 +77,7 @@ ReplicaWorker::LastUpdate ReplicaWorker::last_update() const {
 
 ReplicaWorker::Figures ReplicaWorker::figures() const {
   const std::lock_guard lock(mutex_);
-  return {scene_, extent_m_, updates_, bytes_received_, latency_ms_};
+  return {scene_, extent_m_, updates_, bytes_received_, latency_ms_, epochs_shown_};
 }
 
 void ReplicaWorker::loop() {
@@ -97,6 +97,8 @@ void ReplicaWorker::loop() {
       receive_control();
       receive_answers();
       receive_events();
+      show_if_due();  // by time: no message need come
+      cache_.free_dropped();
     }
     report(monotonic_s(), true);
     link_.leave([this] { return status(); });
@@ -182,7 +184,7 @@ void ReplicaWorker::apply(const ModelEvent& event) {
         else if constexpr (std::is_same_v<E, wire::Forget>)
           cache_.forget(e.sequence, e.clusters);
         else
-          cache_.clear(e.sequence);
+          begin_replica(cache_.config(), e.epoch, e.sequence), requester_.on_epoch(to_master_s(monotonic_s()));
         return true;
       },
       event.body);
@@ -190,8 +192,31 @@ void ReplicaWorker::apply(const ModelEvent& event) {
   if (applied && options_.events) options_.events->add(event);
 }
 
+void ReplicaWorker::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence) {
+  const bool held = cache_.begin_replica(config, epoch, sequence);
+  switch_.begin(epoch, held, monotonic_s());
+}
+
+void ReplicaWorker::show_if_due() {
+  const double now_s = monotonic_s();
+  if (!switch_.due(now_s)) return;
+  cache_.show_newest();
+  if (const auto since_s = switch_.waiting_since_s()) {
+    ++epochs_shown_;
+    spans_.add("epoch held", to_master_s(*since_s), to_master_s(now_s), 3);
+  }
+  switch_.shown();
+}
+
 bool ReplicaWorker::apply_patch(const wire::Patch& patch) {
   const double begin = monotonic_s();
+  // Events in order always tell of an epoch before its first patch; a replica is never of two.
+  if (cache_.epoch().value != 0 && patch.epoch != cache_.epoch()) {
+    ++decode_errors_;
+    log::warn("patch {} is of epoch {} while the model is of epoch {}: dropped", patch.sequence.value,
+              patch.epoch.value, cache_.epoch().value);
+    return false;
+  }
   const auto bytes = std::span(reinterpret_cast<const uint8_t*>(patch.image.data()), patch.image.size());
   if (const Status decoded = codec::decode_into(tile_, bytes, patch.rect.width, patch.rect.height); !decoded) {
     ++decode_errors_;
@@ -199,20 +224,22 @@ bool ReplicaWorker::apply_patch(const wire::Patch& patch) {
     return false;
   }
   const double decoded = monotonic_s();
-  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, tile_, patch.frame));
+  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, tile_, patch.frame),
+                patch.epoch);
   const double inserted = monotonic_s();
   spans_.add("decode", to_master_s(begin), to_master_s(decoded), 1);
   spans_.add("insert", to_master_s(decoded), to_master_s(inserted), 1);
   points_received_ += patch.kept;
   bytes_received_ += patch.image.size();
-  if (patch.frame_complete) cache_.show_newest();
+  switch_.on_part({patch.epoch, patch.step, patch.frame_complete, patch.viewer == link_.instance()}, inserted);
+  show_if_due();
 
   if (const auto u = requester_.on_applied(patch, to_master_s(inserted))) {
     updates_table_.add({double(u->request.value), double(patch.frame.value), u->requested_s, u->first_s, u->complete_s,
                         (u->complete_s - u->requested_s) * 1e3, (u->first_s - u->requested_s) * 1e3, double(u->tiles),
                         double(u->samples), double(u->points), double(u->bytes),
                         u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0, double(u->camera.width),
-                        double(u->camera.height)});
+                        double(u->camera.height), double(patch.epoch.value)});
     spans_.add("view update", u->requested_s, u->complete_s, 2);
     const std::lock_guard lock(mutex_);
     last_update_ = {u->requested_s, u->camera.pose, patch.sequence.value};
@@ -239,15 +266,16 @@ void ReplicaWorker::report(double now_s, bool last) {
   for (const auto& rows :
        {frames_.flush(link_.instance()), updates_table_.flush(link_.instance()), spans_.flush(link_.instance())})
     if (rows) link_.socket().send(*rows);
-  std::vector<points::ClusterKey> seen;
+  send_access_reports();
+}
+
+void ReplicaWorker::send_access_reports() {
   {
     const std::lock_guard lock(mutex_);
-    seen.swap(seen_);
+    std::swap(seen_, reported_);
   }
-  if (seen.empty() || !state_) return;
-  std::sort(seen.begin(), seen.end());
-  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-  state_->send(wire::AccessReport{link_.instance(), seen});
+  for (auto& part : reported_.reports())
+    if (state_) state_->send(wire::AccessReport{link_.instance(), std::move(part.clusters), std::move(part.frames)});
 }
 
 net::MasterLink::Values ReplicaWorker::status() const {
@@ -262,6 +290,8 @@ net::MasterLink::Values ReplicaWorker::status() const {
           {"updates", double(updates_)},
           {"frames", double(frames_shown_)},
           {"first_points_s", first_points_s_},
+          {"epochs_shown", double(epochs_shown_)},
+          {"epoch", double(switch_.displayed().value)},
           {"sequence", double(sequencer_.applied().value)},
           {"messages_rejected",
            double((patches_ ? patches_->rejected() : 0) + (state_ ? state_->rejected() : 0) + decode_errors_)}};

@@ -11,9 +11,13 @@
 
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/window_surface.h"
+#include "common/core/clock.h"
+#include "common/net/control.h"
 
 namespace telesplat::viewer {
 namespace {
+
+constexpr double kPicturesAfterSignal_s = 1.0, kMasterPatience_s = 2.0;
 
 Result<geometry::Trajectory> make_trajectory(const std::string& name) {
   if (name == "orbit") return geometry::Trajectory::orbit();
@@ -74,9 +78,14 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   auto& d = o.display;
   app.add_option("--size", o.size, "display size in pixels, WxH")->capture_default_str();
   app.add_option("--sampling-size", o.sampling_size,
-                 "sampling size in pixels, WxH; auto: from half the display's to all of it, as fine as updates of "
+                 "sampling size in pixels, WxH; auto: from --least-sampling of the display's to all of it, as fine as "
+                 "updates of "
                  "--target-latency allow")
       ->capture_default_str();
+  app.add_option("--least-sampling", o.requests.min_scale,
+                 "--sampling-size auto: sampled pixels a displayed pixel, on each axis, at least")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1.0));
   app.add_option("--target-latency", o.requests.target_latency_s,
                  "seconds from request to complete view update that --sampling-size auto aims at")
       ->capture_default_str()
@@ -127,6 +136,10 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--update-rate", o.requests.max_rate_hz, "view requests a second at most")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 1000.0));
+  app.add_option("--epoch-patience", o.epoch_patience_s,
+                 "seconds that a changed scene's last picture is kept while the new one is incomplete")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 60.0));
   app.add_option("--record-every", d.picture_every, "record every N-th frame as a PNG; 0: one every 2.5 s and the last")
       ->capture_default_str();
   app.add_option("--record-points", o.record_points_mb,
@@ -148,6 +161,7 @@ void add_flags(CLI::App& app, ViewerOptions& o) {
                  "monotonic clock when the session was started, for start-up times; 0: now")
       ->capture_default_str();
   app.add_option("--out", o.out, "run folder for pictures and frames to verify");
+  app.add_flag("--end-session", o.end_session, "when this viewer is done, the session is over for everyone");
   app.add_flag("--window", o.window, "show a window; the person at it moves the camera");
   app.add_flag("--fullscreen", o.fullscreen, "the window fills the screen");
 }
@@ -218,12 +232,15 @@ int run(ViewerOptions o) {
        {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
        {"splat_scale",
         fmt::format("{}", o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(o.display.render.kernel))}},
+      o.epoch_patience_s,
       events.get(),
       o.started_s};
   DisplayResult result;
+  bool session_ended = false;
   {
     ReplicaWorker worker(context, worker_options, cache, frames, spans);
     result = run_display(o.display, **surface, **renderer, cache, worker, frames, spans, spool.get());
+    session_ended = worker.shutdown_requested();
   }
   surface->reset();  // the window goes at once, whatever there is to write
   if (spool) {
@@ -233,14 +250,24 @@ int run(ViewerOptions o) {
       std::printf("progress pictures %.3f\n", double(done) / double(of));
       std::fflush(stdout);
     };
-    if (const Status s = develop_frames(spool_directory, o.out + "/images", progress); !s) {
+    const auto in_time = [signalled_s = 0.0]() mutable {
+      if (!net::stop_requested()) return true;
+      if (signalled_s == 0) signalled_s = monotonic_s();
+      return monotonic_s() - signalled_s < kPicturesAfterSignal_s;
+    };
+    if (const Status s = develop_frames(spool_directory, o.out + "/images", progress, in_time); !s) {
       log::error("{}", s.error().text);
       return 1;
     }
     std::error_code error;
     if (std::filesystem::is_empty(spool_directory, error)) std::filesystem::remove(spool_directory, error);
   }
-  return 0;
+  if (!o.end_session) return 0;
+  if (!session_ended && !net::stop_requested())
+    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s); !answer)
+      log::warn("the session could not be ended: {}", answer.error().text);
+  if (result.frames == 0) log::error("the session ended before anything was shown");
+  return result.frames == 0 ? 1 : 0;
 }
 
 }  // namespace telesplat::viewer

@@ -10,14 +10,17 @@ struct ViewerOptions {
   DisplayOptions display;
   RequestOptions requests;
   std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling: or auto
-  std::string trajectory = "orbit";                           ///< "orbit", "still" or a CSV file
+  std::string trajectory = "orbit";                       ///< "orbit", "still" or a CSV file
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
+  double epoch_patience_s =
+      0.15;                ///< a changed scene's old points stay on display for so long if the new ones are late
   double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
   uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none
   bool window = false;               ///< show a window instead of running headless
   bool fullscreen = false;           ///< the window fills the screen
   double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
+  bool end_session = false;          ///< tell the master to end the session once this viewer's run is over and recorded
   std::string out;                   ///< run folder; empty: nothing is recorded
 };
 
@@ -31,7 +34,8 @@ Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag
 /// The same, or "auto" (then the value is not used).
 Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
 
-/// Exit code: 0 done, 1 failed while running, 2 bad usage or input.
+/// Exit code: 0 done, 1 failed while running (with end_session: also if the session ended before anything was shown), 2 bad usage or
+/// input. A signal ends it within 2 s: recorded frames that are not pictures by then stay in OUT/spool.
 int run(ViewerOptions options);
 
 }  // namespace telesplat::viewer

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "common/core/clock.h"
+#include "common/net/service.h"
 
 namespace telesplat::net {
 namespace {
@@ -13,6 +14,7 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
     : hello_(std::move(hello)),
       socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes}) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
+  hello_.facts.emplace("host", host_name());
   hello_.pid = static_cast<uint64_t>(getpid());
   if (const Status s = socket_.connect(endpoint); !s) log::error("{}", s.error().text);
 }

@@ -1,5 +1,6 @@
 #include "common/net/service.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -13,14 +14,31 @@
 namespace telesplat::net {
 namespace {
 std::atomic<bool> stop_flag{false};
-void on_signal(int) { stop_flag = true; }
+void set_flag(int) { stop_flag = true; }
+void end_process(int) { _exit(0); }
+
+void handle_signals(void (*handler)(int)) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+}
+
+bool is_wildcard(std::string_view host) { return host == "*" || host == "0.0.0.0" || host == "[::]" || host == "::"; }
 }  // namespace
 
 void add_service_flags(CLI::App& app, ServiceOptions& o, Ends ends) {
-  if (ends != Ends::kBinds) app.add_option("--master", o.master, "address of the master")->capture_default_str();
+  if (ends != Ends::kBinds)
+    app.add_option("--master", o.master, "address of the master")->capture_default_str()->envname("TELESPLAT_MASTER");
   app.add_option("--name", o.name, "name in logs and metrics")->capture_default_str();
   if (ends != Ends::kConnects)
     app.add_option("--bind", o.bind, "address to bind to; port * takes a free one")->capture_default_str();
+  if (ends == Ends::kBoth)
+    app.add_option(
+           "--advertise", o.advertise,
+           "host that others are told to connect to; default: as bound, this host's name where that is a wildcard")
+        ->check([](const std::string& host) { return complain_about_host(host); });
   app.add_flag("--insecure", o.insecure, "allow addresses other than loopback without encryption");
   app.add_option("--log-level", o.log_level, "trace, debug, info, warn, error or off")
       ->capture_default_str()
@@ -35,13 +53,34 @@ void parse_or_exit(CLI::App& app, int argc, char** argv) {
   }
 }
 
-void install_signal_handlers() {
-  struct sigaction action {};
-  action.sa_handler = on_signal;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  signal(SIGPIPE, SIG_IGN);
+std::string host_name() {
+  char name[256] = {};
+  return gethostname(name, sizeof name - 1) == 0 && *name ? name : "localhost";
 }
+
+std::string unique_name(const std::string& role) { return fmt::format("{}-{}-{}", role, host_name(), getpid()); }
+
+std::string announced(const std::string& endpoint, const std::string& advertise) {
+  constexpr std::string_view kTcp = "tcp://";
+  const size_t colon = endpoint.rfind(':');
+  if (!endpoint.starts_with(kTcp) || colon < kTcp.size()) return endpoint;
+  const std::string bound = endpoint.substr(kTcp.size(), colon - kTcp.size());
+  if (advertise.empty() && !is_wildcard(bound)) return endpoint;
+  std::string host = advertise.empty() ? host_name() : advertise;
+  if (host.find(':') != host.npos && host.front() != '[') host = "[" + host + "]";  // an IPv6 address
+  return fmt::format("{}{}{}", kTcp, host, endpoint.substr(colon));
+}
+
+std::string complain_about_host(const std::string& host) {
+  if (host.empty() || host.size() > 253) return "is empty or longer than the 253 characters of a host name";
+  if (is_wildcard(host)) return host + " is a wildcard: nobody can connect to it";
+  if (host.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789.-_:[]%") != host.npos)
+    return host + " is neither a host name nor an address (without transport and port)";
+  return {};
+}
+
+void end_on_signals() { handle_signals(end_process); }
+void install_signal_handlers() { handle_signals(set_flag); }
 bool stop_requested() { return stop_flag; }
 
 void lower_thread_priority(int levels) {

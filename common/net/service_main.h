@@ -12,6 +12,7 @@ namespace telesplat::net {
 template <class Options>
 int service_main(int argc, char** argv, const char* about, Options options, void (*add_flags)(CLI::App&, Options&),
                  auto run) {
+  end_on_signals();  // until run() looks at the flag
   return guarded_main([&] {
     CLI::App app{about};
     add_flags(app, options);

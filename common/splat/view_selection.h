@@ -45,12 +45,18 @@ struct DrawItem {
 
 struct DrawList {
   std::vector<DrawItem> items;
-  std::vector<points::ClusterKey> clusters_seen;  ///< clusters that passed culling: for access reports
+  /// Clusters that passed culling: for access reports. With SelectionOptions::best_patch_only a cluster once for each patch of it
+  /// that is drawn, and frames_seen, as long, has that patch's frame tag; else frames_seen is empty.
+  std::vector<points::ClusterKey> clusters_seen;
+  std::vector<uint32_t> frames_seen;
   uint64_t points = 0;
   float scale =
       1.0f;  ///< SelectionOptions::scale: splat_px / scale is how far apart an item's samples lie on the screen
   double distance_m = 0;  ///< mean distance of the points drawn, by their leaves; 0 if there are none
   Sequence applied;       ///< the newest event of the model they were selected from
+  EpochId epoch;          ///< that model's; a list never has points of two
+  uint64_t replica =
+      0;  ///< with it a DrawItem's cluster and sequence name the points: another packer's sequences begin again
 };
 
 /// Culls clusters by frustum, mosaics by normal cone; chooses how many of each mosaic's points are drawn (level_choice.h): the

@@ -7,6 +7,7 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
+#include "services/data/julia_service.h"
 
 namespace telesplat::data {
 namespace {
@@ -48,7 +49,7 @@ wire::Hello make_hello(const DataServiceOptions& o, const MeshStore& store, cons
 
 void add_flags(CLI::App& app, DataServiceOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kBoth);
-  app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)")->required();
+  app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), or julia")->required();
   app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")
       ->capture_default_str()
       ->check(CLI::Range(1e-3, 1e3));
@@ -59,16 +60,22 @@ void add_flags(CLI::App& app, DataServiceOptions& o) {
                  "folder of the chunk store; default: telesplat in the user's cache folder");
   app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
   app.add_flag("--report-progress", o.report_progress, "print progress lines on stdout");
+  julia::add_scene_flags(app, o.julia);
 }
 
 int run(const DataServiceOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
-  net::install_signal_handlers();
+  if (o.scene == julia::kSceneWord) return run_julia(o);
+  if (o.julia.any()) {
+    std::fprintf(stderr, "telesplat: %s: is a file, but a Julia set's parameters are given\n", o.scene.c_str());
+    return 2;
+  }
   const auto store = MeshStore::open(o.scene, o.mesh, make_progress(o.report_progress));
   if (!store) {
     std::fprintf(stderr, "telesplat: %s\n", store.error().text.c_str());
     return 2;
   }
+  net::install_signal_handlers();  // until here a signal ended the process: what was being read is read again next time
   const MeshStoreInfo& info = (*store)->info();
   if (info.degenerate_dropped) log::info("{} degenerate triangles dropped", info.degenerate_dropped);
   log::info("{}: {} triangles in {} chunks{}", o.scene, info.triangles, (*store)->chunks().size(),
@@ -81,7 +88,8 @@ int run(const DataServiceOptions& o) {
     log::error("{}", endpoint.error().text);
     return 2;
   }
-  net::MasterLink link(context, o.service.master, make_hello(o, **store, *endpoint));
+  net::MasterLink link(context, o.service.master,
+                       make_hello(o, **store, net::announced(*endpoint, o.service.advertise)));
   const auto status = [&] {
     return net::MasterLink::Values{{"rss_mb", net::resident_mb()},
                                    {"peak_rss_mb", net::peak_resident_mb()},

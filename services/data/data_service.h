@@ -1,6 +1,7 @@
 // The data server process (T5.2.1): opens the data set, says hello, serves chunks to whoever asks.
 #pragma once
 
+#include "common/julia/flags.h"
 #include "common/net/service.h"
 #include "services/data/mesh_store.h"
 
@@ -8,8 +9,9 @@ namespace telesplat::data {
 
 struct DataServiceOptions {
   net::ServiceOptions service;
-  std::string scene;  ///< path of the mesh file
-  MeshOptions mesh;
+  std::string scene;  ///< path of the mesh file, or "julia"
+  MeshOptions mesh;   ///< of a Julia set: its room size
+  julia::SceneOptions julia;
   bool report_progress = false;  ///< "progress STAGE FRACTION" lines on stdout, for the launcher
 };
 

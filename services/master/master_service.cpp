@@ -10,7 +10,8 @@
 namespace telesplat::master {
 namespace {
 
-constexpr double kFarewell_s = 3.0;
+// How long others may take to say goodbye; less where someone waits for the master itself to end.
+constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
 
 // The effective configuration of everyone who took part.
 void write_session(const std::string& directory, const MasterServiceOptions& o,
@@ -115,7 +116,9 @@ int run(const MasterServiceOptions& o) {
 
   while (!net::stop_requested() && !core.stop_requested()) serve_for(20);
   core.shut_down(net::stop_requested() ? "the master was told to stop" : "stop was commanded");
-  for (const double until = monotonic_s() + kFarewell_s; !core.everyone_left() && monotonic_s() < until;) serve_for(10);
+  const auto patience_s = [] { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; };
+  for (const double begin = monotonic_s(); !core.everyone_left() && monotonic_s() - begin < patience_s();)
+    serve_for(10);
 
   auto processes = core.processes();
   processes.push_back({"master",

@@ -16,7 +16,7 @@ struct MasterServiceOptions {
 void add_session_flags(CLI::App& app, MasterServiceOptions& options);
 void add_flags(CLI::App& app, MasterServiceOptions& options);
 
-/// Serves until SIGINT, SIGTERM or a "stop" command; then tells everyone to finish, waits for them (3 s at most) and writes the
+/// Serves until SIGINT, SIGTERM or a "stop" command; then tells everyone to finish, waits for them (3 s at most, 1 s after a signal) and writes the
 /// record. Prints "listening on ENDPOINT" on stdout when ready. Returns the exit code.
 int run(const MasterServiceOptions& options);
 

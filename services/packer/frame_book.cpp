@@ -11,10 +11,10 @@ const FrameBook::Frame* FrameBook::find(FrameId id) const {
   return found == open_.end() ? nullptr : &*found;
 }
 
-bool FrameBook::is_duplicate(const SampledTile& tile) const {
-  if (is_finished_.count(tile.frame)) return true;
-  const Frame* frame = find(tile.frame);
-  return frame && tile.tile < frame->has_tile.size() && frame->has_tile[tile.tile];
+bool FrameBook::has(FrameId id, uint32_t tile) const {
+  if (is_finished_.count(id)) return true;
+  const Frame* frame = find(id);
+  return frame && tile < frame->has_tile.size() && frame->has_tile[tile];
 }
 
 Status FrameBook::check(const SampledTile& tile) const {

@@ -26,7 +26,7 @@ class FrameBook {
   };
 
   /// True if this tile was packed before.
-  bool is_duplicate(const SampledTile& tile) const;
+  bool has(FrameId frame, uint32_t tile) const;
   /// Refuses a tile whose frame was said to have another camera or another number of tiles.
   Status check(const SampledTile& tile) const;
   /// Notes the tile as packed. Returns its frame as it is then; finished and forgotten if tiles_left is 0.

@@ -69,7 +69,9 @@ struct PackerCore::Impl {
                            tile.image);
   }
 
-  Event pack(SampledTile& tile, double now_s) {
+  using Stream = std::shared_ptr<const std::vector<uint8_t>>;
+
+  Event pack(SampledTile& tile, double now_s, Stream stream) {
     const splat::Elimination elimination = eliminate(tile);
     Event event = next_event(Event::Kind::kPatch);
     const FrameBook::Frame frame = frames.add(tile, elimination);
@@ -79,7 +81,9 @@ struct PackerCore::Impl {
     event.camera = tile.camera, event.rect = tile.rect;
     event.samples = elimination.samples, event.kept = elimination.kept;
     event.frame_samples = frame.samples, event.frame_kept = frame.kept;
-    event.blob = std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
+    const bool as_it_came = stream && config.redundancy == Redundancy::kKeep;
+    event.blob =
+        as_it_came ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
 
     points::PreparedPatch patch =
         points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
@@ -117,14 +121,14 @@ PackerCore::PackerCore(const Config& config, EpochId epoch, Hooks hooks)
     : impl_(new Impl{.config = config, .hooks = std::move(hooks), .epoch = epoch}) {}
 PackerCore::~PackerCore() = default;
 
-Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s) {
+Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, Impl::Stream stream) {
   Impl& i = *impl_;
   if (tile.epoch != i.epoch) {
     ++i.statistics.tiles_other_epoch;
     return std::optional<Event>();
   }
   Status good = check(tile);
-  if (good && i.frames.is_duplicate(tile)) {
+  if (good && i.frames.has(tile.frame, tile.tile)) {
     ++i.statistics.tiles_duplicate;
     return std::optional<Event>();
   }
@@ -133,8 +137,10 @@ Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s) 
     ++i.statistics.tiles_refused;
     return good.error();
   }
-  return std::optional<Event>(i.pack(tile, now_s));
+  return std::optional<Event>(i.pack(tile, now_s, std::move(stream)));
 }
+
+bool PackerCore::has(FrameId frame, uint32_t tile) const { return impl_->frames.has(frame, tile); }
 
 void PackerCore::accessed(std::span<const points::ClusterKey> clusters, double now_s) {
   for (const points::ClusterKey key : clusters)
@@ -169,6 +175,7 @@ std::vector<Event> PackerCore::events_since(Sequence after) const {
 
 Sequence PackerCore::sequence() const { return impl_->sequence; }
 EpochId PackerCore::epoch() const { return impl_->epoch; }
+Redundancy PackerCore::redundancy() const { return impl_->config.redundancy; }
 const points::PointModel& PackerCore::model() const { return impl_->model; }
 const Statistics& PackerCore::statistics() const { return impl_->statistics; }
 uint64_t PackerCore::log_bytes() const { return impl_->log.bytes(); }

@@ -75,7 +75,7 @@ struct Event {
 
   // kForget
   std::vector<points::ClusterKey> clusters;  ///< ascending, at most kMaxForgetKeys
-  std::vector<uint32_t> frames;              ///< empty: whole clusters; else one a cluster: its mosaics with this frame tag
+  std::vector<uint32_t> frames;  ///< empty: whole clusters; else one a cluster: its mosaics with this frame tag
 };
 
 struct Statistics {
@@ -110,7 +110,13 @@ class PackerCore {
   /// nothing is left is an event too (of no points), so that viewers can tell when a frame is complete. Nothing: the
   /// tile was dropped and counted (duplicate, other epoch). Error: camera, rectangle, image or frame do not fit
   /// together; dropped and counted. now_s: any steady clock; the same one in all calls.
-  Result<std::optional<Event>> submit(SampledTile tile, double now_s);
+  ///   stream: codec stream of the tile's image, or null. Where everything is kept it is published as it is; otherwise, or
+  ///   if it is null, the tile is encoded.
+  Result<std::optional<Event>> submit(SampledTile tile, double now_s,
+                                      std::shared_ptr<const std::vector<uint8_t>> stream = {});
+
+  /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.
+  bool has(FrameId frame, uint32_t tile) const;
 
   /// A viewer drew these clusters. Unknown keys are ignored.
   void accessed(std::span<const points::ClusterKey> clusters, double now_s);
@@ -130,6 +136,7 @@ class PackerCore {
   /// Of the newest event; 0 before the first.
   Sequence sequence() const;
   EpochId epoch() const;
+  Redundancy redundancy() const;
   const points::PointModel& model() const;
   const Statistics& statistics() const;
   /// Memory of the events kept for events_since(), estimated. Forgets kept are at most as many as leaves were ever

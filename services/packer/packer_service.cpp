@@ -8,7 +8,9 @@
 #include "common/metrics/recorder.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
+#include "services/packer/block_gatherer.h"
 #include "services/packer/depth_recorder.h"
+#include "services/packer/epoch_hold.h"
 #include "services/packer/packer_core.h"
 
 namespace telesplat::packer {
@@ -35,7 +37,7 @@ class PackerService {
     for (const auto& [socket, key] : {std::pair{&tiles_, "tiles"}, {&patches_, "patches"}, {&state_, "state"}}) {
       const auto endpoint = socket->bind(options_.service.bind, options_.service.insecure);
       if (!endpoint) return endpoint.error();
-      hello.endpoints[key] = *endpoint;
+      hello.endpoints[key] = net::announced(*endpoint, options_.service.advertise);
     }
     if (!options_.record_depth.empty()) {
       auto recorder = DepthRecorder::open(options_.record_depth, options_.record_depth_frames);
@@ -50,11 +52,9 @@ class PackerService {
     while (!net::stop_requested() && !link_->shutdown_requested()) {
       const double now = monotonic_s();
       link_->tick(now, [&] { return status(); });
-      follow_session();
       periodic(now);
       net::wait_readable({&link_->socket(), &tiles_, &state_}, 50);
-      while (const auto message = link_->socket().receive())
-        if (!link_->handle(*message, monotonic_s())) link_->socket().reject(*message, "its type is not expected here");
+      receive_control();
       receive_state_requests();
       receive_tiles();
     }
@@ -65,6 +65,13 @@ class PackerService {
 
  private:
   double master_now() const { return link_->to_master_s(monotonic_s()); }
+
+  void receive_control() {
+    while (const auto message = link_->socket().receive())
+      if (!link_->handle(*message, monotonic_s())) link_->socket().reject(*message, "its type is not expected here");
+    follow_session();
+    ahead_.expire(monotonic_s());
+  }
 
   // The model's box comes with the data server; another box means another model.
   void follow_session() {
@@ -92,9 +99,12 @@ class PackerService {
       if (core_) instance_ = net::make_instance_id();  // viewers start anew
       model_ = config.model;
       core_.emplace(config, s.epoch);
+      gatherer_.clear();
     } else if (const auto event = core_->begin_epoch(s.epoch)) {
       publish(*event);
+      gatherer_.clear();
     }
+    for (const auto& [tile, bytes, since_s] : ahead_.take()) pack(tile, since_s);
   }
 
   void periodic(double now_s) {
@@ -135,38 +145,93 @@ class PackerService {
     for (int n = 0; n < kTilesAtOnce; ++n) {
       const auto message = tiles_.receive();
       if (!message) return;
-      net::dispatch<wire::DepthTile>(tiles_, *message, [&](const wire::DepthTile& tile) { pack(*message, tile); });
+      net::dispatch<wire::DepthTile>(tiles_, *message, [&](const wire::DepthTile& tile) {
+        pack({*message, tile}, monotonic_s());
+      });
     }
   }
 
-  void pack(const net::Message& message, const wire::DepthTile& m) {
+  struct ReceivedTile {
+    net::Message message;
+    wire::DepthTile tile;  // its image lies in the message
+  };
+
+  // Of an epoch that is not announced yet: the announcement comes on another socket and may be about to.
+  bool is_ahead(const wire::DepthTile& m) {
+    if (m.lease.epoch > core_->epoch()) receive_control();
+    return m.lease.epoch > core_->epoch();
+  }
+
+  void pack(const ReceivedTile& received, double since_s) {
+    const auto& [message, m] = received;
     if (!core_) return;
-    const double received = master_now();
+    if (is_ahead(m)) return ahead_.add(received, message.body.size(), since_s);
     const auto& lease = m.lease;
-    auto image = codec::decode({reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size()}, lease.rect.width,
-                               lease.rect.height);
-    if (!image) return tiles_.reject(message, image.error().text);
-    const double decoded = master_now();
-    if (recorder_)
-      if (const Status s = recorder_->add(lease.frame, lease.camera, lease.rect, lease.blocks_in_frame, *image); !s) {
-        log::error("{}", s.error().text);
-        recorder_.reset();
-      }
-    auto event =
-        core_->submit({lease.frame, lease.epoch, uint32_t(lease.block), uint32_t(lease.blocks_in_frame),
-                       uint32_t(lease.step), lease.camera, lease.rect, lease.viewer, lease.request, std::move(*image)},
-                      monotonic_s());
-    if (!event) return tiles_.reject(message, event.error().text);
-    if (!*event) return;
-    const Event& e = **event;
-    publish(e);
-    const double packed = master_now();
-    spans_.add("decode", received, decoded);
-    spans_.add("pack", decoded, packed);
-    bytes_sent_ += e.blob->size();
-    link_->socket().send(wire::TileDone{lease.frame, lease.tile, lease.lease, m.sampler, lease.step, lease.rect,
-                                        e.samples, e.kept, m.image.size(), e.blob->size(), lease.leased_s,
-                                        m.sample_begin_s, m.sample_end_s, m.encode_end_s, received, packed});
+    const auto block = uint32_t(lease.block);
+    if (lease.epoch != core_->epoch()) return void(++other_epoch_);
+    if (core_->has(lease.frame, block)) return void(++duplicates_);
+    const double receive_s = link_->to_master_s(since_s), begin_s = master_now();
+    const std::span stream(reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size());
+    auto gathered = gatherer_.add({lease.frame,
+                                   lease.epoch,
+                                   block,
+                                   uint32_t(lease.blocks_in_frame),
+                                   uint32_t(lease.step),
+                                   lease.camera,
+                                   lease.block_rect,
+                                   lease.viewer,
+                                   lease.request,
+                                   {}},
+                                  lease.rect, stream);
+    if (!gathered) return tiles_.reject(message, gathered.error().text);
+    if (!*gathered) return;
+    wire::TileDone done{lease.frame,
+                        lease.tile,
+                        lease.lease,
+                        m.sampler,
+                        lease.step,
+                        lease.rect,
+                        (*gathered)->samples,
+                        0,
+                        m.image.size(),
+                        0,
+                        lease.leased_s,
+                        m.sample_begin_s,
+                        m.sample_end_s,
+                        m.encode_end_s,
+                        receive_s};
+    if (core_->redundancy() == Redundancy::kKeep) done.kept = done.samples;
+    if ((*gathered)->block && !pack_block(message, **gathered, stream, begin_s, done)) return;
+    done.packed_s = master_now();
+    link_->socket().send(done);
+  }
+
+  // Publishes a block that is complete. What that gives is counted to the tile that completed it.
+  bool pack_block(const net::Message& message, BlockGatherer::Gathered& gathered, std::span<const uint8_t> stream,
+                  double begin_s, wire::TileDone& done) {
+    const double gathered_s = master_now();
+    record(*gathered.block);
+    std::shared_ptr<const std::vector<uint8_t>> ready;
+    if (gathered.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
+    const auto event = core_->submit(std::move(*gathered.block), monotonic_s(), std::move(ready));
+    if (!event) tiles_.reject(message, event.error().text);
+    if (!event || !*event) return false;
+    publish(**event);
+    spans_.add("decode", begin_s, gathered_s);
+    spans_.add("pack", gathered_s, master_now());
+    if (core_->redundancy() == Redundancy::kEliminate) done.kept = (*event)->kept;
+    done.bytes_sent = (*event)->blob->size();
+    bytes_sent_ += done.bytes_sent;
+    return true;
+  }
+
+  // Whole views only, as sampled.
+  void record(const SampledTile& block) {
+    if (!recorder_ || block.step != 1) return;
+    if (const Status s = recorder_->add(block.frame, block.camera, block.rect, block.tiles_in_frame, block.image); !s) {
+      log::error("{}", s.error().text);
+      recorder_.reset();
+    }
   }
 
   void receive_state_requests() {
@@ -200,12 +265,16 @@ class PackerService {
         {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())}};
     if (core_) {
       const auto& s = core_->statistics();
+      const auto& g = gatherer_.statistics();
       v.insert({{"points", double(core_->model().points())},
                 {"model_bytes", double(core_->model().bytes())},
                 {"log_bytes", double(core_->log_bytes())},
                 {"sequence", double(core_->sequence().value)},
-                {"tiles", double(s.tiles)},
-                {"tiles_duplicate", double(s.tiles_duplicate)},
+                {"tiles", double(g.tiles)},
+                {"tiles_duplicate", double(s.tiles_duplicate + g.tiles_duplicate + duplicates_)},
+                {"tiles_other_epoch", double(s.tiles_other_epoch + other_epoch_ + ahead_.dropped())},
+                {"blocks", double(s.tiles)},
+                {"blocks_dropped", double(g.blocks_dropped)},
                 {"frames_complete", double(s.frames_complete)},
                 {"points_forgotten", double(s.points_forgotten)},
                 {"points_outside", double(s.points_outside)}});
@@ -222,11 +291,13 @@ class PackerService {
   std::optional<net::MasterLink> link_;
   InstanceId instance_ = net::make_instance_id();
   std::optional<PackerCore> core_;
+  BlockGatherer gatherer_;
+  EpochHold<ReceivedTile> ahead_;
   std::optional<DepthRecorder> recorder_;
   points::ModelConfig model_;
   metrics::SpanRecorder spans_;
   int seen_version_ = 0;
-  uint64_t bytes_sent_ = 0;
+  uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
   double last_mark_s_ = 0, last_tick_s_ = 0;
 };
 

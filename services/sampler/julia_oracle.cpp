@@ -105,7 +105,7 @@ bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Interval ra
     }
     const float g = r - threshold * t;
     if (g <= 0) {
-      out = i == 0 ? Bracket{t, 0, t, -1} : Bracket{last_t, last_r - threshold * last_t, t, g};
+      out = gone == 0 ? Bracket{t, 0, t, -1} : Bracket{last_t, last_r - threshold * last_t, t, g};
       return true;
     }
     if (t + r >= range.t1) return false;
@@ -175,11 +175,13 @@ float dot(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) +
 // To unit length; false if it has none or is not finite.
 bool normalise(float* n) {
   const float most = std::max(std::max(std::abs(n[0]), std::abs(n[1])), std::abs(n[2]));
-  if (!(most > kTiny && most < kNothing)) return false;
+  for (int i = 0; i < 3; ++i)
+    if (!(std::abs(n[i]) < kNothing)) return false;
+  if (!(most > kTiny)) return false;
   for (int i = 0; i < 3; ++i) n[i] = n[i] / most;
   const float length = std::sqrt(dot(n, n));
   for (int i = 0; i < 3; ++i) n[i] = n[i] / length;
-  return length > 0;
+  return true;
 }
 
 // The gradient where it is good; else the estimate's differences over a footprint; else the direction towards the viewer. What still faces
@@ -277,9 +279,4 @@ void julia_trace_plainly(const Constants& k, const JuliaRays& rays, const JuliaP
     }
 }
 
-}  // namespace telesplat::sampler
-namespace telesplat::sampler {
-void julia_trace(const JuliaScene::Constants& k, const JuliaRays& rays, const JuliaPart& part, JuliaPoints& out) {
-  julia_trace_plainly(k, rays, part, out);
-}
 }  // namespace telesplat::sampler

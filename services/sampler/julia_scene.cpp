@@ -31,7 +31,7 @@ JuliaScene::JuliaScene(const julia::Parameters& parameters, const julia::Placeme
   for (int i = 0; i < 3; ++i) axes_[i] = orbit(slice.e[i]);
   origin_ = orbit(slice.origin);
 
-  const double radius = julia::radius(parameters.c), bailout = std::max(parameters.bailout, radius);
+  const double radius = julia::radius(parameters.c), bailout = std::max(parameters.bailout, 1.01 * radius);
   Constants& k = constants_;
   k = {};
   k.c_w = static_cast<float>(2 * parameters.c.w);
@@ -79,9 +79,9 @@ JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, co
   const auto at_x = [&](double x) { return glm::dvec3(camera.left + x * pixel_x, 0, 0); };
   const auto at_y = [&](double y) { return glm::dvec3(0, camera.top - y * pixel_y, -1); };
   const double middle = kJuliaBlock * 0.5;
-  for (int x = 0; x < columns_of_blocks * kJuliaBlock; ++x) store(column, at_x(x0 + x + 0.5));
+  for (int x = 0; x < columns_of_blocks * kJuliaBlock + kPadding; ++x) store(column, at_x(x0 + x + 0.5));
   for (int y = 0; y < rows_of_blocks * kJuliaBlock; ++y) store(row, at_y(y0 + y + 0.5));
-  for (int x = 0; x < columns_of_blocks; ++x) store(block_column, at_x(x0 + x * kJuliaBlock + middle));
+  for (int x = 0; x < columns_of_blocks + kPadding; ++x) store(block_column, at_x(x0 + x * kJuliaBlock + middle));
   for (int y = 0; y < rows_of_blocks; ++y) store(block_row, at_y(y0 + y * kJuliaBlock + middle));
 
   const glm::dvec4 orbit = scene.orbit_point(camera.pose.position_room);

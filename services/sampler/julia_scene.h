@@ -23,7 +23,8 @@ namespace telesplat::sampler {
 class JuliaScene {
  public:
   /// The palette index must be one of julia::palette_names(). An orbit counts as escaped no sooner than it must escape:
-  /// the bailout used is the larger of the one given and julia::radius(c).
+  /// the bailout used is the larger of the one given and 1.01 julia::radius(c),
+  /// so that what has escaped never comes back, rounded as it is.
   JuliaScene(const julia::Parameters& parameters, const julia::Placement& placement);
 
   /// What the kernels read. Lengths in set units, room space in metres.
@@ -79,6 +80,7 @@ struct JuliaRays {
   float block_ball;    ///< as `ball`, for a block's middle ray to stand for all its rays
   float block_margin;  ///< metres that the box grows by, likewise
   std::array<std::vector<float>, 7> column, row;              ///< of pixels, from (x0, y0)
+  static constexpr int kPadding = 16;                         ///< more to the right, for whole vectors
   std::array<std::vector<float>, 7> block_column, block_row;  ///< of the blocks' middles
 };
 

@@ -28,6 +28,8 @@ inline constexpr float kMaxSlope = 0.5f;  ///< of the estimate along a ray, for 
 inline constexpr float kSlack = 1.01f;    ///< so that a safe step never counts as too long, rounded as it is
 inline constexpr float kTrust = 1.0f;     ///< radii of a new point's free ball that may be relied on
 inline constexpr int kRefinements = 3;
+inline constexpr int kMarchWays = 2;  ///< vectors of rays that are marched side by side (tuned)
+inline constexpr int kRefill = 2;     ///< lanes that are given new rays at once (tuned)
 
 inline constexpr float kLeast = 0.02f;  ///< cosine at which normals that faced away are left
 

@@ -1,13 +1,11 @@
 // telesplat-sampler: leases tiles, samples them from the data, pushes depth images to the packer. Scales as replicas.
-#include <unistd.h>
-
 #include "common/net/service_main.h"
 #include "services/sampler/sampler_service.h"
 
 int main(int argc, char** argv) {
   using namespace telesplat;
   sampler::SamplerServiceOptions options;
-  options.service.name = "sampler-" + std::to_string(getpid());
+  options.service.name = net::unique_name("sampler");
   return net::service_main(argc, argv,
                            "telesplat-sampler: samples tiles of requested views; run as many as there are machines",
                            options, sampler::add_flags, sampler::run);

@@ -87,6 +87,31 @@ TEST_F(GlRendererTest, FramesDoNotDependOnTheOnesBefore) {
     }
 }
 
+// Another packer numbers its events from 1 again, and memory comes back at the same address.
+TEST_F(GlRendererTest, PointsOfAnotherReplicaAreNotTakenForThoseKept) {
+  const auto worn = made(GlRenderer::make()), fresh = made(GlRenderer::make());
+  ASSERT_TRUE(worn && fresh);
+  const geometry::Camera camera = testing::front_camera(64, 48);
+  const std::vector<uint16_t> position(4, 32768), normal(4, image::encode_normal16({0, 0, 1}));
+  std::vector<uint32_t> colour(4, 0xff0000);
+  points::Cluster cluster{5, {{-0.2f, -0.2f, -1.2f}, {0.2f, 0.2f, -0.8f}}, {}};
+  splat::DrawList list = testing::draw_list(
+      {{&cluster, {4, position.data(), position.data(), position.data(), normal.data(), colour.data()}, 8.0f, {1}}});
+  const image::Shading shading = testing::unlit(camera);
+  const auto draw = [&](viewer::Renderer& renderer) {
+    testing::Frame frame(camera.width, camera.height);
+    renderer.render(list, camera, splat::RenderOptions{splat::Kernel::kSquare, kNoFinish}, shading, frame.target());
+    return frame;
+  };
+  list.replica = 1;
+  const testing::Frame red = draw(*worn);
+  std::fill(colour.begin(), colour.end(), 0x00ff00);
+  list.replica = 2;
+  const testing::Frame green = draw(*worn);
+  EXPECT_NE(red.at(32, 24), green.at(32, 24));
+  EXPECT_TRUE(green == draw(*fresh));
+}
+
 // State that a window or a user interface may leave behind.
 void disturb_state() {
   for (const GLenum on : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE, GL_FRAMEBUFFER_SRGB})

@@ -99,6 +99,32 @@ TEST_F(Requester, AnUpdateIsMeasuredFromRequestToItsLastPart) {
   EXPECT_FALSE(requester.on_applied(part(first, 0, 1), 2).has_value());  // replaced at the master: will not be answered
 }
 
+TEST_F(Requester, ACoarsePassBeginsAnUpdateAndDoesNotCompleteIt) {
+  requester.on_pose(0, display);
+  const RequestId id = requester.next(0)->request;
+  auto coarse = part(id, 0, 1);
+  coarse.step = 4;
+  EXPECT_TRUE(coarse.frame_complete);
+  EXPECT_FALSE(requester.on_applied(coarse, 0.1).has_value());
+  EXPECT_DOUBLE_EQ(requester.latency_s(), 0);
+  EXPECT_FALSE(requester.on_applied(part(id, 0, 2), 0.3).has_value());
+  const auto update = requester.on_applied(part(id, 1, 2), 0.4);
+  ASSERT_TRUE(update.has_value());
+  EXPECT_DOUBLE_EQ(update->first_s, 0.1);
+  EXPECT_DOUBLE_EQ(update->complete_s, 0.4);
+  EXPECT_EQ(update->tiles, 3u);
+  EXPECT_DOUBLE_EQ(requester.latency_s(), 0.4);
+}
+
+TEST_F(Requester, ACoarsePartThatComesLastIsNoNewUpdate) {
+  requester.on_pose(0, display);
+  const RequestId id = requester.next(0)->request;
+  EXPECT_TRUE(requester.on_applied(part(id, 0, 1), 0.3).has_value());
+  auto coarse = part(id, 0, 1);
+  coarse.step = 4;
+  EXPECT_FALSE(requester.on_applied(coarse, 0.4).has_value());
+}
+
 class AdaptiveRequester : public testing::Test {
  protected:
   ViewRequester requester{{.max_rate_hz = 1000, .adaptive = true, .target_latency_s = 0.2}, kMe};
@@ -130,6 +156,24 @@ TEST_F(AdaptiveRequester, AStillHeadSeesEveryPixelsOwnSample) {
   EXPECT_EQ(c.width, 2560);
   EXPECT_EQ(c.height, 1600);
   EXPECT_DOUBLE_EQ(c.left, display.left);
+}
+
+TEST_F(AdaptiveRequester, AStillHeadOfAChangingSceneIsServedAsFastAsAMovingOne) {
+  cycle(1e7, false);
+  for (int i = 0; i < 30; ++i) {
+    requester.on_epoch(now_s);
+    const geometry::Camera c = cycle(1e7, false);
+    EXPECT_LE(double(c.width) * c.height, 2.2e6) << "0.2 s, ten million pixels a second";
+    EXPECT_DOUBLE_EQ(c.left, display.left);
+    if (i > 20) {
+      EXPECT_NEAR(double(c.width) * c.height, 2e6, 2e5);
+    }
+  }
+  const double last_s = now_s;
+  geometry::Camera c = cycle(1e7, false);
+  while (now_s < last_s + 1) c = cycle(1e7, false);
+  c = cycle(1e7, false);
+  EXPECT_EQ(c.width, 2560) << "the scene rests, and so does the head";
 }
 
 TEST_F(AdaptiveRequester, SamplesAsFinelyAsTheLatencyAllows) {

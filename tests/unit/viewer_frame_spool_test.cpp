@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include "client/viewer/record/frame_spool.h"
@@ -25,7 +26,8 @@ class Spool : public testing::Test {
                    0.25 * double(number),
                    use,
                    geometry::make_camera({}, 90, 20, 10),
-                   {20, 10, std::vector<uint32_t>(200, 0x102030), std::vector<float>(200, 1.5f)}};
+                   {20, 10, std::vector<uint32_t>(200, 0x102030), std::vector<float>(200, 1.5f)},
+                   {40 + number}};
     f.view.depth_m[7] = std::numeric_limits<float>::infinity();
     f.view.colour[9] = uint32_t(number);
     return f;
@@ -46,6 +48,7 @@ TEST_F(Spool, FramesComeBackAsTheyWere) {
   const SpooledFrame expected = frame(3, kVerify);
   EXPECT_EQ(back->number, 3u);
   EXPECT_EQ(back->use, kVerify);
+  EXPECT_EQ(back->epoch, (EpochId{43}));
   EXPECT_TRUE(back->camera == expected.camera);
   EXPECT_EQ(back->view.colour, expected.view.colour);
   EXPECT_EQ(back->view.depth_m, expected.view.depth_m);
@@ -81,6 +84,22 @@ TEST_F(Spool, FilesThatAreNoFramesAreRefused) {
   }
   EXPECT_FALSE(read_spooled_frame(directory_).ok());
   EXPECT_FALSE(FrameSpool::open("/proc/no/such/place").ok());
+}
+
+TEST_F(Spool, FramesOfAnEarlierVersionAreNamed) {
+  {
+    auto spool = FrameSpool::open(directory_);
+    (*spool)->exchange(frame(1, kVerify));
+    (*spool)->flush();
+  }
+  const std::string path = spooled_frames(directory_).at(0);
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(7).put('1');
+  file.close();
+  const auto back = read_spooled_frame(path);
+  ASSERT_FALSE(back.ok());
+  EXPECT_NE(back.error().text.find(path), std::string::npos);
+  EXPECT_NE(back.error().text.find("version '1' instead of '2'"), std::string::npos) << back.error().text;
 }
 
 TEST(ParseSize, TakesWidthAndHeightWithinLimits) {

@@ -45,16 +45,17 @@ class Comparison {
 
   /// Reads the data. False texts are about the data file.
   Status open() {
-    auto store = data::MeshStore::open(subject_.scene, subject_.mesh, [&](const char* stage, double fraction) {
-      progress_.show(fmt::format("{}: {} {:.0f} %", subject_.name, stage, 100 * fraction));
-    });
-    if (!store) return store.error();
-    store_ = std::move(*store);
-    sampler_ = sampler::make_ray_sampler(options_.threads);
-    std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks;
-    for (const auto& c : store_->chunks()) chunks.emplace_back(c.id, store_->chunk(c.id));
-    if (const Status s = sampler_->add_chunks(std::move(chunks)); !s) return s;
-    auto models = PoseModels::open(subject_, options_.magnify, *sampler_, *store_);
+    if (subject_.julia) {
+      scene_ = open_direct_julia(*subject_.julia, options_.threads);
+    } else {
+      auto mesh =
+          open_direct_mesh(subject_.scene, subject_.mesh, options_.threads, [&](const char* stage, double fraction) {
+            progress_.show(fmt::format("{}: {} {:.0f} %", subject_.name, stage, 100 * fraction));
+          });
+      if (!mesh) return mesh.error();
+      scene_ = std::move(*mesh);
+    }
+    auto models = PoseModels::open(subject_, options_.magnify, *scene_);
     if (!models) return models.error();
     models_ = std::move(*models);
     return ok_status();
@@ -98,14 +99,14 @@ class Comparison {
  private:
   std::string caption() const {
     const auto& c = subject_.frames.front().camera;
-    return fmt::format("{}: {} triangles, display {}x{}, sampled {}, finish {}", subject_.name,
-                       store_->info().triangles, c.width, c.height, subject_.sampling, splat::finish_name(finish_));
+    return fmt::format("{}: {}, display {}x{}, sampled {}, finish {}", subject_.name, scene_->size(), c.width, c.height,
+                       subject_.sampling, splat::finish_name(finish_));
   }
   nlohmann::ordered_json about() const {
     const auto& c = subject_.frames.front().camera;
     return {{"schema", 1},
             {"scene", subject_.name},
-            {"primitives", store_->info().triangles},
+            {"primitives", scene_->primitives()},
             {"mode", subject_.events.empty() ? "still" : "run"},
             {"size", {c.width, c.height}},
             {"sampling", subject_.sampling},
@@ -123,8 +124,9 @@ class Comparison {
     CellOptions cell_options;
     cell_options.shading = subject_.shading;
     cell_options.best_patch_only = subject_.best_patch_only;
-    const image::View reference =
-        sampler::render_directly(*sampler_, frame.camera, image::Shading(cell_options.shading, frame.camera));
+    const auto drawn = scene_->draw(frame.camera, cell_options.shading, frame.epoch);
+    if (!drawn) return drawn.error();
+    const image::View& reference = *drawn;
     const bool shows = std::any_of(reference.depth_m.begin(), reference.depth_m.end(),
                                    [](float d) { return d < std::numeric_limits<float>::infinity(); });
     if (!shows) return Error{fmt::format("frame {} of {}: does not show the data", frame.number, subject_.name)};
@@ -162,7 +164,7 @@ class Comparison {
     const auto& f = pose.frame;
     const std::vector<std::string> captions{
         subject_.name,
-        fmt::format("{} triangles, drawn directly: one ray a pixel", store_->info().triangles),
+        scene_->size() + ", drawn directly: one ray a pixel",
         subject_.events.empty() ? std::string("still camera")
                                 : fmt::format("frame {} at {:.2f} s, event {}", f.number, f.t_s, f.sequence.value),
         fmt::format("display {}x{}", f.camera.width, f.camera.height),
@@ -194,8 +196,7 @@ class Comparison {
   splat::Finish finish_;
   const std::vector<std::string>& renderers_;
   ProgressLine progress_;
-  std::shared_ptr<data::MeshStore> store_;
-  std::unique_ptr<sampler::Sampler> sampler_;
+  std::unique_ptr<DirectScene> scene_;
   std::unique_ptr<PoseModels> models_;
   std::vector<ComparedPose> poses_;
   std::vector<PoseStrip> strips_;

@@ -57,13 +57,16 @@ Result<CompareSubject> find_run(const CompareOptions& o) {
   s.mesh = run->mesh;
   if (!o.mesh.cache_dir.empty()) s.mesh.cache_dir = o.mesh.cache_dir;
   if (!o.mesh.use_cache) s.mesh.use_cache = false;
-  if (s.scene.empty())
+  s.julia = run->julia;
+  if (s.julia && !o.scene.empty())
+    return Error{fmt::format("--scene {}: {} shows a Julia set, which has no data file", o.scene, o.path)};
+  if (s.scene.empty() && !s.julia)
     return Error{fmt::format("{}/session.toml: does not tell where the data is (key file of [scene]); --scene names it",
                              o.path)};
-  if (!fs::exists(s.scene, error))
+  if (!s.julia && !fs::exists(s.scene, error))
     return Error{fmt::format("{}: the data file is not there{}", s.scene,
                              o.scene.empty() ? "; if it was moved, --scene tells where to" : "")};
-  s.name = fs::path(s.scene).filename().string();
+  s.name = s.julia ? s.julia->title : fs::path(s.scene).filename().string();
   s.octree_depth = run->octree_depth;
   s.shading = run->shading;
   s.best_patch_only = run->keeps_redundant;
@@ -94,9 +97,8 @@ Result<CompareSubject> find_subject(const CompareOptions& o) {
   return subject;
 }
 
-Result<std::unique_ptr<PoseModels>> PoseModels::open(const CompareSubject& subject, int magnify,
-                                                     sampler::Sampler& sampler, const data::MeshStore& store) {
-  std::unique_ptr<PoseModels> out(new PoseModels(subject, magnify, sampler, store));
+Result<std::unique_ptr<PoseModels>> PoseModels::open(const CompareSubject& subject, int magnify, DirectScene& scene) {
+  std::unique_ptr<PoseModels> out(new PoseModels(subject, magnify, scene));
   if (subject.events.empty()) return out;
   auto events = viewer::EventReplay::open(subject.events);
   if (!events) return events.error();
@@ -123,12 +125,13 @@ Result<const points::PointModel*> PoseModels::of(const DisplayedFrame& frame) {
   sampling.width = std::max(1, sampling.width / magnify_);
   sampling.height = std::max(1, sampling.height / magnify_);
   const geometry::Rect whole{0, 0, sampling.width, sampling.height};
-  const points::ModelConfig config{store_.info().box_room, subject_.octree_depth};
-  if (const Status s = points::validate(config); !s)
-    return Error{fmt::format("{}: {}", subject_.scene, s.error().text)};
+  const points::ModelConfig config{scene_.box_room(), subject_.octree_depth};
+  if (const Status s = points::validate(config); !s) return Error{fmt::format("{}: {}", subject_.name, s.error().text)};
+  auto image = scene_.sample(sampling, frame.epoch);
+  if (!image) return image.error();
   sampled_ = std::make_unique<points::PointModel>(config);
   applied_ = {1};
-  sampled_->insert(points::prepare_patch(config, applied_, sampling, whole, sampler_.sample(sampling, whole)));
+  sampled_->insert(points::prepare_patch(config, applied_, sampling, whole, std::move(*image)));
   return sampled_.get();
 }
 

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "client/viewer/record/event_record.h"
-#include "services/sampler/sampler.h"
 #include "tools/telesplat/compare_command.h"
+#include "tools/telesplat/direct_scene.h"
 #include "tools/telesplat/recorded_run.h"
 
 namespace telesplat::launcher {
@@ -15,6 +15,7 @@ struct CompareSubject {
   std::string name;   ///< for captions
   std::string scene;  ///< path of the data file
   data::MeshOptions mesh;
+  std::optional<RecordedJulia> julia;  ///< instead of a data file
   std::string out;
   std::string events;                ///< record of point-model events; empty: poses are sampled
   std::string sampling;              ///< how the points were sampled, for captions
@@ -30,9 +31,8 @@ Result<CompareSubject> find_subject(const CompareOptions& options);
 /// The point models of a subject's poses, one after the other.
 class PoseModels {
  public:
-  /// Opens the record, if the subject has one. `sampler` and `store` must outlive this.
-  static Result<std::unique_ptr<PoseModels>> open(const CompareSubject& subject, int magnify, sampler::Sampler& sampler,
-                                                  const data::MeshStore& store);
+  /// Opens the record, if the subject has one. `scene` must outlive this.
+  static Result<std::unique_ptr<PoseModels>> open(const CompareSubject& subject, int magnify, DirectScene& scene);
 
   /// What the frame displayed, or what one sampling frame of its pose gives. Frames come in order of display.
   /// The model holds until the next call.
@@ -40,14 +40,13 @@ class PoseModels {
   Sequence applied() const { return applied_; }
 
  private:
-  PoseModels(const CompareSubject& subject, int magnify, sampler::Sampler& sampler, const data::MeshStore& store)
-      : subject_(subject), magnify_(magnify), sampler_(sampler), store_(store) {}
+  PoseModels(const CompareSubject& subject, int magnify, DirectScene& scene)
+      : subject_(subject), magnify_(magnify), scene_(scene) {}
   Result<const points::PointModel*> replay(const DisplayedFrame& frame);
 
   const CompareSubject& subject_;
   int magnify_;
-  sampler::Sampler& sampler_;
-  const data::MeshStore& store_;
+  DirectScene& scene_;
   std::unique_ptr<viewer::EventReplay> events_;
   std::unique_ptr<points::PointModel> sampled_;
   uint32_t replica_ = 0;

@@ -1,8 +1,6 @@
 #include "tools/telesplat/control_client.h"
 
-#include <fmt/format.h>
-
-#include "common/core/clock.h"
+#include "common/net/control.h"
 
 namespace telesplat::launcher {
 
@@ -15,20 +13,7 @@ ControlClient::ControlClient(const std::string& master_endpoint)
 
 Result<std::string> ControlClient::ask(const std::string& command, double timeout_s,
                                        const std::map<std::string, std::string>& arguments) {
-  while (socket_.receive()) {
-  }  // answers to what was asked before
-  socket_.send(wire::Control{command, arguments});
-  for (const double until = monotonic_s() + timeout_s; monotonic_s() < until;) {
-    net::wait_readable({&socket_}, 20);
-    while (const auto message = socket_.receive()) {
-      if (message->type != wire::ControlReply::kName) continue;
-      const auto reply = socket_.decode<wire::ControlReply>(*message);
-      if (!reply) continue;
-      if (!reply->ok) return Error{reply->text};
-      return reply->text;
-    }
-  }
-  return Error{fmt::format("no answer from a master at {} within {} s", endpoint_, timeout_s)};
+  return net::ask_master(socket_, endpoint_, command, timeout_s, arguments);
 }
 
 void ControlClient::request_status() { socket_.send(wire::Control{"status", {}}); }

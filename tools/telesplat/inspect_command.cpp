@@ -13,6 +13,7 @@
 #include "client/viewer/record/frame_spool.h"
 #include "common/codec/depth_codec.h"
 #include "services/data/inspect.h"
+#include "tools/telesplat/recorded_julia.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -26,6 +27,18 @@ int refuse(const std::string& why) {
   return 2;
 }
 
+int inspect_julia(const std::string& directory) {
+  const auto julia = read_recorded_julia(directory);
+  if (!julia) return refuse(julia.error().text);
+  std::printf("%s, %s\n", julia->title.c_str(),
+              julia->animate.empty() ? "not animated when it began" : ("animated: " + julia->animate).c_str());
+  for (const auto& info : julia::parameter_infos())
+    std::printf("  %-14s %-12g %.*s\n", std::string(info.name).c_str(), julia::get(julia->begin, info.name),
+                int(info.text.size()), info.text.data());
+  if (!julia->epochs.empty()) std::printf("  %zu epochs (epochs.csv)\n", julia->epochs.size());
+  return 0;
+}
+
 int inspect_run(const std::string& directory) {
   std::ifstream in(directory + "/summary.json");
   const auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
@@ -33,6 +46,8 @@ int inspect_run(const std::string& directory) {
     return refuse(
         fmt::format("{}: is a folder without a readable summary.json, so it is not a finished run", directory));
   std::printf("%s: a run\n%s\n", directory.c_str(), summary.dump(2).c_str());
+  if (summary.value("kind", std::string()) == julia::kSceneWord)
+    if (const int code = inspect_julia(directory)) return code;
   std::error_code error;
   for (const auto& entry : fs::recursive_directory_iterator(directory, error))
     if (entry.is_regular_file(error))

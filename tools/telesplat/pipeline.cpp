@@ -40,7 +40,7 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
   if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
   for (const auto& [key, value] : o.master.master.settings) {
     if (key == "packing.keep_redundant")
-      a.insert(a.end(), {"--packing.redundancy", value != 0 ? "keep" : "eliminate"});
+      a.insert(a.end(), {"--packing.redundancy", value < 0 ? "auto" : value != 0 ? "keep" : "eliminate"});
     else
       a.insert(a.end(), {"--" + key, text(value)});
   }
@@ -50,6 +50,10 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
 std::vector<std::string> data_arguments(const RunOptions& o) {
   std::vector<std::string> a{o.scene, "--room-size", text(o.mesh.room_size_m), "--up=" + o.mesh.up,
                              "--report-progress"};
+  if (o.shows_julia()) {
+    const auto flags = julia::to_flags(o.julia);
+    a.insert(a.end(), flags.begin(), flags.end());
+  }
   if (!o.mesh.cache_dir.empty()) a.insert(a.end(), {"--cache", o.mesh.cache_dir});
   if (!o.mesh.use_cache) a.push_back("--no-cache");
   return a;
@@ -67,6 +71,8 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              v.size,
                              "--sampling-size",
                              v.sampling_size,
+                             "--least-sampling",
+                             text(v.requests.min_scale),
                              "--trajectory",
                              v.trajectory,
                              "--duration",
@@ -103,6 +109,8 @@ std::vector<std::string> viewer_arguments(const RunOptions& o) {
                              v.coupling,
                              "--update-rate",
                              text(v.requests.max_rate_hz),
+                             "--epoch-patience",
+                             text(v.epoch_patience_s),
                              "--record-every",
                              text(double(d.picture_every)),
                              "--verify",

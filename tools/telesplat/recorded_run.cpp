@@ -72,6 +72,11 @@ Result<std::string> read_session(const std::string& path, RecordedRun& run) {
   if (!known) return Error{fmt::format("{}: shading is \"{}\", not lit, head or unlit", path, shading)};
   run.shading = *known;
 
+  if (table["scene"]["kind"].value_or(std::string()) == julia::kSceneWord) {
+    auto julia = read_recorded_julia(run.directory);
+    if (!julia) return julia.error();
+    run.julia = std::move(*julia);
+  }
   run.scene = table["scene"]["file"].value_or(std::string());
   run.mesh.room_size_m = number(table["scene"]["room_size"], run.mesh.room_size_m);
   run.mesh.up = table["scene"]["up"].value_or(run.mesh.up);
@@ -109,7 +114,10 @@ Status read_frames(const std::string& path, const std::string& viewer, RecordedR
     at.push_back(size_t(found - header.begin()));
   }
 
-  const auto detail = size_t(std::find(header.begin(), header.end(), "detail") - header.begin());  // none: 1
+  const auto column = [&](const char* name) {
+    return size_t(std::find(header.begin(), header.end(), name) - header.begin());
+  };
+  const size_t detail = column("detail"), epoch = column("epoch");  // none: 1, 0
 
   size_t row = 1;
   while (next_line()) {
@@ -139,6 +147,11 @@ Status read_frames(const std::string& path, const std::string& viewer, RecordedR
       const auto read = std::from_chars(text.data(), text.data() + text.size(), f.detail);
       if (read.ec != std::errc() || !(f.detail > 0 && f.detail <= 1))
         return wrong(fmt::format("detail is \"{}\", limits are above 0 and 1", text.substr(0, 40)));
+    }
+    if (epoch < columns) {
+      const auto text = fields[epoch];
+      const auto read = std::from_chars(text.data(), text.data() + text.size(), f.epoch.value);
+      if (read.ec != std::errc()) return wrong(fmt::format("epoch is \"{}\", not a number", text.substr(0, 40)));
     }
     if (!run.frames.empty()) {
       const DisplayedFrame& before = run.frames.back();

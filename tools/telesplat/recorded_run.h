@@ -1,6 +1,7 @@
 // A run folder as `telesplat run` left it: what is needed to make its displayed frames again.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "common/geometry/camera.h"
 #include "common/image/shading.h"
 #include "services/data/mesh_store.h"
+#include "tools/telesplat/recorded_julia.h"
 
 namespace telesplat::launcher {
 
@@ -20,13 +22,15 @@ struct DisplayedFrame {
   uint64_t points_drawn = 0;
   geometry::Camera camera;
   double detail = 1;  ///< SelectionOptions::detail it was drawn with
+  EpochId epoch;      ///< of all points in it
 };
 
 struct RecordedRun {
   std::string directory;
   std::string scene;  ///< path of the data file; empty: the folder does not tell
   data::MeshOptions mesh;
-  int width = 0, height = 0;  ///< of the display
+  std::optional<RecordedJulia> julia;  ///< instead of a data file
+  int width = 0, height = 0;           ///< of the display
   double fov_deg = 0, near_m = 0;
   std::string sampling_size, renderer, kernel;  ///< as they were, for captions
   image::ShadingParameters shading;
@@ -35,7 +39,7 @@ struct RecordedRun {
   std::vector<DisplayedFrame> frames;  ///< of the run's own viewer, in order
 };
 
-/// Reads session.toml and frames.csv. Errors name file, line, value and limit.
+/// Reads session.toml, frames.csv and, of a Julia set, epochs.csv. Errors name file, line, value and limit.
 Result<RecordedRun> read_recorded_run(const std::string& directory);
 
 /// The frames of these numbers, in order of display; or, if there are none, `count` of them evenly spaced over the frames that show the

@@ -10,16 +10,21 @@
 #include <thread>
 
 #include "client/viewer/display/window.h"
+#include "client/viewer/record/frame_spool.h"
 #include "common/core/clock.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/pipeline.h"
 #include "tools/telesplat/progress_line.h"
+#include "tools/telesplat/recorded_julia.h"
 #include "tools/telesplat/verify.h"
 
 namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
+
+// A frame of a Julia set is dear: coarser while the head moves. Points of views long past are of no use, since nothing is eliminated.
+constexpr double kJuliaLeastSampling = 0.4, kJuliaMaxPoints = 8e6;
 
 // fps, updates/s, points, MB/s from two status answers.
 class LiveFigures {
@@ -87,10 +92,15 @@ Status check_usage(const RunOptions& o) {
                                       {o.viewer.display.exr, "--exr"},
                                       {o.record_depth, "--record-depth"}})
       if (asked) return Error{fmt::format("{} needs --out: nothing is recorded without a run folder", flag)};
-  if (o.join_master.empty()) {
+  if (o.shows_julia()) {
+    if (const auto scene = julia::read_scene(o.julia); !scene) return scene.error();
+  } else if (o.julia.any()) {
+    return Error{fmt::format("{}: is not \"{}\", but a Julia set's parameters are given", o.scene, julia::kSceneWord)};
+  } else if (o.join_master.empty()) {
     std::error_code error;
     if (!fs::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
-    if (fs::is_directory(o.scene, error)) return Error{fmt::format("{}: is a folder; a mesh file is needed", o.scene)};
+    if (fs::is_directory(o.scene, error))
+      return Error{fmt::format("{}: is a folder; a mesh file is needed, or the word julia", o.scene)};
   }
   if (const auto size = viewer::parse_size(o.viewer.size, "--size"); !size) return size.error();
   if (const auto size = viewer::parse_sampling_size(o.viewer.sampling_size); !size) return size.error();
@@ -114,13 +124,29 @@ void complete_session(const RunOptions& o) {
     return out + '"';
   };
   std::ofstream out(path, std::ios::app);
-  out << "\n[scene]\nfile = " << quoted(fs::absolute(o.scene, error).string())
-      << fmt::format("\nroom_size = {}\nup = \"{}\"\n", o.mesh.room_size_m, o.mesh.up);
-  if (!o.mesh.use_cache) out << "no_cache = true\n";
-  if (!o.mesh.cache_dir.empty()) out << "cache = " << quoted(fs::absolute(o.mesh.cache_dir, error).string()) << "\n";
+  if (o.shows_julia()) {
+    const auto scene = julia::read_scene(o.julia);
+    if (!scene) return;
+    const auto placement = julia::place(*scene, o.mesh.room_size_m);
+    if (!placement) return;
+    out << session_tables(*scene, *placement, o.mesh.room_size_m);
+  } else {
+    out << "\n[scene]\nfile = " << quoted(fs::absolute(o.scene, error).string())
+        << fmt::format("\nroom_size = {}\nup = \"{}\"\n", o.mesh.room_size_m, o.mesh.up);
+    if (!o.mesh.use_cache) out << "no_cache = true\n";
+    if (!o.mesh.cache_dir.empty()) out << "cache = " << quoted(fs::absolute(o.mesh.cache_dir, error).string()) << "\n";
+  }
   const auto& d = o.viewer.display;
   out << fmt::format("\n[display]\nsize = \"{}\"\nfov = {}\nnear = {}\nshading = \"{}\"\n", o.viewer.size, d.fov_deg,
                      d.near_m, o.viewer.shading);
+}
+
+// The scene that a run showed, for its reference pictures.
+Result<std::unique_ptr<DirectScene>> open_direct(const RunOptions& o) {
+  if (!o.shows_julia()) return open_direct_mesh(o.scene, o.mesh, 0, [](const char*, double) {});
+  auto julia = read_recorded_julia(o.out);
+  if (!julia) return julia.error();
+  return open_direct_julia(std::move(*julia), 0);
 }
 
 void print_report(const std::string& directory) {
@@ -135,8 +161,15 @@ void print_report(const std::string& directory) {
     return fmt::format("median {:.1f}  p95 {:.1f}  max {:.1f} {}", d["median"].get<double>(), d["p95"].get<double>(),
                        d["max"].get<double>(), unit);
   };
-  std::printf("\n%s: %llu triangles, display %dx%d, sampling %dx%d, %d sampler(s), %s renderer, %s splats\n",
-              s["scene"].get<std::string>().c_str(), (unsigned long long)s["primitives"].get<uint64_t>(),
+  std::string subject = s["scene"].get<std::string>();
+  if (s["kind"] == "mesh") {
+    subject += fmt::format(": {} triangles", s["primitives"].get<uint64_t>());
+  } else if (const auto julia = read_recorded_julia(directory)) {
+    const auto& c = julia->begin.c;
+    subject += fmt::format(": c = ({:.4g}, {:.4g}, {:.4g}, {:.4g}), {} epoch(s)", c.x, c.y, c.z, c.w,
+                           std::max<size_t>(1, julia->epochs.size()));
+  }
+  std::printf("\n%s, display %dx%d, sampling %dx%d, %d sampler(s), %s renderer, %s splats\n", subject.c_str(),
               s["size"][0].get<int>(), s["size"][1].get<int>(), s["sampling_size"][0].get<int>(),
               s["sampling_size"][1].get<int>(), s["samplers"].get<int>(), s["renderer"].get<std::string>().c_str(),
               s["splat"].get<std::string>().c_str());
@@ -186,7 +219,8 @@ RunOptions view_defaults() {
 }
 
 void add_run_flags(CLI::App& app, RunOptions& o) {
-  app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB)");
+  app.add_option("scene", o.scene,
+                 "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), the word julia, or a scene file (TOML)");
   const bool window = o.viewer.window;
   app.add_option("--out", o.out,
                  window ? "run folder; without it nothing is recorded" : "run folder; default: runs/DATE-TIME");
@@ -213,6 +247,7 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
                "keep the first 50 sampled depth images (telesplat inspect reads them)");
   app.add_option("--seed", o.seed, "seed of whatever is random in a run; nothing is, in mesh runs")
       ->capture_default_str();
+  julia::add_scene_flags(app, o.julia);
   viewer::add_view_flags(app, o.viewer);
   master::add_session_flags(app, o.master);
   app.add_option("--log-level", o.master.service.log_level, "trace, debug, info, warn, error or off")
@@ -224,6 +259,12 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
   app.footer(keys);
 }
 
+void apply_scene_defaults(const CLI::App& app, RunOptions& o) {
+  if (!o.shows_julia()) return;
+  if (app.count("--least-sampling") == 0) o.viewer.requests.min_scale = kJuliaLeastSampling;
+  if (app.count("--packing.max_points") == 0) o.master.master.settings["packing.max_points"] = kJuliaMaxPoints;
+}
+
 int run(const RunOptions& given) {
   RunOptions o = given;
   o.started_s = monotonic_s();
@@ -233,7 +274,11 @@ int run(const RunOptions& given) {
     std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
     return 2;
   };
-  if (o.scene.empty() && o.join_master.empty()) return refuse({"a scene is needed: a mesh file"});
+  if (o.julia.list_presets) {
+    std::fputs(julia::describe_presets().c_str(), stdout);
+    return 0;
+  }
+  if (o.scene.empty() && o.join_master.empty()) return refuse({"a scene is needed: a mesh file or the word julia"});
   if (const Status s = check_usage(o); !s) return refuse(s.error());
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
@@ -276,6 +321,13 @@ int run(const RunOptions& given) {
   }
   progress.close();
   pipeline->finish();
+  // A viewer that is told to stop does so, whatever pictures are left to make.
+  if (state == Pipeline::State::kRunning && !o.out.empty()) {
+    const std::string spool = o.out + "/spool";
+    if (const Status s = viewer::develop_frames(spool, o.out + "/images", {}); !s)
+      progress.line("telesplat: " + s.error().text);
+    if (fs::is_empty(spool, error)) fs::remove(spool, error);
+  }
   for (const auto& n : pipeline->take_notes()) progress.line(n);
   if (o.join_master.empty() && !o.out.empty()) complete_session(o);
   if (state == Pipeline::State::kBadInput) {
@@ -291,10 +343,10 @@ int run(const RunOptions& given) {
 
   const bool interrupted = state == Pipeline::State::kRunning;
   if (o.viewer.display.verify_every && (window || !interrupted) && o.join_master.empty()) {
-    const auto store = data::MeshStore::open(o.scene, o.mesh, [](const char*, double) {});
-    if (!store) return refuse(store.error());
+    auto scene = open_direct(o);
+    if (!scene) return refuse(scene.error());
     const Status verified = verify_run(
-        o.out, **store, *image::shading_named(o.viewer.shading),
+        o.out, **scene, *image::shading_named(o.viewer.shading),
         [&](size_t done, size_t of) { progress.show(fmt::format("verifying view {} of {}", done, of)); },
         net::stop_requested);
     progress.close();

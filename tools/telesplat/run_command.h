@@ -2,6 +2,7 @@
 #pragma once
 
 #include "client/viewer/viewer_service.h"
+#include "common/julia/flags.h"
 #include "services/data/mesh_store.h"
 #include "services/master/master_service.h"
 
@@ -9,8 +10,9 @@ namespace telesplat::launcher {
 
 /// viewer.window tells `view` from `run`.
 struct RunOptions {
-  std::string scene;
+  std::string scene;  ///< path of a data file, or "julia"
   data::MeshOptions mesh;
+  julia::SceneOptions julia;
   master::MasterServiceOptions master;
   viewer::ViewerOptions viewer;
   int samplers = 1;
@@ -23,6 +25,7 @@ struct RunOptions {
   uint64_t seed = 0;
   bool record_depth = false;       ///< keep sampled depth images in OUT/depth
   bool background_servers = true;  ///< samplers, packer and data run at lower priority than the viewer
+  bool shows_julia() const { return scene == julia::kSceneWord; }
 };
 
 /// What `telesplat view` does unless told otherwise: a window, until it is closed, with the camera in the person's hands.
@@ -30,6 +33,9 @@ RunOptions view_defaults();
 
 /// Flags of `run`, or of `view` if options.viewer.window is set.
 void add_run_flags(CLI::App& app, RunOptions& options);
+
+/// Once `app` is parsed: what a Julia set is better shown with than a mesh, where no flag says otherwise.
+void apply_scene_defaults(const CLI::App& app, RunOptions& options);
 
 /// A window that is closed, or Ctrl-C there, is an end like any other. Exit code: 0 done, 1 failed while running, 2 bad usage or input. No process is left behind in any case.
 int run(const RunOptions& options);

@@ -9,7 +9,6 @@
 #include "client/viewer/record/frame_spool.h"
 #include "common/image/quality.h"
 #include "common/metrics/statistics.h"
-#include "services/sampler/sampler.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -78,25 +77,18 @@ Status write_summary(const std::string& directory, const std::vector<Verified>& 
 
 }  // namespace
 
-Status verify_run(const std::string& directory, const data::MeshStore& store,
-                  const image::ShadingParameters& shading_parameters,
+Status verify_run(const std::string& directory, DirectScene& scene, const image::ShadingParameters& shading,
                   const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& should_stop) {
   const std::string spool = directory + "/spool";
   const auto paths = viewer::spooled_frames(spool);
-  auto sampler = sampler::make_ray_sampler(0);
-  std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks;
-  for (const auto& c : store.chunks()) chunks.emplace_back(c.id, store.chunk(c.id));
-  if (const Status s = sampler->add_chunks(std::move(chunks)); !s) return s;
-
   std::vector<Verified> views;
-  const auto reference_of = [&](const geometry::Camera& camera) {
-    return sampler::render_directly(*sampler, camera, image::Shading(shading_parameters, camera));
-  };
   for (size_t i = 0; i < paths.size() && !should_stop(); ++i) {
     const auto frame = viewer::read_spooled_frame(paths[i]);
     if (!frame) return frame.error();
     if (!(frame->use & viewer::kVerify) || frame->view.depth_m.empty()) continue;
-    views.push_back({paths[i], frame->number, frame->t_s, image::compare(reference_of(frame->camera), frame->view)});
+    const auto reference = scene.draw(frame->camera, shading, frame->epoch);
+    if (!reference) return reference.error();
+    views.push_back({paths[i], frame->number, frame->t_s, image::compare(*reference, frame->view)});
     progress(i + 1, paths.size());
   }
 
@@ -117,8 +109,10 @@ Status verify_run(const std::string& directory, const data::MeshStore& store,
          {std::pair{"worst", seen.front()}, {"median", seen[seen.size() / 2]}, {"last", last}}) {
       const auto frame = viewer::read_spooled_frame(v.path);
       if (!frame) return frame.error();
+      const auto reference = scene.draw(frame->camera, shading, frame->epoch);
+      if (!reference) return reference.error();
       if (const Status s = image::write_png(fmt::format("{}/images/verify-{}-{:06d}.png", directory, name, v.frame),
-                                            side_by_side(reference_of(frame->camera), frame->view));
+                                            side_by_side(*reference, frame->view));
           !s)
         return s;
     }

@@ -2,73 +2,93 @@
 
 #include <iterator>
 
-namespace telesplat::viewer {
+#include "common/core/check.h"
 
-void ModelCache::begin_replica(const points::ModelConfig& config) {
-  auto fresh = std::make_unique<points::PointModel>(config);
-  const std::lock_guard lock(mutex_);
-  if (newest_) {
-    if (!shown_)
-      shown_ = std::move(newest_), applied_shown_ = applied_;
-    else
-      retired_models_.push_back(std::move(newest_));
-  }
-  newest_ = std::move(fresh);
-  applied_ = {};
+namespace telesplat::viewer {
+namespace {
+
+template <class T>
+void move_to_end(std::vector<T>& from, std::vector<T>& to) {
+  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  from.clear();
 }
 
-void ModelCache::insert(points::PreparedPatch patch) {
+}  // namespace
+
+void ModelCache::drop(Replica& replica) {
+  auto& models = dropped_of(replica.model.get()).models;
+  models.push_back(std::move(replica.model));
+}
+
+bool ModelCache::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence applied) {
+  auto fresh = std::make_unique<points::PointModel>(config);
   const std::lock_guard lock(mutex_);
-  applied_ = patch.sequence;
-  newest_->insert(std::move(patch));
+  if (newest_.model) {
+    if (!older_.model && newest_.model->points() > 0)
+      older_ = std::move(newest_);
+    else
+      drop(newest_);
+  }
+  newest_ = {std::move(fresh), epoch, applied, ++replicas_};
+  return older_.model != nullptr;
+}
+
+void ModelCache::insert(points::PreparedPatch patch, EpochId epoch) {
+  const std::lock_guard lock(mutex_);
+  CHECK(newest_.epoch == epoch || newest_.epoch.value == 0);
+  newest_.epoch = epoch;
+  newest_.applied = patch.sequence;
+  newest_.model->insert(std::move(patch));
   ++patches_;
 }
 
 void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys) {
   const std::lock_guard lock(mutex_);
-  auto dropped = newest_->take_out(keys);
-  applied_ = sequence;
-  std::move(dropped.begin(), dropped.end(), std::back_inserter(retired_clusters_));
-}
-
-void ModelCache::clear(Sequence sequence) {
-  auto fresh = std::make_unique<points::PointModel>(newest_->config());
-  const std::lock_guard lock(mutex_);
-  retired_models_.push_back(std::exchange(newest_, std::move(fresh)));
-  applied_ = sequence;
+  auto dropped = newest_.model->take_out(keys);
+  newest_.applied = sequence;
+  move_to_end(dropped, dropped_of(newest_.model.get()).clusters);
 }
 
 void ModelCache::show_newest() {
   const std::lock_guard lock(mutex_);
-  if (shown_) retired_models_.push_back(std::move(shown_));
+  if (older_.model) drop(older_);
+}
+
+void ModelCache::free_dropped() {
+  Dropped free;  // freed after the lock is released
+  const std::lock_guard lock(mutex_);
+  std::swap(free, free_);
 }
 
 uint64_t ModelCache::digest() const {
   const std::lock_guard lock(mutex_);
-  return newest_ ? newest_->digest() : 0;
+  return newest_.model ? newest_.model->digest() : 0;
 }
 
 void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {
   const std::lock_guard lock(mutex_);
-  const points::PointModel* model = shown_ ? shown_.get() : newest_.get();
-  if (model)
-    splat::select_view(*model, camera, options, out);
+  const Replica& replica = displayed();
+  if (replica.model)
+    splat::select_view(*replica.model, camera, options, out);
   else
     out = {};
-  out.applied = shown_ ? applied_shown_ : applied_;
+  out.applied = replica.applied;
+  out.epoch = replica.epoch;
+  out.replica = replica.number;
+  drawn_ = replica.model.get();
 }
 
 void ModelCache::end_frame() {
-  std::vector<std::unique_ptr<points::Cluster>> clusters;
-  std::vector<std::unique_ptr<points::PointModel>> models;
   const std::lock_guard lock(mutex_);
-  clusters.swap(retired_clusters_);
-  models.swap(retired_models_);
-}  // freed after the lock is released: destructors run in reverse order
+  drawn_ = nullptr;
+  move_to_end(parked_.clusters, free_.clusters);
+  move_to_end(parked_.models, free_.models);
+}
 
 ModelCache::Figures ModelCache::figures() const {
   const std::lock_guard lock(mutex_);
-  return newest_ ? Figures{newest_->points(), newest_->bytes(), patches_} : Figures{};
+  if (!newest_.model) return {};
+  return {newest_.model->points(), newest_.model->bytes(), displayed().model->points(), patches_};
 }
 
 }  // namespace telesplat::viewer

@@ -1,5 +1,6 @@
 // The viewer's replica of the point model, shared by the worker that applies events and the display thread that draws. Events are
-// prepared without the lock and committed under it in microseconds; what a frame in progress may still draw is freed after it.
+// prepared without the lock and committed under it in microseconds. What is dropped is freed by the worker, and not before the
+// frame that may draw it is finished.
 #pragma once
 
 #include <memory>
@@ -14,15 +15,20 @@ namespace telesplat::viewer {
 class ModelCache {
  public:
   // ---- worker ----
-  /// Starts an empty replica. An older one, if any, is shown until show_newest() is called.
-  void begin_replica(const points::ModelConfig& config);
-  bool has_replica() const { return newest_ != nullptr; }
-  const points::ModelConfig& config() const { return newest_->config(); }
-  void insert(points::PreparedPatch patch);
+  /// Starts an empty replica, of another packer's model or of a new epoch; epoch 0: not known yet. What is on display stays there
+  /// until show_newest(), unless it is empty; a newer one that was not shown is dropped. Returns whether an older one stays.
+  bool begin_replica(const points::ModelConfig& config, EpochId epoch = {}, Sequence applied = {});
+  bool has_replica() const { return newest_.model != nullptr; }
+  const points::ModelConfig& config() const { return newest_.model->config(); }
+  /// Of the newest replica; 0: not known yet.
+  EpochId epoch() const { return newest_.epoch; }
+  /// Precondition: `epoch` is the newest replica's, or that is not known yet.
+  void insert(points::PreparedPatch patch, EpochId epoch);
   void forget(Sequence sequence, std::span<const points::ClusterKey> keys);
-  void clear(Sequence sequence);
   /// Replaces the older replica on display by the newest. No effect if it is displayed already.
   void show_newest();
+  /// Frees what was dropped and no frame draws any more. To be called often: to free a million points takes milliseconds.
+  void free_dropped();
   /// Digest of the newest replica, for tests of replication.
   uint64_t digest() const;
 
@@ -33,17 +39,33 @@ class ModelCache {
 
   // ---- any thread ----
   struct Figures {
-    uint64_t points = 0, bytes = 0, patches = 0;
+    uint64_t points = 0, bytes = 0;  ///< of the newest replica
+    uint64_t points_displayed = 0;   ///< of the one on display
+    uint64_t patches = 0;            ///< inserted so far
   };
   Figures figures() const;
 
  private:
+  struct Replica {
+    std::unique_ptr<points::PointModel> model;
+    EpochId epoch;
+    Sequence applied;     // newest event
+    uint64_t number = 0;  // of all replicas this cache had
+  };
+  struct Dropped {
+    std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were: draw lists point to them
+    std::vector<std::unique_ptr<points::PointModel>> models;
+  };
+  const Replica& displayed() const { return older_.model ? older_ : newest_; }
+  // Where to put what was part of a model: it waits for the end of the frame if that frame draws the model.
+  Dropped& dropped_of(const points::PointModel* model) { return model == drawn_ ? parked_ : free_; }
+  void drop(Replica& replica);
+
   mutable std::mutex mutex_;
-  std::unique_ptr<points::PointModel> newest_, shown_;              // shown_ only while it is not the newest
-  std::vector<std::unique_ptr<points::Cluster>> retired_clusters_;  // where they were: draw lists point to them
-  std::vector<std::unique_ptr<points::PointModel>> retired_models_;
-  Sequence applied_, applied_shown_;  // newest events of newest_ and shown_
-  uint64_t patches_ = 0;
+  Replica newest_, older_;  // older_ only while it is on display in place of the newest
+  const points::PointModel* drawn_ = nullptr;
+  Dropped parked_, free_;
+  uint64_t replicas_ = 0, patches_ = 0;
 };
 
 }  // namespace telesplat::viewer

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kVelocityWindow_s = 0.15, kMaxMove_m = 0.3, kMaxTurn_rad = 0.6;
 constexpr size_t kMaxOpen = 256;
+constexpr double kEpochSettles_s = 1.0;      // without a new epoch the scene counts as unchanging again
 constexpr double kFirstPixels = 1280 * 800;  // what adaptive sampling begins with
 
 // Side of a sampled image: a multiple of 8 in range.
@@ -82,8 +83,9 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
   const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
   const double margin = motion < 0.002 ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
-  // The first view is wanted soon rather than sharp.
-  const bool still = margin == 0 && latency_s_ > 0;
+  // The first view is wanted soon rather than sharp, and so is each of an epoch that may not last.
+  const bool changing = last_update_s_ < epoch_began_s_ || now_s - epoch_began_s_ < kEpochSettles_s;
+  const bool still = margin == 0 && latency_s_ > 0 && !changing;
   if (options_.adaptive) {
     if (scale_ == 0)
       scale_ =
@@ -113,8 +115,8 @@ std::optional<ViewRequester::Update> ViewRequester::on_applied(const wire::Patch
   u.points += patch.kept;
   u.samples += patch.samples;
   u.bytes += patch.image.size();
-  if (!patch.frame_complete) return std::nullopt;
-  u.complete_s = now_s;
+  if (!patch.frame_complete || patch.step > 1) return std::nullopt;
+  u.complete_s = last_update_s_ = now_s;
   // The master's clock as seen from here may be set back when the connection is made anew.
   const double latency_s = std::max(now_s - u.requested_s, 1e-3);
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;

@@ -55,17 +55,21 @@ class ViewRequester {
 
   /// A displayed pose; display: the camera it was shown with.
   void on_pose(double t_s, const geometry::Camera& display);
+  /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full resolution.
+  void on_epoch(double now_s) { epoch_began_s_ = now_s; }
   /// The next request, if one is due.
   std::optional<wire::ViewRequest> next(double now_s);
 
   struct Update {
     RequestId request;
-    double requested_s = 0, first_s = 0, complete_s = 0;
+    double requested_s = 0, first_s = 0,
+           complete_s = 0;  ///< first_s: the first part, of the coarse pass if there is one
     geometry::Camera camera;
-    bool still = false;  ///< asked for while the head rested
-    uint64_t points = 0, samples = 0, bytes = 0, tiles = 0;
+    bool still = false;                                      ///< asked for at full resolution, while the head rested
+    uint64_t points = 0, samples = 0, bytes = 0, tiles = 0;  ///< the coarse pass included
   };
-  /// Part of a frame was applied. Returns the finished update when it was its last part and the frame was asked for by us.
+  /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution and asked for
+  /// by us; a coarse pass may come before it, with the same request.
   std::optional<Update> on_applied(const wire::Patch& patch, double now_s);
 
   double latency_s() const { return latency_s_; }
@@ -77,7 +81,7 @@ class ViewRequester {
   std::optional<geometry::Camera> display_;
   RequestId next_{1};
   double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
-  double last_sent_s_ = -1e9, latency_s_ = 0;
+  double last_sent_s_ = -1e9, latency_s_ = 0, epoch_began_s_ = -1e9, last_update_s_ = -1e9;
   std::map<RequestId, Update> open_;
 };
 

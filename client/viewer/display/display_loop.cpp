@@ -73,7 +73,8 @@ const std::vector<std::string>& frame_columns() {
                                                 "qz",
                                                 "present_ms",
                                                 "detail",
-                                                "budget_ms"};
+                                                "budget_ms",
+                                                "epoch"};
   return columns;
 }
 
@@ -154,7 +155,7 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
                                                   std::max(o.threads, 1);
     budget.frame_done((selected_s - begin_s) * 1e3, std::min((end_s - selected_s) * 1e3, work_ms), double(list.points),
                       o.selection.detail);
-    worker.on_frame(end_s, camera, list.clusters_seen);
+    worker.on_frame(end_s, camera, list);
     surface.present(view);
     const double presented_s = monotonic_s();
 
@@ -176,7 +177,7 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
                 double(list.points),
                 double(stats.points_drawn),
                 double(list.items.size()),
-                double(figures.points),
+                double(figures.points_displayed),
                 double(list.applied.value),
                 (worker.to_master_s(end_s) - update.requested_s) * 1e3,
                 glm::distance(p, update.pose.position_room),
@@ -190,12 +191,13 @@ DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface
                 q.z,
                 (presented_s - end_s) * 1e3,
                 o.selection.detail,
-                budget.budget_ms()});
+                budget.budget_ms(),
+                double(list.epoch.value)});
     spans.add("display frame", worker.to_master_s(begin_s), worker.to_master_s(end_s), 0);
     previous_s = end_s;
     if (use) {
       if (use & kPicture) next_picture_s = t_s + kPicturePeriod_s;
-      view = spool->exchange({result.frames, t_s, use, camera, std::move(view)});
+      view = spool->exchange({result.frames, t_s, use, camera, std::move(view), list.epoch});
     }
     ++result.frames;
     surface.report(live_figures(presented_s, result.frames, stats.points_drawn, cache, worker));

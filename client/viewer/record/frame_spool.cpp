@@ -16,8 +16,8 @@ namespace fs = std::filesystem;
 
 // A spool file: this header, then colour (u32) and depth (f32) of width x height pixels.
 struct FileHeader {
-  char magic[8] = {'T', 'S', 'F', 'R', 'A', 'M', 'E', '1'};
-  uint64_t number = 0;
+  char magic[8] = {'T', 'S', 'F', 'R', 'A', 'M', 'E', '2'};
+  uint64_t number = 0, epoch = 0;
   double t_s = 0;
   double camera[12] = {};
   int32_t width = 0, height = 0;
@@ -33,6 +33,7 @@ bool write_frame(const std::string& directory, const SpooledFrame& f) {
   const auto& p = c.pose.position_room;
   const auto& q = c.pose.orientation;
   h.number = f.number;
+  h.epoch = f.epoch.value;
   h.t_s = f.t_s;
   const double camera[12] = {p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m};
   std::copy(camera, camera + 12, h.camera);
@@ -138,9 +139,14 @@ std::vector<std::string> spooled_frames(const std::string& directory) {
 Result<SpooledFrame> read_spooled_frame(const std::string& path) {
   const FilePtr in = open_file(path, "rb");
   FileHeader h;
-  if (!in || std::fread(&h, sizeof h, 1, in.get()) != 1 || std::memcmp(h.magic, FileHeader{}.magic, 8) != 0)
+  const bool read = in && std::fread(&h, sizeof h, 1, in.get()) == 1;
+  // The last letter of the magic is the version.
+  if (!read || std::memcmp(h.magic, FileHeader{}.magic, 7) != 0)
     return Error{fmt::format("{}: is not a recorded frame", path)};
-  SpooledFrame f{h.number, h.t_s, h.use, {}, {}};
+  if (h.magic[7] != FileHeader{}.magic[7])
+    return Error{fmt::format("{}: is a recorded frame of version {:?} instead of {:?}", path, h.magic[7],
+                             FileHeader{}.magic[7])};
+  SpooledFrame f{h.number, h.t_s, h.use, {}, {}, {h.epoch}};
   const double* c = h.camera;
   f.camera = {
       {{c[0], c[1], c[2]}, glm::dquat(c[3], c[4], c[5], c[6])}, c[7], c[8], c[9], c[10], c[11], h.width, h.height};
@@ -157,11 +163,12 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
 }
 
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
-                      const std::function<void(size_t, size_t)>& progress) {
+                      const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on) {
   std::error_code error;
   fs::create_directories(picture_directory, error);
   const auto paths = spooled_frames(spool_directory);
   for (size_t i = 0; i < paths.size(); ++i) {
+    if (go_on && !go_on()) break;
     auto frame = read_spooled_frame(paths[i]);
     if (!frame) return frame.error();
     const std::string base = fmt::format("{}/frame-{:06d}", picture_directory, frame->number);

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "common/core/ids.h"
 #include "common/core/result.h"
 #include "common/geometry/camera.h"
 #include "common/image/file.h"
@@ -26,6 +27,7 @@ struct SpooledFrame {
   uint32_t use = 0;
   geometry::Camera camera;
   image::View view;
+  EpochId epoch;  ///< of all points in it
 };
 
 class FrameSpool {
@@ -57,11 +59,11 @@ class FrameSpool {
 
 /// Paths of the spooled frames of a folder, by frame number.
 std::vector<std::string> spooled_frames(const std::string& directory);
-/// Reads one spooled frame; refuses files that are not one.
+/// Reads one spooled frame; refuses files that are not one, or were written by an earlier version.
 Result<SpooledFrame> read_spooled_frame(const std::string& path);
 /// Turns frames marked kPicture into directory/frame-NNNNNN.png (kExr: .exr too) and deletes spooled frames that are not also
-/// marked kVerify. progress: done, of.
+/// marked kVerify. progress: done, of. go_on: asked before each frame; once it says no, the remaining ones are left as they are.
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
-                      const std::function<void(size_t, size_t)>& progress);
+                      const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on = {});
 
 }  // namespace telesplat::viewer

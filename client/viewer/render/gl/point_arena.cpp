@@ -23,12 +23,12 @@ PointArenas::~PointArenas() {
 }
 
 size_t PointArenas::KeyHash::operator()(const Key& k) const {
-  uint64_t h = k.sequence.value * 0x9e3779b97f4a7c15ull ^ k.cluster;
+  uint64_t h = (k.sequence.value ^ k.replica << 40) * 0x9e3779b97f4a7c15ull ^ k.cluster;
   h = (h ^ h >> 29) * 0xbf58476d1ce4e5b9ull ^ reinterpret_cast<uintptr_t>(k.colour);
   return static_cast<size_t>((h ^ h >> 32) * 0x94d049bb133111ebull);
 }
 
-PointRange PointArenas::place(const splat::DrawItem& item) {
+PointRange PointArenas::place(const splat::DrawItem& item, uint64_t replica) {
   const points::Mosaic::Level level = item.arrays();
   const uint32_t words = 3 * level.count;
   if (item.sequence.value == 0) {
@@ -38,7 +38,7 @@ PointRange PointArenas::place(const splat::DrawItem& item) {
     return entry.range;
   }
   const auto [it, is_new] =
-      entries_.try_emplace(Key{item.cluster->key, level.count, item.sequence, level.x, level.colour});
+      entries_.try_emplace(Key{item.cluster->key, level.count, item.sequence, replica, level.x, level.colour});
   Entry& entry = it->second;
   if (is_new) {
     entry.range = allocate(words);

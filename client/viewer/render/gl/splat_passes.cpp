@@ -124,7 +124,7 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
     for (uint32_t i = runs_.runs[r].first; i < runs_.runs[r].last; ++i) {
       const splat::DrawItem& item = list.items[i];
       if (item.level.count == 0) continue;
-      const PointRange range = arenas_.place(item);
+      const PointRange range = arenas_.place(item, list.replica);
       DrawRecord d = record(item, item.splat_px / list.scale, kernel, surfel_camera);
       d.word = range.word;
       d.count = item.arrays().count;

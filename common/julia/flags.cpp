@@ -1,0 +1,151 @@
+#include "common/julia/flags.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+
+namespace telesplat::julia {
+namespace {
+
+template <class Names>
+std::string joined(const Names& names) {
+  std::string out;
+  for (const auto& n : names) out += fmt::format("{}{}", out.empty() ? "" : ", ", n);
+  return out;
+}
+
+// Takes "nan" and "inf" as well, so that the parameter's own limits answer.
+Result<double> read_number(std::string_view name, const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end) return Error{fmt::format("{} is \"{}\", not a number", name, text.substr(0, 40))};
+  return value;
+}
+
+// "i,j,k,real"
+Status read_constant(const std::string& text, Parameters& p) {
+  const char* names[] = {"c.x", "c.y", "c.z", "c.w"};
+  size_t begin = 0;
+  for (int i = 0; i < 4; ++i) {
+    const size_t comma = text.find(',', begin);
+    if ((comma == std::string::npos) != (i == 3))
+      return Error{fmt::format("c is \"{}\", not four numbers i,j,k,real", text.substr(0, 80))};
+    const auto value = read_number(names[i], text.substr(begin, comma - begin));
+    if (!value) return value.error();
+    if (const Status s = set(p, names[i], *value); !s) return s;
+    begin = comma + 1;
+  }
+  return ok_status();
+}
+
+}  // namespace
+
+bool SceneOptions::any() const {
+  return !preset.empty() || !c.empty() || !animate.empty() || list_presets ||
+         std::any_of(values.begin(), values.end(), [](const auto& v) { return !v.second.empty(); });
+}
+
+void add_scene_flags(CLI::App& app, SceneOptions& o) {
+  const std::string group = "Julia sets";
+  std::vector<std::string_view> names;
+  for (const auto& p : presets()) names.push_back(p.name);
+  app.add_option("--preset", o.preset, fmt::format("{}; default: {}", joined(names), names.front()))->group(group);
+  app.add_flag("--list-presets", o.list_presets, "tell the presets' constants and end")->group(group);
+  app.add_option("--c", o.c, "the constant: i,j,k,real, each -4..4")->group(group);
+  app.add_option("--animate", o.animate,
+                 "parameters that change: NAME=FROM:TO:SECONDS (and back, for ever) or NAME=@0s:VALUE@5s:VALUE..., "
+                 "several with ; between them; off: nothing")
+      ->group(group);
+  o.values.clear();
+  for (const auto& info : parameter_infos()) o.values.emplace_back(info.name, "");
+  const auto default_text = [defaults = presets().front().parameters](std::string_view name) {
+    if (name == "palette") return std::string(palette_names()[size_t(defaults.palette)]);
+    if (name == "colour") return std::string(colour_names()[size_t(defaults.colour)]);
+    return fmt::format("{}", get(defaults, name));
+  };
+  for (size_t i = 0; i < o.values.size(); ++i) {
+    const auto& info = parameter_infos()[i];
+    std::string limits = fmt::format("{}..{}", info.least, info.most);
+    if (info.name == "palette") limits = joined(palette_names());
+    if (info.name == "colour") limits = joined(colour_names());
+    std::string text = fmt::format("{}: {}", info.text, limits);
+    if (!info.name.starts_with("c.")) text += fmt::format("; first preset: {}", default_text(info.name));
+    app.add_option(fmt::format("--{}", info.name), o.values[i].second, text)->group(group);
+  }
+}
+
+Result<double> read_value(std::string_view name, const std::string& text) {
+  const auto names = name == "palette"  ? palette_names()
+                     : name == "colour" ? colour_names()
+                                        : std::span<const std::string_view>{};
+  const auto found = std::find(names.begin(), names.end(), text);
+  if (found != names.end()) return double(found - names.begin());
+  auto value = read_number(name, text);
+  if (!value && !names.empty())
+    return Error{fmt::format("{} is \"{}\", not one of {}", name, text.substr(0, 40), joined(names))};
+  return value;
+}
+
+Result<Scene> read_scene(const SceneOptions& o) {
+  Scene out;
+  const std::string preset = o.preset.empty() ? std::string(presets().front().name) : o.preset;
+  const auto chosen = preset_named(preset);
+  if (!chosen) return chosen.error();
+  out.parameters = *chosen;
+  out.title = fmt::format("{}{}", kSceneWord, o.c.empty() || !o.preset.empty() ? " (" + preset + ")" : "");
+  if (!o.c.empty())
+    if (const Status s = read_constant(o.c, out.parameters); !s) return s.error();
+  for (const auto& [name, text] : o.values) {
+    if (text.empty()) continue;
+    const auto value = read_value(name, text);
+    if (!value) return value.error();
+    if (const Status s = set(out.parameters, name, *value); !s) return s.error();
+  }
+  if (const Status s = validate(out.parameters); !s) return s.error();
+  if (o.animate.empty() || o.animate == "off") return out;
+  auto timeline = parse_timeline(o.animate);
+  if (!timeline) return timeline.error();
+  out.timeline = std::move(*timeline);
+  if (const size_t bytes = out.timeline.text().size(); bytes > kMaxAnimation)
+    return Error{fmt::format("the animation is a text of {} bytes, limit {}", bytes, kMaxAnimation)};
+  if (const Status s = validate(out.parameters, out.timeline); !s) return s.error();
+  out.parameters = *parameters_at(out.parameters, out.timeline, 0);
+  return out;
+}
+
+std::vector<std::string> to_flags(const SceneOptions& o) {
+  std::vector<std::string> out;
+  const auto add = [&](std::string_view name, const std::string& value) {
+    if (!value.empty()) out.push_back(fmt::format("--{}={}", name, value));
+  };
+  add("preset", o.preset);
+  add("c", o.c);
+  for (const auto& [name, text] : o.values) add(name, text);
+  add("animate", o.animate);
+  return out;
+}
+
+std::string describe_presets() {
+  std::string out = "preset       c = (i, j, k, real)                 palette    what it looks like\n";
+  for (const auto& p : presets()) {
+    const auto& c = p.parameters.c;
+    out += fmt::format("{:12} {:36} {:10} {}\n", p.name, fmt::format("{}, {}, {}, {}", c.x, c.y, c.z, c.w),
+                       palette_names()[size_t(p.parameters.palette)], p.text);
+  }
+  return out;
+}
+
+Result<Placement> place(const Scene& scene, double room_size_m, const std::function<void(size_t, size_t)>& progress) {
+  const AnimatedBounds found = animated_bounds(scene.parameters, scene.timeline, progress);
+  if (!found.box.empty()) return place(found.box, room_size_m);
+  const Parameters p = *parameters_at(scene.parameters, scene.timeline, found.empty_at_s);
+  std::string what = fmt::format("slice.offset is {}: the slice", p.slice_offset);
+  if (p.bound > 0)
+    what = fmt::format("slice.offset is {} and bound {}: the slice in that cube", p.slice_offset, p.bound);
+  if (!scene.timeline.empty()) what += fmt::format(", at {:.4g} s of the animation,", found.empty_at_s);
+  return Error{what + " holds no point of the set"};
+}
+
+}  // namespace telesplat::julia

@@ -1,0 +1,57 @@
+// The command line of a Julia set: one flag a parameter. Shared by the programs that take one.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/julia/animation.h"
+
+namespace CLI {
+class App;
+}
+
+namespace telesplat::julia {
+
+/// The word that stands where a data file would.
+inline constexpr std::string_view kSceneWord = "julia";
+
+inline constexpr size_t kMaxAnimation =
+    4000;  ///< bytes of a scene's animation as text: it travels in one string of a message
+
+/// As given: nothing is read or checked yet.
+struct SceneOptions {
+  std::string preset;  ///< empty: the first of presets()
+  std::string c;       ///< "i,j,k,real"; empty: not given
+  std::vector<std::pair<std::string, std::string>>
+      values;           ///< parameter name and text, in the order of parameter_infos()
+  std::string animate;  ///< empty or "off": nothing
+  bool list_presets = false;
+  bool any() const;  ///< something was given that only a Julia set takes
+};
+
+/// --preset, --c, --animate, --list-presets and one flag a parameter: --c.x, --iterations, ..., limits in their help.
+void add_scene_flags(CLI::App& app, SceneOptions& options);
+
+struct Scene {
+  std::string title;      ///< "julia (coral)"; "julia" if c was given
+  Parameters parameters;  ///< with the animation's values at 0 s
+  Timeline timeline;
+};
+/// Preset, then c, then single parameters, then the animation. Error: what cannot be read, with limits; as validate().
+Result<Scene> read_scene(const SceneOptions& options);
+
+/// The flags that say the same again, for another program.
+std::vector<std::string> to_flags(const SceneOptions& options);
+
+/// A parameter's value as people write it: a number, or the name of a palette or of what colours are made from.
+Result<double> read_value(std::string_view name, const std::string& text);
+
+/// Names, constants and descriptions, a line each.
+std::string describe_presets();
+
+/// The scene in the room: where its set lies during the whole animation. Error: the slice is empty at some time.
+Result<Placement> place(const Scene& scene, double room_size_m,
+                        const std::function<void(size_t, size_t)>& progress = {});
+
+}  // namespace telesplat::julia

@@ -1,0 +1,61 @@
+// Names and addresses that processes give themselves: they must be good for others, on other machines and in other containers.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+
+#include "common/net/service.h"
+
+namespace telesplat::net {
+namespace {
+
+TEST(Service, NamesTellRoleHostAndProcess) {
+  ASSERT_FALSE(host_name().empty());
+  EXPECT_EQ(unique_name("sampler"), "sampler-" + host_name() + "-" + std::to_string(getpid()));
+}
+
+TEST(Service, AnnouncesWhatItIsToldOrIsBoundTo) {
+  EXPECT_EQ(announced("tcp://127.0.0.1:7000", ""), "tcp://127.0.0.1:7000");
+  EXPECT_EQ(announced("tcp://192.168.1.5:7000", ""), "tcp://192.168.1.5:7000");
+  EXPECT_EQ(announced("tcp://192.168.1.5:7000", "lab.example"), "tcp://lab.example:7000");
+  EXPECT_EQ(announced("tcp://0.0.0.0:7000", "10.0.0.7"), "tcp://10.0.0.7:7000");
+  EXPECT_EQ(announced("tcp://0.0.0.0:7000", "fe80::1"), "tcp://[fe80::1]:7000");
+  EXPECT_EQ(announced("tcp://0.0.0.0:7000", "[fe80::1]"), "tcp://[fe80::1]:7000");
+  EXPECT_EQ(announced("ipc:///run/telesplat/tiles", "lab.example"), "ipc:///run/telesplat/tiles");
+  EXPECT_EQ(announced("inproc://tiles", ""), "inproc://tiles");
+}
+
+TEST(Service, NeverAnnouncesAWildcard) {
+  for (const char* bound : {"tcp://0.0.0.0:7000", "tcp://[::]:7000", "tcp://*:7000"})
+    EXPECT_EQ(announced(bound, ""), "tcp://" + host_name() + ":7000") << bound;
+}
+
+TEST(Service, RefusesHostsThatNobodyCanConnectTo) {
+  for (const char* host : {"lab-3.example.org", "10.0.0.7", "fe80::1", "[fe80::1%eth0]", "a_container"})
+    EXPECT_EQ(complain_about_host(host), "") << host;
+  for (const std::string host : {std::string("0.0.0.0"), std::string("*"), std::string("::"), std::string("[::]"),
+                                 std::string(""), std::string("tcp://lab"), std::string("a b"), std::string(254, 'a')})
+    EXPECT_NE(complain_about_host(host), "") << host;
+}
+
+TEST(Service, FlagsTakeTheMasterFromTheEnvironment) {
+  const auto parse = [](std::vector<std::string> arguments, Ends ends) {
+    ServiceOptions options;
+    CLI::App app;
+    add_service_flags(app, options, ends);
+    std::reverse(arguments.begin(), arguments.end());
+    app.parse(arguments);
+    return options;
+  };
+  setenv("TELESPLAT_MASTER", "tcp://leader:7700", 1);
+  EXPECT_EQ(parse({}, Ends::kConnects).master, "tcp://leader:7700");
+  EXPECT_EQ(parse({"--master", "tcp://other:1"}, Ends::kBoth).master, "tcp://other:1");
+  unsetenv("TELESPLAT_MASTER");
+  EXPECT_EQ(parse({}, Ends::kBoth).master, "tcp://127.0.0.1:7700");
+  EXPECT_EQ(parse({"--advertise", "lab"}, Ends::kBoth).advertise, "lab");
+  EXPECT_THROW(parse({"--advertise", "0.0.0.0"}, Ends::kBoth), CLI::ValidationError);
+  EXPECT_THROW(parse({"--advertise", "lab"}, Ends::kConnects), CLI::ExtrasError);
+}
+
+}  // namespace
+}  // namespace telesplat::net
