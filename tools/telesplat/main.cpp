@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "tools/telesplat/bench_scaling.h"
 #include "tools/telesplat/compare_command.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/inspect_command.h"
@@ -91,6 +92,13 @@ int telesplat_main(int argc, char** argv) {
       "compare", "draw poses of a recorded run with every kernel and renderer, and directly from the data");
   launcher::add_compare_flags(*compare, compare_options);
 
+  launcher::ScalingOptions scaling_options;
+  auto* bench = app.add_subcommand("bench", "measure the pipeline");
+  bench->require_subcommand(1);
+  auto* scaling = bench->add_subcommand(
+      "scaling", "how a Julia set's frame speeds up with the number of samplers, beside table 7.2 of the thesis");
+  launcher::add_scaling_flags(*scaling, scaling_options);
+
   auto arguments = launcher::expand_scene_file(argc, argv);
   if (!arguments) {
     std::fprintf(stderr, "telesplat: %s\n", arguments.error().text.c_str());
@@ -103,6 +111,7 @@ int telesplat_main(int argc, char** argv) {
   if (*view) launcher::apply_scene_defaults(*view, view_options);
   if (*run) return launcher::run(run_options);
   if (*view) return launcher::run(view_options);
+  if (*bench) return launcher::bench_scaling(scaling_options);
   if (*compare) return launcher::compare(compare_options);
   if (*ctl) return control(master, command, given);
   return launcher::inspect(path, mesh);
