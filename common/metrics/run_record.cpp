@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "common/image/depth_image.h"
 
@@ -20,6 +21,20 @@ std::string shortest(double v) { return fmt::format("{:.9g}", v); }
 
 void write_text(FILE* file, const std::string& text) {
   if (file) std::fwrite(text.data(), 1, text.size(), file);
+}
+
+// How evenly samplers were kept busy: (most - least) / mean.
+nlohmann::ordered_json busy_spread(const std::map<std::string, double>& busy_s) {
+  double least = 1e300, most = 0, sum = 0;
+  auto by_name = nlohmann::ordered_json::object();
+  for (const auto& [name, s] : busy_s) {
+    least = std::min(least, s);
+    most = std::max(most, s);
+    sum += s;
+    by_name[name] = std::round(s * 1e6) / 1e6;
+  }
+  const double spread = sum > 0 ? (most - least) * double(busy_s.size()) / sum : 0;
+  return {{"spread", std::round(spread * 1e4) / 1e4}, {"busy_s", by_name}};
 }
 
 }  // namespace
@@ -38,12 +53,13 @@ Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory)
       return Error{fmt::format("{}: cannot write into it: {}", directory, std::strerror(errno))};
   }
   out->tiles_file_ = open_file("tiles.csv");
+  out->epochs_file_ = open_file("epochs.csv");
   out->trace_file_ = open_file("trace.json");
-  if (!out->tiles_file_ || !out->trace_file_)
+  if (!out->tiles_file_ || !out->epochs_file_ || !out->trace_file_)
     return Error{fmt::format("{}: cannot write into it: {}", directory, std::strerror(errno))};
   write_text(out->tiles_file_,
              "frame,tile,lease,sampler,samples,kept,bytes_sampled,bytes_sent,leased_s,sample_begin_s,sample_end_s,"
-             "encode_end_s,receive_s,packed_s\n");
+             "encode_end_s,receive_s,packed_s,x,y,width,height,step\n");
   write_text(out->trace_file_, "[\n");
   return out;
 }
@@ -52,6 +68,7 @@ RunRecord::~RunRecord() {
   for (auto& [name, table] : tables_)
     if (table.file) std::fclose(table.file);
   if (tiles_file_) std::fclose(tiles_file_);
+  if (epochs_file_) std::fclose(epochs_file_);
   if (trace_file_) {
     write_text(trace_file_, "\n]\n");
     std::fclose(trace_file_);
@@ -116,10 +133,31 @@ void RunRecord::write_spans(const Process& process, const wire::MetricRows& rows
 
 void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& t) {
   tiles_.push_back(t);
-  write_text(tiles_file_,
-             fmt::format("{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n", t.frame.value, t.tile,
-                         t.lease.value, sampler, t.samples, t.kept, t.bytes_sampled, t.bytes_sent, t.leased_s,
-                         t.sample_begin_s, t.sample_end_s, t.encode_end_s, t.receive_s, t.packed_s));
+  busy_s_[sampler] += std::max(0.0, t.encode_end_s - t.sample_begin_s);
+  if (!tiles_file_) return;
+  fmt::memory_buffer line;
+  fmt::format_to(std::back_inserter(line),
+                 "{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{},{},{},{},{}\n", t.frame.value,
+                 t.tile, t.lease.value, sampler, t.samples, t.kept, t.bytes_sampled, t.bytes_sent, t.leased_s,
+                 t.sample_begin_s, t.sample_end_s, t.encode_end_s, t.receive_s, t.packed_s, t.rect.x, t.rect.y,
+                 t.rect.width, t.rect.height, t.step);
+  std::fwrite(line.data(), 1, line.size(), tiles_file_);
+}
+
+void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters) {
+  if (epochs_++ == 0) {
+    std::string header = "epoch,t_s";
+    for (const auto& [name, value] : parameters) epoch_columns_.push_back(name), header += "," + name;
+    write_text(epochs_file_, header + "\n");
+  }
+  std::string line = fmt::format("{},{:.6f}", epoch.value, t_s);
+  for (const auto& name : epoch_columns_) {
+    const auto found = parameters.find(name);
+    // Exact: the frame can be made again from it.
+    line += found == parameters.end() ? "," : fmt::format(",{}", found->second);
+  }
+  write_text(epochs_file_, line + "\n");
+  if (epochs_file_) std::fflush(epochs_file_);
 }
 
 std::vector<double> RunRecord::column(const std::string& table, const std::string& name) const {
@@ -169,24 +207,29 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
     return it == counters.end() ? 0.0 : it->second;
   };
 
-  // Per frame: sampling from the first tile's begin to the last one's end; packing is the sum over its tiles.
+  // Per frame: sampling from the first tile's begin to the last one's end; packing is the sum over its tiles. Coarse frames are a part of
+  // their view only, so they would flatter these figures.
   struct FrameTimes {
-    double begin = 1e300, end = 0, packing_s = 0;
+    double leased = 1e300, begin = 1e300, end = 0, packing_s = 0;
   };
   std::map<uint64_t, FrameTimes> frames;
   double bytes_raw = 0, bytes_sent = 0, samples = 0, kept = 0;
   for (const auto& t : tiles_) {
-    auto& f = frames[t.frame.value];
-    f.begin = std::min(f.begin, t.sample_begin_s);
-    f.end = std::max(f.end, t.encode_end_s);
-    f.packing_s += t.packed_s - t.receive_s;
+    if (t.step == 1) {
+      auto& f = frames[t.frame.value];
+      f.leased = std::min(f.leased, t.leased_s);
+      f.begin = std::min(f.begin, t.sample_begin_s);
+      f.end = std::max(f.end, t.encode_end_s);
+      f.packing_s += t.packed_s - t.receive_s;
+    }
     bytes_raw += double(t.samples) * image::kRawBytesPerPixel;
     bytes_sent += double(t.bytes_sent);
     samples += double(t.samples);
     kept += double(t.kept);
   }
-  std::vector<double> sampling_ms, packing_ms;
+  std::vector<double> leased_ms, sampling_ms, packing_ms;
   for (const auto& [id, f] : frames) {
+    leased_ms.push_back((f.end - f.leased) * 1e3);
     sampling_ms.push_back((f.end - f.begin) * 1e3);
     packing_ms.push_back(f.packing_s * 1e3);
   }
@@ -227,6 +270,7 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       {"size", {uint64_t(number("viewer", "width")), uint64_t(number("viewer", "height"))}},
       {"sampling_size", {uint64_t(number("viewer", "sampling_width")), uint64_t(number("viewer", "sampling_height"))}},
       {"sampling", fact("viewer", "sampling")},
+      {"epochs", epochs_},
       {"frames", times.size()},
       {"updates", column("updates", "latency_ms").size()},
       {"duration_s", std::round(span_s * 1000) / 1000},
@@ -237,7 +281,9 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       {"view_update_latency_ms", to_json(distribution(column("updates", "latency_ms")))},
       {"start_up_latency_ms", to_json(distribution(column("updates", "start_up_ms")))},
       {"sampling_ms", to_json(distribution(sampling_ms))},
+      {"lease_to_sampled_ms", to_json(distribution(leased_ms))},
       {"packing_ms", to_json(distribution(packing_ms))},
+      {"samplers_busy", busy_spread(busy_s_)},
       {"data_generating_rate_mb_s", bytes_raw / 1e6 / run_s},
       {"data_transfer_rate_mb_s", bytes_sent / 1e6 / run_s},
       {"data_consuming_rate_mb_s", sum_status("viewer", "points_received") * 12 / 1e6 / viewers / run_s},
@@ -251,6 +297,7 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       {"update_age_ms", to_json(distribution(column("frames", "update_age_ms")))},
       {"first_points_s", sum_present("viewer", "first_points_s") / viewers},
       {"tiles_released", uint64_t(counter("tiles_released"))},
+      {"leases_backup", uint64_t(counter("leases_backup"))},
       {"quality", nullptr},
       {"peak_rss_mb", rss},
       {"errors",

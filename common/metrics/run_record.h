@@ -1,4 +1,4 @@
-// The record of a run (DESIGN section 6): frames.csv, updates.csv, tiles.csv, trace.json, summary.json in one folder. Written by
+// The record of a run (DESIGN section 6): frames.csv, updates.csv, tiles.csv, epochs.csv, trace.json, summary.json in one folder. Written by
 // the master as rows arrive, so that what was measured survives whatever ends the run.
 #pragma once
 
@@ -32,6 +32,8 @@ class RunRecord {
   /// Rows of "frames", "updates" or "spans" from `process`. Refuses unknown tables and shapes that do not fit.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
   void add_tile(const std::string& sampler, const wire::TileDone& tile);
+  /// The scene's parameters from t_s on. epochs.csv has the names of the first epoch.
+  void add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters);
 
   /// The summary of DESIGN section 6 from everything so far. processes: all that took part; counters: "leases_expired",
   /// "tiles_released".
@@ -55,7 +57,11 @@ class RunRecord {
   std::string directory_;
   std::map<std::string, Table> tables_;
   std::vector<wire::TileDone> tiles_;
+  std::map<std::string, double> busy_s_;  // sample begin to encode end, by sampler
+  std::vector<std::string> epoch_columns_;
+  size_t epochs_ = 0;
   FILE* tiles_file_ = nullptr;
+  FILE* epochs_file_ = nullptr;
   FILE* trace_file_ = nullptr;
   bool trace_has_events_ = false;
   std::map<std::string, int> trace_names_;

@@ -1,96 +1,128 @@
 #include "services/master/frame_schedule.h"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 
 namespace telesplat::master {
 
-std::vector<geometry::Rect> cut_tiles(int width, int height, int tile_size) {
-  std::vector<geometry::Rect> out;
-  for (int y = 0; y < height; y += tile_size)
-    for (int x = 0; x < width; x += tile_size)
-      out.push_back({x, y, std::min(tile_size, width - x), std::min(tile_size, height - y)});
-  const auto distance = [&](const geometry::Rect& r) {
-    return std::hypot(r.x + r.width / 2.0 - width / 2.0, r.y + r.height / 2.0 - height / 2.0);
-  };
-  std::stable_sort(out.begin(), out.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
-  return out;
+void FrameSchedule::request_view(const wire::ViewRequest& request) { waiting_[request.viewer].request = request; }
+
+void FrameSchedule::forget_viewer(InstanceId viewer) {
+  waiting_.erase(viewer);
+  for (Frame& f : frames_)
+    if (f.request.viewer == viewer) f.viewer_left = true;
 }
 
-void FrameSchedule::request_view(const wire::ViewRequest& request) { waiting_[request.viewer] = request; }
-void FrameSchedule::forget_viewer(InstanceId viewer) { waiting_.erase(viewer); }
+void FrameSchedule::begin_turns() {
+  for (auto& [viewer, w] : waiting_) w.turn = true;
+}
 
-bool FrameSchedule::begin_frame(EpochId epoch) {
-  if (waiting_.empty() || frames_.size() >= size_t(options_.frames_in_flight)) return false;
-  auto next = waiting_.upper_bound(last_viewer_);
-  if (next == waiting_.end()) next = waiting_.begin();
-  Frame frame{next_frame_, epoch, next->second, {}, 0};
-  next_frame_ = next_frame_.next();
+bool FrameSchedule::turn_waiting() const {
+  return std::any_of(waiting_.begin(), waiting_.end(), [](const auto& w) { return w.second.turn; });
+}
+
+size_t FrameSchedule::views_in_flight() const {
+  return size_t(std::count_if(frames_.begin(), frames_.end(), [](const Frame& f) { return f.step == 1; }));
+}
+
+bool FrameSchedule::begin_view(EpochId epoch, bool turns_only) {
+  if (views_in_flight() >= size_t(options_.frames_in_flight)) return false;
+  const auto wanted = [&](const auto& w) { return !turns_only || w.second.turn; };
+  auto next = std::find_if(waiting_.upper_bound(last_viewer_), waiting_.end(), wanted);
+  if (next == waiting_.end()) next = std::find_if(waiting_.begin(), waiting_.end(), wanted);
+  if (next == waiting_.end()) return false;
+  const wire::ViewRequest request = next->second.request;
   last_viewer_ = next->first;
   waiting_.erase(next);
-  // A hostile viewer could ask for a frame of very many tiles; larger tiles keep the count bounded.
-  int size = options_.tile_size;
-  const auto& camera = frame.request.camera;
-  while (uint64_t((camera.width + size - 1) / size) * uint64_t((camera.height + size - 1) / size) > 1024) size *= 2;
-  for (const auto& rect : cut_tiles(camera.width, camera.height, size)) frame.tiles.push_back({rect});
-  frames_.push_back(std::move(frame));
+  if (cut_.coarse) begin_frame(epoch, request, kCoarseStep);
+  begin_frame(epoch, request, 1);
   return true;
 }
 
-bool FrameSchedule::tile_open() const {
-  for (const Frame& f : frames_)
-    for (const Tile& t : f.tiles)
-      if (t.state == State::kOpen) return true;
-  return false;
+void FrameSchedule::begin_frame(EpochId epoch, const wire::ViewRequest& request, int step) {
+  const geometry::Camera camera = step == 1 ? request.camera : geometry::subsample(request.camera, step);
+  auto tiles = cut_.rows ? FrameTiles::of_rows(camera.width, camera.height)
+                         : FrameTiles::of_squares(camera.width, camera.height, options_.tile_size);
+  frames_.push_back({next_frame_, epoch, request, step, camera, std::move(tiles)});
+  next_frame_ = next_frame_.next();
 }
 
-std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, EpochId epoch, double now_s) {
-  do {
-    for (Frame& f : frames_)
-      for (size_t i = 0; i < f.tiles.size(); ++i) {
-        Tile& t = f.tiles[i];
-        if (t.state != State::kOpen) continue;
-        t.state = State::kLeased;
-        t.lease = next_lease_;
-        t.sampler = sampler;
-        t.leased_s = now_s;
-        t.expires_s = now_s + lease_time_s();
-        next_lease_ = next_lease_.next();
-        return wire::Lease{.lease = t.lease,
-                           .frame = f.id,
-                           .epoch = f.epoch,
-                           .viewer = f.request.viewer,
-                           .request = f.request.request,
-                           .tile = i,
-                           .block = i,
-                           .blocks_in_frame = f.tiles.size(),
-                           .camera = f.request.camera,
-                           .rect = t.rect,
-                           .block_rect = t.rect,
-                           .leased_s = now_s};
-      }
-  } while (begin_frame(epoch));
+bool FrameSchedule::tile_open() const {
+  return std::any_of(frames_.begin(), frames_.end(), [](const Frame& f) { return f.tiles.open(); });
+}
+
+bool FrameSchedule::backup_due(double now_s) const {
+  const double before_s = now_s - backup_after_s();
+  return std::any_of(frames_.begin(), frames_.end(),
+                     [&](const Frame& f) { return !f.tiles.open() && f.tiles.overdue(before_s, nullptr); });
+}
+
+std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, double now_s, bool even_own) {
+  costs_.join(sampler);
+  const double pixel_s = costs_.pixel_s(sampler);
+  for (Frame& f : frames_) {
+    const int rows =
+        band_rows(options_.lease_target_s, pixel_s * f.camera.width, f.tiles.rows_left(), costs_.samplers());
+    if (const auto tile = f.tiles.take(sampler, rows, even_own)) return lease_tile(f, *tile, sampler, now_s);
+    if (f.tiles.open()) continue;
+    // A frame is finished before the next is fed: what is out too long gets a second sampler.
+    if (const auto tile = f.tiles.overdue(now_s - backup_after_s(), &sampler)) {
+      ++backups_;
+      return lease_tile(f, *tile, sampler, now_s);
+    }
+  }
   return std::nullopt;
+}
+
+wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& sampler, double now_s) {
+  const LeaseId id = next_lease_;
+  next_lease_ = next_lease_.next();
+  f.tiles.lease(tile, id, sampler, now_s, now_s + lease_time_s());
+  const auto& t = f.tiles.tile(tile);
+  return {.lease = id,
+          .frame = f.id,
+          .epoch = f.epoch,
+          .viewer = f.request.viewer,
+          .request = f.request.request,
+          .tile = tile,
+          .step = uint64_t(f.step),
+          .block = t.block,
+          .blocks_in_frame = f.tiles.blocks().size(),
+          .camera = f.camera,
+          .rect = t.rect,
+          .block_rect = f.tiles.blocks()[t.block],
+          .leased_s = now_s};
 }
 
 void FrameSchedule::extend(LeaseId lease, double now_s) {
   for (Frame& f : frames_)
-    for (Tile& t : f.tiles)
-      if (t.state == State::kLeased && t.lease == lease) t.expires_s = now_s + options_.lease_timeout_s;
+    if (f.tiles.extend(lease, now_s, now_s + options_.lease_timeout_s)) return;
 }
 
-bool FrameSchedule::tile_done(FrameId id, uint64_t tile, double now_s) {
-  const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == id; });
-  if (f == frames_.end() || tile >= f->tiles.size() || f->tiles[tile].state == State::kDone) return false;
-  Tile& t = f->tiles[tile];
-  if (t.state == State::kLeased)
-    tile_time_s_ = tile_time_s_ == 0 ? now_s - t.leased_s : 0.95 * tile_time_s_ + 0.05 * (now_s - t.leased_s);
-  t.state = State::kDone;
-  if (++f->done == f->tiles.size()) {
-    frames_.erase(f);
-    ++completed_;
-  }
+bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
+  const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
+  if (f == frames_.end()) return false;
+  const auto* out = f->tiles.out(m.lease);
+  const double leased_s = out ? out->leased_s : now_s;
+  if (!f->tiles.done(m.tile)) return false;
+  if (out) tile_time_s_ = tile_time_s_ == 0 ? now_s - leased_s : 0.95 * tile_time_s_ + 0.05 * (now_s - leased_s);
+  const auto& rect = f->tiles.tile(m.tile).rect;
+  costs_.learn(sampler, m.encode_end_s - m.sample_begin_s, double(rect.width) * rect.height);
+  if (f->tiles.complete()) end_frame(f);
   return true;
+}
+
+void FrameSchedule::end_frame(std::deque<Frame>::iterator frame) {
+  const bool whole = frame->step == 1;
+  const auto viewer = frame->request.viewer;
+  const auto request = frame->request.request;
+  frames_.erase(frame);
+  if (!whole) return;
+  ++completed_;
+  // A coarse frame that is not there yet shows nothing any more.
+  std::erase_if(frames_, [&](const Frame& f) {
+    return f.step != 1 && f.request.viewer == viewer && f.request.request == request;
+  });
 }
 
 double FrameSchedule::lease_time_s() const {
@@ -98,39 +130,36 @@ double FrameSchedule::lease_time_s() const {
   return std::clamp(25 * tile_time_s_, std::min(0.3, options_.lease_timeout_s), options_.lease_timeout_s);
 }
 
+double FrameSchedule::backup_after_s() const {
+  return tile_time_s_ == 0 ? std::numeric_limits<double>::infinity() : std::max(3 * tile_time_s_, kLeastOverdue_s);
+}
+
 int FrameSchedule::expire(double now_s, const std::function<void(const std::string&)>& lost_sampler) {
   int count = 0;
-  for (Frame& f : frames_)
-    for (Tile& t : f.tiles)
-      if (t.state == State::kLeased && now_s > t.expires_s) {
-        lost_sampler(t.sampler);
-        t.state = State::kOpen;
-        ++count;
-      }
+  for (Frame& f : frames_) count += f.tiles.expire(now_s, lost_sampler);
   released_ += uint64_t(count);
   return count;
 }
 
 int FrameSchedule::release_sampler(const std::string& sampler) {
+  costs_.leave(sampler);
   int count = 0;
-  for (Frame& f : frames_)
-    for (Tile& t : f.tiles)
-      if (t.state == State::kLeased && t.sampler == sampler) {
-        t.state = State::kOpen;
-        ++count;
-      }
+  for (Frame& f : frames_) count += f.tiles.release(sampler);
   released_ += uint64_t(count);
   return count;
 }
 
 size_t FrameSchedule::leases_of(const std::string& sampler) const {
   size_t count = 0;
-  for (const Frame& f : frames_)
-    count += size_t(std::count_if(f.tiles.begin(), f.tiles.end(),
-                                  [&](const Tile& t) { return t.state == State::kLeased && t.sampler == sampler; }));
+  for (const Frame& f : frames_) count += f.tiles.leases_of(sampler);
   return count;
 }
 
-void FrameSchedule::drop_frames() { frames_.clear(); }
+void FrameSchedule::drop_frames() {
+  // Newest first: where two views of a viewer were in flight, the newer one is wanted.
+  for (auto f = frames_.rbegin(); f != frames_.rend(); ++f)
+    if (!f->viewer_left) waiting_.try_emplace(f->request.viewer, Waiting{f->request, false});
+  frames_.clear();
+}
 
 }  // namespace telesplat::master

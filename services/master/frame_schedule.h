@@ -1,5 +1,5 @@
-// View requests -> sampling frames -> tile leases (T7.3): leases are pulled by idle samplers, expire, and are handed out again;
-// a tile is done only when the packer has it. No sockets, no clocks.
+// View requests -> sampling frames -> leases (T7.3): leases are pulled by idle samplers, expire, and are handed out again; a tile is done
+// only when the packer has it. No sockets, no clocks.
 #pragma once
 
 #include <deque>
@@ -9,76 +9,109 @@
 #include <vector>
 
 #include "common/wire/messages.h"
+#include "services/master/frame_tiles.h"
+#include "services/master/sampling_costs.h"
 
 namespace telesplat::master {
 
+inline constexpr int kCoarseStep = 4;             ///< a coarse frame has every 4th pixel of every 4th row
+inline constexpr double kLeastOverdue_s = 0.015;  ///< nothing that has been out for less gets a backup
+
 struct ScheduleOptions {
   int tile_size = 256;       ///< pixels a side; the last column and row may be smaller
-  int frames_in_flight = 2;  ///< frames begun and not complete, at most
+  int frames_in_flight = 2;  ///< views begun and not complete, at most
   double lease_timeout_s =
       2.0;  ///< longest time before a lease goes to another sampler; shorter once tile times are known
+  double lease_target_s = 0.004;  ///< what a lease of rows should take its sampler
 };
 
-/// Cuts a frame into tiles of tile_size, those nearest the centre first (that is where the person looks).
-std::vector<geometry::Rect> cut_tiles(int width, int height, int tile_size);
+/// How the frames of a scene are leased.
+struct Cut {
+  bool rows = false;    ///< bands of rows of blocks instead of square tiles
+  bool coarse = false;  ///< a view is two frames: one of step kCoarseStep, then one of step 1
+  bool operator==(const Cut&) const = default;
+};
 
 class FrameSchedule {
  public:
   explicit FrameSchedule(const ScheduleOptions& options) : options_(options) {}
 
+  /// For frames that begin from now on.
+  void set_cut(Cut cut) { cut_ = cut; }
+  Cut cut() const { return cut_; }
+
   /// The newest request of a viewer replaces the one that waits.
   void request_view(const wire::ViewRequest& request);
   void forget_viewer(InstanceId viewer);
+  bool view_waiting() const { return !waiting_.empty(); }
+  /// The viewers that wait now have a turn; those who come later have none. A turn ends when the viewer's frame begins.
+  void begin_turns();
+  bool turn_waiting() const;
 
-  /// The next tile to sample, leased to `sampler`, or nothing if no tile is open and no view waits.
-  std::optional<wire::Lease> lease(const std::string& sampler, EpochId epoch, double now_s);
+  /// Begins the frame or frames of the next view that waits; viewers take turns. turns_only: only those that have a turn. False: none
+  /// waits, or as many views are in flight as may be.
+  bool begin_view(EpochId epoch, bool turns_only = false);
+
+  /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been out for long in a
+  /// frame that has none (see backup_after_s()). even_own: tiles whose lease ran out at this very sampler, too.
+  std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true);
   /// Gives a lease its full time again. Unknown leases are ignored.
   void extend(LeaseId lease, double now_s);
-  /// The packer has this tile. Returns true the first time, false for duplicates and unknown frames.
-  bool tile_done(FrameId frame, uint64_t tile, double now_s);
+  /// The packer has this tile, which `sampler` (empty: unknown) sampled. Returns true the first time, whichever lease it came from; false
+  /// for duplicates, tiles never leased and unknown frames. Learns from the tile's times.
+  bool tile_done(const wire::TileDone& tile, const std::string& sampler, double now_s);
 
   /// Takes back leases that ran out. Returns how many; lost_sampler is told whose.
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
   /// Takes back all leases of a sampler that left. Returns how many.
   int release_sampler(const std::string& sampler);
   size_t leases_of(const std::string& sampler) const;
-  /// Drops all frames (new epoch, new packer); waiting view requests stay.
+  /// Drops all frames (new epoch, new packer). Their views wait again, unless a newer request of the viewer does.
   void drop_frames();
 
-  bool view_waiting() const { return !waiting_.empty(); }
   bool tile_open() const;
+  /// A tile has been out so long that any other sampler than its own could take a backup.
+  bool backup_due(double now_s) const;
   size_t frames_in_flight() const { return frames_.size(); }
-  uint64_t frames_completed() const { return completed_; }
+  size_t views_in_flight() const;
+  uint64_t frames_completed() const { return completed_; }  ///< those of step 1: views
   uint64_t tiles_released() const { return released_; }
+  uint64_t backups() const { return backups_; }
+  const SamplingCosts& costs() const { return costs_; }
   /// Seconds after which a lease expires now: 25 typical tile times, within [0.3, lease_timeout_s].
   double lease_time_s() const;
+  /// Seconds after which a tile that is out may be leased to another sampler too: 3 typical tile times, at least kLeastOverdue_s; never
+  /// while nothing is known.
+  double backup_after_s() const;
 
  private:
-  enum class State { kOpen, kLeased, kDone };
-  struct Tile {
-    geometry::Rect rect;
-    State state = State::kOpen;
-    LeaseId lease;
-    std::string sampler;
-    double leased_s = 0, expires_s = 0;
+  struct Waiting {
+    wire::ViewRequest request;
+    bool turn = false;
   };
   struct Frame {
     FrameId id;
     EpochId epoch;
     wire::ViewRequest request;
-    std::vector<Tile> tiles;
-    size_t done = 0;
+    int step = 1;
+    geometry::Camera camera;
+    FrameTiles tiles;
+    bool viewer_left = false;
   };
-  bool begin_frame(EpochId epoch);
+  void begin_frame(EpochId epoch, const wire::ViewRequest& request, int step);
+  void end_frame(std::deque<Frame>::iterator frame);
+  wire::Lease lease_tile(Frame& frame, size_t tile, const std::string& sampler, double now_s);
 
   ScheduleOptions options_;
-  std::map<InstanceId, wire::ViewRequest> waiting_;
+  Cut cut_;
+  std::map<InstanceId, Waiting> waiting_;
   InstanceId last_viewer_;  // viewers take turns
   std::deque<Frame> frames_;
+  SamplingCosts costs_;
   FrameId next_frame_{1};
   LeaseId next_lease_{1};
   double tile_time_s_ = 0;  // running mean of lease -> done
-  uint64_t completed_ = 0, released_ = 0;
+  uint64_t completed_ = 0, released_ = 0, backups_ = 0;
 };
 
 }  // namespace telesplat::master

@@ -13,7 +13,7 @@ constexpr int kMaxWaitingLeases = 64;  // lease requests of one sampler
 }  // namespace
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
-    : options_(options), instance_(instance), record_(record), schedule_(options.schedule) {}
+    : options_(options), instance_(instance), record_(record), schedule_(options.schedule), scene_(options.animation) {}
 
 MasterCore::Peer* MasterCore::known(const std::string& peer, double now_s) {
   const auto it = peers_.find(peer);
@@ -32,28 +32,65 @@ MasterCore::Peer* MasterCore::find_role(const std::string& role) {
 }
 
 wire::Welcome MasterCore::welcome(double now_s) const {
-  wire::Welcome w{instance_, 0, now_s, epoch_, options_.octree_depth, {}, {}, {}, {}, options_.settings};
-  for (const auto& [id, p] : peers_) {
-    if (p.gone) continue;
-    w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
-    if (p.hello.role == "data") {
-      w.box_room = p.hello.box_room;
-      w.facts = p.hello.facts;
-      w.parameters = p.hello.parameters;
-    }
-  }
+  wire::Welcome w;
+  w.master = instance_;
+  w.master_s = now_s;
+  w.epoch = epoch_;
+  w.octree_depth = options_.octree_depth;
+  w.settings = settings();
+  // The scene stays what it is while its data server is away.
+  w.box_room = box_room_;
+  w.facts = facts_;
+  w.parameters = scene_.values();
+  for (const auto& [id, p] : peers_)
+    if (!p.gone) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
   return w;
 }
 
+std::map<std::string, double> MasterCore::settings() const {
+  auto out = options_.settings;
+  if (const auto keep = out.find("packing.keep_redundant"); keep != out.end() && keep->second < 0)
+    keep->second = scene_.kind() == "julia" ? 1 : 0;
+  return out;
+}
+
 void MasterCore::announce(double now_s) {
-  for (const auto& [id, p] : peers_)
-    if (!p.gone && p.hello.role != "ctl") emit(id, welcome(now_s));
+  const std::string body = wire::encode(welcome(now_s));
+  // The packer first: it should know an epoch before tiles of it come.
+  for (const bool packer : {true, false})
+    for (const auto& [id, p] : peers_)
+      if (!p.gone && p.hello.role != "ctl" && (p.hello.role == "packer") == packer)
+        outgoing_.push_back({id, std::string(wire::Welcome::kName), body});
+}
+
+void MasterCore::next_epoch(double now_s) {
+  epoch_ = epoch_.next();
+  schedule_.drop_frames();
+  if (scene_known_) record_.add_epoch(epoch_, now_s, scene_.values());
+  announce(now_s);
+}
+
+void MasterCore::adopt_scene(const wire::Hello& data, double now_s) {
+  box_room_ = data.box_room;
+  facts_ = data.facts;
+  std::string problem;
+  bool changed = scene_.adopt(data, problem);
+  if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
+  const bool julia = scene_.kind() == "julia";
+  const Cut cut{julia, options_.progressive == Progressive::kAuto ? julia : options_.progressive == Progressive::kOn};
+  changed |= cut != schedule_.cut();
+  schedule_.set_cut(cut);
+  if (!std::exchange(scene_known_, true))
+    record_.add_epoch(epoch_, now_s, scene_.values());
+  else if (changed)
+    next_epoch(now_s);  // another scene than that of the server before
 }
 
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
   if (peers_.size() >= kMaxPeers && !peers_.contains(peer)) {
     const auto departed = std::find_if(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone; });
     if (departed == peers_.end()) return;
+    instances_.erase(departed->second.hello.instance);
     peers_.erase(departed);
   }
   // A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet.
@@ -67,6 +104,8 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   const bool changed = p.hello.instance != m.instance || p.gone || p.hello.endpoints != m.endpoints;
   if (changed && m.role == "packer")
     schedule_.drop_frames();  // a new packer has none of the tiles that the old one had
+  instances_.erase(p.hello.instance);
+  instances_[m.instance] = peer;
   p.hello = m;
   p.process.role = m.role;
   p.process.name = m.name;
@@ -75,6 +114,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   p.seen_s = now_s;
   p.gone = false;
   if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
+  if (m.role == "data") adopt_scene(m, now_s);
   wire::Welcome w = welcome(now_s);
   w.hello_sent_s = m.sent_s;
   emit(peer, w);
@@ -95,8 +135,7 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
 void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double now_s) {
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "sampler" || p->waiting_leases >= kMaxWaitingLeases) return;
-  ++p->waiting_leases;
-  idle_.push_back(peer);
+  if (p->waiting_leases++ == 0) idle_.push_back(peer);
   dispatch(now_s);
 }
 
@@ -107,17 +146,19 @@ void MasterCore::on(const std::string& peer, const wire::LeaseExtend& m, double 
 void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now_s) {
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "packer") return;
-  if (!schedule_.tile_done(m.frame, m.tile, now_s)) return;
-  std::string sampler = "?";
-  for (const auto& [id, s] : peers_)
-    if (s.hello.instance == m.sampler) sampler = s.hello.name;
-  record_.add_tile(sampler, m);
+  const auto by = instances_.find(m.sampler);
+  const auto sampler = by == instances_.end() ? peers_.end() : peers_.find(by->second);
+  const bool known_sampler = sampler != peers_.end();
+  if (!schedule_.tile_done(m, known_sampler ? sampler->first : std::string(), now_s)) return;
+  record_.add_tile(known_sampler ? sampler->second.hello.name : "?", m);
   dispatch(now_s);
 }
 
-void MasterCore::on(const std::string& peer, const wire::Goodbye&, double) {
+void MasterCore::on(const std::string& peer, const wire::Goodbye&, double now_s) {
   const auto it = peers_.find(peer);
-  if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "left", true);
+  if (it == peers_.end() || it->second.gone) return;
+  lose(it->second, peer, "left", true);
+  dispatch(now_s);
 }
 
 Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double now_s) {
@@ -133,14 +174,26 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
     stop_ = true;
     return;
   }
-  if (m.command == "epoch") {
-    epoch_ = epoch_.next();
-    schedule_.drop_frames();
-    announce(now_s);
-    return emit(peer, wire::ControlReply{true, fmt::format("epoch {}", epoch_.value)});
+  const auto done = obey(m, now_s);
+  emit(peer, wire::ControlReply{done.ok(), done ? *done : done.error().text});
+  if (done) dispatch(now_s);
+}
+
+Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
+  if (m.command == "set")
+    if (const Status s = scene_.set(m.arguments); !s) return s.error();
+  if (m.command == "epoch" || m.command == "set") {
+    next_epoch(now_s);
+    return fmt::format("epoch {}", epoch_.value);
   }
-  emit(peer, wire::ControlReply{
-                 false, fmt::format("unknown command '{}'; known: status, stop, epoch", m.command.substr(0, 64))});
+  if (m.command == "animate") {
+    const auto timeline = m.arguments.find("timeline");
+    if (timeline == m.arguments.end())
+      return Error{"animate: the argument timeline is missing, such as c.y=-0.4:0.4:10s, or off"};
+    if (const Status s = scene_.animate(timeline->second); !s) return s.error();
+    return "animation " + scene_.animation();
+  }
+  return Error{fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate", m.command.substr(0, 64))};
 }
 
 void MasterCore::undeliverable(const std::string& peer) {
@@ -167,18 +220,39 @@ void MasterCore::tick(double now_s) {
               it == peers_.end() ? "?" : it->second.hello.name);
   });
   leases_expired_ += uint64_t(expired);
-  if (expired || schedule_.tile_open() || schedule_.view_waiting()) dispatch(now_s);
+  dispatch(now_s);
+}
+
+bool MasterCore::begin_view(double now_s) {
+  if (!scene_.animated()) return schedule_.begin_view(epoch_);
+  // One view at a time, so that each epoch has a complete one; all who wait when an epoch begins are served from it, in turn.
+  if (schedule_.frames_in_flight() > 0 || !schedule_.view_waiting()) return false;
+  if (!schedule_.turn_waiting()) {
+    if (scene_.step(now_s)) next_epoch(now_s);
+    schedule_.begin_turns();
+  }
+  return schedule_.begin_view(epoch_, true);
+}
+
+bool MasterCore::lease_one(double now_s) {
+  for (const bool even_own : {false, true})
+    for (size_t i = 0; i < idle_.size(); ++i) {
+      const std::string sampler = idle_[i];
+      const auto lease = schedule_.lease(sampler, now_s, even_own);
+      if (!lease) continue;
+      idle_.erase(idle_.begin() + std::ptrdiff_t(i));
+      if (--peers_[sampler].waiting_leases > 0) idle_.push_back(sampler);
+      emit(sampler, *lease);
+      return true;
+    }
+  return false;
 }
 
 void MasterCore::dispatch(double now_s) {
-  if (stop_ || !find_role("packer")) return;
+  if (stop_ || idle_.empty() || !find_role("packer")) return;
   while (!idle_.empty()) {
-    const std::string sampler = idle_.front();
-    const auto lease = schedule_.lease(sampler, epoch_, now_s);
-    if (!lease) return;
-    idle_.pop_front();
-    --peers_[sampler].waiting_leases;
-    emit(sampler, *lease);
+    if ((schedule_.tile_open() || schedule_.backup_due(now_s)) && lease_one(now_s)) continue;
+    if (!begin_view(now_s)) return;
   }
 }
 
@@ -206,6 +280,7 @@ std::vector<metrics::Process> MasterCore::processes() const {
 std::map<std::string, double> MasterCore::counters() const {
   return {{"leases_expired", double(leases_expired_)},
           {"tiles_released", double(schedule_.tiles_released())},
+          {"leases_backup", double(schedule_.backups())},
           {"frames_completed", double(schedule_.frames_completed())}};
 }
 
@@ -216,6 +291,10 @@ std::string MasterCore::status_json(double now_s) const {
   out["frames_in_flight"] = schedule_.frames_in_flight();
   out["leases_expired"] = leases_expired_;
   out["tiles_released"] = schedule_.tiles_released();
+  out["leases_backup"] = schedule_.backups();
+  out["parameters"] = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : scene_.values()) out["parameters"][name] = value;
+  out["animation"] = scene_.animation();
   out["processes"] = nlohmann::ordered_json::array();
   for (const auto& [id, p] : peers_) {
     if (p.hello.role == "ctl") continue;

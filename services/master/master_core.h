@@ -4,18 +4,30 @@
 #include <deque>
 #include <map>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "common/metrics/run_record.h"
 #include "common/wire/serial.h"
 #include "services/master/frame_schedule.h"
+#include "services/master/scene_parameters.h"
 
 namespace telesplat::master {
 
+/// Whether a view arrives coarse first.
+enum class Progressive {
+  kAuto,  ///< of scenes that take long to sample: Julia sets
+  kOn,
+  kOff
+};
+
 struct MasterOptions {
   ScheduleOptions schedule;
+  Progressive progressive = Progressive::kAuto;
+  julia::Timeline animation;  ///< of the scene's parameters, from the first view on; empty: what the data server says
   uint64_t octree_depth = 6;
-  std::map<std::string, double> settings;  ///< packing.* values for the packer, passed on in every welcome
+  std::map<std::string, double> settings;  ///< packing.* values for the packer, passed on in every welcome;
+                                           ///< packing.keep_redundant below 0: 1 for Julia sets, else 0
   double silent_after_s = 5.0;             ///< a process that reports nothing for so long is taken for dead
 };
 
@@ -43,6 +55,8 @@ class MasterCore {
   void undeliverable(const std::string& peer);
   /// To be called every 50 ms or so: expires leases, notices the dead.
   void tick(double now_s);
+  /// Samplers idle while tiles are out: a backup may soon be due, so tick() should come every few ms.
+  bool hurried() const { return !idle_.empty() && schedule_.frames_in_flight() > 0; }
   /// Tells everyone to finish.
   void shut_down(const std::string& reason);
 
@@ -53,6 +67,10 @@ class MasterCore {
 
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
+  bool progressive() const { return schedule_.cut().coarse; }
+  std::string animation() const { return scene_.animation(); }
+  /// MasterOptions::settings as the packer gets them: what was left to the kind of scene is decided.
+  std::map<std::string, double> settings() const;
 
  private:
   struct Peer {
@@ -60,7 +78,7 @@ class MasterCore {
     metrics::Process process;
     double seen_s = 0;
     bool gone = false;
-    int waiting_leases = 0;
+    int waiting_leases = 0;  ///< lease requests not answered yet; above 0: the sampler is in idle_
   };
   template <class M>
   void emit(const std::string& peer, const M& m) {
@@ -70,6 +88,11 @@ class MasterCore {
   Peer* find_role(const std::string& role);
   wire::Welcome welcome(double now_s) const;
   void announce(double now_s);
+  void adopt_scene(const wire::Hello& data, double now_s);
+  void next_epoch(double now_s);
+  Result<std::string> obey(const wire::Control& m, double now_s);
+  bool begin_view(double now_s);
+  bool lease_one(double now_s);
   void dispatch(double now_s);
   void lose(Peer& peer, const std::string& routing_id, const char* why, bool said_goodbye = false);
   std::string status_json(double now_s) const;
@@ -78,9 +101,14 @@ class MasterCore {
   InstanceId instance_;
   metrics::RunRecord& record_;
   FrameSchedule schedule_;
+  SceneParameters scene_;
+  bool scene_known_ = false;
+  geometry::Box box_room_;  // of the last data server
+  std::map<std::string, std::string> facts_;
   EpochId epoch_{1};
-  std::map<std::string, Peer> peers_;  // by routing id
-  std::deque<std::string> idle_;       // samplers waiting for a lease, one entry a request
+  std::map<std::string, Peer> peers_;                      // by routing id
+  std::unordered_map<InstanceId, std::string> instances_;  // routing ids
+  std::deque<std::string> idle_;                           // samplers waiting for leases, each once
   std::vector<Outgoing> outgoing_;
   uint64_t leases_expired_ = 0;
   bool stop_ = false;

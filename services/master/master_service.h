@@ -9,10 +9,11 @@ namespace telesplat::master {
 struct MasterServiceOptions {
   net::ServiceOptions service;  ///< bind: the control socket's address
   MasterOptions master;
-  std::string out;  ///< run folder; empty: no record is written
+  std::string out;      ///< run folder; empty: no record is written
+  std::string animate;  ///< as julia::parse_timeline takes it; empty: what the data server says
 };
 
-/// Flags that `telesplat run` has too: tiles, leases, packing.
+/// Flags that `telesplat run` has too: tiles, leases, packing. (There the data server is told of animations.)
 void add_session_flags(CLI::App& app, MasterServiceOptions& options);
 void add_flags(CLI::App& app, MasterServiceOptions& options);
 

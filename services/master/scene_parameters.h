@@ -1,0 +1,50 @@
+// The scene's parameters in the current epoch, what may change them, and the animation that does (T7.3). No clocks: times come in.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "common/julia/parameters.h"
+#include "common/julia/timeline.h"
+#include "common/wire/messages.h"
+
+namespace telesplat::master {
+
+class SceneParameters {
+ public:
+  /// `timeline`: what animates the scene from its first view on; empty: what the data server's fact "animate" says, if anything.
+  explicit SceneParameters(julia::Timeline timeline = {}) : wished_(std::move(timeline)) {}
+
+  /// A data server said hello. One that says the same as the one before (it was restarted) changes nothing: values set or animated since
+  /// then stay. True: values() are others than before. Whatever is wrong with what it says is in `problem`, and then nothing can be set.
+  bool adopt(const wire::Hello& data, std::string& problem);
+
+  const std::string& kind() const { return kind_; }
+  const std::map<std::string, double>& values() const { return values_; }
+
+  /// Sets parameters by name. Error: the scene has none, no such parameter, one that is fixed or animated, no number, limits; then nothing
+  /// changed. Names parameter, value and limit.
+  Status set(const std::map<std::string, std::string>& arguments);
+  /// Begins the animation `text`, instead of the one that runs; "off" ends it, values stay as they are. Error: cannot be read, does not fit
+  /// the scene; then nothing changed.
+  Status animate(const std::string& text);
+
+  bool animated() const { return !timeline_.empty(); }
+  std::string animation() const { return animated() ? timeline_.text() : "off"; }
+  /// Takes the animation's values at now_s; its clock begins with the first call. True: they are others than before.
+  bool step(double now_s);
+
+ private:
+  Status begin(julia::Timeline timeline);
+  std::map<std::string, double> with(const julia::Parameters& parameters) const;
+
+  julia::Timeline wished_;
+  std::string kind_;
+  std::map<std::string, double> told_, values_;  // by the data server; now
+  std::optional<julia::Parameters> julia_;       // of values_; none: nothing can be set
+  julia::Timeline timeline_;
+  std::optional<double> begun_s_;
+};
+
+}  // namespace telesplat::master
