@@ -5,6 +5,7 @@
 #include "tools/telesplat/compare_command.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/inspect_command.h"
+#include "tools/telesplat/presets_command.h"
 #include "tools/telesplat/run_command.h"
 #include "tools/telesplat/scene_file.h"
 
@@ -91,6 +92,10 @@ int telesplat_main(int argc, char** argv) {
       "compare", "draw poses of a recorded run with every kernel and renderer, and directly from the data");
   launcher::add_compare_flags(*compare, compare_options);
 
+  launcher::PresetsOptions presets_options;
+  auto* presets = app.add_subcommand("presets", "tell or draw the Julia sets that have names");
+  launcher::add_presets_flags(*presets, presets_options);
+
   auto arguments = launcher::expand_scene_file(argc, argv);
   if (!arguments) {
     std::fprintf(stderr, "telesplat: %s\n", arguments.error().text.c_str());
@@ -103,6 +108,7 @@ int telesplat_main(int argc, char** argv) {
   if (*view) launcher::apply_scene_defaults(*view, view_options);
   if (*run) return launcher::run(run_options);
   if (*view) return launcher::run(view_options);
+  if (*presets) return launcher::presets(presets_options);
   if (*compare) return launcher::compare(compare_options);
   if (*ctl) return control(master, command, given);
   return launcher::inspect(path, mesh);
