@@ -180,7 +180,7 @@ void ReplicaWorker::apply(const ModelEvent& event) {
         if constexpr (std::is_same_v<E, wire::Patch>)
           return apply_patch(e);
         else if constexpr (std::is_same_v<E, wire::Forget>)
-          cache_.forget(e.sequence, e.clusters);
+          cache_.forget(e.sequence, e.clusters, e.frames);
         else
           cache_.clear(e.sequence);
         return true;

@@ -46,6 +46,9 @@ struct DrawItem {
 struct DrawList {
   std::vector<DrawItem> items;
   std::vector<points::ClusterKey> clusters_seen;  ///< clusters that passed culling: for access reports
+  std::vector<uint32_t>
+      frames_seen;  ///< best_patch_only: clusters_seen has one entry for each patch drawn, and this its frame
+                    ///< tag; empty otherwise
   uint64_t points = 0;
   float scale =
       1.0f;  ///< SelectionOptions::scale: splat_px / scale is how far apart an item's samples lie on the screen

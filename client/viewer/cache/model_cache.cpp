@@ -24,9 +24,9 @@ void ModelCache::insert(points::PreparedPatch patch) {
   ++patches_;
 }
 
-void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys) {
+void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames) {
   const std::lock_guard lock(mutex_);
-  auto dropped = newest_->take_out(keys);
+  auto dropped = frames.empty() ? newest_->take_out(keys) : newest_->take_out(keys, frames);
   applied_ = sequence;
   std::move(dropped.begin(), dropped.end(), std::back_inserter(retired_clusters_));
 }

@@ -19,7 +19,8 @@ class ModelCache {
   bool has_replica() const { return newest_ != nullptr; }
   const points::ModelConfig& config() const { return newest_->config(); }
   void insert(points::PreparedPatch patch);
-  void forget(Sequence sequence, std::span<const points::ClusterKey> keys);
+  /// frames: empty, or one a key: then only the mosaics with that frame tag (PointModel::forget).
+  void forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames = {});
   void clear(Sequence sequence);
   /// Replaces the older replica on display by the newest. No effect if it is displayed already.
   void show_newest();
@@ -39,8 +40,9 @@ class ModelCache {
 
  private:
   mutable std::mutex mutex_;
-  std::unique_ptr<points::PointModel> newest_, shown_;              // shown_ only while it is not the newest
-  std::vector<std::unique_ptr<points::Cluster>> retired_clusters_;  // where they were: draw lists point to them
+  std::unique_ptr<points::PointModel> newest_, shown_;  // shown_ only while it is not the newest
+  std::vector<std::unique_ptr<points::Cluster>>
+      retired_clusters_;  // where they were, or what was dropped of them: draw lists point to them
   std::vector<std::unique_ptr<points::PointModel>> retired_models_;
   Sequence applied_, applied_shown_;  // newest events of newest_ and shown_
   uint64_t patches_ = 0;
