@@ -15,13 +15,13 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr double kRoomSize_m = 0.8, kFov_deg = 40, kNear_m = 0.02;
+constexpr double kRoomSize_m = 0.8, kFov_deg = 46, kNear_m = 0.02;
 constexpr int kMargin = 12, kLine = 20;
 constexpr uint32_t kPaper = 0xff181818, kInk = 0xffe8e8e8, kPale = 0xffa0a0a0;
 
-// From the default pose's place, closer by its lens.
+// From in front, right and above.
 geometry::Camera camera_of(int width, int height) {
-  return geometry::make_camera(geometry::default_pose(), kFov_deg, width, height, kNear_m);
+  return geometry::make_camera(geometry::look_at({0.75, 0.55, 0.95}, {0, 0, 0}), kFov_deg, width, height, kNear_m);
 }
 
 Result<image::View> picture_of(const julia::Preset& preset, int width, int height, int magnify) {
