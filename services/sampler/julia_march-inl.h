@@ -196,7 +196,8 @@ HWY_NOINLINE void March(const Constants& k, const JuliaRays& rays, Queue& queue)
       r[j] = hn::Mul(r[j], inverse[j]);
       const VF gone = hn::Sub(t[j], last_t[j]);
       const MF apart = hn::Gt(gone, hn::Add(hn::Mul(last_r[j], set(kSlack)), hn::Mul(r[j], set(kTrust))));
-      g[j] = hn::Sub(r[j], hn::Mul(hn::Mul(set(threshold), inverse[j]), t[j]));
+      const VF threshold_t = hn::Mul(hn::Mul(set(threshold), inverse[j]), t[j]);
+      g[j] = hn::Sub(r[j], threshold_t);
       steps[j] = hn::Add(steps[j], set(1));
       const MF hit = hn::AndNot(apart, hn::Le(g[j], hn::Zero(f)));
       const MF out = hn::AndNot(apart, hn::Ge(hn::Add(t[j], r[j]), t1[j]));
@@ -205,8 +206,11 @@ HWY_NOINLINE void March(const Constants& k, const JuliaRays& rays, Queue& queue)
       finished |= BitsOf(done) << (j * lanes);
 
       const VF slope = hn::IfThenElse(hn::Gt(gone, hn::Zero(f)), hn::Div(hn::Sub(r[j], last_r[j]), gone), set(-1));
-      const VF ratio = hn::Div(set(kRelax), hn::Sub(set(1), hn::Min(hn::Max(slope, set(-1)), set(kMaxSlope))));
-      const VF far = hn::Min(hn::Add(t[j], hn::Mul(r[j], hn::Max(ratio, set(1)))), t1[j]);
+      const VF even = hn::Div(set(kRelax), hn::Sub(set(1), hn::Min(hn::Max(slope, set(-1)), set(kMaxSlope))));
+      const VF ratio = hn::Max(even, set(1));
+      const MF near = hn::Lt(r[j], hn::Mul(set(kNear), threshold_t));
+      const VF most = hn::IfThenElse(near, set(kNearRatio), ratio);
+      const VF far = hn::Min(hn::Add(t[j], hn::Mul(r[j], hn::Min(ratio, most))), t1[j]);
       next_t[j] = hn::IfThenElse(done, t[j], hn::IfThenElse(apart, hn::Add(last_t[j], last_r[j]), far));
       const MF keep = hn::Or(done, apart);
       next_last_t[j] = hn::IfThenElse(keep, last_t[j], t[j]);

@@ -25,9 +25,12 @@ inline constexpr float kConeStop =
 inline constexpr int kMaxSteps = 1024;
 inline constexpr float kRelax = 1.8f;     ///< 2: free balls just touch if the estimate goes on changing evenly (tuned)
 inline constexpr float kMaxSlope = 0.5f;  ///< of the estimate along a ray, for the length of steps (tuned)
-inline constexpr float kSlack = 1.01f;    ///< so that a safe step never counts as too long, rounded as it is
-inline constexpr float kTrust = 1.0f;     ///< radii of a new point's free ball that may be relied on
-inline constexpr int kRefinements = 3;
+inline constexpr float kNear =
+    3;  ///< thresholds: where the estimate is below, steps are kNearRatio of it at most (tuned)
+inline constexpr float kNearRatio = 0.8f;
+inline constexpr float kSlack = 1.01f;  ///< so that a safe step never counts as too long, rounded as it is
+inline constexpr float kTrust = 1.0f;   ///< radii of a new point's free ball that may be relied on
+inline constexpr int kRefinements = 2;
 inline constexpr int kMarchWays = 2;  ///< vectors of rays that are marched side by side (tuned)
 inline constexpr int kRefill = 2;     ///< lanes that are given new rays at once (tuned)
 

@@ -136,6 +136,7 @@ TEST_F(SceneFile, ErrorsOfJuliaSetsNameTheLine) {
       {"kind = \"julia\"\n[[keyframe]]\nt = 0\nc.y = 7\n", ":4: c.y is 7"},
       {"kind = \"julia\"\n[[keyframe]]\nc.y = 1\n", ":2: a key frame's t"},
       {"kind = \"julia\"\n[[keyframe]]\nt = 0\n", "without parameters"},
+      {"kind = \"julia\"\n[julia]\nt = 1\n", ":3: t belongs"},
       {"kind = \"julia\"\nkeyframe = 3\n", ":2: keyframe is not"},
       {"kind = \"julia\"\n[[keyframe]]\nt = 0\nc.y = 1\n", "one key frame"},
       {"kind = \"julia\"\n[[keyframe]]\nt = 2\nc.y = 1\n[[keyframe]]\nt = 1\nc.y = 1\n", "must be at 0 s"},

@@ -6,6 +6,7 @@
 #include "tools/telesplat/compare_command.h"
 #include "tools/telesplat/control_client.h"
 #include "tools/telesplat/inspect_command.h"
+#include "tools/telesplat/presets_command.h"
 #include "tools/telesplat/run_command.h"
 #include "tools/telesplat/scene_file.h"
 
@@ -98,6 +99,9 @@ int telesplat_main(int argc, char** argv) {
   auto* scaling = bench->add_subcommand(
       "scaling", "how a Julia set's frame speeds up with the number of samplers, beside table 7.2 of the thesis");
   launcher::add_scaling_flags(*scaling, scaling_options);
+  launcher::PresetsOptions presets_options;
+  auto* presets = app.add_subcommand("presets", "tell or draw the Julia sets that have names");
+  launcher::add_presets_flags(*presets, presets_options);
 
   auto arguments = launcher::expand_scene_file(argc, argv);
   if (!arguments) {
@@ -112,6 +116,7 @@ int telesplat_main(int argc, char** argv) {
   if (*run) return launcher::run(run_options);
   if (*view) return launcher::run(view_options);
   if (*bench) return launcher::bench_scaling(scaling_options);
+  if (*presets) return launcher::presets(presets_options);
   if (*compare) return launcher::compare(compare_options);
   if (*ctl) return control(master, command, given);
   return launcher::inspect(path, mesh);

@@ -49,7 +49,7 @@ class SceneReader {
       const auto* inner = node.as_table();
       if (group.empty() && name == "julia" && inner) {
         if (first_julia_key_.empty()) first_julia_key_ = "[julia]";
-        if (const Status s = read_parameters("", *inner); !s) return s;
+        if (const Status s = read_parameters(*inner); !s) return s;
       } else if (group.empty() && name == "keyframe") {
         if (const Status s = read_key_frames(node); !s) return s;
       } else if (inner) {
@@ -118,6 +118,7 @@ class SceneReader {
   Status each_parameter(const std::string& prefix, const toml::table& table, const Use& use) {
     for (const auto& [key, node] : table) {
       std::string name = prefix + std::string(key.str());
+      if (name == "t") continue;  // a key frame's time
       if (const auto* inner = node.as_table()) {
         if (const Status s = each_parameter(name + ".", *inner, use); !s) return s;
         continue;
@@ -134,8 +135,9 @@ class SceneReader {
     return ok_status();
   }
 
-  Status read_parameters(const std::string& prefix, const toml::table& table) {
-    return each_parameter(prefix, table, [&](const std::string& name, double value) {
+  Status read_parameters(const toml::table& table) {
+    if (const auto* time = table.get("t")) return wrong(*time, "t belongs to [[keyframe]]");
+    return each_parameter("", table, [&](const std::string& name, double value) {
       flags_.push_back(fmt::format("--{}={}", name, value));
     });
   }
@@ -161,13 +163,12 @@ class SceneReader {
     const auto* frames = node.as_array();
     if (!frames || !frames->is_array_of_tables()) return wrong(node, "keyframe is not a list of tables [[keyframe]]");
     for (const auto& frame : *frames) {
-      toml::table rest = *frame.as_table();
-      const auto t_s = rest["t"].value<double>();
+      const toml::table& table = *frame.as_table();
+      const auto t_s = table["t"].value<double>();
       if (!t_s || !std::isfinite(*t_s)) return wrong(frame, "a key frame's t is not a time in seconds");
-      rest.erase("t");
-      if (rest.empty()) return wrong(frame, "a key frame without parameters");
+      if (table.size() < 2) return wrong(frame, "a key frame without parameters");
       if (const Status s = each_parameter(
-              "", rest,
+              "", table,
               [&](const std::string& name, double value) { tracks_[name] += fmt::format("@{}s:{}", *t_s, value); });
           !s)
         return s;

@@ -1,0 +1,74 @@
+// Quaternion Julia sets, frames of 1024 x 640 on one core, seen from the default pose and filling the view, by instruction set beside the
+// scalar oracle. The thesis took 69.3 s a frame of this size on one node (table 7.2): counter thesis/this.
+#include <benchmark/benchmark.h>
+
+#include "common/geometry/trajectory.h"
+#include "services/sampler/julia_sampler.h"
+#include "tests/support/simd_targets.h"
+
+namespace telesplat::sampler {
+namespace {
+
+constexpr geometry::Rect kFrame{0, 0, 1024, 640};
+constexpr double kThesis_s = 69.3;
+
+geometry::Camera from(double distance_m) {
+  geometry::Pose pose = geometry::default_pose();
+  pose.position_room *= distance_m / glm::length(pose.position_room);
+  return geometry::make_camera(pose, 90, kFrame.width, kFrame.height);
+}
+
+JuliaScene scene_of(const julia::Preset& preset) {
+  return {preset.parameters, julia::place(julia::bounds(preset.parameters), 0.8)};
+}
+
+// target: 0 is the scalar oracle. rows: of a lease; the frame is sampled lease after lease.
+void frame(benchmark::State& state, const julia::Preset& preset, double distance_m, int64_t target, int rows) {
+  const testing::OnTarget on(target == 0 ? testing::simd_targets().front() : target);
+  JuliaSampler sampler(1, target == 0 ? julia_trace_plainly : julia_trace);
+  const JuliaScene scene = scene_of(preset);
+  const geometry::Camera camera = from(distance_m);
+  size_t covered = 0;
+  for (auto _ : state) {
+    covered = 0;
+    for (int y = 0; y < kFrame.height; y += rows) {
+      const image::DepthImage image = sampler.sample(scene, camera, {0, y, kFrame.width, rows}, 1);
+      covered +=
+          static_cast<size_t>(std::count_if(image.depth.begin(), image.depth.end(), [](uint32_t d) { return d != 0; }));
+    }
+  }
+  const double rays = double(kFrame.width) * kFrame.height, frames = double(state.iterations());
+  state.counters["covered"] = double(covered) / rays;
+  state.counters["Mrays/s"] = benchmark::Counter(rays / 1e6 * frames, benchmark::Counter::kIsRate);
+  state.counters["thesis/this"] = benchmark::Counter(kThesis_s * frames, benchmark::Counter::kIsRate);
+}
+
+void add(const julia::Preset& preset, double distance_m, int64_t target, int rows, const std::string& what) {
+  const std::string name = "JuliaFrame/" + std::string(preset.name) + "/" + what;
+  benchmark::RegisterBenchmark(name.c_str(), [=, &preset](benchmark::State& state) {
+    frame(state, preset, distance_m, target, rows);
+  })->Unit(benchmark::kMillisecond);
+}
+
+// Every preset at 1 m; the default one also nearer, by target, and in leases of few rows.
+const bool registered = [] {
+  const int64_t best = testing::simd_targets().front();
+  for (const julia::Preset& preset : julia::presets()) {
+    if (&preset != &julia::presets().front()) {
+      add(preset, 1, 0, kFrame.height, "1m/scalar");
+      add(preset, 1, best, kFrame.height, std::string("1m/") + hwy::TargetName(best));
+      continue;
+    }
+    for (const auto& [distance_m, name] : {std::pair{1.0, "1m/"}, {0.7377, "default/"}, {0.45, "0.45m/"}}) {
+      add(preset, distance_m, 0, kFrame.height, std::string(name) + "scalar");
+      for (const int64_t target : testing::simd_targets())
+        add(preset, distance_m, target, kFrame.height, std::string(name) + hwy::TargetName(target));
+    }
+    for (const int rows : {1, 4, 16})
+      add(preset, 1, best, rows, "1m/" + std::string(hwy::TargetName(best)) + "/rows:" + std::to_string(rows));
+  }
+  return true;
+}();
+
+}  // namespace
+}  // namespace telesplat::sampler
