@@ -155,8 +155,11 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   dispatch(now_s);
 }
 
-void MasterCore::on(const std::string& peer, const wire::Goodbye&, double now_s) {
-  const auto it = peers_.find(peer);
+void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_s) {
+  auto it = peers_.find(peer);
+  // A process whose own connection is busy says it over another.
+  if (const auto by = instances_.find(m.instance); it == peers_.end() && by != instances_.end())
+    it = peers_.find(by->second);
   if (it == peers_.end() || it->second.gone) return;
   lose(it->second, peer, "left", true);
   dispatch(now_s);
