@@ -12,6 +12,10 @@ constexpr size_t kMaxPeers = 4096;     // remembered processes, the departed inc
 constexpr int kMaxWaitingLeases = 64;  // lease requests of one sampler
 }  // namespace
 
+const char* name_of(Progressive progressive) {
+  return progressive == Progressive::kAuto ? "auto" : progressive == Progressive::kOn ? "on" : "off";
+}
+
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
     : options_(options), instance_(instance), record_(record), schedule_(options.schedule), scene_(options.animation) {}
 

@@ -21,6 +21,9 @@ enum class Progressive {
   kOff
 };
 
+/// As --progressive takes it.
+const char* name_of(Progressive progressive);
+
 struct MasterOptions {
   ScheduleOptions schedule;
   Progressive progressive = Progressive::kAuto;

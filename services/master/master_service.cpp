@@ -13,8 +13,11 @@ namespace {
 // How long others may take to say goodbye; less where someone waits for the master itself to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
 
-const std::map<std::string, Progressive> kProgressive{
-    {"auto", Progressive::kAuto}, {"on", Progressive::kOn}, {"off", Progressive::kOff}};
+std::map<std::string, Progressive> progressive_names() {
+  std::map<std::string, Progressive> out;
+  for (const auto p : {Progressive::kAuto, Progressive::kOn, Progressive::kOff}) out[name_of(p)] = p;
+  return out;
+}
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -68,7 +71,7 @@ void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
   app.add_option("--progressive", o.master.progressive,
                  "on: a view arrives with every 4th pixel of every 4th row first; auto: of Julia sets")
       ->default_str("auto")
-      ->transform(CLI::CheckedTransformer(kProgressive));
+      ->transform(CLI::CheckedTransformer(progressive_names()));
   app.add_option("--octree-depth", o.master.octree_depth, "levels of the point model's octree")
       ->capture_default_str()
       ->check(CLI::Range(1, 10));
