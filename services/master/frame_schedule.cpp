@@ -97,15 +97,20 @@ wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& 
 void FrameSchedule::extend(LeaseId lease, double now_s) {
   for (Frame& f : frames_)
     if (f.tiles.extend(lease, now_s, now_s + options_.lease_timeout_s)) return;
+  if (const auto o = overtaken_.find(lease); o != overtaken_.end())
+    o->second.expires_s = now_s + options_.lease_timeout_s;
 }
 
 bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
   const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
   if (f == frames_.end()) return false;
-  const auto* out = f->tiles.out(m.lease);
-  const double leased_s = out ? out->leased_s : now_s;
+  if (m.tile >= f->tiles.tiles()) return false;
+  std::optional<double> took_s;
+  if (const auto* out = f->tiles.out(m.lease); out && out->tile == m.tile) took_s = now_s - out->leased_s;
+  for (const LeaseId id : f->tiles.tile(m.tile).leases)
+    if (const auto* out = f->tiles.out(id); out && id != m.lease) overtaken_[id] = {out->sampler, out->expires_s};
   if (!f->tiles.done(m.tile)) return false;
-  if (out) tile_time_s_ = tile_time_s_ == 0 ? now_s - leased_s : 0.95 * tile_time_s_ + 0.05 * (now_s - leased_s);
+  if (took_s) tile_time_s_ = tile_time_s_ == 0 ? *took_s : 0.95 * tile_time_s_ + 0.05 * *took_s;
   const auto& rect = f->tiles.tile(m.tile).rect;
   costs_.learn(sampler, m.encode_end_s - m.sample_begin_s, double(rect.width) * rect.height);
   if (f->tiles.complete()) end_frame(f);
@@ -134,9 +139,18 @@ double FrameSchedule::backup_after_s() const {
   return tile_time_s_ == 0 ? std::numeric_limits<double>::infinity() : std::max(3 * tile_time_s_, kLeastOverdue_s);
 }
 
+void FrameSchedule::heard_of(const std::string& sampler) {
+  std::erase_if(overtaken_, [&](const auto& o) { return o.second.sampler == sampler; });
+}
+
 int FrameSchedule::expire(double now_s, const std::function<void(const std::string&)>& lost_sampler) {
   int count = 0;
   for (Frame& f : frames_) count += f.tiles.expire(now_s, lost_sampler);
+  count += int(std::erase_if(overtaken_, [&](const auto& o) {
+    if (now_s <= o.second.expires_s) return false;
+    lost_sampler(o.second.sampler);
+    return true;
+  }));
   released_ += uint64_t(count);
   return count;
 }
@@ -145,6 +159,7 @@ int FrameSchedule::release_sampler(const std::string& sampler) {
   costs_.leave(sampler);
   int count = 0;
   for (Frame& f : frames_) count += f.tiles.release(sampler);
+  count += int(std::erase_if(overtaken_, [&](const auto& o) { return o.second.sampler == sampler; }));
   released_ += uint64_t(count);
   return count;
 }
@@ -152,6 +167,7 @@ int FrameSchedule::release_sampler(const std::string& sampler) {
 size_t FrameSchedule::leases_of(const std::string& sampler) const {
   size_t count = 0;
   for (const Frame& f : frames_) count += f.tiles.leases_of(sampler);
+  for (const auto& [id, o] : overtaken_) count += o.sampler == sampler;
   return count;
 }
 
@@ -160,6 +176,7 @@ void FrameSchedule::drop_frames() {
   for (auto f = frames_.rbegin(); f != frames_.rend(); ++f)
     if (!f->viewer_left) waiting_.try_emplace(f->request.viewer, Waiting{f->request, false});
   frames_.clear();
+  overtaken_.clear();
 }
 
 }  // namespace telesplat::master

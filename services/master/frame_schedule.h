@@ -61,7 +61,9 @@ class FrameSchedule {
   /// for duplicates, tiles never leased and unknown frames. Learns from the tile's times.
   bool tile_done(const wire::TileDone& tile, const std::string& sampler, double now_s);
 
-  /// Takes back leases that ran out. Returns how many; lost_sampler is told whose.
+  /// A sign of life: whatever `sampler` had that a backup was faster with, it is through with.
+  void heard_of(const std::string& sampler);
+  /// Takes back leases that ran out, those that a backup was faster with included. Returns how many; lost_sampler is told whose.
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
   /// Takes back all leases of a sampler that left. Returns how many.
   int release_sampler(const std::string& sampler);
@@ -98,6 +100,11 @@ class FrameSchedule {
     FrameTiles tiles;
     bool viewer_left = false;
   };
+  // A lease whose tile another sampler delivered first; its own may be dead or slow.
+  struct Overtaken {
+    std::string sampler;
+    double expires_s;
+  };
   void begin_frame(EpochId epoch, const wire::ViewRequest& request, int step);
   void end_frame(std::deque<Frame>::iterator frame);
   wire::Lease lease_tile(Frame& frame, size_t tile, const std::string& sampler, double now_s);
@@ -107,6 +114,7 @@ class FrameSchedule {
   std::map<InstanceId, Waiting> waiting_;
   InstanceId last_viewer_;  // viewers take turns
   std::deque<Frame> frames_;
+  std::map<LeaseId, Overtaken> overtaken_;
   SamplingCosts costs_;
   FrameId next_frame_{1};
   LeaseId next_lease_{1};

@@ -135,6 +135,7 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
 void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double now_s) {
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "sampler" || p->waiting_leases >= kMaxWaitingLeases) return;
+  schedule_.heard_of(peer);
   if (p->waiting_leases++ == 0) idle_.push_back(peer);
   dispatch(now_s);
 }

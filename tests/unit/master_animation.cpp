@@ -117,8 +117,8 @@ TEST_F(Animation, SetBeginsAnEpochThatEveryoneIsToldOf) {
   join();
   core.on("s1", wire::LeaseRequest{}, 1);
   request(5, 1, 1);
-  leases.clear();
   const auto answer = command("set", {{"c.y", "0.125"}, {"iterations", "17"}}, 2);
+  leases.clear();  // of epoch 1
   EXPECT_TRUE(answer.ok) << answer.text;
   EXPECT_EQ(answer.text, "epoch 2");
   for (const char* peer : {"d", "p", "s1", "s2", "v5", "v6"}) {

@@ -292,6 +292,29 @@ TEST(Backups, OutliveTheSamplerTheyStandInFor) {
   EXPECT_EQ(s.lease("d", 12)->tile, a->tile);
 }
 
+TEST(Backups, DoNotHideThatASamplerDied) {
+  for (const bool alive : {true, false}) {
+    auto s = experienced(0.001, true);
+    ASSERT_TRUE(s.lease("a", 10));
+    const auto b = s.lease("b", 10);
+    s.tile_done(done(*b), "b", 10.001);
+    s.tile_done(done(*s.lease("c", 11)), "c", 11.001);
+    EXPECT_EQ(s.frames_in_flight(), 0u);
+    EXPECT_EQ(s.leases_of("a"), 1u) << "nothing was heard of it";
+    if (alive) s.heard_of("a");
+    EXPECT_EQ(s.leases_of("a"), alive ? 0u : 1u);
+    std::vector<std::string> lost;
+    EXPECT_EQ(s.expire(200, [&](const std::string& name) { lost.push_back(name); }), alive ? 0 : 1);
+    EXPECT_EQ(lost.size(), alive ? 0u : 1u);
+    EXPECT_EQ(s.expire(300, kNobody), 0);
+  }
+  auto s = experienced(0.001, true);
+  ASSERT_TRUE(s.lease("a", 10) && s.lease("b", 10));
+  for (int i = 0; i < 2; ++i) s.tile_done(done(*s.lease("c", 11)), "c", 11.001);
+  EXPECT_EQ(s.release_sampler("a"), 1);
+  EXPECT_EQ(s.tiles_released(), 1u);
+}
+
 TEST(Backups, FinishAFrameBeforeTheNextIsFed) {
   FrameSchedule s({.frames_in_flight = 2, .lease_timeout_s = 100});
   s.set_cut({true, false});

@@ -175,6 +175,10 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
                           "view_update_latency_ms",
                           "start_up_latency_ms",
                           "sampling_ms",
+                          "lease_to_sampled_ms",
+                          "samplers_busy",
+                          "epochs",
+                          "leases_backup",
                           "packing_ms",
                           "data_generating_rate_mb_s",
                           "data_transfer_rate_mb_s",
@@ -208,6 +212,50 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
   EXPECT_EQ(s["peak_rss_mb"]["sampler"], nlohmann::json::array({40.0}));
   const std::string tiles = text("tiles.csv");
   EXPECT_EQ(std::count(tiles.begin(), tiles.end(), '\n'), 4);
+}
+
+TEST_F(Record, TilesTellWhereTheyLieAndCoarseFramesAreNotTimed) {
+  auto coarse = tile(1, 0, 0.5), fine = tile(2, 3, 1.0);
+  coarse.step = 4;
+  fine.rect = {0, 128, 640, 3};
+  fine.leased_s = 0.99;
+  record->add_tile("a", coarse);
+  record->add_tile("a", fine);
+  const auto s = record->summary({}, {});
+  EXPECT_EQ(s["sampling_ms"]["max"], 12);
+  EXPECT_EQ(s["lease_to_sampled_ms"]["max"], 22);
+  EXPECT_EQ(s["packing_ms"]["max"], 5);
+  EXPECT_EQ(s["bytes_sent"], 1000) << "what coarse frames sent counts";
+  ASSERT_TRUE(record->finish({}, {}));
+  const std::string tiles = text("tiles.csv");
+  EXPECT_TRUE(tiles.starts_with("frame,tile,lease,sampler,samples,")) << tiles;
+  EXPECT_NE(tiles.find("packed_s,x,y,width,height,step\n"), std::string::npos);
+  EXPECT_NE(tiles.find(",0,128,640,3,1\n"), std::string::npos) << tiles;
+  EXPECT_NE(tiles.find(",0,0,0,0,4\n"), std::string::npos) << tiles;
+}
+
+TEST_F(Record, SaysHowEvenlySamplersWereBusy) {
+  for (int i = 0; i < 10; ++i) record->add_tile("a", tile(1, uint64_t(i), i));
+  for (int i = 0; i < 5; ++i) record->add_tile("b", tile(1, uint64_t(10 + i), i));
+  auto backwards = tile(1, 15, 1);
+  backwards.encode_end_s = 0;
+  record->add_tile("b", backwards);  // clocks that disagree
+  const auto busy = record->summary({}, {})["samplers_busy"];
+  EXPECT_NEAR(double(busy["busy_s"]["a"]), 0.12, 1e-9);
+  EXPECT_NEAR(double(busy["busy_s"]["b"]), 0.06, 1e-9);
+  EXPECT_NEAR(double(busy["spread"]), 0.06 / 0.09, 1e-4);
+}
+
+TEST_F(Record, EpochsCanBeMadeAgain) {
+  const double third = 1.0 / 3;
+  record->add_epoch({1}, 0.5, {{"c.x", third}, {"iterations", 64}});
+  record->add_epoch({2}, 1.25, {{"c.x", -1e-9}, {"iterations", 65}, {"new", 1}});
+  record->add_epoch({4}, 2, {{"iterations", 66}});
+  const std::string epochs = text("epochs.csv");
+  EXPECT_EQ(epochs,
+            "epoch,t_s,c.x,iterations\n1,0.500000,0.3333333333333333,64\n2,1.250000,-1e-09,65\n4,2.000000,,66\n");
+  EXPECT_EQ(std::strtod(epochs.c_str() + epochs.find("0.333"), nullptr), third);
+  EXPECT_EQ(record->summary({}, {})["epochs"], 3);
 }
 
 TEST_F(Record, OfARunWithoutAnythingHoldsZeros) {
