@@ -1,6 +1,7 @@
 // Viewers that fall behind or come late end with the packer's points.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 
 #include "tests/support/pipeline_run.h"
@@ -47,6 +48,30 @@ TEST(Viewers, AViewerThatWasStoppedResynchronises) {
   run.program().signal(SIGINT);
   EXPECT_EQ(run.program().wait(60), 1);
   EXPECT_TRUE(run.all_gone());
+}
+
+// A version of the data set for which nothing changed: the display goes over from one to the next, and is never without points.
+TEST(Viewers, ANewEpochReplacesTheOldOneOnDisplay) {
+  PipelineRun run({"--duration", "0", "--trajectory", "still"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  for (double epoch = 2; epoch <= 3; ++epoch) {
+    Program ctl("telesplat", {"ctl", "--master", run.master(), "epoch"}, run.folder() / "ctl");
+    ASSERT_EQ(ctl.wait(), 0) << ctl.err();
+    EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "epoch") == epoch; }));
+    const double updates = value(run.status(), "viewer-1", "updates");
+    EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates; }));
+  }
+  EXPECT_EQ(value(run.status(), "viewer-1", "epochs_shown"), 2);
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return same_points(s, "viewer-1"); }));
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  const auto epochs = run.column("frames.csv", "epoch"), points = run.column("frames.csv", "points_selected");
+  ASSERT_EQ(epochs.size(), points.size());
+  EXPECT_EQ(epochs.front(), 1);
+  EXPECT_EQ(epochs.back(), 3);
+  EXPECT_TRUE(std::is_sorted(epochs.begin(), epochs.end()));
+  EXPECT_GT(*std::min_element(points.begin(), points.end()), 0) << "a frame without points";
+  EXPECT_EQ(run.column("updates.csv", "epoch").back(), 3);
+  EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
 }
 
 TEST(Viewers, ALateViewerGetsThePackersPoints) {

@@ -176,6 +176,18 @@ TEST_F(AdaptiveRequester, AStillHeadOfAChangingSceneIsServedAsFastAsAMovingOne) 
   EXPECT_EQ(c.width, 2560) << "the scene rests, and so does the head";
 }
 
+TEST_F(AdaptiveRequester, AChangingSceneMayBeSampledMoreCoarsely) {
+  geometry::Camera c;
+  for (int i = 0; i < 40; ++i) {
+    requester.on_epoch(now_s);
+    c = cycle(1e5, true);
+  }
+  EXPECT_NEAR(density(c), 0.25, 0.01);
+  now_s += 2;
+  cycle(1e5, true);
+  EXPECT_NEAR(density(cycle(1e5, true)), 0.5, 0.01) << "it rests: half a sample a pixel at least, as ever";
+}
+
 TEST_F(AdaptiveRequester, SamplesAsFinelyAsTheLatencyAllows) {
   geometry::Camera c = cycle(1e7, true);
   EXPECT_NEAR(density(c), 0.5, 0.01);  // 1280x800 at first

@@ -382,6 +382,12 @@ TEST(TitleLine, HasRatesSinceTheLastOne) {
   f = {50.5, "crater.ply", 0.8, 31, 2, 212.4, 410'000, 1'200'000, 1'155'000};
   EXPECT_EQ(line.update(f),
             "crater.ply - 60.0 fps, 4.0 updates/s, 212 ms latency, 0.41 M points drawn, 1.20 M cached, 2.31 MB/s");
+  f = {51.0, "crater.ply", 0.8, 61, 4, 212.4, 410'000, 1'200'000, 2'310'000, 3};
+  EXPECT_EQ(line.update(f),
+            "crater.ply - 60.0 fps, 4.0 updates/s, 212 ms latency, 0.41 M points drawn, 1.20 M cached, 2.31 MB/s, 6.0 "
+            "epochs/s");
+  f = {51.5, "crater.ply", 0.8, 91, 6, 212.4, 410'000, 1'200'000, 3'465'000, 3};
+  EXPECT_EQ(line.update(f)->find("epochs"), std::string::npos) << "the scene rests";
 }
 
 TEST(WindowCamera, TheFieldOfViewSpansTheLongerSide) {

@@ -84,12 +84,12 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
   const double margin = motion < 0.002 ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
   // The first view is wanted soon rather than sharp, and so is each of an epoch that may not last.
-  const bool changing = last_update_s_ < epoch_began_s_ || now_s - epoch_began_s_ < kEpochSettles_s;
-  const bool still = margin == 0 && latency_s_ > 0 && !changing;
+  changing_ = last_update_s_ < epoch_began_s_ || now_s - epoch_began_s_ < kEpochSettles_s;
+  const bool still = margin == 0 && latency_s_ > 0 && !changing_;
   if (options_.adaptive) {
     if (scale_ == 0)
-      scale_ =
-          std::clamp(std::sqrt(kFirstPixels / (double(display_->width) * display_->height)), options_.min_scale, 1.0);
+      scale_ = std::clamp(std::sqrt(kFirstPixels / (double(display_->width) * display_->height)), min_scale(), 1.0);
+    scale_ = std::clamp(scale_, min_scale(), 1.0);
     // A wider view is sampled as finely; a still head sees every pixel's own sample.
     const double per_pixel = scale_ * (1 + margin);
     camera.width = still ? display_->width : whole_side(display_->width * per_pixel);
@@ -122,8 +122,8 @@ std::optional<ViewRequester::Update> ViewRequester::on_applied(const wire::Patch
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
   // Time goes with the number of pixels, hence the root; by small steps, since views differ.
   if (options_.adaptive && !u.still)
-    scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / latency_s), 0.85, 1.1),
-                        options_.min_scale, 1.0);
+    scale_ =
+        std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / latency_s), 0.85, 1.1), min_scale(), 1.0);
   const Update done = u;
   // Requests before this one were replaced at the master and will never be answered.
   open_.erase(open_.begin(), std::next(it));

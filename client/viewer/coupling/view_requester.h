@@ -21,7 +21,9 @@ struct RequestOptions {
               ///< used
   double target_latency_s = 0.15;  ///< adaptive: longer updates make sampling coarser, shorter ones finer
   double min_scale = 0.5;          ///< adaptive: sampled pixels a displayed pixel, on each axis, at least (at most 1)
-  bool follow_display = false;     ///< sample as many pixels, in the display's aspect: for windows that change theirs
+  double min_scale_changing =
+      0.25;                     ///< the same while the scene changes, when each view is displayed for a moment only
+  bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 
 /// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's aspect, sides
@@ -81,6 +83,9 @@ class ViewRequester {
   std::optional<geometry::Camera> display_;
   RequestId next_{1};
   double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
+  double min_scale() const { return changing_ ? options_.min_scale_changing : options_.min_scale; }
+
+  bool changing_ = false;  // the scene; as of the last request
   double last_sent_s_ = -1e9, latency_s_ = 0, epoch_began_s_ = -1e9, last_update_s_ = -1e9;
   std::map<RequestId, Update> open_;
 };

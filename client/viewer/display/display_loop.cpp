@@ -38,8 +38,16 @@ void fit(image::View& view, const geometry::Camera& camera, bool with_depth) {
 LiveFigures live_figures(double now_s, uint64_t frames, uint64_t points_drawn, const ModelCache& cache,
                          const ReplicaWorker& worker) {
   const auto network = worker.figures();
-  return {now_s,        network.scene,          network.extent_m,      frames, network.updates, network.latency_ms,
-          points_drawn, cache.figures().points, network.bytes_received};
+  return {now_s,
+          network.scene,
+          network.extent_m,
+          frames,
+          network.updates,
+          network.latency_ms,
+          points_drawn,
+          cache.figures().points_displayed,
+          network.bytes_received,
+          network.epochs_shown};
 }
 
 }  // namespace

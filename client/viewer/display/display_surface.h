@@ -23,6 +23,7 @@ struct LiveFigures {
   uint64_t frames = 0, updates = 0;  ///< displayed; completely received
   double latency_ms = 0;             ///< of the newest view update, request to complete; 0 before the first
   uint64_t points_drawn = 0, points_cached = 0, bytes_received = 0;
+  uint64_t epochs_shown = 0;  ///< times a changed scene took the place of the one on display
 };
 
 /// Called by the display loop, in its thread, in this order for every frame.

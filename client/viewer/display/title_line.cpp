@@ -25,6 +25,8 @@ std::optional<std::string> TitleLine::update(const LiveFigures& f) {
         name, double(f.frames - last_->frames) / dt_s, double(f.updates - last_->updates) / dt_s, f.latency_ms,
         double(f.points_drawn) / 1e6, double(f.points_cached) / 1e6,
         double(f.bytes_received - last_->bytes_received) / 1e6 / dt_s);
+  if (f.frames > 0 && !news && f.epochs_shown > last_->epochs_shown)
+    text += fmt::format(", {:.1f} epochs/s", double(f.epochs_shown - last_->epochs_shown) / dt_s);
   last_ = f;
   return text;
 }
