@@ -142,6 +142,30 @@ TEST(PatchChoice, TilesOfOneFrameAreOnePatch) {
   EXPECT_EQ(sequences, (std::set<uint64_t>{2, 3, 4, 5})) << "all four tiles of the better frame, nothing else";
 }
 
+TEST(PatchChoice, PatchesDrawnAreToldForAccessReports) {
+  Square square(3);
+  square.add({0, 0, 1.6});
+  square.add({0, 0, 0.8}, -0.25, 0.05, 2);
+  splat::SelectionOptions options;
+  splat::DrawList list;
+  splat::select_view(square.model(), camera_from({0, 0, 0.9}), options, list);
+  EXPECT_TRUE(list.frames_seen.empty());
+  EXPECT_FALSE(list.clusters_seen.empty());
+  options.best_patch_only = true;
+  splat::select_view(square.model(), camera_from({0, 0, 0.9}), options, list);
+  ASSERT_EQ(list.clusters_seen.size(), list.frames_seen.size());
+  std::set<std::pair<points::ClusterKey, uint32_t>> told, drawn;
+  for (size_t i = 0; i < list.frames_seen.size(); ++i)
+    EXPECT_TRUE(told.insert({list.clusters_seen[i], list.frames_seen[i]}).second) << "each once";
+  for (const auto& item : list.items)
+    for (const auto& m : item.cluster->mosaics)
+      if (m.sequence() == item.sequence) drawn.insert({item.cluster->key, m.frame_tag()});
+  EXPECT_EQ(told, drawn);
+  std::set<uint32_t> frames;
+  for (const auto& [key, frame] : told) frames.insert(frame);
+  EXPECT_EQ(frames, (Frames{1, 2}));
+}
+
 TEST(PatchChoice, EveryClusterShowsSomething) {
   Square square(4);
   for (int i = 0; i < 12; ++i)
