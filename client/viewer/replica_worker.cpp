@@ -182,7 +182,7 @@ void ReplicaWorker::apply(const ModelEvent& event) {
         if constexpr (std::is_same_v<E, wire::Patch>)
           return apply_patch(e);
         else if constexpr (std::is_same_v<E, wire::Forget>)
-          cache_.forget(e.sequence, e.clusters);
+          cache_.forget(e.sequence, e.clusters, e.frames);
         else
           begin_replica(cache_.config(), e.epoch, e.sequence), requester_.on_epoch(to_master_s(monotonic_s()));
         return true;

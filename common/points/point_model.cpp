@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 
@@ -93,6 +94,47 @@ std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const Clust
 std::vector<Cluster> PointModel::forget(std::span<const ClusterKey> keys) {
   std::vector<Cluster> dropped;
   for (const auto& cluster : take_out(keys)) dropped.push_back(std::move(*cluster));
+  return dropped;
+}
+
+std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const ClusterKey> keys,
+                                                           std::span<const uint32_t> frames) {
+  CHECK(keys.size() == frames.size());
+  std::vector<std::unique_ptr<Cluster>> dropped;
+  std::vector<Mosaic> mosaics;
+  for (size_t i = 0; i < keys.size(); ++i) {
+    const auto found = clusters_.find(keys[i]);
+    if (found == clusters_.end()) continue;
+    Cluster& cluster = *found->second;
+    const auto is_of_patch = [&](const Mosaic& m) { return m.frame_tag() == frames[i]; };
+    const auto first = std::find_if(cluster.mosaics.begin(), cluster.mosaics.end(), is_of_patch);
+    if (first == cluster.mosaics.end()) continue;
+    if (std::all_of(first, cluster.mosaics.end(), is_of_patch) && first == cluster.mosaics.begin()) {
+      auto whole = take_out(keys.subspan(i, 1));
+      dropped.push_back(std::move(whole.front()));
+      continue;
+    }
+    // What stays closes up, in order of sequence.
+    mosaics.clear();
+    auto end = first;
+    for (auto m = first; m != cluster.mosaics.end(); ++m) {
+      if (!is_of_patch(*m)) {
+        *end++ = std::move(*m);
+        continue;
+      }
+      points_ -= m->count(0);
+      cluster_bytes_ -= m->bytes() - sizeof(Mosaic);
+      mosaics.push_back(std::move(*m));
+    }
+    cluster.mosaics.erase(end, cluster.mosaics.end());
+    dropped.push_back(std::make_unique<Cluster>(Cluster{cluster.key, cluster.leaf_room, std::move(mosaics)}));
+  }
+  return dropped;
+}
+
+std::vector<Cluster> PointModel::forget(std::span<const ClusterKey> keys, std::span<const uint32_t> frames) {
+  std::vector<Cluster> dropped;
+  for (const auto& cluster : take_out(keys, frames)) dropped.push_back(std::move(*cluster));
   return dropped;
 }
 

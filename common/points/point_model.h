@@ -24,6 +24,9 @@ namespace telesplat::points {
 inline constexpr int kLevels = 3;           ///< level 0 = every sample, 1 = one of 2x2 pixels, 2 = one of 4x4
 inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
 
+/// A frame tag is what of a frame's number these bits hold.
+inline constexpr uint32_t kFrameTagMask = (1u << 24) - 1;
+
 /// Where a cluster's leaf lies: its integer coordinates, `depth` bits each, in the octree's cube; x in the low bits
 /// (x | y << 10 | z << 20).
 using ClusterKey = uint32_t;
@@ -143,6 +146,13 @@ class PointModel {
   /// The same, but the clusters stay where they are in memory: a viewer keeps them alive until its frame is drawn, since draw
   /// lists point to clusters and not only to their points.
   std::vector<std::unique_ptr<Cluster>> take_out(std::span<const ClusterKey> keys);
+  /// Event "forget" of single patches: drops the mosaics with frame tag frames[i] from cluster keys[i], and the cluster when none
+  /// is left. What is not there is ignored. Returns what was dropped: clusters with the dropped mosaics alone, one for each i that
+  /// found some. Precondition: as many frames as keys.
+  std::vector<Cluster> forget(std::span<const ClusterKey> keys, std::span<const uint32_t> frames);
+  /// The same for a viewer: while it keeps what is returned, draw lists made before stay drawable. A cluster that has none left
+  /// is returned as it lay in memory; one that stays does so with other mosaics, whose points do not move.
+  std::vector<std::unique_ptr<Cluster>> take_out(std::span<const ClusterKey> keys, std::span<const uint32_t> frames);
   /// Event "new epoch": drops everything.
   void clear();
 

@@ -83,6 +83,17 @@ float dither_of(points::ClusterKey key, const points::Mosaic& m) {
   return static_cast<float>(h >> 40) * 0x1p-24f;
 }
 
+// The patches that the mosaics drawn of a cluster are of.
+void note_patches(points::ClusterKey key, const std::vector<const points::Mosaic*>& drawn, DrawList& out) {
+  const auto first = static_cast<ptrdiff_t>(out.frames_seen.size());
+  for (const points::Mosaic* m : drawn) {
+    const uint32_t frame = m->frame_tag();
+    if (std::find(out.frames_seen.begin() + first, out.frames_seen.end(), frame) != out.frames_seen.end()) continue;
+    out.clusters_seen.push_back(key);
+    out.frames_seen.push_back(frame);
+  }
+}
+
 // Points [first, last) of a mosaic's level.
 DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int l, uint32_t first, uint32_t last) {
   const points::Mosaic::Level a = m.level(l);
@@ -105,7 +116,6 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
                  DrawList& out) {
   out.items.clear();
   out.clusters_seen.clear();
-  out.frames_seen.clear();
   out.points = 0;
   out.scale = options.scale;
   const geometry::Frustum frustum(camera);
@@ -118,7 +128,6 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
   for (const auto& [key, cluster] : model.clusters()) {
     const geometry::Box& leaf = cluster->leaf_room;
     if (!frustum.may_contain(leaf)) continue;
-    out.clusters_seen.push_back(key);
     const float leaf_m = leaf.hi.x - leaf.lo.x;
     const float range = points::pixel_range(camera, glm::dvec3(leaf.centre()), static_cast<double>(leaf_m));
     const float radius_m_of_px = 0.5f * leaf_m / range;
@@ -126,7 +135,12 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
     visible.clear();
     for (const points::Mosaic& m : cluster->mosaics)
       if (!(options.cone_culling && cone_faces_away(m, view))) visible.push_back(&m);
-    if (options.best_patch_only) chooser.choose(leaf, patches, visible);
+    if (options.best_patch_only) {
+      chooser.choose(leaf, patches, visible);
+      note_patches(key, visible, out);
+    } else {
+      out.clusters_seen.push_back(key);
+    }
     chosen.clear();
     for (const points::Mosaic* mosaic : visible) {
       const points::Mosaic& m = *mosaic;

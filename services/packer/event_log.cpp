@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <tuple>
 
 namespace telesplat::packer {
 namespace {
@@ -15,10 +16,14 @@ bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequenc
 }  // namespace
 
 uint64_t EventLog::Patch::bytes() const {
-  return sizeof(Patch) + kNodeBytes + event.blob->capacity() + forgotten.capacity() * sizeof(points::ClusterKey);
+  return sizeof(Patch) + kNodeBytes + event.blob->capacity() + forgotten.capacity() * sizeof forgotten[0] +
+         patch_forgotten.capacity() * sizeof patch_forgotten[0];
 }
 
-uint64_t EventLog::bytes() const { return patch_bytes_ + last_forget_.size() * kForgetBytes; }
+uint64_t EventLog::bytes() const {
+  return patch_bytes_ + last_forget_.size() * kForgetBytes +
+         patches_forgotten_ * (sizeof(points::ClusterKey) + sizeof(uint32_t));
+}
 
 void EventLog::add_patch(const Event& event, size_t mosaics) {
   if (mosaics == 0) return;
@@ -26,28 +31,51 @@ void EventLog::add_patch(const Event& event, size_t mosaics) {
   patch_bytes_ += patch.bytes();
 }
 
+void EventLog::drop_mosaic(const points::Mosaic& mosaic, points::ClusterKey key, Sequence sequence, bool patch_alone) {
+  const auto found = patches_.find(mosaic.sequence());
+  CHECK(found != patches_.end());  // a patch stays as long as it has a mosaic in the model
+  Patch& patch = found->second;
+  patch_bytes_ -= patch.bytes();
+  if (--patch.alive == 0) {
+    patches_.erase(found);
+    return;
+  }
+  if (patch_alone)
+    patch.patch_forgotten.emplace_back(sequence, key);
+  else
+    patch.forgotten.push_back(key);
+  patch_bytes_ += patch.bytes();
+}
+
 void EventLog::add_forget(Sequence sequence, std::span<const points::Cluster> dropped) {
   for (const points::Cluster& cluster : dropped) {
     last_forget_[cluster.key] = sequence;
-    for (const points::Mosaic& mosaic : cluster.mosaics) {
-      const auto found = patches_.find(mosaic.sequence());
-      CHECK(found != patches_.end());  // a patch stays as long as it has a mosaic in the model
-      Patch& patch = found->second;
-      patch_bytes_ -= patch.bytes();
-      if (--patch.alive == 0) {
-        patches_.erase(found);
-      } else {
-        patch.forgotten.push_back(cluster.key);
-        patch_bytes_ += patch.bytes();
-      }
-    }
+    for (const points::Mosaic& mosaic : cluster.mosaics) drop_mosaic(mosaic, cluster.key, sequence, false);
   }
+}
+
+void EventLog::add_patch_forget(const Event& event, std::span<const points::Cluster> dropped) {
+  for (const points::Cluster& cluster : dropped)
+    for (const points::Mosaic& mosaic : cluster.mosaics) drop_mosaic(mosaic, cluster.key, event.sequence, true);
+  patch_forgets_.push_back(event);
+  patches_forgotten_ += event.clusters.size();
+  while (patches_forgotten_ > max_patches_) {
+    patches_forgotten_ -= patch_forgets_.front().clusters.size();
+    horizon_ = patch_forgets_.front().sequence;
+    patch_forgets_.pop_front();
+  }
+}
+
+bool EventLog::remembers(Sequence after) const {
+  return after.value == 0 || after >= horizon_ || (epoch_ && after < epoch_->sequence);
 }
 
 void EventLog::add_epoch(const Event& event) {
   patches_.clear();
   last_forget_.clear();
-  patch_bytes_ = 0;
+  patch_forgets_.clear();
+  patch_bytes_ = patches_forgotten_ = 0;
+  horizon_ = {};
   epoch_ = event;
 }
 
@@ -61,7 +89,13 @@ std::vector<Event> EventLog::since(Sequence after) const {
   }
   std::vector<Event> live;
   for (auto patch = patches_.upper_bound(after); patch != patches_.end(); ++patch) live.push_back(patch->second.event);
-  const std::vector<Event> wiping = forgets(after, from_nothing);
+  // One sequence is of one event, so of one of the three.
+  std::vector<Event> wiping;
+  for (const bool patches_alone : {false, true}) {
+    const std::vector<Event> more = patches_alone ? patch_forgets(after, from_nothing) : forgets(after, from_nothing);
+    wiping.insert(wiping.end(), more.begin(), more.end());
+  }
+  std::sort(wiping.begin(), wiping.end(), by_sequence);
   std::merge(live.begin(), live.end(), wiping.begin(), wiping.end(), std::back_inserter(out), by_sequence);
   return out;
 }
@@ -87,6 +121,31 @@ std::vector<Event> EventLog::forgets(Sequence after, bool from_nothing) const {
       event.kind = Event::Kind::kForget;
     }
     out.back().clusters.push_back(key);
+  }
+  return out;
+}
+
+std::vector<Event> EventLog::patch_forgets(Sequence after, bool from_nothing) const {
+  std::vector<Event> out;
+  if (!from_nothing) {
+    for (const Event& event : patch_forgets_)
+      if (event.sequence > after) out.push_back(event);
+    return out;
+  }
+  std::vector<std::tuple<Sequence, points::ClusterKey, uint32_t>> keys;
+  for (const auto& [sequence, patch] : patches_)
+    for (const auto& [forgotten, key] : patch.patch_forgotten)
+      keys.emplace_back(forgotten, key, static_cast<uint32_t>(patch.event.frame.value & points::kFrameTagMask));
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  for (const auto& [sequence, key, frame] : keys) {
+    if (out.empty() || out.back().sequence != sequence) {
+      Event& event = out.emplace_back();
+      event.sequence = sequence;
+      event.kind = Event::Kind::kForget;
+    }
+    out.back().clusters.push_back(key);
+    out.back().frames.push_back(frame);
   }
   return out;
 }

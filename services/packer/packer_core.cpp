@@ -8,6 +8,7 @@
 #include "services/packer/event_log.h"
 #include "services/packer/frame_book.h"
 #include "services/packer/obsolescence.h"
+#include "services/packer/patch_obsolescence.h"
 
 namespace telesplat::packer {
 namespace {
@@ -42,9 +43,10 @@ struct PackerCore::Impl {
   EpochId epoch;
   Sequence sequence;  // of the newest event
   points::PointModel model{config.model};
-  EventLog log;
+  EventLog log{};
   FrameBook frames;
-  Obsolescence obsolescence;
+  Obsolescence obsolescence;             // of clusters, kEliminate
+  PatchObsolescence patch_obsolescence;  // kKeep
   Statistics statistics;
   std::vector<float> reference_depth_m;  // kept for its memory
 
@@ -56,8 +58,10 @@ struct PackerCore::Impl {
     return event;
   }
 
+  bool keeps() const { return config.redundancy == Redundancy::kKeep; }
+
   splat::Elimination eliminate(SampledTile& tile) {
-    if (config.redundancy == Redundancy::kKeep) {
+    if (keeps()) {
       const auto nothing = static_cast<uint64_t>(std::count(tile.image.depth.begin(), tile.image.depth.end(), 0u));
       return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
     }
@@ -81,13 +85,18 @@ struct PackerCore::Impl {
     event.camera = tile.camera, event.rect = tile.rect;
     event.samples = elimination.samples, event.kept = elimination.kept;
     event.frame_samples = frame.samples, event.frame_kept = frame.kept;
-    const bool as_it_came = stream && config.redundancy == Redundancy::kKeep;
+    const bool as_it_came = stream && keeps();
     event.blob =
         as_it_came ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
 
     points::PreparedPatch patch =
         points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
-    for (const auto& [key, mosaic] : patch.mosaics) obsolescence.accessed(key, now_s);
+    for (const auto& [key, mosaic] : patch.mosaics) {
+      if (keeps())
+        patch_obsolescence.added(key, mosaic, now_s);
+      else
+        obsolescence.accessed(key, now_s);
+    }
     log.add_patch(event, patch.mosaics.size());
     statistics.points_outside += patch.outside;
     model.insert(std::move(patch));
@@ -110,6 +119,26 @@ struct PackerCore::Impl {
       log.add_forget(event.sequence, dropped);
       for (const points::ClusterKey key : some) obsolescence.forgotten(key);
       statistics.clusters_forgotten += dropped.size();
+      statistics.points_forgotten += points - model.points();
+      out.push_back(std::move(event));
+    }
+  }
+
+  void forget_patches(std::span<const PatchKey> keys, std::vector<Event>& out) {
+    while (!keys.empty()) {
+      const auto some = keys.first(std::min(keys.size(), kMaxForgetKeys));
+      keys = keys.subspan(some.size());
+      Event event = next_event(Event::Kind::kForget);
+      for (const PatchKey& key : some) {
+        event.clusters.push_back(key.cluster);
+        event.frames.push_back(key.frame);
+        patch_obsolescence.forgotten(key);
+      }
+      const uint64_t points = model.points(), clusters = model.clusters().size();
+      const std::vector<points::Cluster> dropped = model.forget(event.clusters, event.frames);
+      log.add_patch_forget(event, dropped);
+      statistics.clusters_forgotten += clusters - model.clusters().size();
+      statistics.patches_forgotten += dropped.size();
       statistics.points_forgotten += points - model.points();
       out.push_back(std::move(event));
     }
@@ -142,16 +171,33 @@ Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, 
 
 bool PackerCore::has(FrameId frame, uint32_t tile) const { return impl_->frames.has(frame, tile); }
 
-void PackerCore::accessed(std::span<const points::ClusterKey> clusters, double now_s) {
-  for (const points::ClusterKey key : clusters)
-    if (impl_->obsolescence.knows(key)) impl_->obsolescence.accessed(key, now_s);
+void PackerCore::accessed(std::span<const points::ClusterKey> clusters, double now_s,
+                          std::span<const uint32_t> frames) {
+  CHECK(frames.empty() || frames.size() == clusters.size());
+  Impl& i = *impl_;
+  for (size_t n = 0; n < clusters.size(); ++n) {
+    if (!i.keeps()) {
+      if (i.obsolescence.knows(clusters[n])) i.obsolescence.accessed(clusters[n], now_s);
+    } else if (frames.empty()) {
+      i.patch_obsolescence.accessed(clusters[n], now_s);
+    } else {
+      i.patch_obsolescence.accessed({clusters[n], frames[n]}, now_s);
+    }
+  }
 }
 
 std::vector<Event> PackerCore::tick(double now_s) {
   Impl& i = *impl_;
+  const Config& c = i.config;
   std::vector<Event> out;
-  i.forget(i.obsolescence.choose(i.model, now_s, i.config.obsolete_after_s, i.config.max_points), out);
-  if (i.config.max_log_bytes > 0) i.forget(i.obsolescence.choose_patches(i.model, i.log, i.config.max_log_bytes), out);
+  if (i.keeps()) {
+    const PatchLimits limits{c.obsolete_after_s, c.age_weight, c.rate_weight, c.patches_per_cluster, c.max_points};
+    i.forget_patches(i.patch_obsolescence.choose(limits, now_s), out);
+    if (c.max_log_bytes > 0) i.forget_patches(i.patch_obsolescence.choose_events(i.model, i.log, c.max_log_bytes), out);
+  } else {
+    i.forget(i.obsolescence.choose(i.model, now_s, c.obsolete_after_s, c.max_points), out);
+    if (c.max_log_bytes > 0) i.forget(i.obsolescence.choose_patches(i.model, i.log, c.max_log_bytes), out);
+  }
   return out;
 }
 
@@ -163,15 +209,19 @@ std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
   i.model.clear();
   i.frames.clear();
   i.obsolescence.clear();
+  i.patch_obsolescence.clear();
   i.log.add_epoch(event);
   return event;
 }
 
 std::vector<Event> PackerCore::events_since(Sequence after) const {
+  CHECK(remembers(after));
   std::vector<Event> events = impl_->log.since(after);
   for (Event& event : events) event.epoch = impl_->epoch;
   return events;
 }
+
+bool PackerCore::remembers(Sequence after) const { return impl_->log.remembers(after); }
 
 Sequence PackerCore::sequence() const { return impl_->sequence; }
 EpochId PackerCore::epoch() const { return impl_->epoch; }

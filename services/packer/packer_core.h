@@ -35,7 +35,11 @@ struct Config {
   uint64_t max_points = 0;  ///< above it, least recently drawn clusters are forgotten down to 90 % of it; 0 = no limit
   uint64_t max_log_bytes = 0;  ///< of the patches kept for events_since(): above it, those least recently drawn are
                                ///< forgotten with their clusters, down to 90 % of it; 0 = no limit
-  int threads = 1;             ///< for reference depth maps; 0 = all cores
+  // kKeep only: there single patches of clusters are forgotten, highest score first (patch_obsolescence.h). obsolete_after_s,
+  // max_points and max_log_bytes are then of patches too.
+  double age_weight = 1, rate_weight = 4;
+  uint32_t patches_per_cluster = 6;  ///< at most; 0 = no limit
+  int threads = 1;                   ///< for reference depth maps; 0 = all cores
 };
 
 /// A tile as a sampler sent it, decoded.
@@ -86,7 +90,7 @@ struct Statistics {
   uint64_t frames_complete = 0;
   uint64_t samples = 0, kept = 0;  ///< covered pixels before and after elimination
   uint64_t points_outside = 0;     ///< kept samples outside the octree's cube
-  uint64_t clusters_forgotten = 0, points_forgotten = 0;
+  uint64_t clusters_forgotten = 0, patches_forgotten = 0, points_forgotten = 0;
 };
 
 class PackerCore {
@@ -118,8 +122,9 @@ class PackerCore {
   /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.
   bool has(FrameId frame, uint32_t tile) const;
 
-  /// A viewer drew these clusters. Unknown keys are ignored.
-  void accessed(std::span<const points::ClusterKey> clusters, double now_s);
+  /// A viewer drew these clusters; of each the patch with that frame tag, or all of its patches if `frames` is empty. Unknown keys
+  /// are ignored. Precondition: no frames, or as many as clusters.
+  void accessed(std::span<const points::ClusterKey> clusters, double now_s, std::span<const uint32_t> frames = {});
 
   /// Decides what is obsolete (T4.3.3) or too much. Returns the forget events to publish, most often none.
   std::vector<Event> tick(double now_s);
@@ -130,8 +135,10 @@ class PackerCore {
   /// What brings a replica that has applied every event up to `after` (0: an empty one) to the present state, in order
   /// of sequence. Patches of which every point is forgotten are left out, as are forgets that change nothing for anyone
   /// who applies this list; so sequences rise but may have holes. A replica that has applied the list is as of
-  /// sequence().
+  /// sequence(). Precondition: remembers(after).
   std::vector<Event> events_since(Sequence after) const;
+  /// False for a replica of long ago of which it is not known any more what it would have to forget: it must start anew, from 0.
+  bool remembers(Sequence after) const;
 
   /// Of the newest event; 0 before the first.
   Sequence sequence() const;

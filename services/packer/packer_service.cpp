@@ -93,6 +93,10 @@ class PackerService {
     config.relative_epsilon = float(setting("packing.epsilon", config.relative_epsilon));
     config.obsolete_after_s = setting("packing.obsolete_after_s", 0);
     config.max_points = uint64_t(setting("packing.max_points", 0));
+    config.age_weight = setting("packing.age_weight", config.age_weight);
+    config.rate_weight = setting("packing.rate_weight", config.rate_weight);
+    config.patches_per_cluster =
+        uint32_t(std::clamp(setting("packing.patches_per_cluster", config.patches_per_cluster), 0.0, 1e9));
     config.max_log_bytes = uint64_t(options_.log_limit_mb * 1e6);
     config.threads = options_.threads;
     if (!core_ || model_ != config.model) {
@@ -241,7 +245,7 @@ class PackerService {
       net::dispatch<wire::StateRequest, wire::AccessReport>(state_, *message, [&](const auto& m) {
         if (!core_) return;
         if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>)
-          core_->accessed(m.clusters, monotonic_s());
+          core_->accessed(m.clusters, monotonic_s(), m.frames);
         else
           answer(message->peer, m);
       });
@@ -251,6 +255,11 @@ class PackerService {
   void answer(const std::string& peer, const wire::StateRequest& request) {
     const Sequence after =
         request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
+    if (!core_->remembers(after)) {
+      // A packer it does not know: then it asks for everything.
+      state_.send(wire::StateMark{net::make_instance_id(), {}, core_->epoch(), false, 0}, peer);
+      return log::info("a viewer that stopped after {} starts anew", after.value);
+    }
     const auto events = core_->events_since(after);
     for (const auto& e : events) send_event(e, [&](const auto& m) { state_.send(m, peer); });
     state_.send(mark(true), peer);
@@ -276,6 +285,7 @@ class PackerService {
                 {"blocks", double(s.tiles)},
                 {"blocks_dropped", double(g.blocks_dropped)},
                 {"frames_complete", double(s.frames_complete)},
+                {"patches_forgotten", double(s.patches_forgotten)},
                 {"points_forgotten", double(s.points_forgotten)},
                 {"points_outside", double(s.points_outside)}});
     }

@@ -216,6 +216,43 @@ void splat_select_view(benchmark::State& state) {
 }
 BENCHMARK(splat_select_view)->ArgName("patches")->Arg(1)->Arg(64)->Unit(benchmark::kMillisecond);
 
+// Redundant patches, six a cluster: views of 1280x800 that move a little, in blocks of 64 rows, interleaved two by two; every third is
+// coarse (every 4th pixel of every 4th row). best: 1 = the best of each cluster are drawn, 0 = all of them (the baseline).
+void splat_select_best(benchmark::State& state) {
+  static points::PointModel m(model_config());
+  if (m.points() == 0) {
+    uint64_t sequence = 0;
+    const auto add_block = [&](uint64_t frame, int block) {
+      geometry::Pose pose = geometry::default_pose();
+      pose.position_room.x += 0.01 * static_cast<double>(frame);
+      const geometry::Camera whole = geometry::make_camera(pose, 90, 1280, 800);
+      const geometry::Camera camera = geometry::subsample(whole, frame % 3 == 0 ? 4 : 1);
+      if (block * 64 >= camera.height) return;
+      const geometry::Rect rect{0, block * 64, camera.width, std::min(64, camera.height - block * 64)};
+      const image::DepthImage image = wavy_image(camera);
+      image::DepthImage cut(rect.width, rect.height);
+      const auto first = static_cast<ptrdiff_t>(rect.y) * rect.width;
+      std::copy_n(image.depth.begin() + first, cut.pixels(), cut.depth.begin());
+      std::copy_n(image.colour.begin() + first, cut.pixels(), cut.colour.begin());
+      std::copy_n(image.normal.begin() + first, cut.pixels(), cut.normal.begin());
+      m.insert(points::prepare_patch(m.config(), Sequence{++sequence}, camera, rect, cut, FrameId{frame}));
+    };
+    for (uint64_t frame = 1; frame <= 6; frame += 2)
+      for (int block = 0; block < 13; ++block) add_block(frame, block), add_block(frame + 1, block);
+  }
+  splat::SelectionOptions options;
+  options.best_patch_only = state.range(0) != 0;
+  splat::DrawList list;
+  for (auto _ : state) splat::select_view(m, display_camera(), options, list);
+  size_t mosaics = 0;
+  for (const auto& [key, cluster] : m.clusters()) mosaics += cluster->mosaics.size();
+  state.counters["clusters"] = static_cast<double>(m.clusters().size());
+  state.counters["mosaics"] = static_cast<double>(mosaics);
+  state.counters["seen"] = static_cast<double>(list.clusters_seen.size());
+  state.counters["points"] = static_cast<double>(list.points);
+}
+BENCHMARK(splat_select_best)->ArgName("best")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
 // A frame as the display makes it, finish included, for one eye or for both: what is drawn is chosen once for the two of them.
 void splat_eyes(benchmark::State& state) {
   const auto kernel = static_cast<splat::Kernel>(state.range(0));

@@ -44,15 +44,17 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
   packer::Config config = test::packer_config();
   config.model.depth = 4 + GetParam() % 3;
   config.obsolete_after_s = 8;
-  config.max_points = GetParam() % 2 ? 60000 : 0;
+  config.max_points = GetParam() % 4 < 2 ? 60000 : 0;
   config.max_log_bytes = GetParam() % 3 ? 400000 : 0;
-  config.redundancy = GetParam() % 4 == 3 ? packer::Redundancy::kKeep : packer::Redundancy::kEliminate;
+  const bool keep = GetParam() % 2 == 1;  // then single patches of clusters are forgotten
+  config.redundancy = keep ? packer::Redundancy::kKeep : packer::Redundancy::kEliminate;
+  config.patches_per_cluster = GetParam() % 5 == 4 ? 0 : static_cast<uint32_t>(1 + GetParam() % 3);
   packer::PackerCore core(config, {1});
 
   // One hears everything, one misses events now and then and asks for them, one joins anew each time.
   test::Replica steady(config.model), gappy(config.model);
   uint64_t next_frame = 1, expected_sequence = 0;
-  int patches = 0, forgets = 0, epochs = 0, gaps = 0, published = 0;
+  int patches = 0, forgets = 0, patch_forgets = 0, epochs = 0, gaps = 0, published = 0;
   double now_s = 0;
   std::vector<packer::SampledTile> waiting;
   const auto publish = [&](const packer::Event& event) {
@@ -60,6 +62,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
     ++published;
     patches += event.kind == packer::Event::Kind::kPatch;
     forgets += event.kind == packer::Event::Kind::kForget;
+    patch_forgets += !event.frames.empty();
     epochs += event.kind == packer::Event::Kind::kEpoch;
     steady.apply(event);
     const bool lost = chance(0.15);
@@ -80,14 +83,22 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
       if (const auto event = core.begin_epoch({core.epoch().value + 1})) publish(*event);
     } else if (chance(0.2)) {
       std::vector<points::ClusterKey> seen;
-      for (const auto& [key, cluster] : core.model().clusters())
-        if (chance(0.3)) seen.push_back(key);
-      core.accessed(seen, now_s);
+      std::vector<uint32_t> frames;  // not told every other time
+      const bool told = chance(0.5);
+      for (const auto& [key, cluster] : core.model().clusters()) {
+        if (!chance(0.3)) continue;
+        seen.push_back(key);
+        if (told) frames.push_back(cluster->mosaics[random() % cluster->mosaics.size()].frame_tag());
+      }
+      core.accessed(seen, now_s, frames);
       for (const auto& event : core.tick(now_s)) publish(event);
     } else {
       if (waiting.empty()) {
-        waiting = test::sampled_frame({next_frame++}, test::scene_camera(test::random_eye(random), 160, 100), 64,
-                                      core.epoch());
+        // Some are coarse; those are forgotten first, perhaps before they are complete.
+        const int width = keep && chance(0.3) ? 40 : 160;
+        waiting =
+            test::sampled_frame({next_frame++}, test::scene_camera(test::random_eye(random), width, width * 5 / 8),
+                                width == 40 ? 16 : 64, core.epoch());
         std::shuffle(waiting.begin(), waiting.end(), random);
         if (chance(0.3)) waiting.push_back(waiting.front());  // a duplicate
       }
@@ -104,6 +115,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
     }
   }
   EXPECT_GT(patches, 100);
+  EXPECT_EQ(patch_forgets, keep ? forgets : 0);
 
   gappy.catch_up(core);
   test::Replica late(config.model);
@@ -118,9 +130,12 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
 INSTANTIATE_TEST_SUITE_P(Seeds, ReplicaCheck, testing::Range(1, 13));
 
 // From every sequence at which a replica may have stopped.
-TEST(ReplicaResume, FromEverySequence) {
+class ReplicaResume : public testing::TestWithParam<packer::Redundancy> {};
+TEST_P(ReplicaResume, FromEverySequence) {
   std::mt19937_64 random(5);
   packer::Config config = test::packer_config();
+  config.redundancy = GetParam();
+  config.patches_per_cluster = 2;
   config.model.depth = 3;
   config.obsolete_after_s = 2;
   packer::PackerCore core(config, {1});
@@ -144,6 +159,8 @@ TEST(ReplicaResume, FromEverySequence) {
     ASSERT_EQ(replica.model().digest(), core.model().digest()) << "stopped after " << stop;
   }
 }
+INSTANTIATE_TEST_SUITE_P(Modes, ReplicaResume,
+                         testing::Values(packer::Redundancy::kEliminate, packer::Redundancy::kKeep));
 
 }  // namespace
 }  // namespace telesplat

@@ -43,11 +43,17 @@ class Replica {
     CHECK(applied_ < event.sequence);
     applied_ = event.sequence;
     if (event.kind == packer::Event::Kind::kEpoch) model_.clear();
-    if (event.kind == packer::Event::Kind::kForget) model_.forget(event.clusters);
+    if (event.kind == packer::Event::Kind::kForget) {
+      if (event.frames.empty())
+        model_.forget(event.clusters);
+      else
+        model_.forget(event.clusters, event.frames);
+    }
     if (event.kind == packer::Event::Kind::kPatch) {
       const auto image = codec::decode(*event.blob, event.rect.width, event.rect.height);
       CHECK(image.ok());
-      model_.insert(points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image, event.frame));
+      model_.insert(
+          points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image, event.frame));
     }
   }
   /// Closes a gap.

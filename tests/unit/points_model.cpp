@@ -92,6 +92,54 @@ TEST(PointModel, ClustersTakenOutStayDrawable) {
   EXPECT_EQ(model.find(key), nullptr);
 }
 
+TEST(PointModel, ForgetDropsSinglePatches) {
+  PointModel model(test::scene_config()), expected(test::scene_config());
+  // Two blocks of frame 1, with one of frame 2 between them.
+  const geometry::Camera camera = test::scene_camera({0.6, 0.4, 0.3}, kTile.width, kTile.height);
+  const auto add = [&](PointModel& m, uint64_t sequence, uint64_t frame) {
+    m.insert(prepare_patch(m.config(), {sequence}, camera, kTile, test::sample_scene(camera, kTile), {frame}));
+  };
+  for (const auto& [sequence, frame] : {std::pair{1, 1}, {2, 2}, {3, 1}})
+    add(model, uint64_t(sequence), uint64_t(frame));
+  add(expected, 2, 2);
+  const Mosaic::Level kept = model.clusters().begin()->second->mosaics.at(1).level(0);
+  const Mosaic::Level gone = model.clusters().begin()->second->mosaics.at(2).level(0);
+  const Cluster* first = model.clusters().begin()->second.get();
+  std::vector<ClusterKey> keys{0xfffffff0u, first->key};  // unknown; a frame it does not have
+  std::vector<uint32_t> frames{1, 7};
+  for (const auto& [key, cluster] : model.clusters())
+    for (int twice = 0; twice < 2; ++twice) keys.push_back(key), frames.push_back(1);
+
+  const uint64_t points = model.points();
+  const auto dropped = model.take_out(keys, frames);
+  EXPECT_EQ(dropped.size(), model.clusters().size());
+  EXPECT_EQ(model.digest(), expected.digest());
+  EXPECT_EQ(model.points(), points / 3);
+  EXPECT_EQ(model.find(first->key), first);
+  EXPECT_EQ(first->mosaics.at(0).level(0).x, kept.x) << "what stays does not move";
+  uint64_t points_dropped = 0;
+  bool found = false;
+  for (const auto& cluster : dropped) {
+    ASSERT_EQ(cluster->mosaics.size(), 2u);
+    EXPECT_EQ(cluster->leaf_room, leaf_box(model.config(), cluster->key));
+    for (const Mosaic& m : cluster->mosaics) {
+      EXPECT_EQ(m.frame_tag(), 1u);
+      points_dropped += m.count(0);
+      found |= m.level(0).x == gone.x;
+    }
+  }
+  EXPECT_EQ(points_dropped, points - points / 3);
+  EXPECT_TRUE(found) << "nor does what was dropped";
+
+  // The last patch of a cluster takes the cluster along, as it lies in memory.
+  const ClusterKey key = first->key;
+  const auto last = model.take_out(std::vector<ClusterKey>{key}, std::vector<uint32_t>{2});
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_EQ(last[0].get(), first);
+  EXPECT_EQ(model.find(key), nullptr);
+  EXPECT_EQ(model.points() + model.points_in(key) + last[0]->mosaics.at(0).count(0), points / 3);
+}
+
 TEST(PointModel, ForgettingEverythingIsAnEmptyModel) {
   PointModel model(test::scene_config()), cleared(test::scene_config());
   model.insert(patch(1));

@@ -21,6 +21,10 @@ constexpr double kMasterPatience_s = 10, kFarewell_s = 4;
 
 std::string text(double v) { return fmt::format("{}", v); }
 
+std::string progressive(master::Progressive p) {
+  return p == master::Progressive::kOn ? "on" : p == master::Progressive::kOff ? "off" : "auto";
+}
+
 std::vector<std::string> master_arguments(const RunOptions& o) {
   const auto& s = o.master.master.schedule;
   std::vector<std::string> a{"--name",
@@ -33,6 +37,10 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
                              text(s.frames_in_flight),
                              "--lease-timeout",
                              text(s.lease_timeout_s),
+                             "--lease-target",
+                             text(s.lease_target_s),
+                             "--progressive",
+                             progressive(o.master.master.progressive),
                              "--octree-depth",
                              text(double(o.master.master.octree_depth)),
                              "--log-level",

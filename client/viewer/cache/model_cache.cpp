@@ -42,9 +42,9 @@ void ModelCache::insert(points::PreparedPatch patch, EpochId epoch) {
   ++patches_;
 }
 
-void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys) {
+void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames) {
   const std::lock_guard lock(mutex_);
-  auto dropped = newest_.model->take_out(keys);
+  auto dropped = frames.empty() ? newest_.model->take_out(keys) : newest_.model->take_out(keys, frames);
   newest_.applied = sequence;
   move_to_end(dropped, dropped_of(newest_.model.get()).clusters);
 }

@@ -24,7 +24,8 @@ class ModelCache {
   EpochId epoch() const { return newest_.epoch; }
   /// Precondition: `epoch` is the newest replica's, or that is not known yet.
   void insert(points::PreparedPatch patch, EpochId epoch);
-  void forget(Sequence sequence, std::span<const points::ClusterKey> keys);
+  /// frames: empty, or one a key: then only the mosaics with that frame tag (PointModel::forget).
+  void forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames = {});
   /// Replaces the older replica on display by the newest. No effect if it is displayed already.
   void show_newest();
   /// Frees what was dropped and no frame draws any more. To be called often: to free a million points takes milliseconds.
@@ -53,7 +54,7 @@ class ModelCache {
     uint64_t number = 0;  // of all replicas this cache had
   };
   struct Dropped {
-    std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were: draw lists point to them
+    std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were, or what was dropped of them: draw lists point to it
     std::vector<std::unique_ptr<points::PointModel>> models;
   };
   const Replica& displayed() const { return older_.model ? older_ : newest_; }

@@ -122,7 +122,10 @@ struct EventReplay::Impl {
     return ok_status();
   }
   Status apply(const wire::Forget& f) {
-    model->forget(f.clusters);
+    if (f.frames.empty())
+      model->forget(f.clusters);
+    else
+      model->forget(f.clusters, f.frames);
     return ok_status();
   }
   Status apply(const wire::EpochBegin&) {
