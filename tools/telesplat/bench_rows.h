@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "common/geometry/camera.h"
 #include "common/julia/flags.h"
 #include "services/sampler/replay_file.h"
 
