@@ -11,12 +11,13 @@ namespace {
 
 constexpr float kMinCosine = 0.35f;     // samples taken at a steeper slope count as taken at this one
 constexpr float kPixelRadius2 = 0.25f;  // of the low-pass
-constexpr size_t kFramesInFlight = 16;  // the most a session may have
 constexpr float kMoreCovered = 1.1f, kApart = 0.1f;
+constexpr float kAreaOff = 1.2f,
+                kCentreOff = 0.6f;  // of n samples: kAreaOff n^(-3/4) of the area, kCentreOff / sqrt n spacings
 
-// Of the slope by which the mosaic was sampled, not below kMinCosine.
-float sampled_cosine(const points::Mosaic& m) {
-  return std::max(glm::dot(m.cone_axis(), m.direction_to_eye()), kMinCosine);
+// Of the slope by which samples were taken, not below kMinCosine.
+float sampled_cosine(const glm::vec3& normal, const glm::vec3& to_eye) {
+  return std::max(glm::dot(normal, to_eye), kMinCosine);
 }
 
 }  // namespace
@@ -26,17 +27,21 @@ PatchView patch_view(const geometry::Camera& camera) {
           static_cast<float>(camera.near_m)};
 }
 
-float surfel_quality(const points::Mosaic& mosaic, const geometry::Box& leaf_room, const PatchView& view) {
-  const glm::vec4 centre = view.view * glm::vec4(mosaic.centroid_room(leaf_room), 1.0f);
+namespace {
+
+// surfel_quality() of a surfel at `centroid_room`; pixel_range and to_eye_room: of how it was sampled.
+float quality_of(const glm::vec3& centroid_room, const glm::vec3& normal_room, const glm::vec3& to_eye_room,
+                 float pixel_range, float leaf_m, const PatchView& view) {
+  const glm::vec4 centre = view.view * glm::vec4(centroid_room, 1.0f);
   const float w = -centre.z;
   if (!(w > view.near_m)) return 0;
   const auto turn = [&](const glm::vec3& v) {
     const glm::vec3 c = glm::mat3(view.view) * v;
     return glm::vec3(c.x, -c.y, -c.z);
   };
-  const glm::vec3 normal = turn(mosaic.cone_axis()), to_eye = turn(mosaic.direction_to_eye());
+  const glm::vec3 normal = turn(normal_room), to_eye = turn(to_eye_room);
   const float u = centre.x / w, v = -centre.y / w;
-  const float rho = 0.5f * (leaf_room.hi.x - leaf_room.lo.x) / (mosaic.pixel_range() * w), rho2 = rho * rho;
+  const float rho = 0.5f * leaf_m / (pixel_range * w), rho2 = rho * rho;
 
   // Camera axes X right, Y down, Z forward. G = T (I - n n^T + kappa d d^T) T^T, T = [1 0 -u; 0 1 -v; 0 0 1].
   const float cosine = glm::dot(normal, to_eye), kappa = 1.0f / std::max(cosine * cosine, kMinCosine * kMinCosine);
@@ -58,50 +63,79 @@ float surfel_quality(const points::Mosaic& mosaic, const geometry::Box& leaf_roo
   return std::sqrt(short2) / long2;  // (r1 / r0) / r0
 }
 
+}  // namespace
+
+float surfel_quality(const points::Mosaic& m, const geometry::Box& leaf_room, const PatchView& view) {
+  return quality_of(m.centroid_room(leaf_room), m.cone_axis(), m.direction_to_eye(), m.pixel_range(),
+                    leaf_room.hi.x - leaf_room.lo.x, view);
+}
+
 float surface_covered(const points::Mosaic& m) {
-  return static_cast<float>(m.count(0)) / (m.pixel_range() * m.pixel_range() * sampled_cosine(m));
+  return static_cast<float>(m.count(0)) /
+         (m.pixel_range() * m.pixel_range() * sampled_cosine(m.cone_axis(), m.direction_to_eye()));
+}
+
+// Whether what `patch` shows of the cluster is shown by a better one.
+bool PatchChooser::shows(const Patch& better, const Patch& patch, float leaf_m) const {
+  const float larger = kMoreCovered + patch.covered_off + better.covered_off;
+  if (patch.covered > larger * better.covered) return false;
+  const float inside = 0.5f * std::max(1.0f - patch.covered / better.covered, 0.0f);
+  const float apart = (kApart + inside) * std::sqrt(better.covered) + patch.centre_off + better.centre_off;
+  const glm::vec3 between = patch.centre - better.centre;
+  return glm::dot(between, between) <= apart * apart * leaf_m * leaf_m;
 }
 
 void PatchChooser::choose(const geometry::Box& leaf_room, const PatchView& view,
                           std::vector<const points::Mosaic*>& mosaics) {
   if (mosaics.size() < 2) return;
+  // Mosaics of one frame need not follow each other: blocks of several frames come in turns.
   patches_.clear();
   patch_of_.clear();
   for (const points::Mosaic* m : mosaics) {
-    // Mosaics are in order of sequence, and at most kFramesInFlight frames are packed at a time.
     size_t i = patches_.size();
-    while (i > 0 && patches_.size() - i < kFramesInFlight && patches_[i - 1].frame != m->frame_tag()) --i;
-    if (i == 0 || patches_[i - 1].frame != m->frame_tag()) {
-      patches_.push_back({m->frame_tag()});
+    while (i > 0 && patches_[i - 1].frame != m->frame_tag()) --i;
+    if (i == 0) {
+      patches_.push_back({m->frame_tag(), m->pixel_range(), {}});
       i = patches_.size();
     }
-    Patch* patch = &patches_[i - 1];
     patch_of_.push_back(static_cast<uint32_t>(i - 1));
-    const auto n = static_cast<float>(m->count(0));
-    patch->quality += n * surfel_quality(*m, leaf_room, view);
-    patch->covered += surface_covered(*m);
-    patch->points += n;
-    patch->centre += n * m->centroid_room(leaf_room);
   }
   if (patches_.size() < 2) return;
-  for (Patch& p : patches_) p.quality /= p.points, p.centre /= p.points;
+
+  // All mosaics of a patch in this leaf were sampled at one rate from one direction.
+  for (size_t i = 0; i < mosaics.size(); ++i) {
+    const points::Mosaic& m = *mosaics[i];
+    Patch& p = patches_[patch_of_[i]];
+    if (p.points == 0) p.to_eye = m.direction_to_eye();
+    const auto n = static_cast<float>(m.count(0));
+    const glm::vec3 normal = m.cone_axis();
+    p.points += n;
+    p.covered += n / (p.pixel_range * p.pixel_range * sampled_cosine(normal, p.to_eye));
+    p.centre += n * m.centroid_room(leaf_room);
+    p.normal += n * normal;
+  }
+  const float leaf_m = leaf_room.hi.x - leaf_room.lo.x;
+  for (Patch& p : patches_) {
+    p.centre /= p.points;
+    const float length2 = glm::dot(p.normal, p.normal);
+    p.normal = length2 > 0 ? p.normal / std::sqrt(length2) : p.to_eye;
+    p.quality = quality_of(p.centre, p.normal, p.to_eye, p.pixel_range, leaf_m, view);
+    const float root = std::sqrt(p.points);
+    p.covered_off = kAreaOff / (root * std::sqrt(root));
+    p.centre_off = kCentreOff / (root * p.pixel_range);
+  }
 
   by_quality_.resize(patches_.size());
   std::iota(by_quality_.begin(), by_quality_.end(), 0u);
-  std::stable_sort(by_quality_.begin(), by_quality_.end(),
-                   [&](uint32_t a, uint32_t b) { return patches_[a].quality > patches_[b].quality; });
-  const float leaf_m = leaf_room.hi.x - leaf_room.lo.x;
+  std::sort(by_quality_.begin(), by_quality_.end(), [&](uint32_t a, uint32_t b) {
+    return patches_[a].quality != patches_[b].quality ? patches_[a].quality > patches_[b].quality : a < b;
+  });
   for (size_t i = 0; i < by_quality_.size(); ++i) {
     Patch& p = patches_[by_quality_[i]];
     p.drawn = true;
     for (size_t j = 0; j < i && p.drawn; ++j) {
       const Patch& better = patches_[by_quality_[j]];
-      if (!better.drawn) continue;
-      const bool more = p.covered > kMoreCovered * better.covered;
-      const float inside = 0.5f * std::max(1.0f - p.covered / better.covered, 0.0f);
-      const bool elsewhere =
-          glm::distance(p.centre, better.centre) > (kApart + inside) * leaf_m * std::sqrt(better.covered);
-      if (!more && !elsewhere) p.drawn = false;
+      p.drawn = !(better.drawn && shows(better, p, leaf_m));
     }
   }
   size_t kept = 0;

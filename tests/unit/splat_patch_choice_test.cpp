@@ -1,6 +1,7 @@
 // Redundant patches: which of a cluster's are drawn (T4.4.3.3).
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -23,26 +24,30 @@ class Square {
  public:
   explicit Square(int depth = 0) : model_({{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}, depth}) {}
 
-  /// Samples the part of the square with x in [x0, x1); in `tiles` tiles side by side, of one frame.
-  void add(const glm::dvec3& eye, double x0 = -0.25, double x1 = 0.25, int tiles = 1) {
-    const geometry::Camera camera = camera_from(eye);
-    const glm::dvec3 backward = camera.pose.orientation * glm::dvec3(0, 0, 1);
+  /// Samples the part of the square with x in [x0, x1); in `tiles` tiles side by side, of one frame; every step-th pixel of every
+  /// step-th row.
+  void add(const glm::dvec3& eye, double x0 = -0.25, double x1 = 0.25, int tiles = 1, int step = 1) {
     ++frame_;
-    for (int tile = 0; tile < tiles; ++tile) {
-      const int width = kSide / tiles;
-      image::DepthImage image(width, kSide);
-      for (int y = 0; y < kSide; ++y)
-        for (int x = 0; x < width; ++x) {
-          const glm::dvec3 ray = camera.unproject(tile * width + x + 0.5, y + 0.5, 1.0) - eye;
-          const glm::dvec3 hit = eye - ray * (eye.z / ray.z);
-          if (hit.x < x0 || hit.x >= x1 || std::abs(hit.y) > 0.25) continue;
-          const size_t i = size_t(y) * width + x;
-          image.depth[i] = image::encode_depth(glm::dot(eye - hit, backward), camera.near_m);
-          image.normal[i] = image::encode_normal16({0, 0, 1});
-        }
-      model_.insert(points::prepare_patch(model_.config(), Sequence{++sequence_}, camera,
-                                          {tile * width, 0, width, kSide}, image, FrameId{frame_}));
-    }
+    for (int tile = 0; tile < tiles; ++tile) add_tile(frame_, eye, tile, tiles, x0, x1, step);
+  }
+  void add_tile(uint64_t frame, const glm::dvec3& eye, int tile, int tiles, double x0 = -0.25, double x1 = 0.25,
+                int step = 1) {
+    frame_ = std::max(frame_, frame);
+    const geometry::Camera camera = geometry::subsample(camera_from(eye), step);
+    const glm::dvec3 backward = camera.pose.orientation * glm::dvec3(0, 0, 1);
+    const int width = camera.width / tiles;
+    image::DepthImage image(width, camera.height);
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const glm::dvec3 ray = camera.unproject(tile * width + x + 0.5, y + 0.5, 1.0) - eye;
+        const glm::dvec3 hit = eye - ray * (eye.z / ray.z);
+        if (hit.x < x0 || hit.x >= x1 || std::abs(hit.y) > 0.25) continue;
+        const size_t i = size_t(y) * width + x;
+        image.depth[i] = image::encode_depth(glm::dot(eye - hit, backward), camera.near_m);
+        image.normal[i] = image::encode_normal16({0, 0, 1});
+      }
+    model_.insert(points::prepare_patch(model_.config(), Sequence{++sequence_}, camera,
+                                        {tile * width, 0, width, camera.height}, image, FrameId{frame}));
   }
   const points::PointModel& model() const { return model_; }
   const points::Cluster& cluster() const { return *model_.clusters().begin()->second; }
@@ -140,6 +145,70 @@ TEST(PatchChoice, TilesOfOneFrameAreOnePatch) {
   std::set<uint64_t> sequences;
   for (const auto& item : list.items) sequences.insert(item.sequence.value);
   EXPECT_EQ(sequences, (std::set<uint64_t>{2, 3, 4, 5})) << "all four tiles of the better frame, nothing else";
+}
+
+TEST(PatchChoice, BlocksOfFramesThatComeInTurnsAreTheirPatches) {
+  Square square;
+  for (int tile = 0; tile < 4; ++tile)
+    for (const auto& [frame, distance] : {std::pair{1, 1.6}, {2, 0.8}, {3, 1.2}})
+      square.add_tile(uint64_t(frame), {0, 0, distance}, tile, 4);
+  EXPECT_EQ(square.drawn({0, 0, 0.7}), Frames{2});
+}
+
+TEST(PatchChoice, CoarsePatchesLoseToFineOnesOfNearlyTheSameView) {
+  for (const int depth : {2, 3, 4, 5}) {  // down to two coarse samples across a leaf
+    for (const glm::dvec3& eye : {glm::dvec3(0, 0, 0.8), {0.3, 0.2, 0.9}, {-0.5, 0.1, 0.7}}) {
+      Square square(depth);
+      square.add(eye, -0.25, 0.25, 1, 4);
+      square.add(eye + glm::dvec3(0.01, -0.01, 0.01));
+      square.add(eye + glm::dvec3(-0.01, 0, 0), -0.25, 0.25, 1, 4);
+      EXPECT_EQ(square.drawn(eye), Frames{2}) << "depth " << depth << " from " << eye.x;
+      EXPECT_EQ(square.drawn(eye * 0.8), Frames{2});
+    }
+  }
+}
+
+TEST(PatchChoice, AFinePatchFromTheSideDoesNotReplaceABetterOne) {
+  for (const int depth : {0, 3}) {
+    Square square(depth);
+    square.add({0, 0, 1.4});      // not as fine, but straight on
+    square.add({0.62, 0, 0.12});  // near, at a low angle
+    const Frames drawn = square.drawn({0, 0, 0.7});
+    EXPECT_TRUE(drawn.contains(1)) << depth;
+    EXPECT_EQ(square.drawn({0, 0, 1.4}), Frames{1}) << depth;
+  }
+}
+
+// While a frame is half there, an older one is drawn where the new one has nothing yet: no leaf loses much of what it showed.
+TEST(PatchChoice, WhatAFrameHasNotBroughtYetIsShownByOlderOnes) {
+  for (const int step : {1, 4}) {
+    const glm::dvec3 eye(0.1, 0, 0.8);
+    for (int half = 1; half < 8; ++half) {
+      Square square(3);
+      square.add(eye, -0.25, 0.25, 1, step);
+      for (int tile = 0; tile < half; ++tile) square.add_tile(2, eye + glm::dvec3(0.01, 0, -0.02), tile, 8);
+      splat::SelectionOptions options;
+      options.best_patch_only = true, options.transitions = false;
+      splat::DrawList list;
+      splat::select_view(square.model(), camera_from(eye), options, list);
+      for (const auto& [key, cluster] : square.model().clusters()) {
+        std::set<Sequence> drawn;
+        for (const auto& item : list.items)
+          if (item.cluster == cluster.get()) drawn.insert(item.sequence);
+        // In steps of a sixteenth of the leaf along x: which parts have points, which of them are drawn.
+        std::array<bool, 16> has{}, shown{};
+        for (const auto& m : cluster->mosaics)
+          for (uint32_t i = 0; i < m.count(0); ++i) {
+            const size_t at = m.level(0).x[i] >> 12;
+            has[at] = true;
+            shown[at] = shown[at] || drawn.contains(m.sequence());
+          }
+        int lost = 0;
+        for (size_t i = 0; i < has.size(); ++i) lost += has[i] && !shown[i];
+        EXPECT_LE(lost, 4) << "step " << step << ", " << half << " of 8 tiles, cluster " << key;
+      }
+    }
+  }
 }
 
 TEST(PatchChoice, PatchesDrawnAreToldForAccessReports) {

@@ -16,7 +16,7 @@ namespace {
 
 // Flags that take on or off; the others that a boolean can stand for are either there or not.
 bool is_switch(const std::string& flag) {
-  return flag == "detail-budget" || flag == "speed-detail" || flag == "finish";
+  return flag == "detail-budget" || flag == "speed-detail" || flag == "finish" || flag == "progressive";
 }
 
 // One scene file on its way to flags.

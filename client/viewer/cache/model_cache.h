@@ -54,7 +54,7 @@ class ModelCache {
     uint64_t number = 0;  // of all replicas this cache had
   };
   struct Dropped {
-    std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were: draw lists point to them
+    std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were, or what was dropped of them: draw lists point to it
     std::vector<std::unique_ptr<points::PointModel>> models;
   };
   const Replica& displayed() const { return older_.model ? older_ : newest_; }

@@ -1,0 +1,201 @@
+// Julia sets: whole runs of scenes that no file holds.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> with(std::vector<std::string> more) {
+  more.insert(more.begin(), {"--size", "320x200", "--sampling-size", "auto", "--record-points", "64"});
+  return more;
+}
+
+TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
+  PipelineRun run(with({"--preset", "wings", "--duration", "4", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
+                  "julia");
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  const auto s = run.summary();
+  ASSERT_TRUE(s.is_object());
+  EXPECT_EQ(s["kind"], "julia");
+  EXPECT_EQ(s["scene"], "julia (wings)");
+  EXPECT_EQ(s["primitives"], 0);
+  EXPECT_GT(s["updates"], 2);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  EXPECT_GE(s["quality"]["views"], 2);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], 18);
+  // The head stands still: by now every pixel was sampled at the display's resolution.
+  EXPECT_GT(s["quality"]["last_view"]["psnr_db"], 22);
+  EXPECT_LT(s["quality"]["last_view"]["hole_fraction"], 0.02);
+  EXPECT_NE(run.program().out().find("julia (wings): c = ("), std::string::npos) << run.program().out();
+
+  // Views arrive coarse first, in rows, and every sampler takes part.
+  const auto steps = run.column("tiles.csv", "step");
+  EXPECT_GT(std::count(steps.begin(), steps.end(), 4), 0);
+  EXPECT_GT(std::count(steps.begin(), steps.end(), 1), 0);
+  EXPECT_EQ(steps.size(),
+            size_t(std::count(steps.begin(), steps.end(), 4) + std::count(steps.begin(), steps.end(), 1)));
+
+  Program inspect("telesplat", {"inspect", run.out()}, run.folder() / "inspect");
+  EXPECT_EQ(inspect.wait(), 0) << inspect.err();
+  for (const char* part : {"julia (wings)", "slice.turn-z", "colour.scale", "summary.json"})
+    EXPECT_NE(inspect.out().find(part), std::string::npos) << part;
+
+  Program compare("telesplat",
+                  {"compare", run.out(), "--kernels", "disc", "--renderers", "cpu", "--poses", "2", "--repeat", "1"},
+                  run.folder() / "compare");
+  EXPECT_EQ(compare.wait(90), 0) << compare.err();
+  EXPECT_TRUE(fs::exists(run.out() + "/compare/contact-sheet.png"));
+}
+
+TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
+  PipelineRun run(with({"--animate", "c.y=-0.5:-0.3:2s;slice.offset=0:0.2:3s", "--duration", "5", "--verify", "10",
+                        "--trajectory", "still"}),
+                  "julia");
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  const auto epochs = run.column("epochs.csv", "epoch"), values = run.column("epochs.csv", "c.y"),
+             others = run.column("epochs.csv", "c.x"), shown = run.column("frames.csv", "epoch"),
+             drawn = run.column("frames.csv", "points_drawn");
+  ASSERT_GT(epochs.size(), 5u);
+  ASSERT_EQ(values.size(), epochs.size());
+  EXPECT_TRUE(std::is_sorted(epochs.begin(), epochs.end()));
+  EXPECT_EQ(std::set<double>(epochs.begin(), epochs.end()).size(), epochs.size());
+  for (const double v : values) {
+    EXPECT_GE(v, -0.5 - 1e-9);
+    EXPECT_LE(v, -0.3 + 1e-9);
+  }
+  EXPECT_GT(*std::max_element(values.begin(), values.end()) - *std::min_element(values.begin(), values.end()), 0.1);
+  EXPECT_EQ(std::set<double>(others.begin(), others.end()).size(), 1u) << "c.x is not animated";
+
+  // Epochs are displayed in their order, each known, and never nothing once there was something.
+  ASSERT_EQ(shown.size(), drawn.size());
+  std::set<double> displayed;
+  double newest = 0;
+  bool something = false;
+  for (size_t i = 0; i < shown.size(); ++i) {
+    if (drawn[i] == 0) {
+      EXPECT_FALSE(something) << "frame " << i << " shows nothing";
+      continue;
+    }
+    something = true;
+    EXPECT_GE(shown[i], newest) << "frame " << i;
+    newest = shown[i];
+    displayed.insert(shown[i]);
+    EXPECT_NE(std::find(epochs.begin(), epochs.end(), shown[i]), epochs.end()) << shown[i];
+  }
+  EXPECT_GT(displayed.size(), 3u);
+  // Compared with the set of its own epoch each frame is right; with that of another it would not be.
+  const auto s = run.summary();
+  EXPECT_GE(s["quality"]["views"], 2);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], 18);
+}
+
+TEST(Julia, ParametersAreSetAndAnimatedWhileItRuns) {
+  PipelineRun run(with({"--duration", "0", "--trajectory", "still"}), "julia");
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  const auto ctl = [&](std::vector<std::string> arguments, const std::string& name) {
+    arguments.insert(arguments.begin(), "ctl");
+    arguments.insert(arguments.end(), {"--master", run.master()});
+    auto program = std::make_unique<Program>("telesplat", arguments, run.folder() / name);
+    program->wait(30);
+    return program;
+  };
+  EXPECT_EQ(ctl({"set", "c.y=0.3", "palette=ice"}, "set")->wait(), 0);
+  EXPECT_NE(ctl({"set", "c.y=7"}, "far")->wait(), 0);
+  EXPECT_NE(ctl({"set", "c.q=1"}, "unknown")->wait(), 0);
+  EXPECT_EQ(ctl({"set", "c.y"}, "no-value")->wait(), 2);
+  EXPECT_EQ(ctl({"set"}, "nothing")->wait(), 2);
+  EXPECT_EQ(ctl({"animate", "c.y"}, "no-timeline")->wait(), 2);
+  EXPECT_EQ(ctl({"animate", "c.x=0.3:0.4:1s"}, "animate")->wait(), 0);
+  EXPECT_TRUE(wait_until([&] { return run.column("epochs.csv", "epoch").size() > 4; }))
+      << run.column("epochs.csv", "epoch").size();
+  EXPECT_EQ(ctl({"animate", "off"}, "off")->wait(), 0);
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
+  const auto values = run.column("epochs.csv", "c.y"), palettes = run.column("epochs.csv", "palette");
+  ASSERT_FALSE(values.empty());
+  EXPECT_EQ(values.back(), 0.3);
+  EXPECT_EQ(palettes.back(), 7);
+  EXPECT_EQ(std::count(values.begin(), values.end(), 7), 0);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Julia, ASceneFileWithKeyFrames) {
+  TemporaryFolder folder;
+  const std::string path = folder / "scene.toml";
+  std::ofstream(path)
+      << "[scene]\nkind = \"julia\"\npreset = \"lantern\"\n[julia]\niterations = 40\n"
+         "[[keyframe]]\nt = 0\nc.w = -0.2\n[[keyframe]]\nt = 1\nc.w = -0.3\n[[keyframe]]\nt = 2\nc.w = -0.2\n";
+  PipelineRun run(with({"--duration", "3"}), path);
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  const auto iterations = run.column("epochs.csv", "iterations"), values = run.column("epochs.csv", "c.w");
+  ASSERT_GT(iterations.size(), 2u);
+  EXPECT_EQ(std::count(iterations.begin(), iterations.end(), 40), std::ptrdiff_t(iterations.size()));
+  EXPECT_LT(*std::min_element(values.begin(), values.end()), -0.22);
+  EXPECT_EQ(run.summary()["scene"], "julia (lantern)");
+}
+
+struct Wrong {
+  std::string name;
+  std::vector<std::string> arguments;
+  std::string named;  // what the line must name
+};
+void PrintTo(const Wrong& w, std::ostream* out) { *out << w.name; }
+
+class JuliaWrong : public ::testing::TestWithParam<Wrong> {};
+
+TEST_P(JuliaWrong, ExitsWithTwoAndOneLine) {
+  const Wrong& w = GetParam();
+  PipelineRun run(with(w.arguments), "julia");
+  EXPECT_EQ(run.program().wait(60), 2) << run.program().err();
+  const std::string err = run.program().err();
+  EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
+  EXPECT_TRUE(err.starts_with("telesplat: ")) << err;
+  EXPECT_NE(err.find(w.named), std::string::npos) << err;
+  EXPECT_FALSE(fs::exists(run.out())) << "a run folder was left";
+  EXPECT_TRUE(run.all_gone());
+}
+
+const Wrong kWrong[] = {
+    {"NotANumber", {"--c.x", "nan"}, "c.x is nan, limits are -4..4"},
+    {"NoIterations", {"--iterations", "0"}, "iterations is 0, limits are 1..4096"},
+    {"TooManyIterations", {"--iterations", "1000000000"}, "iterations is 1000000000, limits are 1..4096"},
+    {"SliceBeyondTheSet", {"--slice.offset", "3"}, "the slice is empty"},
+    {"SliceBesideTheSet", {"--c", "0,0,0,1.5", "--slice.offset", "1.75"}, "holds no point of the set"},
+    {"UnknownPreset", {"--preset", "nonesuch"}, "nonesuch"},
+    {"UnknownPalette", {"--palette", "mud"}, "mud"},
+    {"UnreadableAnimation", {"--animate", "c.y=0.4"}, "c.y=0.4"},
+    {"AnimatedWhatDoesNotAnimate", {"--animate", "iterations=1:9:1s"}, "iterations: cannot be animated"},
+    {"AnimatedBeyondLimits", {"--animate", "c.y=0:9:1s"}, "c.y is 9, limits are -4..4"},
+    {"AnimatedIntoNothing", {"--animate", "slice.offset=0:1.75:1s;c.w=-0.2:1.5:1s"}, "s of the animation"},
+};
+INSTANTIATE_TEST_SUITE_P(Cases, JuliaWrong, ::testing::ValuesIn(kWrong),
+                         [](const auto& info) { return info.param.name; });
+
+TEST(JuliaUsage, MeshesTakeNoParametersAndHelpTellsThemAll) {
+  {
+    PipelineRun run({"--palette", "ice"});
+    EXPECT_EQ(run.program().wait(60), 2);
+    EXPECT_NE(run.program().err().find("terrain.ply"), std::string::npos) << run.program().err();
+  }
+  TemporaryFolder folder;
+  Program help("telesplat", {"run", "julia", "--help"}, folder / "help");
+  EXPECT_EQ(help.wait(), 0);
+  for (const char* part : {"--c.w", "--slice.turn-y", "1..4096", "trap-plane", "spectrum", "--animate"})
+    EXPECT_NE(help.out().find(part), std::string::npos) << part;
+  Program list("telesplat", {"run", "julia", "--list-presets"}, folder / "list");
+  EXPECT_EQ(list.wait(), 0);
+  EXPECT_NE(list.out().find("lantern"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace telesplat::test
