@@ -33,7 +33,7 @@ TEST(Service, NeverAnnouncesAWildcard) {
 TEST(Service, RefusesHostsThatNobodyCanConnectTo) {
   for (const char* host : {"lab-3.example.org", "10.0.0.7", "fe80::1", "[fe80::1%eth0]", "a_container"})
     EXPECT_EQ(complain_about_host(host), "") << host;
-  for (const std::string host : {std::string("0.0.0.0"), std::string("*"), std::string("::"), std::string("[::]"),
+  for (const std::string& host : {std::string("0.0.0.0"), std::string("*"), std::string("::"), std::string("[::]"),
                                  std::string(""), std::string("tcp://lab"), std::string("a b"), std::string(254, 'a')})
     EXPECT_NE(complain_about_host(host), "") << host;
 }
