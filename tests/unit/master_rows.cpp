@@ -31,6 +31,12 @@ wire::TileDone done(const wire::Lease& l, double took_s = 0) {
 
 const auto kNobody = [](const std::string&) {};
 
+// To "a", or, what only an idle sampler gets, to "b".
+std::optional<wire::Lease> lease_any(FrameSchedule& s) {
+  const auto l = s.lease("a", 0);
+  return l ? l : s.lease("b", 0);
+}
+
 FrameSchedule by_rows(ScheduleOptions options = {}, bool coarse = false) {
   FrameSchedule s(options);
   s.set_cut({true, coarse});
@@ -175,13 +181,27 @@ TEST(Rows, HugeFramesAreBounded) {
   s.request_view(request(1, 1, geometry::kMaxImageSide, geometry::kMaxImageSide));
   s.begin_view({1});
   size_t tiles = 0;
-  while (const auto l = s.lease("a", 0)) {
+  while (const auto l = lease_any(s)) {
     EXPECT_LT(l->tile, wire::kMaxTiles);
     EXPECT_LT(l->block, l->blocks_in_frame);
     EXPECT_LE(l->blocks_in_frame, 256u);
     ++tiles;
   }
   EXPECT_EQ(tiles, size_t(geometry::kMaxImageSide)) << "a row each while nothing is known";
+}
+
+TEST(Rows, TheLastGoToSamplersThatHaveNothingElse) {
+  auto s = by_rows();
+  s.request_view(request(1, 1, 64, 8));
+  s.begin_view({1});
+  ASSERT_TRUE(s.lease("a", 0));
+  ASSERT_TRUE(s.lease("b", 0));
+  size_t of_a = 1;
+  while (s.lease("a", 0)) ++of_a;
+  EXPECT_EQ(of_a, 5u) << "two rows are left, one a sampler, but it is busy";
+  EXPECT_FALSE(s.lease("b", 0)) << "so is this one";
+  EXPECT_TRUE(s.lease("c", 0));
+  EXPECT_TRUE(s.lease("d", 0));
 }
 
 TEST(Coarse, ComesFirstAndTheFineOneFollowsAtOnce) {
@@ -193,7 +213,7 @@ TEST(Coarse, ComesFirstAndTheFineOneFollowsAtOnce) {
     EXPECT_EQ(s.frames_in_flight(), 2u);
     EXPECT_EQ(s.views_in_flight(), 1u);
     std::vector<wire::Lease> leases;
-    while (const auto l = s.lease("a", 0)) leases.push_back(*l);
+    while (const auto l = lease_any(s)) leases.push_back(*l);
     const auto fine = std::find_if(leases.begin(), leases.end(), [](const auto& l) { return l.step == 1; });
     ASSERT_NE(fine, leases.begin());
     ASSERT_NE(fine, leases.end());
@@ -364,7 +384,7 @@ TEST(DroppedFrames, LeaveTheirViewsWaiting) {
   while (s.begin_view({2})) {
     const auto l = s.lease("a", 0);
     again[l->viewer.value] = l->request.value;
-    while (const auto rest = s.lease("a", 0)) s.tile_done(done(*rest), "a", 0);
+    while (const auto rest = lease_any(s)) s.tile_done(done(*rest), "a", 0);
     s.tile_done(done(*l), "a", 0);
   }
   EXPECT_EQ(again, (std::map<uint64_t, uint64_t>{{1, 1}, {2, 2}}));
