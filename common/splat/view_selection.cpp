@@ -116,6 +116,7 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
                  DrawList& out) {
   out.items.clear();
   out.clusters_seen.clear();
+  out.frames_seen.clear();
   out.points = 0;
   out.scale = options.scale;
   const geometry::Frustum frustum(camera);

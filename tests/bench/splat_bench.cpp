@@ -224,7 +224,7 @@ void splat_select_best(benchmark::State& state) {
     uint64_t sequence = 0;
     const auto add_block = [&](uint64_t frame, int block) {
       geometry::Pose pose = geometry::default_pose();
-      pose.position_room.x += 0.01 * static_cast<double>(frame);
+      pose.position_room.x += 0.001 * static_cast<double>(frame);
       const geometry::Camera whole = geometry::make_camera(pose, 90, 1280, 800);
       const geometry::Camera camera = geometry::subsample(whole, frame % 3 == 0 ? 4 : 1);
       if (block * 64 >= camera.height) return;
