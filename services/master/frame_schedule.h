@@ -17,6 +17,10 @@ namespace telesplat::master {
 inline constexpr int kCoarseStep = 4;             ///< a coarse frame has every 4th pixel of every 4th row
 inline constexpr double kLeastOverdue_s = 0.015;  ///< nothing that has been out for less gets a backup
 
+/// Seconds of lease_target_s that each sampler adds at least: so master and packer have no more than 4000 leases of rows a second to look
+/// after, however many samplers there are. Set by `telesplat bench scaling`: on two cores that leaves the samplers' processes their part.
+inline constexpr double kTargetPerSampler_s = 0.25e-3;
+
 struct ScheduleOptions {
   int tile_size = 256;       ///< pixels a side; the last column and row may be smaller
   int frames_in_flight = 2;  ///< views begun and not complete, at most
@@ -53,8 +57,8 @@ class FrameSchedule {
   bool begin_view(EpochId epoch, bool turns_only = false);
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been out for long in a
-  /// frame that has none (see backup_after_s()). The newest frame's last
-  /// rows, one a sampler, go only to samplers that hold no other lease. even_own: tiles whose lease ran out at this very sampler, too.
+  /// frame that has none (see backup_after_s()). The newest frame's last rows,
+  /// one a sampler, go only to samplers that hold no other lease. even_own: tiles whose lease ran out at this very sampler, too.
   std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true);
   /// Gives a lease its full time again. Unknown leases are ignored.
   void extend(LeaseId lease, double now_s);

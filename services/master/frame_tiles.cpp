@@ -71,6 +71,7 @@ void FrameTiles::lease(size_t i, LeaseId id, const std::string& sampler, double 
     t.state = Tile::State::kLeased;
   }
   out_.emplace_hint(out_.end(), id, Out{i, sampler, now_s, now_s, expires_s});
+  ++held_[sampler];
 }
 
 bool FrameTiles::extend(LeaseId id, double now_s, double expires_s) {
@@ -89,7 +90,10 @@ const FrameTiles::Out* FrameTiles::out(LeaseId id) const {
 bool FrameTiles::done(uint64_t i) {
   if (i >= unleased_ || tiles_[i].state == Tile::State::kDone) return false;
   Tile& t = tiles_[i];
-  for (LeaseId& id : t.leases) out_.erase(id), id = {};
+  for (LeaseId& id : t.leases) {
+    if (const auto lease = out_.find(id); lease != out_.end()) end(lease);
+    id = {};
+  }
   if (t.state == Tile::State::kOpen) reopened_.erase(i);
   t.state = Tile::State::kDone;
   ++done_;
@@ -104,6 +108,12 @@ std::map<LeaseId, FrameTiles::Out>::iterator FrameTiles::take_back(std::map<Leas
     t.state = Tile::State::kOpen;
     reopened_.insert(lease->second.tile);
   }
+  return end(lease);
+}
+
+std::map<LeaseId, FrameTiles::Out>::iterator FrameTiles::end(std::map<LeaseId, Out>::iterator lease) {
+  const auto held = held_.find(lease->second.sampler);
+  if (--held->second == 0) held_.erase(held);
   return out_.erase(lease);
 }
 
@@ -133,8 +143,8 @@ int FrameTiles::release(const std::string& sampler) {
 }
 
 size_t FrameTiles::leases_of(const std::string& sampler) const {
-  return size_t(
-      std::count_if(out_.begin(), out_.end(), [&](const auto& entry) { return entry.second.sampler == sampler; }));
+  const auto held = held_.find(sampler);
+  return held == held_.end() ? 0 : held->second;
 }
 
 }  // namespace telesplat::master

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "common/core/ids.h"
@@ -71,13 +72,15 @@ class FrameTiles {
 
  private:
   std::map<LeaseId, Out>::iterator take_back(std::map<LeaseId, Out>::iterator lease);
+  std::map<LeaseId, Out>::iterator end(std::map<LeaseId, Out>::iterator lease);
 
   std::vector<geometry::Rect> blocks_;
   std::vector<Tile> tiles_;
   RowBands rows_;
-  size_t unleased_ = 0;         // tiles before it were leased at least once
-  std::set<size_t> reopened_;   // of these, the open ones
-  std::map<LeaseId, Out> out_;  // oldest first
+  size_t unleased_ = 0;                           // tiles before it were leased at least once
+  std::set<size_t> reopened_;                     // of these, the open ones
+  std::map<LeaseId, Out> out_;                    // oldest first
+  std::unordered_map<std::string, size_t> held_;  // leases out, by sampler
   size_t done_ = 0;
 };
 
