@@ -40,7 +40,7 @@ wire::Welcome MasterCore::welcome(double now_s) const {
   w.master = instance_;
   w.master_s = now_s;
   w.epoch = epoch_;
-  w.octree_depth = options_.octree_depth;
+  w.octree_depth = octree_depth();
   w.settings = settings();
   // The scene stays what it is while its data server is away.
   w.box_room = box_room_;
@@ -49,6 +49,13 @@ wire::Welcome MasterCore::welcome(double now_s) const {
   for (const auto& [id, p] : peers_)
     if (!p.gone) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
   return w;
+}
+
+uint64_t MasterCore::octree_depth() const {
+  if (options_.octree_depth > 0) return options_.octree_depth;
+  // Where patches are kept, fewer and larger clusters are chosen from sooner: a Julia set along a walk at 2560x1600 had 54 fps, 237 ms and
+  // 28.5 dB with 5 levels, 44 fps, 284 ms and 28.2 dB with 6.
+  return scene_.kind() == "julia" ? 5 : 6;
 }
 
 std::map<std::string, double> MasterCore::settings() const {

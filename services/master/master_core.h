@@ -28,7 +28,7 @@ struct MasterOptions {
   ScheduleOptions schedule;
   Progressive progressive = Progressive::kAuto;
   julia::Timeline animation;  ///< of the scene's parameters, from the first view on; empty: what the data server says
-  uint64_t octree_depth = 6;
+  uint64_t octree_depth = 0;  ///< 0: what suits the scene (MasterCore::octree_depth)
   std::map<std::string, double> settings;  ///< packing.* values for the packer, passed on in every welcome;
                                            ///< packing.keep_redundant below 0: 1 for Julia sets, else 0
   double silent_after_s = 5.0;             ///< a process that reports nothing for so long is taken for dead
@@ -72,7 +72,8 @@ class MasterCore {
   std::map<std::string, double> counters() const;
   bool progressive() const { return schedule_.cut().coarse; }
   std::string animation() const { return scene_.animation(); }
-  /// MasterOptions::settings as the packer gets them: what was left to the kind of scene is decided.
+  /// MasterOptions::octree_depth, and settings as the packer gets them: what was left to the kind of scene is decided.
+  uint64_t octree_depth() const;
   std::map<std::string, double> settings() const;
 
  private:

@@ -32,7 +32,7 @@ void write_session(const std::string& directory, const MasterServiceOptions& o, 
   out << "# The effective configuration of this run.\n[session]\ntile_size = " << o.master.schedule.tile_size
       << "\nframes_in_flight = " << o.master.schedule.frames_in_flight
       << "\nlease_timeout_s = " << o.master.schedule.lease_timeout_s
-      << "\nlease_target_s = " << o.master.schedule.lease_target_s << "\noctree_depth = " << o.master.octree_depth
+      << "\nlease_target_s = " << o.master.schedule.lease_target_s << "\noctree_depth = " << core.octree_depth()
       << "\nprogressive = " << quoted(core.progressive() ? "on" : "off") << "\nanimation = " << quoted(core.animation())
       << "\n\n[settings]\n";
   for (const auto& [key, value] : core.settings()) out << '"' << key << "\" = " << fmt::format("{}", value) << "\n";
@@ -72,9 +72,10 @@ void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
                  "on: a view arrives with every 4th pixel of every 4th row first; auto: of Julia sets")
       ->default_str("auto")
       ->transform(CLI::CheckedTransformer(progressive_names()));
-  app.add_option("--octree-depth", o.master.octree_depth, "levels of the point model's octree")
+  app.add_option("--octree-depth", o.master.octree_depth,
+                 "levels of the point model's octree; 0: 5 for Julia sets, else 6")
       ->capture_default_str()
-      ->check(CLI::Range(1, 10));
+      ->check(CLI::Range(0, 10));
   for (const auto& [name, text, value] :
        {std::tuple{"packing.max_points", "points the model holds at most", 20e6},
         {"packing.obsolete_after_s", "forget clusters not seen for so long; 0: never", 0.0},

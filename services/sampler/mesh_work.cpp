@@ -34,11 +34,13 @@ void MeshWork::on_welcome(const wire::Welcome& session) {
   if (chunks == session.endpoints.end() || chunks->second.empty() ||
       (chunks->second == endpoint_ && session.epoch == epoch_))
     return;
-  endpoint_ = chunks->second;
   epoch_ = session.epoch;
-  blocks_.emplace(context_, net::Kind::kDealer, service_name_ + ":chunks",
-                  net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes});
-  if (const Status s = blocks_->connect(endpoint_); !s) log::error("{}", s.error().text);
+  if (chunks->second != endpoint_) {
+    endpoint_ = chunks->second;
+    blocks_.emplace(context_, net::Kind::kDealer, service_name_ + ":chunks",
+                    net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes});
+    if (const Status s = blocks_->connect(endpoint_); !s) log::error("{}", s.error().text);
+  }
   // A restarted data server with the same data has the same chunks: keep what we hold.
   const auto hash = session.facts.find("content_hash");
   if (hash == session.facts.end() || hash->second.empty() || hash->second != content_hash_) {
