@@ -141,6 +141,7 @@ void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double n
   if (!p || p->hello.role != "sampler" || p->waiting_leases >= kMaxWaitingLeases) return;
   schedule_.heard_of(peer);
   if (p->waiting_leases++ == 0) idle_.push_back(peer);
+  p->most_waiting = std::max(p->most_waiting, p->waiting_leases);
   dispatch(now_s);
 }
 
@@ -246,10 +247,11 @@ bool MasterCore::lease_one(double now_s) {
   for (const bool even_own : {false, true})
     for (size_t i = 0; i < idle_.size(); ++i) {
       const std::string sampler = idle_[i];
-      const auto lease = schedule_.lease(sampler, now_s, even_own);
+      Peer& p = peers_[sampler];
+      const auto lease = schedule_.lease(sampler, now_s, even_own, p.waiting_leases == p.most_waiting);
       if (!lease) continue;
       idle_.erase(idle_.begin() + std::ptrdiff_t(i));
-      if (--peers_[sampler].waiting_leases > 0) idle_.push_back(sampler);
+      if (--p.waiting_leases > 0) idle_.push_back(sampler);
       emit(sampler, *lease);
       return true;
     }
