@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <deque>
+#include <utility>
 
 #include "common/codec/depth_codec.h"
 #include "services/packer/event_log.h"
@@ -49,6 +51,14 @@ struct PackerCore::Impl {
   PatchObsolescence patch_obsolescence;  // kKeep
   Statistics statistics;
   std::vector<float> reference_depth_m;  // kept for its memory
+  struct CoarsePass {
+    FrameId frame;
+    InstanceId viewer;
+    RequestId request;
+    std::vector<PatchKey> patches;
+  };
+  std::deque<CoarsePass> coarse;     // kKeep: coarse frames whose complete ones are not there yet, oldest first
+  std::vector<PatchKey> superseded;  // what complete frames made superfluous
 
   Event next_event(Event::Kind kind) {
     Event event;
@@ -75,6 +85,23 @@ struct PackerCore::Impl {
 
   using Stream = std::shared_ptr<const std::vector<uint8_t>>;
 
+  // A coarse frame is over when a complete one answers the same request of its viewer, or a later one.
+  void note_pass(const Event& event, const points::PreparedPatch& patch) {
+    if (event.step > 1) {
+      if (coarse.empty() || coarse.back().frame != event.frame)
+        coarse.push_back({event.frame, event.viewer, event.request, {}});
+      if (coarse.size() > kMaxOpenFrames) coarse.pop_front();
+      auto& patches = coarse.back().patches;
+      for (const auto& [key, mosaic] : patch.mosaics) patches.push_back({key, mosaic.frame_tag()});
+    } else if (event.frame_complete) {
+      std::erase_if(coarse, [&](const CoarsePass& pass) {
+        const bool over = pass.viewer == event.viewer && pass.request <= event.request;
+        if (over) superseded.insert(superseded.end(), pass.patches.begin(), pass.patches.end());
+        return over;
+      });
+    }
+  }
+
   Event pack(SampledTile& tile, double now_s, Stream stream) {
     const splat::Elimination elimination = eliminate(tile);
     Event event = next_event(Event::Kind::kPatch);
@@ -97,6 +124,7 @@ struct PackerCore::Impl {
       else
         obsolescence.accessed(key, now_s);
     }
+    if (keeps()) note_pass(event, patch);
     log.add_patch(event, patch.mosaics.size());
     statistics.points_outside += patch.outside;
     model.insert(std::move(patch));
@@ -201,6 +229,15 @@ std::vector<Event> PackerCore::tick(double now_s) {
   return out;
 }
 
+std::vector<Event> PackerCore::forget_superseded() {
+  std::vector<Event> out;
+  std::vector<PatchKey> keys = std::exchange(impl_->superseded, {});
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  impl_->forget_patches(keys, out);
+  return out;
+}
+
 std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
   Impl& i = *impl_;
   if (epoch == i.epoch) return std::nullopt;
@@ -210,6 +247,8 @@ std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
   i.frames.clear();
   i.obsolescence.clear();
   i.patch_obsolescence.clear();
+  i.coarse.clear();
+  i.superseded.clear();
   i.log.add_epoch(event);
   return event;
 }

@@ -129,6 +129,10 @@ class PackerCore {
   /// Decides what is obsolete (T4.3.3) or too much. Returns the forget events to publish, most often none.
   std::vector<Event> tick(double now_s);
 
+  /// kKeep: the forget events for the coarse passes of frames that were completed since the last call: a complete frame has every sample of
+  /// its coarse pass, whose patches would only be in the way of choosing the best ones.
+  std::vector<Event> forget_superseded();
+
   /// A new version of the data set: forgets everything. Nothing if that is the epoch already.
   std::optional<Event> begin_epoch(EpochId epoch);
 

@@ -221,6 +221,8 @@ class PackerService {
     if (!event) tiles_.reject(message, event.error().text);
     if (!event || !*event) return false;
     publish(**event);
+    if ((*event)->frame_complete)
+      for (const auto& forget : core_->forget_superseded()) publish(forget);
     spans_.add("decode", begin_s, gathered_s);
     spans_.add("pack", gathered_s, master_now());
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = (*event)->kept;

@@ -32,9 +32,9 @@ TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
   EXPECT_GT(s["updates"], 2);
   EXPECT_EQ(s["errors"]["messages_rejected"], 0);
   EXPECT_GE(s["quality"]["views"], 2);
-  EXPECT_GT(s["quality"]["psnr_db"]["median"], 18);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], 20);
   // The head stands still: by now every pixel was sampled at the display's resolution.
-  EXPECT_GT(s["quality"]["last_view"]["psnr_db"], 22);
+  EXPECT_GT(s["quality"]["last_view"]["psnr_db"], 23);
   EXPECT_LT(s["quality"]["last_view"]["hole_fraction"], 0.02);
   EXPECT_NE(run.program().out().find("julia (wings): c = ("), std::string::npos) << run.program().out();
 
@@ -94,10 +94,10 @@ TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
     EXPECT_NE(std::find(epochs.begin(), epochs.end(), shown[i]), epochs.end()) << shown[i];
   }
   EXPECT_GT(displayed.size(), 3u);
-  // Compared with the set of its own epoch each frame is right; with that of another it would not be.
+  // Compared with the set of its own epoch each frame is right (31 dB); compared with the first epoch's all are at 21 dB.
   const auto s = run.summary();
   EXPECT_GE(s["quality"]["views"], 2);
-  EXPECT_GT(s["quality"]["psnr_db"]["median"], 18);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], 27);
 }
 
 TEST(Julia, ParametersAreSetAndAnimatedWhileItRuns) {

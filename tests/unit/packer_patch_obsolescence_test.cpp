@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include <algorithm>
 
 #include "common/points/mosaic_builder.h"
@@ -163,6 +165,42 @@ TEST(KeepMode, CoarsePatchesGoFirst) {
     std::sort(frames.begin(), frames.end());
     EXPECT_LE(std::unique(frames.begin(), frames.end()) - frames.begin(), 2);
   }
+}
+
+TEST(KeepMode, ACompleteFrameSupersedesItsCoarsePass) {
+  PackerCore core(keep_config(), test::kEpoch);
+  test::Replica replica(keep_config().model);
+  const auto apply = [&](const std::vector<Event>& events) {
+    for (const Event& e : events) replica.apply(e);
+  };
+  // Coarse and complete frames of two requests in turns, in four tiles each; the complete one of the first comes last.
+  const auto frame = [&](uint64_t id, uint64_t request, uint32_t step) {
+    const geometry::Camera full = camera(0.01 * double(request));
+    auto tiles = test::sampled_frame({id}, step > 1 ? geometry::subsample(full, int(step)) : full, step > 1 ? 16 : 48);
+    for (auto& t : tiles) t.step = step, t.request = {request};
+    return tiles;
+  };
+  apply(submit_all(core, frame(1, 1, 4), 0));
+  apply(submit_all(core, frame(3, 2, 4), 0));
+  EXPECT_TRUE(core.forget_superseded().empty());
+  auto fine = frame(2, 1, 1);
+  auto last = std::move(fine.back());
+  fine.pop_back();
+  apply(submit_all(core, std::move(fine), 0));
+  EXPECT_TRUE(core.forget_superseded().empty()) << "not complete yet";
+  apply({**core.submit(std::move(last), 0)});
+  const auto events = core.forget_superseded();
+  ASSERT_EQ(events.size(), 1u);
+  apply(events);
+  EXPECT_TRUE(core.forget_superseded().empty());
+  std::set<uint32_t> left;
+  for (const auto& [key, cluster] : core.model().clusters())
+    for (const auto& m : cluster->mosaics) left.insert(m.frame_tag());
+  EXPECT_EQ(left, (std::set<uint32_t>{2, 3})) << "the other request's coarse pass is all there is of it";
+  EXPECT_EQ(replica.model().digest(), core.model().digest());
+  test::Replica late(keep_config().model);
+  late.catch_up(core);
+  EXPECT_EQ(late.model().digest(), core.model().digest());
 }
 
 TEST(KeepMode, WhatIsDrawnStays) {
