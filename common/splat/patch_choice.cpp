@@ -12,8 +12,7 @@ namespace {
 constexpr float kMinCosine = 0.35f;     // samples taken at a steeper slope count as taken at this one
 constexpr float kPixelRadius2 = 0.25f;  // of the low-pass
 constexpr float kMoreCovered = 1.1f, kApart = 0.1f;
-constexpr float kAreaOff = 1.2f,
-                kCentreOff = 0.6f;  // of n samples: kAreaOff n^(-3/4) of the area, kCentreOff / sqrt n spacings
+constexpr float kAreaOff = 1.5f, kCentreOff = 0.5f;  // of n samples: kAreaOff / sqrt n of the area, kCentreOff spacings
 
 // Of the slope by which samples were taken, not below kMinCosine.
 float sampled_cosine(const glm::vec3& normal, const glm::vec3& to_eye) {
@@ -120,9 +119,8 @@ void PatchChooser::choose(const geometry::Box& leaf_room, const PatchView& view,
     const float length2 = glm::dot(p.normal, p.normal);
     p.normal = length2 > 0 ? p.normal / std::sqrt(length2) : p.to_eye;
     p.quality = quality_of(p.centre, p.normal, p.to_eye, p.pixel_range, leaf_m, view);
-    const float root = std::sqrt(p.points);
-    p.covered_off = kAreaOff / (root * std::sqrt(root));
-    p.centre_off = kCentreOff / (root * p.pixel_range);
+    p.covered_off = kAreaOff / std::sqrt(p.points);
+    p.centre_off = kCentreOff / p.pixel_range;
   }
 
   by_quality_.resize(patches_.size());

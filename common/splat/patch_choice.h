@@ -29,10 +29,10 @@ float surface_covered(const points::Mosaic& mosaic);
 /// Chooses among the patches of one cluster; a patch is all mosaics with one frame tag, in however many blocks they came. In order
 /// of falling quality (of a surfel at the patch's centroid, with the mean of its cones' axes) each is drawn unless one that is drawn
 /// already shows what it shows: covers at least nearly as much (1 / 1.1), around a centre so near that the smaller one's extent lies
-/// inside the larger one's, but for a tenth of it. To both is added how far counts of samples are off: of n samples on a regular
-/// grid the area is known to about 1.2 n^(-3/4) of it (two standard deviations, from those at its border), the centre to 0.6 / sqrt
-/// n of their spacing. So a coarse patch does not count as larger than a fine one for what its few samples round up. The best patch
-/// is always drawn; where it is partial, as while its frame is coming in, others fill what it leaves open.
+/// inside the larger one's, but for a tenth of it. To both is added what counts of samples may be off: n samples of a grid, of which a
+/// leaf's faces cut whole rows, know the area to 1.5 / sqrt n of it and the centre to half their spacing. So a coarse patch does
+/// not count as larger than a fine one for what its few samples round up. The best patch is always drawn; where it is partial, as
+/// while its frame is coming in, others fill what it leaves open.
 class PatchChooser {
  public:
   /// Removes from `mosaics` those of patches that are not drawn. Order is kept.

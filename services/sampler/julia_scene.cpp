@@ -70,19 +70,34 @@ JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, co
       rows_of_blocks((rect.y + rect.height - y0 + kJuliaBlock - 1) / kJuliaBlock),
       near_m(static_cast<float>(camera.near_m)) {
   const double pixel_x = 1 / camera.focal_x(), pixel_y = 1 / camera.focal_y();
-  const auto store = [&](std::array<std::vector<float>, 7>& to, const glm::dvec3& camera_space) {
+  // Directions are sums of multiples of the camera's axes, all seven components alike.
+  using Seven = std::array<double, 7>;
+  const auto axis = [&](const glm::dvec3& camera_space) {
     const glm::dvec3 room = camera.pose.orientation * camera_space;
     const glm::dvec4 orbit = scene.orbit_direction(room);
-    for (int i = 0; i < 4; ++i) to[i].push_back(static_cast<float>(orbit[i]));
-    for (int i = 0; i < 3; ++i) to[4 + i].push_back(static_cast<float>(room[i]));
+    return Seven{orbit.x, orbit.y, orbit.z, orbit.w, room.x, room.y, room.z};
   };
-  const auto at_x = [&](double x) { return glm::dvec3(camera.left + x * pixel_x, 0, 0); };
-  const auto at_y = [&](double y) { return glm::dvec3(0, camera.top - y * pixel_y, -1); };
+  const Seven right = axis({1, 0, 0}), up = axis({0, 1, 0}), ahead = axis({0, 0, -1});
+  // The first of `count` pixels or blocks at `first`, in pixels, the others `step` apart.
+  const auto fill_columns = [&](std::array<std::vector<float>, 7>& to, double first, double step, int count) {
+    for (int i = 0; i < 7; ++i) {
+      to[i].resize(static_cast<size_t>(count));
+      for (int n = 0; n < count; ++n)
+        to[i][n] = static_cast<float>((camera.left + (first + n * step) * pixel_x) * right[i]);
+    }
+  };
+  const auto fill_rows = [&](std::array<std::vector<float>, 7>& to, double first, double step, int count) {
+    for (int i = 0; i < 7; ++i) {
+      to[i].resize(static_cast<size_t>(count));
+      for (int n = 0; n < count; ++n)
+        to[i][n] = static_cast<float>(ahead[i] + (camera.top - (first + n * step) * pixel_y) * up[i]);
+    }
+  };
   const double middle = kJuliaBlock * 0.5;
-  for (int x = 0; x < columns_of_blocks * kJuliaBlock + kPadding; ++x) store(column, at_x(x0 + x + 0.5));
-  for (int y = 0; y < rows_of_blocks * kJuliaBlock; ++y) store(row, at_y(y0 + y + 0.5));
-  for (int x = 0; x < columns_of_blocks + kPadding; ++x) store(block_column, at_x(x0 + x * kJuliaBlock + middle));
-  for (int y = 0; y < rows_of_blocks; ++y) store(block_row, at_y(y0 + y * kJuliaBlock + middle));
+  fill_columns(column, x0 + 0.5, 1, columns_of_blocks * kJuliaBlock + kPadding);
+  fill_rows(row, y0 + 0.5, 1, rows_of_blocks * kJuliaBlock);
+  fill_columns(block_column, x0 + middle, kJuliaBlock, columns_of_blocks + kPadding);
+  fill_rows(block_row, y0 + middle, kJuliaBlock, rows_of_blocks);
 
   const glm::dvec4 orbit = scene.orbit_point(camera.pose.position_room);
   for (int i = 0; i < 4; ++i) origin[i] = static_cast<float>(orbit[i]);
