@@ -82,7 +82,7 @@ class MasterCore {
     double seen_s = 0;
     bool gone = false;
     int waiting_leases = 0;  ///< lease requests not answered yet; above 0: the sampler is in idle_
-    int most_waiting = 0;    ///< at once, so far: as many wait again when it has sampled all it had
+    int leases_at_once = 0;  ///< a sampler's: waiting for so many it holds none; 0: it did not say
   };
   template <class M>
   void emit(const std::string& peer, const M& m) {
