@@ -59,7 +59,8 @@ class FrameSchedule {
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been out for long in a
   /// frame that has none (see backup_after_s()). The newest frame's last rows,
   /// one a sampler, go only to samplers that hold no other lease. even_own: tiles whose lease ran out at this very sampler, too.
-  std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true);
+  /// idle: it is known to hold none, though the packer may not have said so yet.
+  std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true, bool idle = false);
   /// Gives a lease its full time again. Unknown leases are ignored.
   void extend(LeaseId lease, double now_s);
   /// The packer has this tile, which `sampler` (empty: unknown) sampled. Returns true the first time, whichever lease it came from; false

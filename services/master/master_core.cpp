@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "common/core/log.h"
 
@@ -122,6 +123,8 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   p.process.name = m.name;
   p.process.pid = m.pid;
   p.process.facts = m.facts;
+  if (const auto at_once = m.facts.find("leases"); at_once != m.facts.end())
+    p.leases_at_once = std::clamp(std::atoi(at_once->second.c_str()), 0, kMaxWaitingLeases);
   p.seen_s = now_s;
   p.gone = false;
   if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
@@ -253,10 +256,12 @@ bool MasterCore::lease_one(double now_s) {
   for (const bool even_own : {false, true})
     for (size_t i = 0; i < idle_.size(); ++i) {
       const std::string sampler = idle_[i];
-      const auto lease = schedule_.lease(sampler, now_s, even_own);
+      Peer& p = peers_[sampler];
+      const auto lease =
+          schedule_.lease(sampler, now_s, even_own, p.leases_at_once > 0 && p.waiting_leases >= p.leases_at_once);
       if (!lease) continue;
       idle_.erase(idle_.begin() + std::ptrdiff_t(i));
-      if (--peers_[sampler].waiting_leases > 0) idle_.push_back(sampler);
+      if (--p.waiting_leases > 0) idle_.push_back(sampler);
       emit(sampler, *lease);
       return true;
     }

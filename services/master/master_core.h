@@ -83,6 +83,7 @@ class MasterCore {
     double seen_s = 0;
     bool gone = false;
     int waiting_leases = 0;  ///< lease requests not answered yet; above 0: the sampler is in idle_
+    int leases_at_once = 0;  ///< a sampler's: waiting for so many it holds none; 0: it did not say
   };
   template <class M>
   void emit(const std::string& peer, const M& m) {

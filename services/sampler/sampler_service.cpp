@@ -70,7 +70,7 @@ class SamplerService {
     hello.role = "sampler";
     hello.name = o.service.name;
     hello.instance = instance;
-    hello.facts = {{"sampler", o.kind}, {"threads", std::to_string(o.threads)}};
+    hello.facts = {{"sampler", o.kind}, {"threads", std::to_string(o.threads)}, {"leases", std::to_string(kLeases)}};
     return hello;
   }
 

@@ -80,7 +80,7 @@ class Study {
   }
   static std::vector<std::string> compute_flags() { return {"--threads", "1"}; }
 
-  // The times of `frames` frames. at_s, if asked for: when the first began and the last ended.
+  // The times of `frames` frames.
   Result<std::vector<double>> frames(BenchSession& session, int nodes, int frames, double expected_s,
                                      const std::string& name) {
     std::vector<double> times;
@@ -98,7 +98,7 @@ class Study {
   }
 
   Status simulated(const std::string& name, double frame_s) {
-    auto session = BenchSession::start(flags_, folder(name));
+    auto session = BenchSession::start(flags_, folder(name), true);
     if (!session) return session.error();
     ScalingSeries series{name, true, frame_s, {}};
     std::vector<int> nodes = options_.nodes;
@@ -123,7 +123,7 @@ class Study {
     const int count = options_.frames ? options_.frames : kComputedFrames;
     for (const int n : options_.nodes) {
       if (n > report_.cores) continue;
-      auto session = BenchSession::start(flags_, folder(fmt::format("computed-{}", n)));
+      auto session = BenchSession::start(flags_, folder(fmt::format("computed-{}", n)), false);
       if (!session) return session.error();
       if (const Status s = (*session)->add_samplers(size_t(n), compute_flags()); !s) return s;
       const auto warm = frames(**session, n, 2, rows_s_ / n, "computed");  // the master learns what rows cost
@@ -152,7 +152,7 @@ class Study {
     for (const auto& [name, n, flags, frame_s] :
          {std::tuple{std::string("simulated, rows 20 times cheaper"), 4, replay_flags(simulated_s), simulated_s},
           {std::string("computed"), 2, compute_flags(), rows_s_}}) {
-      auto session = BenchSession::start(flags_, folder(fmt::format("kill-{}", n)));
+      auto session = BenchSession::start(flags_, folder(fmt::format("kill-{}", n)), name != "computed");
       if (!session) return session.error();
       if (const Status s = (*session)->add_samplers(size_t(n), flags); !s) return s;
       const auto normal = frames(**session, n, kKillFrames, frame_s / n, "kill");

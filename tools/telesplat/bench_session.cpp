@@ -15,8 +15,8 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr double kPatience_s = 20;                 // for processes to start
-constexpr int kServerNice = 5, kSamplerNice = 10;  // as `telesplat run` has them
+constexpr double kPatience_s = 20;                    // for processes to start
+constexpr int kPackerNice = 5, kBackgroundNice = 10;  // as `telesplat run` has them
 
 int count_alive(const nlohmann::json& status, const std::string& role) {
   int n = 0;
@@ -29,8 +29,9 @@ int count_alive(const nlohmann::json& status, const std::string& role) {
 }  // namespace
 
 Result<std::unique_ptr<BenchSession>> BenchSession::start(const std::vector<std::string>& scene_flags,
-                                                          const std::string& directory) {
+                                                          const std::string& directory, bool own_machines) {
   std::unique_ptr<BenchSession> s(new BenchSession);
+  s->sampler_nice_ = own_machines ? 0 : kBackgroundNice;
   s->directory_ = directory;
   std::error_code error;
   std::filesystem::create_directories(directory + "/logs", error);
@@ -47,8 +48,9 @@ Result<std::unique_ptr<BenchSession>> BenchSession::start(const std::vector<std:
   if (!listens) return listens.error();
   std::vector<std::string> data{"julia"};
   data.insert(data.end(), scene_flags.begin(), scene_flags.end());
-  if (const Status ok = s->launch(s->servers_, "data", "telesplat-data", data, kSamplerNice); !ok) return ok.error();
-  if (const Status ok = s->launch(s->servers_, "packer", "telesplat-packer", {}, kServerNice); !ok) return ok.error();
+  if (const Status ok = s->launch(s->servers_, "data", "telesplat-data", data, kBackgroundNice); !ok) return ok.error();
+  if (const Status ok = s->launch(s->servers_, "packer", "telesplat-packer", {}, own_machines ? 0 : kPackerNice); !ok)
+    return ok.error();
 
   s->control_ = std::make_unique<ControlClient>(s->endpoint_);
   wire::Hello hello;
@@ -98,7 +100,7 @@ Status BenchSession::wait_for(const char* what, auto condition) {
 Status BenchSession::add_samplers(size_t count, const std::vector<std::string>& flags) {
   while (samplers_.size() < count) {
     const Status s =
-        launch(samplers_, fmt::format("sampler-{}", samplers_.size() + 1), "telesplat-sampler", flags, kSamplerNice);
+        launch(samplers_, fmt::format("sampler-{}", samplers_.size() + 1), "telesplat-sampler", flags, sampler_nice_);
     if (!s) return s;
   }
   double asked_s = -1e9;
