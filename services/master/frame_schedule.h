@@ -21,6 +21,10 @@ inline constexpr double kLeastOverdue_s = 0.015;  ///< nothing that has been out
 /// after, however many samplers there are. Set by `telesplat bench scaling`: on two cores that leaves the samplers' processes their part.
 inline constexpr double kTargetPerSampler_s = 0.25e-3;
 
+/// Rows that take longer are not kept in store at the end of a frame; of cheaper ones it takes longer to fetch the next than to wait for one
+/// in store (3 to 8 ms between idle and busy with 40 samplers on two cores; `telesplat bench scaling`).
+inline constexpr double kDearRow_s = 0.01;
+
 struct ScheduleOptions {
   int tile_size = 256;       ///< pixels a side; the last column and row may be smaller
   int frames_in_flight = 2;  ///< views begun and not complete, at most
@@ -58,7 +62,7 @@ class FrameSchedule {
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been out for long in a
   /// frame that has none (see backup_after_s()). The newest frame's last rows,
-  /// one a sampler, go only to samplers that hold no other lease. even_own: tiles whose lease ran out at this very sampler, too.
+  /// one a sampler, go only to samplers that hold no other lease, if they take longer than kDearRow_s. even_own: tiles whose lease ran out at this very sampler, too.
   /// idle: it is known to hold none, though the packer may not have said so yet.
   std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true, bool idle = false);
   /// Gives a lease its full time again. Unknown leases are ignored.
