@@ -34,7 +34,8 @@ RowBands::Band RowBands::carve(int rows) {
 }
 
 int band_rows(double target_s, double row_s, int rows_left, size_t samplers) {
-  const int most = std::max(1, int(size_t(std::max(rows_left, 0)) / (3 * std::max<size_t>(samplers, 1))));
+  const size_t parts = 3 * std::max<size_t>(samplers, 1);
+  const int most = std::max(1, int((size_t(std::max(rows_left, 0)) + parts - 1) / parts));
   if (!(row_s > 0)) return 1;
   return int(std::clamp(std::round(target_s / row_s), 1.0, double(most)));
 }

@@ -35,7 +35,7 @@ class RowBands {
 };
 
 /// Guided self-scheduling (Polychronopoulos and Kuck, 1987) with a target: as many rows as take target_s, but no more than a third of an
-/// equal share of what is left, so that all finish together. At least 1. row_s: seconds a row of this sampler; 0: not known yet, 1 row.
+/// equal share of what is left (rounded up), so that all finish together. At least 1. row_s: seconds a row of this sampler; 0: not known yet, 1 row.
 int band_rows(double target_s, double row_s, int rows_left, size_t samplers);
 
 }  // namespace telesplat::master

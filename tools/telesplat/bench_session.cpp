@@ -31,7 +31,6 @@ int count_alive(const nlohmann::json& status, const std::string& role) {
 Result<std::unique_ptr<BenchSession>> BenchSession::start(const std::vector<std::string>& scene_flags,
                                                           const std::string& directory, bool own_machines) {
   std::unique_ptr<BenchSession> s(new BenchSession);
-  s->sampler_nice_ = own_machines ? 0 : kBackgroundNice;
   s->directory_ = directory;
   std::error_code error;
   std::filesystem::create_directories(directory + "/logs", error);
@@ -100,7 +99,7 @@ Status BenchSession::wait_for(const char* what, auto condition) {
 Status BenchSession::add_samplers(size_t count, const std::vector<std::string>& flags) {
   while (samplers_.size() < count) {
     const Status s =
-        launch(samplers_, fmt::format("sampler-{}", samplers_.size() + 1), "telesplat-sampler", flags, sampler_nice_);
+        launch(samplers_, fmt::format("sampler-{}", samplers_.size() + 1), "telesplat-sampler", flags, kBackgroundNice);
     if (!s) return s;
   }
   double asked_s = -1e9;

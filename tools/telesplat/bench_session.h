@@ -18,8 +18,8 @@ namespace telesplat::launcher {
 class BenchSession {
  public:
   /// scene_flags: as telesplat-data julia takes them. The master records into `directory`, logs go to directory/logs. Returns when data
-  /// server and packer have joined. own_machines: samplers and packer stand for machines of their own, none gives way to another; else they
-  /// have the priorities that `telesplat run` gives them. Error: what failed to start, or took over 20 s, or that Ctrl-C came.
+  /// server and packer have joined. own_machines: samplers stand for machines of their own, so the packer gives way to none of
+  /// them; else all have the priorities that `telesplat run` gives them. Error: what failed to start, or took over 20 s, or that Ctrl-C came.
   static Result<std::unique_ptr<BenchSession>> start(const std::vector<std::string>& scene_flags,
                                                      const std::string& directory, bool own_machines);
   ~BenchSession();
@@ -69,7 +69,6 @@ class BenchSession {
   std::optional<net::MasterLink> link_;
   std::optional<net::Socket> patches_;
   std::unique_ptr<ControlClient> control_;
-  int sampler_nice_ = 0;
   bool subscribed_ = false;
   RequestId request_;
   Progress progress_;
