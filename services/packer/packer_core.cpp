@@ -102,7 +102,7 @@ struct PackerCore::Impl {
     }
   }
 
-  Event pack(SampledTile& tile, double now_s, Stream stream) {
+  Event pack(SampledTile& tile, double now_s, Stream stream, const std::function<void(const Event&)>& publish) {
     const splat::Elimination elimination = eliminate(tile);
     Event event = next_event(Event::Kind::kPatch);
     const FrameBook::Frame frame = frames.add(tile, elimination);
@@ -115,6 +115,7 @@ struct PackerCore::Impl {
     const bool as_it_came = stream && keeps();
     event.blob =
         as_it_came ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
+    if (publish) publish(event);
 
     points::PreparedPatch patch =
         points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
@@ -178,7 +179,8 @@ PackerCore::PackerCore(const Config& config, EpochId epoch, Hooks hooks)
     : impl_(new Impl{.config = config, .hooks = std::move(hooks), .epoch = epoch}) {}
 PackerCore::~PackerCore() = default;
 
-Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, Impl::Stream stream) {
+Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, Impl::Stream stream,
+                                                const std::function<void(const Event&)>& publish) {
   Impl& i = *impl_;
   if (tile.epoch != i.epoch) {
     ++i.statistics.tiles_other_epoch;
@@ -194,7 +196,7 @@ Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, 
     ++i.statistics.tiles_refused;
     return good.error();
   }
-  return std::optional<Event>(i.pack(tile, now_s, std::move(stream)));
+  return std::optional<Event>(i.pack(tile, now_s, std::move(stream), publish));
 }
 
 bool PackerCore::has(FrameId frame, uint32_t tile) const { return impl_->frames.has(frame, tile); }

@@ -116,8 +116,11 @@ class PackerCore {
   /// together; dropped and counted. now_s: any steady clock; the same one in all calls.
   ///   stream: codec stream of the tile's image, or null. Where everything is kept it is published as it is; otherwise, or
   ///   if it is null, the tile is encoded.
+  ///   publish: called with the event as soon as it is known, while the model has yet to take the points over, so that
+  ///   those who wait for them need not wait for that too; or null.
   Result<std::optional<Event>> submit(SampledTile tile, double now_s,
-                                      std::shared_ptr<const std::vector<uint8_t>> stream = {});
+                                      std::shared_ptr<const std::vector<uint8_t>> stream = {},
+                                      const std::function<void(const Event&)>& publish = {});
 
   /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.
   bool has(FrameId frame, uint32_t tile) const;

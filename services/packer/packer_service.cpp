@@ -173,8 +173,28 @@ class PackerService {
     const auto& lease = m.lease;
     const auto block = uint32_t(lease.block);
     if (lease.epoch != core_->epoch()) return void(++other_epoch_);
-    if (core_->has(lease.frame, block)) return void(++duplicates_);
     const double receive_s = link_->to_master_s(since_s), begin_s = master_now();
+    wire::TileDone done{.frame = lease.frame,
+                        .tile = lease.tile,
+                        .lease = lease.lease,
+                        .sampler = m.sampler,
+                        .step = lease.step,
+                        .rect = lease.rect,
+                        .bytes_sampled = m.image.size(),
+                        .leased_s = lease.leased_s,
+                        .sample_begin_s = m.sample_begin_s,
+                        .sample_end_s = m.sample_end_s,
+                        .encode_end_s = m.encode_end_s,
+                        .receive_s = receive_s};
+    const auto tell = [&] {
+      done.packed_s = master_now();
+      link_->socket().send(done);
+    };
+    // What is here already is done, should the master not know; if it does, it takes no notice.
+    if (core_->has(lease.frame, block)) {
+      ++duplicates_;
+      return tell();
+    }
     const std::span stream(reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size());
     auto gathered = gatherer_.add({lease.frame,
                                    lease.epoch,
@@ -188,47 +208,28 @@ class PackerService {
                                    {}},
                                   lease.rect, stream);
     if (!gathered) return tiles_.reject(message, gathered.error().text);
-    if (!*gathered) return;
-    wire::TileDone done{lease.frame,
-                        lease.tile,
-                        lease.lease,
-                        m.sampler,
-                        lease.step,
-                        lease.rect,
-                        (*gathered)->samples,
-                        0,
-                        m.image.size(),
-                        0,
-                        lease.leased_s,
-                        m.sample_begin_s,
-                        m.sample_end_s,
-                        m.encode_end_s,
-                        receive_s};
+    if (!*gathered) return tell();
+    done.samples = (*gathered)->samples;
     if (core_->redundancy() == Redundancy::kKeep) done.kept = done.samples;
-    if ((*gathered)->block && !pack_block(message, **gathered, stream, begin_s, done)) return;
-    done.packed_s = master_now();
-    link_->socket().send(done);
-  }
-
-  // Publishes a block that is complete. What that gives is counted to the tile that completed it.
-  bool pack_block(const net::Message& message, BlockGatherer::Gathered& gathered, std::span<const uint8_t> stream,
-                  double begin_s, wire::TileDone& done) {
+    if (!(*gathered)->block) return tell();
     const double gathered_s = master_now();
-    record(*gathered.block);
+    record(*(*gathered)->block);
     std::shared_ptr<const std::vector<uint8_t>> ready;
-    if (gathered.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
-    const auto event = core_->submit(std::move(*gathered.block), monotonic_s(), std::move(ready));
-    if (!event) tiles_.reject(message, event.error().text);
-    if (!event || !*event) return false;
-    publish(**event);
-    if ((*event)->frame_complete)
+    if ((*gathered)->is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
+    // What a block gives is counted to the tile that completed it.
+    const auto announce = [&](const Event& event) {
+      publish(event);
+      if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
+      done.bytes_sent = event.blob->size();
+      bytes_sent_ += done.bytes_sent;
+      tell();
+    };
+    const auto event = core_->submit(std::move(*(*gathered)->block), monotonic_s(), std::move(ready), announce);
+    if (!event) return tiles_.reject(message, event.error().text);
+    if (*event && (*event)->frame_complete)
       for (const auto& forget : core_->forget_superseded()) publish(forget);
     spans_.add("decode", begin_s, gathered_s);
     spans_.add("pack", gathered_s, master_now());
-    if (core_->redundancy() == Redundancy::kEliminate) done.kept = (*event)->kept;
-    done.bytes_sent = (*event)->blob->size();
-    bytes_sent_ += done.bytes_sent;
-    return true;
   }
 
   // Whole views only, as sampled.

@@ -97,6 +97,22 @@ TEST(PackerCore, TilesOfOtherEpochsAreDroppedAndCounted) {
   EXPECT_EQ(core.model().points(), 0u);
 }
 
+TEST(PackerCore, PublishesBeforeItsOwnModelHasThePoints) {
+  PackerCore core(packer_config(), kEpoch);
+  uint64_t told = 0;
+  const auto tile = sampled_frame({1}, camera(), 320)[0];
+  const auto event = core.submit(tile, 0, {}, [&](const Event& e) {
+    told = e.kept;
+    EXPECT_EQ(e.sequence, core.sequence());
+    EXPECT_EQ(core.model().points(), 0u);
+  });
+  ASSERT_TRUE(event.ok() && event->has_value());
+  EXPECT_GT(told, 0u);
+  EXPECT_EQ(core.model().points(), told);
+  const auto nothing = [](const Event&) { ADD_FAILURE() << "there is nothing to publish"; };
+  EXPECT_FALSE(core.submit(tile, 0, {}, nothing)->has_value());
+}
+
 TEST(PackerCore, ContradictingTilesAreRefusedWithAReason) {
   PackerCore core(packer_config(), kEpoch);
   const auto good = sampled_frame({1}, camera(), 128);
