@@ -32,6 +32,7 @@ inline constexpr size_t kMaxKeys = 1u << 21;          ///< cluster keys in one m
 inline constexpr size_t kMaxEntries = 4096;           ///< entries of a map or list
 inline constexpr uint64_t kMaxTiles = 1u << 16;       ///< tiles of a frame, and blocks
 inline constexpr uint64_t kMaxStep = 16;              ///< of a coarse frame
+inline constexpr int64_t kMaxTilePixels = 1 << 24;    ///< of a tile: what the codec takes
 
 using Bytes = std::span<const std::byte>;
 

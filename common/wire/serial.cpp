@@ -279,6 +279,8 @@ std::optional<Error> check_step(uint64_t step) {
 }
 std::optional<Error> check(const Lease& m) {
   if (auto bad = check_tile(m.camera, m.rect, m.tile, kMaxTiles)) return bad;
+  if (int64_t{m.rect.width} * m.rect.height > kMaxTilePixels)
+    return Error{fmt::format("tile of {}x{} pixels, limit {}", m.rect.width, m.rect.height, kMaxTilePixels)};
   if (auto bad = check_tile(m.camera, m.block_rect, m.block, m.blocks_in_frame)) return bad;
   const geometry::Rect &r = m.rect, &b = m.block_rect;
   if (r.x < b.x || r.y < b.y || r.x + r.width > b.x + b.width || r.y + r.height > b.y + b.height)

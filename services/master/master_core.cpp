@@ -142,6 +142,8 @@ void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double
 void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double now_s) {
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
+  // The coarse pass looks a little beyond the view's edges, maybe beyond what a lease may.
+  if (!geometry::validate(geometry::subsample(m.camera, kCoarseStep))) return;
   schedule_.request_view(m);
   dispatch(now_s);
 }
@@ -175,7 +177,8 @@ void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_
   if (const auto by = instances_.find(m.instance); it == peers_.end() && by != instances_.end())
     it = peers_.find(by->second);
   if (it == peers_.end() || it->second.gone) return;
-  lose(it->second, peer, "left", true);
+  const std::string id = it->first;  // not the other connection's
+  lose(it->second, id, "left", true);
   dispatch(now_s);
 }
 

@@ -27,10 +27,12 @@ bool SceneParameters::adopt(const wire::Hello& data, std::string& problem) {
     const auto found = data.facts.find(key);
     return found == data.facts.end() ? std::string() : found->second;
   };
-  if (fact("kind") == kind_ && data.parameters == told_) return false;
+  const bool other_data = fact("content_hash") != content_hash_;
+  if (fact("kind") == kind_ && data.parameters == told_ && !other_data) return false;
   kind_ = fact("kind");
   told_ = data.parameters;
-  const bool changed = values_ != told_;
+  content_hash_ = fact("content_hash");
+  const bool changed = values_ != told_ || other_data;
   values_ = told_;
   julia_.reset();
   timeline_ = {};

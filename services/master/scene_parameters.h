@@ -41,6 +41,7 @@ class SceneParameters {
 
   julia::Timeline wished_;
   std::string kind_;
+  std::string content_hash_;
   std::map<std::string, double> told_, values_;  // by the data server; now
   std::optional<julia::Parameters> julia_;       // of values_; none: nothing can be set
   julia::Timeline timeline_;

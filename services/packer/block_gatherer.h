@@ -11,7 +11,7 @@
 namespace telesplat::packer {
 
 /// Frames of which blocks are being gathered; of more the oldest one's blocks are dropped.
-inline constexpr size_t kMaxGatheredFrames = 16;
+inline constexpr size_t kMaxGatheredFrames = 64;
 /// A block that is gathered has at most so many pixels: 64 rows of the widest image. One tile of it allocates them all.
 inline constexpr size_t kMaxBlockPixels = size_t{1} << 20;
 /// All of them together (ten bytes each); beyond it the oldest frame's are dropped.

@@ -11,7 +11,7 @@ namespace telesplat::packer {
 
 /// Unfinished frames remembered: more than viewers have under way at once. Of an older one the tiles are forgotten;
 /// should one come twice then, elimination makes little of it.
-inline constexpr size_t kMaxOpenFrames = 8;
+inline constexpr size_t kMaxOpenFrames = 64;
 /// Finished frames remembered, to tell duplicates that come late.
 inline constexpr size_t kMaxFinishedFrames = 4096;
 

@@ -240,6 +240,11 @@ std::vector<Event> PackerCore::forget_superseded() {
   return out;
 }
 
+void PackerCore::forget_frames() {
+  impl_->frames.clear();
+  impl_->coarse.clear();
+}
+
 std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
   Impl& i = *impl_;
   if (epoch == i.epoch) return std::nullopt;

@@ -136,6 +136,9 @@ class PackerCore {
   /// its coarse pass, whose patches would only be in the way of choosing the best ones.
   std::vector<Event> forget_superseded();
 
+  /// Frames are numbered anew from here: what came of those so far is of no meaning for what comes.
+  void forget_frames();
+
   /// A new version of the data set: forgets everything. Nothing if that is the epoch already.
   std::optional<Event> begin_epoch(EpochId epoch);
 

@@ -99,7 +99,15 @@ class PackerService {
         uint32_t(std::clamp(setting("packing.patches_per_cluster", config.patches_per_cluster), 0.0, 1e9));
     config.max_log_bytes = uint64_t(options_.log_limit_mb * 1e6);
     config.threads = options_.threads;
-    if (!core_ || model_ != config.model) {
+    // Another master counts frames from 1 again: which tiles came of the old one's says nothing. Where patches are told apart by their
+    // frames the model starts anew, too.
+    const bool another_master = core_ && master_ != s.master;
+    master_ = s.master;
+    if (another_master) {
+      core_->forget_frames();
+      gatherer_.clear();
+    }
+    if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
       if (core_) instance_ = net::make_instance_id();  // viewers start anew
       model_ = config.model;
       core_.emplace(config, s.epoch);
@@ -302,7 +310,7 @@ class PackerService {
   const PackerServiceOptions& options_;
   net::Socket tiles_, patches_, state_;
   std::optional<net::MasterLink> link_;
-  InstanceId instance_ = net::make_instance_id();
+  InstanceId instance_ = net::make_instance_id(), master_;
   std::optional<PackerCore> core_;
   BlockGatherer gatherer_;
   EpochHold<ReceivedTile> ahead_;

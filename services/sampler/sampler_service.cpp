@@ -20,6 +20,7 @@ namespace telesplat::sampler {
 namespace {
 
 constexpr int kLeases = 2;          // held and asked for: one being sampled, one to go on with at once
+constexpr size_t kMaxHeld = 64;     // a master that sends more leases than it was asked for is not believed
 constexpr double kIdle_s = 0.1;     // the longest wait: then status reports and hellos are due
 constexpr double kSpanFlush_s = 1;  // between two deliveries of spans
 
@@ -57,7 +58,8 @@ class SamplerService {
       if (!ready) wait(std::min(next.again_s - now, kIdle_s));
       receive_control(!give_up_s);
       if (work_) work_->receive();
-      if (ready && !leases_.empty()) sample_next();
+      // What came meanwhile may have changed what is known of the lease's epoch.
+      if (ready && look_at_next(monotonic_s()).state == Readiness::State::kReady && !leases_.empty()) sample_next();
     }
     flush_metrics(1e300);
     link_.leave([&] { return status(); });
@@ -167,9 +169,10 @@ class SamplerService {
         if (link_.version() != version) on_welcome();
         continue;
       }
+      // An answer is an answer, be it one that cannot be read.
+      if (message->type == wire::Lease::kName) leases_asked_ = std::max(0, leases_asked_ - 1);
       net::dispatch<wire::Lease>(link_.socket(), *message, [&](const wire::Lease& lease) {
-        leases_asked_ = std::max(0, leases_asked_ - 1);
-        if (takes_leases) leases_.push_back({lease, now});
+        if (takes_leases && tiles_ && leases_.size() < kMaxHeld) leases_.push_back({lease, now});
       });
     }
   }

@@ -198,6 +198,30 @@ TEST_F(Master, ADeadSamplersLeasesCountAsExpired) {
   EXPECT_EQ(core.counters().at("tiles_released"), 3);
 }
 
+TEST_F(Master, AGoodbyeOverAnotherConnectionReleasesItsSendersLeases) {
+  join_all();
+  const wire::Lease lease = lease_to("s1");
+  core.on("s1", wire::LeaseRequest{}, 1.1);  // it waits for another one, too
+  core.on("some other socket", wire::Goodbye{{3}}, 1.2);
+  core.on("s2", wire::LeaseRequest{}, 1.3);
+  const auto again = sent<wire::Lease>("s2");
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again[0].tile, lease.tile);
+  EXPECT_TRUE(sent<wire::Lease>("s1").empty());
+}
+
+TEST_F(Master, AViewWhoseCoarsePassNobodyCouldReadIsNotSampled) {
+  join_all();
+  core.on("s1", wire::LeaseRequest{}, 1);
+  wire::ViewRequest r;
+  r.viewer = {5};
+  r.request = {1};
+  r.camera.left = -1000, r.camera.right = 1000, r.camera.width = 1;
+  ASSERT_TRUE(geometry::validate(r.camera));
+  core.on("v", r, 1);
+  EXPECT_TRUE(sent<wire::Lease>("s1").empty());
+}
+
 TEST_F(Master, ASilentSamplerIsTakenForDead) {
   join_all();
   lease_to("s1", 1, 1);

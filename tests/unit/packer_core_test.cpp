@@ -97,6 +97,19 @@ TEST(PackerCore, TilesOfOtherEpochsAreDroppedAndCounted) {
   EXPECT_EQ(core.model().points(), 0u);
 }
 
+TEST(PackerCore, FramesOfAnotherMasterAreNewOnes) {
+  PackerCore core(packer_config(), kEpoch);
+  const auto tile = sampled_frame({1}, camera(), 320)[0];
+  ASSERT_TRUE(core.submit(tile, 0)->has_value());
+  EXPECT_TRUE(core.has({1}, 0));
+  core.forget_frames();
+  EXPECT_FALSE(core.has({1}, 0));
+  const auto again = core.submit(tile, 0);
+  ASSERT_TRUE(again.ok() && again->has_value());
+  EXPECT_TRUE((*again)->frame_complete);
+  EXPECT_LT((*again)->kept, (*again)->samples / 10) << "the points are still there";
+}
+
 TEST(PackerCore, PublishesBeforeItsOwnModelHasThePoints) {
   PackerCore core(packer_config(), kEpoch);
   uint64_t told = 0;

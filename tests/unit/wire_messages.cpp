@@ -239,6 +239,10 @@ TEST(Limits, OfTiles) {
   lease.tile = kMaxTiles;
   EXPECT_TRUE(refused<Lease>(encode(lease), "tile 65536"));
   lease = sample_message<Lease>();
+  lease.camera.width = lease.camera.height = geometry::kMaxImageSide;
+  lease.rect = lease.block_rect = {0, 0, 4097, 4096};
+  EXPECT_TRUE(refused<Lease>(encode(lease), "16777216"));
+  lease = sample_message<Lease>();
   lease.block_rect = {64, 32, 100, 49};
   EXPECT_TRUE(refused<Lease>(encode(lease), "not inside its block"));
 }

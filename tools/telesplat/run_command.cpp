@@ -94,6 +94,9 @@ Status check_usage(const RunOptions& o) {
       if (asked) return Error{fmt::format("{} needs --out: nothing is recorded without a run folder", flag)};
   if (o.shows_julia()) {
     if (const auto scene = julia::read_scene(o.julia); !scene) return scene.error();
+  } else if (o.julia.any() && o.scene.empty()) {
+    return Error{
+        "a Julia set's parameters are given, but no scene; a running session's are changed with telesplat ctl set"};
   } else if (o.julia.any()) {
     return Error{fmt::format("{}: is not \"{}\", but a Julia set's parameters are given", o.scene, julia::kSceneWord)};
   } else if (o.join_master.empty()) {
@@ -322,11 +325,13 @@ int run(const RunOptions& given) {
   progress.close();
   pipeline->finish();
   // A viewer that is told to stop does so, whatever pictures are left to make.
-  if (state == Pipeline::State::kRunning && !o.out.empty()) {
-    const std::string spool = o.out + "/spool";
-    if (const Status s = viewer::develop_frames(spool, o.out + "/images", {}); !s)
+  const std::string spool = o.out + "/spool";
+  if (state != Pipeline::State::kBadInput && !o.out.empty() && fs::is_directory(spool, error)) {
+    const auto tell = [&](size_t done, size_t of) { progress.show(fmt::format("picture {} of {}", done, of)); };
+    if (const Status s = viewer::develop_frames(spool, o.out + "/images", tell); !s)
       progress.line("telesplat: " + s.error().text);
     if (fs::is_empty(spool, error)) fs::remove(spool, error);
+    progress.close();
   }
   for (const auto& n : pipeline->take_notes()) progress.line(n);
   if (o.join_master.empty() && !o.out.empty()) complete_session(o);

@@ -201,7 +201,8 @@ bool gives(const std::vector<std::string>& arguments, const std::string& flag) {
 void give_way(std::vector<std::string>& flags, const std::vector<std::string>& arguments) {
   const bool preset = gives(arguments, "--preset"), c = preset || gives(arguments, "--c");
   std::erase_if(flags, [&](const std::string& flag) {
-    if (c && (flag.starts_with("--c=") || flag.starts_with("--c."))) return true;
+    // An animation of the file would move away what was given here.
+    if (c && (flag.starts_with("--c=") || flag.starts_with("--c.") || flag.starts_with("--animate="))) return true;
     const auto infos = julia::parameter_infos();
     return preset && std::any_of(infos.begin(), infos.end(),
                                  [&](const auto& i) { return flag.starts_with(fmt::format("--{}=", i.name)); });

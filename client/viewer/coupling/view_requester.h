@@ -1,6 +1,7 @@
 // Asynchronous coupling (T6.5): which view to ask for next, and when. Poses of the past are all it knows.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <map>
 #include <optional>
@@ -83,7 +84,9 @@ class ViewRequester {
   std::optional<geometry::Camera> display_;
   RequestId next_{1};
   double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
-  double min_scale() const { return changing_ ? options_.min_scale_changing : options_.min_scale; }
+  double min_scale() const {
+    return changing_ ? std::min(options_.min_scale, options_.min_scale_changing) : options_.min_scale;
+  }
 
   bool changing_ = false;  // the scene; as of the last request
   double last_sent_s_ = -1e9, latency_s_ = 0, epoch_began_s_ = -1e9, last_update_s_ = -1e9;
