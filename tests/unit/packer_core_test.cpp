@@ -341,13 +341,13 @@ TEST(PackerCore, AnEpochClearsEverything) {
 TEST(PackerCore, UnfinishedFramesDoNotPileUp) {
   PackerCore core(packer_config(), kEpoch);
   const auto tile = sampled_frame({1}, camera(), 160)[0];
-  for (uint64_t frame = 1; frame <= 20; ++frame) {
+  for (uint64_t frame = 1; frame <= 80; ++frame) {
     SampledTile t = tile;
     t.frame = {frame};
     ASSERT_TRUE(core.submit(t, 0)->has_value());
   }
   SampledTile newest = tile, oldest = tile;
-  newest.frame = {20};
+  newest.frame = {80};
   EXPECT_FALSE(core.submit(newest, 0)->has_value());
   // The oldest frame's tiles are not remembered; one that comes again is packed again, to nothing.
   const auto again = core.submit(oldest, 0);
