@@ -54,8 +54,8 @@ wire::Welcome MasterCore::welcome(double now_s) const {
 
 uint64_t MasterCore::octree_depth() const {
   if (options_.octree_depth > 0) return options_.octree_depth;
-  // Where patches are kept, fewer and larger clusters are chosen from sooner: a Julia set along a walk at 2560x1600 had 54 fps, 237 ms and
-  // 28.5 dB with 5 levels, 44 fps, 284 ms and 28.2 dB with 6.
+  // Where patches are kept, fewer and larger clusters are chosen from sooner: a Julia set along a walk at 2560x1600 had 54 fps, 237 ms,
+  // 28.5 dB and 0.9 % holes with 5 levels, 44 fps, 284 ms, 28.2 dB and 0.3 % with 6.
   return scene_.kind() == "julia" ? 5 : 6;
 }
 
