@@ -17,13 +17,15 @@
 #include "common/geometry/box.h"
 #include "common/geometry/camera.h"
 #include "common/geometry/mesh_chunk.h"
+#include "common/volume/levels.h"
+#include "common/volume/shear.h"
 
 namespace telesplat::wire {
 
 // Structs and their fields() stand as tables.
 // clang-format off
 
-inline constexpr uint64_t kProtocolVersion = 2;
+inline constexpr uint64_t kProtocolVersion = 3;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
 inline constexpr size_t kMaxControlBytes = 1u << 20;  ///< whole body of a message without bulk fields
@@ -33,6 +35,9 @@ inline constexpr size_t kMaxEntries = 4096;           ///< entries of a map or l
 inline constexpr uint64_t kMaxTiles = 1u << 16;       ///< tiles of a frame, and blocks
 inline constexpr uint64_t kMaxStep = 16;              ///< of a coarse frame
 inline constexpr int64_t kMaxTilePixels = 1 << 24;    ///< of a tile: what the codec takes
+inline constexpr uint64_t kMaxSlabs = 1024;           ///< of a volume, and samplers that share it
+inline constexpr uint64_t kMaxBuffers = 8;            ///< of a loosely coupled viewer
+inline constexpr size_t kMaxViews = 64;               ///< viewers that one sampling frame of a volume serves
 
 using Bytes = std::span<const std::byte>;
 
@@ -83,15 +88,17 @@ struct WhoAreYou {
   template <class F> static void fields(F& f, auto& m) { f("master", m.master); }
 };
 
-/// Viewer -> master: sample this view. Only the newest request of a viewer waits; it replaces the one before.
+/// Viewer -> master: sample this view. With `buffers` 0 (asynchronous coupling) only the newest request of a viewer waits; it replaces the one
+/// before. Otherwise (synchronous: 1, loose: the buffers of T6.4) requests wait in order, at most so many of a viewer; more are dropped.
 struct ViewRequest {
   static constexpr std::string_view kName = "view_request";
   InstanceId viewer;
   RequestId request;
   geometry::Camera camera;  ///< predicted pose; width x height is the sampling size
   double sent_s = 0;
+  uint64_t buffers = 0;     ///< at most kMaxBuffers
   template <class F> static void fields(F& f, auto& m) {
-    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("sent_s", m.sent_s);
+    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("sent_s", m.sent_s); f("buffers", m.buffers);
   }
 };
 
@@ -176,7 +183,8 @@ struct MetricRows {
 struct Control {
   static constexpr std::string_view kName = "control";
   std::string command;  ///< "status", "stop", "epoch", "set" (arguments: parameter -> value), "animate" (argument "timeline": as
-                        ///< julia::parse_timeline takes it, or "off")
+                        ///< julia::parse_timeline takes it, or "off"), "tf" (argument "transfer": a preset's name or points, as
+                        ///< volume::parse_transfer takes them)
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) { f("command", m.command); f("arguments", m.arguments); }
 };
@@ -313,6 +321,162 @@ struct AccessReport {
   std::vector<uint32_t> clusters;
   std::vector<uint32_t> frames;  ///< empty: not told; else one a cluster: the frame tag of mosaics that were drawn of it
   template <class F> static void fields(F& f, auto& m) { f("viewer", m.viewer); f("clusters", m.clusters); f("frames", m.frames); }
+};
+
+// ---- volumes (T4.5, T5.3, T7.4) ---------------------------------------------------------------------------------------------
+
+/// Data server -> master: how many voxels of each of its slices are not transparent in this epoch. What slabs are cut by.
+struct SliceWeights {
+  static constexpr std::string_view kName = "slice_weights";
+  InstanceId data;
+  EpochId epoch;
+  uint64_t begin = 0;             ///< the first slice
+  std::vector<uint32_t> voxels;   ///< of slices begin, begin + 1, ... (as bin, little-endian u32)
+  double bytes_per_voxel = 0;     ///< estimated
+  template <class F> static void fields(F& f, auto& m) {
+    f("data", m.data); f("epoch", m.epoch); f("begin", m.begin); f("voxels", m.voxels); f("bytes_per_voxel", m.bytes_per_voxel);
+  }
+};
+
+/// One transfer of the assignment sheet (T5.3): in `round` this sampler fetches slices [begin, end) from this data server.
+struct SheetEntry {
+  uint64_t round = 0;
+  std::string endpoint;
+  uint64_t begin = 0, end = 0;
+  template <class F> static void fields(F& f, auto& m) {
+    f("round", m.round); f("endpoint", m.endpoint); f("begin", m.begin); f("end", m.end);
+  }
+};
+
+/// Master -> sampler: of this partition of the volume you hold the slab [begin, end); fetch what you lack of it, in the sheet's order.
+/// The sheet covers one slice more on both sides. An older partition may still be leased until the new one is ready.
+struct SlabAssignment {
+  static constexpr std::string_view kName = "slab_assignment";
+  uint64_t partition = 0;           ///< numbered from 1
+  uint64_t slab = 0, slabs = 1;     ///< begin == end: this sampler is spare
+  uint64_t begin = 0, end = 0;
+  std::vector<SheetEntry> sheet;    ///< at most kMaxSlabs
+  template <class F> static void fields(F& f, auto& m) {
+    f("partition", m.partition); f("slab", m.slab); f("slabs", m.slabs); f("begin", m.begin); f("end", m.end); f("sheet", m.sheet);
+  }
+};
+
+/// Sampler -> master: it holds its slab of this partition, in the session's newest epoch that it knows of.
+struct SlabReady {
+  static constexpr std::string_view kName = "slab_ready";
+  InstanceId sampler;
+  uint64_t partition = 0;
+  EpochId epoch;
+  uint64_t voxels = 0, bytes = 0;   ///< held; received for it
+  template <class F> static void fields(F& f, auto& m) {
+    f("sampler", m.sampler); f("partition", m.partition); f("epoch", m.epoch); f("voxels", m.voxels); f("bytes", m.bytes);
+  }
+};
+
+/// A viewer that a sampling frame is for.
+struct SliceView {
+  InstanceId viewer;
+  RequestId request;
+  geometry::Camera camera;   ///< as requested
+  uint64_t buffers = 0;      ///< ViewRequest::buffers
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("buffers", m.buffers);
+  }
+};
+
+/// Master -> sampler, in answer to a lease_request: splat your slab into slice images of this frame.
+struct SliceLease {
+  static constexpr std::string_view kName = "slice_lease";
+  LeaseId lease;
+  FrameId frame;
+  EpochId epoch;
+  uint64_t partition = 0;
+  uint64_t slab = 0, slabs = 1;   ///< the frame is complete with one delivery of each
+  uint64_t begin = 0, end = 0;    ///< the slab's slices
+  volume::ShearFrame shear;       ///< validated against the session's grid by whoever uses it
+  std::vector<SliceView> views;   ///< at least one, at most kMaxViews
+  double leased_s = 0;
+  template <class F> static void fields(F& f, auto& m) {
+    f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("partition", m.partition); f("slab", m.slab);
+    f("slabs", m.slabs); f("begin", m.begin); f("end", m.end); f("shear", m.shear); f("views", m.views); f("leased_s", m.leased_s);
+  }
+};
+
+/// Sampler -> data (DEALER -> ROUTER): voxels of these slices, please, that the epoch's transfer function shows and whose level is not in `have`.
+struct VoxelRequest {
+  static constexpr std::string_view kName = "voxel_request";
+  EpochId epoch;
+  uint64_t step = 0;              ///< of a time-varying volume
+  uint64_t begin = 0, end = 0;    ///< slices
+  uint64_t round = 0;             ///< of the sheet: requests of earlier rounds are served first
+  Bytes have;                     ///< volume::LevelSet; empty: none
+  template <class F> static void fields(F& f, auto& m) {
+    f("epoch", m.epoch); f("step", m.step); f("begin", m.begin); f("end", m.end); f("round", m.round);
+    f("have", m.have, size_t{volume::kMaxLevels / 8});
+  }
+};
+/// Its answer. A server that does not know the epoch yet, or has none of the slices, says so with `known` false: ask again.
+struct VoxelData {
+  static constexpr std::string_view kName = "voxel_data";
+  EpochId epoch;
+  uint64_t step = 0;
+  uint64_t begin = 0, end = 0;
+  bool known = false;
+  uint64_t voxels = 0;
+  Bytes have;                     ///< as requested
+  Bytes shown;                    ///< volume::LevelSet: the levels of which the sampler has all voxels of these slices now
+  Bytes data;                     ///< volume::encode_voxels
+  template <class F> static void fields(F& f, auto& m) {
+    f("epoch", m.epoch); f("step", m.step); f("begin", m.begin); f("end", m.end); f("known", m.known); f("voxels", m.voxels);
+    f("have", m.have, size_t{volume::kMaxLevels / 8}); f("shown", m.shown, size_t{volume::kMaxLevels / 8});
+    f("data", m.data, kMaxBulkBytes);
+  }
+};
+
+/// Sampler (PUSH) -> packer (PULL), beside depth tiles: the slice images of one slab.
+struct SliceImages {
+  static constexpr std::string_view kName = "slice_images";
+  InstanceId sampler;
+  SliceLease lease;               ///< as leased
+  uint64_t voxels = 0;            ///< splatted
+  double sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0;
+  Bytes data;                     ///< volume/slice_image.h, one after the other
+  template <class F> static void fields(F& f, auto& m) {
+    f("sampler", m.sampler); f("lease", m.lease); f("voxels", m.voxels); f("sample_begin_s", m.sample_begin_s);
+    f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s); f("data", m.data, kMaxBulkBytes);
+  }
+};
+
+/// Packer (state ROUTER) -> viewer (DEALER): a complete frame, cropped to what this viewer may see of it. In order of frames; never more
+/// of them unacknowledged than the viewer has buffers.
+struct SliceFrame {
+  static constexpr std::string_view kName = "slice_frame";
+  InstanceId packer;
+  EpochId epoch;
+  FrameId frame;
+  InstanceId viewer;
+  RequestId request;
+  geometry::Camera camera;        ///< as requested
+  volume::ShearFrame shear;
+  uint64_t slabs = 1, voxels = 0; ///< that it was made from
+  double leased_s = 0, packed_s = 0;  ///< first lease; when it was complete
+  Bytes data;                     ///< volume/slice_image.h
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer); f("request", m.request);
+    f("camera", m.camera); f("shear", m.shear); f("slabs", m.slabs); f("voxels", m.voxels); f("leased_s", m.leased_s);
+    f("packed_s", m.packed_s); f("data", m.data, kMaxBulkBytes);
+  }
+};
+/// Viewer -> packer: this frame has left its buffer (it is decoded and replaced an older one, or was displayed and let go). Frame 0: here I am.
+struct SliceAck {
+  static constexpr std::string_view kName = "slice_ack";
+  InstanceId viewer;
+  FrameId frame;
+  uint64_t buffers = 1;           ///< it has, 1 to kMaxBuffers
+  bool in_order = false;          ///< false: of frames that wait for it only the newest is worth sending
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("frame", m.frame); f("buffers", m.buffers); f("in_order", m.in_order);
+  }
 };
 
 // clang-format on

@@ -15,6 +15,8 @@ namespace {
 
 using Packer = msgpack::packer<msgpack::sbuffer>;
 
+constexpr uint32_t kShearNumbers = 11;  // of a shear frame before its layers
+
 // ---- encoding -------------------------------------------------------------------------------------------------------------
 
 template <class T>
@@ -65,6 +67,17 @@ class Encoder {
                c.box_room.lo.z, c.box_room.hi.x, c.box_room.hi.y, c.box_room.hi.z});
   }
   void put(const Lease& lease);
+  void put(const SliceLease& lease);
+  void put(const volume::ShearFrame& s) {
+    p_.pack_array(kShearNumbers + 3 * static_cast<uint32_t>(s.layers.size()));
+    for (const double v : {double(s.axis), double(s.direction), s.eye.x, s.eye.y, s.eye.z, s.u0, s.du, s.v0, s.dv,
+                           double(s.width), double(s.height)})
+      p_.pack(v);
+    for (const auto& l : s.layers)
+      for (const double v : {double(l.begin), double(l.end), l.plane}) p_.pack(v);
+  }
+  template <class M>
+  void put(const std::vector<M>& structs);
   void numbers(std::initializer_list<double> values) {
     p_.pack_array(static_cast<uint32_t>(values.size()));
     for (double v : values) p_.pack(v);
@@ -95,6 +108,12 @@ void pack_map(Packer& p, const M& m, bool with_version) {
 }
 
 void Encoder::put(const Lease& lease) { pack_map(p_, lease, false); }
+void Encoder::put(const SliceLease& lease) { pack_map(p_, lease, false); }
+template <class M>
+void Encoder::put(const std::vector<M>& structs) {
+  p_.pack_array(static_cast<uint32_t>(structs.size()));
+  for (const M& m : structs) pack_map(p_, m, false);
+}
 
 // ---- decoding -------------------------------------------------------------------------------------------------------------
 
@@ -247,11 +266,50 @@ class Decoder {
           {ChunkId{uint64_t(v[0])}, {{v[3], v[4], v[5]}, {v[6], v[7], v[8]}}, uint64_t(v[1]), uint64_t(v[2])});
     }
   }
-  void get(const msgpack::object& o, Lease& lease) {
+  void get(const msgpack::object& o, volume::ShearFrame& s) {
+    if (o.type != msgpack::type::ARRAY) return fail("is not a list");
+    const auto& list = o.via.array;
+    if (list.size < kShearNumbers + 3 || (list.size - kShearNumbers) % 3 ||
+        list.size > kShearNumbers + 3 * volume::kMaxLayers)
+      return fail(fmt::format("is a list of {} numbers, limits {} and {}, three a layer", list.size, kShearNumbers + 3,
+                              kShearNumbers + 3 * volume::kMaxLayers));
+    const auto number = [&](uint32_t i) {
+      double v = 0;
+      if (!error) get(list.ptr[i], v);
+      return v;
+    };
+    const auto integer = [&](uint32_t i, double lo, double hi) {
+      const double v = number(i);
+      if (!error && !is_integer(v, lo, hi))
+        fail(fmt::format("has {} as number {}, not an integer in {} to {}", v, i, lo, hi));
+      return error ? 0 : int(v);
+    };
+    s.axis = integer(0, 0, 2);
+    s.direction = integer(1, -1, 1);
+    s.eye = {number(2), number(3), number(4)};
+    s.u0 = number(5), s.du = number(6), s.v0 = number(7), s.dv = number(8);
+    s.width = integer(9, 1, volume::kMaxRasterSide);
+    s.height = integer(10, 1, volume::kMaxRasterSide);
+    for (uint32_t at = kShearNumbers; at < list.size && !error; at += 3)
+      s.layers.push_back({integer(at, 0, volume::kMaxSide), integer(at + 1, 0, volume::kMaxSide), number(at + 2)});
+  }
+  void get(const msgpack::object& o, Lease& lease) { get_struct(o, lease); }
+  void get(const msgpack::object& o, SliceLease& lease) { get_struct(o, lease); }
+  void get(const msgpack::object& o, std::vector<SheetEntry>& v) { get_structs(o, v, kMaxSlabs); }
+  void get(const msgpack::object& o, std::vector<SliceView>& v) { get_structs(o, v, kMaxViews); }
+  template <class M>
+  void get_struct(const msgpack::object& o, M& m) {
     if (o.type != msgpack::type::MAP) return fail("is not a map");
     Decoder inner(o);
-    Lease::fields(inner, lease);
+    M::fields(inner, m);
     if (inner.error) fail(": " + inner.error->text);
+  }
+  template <class M>
+  void get_structs(const msgpack::object& o, std::vector<M>& v, size_t limit) {
+    if (o.type != msgpack::type::ARRAY) return fail("is not a list");
+    if (!within(o.via.array.size, limit)) return;
+    v.resize(o.via.array.size);
+    for (uint32_t i = 0; i < o.via.array.size && !error; ++i) get_struct(o.via.array.ptr[i], v[i]);
   }
 
   const msgpack::object& map_;
@@ -299,6 +357,44 @@ std::optional<Error> check_frames(const std::vector<uint32_t>& clusters, const s
 }
 std::optional<Error> check(const Forget& m) { return check_frames(m.clusters, m.frames); }
 std::optional<Error> check(const AccessReport& m) { return check_frames(m.clusters, m.frames); }
+std::optional<Error> check_buffers(uint64_t buffers) {
+  if (buffers <= kMaxBuffers) return std::nullopt;
+  return Error{fmt::format("{} buffers, limit {}", buffers, kMaxBuffers)};
+}
+std::optional<Error> check(const ViewRequest& m) { return check_buffers(m.buffers); }
+std::optional<Error> check(const SliceAck& m) {
+  if (m.buffers < 1) return Error{"0 buffers, at least 1"};
+  return check_buffers(m.buffers);
+}
+std::optional<Error> check_slices(uint64_t begin, uint64_t end) {
+  if (begin <= end && end <= uint64_t(volume::kMaxSide)) return std::nullopt;
+  return Error{fmt::format("slices {} to {}, limit {}", begin, end, volume::kMaxSide)};
+}
+std::optional<Error> check_slab(uint64_t slab, uint64_t slabs, uint64_t begin, uint64_t end) {
+  if (slabs < 1 || slabs > kMaxSlabs || slab >= slabs)
+    return Error{fmt::format("slab {} of {} is out of range, limit {}", slab, slabs, kMaxSlabs)};
+  return check_slices(begin, end);
+}
+std::optional<Error> check(const SliceWeights& m) {
+  if (m.voxels.size() > size_t(volume::kMaxSide))
+    return Error{fmt::format("{} slices, limit {}", m.voxels.size(), volume::kMaxSide)};
+  return check_slices(m.begin, m.begin + m.voxels.size());
+}
+std::optional<Error> check(const SlabAssignment& m) {
+  for (const auto& e : m.sheet)
+    if (auto bad = check_slices(e.begin, e.end)) return bad;
+  return check_slab(m.slab, m.slabs, m.begin, m.end);
+}
+std::optional<Error> check(const SliceLease& m) {
+  if (m.views.empty()) return Error{"is for no viewer"};
+  for (const auto& v : m.views)
+    if (auto bad = check_buffers(v.buffers)) return bad;
+  if (m.begin == m.end) return Error{"its slab is empty"};
+  return check_slab(m.slab, m.slabs, m.begin, m.end);
+}
+std::optional<Error> check(const SliceImages& m) { return check(m.lease); }
+std::optional<Error> check(const VoxelRequest& m) { return check_slices(m.begin, m.end); }
+std::optional<Error> check(const VoxelData& m) { return check_slices(m.begin, m.end); }
 
 template <class M>
 constexpr size_t body_limit() {
@@ -377,6 +473,15 @@ TELESPLAT_MESSAGE(EpochBegin)
 TELESPLAT_MESSAGE(StateMark)
 TELESPLAT_MESSAGE(StateRequest)
 TELESPLAT_MESSAGE(AccessReport)
+TELESPLAT_MESSAGE(SliceWeights)
+TELESPLAT_MESSAGE(SlabAssignment)
+TELESPLAT_MESSAGE(SlabReady)
+TELESPLAT_MESSAGE(SliceLease)
+TELESPLAT_MESSAGE(VoxelRequest)
+TELESPLAT_MESSAGE(VoxelData)
+TELESPLAT_MESSAGE(SliceImages)
+TELESPLAT_MESSAGE(SliceFrame)
+TELESPLAT_MESSAGE(SliceAck)
 #undef TELESPLAT_MESSAGE
 
 }  // namespace telesplat::wire

@@ -9,11 +9,14 @@
 
 namespace telesplat::test {
 
-using AllMessages = std::tuple<wire::Hello, wire::Welcome, wire::WhoAreYou, wire::ViewRequest, wire::LeaseRequest,
-                               wire::Lease, wire::LeaseExtend, wire::TileDone, wire::StatusReport, wire::MetricRows,
-                               wire::Control, wire::ControlReply, wire::Shutdown, wire::Goodbye, wire::ChunkListRequest,
-                               wire::ChunkList, wire::ChunkRequest, wire::Chunk, wire::DepthTile, wire::Patch,
-                               wire::Forget, wire::EpochBegin, wire::StateMark, wire::StateRequest, wire::AccessReport>;
+using AllMessages =
+    std::tuple<wire::Hello, wire::Welcome, wire::WhoAreYou, wire::ViewRequest, wire::LeaseRequest, wire::Lease,
+               wire::LeaseExtend, wire::TileDone, wire::StatusReport, wire::MetricRows, wire::Control,
+               wire::ControlReply, wire::Shutdown, wire::Goodbye, wire::ChunkListRequest, wire::ChunkList,
+               wire::ChunkRequest, wire::Chunk, wire::DepthTile, wire::Patch, wire::Forget, wire::EpochBegin,
+               wire::StateMark, wire::StateRequest, wire::AccessReport, wire::SliceWeights, wire::SlabAssignment,
+               wire::SlabReady, wire::SliceLease, wire::VoxelRequest, wire::VoxelData, wire::SliceImages,
+               wire::SliceFrame, wire::SliceAck>;
 
 inline constexpr std::array<std::byte, 5> kBulk{std::byte{1}, std::byte{2}, std::byte{0}, std::byte{255}, std::byte{5}};
 
@@ -46,12 +49,33 @@ struct Filler {
     v = {{ChunkId{0}, {{-1, -1, -1}, {0, 0, 0}}, 12, 500}, {ChunkId{1}, {{0, 0, 0}, {1, 1, 1}}, 7, 300}};
   }
   void operator()(const char*, wire::Lease& v, size_t = 0) { fill(v); }
+  void operator()(const char*, wire::SliceLease& v, size_t = 0) { fill(v); }
+  void operator()(const char*, volume::ShearFrame& v, size_t = 0) {
+    v = {1, -1, {3, 40, 5}, -0.5, 0.01, -0.25, 0.02, 100, 50, {{8, 16, 11.5}, {0, 8, 3.5}}};
+  }
+  template <class M>
+  void operator()(const char*, std::vector<M>& v, size_t = 0) {
+    v.resize(2);
+    for (M& m : v) fill(m);
+  }
   template <class M>
   void fill(M& m) {
     M::fields(*this, m);
     if constexpr (requires { m.tiles_in_frame; }) m.tile = 3, m.tiles_in_frame = 8;
     if constexpr (requires { m.blocks_in_frame; }) m.tile = 5, m.block = 3, m.blocks_in_frame = 8;
     if constexpr (requires { m.step; }) m.step = 4;
+    if constexpr (requires {
+                    m.slabs;
+                    m.slab;
+                  })
+      m.slab = 2, m.slabs = 5;
+    if constexpr (requires {
+                    m.begin;
+                    m.end;
+                  })
+      m.begin = 3, m.end = 12;
+    if constexpr (std::is_same_v<M, wire::SliceWeights>) m.begin = 3;
+    if constexpr (requires { m.buffers; }) m.buffers = 3;
   }
 
  private:

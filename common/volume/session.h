@@ -1,0 +1,38 @@
+// What everyone knows of a volume scene, as it travels in Hello and Welcome: numbers in `parameters`, texts in `facts`. Changes with the epoch: step
+// and transfer function.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "common/volume/grid.h"
+#include "common/volume/transfer_function.h"
+
+namespace telesplat::volume {
+
+struct Session {
+  Grid grid;
+  Levels levels;
+  ValueRange range;
+  TransferFunction transfer;  ///< facts["transfer"]: its text form
+  bool lit = true;            ///< voxels carry normals of their gradient and are shaded
+  int steps = 1;              ///< of a time-varying volume
+  int step = 0;               ///< parameters["volume.step"]: the one that this epoch shows
+  double steps_per_s = 0;     ///< how fast it plays; 0: it does not
+  int part = 0,
+      parts =
+          1;  ///< of a data server's hello: it holds the slices [size_z * part / parts, size_z * (part + 1) / parts)
+  bool operator==(const Session&) const = default;
+};
+
+/// "volume.size.x" ... "volume.m00" ... "volume.levels.lo" ... "volume.step", "volume.steps", "volume.part" ...
+std::map<std::string, double> to_parameters(const Session& session);
+/// "transfer".
+std::map<std::string, std::string> to_facts(const Session& session);
+/// Others' names are ignored. Error: something is missing or beyond its limits.
+Result<Session> read_session(const std::map<std::string, double>& parameters,
+                             const std::map<std::string, std::string>& facts);
+
+inline constexpr int kMaxSteps = 4096;
+
+}  // namespace telesplat::volume

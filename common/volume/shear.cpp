@@ -1,0 +1,247 @@
+#include "common/volume/shear.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace telesplat::volume {
+namespace {
+
+constexpr double kSteepest =
+    8.0;  // slopes beyond this, in voxels a voxel, are not sampled: near the plane of the eye they have no end
+
+glm::dvec3 transform(const glm::dmat4& m, const glm::dvec3& p) { return m * glm::dvec4(p, 1); }
+glm::dvec3 direction_of(const glm::dmat4& m, const glm::dvec3& d) { return m * glm::dvec4(d, 0); }
+
+// Room-space direction of a display ray, at depth 1.
+glm::dvec3 ray(const geometry::Camera& c, double x_pix, double y_pix) {
+  return c.unproject(x_pix, y_pix, 1) - c.pose.position_room;
+}
+
+struct PrincipalAxis {
+  int axis, direction;
+};
+
+// The axis along which the eye is farthest outside the grid, in metres; inside, the one closest to where the camera looks.
+PrincipalAxis choose_axis(const Grid& grid, const glm::dvec3& eye, const glm::dvec3& look) {
+  PrincipalAxis best{2, 1};
+  double farthest = 0;
+  for (int a = 0; a < 3; ++a) {
+    const double length_m = glm::length(glm::dvec3(grid.index_to_room[a]));
+    const double last = grid.size[size_t(a)] - 1;
+    const double outside = std::max(-eye[a], eye[a] - last) * length_m;
+    if (outside > farthest) farthest = outside, best = {a, eye[a] < 0 ? 1 : -1};
+  }
+  if (farthest > 0) return best;
+  double closest = -1;
+  for (int a = 0; a < 3; ++a) {
+    const double along = std::abs(look[a]) * glm::length(glm::dvec3(grid.index_to_room[a]));
+    if (along > closest) closest = along, best = {a, look[a] >= 0 ? 1 : -1};
+  }
+  return best;
+}
+
+struct Span {
+  double lo = 1e300, hi = -1e300;
+  void extend(double v) { lo = std::min(lo, v), hi = std::max(hi, v); }
+};
+
+// A convex polygon or polyhedron's vertices, clipped by a plane: keeps where distance(p) >= 0. Works on the edges of all pairs, which for the
+// few vertices here is cheap and needs no adjacency.
+void clip(std::vector<glm::dvec3>& vertices, const auto& distance) {
+  std::vector<glm::dvec3> out;
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    const double a = distance(vertices[i]);
+    if (a >= 0) out.push_back(vertices[i]);
+    for (size_t j = i + 1; j < vertices.size(); ++j) {
+      const double b = distance(vertices[j]);
+      if ((a < 0) != (b < 0)) out.push_back(vertices[i] + (vertices[j] - vertices[i]) * (a / (a - b)));
+    }
+  }
+  vertices = std::move(out);
+}
+
+}  // namespace
+
+glm::dvec3 ShearFrame::unproject(double x, double y, double at) const {
+  glm::dvec3 out;
+  out[axis] = at;
+  out[u()] = eye[u()] + (u0 + x * du) * t(at);
+  out[v()] = eye[v()] + (v0 + y * dv) * t(at);
+  return out;
+}
+
+double ShearFrame::path(const Grid& grid, double x, double y) const {
+  glm::dvec3 step;
+  step[axis] = direction;
+  step[u()] = u0 + x * du;
+  step[v()] = v0 + y * dv;
+  return glm::length(direction_of(grid.index_to_room, step)) / grid.unit_m();
+}
+
+std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry::Camera> cameras,
+                                     const PlanOptions& options) {
+  if (cameras.empty()) return std::nullopt;
+  const geometry::Camera& first = cameras[0];
+  const glm::dmat4 to_index = grid.room_to_index();
+  ShearFrame out;
+  out.eye = transform(to_index, first.pose.position_room);
+  const glm::dvec3 look = direction_of(to_index, ray(first, first.width / 2.0, first.height / 2.0));
+  const auto [axis, direction] = choose_axis(grid, out.eye, look);
+  out.axis = axis;
+  out.direction = direction;
+  const int u = out.u(), v = out.v(), slices = grid.size[size_t(axis)];
+
+  // Slices in front of the eye.
+  const double near = std::max(options.near_slices, 0.25);
+  int begin = 0, end = slices;
+  if (direction > 0)
+    begin = std::max(begin, int(std::ceil(std::max(out.eye[axis] + near, 0.0))));
+  else
+    end = std::min(end, int(std::floor(std::min(out.eye[axis] - near, slices - 1.0))) + 1);
+  if (begin >= end) return std::nullopt;
+
+  // What the cameras see of them: the box [-1, n] between the first and last slice, clipped by each frustum, in slopes.
+  Span slope_u, slope_v;
+  double nearest_t = 1e300;
+  for (const auto& camera : cameras) {
+    std::vector<glm::dvec3> seen;
+    for (int corner = 0; corner < 8; ++corner) {
+      glm::dvec3 p;
+      p[axis] = corner & 1 ? end - 1 : begin;
+      p[u] = corner & 2 ? grid.size[size_t(u)] : -1.0;
+      p[v] = corner & 4 ? grid.size[size_t(v)] : -1.0;
+      seen.push_back(p);
+    }
+    const glm::dvec3 eye = transform(to_index, camera.pose.position_room);
+    // Planes through the camera's eye and two neighbouring corner rays, pointing inwards.
+    std::array<glm::dvec3, 4> rays{};
+    const double w = camera.width, h = camera.height;
+    const std::array<std::pair<double, double>, 4> corners{{{0, 0}, {w, 0}, {w, h}, {0, h}}};
+    for (size_t i = 0; i < 4; ++i) rays[i] = direction_of(to_index, ray(camera, corners[i].first, corners[i].second));
+    const glm::dvec3 middle = direction_of(to_index, ray(camera, w / 2, h / 2));
+    for (size_t i = 0; i < 4; ++i) {
+      glm::dvec3 normal = glm::cross(rays[i], rays[(i + 1) % 4]);
+      if (glm::dot(normal, middle) < 0) normal = -normal;
+      clip(seen, [&](const glm::dvec3& p) { return glm::dot(p - eye, normal); });
+    }
+    for (const auto& p : seen) {
+      const double t = out.t(p[axis]);
+      slope_u.extend(std::clamp((p[u] - out.eye[u]) / t, -kSteepest, kSteepest));
+      slope_v.extend(std::clamp((p[v] - out.eye[v]) / t, -kSteepest, kSteepest));
+      nearest_t = std::min(nearest_t, t);
+    }
+  }
+  if (!(slope_u.hi > slope_u.lo) || !(slope_v.hi > slope_v.lo)) return std::nullopt;
+
+  // As fine as the display where the display is finest in slopes, which is where it sees the principal axis most squarely: of the raster's
+  // points the one nearest to slope 0 lies there.
+  const auto finest = [&](int of) {
+    glm::dvec3 d;
+    d[axis] = direction;
+    d[u] = std::clamp(0.0, slope_u.lo, slope_u.hi);
+    d[v] = std::clamp(0.0, slope_v.lo, slope_v.hi);
+    const glm::dvec3 at = direction_of(grid.index_to_room, d);
+    glm::dvec3 side(0.0);
+    side[of] = 1;
+    const glm::dvec3 across = direction_of(grid.index_to_room, side);
+    // Angle that one unit of slope spans there, against the angle of a display pixel in its middle.
+    const double distance = glm::length(at);
+    const glm::dvec3 perpendicular = across - at * (glm::dot(across, at) / (distance * distance));
+    const double angle_per_slope = glm::length(perpendicular) / distance;
+    const double pixel_angle = 1 / std::max(first.focal_x(), first.focal_y());
+    return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), options.finest / std::max(nearest_t, 1e-3));
+  };
+  const auto size = [](const Span& s, double& pitch) {
+    const double pixels = std::ceil((s.hi - s.lo) / pitch);
+    if (pixels > kMaxRasterSide) pitch = (s.hi - s.lo) / kMaxRasterSide;
+    return std::clamp(int(std::ceil((s.hi - s.lo) / pitch - 1e-9)), 1, kMaxRasterSide);
+  };
+  out.du = finest(u);
+  out.dv = finest(v);
+  out.width = size(slope_u, out.du);
+  out.height = size(slope_v, out.dv);
+  out.u0 = slope_u.lo;
+  out.v0 = slope_v.lo;
+
+  // Layers: bounds at multiples of the same thickness, whatever part of the grid is in front of the eye, so that they stay in place.
+  const int layers = std::clamp(options.layers, 1, std::min(kMaxLayers, slices));
+  for (int l = 0; l < layers; ++l) {
+    const int from = std::max(begin, int(int64_t{slices} * l / layers));
+    const int to = std::min(end, int(int64_t{slices} * (l + 1) / layers));
+    if (from < to) out.layers.push_back({from, to, (from + to - 1) / 2.0});
+  }
+  if (direction < 0) std::reverse(out.layers.begin(), out.layers.end());
+  return out;
+}
+
+Status validate(const ShearFrame& frame, const Grid& grid) {
+  if (frame.axis < 0 || frame.axis > 2 || (frame.direction != 1 && frame.direction != -1))
+    return Error{
+        fmt::format("principal axis {} in direction {}: not 0 to 2 and +1 or -1", frame.axis, frame.direction)};
+  if (frame.width < 1 || frame.height < 1 || frame.width > kMaxRasterSide || frame.height > kMaxRasterSide)
+    return Error{fmt::format("a raster of {} x {} pixels, limits 1 and {}", frame.width, frame.height, kMaxRasterSide)};
+  for (const double v : {frame.eye.x, frame.eye.y, frame.eye.z, frame.u0, frame.v0})
+    if (!std::isfinite(v) || std::abs(v) > 1e9) return Error{fmt::format("{} in a shear, limit 1e9", v)};
+  for (const double v : {frame.du, frame.dv})
+    if (!(v >= 1e-9 && v <= 1e3)) return Error{fmt::format("a pixel of slope {}, limits 1e-9 and 1000", v)};
+  if (frame.layers.empty() || frame.layers.size() > size_t(kMaxLayers))
+    return Error{fmt::format("{} layers, limits 1 and {}", frame.layers.size(), kMaxLayers)};
+  const int slices = grid.size[size_t(frame.axis)];
+  int next = frame.direction > 0 ? 0 : slices;  // layers go on from here
+  for (const auto& l : frame.layers) {
+    const bool in_order = frame.direction > 0 ? l.begin >= next : l.end <= next;
+    if (l.begin < 0 || l.end > slices || l.begin >= l.end || !in_order)
+      return Error{fmt::format("a layer of slices {} to {} of {} is empty, out of range or out of order", l.begin,
+                               l.end, slices)};
+    if (!(l.plane >= l.begin - 0.5 && l.plane <= l.end - 0.5))
+      return Error{fmt::format("a layer of slices {} to {} stands at {}", l.begin, l.end, l.plane)};
+    if (!(std::min(frame.t(l.begin), frame.t(l.end - 1)) >= 0.1))
+      return Error{fmt::format("a layer of slices {} to {} is behind or too near to the eye at {}", l.begin, l.end,
+                               frame.eye[frame.axis])};
+    next = frame.direction > 0 ? l.end : l.begin;
+  }
+  return ok_status();
+}
+
+std::optional<glm::dmat3> warp(const Grid& grid, const ShearFrame& frame, double plane,
+                               const geometry::Camera& display) {
+  const glm::dmat4 to_index = grid.room_to_index();
+  const glm::dvec3 eye = transform(to_index, display.pose.position_room);
+  const double gap = plane - eye[frame.axis];
+  const double t = frame.t(plane);
+  if (std::abs(gap) < 1e-9 || !(t > 0)) return std::nullopt;
+  // Index-space direction of the ray through (px, py) is d0 + px dx + py dy.
+  const glm::dvec3 d0 = direction_of(to_index, ray(display, 0, 0));
+  const glm::dvec3 dx = direction_of(to_index, ray(display, 1, 0)) - d0;
+  const glm::dvec3 dy = direction_of(to_index, ray(display, 0, 1)) - d0;
+  // It meets the plane at eye + d * gap / d_p, in front where d_p and gap have the same sign. Raster x = ((eye_u + d_u gap / d_p - e_u) / t - u0) /
+  // du; times w = d_p * sign(gap) it is linear in (px, py).
+  const double sign = gap > 0 ? 1 : -1;
+  const auto row = [&](int of, double origin, double pitch) {
+    const double a = gap / (t * pitch), b = ((eye[of] - frame.eye[of]) / t - origin) / pitch;
+    const auto entry = [&](const glm::dvec3& d) { return sign * (a * d[of] + b * d[frame.axis]); };
+    return glm::dvec3(entry(dx), entry(dy), entry(d0));
+  };
+  const glm::dvec3 x = row(frame.u(), frame.u0, frame.du), y = row(frame.v(), frame.v0, frame.dv);
+  const glm::dvec3 w = sign * glm::dvec3(dx[frame.axis], dy[frame.axis], d0[frame.axis]);
+  return glm::transpose(glm::dmat3(x, y, w));
+}
+
+std::pair<int, int> owned_pixels(const Grid& grid, const ShearFrame& frame, int slice, int k_begin, int k_end) {
+  const bool rows = frame.axis == 0;  // then v is k
+  const double t = frame.t(slice), eye = frame.eye[2];
+  const double origin = rows ? frame.v0 : frame.u0, pitch = rows ? frame.dv : frame.du;
+  const int pixels = rows ? frame.height : frame.width;
+  // The first pixel whose centre lies at or beyond k - 0.5.
+  const auto first_at = [&](int k) {
+    const double x = ((k - 0.5 - eye) / t - origin) / pitch - 0.5;
+    return int(std::clamp(std::ceil(x), 0.0, double(pixels)));
+  };
+  return {k_begin <= 0 ? 0 : first_at(k_begin), k_end >= grid.size[2] ? pixels : first_at(k_end)};
+}
+
+}  // namespace telesplat::volume

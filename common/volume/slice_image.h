@@ -1,0 +1,45 @@
+// Slice images: what a sampler makes of its slab, one a layer, and how they travel. Coded in blocks, each by itself, so that the packer can leave out
+// blocks a viewer does not see without decoding any.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/geometry/camera.h"
+
+namespace telesplat::volume {
+
+inline constexpr int kSliceBlock = 64;  ///< pixels a side; blocks lie on the raster's grid of multiples of it
+
+/// One layer's image of one slab: a rectangle of the frame's raster, outside which it is transparent.
+struct SliceImage {
+  int layer = 0;                 ///< of ShearFrame::layers
+  int k_begin = 0, k_end = 0;    ///< the slab
+  geometry::Rect rect;           ///< in the raster; at least one pixel
+  std::vector<uint32_t> pixels;  ///< rect.width x rect.height, 0xAARRGGBB, colours premultiplied by alpha
+};
+
+/// An encoded image's block, in place.
+struct EncodedBlock {
+  int x = 0, y = 0;  ///< block column and row in the raster
+  std::span<const uint8_t> bytes;
+};
+/// An encoded image, taken apart without decoding. Spans point into what was parsed.
+struct EncodedSlice {
+  int layer = 0, k_begin = 0, k_end = 0;
+  std::vector<EncodedBlock> blocks;  ///< those with anything in them, in order of rows
+};
+
+/// Blocks that are wholly transparent are left out; an image without any gives an empty slice, which is left out by join().
+std::vector<uint8_t> encode_slice(const SliceImage& image);
+/// Encoded images one after the other -> slices. raster: width and height, layers: how many; what does not fit them is refused. Bytes come from outside.
+Result<std::vector<EncodedSlice>> parse_slices(std::span<const uint8_t> bytes, int raster_width, int raster_height,
+                                               int layers);
+/// The other way; slices without blocks are left out.
+std::vector<uint8_t> join_slices(std::span<const EncodedSlice> slices);
+/// Decodes all blocks; the image's rectangle is the smallest that holds them, clipped to the raster. Error: a block that is no such block.
+Result<SliceImage> decode_slice(const EncodedSlice& slice, int raster_width, int raster_height);
+
+}  // namespace telesplat::volume
