@@ -49,13 +49,23 @@ wire::Hello make_hello(const DataServiceOptions& o, const MeshStore& store, cons
 
 void add_flags(CLI::App& app, DataServiceOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kBoth);
-  app.add_option("scene", o.scene, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), or julia")->required();
+  app.add_option(
+         "scene", o.scene,
+         "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), elevation raster (GeoTIFF, HGT, 16-bit PNG), or julia")
+      ->required();
   app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")
       ->capture_default_str()
       ->check(CLI::Range(1e-3, 1e3));
   app.add_option("--up", o.mesh.up, "data axis that points up: x, y, z, -x, -y, -z or auto")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
+  app.add_option(
+         "--z-scale", o.mesh.elevation.z_scale,
+         "elevation rasters: heights times this; 0: 1 where the file says where it lies, else so that the relief "
+         "is a seventh of its side")
+      ->capture_default_str()
+      ->check(CLI::Range(-1e6, 1e6));
+  app.add_option("--texture", o.mesh.elevation.texture, "elevation rasters: an image draped over them");
   app.add_option("--cache", o.mesh.cache_dir,
                  "folder of the chunk store; default: telesplat in the user's cache folder");
   app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");

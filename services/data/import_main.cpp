@@ -8,9 +8,11 @@
 
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <new>
 
+#include "services/data/elevation.h"
 #include "services/data/import_report.h"
 #include "services/data/vtk_import.h"
 
@@ -30,11 +32,21 @@ void limit_memory(uint64_t file_bytes) {
 #endif
 }
 
+telesplat::Result<telesplat::data::Mesh> import_elevation(const std::string& path, double z_scale,
+                                                          const std::string& texture) {
+  const auto raster = telesplat::data::read_elevation(path, texture);
+  if (!raster) return raster.error();
+  return telesplat::data::elevation_mesh(*raster, {z_scale, texture}, path);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fputs("usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n", stderr);
+  if (argc != 3 && argc != 5) {
+    std::fputs(
+        "usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n"
+        "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n",
+        stderr);
     return 2;
   }
   const std::string format = argv[1], path = argv[2];
@@ -49,7 +61,9 @@ int main(int argc, char** argv) {
   const int out = dup(STDOUT_FILENO);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // whatever VTK prints must not get between
   try {
-    return telesplat::data::write_import_report(out, telesplat::data::import_with_vtk(path, format)) ? 0 : 1;
+    const auto mesh = argc == 5 ? import_elevation(path, std::atof(argv[3]), argv[4])
+                                : telesplat::data::import_with_vtk(path, format);
+    return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const telesplat::Error error{
         fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};

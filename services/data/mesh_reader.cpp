@@ -12,7 +12,8 @@ namespace telesplat::data {
 namespace {
 
 constexpr const char* kSupported =
-    "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTK (polygonal data), glTF and GLB";
+    "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTK (polygonal data), glTF and GLB, and elevation rasters "
+    "(GeoTIFF, HGT, 16-bit PNG)";
 
 std::string extension_of(const std::string& path) {
   std::string out = std::filesystem::path(path).extension().string();
@@ -28,9 +29,8 @@ bool is_one_of(const std::string& word, std::initializer_list<const char*> words
 // Files that people may well take for meshes: what they are, in words.
 std::string other_kind(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
-  if (content.starts_with("\x89PNG"sv) || content.starts_with("\xff\xd8\xff"sv)) return "an image";
-  if (content.starts_with("II*\0"sv) || content.starts_with("MM\0*"sv)) return "a TIFF image or elevation raster";
-  if (is_one_of(extension, {".hgt", ".dem", ".asc", ".dt2"})) return "an elevation raster";
+  if (content.starts_with("\xff\xd8\xff"sv)) return "a JPEG image";
+  if (content.starts_with("\x89PNG"sv)) return "a PNG image of 8-bit colours";
   if (content.starts_with("NRRD") || content.starts_with("ObjectType = Image") ||
       is_one_of(extension, {".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".raw", ".dcm", ".vti"}) ||
       (content.size() > 132 && content.substr(128, 4) == "DICM"))
@@ -40,6 +40,15 @@ std::string other_kind(std::string_view content, const std::string& extension) {
                           "7zXZ"sv))
     return "a compressed file (unpack it first)";
   return "";
+}
+
+// Elevation rasters, by content or name: TIFF, PNG of 16 bits of grey, and formats without a signature.
+bool looks_like_raster(std::string_view content, const std::string& extension) {
+  using namespace std::string_view_literals;
+  if (content.starts_with("II*\0"sv) || content.starts_with("MM\0*"sv) || content.starts_with("II+\0"sv)) return true;
+  // Of a PNG the header chunk comes first: bit depth in byte 24, colour type (0: grey) in byte 25.
+  if (content.starts_with("\x89PNG"sv)) return content.size() > 26 && content[24] == 16 && content[25] == 0;
+  return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2"});
 }
 
 // Ascii STL starts with "solid", and so do some binary ones: their size gives them away.
@@ -77,6 +86,7 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
     if (start.find("type=\"PolyData\"") != start.npos) return {"vtp", ""};
     return {"", fmt::format("is a VTK file, but not of polygonal data (type=\"PolyData\"); {}", kSupported)};
   }
+  if (looks_like_raster(content, extension)) return {"raster", ""};
   if (const std::string kind = other_kind(content, extension); !kind.empty())
     return {"", fmt::format("is {}, not a mesh; {}", kind, kSupported)};
   if (is_binary_stl(content)) return {"stl", ""};
@@ -93,18 +103,19 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   return {"", fmt::format("is of no known format; {}", kSupported)};
 }
 
-Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress) {
+Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
   const std::string_view content = (*file)->text();
   const DetectedFormat detected = detect_format(content, path);
   if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
   try {
-    auto mesh = detected.format == "ply"   ? read_ply(content, path, progress)
-                : detected.format == "off" ? read_off(content, path, progress)
-                : detected.format == "stl" ? read_stl(content, path, progress)
-                : detected.format == "obj" ? read_obj(content, path, progress)
-                                           : read_with_vtk(content, detected.format, path, progress);
+    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress)
+                : detected.format == "off"    ? read_off(content, path, progress)
+                : detected.format == "stl"    ? read_stl(content, path, progress)
+                : detected.format == "obj"    ? read_obj(content, path, progress)
+                : detected.format == "raster" ? read_with_gdal(path, elevation, progress)
+                                              : read_with_vtk(content, detected.format, path, progress);
     if (!mesh) return mesh;
     if (auto status = validate_mesh(*mesh, path); !status) return status.error();
     return mesh;

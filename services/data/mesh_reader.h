@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "services/data/elevation.h"
 #include "services/data/mesh.h"
 
 namespace telesplat::data {
@@ -12,7 +13,7 @@ namespace telesplat::data {
 /// Fraction of the file read, 0..1; called now and then on the reading thread.
 using ReadProgress = std::function<void(double fraction)>;
 
-/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtk", "gltf", or
+/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtk", "gltf", "raster", or
 /// "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and what is supported.
 struct DetectedFormat {
   std::string format;
@@ -22,7 +23,8 @@ DetectedFormat detect_format(std::string_view content, const std::string& path);
 
 /// Reads a mesh file of any supported format; what it returns passed validate_mesh. Errors name the file.
 /// Nothing is allocated by a count that the file merely claims.
-Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress);
+/// elevation: of rasters alone.
+Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {});
 
 // The readers of single formats. `content` is the whole file, `name` stands in error texts. They promise what validate_mesh checks only
 // as far as sizes go (arrays one a vertex, three indices a triangle); read_mesh checks the rest. Faces of more than three
@@ -41,6 +43,9 @@ Result<Mesh> read_obj(std::string_view content, const std::string& name, const R
 /// $PATH: neither VTK's messages nor a crash on a hostile file reach us. Claimed counts are checked here before VTK sees the file.
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
                            const ReadProgress& progress);
+
+/// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated: elevation.h.
+Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress);
 
 /// Other files that `path` pulls in (material libraries of an OBJ, buffers and images of a glTF), as paths; existing or not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);

@@ -65,8 +65,7 @@ fs::path default_cache_dir() {
 }
 
 // The content of the file and of those it pulls in.
-uint64_t hash_content(const MappedFile& file, const std::string& format, const std::string& path,
-                      const Progress& progress) {
+uint64_t hash_content(const MappedFile& file, const std::vector<std::string>& companions, const Progress& progress) {
   constexpr size_t kStep = 64 << 20;
   XXH3_state_t* state = XXH3_createState();
   XXH3_64bits_reset(state);
@@ -75,7 +74,7 @@ uint64_t hash_content(const MappedFile& file, const std::string& format, const s
     progress("hash", static_cast<double>(at) / static_cast<double>(bytes.size()));
     XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
   }
-  for (const std::string& companion : companion_files(file.text(), format, path))
+  for (const std::string& companion : companions)
     if (const auto other = MappedFile::open(companion))
       XXH3_64bits_update(state, (*other)->bytes().data(), (*other)->bytes().size());
   const uint64_t hash = XXH3_64bits_digest(state);
@@ -95,7 +94,8 @@ Status validate_options(const MeshOptions& options) {
 // Reads the mesh file and writes its store into the descriptor.
 Status build_store(int descriptor, const std::string& path, const MeshOptions& options, uint64_t content_hash,
                    const Progress& progress) {
-  auto mesh = read_mesh(path, [&](double fraction) { progress("read", fraction); });
+  auto mesh = read_mesh(
+      path, [&](double fraction) { progress("read", fraction); }, options.elevation);
   if (!mesh) return mesh.error();
   progress("read", 1.0);
   MeshStoreInfo info;
@@ -147,11 +147,22 @@ Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, cons
   if (!file) return file.error();
   const DetectedFormat detected = detect_format((*file)->text(), path);
   if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
-  const uint64_t hash = hash_content(**file, detected.format, path, progress);
+  const bool raster = detected.format == "raster";
+  if (!raster && (options.elevation.z_scale != 0 || !options.elevation.texture.empty()))
+    return Error{fmt::format("{}: is no elevation raster, but --z-scale or --texture is given", path)};
+  auto companions = companion_files((*file)->text(), detected.format, path);
+  if (raster && !options.elevation.texture.empty()) {
+    const auto texture = MappedFile::open(options.elevation.texture);
+    if (!texture) return texture.error();
+    companions.push_back(options.elevation.texture);
+  }
+  const uint64_t hash = hash_content(**file, companions, progress);
   if (!options.use_cache) return open_unnamed(path, options, hash, progress);
 
   const fs::path folder = options.cache_dir.empty() ? default_cache_dir() : fs::path(options.cache_dir);
-  const std::string stem = (folder / fmt::format("{:016x}-{}-{}", hash, options.up, options.room_size_m)).string();
+  const std::string variant = raster ? fmt::format("-z{}", options.elevation.z_scale) : "";
+  const std::string stem =
+      (folder / fmt::format("{:016x}-{}-{}{}", hash, options.up, options.room_size_m, variant)).string();
   const std::string name = stem + ".mesh", part = stem + ".part";
   if (auto content = open_existing(name)) return make_store(std::move(*content), path, true);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/geometry/mesh_chunk.h"
+#include "services/data/elevation.h"
 
 namespace telesplat::data {
 
@@ -16,6 +17,7 @@ struct MeshOptions {
       "auto";  ///< x, y, z, -x, -y, -z: the data axis that points up; auto: z for terrains and medical data, else y
   std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
   bool use_cache = true;
+  ElevationOptions elevation;  ///< of elevation rasters alone
 };
 
 struct MeshStoreInfo {

@@ -82,17 +82,21 @@ std::string import_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : kImportProgram;
 }
 
-// Runs the import program with `output` as its standard output. Returns its wait status.
-Result<int> run_import(int output, const std::string& format, const std::string& path) {
+// Runs the import program with these arguments and `output` as its standard output. Returns its wait status.
+Result<int> run_import(int output, std::vector<std::string> words) {
+  const std::string format = words[0], path = words[1];
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  std::string program = import_program(), format_argument = format, path_argument = path;
-  char* arguments[] = {program.data(), format_argument.data(), path_argument.data(), nullptr};
+  words.insert(words.begin(), import_program());
+  const std::string& program = words[0];
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
   pid_t child = -1;
-  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments, environ);
+  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   if (failed)
     return Error{fmt::format("{}: the program that reads {} files, {}, cannot be started: {}", path, format, program,
@@ -103,28 +107,38 @@ Result<int> run_import(int output, const std::string& format, const std::string&
   return status;
 }
 
+// What the import program makes of a file: a mesh, or an error.
+Result<Mesh> import(const std::string& reader, std::vector<std::string> words) {
+  const std::string format = words[0], path = words[1];
+  const int output = memfd_create("telesplat-import", MFD_CLOEXEC);
+  if (output < 0) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
+  auto result = [&]() -> Result<Mesh> {
+    const auto status = run_import(output, std::move(words));
+    if (!status) return status.error();
+    if (WIFSIGNALED(*status))
+      return Error{fmt::format("{}: is damaged: {} reader {}", path, reader,
+                               WTERMSIG(*status) == SIGALRM ? "did not end" : "crashed on it")};
+    if (WEXITSTATUS(*status) == 127)
+      return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
+    if (WEXITSTATUS(*status) != 0) return Error{fmt::format("{}: is damaged: {} reader gave up on it", path, reader)};
+    return read_import_report(output, path, format);
+  }();
+  close(output);
+  return result;
+}
+
 }  // namespace
 
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
                            const ReadProgress& progress) {
   if (auto status = check_before(content, format, path); !status) return status.error();
   if (progress) progress(0.0);
-  const int output = memfd_create("telesplat-import", MFD_CLOEXEC);
-  if (output < 0) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
-  auto result = [&]() -> Result<Mesh> {
-    const auto status = run_import(output, format, path);
-    if (!status) return status.error();
-    if (WIFSIGNALED(*status))
-      return Error{fmt::format("{}: is damaged: VTK's {} reader {}", path, format,
-                               WTERMSIG(*status) == SIGALRM ? "did not end" : "crashed on it")};
-    if (WEXITSTATUS(*status) == 127)
-      return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
-    if (WEXITSTATUS(*status) != 0)
-      return Error{fmt::format("{}: is damaged: VTK's {} reader gave up on it", path, format)};
-    return read_import_report(output, path, format);
-  }();
-  close(output);
-  return result;
+  return import("VTK's " + format, {format, path});
+}
+
+Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress) {
+  if (progress) progress(0.0);
+  return import("GDAL's raster", {"raster", path, fmt::format("{}", options.z_scale), options.texture});
 }
 
 }  // namespace telesplat::data

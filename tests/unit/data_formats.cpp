@@ -248,6 +248,35 @@ TEST(VtkReader, GltfNodesAndMaterials) {
   EXPECT_NE(missing.error().text.find("ab.bin"), std::string::npos) << missing.error().text;
 }
 
+TEST(Rasters, AsciiGridWithAVoidCorner) {
+  const TempFolder folder;
+  const auto path =
+      folder.write("grid.asc",
+                   "ncols 3\nnrows 2\nxllcorner 500000\nyllcorner 4000000\ncellsize 30\nNODATA_value -9999\n"
+                   "1 2 3\n4 5 -9999\n");
+  const auto mesh = read_mesh(path, nullptr, {.z_scale = 2});
+  ASSERT_TRUE(mesh) << mesh.error().text;
+  EXPECT_EQ(mesh->format, "raster");
+  EXPECT_EQ(mesh->positions.size(), 5u);
+  EXPECT_EQ(mesh->indices.size(), 9u);
+  EXPECT_NEAR(glm::distance(mesh->positions[0], mesh->positions[1] - glm::dvec3(0, 0, 2)), 30, 1e-6);
+  EXPECT_EQ(mesh->positions[4].z, 10);
+  EXPECT_EQ(mesh->colours.size(), 5u);
+}
+
+TEST(Rasters, TextureIsDraped) {
+  const TempFolder folder;
+  const auto path = folder.write("grid.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n4 5\n");
+  const auto image =
+      folder.write("photo.ppm", "P6 2 2 255\n" + std::string("\xff\0\0\0\xff\0\0\0\xff\x40\x50\x60", 12));
+  const auto mesh = read_mesh(path, nullptr, {.texture = image});
+  ASSERT_TRUE(mesh) << mesh.error().text;
+  EXPECT_EQ(mesh->colours, (std::vector<uint32_t>{0xff0000, 0x00ff00, 0x0000ff, 0x405060}));
+  const auto missing = read_mesh(path, nullptr, {.texture = folder / "nothing.png"});
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().text.find("nothing.png"), std::string::npos);
+}
+
 TEST(DetectFormat, ByContentBeforeName) {
   EXPECT_EQ(detect_format("ply\nformat", "x.obj").format, "ply");
   EXPECT_EQ(detect_format("OFF\n1 2 3", "x").format, "off");
@@ -255,8 +284,10 @@ TEST(DetectFormat, ByContentBeforeName) {
   EXPECT_EQ(detect_format("# comment\n\nv 1 2 3\n", "no extension").format, "obj");
   EXPECT_EQ(detect_format("solid x\nfacet normal", "x").format, "stl");
   EXPECT_EQ(detect_format("{ \"asset\": {} }", "x").format, "gltf");
-  for (const char* raster : {"N42W123.hgt", "scan.nii.gz", "volume.mha"}) {
-    const DetectedFormat detected = detect_format(std::string(100, '\1'), raster);
+  EXPECT_EQ(detect_format(std::string(100, '\1'), "N42W123.hgt").format, "raster");
+  EXPECT_EQ(detect_format(std::string("II*\0", 4), "x").format, "raster");
+  for (const char* volume : {"scan.nii.gz", "volume.mha"}) {
+    const DetectedFormat detected = detect_format(std::string(100, '\1'), volume);
     EXPECT_EQ(detected.format, "");
     EXPECT_NE(detected.complaint.find("supported are"), std::string::npos) << detected.complaint;
   }

@@ -64,13 +64,24 @@ INSTANTIATE_TEST_SUITE_P(All, RealFiles,
                            return n;
                          });
 
-TEST(RealRasters, AreRefusedByKind) {
+TEST(RealRasters, BecomeColouredHeightFields) {
   for (const char* name : {"formats/N42W123.hgt", "formats/andes-srtm3.tif"}) {
     const std::string path = data_folder() + "/" + name;
     if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
-    const auto store = MeshStore::open(path, plain_options(), nullptr);
-    ASSERT_FALSE(store.ok());
-    EXPECT_NE(store.error().text.find("elevation raster"), std::string::npos) << store.error().text;
+    const auto store = MeshStore::open(path, {.use_cache = false}, nullptr);
+    ASSERT_TRUE(store.ok()) << store.error().text;
+    const auto& info = (*store)->info();
+    EXPECT_EQ(info.format, "raster");
+    EXPECT_EQ(info.up, "z");
+    EXPECT_TRUE(info.had_colours);
+    EXPECT_GT(info.triangles, 2'500'000u);
+    EXPECT_LE(info.triangles, 2u * 1200 * 1200);
+    // A tile of one degree: 111 km from south to north, mountains of some thousand metres.
+    const auto size = info.box_data.size();
+    EXPECT_NEAR(size.y, 110'574, 300);
+    EXPECT_GT(size.x, 75'000);
+    EXPECT_GT(size.z, 1000);
+    EXPECT_LT(size.z, 8000);
   }
 }
 

@@ -15,7 +15,7 @@ TEST(MadeVolume, IsTheSameForTheSameSeed) {
 }
 
 TEST(MadeVolume, HoldsAirWoodEarthenwareAndMetal) {
-  const Scan scan = make_tree(96, 1, {});
+  const Scan scan = make_tree(160, 1, {});
   size_t air = 0, wood = 0, pot = 0, metal = 0;
   for (const uint16_t v : scan.values) {
     air += v < 1000;
