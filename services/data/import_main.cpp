@@ -14,6 +14,7 @@
 
 #include "services/data/elevation.h"
 #include "services/data/import_report.h"
+#include "services/data/isosurface.h"
 #include "services/data/vtk_import.h"
 
 namespace {
@@ -45,13 +46,17 @@ int main(int argc, char** argv) {
   if (argc != 3 && argc != 5) {
     std::fputs(
         "usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n"
-        "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n",
+        "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
+        "       telesplat-import iso NAME            (standard input: isosurface.h)\n",
         stderr);
     return 2;
   }
   const std::string format = argv[1], path = argv[2];
   struct stat status {};
-  stat(path.c_str(), &status);
+  if (format == "iso")
+    fstat(STDIN_FILENO, &status);
+  else
+    stat(path.c_str(), &status);
   const auto file_bytes = static_cast<uint64_t>(status.st_size);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
@@ -61,8 +66,9 @@ int main(int argc, char** argv) {
   const int out = dup(STDOUT_FILENO);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // whatever VTK prints must not get between
   try {
-    const auto mesh = argc == 5 ? import_elevation(path, std::atof(argv[3]), argv[4])
-                                : telesplat::data::import_with_vtk(path, format);
+    const auto mesh = argc == 5         ? import_elevation(path, std::atof(argv[3]), argv[4])
+                      : format == "iso" ? telesplat::data::flying_edges(STDIN_FILENO, path)
+                                        : telesplat::data::import_with_vtk(path, format);
     return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const telesplat::Error error{

@@ -1,22 +1,11 @@
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/mman.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <charconv>
-#include <csignal>
-#include <cstring>
-#include <filesystem>
 
 #include "services/data/gltf_header.h"
-#include "services/data/import_report.h"
+#include "services/data/import_process.h"
 #include "services/data/mapped_file.h"
 #include "services/data/mesh_reader.h"
-
-extern char** environ;
 
 namespace telesplat::data {
 namespace {
@@ -73,58 +62,6 @@ Status check_before(std::string_view content, const std::string& format, const s
         "{}: is a VTK file of {} (a volume or grid), not of POLYDATA: only polygonal meshes are read", path, kind)};
   return check_counts(content, path,
                       {"\nPOINTS ", "\nPOLYGONS ", "\nTRIANGLE_STRIPS ", "\nPOINT_DATA ", "\nCELL_DATA "}, 1);
-}
-
-// The import program lies beside this one; else it is looked for in $PATH.
-std::string import_program() {
-  std::error_code error;
-  const auto beside = std::filesystem::read_symlink("/proc/self/exe", error).parent_path() / kImportProgram;
-  return !error && std::filesystem::exists(beside, error) ? beside.string() : kImportProgram;
-}
-
-// Runs the import program with these arguments and `output` as its standard output. Returns its wait status.
-Result<int> run_import(int output, std::vector<std::string> words) {
-  const std::string format = words[0], path = words[1];
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-  words.insert(words.begin(), import_program());
-  const std::string& program = words[0];
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  pid_t child = -1;
-  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed)
-    return Error{fmt::format("{}: the program that reads {} files, {}, cannot be started: {}", path, format, program,
-                             std::strerror(failed))};
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) return Error{fmt::format("{}: lost the process that reads it: {}", path, std::strerror(errno))};
-  return status;
-}
-
-// What the import program makes of a file: a mesh, or an error.
-Result<Mesh> import(const std::string& reader, std::vector<std::string> words) {
-  const std::string format = words[0], path = words[1];
-  const int output = memfd_create("telesplat-import", MFD_CLOEXEC);
-  if (output < 0) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
-  auto result = [&]() -> Result<Mesh> {
-    const auto status = run_import(output, std::move(words));
-    if (!status) return status.error();
-    if (WIFSIGNALED(*status))
-      return Error{fmt::format("{}: is damaged: {} reader {}", path, reader,
-                               WTERMSIG(*status) == SIGALRM ? "did not end" : "crashed on it")};
-    if (WEXITSTATUS(*status) == 127)
-      return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
-    if (WEXITSTATUS(*status) != 0) return Error{fmt::format("{}: is damaged: {} reader gave up on it", path, reader)};
-    return read_import_report(output, path, format);
-  }();
-  close(output);
-  return result;
 }
 
 }  // namespace

@@ -1,0 +1,16 @@
+// Running the program telesplat-import, which reads with other people's libraries what may crash them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "services/data/mesh.h"
+
+namespace telesplat::data {
+
+/// Runs it with `words` as its arguments, the first being what to read as and the second the file's name, and takes the mesh or the error that
+/// it hands back. reader: who reads, for error texts ("VTK's vtp"). input: a descriptor that it gets as its standard input; negative: none.
+/// Error: what it says; it crashed, did not end, is missing.
+Result<Mesh> import(const std::string& reader, std::vector<std::string> words, int input = -1);
+
+}  // namespace telesplat::data
