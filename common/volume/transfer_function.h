@@ -14,9 +14,10 @@
 namespace telesplat::volume {
 
 inline constexpr size_t kMaxTransferPoints = 1024;
-inline constexpr size_t kMaxTransferText = 64u << 10;  ///< bytes of the text form
+inline constexpr size_t kMaxTransferText = 4000;  ///< bytes of the text form: it travels in one string of a message
+inline constexpr double kMaxTransferValue = 1e30;
 
-/// Linear between points, constant outside the first and last. Two points may stand at one value: a jump.
+/// Linear between points, constant outside the first and last. Several points may stand at one value: a jump, at which the last one holds.
 struct TransferFunction {
   struct Point {
     double value = 0;           ///< in the data's own units
@@ -34,8 +35,9 @@ struct TransferFunction {
 struct ValueRange {
   double lo = 0, hi = 1;  ///< smallest and largest value (finite ones)
   double typical_lo = 0,
-         typical_hi = 1;    ///< where most of what is not background lies: percentiles, see data/volume_statistics
+         typical_hi = 1;  ///< where most of what is not background lies: percentiles, services/data/volume_statistics.h
   bool hounsfield = false;  ///< a CT in Hounsfield units: presets then have absolute values
+  bool operator==(const ValueRange&) const = default;
 };
 
 struct TransferPreset {
@@ -48,27 +50,30 @@ Result<TransferFunction> transfer_preset(std::string_view name, const ValueRange
 /// What fits data nobody said anything about.
 std::string_view fitting_preset(const ValueRange& range);
 
-/// "value:colour:opacity, ..." such as "0:#000000:0, 80:#ff8800:0.1, 255:#ffffff:0.9"; values may be percentages of the range ("30%").
+/// "value:colour:opacity, ..." such as "0:#000000:0, 80:#ff8800:0.1, 255:#ffffff:0.9"; values may be percentages of [lo, hi] ("30%"), colours
+/// three numbers from 0 to 1 ("1/0.5/0"). Error: what is no such point; as validate(); a text over kMaxTransferText.
 Result<TransferFunction> parse_transfer(std::string_view text, const ValueRange& range);
 /// The text form, absolute values; parse_transfer of it gives the same function again, to the last bit.
 std::string to_text(const TransferFunction& transfer);
 /// A ParaView colour-map JSON file's content: RGBPoints with Points (opacity), or without (opacity rises over the range). name: for error
-/// texts. A list of several maps: the first.
+/// texts. A list of several maps: the first. A map from 0 (or -1) to 1 is stretched over [lo, hi] if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
 Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name,
                                              const ValueRange& range);
-/// What people give: a preset's name, a JSON file's path, or points.
+/// What people give: a path that ends in ".json", points (they have a ':'), or a preset's name.
 Result<TransferFunction> resolve_transfer(const std::string& text, const ValueRange& range);
 
-/// Refuses no points, too many, values that are not finite or not ascending, colours or opacities outside [0, 1].
+/// Refuses no points, too many, values beyond kMaxTransferValue or not ascending, colours or opacities outside [0, 1].
 Status validate(const TransferFunction& transfer);
 
 /// Colour and extinction of every level, computed once an epoch.
 struct LevelColour {
   float r = 0, g = 0, b = 0;
-  float extinction =
-      0;  ///< per Grid::unit_m(): -log(1 - opacity), opacity at most kMaxOpacity; 0: transparent, never sent
+  /// Per Grid::unit_m(): -log(1 - opacity), opacity at most kMaxOpacity. 0, that is transparent and never sent, below kLeastOpacity.
+  float extinction = 0;
 };
 inline constexpr float kMaxOpacity = 0.9999f;
+inline constexpr float kLeastOpacity =
+    1e-4f;  ///< 256 voxels of it behind one another hide 2.5 % of what is behind them
 std::vector<LevelColour> level_colours(const TransferFunction& transfer, const Levels& levels);
 
 }  // namespace telesplat::volume

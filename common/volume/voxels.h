@@ -45,14 +45,19 @@ class LevelSet {
   std::vector<uint8_t> bits_;
 };
 
-/// Compact form, about two to four bytes a voxel (bits of occupancy by runs, levels and normals in byte planes, zstd).
+inline constexpr size_t kMaxVoxelsCoded = size_t{1} << 25;  ///< in one coded set; a slice has at most half as many
+
+/// Compact form, about two to four bytes a voxel: occupancy as runs, levels and normals as differences from their neighbours', in byte planes,
+/// entropy-coded. Precondition: at most kMaxVoxelsCoded voxels; rows and order as Voxels says.
 std::vector<uint8_t> encode_voxels(const Voxels& voxels, int size_x, int size_y);
-/// Reads it; bytes come from outside. Error: truncated, claims that do not fit the slices asked for or the grid; nothing is allocated by a mere
-/// claim.
+/// Reads it; bytes come from outside. k_begin, k_end: the slices asked for; the answer may have fewer. Error: truncated, more than
+/// kMaxVoxelsCoded, slices, places or levels beyond those asked for or the grid. Memory grows with the rows asked for and with voxels that
+/// are there.
 Result<Voxels> decode_voxels(std::span<const uint8_t> bytes, int size_x, int size_y, int k_begin, int k_end,
                              int level_count);
 
-/// The union of two disjoint sets of the same slices (a sampler's own, and what a new transfer function adds). Both lit, or neither.
+/// The union of two disjoint sets of the same slices (a sampler's own, and what a new transfer function adds). Both lit, or neither; a set
+/// without voxels is either.
 Voxels merge(const Voxels& a, const Voxels& b);
 
 }  // namespace telesplat::volume
