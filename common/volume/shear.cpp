@@ -25,22 +25,55 @@ struct PrincipalAxis {
   int axis, direction;
 };
 
-// The axis along which the eye is farthest outside the grid, in metres; inside, the one closest to where the camera looks.
-PrincipalAxis choose_axis(const Grid& grid, const glm::dvec3& eye, const glm::dvec3& look) {
+// Whether the ray from `eye` along d meets the grid's box in front.
+bool meets_box(const Grid& grid, const glm::dvec3& eye, const glm::dvec3& d) {
+  double enter = 0, leave = 1e300;
+  for (int a = 0; a < 3; ++a) {
+    const double lo = (-0.5 - eye[a]) / d[a], hi = (grid.size[size_t(a)] - 0.5 - eye[a]) / d[a];
+    if (d[a] == 0 && (eye[a] < -0.5 || eye[a] > grid.size[size_t(a)] - 0.5)) return false;
+    if (d[a] == 0) continue;
+    enter = std::max(enter, std::min(lo, hi));
+    leave = std::min(leave, std::max(lo, hi));
+  }
+  return enter < leave;
+}
+
+// The axis to which the rays that meet the grid are closest: of each candidate the steepest ray counts, and the mean of all, in room slopes.
+PrincipalAxis choose_axis(const Grid& grid, std::span<const geometry::Camera> cameras, const glm::dmat4& to_index) {
+  constexpr int kRays = 17;  // a side
+  constexpr double kUseless = 16;
+  glm::dvec3 length_m, sum[2]{}, most[2]{};
+  for (int a = 0; a < 3; ++a) length_m[a] = glm::length(glm::dvec3(grid.index_to_room[a]));
+  int rays = 0;
+  const auto count = [&](const glm::dvec3& d) {
+    const glm::dvec3 m = d * length_m;
+    ++rays;
+    for (int a = 0; a < 3; ++a)
+      for (const int forward : {0, 1}) {
+        const double along = forward ? m[a] : -m[a], across = std::hypot(m[(a + 1) % 3], m[(a + 2) % 3]);
+        const double slope = along > 0 ? std::min(across / along, kUseless) : kUseless;
+        sum[forward][a] += slope;
+        most[forward][a] = std::max(most[forward][a], slope);
+      }
+  };
+  for (const auto& camera : cameras) {
+    const glm::dvec3 eye = transform(to_index, camera.pose.position_room);
+    for (int y = 0; y < kRays; ++y)
+      for (int x = 0; x < kRays; ++x) {
+        const glm::dvec3 d =
+            direction_of(to_index, ray(camera, camera.width * (x + 0.5) / kRays, camera.height * (y + 0.5) / kRays));
+        if (meets_box(grid, eye, d)) count(d);
+      }
+  }
+  // A grid that falls between the rays: the one through its centre.
+  const glm::dvec3 centre((grid.size[0] - 1) / 2.0, (grid.size[1] - 1) / 2.0, (grid.size[2] - 1) / 2.0);
+  if (rays == 0) count(centre - transform(to_index, cameras[0].pose.position_room));
   PrincipalAxis best{2, 1};
-  double farthest = 0;
-  for (int a = 0; a < 3; ++a) {
-    const double length_m = glm::length(glm::dvec3(grid.index_to_room[a]));
-    const double last = grid.size[size_t(a)] - 1;
-    const double outside = std::max(-eye[a], eye[a] - last) * length_m;
-    if (outside > farthest) farthest = outside, best = {a, eye[a] < 0 ? 1 : -1};
-  }
-  if (farthest > 0) return best;
-  double closest = -1;
-  for (int a = 0; a < 3; ++a) {
-    const double along = std::abs(look[a]) * glm::length(glm::dvec3(grid.index_to_room[a]));
-    if (along > closest) closest = along, best = {a, look[a] >= 0 ? 1 : -1};
-  }
+  double least = 1e300;
+  for (int a = 0; a < 3; ++a)
+    for (const int forward : {0, 1})
+      if (const double score = most[forward][a] + sum[forward][a] / rays; score < least)
+        least = score, best = {a, forward ? 1 : -1};
   return best;
 }
 
@@ -89,8 +122,7 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
   const glm::dmat4 to_index = grid.room_to_index();
   ShearFrame out;
   out.eye = transform(to_index, first.pose.position_room);
-  const glm::dvec3 look = direction_of(to_index, ray(first, first.width / 2.0, first.height / 2.0));
-  const auto [axis, direction] = choose_axis(grid, out.eye, look);
+  const auto [axis, direction] = choose_axis(grid, cameras, to_index);
   out.axis = axis;
   out.direction = direction;
   const int u = out.u(), v = out.v(), slices = grid.size[size_t(axis)];

@@ -64,10 +64,9 @@ struct PlanOptions {
   double near_slices = 1;  ///< slices nearer to the eye than this many are left out
 };
 
-/// The view of `cameras` (at least one; all near the same place), sampled from cameras[0]'s eye. The principal axis is the one along which
-/// the eye is farthest outside the grid, in room metres; for an eye inside, the one closest to the direction it looks in. The raster covers what
-/// of the grid's box any of the cameras sees, and no more; its pixels are as large as cameras[0]'s where it sees the grid's nearest part.
-/// Nothing: no camera sees any of it.
+/// The view of `cameras` (at least one; all near the same place), sampled from cameras[0]'s eye. The principal axis is the one to which their rays
+/// through the grid are closest, be the eye outside the grid or inside. The raster covers what of the grid's box any of the cameras sees, and
+/// no more; its pixels are as large as cameras[0]'s where it sees the grid's nearest part. Nothing: no camera sees any of it.
 std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry::Camera> cameras,
                                      const PlanOptions& options = {});
 

@@ -153,5 +153,20 @@ TEST(VolumeShear, EyeInsideSeesOnlyWhatIsInFront) {
   EXPECT_FALSE(plan_frame(grid, std::span(&away, 1)));
 }
 
+// Just above the top slice, looking along it: slices across the look are the ones to splat.
+TEST(VolumeShear, EyeThatSkimsAFaceSamplesAlongItsLook) {
+  const Grid grid = a_grid();
+  const glm::dvec3 eye = grid.index_to_room * glm::dvec4(-3, 25, 40.5, 1);
+  const glm::dvec3 ahead = grid.index_to_room * glm::dvec4(60, 25, 38, 1);
+  const auto camera =
+      geometry::make_camera({eye, glm::quatLookAt(glm::normalize(ahead - eye), glm::dvec3(0, 1, 0))}, 80, 200, 100);
+  const auto frame = plan_frame(grid, std::span(&camera, 1));
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->axis, 0);
+  EXPECT_EQ(frame->direction, 1);
+  EXPECT_LT(frame->width, 1000);
+  EXPECT_LT(frame->height, 1000);
+}
+
 }  // namespace
 }  // namespace telesplat::volume
