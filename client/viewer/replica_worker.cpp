@@ -2,15 +2,15 @@
 
 #include <algorithm>
 
-#include "common/codec/depth_codec.h"
 #include "common/core/clock.h"
-#include "common/net/dispatch.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kReportPeriod_s = 1.0, kAnswerPatience_s = 2.0;
+constexpr double kReportPeriod_s = 1.0;
 constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
+// How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each cycle.
+constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
 
 wire::Hello make_hello(const ReplicaWorker::Options& o) {
   wire::Hello hello;
@@ -21,31 +21,45 @@ wire::Hello make_hello(const ReplicaWorker::Options& o) {
   return hello;
 }
 
+RequestOptions with_buffers(RequestOptions o, const CouplingGate& gate) {
+  o.buffers = uint64_t(gate.buffers());
+  return o;
+}
+
 }  // namespace
 
-ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, ModelCache& cache,
+ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, ViewerCaches& caches,
                              metrics::TableRecorder& frames, metrics::SpanRecorder& spans)
     : context_(context),
       options_(options),
-      cache_(cache),
+      caches_(caches),
       frames_(frames),
       spans_(spans),
       updates_table_("updates",
                      {"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
                       "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch"}),
       link_(context, options.service.master, make_hello(options)),
-      sequencer_({[this](const ModelEvent& e) { apply(e); },
-                  [this] {
-                    points::ModelConfig config{link_.session()->box_room, int(link_.session()->octree_depth)};
-                    begin_replica(config, {}, {});
-                    if (options_.events) options_.events->begin_replica(config);
-                  },
-                  [this](InstanceId packer, Sequence after) {
-                    asked_s_ = monotonic_s();
-                    if (state_) state_->send(wire::StateRequest{link_.instance(), packer, after});
-                  }}),
-      switch_(options.epoch_patience_s),
-      requester_(options.requests, link_.instance()),
+      points_({link_.instance(), options.epoch_patience_s, options.events, caches.gate.waits()},
+              {[this] {
+                 return points::ModelConfig{link_.session()->box_room, int(link_.session()->octree_depth)};
+               },
+               [this](InstanceId packer, Sequence after) {
+                 if (state_) state_->send(wire::StateRequest{link_.instance(), packer, after});
+               },
+               [this](const ViewPart& part) { on_part(part); }, [this] { on_epoch(); },
+               [this](double s) { return to_master_s(s); }},
+              caches.points, caches.batches, spans),
+      slices_({link_.instance(), uint64_t(caches.gate.buffers())},
+              {[this](RequestId r) { return requester_.requested_s(r); },
+               [this](RequestId r) { return caches_.gate.with([r](Coupling& c) { return c.is_open(r); }); },
+               [this](const ViewPart& part) {
+                 // The packer sends frames in order.
+                 caches_.gate.with([&](Coupling& c) { c.skip_before(part.request); });
+                 on_part(part);
+               },
+               [this] { on_epoch(); }, [this](double s) { return to_master_s(s); }},
+              caches.slices, spans),
+      requester_(with_buffers(options.requests, caches.gate), link_.instance()),
       started_s_(options.started_s > 0 ? options.started_s : monotonic_s()),
       thread_([this] { loop(); }) {}
 
@@ -56,21 +70,28 @@ ReplicaWorker::~ReplicaWorker() {
 
 void ReplicaWorker::on_pose(double now_s, const geometry::Camera& camera) {
   const std::lock_guard lock(mutex_);
-  poses_.emplace_back(now_s, camera);
+  poses_.push_back({now_s, camera});
 }
 
 void ReplicaWorker::on_first_points(double now_s) {
   if (first_points_s_ == 0) first_points_s_ = now_s - started_s_;
 }
 
-void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, const splat::DrawList& list) {
-  on_pose(now_s, camera);
+void ReplicaWorker::on_frame(double now_s, const geometry::Camera& camera, EpochId epoch,
+                             const ShownUpdate* waited_for) {
   ++frames_shown_;
+  // Where nothing is held back it is the receiver of points that knows.
+  if (const uint64_t before = epoch_shown_.exchange(epoch.value); before != 0 && before != epoch.value) ++epochs_shown_;
   const std::lock_guard lock(mutex_);
-  seen_.add(list.clusters_seen, list.frames_seen);
+  poses_.push_back({now_s, camera, waited_for ? waited_for->requested_s : 0.0});
 }
 
-ReplicaWorker::LastUpdate ReplicaWorker::last_update() const {
+void ReplicaWorker::on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames) {
+  const std::lock_guard lock(mutex_);
+  seen_.add(clusters, frames);
+}
+
+ShownUpdate ReplicaWorker::last_update() const {
   const std::lock_guard lock(mutex_);
   return last_update_;
 }
@@ -82,23 +103,28 @@ ReplicaWorker::Figures ReplicaWorker::figures() const {
 
 void ReplicaWorker::loop() {
   net::lower_thread_priority(5);  // the display comes first
+  const double poll_s = caches_.gate.waits() ? kCoupledPoll_s : kPoll_s;
   try {
     while (!stop_) {
       const double now = monotonic_s();
       link_.tick(now, [this] { return status(); });
       connect_if_changed();
-      request_view(now);
+      request_views(now);
       report(now, false);
-      if (sequencer_.waiting() && now - asked_s_ > kAnswerPatience_s) sequencer_.retry();
       std::vector<net::Socket*> sockets{&link_.socket()};
       if (patches_) sockets.push_back(&*patches_);
       if (state_) sockets.push_back(&*state_);
-      net::wait_readable(sockets, 10);
+      net::wait_readable_s(sockets, poll_s);
       receive_control();
-      receive_answers();
-      receive_events();
-      show_if_due();  // by time: no message need come
-      cache_.free_dropped();
+      if (state_ && kind_ == SceneKind::kVolume) {
+        slices_.receive(*state_, kMessagesAtOnce);
+        slices_.tick(monotonic_s(), *state_);
+      } else if (state_) {
+        points_.receive_answers(*state_, kMessagesAtOnce);
+        points_.receive_events(*patches_, kMessagesAtOnce);
+        points_.tick(monotonic_s());  // by time: no message need come
+        caches_.points.free_dropped();
+      }
     }
     report(monotonic_s(), true);
     link_.leave([this] { return status(); });
@@ -115,29 +141,46 @@ void ReplicaWorker::connect_if_changed() {
   const auto keep = session.settings.find("packing.keep_redundant");
   keeps_redundant_ = keep != session.settings.end() && keep->second != 0;
   offset_s_ = link_.to_master_s(0);
-  const auto endpoint = [&](const char* key) {
-    const auto it = session.endpoints.find(key);
-    return it == session.endpoints.end() ? std::string() : it->second;
+  other_master_ |= std::exchange(master_, session.master) != session.master;  // it knows nothing of what was asked for
+  if (session.box_room.empty()) return;
+  const auto text = [](const std::map<std::string, std::string>& from, const char* key) {
+    const auto it = from.find(key);
+    return it == from.end() ? std::string() : it->second;
   };
-  const std::string patches = endpoint("patches"), state = endpoint("state");
-  if (!session.box_room.empty()) {
-    const auto named = session.facts.find("scene");
-    const glm::vec3 size = session.box_room.size();
+  const glm::vec3 size = session.box_room.size();
+  {
     const std::lock_guard lock(mutex_);
-    scene_ = named == session.facts.end() ? std::string() : named->second;
+    scene_ = text(session.facts, "scene");
     extent_m_ = std::max({size.x, size.y, size.z});
   }
-  if (patches.empty() || state.empty() || session.box_room.empty()) return;
+  const SceneKind kind = text(session.facts, "kind") == "volume" ? SceneKind::kVolume : SceneKind::kPoints;
+  if (kind_ != SceneKind::kUnknown && kind_ != kind)
+    return log::error("the session's scene is of another kind now: start this viewer again to see it");
+  if (kind == SceneKind::kVolume)
+    if (const Status s = slices_.set_session(session); !s)
+      return log::error("the volume as the master tells of it cannot be shown: {}", s.error().text);
+  kind_ = kind;
+  connect(kind == SceneKind::kVolume ? std::string() : text(session.endpoints, "patches"),
+          text(session.endpoints, "state"));
+}
+
+void ReplicaWorker::connect(const std::string& patches, const std::string& state) {
+  const bool points = kind_ == SceneKind::kPoints;
+  if (state.empty() || (points && patches.empty())) return;
   if (patches == patches_endpoint_ && state == state_endpoint_) return;
   patches_endpoint_ = patches;
   state_endpoint_ = state;
   const net::SocketOptions bulk{.high_water_mark = 4096,
                                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes};
-  patches_.emplace(context_, net::Kind::kSub, options_.service.name + ":patches", bulk);
+  if (points) patches_.emplace(context_, net::Kind::kSub, options_.service.name + ":patches", bulk);
   state_.emplace(context_, net::Kind::kDealer, options_.service.name + ":state", bulk);
-  for (const auto& [socket, address] : {std::pair{&*patches_, patches}, std::pair{&*state_, state}})
-    if (const Status s = socket->connect(address); !s) log::error("{}", s.error().text);
-  sequencer_.start();
+  if (patches_)
+    if (const Status s = patches_->connect(patches); !s) log::error("{}", s.error().text);
+  if (const Status s = state_->connect(state); !s) log::error("{}", s.error().text);
+  if (points)
+    points_.start();
+  else
+    slices_.introduce();
 }
 
 void ReplicaWorker::receive_control() {
@@ -146,118 +189,73 @@ void ReplicaWorker::receive_control() {
   if (link_.shutdown_requested()) shutdown_ = true;
 }
 
-void ReplicaWorker::receive_events() {
-  if (!patches_) return;
-  for (int n = 0; n < kMessagesAtOnce; ++n) {
-    const auto message = patches_->receive();
-    if (!message) return;
-    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(*patches_, *message, [&](auto& m) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
-        sequencer_.on_mark(m);
-      else
-        sequencer_.on_published({m, message->owner});
-    });
-  }
-}
+void ReplicaWorker::on_epoch() { requester_.on_epoch(to_master_s(monotonic_s())); }
 
-void ReplicaWorker::receive_answers() {
-  if (!state_) return;
-  for (int n = 0; n < kMessagesAtOnce; ++n) {
-    const auto message = state_->receive();
-    if (!message) return;
-    asked_s_ = monotonic_s();  // an answer that is coming in is not late
-    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(*state_, *message, [&](auto& m) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
-        sequencer_.on_mark(m);
-      else
-        sequencer_.on_replayed({m, message->owner});
-    });
-  }
-}
-
-void ReplicaWorker::apply(const ModelEvent& event) {
-  const bool applied = std::visit(
-      [this](const auto& e) {
-        using E = std::decay_t<decltype(e)>;
-        if constexpr (std::is_same_v<E, wire::Patch>)
-          return apply_patch(e);
-        else if constexpr (std::is_same_v<E, wire::Forget>)
-          cache_.forget(e.sequence, e.clusters, e.frames);
-        else
-          begin_replica(cache_.config(), e.epoch, e.sequence), requester_.on_epoch(to_master_s(monotonic_s()));
-        return true;
-      },
-      event.body);
-  // After it: points are shown first. What could not be applied could not be replayed either.
-  if (applied && options_.events) options_.events->add(event);
-}
-
-void ReplicaWorker::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence) {
-  const bool held = cache_.begin_replica(config, epoch, sequence);
-  switch_.begin(epoch, held, monotonic_s());
-}
-
-void ReplicaWorker::show_if_due() {
-  const double now_s = monotonic_s();
-  if (!switch_.due(now_s)) return;
-  cache_.show_newest();
-  if (const auto since_s = switch_.waiting_since_s()) {
-    ++epochs_shown_;
-    spans_.add("epoch held", to_master_s(*since_s), to_master_s(now_s), 3);
-  }
-  switch_.shown();
-}
-
-bool ReplicaWorker::apply_patch(const wire::Patch& patch) {
-  const double begin = monotonic_s();
-  // Events in order always tell of an epoch before its first patch; a replica is never of two.
-  if (cache_.epoch().value != 0 && patch.epoch != cache_.epoch()) {
-    ++decode_errors_;
-    log::warn("patch {} is of epoch {} while the model is of epoch {}: dropped", patch.sequence.value,
-              patch.epoch.value, cache_.epoch().value);
-    return false;
-  }
-  const auto bytes = std::span(reinterpret_cast<const uint8_t*>(patch.image.data()), patch.image.size());
-  if (const Status decoded = codec::decode_into(tile_, bytes, patch.rect.width, patch.rect.height); !decoded) {
-    ++decode_errors_;
-    log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
-    return false;
-  }
-  const double decoded = monotonic_s();
-  cache_.insert(points::prepare_patch(cache_.config(), patch.sequence, patch.camera, patch.rect, tile_, patch.frame),
-                patch.epoch);
-  const double inserted = monotonic_s();
-  spans_.add("decode", to_master_s(begin), to_master_s(decoded), 1);
-  spans_.add("insert", to_master_s(decoded), to_master_s(inserted), 1);
-  points_received_ += patch.kept;
-  bytes_received_ += patch.image.size();
-  switch_.on_part({patch.epoch, patch.step, patch.frame_complete, patch.viewer == link_.instance()}, inserted);
-  show_if_due();
-
-  if (const auto u = requester_.on_applied(patch, to_master_s(inserted))) {
-    updates_table_.add({double(u->request.value), double(patch.frame.value), u->requested_s, u->first_s, u->complete_s,
-                        (u->complete_s - u->requested_s) * 1e3, (u->first_s - u->requested_s) * 1e3, double(u->tiles),
-                        double(u->samples), double(u->points), double(u->bytes),
-                        u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0, double(u->camera.width),
-                        double(u->camera.height), double(patch.epoch.value)});
-    spans_.add("view update", u->requested_s, u->complete_s, 2);
+void ReplicaWorker::on_part(const ViewPart& part) {
+  const double local_s = monotonic_s(), now_s = to_master_s(local_s);
+  bytes_received_ += part.bytes;
+  if (part.viewer != link_.instance()) return;
+  caches_.gate.with([&](Coupling& c) { c.progress(local_s); });
+  const auto u = requester_.on_part(part, now_s);
+  if (!u) return;
+  const double eliminated =
+      kind_ == SceneKind::kPoints && u->samples ? 1.0 - double(u->points) / double(u->samples) : 0.0;
+  updates_table_.add({double(u->request.value), double(part.frame.value), u->requested_s, u->first_s, u->complete_s,
+                      (u->complete_s - u->requested_s) * 1e3, (u->first_s - u->requested_s) * 1e3, double(u->tiles),
+                      double(u->samples), double(u->points), double(u->bytes), eliminated, double(part.camera.width),
+                      double(part.camera.height), double(part.epoch.value)});
+  spans_.add("view update", u->requested_s, u->complete_s, 2);
+  const ShownUpdate update{u->request, u->requested_s, part.camera.pose};
+  {
     const std::lock_guard lock(mutex_);
-    last_update_ = {u->requested_s, u->camera.pose, patch.sequence.value};
+    last_update_ = update;
     latency_ms_ = (u->complete_s - u->requested_s) * 1e3;
     ++updates_;
   }
-  return true;
+  if (!caches_.gate.waits()) return;
+  complete_[u->request] = update;
+  caches_.gate.with([&](Coupling& c) { release(c.completed(u->request, local_s)); });
 }
 
-void ReplicaWorker::request_view(double now_s) {
-  std::vector<std::pair<double, geometry::Camera>> poses;
+// To be called before the display can take them: with the gate closed.
+void ReplicaWorker::release(const std::vector<RequestId>& requests) {
+  for (const RequestId request : requests) {
+    caches_.batches.close(complete_[request]);
+    complete_.erase(complete_.begin(), complete_.upper_bound(request));
+  }
+}
+
+void ReplicaWorker::request_views(double now_s) {
+  std::vector<SeenPose> poses;
   {
     const std::lock_guard lock(mutex_);
     poses.swap(poses_);
   }
-  for (const auto& [t, camera] : poses) requester_.on_pose(to_master_s(t), camera);
-  if (!link_.session() || !patches_) return;
-  if (const auto request = requester_.next(to_master_s(now_s))) link_.socket().send(*request);
+  for (const auto& p : poses) {
+    requester_.on_pose(to_master_s(p.t_s), p.camera);
+    if (p.waited_since_s > 0) requester_.on_displayed(to_master_s(p.t_s) - p.waited_since_s);
+  }
+  if (!link_.session() || !state_) return;
+  std::vector<RequestId> again;
+  bool may_ask = true;
+  caches_.gate.with([&](Coupling& c) {
+    std::vector<RequestId> released;
+    again = c.overdue(now_s, released);
+    release(released);
+    if (std::exchange(other_master_, false)) again = c.open();
+    may_ask = c.may_ask();
+  });
+  for (const auto& request : requester_.again(again, to_master_s(now_s))) link_.socket().send(request);
+  if (!again.empty() && kind_ == SceneKind::kVolume) slices_.introduce();
+  while (may_ask) {
+    const auto request = requester_.next(to_master_s(now_s));
+    if (!request) return;
+    link_.socket().send(*request);
+    caches_.gate.with([&](Coupling& c) {
+      c.asked(request->request, now_s);
+      may_ask = c.waits() && c.may_ask();
+    });
+  }
 }
 
 void ReplicaWorker::report(double now_s, bool last) {
@@ -279,22 +277,27 @@ void ReplicaWorker::send_access_reports() {
 }
 
 net::MasterLink::Values ReplicaWorker::status() const {
-  const auto figures = cache_.figures();
+  const auto model = caches_.points.figures();
+  const auto slices = caches_.slices.figures();
+  const auto points = points_.figures();
+  const auto volume = slices_.figures();
+  const bool held = kind_ == SceneKind::kVolume || caches_.gate.waits();
   return {{"rss_mb", net::resident_mb()},
           {"peak_rss_mb", net::peak_resident_mb()},
-          {"points", double(figures.points)},
-          {"model_bytes", double(figures.bytes)},
-          {"points_received", double(points_received_)},
+          {"points", double(model.points)},
+          {"model_bytes", double(model.bytes)},
+          {"pixels", double(slices.pixels)},
+          {"points_received", double(points.points_received)},
           {"bytes_received", double(bytes_received_)},
-          {"gaps_resynced", double(sequencer_.gaps())},
+          {"gaps_resynced", double(points.gaps)},
           {"updates", double(updates_)},
           {"frames", double(frames_shown_)},
           {"first_points_s", first_points_s_},
-          {"epochs_shown", double(epochs_shown_)},
-          {"epoch", double(switch_.displayed().value)},
-          {"sequence", double(sequencer_.applied().value)},
-          {"messages_rejected",
-           double((patches_ ? patches_->rejected() : 0) + (state_ ? state_->rejected() : 0) + decode_errors_)}};
+          {"epochs_shown", double(held ? uint64_t(epochs_shown_) : points.epochs_shown)},
+          {"epoch", double(held ? uint64_t(epoch_shown_) : points.epoch.value)},
+          {"sequence", double(points.sequence.value)},
+          {"messages_rejected", double((patches_ ? patches_->rejected() : 0) + (state_ ? state_->rejected() : 0) +
+                                       points.decode_errors + volume.decode_errors)}};
 }
 
 }  // namespace telesplat::viewer

@@ -10,6 +10,8 @@
 #include <thread>
 
 #include "client/viewer/display/headless_surface.h"
+#include "client/viewer/display/point_source.h"
+#include "client/viewer/display/volume_source.h"
 #include "client/viewer/display/window_surface.h"
 #include "common/core/clock.h"
 #include "common/net/control.h"
@@ -17,6 +19,7 @@
 namespace telesplat::viewer {
 namespace {
 
+constexpr int kMaxWallSide = 16;
 constexpr double kPicturesAfterSignal_s = 1.0, kMasterPatience_s = 2.0;
 
 Result<geometry::Trajectory> make_trajectory(const std::string& name) {
@@ -72,6 +75,18 @@ Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag
       h > geometry::kMaxImageSide)
     return Error{fmt::format("{} {}: not WIDTHxHEIGHT with both in 16..{}", flag, text, geometry::kMaxImageSide)};
   return std::pair{w, h};
+}
+
+Result<std::pair<int, int>> parse_wall(const std::string& text) {
+  int columns = 0, rows = 0;
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, columns);
+  const bool cross = first.ec == std::errc() && first.ptr != end && *first.ptr == 'x';
+  const auto second = cross ? std::from_chars(first.ptr + 1, end, rows) : first;
+  if (!cross || second.ec != std::errc() || second.ptr != end || columns < 1 || rows < 1 || columns > kMaxWallSide ||
+      rows > kMaxWallSide)
+    return Error{fmt::format("--wall {}: not COLUMNSxROWS with both in 1..{}", text, kMaxWallSide)};
+  return std::pair{columns, rows};
 }
 
 void add_view_flags(CLI::App& app, ViewerOptions& o) {
@@ -130,10 +145,16 @@ void add_view_flags(CLI::App& app, ViewerOptions& o) {
                  "lit: head light, directional light, ambient; head: head light; unlit: colours as they are")
       ->capture_default_str()
       ->check(CLI::IsMember(image::kShadingNames));
-  app.add_option("--coupling", o.coupling, "async: the display never waits for the server")
+  app.add_option("--coupling", o.coupling,
+                 "async: the display never waits for the server; sync: each frame asks for a view update and waits for "
+                 "it; loose: each frame waits for the next update, --buffers of them are asked for ahead")
       ->capture_default_str()
-      ->check(CLI::IsMember({"async"}));
-  app.add_option("--update-rate", o.requests.max_rate_hz, "view requests a second at most")
+      ->check(CLI::IsMember({"async", "sync", "loose"}));
+  app.add_option("--buffers", o.buffers,
+                 "--coupling loose: view updates that are on their way or complete and not displayed, at most")
+      ->capture_default_str()
+      ->check(CLI::Range(uint64_t{1}, wire::kMaxBuffers));
+  app.add_option("--update-rate", o.requests.max_rate_hz, "--coupling async: view requests a second at most")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 1000.0));
   app.add_option("--epoch-patience", o.epoch_patience_s,
@@ -160,6 +181,14 @@ void add_flags(CLI::App& app, ViewerOptions& o) {
   app.add_option("--started-at", o.started_s,
                  "monotonic clock when the session was started, for start-up times; 0: now")
       ->capture_default_str();
+  app.add_option("--wall", o.wall,
+                 "COLUMNSxROWS: this display is a tile of a wall; --fov is the wall's, --size the tile's");
+  app.add_option("--wall-tile", o.wall_tile, "which tile, counted by rows from the upper left, from 0")
+      ->capture_default_str();
+  app.add_option("--clock-from", o.display.clock_from_s,
+                 "monotonic clock when the head's movement and --duration begin, for several viewers that follow one "
+                 "head; 0: with the first displayed frame")
+      ->capture_default_str();
   app.add_option("--out", o.out, "run folder for pictures and frames to verify");
   app.add_flag("--end-session", o.end_session, "when this viewer is done, the session is over for everyone");
   app.add_flag("--window", o.window, "show a window; the person at it moves the camera");
@@ -174,6 +203,18 @@ int run(ViewerOptions o) {
   if (!sampling) return refuse(sampling.error());
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
+  const auto wall = parse_wall(o.wall.empty() ? "1x1" : o.wall);
+  if (!wall) return refuse(wall.error());
+  std::tie(o.display.wall.columns, o.display.wall.rows) = *wall;
+  if (o.wall_tile < 0 || o.wall_tile >= wall->first * wall->second)
+    return refuse({fmt::format("--wall-tile {}: --wall {} has the tiles 0..{}", o.wall_tile,
+                               o.wall.empty() ? "1x1" : o.wall, wall->first * wall->second - 1)});
+  o.display.wall.tile = o.wall_tile;
+  const auto coupling = coupling_named(o.coupling);
+  if (!coupling) return refuse({fmt::format("--coupling {}: not async, sync or loose", o.coupling)});
+  if (o.buffers < 1 || uint64_t(o.buffers) > wire::kMaxBuffers)
+    return refuse({fmt::format("--buffers {}: not in 1..{}", o.buffers, wire::kMaxBuffers)});
+  const int buffers = buffers_of(*coupling, o.buffers);
   o.display.render.kernel = *splat::kernel_named(o.splat);
   o.display.splat_scale = float(o.splat_scale);
   o.display.shading = *image::shading_named(o.shading);
@@ -209,14 +250,14 @@ int run(ViewerOptions o) {
   }
 
   net::Context context;
-  ModelCache cache;
+  ViewerCaches caches(buffers);
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
   ReplicaWorker::Options worker_options{
       o.service,
       o.requests,
       {{"coupling", o.coupling},
-       {"buffers", "0"},
+       {"buffers", std::to_string(buffers)},
        {"renderer", (*renderer)->name()},
        {"splat", o.splat},
        {"finish", splat::finish_name(o.display.render.finish)},
@@ -235,12 +276,30 @@ int run(ViewerOptions o) {
       o.epoch_patience_s,
       events.get(),
       o.started_s};
+  if (!o.wall.empty()) {
+    worker_options.facts["wall"] = o.wall;
+    worker_options.facts["wall_tile"] = std::to_string(o.wall_tile);
+  }
   DisplayResult result;
   bool session_ended = false;
   {
-    ReplicaWorker worker(context, worker_options, cache, frames, spans);
-    result = run_display(o.display, **surface, **renderer, cache, worker, frames, spans, spool.get());
+    ReplicaWorker worker(context, worker_options, caches, frames, spans);
+    const SourceMaker make_source = [&](SceneKind kind) -> Result<std::unique_ptr<ViewSource>> {
+      if (kind == SceneKind::kPoints)
+        return std::unique_ptr<ViewSource>(new PointSource(o.display, std::move(*renderer), caches, worker));
+      const std::string name = (*renderer)->name();
+      renderer->reset();  // its context must not be the current one
+      auto volumes = make_volume_renderer(name, o.threads);
+      if (!volumes) return volumes.error();
+      return std::unique_ptr<ViewSource>(
+          new VolumeSource(std::move(*volumes), caches.slices, o.display.shading.background));
+    };
+    result = run_display(o.display, **surface, make_source, caches.gate, worker, frames, spans, spool.get());
     session_ended = worker.shutdown_requested();
+  }
+  if (!result.error.empty()) {
+    log::error("{}", result.error);
+    return 1;
   }
   surface->reset();  // the window goes at once, whatever there is to write
   if (spool) {

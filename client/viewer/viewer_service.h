@@ -12,6 +12,9 @@ struct ViewerOptions {
   std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling: or auto
   std::string trajectory = "orbit";                       ///< "orbit", "still" or a CSV file
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
+  int buffers = 3;    ///< of loose coupling
+  std::string wall;   ///< "CxR": this display is a tile of a wall; empty: it is none
+  int wall_tile = 0;  ///< which one, by rows from the upper left
   double epoch_patience_s =
       0.15;                ///< a changed scene's old points stay on display for so long if the new ones are late
   double splat_scale = 0;  ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
@@ -33,6 +36,9 @@ Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag
 
 /// The same, or "auto" (then the value is not used).
 Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
+
+/// "CxR" with 1 to 16 columns and rows.
+Result<std::pair<int, int>> parse_wall(const std::string& text);
 
 /// Exit code: 0 done, 1 failed while running (with end_session: also if the session ended before anything was shown), 2 bad usage or
 /// input. A signal ends it within 2 s: recorded frames that are not pictures by then stay in OUT/spool.

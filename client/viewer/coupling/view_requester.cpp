@@ -74,10 +74,10 @@ void ViewRequester::on_pose(double t_s, const geometry::Camera& display) {
   display_ = display;
 }
 
-std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
-  if (!display_ || now_s - last_sent_s_ < 1.0 / options_.max_rate_hz) return std::nullopt;
-  last_sent_s_ = now_s;
-  const double horizon_s = latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
+geometry::Camera ViewRequester::wanted(double now_s, bool& still) {
+  const double horizon_s = displayed_latency_s_ > 0 ? displayed_latency_s_
+                           : latency_s_ > 0         ? latency_s_
+                                                    : options_.initial_latency_s;
   geometry::Camera camera = *display_;
   camera.pose = predictor_.predict(now_s + horizon_s);
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
@@ -85,7 +85,7 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const double margin = motion < 0.002 ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
   // The first view is wanted soon rather than sharp, and so is each of an epoch that may not last.
   changing_ = last_update_s_ < epoch_began_s_ || now_s - epoch_began_s_ < kEpochSettles_s;
-  const bool still = margin == 0 && latency_s_ > 0 && !changing_;
+  still = margin == 0 && latency_s_ > 0 && !changing_;
   if (options_.adaptive) {
     if (scale_ == 0)
       scale_ = std::clamp(std::sqrt(kFirstPixels / (double(display_->width) * display_->height)), min_scale(), 1.0);
@@ -99,34 +99,71 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   }
   const double du = (camera.right - camera.left) * margin / 2, dv = (camera.top - camera.bottom) * margin / 2;
   camera.left -= du, camera.right += du, camera.bottom -= dv, camera.top += dv;
-  const RequestId id = next_;
-  next_ = next_.next();
-  open_[id] = {id, now_s, 0, 0, camera, still};
-  while (open_.size() > kMaxOpen) open_.erase(open_.begin());
-  return wire::ViewRequest{viewer_, id, camera, now_s};
+  return camera;
 }
 
-std::optional<ViewRequester::Update> ViewRequester::on_applied(const wire::Patch& patch, double now_s) {
-  if (patch.viewer != viewer_) return std::nullopt;
-  const auto it = open_.find(patch.request);
+std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
+  if (!display_ || (options_.buffers == 0 && now_s - last_sent_s_ < 1.0 / options_.max_rate_hz)) return std::nullopt;
+  last_sent_s_ = now_s;
+  bool still = false;
+  const geometry::Camera camera = wanted(now_s, still);
+  const RequestId id = next_;
+  next_ = next_.next();
+  open_[id] = {id,   options_.buffers ? std::min<uint64_t>(open_.size(), options_.buffers - 1) : 0, now_s, 0, 0, camera,
+               still};
+  while (open_.size() > kMaxOpen) open_.erase(open_.begin());
+  return wire::ViewRequest{viewer_, id, camera, now_s, options_.buffers};
+}
+
+std::vector<wire::ViewRequest> ViewRequester::again(std::span<const RequestId> requests, double now_s) {
+  std::vector<wire::ViewRequest> out;
+  for (const RequestId id : requests) {
+    const auto it = open_.find(id);
+    if (it == open_.end() || !display_) continue;
+    it->second.camera = wanted(now_s, it->second.still);
+    out.push_back({viewer_, id, it->second.camera, now_s, options_.buffers});
+  }
+  return out;
+}
+
+void ViewRequester::on_displayed(double latency_s) {
+  latency_s = std::clamp(latency_s, 1e-3, 10.0);
+  displayed_latency_s_ = displayed_latency_s_ == 0 ? latency_s : 0.8 * displayed_latency_s_ + 0.2 * latency_s;
+}
+
+std::optional<double> ViewRequester::requested_s(RequestId request) const {
+  const auto it = open_.find(request);
+  return it == open_.end() ? std::nullopt : std::optional(it->second.requested_s);
+}
+
+ViewPart part_of(const wire::Patch& p) {
+  return {p.viewer, p.request, p.epoch,   p.frame,        p.frame_complete && p.step <= 1,
+          1,        p.kept,    p.samples, p.image.size(), p.camera};
+}
+
+std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part, double now_s) {
+  if (part.viewer != viewer_) return std::nullopt;
+  const auto it = open_.find(part.request);
   if (it == open_.end()) return std::nullopt;
   Update& u = it->second;
-  if (u.tiles++ == 0) u.first_s = now_s;
-  u.points += patch.kept;
-  u.samples += patch.samples;
-  u.bytes += patch.image.size();
-  if (!patch.frame_complete || patch.step > 1) return std::nullopt;
+  if (u.tiles == 0) u.first_s = now_s;
+  u.tiles += part.tiles;
+  u.points += part.points;
+  u.samples += part.samples;
+  u.bytes += part.bytes;
+  if (!part.complete) return std::nullopt;
   u.complete_s = last_update_s_ = now_s;
   // The master's clock as seen from here may be set back when the connection is made anew.
   const double latency_s = std::max(now_s - u.requested_s, 1e-3);
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
-  // Time goes with the number of pixels, hence the root; by small steps, since views differ.
-  if (options_.adaptive && !u.still)
-    scale_ =
-        std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / latency_s), 0.85, 1.1), min_scale(), 1.0);
+  // Time goes with the number of pixels, hence the root; by small steps, since views differ. Requests that were sent before it took their share.
+  if (options_.adaptive && !u.still) {
+    const double own_s = latency_s / double(1 + u.ahead);
+    scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / own_s), 0.85, 1.1), min_scale(), 1.0);
+  }
   const Update done = u;
-  // Requests before this one were replaced at the master and will never be answered.
-  open_.erase(open_.begin(), std::next(it));
+  // Asynchronous requests before this one were replaced at the master and will never be answered; others may still be.
+  open_.erase(options_.buffers ? it : open_.begin(), std::next(it));
   return done;
 }
 

@@ -1,11 +1,13 @@
-// Asynchronous coupling (T6.5): which view to ask for next, and when. Poses of the past are all it knows.
+// Which view to ask for next, and when (T6.3-6.5). Poses of the past are all it knows.
 #pragma once
 
 #include <algorithm>
 #include <deque>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "common/geometry/camera.h"
 #include "common/wire/messages.h"
@@ -23,7 +25,8 @@ struct RequestOptions {
   double target_latency_s = 0.15;  ///< adaptive: longer updates make sampling coarser, shorter ones finer
   double min_scale = 0.5;          ///< adaptive: sampled pixels a displayed pixel, on each axis, at least (at most 1)
   double min_scale_changing =
-      0.25;                     ///< the same while the scene changes, when each view is displayed for a moment only
+      0.25;              ///< the same while the scene changes, when each view is displayed for a moment only
+  uint64_t buffers = 0;  ///< 0: asynchronous; else requests are paced by credits (coupling.h) and not by max_rate_hz
   bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 
@@ -52,6 +55,18 @@ class PosePredictor {
   std::deque<Sample> samples_;
 };
 
+/// What came of an answer: a tile of points, or a whole volume frame.
+struct ViewPart {
+  InstanceId viewer;
+  RequestId request;
+  EpochId epoch;
+  FrameId frame;
+  bool complete = false;  ///< the last part of the frame of full resolution
+  uint64_t tiles = 1, points = 0, samples = 0, bytes = 0;
+  geometry::Camera camera;  ///< that was sampled
+};
+ViewPart part_of(const wire::Patch& patch);
+
 class ViewRequester {
  public:
   ViewRequester(const RequestOptions& options, InstanceId viewer) : options_(options), viewer_(viewer) {}
@@ -60,11 +75,18 @@ class ViewRequester {
   void on_pose(double t_s, const geometry::Camera& display);
   /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full resolution.
   void on_epoch(double now_s) { epoch_began_s_ = now_s; }
-  /// The next request, if one is due.
+  /// The next request; asynchronously, if one is due.
   std::optional<wire::ViewRequest> next(double now_s);
+  /// These requests once more, for the view that is wanted now.
+  std::vector<wire::ViewRequest> again(std::span<const RequestId> requests, double now_s);
+  /// A frame that waited for its update was displayed so long after the update had been requested: predictions reach to there.
+  void on_displayed(double latency_s);
+  /// When it was requested; nothing: not by us, or it has been answered.
+  std::optional<double> requested_s(RequestId request) const;
 
   struct Update {
     RequestId request;
+    uint64_t ahead = 0;  ///< requests that were open when it was sent: it is answered after them
     double requested_s = 0, first_s = 0,
            complete_s = 0;  ///< first_s: the first part, of the coarse pass if there is one
     geometry::Camera camera;
@@ -73,7 +95,8 @@ class ViewRequester {
   };
   /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution and asked for
   /// by us; a coarse pass may come before it, with the same request.
-  std::optional<Update> on_applied(const wire::Patch& patch, double now_s);
+  std::optional<Update> on_part(const ViewPart& part, double now_s);
+  std::optional<Update> on_applied(const wire::Patch& patch, double now_s) { return on_part(part_of(patch), now_s); }
 
   double latency_s() const { return latency_s_; }
 
@@ -88,8 +111,10 @@ class ViewRequester {
     return changing_ ? std::min(options_.min_scale, options_.min_scale_changing) : options_.min_scale;
   }
 
+  geometry::Camera wanted(double now_s, bool& still);
+
   bool changing_ = false;  // the scene; as of the last request
-  double last_sent_s_ = -1e9, latency_s_ = 0, epoch_began_s_ = -1e9, last_update_s_ = -1e9;
+  double last_sent_s_ = -1e9, latency_s_ = 0, displayed_latency_s_ = 0, epoch_began_s_ = -1e9, last_update_s_ = -1e9;
   std::map<RequestId, Update> open_;
 };
 

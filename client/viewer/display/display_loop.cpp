@@ -6,12 +6,11 @@
 #include <thread>
 
 #include "common/core/clock.h"
-#include "common/splat/frame_budget.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kPicturePeriod_s = 2.5, kBudgetShare = 0.85;
+constexpr double kPicturePeriod_s = 2.5, kRestPeriod_s = 1.0 / 30, kLookAfterSurface_s = 0.1;
 
 bool told_to_stop(const ReplicaWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
@@ -35,7 +34,7 @@ void fit(image::View& view, const geometry::Camera& camera, bool with_depth) {
   view.depth_m.resize(with_depth ? pixels : 0);
 }
 
-LiveFigures live_figures(double now_s, uint64_t frames, uint64_t points_drawn, const ModelCache& cache,
+LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
                          const ReplicaWorker& worker) {
   const auto network = worker.figures();
   return {now_s,
@@ -44,10 +43,12 @@ LiveFigures live_figures(double now_s, uint64_t frames, uint64_t points_drawn, c
           frames,
           network.updates,
           network.latency_ms,
-          points_drawn,
-          cache.figures().points_displayed,
+          drawn.drawn,
+          drawn.cached,
           network.bytes_received,
-          network.epochs_shown};
+          network.epochs_shown,
+          source.drawn_name(),
+          source.cached_name()};
 }
 
 }  // namespace
@@ -82,136 +83,202 @@ const std::vector<std::string>& frame_columns() {
                                                 "present_ms",
                                                 "detail",
                                                 "budget_ms",
-                                                "epoch"};
+                                                "epoch",
+                                                "wait_ms",
+                                                "request",
+                                                "buffers_filled"};
   return columns;
 }
 
-DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, Renderer& renderer, ModelCache& cache,
-                          ReplicaWorker& worker, metrics::TableRecorder& frames, metrics::SpanRecorder& spans,
-                          FrameSpool* spool) {
-  DisplayOptions o = options;
-  Look look{o.render, o.shading.lit};
-  const auto begin_frame = [&](double now_s, double t_s) {
-    const geometry::Camera camera = surface.begin_frame(now_s, t_s, look);
-    o.render = look.render;
-    o.shading.lit = look.lit;
-    o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(look.render.kernel);
-    o.selection.best_patch_only = worker.keeps_redundant();
-    return camera;
-  };
-  image::View view;
-  splat::DrawList list;
+geometry::Camera tile_of(const geometry::Camera& whole, const WallTile& wall) {
+  const int width = whole.width / wall.columns, height = whole.height / wall.rows;
+  return geometry::crop(whole, {wall.tile % wall.columns * width, wall.tile / wall.columns * height, width, height});
+}
 
-  // Start-up: the head rests until the first view is complete, its points are shown as they come.
-  while (!worker.first_update_complete()) {
-    if (told_to_stop(worker, surface)) return {0, true};
-    const geometry::Camera camera = begin_frame(monotonic_s(), -1);
-    worker.on_pose(monotonic_s(), camera);
-    cache.select(camera, o.selection, list);
-    fit(view, camera, spool != nullptr);
-    if (list.points > 0 || surface.visible()) {
-      const auto stats = renderer.render(list, camera, o.render, image::Shading(o.shading, camera),
-                                         {camera.width, camera.height, view.colour.data(), nullptr});
-      surface.present(view);
-      if (list.points > 0) worker.on_first_points(monotonic_s());
-      surface.report(live_figures(monotonic_s(), 0, stats.points_drawn, cache, worker));
-    }
-    cache.end_frame();
-    sleep_until(monotonic_s() + 1.0 / 30);
+namespace {
+
+class Display {
+ public:
+  Display(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ReplicaWorker& worker,
+          metrics::TableRecorder& frames, metrics::SpanRecorder& spans, FrameSpool* spool)
+      : o_(o),
+        surface_(surface),
+        gate_(gate),
+        worker_(worker),
+        frames_(frames),
+        spans_(spans),
+        spool_(spool),
+        look_{o.render, o.shading.lit} {}
+
+  DisplayResult run(const SourceMaker& make_source) {
+    if (!wait_for_scene()) return {0, true, {}};
+    auto made = make_source(worker_.kind());
+    if (!made) return {0, true, made.error().text};
+    source_ = std::move(*made);
+    if (!rest()) return {0, true, {}};
+    worker_.on_first_points(monotonic_s());
+    start_s_ = o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s();
+    while (!last_) frame();
+    return result_;
   }
-  worker.on_first_points(monotonic_s());
 
-  // What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
-  splat::FrameBudget budget(o.detail_budget && o.target_fps > 0 ? kBudgetShare * 1e3 / o.target_fps : 0,
-                            o.least_detail);
-  splat::SpeedDetail speed;
-  DisplayResult result;
-  const double start_s = monotonic_s();
-  double previous_s = 0, next_picture_s = 0;
-  bool last = false;
-  while (!last) {
-    const double begin_s = monotonic_s(), t_s = begin_s - start_s;
-    if (told_to_stop(worker, surface)) {
-      result.interrupted = true;
-      last = true;
+ private:
+  // Until it is known what there is to show.
+  bool wait_for_scene() {
+    for (; worker_.kind() == SceneKind::kUnknown; sleep_until(monotonic_s() + kRestPeriod_s)) {
+      if (told_to_stop(worker_, surface_)) return false;
+      const geometry::Camera camera = surface_.begin_frame(monotonic_s(), -1, look_);
+      if (!surface_.visible()) continue;
+      fit(view_, camera, false);
+      std::fill(view_.colour.begin(), view_.colour.end(), o_.shading.background);
+      surface_.present(view_);
+      const auto network = worker_.figures();
+      surface_.report({.now_s = monotonic_s(), .scene = network.scene, .extent_m = network.extent_m});
     }
-    last = last || (o.duration_s > 0 && t_s >= o.duration_s) || (o.frames > 0 && result.frames + 1 >= o.frames);
+    return true;
+  }
 
-    // The view of now, from what is cached now.
-    const geometry::Camera camera = begin_frame(begin_s, t_s);
-    const image::Shading shading(o.shading, camera);
-    if (o.speed_detail) speed.frame(begin_s, camera, list.distance_m > 0 ? list.distance_m : 1);
-    o.selection.detail = float(std::min(budget.detail(), speed.detail()));
-    cache.select(camera, o.selection, list);
-    const double selected_s = monotonic_s();
+  // The head rests until the first view is complete; what comes of it is shown as it comes, unless the display waits for whole updates.
+  bool rest() {
+    for (; !worker_.first_update_complete(); sleep_until(monotonic_s() + kRestPeriod_s)) {
+      if (told_to_stop(worker_, surface_)) return false;
+      const double now_s = monotonic_s();
+      const geometry::Camera camera = surface_.begin_frame(now_s, -1, look_);
+      worker_.on_pose(now_s, camera);
+      fit(view_, camera, spool_ != nullptr);
+      const DrawnFrame drawn = source_->draw({now_s, camera, look_, false, true, surface_.visible()}, view_);
+      if (drawn.empty && !surface_.visible()) continue;
+      surface_.present(view_);
+      if (!drawn.empty) worker_.on_first_points(monotonic_s());
+      surface_.report(live_figures(monotonic_s(), 0, drawn, *source_, worker_));
+    }
+    return true;
+  }
+
+  // Whether the frame that begins now is the last one.
+  void see_whether_last(double t_s) {
+    if (told_to_stop(worker_, surface_)) result_.interrupted = last_ = true;
+    last_ = last_ || (o_.duration_s > 0 && t_s >= o_.duration_s) || (o_.frames > 0 && result_.frames + 1 >= o_.frames);
+  }
+
+  // Where the display waits for updates: until the next one is there, or the end has come. Seconds that it took.
+  double wait_for_update() {
+    if (!gate_.waits()) return 0;
+    const double begin_s = monotonic_s();
+    for (;;) {
+      if (const auto request = gate_.take(kLookAfterSurface_s)) {
+        source_->advance(*request);
+        return monotonic_s() - begin_s;
+      }
+      const double now_s = monotonic_s(), t_s = now_s - start_s_;
+      if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s)) return now_s - begin_s;
+      worker_.on_pose(now_s, surface_.begin_frame(now_s, t_s, look_));
+      if (view_intact_ && surface_.visible()) surface_.present(view_);
+    }
+  }
+
+  uint32_t use_of_frame(double t_s) const {
+    if (!spool_) return 0;
     uint32_t use = 0;
-    if (spool) {
-      if (o.picture_every ? result.frames % o.picture_every == 0 : t_s >= next_picture_s || last)
-        use |= o.exr ? kPicture | kExr : kPicture;
-      if (o.verify_every && (result.frames % o.verify_every == 0 || last)) use |= kVerify;
-    }
-    const bool with_depth = use & (kVerify | kExr);
-    fit(view, camera, spool != nullptr);
-    const auto stats =
-        renderer.render(list, camera, o.render, shading,
-                        {camera.width, camera.height, view.colour.data(), with_depth ? view.depth_m.data() : nullptr});
-    cache.end_frame();
-    const double end_s = monotonic_s();
-    // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
-    const double work_ms = stats.prepare_ms + (stats.project_ms + stats.resolve_ms + stats.fill_ms + stats.smooth_ms +
-                                               stats.antialias_ms) /
-                                                  std::max(o.threads, 1);
-    budget.frame_done((selected_s - begin_s) * 1e3, std::min((end_s - selected_s) * 1e3, work_ms), double(list.points),
-                      o.selection.detail);
-    worker.on_frame(end_s, camera, list);
-    surface.present(view);
-    const double presented_s = monotonic_s();
+    if (o_.picture_every ? result_.frames % o_.picture_every == 0 : t_s >= next_picture_s_ || last_)
+      use |= o_.exr ? kPicture | kExr : kPicture;
+    if (o_.verify_every && (result_.frames % o_.verify_every == 0 || last_)) use |= kVerify;
+    return use;
+  }
 
-    const auto update = worker.last_update();
-    const auto figures = cache.figures();
+  void frame() {
+    const double wait_s = wait_for_update();
+    const double begin_s = monotonic_s(), t_s = begin_s - start_s_;
+    see_whether_last(t_s);
+    // The view of now, from what is cached now.
+    const geometry::Camera camera = surface_.begin_frame(begin_s, t_s, look_);
+    const uint32_t use = use_of_frame(t_s);
+    const bool with_depth = use & (kVerify | kExr);
+    fit(view_, camera, spool_ != nullptr);
+    const DrawnFrame drawn = source_->draw({begin_s, camera, look_, with_depth}, view_);
+    const double end_s = monotonic_s();
+    worker_.on_frame(end_s, camera, drawn.epoch, gate_.waits() ? &drawn.update : nullptr);
+    surface_.present(view_);
+    const double presented_s = monotonic_s();
+    const int filled = gate_.filled();
+    source_->displayed();
+    gate_.displayed();
+    add_row(begin_s, end_s, presented_s, camera, drawn, wait_s, filled);
+    view_intact_ = use == 0;
+    if (use) {
+      if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
+      view_ = spool_->exchange({result_.frames, t_s, use, camera, std::move(view_), drawn.epoch});
+    }
+    ++result_.frames;
+    surface_.report(live_figures(presented_s, result_.frames, drawn, *source_, worker_));
+    if (o_.target_fps > 0) sleep_until(begin_s + 1.0 / o_.target_fps);
+  }
+
+  void add_row(double begin_s, double end_s, double presented_s, const geometry::Camera& camera, const DrawnFrame& d,
+               double wait_s, int filled) {
     const auto& p = camera.pose.position_room;
     const auto& q = camera.pose.orientation;
-    frames.add({double(result.frames),
-                t_s,
-                previous_s > 0 ? (end_s - previous_s) * 1e3 : 0.0,
-                (end_s - begin_s) * 1e3,
-                (selected_s - begin_s) * 1e3,
-                (end_s - selected_s) * 1e3,
-                stats.project_ms,
-                stats.resolve_ms,
-                stats.fill_ms,
-                stats.smooth_ms,
-                stats.antialias_ms,
-                double(list.points),
-                double(stats.points_drawn),
-                double(list.items.size()),
-                double(figures.points_displayed),
-                double(list.applied.value),
-                (worker.to_master_s(end_s) - update.requested_s) * 1e3,
-                glm::distance(p, update.pose.position_room),
-                angle_deg(q, update.pose.orientation),
-                p.x,
-                p.y,
-                p.z,
-                q.w,
-                q.x,
-                q.y,
-                q.z,
-                (presented_s - end_s) * 1e3,
-                o.selection.detail,
-                budget.budget_ms(),
-                double(list.epoch.value)});
-    spans.add("display frame", worker.to_master_s(begin_s), worker.to_master_s(end_s), 0);
-    previous_s = end_s;
-    if (use) {
-      if (use & kPicture) next_picture_s = t_s + kPicturePeriod_s;
-      view = spool->exchange({result.frames, t_s, use, camera, std::move(view), list.epoch});
-    }
-    ++result.frames;
-    surface.report(live_figures(presented_s, result.frames, stats.points_drawn, cache, worker));
-    if (o.target_fps > 0) sleep_until(begin_s + 1.0 / o.target_fps);
+    frames_.add({double(result_.frames),
+                 begin_s - start_s_,
+                 previous_s_ > 0 ? (end_s - previous_s_) * 1e3 : 0.0,
+                 (end_s - begin_s) * 1e3,
+                 (d.chosen_s - begin_s) * 1e3,
+                 (end_s - d.chosen_s) * 1e3,
+                 d.project_cpu_ms,
+                 d.resolve_cpu_ms,
+                 d.fill_cpu_ms,
+                 d.smooth_cpu_ms,
+                 d.antialias_cpu_ms,
+                 double(d.selected),
+                 double(d.drawn),
+                 double(d.items),
+                 double(d.cached),
+                 double(d.sequence),
+                 (worker_.to_master_s(end_s) - d.update.requested_s) * 1e3,
+                 glm::distance(p, d.update.pose.position_room),
+                 angle_deg(q, d.update.pose.orientation),
+                 p.x,
+                 p.y,
+                 p.z,
+                 q.w,
+                 q.x,
+                 q.y,
+                 q.z,
+                 (presented_s - end_s) * 1e3,
+                 d.detail,
+                 d.budget_ms,
+                 double(d.epoch.value),
+                 wait_s * 1e3,
+                 double(d.update.request.value),
+                 double(filled)});
+    if (wait_s > 0)
+      spans_.add("wait for update", worker_.to_master_s(begin_s - wait_s), worker_.to_master_s(begin_s), 0);
+    spans_.add("display frame", worker_.to_master_s(begin_s), worker_.to_master_s(end_s), 0);
+    previous_s_ = end_s;
   }
-  return result;
+
+  const DisplayOptions& o_;
+  DisplaySurface& surface_;
+  CouplingGate& gate_;
+  ReplicaWorker& worker_;
+  metrics::TableRecorder& frames_;
+  metrics::SpanRecorder& spans_;
+  FrameSpool* spool_;
+  Look look_;
+  std::unique_ptr<ViewSource> source_;
+  image::View view_;
+  bool view_intact_ = false;  // it holds what is on display
+  DisplayResult result_;
+  double start_s_ = 0, previous_s_ = 0, next_picture_s_ = 0;
+  bool last_ = false;
+};
+
+}  // namespace
+
+DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
+                          CouplingGate& gate, ReplicaWorker& worker, metrics::TableRecorder& frames,
+                          metrics::SpanRecorder& spans, FrameSpool* spool) {
+  return Display(options, surface, gate, worker, frames, spans, spool).run(make_source);
 }
 
 }  // namespace telesplat::viewer

@@ -23,7 +23,9 @@ struct LiveFigures {
   uint64_t frames = 0, updates = 0;  ///< displayed; completely received
   double latency_ms = 0;             ///< of the newest view update, request to complete; 0 before the first
   uint64_t points_drawn = 0, points_cached = 0, bytes_received = 0;
-  uint64_t epochs_shown = 0;  ///< times a changed scene took the place of the one on display
+  uint64_t epochs_shown = 0;          ///< times a changed scene took the place of the one on display
+  const char* drawn_name = "points";  ///< what points_drawn counts
+  const char* cached_name = "";       ///< and points_cached, with a space before it
 };
 
 /// Called by the display loop, in its thread, in this order for every frame.

@@ -17,7 +17,9 @@ class HeadlessSurface final : public DisplaySurface {
     const auto& o = options_;
     const double now_s = std::max(0.0, t_s);
     const double moving_s = o.duration_s > 0 ? std::min(now_s, o.duration_s - o.hold_s) : now_s;
-    return geometry::make_camera(trajectory_.at(moving_s), o.fov_deg, o.width, o.height, o.near_m);
+    return tile_of(geometry::make_camera(trajectory_.at(moving_s), o.fov_deg, o.width * o.wall.columns,
+                                         o.height * o.wall.rows, o.near_m),
+                   o.wall);
   }
   bool visible() const override { return false; }
   void present(const image::View&) override {}

@@ -21,9 +21,9 @@ std::optional<std::string> TitleLine::update(const LiveFigures& f) {
     text = name;
   else
     text = fmt::format(
-        "{} - {:.1f} fps, {:.1f} updates/s, {:.0f} ms latency, {:.2f} M points drawn, {:.2f} M cached, {:.2f} MB/s",
-        name, double(f.frames - last_->frames) / dt_s, double(f.updates - last_->updates) / dt_s, f.latency_ms,
-        double(f.points_drawn) / 1e6, double(f.points_cached) / 1e6,
+        "{} - {:.1f} fps, {:.1f} updates/s, {:.0f} ms latency, {:.2f} M {} drawn, {:.2f} M{} cached, {:.2f} MB/s", name,
+        double(f.frames - last_->frames) / dt_s, double(f.updates - last_->updates) / dt_s, f.latency_ms,
+        double(f.points_drawn) / 1e6, f.drawn_name, double(f.points_cached) / 1e6, f.cached_name,
         double(f.bytes_received - last_->bytes_received) / 1e6 / dt_s);
   if (f.frames > 0 && !news && f.epochs_shown > last_->epochs_shown)
     text += fmt::format(", {:.1f} epochs/s", double(f.epochs_shown - last_->epochs_shown) / dt_s);

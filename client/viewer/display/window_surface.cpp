@@ -44,7 +44,9 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   const auto& o = options_;
   const bool playback = t_s >= 0 && (o.duration_s <= 0 || t_s < o.duration_s - o.hold_s);
   const geometry::Camera camera =
-      window_camera(interaction_.advance(now_s, playback), o.fov_deg, window_->width(), window_->height(), o.near_m);
+      tile_of(window_camera(interaction_.advance(now_s, playback), o.fov_deg, window_->width() * o.wall.columns,
+                            window_->height() * o.wall.rows, o.near_m),
+              o.wall);
   interaction_.set_height_tangent(camera.top - camera.bottom);
   look = interaction_.look();
   for (const auto& note : interaction_.take_notes()) tell_(note);

@@ -1,0 +1,77 @@
+#include "client/viewer/coupling/coupling.h"
+
+#include <algorithm>
+
+#include "common/core/check.h"
+
+namespace telesplat::viewer {
+
+std::optional<CouplingMode> coupling_named(std::string_view name) {
+  for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync, CouplingMode::kLoose})
+    if (name == coupling_name(mode)) return mode;
+  return std::nullopt;
+}
+
+const char* coupling_name(CouplingMode mode) {
+  return mode == CouplingMode::kAsync ? "async" : mode == CouplingMode::kSync ? "sync" : "loose";
+}
+
+int buffers_of(CouplingMode mode, int loose) {
+  return mode == CouplingMode::kAsync ? 0 : mode == CouplingMode::kSync ? 1 : loose;
+}
+
+void Coupling::asked(RequestId request, double now_s) {
+  if (!waits()) return;
+  CHECK(open_.empty() || open_.back().request < request);
+  if (open_.empty()) heard_s_ = now_s;
+  open_.push_back({request});
+}
+
+bool Coupling::is_open(RequestId request) const {
+  return std::any_of(open_.begin(), open_.end(), [&](const Open& o) { return o.request == request && !o.complete; });
+}
+
+void Coupling::skip_before(RequestId request) {
+  if (is_open(request)) std::erase_if(open_, [&](const Open& o) { return o.request < request && !o.complete; });
+}
+
+std::vector<RequestId> Coupling::release() {
+  std::vector<RequestId> out;
+  for (; !open_.empty() && open_.front().complete; open_.pop_front()) out.push_back(open_.front().request);
+  ready_.insert(ready_.end(), out.begin(), out.end());
+  return out;
+}
+
+std::vector<RequestId> Coupling::completed(RequestId request, double now_s) {
+  heard_s_ = now_s;
+  for (Open& o : open_) o.complete |= o.request == request;
+  return release();
+}
+
+std::vector<RequestId> Coupling::overdue(double now_s, std::vector<RequestId>& released) {
+  if (open_.empty() || now_s < heard_s_ + kPatience_s) return {};
+  heard_s_ = now_s;
+  const auto complete = std::find_if(open_.begin(), open_.end(), [](const Open& o) { return o.complete; });
+  if (complete == open_.end()) return open();
+  open_.erase(open_.begin(), complete);
+  released = release();
+  return {};
+}
+
+std::vector<RequestId> Coupling::open() const {
+  std::vector<RequestId> out;
+  for (const Open& o : open_)
+    if (!o.complete) out.push_back(o.request);
+  return out;
+}
+
+std::optional<RequestId> Coupling::take() {
+  CHECK(!displaying_);
+  if (ready_.empty()) return std::nullopt;
+  const RequestId out = ready_.front();
+  ready_.pop_front();
+  displaying_ = true;
+  return out;
+}
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,46 @@
+// What the display draws: points of the model, or frames of a volume. The display loop does not know which.
+#pragma once
+
+#include <memory>
+
+#include "client/viewer/cache/shown_update.h"
+#include "client/viewer/display/display_surface.h"
+
+namespace telesplat::viewer {
+
+struct FrameInput {
+  double begin_s = 0;  ///< monotonic clock
+  geometry::Camera camera;
+  Look look;
+  bool with_depth = false;  ///< view.depth_m has room for it and is to be filled
+  bool resting = false;  ///< before the first view update is complete: nothing is measured for the sake of later frames
+  bool even_empty = true;  ///< draw the background too if there is nothing else; else leave the view as it is
+};
+
+/// The columns of frames.csv that depend on what is drawn (docs/metrics.md).
+struct DrawnFrame {
+  bool empty = true;    ///< there was nothing of the scene to draw
+  double chosen_s = 0;  ///< monotonic clock: what to draw was chosen
+  double project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0, antialias_cpu_ms = 0;
+  uint64_t selected = 0, drawn = 0, items = 0, cached = 0, sequence = 0;
+  double detail = 1, budget_ms = 0;
+  EpochId epoch;
+  ShownUpdate update;  ///< the newest view update that it shows
+};
+
+/// Used by one thread, the display's.
+class ViewSource {
+ public:
+  virtual ~ViewSource() = default;
+  /// Where the display waits: from now on frames show this update, which is complete.
+  virtual void advance(RequestId request) = 0;
+  /// Draws the view of input.camera, into `view`, which has its size.
+  virtual DrawnFrame draw(const FrameInput& input, image::View& view) = 0;
+  /// The frame has been displayed.
+  virtual void displayed() {}
+  /// What is drawn and cached, for people: "points".
+  virtual const char* drawn_name() const = 0;
+  virtual const char* cached_name() const = 0;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,69 @@
+// The worker's part for volumes: takes complete frames of slice images, checks and decodes them, puts them into the cache, acknowledges them.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "client/viewer/cache/slice_cache.h"
+#include "client/viewer/coupling/view_requester.h"
+#include "common/core/log.h"
+#include "common/metrics/recorder.h"
+#include "common/net/socket.h"
+
+namespace telesplat::viewer {
+
+class SliceReceiver {
+ public:
+  /// Pixels of all images of a frame, at most (1 GiB): a few bytes can claim many of them.
+  static constexpr uint64_t kMaxPixels = 1u << 28;
+  /// Frames on their way to an asynchronous viewer: while one is decoded the next one travels.
+  static constexpr uint64_t kAsyncBuffers = 2;
+
+  struct Options {
+    InstanceId viewer;
+    uint64_t buffers = 0;  ///< of the coupling; 0: asynchronous
+  };
+  struct Links {
+    std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester
+    std::function<bool(RequestId)> expected;                      ///< whether it is open; asked where the display waits
+    std::function<void(const ViewPart&)> on_part;                 ///< a frame is in the cache
+    std::function<void()> on_epoch;  ///< its epoch is another than that of the frame before
+    std::function<double(double)> to_master_s;
+  };
+  SliceReceiver(const Options& options, Links links, SliceCache& cache, metrics::SpanRecorder& spans);
+
+  /// What the master knows of the volume. Without a valid grid no frame is taken.
+  Status set_session(const wire::Welcome& session);
+  /// The packer does not know this viewer (any more).
+  void introduce() { introduced_s_ = -1e9, known_ = false; }
+  void receive(net::Socket& state, int most);
+  /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come.
+  void tick(double now_s, net::Socket& state);
+
+  /// Checks and decodes. Bytes come from outside. Error: what is wrong with it, for the log.
+  static Result<BufferedFrame> decode(const wire::SliceFrame& frame, const volume::Grid& grid);
+
+  struct Figures {
+    uint64_t pixels_received = 0, decode_errors = 0;
+  };
+  Figures figures() const { return {pixels_received_, decode_errors_}; }
+
+ private:
+  void on(const wire::SliceFrame& frame, net::Socket& state);
+  void acknowledge(FrameId frame, net::Socket& state);
+
+  Options options_;
+  Links links_;
+  SliceCache& cache_;
+  metrics::SpanRecorder& spans_;
+  std::optional<volume::Grid> grid_;
+  InstanceId packer_;
+  FrameId newest_;
+  EpochId epoch_;
+  bool known_ = false;  // to the packer
+  double introduced_s_ = -1e9;
+  uint64_t pixels_received_ = 0, decode_errors_ = 0;
+  log::RateLimiter log_limit_;
+};
+
+}  // namespace telesplat::viewer
