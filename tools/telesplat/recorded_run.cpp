@@ -77,6 +77,7 @@ Result<std::string> read_session(const std::string& path, RecordedRun& run) {
     if (!julia) return julia.error();
     run.julia = std::move(*julia);
   }
+  run.volume = table["scene"]["kind"].value_or(std::string()) == "volume";
   run.scene = table["scene"]["file"].value_or(std::string());
   run.mesh.room_size_m = number(table["scene"]["room_size"], run.mesh.room_size_m);
   run.mesh.up = table["scene"]["up"].value_or(run.mesh.up);
