@@ -51,6 +51,12 @@ std::vector<std::string> data_arguments(const RunOptions& o, int part) {
     const auto flags = julia::to_flags(o.julia);
     a.insert(a.end(), flags.begin(), flags.end());
   }
+  if (o.kind == SceneKind::kMesh) {
+    if (o.mesh.iso) a.push_back(fmt::format("--iso={}", *o.mesh.iso));
+    if (!o.mesh.raw.empty()) a.push_back("--raw=" + o.mesh.raw);
+    if (o.mesh.elevation.z_scale != 0) a.push_back(fmt::format("--z-scale={}", o.mesh.elevation.z_scale));
+    if (!o.mesh.elevation.texture.empty()) a.push_back("--texture=" + o.mesh.elevation.texture);
+  }
   if (o.kind == SceneKind::kVolume) {
     for (const auto& [flag, value] :
          {std::pair{"--raw", o.volume.raw}, {"--tf", o.volume.transfer}, {"--series-rate", o.series_rate}})

@@ -124,6 +124,13 @@ void complete_session(const RunOptions& o) {
       if (!o.volume.raw.empty()) out << "raw = " << quoted(o.volume.raw) << "\n";
       if (!o.volume.transfer.empty()) out << "tf = " << quoted(o.volume.transfer) << "\n";
     }
+    if (o.kind == SceneKind::kMesh) {
+      if (o.mesh.iso) out << fmt::format("iso = {}\n", *o.mesh.iso);
+      if (!o.mesh.raw.empty()) out << "raw = " << quoted(o.mesh.raw) << "\n";
+      if (o.mesh.elevation.z_scale != 0) out << fmt::format("z_scale = {}\n", o.mesh.elevation.z_scale);
+      if (const auto& texture = o.mesh.elevation.texture; !texture.empty())
+        out << "texture = " << quoted(fs::absolute(texture, error).string()) << "\n";
+    }
     if (!o.mesh.use_cache) out << "no_cache = true\n";
     if (!o.mesh.cache_dir.empty()) out << "cache = " << quoted(fs::absolute(o.mesh.cache_dir, error).string()) << "\n";
   }

@@ -73,18 +73,18 @@ void print_report(const std::string& directory) {
   };
   const std::string subject = subject_of(directory, s);
   const bool volume = s["kind"] == "volume";
-  std::string head = fmt::format("{}, display {}x{}, sampling {}x{}, {}, {} renderer", subject, s["size"][0].get<int>(),
-                                 s["size"][1].get<int>(), s["sampling_size"][0].get<int>(),
-                                 s["sampling_size"][1].get<int>(), plural(s["samplers"].get<int>(), "sampler"),
-                                 s["renderer"].get<std::string>());
+  std::string head =
+      fmt::format("{}, display {}x{}, sampling {}x{}, {}, {} renderer", subject, s["size"][0].get<int>(),
+                  s["size"][1].get<int>(), s["sampling_size"][0].get<int>(), s["sampling_size"][1].get<int>(),
+                  plural(s["samplers"].get<int>(), "sampler"), s["renderer"].get<std::string>());
   if (!volume) head += ", " + s["splat"].get<std::string>() + " splats";
   if (const int viewers = s["viewers"].get<int>(); viewers > 1)
     head += fmt::format(", {} (figures of all)", plural(viewers, "viewer"));
   std::printf("\n%s\n", head.c_str());
   const std::string coupling = s["coupling"].get<std::string>();
-  line("display", fmt::format("{:.1f} fps over {} frames, {} coupling{}", s["fps"].get<double>(),
-                              s["frames"].get<uint64_t>(), coupling,
-                              coupling == "loose" ? fmt::format(" of {} buffers", s["buffers"].get<int>()) : ""));
+  line("display",
+       fmt::format("{:.1f} fps over {} frames, {} coupling{}", s["fps"].get<double>(), s["frames"].get<uint64_t>(),
+                   coupling, coupling == "loose" ? fmt::format(" of {} buffers", s["buffers"].get<int>()) : ""));
   line("inter-frame delay", dist("inter_frame_delay_ms", "ms"));
   line("view construction", dist("view_construction_ms", "ms"));
   line("view updates",

@@ -20,6 +20,7 @@ constexpr double kJuliaLeastSampling = 0.4, kJuliaMaxPoints = 8e6;
 constexpr double kWallHold_s = 2;
 
 constexpr std::initializer_list<const char*> kOfVolumes{"--tf", "--lighting", "--series-rate", "--data-servers"};
+constexpr std::initializer_list<const char*> kOfRasters{"--z-scale", "--texture"};
 constexpr std::initializer_list<const char*> kOfPoints{
     "--sampler",        "--splat",        "--splat-scale",        "--finish",
     "--detail-budget",  "--least-detail", "--speed-detail",       "--record-depth",
@@ -39,7 +40,9 @@ Result<SceneKind> kind_of(const RunOptions& o) {
   if (o.scene.empty()) return SceneKind::kNone;
   std::error_code error;
   if (!fs::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
-  if (!o.volume.raw.empty() || data::looks_like_volume(o.scene)) return SceneKind::kVolume;
+  if (!o.volume.raw.empty() || data::looks_like_volume(o.scene))
+    return o.mesh.iso ? SceneKind::kMesh : SceneKind::kVolume;
+  if (o.mesh.iso) return Error{fmt::format("--iso: {} is no volume", o.scene)};
   if (fs::is_directory(o.scene, error))
     return Error{fmt::format(
         "{}: is a folder, and not one of DICOM slices or of a numbered series of volume files; a data file is needed, "
