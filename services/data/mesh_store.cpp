@@ -6,13 +6,16 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "common/core/log.h"
+#include "services/data/isosurface.h"
 #include "services/data/mesh_reader.h"
 #include "services/data/placement.h"
 #include "services/data/store_file.h"
@@ -64,23 +67,76 @@ fs::path default_cache_dir() {
   return fs::temp_directory_path() / fmt::format("telesplat-{}", getuid());
 }
 
-// The content of the file and of those it pulls in.
-uint64_t hash_content(const MappedFile& file, const std::vector<std::string>& companions, const Progress& progress) {
+// Text as hexadecimal digits of its hash: for file names.
+std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
+
+// What a store is made from.
+struct Source {
+  uint64_t hash = 0;    // of all files' content
+  std::string variant;  // what else decides what the mesh is, for the store's name
+  std::function<Result<Mesh>(const ReadProgress&)> read;
+};
+
+// Of these files' content; those that cannot be read are left out: reading says why.
+uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progress) {
   constexpr size_t kStep = 64 << 20;
   XXH3_state_t* state = XXH3_createState();
   XXH3_64bits_reset(state);
-  const auto bytes = file.bytes();
-  for (size_t at = 0; at < bytes.size(); at += kStep) {
-    progress("hash", static_cast<double>(at) / static_cast<double>(bytes.size()));
-    XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
+  for (size_t n = 0; n < paths.size(); ++n) {
+    const auto file = MappedFile::open(paths[n]);
+    if (!file) continue;
+    const auto bytes = (*file)->bytes();
+    for (size_t at = 0; at < bytes.size(); at += kStep) {
+      const double of_file = static_cast<double>(at) / static_cast<double>(bytes.size());
+      progress("hash", (static_cast<double>(n) + of_file) / static_cast<double>(paths.size()));
+      XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
+    }
   }
-  for (const std::string& companion : companions)
-    if (const auto other = MappedFile::open(companion))
-      XXH3_64bits_update(state, (*other)->bytes().data(), (*other)->bytes().size());
   const uint64_t hash = XXH3_64bits_digest(state);
   XXH3_freeState(state);
   progress("hash", 1.0);
   return hash;
+}
+
+Result<Source> mesh_source(const std::string& path, const MeshOptions& options, const Progress& progress) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  const DetectedFormat detected = detect_format((*file)->text(), path);
+  if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
+  std::vector<std::string> files{path};
+  for (auto& companion : companion_files((*file)->text(), detected.format, path)) files.push_back(std::move(companion));
+  const ElevationOptions& elevation = options.elevation;
+  const bool raster = detected.format == "raster";
+  if (!raster && (elevation.z_scale != 0 || !elevation.texture.empty()))
+    return Error{fmt::format("{}: is no elevation raster, but --z-scale or --texture is given", path)};
+  if (!elevation.texture.empty()) {
+    const auto texture = MappedFile::open(elevation.texture);
+    if (!texture) return texture.error();
+    files.push_back(elevation.texture);
+  }
+  return Source{hash_files(files, progress), raster ? fmt::format("-z{}", elevation.z_scale) : "",
+                [=](const ReadProgress& p) { return read_mesh(path, p, elevation); }};
+}
+
+Result<Source> surface_source(const std::string& path, const MeshOptions& options, const Progress& progress) {
+  auto found = find_volume(path, options.raw);
+  if (!found) return found.error();
+  std::vector<std::string> files{found->steps.front()};
+  std::error_code error;
+  if (fs::is_directory(files.front(), error)) {  // a folder of slices
+    const std::string folder = std::exchange(files, {}).front();
+    for (const auto& entry : fs::directory_iterator(folder, error))
+      if (entry.is_regular_file(error)) files.push_back(entry.path().string());
+    std::sort(files.begin(), files.end());
+  }
+  const double iso = *options.iso;
+  return Source{hash_files(files, progress),
+                fmt::format("-iso{}{}", iso, options.raw.empty() ? "" : "-" + hex(options.raw)),
+                [source = std::move(*found), iso](const ReadProgress& p) -> Result<Mesh> {
+                  const auto volume = read_volume(source, 0, p);
+                  if (!volume) return volume.error();
+                  return isosurface(*volume, iso, source.name);
+                }};
 }
 
 Status validate_options(const MeshOptions& options) {
@@ -92,10 +148,9 @@ Status validate_options(const MeshOptions& options) {
 }
 
 // Reads the mesh file and writes its store into the descriptor.
-Status build_store(int descriptor, const std::string& path, const MeshOptions& options, uint64_t content_hash,
+Status build_store(int descriptor, const std::string& path, const MeshOptions& options, const Source& source,
                    const Progress& progress) {
-  auto mesh = read_mesh(
-      path, [&](double fraction) { progress("read", fraction); }, options.elevation);
+  auto mesh = source.read([&](double fraction) { progress("read", fraction); });
   if (!mesh) return mesh.error();
   progress("read", 1.0);
   MeshStoreInfo info;
@@ -103,7 +158,7 @@ Status build_store(int descriptor, const std::string& path, const MeshOptions& o
   info.vertices = mesh->positions.size();
   info.had_normals = !mesh->normals.empty();
   info.had_colours = !mesh->colours.empty();
-  info.content_hash = content_hash;
+  info.content_hash = source.hash;
   progress("normals", 0.0);
   const auto placed = place_mesh(std::move(*mesh), options.room_size_m, options.up, path);
   if (!placed) return placed.error();
@@ -117,15 +172,15 @@ Status build_store(int descriptor, const std::string& path, const MeshOptions& o
 }
 
 // Without a cache: a file that has no name and goes away with its last mapping.
-Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const MeshOptions& options, uint64_t hash,
-                                                const Progress& progress) {
+Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const MeshOptions& options,
+                                                const Source& source, const Progress& progress) {
   std::error_code ignored;
   std::string name = (fs::temp_directory_path(ignored) / "telesplat-XXXXXX").string();
   const Descriptor file(mkostemp(name.data(), O_CLOEXEC));
   if (!file.valid())
     return Error{fmt::format("{}: no temporary file {} for its chunks: {}", path, name, std::strerror(errno))};
   unlink(name.c_str());
-  if (auto status = build_store(file.get(), path, options, hash, progress); !status) return status.error();
+  if (auto status = build_store(file.get(), path, options, source, progress); !status) return status.error();
   auto content = read_store(file.get(), name);
   if (!content) return content.error();
   return make_store(std::move(*content), path, false);
@@ -143,26 +198,14 @@ Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, cons
                                                    const Progress& user_progress) {
   const Progress progress = user_progress ? user_progress : [](const char*, double) {};
   if (auto status = validate_options(options); !status) return status.error();
-  const auto file = MappedFile::open(path);
-  if (!file) return file.error();
-  const DetectedFormat detected = detect_format((*file)->text(), path);
-  if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
-  const bool raster = detected.format == "raster";
-  if (!raster && (options.elevation.z_scale != 0 || !options.elevation.texture.empty()))
-    return Error{fmt::format("{}: is no elevation raster, but --z-scale or --texture is given", path)};
-  auto companions = companion_files((*file)->text(), detected.format, path);
-  if (raster && !options.elevation.texture.empty()) {
-    const auto texture = MappedFile::open(options.elevation.texture);
-    if (!texture) return texture.error();
-    companions.push_back(options.elevation.texture);
-  }
-  const uint64_t hash = hash_content(**file, companions, progress);
-  if (!options.use_cache) return open_unnamed(path, options, hash, progress);
+  const auto source = options.iso ? surface_source(path, options, progress) : mesh_source(path, options, progress);
+  if (!source) return source.error();
+  if (!options.use_cache) return open_unnamed(path, options, *source, progress);
 
   const fs::path folder = options.cache_dir.empty() ? default_cache_dir() : fs::path(options.cache_dir);
-  const std::string variant = raster ? fmt::format("-z{}", options.elevation.z_scale) : "";
   const std::string stem =
-      (folder / fmt::format("{:016x}-{}-{}{}", hash, options.up, options.room_size_m, variant)).string();
+      (folder / fmt::format("{:016x}-{}-{}{}", source->hash, options.up, options.room_size_m, source->variant))
+          .string();
   const std::string name = stem + ".mesh", part = stem + ".part";
   if (auto content = open_existing(name)) return make_store(std::move(*content), path, true);
 
@@ -172,7 +215,7 @@ Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, cons
   const Descriptor lock(::open((stem + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
   if (!lock.valid() || flock(lock.get(), LOCK_EX) != 0) {
     log::warn("cache folder {} cannot be written ({}); going on without", folder.string(), std::strerror(errno));
-    return open_unnamed(path, options, hash, progress);
+    return open_unnamed(path, options, *source, progress);
   }
   auto content = open_existing(name);
   if (content) return make_store(std::move(*content), path, true);
@@ -184,9 +227,9 @@ Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, cons
     const Descriptor out(::open(part.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
     if (!out.valid()) {
       log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
-      return open_unnamed(path, options, hash, progress);
+      return open_unnamed(path, options, *source, progress);
     }
-    const Status built = build_store(out.get(), path, options, hash, progress);
+    const Status built = build_store(out.get(), path, options, *source, progress);
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
       const std::string reason =
           built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct MeshOptions {
   std::string cache_dir;  ///< empty: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat
   bool use_cache = true;
   ElevationOptions elevation;  ///< of elevation rasters alone
+  std::optional<double> iso;   ///< of volumes alone: the surface where they have this value
+  std::string raw;             ///< with iso: VolumeSource::raw
 };
 
 struct MeshStoreInfo {

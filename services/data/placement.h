@@ -26,11 +26,11 @@ struct PlacedMesh {
 Result<glm::dmat3> rotation_for_up(const std::string& up);
 
 /// Which data axis points up, "y" or "z":
-///   z for terrains: the box is less than 0.35 times as high in z as it is wide in x and y, and the surface is an open height field in z
+///   z for terrains: elevation rasters; or the box is less than 0.35 times as high in z as it is wide in x and y, and the surface is an open height field in z
 ///     (its area vector, the sum of all triangle normals times areas, is at least 0.4 times the total area and within 30
 ///     degrees of z; over a closed surface that sum is zero);
 ///   z for medical data: isosurfaces (most vertices have two coordinates, and only two, in common with many others, because marching cubes
-///     puts them on the edges of a voxel grid), and VTK's own formats;
+///     puts them on the edges of a voxel grid), VTK's own formats, and surfaces of volumes;
 ///   y otherwise.
 /// A guess: `up` overrides it. Precondition: validate_mesh passed.
 std::string guess_up(const Mesh& mesh);

@@ -58,7 +58,7 @@ bool is_isosurface(const Mesh& mesh) {
 }  // namespace
 
 std::string guess_up(const Mesh& mesh) {
-  if (mesh.format == "raster") return "z";
+  if (mesh.format == "raster" || mesh.format == "isosurface") return "z";
   geometry::DBox box;
   for (uint32_t i : mesh.indices) box.extend(mesh.positions[i]);
   const bool scientific = mesh.format == "vtp" || mesh.format == "vtk";

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -72,6 +73,27 @@ void write_terrain(const std::string& path, int cells) {
       for (const auto& [p, q, r] : {std::tuple{a, a + 1, a + side + 1}, {a, a + side + 1, a + side}})
         put(out, uint8_t(3)), put(out, p), put(out, q), put(out, r);
     }
+  std::ofstream(path, std::ios::binary) << out;
+}
+
+void write_volume(const std::string& path, int side, double turn) {
+  std::string out = fmt::format(
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nDimSize = {0} {0} "
+      "{0}\nElementSpacing = 1 1 1\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n",
+      side);
+  const double angle = 2 * 3.14159265358979 * turn;
+  const auto ball = [](double x, double y, double z, double radius) {
+    return std::clamp((radius - std::sqrt(x * x + y * y + z * z)) / 0.25 + 0.5, 0.0, 1.0);
+  };
+  for (int k = 0; k < side; ++k)
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i) {
+        const double x = 2.0 * i / (side - 1) - 1, y = 2.0 * j / (side - 1) - 1, z = 2.0 * k / (side - 1) - 1;
+        const double large = 200 * ball(x, y, z, 0.45),
+                     small = 140 * ball(x - 0.5 * std::cos(angle), y - 0.5 * std::sin(angle), z - 0.4, 0.3),
+                     rod = 255 * std::clamp((0.12 - std::hypot(x, y)) / 0.08 + 0.5, 0.0, 1.0) * (std::abs(z) < 0.85);
+        out += char(uint8_t(std::lround(std::max({large, small, rod}))));
+      }
   std::ofstream(path, std::ios::binary) << out;
 }
 

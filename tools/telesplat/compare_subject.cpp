@@ -43,6 +43,11 @@ Result<CompareSubject> find_scene(const CompareOptions& o) {
 Result<CompareSubject> find_run(const CompareOptions& o) {
   CompareSubject s;
   std::error_code error;
+  const auto run = read_recorded_run(o.path);
+  if (!run) return run.error();
+  if (run->volume)
+    return Error{fmt::format(
+        "{}: shows a volume, which is not drawn from points; telesplat run --verify compares its frames", o.path)};
   if (!o.still) {
     s.events = o.path + "/points.events";
     if (!fs::is_regular_file(s.events, error))
@@ -51,8 +56,6 @@ Result<CompareSubject> find_run(const CompareOptions& o) {
                       "it is given --record-points 0 (--still samples the poses anew)",
                       s.events)};
   }
-  const auto run = read_recorded_run(o.path);
-  if (!run) return run.error();
   s.scene = o.scene.empty() ? run->scene : o.scene;
   s.mesh = run->mesh;
   if (!o.mesh.cache_dir.empty()) s.mesh.cache_dir = o.mesh.cache_dir;

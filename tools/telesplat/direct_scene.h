@@ -14,6 +14,7 @@
 #include "common/image/shading.h"
 #include "services/data/mesh_store.h"
 #include "tools/telesplat/recorded_julia.h"
+#include "tools/telesplat/recorded_volume.h"
 
 namespace telesplat::launcher {
 
@@ -37,6 +38,10 @@ class DirectScene {
 Result<std::unique_ptr<DirectScene>> open_direct_mesh(const std::string& path, const data::MeshOptions& options,
                                                       int threads,
                                                       const std::function<void(const char*, double)>& progress);
+
+/// Opens the volume of a run; each epoch's voxels go through the ray caster (services/sampler/volume_raycaster.h). sample() is an error.
+Result<std::unique_ptr<DirectScene>> open_direct_volume(RecordedVolume recorded, int threads,
+                                                        const std::function<void(const char*, double)>& progress);
 
 std::unique_ptr<DirectScene> open_direct_julia(RecordedJulia julia, int threads);
 

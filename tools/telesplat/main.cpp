@@ -4,7 +4,7 @@
 
 #include "tools/telesplat/bench_scaling.h"
 #include "tools/telesplat/compare_command.h"
-#include "tools/telesplat/control_client.h"
+#include "tools/telesplat/control_command.h"
 #include "tools/telesplat/inspect_command.h"
 #include "tools/telesplat/presets_command.h"
 #include "tools/telesplat/run_command.h"
@@ -13,50 +13,6 @@
 namespace {
 
 using namespace telesplat;
-
-// "NAME=VALUE" of `set`, the timeline of `animate`.
-Result<std::map<std::string, std::string>> control_arguments(const std::string& command,
-                                                             const std::vector<std::string>& given) {
-  std::map<std::string, std::string> out;
-  if (command == "set") {
-    if (given.empty()) return Error{"ctl set: needs NAME=VALUE, such as c.y=0.3"};
-    for (const auto& a : given) {
-      const size_t equals = a.find('=');
-      if (equals == std::string::npos || equals == 0)
-        return Error{fmt::format("ctl set: \"{}\" is not NAME=VALUE, such as c.y=0.3", a.substr(0, 80))};
-      const std::string name = a.substr(0, equals);
-      const auto value = julia::read_value(name, a.substr(equals + 1));
-      if (!value) return Error{"ctl set: " + value.error().text};
-      out[name] = fmt::format("{}", *value);
-    }
-  } else if (command == "animate") {
-    if (given.size() != 1) return Error{"ctl animate: needs one timeline, such as c.y=-0.4:0.4:10s, or off"};
-    if (given.front() != "off")
-      if (const auto timeline = julia::parse_timeline(given.front()); !timeline) return timeline.error();
-    out["timeline"] = given.front();
-  } else if (!given.empty()) {
-    return Error{fmt::format("ctl {}: takes nothing more, not \"{}\"", command, given.front().substr(0, 80))};
-  }
-  return out;
-}
-
-int control(const std::string& master, const std::string& command, const std::vector<std::string>& given) {
-  log::initialise("ctl", "warn");
-  const auto arguments = control_arguments(command, given);
-  if (!arguments) {
-    std::fprintf(stderr, "telesplat: %s\n", arguments.error().text.c_str());
-    return 2;
-  }
-  launcher::ControlClient client(master);
-  const auto answer = client.ask(command, 5.0, *arguments);
-  if (!answer) {
-    std::fprintf(stderr, "telesplat: %s\n", answer.error().text.c_str());
-    return 1;
-  }
-  const auto json = nlohmann::ordered_json::parse(*answer, nullptr, false);
-  std::printf("%s\n", json.is_object() ? json.dump(2).c_str() : answer->c_str());
-  return 0;
-}
 
 int telesplat_main(int argc, char** argv) {
   CLI::App app{"telesplat: explore data sets that are too large for this machine"};
@@ -70,16 +26,9 @@ int telesplat_main(int argc, char** argv) {
   auto* view = app.add_subcommand("view", "open a window on a data set, with the whole pipeline on this machine");
   launcher::add_run_flags(*view, view_options);
 
-  std::string command, master = "tcp://127.0.0.1:7700";
+  launcher::ControlOptions control_options;
   auto* ctl = app.add_subcommand("ctl", "ask or tell a running session's master");
-  ctl->add_option("command", command,
-                  "status: who takes part and what they count; stop: end the session; epoch: drop all points; set "
-                  "NAME=VALUE...: change a Julia set's parameters; animate TIMELINE: as --animate of run, or off")
-      ->required()
-      ->check(CLI::IsMember({"status", "stop", "epoch", "set", "animate"}));
-  std::vector<std::string> given;
-  ctl->add_option("arguments", given, "of set and animate")->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  ctl->add_option("--master", master, "address of the master")->capture_default_str();
+  launcher::add_control_flags(*ctl, control_options);
 
   std::string path;
   data::MeshOptions mesh;
@@ -100,7 +49,8 @@ int telesplat_main(int argc, char** argv) {
       "scaling", "how a Julia set's frame speeds up with the number of samplers, beside table 7.2 of the thesis");
   launcher::add_scaling_flags(*scaling, scaling_options);
   launcher::PresetsOptions presets_options;
-  auto* presets = app.add_subcommand("presets", "tell or draw the Julia sets that have names");
+  auto* presets = app.add_subcommand(
+      "presets", "tell the Julia sets and transfer functions that have names, or draw the Julia sets");
   launcher::add_presets_flags(*presets, presets_options);
 
   auto arguments = launcher::expand_scene_file(argc, argv);
@@ -111,14 +61,12 @@ int telesplat_main(int argc, char** argv) {
   std::vector<char*> pointers{argv[0]};
   for (auto& a : *arguments) pointers.push_back(a.data());
   net::parse_or_exit(app, int(pointers.size()), pointers.data());
-  if (*run) launcher::apply_scene_defaults(*run, run_options);
-  if (*view) launcher::apply_scene_defaults(*view, view_options);
-  if (*run) return launcher::run(run_options);
-  if (*view) return launcher::run(view_options);
+  if (*run) return launcher::run(*run, run_options);
+  if (*view) return launcher::run(*view, view_options);
   if (*bench) return launcher::bench_scaling(scaling_options);
   if (*presets) return launcher::presets(presets_options);
   if (*compare) return launcher::compare(compare_options);
-  if (*ctl) return control(master, command, given);
+  if (*ctl) return launcher::control(control_options);
   return launcher::inspect(path, mesh);
 }
 

@@ -10,124 +10,17 @@
 #include <thread>
 
 #include "common/core/clock.h"
-#include "tools/telesplat/control_client.h"
+#include "tools/telesplat/process_arguments.h"
+#include "tools/telesplat/wall.h"
 
 namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
 constexpr int kMaxRestarts = 5;
-constexpr double kMasterPatience_s = 10, kFarewell_s = 4;
-
-std::string text(double v) { return fmt::format("{}", v); }
-
-std::vector<std::string> master_arguments(const RunOptions& o) {
-  const auto& s = o.master.master.schedule;
-  std::vector<std::string> a{"--name",
-                             "master",
-                             "--bind",
-                             "tcp://127.0.0.1:*",
-                             "--tile-size",
-                             text(s.tile_size),
-                             "--frames-in-flight",
-                             text(s.frames_in_flight),
-                             "--lease-timeout",
-                             text(s.lease_timeout_s),
-                             "--lease-target",
-                             text(s.lease_target_s),
-                             "--progressive",
-                             master::name_of(o.master.master.progressive),
-                             "--octree-depth",
-                             text(double(o.master.master.octree_depth)),
-                             "--log-level",
-                             o.master.service.log_level};
-  if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
-  for (const auto& [key, value] : o.master.master.settings) {
-    if (key == "packing.keep_redundant")
-      a.insert(a.end(), {"--packing.redundancy", value < 0 ? "auto" : value != 0 ? "keep" : "eliminate"});
-    else
-      a.insert(a.end(), {"--" + key, text(value)});
-  }
-  return a;
-}
-
-std::vector<std::string> data_arguments(const RunOptions& o) {
-  std::vector<std::string> a{o.scene, "--room-size", text(o.mesh.room_size_m), "--up=" + o.mesh.up,
-                             "--report-progress"};
-  if (o.shows_julia()) {
-    const auto flags = julia::to_flags(o.julia);
-    a.insert(a.end(), flags.begin(), flags.end());
-  }
-  if (!o.mesh.cache_dir.empty()) a.insert(a.end(), {"--cache", o.mesh.cache_dir});
-  if (!o.mesh.use_cache) a.push_back("--no-cache");
-  return a;
-}
-
-std::vector<std::string> packer_arguments(const RunOptions& o) {
-  if (!o.record_depth) return {};
-  return {"--record-depth", o.out + "/depth"};
-}
-
-std::vector<std::string> viewer_arguments(const RunOptions& o) {
-  const auto& v = o.viewer;
-  const auto& d = v.display;
-  std::vector<std::string> a{"--size",
-                             v.size,
-                             "--sampling-size",
-                             v.sampling_size,
-                             "--least-sampling",
-                             text(v.requests.min_scale),
-                             "--trajectory",
-                             v.trajectory,
-                             "--duration",
-                             text(d.duration_s),
-                             "--frames",
-                             text(double(d.frames)),
-                             "--hold",
-                             text(d.hold_s),
-                             "--fov",
-                             text(d.fov_deg),
-                             "--near",
-                             text(d.near_m),
-                             "--target-fps",
-                             text(d.target_fps),
-                             "--detail-budget",
-                             d.detail_budget ? "on" : "off",
-                             "--least-detail",
-                             text(d.least_detail),
-                             "--target-latency",
-                             text(v.requests.target_latency_s),
-                             "--speed-detail",
-                             d.speed_detail ? "on" : "off",
-                             "--renderer",
-                             v.renderer,
-                             "--splat",
-                             v.splat,
-                             "--splat-scale",
-                             text(v.splat_scale),
-                             "--finish",
-                             v.finish,
-                             "--shading",
-                             v.shading,
-                             "--coupling",
-                             v.coupling,
-                             "--update-rate",
-                             text(v.requests.max_rate_hz),
-                             "--epoch-patience",
-                             text(v.epoch_patience_s),
-                             "--record-every",
-                             text(double(d.picture_every)),
-                             "--verify",
-                             text(double(d.verify_every)),
-                             "--record-points",
-                             text(double(v.record_points_mb)),
-                             "--started-at",
-                             text(o.started_s)};
-  if (!o.out.empty()) a.insert(a.end(), {"--out", o.out});
-  for (const auto& [set, flag] : {std::pair{d.exr, "--exr"}, {v.window, "--window"}, {v.fullscreen, "--fullscreen"}})
-    if (set) a.push_back(flag);
-  return a;
-}
+constexpr double kMasterPatience_s = 10, kFarewell_s = 4, kAskEvery_s = 0.1;
+// From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view meanwhile.
+constexpr double kWallLead_s = 1.5;
 
 }  // namespace
 
@@ -160,21 +53,53 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
         return Error{"the master did not start: " + p.last_log_line("master")};
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    p.members_.push_back({"data", "telesplat-data", common(data_arguments(o), "data"), background});
+    for (int i = 1; i <= o.data_servers; ++i)
+      p.members_.push_back({"data", "telesplat-data",
+                            common(data_arguments(o, i), o.data_servers == 1 ? "data" : fmt::format("data-{}", i)),
+                            background});
     p.members_.push_back({"packer", "telesplat-packer", common(packer_arguments(o), "packer"), background / 2});
-    const int cores = int(std::max(1u, std::thread::hardware_concurrency()));
-    const int threads = o.sampler_threads ? o.sampler_threads : std::max(1, cores / o.samplers);
     for (int i = 1; i <= o.samplers; ++i)
       p.members_.push_back(
-          {"sampler", "telesplat-sampler",
-           common({"--sampler", o.sampler_kind, "--threads", std::to_string(threads)}, fmt::format("sampler-{}", i)),
-           background});
+          {"sampler", "telesplat-sampler", common(sampler_arguments(o), fmt::format("sampler-{}", i)), background});
   }
-  p.members_.push_back({"viewer", "telesplat-viewer", common(viewer_arguments(o), "viewer-1"), 0});
+  p.options_ = std::make_unique<RunOptions>(o);
+  if (o.wall.empty()) p.add_viewers(0);
   for (auto& m : p.members_)
     if (!m.process)
       if (const Status s = p.launch(m); !s) return s.error();
   return p;
+}
+
+// The viewers of a wall share a clock, which begins when there is something to see: so they start once the data servers are there.
+void Pipeline::add_viewers(double clock_from_s) {
+  const RunOptions& o = *options_;
+  for (int i = 1; i <= o.viewers; ++i) {
+    std::vector<std::string> a = viewer_arguments(o, i, clock_from_s);
+    a.insert(a.end(),
+             {"--master", master_endpoint_, "--name", viewer_name(i), "--log-level", o.master.service.log_level});
+    members_.push_back({"viewer", "telesplat-viewer", std::move(a), 0});
+  }
+  has_viewers_ = true;
+}
+
+Status Pipeline::start_wall() {
+  const double now = monotonic_s();
+  if (!control_) control_ = std::make_unique<ControlClient>(master_endpoint_);
+  if (now - asked_s_ > kAskEvery_s) {
+    control_->request_status();
+    asked_s_ = now;
+  }
+  const auto status = control_->poll_status();
+  if (!status || !status->contains("processes")) return ok_status();
+  int there = 0;
+  for (const auto& p : (*status)["processes"]) there += p.value("role", "") == "data" && p.value("alive", false);
+  if (there < (options_->join_master.empty() ? options_->data_servers : 1)) return ok_status();
+  control_.reset();
+  const size_t before = members_.size();
+  add_viewers(now + kWallLead_s);
+  for (size_t i = before; i < members_.size(); ++i)
+    if (const Status s = launch(members_[i]); !s) return s;
+  return ok_status();
 }
 
 Status Pipeline::launch(Member& m) {
@@ -197,14 +122,21 @@ std::string Pipeline::last_log_line(const std::string& name) const {
 }
 
 Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
+  if (!has_viewers_)
+    if (const Status s = start_wall(); !s) {
+      news.push_back(s.error().text);
+      return State::kFailed;
+    }
+  int viewing = 0;
   for (auto& m : members_) {
+    if (m.role == "viewer" && !m.process->ended()) ++viewing;
     read(m);
     if (!m.process->ended()) continue;
     read(m);  // its last words
     const std::string name = m.process->name();
     const int code = m.process->exit_code();
     if (m.role == "viewer") {
-      if (code == 0) return State::kFinished;
+      if (code == 0) continue;
       news.push_back(fmt::format("{} ended with code {}: {}", name, code, last_log_line(name)));
       return code == 2 ? State::kBadInput : State::kFailed;
     }
@@ -226,7 +158,7 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
       return State::kFailed;
     }
   }
-  return State::kRunning;
+  return viewing == 0 && has_viewers_ ? State::kFinished : State::kRunning;
 }
 
 void Pipeline::read(Member& m) {
@@ -239,12 +171,11 @@ void Pipeline::read(Member& m) {
 std::string Pipeline::progress() { return progress_; }
 
 void Pipeline::finish() {
-  // The viewer sends its last measurements before anyone else leaves.
+  // Viewers send their last measurements before anyone else leaves.
   for (auto& m : members_)
-    if (m.role == "viewer" && m.process && !m.process->ended()) {
-      m.process->signal(SIGTERM);
-      m.process->finish(20);
-    }
+    if (m.role == "viewer" && m.process) m.process->signal(SIGTERM);
+  for (auto& m : members_)
+    if (m.role == "viewer" && m.process) m.process->finish(20);
   if (members_.front().role == "master" && members_.front().process && !members_.front().process->ended() &&
       !master_endpoint_.empty()) {
     ControlClient control(master_endpoint_);

@@ -1,31 +1,34 @@
 // The processes of one session on this machine: started in any order, supervised, ended together.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "tools/telesplat/child_process.h"
+#include "tools/telesplat/control_client.h"
 #include "tools/telesplat/run_command.h"
 
 namespace telesplat::launcher {
 
 class Pipeline {
  public:
-  /// Starts master, data, packer, samplers and a viewer (the viewer alone if options.join_master is set).
+  /// Starts master, data servers, packer, samplers and viewers (the viewers alone if options.join_master is set). Those of a wall follow in
+  /// supervise(), once the data servers have read their data.
   static Result<Pipeline> start(const RunOptions& options);
 
   const std::string& master_endpoint() const { return master_endpoint_; }
 
   enum class State { kRunning, kFinished, kFailed, kBadInput };
   /// Looks after the children; does not wait. Samplers, packer and data that die are restarted (5 times each at most); the
-  /// master's or the viewer's death ends the run. `news` gets lines for the person.
+  /// master's or a viewer's death ends the run, which is finished when all viewers are. `news` gets lines for the person.
   State supervise(std::vector<std::string>& news);
   /// "reading 43 %" and the like, from the children's progress lines; empty if there is nothing to tell.
   std::string progress();
-  /// Lines that the viewer told the person, since the last call.
+  /// Lines that viewers told the person, since the last call.
   std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
-  /// Ends everything: the viewer first, then a "stop" to the master, then whoever is left.
+  /// Ends everything: viewers first, then a "stop" to the master, then whoever is left.
   void finish();
   int restarts() const { return restarts_; }
 
@@ -37,6 +40,8 @@ class Pipeline {
     int restarts = 0;
     std::optional<ChildProcess> process;
   };
+  void add_viewers(double clock_from_s);
+  Status start_wall();
   Status launch(Member& member);
   void read(Member& member);
   std::string last_log_line(const std::string& name) const;
@@ -45,6 +50,10 @@ class Pipeline {
   std::vector<std::string> notes_;
   std::vector<Member> members_;
   int restarts_ = 0;
+  std::unique_ptr<RunOptions> options_;
+  bool has_viewers_ = false;
+  std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
+  double asked_s_ = -1e9;
 };
 
 /// Folder of the program that runs: the others lie beside it.

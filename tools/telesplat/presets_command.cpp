@@ -9,6 +9,7 @@
 #include "common/geometry/trajectory.h"
 #include "common/image/canvas.h"
 #include "common/julia/flags.h"
+#include "common/volume/transfer_function.h"
 #include "tools/telesplat/direct_scene.h"
 #include "tools/telesplat/progress_line.h"
 
@@ -48,7 +49,10 @@ void add_presets_flags(CLI::App& app, PresetsOptions& o) {
 
 int presets(const PresetsOptions& o) {
   if (o.out.empty()) {
-    std::fputs(julia::describe_presets().c_str(), stdout);
+    std::printf("Julia sets (--preset):\n%s\nTransfer functions of volumes (--tf):\n",
+                julia::describe_presets().c_str());
+    for (const auto& preset : volume::transfer_presets())
+      std::fputs(fmt::format("  {:<12} {}\n", preset.name, preset.text).c_str(), stdout);
     return 0;
   }
   const auto size = viewer::parse_size(o.size, "--size");

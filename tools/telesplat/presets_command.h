@@ -1,4 +1,4 @@
-// `telesplat presets`: the Julia sets that have names, as text or as a sheet of pictures.
+// `telesplat presets`: the Julia sets and the transfer functions that have names; as text, or the Julia sets as a sheet of pictures.
 #pragma once
 
 #include <string>

@@ -77,9 +77,14 @@ Result<std::string> read_session(const std::string& path, RecordedRun& run) {
     if (!julia) return julia.error();
     run.julia = std::move(*julia);
   }
+  run.volume = table["scene"]["kind"].value_or(std::string()) == "volume";
   run.scene = table["scene"]["file"].value_or(std::string());
   run.mesh.room_size_m = number(table["scene"]["room_size"], run.mesh.room_size_m);
   run.mesh.up = table["scene"]["up"].value_or(run.mesh.up);
+  if (const auto iso = table["scene"]["iso"].value<double>()) run.mesh.iso = *iso;
+  run.mesh.raw = table["scene"]["raw"].value_or(std::string());
+  run.mesh.elevation.z_scale = number(table["scene"]["z_scale"], 0);
+  run.mesh.elevation.texture = table["scene"]["texture"].value_or(std::string());
   run.mesh.cache_dir = table["scene"]["cache"].value_or(std::string());
   run.mesh.use_cache = !table["scene"]["no_cache"].value_or(false);
   if (!(run.mesh.room_size_m >= 1e-3 && run.mesh.room_size_m <= 1e3))

@@ -30,6 +30,7 @@ struct RecordedRun {
   std::string scene;  ///< path of the data file; empty: the folder does not tell
   data::MeshOptions mesh;
   std::optional<RecordedJulia> julia;  ///< instead of a data file
+  bool volume = false;                 ///< the data file is a volume: read_recorded_volume() tells more
   int width = 0, height = 0;           ///< of the display
   double fov_deg = 0, near_m = 0;
   std::string sampling_size, renderer, kernel;  ///< as they were, for captions

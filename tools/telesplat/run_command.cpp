@@ -16,46 +16,15 @@
 #include "tools/telesplat/pipeline.h"
 #include "tools/telesplat/progress_line.h"
 #include "tools/telesplat/recorded_julia.h"
+#include "tools/telesplat/recorded_volume.h"
+#include "tools/telesplat/run_report.h"
 #include "tools/telesplat/verify.h"
+#include "tools/telesplat/wall.h"
 
 namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
-
-// A frame of a Julia set is dear: coarser while the head moves. Points of views long past are of no use, since nothing is eliminated.
-constexpr double kJuliaLeastSampling = 0.4, kJuliaMaxPoints = 8e6;
-
-// fps, updates/s, points, MB/s from two status answers.
-class LiveFigures {
- public:
-  std::string update(const nlohmann::json& status, double now_s) {
-    double updates = 0, points = 0, bytes = 0, frames = 0;
-    int samplers = 0;
-    for (const auto& p : status["processes"]) {
-      const auto value = [&](const char* key) {
-        return p.contains("values") && p["values"].contains(key) ? p["values"][key].get<double>() : 0.0;
-      };
-      if (p["role"] == "sampler" && p["alive"] == true) ++samplers;
-      if (p["role"] != "viewer") continue;
-      updates += value("updates");
-      frames += value("frames");
-      points += value("points");
-      bytes += value("bytes_received");
-    }
-    const double dt = now_s - last_s_;
-    if (last_s_ > 0 && dt > 0.5 && frames > 0)
-      text_ = fmt::format("{:5.1f} fps  {:4.1f} updates/s  {:5.2f} M points  {:5.2f} MB/s  {} sampler{}",
-                          (frames - frames_) / dt, (updates - updates_) / dt, points / 1e6, (bytes - bytes_) / 1e6 / dt,
-                          samplers, samplers == 1 ? "" : "s");
-    if (dt > 0.5) last_s_ = now_s, updates_ = updates, bytes_ = bytes, frames_ = frames;
-    return text_;
-  }
-
- private:
-  double last_s_ = 0, updates_ = 0, bytes_ = 0, frames_ = 0;
-  std::string text_;
-};
 
 /// A folder for the logs of a session that leaves nothing behind; kept if something went wrong.
 class PassingFolder {
@@ -99,17 +68,31 @@ Status check_usage(const RunOptions& o) {
         "a Julia set's parameters are given, but no scene; a running session's are changed with telesplat ctl set"};
   } else if (o.julia.any()) {
     return Error{fmt::format("{}: is not \"{}\", but a Julia set's parameters are given", o.scene, julia::kSceneWord)};
-  } else if (o.join_master.empty()) {
-    std::error_code error;
-    if (!fs::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
-    if (fs::is_directory(o.scene, error))
-      return Error{fmt::format("{}: is a folder; a mesh file is needed, or the word julia", o.scene)};
+  } else if (o.kind == SceneKind::kVolume && o.join_master.empty()) {
+    if (const auto found = data::find_volume(o.scene, o.volume.raw); !found) return found.error();
+  }
+  if (!o.wall.empty()) {
+    const auto wall = parse_wall(o.wall);
+    if (!wall) return wall.error();
+    if (o.viewers != wall->tiles())
+      return Error{fmt::format("--viewers {}: a wall of {} has {}", o.viewers, o.wall, wall->tiles())};
   }
   if (const auto size = viewer::parse_size(o.viewer.size, "--size"); !size) return size.error();
   if (const auto size = viewer::parse_sampling_size(o.viewer.sampling_size); !size) return size.error();
   if (o.viewer.trajectory != "orbit" && o.viewer.trajectory != "still")
     if (const auto t = geometry::Trajectory::read_csv(o.viewer.trajectory); !t) return t.error();
   return o.viewer.window ? viewer::check_display() : ok_status();
+}
+
+// The wall's picture, and of which moments its tiles are.
+Status report_wall(const RunOptions& o) {
+  const auto tiles = stitch_wall(o.out, *parse_wall(o.wall));
+  if (!tiles) return tiles.error();
+  std::string moments;
+  for (const auto& t : *tiles)
+    moments += fmt::format("{}{} frame {} at {:.2f} s", moments.empty() ? "" : ", ", t.viewer, t.frame, t.t_s);
+  std::printf("The wall's picture is images/wall.png, of %s\n", moments.c_str());
+  return ok_status();
 }
 
 // Adds to the master's session.toml what only the launcher knows: where the scene is, and the display's camera. `telesplat compare`
@@ -136,6 +119,18 @@ void complete_session(const RunOptions& o) {
   } else {
     out << "\n[scene]\nfile = " << quoted(fs::absolute(o.scene, error).string())
         << fmt::format("\nroom_size = {}\nup = \"{}\"\n", o.mesh.room_size_m, o.mesh.up);
+    if (o.kind == SceneKind::kVolume) {
+      out << "kind = \"volume\"\n" << (o.volume.lit ? "" : "lighting = \"off\"\n");
+      if (!o.volume.raw.empty()) out << "raw = " << quoted(o.volume.raw) << "\n";
+      if (!o.volume.transfer.empty()) out << "tf = " << quoted(o.volume.transfer) << "\n";
+    }
+    if (o.kind == SceneKind::kMesh) {
+      if (o.mesh.iso) out << fmt::format("iso = {}\n", *o.mesh.iso);
+      if (!o.mesh.raw.empty()) out << "raw = " << quoted(o.mesh.raw) << "\n";
+      if (o.mesh.elevation.z_scale != 0) out << fmt::format("z_scale = {}\n", o.mesh.elevation.z_scale);
+      if (const auto& texture = o.mesh.elevation.texture; !texture.empty())
+        out << "texture = " << quoted(fs::absolute(texture, error).string()) << "\n";
+    }
     if (!o.mesh.use_cache) out << "no_cache = true\n";
     if (!o.mesh.cache_dir.empty()) out << "cache = " << quoted(fs::absolute(o.mesh.cache_dir, error).string()) << "\n";
   }
@@ -146,69 +141,55 @@ void complete_session(const RunOptions& o) {
 
 // The scene that a run showed, for its reference pictures.
 Result<std::unique_ptr<DirectScene>> open_direct(const RunOptions& o) {
-  if (!o.shows_julia()) return open_direct_mesh(o.scene, o.mesh, 0, [](const char*, double) {});
+  const auto silent = [](const char*, double) {};
+  if (o.kind == SceneKind::kVolume) {
+    auto volume = read_recorded_volume(o.out);
+    if (!volume) return volume.error();
+    return open_direct_volume(std::move(*volume), 0, silent);
+  }
+  if (!o.shows_julia()) return open_direct_mesh(o.scene, o.mesh, 0, silent);
   auto julia = read_recorded_julia(o.out);
   if (!julia) return julia.error();
   return open_direct_julia(std::move(*julia), 0);
 }
 
-void print_report(const std::string& directory) {
-  std::ifstream in(directory + "/summary.json");
-  const auto s = nlohmann::json::parse(in, nullptr, false);
-  if (!s.is_object()) return;
-  const auto line = [](const std::string& what, const std::string& value) {
-    std::printf("  %-34s %s\n", what.c_str(), value.c_str());
-  };
-  const auto dist = [&](const char* key, const char* unit) {
-    const auto& d = s[key];
-    return fmt::format("median {:.1f}  p95 {:.1f}  max {:.1f} {}", d["median"].get<double>(), d["p95"].get<double>(),
-                       d["max"].get<double>(), unit);
-  };
-  std::string subject = s["scene"].get<std::string>();
-  if (s["kind"] == "mesh") {
-    subject += fmt::format(": {} triangles", s["primitives"].get<uint64_t>());
-  } else if (const auto julia = read_recorded_julia(directory)) {
-    const auto& c = julia->begin.c;
-    subject += fmt::format(": c = ({:.4g}, {:.4g}, {:.4g}, {:.4g}), {} epoch(s)", c.x, c.y, c.z, c.w,
-                           std::max<size_t>(1, julia->epochs.size()));
+// Recorded frames become pictures, whatever made their viewer stop before they were.
+void develop_pictures(const RunOptions& o, ProgressLine& progress) {
+  std::error_code error;
+  for (int i = 1; i <= o.viewers; ++i) {
+    const std::string folder = viewer_directory(o.out, i), spool = folder + "/spool";
+    if (!fs::is_directory(spool, error)) continue;
+    const auto tell = [&](size_t done, size_t of) { progress.show(fmt::format("picture {} of {}", done, of)); };
+    if (const Status s = viewer::develop_frames(spool, folder + "/images", tell); !s)
+      progress.line("telesplat: " + s.error().text);
+    if (fs::is_empty(spool, error)) fs::remove(spool, error);
+    progress.close();
   }
-  std::printf("\n%s, display %dx%d, sampling %dx%d, %d sampler(s), %s renderer, %s splats\n", subject.c_str(),
-              s["size"][0].get<int>(), s["size"][1].get<int>(), s["sampling_size"][0].get<int>(),
-              s["sampling_size"][1].get<int>(), s["samplers"].get<int>(), s["renderer"].get<std::string>().c_str(),
-              s["splat"].get<std::string>().c_str());
-  line("display", fmt::format("{:.1f} fps over {} frames", s["fps"].get<double>(), s["frames"].get<uint64_t>()));
-  line("inter-frame delay", dist("inter_frame_delay_ms", "ms"));
-  line("view construction", dist("view_construction_ms", "ms"));
-  line("view updates",
-       fmt::format("{:.2f} per second, {} in all", s["updates_per_s"].get<double>(), s["updates"].get<uint64_t>()));
-  line("view update latency", dist("view_update_latency_ms", "ms"));
-  line("sampling / packing of a frame",
-       fmt::format("median {:.1f} / {:.1f} ms", s["sampling_ms"]["median"].get<double>(),
-                   s["packing_ms"]["median"].get<double>()));
-  line("points cached", fmt::format("{:.2f} M, {:.1f} bytes each", s["points_cached"].get<double>() / 1e6,
-                                    s["bytes_per_cached_point"].get<double>()));
-  line("redundancy eliminated", fmt::format("{:.2f} %", s["redundancy_eliminated"].get<double>() * 100));
-  line("sent to viewers",
-       fmt::format("{:.2f} MB of {:.0f} MB sampled ({:.0f} : 1), {:.2f} MB/s", s["bytes_sent"].get<double>() / 1e6,
-                   s["bytes_raw"].get<double>() / 1e6, s["compression_ratio"].get<double>(),
-                   s["data_transfer_rate_mb_s"].get<double>()));
-  if (s["quality"].is_object()) {
-    const auto& q = s["quality"];
-    line("PSNR against direct rendering",
-         fmt::format("median {:.2f} dB over {} views", q["psnr_db"]["median"].get<double>(), q["views"].get<int>()));
-    line("SSIM", fmt::format("median {:.4f}", q["ssim"]["median"].get<double>()));
-    line("hole fraction", fmt::format("median {:.3f} %  p95 {:.3f} %", q["hole_fraction"]["median"].get<double>() * 100,
-                                      q["hole_fraction"]["p95"].get<double>() * 100));
-    if (q.contains("last_view"))
-      line("last view", fmt::format("PSNR {:.2f} dB, holes {:.3f} %", q["last_view"]["psnr_db"].get<double>(),
-                                    q["last_view"]["hole_fraction"].get<double>() * 100));
-  }
-  const auto& e = s["errors"];
-  line("errors", fmt::format("{} messages rejected, {} gaps resynchronised, {} leases expired",
-                             e["messages_rejected"].get<uint64_t>(), e["gaps_resynced"].get<uint64_t>(),
-                             e["leases_expired"].get<uint64_t>()));
-  std::printf("\nEverything lies in %s (summary.json, frames.csv, updates.csv, tiles.csv, trace.json, images/)\n",
-              directory.c_str());
+}
+
+void add_volume_flags(CLI::App& app, RunOptions& o) {
+  app.add_option("--raw", o.volume.raw,
+                 "a raw volume's layout: SIZExSIZExSIZE:u8|i8|u16|i16|f32[:SPACING,SPACING,SPACING]");
+  app.add_option("--tf", o.volume.transfer,
+                 "a volume's transfer function: a preset (telesplat presets), a ParaView JSON file, or "
+                 "value:colour:opacity,...; default: what fits");
+  app.add_option("--iso", o.mesh.iso, "show the surface where a volume has this value, as a mesh");
+  app.add_option("--z-scale", o.mesh.elevation.z_scale,
+                 "elevation rasters: heights are so many times as high; 0: as they are, or what suits a raster without "
+                 "coordinates")
+      ->capture_default_str();
+  app.add_option("--texture", o.mesh.elevation.texture, "elevation rasters: picture that is laid over them");
+  app.add_option_function<std::string>(
+         "--lighting", [&o](const std::string& v) { o.volume.lit = v == "on"; },
+         "on: a volume's voxels are shaded by their gradients")
+      ->default_str("on")
+      ->check(CLI::IsMember({"on", "off"}));
+  app.add_option("--series-rate", o.series_rate,
+                 "steps a second at which a numbered series of volumes plays; 0: it does not; default: all in a second")
+      ->check(CLI::Range(0.0, 1000.0));
+  app.add_option("--data-servers", o.data_servers, "processes that each serve a part of a volume")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 16));
 }
 
 }  // namespace
@@ -222,11 +203,22 @@ RunOptions view_defaults() {
 }
 
 void add_run_flags(CLI::App& app, RunOptions& o) {
-  app.add_option("scene", o.scene,
-                 "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), the word julia, or a scene file (TOML)");
+  app.add_option(
+      "scene", o.scene,
+      "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), volume (NRRD, MetaImage, NIfTI, VTI, raw, a folder of "
+      "DICOM slices or of a numbered series), the word julia, or a scene file (TOML)");
   const bool window = o.viewer.window;
   app.add_option("--out", o.out,
                  window ? "run folder; without it nothing is recorded" : "run folder; default: runs/DATE-TIME");
+  if (!window) {
+    app.add_option("--viewers", o.viewers, "viewers, each of which follows the trajectory; the first one is verified")
+        ->capture_default_str()
+        ->check(CLI::Range(1, kMaxViewers));
+    app.add_option(
+        "--wall", o.wall,
+        "COLUMNSxROWS: a display wall of so many viewers, each with --size pixels of one picture of --fov; its "
+        "picture at the end becomes images/wall.png");
+  }
   if (window) app.add_flag("--fullscreen", o.viewer.fullscreen, "the window fills the screen");
   app.add_option("--samplers", o.samplers, "sampler processes")->capture_default_str()->check(CLI::Range(1, 64));
   app.add_option("--sampler", o.sampler_kind, "ray (Embree), raster (OpenGL), or auto: raster on a GPU, else ray")
@@ -242,6 +234,7 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
   app.add_option("--up", o.mesh.up, "data axis that points up")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
+  add_volume_flags(app, o);
   app.add_option("--cache", o.mesh.cache_dir,
                  "folder of the chunk store; default: telesplat in the user's cache folder");
   app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
@@ -262,14 +255,7 @@ void add_run_flags(CLI::App& app, RunOptions& o) {
   app.footer(keys);
 }
 
-void apply_scene_defaults(const CLI::App& app, RunOptions& o) {
-  if (!o.shows_julia()) return;
-  if (app.count("--least-sampling") == 0) o.viewer.requests.min_scale = kJuliaLeastSampling;
-  if (app.count("--packing.max_points") == 0) o.master.master.settings["packing.max_points"] = kJuliaMaxPoints;
-}
-
-int run(const RunOptions& given) {
-  RunOptions o = given;
+int run(const CLI::App& flags, RunOptions o) {
   o.started_s = monotonic_s();
   const bool window = o.viewer.window;
   if (o.out.empty() && !window) o.out = default_out();
@@ -281,7 +267,9 @@ int run(const RunOptions& given) {
     std::fputs(julia::describe_presets().c_str(), stdout);
     return 0;
   }
-  if (o.scene.empty() && o.join_master.empty()) return refuse({"a scene is needed: a mesh file or the word julia"});
+  if (o.scene.empty() && o.join_master.empty())
+    return refuse({"a scene is needed: a mesh or volume file, a folder of DICOM slices, or the word julia"});
+  if (const Status s = settle_scene(flags, o); !s) return refuse(s.error());
   if (const Status s = check_usage(o); !s) return refuse(s.error());
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
@@ -325,14 +313,7 @@ int run(const RunOptions& given) {
   progress.close();
   pipeline->finish();
   // A viewer that is told to stop does so, whatever pictures are left to make.
-  const std::string spool = o.out + "/spool";
-  if (state != Pipeline::State::kBadInput && !o.out.empty() && fs::is_directory(spool, error)) {
-    const auto tell = [&](size_t done, size_t of) { progress.show(fmt::format("picture {} of {}", done, of)); };
-    if (const Status s = viewer::develop_frames(spool, o.out + "/images", tell); !s)
-      progress.line("telesplat: " + s.error().text);
-    if (fs::is_empty(spool, error)) fs::remove(spool, error);
-    progress.close();
-  }
+  if (state != Pipeline::State::kBadInput && !o.out.empty()) develop_pictures(o, progress);
   for (const auto& n : pipeline->take_notes()) progress.line(n);
   if (o.join_master.empty() && !o.out.empty()) complete_session(o);
   if (state == Pipeline::State::kBadInput) {
@@ -361,6 +342,11 @@ int run(const RunOptions& given) {
     }
   }
   print_report(o.out);
+  if (!o.wall.empty())
+    if (const Status s = report_wall(o); !s) {
+      std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
+      return 1;
+    }
   return interrupted && !window ? 1 : 0;
 }
 

@@ -4,18 +4,24 @@
 #include "client/viewer/viewer_service.h"
 #include "common/julia/flags.h"
 #include "services/data/mesh_store.h"
+#include "services/data/volume_store.h"
 #include "services/master/master_service.h"
+#include "tools/telesplat/scene_kind.h"
 
 namespace telesplat::launcher {
 
 /// viewer.window tells `view` from `run`.
 struct RunOptions {
-  std::string scene;  ///< path of a data file, or "julia"
+  std::string scene;  ///< path of a data file or folder, or "julia"
+  SceneKind kind = SceneKind::kNone;
   data::MeshOptions mesh;
+  data::VolumeOptions volume;
+  std::string series_rate;  ///< --series-rate as given
   julia::SceneOptions julia;
   master::MasterServiceOptions master;
   viewer::ViewerOptions viewer;
-  int samplers = 1;
+  int samplers = 1, data_servers = 1, viewers = 1;
+  std::string wall;  ///< "2x1": the viewers are the tiles of a wall; empty: each shows all of the picture
   std::string sampler_kind = "auto";
   int sampler_threads = 0;    ///< a sampler's; 0: the machine's cores shared among the samplers
   std::string join_master;    ///< --master: join a running session instead of starting one
@@ -34,10 +40,7 @@ RunOptions view_defaults();
 /// Flags of `run`, or of `view` if options.viewer.window is set.
 void add_run_flags(CLI::App& app, RunOptions& options);
 
-/// Once `app` is parsed: what a Julia set is better shown with than a mesh, where no flag says otherwise.
-void apply_scene_defaults(const CLI::App& app, RunOptions& options);
-
-/// A window that is closed, or Ctrl-C there, is an end like any other. Exit code: 0 done, 1 failed while running, 2 bad usage or input. No process is left behind in any case.
-int run(const RunOptions& options);
+/// flags: as parsed into `options`. A window that is closed, or Ctrl-C there, is an end like any other. Exit code: 0 done, 1 failed while running, 2 bad usage or input. No process is left behind in any case.
+int run(const CLI::App& flags, RunOptions options);
 
 }  // namespace telesplat::launcher

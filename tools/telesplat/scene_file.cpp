@@ -16,7 +16,8 @@ namespace {
 
 // Flags that take on or off; the others that a boolean can stand for are either there or not.
 bool is_switch(const std::string& flag) {
-  return flag == "detail-budget" || flag == "speed-detail" || flag == "finish" || flag == "progressive";
+  return flag == "detail-budget" || flag == "speed-detail" || flag == "finish" || flag == "progressive" ||
+         flag == "lighting";
 }
 
 // One scene file on its way to flags.
@@ -26,8 +27,8 @@ class SceneReader {
 
   Result<std::vector<std::string>> read(const toml::table& table) {
     if (const Status s = read_table("", table); !s) return s.error();
-    if (!kind_.empty() && kind_ != julia::kSceneWord && kind_ != "mesh")
-      return Error{fmt::format("{}: kind is \"{}\", not mesh or julia", path_, kind_)};
+    if (!kind_.empty() && kind_ != julia::kSceneWord && kind_ != "mesh" && kind_ != "volume")
+      return Error{fmt::format("{}: kind is \"{}\", not mesh, julia or volume", path_, kind_)};
     const bool julia = kind_ == julia::kSceneWord;
     if (julia && !file_.empty()) return Error{fmt::format("{}: a Julia set has no data file (key file)", path_)};
     if (!julia && !first_julia_key_.empty())
@@ -41,6 +42,10 @@ class SceneReader {
  private:
   Error wrong(const toml::node& node, const std::string& what) const {
     return Error{fmt::format("{}:{}: {}", path_, node.source().begin.line, what)};
+  }
+
+  std::string beside(const std::string& file) const {
+    return (std::filesystem::path(path_).parent_path() / file).string();
   }
 
   Status read_table(const std::string& group, const toml::table& table) {
@@ -70,7 +75,16 @@ class SceneReader {
       std::replace(flag.begin(), flag.end(), '_', '-');
     const bool of_scene = group.empty() || group == "scene";
     if (name == "file" && node.is_string()) {
-      file_ = (std::filesystem::path(path_).parent_path() / **node.as_string()).string();
+      file_ = beside(**node.as_string());
+      return ok_status();
+    }
+    // Files that a scene names lie beside it. A transfer function may also be a preset, or points.
+    if (node.is_string() && (flag == "texture" || flag == "trajectory" || flag == "tf")) {
+      const std::string value = **node.as_string();
+      std::error_code error;
+      const bool file = flag == "texture" || value.ends_with(".json") ||
+                        (flag == "trajectory" && std::filesystem::is_regular_file(beside(value), error));
+      flags_.push_back(fmt::format("--{}={}", flag, file ? beside(value) : value));
       return ok_status();
     }
     if (of_scene && name == "kind" && node.is_string()) {

@@ -16,6 +16,8 @@ namespace telesplat::launcher {
 ///   [scene]  kind = "julia"  preset = "coral"  c = [0.1, 0.2, -0.4, -0.2]  animate = ["c.y=-0.4:0.4:10s"]
 ///   [julia]  iterations = 100  slice.offset = 0.1  palette = "ice"
 ///   [[keyframe]]  t = 0.0  c.y = -0.4                                 two at least of each parameter; they become --animate
+/// A volume may say kind = "volume"; what it is shows anyway. Its files, and those of tf, texture and trajectory, lie beside the scene file:
+///   [scene]  file = "head.nrrd"  tf = "skin"  lighting = false  data_servers = 2     [view]  wall = "2x1"  coupling = "loose"  buffers = 2
 /// Returns the flags with their values, then the data file or "julia". Errors name the file and the line or key.
 Result<std::vector<std::string>> read_scene_file(const std::string& path);
 

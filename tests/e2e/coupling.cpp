@@ -1,0 +1,74 @@
+// Synchronous and loose coupling (T6.3, T6.4) of all kinds of scenes: the display shows one frame per view update.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+struct Coupled {
+  std::string kind, coupling;
+  int buffers = 0;  // of loose
+};
+void PrintTo(const Coupled& c, std::ostream* out) { *out << c.kind << " " << c.coupling << " " << c.buffers; }
+
+class Couplings : public ::testing::TestWithParam<Coupled> {};
+
+TEST_P(Couplings, OneFrameForEachViewUpdate) {
+  const Coupled& c = GetParam();
+  TemporaryFolder folder;
+  std::string scene;  // none: the terrain
+  if (c.kind == "julia") scene = "julia";
+  if (c.kind == "volume") write_volume(scene = folder / "balls.mha");
+  std::vector<std::string> arguments{"--size",     "320x200", "--sampling-size", "240x150", "--coupling", c.coupling,
+                                     "--duration", "3",       "--record-points", "0"};
+  if (c.buffers) arguments.insert(arguments.end(), {"--buffers", std::to_string(c.buffers)});
+  PipelineRun run(arguments, scene);
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  const auto s = run.summary();
+  ASSERT_TRUE(s.is_object());
+  EXPECT_EQ(s["kind"], c.kind);
+  EXPECT_EQ(s["coupling"], c.coupling);
+  const int buffers = c.coupling == "sync" ? 1 : c.buffers;
+  EXPECT_EQ(s["buffers"], buffers);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  EXPECT_GT(s["frames"], 5);
+
+  // Each frame shows the update of another request, in their order. When it ends some may be complete and not yet displayed.
+  const auto requests = run.column("frames.csv", "request");
+  ASSERT_EQ(requests.size(), size_t(s["frames"]));
+  EXPECT_TRUE(std::is_sorted(requests.begin(), requests.end()));
+  EXPECT_EQ(std::set<double>(requests.begin(), requests.end()).size(), requests.size()) << "two frames of one update";
+  EXPECT_GE(s["updates"], s["frames"]);
+  EXPECT_LE(s["updates"], int(s["frames"]) + buffers);
+  const auto updates = run.column("updates.csv", "request");
+  const std::set<double> known(updates.begin(), updates.end());
+  for (const double r : requests) EXPECT_TRUE(known.contains(r)) << "request " << r << " has no update";
+
+  const auto filled = run.column("frames.csv", "buffers_filled"), waits = run.column("frames.csv", "wait_ms");
+  ASSERT_EQ(filled.size(), requests.size());
+  ASSERT_EQ(waits.size(), requests.size());
+  EXPECT_LE(*std::max_element(filled.begin(), filled.end()), buffers);
+  EXPECT_GE(*std::min_element(waits.begin(), waits.end()), 0);
+  if (c.coupling == "sync") EXPECT_GT(*std::max_element(waits.begin(), waits.end()), 0) << "it never waited for data";
+}
+
+const Coupled kCoupled[] = {{"mesh", "sync"},     {"julia", "sync"},     {"volume", "sync"},
+                            {"mesh", "loose", 3}, {"julia", "loose", 2}, {"volume", "loose", 3}};
+INSTANTIATE_TEST_SUITE_P(Kinds, Couplings, ::testing::ValuesIn(kCoupled),
+                         [](const auto& info) { return info.param.kind + "_" + info.param.coupling; });
+
+TEST(CouplingUsage, BuffersAreOfLooseCoupling) {
+  for (const auto& [coupling, buffers] : {std::pair{"loose", "0"}, {"loose", "9"}, {"tight", "3"}}) {
+    PipelineRun run({"--coupling", coupling, "--buffers", buffers});
+    EXPECT_EQ(run.program().wait(60), 2) << coupling << buffers;
+    EXPECT_TRUE(run.all_gone());
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::test
