@@ -26,8 +26,9 @@ std::string import_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : kImportProgram;
 }
 
-// Runs the import program with these arguments, `input` (negative: nothing) and `output` as its standard streams. Returns its wait status.
-Result<int> run_import(int input, int output, std::vector<std::string> words) {
+}  // namespace
+
+Result<pid_t> start_import(int input, int output, std::vector<std::string> words) {
   const std::string format = words[0], path = words[1];
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -48,27 +49,30 @@ Result<int> run_import(int input, int output, std::vector<std::string> words) {
   if (failed)
     return Error{fmt::format("{}: the program that reads {} files, {}, cannot be started: {}", path, format, program,
                              std::strerror(failed))};
+  return child;
+}
+
+Status end_import(pid_t child, const std::string& reader, const std::string& format, const std::string& path) {
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) return Error{fmt::format("{}: lost the process that reads it: {}", path, std::strerror(errno))};
-  return status;
+  if (WIFSIGNALED(status))
+    return Error{fmt::format("{}: is damaged: {} reader {}", path, reader,
+                             WTERMSIG(status) == SIGALRM ? "did not end" : "crashed on it")};
+  if (WEXITSTATUS(status) == 127)
+    return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
+  if (WEXITSTATUS(status) != 0) return Error{fmt::format("{}: is damaged: {} reader gave up on it", path, reader)};
+  return ok_status();
 }
-
-}  // namespace
 
 Result<Mesh> import(const std::string& reader, std::vector<std::string> words, int input) {
   const std::string format = words[0], path = words[1];
   const int output = memfd_create("telesplat-import", MFD_CLOEXEC);
   if (output < 0) return Error{fmt::format("{}: no memory file for reading it: {}", path, std::strerror(errno))};
   auto result = [&]() -> Result<Mesh> {
-    const auto status = run_import(input, output, std::move(words));
-    if (!status) return status.error();
-    if (WIFSIGNALED(*status))
-      return Error{fmt::format("{}: is damaged: {} reader {}", path, reader,
-                               WTERMSIG(*status) == SIGALRM ? "did not end" : "crashed on it")};
-    if (WEXITSTATUS(*status) == 127)
-      return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
-    if (WEXITSTATUS(*status) != 0) return Error{fmt::format("{}: is damaged: {} reader gave up on it", path, reader)};
+    const auto child = start_import(input, output, std::move(words));
+    if (!child) return child.error();
+    if (auto status = end_import(*child, reader, format, path); !status) return status.error();
     return read_import_report(output, path, format);
   }();
   close(output);

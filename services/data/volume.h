@@ -30,6 +30,7 @@ struct Volume {
   bool hounsfield = false;  ///< a CT, by what the file says or by its range
   double lo = 0, hi = 0;    ///< smallest and largest finite value
   uint64_t not_finite = 0;  ///< NaN and infinite ones; they count as lo
+  std::string remark;       ///< for people: what was left out or evened (DICOM); often empty
 
   double value(size_t at) const;  ///< of voxel `at` in stored order
 };

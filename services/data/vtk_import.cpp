@@ -22,6 +22,8 @@
 #include <array>
 #include <cmath>
 
+#include "services/data/vtk_complaint.h"
+
 namespace telesplat::data {
 namespace {
 
@@ -182,18 +184,6 @@ class Collector {
   Mesh mesh_;
   bool any_normals_ = false, any_colours_ = false;
 };
-
-// The first thing that VTK complained of, without its file names and addresses; empty if it did not.
-std::string first_complaint(const std::string& output) {
-  const size_t error = output.find("ERROR:");
-  if (error == std::string::npos) return "";
-  size_t start = output.find("): ", error);
-  start = start == std::string::npos ? error + 6 : start + 3;
-  std::string line = output.substr(start, std::min(output.find('\n', start), start + 200) - start);
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
-  return line;
-}
 
 template <class Reader>
 void read_poly_data(const std::string& path, Collector& collector) {
