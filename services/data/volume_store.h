@@ -1,7 +1,9 @@
 // A data server's volume: read, placed in the room, classified and cut into slices on demand. Several servers may hold different parts of one volume.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/volume/session.h"
@@ -15,18 +17,30 @@ struct VolumeOptions {
   std::string raw;       ///< VolumeSource::raw
   std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
   bool lit = true;
-  double steps_per_s = 0;  ///< of a series; 0: as many as make a second, at most 12.5 a second
-  std::string part;        ///< "1/2": the second of two parts; empty: all of it
+  std::optional<double>
+      steps_per_s;      ///< of a series; nothing: as many as make a second, at most 12.5; 0: it does not play
+  std::string part;     ///< "1/2": the second of two parts; empty: all of it
+  int cache_mb = 2048;  ///< steps of a series that are kept
 };
 
+/// Reads one step of a volume.
+using StepReader = std::function<Result<Volume>(size_t step, const ReadProgress&)>;
+
+/// Used from one thread at a time.
 class VolumeStore {
  public:
-  /// mesh: room size, up (auto: z). Reads the first step (all steps of a series that fit in memory are kept once read). Errors name the file.
+  /// mesh: room size, up (auto: z). Reads the first step; all of them if they fit in cache_mb, so that levels cover the values of all. Otherwise
+  /// values of later steps that are beyond the first one's count as its smallest or largest. Steps that are read later, and one step
+  /// ahead, are read in a thread of their own. Errors name the file.
   static Result<std::unique_ptr<VolumeStore>> open(const std::string& path, const VolumeOptions& options,
                                                    const MeshOptions& mesh, const Progress& progress);
+  /// The same of volumes from anywhere. name: for errors.
+  static Result<std::unique_ptr<VolumeStore>> make(StepReader read, size_t steps, const std::string& name,
+                                                   const VolumeOptions& options, const MeshOptions& mesh,
+                                                   const Progress& progress);
   virtual ~VolumeStore() = default;
 
-  /// As it begins; part and parts are this store's.
+  /// As it begins; part and parts are this store's. Valid: read_session takes it.
   virtual const volume::Session& session() const = 0;
   virtual std::string format() const = 0;
 
