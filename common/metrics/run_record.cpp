@@ -23,6 +23,16 @@ void write_text(FILE* file, const std::string& text) {
   if (file) std::fwrite(text.data(), 1, text.size(), file);
 }
 
+// A text as CSV has it (RFC 4180); line ends become spaces, so that a row is a line.
+std::string csv_quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"') out += '"';
+    out += c == '\n' || c == '\r' ? ' ' : c;
+  }
+  return out + '"';
+}
+
 // How evenly samplers were kept busy: (most - least) / mean.
 nlohmann::ordered_json busy_spread(const std::map<std::string, double>& busy_s) {
   double least = 1e300, most = 0, sum = 0;
@@ -69,6 +79,7 @@ RunRecord::~RunRecord() {
     if (table.file) std::fclose(table.file);
   if (tiles_file_) std::fclose(tiles_file_);
   if (epochs_file_) std::fclose(epochs_file_);
+  if (assignment_file_) std::fclose(assignment_file_);
   if (trace_file_) {
     write_text(trace_file_, "\n]\n");
     std::fclose(trace_file_);
@@ -144,10 +155,12 @@ void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& t) {
   std::fwrite(line.data(), 1, line.size(), tiles_file_);
 }
 
-void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters) {
+void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters,
+                          const std::map<std::string, std::string>& texts) {
   if (epochs_++ == 0) {
     std::string header = "epoch,t_s";
     for (const auto& [name, value] : parameters) epoch_columns_.push_back(name), header += "," + name;
+    for (const auto& [name, text] : texts) epoch_texts_.push_back(name), header += "," + name;
     write_text(epochs_file_, header + "\n");
   }
   std::string line = fmt::format("{},{:.6f}", epoch.value, t_s);
@@ -156,8 +169,24 @@ void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string,
     // Exact: the frame can be made again from it.
     line += found == parameters.end() ? "," : fmt::format(",{}", found->second);
   }
+  for (const auto& name : epoch_texts_) {
+    const auto found = texts.find(name);
+    line += found == texts.end() ? "," : "," + csv_quoted(found->second);
+  }
   write_text(epochs_file_, line + "\n");
   if (epochs_file_) std::fflush(epochs_file_);
+}
+
+void RunRecord::add_assignment(const std::vector<Assignment>& transfers) {
+  if (directory_.empty()) return;
+  if (!assignment_file_) {
+    assignment_file_ = std::fopen((directory_ + "/assignment.csv").c_str(), "w");
+    write_text(assignment_file_, "partition,round,data_server,sampler,begin,end,bytes\n");
+  }
+  for (const auto& t : transfers)
+    write_text(assignment_file_, fmt::format("{},{},{},{},{},{},{}\n", t.partition, t.round, csv_quoted(t.data_server),
+                                             csv_quoted(t.sampler), t.begin, t.end, t.bytes));
+  if (assignment_file_) std::fflush(assignment_file_);
 }
 
 std::vector<double> RunRecord::column(const std::string& table, const std::string& name) const {

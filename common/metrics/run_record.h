@@ -23,6 +23,14 @@ struct Process {
   bool replaced = false;                 ///< it died and another of its name took its place
 };
 
+/// A row of assignment.csv: a transfer of a partition's assignment sheet (T5.3).
+struct Assignment {
+  uint64_t partition = 0, round = 0;
+  std::string data_server, sampler;
+  uint64_t begin = 0, end = 0;  ///< slices
+  uint64_t bytes = 0;           ///< expected
+};
+
 class RunRecord {
  public:
   /// Opens a folder for writing, making it if need be; `directory` may be empty: nothing is written, summaries still work.
@@ -32,8 +40,10 @@ class RunRecord {
   /// Rows of "frames", "updates" or "spans" from `process`. Refuses unknown tables and shapes that do not fit.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
   void add_tile(const std::string& sampler, const wire::TileDone& tile);
-  /// The scene's parameters from t_s on. epochs.csv has the names of the first epoch.
-  void add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters);
+  /// The scene's parameters and texts (quoted in the file) from t_s on. epochs.csv has the names of the first epoch.
+  void add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters,
+                 const std::map<std::string, std::string>& texts = {});
+  void add_assignment(const std::vector<Assignment>& transfers);
 
   /// The summary of DESIGN section 6 from everything so far. processes: all that took part; counters: "leases_expired",
   /// "tiles_released".
@@ -58,10 +68,11 @@ class RunRecord {
   std::map<std::string, Table> tables_;
   std::vector<wire::TileDone> tiles_;
   std::map<std::string, double> busy_s_;  // sample begin to encode end, by sampler
-  std::vector<std::string> epoch_columns_;
+  std::vector<std::string> epoch_columns_, epoch_texts_;
   size_t epochs_ = 0;
   FILE* tiles_file_ = nullptr;
   FILE* epochs_file_ = nullptr;
+  FILE* assignment_file_ = nullptr;  // volumes have one
   FILE* trace_file_ = nullptr;
   bool trace_has_events_ = false;
   std::map<std::string, int> trace_names_;

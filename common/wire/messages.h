@@ -28,6 +28,7 @@ namespace telesplat::wire {
 inline constexpr uint64_t kProtocolVersion = 3;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
+inline constexpr size_t kMaxFact = 64u << 10;         ///< bytes of a text in facts and arguments: transfer functions
 inline constexpr size_t kMaxControlBytes = 1u << 20;  ///< whole body of a message without bulk fields
 inline constexpr size_t kMaxBulkBytes = 256u << 20;   ///< whole body of a message with bulk fields
 inline constexpr size_t kMaxKeys = 1u << 21;          ///< cluster keys in one message
@@ -57,7 +58,7 @@ struct Hello {
   geometry::Box box_room;  ///< data: the data set's box; empty otherwise
   template <class F> static void fields(F& f, auto& m) {
     f("role", m.role); f("name", m.name); f("instance", m.instance); f("pid", m.pid); f("sent_s", m.sent_s);
-    f("endpoints", m.endpoints); f("facts", m.facts); f("parameters", m.parameters); f("box_room", m.box_room);
+    f("endpoints", m.endpoints); f("facts", m.facts, kMaxFact); f("parameters", m.parameters); f("box_room", m.box_room);
   }
 };
 
@@ -76,7 +77,7 @@ struct Welcome {
   std::map<std::string, double> settings;        ///< packing.* and session.* values
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s); f("epoch", m.epoch);
-    f("octree_depth", m.octree_depth); f("box_room", m.box_room); f("endpoints", m.endpoints); f("facts", m.facts);
+    f("octree_depth", m.octree_depth); f("box_room", m.box_room); f("endpoints", m.endpoints); f("facts", m.facts, kMaxFact);
     f("parameters", m.parameters); f("settings", m.settings);
   }
 };
@@ -186,7 +187,7 @@ struct Control {
                         ///< julia::parse_timeline takes it, or "off"), "tf" (argument "transfer": a preset's name or points, as
                         ///< volume::parse_transfer takes them)
   std::map<std::string, std::string> arguments;
-  template <class F> static void fields(F& f, auto& m) { f("command", m.command); f("arguments", m.arguments); }
+  template <class F> static void fields(F& f, auto& m) { f("command", m.command); f("arguments", m.arguments, kMaxFact); }
 };
 struct ControlReply {
   static constexpr std::string_view kName = "control_reply";

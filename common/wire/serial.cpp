@@ -206,9 +206,12 @@ class Decoder {
   void get(const msgpack::object& o, std::map<std::string, V>& v) {
     if (o.type != msgpack::type::MAP) return fail("is not a map");
     if (!within(o.via.map.size, kMaxEntries)) return;
+    const size_t value_limit = limit_;
     for (uint32_t i = 0; i < o.via.map.size && !error; ++i) {
       std::string key;
+      limit_ = 0;  // a field's own limit is its values'
       get(o.via.map.ptr[i].key, key);
+      limit_ = value_limit;
       if (!error) get(o.via.map.ptr[i].val, v[key]);
     }
   }

@@ -2,23 +2,27 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace telesplat::master {
 
-void FrameSchedule::request_view(const wire::ViewRequest& request) { waiting_[request.viewer].request = request; }
+void FrameSchedule::request_view(const wire::ViewRequest& request) {
+  if (request.buffers > 0 && std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) {
+        return f.request.viewer == request.viewer && f.request.request == request.request;
+      }))
+    return;
+  waiting_.add(request);
+}
 
 void FrameSchedule::forget_viewer(InstanceId viewer) {
-  waiting_.erase(viewer);
+  waiting_.forget(viewer);
   for (Frame& f : frames_)
     if (f.request.viewer == viewer) f.viewer_left = true;
 }
 
-void FrameSchedule::begin_turns() {
-  for (auto& [viewer, w] : waiting_) w.turn = true;
-}
-
-bool FrameSchedule::turn_waiting() const {
-  return std::any_of(waiting_.begin(), waiting_.end(), [](const auto& w) { return w.second.turn; });
+ViewQueue FrameSchedule::release_views() {
+  drop_frames();
+  return std::exchange(waiting_, {});
 }
 
 size_t FrameSchedule::views_in_flight() const {
@@ -26,14 +30,9 @@ size_t FrameSchedule::views_in_flight() const {
 }
 
 bool FrameSchedule::begin_view(EpochId epoch, bool turns_only) {
-  if (views_in_flight() >= size_t(options_.frames_in_flight)) return false;
-  const auto wanted = [&](const auto& w) { return !turns_only || w.second.turn; };
-  auto next = std::find_if(waiting_.upper_bound(last_viewer_), waiting_.end(), wanted);
-  if (next == waiting_.end()) next = std::find_if(waiting_.begin(), waiting_.end(), wanted);
-  if (next == waiting_.end()) return false;
-  const wire::ViewRequest request = next->second.request;
-  last_viewer_ = next->first;
-  waiting_.erase(next);
+  const wire::ViewRequest* next = waiting_.next(turns_only);
+  if (!next || views_in_flight() >= views_at_once(options_.frames_in_flight, next->buffers)) return false;
+  const wire::ViewRequest request = waiting_.take(next->viewer);
   if (cut_.coarse) begin_frame(epoch, request, kCoarseStep);
   begin_frame(epoch, request, 1);
   return true;
@@ -176,9 +175,9 @@ size_t FrameSchedule::leases_of(const std::string& sampler) const {
 }
 
 void FrameSchedule::drop_frames() {
-  // Newest first: where two views of a viewer were in flight, the newer one is wanted.
+  // Newest first, each view once.
   for (auto f = frames_.rbegin(); f != frames_.rend(); ++f)
-    if (!f->viewer_left) waiting_.try_emplace(f->request.viewer, Waiting{f->request, false});
+    if (!f->viewer_left && f->step == 1) waiting_.put_back(f->request);
   frames_.clear();
   overtaken_.clear();
 }

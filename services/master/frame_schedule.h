@@ -11,6 +11,7 @@
 #include "common/wire/messages.h"
 #include "services/master/frame_tiles.h"
 #include "services/master/sampling_costs.h"
+#include "services/master/view_queue.h"
 
 namespace telesplat::master {
 
@@ -48,16 +49,20 @@ class FrameSchedule {
   void set_cut(Cut cut) { cut_ = cut; }
   Cut cut() const { return cut_; }
 
-  /// The newest request of a viewer replaces the one that waits.
+  /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
   void request_view(const wire::ViewRequest& request);
   void forget_viewer(InstanceId viewer);
   bool view_waiting() const { return !waiting_.empty(); }
-  /// The viewers that wait now have a turn; those who come later have none. A turn ends when the viewer's frame begins.
-  void begin_turns();
-  bool turn_waiting() const;
+  /// See ViewQueue.
+  void begin_turns() { waiting_.begin_turns(); }
+  bool turn_waiting() const { return waiting_.turn_waiting(); }
+  /// What waits, to go on elsewhere: the scene became one of another kind.
+  ViewQueue release_views();
+  void take_views(ViewQueue views) { waiting_ = std::move(views); }
 
   /// Begins the frame or frames of the next view that waits; viewers take turns. turns_only: only those that have a turn. False: none
-  /// waits, or as many views are in flight as may be.
+  /// waits, or as many views are in flight as may be: frames_in_flight, or as many as the viewer has buffers, if that is more, but no
+  /// more than kBufferedInFlight for that.
   bool begin_view(EpochId epoch, bool turns_only = false);
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been out for long in a
@@ -97,10 +102,6 @@ class FrameSchedule {
   double backup_after_s() const;
 
  private:
-  struct Waiting {
-    wire::ViewRequest request;
-    bool turn = false;
-  };
   struct Frame {
     FrameId id;
     EpochId epoch;
@@ -121,8 +122,7 @@ class FrameSchedule {
 
   ScheduleOptions options_;
   Cut cut_;
-  std::map<InstanceId, Waiting> waiting_;
-  InstanceId last_viewer_;  // viewers take turns
+  ViewQueue waiting_;
   std::deque<Frame> frames_;
   std::map<LeaseId, Overtaken> overtaken_;
   SamplingCosts costs_;

@@ -18,7 +18,12 @@ const char* name_of(Progressive progressive) {
 }
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
-    : options_(options), instance_(instance), record_(record), schedule_(options.schedule), scene_(options.animation) {}
+    : options_(options),
+      instance_(instance),
+      record_(record),
+      schedule_(options.schedule),
+      scene_(options.animation),
+      volume_schedule_(options.schedule) {}
 
 MasterCore::Peer* MasterCore::known(const std::string& peer, double now_s) {
   const auto it = peers_.find(peer);
@@ -45,10 +50,11 @@ wire::Welcome MasterCore::welcome(double now_s) const {
   w.settings = settings();
   // The scene stays what it is while its data server is away.
   w.box_room = box_room_;
-  w.facts = facts_;
-  w.parameters = scene_.values();
+  w.facts = volume_on_ ? volume_.facts() : facts_;
+  w.parameters = volume_on_ ? volume_.values() : scene_.values();
   for (const auto& [id, p] : peers_)
     if (!p.gone) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
+  w.endpoints.erase("voxels");  // each part of a volume has its own: samplers get them in their sheets
   return w;
 }
 
@@ -75,25 +81,38 @@ void MasterCore::announce(double now_s) {
         outgoing_.push_back({id, std::string(wire::Welcome::kName), body});
 }
 
+void MasterCore::record_epoch(double now_s) {
+  if (!scene_known_) return;
+  if (volume_on_)
+    record_.add_epoch(epoch_, now_s, volume_.values(), {{"transfer", volume::to_text(volume_.session().transfer)}});
+  else
+    record_.add_epoch(epoch_, now_s, scene_.values());
+}
+
 void MasterCore::next_epoch(double now_s) {
   epoch_ = epoch_.next();
   schedule_.drop_frames();
-  if (scene_known_) record_.add_epoch(epoch_, now_s, scene_.values());
+  volume_schedule_.drop_frames();
+  record_epoch(now_s);
   announce(now_s);
 }
 
 void MasterCore::adopt_scene(const wire::Hello& data, double now_s) {
+  if (const auto kind = data.facts.find("kind"); kind != data.facts.end() && kind->second == "volume")
+    return adopt_volume(data, now_s);
+  const bool other_kind = std::exchange(volume_on_, false);
+  if (other_kind) schedule_.take_views(volume_schedule_.release_views());
   box_room_ = data.box_room;
   facts_ = data.facts;
   std::string problem;
-  bool changed = scene_.adopt(data, problem);
+  bool changed = scene_.adopt(data, problem) || other_kind;
   if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
   const bool julia = scene_.kind() == "julia";
   const Cut cut{julia, options_.progressive == Progressive::kAuto ? julia : options_.progressive == Progressive::kOn};
   changed |= cut != schedule_.cut();
   schedule_.set_cut(cut);
   if (!std::exchange(scene_known_, true))
-    record_.add_epoch(epoch_, now_s, scene_.values());
+    record_epoch(now_s);
   else if (changed)
     next_epoch(now_s);  // another scene than that of the server before
 }
@@ -114,8 +133,11 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
     }
   Peer& p = peers_[peer];
   const bool changed = p.hello.instance != m.instance || p.gone || p.hello.endpoints != m.endpoints;
-  if (changed && m.role == "packer")
-    schedule_.drop_frames();  // a new packer has none of the tiles that the old one had
+  if (changed && m.role == "packer") {  // a new packer has none of the tiles that the old one had
+    schedule_.drop_frames();
+    volume_schedule_.drop_frames();
+  }
+  if (changed && m.role == "sampler") leave_partition(peer);  // a new one holds no slab yet
   instances_.erase(p.hello.instance);
   instances_[m.instance] = peer;
   p.hello = m;
@@ -133,6 +155,8 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   w.hello_sent_s = m.sent_s;
   emit(peer, w);
   if (changed && (!m.endpoints.empty() || m.role == "data")) announce(now_s);
+  if (m.role == "sampler") join_partition(peer);
+  if (volume_on_) dispatch(now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
@@ -144,7 +168,7 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
   if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
   // The coarse pass looks a little beyond the view's edges, maybe beyond what a lease may.
   if (!geometry::validate(geometry::subsample(m.camera, kCoarseStep))) return;
-  schedule_.request_view(m);
+  volume_on_ ? volume_schedule_.request_view(m) : schedule_.request_view(m);
   dispatch(now_s);
 }
 
@@ -152,12 +176,16 @@ void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double n
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "sampler" || p->waiting_leases >= kMaxWaitingLeases) return;
   schedule_.heard_of(peer);
+  join_partition(peer);
   if (p->waiting_leases++ == 0) idle_.push_back(peer);
   dispatch(now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::LeaseExtend& m, double now_s) {
-  if (known(peer, now_s)) schedule_.extend(m.lease, now_s);
+  const Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "sampler") return;
+  join_partition(peer);
+  volume_on_ ? volume_schedule_.extend(m.lease, now_s) : schedule_.extend(m.lease, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now_s) {
@@ -166,7 +194,9 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   const auto by = instances_.find(m.sampler);
   const auto sampler = by == instances_.end() ? peers_.end() : peers_.find(by->second);
   const bool known_sampler = sampler != peers_.end();
-  if (!schedule_.tile_done(m, known_sampler ? sampler->first : std::string(), now_s)) return;
+  if (!(volume_on_ ? volume_schedule_.tile_done(m, now_s)
+                   : schedule_.tile_done(m, known_sampler ? sampler->first : std::string(), now_s)))
+    return;
   record_.add_tile(known_sampler ? sampler->second.hello.name : "?", m);
   dispatch(now_s);
 }
@@ -201,6 +231,10 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
 }
 
 Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
+  if (volume_on_ && (m.command == "set" || m.command == "animate" || m.command == "tf")) return obey_volume(m, now_s);
+  if (m.command == "tf")
+    return Error{facts_.empty() ? std::string("tf: there is no data server yet")
+                                : fmt::format("tf: a scene of kind \"{}\" has no transfer function", scene_.kind())};
   if (m.command == "set")
     if (const Status s = scene_.set(m.arguments); !s) return s.error();
   if (m.command == "epoch" || m.command == "set") {
@@ -214,7 +248,8 @@ Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
     if (const Status s = scene_.animate(timeline->second); !s) return s.error();
     return "animation " + scene_.animation();
   }
-  return Error{fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate", m.command.substr(0, 64))};
+  return Error{
+      fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf", m.command.substr(0, 64))};
 }
 
 void MasterCore::undeliverable(const std::string& peer) {
@@ -226,9 +261,14 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
   p.gone = true;
   p.waiting_leases = 0;
   std::erase(idle_, routing_id);
-  const int leases = schedule_.release_sampler(routing_id);
+  const int leases = schedule_.release_sampler(routing_id) + int(volume_schedule_.leases_of(routing_id));
+  leave_partition(routing_id);
+  if (p.hello.role == "data") volume_.leave(p.hello.instance);
   if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
-  if (p.hello.role == "viewer") schedule_.forget_viewer(p.hello.instance);
+  if (p.hello.role == "viewer") {
+    schedule_.forget_viewer(p.hello.instance);
+    volume_schedule_.forget_viewer(p.hello.instance);
+  }
   if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
 }
 
@@ -241,6 +281,7 @@ void MasterCore::tick(double now_s) {
               it == peers_.end() ? "?" : it->second.hello.name);
   });
   leases_expired_ += uint64_t(expired);
+  if (volume_on_) expire_slabs(now_s);
   dispatch(now_s);
 }
 
@@ -272,11 +313,18 @@ bool MasterCore::lease_one(double now_s) {
 }
 
 void MasterCore::dispatch(double now_s) {
+  if (volume_on_) update_partition(now_s);
   if (stop_ || idle_.empty() || !find_role("packer")) return;
+  if (volume_on_) return dispatch_volume(now_s);
   while (!idle_.empty()) {
     if ((schedule_.tile_open() || schedule_.backup_due(now_s)) && lease_one(now_s)) continue;
     if (!begin_view(now_s)) return;
   }
+}
+
+std::string MasterCore::animation() const {
+  if (volume_on_) return volume_.playing() ? "on" : "off";
+  return scene_.animation();
 }
 
 void MasterCore::shut_down(const std::string& reason) {
@@ -302,22 +350,25 @@ std::vector<metrics::Process> MasterCore::processes() const {
 
 std::map<std::string, double> MasterCore::counters() const {
   return {{"leases_expired", double(leases_expired_)},
-          {"tiles_released", double(schedule_.tiles_released())},
+          {"tiles_released", double(schedule_.tiles_released() + volume_schedule_.slabs_released())},
           {"leases_backup", double(schedule_.backups())},
-          {"frames_completed", double(schedule_.frames_completed())}};
+          {"frames_completed", double(schedule_.frames_completed() + volume_schedule_.frames_completed())},
+          {"partitions", double(partitions_.made())},
+          {"bytes_per_voxel", volume_on_ ? volume_.bytes_per_voxel() : 0}};
 }
 
 std::string MasterCore::status_json(double now_s) const {
   nlohmann::ordered_json out;
   out["epoch"] = epoch_.value;
-  out["frames_completed"] = schedule_.frames_completed();
-  out["frames_in_flight"] = schedule_.frames_in_flight();
+  out["frames_completed"] = schedule_.frames_completed() + volume_schedule_.frames_completed();
+  out["frames_in_flight"] = schedule_.frames_in_flight() + volume_schedule_.frames_in_flight();
   out["leases_expired"] = leases_expired_;
-  out["tiles_released"] = schedule_.tiles_released();
+  out["tiles_released"] = schedule_.tiles_released() + volume_schedule_.slabs_released();
   out["leases_backup"] = schedule_.backups();
   out["parameters"] = nlohmann::ordered_json::object();
-  for (const auto& [name, value] : scene_.values()) out["parameters"][name] = value;
-  out["animation"] = scene_.animation();
+  for (const auto& [name, value] : volume_on_ ? volume_.values() : scene_.values()) out["parameters"][name] = value;
+  out["animation"] = animation();
+  if (volume_on_) out["volume"] = volume_status();
   out["processes"] = nlohmann::ordered_json::array();
   for (const auto& [id, p] : peers_) {
     if (p.hello.role == "ctl") continue;
@@ -326,7 +377,7 @@ std::string MasterCore::status_json(double now_s) const {
                              {"pid", p.hello.pid},
                              {"alive", !p.gone},
                              {"silent_s", std::max(0.0, now_s - p.seen_s)}};
-    if (p.hello.role == "sampler") e["leases"] = schedule_.leases_of(id);
+    if (p.hello.role == "sampler") e["leases"] = schedule_.leases_of(id) + volume_schedule_.leases_of(id);
     for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
     for (const auto& [key, value] : p.hello.facts) e["facts"][key] = value;
     for (const auto& [key, value] : p.process.values) e["values"][key] = value;

@@ -76,6 +76,12 @@ void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
                  "levels of the point model's octree; 0: 5 for Julia sets, else 6")
       ->capture_default_str()
       ->check(CLI::Range(0, 10));
+  double& layers = o.master.settings["volume.layers"];
+  layers = 16;
+  app.add_option("--layers,--volume.layers", layers,
+                 "slice images that a frame of a volume has at most; more: better when the head moves")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, double(volume::kMaxLayers)));
   for (const auto& [name, text, value] :
        {std::tuple{"packing.max_points", "points the model holds at most", 20e6},
         {"packing.obsolete_after_s", "forget clusters not seen for so long; 0: never", 0.0},
@@ -136,14 +142,15 @@ int run(const MasterServiceOptions& o) {
       if (!message) break;
       const double now = monotonic_s();
       net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
-                    wire::TileDone, wire::MetricRows, wire::Goodbye, wire::Control>(
-          control, *message, [&](const auto& m) {
-            if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::MetricRows>) {
-              if (const Status s = core.on(message->peer, m, now); !s) control.reject(*message, s.error().text);
-            } else {
-              core.on(message->peer, m, now);
-            }
-          });
+                    wire::TileDone, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::Goodbye,
+                    wire::Control>(control, *message, [&](const auto& m) {
+        using M = std::decay_t<decltype(m)>;
+        if constexpr (std::is_same_v<M, wire::MetricRows> || std::is_same_v<M, wire::SliceWeights>) {
+          if (const Status s = core.on(message->peer, m, now); !s) control.reject(*message, s.error().text);
+        } else {
+          core.on(message->peer, m, now);
+        }
+      });
     }
     core.tick(monotonic_s());
     for (auto& out : core.take_outgoing())

@@ -9,7 +9,6 @@
 #include "common/julia/animation.h"
 
 namespace telesplat::master {
-namespace {
 
 Result<double> read_number(const std::string& name, const std::string& text) {
   double value = 0;
@@ -19,8 +18,6 @@ Result<double> read_number(const std::string& name, const std::string& text) {
     return Error{fmt::format("{} is \"{}\", not a finite number", name.substr(0, 64), text.substr(0, 40))};
   return value;
 }
-
-}  // namespace
 
 bool SceneParameters::adopt(const wire::Hello& data, std::string& problem) {
   const auto fact = [&](const char* key) {

@@ -11,6 +11,9 @@
 
 namespace telesplat::master {
 
+/// Reads the value that someone wants a parameter to have. Error: no finite number; names it.
+Result<double> read_number(const std::string& name, const std::string& text);
+
 class SceneParameters {
  public:
   /// `timeline`: what animates the scene from its first view on; empty: what the data server's fact "animate" says, if anything.

@@ -148,6 +148,14 @@ TEST(Limits, OfStringsListsAndMaps) {
   hello.name += 'n';
   EXPECT_TRUE(refused<Hello>(encode(hello), "name"));
 
+  hello = sample_message<Hello>();
+  hello.facts["transfer"] = std::string(kMaxFact, '0');  // longer than other strings
+  EXPECT_TRUE(decode<Hello>(bytes_of(encode(hello))));
+  hello.facts["transfer"] += '0';
+  EXPECT_TRUE(refused<Hello>(encode(hello), "facts"));
+  hello.facts = {{std::string(kMaxString + 1, 'k'), "v"}};
+  EXPECT_TRUE(refused<Hello>(encode(hello), "facts"));
+
   StatusReport status = sample_message<StatusReport>();
   status.values.clear();
   for (size_t i = 0; i < kMaxEntries; ++i) status.values["k" + std::to_string(i)] = 1;
