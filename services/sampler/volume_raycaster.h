@@ -5,6 +5,7 @@
 
 #include "common/geometry/camera.h"
 #include "common/image/file.h"
+#include "common/volume/grid.h"
 #include "common/volume/transfer_function.h"
 #include "common/volume/voxels.h"
 
