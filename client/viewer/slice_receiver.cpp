@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
@@ -13,13 +14,25 @@ namespace {
 
 constexpr double kIntroductionPeriod_s = 1;
 
-// Of the image that the blocks will make: the smallest rectangle that holds them.
-uint64_t pixels_of(const volume::EncodedSlice& slice) {
-  if (slice.blocks.empty()) return 0;
-  int x0 = slice.blocks[0].x, x1 = x0, y0 = slice.blocks[0].y, y1 = y0;
-  for (const auto& b : slice.blocks)
-    x0 = std::min(x0, b.x), x1 = std::max(x1, b.x), y0 = std::min(y0, b.y), y1 = std::max(y1, b.y);
-  return uint64_t(x1 - x0 + 1) * uint64_t(y1 - y0 + 1) * volume::kSliceBlock * volume::kSliceBlock;
+geometry::Rect hull(const geometry::Rect& a, const geometry::Rect& b) {
+  const int x = std::min(a.x, b.x), y = std::min(a.y, b.y);
+  return {x, y, std::max(a.x + a.width, b.x + b.width) - x, std::max(a.y + a.height, b.y + b.height) - y};
+}
+
+uint64_t pixels_of(const geometry::Rect& r) { return uint64_t(r.width) * uint64_t(r.height); }
+
+// Of all images, and of the layers that they are merged to.
+uint64_t pixels_claimed(std::span<const volume::EncodedSlice> slices, const volume::ShearFrame& shear) {
+  uint64_t pixels = 0;
+  std::map<int, geometry::Rect> layers;
+  for (const auto& slice : slices) {
+    const geometry::Rect rect = volume::bounds(slice, shear.width, shear.height);
+    pixels += pixels_of(rect);
+    const auto [layer, first] = layers.try_emplace(slice.layer, rect);
+    if (!first) layer->second = hull(layer->second, rect);
+  }
+  for (const auto& [layer, rect] : layers) pixels += pixels_of(rect);
+  return pixels;
 }
 
 }  // namespace
@@ -35,31 +48,25 @@ Status SliceReceiver::set_session(const wire::Welcome& session) {
   return ok_status();
 }
 
-Result<BufferedFrame> SliceReceiver::decode(const wire::SliceFrame& f, const volume::Grid& grid) {
+Result<BufferedFrame> SliceReceiver::decode(const wire::SliceFrame& f, const volume::Grid& grid,
+                                            std::vector<volume::SliceImage>& images) {
   if (const Status s = geometry::validate(f.camera); !s) return s.error();
   if (const Status s = volume::validate(f.shear, grid); !s) return s.error();
   const std::span bytes(reinterpret_cast<const uint8_t*>(f.data.data()), f.data.size());
   const auto slices = volume::parse_slices(bytes, f.shear.width, f.shear.height, int(f.shear.layers.size()));
   if (!slices) return slices.error();
-  uint64_t pixels = 0;
-  for (const auto& slice : *slices) pixels += pixels_of(slice);
-  if (pixels > kMaxPixels) return Error{fmt::format("its images have {} pixels; at most {}", pixels, kMaxPixels)};
-  auto out = std::make_shared<volume::VolumeFrame>();
-  out->grid = grid;
-  out->shear = f.shear;
-  out->frame = f.frame;
-  out->epoch = f.epoch;
-  out->bytes = f.data.size();
-  BufferedFrame buffered;
-  for (const auto& slice : *slices) {
-    auto image = volume::decode_slice(slice, f.shear.width, f.shear.height);
-    if (!image) return image.error();
-    out->images.push_back(std::move(*image));
-  }
-  for (const auto& image : out->images) buffered.pixels += image.pixels.size();
-  buffered.update = {f.request, f.leased_s, f.camera.pose};
-  buffered.frame = std::move(out);
-  return buffered;
+  if (const uint64_t pixels = pixels_claimed(*slices, f.shear); pixels > kMaxPixels)
+    return Error{fmt::format("its images have {} pixels; at most {}", pixels, kMaxPixels)};
+  images.resize(slices->size());
+  for (size_t i = 0; i < images.size(); ++i)
+    if (const Status s = volume::decode_slice_into(images[i], (*slices)[i], f.shear.width, f.shear.height); !s)
+      return s.error();
+  BufferedFrame out;
+  out.frame = std::make_shared<const volume::VolumeFrame>(
+      volume::make_volume_frame(grid, f.shear, images, f.frame, f.epoch, f.data.size()));
+  out.update = {f.request, f.leased_s, f.camera.pose};
+  out.pixels = out.frame->pixels();
+  return out;
 }
 
 void SliceReceiver::receive(net::Socket& state, int most) {
@@ -77,7 +84,7 @@ void SliceReceiver::on(const wire::SliceFrame& f, net::Socket& state) {
   const bool again = f.packer == packer_ && f.frame <= newest_;
   if (again || f.viewer != options_.viewer || !grid_ || (options_.buffers > 0 && !links_.expected(f.request)))
     return acknowledge(f.frame, state);
-  auto frame = decode(f, *grid_);
+  auto frame = decode(f, *grid_, images_);
   if (!frame) {
     ++decode_errors_;
     if (log_limit_.allow(begin_s)) log::warn("volume frame {}: {}: dropped", f.frame.value, frame.error().text);

@@ -14,7 +14,7 @@ namespace telesplat::viewer {
 
 class SliceReceiver {
  public:
-  /// Pixels of all images of a frame, at most (1 GiB): a few bytes can claim many of them.
+  /// Pixels of all images of a frame, those of its layers included, at most (1 GiB): a few bytes can claim many of them.
   static constexpr uint64_t kMaxPixels = 1u << 28;
   /// Frames on their way to an asynchronous viewer: while one is decoded the next one travels.
   static constexpr uint64_t kAsyncBuffers = 2;
@@ -40,8 +40,9 @@ class SliceReceiver {
   /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come.
   void tick(double now_s, net::Socket& state);
 
-  /// Checks and decodes. Bytes come from outside. Error: what is wrong with it, for the log.
-  static Result<BufferedFrame> decode(const wire::SliceFrame& frame, const volume::Grid& grid);
+  /// Checks and decodes. Bytes come from outside. Error: what is wrong with it, for the log. images: memory that is used again.
+  static Result<BufferedFrame> decode(const wire::SliceFrame& frame, const volume::Grid& grid,
+                                      std::vector<volume::SliceImage>& images);
 
   struct Figures {
     uint64_t pixels_received = 0, decode_errors = 0;
@@ -57,6 +58,7 @@ class SliceReceiver {
   SliceCache& cache_;
   metrics::SpanRecorder& spans_;
   std::optional<volume::Grid> grid_;
+  std::vector<volume::SliceImage> images_;
   InstanceId packer_;
   FrameId newest_;
   EpochId epoch_;

@@ -287,9 +287,8 @@ int run(ViewerOptions o) {
     const SourceMaker make_source = [&](SceneKind kind) -> Result<std::unique_ptr<ViewSource>> {
       if (kind == SceneKind::kPoints)
         return std::unique_ptr<ViewSource>(new PointSource(o.display, std::move(*renderer), caches, worker));
-      const std::string name = (*renderer)->name();
       renderer->reset();  // its context must not be the current one
-      auto volumes = make_volume_renderer(name, o.threads);
+      auto volumes = make_volume_renderer(o.renderer, o.threads);
       if (!volumes) return volumes.error();
       return std::unique_ptr<ViewSource>(
           new VolumeSource(std::move(*volumes), caches.slices, o.display.shading.background));

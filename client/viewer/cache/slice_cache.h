@@ -16,7 +16,7 @@ namespace telesplat::viewer {
 struct BufferedFrame {
   std::shared_ptr<const volume::VolumeFrame> frame;
   ShownUpdate update;
-  uint64_t pixels = 0;  ///< of its images
+  uint64_t pixels = 0;  ///< that it holds
 };
 
 class SliceCache {
