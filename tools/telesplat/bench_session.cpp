@@ -2,122 +2,41 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <chrono>
-#include <csignal>
-#include <filesystem>
-#include <thread>
-
 #include "common/core/clock.h"
-#include "common/net/service.h"
-#include "tools/telesplat/pipeline.h"
 
 namespace telesplat::launcher {
 namespace {
 
-constexpr double kPatience_s = 20;                    // for processes to start
-constexpr int kPackerNice = 5, kBackgroundNice = 10;  // as `telesplat run` has them
-
-int count_alive(const nlohmann::json& status, const std::string& role) {
-  int n = 0;
-  // Values come with the first report, after the welcome.
-  for (const auto& p : status.value("processes", nlohmann::json::array()))
-    n += p.value("role", "") == role && p.value("alive", false) && p.contains("values");
-  return n;
-}
+constexpr double kPatience_s = 20;  // for a Julia set's data server
 
 }  // namespace
 
 Result<std::unique_ptr<BenchSession>> BenchSession::start(const std::vector<std::string>& scene_flags,
                                                           const std::string& directory, bool own_machines) {
   std::unique_ptr<BenchSession> s(new BenchSession);
-  s->directory_ = directory;
-  std::error_code error;
-  std::filesystem::create_directories(directory + "/logs", error);
-  if (error) return Error{fmt::format("{}: cannot be made: {}", directory, error.message())};
-  if (const Status ok = s->launch(s->servers_, "master", "telesplat-master",
-                                  {"--bind", "tcp://127.0.0.1:*", "--out", directory, "--progressive", "off"}, 0);
-      !ok)
-    return ok.error();
-  const Status listens = s->wait_for("the master", [&] {
-    for (const auto& line : s->servers_.front().read_lines())
-      if (line.starts_with("listening on ")) s->endpoint_ = line.substr(13);
-    return !s->endpoint_.empty();
-  });
-  if (!listens) return listens.error();
   std::vector<std::string> data{"julia"};
   data.insert(data.end(), scene_flags.begin(), scene_flags.end());
-  if (const Status ok = s->launch(s->servers_, "data", "telesplat-data", data, kBackgroundNice); !ok) return ok.error();
-  if (const Status ok = s->launch(s->servers_, "packer", "telesplat-packer", {}, own_machines ? 0 : kPackerNice); !ok)
-    return ok.error();
-
-  s->control_ = std::make_unique<ControlClient>(s->endpoint_);
+  auto processes = BenchProcesses::start(data, {"--progressive", "off"}, directory, own_machines);
+  if (!processes) return processes.error();
+  s->processes_ = std::move(*processes);
   wire::Hello hello;
   hello.role = "viewer";
   hello.name = "bench";
-  s->link_.emplace(s->context_, s->endpoint_, hello);
-  const Status joined = s->wait_for("data server and packer", [&] {
+  s->link_.emplace(s->context_, s->processes_->endpoint(), hello);
+  if (const Status ok = s->processes_->wait_for_data(kPatience_s, [&] { s->pump(10); }); !ok) return ok.error();
+  for (const double until = monotonic_s() + kPatience_s;
+       !s->subscribed_ || !s->link_->session()->facts.contains("kind");) {
     s->pump(10);
-    return s->subscribed_ && s->link_->session()->facts.contains("kind");
-  });
-  if (!joined) return joined.error();
+    if (const Status ok = s->processes_->alive(); !ok) return ok.error();
+    if (monotonic_s() > until) return Error{"the packer publishes nothing; see " + directory + "/logs"};
+  }
   return s;
 }
 
 BenchSession::~BenchSession() { finish(); }
 
-Status BenchSession::launch(std::vector<ChildProcess>& into, const std::string& name, const std::string& program,
-                            std::vector<std::string> arguments, int nice) {
-  arguments.insert(arguments.end(), {"--name", name, "--log-level", "warn"});
-  if (!endpoint_.empty()) arguments.insert(arguments.end(), {"--master", endpoint_});
-  auto child = ChildProcess::start(name, program_directory() + "/" + program, arguments,
-                                   fmt::format("{}/logs/{}.log", directory_, name), nice);
-  if (!child) return child.error();
-  into.push_back(std::move(*child));
-  return ok_status();
-}
-
-Status BenchSession::alive() {
-  if (net::stop_requested()) return Error{"interrupted"};
-  for (auto* group : {&servers_, &samplers_})
-    for (auto& p : *group)
-      if (p.ended() && p.exit_code() != 128 + SIGKILL)
-        return Error{fmt::format("{} ended with code {}; see {}/logs", p.name(), p.exit_code(), directory_)};
-  return ok_status();
-}
-
-Status BenchSession::wait_for(const char* what, auto condition) {
-  for (const double until = monotonic_s() + kPatience_s; !condition();) {
-    if (const Status s = alive(); !s) return s;
-    if (monotonic_s() > until)
-      return Error{fmt::format("{} did not start within {} s; see {}/logs", what, kPatience_s, directory_)};
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return ok_status();
-}
-
 Status BenchSession::add_samplers(size_t count, const std::vector<std::string>& flags) {
-  while (samplers_.size() < count) {
-    const Status s =
-        launch(samplers_, fmt::format("sampler-{}", samplers_.size() + 1), "telesplat-sampler", flags, kBackgroundNice);
-    if (!s) return s;
-  }
-  double asked_s = -1e9;
-  return wait_for("the samplers", [&] {
-    pump(0);
-    if (monotonic_s() - asked_s < 0.2) return false;
-    asked_s = monotonic_s();
-    const auto status = ask_status();
-    return status && count_alive(*status, "sampler") >= int(count);
-  });
-}
-
-std::optional<nlohmann::json> BenchSession::ask_status() {
-  const auto answer = control_->ask("status", 2);
-  if (!answer) return std::nullopt;
-  auto json = nlohmann::json::parse(*answer, nullptr, false);
-  if (!json.is_object()) return std::nullopt;
-  return json;
+  return processes_->add_samplers(count, flags, [&] { pump(0); });
 }
 
 Status BenchSession::request(const geometry::Camera& camera) {
@@ -135,9 +54,9 @@ Result<BenchSession::Progress> BenchSession::receive(double patience_s) {
   const double now = monotonic_s();
   if (progress_.rows != rows) heard_s_ = now;
   if (!progress_.complete) progress_.elapsed_s = now - requested_s_;
-  if (const Status s = alive(); !s) return s.error();
+  if (const Status s = processes_->alive(); !s) return s.error();
   if (now - heard_s_ > patience_s)
-    return Error{fmt::format("nothing of the frame arrived for {:.0f} s; see {}/logs", patience_s, directory_)};
+    return Error{fmt::format("nothing of the frame arrived for {:.0f} s; see {}/logs", patience_s, directory())};
   return progress_;
 }
 
@@ -170,18 +89,10 @@ void BenchSession::pump(int timeout_ms) {
 }
 
 void BenchSession::finish() {
-  if (servers_.empty()) return;
-  if (!endpoint_.empty() && !servers_.front().ended()) {
-    if (link_) link_->leave([] { return net::MasterLink::Values{}; });
-    ControlClient control(endpoint_);
-    if (!control.ask("stop", 2)) servers_.front().signal(SIGTERM);
-    servers_.front().finish(4);
-  }
-  for (auto* group : {&samplers_, &servers_}) {
-    for (auto& p : *group) p.signal(SIGTERM);
-    for (auto& p : *group) p.finish(2);
-    group->clear();
-  }
+  if (!processes_) return;
+  if (link_) link_->leave([] { return net::MasterLink::Values{}; });
+  link_.reset();
+  processes_->finish();
 }
 
 }  // namespace telesplat::launcher

@@ -122,6 +122,8 @@ std::vector<std::string> viewer_arguments(const RunOptions& o, int number, doubl
                              v.shading,
                              "--coupling",
                              v.coupling,
+                             "--buffers",
+                             text(v.buffers),
                              "--update-rate",
                              text(v.requests.max_rate_hz),
                              "--epoch-patience",
