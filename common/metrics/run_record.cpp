@@ -16,6 +16,7 @@ namespace telesplat::metrics {
 namespace {
 
 constexpr size_t kMaxRows = 50'000'000;
+constexpr double kRawBytesPerSlicePixel = 4, kRawBytesPerPoint = 12;
 
 std::string shortest(double v) { return fmt::format("{:.9g}", v); }
 
@@ -119,6 +120,9 @@ Status RunRecord::write_row_table(const std::string& process, const wire::Metric
     write_text(table.file, line + "\n");
   }
   if (table.file) std::fflush(table.file);
+  const auto viewer = std::find(viewers_.begin(), viewers_.end(), process);
+  table.viewers.insert(table.viewers.end(), rows.values.size() / width, uint32_t(viewer - viewers_.begin()));
+  if (viewer == viewers_.end()) viewers_.push_back(process);
   table.values.insert(table.values.end(), rows.values.begin(), rows.values.end());
   return ok_status();
 }
@@ -201,6 +205,31 @@ std::vector<double> RunRecord::column(const std::string& table, const std::strin
   return out;
 }
 
+std::map<std::string, RunRecord::ViewerFigures> RunRecord::by_viewer() const {
+  std::map<std::string, ViewerFigures> out;
+  const auto whose = [&](const std::string& table, size_t row) -> ViewerFigures& {
+    return out[viewers_[tables_.at(table).viewers[row]]];
+  };
+  const auto times = column("frames", "t_s"), delays = column("frames", "inter_frame_ms");
+  std::map<const ViewerFigures*, double> last_s;
+  for (size_t i = 0; i < times.size(); ++i) {
+    ViewerFigures& v = whose("frames", i);
+    // A viewer that was started again counts its time anew.
+    if (const auto last = last_s.find(&v); last != last_s.end() && times[i] > last->second)
+      v.duration_s += times[i] - last->second;
+    last_s[&v] = times[i];
+    ++v.frames;
+    if (i < delays.size() && delays[i] > 0) v.inter_frame_ms.push_back(delays[i]);  // its first frame has none
+  }
+  const auto latencies = column("updates", "latency_ms");
+  for (size_t i = 0; i < latencies.size(); ++i) {
+    ViewerFigures& v = whose("updates", i);
+    ++v.updates;
+    v.latency_ms.push_back(latencies[i]);
+  }
+  return out;
+}
+
 nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
                                           const std::map<std::string, double>& counters) const {
   using nlohmann::ordered_json;
@@ -243,6 +272,7 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
   };
   std::map<uint64_t, FrameTimes> frames;
   double bytes_raw = 0, bytes_sent = 0, samples = 0, kept = 0;
+  const bool volume = fact("data", "kind") == "volume";  // then samples are voxels, and kept are pixels that they made
   for (const auto& t : tiles_) {
     if (t.step == 1) {
       auto& f = frames[t.frame.value];
@@ -251,7 +281,7 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       f.end = std::max(f.end, t.encode_end_s);
       f.packing_s += t.packed_s - t.receive_s;
     }
-    bytes_raw += double(t.samples) * image::kRawBytesPerPixel;
+    bytes_raw += volume ? double(t.kept) * kRawBytesPerSlicePixel : double(t.samples) * image::kRawBytesPerPixel;
     bytes_sent += double(t.bytes_sent);
     samples += double(t.samples);
     kept += double(t.kept);
@@ -266,10 +296,32 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
   const auto times = column("frames", "t_s");
   auto delays = column("frames", "inter_frame_ms");
   std::erase_if(delays, [](double d) { return d <= 0; });  // the first frame of a viewer has none
-  const double span_s =
-      times.empty() ? 0 : *std::max_element(times.begin(), times.end()) - *std::min_element(times.begin(), times.end());
+  // Each viewer by itself: they need not have begun, nor ended, together.
+  auto viewers_json = ordered_json::object();
+  double span_s = 0, fps = 0, updates_per_s = 0;
+  const auto figures = by_viewer();
+  const auto hundredths = [](double v) { return std::round(v * 100) / 100; };
+  for (const auto& [name, v] : figures) {
+    const double seconds = std::max(v.duration_s, 1e-9);
+    const double rate = v.duration_s > 0 ? double(v.frames) / seconds : 0;
+    const double updates = v.duration_s > 0 ? double(v.updates) / seconds : 0;
+    span_s = std::max(span_s, v.duration_s);
+    fps += rate / double(figures.size());
+    updates_per_s += updates / double(figures.size());
+    viewers_json[name] = {{"frames", v.frames},
+                          {"updates", v.updates},
+                          {"duration_s", std::round(v.duration_s * 1000) / 1000},
+                          {"fps", hundredths(rate)},
+                          {"updates_per_s", hundredths(updates)},
+                          {"inter_frame_delay_ms", to_json(distribution(v.inter_frame_ms))},
+                          {"view_update_latency_ms", to_json(distribution(v.latency_ms))}};
+  }
   const double viewers = std::max<double>(1, double(count_of("viewer")));
   const double run_s = std::max(span_s, 1e-9);
+  double consumed = sum_status("viewer", "points_received") * kRawBytesPerPoint;
+  if (volume)
+    for (const double pixels : column("updates", "points")) consumed += pixels * kRawBytesPerSlicePixel;
+  const double voxels_fetched = sum_status("data", "voxels_sent");
 
   ordered_json rss = ordered_json::object();
   for (const char* role : {"master", "data", "packer"})
@@ -287,7 +339,7 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       {"schema", 1},
       {"scene", fact("data", "scene")},
       {"kind", fact("data", "kind")},
-      {"primitives", uint64_t(number("data", "triangles"))},
+      {"primitives", uint64_t(number("data", volume ? "voxels" : "triangles"))},
       {"samplers", count_of("sampler")},
       {"viewers", count_of("viewer")},
       {"coupling", fact("viewer", "coupling")},
@@ -303,8 +355,10 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       {"frames", times.size()},
       {"updates", column("updates", "latency_ms").size()},
       {"duration_s", std::round(span_s * 1000) / 1000},
-      {"fps", std::round(double(times.size()) / viewers / run_s * 100) / 100},
-      {"updates_per_s", std::round(double(column("updates", "latency_ms").size()) / viewers / run_s * 100) / 100},
+      {"fps", hundredths(fps)},
+      {"updates_per_s", hundredths(updates_per_s)},
+      {"by_viewer", viewers_json},
+      {"frames_sampled", uint64_t(counter("frames_completed"))},
       {"inter_frame_delay_ms", to_json(distribution(delays))},
       {"view_construction_ms", to_json(distribution(column("frames", "construction_ms")))},
       {"view_update_latency_ms", to_json(distribution(column("updates", "latency_ms")))},
@@ -315,15 +369,18 @@ nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
       {"samplers_busy", busy_spread(busy_s_)},
       {"data_generating_rate_mb_s", bytes_raw / 1e6 / run_s},
       {"data_transfer_rate_mb_s", bytes_sent / 1e6 / run_s},
-      {"data_consuming_rate_mb_s", sum_status("viewer", "points_received") * 12 / 1e6 / viewers / run_s},
+      {"data_consuming_rate_mb_s", consumed / 1e6 / viewers / run_s},
       {"bytes_raw", uint64_t(bytes_raw)},
       {"bytes_sent", uint64_t(bytes_sent)},
       {"compression_ratio", bytes_sent > 0 ? bytes_raw / bytes_sent : 0.0},
-      {"redundancy_eliminated", samples > 0 ? 1 - kept / samples : 0.0},
+      {"redundancy_eliminated", samples > 0 && !volume ? 1 - kept / samples : 0.0},
       {"points_cached", uint64_t(points)},
       {"bytes_per_cached_point", points > 0 ? sum_present("packer", "model_bytes") / points : 0.0},
       {"points_drawn", to_json(distribution(column("frames", "points_drawn")))},
       {"update_age_ms", to_json(distribution(column("frames", "update_age_ms")))},
+      {"voxels_fetched", uint64_t(voxels_fetched)},
+      {"bytes_per_voxel", voxels_fetched > 0 ? sum_status("data", "bytes_sent") / voxels_fetched : 0.0},
+      {"partitions", uint64_t(counter("partitions"))},
       {"first_points_s", sum_present("viewer", "first_points_s") / viewers},
       {"tiles_released", uint64_t(counter("tiles_released"))},
       {"leases_backup", uint64_t(counter("leases_backup"))},

@@ -57,15 +57,24 @@ class RunRecord {
   struct Table {
     std::vector<std::string> columns;
     std::vector<double> values;
+    std::vector<uint32_t> viewers;  // of each row: whose, in viewers_
     FILE* file = nullptr;
+  };
+  /// What one viewer did.
+  struct ViewerFigures {
+    size_t frames = 0, updates = 0;
+    double duration_s = 0;
+    std::vector<double> inter_frame_ms, latency_ms;
   };
   RunRecord() = default;
   std::vector<double> column(const std::string& table, const std::string& name) const;
+  std::map<std::string, ViewerFigures> by_viewer() const;
   Status write_row_table(const std::string& process, const wire::MetricRows& rows);
   void write_spans(const Process& process, const wire::MetricRows& rows);
 
   std::string directory_;
   std::map<std::string, Table> tables_;
+  std::vector<std::string> viewers_;
   std::vector<wire::TileDone> tiles_;
   std::map<std::string, double> busy_s_;  // sample begin to encode end, by sampler
   std::vector<std::string> epoch_columns_, epoch_texts_;

@@ -16,9 +16,9 @@ void ViewQueue::add(const wire::ViewRequest& request) {
     requests.assign(1, request);
     return;
   }
-  const bool there = std::any_of(requests.begin(), requests.end(),
-                                 [&](const wire::ViewRequest& r) { return r.request == request.request; });
-  if (there || requests.size() >= std::min(request.buffers, wire::kMaxBuffers)) return;
+  for (wire::ViewRequest& r : requests)
+    if (r.request == request.request) return void(r = request);  // the view wanted now
+  if (requests.size() >= std::min(request.buffers, wire::kMaxBuffers)) return;
   requests.push_back(request);
 }
 

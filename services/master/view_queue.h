@@ -19,8 +19,8 @@ size_t views_at_once(int frames_in_flight, uint64_t buffers);
 
 class ViewQueue {
  public:
-  /// buffers 0: replaces whatever of the viewer waits. Otherwise it waits behind what does, once, and is dropped where as many wait as the viewer
-  /// has buffers (at most wire::kMaxBuffers).
+  /// buffers 0: replaces whatever of the viewer waits. Otherwise it waits behind what does, or takes the place of the one with its id, and is dropped
+  /// where as many wait as the viewer has buffers (at most wire::kMaxBuffers).
   void add(const wire::ViewRequest& request);
   /// The view was begun and its frame dropped: it waits again, before all others of its viewer; not at all if it is asynchronous and a newer one waits. Where
   /// several are put back, the newest comes first.

@@ -68,6 +68,8 @@ ViewQueue VolumeSchedule::release_views() {
 
 bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only) {
   const wire::ViewRequest* next = waiting_.next(turns_only);
+  // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two they might not.
+  if (!frames_.empty() && frames_.back().partition != partition) return false;
   if (!partition || !next || frames_.size() >= views_at_once(options_.frames_in_flight, next->buffers)) return false;
   std::vector<wire::ViewRequest> requests{waiting_.take(next->viewer)};
   const glm::dvec3 eye = requests[0].camera.pose.position_room;
@@ -140,15 +142,24 @@ bool VolumeSchedule::tile_done(const wire::TileDone& m, double now_s) {
 }
 
 int VolumeSchedule::drop_where(const std::function<bool(const Frame&)>& lost) {
+  // With a frame go the later ones of its viewers that take views in order.
+  std::vector<bool> dropped;
+  std::set<InstanceId> in_order;
+  for (const Frame& f : frames_) {
+    dropped.push_back(lost(f) || std::any_of(f.requests.begin(), f.requests.end(),
+                                             [&](const auto& r) { return in_order.contains(r.viewer); }));
+    for (const auto& r : f.requests)
+      if (dropped.back() && r.buffers > 0) in_order.insert(r.viewer);
+  }
   int out = 0;
   // Newest first, so that the views wait in the order in which they were asked for.
-  for (auto f = frames_.end(); f != frames_.begin();) {
-    --f;
-    if (!lost(*f)) continue;
-    for (const SlabState& s : f->slabs) out += s.state == SlabState::State::kLeased;
-    for (const auto& r : f->requests)
-      if (std::find(f->left.begin(), f->left.end(), r.viewer) == f->left.end()) waiting_.put_back(r);
-    f = frames_.erase(f);
+  for (size_t i = frames_.size(); i-- > 0;) {
+    if (!dropped[i]) continue;
+    const Frame& f = frames_[i];
+    for (const SlabState& s : f.slabs) out += s.state == SlabState::State::kLeased;
+    for (const auto& r : f.requests)
+      if (std::find(f.left.begin(), f.left.end(), r.viewer) == f.left.end()) waiting_.put_back(r);
+    frames_.erase(frames_.begin() + std::ptrdiff_t(i));
   }
   return out;
 }

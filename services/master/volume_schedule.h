@@ -44,14 +44,15 @@ class VolumeSchedule {
   void take_views(ViewQueue views) { waiting_ = std::move(views); }
 
   /// Begins the frame of the next view that waits, and of the first view of every other viewer whose eye is within kSameEye_m of its. Viewers take
-  /// turns; turns_only: only those that have a turn. False: none waits, or as many frames are in flight as may be (views_at_once()).
+  /// turns; turns_only: only those that have a turn. False: none waits, as many frames are in flight as may be (views_at_once()), or some of
+  /// another partition are: so all of a viewer's views become complete in order.
   bool begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only = false);
 
   /// The slab of `sampler` in the oldest frame that still needs it. nullopt: there is none.
   std::optional<wire::SliceLease> lease(const std::string& sampler, double now_s);
   /// Gives a lease its full time again. Unknown leases are ignored.
   void extend(LeaseId lease, double now_s);
-  /// The packer has this slab. True the first time; false for duplicates, slabs never leased and unknown frames. Frames become complete in any order.
+  /// The packer has this slab. True the first time; false for duplicates, slabs never leased and unknown frames.
   bool tile_done(const wire::TileDone& tile, double now_s);
 
   /// Drops the frames of leases that ran out; leases then last twice as long, until a frame is complete. lost_sampler is told whose. Returns

@@ -3,9 +3,11 @@
 
 #include <chrono>
 #include <filesystem>
+#include <random>
 
 #include "common/julia/parameters.h"
 #include "services/master/master_core.h"
+#include "services/master/scatter_schedule.h"
 
 namespace telesplat {
 namespace {
@@ -96,6 +98,97 @@ BENCHMARK(master_leases)
     ->Args({1000, 640, 0})
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
+
+// Arguments: senders, receivers, transfers. Baseline in the same run: the same transfers coloured in the order in which they come. `rounds_ratio`: rounds
+// over the least there can be (1); `time`, `time_plain`: the rounds' longest transfers, summed, over the busiest node's bytes, with and without
+// regard for bytes.
+void master_scatter(benchmark::State& state) {
+  std::mt19937 random(1);
+  std::lognormal_distribution<double> bytes(10, 1);
+  std::vector<master::Transfer> transfers;
+  for (int64_t i = 0; i < state.range(2); ++i)
+    transfers.push_back({uint32_t(random() % uint64_t(state.range(0))), uint32_t(random() % uint64_t(state.range(1))),
+                         uint64_t(bytes(random))});
+  std::map<uint32_t, uint64_t> load;
+  for (const auto& t : transfers) load[t.sender] += t.bytes, load[(1u << 31) + t.receiver] += t.bytes;
+  uint64_t busiest = 0;
+  for (const auto& [node, sum] : load) busiest = std::max(busiest, sum);
+  master::AssignmentSheet sheet;
+  for (auto _ : state) sheet = *master::schedule_scatter(transfers);
+  const auto plain = *master::schedule_scatter(transfers, 0, false);
+  state.counters["rounds"] = sheet.rounds;
+  state.counters["rounds_ratio"] = double(sheet.rounds) / double(master::busiest(transfers));
+  state.counters["time"] = double(sheet.makespan(transfers)) / double(busiest);
+  state.counters["time_plain"] = double(plain.makespan(transfers)) / double(busiest);
+}
+BENCHMARK(master_scatter)
+    ->ArgNames({"senders", "receivers", "transfers"})
+    ->Args({4, 3, 10})
+    ->Args({2, 40, 120})
+    ->Args({16, 64, 1024})
+    ->Args({64, 64, 16384})
+    ->Args({1024, 1024, 65536})
+    ->Unit(benchmark::kMillisecond);
+
+// A volume's frame: request, a slice lease for each sampler, completion of each. Arguments: samplers.
+void master_slices(benchmark::State& state) {
+  const auto samplers = uint64_t(state.range(0));
+  auto record = std::move(metrics::RunRecord::open("")).value();
+  master::MasterCore core({}, {1}, *record);
+  const auto join = [&](const std::string& role, uint64_t instance) {
+    wire::Hello h;
+    h.role = role;
+    h.name = role + std::to_string(instance);
+    h.instance = {instance};
+    if (role == "data") {
+      volume::Session s;
+      s.grid.size = {512, 512, 512};
+      s.grid.index_to_room = glm::dmat4(0.002);
+      s.grid.index_to_room[3][3] = 1;
+      s.transfer.points = {{}};
+      h.parameters = volume::to_parameters(s);
+      h.facts = volume::to_facts(s);
+      h.facts["kind"] = "volume";
+      h.endpoints = {{"voxels", "tcp://data"}};
+    }
+    core.on(h.name, h, 0);
+  };
+  join("packer", 2);
+  join("viewer", 3);
+  for (uint64_t i = 0; i < samplers; ++i) join("sampler", 10 + i);
+  join("data", 1);
+  wire::SliceWeights weights;
+  weights.data = {1};
+  weights.epoch = {1};
+  weights.voxels.assign(512, 10'000);
+  if (!core.on("data1", weights, 0)) state.SkipWithError("weights are refused");
+  for (uint64_t i = 0; i < samplers; ++i)
+    core.on("sampler" + std::to_string(10 + i), wire::SlabReady{{10 + i}, 1, {1}, 1, 1}, 0);
+  core.take_outgoing();
+  uint64_t request = 0, leases = 0;
+  for (auto _ : state) {
+    wire::ViewRequest view;
+    view.viewer = {3};
+    view.request = {++request};
+    view.camera = geometry::make_camera({.position_room = {0.5, 0.5, 3}}, 60, 1600, 1200);
+    core.on("viewer3", view, 0);
+    for (uint64_t i = 0; i < samplers; ++i) core.on("sampler" + std::to_string(10 + i), wire::LeaseRequest{}, 0);
+    for (const auto& m : core.take_outgoing()) {
+      if (m.type != wire::SliceLease::kName) continue;
+      const auto l = *wire::decode<wire::SliceLease>(std::as_bytes(std::span(m.body)));
+      wire::TileDone done;
+      done.frame = l.frame;
+      done.tile = l.slab;
+      done.lease = l.lease;
+      core.on("packer2", done, 0);
+      ++leases;
+    }
+  }
+  if (core.counters().at("frames_completed") != double(request)) state.SkipWithError("frames are not complete");
+  state.counters["per_lease"] =
+      benchmark::Counter(double(leases), benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(master_slices)->ArgName("samplers")->Arg(1)->Arg(4)->Arg(40)->Arg(500)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace telesplat

@@ -35,9 +35,13 @@ TEST(ViewQueue, AsynchronousViewersWaitForTheirNewest) {
 TEST(ViewQueue, BufferedOnesWaitInOrderUpToTheirBuffers) {
   ViewQueue q;
   for (uint64_t id = 1; id <= 5; ++id) q.add(request(1, id, 3));
-  q.add(request(1, 2, 3));  // asked again
+  auto again = request(1, 2, 3);
+  again.camera.width = 77;
+  q.add(again);
   EXPECT_EQ(q.waiting({1}), 3u);
-  for (uint64_t id = 1; id <= 3; ++id) EXPECT_EQ(q.take({1}).request.value, id);
+  EXPECT_EQ(q.take({1}).request.value, 1u);
+  EXPECT_EQ(q.take({1}).camera.width, 77) << "asked again: the view wanted now, in its old place";
+  EXPECT_EQ(q.take({1}).request.value, 3u);
   for (uint64_t id = 1; id <= 50; ++id) q.add(request(1, id, 1000));
   EXPECT_EQ(q.waiting({1}), wire::kMaxBuffers);
   q.add(request(1, 99));  // the viewer changed its coupling

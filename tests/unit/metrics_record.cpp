@@ -258,6 +258,81 @@ TEST_F(Record, EpochsCanBeMadeAgain) {
   EXPECT_EQ(record->summary({}, {})["epochs"], 3);
 }
 
+TEST_F(Record, EpochsHaveTextsInQuotes) {
+  record->add_epoch({1}, 0, {{"volume.step", 0}}, {{"transfer", "0:#000000:0, 1:#ffffff:1"}});
+  record->add_epoch({2}, 1, {{"volume.step", 1}}, {{"transfer", "a \"b\"\nc"}});
+  record->add_epoch({3}, 2, {{"volume.step", 2}});
+  EXPECT_EQ(text("epochs.csv"),
+            "epoch,t_s,volume.step,transfer\n1,0.000000,0,\"0:#000000:0, 1:#ffffff:1\"\n"
+            "2,1.000000,1,\"a \"\"b\"\" c\"\n3,2.000000,2,\n");
+}
+
+TEST_F(Record, AssignmentSheetsAreKept) {
+  EXPECT_FALSE(fs::exists(folder + "/run/assignment.csv")) << "meshes have none";
+  record->add_assignment({{1, 0, "data-1", "sampler, \"the first\"", 0, 13, 4000}});
+  record->add_assignment({{2, 3, "data-2", "sampler-2", 12, 24, 5}});
+  EXPECT_EQ(text("assignment.csv"),
+            "partition,round,data_server,sampler,begin,end,bytes\n"
+            "1,0,\"data-1\",\"sampler, \"\"the first\"\"\",0,13,4000\n2,3,\"data-2\",\"sampler-2\",12,24,5\n");
+}
+
+TEST_F(Record, ViewersAreCountedEachByItself) {
+  Process second = viewer;
+  second.name = "viewer-2";
+  // The first shows 5 frames in 1 s, the second, which begins later and is started again, 3 frames in 0.25 s and 3 in 0.25 s.
+  const std::vector<std::string> columns{"t_s", "inter_frame_ms"};
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 0.25, 250, 0.5, 250, 0.75, 250, 1, 250}}));
+  ASSERT_TRUE(record->add_rows(second, {{6}, "frames", columns, {0, 0, 0.125, 125, 0.25, 125}}));
+  ASSERT_TRUE(record->add_rows(second, {{7}, "frames", columns, {0, 0, 0.125, 125, 0.25, 125}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"latency_ms", "points"}, {100, 1000, 200, 3000}}));
+  ASSERT_TRUE(record->add_rows(second, {{6}, "updates", {"latency_ms", "points"}, {50, 6000}}));
+  const auto s = record->summary({viewer, second}, {{"frames_completed", 3}});
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["fps"], 5);
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["updates_per_s"], 2);
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["view_update_latency_ms"]["mean"], 150);
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["inter_frame_delay_ms"]["max"], 250);
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["frames"], 6);
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["duration_s"], 0.5) << "of both its lives";
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["fps"], 12);
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["inter_frame_delay_ms"]["max"], 125);
+  EXPECT_EQ(s["fps"], 8.5) << "the mean over viewers";
+  EXPECT_EQ(s["updates_per_s"], 2);
+  EXPECT_EQ(s["frames"], 11);
+  EXPECT_EQ(s["updates"], 3);
+  EXPECT_EQ(s["duration_s"], 1);
+  EXPECT_EQ(s["frames_sampled"], 3);
+}
+
+TEST_F(Record, OfAVolumeCountsVoxelsAndPixels) {
+  Process data{
+      "data", "data-1", 1, {{"kind", "volume"}, {"voxels", "16777216"}}, {{"bytes_sent", 3000}, {"voxels_sent", 1000}}};
+  Process more{
+      "data", "data-2", 2, {{"kind", "volume"}, {"voxels", "16777216"}}, {{"bytes_sent", 3000}, {"voxels_sent", 1000}}};
+  viewer.facts["coupling"] = "loose";
+  viewer.facts["buffers"] = "3";
+  auto slab = tile(1, 0, 1.0);
+  slab.samples = 50000;  // voxels
+  slab.kept = 250'000;   // pixels
+  slab.bytes_sent = 100'000;
+  record->add_tile("sampler-1", slab);
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s"}, {0, 2}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"latency_ms", "points"}, {100, 100'000, 200, 400'000}}));
+  const auto s = record->summary({data, more, viewer}, {{"partitions", 2}});
+  EXPECT_EQ(s["kind"], "volume");
+  EXPECT_EQ(s["primitives"], 16777216);
+  EXPECT_EQ(s["coupling"], "loose");
+  EXPECT_EQ(s["buffers"], 3);
+  EXPECT_EQ(s["bytes_raw"], 1'000'000) << "four bytes a pixel";
+  EXPECT_EQ(s["compression_ratio"], 10);
+  EXPECT_EQ(s["redundancy_eliminated"], 0);
+  EXPECT_EQ(s["data_generating_rate_mb_s"], 0.5);
+  EXPECT_EQ(s["data_transfer_rate_mb_s"], 0.05);
+  EXPECT_EQ(s["data_consuming_rate_mb_s"], 1);
+  EXPECT_EQ(s["bytes_per_voxel"], 3);
+  EXPECT_EQ(s["voxels_fetched"], 2000);
+  EXPECT_EQ(s["partitions"], 2);
+}
+
 TEST_F(Record, OfARunWithoutAnythingHoldsZeros) {
   const auto s = record->summary({}, {});
   EXPECT_EQ(s["frames"], 0);
