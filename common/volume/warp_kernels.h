@@ -16,18 +16,23 @@ inline constexpr int kWarpPartsX = kWarpTileWidth / kWarpPartWidth, kWarpPartsY 
 inline constexpr int kWarpSubtexels = 128;     ///< steps of bilinear weights
 inline constexpr int kWarpOpaque = 255 * 128;  ///< opacity 1, in the accumulators' steps
 inline constexpr int kWarpDone = 64;           ///< less transparency than this is none: half of an 8-bit step
+inline constexpr int kWarpSolid = 255 * 96;    ///< transparency at which a pixel is solid: 1 - kSolid
 inline constexpr float kWarpNearestW = 1e-6f;  ///< rays with less than this do not meet the plane
 
-/// A layer, as a tile sees it. With (x, y) counted from the tile's corner, at a pixel's centre + 0,
-///   X = (x0 + y xy) + x xx, Y and W likewise;  texel (X / W + shift_x, Y / W + shift_y) / kWarpSubtexels, clamped to [0, last], rounded.
-/// X and Y are relative to a texel near the tile (which shift_x, shift_y add again, and a half), so that floats have enough digits.
+/// A layer, as a tile sees it. With (x, y) counted from the middle of the tile's first pixel,
+///   X = (x0 + y xy) + x xx, Y and W likewise;  bits = bits of (clamp(X / W, least_x, most_x) + shift_x)
+/// of which the lower ones are the place in the image, in 1 / kWarpSubtexels of a texel, rounded: shift_x holds 2^23, and X and Y are relative to a
+/// texel near the tile, which shift_x and shift_y add again, so that floats have enough digits.
 struct WarpLayer {
   float x0, xx, xy, y0, yx, yy, w0, wx, wy;
-  float shift_x, shift_y, last_x, last_y;
+  float least_x, most_x, shift_x, least_y, most_y, shift_y;
   float depth;  ///< times 1 / W: metres
   int32_t pitch;
   const uint32_t* texels;
 };
+inline constexpr float kWarpMagic = 8388608.0f;  ///< 2^23: the sum with a whole number below has it in its lower bits
+inline constexpr int32_t kWarpMagicTexels =
+    0xffff;  ///< of bits >> 7, what is the place's. kMaxRasterSide + 3 is less than half of it
 
 struct WarpTile {
   const WarpLayer* layers = nullptr;  ///< at most 64, front to back

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "common/volume/warp_kernels.h"
-#include "common/volume/warper.h"
 
 namespace telesplat::volume {
 
@@ -34,13 +33,16 @@ inline WarpedPixel warp_pixel(const WarpTile& tile, uint64_t layers, int x, int 
     ++samples;
     const float w = (layer.w0 + py * layer.wy) + px * layer.wx;
     const float inverse = 1.0f / std::max(w, kWarpNearestW);
-    const float at_x = ((layer.x0 + py * layer.xy) + px * layer.xx) * inverse + layer.shift_x;
-    const float at_y = ((layer.y0 + py * layer.yy) + px * layer.yx) * inverse + layer.shift_y;
+    const auto place = [](float at, float least, float most, float shift) {
+      return std::bit_cast<int32_t>(std::min(std::max(at, least), most) + shift);
+    };
+    const float near_x = ((layer.x0 + py * layer.xy) + px * layer.xx) * inverse;
+    const float near_y = ((layer.y0 + py * layer.yy) + px * layer.yx) * inverse;
     // Rays that do not meet the plane look at texel column 0, where nothing is.
-    const auto cx = w >= kWarpNearestW ? static_cast<int32_t>(std::min(std::max(at_x, 0.0f), layer.last_x)) : 0;
-    const auto cy = static_cast<int32_t>(std::min(std::max(at_y, 0.0f), layer.last_y));
+    const int32_t cx = place(w >= kWarpNearestW ? near_x : layer.least_x, layer.least_x, layer.most_x, layer.shift_x);
+    const int32_t cy = place(near_y, layer.least_y, layer.most_y, layer.shift_y);
     const int32_t fx = cx & 127, fy = cy & 127;
-    const uint32_t* texel = layer.texels + (cy >> 7) * layer.pitch + (cx >> 7);
+    const uint32_t* texel = layer.texels + (cy >> 7 & kWarpMagicTexels) * layer.pitch + (cx >> 7 & kWarpMagicTexels);
     int32_t next[4];
     for (int c = 0; c < 4; ++c) {
       const auto row = [&](const uint32_t* t) {
@@ -50,8 +52,7 @@ inline WarpedPixel warp_pixel(const WarpTile& tile, uint64_t layers, int x, int 
       next[c] = add_behind(c, upper + times_15(lower - upper, fy << 8));
     }
     std::copy_n(next, 4, sum);
-    if (static_cast<float>(transparency()) <= static_cast<float>(kWarpOpaque) * (1 - kSolid) &&
-        out.depth_m == std::numeric_limits<float>::infinity())
+    if (transparency() <= kWarpSolid && out.depth_m == std::numeric_limits<float>::infinity())
       out.depth_m = inverse * layer.depth;
     if (transparency() < kWarpDone) break;
   }

@@ -7,6 +7,9 @@
 namespace telesplat::volume {
 namespace {
 
+static_assert(kWarpSolid == static_cast<int>(static_cast<float>(kWarpOpaque) * (1 - kSolid)));
+static_assert((kMaxRasterSide + 3) * kWarpSubtexels < static_cast<int>(kWarpMagic));
+
 int64_t floor_to(int64_t value, int64_t step) {
   const int64_t rest = value % step;
   return value - (rest < 0 ? rest + step : rest);
@@ -113,10 +116,12 @@ bool WarpPlan::place(const Layer& layer, int64_t x, int64_t y, uint64_t bit, War
          .w0 = f(glm::dot(rows[2], first)),
          .wx = f(rows[2].x),
          .wy = f(rows[2].y),
-         .shift_x = f(middle_x * kWarpSubtexels + 0.5),
-         .shift_y = f(middle_y * kWarpSubtexels + 0.5),  // rounds
-         .last_x = f(last_x * kWarpSubtexels),
-         .last_y = f(last_y * kWarpSubtexels),
+         .least_x = f(-middle_x * kWarpSubtexels),
+         .most_x = f((last_x - middle_x) * kWarpSubtexels),
+         .shift_x = f(middle_x * kWarpSubtexels) + kWarpMagic,
+         .least_y = f(-middle_y * kWarpSubtexels),
+         .most_y = f((last_y - middle_y) * kWarpSubtexels),
+         .shift_y = f(middle_y * kWarpSubtexels) + kWarpMagic,
          .depth = f(layer.depth * scale),
          .pitch = image.pitch,
          .texels = image.texels.data()};
