@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "tools/telesplat/bench_scaling.h"
+#include "tools/telesplat/bench_volume.h"
 #include "tools/telesplat/compare_command.h"
 #include "tools/telesplat/control_command.h"
 #include "tools/telesplat/inspect_command.h"
@@ -48,6 +49,11 @@ int telesplat_main(int argc, char** argv) {
   auto* scaling = bench->add_subcommand(
       "scaling", "how a Julia set's frame speeds up with the number of samplers, beside table 7.2 of the thesis");
   launcher::add_scaling_flags(*scaling, scaling_options);
+  launcher::VolumeBenchOptions volume_options;
+  auto* bench_volume = bench->add_subcommand(
+      "volume",
+      "how fast views of a volume are made with 1-4 samplers and 1-4 viewers, beside tables 7.3 and 7.4 of the thesis");
+  launcher::add_volume_bench_flags(*bench_volume, volume_options);
   launcher::PresetsOptions presets_options;
   auto* presets = app.add_subcommand(
       "presets", "tell the Julia sets and transfer functions that have names, or draw the Julia sets");
@@ -63,6 +69,7 @@ int telesplat_main(int argc, char** argv) {
   net::parse_or_exit(app, int(pointers.size()), pointers.data());
   if (*run) return launcher::run(*run, run_options);
   if (*view) return launcher::run(*view, view_options);
+  if (*bench_volume) return launcher::bench_volume(volume_options);
   if (*bench) return launcher::bench_scaling(scaling_options);
   if (*presets) return launcher::presets(presets_options);
   if (*compare) return launcher::compare(compare_options);
