@@ -107,7 +107,8 @@ Result<glm::dvec3> order(DicomSeries& series, const std::string& folder) {
     return Error{fmt::format("{}: slices are missing: {} and {} are {:.3g} apart, others {:.3g}", folder,
                              file_name(slices[widest - 1].path), file_name(slices[widest].path), most, least)};
   if (most > 1.01 * least)
-    series.remark += fmt::format("slices are {:.4g} to {:.4g} apart and were evened; ", least, most);
+    series.remark += (series.remark.empty() ? "" : "; ") +
+                     fmt::format("slices are {:.4g} to {:.4g} apart and were evened", least, most);
   return (*slices.back().position - *slices.front().position) / double(slices.size() - 1);
 }
 
@@ -146,7 +147,7 @@ Result<DicomSeries> find_dicom_series(const std::string& folder) {
   DicomSeries series;
   series.slices = std::move(largest->second);
   if (all->size() > 1)
-    series.remark = fmt::format("{} slices of {} other series in the folder were left out; ",
+    series.remark = fmt::format("{} slices of {} other series in the folder were left out",
                                 slices - series.slices.size(), all->size() - 1);
   for (const DicomSlice& s : series.slices)
     if (auto status = check_slice(s, series.slices.front()); !status) return status.error();

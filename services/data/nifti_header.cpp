@@ -101,8 +101,13 @@ glm::dmat4 placement_of(const Values& v) {
   }
   const glm::dvec3 spacing(v.pixdim[1], v.pixdim[2], v.pixdim[3]);
   if (v.qform > 0) {
-    const double b = v.quaternion[0], c = v.quaternion[1], d = v.quaternion[2];
-    const double a = std::sqrt(std::max(0.0, 1 - b * b - c * c - d * d));
+    double a = 0, b = v.quaternion[0], c = v.quaternion[1], d = v.quaternion[2];
+    if (const double rest = 1 - (b * b + c * c + d * d); rest > 1e-7) {
+      a = std::sqrt(rest);
+    } else {  // half a turn, but for rounding
+      const double length = std::sqrt(1 - rest);
+      b /= length, c /= length, d /= length;
+    }
     const double handed = v.pixdim[0] < 0 ? -1 : 1;
     const glm::dvec3 i(a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c));
     const glm::dvec3 j(2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b));

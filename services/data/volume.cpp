@@ -72,4 +72,10 @@ Result<Volume> read_volume(const VolumeSource& source, size_t step, const ReadPr
   }
 }
 
+Status check_steps(const VolumeSource& source) {
+  for (size_t step = 0; step < source.steps.size(); ++step)
+    if (const auto header = read_step_header(source, step); !header) return header.error();
+  return ok_status();
+}
+
 }  // namespace telesplat::data

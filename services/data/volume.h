@@ -49,7 +49,9 @@ bool looks_like_volume(const std::string& path);
 Result<VolumeSource> find_volume(const std::string& path, const std::string& raw);
 /// Reads one step. Formats that VTK reads are read in the program telesplat-import (vtk_reader.cpp), so that neither crashes nor claims of hostile files
 /// reach us. Error: truncated, lying and mismatched headers (sizes against file sizes), more than volume::kMaxSide on an axis, several
-/// components, types that are none of VoxelType's, memory. Names file, value and limit.
+/// components, types that are none of VoxelType's (wider ones become f32 where that keeps them), memory. Names file, value and limit.
 Result<Volume> read_volume(const VolumeSource& source, size_t step, const ReadProgress& progress);
+/// Reads the headers of all steps, but no voxels. Error: as read_volume says of a header; a step whose size is not that of the first.
+Status check_steps(const VolumeSource& source);
 
 }  // namespace telesplat::data

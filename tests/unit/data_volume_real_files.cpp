@@ -91,7 +91,8 @@ Volume read_or_fail(const std::string& path, size_t step = 0) {
   return volume ? std::move(*volume) : Volume{};
 }
 
-// The folder holds 40 neighbouring slices of the scan that the single file has whole: two readers that share nothing must agree.
+// The folder holds 40 neighbouring slices of the scan that the single file has whole, turned half round about x: two readers that share nothing
+// must agree.
 TEST(RealVolumeSlices, OfTheDicomFolderAreThoseOfTheMetaImage) {
   const std::string folder = data_folder() + "/volumes/";
   for (const char* name : {"alderson-dicom", "alderson-ct-512x512x199.mha"})
@@ -99,17 +100,22 @@ TEST(RealVolumeSlices, OfTheDicomFolderAreThoseOfTheMetaImage) {
   const Volume part = read_or_fail(folder + "alderson-dicom"),
                all = read_or_fail(folder + "alderson-ct-512x512x199.mha");
   ASSERT_EQ(part.size[0], all.size[0]);
-  const size_t slice = size_t(part.size[0]) * size_t(part.size[1]);
-  const auto same = [&](size_t k_part, size_t k_all, size_t stride) {
-    for (size_t at = 0; at < slice; at += stride)
-      if (part.value(k_part * slice + at) != all.value(k_all * slice + at)) return false;
+  ASSERT_EQ(part.size[1], all.size[1]);
+  const size_t width = size_t(part.size[0]), height = size_t(part.size[1]);
+  const auto same = [&](size_t k_part, int k_all, size_t stride) {
+    if (k_all < 0 || k_all >= all.size[2]) return false;
+    for (size_t at = 0; at < width * height; at += stride) {
+      const size_t i = at % width, j = at / width;
+      if (part.value(k_part * width * height + at) != all.value((size_t(k_all) * height + height - 1 - j) * width + i))
+        return false;
+    }
     return true;
   };
-  int found = -1;
-  for (int k = 0; k < all.size[2] && found < 0; ++k)
-    if (same(0, size_t(k), 97)) found = k;
-  ASSERT_GE(found, 0) << "the first slice is nowhere in the whole scan";
-  for (size_t k = 0; k < size_t(part.size[2]); ++k) EXPECT_TRUE(same(k, size_t(found) + k, 1)) << k;
+  int first = 0;
+  while (first < all.size[2] && !same(0, first, 97)) ++first;
+  ASSERT_LT(first, all.size[2]) << "the first slice is nowhere in the whole scan";
+  const int step = same(1, first + 1, 97) ? 1 : -1;
+  for (int k = 0; k < part.size[2]; ++k) EXPECT_TRUE(same(size_t(k), first + step * k, 1)) << k;
 }
 
 TEST(RealVolumeSeries, PlaysInTheOrderOfItsNumbers) {

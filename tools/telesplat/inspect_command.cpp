@@ -93,11 +93,20 @@ int inspect_mesh(const std::string& path, const data::MeshOptions& options) {
   return 0;
 }
 
+int inspect_volume(const std::string& path, const std::string& raw) {
+  const auto facts = data::inspect_volume(path, raw, nullptr);
+  if (!facts) return refuse(facts.error().text);
+  std::fputs(data::describe(*facts).c_str(), stdout);
+  return 0;
+}
+
 }  // namespace
 
-int inspect(const std::string& path, const data::MeshOptions& options) {
+int inspect(const std::string& path, const data::MeshOptions& options, const std::string& raw) {
   std::error_code error;
   if (!fs::exists(path, error)) return refuse(fmt::format("{}: no such file", path));
+  if (!raw.empty() || (!fs::exists(path + "/summary.json", error) && data::looks_like_volume(path)))
+    return inspect_volume(path, raw);
   if (fs::is_directory(path, error)) return inspect_run(path);
   std::string extension = fs::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),

@@ -1,4 +1,4 @@
-// `telesplat inspect PATH`: what a data file, a run folder, a recorded frame, a depth image or a picture holds.
+// `telesplat inspect PATH`: what a data file or volume folder, a run folder, a recorded frame, a depth image or a picture holds.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace telesplat::launcher {
 
-/// Prints to stdout; exit code 0, or 2 with one line on stderr.
-int inspect(const std::string& path, const data::MeshOptions& options);
+/// `raw`: what --raw says of a raw volume; empty: files tell themselves. Prints to stdout; exit code 0, or 2 with one line on stderr.
+int inspect(const std::string& path, const data::MeshOptions& options, const std::string& raw = "");
 
 }  // namespace telesplat::launcher

@@ -37,6 +37,9 @@ int telesplat_main(int argc, char** argv) {
       app.add_subcommand("inspect", "tell what a data file, a run folder, a recorded frame or a depth image holds");
   inspect->add_option("path", path, "file or folder")->required();
   inspect->add_option("--cache", mesh.cache_dir, "folder of the chunk store");
+  std::string raw;
+  inspect->add_option("--raw", raw,
+                      "a raw volume's size and type, and its spacing: 256x256x256:u8 or 512x512x99:i16be:1,1,2.5");
 
   launcher::CompareOptions compare_options;
   auto* compare = app.add_subcommand(
@@ -74,7 +77,7 @@ int telesplat_main(int argc, char** argv) {
   if (*presets) return launcher::presets(presets_options);
   if (*compare) return launcher::compare(compare_options);
   if (*ctl) return launcher::control(control_options);
-  return launcher::inspect(path, mesh);
+  return launcher::inspect(path, mesh, raw);
 }
 
 }  // namespace
