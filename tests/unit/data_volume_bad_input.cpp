@@ -356,7 +356,7 @@ TEST(ImportStream, SurvivesBytesThatAreNoVolume) {
   close(ends[0]);
   const auto whole = received(stream, data.size());
   ASSERT_TRUE(whole && whole->ok());
-  EXPECT_EQ(std::memcmp((**whole)->bytes.data(), data.data(), data.size()), 0);
+  EXPECT_EQ(std::memcmp(whole->value().bytes.data(), data.data(), data.size()), 0);
   const auto too_much = received(stream, data.size() - 1);
   ASSERT_TRUE(too_much && !too_much->ok());
   for (size_t bytes = 0; bytes < stream.size(); ++bytes)
@@ -365,7 +365,9 @@ TEST(ImportStream, SurvivesBytesThatAreNoVolume) {
     std::string changed = stream;
     changed[at] = char(changed[at] ^ 0x55);
     const auto result = received(changed, data.size());  // a voxel's or matrix's change passes; nothing else does harm
-    if (result && result->ok()) EXPECT_LE((**result)->bytes.size(), data.size());
+    if (result && result->ok()) {
+      EXPECT_LE(result->value().bytes.size(), data.size());
+    }
   }
 }
 
