@@ -27,6 +27,7 @@ wire::Hello make_hello(const DataServiceOptions& o, const VolumeStore& store, co
                       {"kind", "volume"},
                       {"format", store.format()},
                       {"voxels", std::to_string(session.grid.voxels())},
+                      {"content_hash", fmt::format("{:016x}", store.content_hash())},
                       {"size", fmt::format("{} x {} x {}", size[0], size[1], size[2])}});
   hello.parameters = volume::to_parameters(session);
   hello.box_room = session.grid.box_room();
@@ -49,7 +50,7 @@ class Worker {
   }
   bool busy() const {
     const std::lock_guard lock(mutex_);
-    return working_ || !done_.empty();
+    return working_ || !done_.empty() || answers_.has_work();
   }
   std::vector<VolumeAnswers::Reply> take() {
     const std::lock_guard lock(mutex_);

@@ -273,6 +273,13 @@ TEST(VolumeSeries, StepsOfOtherSizesAreErrors) {
     EXPECT_NE(store.error().text.find(part), std::string::npos) << store.error().text;
 }
 
+TEST(VolumeStore, TellsOtherDataByTheirHash) {
+  const auto one = open_or_fail(noise(1)), half = open_or_fail(noise(1), {.part = "1/2"}),
+             other = open_or_fail(noise(2));
+  EXPECT_EQ(one->content_hash(), half->content_hash());
+  EXPECT_NE(one->content_hash(), other->content_hash());
+}
+
 TEST(VolumeStore, TakesAFittingPresetAndRefusesNonsense) {
   Volume ct =
       make_volume<int16_t>({9, 9, 9}, VoxelType::kI16, [](int i, int j, int k) { return i < 4 ? -1000 : 100 * j + k; });
