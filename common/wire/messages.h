@@ -416,7 +416,8 @@ struct VoxelRequest {
     f("have", m.have, size_t{volume::kMaxLevels / 8});
   }
 };
-/// Its answer. A server that does not know the epoch yet, or has none of the slices, says so with `known` false: ask again.
+/// Its answer. A server that does not know the epoch (yet), has none of the slices or too much to do, says so with `known` false: ask again
+/// after a while. It may have fewer slices than were asked for - those from begin to end, at most 64 or about 32 MB -: ask for the rest.
 struct VoxelData {
   static constexpr std::string_view kName = "voxel_data";
   EpochId epoch;

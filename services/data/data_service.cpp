@@ -8,6 +8,7 @@
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
 #include "services/data/julia_service.h"
+#include "services/data/volume_service.h"
 
 namespace telesplat::data {
 namespace {
@@ -45,13 +46,33 @@ wire::Hello make_hello(const DataServiceOptions& o, const MeshStore& store, cons
   return hello;
 }
 
+int run_volume(const DataServiceOptions& o) {
+  const double begin_s = monotonic_s();
+  const auto store = VolumeStore::open(o.scene, to_options(o.volume), o.mesh, make_progress(o.report_progress));
+  if (!store) {
+    std::fprintf(stderr, "telesplat: %s\n", store.error().text.c_str());
+    return 2;
+  }
+  net::install_signal_handlers();  // until here a signal ended the process: what was being read is read again next time
+  const volume::Session& session = (*store)->session();
+  const auto& size = session.grid.size;
+  log::info("{}: {} x {} x {} voxels{}, values {:g} to {:g} (mostly {:g} to {:g}{}) in {} levels; ready in {:.0f} ms",
+            o.scene, size[0], size[1], size[2], session.steps > 1 ? fmt::format(", {} steps", session.steps) : "",
+            session.range.lo, session.range.hi, session.range.typical_lo, session.range.typical_hi,
+            session.range.hounsfield ? ", Hounsfield units" : "", session.levels.count,
+            1e3 * (monotonic_s() - begin_s));
+  net::Context context;
+  return serve_volume(context, **store, o, [] { return false; });
+}
+
 }  // namespace
 
 void add_flags(CLI::App& app, DataServiceOptions& o) {
   net::add_service_flags(app, o.service, net::Ends::kBoth);
-  app.add_option(
-         "scene", o.scene,
-         "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), elevation raster (GeoTIFF, HGT, 16-bit PNG), or julia")
+  app.add_option("scene", o.scene,
+                 "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), elevation raster (GeoTIFF, HGT, 16-bit PNG), "
+                 "volume (NRRD, "
+                 "MetaImage, NIfTI, VTI, raw with --raw, a folder of DICOM slices or of a numbered series), or julia")
       ->required();
   app.add_option("--room-size", o.mesh.room_size_m, "largest extent of the data set in room space, metres")
       ->capture_default_str()
@@ -70,17 +91,31 @@ void add_flags(CLI::App& app, DataServiceOptions& o) {
                  "folder of the chunk store; default: telesplat in the user's cache folder");
   app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
   app.add_flag("--report-progress", o.report_progress, "print progress lines on stdout");
+  app.add_option("--iso", o.mesh.iso, "volumes: show the surface where they have this value, as a mesh");
+  add_volume_flags(app, o.volume);
   julia::add_scene_flags(app, o.julia);
 }
 
 int run(const DataServiceOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
-  if (o.scene == julia::kSceneWord) return run_julia(o);
-  if (o.julia.any()) {
-    std::fprintf(stderr, "telesplat: %s: is a file, but a Julia set's parameters are given\n", o.scene.c_str());
+  const auto refuse = [&](const char* why) {
+    std::fprintf(stderr, "telesplat: %s: %s\n", o.scene.c_str(), why);
     return 2;
-  }
-  const auto store = MeshStore::open(o.scene, o.mesh, make_progress(o.report_progress));
+  };
+  const bool is_julia = o.scene == julia::kSceneWord;
+  if (!is_julia && o.julia.any()) return refuse("is a file, but a Julia set's parameters are given");
+  const bool surface = o.mesh.iso.has_value();
+  if (!is_julia && !surface && (!o.volume.raw.empty() || looks_like_volume(o.scene))) return run_volume(o);
+  if (o.volume.any_but_raw())
+    return refuse(
+        surface
+            ? "is shown as a surface (--iso), but --tf, --lighting, --series-rate, --part or --volume-cache-mb is given"
+            : "is no volume, but --tf, --lighting, --series-rate, --part or --volume-cache-mb is given");
+  if (is_julia)
+    return o.volume.raw.empty() && !surface ? run_julia(o) : refuse("is a Julia set, but --raw or --iso is given");
+  MeshOptions mesh = o.mesh;
+  mesh.raw = o.volume.raw;
+  const auto store = MeshStore::open(o.scene, mesh, make_progress(o.report_progress));
   if (!store) {
     std::fprintf(stderr, "telesplat: %s\n", store.error().text.c_str());
     return 2;

@@ -4,13 +4,15 @@
 #include "common/julia/flags.h"
 #include "common/net/service.h"
 #include "services/data/mesh_store.h"
+#include "services/data/volume_flags.h"
 
 namespace telesplat::data {
 
 struct DataServiceOptions {
   net::ServiceOptions service;
-  std::string scene;  ///< path of the mesh file, or "julia"
-  MeshOptions mesh;   ///< of a Julia set: its room size
+  std::string scene;  ///< path of a mesh, raster or volume, or "julia"
+  MeshOptions mesh;   ///< of a Julia set: its room size; of a volume: that and which way is up
+  VolumeFlags volume;
   julia::SceneOptions julia;
   bool report_progress = false;  ///< "progress STAGE FRACTION" lines on stdout, for the launcher
 };

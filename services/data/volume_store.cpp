@@ -1,6 +1,7 @@
 #include "services/data/volume_store.h"
 
 #include <fmt/format.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <charconv>
@@ -101,6 +102,7 @@ class Store final : public VolumeStore {
     session_.levels = *levels;
     session_.range = describe_values(count_levels(all[0], *levels), *levels, lo, hi, all[0].hounsfield);
     for (size_t step = 0; step < all.size(); ++step) {
+      content_hash_ = XXH3_64bits_withSeed(all[step].stored.data(), all[step].stored.size(), content_hash_);
       keep(int(step), std::make_shared<VolumeSlices>(all[step], session_, begin_, end_));
       all[step].stored = {};
       progress("classify", double(step + 1) / double(all.size()));
@@ -118,6 +120,7 @@ class Store final : public VolumeStore {
 
   const volume::Session& session() const override { return session_; }
   std::string format() const override { return format_; }
+  uint64_t content_hash() const override { return content_hash_; }
 
   Result<volume::Voxels> voxels(int step, int k_begin, int k_end, const volume::LevelSet& shown,
                                 const volume::LevelSet& have) override {
@@ -205,6 +208,7 @@ class Store final : public VolumeStore {
   const size_t cache_bytes_;
   volume::Session session_;
   std::string format_;
+  uint64_t content_hash_ = 0;
   int begin_ = 0, end_ = 0;
   std::list<std::pair<int, Step>> kept_;  // newest first
   int ahead_step_ = 0;

@@ -43,6 +43,8 @@ class VolumeStore {
   /// As it begins; part and parts are this store's. Valid: read_session takes it.
   virtual const volume::Session& session() const = 0;
   virtual std::string format() const = 0;
+  /// Of the steps that were read when it was opened, whatever the part: other data, another hash.
+  virtual uint64_t content_hash() const = 0;
 
   /// Voxels of slices [k_begin, k_end) of a step whose level is in `shown` and not in `have`; with normals if the session is lit. Slices outside
   /// this part are left out: the answer's own k_begin and k_end say what it has. Error: a step that cannot be read.

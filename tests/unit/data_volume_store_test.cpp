@@ -10,67 +10,14 @@
 
 #include "common/image/normal.h"
 #include "services/data/volume_slices.h"
-#include "services/data/volume_store.h"
+#include "tests/support/volume_samples.h"
 
 namespace telesplat::data {
 namespace {
 
-// A volume whose voxel (i, j, k) stores f(i, j, k).
-template <class T, class F>
-Volume make_volume(std::array<int, 3> size, VoxelType type, const F& f) {
-  Volume v;
-  v.size = size, v.type = type, v.format = "test";
-  v.lo = std::numeric_limits<double>::infinity(), v.hi = -v.lo;
-  for (int k = 0; k < size[2]; ++k)
-    for (int j = 0; j < size[1]; ++j)
-      for (int i = 0; i < size[0]; ++i) {
-        const T value = T(f(i, j, k));
-        const auto* bytes = reinterpret_cast<const std::byte*>(&value);
-        v.stored.insert(v.stored.end(), bytes, bytes + sizeof value);
-        if (!std::isfinite(double(value))) continue;
-        v.lo = std::min(v.lo, double(value)), v.hi = std::max(v.hi, double(value));
-      }
-  return v;
-}
 void rescale(Volume& v, double scale, double offset) {
   const double a = v.lo * scale + offset, b = v.hi * scale + offset;
   v.scale = scale, v.offset = offset, v.lo = std::min(a, b), v.hi = std::max(a, b);
-}
-
-Volume noise(uint32_t seed = 1, std::array<int, 3> size = {19, 11, 13}) {
-  std::mt19937 random(seed);
-  return make_volume<uint8_t>(size, VoxelType::kU8, [&](int, int, int) { return random() % 256; });
-}
-
-Result<std::unique_ptr<VolumeStore>> open_steps(std::vector<Volume> steps, VolumeOptions options = {},
-                                                MeshOptions mesh = {}, std::atomic<size_t>* reads = nullptr) {
-  if (options.transfer.empty()) options.transfer = "0:#ffffff:0, 100%:#ffffff:1";
-  const size_t count = steps.size();
-  auto shared = std::make_shared<std::vector<Volume>>(std::move(steps));
-  const auto read = [shared, reads](size_t step, const ReadProgress&) -> Result<Volume> {
-    if (reads) ++*reads;
-    return (*shared)[step];
-  };
-  return VolumeStore::make(read, count, "test", options, mesh, [](const char*, double) {});
-}
-std::unique_ptr<VolumeStore> open_or_fail(Volume v, VolumeOptions options = {}, MeshOptions mesh = {}) {
-  std::vector<Volume> steps;
-  steps.push_back(std::move(v));
-  auto store = open_steps(std::move(steps), options, mesh);
-  EXPECT_TRUE(store) << store.error().text;
-  return store ? std::move(*store) : nullptr;
-}
-
-volume::LevelSet levels_between(int begin, int end) {
-  volume::LevelSet out;
-  for (int l = begin; l < end; ++l) out.add(l);
-  return out;
-}
-volume::Voxels voxels_or_fail(VolumeStore& store, int begin, int end, const volume::LevelSet& shown,
-                              const volume::LevelSet& have = {}, int step = 0) {
-  auto v = store.voxels(step, begin, end, shown, have);
-  EXPECT_TRUE(v) << v.error().text;
-  return v ? std::move(*v) : volume::Voxels{};
 }
 
 TEST(VolumeLevels, KeepTheValuesOfSmallTypesAndSpans) {
@@ -324,6 +271,13 @@ TEST(VolumeSeries, StepsOfOtherSizesAreErrors) {
   ASSERT_FALSE(store);
   for (const char* part : {"test", "step 2", "19 x 11 x 13", "8 x 8 x 8"})
     EXPECT_NE(store.error().text.find(part), std::string::npos) << store.error().text;
+}
+
+TEST(VolumeStore, TellsOtherDataByTheirHash) {
+  const auto one = open_or_fail(noise(1)), half = open_or_fail(noise(1), {.part = "1/2"}),
+             other = open_or_fail(noise(2));
+  EXPECT_EQ(one->content_hash(), half->content_hash());
+  EXPECT_NE(one->content_hash(), other->content_hash());
 }
 
 TEST(VolumeStore, TakesAFittingPresetAndRefusesNonsense) {
