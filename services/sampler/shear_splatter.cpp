@@ -268,6 +268,7 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
     const uint64_t held = voxels.size() == 0 ? 0 : first_of(k_end) - first_of(k_begin);
     stats->voxels = total.voxels;
     stats->skipped = held > total.voxels ? held - total.voxels : 0;
+    stats->pixels = total.pixels;
     stats->arrange_ms = arrange_ms;
     stats->splat_ms = ms_since(splatting);
   }

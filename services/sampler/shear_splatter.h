@@ -28,14 +28,15 @@ class SlabVolume {
 };
 
 struct ShearStats {
-  uint64_t voxels = 0;   ///< splatted: not transparent, not skipped behind what is opaque
-  uint64_t skipped = 0;  ///< behind what is opaque
+  uint64_t voxels = 0;   ///< splatted
+  uint64_t skipped = 0;  ///< other voxels of the slab: transparent now, out of the raster, or behind what is opaque
+  uint64_t pixels = 0;   ///< composited, summed over slices
   double arrange_ms = 0, splat_ms = 0;
 };
 
 /// The field that is splatted: every voxel has an extinction (per Grid::unit_m) and a colour, lit by volume/lighting.h. Within a slice both extinction
 /// and extinction times colour are interpolated bilinearly (a tent of one voxel; where a voxel is smaller than a pixel, of one pixel), the
-/// kernel being the same for all voxels of a slice (T4.5.1). A slice adds opacity 1 - exp(-extinction * path), path = ShearFrame::path; slices
+/// kernel being the same for all voxels of a slice (T4.5.1), its weights adding up to 1 at every pixel. A slice adds opacity 1 - exp(-extinction * path), path = ShearFrame::path; slices
 /// are composited front to back in single precision. Images are cropped to what is not transparent; empty ones are left out.
 /// Early termination: what lies behind opaque pixels is skipped, but for a margin around them, so that small head movements reveal no holes.
 class ShearSplatter {
@@ -44,7 +45,7 @@ class ShearSplatter {
   ~ShearSplatter();
 
   /// Images of the slab [k_begin, k_end) of the frame: pixels of owned_pixels() only, for which the volume must hold one slice more on both sides where
-  /// the grid has them. colours: one a level of the epoch. Precondition: validate(frame, grid).
+  /// the grid has them; where pixels are larger than 1.5 voxels, the kernel ends with what is held. colours: one a level of the epoch. Precondition: validate(frame, grid).
   std::vector<volume::SliceImage> splat(const SlabVolume& volume, const std::vector<volume::LevelColour>& colours,
                                         const volume::ShearFrame& frame, int k_begin, int k_end,
                                         ShearStats* stats = nullptr);
