@@ -45,6 +45,23 @@ PixelLattice PixelLattice::make(double lo, double hi, int pixels) {
   return out;
 }
 
+std::vector<PlacedLayer> place_layers(const VolumeFrame& frame, const geometry::Camera& camera) {
+  std::vector<PlacedLayer> out;
+  const glm::dvec3 eye = frame.grid.room_to_index() * glm::dvec4(camera.pose.position_room, 1);
+  for (const int i : front_to_back(frame, eye)) {
+    const LayerImage& image = frame.layers[static_cast<size_t>(i)];
+    const double plane = frame.shear.layers[static_cast<size_t>(image.layer)].plane;
+    const auto to_raster = warp(frame.grid, frame.shear, plane, camera);
+    if (!to_raster) continue;
+    // Raster pixel (rect.x, rect.y) has its centre at + 0.5 and is texel (1, 1).
+    glm::dmat3 rows = glm::transpose(*to_raster);
+    rows[0] += (0.5 - image.rect.x) * rows[2];
+    rows[1] += (0.5 - image.rect.y) * rows[2];
+    out.push_back({&image, rows, std::abs(plane - eye[frame.shear.axis])});
+  }
+  return out;
+}
+
 WarpPlan::WarpPlan(const VolumeFrame& frame, const geometry::Camera& camera)
     : across_(PixelLattice::make(camera.left, camera.right, camera.width)),
       down_(PixelLattice::make(-camera.top, -camera.bottom, camera.height)),
@@ -55,19 +72,7 @@ WarpPlan::WarpPlan(const VolumeFrame& frame, const geometry::Camera& camera)
   };
   tiles_x_ = tiles(across_.first, width_, kWarpTileWidth);
   tiles_y_ = tiles(down_.first, height_, kWarpTileHeight);
-  const geometry::Camera whole = of_lattice(camera, across_, down_);
-  const glm::dvec3 eye = frame.grid.room_to_index() * glm::dvec4(camera.pose.position_room, 1);
-  for (const int i : front_to_back(frame, eye)) {
-    const LayerImage& image = frame.layers[static_cast<size_t>(i)];
-    const double plane = frame.shear.layers[static_cast<size_t>(image.layer)].plane;
-    const auto to_raster = warp(frame.grid, frame.shear, plane, whole);
-    if (!to_raster) continue;
-    // Raster pixel (rect.x, rect.y) has its centre at + 0.5 and is texel (1, 1).
-    glm::dmat3 rows = glm::transpose(*to_raster);
-    rows[0] += (0.5 - image.rect.x) * rows[2];
-    rows[1] += (0.5 - image.rect.y) * rows[2];
-    layers_.push_back({&image, rows, std::abs(plane - eye[frame.shear.axis])});
-  }
+  layers_ = place_layers(frame, of_lattice(camera, across_, down_));
 }
 
 geometry::Rect WarpPlan::rect(int tx, int ty) const {
@@ -79,7 +84,8 @@ geometry::Rect WarpPlan::rect(int tx, int ty) const {
   return {left, top, std::min(x0 + kWarpTileWidth, width_) - left, std::min(y0 + kWarpTileHeight, height_) - top};
 }
 
-bool WarpPlan::place(const Layer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile, WarpLayer& out) const {
+bool WarpPlan::place(const PlacedLayer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile,
+                     WarpLayer& out) const {
   const LayerImage& image = *layer.image;
   constexpr double w = kWarpTileWidth, h = kWarpTileHeight;
   const auto at = [&](int row, double px, double py) {
@@ -183,7 +189,7 @@ void WarpPlan::place(int tx, int ty, WarpTile& tile, std::vector<WarpLayer>& lay
   tile.y1 = tile.y0 + drawn.height;
   tile.parts.fill(0);
   layers.clear();
-  for (const Layer& layer : layers_) {
+  for (const PlacedLayer& layer : layers_) {
     WarpLayer placed;
     if (place(layer, x, y, uint64_t{1} << layers.size(), tile, placed)) layers.push_back(placed);
   }

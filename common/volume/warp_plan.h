@@ -20,6 +20,17 @@ struct PixelLattice {
   static PixelLattice make(double lo, double hi, int pixels);
 };
 
+/// A layer, and where the rays of display pixels meet it.
+struct PlacedLayer {
+  const LayerImage* image;
+  /// (X, Y, W) = column i . (x, y, 1): the ray through continuous pixel position (x, y) meets texel (X / W, Y / W) of the image (whole numbers are
+  /// texels' centres) if W > 0. Columns, not rows: to_texel[0] gives X.
+  glm::dmat3 to_texel;
+  double depth;  ///< over W: distance along -z, metres
+};
+/// The layers of a frame that the camera's rays may meet, in front_to_back order. image points into frame.
+std::vector<PlacedLayer> place_layers(const VolumeFrame& frame, const geometry::Camera& camera);
+
 /// One display image's plan, to be used by all tiles.
 class WarpPlan {
  public:
@@ -37,17 +48,12 @@ class WarpPlan {
   void place(int tx, int ty, WarpTile& tile, std::vector<WarpLayer>& layers) const;
 
  private:
-  struct Layer {
-    const LayerImage* image;
-    glm::dmat3 to_texel;  ///< rows of volume::warp in columns: X, Y in texels of the image, W; from lattice numbers
-    double depth;         ///< times 1 / W
-  };
-  bool place(const Layer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile, WarpLayer& out) const;
+  bool place(const PlacedLayer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile, WarpLayer& out) const;
 
   PixelLattice across_, down_;
   int width_, height_;
   int tiles_x_, tiles_y_;
-  std::vector<Layer> layers_;
+  std::vector<PlacedLayer> layers_;
 };
 
 }  // namespace telesplat::volume
