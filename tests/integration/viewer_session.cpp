@@ -161,6 +161,17 @@ TEST(PointSession, AsynchronouslyPointsAreShownAsTheyCome) {
   EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0);
 }
 
+TEST(VolumeSession, GoesOnWithAnotherMaster) {
+  for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync, CouplingMode::kLoose}) {
+    const Shown s = show({.restart_after = 6}, mode, 60);
+    expect_complete(s, 60);
+    if (mode == CouplingMode::kAsync) continue;
+    expect_one_update_a_frame(s);
+    EXPECT_GE(s.counts.repeated, 1u) << "what it had asked for is asked for again";
+    EXPECT_EQ(s.request.back(), 60) << "and nothing is left out";
+  }
+}
+
 TEST(PointSession, AForgottenRequestIsMadeAgain) {
   const Shown s = show({.volume = false, .forgotten = {3}}, CouplingMode::kLoose, 10);
   expect_complete(s, 10);

@@ -12,7 +12,7 @@
 namespace telesplat::test {
 namespace {
 
-constexpr InstanceId kMaster{11}, kPacker{12};
+constexpr InstanceId kPacker{12};
 
 wire::Bytes bytes_of(const std::vector<uint8_t>& v) { return {reinterpret_cast<const std::byte*>(v.data()), v.size()}; }
 
@@ -71,7 +71,7 @@ void FakeSession::loop() {
 
 wire::Welcome FakeSession::welcome() const {
   wire::Welcome w;
-  w.master = kMaster;
+  w.master = master_id_;
   w.master_s = monotonic_s();
   w.epoch = epoch_;
   w.octree_depth = 5;
@@ -103,6 +103,8 @@ void FakeSession::receive_master() {
       counts_.repeated += known;
       counts_.buffers = request->buffers;
       if (!known && options_.forgotten.contains(request->request.value)) continue;
+      const auto same = [&](const wire::ViewRequest& r) { return r.request == request->request; };
+      if (std::any_of(open_.begin(), open_.end(), same)) continue;
       open_.push_back(*request);
       counts_.most_open = std::max<uint64_t>(counts_.most_open, open_.size());
     } else if (m->type == wire::MetricRows::kName) {
@@ -154,6 +156,15 @@ void FakeSession::answer_next() {
       log_.emplace_back(wire::EpochBegin::kName, wire::encode(wire::EpochBegin{kPacker, {++sequence_}, epoch_}));
       patches_.send_frames({}, log_.back().first, log_.back().second);
     }
+  }
+  if (options_.restart_after && answers_ == options_.restart_after) {
+    master_id_ = {13};
+    frame_ = last_acknowledged_ = 0;
+    unacknowledged_.clear();
+    open_.clear();
+    master_.send(welcome(), viewer_);
+    options_.restart_after = 0;
+    return;
   }
   ++answers_;
   const wire::ViewRequest request = open_.front();

@@ -23,8 +23,9 @@ class FakeSession {
     int coarse_patches = 0;  ///< of points: parts that are published before the first part of full resolution
     /// Answers of these requests (1, 2, ...) are damaged, or not given when they are asked for the first time.
     std::set<uint64_t> damaged, forgotten;
-    bool introductions_only = false;  ///< nothing is sent to viewers that did not introduce themselves
-    uint64_t epoch_every = 0;         ///< a new epoch after so many answers; 0: never
+    uint64_t epoch_every = 0;  ///< a new epoch after so many answers; 0: never
+    uint64_t restart_after =
+        0;  ///< another master after so many answers: requests are lost, frames numbered anew; 0: never
   };
   FakeSession(net::Context& context, const Options& options, std::string name);
   ~FakeSession();
@@ -63,6 +64,7 @@ class FakeSession {
   std::set<uint64_t> seen_, unacknowledged_;
   uint64_t frame_ = 0, sequence_ = 0, answers_ = 0, last_acknowledged_ = 0, buffers_ = 1;
   EpochId epoch_{1};
+  InstanceId master_id_{11};
   std::vector<std::pair<std::string, std::string>> log_;  // published events: type, body
 
   mutable std::mutex mutex_;
