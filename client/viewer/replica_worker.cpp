@@ -141,7 +141,10 @@ void ReplicaWorker::connect_if_changed() {
   const auto keep = session.settings.find("packing.keep_redundant");
   keeps_redundant_ = keep != session.settings.end() && keep->second != 0;
   offset_s_ = link_.to_master_s(0);
-  other_master_ |= std::exchange(master_, session.master) != session.master;  // it knows nothing of what was asked for
+  if (std::exchange(master_, session.master) != session.master) {
+    other_master_ = true;  // it knows nothing of what was asked for
+    slices_.begin_anew();
+  }
   if (session.box_room.empty()) return;
   const auto text = [](const std::map<std::string, std::string>& from, const char* key) {
     const auto it = from.find(key);
@@ -180,7 +183,7 @@ void ReplicaWorker::connect(const std::string& patches, const std::string& state
   if (points)
     points_.start();
   else
-    slices_.introduce();
+    slices_.begin_anew();
 }
 
 void ReplicaWorker::receive_control() {
@@ -246,7 +249,6 @@ void ReplicaWorker::request_views(double now_s) {
     may_ask = c.may_ask();
   });
   for (const auto& request : requester_.again(again, to_master_s(now_s))) link_.socket().send(request);
-  if (!again.empty() && kind_ == SceneKind::kVolume) slices_.introduce();
   while (may_ask) {
     const auto request = requester_.next(to_master_s(now_s));
     if (!request) return;

@@ -12,7 +12,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kIntroductionPeriod_s = 1;
+constexpr double kIntroductionPeriod_s = 1, kSilence_s = 2;
 
 geometry::Rect hull(const geometry::Rect& a, const geometry::Rect& b) {
   const int x = std::min(a.x, b.x), y = std::min(a.y, b.y);
@@ -79,7 +79,7 @@ void SliceReceiver::receive(net::Socket& state, int most) {
 
 void SliceReceiver::on(const wire::SliceFrame& f, net::Socket& state) {
   const double begin_s = monotonic_s();
-  known_ = true;
+  heard_s_ = begin_s;
   // What is not put into a buffer has left it.
   const bool again = f.packer == packer_ && f.frame <= newest_;
   if (again || f.viewer != options_.viewer || !grid_ || (options_.buffers > 0 && !links_.expected(f.request)))
@@ -112,7 +112,8 @@ void SliceReceiver::acknowledge(FrameId frame, net::Socket& state) {
 void SliceReceiver::tick(double now_s, net::Socket& state) {
   for (const FrameId frame : cache_.take_left()) acknowledge(frame, state);
   cache_.free_dropped();
-  if (known_ || now_s - introduced_s_ < kIntroductionPeriod_s) return;
+  const double period_s = heard_s_ > 0 ? kSilence_s : kIntroductionPeriod_s;
+  if (now_s - std::max(heard_s_, introduced_s_) < period_s) return;
   introduced_s_ = now_s;
   acknowledge({}, state);
 }

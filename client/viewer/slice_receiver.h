@@ -34,10 +34,11 @@ class SliceReceiver {
 
   /// What the master knows of the volume. Without a valid grid no frame is taken.
   Status set_session(const wire::Welcome& session);
-  /// The packer does not know this viewer (any more).
-  void introduce() { introduced_s_ = -1e9, known_ = false; }
+  /// Another packer, which does not know this viewer; or another master, which numbers frames anew.
+  void begin_anew() { heard_s_ = introduced_s_ = -1e9, newest_ = {}; }
   void receive(net::Socket& state, int most);
-  /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come.
+  /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come, and when none came for long: a packer
+  /// that was restarted where it was does not know this viewer.
   void tick(double now_s, net::Socket& state);
 
   /// Checks and decodes. Bytes come from outside. Error: what is wrong with it, for the log. images: memory that is used again.
@@ -62,8 +63,7 @@ class SliceReceiver {
   InstanceId packer_;
   FrameId newest_;
   EpochId epoch_;
-  bool known_ = false;  // to the packer
-  double introduced_s_ = -1e9;
+  double introduced_s_ = -1e9, heard_s_ = -1e9;  // -1e9: nothing came yet
   uint64_t pixels_received_ = 0, decode_errors_ = 0;
   log::RateLimiter log_limit_;
 };

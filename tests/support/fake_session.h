@@ -1,0 +1,78 @@
+// The server side of a session as one thread: a master that answers every view request and a packer that sends what was asked for, so that
+// viewers are tested with every message under control.
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/net/socket.h"
+#include "common/volume/grid.h"
+
+namespace telesplat::test {
+
+class FakeSession {
+ public:
+  struct Options {
+    bool volume = true;
+    int coarse_patches = 0;  ///< of points: parts that are published before the first part of full resolution
+    /// Answers of these requests (1, 2, ...) are damaged, or not given when they are asked for the first time.
+    std::set<uint64_t> damaged, forgotten;
+    uint64_t epoch_every = 0;  ///< a new epoch after so many answers; 0: never
+    uint64_t restart_after =
+        0;  ///< another master after so many answers: requests are lost, frames numbered anew; 0: never
+  };
+  FakeSession(net::Context& context, const Options& options, std::string name);
+  ~FakeSession();
+
+  const std::string& master() const { return master_endpoint_; }
+  /// What of frames.csv arrived: columns by name.
+  std::vector<double> column(const std::string& table, const std::string& name) const;
+  std::map<std::string, double> status() const;
+
+  struct Counts {
+    uint64_t requests = 0, repeated = 0;  ///< view requests, and those whose id was known
+    uint64_t most_open = 0;               ///< requests not answered, at most at any time
+    uint64_t most_unacknowledged = 0;     ///< volume frames on their way, at most
+    uint64_t introductions = 0, acknowledged = 0;
+    bool rising = true;  ///< acknowledgements came in the order of frames
+    uint64_t buffers = 0;
+    bool in_order = false;
+  };
+  Counts counts() const;
+
+ private:
+  void loop();
+  void receive_master();
+  void receive_state();
+  void answer_next();
+  void send_slices(const wire::ViewRequest& request);
+  void publish_points(const wire::ViewRequest& request);
+  wire::Welcome welcome() const;
+
+  Options options_;
+  volume::Grid grid_;
+  std::string master_endpoint_, state_endpoint_, patches_endpoint_;
+  net::Socket master_, state_, patches_;
+  std::string viewer_, viewer_state_;  // routing ids
+  std::deque<wire::ViewRequest> open_;
+  std::set<uint64_t> seen_, unacknowledged_;
+  uint64_t frame_ = 0, sequence_ = 0, answers_ = 0, last_acknowledged_ = 0, buffers_ = 1;
+  EpochId epoch_{1};
+  InstanceId master_id_{11};
+  std::vector<std::pair<std::string, std::string>> log_;  // published events: type, body
+
+  mutable std::mutex mutex_;
+  Counts counts_;
+  std::map<std::string, wire::MetricRows> tables_;
+  std::map<std::string, double> status_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace telesplat::test
