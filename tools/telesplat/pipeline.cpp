@@ -55,7 +55,7 @@ Result<Pipeline> Pipeline::start(const RunOptions& o) {
     }
     for (int i = 1; i <= o.data_servers; ++i)
       p.members_.push_back({"data", "telesplat-data",
-                            common(data_arguments(o, i), o.data_servers == 1 ? "data" : fmt::format("data-{}", i)),
+                            common(data_arguments(o, i - 1), o.data_servers == 1 ? "data" : fmt::format("data-{}", i)),
                             background});
     p.members_.push_back({"packer", "telesplat-packer", common(packer_arguments(o), "packer"), background / 2});
     for (int i = 1; i <= o.samplers; ++i)
