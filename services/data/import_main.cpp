@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   if (argc != 3 && argc != 5) {
     std::fputs(
         "usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n"
-        "       telesplat-import metaimage|nifti|vti FILE   (standard output: import_stream.h)\n"
+        "       telesplat-import nifti|vti FILE      (standard output: import_stream.h)\n"
         "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
         "       telesplat-import iso NAME            (standard input: isosurface.h)\n",
         stderr);

@@ -101,7 +101,8 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
   h.index_to_data = placement(axis(0), axis(1), axis(2), {(*origin)[0], (*origin)[1], (*origin)[2]});
 
   h.big_endian = is_true(value(keys, {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}));
-  const bool binary = is_true(value(keys, {"BinaryData"}));
+  const std::string_view said = value(keys, {"BinaryData"});
+  const bool binary = said.empty() || is_true(said);
   const bool packed = is_true(value(keys, {"CompressedData"}));
   h.encoding = packed ? Encoding::kGzip : binary ? Encoding::kRaw : Encoding::kText;
   const std::string_view data = value(keys, {"ElementDataFile"});
@@ -112,7 +113,7 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
   h.data_at = local ? data_at : 0;
   if (const auto text = value(keys, {"HeaderSize"}); !text.empty() && !local) {
     const auto bytes = number(text);
-    if (!bytes || *bytes < -1 || *bytes > 1e15)
+    if (!bytes || *bytes < -1 || *bytes > 1e15 || (*bytes < 0 && h.encoding != Encoding::kRaw))
       return Error{fmt::format("{}: its HeaderSize is {}", path, quoted(text))};
     if (*bytes < 0)
       h.data_at_end = true;

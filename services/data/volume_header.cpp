@@ -73,7 +73,7 @@ const char* name_of(StoredType type) {
   return kNames[static_cast<size_t>(type)];
 }
 
-bool reads_with_vtk(const std::string& format) { return format == "metaimage" || format == "nifti" || format == "vti"; }
+bool reads_with_vtk(const std::string& format) { return format == "nifti" || format == "vti"; }
 
 Status check_header(const VolumeFileHeader& h, uint64_t data_bytes, const std::string& path) {
   for (const int64_t n : h.size)

@@ -74,8 +74,9 @@ Result<FileStart> read_start(const std::string& path);
 
 /// What kind of volume file this is: "nrrd", "metaimage", "nifti", "vti", "dicom"; "" if none. By content first, then by name.
 std::string volume_format(const FileStart& start, const std::string& path);
-/// Whether files of a format go through VTK, or are read without it: VTK 9.1 knows neither NRRD's compression and directions nor DICOM's order,
-/// orientation and signs of slices.
+/// Whether files of a format go through VTK. The others are read without it: VTK 9.1 knows neither NRRD's compression and directions, nor DICOM's order,
+/// orientation and signs of slices, nor MetaImage's directions, and takes damaged compressed MetaImages for whole (what is missing stays whatever
+/// the memory held).
 bool reads_with_vtk(const std::string& format);
 /// Reads and checks the header of a volume file that is no DICOM slice (dicom_series.h). With `raw`: of a raw file that is as it says. Error: cannot be
 /// read, is no volume; those of the parsers and of check_header.

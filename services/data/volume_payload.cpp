@@ -224,7 +224,11 @@ Result<std::vector<std::byte>> read_payload(const VolumeFileHeader& h, const std
     if (*n == 0) return too_short(h, path, 0);
     left -= *n;
   }
-  return fill(h, path, progress, [&](std::byte* to, size_t bytes) { return inflater.read(to, bytes); });
+  auto voxels = fill(h, path, progress, [&](std::byte* to, size_t bytes) { return inflater.read(to, bytes); });
+  // Reading on brings the stream's checksum, if the voxels were all of it.
+  std::byte more;
+  if (const auto n = inflater.read(&more, 1); voxels && !n) return n.error();
+  return voxels;
 }
 
 }  // namespace telesplat::data

@@ -1,4 +1,4 @@
-// Voxels of the formats that need nobody else's reader: raw files, NRRD; and what becomes of stored values.
+// Voxels of the formats that need nobody else's reader: raw files, NRRD, MetaImage; and what becomes of stored values.
 #pragma once
 
 #include <cstddef>

@@ -5,7 +5,6 @@
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
 #include <vtkMatrix3x3.h>
-#include <vtkMetaImageReader.h>
 #include <vtkNIFTIImageReader.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
@@ -102,8 +101,8 @@ Result<VtkVolume> volume_of(vtkDataArray* array, const VolumeFileHeader& header,
   return out;
 }
 
-Result<VtkVolume> read_image(vtkImageReader2* reader, const VolumeFileHeader& header, const std::string& path,
-                             const ReadProgress& progress) {
+Result<VtkVolume> read_nifti(const VolumeFileHeader& header, const std::string& path, const ReadProgress& progress) {
+  vtkNew<vtkNIFTIImageReader> reader;
   reader->SetFileName(path.c_str());
   update(reader, progress);
   vtkImageData* image = reader->GetOutput();
@@ -113,12 +112,7 @@ Result<VtkVolume> read_image(vtkImageReader2* reader, const VolumeFileHeader& he
     if (size[a] != header.size[a])
       return Error{fmt::format("{}: VTK finds {} x {} x {} voxels, its header says {} x {} x {}", path, size[0],
                                size[1], size[2], header.size[0], header.size[1], header.size[2])};
-  return volume_of(image->GetPointData()->GetScalars(), header, path);
-}
-
-Result<VtkVolume> read_nifti(const VolumeFileHeader& header, const std::string& path, const ReadProgress& progress) {
-  vtkNew<vtkNIFTIImageReader> reader;
-  auto volume = read_image(reader, header, path, progress);
+  auto volume = volume_of(image->GetPointData()->GetScalars(), header, path);
   if (volume && reader->GetQFac() < 0) {
     // VTK turns the order of slices round then: index k there is n - 1 - k here.
     glm::dmat4& m = volume->header.index_to_data;
@@ -164,12 +158,7 @@ Result<VtkVolume> read_vtk_volume(const VolumeFileHeader& header, const std::str
                                   const ReadProgress& progress) {
   vtkNew<vtkStringOutputWindow> output;
   vtkOutputWindow::SetInstance(output);
-  auto volume = [&]() -> Result<VtkVolume> {
-    if (header.format == "nifti") return read_nifti(header, path, progress);
-    if (header.format == "vti") return read_vti(header, path, progress);
-    vtkNew<vtkMetaImageReader> reader;
-    return read_image(reader, header, path, progress);
-  }();
+  auto volume = header.format == "nifti" ? read_nifti(header, path, progress) : read_vti(header, path, progress);
   const std::string complaint = first_complaint(output->GetOutput());
   if (!complaint.empty())
     return Error{fmt::format("{}: is damaged or cut: its {} x {} x {} voxels cannot be read: {}", path, header.size[0],

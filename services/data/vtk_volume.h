@@ -19,7 +19,7 @@ struct VtkVolume {
   VolumeFileHeader header;  ///< size and stored type are the image's; byte order and payload mean nothing
 };
 
-/// Reads a file that VTK reads (metaimage, nifti, vti). `header`: read_volume_header(path). Error: what VTK complained of; an image that is not as the header says.
+/// Reads a file that VTK reads (nifti, vti). `header`: read_volume_header(path). Error: what VTK complained of; an image that is not as the header says.
 Result<VtkVolume> read_vtk_volume(const VolumeFileHeader& header, const std::string& path,
                                   const ReadProgress& progress);
 
