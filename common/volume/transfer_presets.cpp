@@ -24,19 +24,20 @@ constexpr PresetPoint kCtAngioHu[] = {{-3024, 0x200000, 0},  {110, 0x400800, 0},
                                       {3071, 0xffffff, 0.9f}};
 
 // Of anything: relative to where the values are that are not background.
-constexpr PresetPoint kPlain[] = {{-0.02, 0x284868, 0},    {0.08, 0x3868a0, 0.015f}, {0.35, 0x58a898, 0.06f},
-                                  {0.65, 0xe0b860, 0.25f}, {1, 0xf8f0e0, 0.6f},      {1.6, 0xffffff, 0.85f}};
+// They begin above 0, so that the background's noise stays out.
+constexpr PresetPoint kPlain[] = {{0.12, 0x284868, 0},     {0.2, 0x3868a0, 0.015f}, {0.38, 0x58a898, 0.07f},
+                                  {0.65, 0xe0b860, 0.25f}, {1, 0xf8f0e0, 0.6f},     {1.6, 0xffffff, 0.85f}};
 constexpr PresetPoint kBone[] = {
     {0.3, 0x5a3420, 0}, {0.5, 0xb87848, 0.08f}, {0.8, 0xe8c898, 0.35f}, {1.2, 0xfff4e0, 0.8f}};
-constexpr PresetPoint kSkin[] = {{-0.1, 0x8a5a48, 0},   {0.1, 0xd89a7c, 0.12f}, {0.35, 0xecb898, 0.25f},
-                                 {0.7, 0xd8846c, 0.3f}, {1, 0xf0d8b8, 0.6f},    {1.5, 0xffffff, 0.9f}};
+constexpr PresetPoint kSkin[] = {{0.03, 0x8a5a48, 0},   {0.15, 0xd89a7c, 0.12f}, {0.35, 0xecb898, 0.25f},
+                                 {0.7, 0xd8846c, 0.3f}, {1, 0xf0d8b8, 0.6f},     {1.5, 0xffffff, 0.9f}};
 constexpr PresetPoint kCtAngio[] = {
     {0.15, 0x400800, 0}, {0.35, 0xa81810, 0.06f}, {0.7, 0xe84830, 0.35f}, {1, 0xf0b090, 0.6f}, {1.5, 0xffecd0, 0.9f}};
-constexpr PresetPoint kMr[] = {{0, 0x281c18, 0},       {0.15, 0x583830, 0.01f}, {0.4, 0x986858, 0.06f},
-                               {0.7, 0xd0b0a0, 0.22f}, {1, 0xf0e8e0, 0.5f},     {1.5, 0xffffff, 0.8f}};
-constexpr PresetPoint kFire[] = {{-0.02, 0x000000, 0},  {0.1, 0x400418, 0.015f}, {0.35, 0xb02010, 0.07f},
+constexpr PresetPoint kMr[] = {{0.04, 0x281c18, 0},    {0.15, 0x683c30, 0.01f}, {0.4, 0xb07860, 0.06f},
+                               {0.7, 0xd8b8a4, 0.22f}, {1, 0xf0e8e0, 0.5f},     {1.5, 0xffffff, 0.8f}};
+constexpr PresetPoint kFire[] = {{0.05, 0x200008, 0},   {0.15, 0x580818, 0.02f}, {0.35, 0xb02010, 0.07f},
                                  {0.6, 0xf88010, 0.2f}, {0.85, 0xffd848, 0.45f}, {1.1, 0xffffe0, 0.8f}};
-constexpr PresetPoint kGrey[] = {{0, 0x000000, 0}, {1, 0xffffff, 0.5f}};
+constexpr PresetPoint kGrey[] = {{0.02, 0x000000, 0}, {1, 0xffffff, 0.5f}};
 
 struct Preset {
   std::span<const PresetPoint> relative, hounsfield;  // hounsfield: empty if the same serves

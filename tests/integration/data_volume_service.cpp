@@ -143,5 +143,28 @@ TEST_F(Service, TellsAgainWhatTheScenesNewestEpochWeighs) {
   }
 }
 
+TEST(DataServer, RefusesAVolumesFlagsWhereThereIsNoVolume) {
+  const auto refusal = [](DataServiceOptions o) {
+    o.service.name = "data";
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run(o), 2);
+    return testing::internal::GetCapturedStderr();
+  };
+  DataServiceOptions julia, file, surface;
+  julia.scene = "julia", julia.volume.transfer = "bone";
+  file.scene = "CMakeLists.txt", file.volume.part = "0/2";
+  surface.scene = "CMakeLists.txt", surface.mesh.iso = 5, surface.volume.lighting = "off";
+  for (const auto& [text, scene] : {std::pair{refusal(julia), "julia"}, {refusal(file), "CMakeLists.txt"}}) {
+    EXPECT_NE(text.find(scene), std::string::npos) << text;
+    EXPECT_NE(text.find("is no volume"), std::string::npos) << text;
+  }
+  EXPECT_NE(refusal(surface).find("--iso"), std::string::npos);
+  julia.volume = {}, julia.mesh.iso = 1;
+  EXPECT_NE(refusal(julia).find("--iso"), std::string::npos);
+  DataServiceOptions missing;
+  missing.scene = "nowhere.raw", missing.volume.raw = "4x4x4:u8";
+  EXPECT_NE(refusal(missing).find("nowhere.raw"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace telesplat::data

@@ -110,6 +110,8 @@ TEST(VolumeTransfer, PresetsAreValidFitTheDataAndTravel) {
       EXPECT_EQ(*parse_transfer(to_text(*f), range), *f) << preset.name;
       EXPECT_LT(to_text(*f).size(), kMaxTransferText);
       EXPECT_FALSE(preset.text.empty());
+      // What is below where the data begin is background.
+      EXPECT_TRUE(!(range == kBytes) || f->at(range.typical_lo).opacity == 0) << preset.name;
     }
   // Air, flesh and bone of a CT.
   EXPECT_EQ(transfer_preset("bone", kCt)->at(40).opacity, 0);
