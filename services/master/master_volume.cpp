@@ -127,7 +127,7 @@ void MasterCore::assign(const Partition& partition) {
   }
   for (const auto& sampler : partition.spare)
     emit(sampler, wire::SlabAssignment{.partition = partition.number,
-                                       .slab = partition.slabs.size(),
+                                       .slab = 0,
                                        .slabs = partition.slabs.size(),
                                        .begin = 0,
                                        .end = 0,

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "common/core/check.h"
+#include "common/wire/messages.h"
 
 namespace telesplat::master {
 namespace {
@@ -85,6 +86,7 @@ void SlabPartitions::set_slices(int slices) {
   CHECK(slices >= 1);
   weights_.assign(size_t(slices), 1);
   newest_ = in_use_ = nullptr;
+  none_since_s_.reset();
   changed_ = true;
 }
 
@@ -126,7 +128,7 @@ bool SlabPartitions::uneven() const {
   };
   const double total = double(std::accumulate(weights_.begin(), weights_.end(), uint64_t{0}));
   const double most = heaviest(newest_->slabs, [](const Slab& s) { return s.range; });
-  const size_t parts = newest_->slabs.size() + newest_->spare.size();
+  const size_t parts = std::min(newest_->slabs.size() + newest_->spare.size(), size_t{wire::kMaxSlabs});
   if (most <= kUneven * total / double(parts)) return false;
   return heaviest(cut_slabs(weights_, int(parts)), [](const SlabRange& r) { return r; }) < 0.9 * most;
 }
@@ -136,7 +138,7 @@ std::shared_ptr<const Partition> SlabPartitions::update(double now_s) {
   std::shared_ptr<const Partition> made;
   if (changed_ || (newest_ && now_s - newest_->made_s >= kRecutAfter_s && uneven())) {
     changed_ = false;
-    const auto ranges = cut_slabs(weights_, int(samplers_.size()));
+    const auto ranges = cut_slabs(weights_, int(std::min(samplers_.size(), size_t{wire::kMaxSlabs})));
     newest_ = std::make_shared<Partition>(Partition{.number = ++made_, .made_s = now_s});
     for (size_t i = 0; i < samplers_.size(); ++i) {
       if (i >= ranges.size()) {
@@ -149,8 +151,16 @@ std::shared_ptr<const Partition> SlabPartitions::update(double now_s) {
     }
     made = newest_;
   }
-  if (newest_ && in_use_ != newest_ && (newest_->ready() || (!in_use_ && now_s - newest_->made_s >= kReadyPatience_s)))
-    in_use_ = newest_;
+  if (!in_use_ && !none_since_s_) none_since_s_ = now_s;
+  if (newest_ && in_use_ != newest_) {
+    if (newest_->ready()) {
+      in_use_ = newest_;
+      none_since_s_.reset();
+    } else if (!in_use_ && now_s - *none_since_s_ >= kReadyPatience_s) {
+      in_use_ =
+          newest_;  // and so is the next one, if that happens again before one is ready: samplers may come and go all the time
+    }
+  }
   return made;
 }
 

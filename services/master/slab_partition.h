@@ -80,6 +80,7 @@ class SlabPartitions {
   std::vector<std::string> samplers_;  // in order of their slabs
   std::shared_ptr<Partition> newest_, in_use_;
   bool changed_ = false;  // something that asks for a new partition
+  std::optional<double> none_since_s_;  // since when there is none to use, or only one that was not waited for
   uint64_t made_ = 0;
 };
 

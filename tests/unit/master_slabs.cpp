@@ -147,7 +147,11 @@ TEST_F(Partitions, OneThatLostASamplerIsNotUsedAnyMore) {
   EXPECT_FALSE(p.in_use());
   p.update(1 + kReadyPatience_s);
   EXPECT_TRUE(p.in_use());
+  // Again, before one was ready: nobody waits anew.
   p.leave("a");
+  EXPECT_FALSE(p.in_use());
+  p.update(1 + kReadyPatience_s);
+  EXPECT_TRUE(p.in_use());
   p.leave("c");
   EXPECT_FALSE(p.update(9));
   EXPECT_FALSE(p.in_use());

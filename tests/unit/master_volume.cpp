@@ -34,8 +34,11 @@ wire::ViewRequest request(uint64_t viewer, uint64_t id, uint64_t buffers = 0, gl
   return r;
 }
 
+// The same one whenever it is asked for.
 std::shared_ptr<Partition> halves(uint64_t number = 1) {
-  auto p = std::make_shared<Partition>();
+  static std::map<uint64_t, std::shared_ptr<Partition>> all;
+  auto& p = all[number];
+  if (!p) p = std::make_shared<Partition>();
   p->number = number;
   p->slabs = {{.sampler = "a", .range = {0, 10}}, {.sampler = "b", .range = {10, 24}}};
   return p;
@@ -195,6 +198,27 @@ TEST_F(Slabs, LeasesThatRunOutDropTheirFrame) {
   s.tile_done(done(*d), 8);
   EXPECT_EQ(s.frames_completed(), 1u);
   EXPECT_GT(s.lease_time_s(), 2) << "3 s are usual here";
+}
+
+TEST_F(Slabs, PartitionsDoNotMix) {
+  s.request_view(request(1, 1));
+  s.request_view(request(2, 1, 0, {0, 0.4, 3}));
+  ASSERT_TRUE(s.begin_frame({1}, halves(1)));
+  EXPECT_FALSE(s.begin_frame({1}, halves(2))) << "its frame might be complete before the one that was begun first";
+  for (const char* sampler : {"a", "b"}) s.tile_done(done(*s.lease(sampler, 0)), 0.1);
+  EXPECT_TRUE(s.begin_frame({1}, halves(2)));
+}
+
+TEST_F(Slabs, ViewsInOrderAreDroppedInOrder) {
+  for (uint64_t id = 1; id <= 2; ++id) s.request_view(request(1, id, 2));
+  s.begin_frame({1}, halves());
+  s.begin_frame({1}, halves());
+  const auto first = s.lease("a", 0), second = s.lease("a", 1);
+  s.tile_done(done(*second), 1.1);  // the first one's images were lost
+  EXPECT_EQ(expire(2.5), 1);
+  EXPECT_EQ(s.frames_in_flight(), 0u) << "or the second view would be there before the first";
+  s.begin_frame({1}, halves());
+  EXPECT_EQ(s.lease("b", 3)->views[0].request.value, 1u);
 }
 
 TEST_F(Slabs, SamplersThatAreGoneDropOnlyWhatLacksTheirSlab) {
@@ -694,14 +718,32 @@ TEST_F(VolumeMaster, ASamplerThatJoinsDoesNotStopTheDisplay) {
   ready(2);
   core->on("sampler3", wire::SlabReady{{3}, 2, {1}, 1, 1}, now);
   view(2);
-  const auto fresh = leased(3);
-  ASSERT_TRUE(fresh);
-  EXPECT_EQ(fresh->partition, 2u);
+  EXPECT_FALSE(leased(3)) << "frames of the old one are finished first, with its slabs";
   ask(2);
   auto l = leased(2);
   ASSERT_TRUE(l);
-  EXPECT_EQ(l->partition, 1u) << "frames of the old one are finished, with its slabs";
+  EXPECT_EQ(l->partition, 1u);
   EXPECT_EQ(l->frame, old->frame);
+  finish(*old, 1);
+  finish(*l, 2);
+  const auto fresh = leased(3);
+  ASSERT_TRUE(fresh);
+  EXPECT_EQ(fresh->partition, 2u);
+}
+
+TEST_F(VolumeMaster, SpareSamplersAreToldSo) {
+  begin();
+  hello("packer", 10);
+  for (uint64_t sampler = 1; sampler <= 30; ++sampler) hello("sampler", sampler);
+  join_data(session());
+  size_t spare = 0;
+  for (uint64_t sampler = 1; sampler <= 30; ++sampler) {
+    const auto a = sent<wire::SlabAssignment>("sampler" + std::to_string(sampler));
+    ASSERT_EQ(a.size(), 1u);
+    spare += a[0].begin == a[0].end;
+    EXPECT_EQ(a[0].slabs, 24u);
+  }
+  EXPECT_EQ(spare, 6u) << "there are 24 slices";
 }
 
 TEST_F(VolumeMaster, ADeadSamplersSlabMoves) {
