@@ -263,7 +263,7 @@ std::optional<glm::dmat3> warp(const Grid& grid, const ShearFrame& frame, double
   return glm::transpose(glm::dmat3(x, y, w));
 }
 
-std::pair<int, int> owned_pixels(const Grid& grid, const ShearFrame& frame, int slice, int k_begin, int k_end) {
+std::pair<int, int> owned_pixels(const Grid& grid, const ShearFrame& frame, double slice, int k_begin, int k_end) {
   const bool rows = frame.axis == 0;  // then v is k
   const double t = frame.t(slice), eye = frame.eye[2];
   const double origin = rows ? frame.v0 : frame.u0, pitch = rows ? frame.dv : frame.du;

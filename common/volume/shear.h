@@ -76,9 +76,9 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
 std::optional<glm::dmat3> warp(const Grid& grid, const ShearFrame& frame, double plane,
                                const geometry::Camera& display);
 
-/// Raster rows (axis 0) or columns (axis 1) [first, second) of the slice x_p = `slice` whose index coordinate k lies in [k_begin - 0.5,
+/// Raster rows (axis 0) or columns (axis 1) [first, second) of the plane x_p = `slice` (whole for a slice, or between two) whose index coordinate k lies in [k_begin - 0.5,
 /// k_end - 0.5): the part of a slice that a slab of voxels [k_begin, k_end) owns. The slabs at the grid's ends own what lies beyond them, too.
 /// Every pixel of a slice belongs to exactly one slab, so that slabs meet without a seam. Precondition: axis != 2, t(slice) > 0.
-std::pair<int, int> owned_pixels(const Grid& grid, const ShearFrame& frame, int slice, int k_begin, int k_end);
+std::pair<int, int> owned_pixels(const Grid& grid, const ShearFrame& frame, double slice, int k_begin, int k_end);
 
 }  // namespace telesplat::volume

@@ -38,11 +38,17 @@ void MakeLine(const SliceInTile& s, int v, uint64_t needed, Scratch& scratch, Li
   line.mask = 0;
   const int r = v - rows.row_begin;
   if (r < 0 || r >= rows.rows || needed == 0) return;
-  const uint32_t* first = rows.first.data() + size_t(s.slice.held) * size_t(rows.rows) + size_t(r);
-  if (first[0] == first[1]) return;
-  const uint64_t voxels = ResampleRow(s.scene, s.columns, rows.cells.data() + first[0], rows.cells.data() + first[1],
-                                      needed, scratch.dense, line);
-  if (v >= s.own_lo && v <= s.own_hi) out.voxels += voxels;
+  CellRow cells[2];
+  int count = 0;
+  for (const int held : s.slice.held) {
+    if (held < 0) continue;
+    const uint32_t* first = rows.first.data() + size_t(held) * size_t(rows.rows) + size_t(r);
+    if (first[0] != first[1]) cells[count++] = {rows.cells.data() + first[0], rows.cells.data() + first[1]};
+  }
+  if (count == 0) return;
+  const uint64_t voxels = ResampleRow(s.scene, s.columns, cells, count, s.slice.weight, needed, scratch.dense, line);
+  // Voxels count in their own slices, not in those between.
+  if (v >= s.own_lo && v <= s.own_hi && s.slice.weight == 1) out.voxels += voxels;
 }
 
 const float* PathsOf(const SliceInTile& s, int y) {
@@ -141,13 +147,14 @@ void Minify(const SliceInTile& s, Scratch& scratch, SplatOutcome& out) {
 void SplatSliceInTile(const SplatScene& scene, const SplatTile& job, const SplatSlice& slice, Scratch& scratch,
                       SplatOutcome& out) {
   SliceInTile s{scene, job, slice, {}, 0, 0, 0, 0, 0};
-  const ShearRows::Bounds& bounds = scene.rows->bounds[size_t(slice.held)];
-  if (bounds.u_lo > bounds.u_hi) return;
+  const ShearRows::Bounds& bounds = slice.bounds;
   const int width = std::min(kTileWidth, scene.width - job.x0);
   const SliceAxis &u = slice.u, &v = slice.v;
   if (u.begin >= job.x0 + width || u.end <= job.x0) return;
   s.columns = columns_of(u, job.x0, width);
-  if (s.columns.begin >= s.columns.end || bounds.u_hi < s.columns.u_lo || bounds.u_lo > s.columns.u_hi) return;
+  if (s.columns.begin >= s.columns.end) return;
+  const double radius = std::max(1.0, u.pitch), left = u.origin + u.pitch * (job.x0 + s.columns.begin);
+  if (bounds.u_hi < left - radius || bounds.u_lo > u.origin + u.pitch * (job.x0 + s.columns.end - 1) + radius) return;
   s.origin = v.origin + v.pitch * job.y0;
   // Pixel rows that the slice's voxels reach.
   const double reach = std::max(1 / v.pitch, 1.0);

@@ -43,8 +43,6 @@ struct TileColumns {
   float radius;                // the kernel's, voxels: more than 1 where a pixel is larger than a voxel
   int lattice_lo, lattice_hi;  // less base
   int begin, end;              // pixels that may be written, from the tile's first
-  int u_lo, u_hi;              // voxels that reach into it
-  int own_lo, own_hi;          // voxels whose centres lie in it: counted here
 };
 
 inline TileColumns columns_of(const SliceAxis& axis, int x0, int width) {
@@ -60,10 +58,6 @@ inline TileColumns columns_of(const SliceAxis& axis, int x0, int width) {
   const auto bound = [&](double v) { return int(std::clamp(v - c.base, -1e6, 1e6)); };
   c.lattice_lo = bound(axis.lattice_lo), c.lattice_hi = bound(axis.lattice_hi);
   c.begin = std::max(axis.begin - x0, 0), c.end = std::min(axis.end - x0, width);
-  c.u_lo = int(std::ceil(axis.origin + axis.pitch * (x0 + c.begin) - radius));
-  c.u_hi = int(std::floor(axis.origin + axis.pitch * (x0 + c.end - 1) + radius));
-  c.own_lo = int(std::ceil(axis.origin + axis.pitch * (x0 + c.begin - 0.5)));
-  c.own_hi = int(std::ceil(axis.origin + axis.pitch * (x0 + c.end - 0.5))) - 1;
   return c;
 }
 
@@ -127,52 +121,107 @@ HWY_INLINE void TrimBlock(const TileColumns& c, int block, float* to) {
   }
 }
 
-// The line of a row of cells, of `needed` blocks alone. Returns how many voxels it was made of, counted where their centres lie.
-inline uint64_t ResampleRow(const SplatScene& scene, const TileColumns& c, const ShearCell* begin, const ShearCell* end,
-                            uint64_t needed, DenseRow& dense, Line& line) {
-  line.mask = 0;
-  if (end - begin > 16)
-    begin = std::lower_bound(begin, end, c.u_lo, [](const ShearCell& cell, int u) { return int(cell.u) < u; });
+// Cells of a row: [begin, end).
+struct CellRow {
+  const ShearCell* begin = nullptr;
+  const ShearCell* end = nullptr;
+};
+
+// Adjacent pixels of a line, and the voxels that reach them.
+struct Segment {
+  int x_begin, x_end;
+  int u_lo, u_hi;      // that reach them
+  int own_lo, own_hi;  // that have their centres in them: those are counted
+};
+
+inline Segment segment_of(const TileColumns& c, int first_block, int last_block) {
+  Segment s;
+  s.x_begin = std::max(c.begin, first_block * kSplatBlock);
+  s.x_end = std::min(c.end, (last_block + 1) * kSplatBlock);
+  const auto at = [&](float x) { return c.origin + c.pitch * x; };
+  s.u_lo = c.base + int(std::ceil(at(float(s.x_begin)) - c.radius));
+  s.u_hi = c.base + int(std::floor(at(float(s.x_end - 1)) + c.radius));
+  s.own_lo = c.base + int(std::ceil(at(float(s.x_begin) - 0.5f)));
+  s.own_hi = c.base + int(std::ceil(at(float(s.x_end) - 0.5f))) - 1;
+  return s;
+}
+
+// Cells of a row that reach a segment.
+inline CellRow cells_of(const CellRow& row, const Segment& segment) {
+  CellRow out = row;
+  if (row.end - row.begin > 16)
+    out.begin = std::lower_bound(row.begin, row.end, segment.u_lo,
+                                 [](const ShearCell& cell, int u) { return int(cell.u) < u; });
   else
-    while (begin != end && int(begin->u) < c.u_lo) ++begin;
+    while (out.begin != out.end && int(out.begin->u) < segment.u_lo) ++out.begin;
+  return out;
+}
+
+// Adds weight times the voxels of a segment to the dense row. Returns the blocks that they reach; `voxels` counts them. row: ends with the last
+// cell that was looked at.
+HWY_INLINE uint64_t FillRow(const SplatScene& scene, const TileColumns& c, const Segment& segment, float weight,
+                            CellRow& row, DenseRow& dense, uint64_t& voxels) {
   float* at = dense.at + 4 * kMargin;
-  uint64_t mask = 0, voxels = 0;
+  const Quad w = QuadOf(weight);
+  uint64_t mask = 0;
   // Runs of voxels side by side reach the blocks of the pixels between half-open ends.
   int run = -2, last = -2;
-  const auto close = [&]() HWY_ATTR {
+  const auto close = [&]() {
     if (run < 0) return;
     const float from = (float(run - c.base) - c.origin) * c.inverse - c.reach;
     const float to = (float(last - c.base) - c.origin) * c.inverse + c.reach;
-    const int lo = std::max(int(std::ceil(from)), c.begin), hi = std::min(int(std::floor(to)), c.end - 1);
+    const int lo = std::max(int(std::ceil(from)), segment.x_begin);
+    const int hi = std::min(int(std::floor(to)), segment.x_end - 1);
     if (lo <= hi) mask |= blocks(lo / kSplatBlock, hi / kSplatBlock);
-    voxels += uint64_t(std::max(std::min(last, c.own_hi) - std::max(run, c.own_lo) + 1, 0));
+    voxels += uint64_t(std::max(std::min(last, segment.own_hi) - std::max(run, segment.own_lo) + 1, 0));
   };
-  const ShearCell* cell = begin;
-  for (; cell != end; ++cell) {
+  const ShearCell* cell = row.begin;
+  for (; cell != row.end; ++cell) {
     const int u = cell->u;
-    if (u > c.u_hi) break;
-    const auto colour = LoadQuad(scene.colours + 4 * cell->level);
-    if (scene.colours[4 * cell->level + 3] == 0) continue;
-    const auto light = LoadQuad(scene.light_factors + 4 * scene.light[cell->normal]);
-    StoreQuad(Mul(colour, light), at + 4 * u);
+    if (u > segment.u_hi) break;
+    const float* colour = scene.colours + 4 * cell->level;
+    if (colour[3] == 0) continue;
+    const Quad light = Mul(LoadQuad(scene.light_factors + 4 * scene.light[cell->normal]), w);
+    StoreQuad(Add(LoadQuad(at + 4 * u), Mul(LoadQuad(colour), light)), at + 4 * u);
     if (u != last + 1) close(), run = u;
     last = u;
   }
   close();
-  const ShearCell* const stop = cell;
-  mask &= needed;
-  line.mask = mask;
-  for (uint64_t m = mask; m != 0; m &= m - 1) {
-    const int block = std::countr_zero(m);
-    float* to = line.at + block * kBlockFloats;
-    if (c.radius > 1)
-      MinifyBlock(c, dense, block, scene.size_u, to);
-    else
-      MagnifyBlock(c, dense, block, to);
-    if (block * kSplatBlock < c.begin || (block + 1) * kSplatBlock > c.end) TrimBlock(c, block, to);
+  row.end = cell;
+  return mask;
+}
+
+// The line of a row of voxels, or of the sum of two, of `needed` blocks alone. Returns how many voxels it was made of.
+inline uint64_t ResampleRow(const SplatScene& scene, const TileColumns& c, const CellRow* rows, int count, float weight,
+                            uint64_t needed, DenseRow& dense, Line& line) {
+  line.mask = 0;
+  uint64_t voxels = 0;
+  for (uint64_t rest = needed; rest != 0;) {
+    const int first = std::countr_zero(rest), last = first + std::countr_one(rest >> first) - 1;
+    rest &= ~blocks(first, last);
+    const Segment segment = segment_of(c, first, last);
+    if (segment.x_begin >= segment.x_end) continue;
+    CellRow filled[2];
+    uint64_t mask = 0;
+    for (int r = 0; r < count; ++r) {
+      filled[r] = cells_of(rows[r], segment);
+      mask |= FillRow(scene, c, segment, weight, filled[r], dense, voxels);
+    }
+    line.mask |= mask;
+    for (uint64_t m = mask; m != 0; m &= m - 1) {
+      const int block = std::countr_zero(m);
+      float* to = line.at + block * kBlockFloats;
+      if (c.radius > 1)
+        MinifyBlock(c, dense, block, scene.size_u, to);
+      else
+        MagnifyBlock(c, dense, block, to);
+      if (block * kSplatBlock < c.begin || (block + 1) * kSplatBlock > c.end) TrimBlock(c, block, to);
+    }
+    for (int r = 0; r < count; ++r)
+      for (const ShearCell* cell = filled[r].begin; cell != filled[r].end; ++cell)
+        StoreQuad(QuadOf(0), dense.at + 4 * (kMargin + cell->u));
   }
-  for (cell = begin; cell != stop; ++cell) StoreQuad(QuadOf(0), at + 4 * cell->u);
-  return mask != 0 ? voxels : 0;
+  return voxels;
 }
 
 }  // namespace telesplat::sampler::HWY_NAMESPACE

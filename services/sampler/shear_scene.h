@@ -28,8 +28,11 @@ struct SliceAxis {
   double lattice_lo = -1e9, lattice_hi = 1e9;
 };
 
+/// A slice, or a plane half way between two: the mean of both, the field being linear there.
 struct SplatSlice {
-  int held = 0;  ///< index of the slice in ShearRows
+  int held[2] = {-1, -1};    ///< indices in ShearRows; -1: none
+  float weight = 1;          ///< of the voxels of each
+  ShearRows::Bounds bounds;  ///< of the voxels of both
   SliceAxis u, v;
 };
 
@@ -40,7 +43,7 @@ struct SplatScene {
   const float* colours = nullptr;        ///< r, g, b times extinction, and extinction of every level; 16-byte aligned
   const uint8_t* light = nullptr;        ///< intensity by normal, in 1/255
   const float* light_factors = nullptr;  ///< (i, i, i, 1) of every intensity i; 16-byte aligned
-  /// For each raster row and block: path at its first pixel, and how much it grows a pixel.
+  /// For each raster row and block: path from a plane to the next at its first pixel, and how much it grows a pixel.
   const float* paths = nullptr;
   int blocks_across = 0;  ///< of the raster, rounded up
   int width = 0, height = 0;

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <initializer_list>
 
 #include "common/volume/lighting.h"
 #include "services/sampler/shear_hidden.h"
@@ -24,8 +25,8 @@ double ms_since(Clock::time_point start) {
 }
 
 // How far heads turn about the volume's middle before a newer frame comes: what may come into sight by that is splatted even where it is hidden
-// now. tan 5 degrees.
-constexpr double kHeadMove = 0.0875;
+// now. 5 degrees and some more.
+constexpr double kHeadMove = 0.12;
 
 using Floats = hwy::AlignedFreeUniquePtr<float[]>;
 
@@ -43,7 +44,7 @@ Floats colour_table(const std::vector<volume::LevelColour>& colours) {
 }
 
 // Path lengths (ShearFrame::path) by block: at the first pixel, and growth a pixel so that the last one's is right, too.
-std::vector<float> block_paths(const volume::Grid& grid, const volume::ShearFrame& frame, int across) {
+std::vector<float> block_paths(const volume::Grid& grid, const volume::ShearFrame& frame, int across, int planes) {
   std::vector<float> out(2 * size_t(across) * size_t(frame.height));
   // The ray's direction is a + x b + y c; its length the root of a quadratic form.
   const glm::dmat3 m(grid.index_to_room);
@@ -52,18 +53,27 @@ std::vector<float> block_paths(const volume::Grid& grid, const volume::ShearFram
   first[frame.u()] = frame.u0 + 0.5 * frame.du;
   first[frame.v()] = frame.v0 + 0.5 * frame.dv;
   const glm::dvec3 start = m * first, right = m[frame.u()] * frame.du, down = m[frame.v()] * frame.dv;
-  const double unit = 1 / grid.unit_m();
-  constexpr int kLast = kSplatBlock - 1;
+  const double unit = 1 / (grid.unit_m() * planes);
   for (int y = 0; y < frame.height; ++y) {
     const glm::dvec3 row = start + down * double(y);
     for (int b = 0; b < across; ++b) {
+      const int last = std::max(std::min(kSplatBlock, frame.width - b * kSplatBlock) - 1, 1);
       const double from = glm::length(row + right * double(b * kSplatBlock)) * unit;
-      const double to = glm::length(row + right * double(b * kSplatBlock + kLast)) * unit;
+      const double to = glm::length(row + right * double(b * kSplatBlock + last)) * unit;
       float* at = out.data() + 2 * (size_t(y) * size_t(across) + size_t(b));
-      at[0] = float(from), at[1] = float((to - from) / kLast);
+      at[0] = float(from), at[1] = float((to - from) / last);
     }
   }
   return out;
+}
+
+// How many planes a slice is sampled on: two where levels are so opaque that one would show as a step. Known from what all samplers share.
+int planes_of(const volume::Grid& grid, const volume::ShearFrame& frame,
+              const std::vector<volume::LevelColour>& colours) {
+  constexpr double kMuch = 0.6;  // extinction of a slice
+  float most = 0;
+  for (const volume::LevelColour& c : colours) most = std::max(most, c.extinction);
+  return most * frame.path(grid, frame.width / 2.0, frame.height / 2.0) > kMuch ? 2 : 1;
 }
 
 struct LayerSlices {
@@ -71,28 +81,37 @@ struct LayerSlices {
   geometry::Rect rect;     // raster pixels that they reach, in whole blocks; no width: none
 };
 
-// Where slices lie in the raster. cut: the axis along which the slab ends (0: u, 1: v, none).
+// Where slices lie in the raster.
 struct Geometry {
   std::vector<SplatSlice> slices;
   std::vector<LayerSlices> layers;
 };
 
+// planes: of a slice, 1 or 2; see planes_of.
 Geometry slices_of(const volume::Grid& grid, const volume::ShearFrame& frame, const ShearRows& rows, int k_begin,
-                   int k_end, int held_begin, int held_end) {
+                   int k_end, int held_begin, int held_end, int planes) {
   Geometry out;
   for (const volume::Layer& layer : frame.layers) {
     LayerSlices l;
     l.begin = int(out.slices.size());
     int x_lo = frame.width, x_hi = -1, y_lo = frame.height, y_hi = -1;
-    for (int n = 0; n < layer.end - layer.begin; ++n) {
-      const int s = frame.direction > 0 ? layer.begin + n : layer.end - 1 - n;
-      if (frame.axis == 2 && (s < k_begin || s >= k_end)) continue;
-      if (s < rows.slice_begin || s >= rows.slice_begin + rows.slices) continue;
+    const auto add = [&](double at, std::initializer_list<int> of) {
       SplatSlice slice;
-      slice.held = s - rows.slice_begin;
-      const ShearRows::Bounds& bounds = rows.bounds[size_t(slice.held)];
-      if (bounds.u_lo > bounds.u_hi) continue;
-      const double t = frame.t(s);
+      slice.weight = 1.0f / float(of.size());
+      int count = 0;
+      for (const int s : of) {
+        const int held = s - rows.slice_begin;
+        if (held < 0 || held >= rows.slices) continue;
+        const ShearRows::Bounds& b = rows.bounds[size_t(held)];
+        if (b.u_lo > b.u_hi) continue;
+        slice.held[count++] = held;
+        slice.bounds.u_lo = std::min(slice.bounds.u_lo, b.u_lo),
+        slice.bounds.u_hi = std::max(slice.bounds.u_hi, b.u_hi);
+        slice.bounds.v_lo = std::min(slice.bounds.v_lo, b.v_lo),
+        slice.bounds.v_hi = std::max(slice.bounds.v_hi, b.v_hi);
+      }
+      const double t = frame.t(at);
+      if (count == 0 || t < 0.1) return;
       slice.u.origin = frame.eye[frame.u()] + (frame.u0 + 0.5 * frame.du) * t;
       slice.u.pitch = frame.du * t;
       slice.u.end = frame.width;
@@ -101,7 +120,7 @@ Geometry slices_of(const volume::Grid& grid, const volume::ShearFrame& frame, co
       slice.v.end = frame.height;
       if (frame.axis != 2) {
         SliceAxis& cut = frame.axis == 0 ? slice.v : slice.u;
-        const auto [first, last] = volume::owned_pixels(grid, frame, s, k_begin, k_end);
+        const auto [first, last] = volume::owned_pixels(grid, frame, at, k_begin, k_end);
         cut.begin = first, cut.end = last;
         if (held_begin > 0) cut.lattice_lo = held_begin;
         if (held_end < grid.size[2]) cut.lattice_hi = held_end - 1;
@@ -116,10 +135,22 @@ Geometry slices_of(const volume::Grid& grid, const volume::ShearFrame& frame, co
         return from <= to;
       };
       int xa = 0, xb = 0, ya = 0, yb = 0;
-      if (!reach(slice.u, bounds.u_lo, bounds.u_hi, xa, xb) || !reach(slice.v, bounds.v_lo, bounds.v_hi, ya, yb))
-        continue;
+      if (!reach(slice.u, slice.bounds.u_lo, slice.bounds.u_hi, xa, xb) ||
+          !reach(slice.v, slice.bounds.v_lo, slice.bounds.v_hi, ya, yb))
+        return;
       x_lo = std::min(x_lo, xa), x_hi = std::max(x_hi, xb), y_lo = std::min(y_lo, ya), y_hi = std::max(y_hi, yb);
       out.slices.push_back(slice);
+    };
+    for (int n = 0; n < layer.end - layer.begin; ++n) {
+      const int s = frame.direction > 0 ? layer.begin + n : layer.end - 1 - n;
+      if (frame.axis == 2 && (s < k_begin || s >= k_end)) continue;
+      // The plane behind a slice, in index order, goes with it; the one before the first slice with that.
+      const bool forward = frame.direction > 0;
+      if (planes == 2 && forward && s == 0) add(-0.5, {-1, 0});
+      if (planes == 2 && !forward) add(s + 0.5, {s, s + 1});
+      add(s, {s});
+      if (planes == 2 && forward) add(s + 0.5, {s, s + 1});
+      if (planes == 2 && !forward && s == 0) add(-0.5, {-1, 0});
     }
     l.end = int(out.slices.size());
     if (l.begin < l.end) {
@@ -172,11 +203,12 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
   const auto splatting = Clock::now();
 
   SplatScene scene;
+  const int planes = planes_of(grid, frame, colours);
   scene.rows = &rows;
   scene.size_u = grid.size[size_t(frame.u())];
   scene.width = frame.width, scene.height = frame.height;
   scene.blocks_across = (frame.width + kSplatBlock - 1) / kSplatBlock;
-  const Geometry geometry = slices_of(grid, frame, rows, k_begin, k_end, voxels.k_begin, voxels.k_end);
+  const Geometry geometry = slices_of(grid, frame, rows, k_begin, k_end, voxels.k_begin, voxels.k_end, planes);
   scene.slices = geometry.slices.data();
   const Floats table = colour_table(colours);
   scene.colours = table.get();
@@ -188,7 +220,7 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
   }
   scene.light = light.data();
   scene.light_factors = impl_->light_factors.get();
-  const std::vector<float> paths = block_paths(grid, frame, scene.blocks_across);
+  const std::vector<float> paths = block_paths(grid, frame, scene.blocks_across, planes);
   scene.paths = paths.data();
 
   const int tiles_across = (frame.width + kTileWidth - 1) / kTileWidth;

@@ -36,8 +36,9 @@ struct ShearStats {
 
 /// The field that is splatted: every voxel has an extinction (per Grid::unit_m) and a colour, lit by volume/lighting.h. Within a slice both extinction
 /// and extinction times colour are interpolated bilinearly (a tent of one voxel; where a voxel is smaller than a pixel, of one pixel), the
-/// kernel being the same for all voxels of a slice (T4.5.1), its weights adding up to 1 at every pixel. A slice adds opacity 1 - exp(-extinction * path), path = ShearFrame::path; slices
-/// are composited front to back in single precision. Images are cropped to what is not transparent; empty ones are left out.
+/// kernel being the same for all voxels of a slice (T4.5.1), its weights adding up to 1 at every pixel. A slice adds
+/// opacity 1 - exp(-extinction * path), path = ShearFrame::path; slices are composited front to back in single precision. Where the most opaque level
+/// has an extinction of more than 0.6 a slice, so do planes half way between slices, then with half the path each. Images are cropped to what is not transparent; empty ones are left out.
 /// Early termination: what lies behind opaque pixels is skipped, but for a margin around them, so that small head movements reveal no holes.
 class ShearSplatter {
  public:
@@ -45,7 +46,8 @@ class ShearSplatter {
   ~ShearSplatter();
 
   /// Images of the slab [k_begin, k_end) of the frame: pixels of owned_pixels() only, for which the volume must hold one slice more on both sides where
-  /// the grid has them; where pixels are larger than 1.5 voxels, the kernel ends with what is held. colours: one a level of the epoch. Precondition: validate(frame, grid).
+  /// the grid has them; where pixels are larger than 1.5 voxels, the kernel ends with what is held. colours:
+  /// one a level of the epoch. Precondition: validate(frame, grid).
   std::vector<volume::SliceImage> splat(const SlabVolume& volume, const std::vector<volume::LevelColour>& colours,
                                         const volume::ShearFrame& frame, int k_begin, int k_end,
                                         ShearStats* stats = nullptr);

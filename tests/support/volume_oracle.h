@@ -2,6 +2,7 @@
 // nothing is skipped.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -12,7 +13,9 @@ namespace telesplat::test {
 
 class SplatOracle {
  public:
-  SplatOracle(const VolumeScene& scene, const volume::ShearFrame& frame) : grid_(scene.grid), frame_(frame) {
+  /// planes: on how many a slice is sampled.
+  SplatOracle(const VolumeScene& scene, const volume::ShearFrame& frame, int planes)
+      : grid_(scene.grid), frame_(frame), planes_(planes) {
     const auto& n = grid_.size;
     field_.resize(size_t(n[0]) * size_t(n[1]) * size_t(n[2]), glm::dvec4(0));
     std::vector<float> light;
@@ -31,11 +34,17 @@ class SplatOracle {
   /// Premultiplied colour and alpha, 0 to 1, of a layer's pixel.
   glm::dvec4 pixel(const volume::Layer& layer, int x, int y) {
     glm::dvec4 sum(0);
-    for (int n = 0; n < layer.end - layer.begin; ++n) {
-      const int s = frame_.direction > 0 ? layer.begin + n : layer.end - 1 - n;
+    std::vector<double> at;
+    if (planes_ == 2 && layer.begin == 0) at.push_back(-0.5);
+    for (int s = layer.begin; s < layer.end; ++s) {
+      at.push_back(s);
+      if (planes_ == 2) at.push_back(s + 0.5);
+    }
+    if (frame_.direction < 0) std::reverse(at.begin(), at.end());
+    for (const double s : at) {
       const glm::dvec4 e = slice(s, x, y);
       if (!(e.w > 0)) continue;
-      const double alpha = 1 - std::exp(-e.w * frame_.path(grid_, x + 0.5, y + 0.5));
+      const double alpha = 1 - std::exp(-e.w * frame_.path(grid_, x + 0.5, y + 0.5) / planes_);
       sum += (1 - sum.w) * alpha * glm::dvec4(glm::dvec3(e) / e.w, 1);
     }
     return sum;
@@ -47,7 +56,7 @@ class SplatOracle {
   }
 
   // Extinction times colour, and extinction, of a slice at a pixel.
-  glm::dvec4 slice(int s, int x, int y) {
+  glm::dvec4 slice(double s, int x, int y) {
     const glm::dvec3 p = frame_.unproject(x + 0.5, y + 0.5, s);
     const double t = frame_.t(s), ru = std::max(1.0, frame_.du * t), rv = std::max(1.0, frame_.dv * t);
     const int u = frame_.u(), v = frame_.v();
@@ -59,14 +68,18 @@ class SplatOracle {
         weights += w;
         if (a < 0 || b < 0 || a >= grid_.size[size_t(u)] || b >= grid_.size[size_t(v)]) continue;
         std::array<int, 3> index{};
-        index[size_t(frame_.axis)] = s, index[size_t(u)] = a, index[size_t(v)] = b;
-        sum += w * at(index[0], index[1], index[2]);
+        index[size_t(u)] = a, index[size_t(v)] = b;
+        for (const double side : {std::floor(s), std::ceil(s)}) {  // the same one twice, or half way between
+          index[size_t(frame_.axis)] = int(side);
+          if (side >= 0 && side < grid_.size[size_t(frame_.axis)]) sum += 0.5 * w * at(index[0], index[1], index[2]);
+        }
       }
     return weights > 0 ? sum / weights : sum;
   }
 
   volume::Grid grid_;
   volume::ShearFrame frame_;
+  int planes_;
   std::vector<glm::dvec4> field_;
 };
 
