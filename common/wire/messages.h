@@ -344,6 +344,7 @@ struct SheetEntry {
   uint64_t round = 0;
   std::string endpoint;
   uint64_t begin = 0, end = 0;
+  bool operator==(const SheetEntry&) const = default;
   template <class F> static void fields(F& f, auto& m) {
     f("round", m.round); f("endpoint", m.endpoint); f("begin", m.begin); f("end", m.end);
   }

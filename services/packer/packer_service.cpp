@@ -12,6 +12,7 @@
 #include "services/packer/depth_recorder.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/packer_core.h"
+#include "services/packer/volume_packing.h"
 
 namespace telesplat::packer {
 namespace {
@@ -78,7 +79,7 @@ class PackerService {
     if (!link_->session() || link_->version() == seen_version_) return;
     seen_version_ = link_->version();
     const wire::Welcome& s = *link_->session();
-    if (s.box_room.empty()) return;
+    if (volume_.follow(s, monotonic_s()) || s.box_room.empty()) return;
     const auto setting = [&](const char* key, double fallback) {
       const auto it = s.settings.find(key);
       return it == s.settings.end() ? fallback : it->second;
@@ -120,13 +121,14 @@ class PackerService {
   }
 
   void periodic(double now_s) {
-    if (!core_) return;
     if (now_s - last_tick_s_ >= kTickPeriod_s) {
       last_tick_s_ = now_s;
-      for (const auto& event : core_->tick(now_s)) publish(event);
+      volume_.tick(now_s);
       flush_spans();
+      if (core_)
+        for (const auto& event : core_->tick(now_s)) publish(event);
     }
-    if (now_s - last_mark_s_ >= kMarkPeriod_s) {
+    if (core_ && now_s - last_mark_s_ >= kMarkPeriod_s) {
       last_mark_s_ = now_s;
       patches_.send(mark(false));
     }
@@ -157,8 +159,11 @@ class PackerService {
     for (int n = 0; n < kTilesAtOnce; ++n) {
       const auto message = tiles_.receive();
       if (!message) return;
-      net::dispatch<wire::DepthTile>(tiles_, *message, [&](const wire::DepthTile& tile) {
-        pack({*message, tile}, monotonic_s());
+      net::dispatch<wire::DepthTile, wire::SliceImages>(tiles_, *message, [&](const auto& m) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::DepthTile>)
+          pack({*message, m}, monotonic_s());
+        else if (const Status s = volume_.receive(*message, m, monotonic_s()); !s)
+          tiles_.reject(*message, s.error().text);
       });
     }
   }
@@ -253,9 +258,13 @@ class PackerService {
     for (int n = 0; n < 64; ++n) {
       const auto message = state_.receive();
       if (!message) return;
-      net::dispatch<wire::StateRequest, wire::AccessReport>(state_, *message, [&](const auto& m) {
-        if (!core_) return;
-        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>)
+      net::dispatch<wire::StateRequest, wire::AccessReport, wire::SliceAck>(state_, *message, [&](const auto& m) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::SliceAck>) {
+          if (const Status s = volume_.acknowledged(message->peer, m, monotonic_s()); !s)
+            state_.reject(*message, s.error().text);
+        } else if (!core_) {
+          return;
+        } else if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>)
           core_->accessed(m.clusters, monotonic_s(), m.frames);
         else
           answer(message->peer, m);
@@ -300,6 +309,7 @@ class PackerService {
                 {"points_forgotten", double(s.points_forgotten)},
                 {"points_outside", double(s.points_outside)}});
     }
+    volume_.add_status(v);
     return v;
   }
 
@@ -317,6 +327,12 @@ class PackerService {
   std::optional<DepthRecorder> recorder_;
   points::ModelConfig model_;
   metrics::SpanRecorder spans_;
+  VolumePacking volume_{
+      {.tell = [this](const wire::TileDone& m) { link_->socket().send(m); },
+       .send = [this](const wire::SliceFrame& m, const std::string& peer) { return state_.send(m, peer); },
+       .master_now = [this] { return master_now(); },
+       .to_master_s = [this](double s) { return link_->to_master_s(s); }},
+      spans_};
   int seen_version_ = 0;
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
   double last_mark_s_ = 0, last_tick_s_ = 0;

@@ -1,5 +1,5 @@
-// What a sampler does for its leases, one implementation a kind of scene: fetch what a lease needs, then sample it. The service
-// around it asks for leases, encodes, sends. One thread; nothing here may wait.
+// What a sampler does for leases of tiles, one implementation a kind of scene: fetch what a lease needs, then sample it. TileWork (tile_work.h) holds the
+// leases and encodes the depth images. One thread; nothing here may wait.
 #pragma once
 
 #include <memory>
@@ -8,6 +8,7 @@
 #include "common/core/clock.h"
 #include "common/image/depth_image.h"
 #include "common/net/master_link.h"
+#include "services/sampler/sampling_work.h"
 
 namespace telesplat::sampler {
 
@@ -15,17 +16,6 @@ namespace telesplat::sampler {
 struct HeldLease {
   wire::Lease lease;
   double received_s = 0;
-};
-
-/// Whether a lease can be sampled.
-struct Readiness {
-  enum class State {
-    kReady,     ///< sample() may be called
-    kWaits,     ///< not before again_s; sooner if one of sockets() brings something
-    kHopeless,  ///< never: it is to be dropped, the master gives it to another when it has run out
-  };
-  State state = State::kReady;
-  double again_s = 1e300;
 };
 
 /// A sampled tile and when its sampling began and ended, on this machine's clock.

@@ -3,26 +3,26 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <optional>
 
-#include "common/codec/depth_codec.h"
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
-#include "common/net/dispatch.h"
 #include "common/net/master_link.h"
 #include "services/sampler/drain_guard.h"
 #include "services/sampler/julia_work.h"
 #include "services/sampler/mesh_work.h"
 #include "services/sampler/replay_work.h"
+#include "services/sampler/shear_slabs.h"
+#include "services/sampler/tile_work.h"
+#include "services/sampler/volume_work.h"
 
 namespace telesplat::sampler {
 namespace {
 
 constexpr int kLeases = 2;          // held and asked for: one being sampled, one to go on with at once
-constexpr size_t kMaxHeld = 64;     // a master that sends more leases than it was asked for is not believed
 constexpr double kIdle_s = 0.1;     // the longest wait: then status reports and hellos are due
 constexpr double kSpanFlush_s = 1;  // between two deliveries of spans
+constexpr double kSendAgain_s = 0.025, kSendFor_s = 1;  // to a packer that is slow or being restarted
 
 class SamplerService {
  public:
@@ -32,10 +32,9 @@ class SamplerService {
       : options_(o),
         context_(context),
         mesh_sampler_(std::move(sampler)),
-        work_(std::move(replay)),
-        replays_(work_ != nullptr),
+        replays_(replay != nullptr),
         link_(context, o.service.master, make_hello(o, instance)) {
-    if (work_) link_.tell("sampler", work_->name());
+    if (replays_) set_work(tile_work(std::move(replay)));
   }
 
   int serve() {
@@ -45,21 +44,22 @@ class SamplerService {
       if (net::stop_requested() && !give_up_s) give_up_s = now + kDrain_s;
       link_.tick(now, [&] { return status(); });
       flush_metrics(now);
+      send_out(now);
       const Readiness next = look_at_next(now);
-      const bool ready = !leases_.empty() && next.state == Readiness::State::kReady;
+      const bool ready = held() > 0 && next.state == Readiness::State::kReady && !unsent_;
       if (give_up_s) {
         // What cannot be sampled now, or comes only now, is left to the master: it goes to others with our goodbye.
-        const bool waits = !leases_.empty() && next.again_s < *give_up_s;
+        const bool waits = unsent_ || (held() > 0 && next.again_s < *give_up_s);
         if ((!ready && !waits) || now > *give_up_s) break;
       } else {
         ask_for_leases();
       }
-      if (work_) work_->fetch(leases_.empty() ? nullptr : &leases_.front(), now);
-      if (!ready) wait(std::min(next.again_s - now, kIdle_s));
+      if (work_) work_->fetch(now);
+      if (!ready) wait(std::min(unsent_ ? kSendAgain_s : next.again_s - now, kIdle_s));
       receive_control(!give_up_s);
-      if (work_) work_->receive();
+      if (work_) work_->receive(monotonic_s());
       // What came meanwhile may have changed what is known of the lease's epoch.
-      if (ready && look_at_next(monotonic_s()).state == Readiness::State::kReady && !leases_.empty()) sample_next();
+      if (ready && look_at_next(monotonic_s()).state == Readiness::State::kReady && held() > 0) sample_next();
     }
     flush_metrics(1e300);
     link_.leave([&] { return status(); });
@@ -90,13 +90,18 @@ class SamplerService {
     if (const auto rows = spans_.flush(link_.instance())) link_.socket().send(*rows);
   }
 
+  size_t held() const { return work_ ? work_->leases() : 0; }
+  Readiness look_at_next(double now_s) {
+    return work_ ? work_->look_at_next(now_s) : Readiness{Readiness::State::kWaits};
+  }
+
   // Every welcome counts: a later one may be of another epoch whose leases are already on their way.
   void on_welcome() {
     const wire::Welcome& session = *link_.session();
     if (session.master != master_) {  // another master knows nothing of the leases we asked for
       master_ = session.master;
       leases_asked_ = 0;
-      leases_.clear();
+      if (work_) work_->drop_leases();
     }
     const auto tiles = session.endpoints.find("tiles");
     if (tiles != session.endpoints.end() && !tiles->second.empty() && tiles->second != tiles_endpoint_) {
@@ -112,10 +117,10 @@ class SamplerService {
 
   void choose_work(const std::string& kind) {
     kind_ = kind;
-    leases_.clear();
     work_.reset();
+    const auto cache_bytes = uint64_t(options_.chunk_cache_mb * 1e6);
     if (kind == "julia") {
-      work_ = std::make_unique<JuliaWork>(options_.threads);
+      set_work(tile_work(std::make_unique<JuliaWork>(options_.threads)));
     } else if (kind == "mesh") {
       if (!mesh_sampler_) {
         auto made = make_sampler(options_.kind, options_.threads);
@@ -126,28 +131,31 @@ class SamplerService {
         }
         mesh_sampler_ = std::move(*made);
       }
-      work_ = std::make_unique<MeshWork>(std::move(mesh_sampler_), uint64_t(options_.chunk_cache_mb * 1e6),
-                                         options_.service.name, context_, link_, spans_);
+      set_work(tile_work(std::make_unique<MeshWork>(std::move(mesh_sampler_), cache_bytes, options_.service.name,
+                                                    context_, link_, spans_)));
+    } else if (kind == "volume") {
+      const VolumeWork::Master master{.instance = link_.instance(),
+                                      .ready = [this](const wire::SlabReady& m) { link_.socket().send(m); },
+                                      .extend = [this](const wire::LeaseExtend& m) { link_.socket().send(m); },
+                                      .to_master_s = [this](double s) { return link_.to_master_s(s); }};
+      set_work(std::make_unique<VolumeWork>(make_shear_slabs(options_.threads), options_.threads, cache_bytes,
+                                            options_.service.name, context_, master, spans_));
     } else {
-      log::error("the session's data are of kind '{}'; this sampler knows julia and mesh", kind.substr(0, 64));
-      return;
+      log::error("the session's data are of kind '{}'; this sampler knows julia, mesh and volume", kind.substr(0, 64));
     }
+  }
+
+  std::unique_ptr<SamplingWork> tile_work(std::unique_ptr<LeaseWork> work) {
+    return std::make_unique<TileWork>(std::move(work), link_);
+  }
+  void set_work(std::unique_ptr<SamplingWork> work) {
+    work_ = std::move(work);
     link_.tell("sampler", work_->name());
   }
 
-  // Whether the first lease can be sampled; drops those that never can.
-  Readiness look_at_next(double now_s) {
-    while (!leases_.empty()) {
-      const Readiness r = work_ ? work_->readiness(leases_.front(), now_s) : Readiness{Readiness::State::kHopeless};
-      if (r.state != Readiness::State::kHopeless) return r;
-      leases_.pop_front();
-    }
-    return {Readiness::State::kWaits};
-  }
-
-  void ask_for_leases(int being_sampled = 0) {
+  void ask_for_leases() {
     if (!tiles_ || !work_ || !work_->takes_leases()) return;
-    while (leases_asked_ + int(leases_.size()) + being_sampled < kLeases) {
+    while (leases_asked_ + int(held()) < kLeases) {
       link_.socket().send(wire::LeaseRequest{link_.instance()});
       ++leases_asked_;
     }
@@ -170,47 +178,43 @@ class SamplerService {
         continue;
       }
       // An answer is an answer, be it one that cannot be read.
-      if (message->type == wire::Lease::kName) leases_asked_ = std::max(0, leases_asked_ - 1);
-      net::dispatch<wire::Lease>(link_.socket(), *message, [&](const wire::Lease& lease) {
-        if (takes_leases && tiles_ && leases_.size() < kMaxHeld) leases_.push_back({lease, now});
-      });
+      if (message->type == wire::Lease::kName || message->type == wire::SliceLease::kName)
+        leases_asked_ = std::max(0, leases_asked_ - 1);
+      if (work_)
+        work_->take(link_.socket(), *message, takes_leases && tiles_, now);
+      else
+        link_.socket().reject(*message, "nothing is sampled yet");
     }
   }
 
   void sample_next() {
-    const HeldLease held = std::move(leases_.front());
-    leases_.pop_front();
-    if (!net::stop_requested()) ask_for_leases(1);  // the answer comes while we sample
-    const Sampled sampled = work_->sample(held);
-    const auto stream = codec::encode(sampled.image);
-    wire::DepthTile tile{link_.instance(), held.lease};
-    tile.sample_begin_s = link_.to_master_s(sampled.begin_s);
-    tile.sample_end_s = link_.to_master_s(sampled.end_s);
-    tile.encode_end_s = link_.to_master_s(monotonic_s());
-    tile.image = std::as_bytes(std::span(stream));
-    std::string body = wire::encode(tile);
+    if (!net::stop_requested()) ask_for_leases();  // the answer comes while we sample
+    Delivery made = work_->sample_next();
     ++tiles_sampled_;
-    spans_.add("sample", tile.sample_begin_s, tile.sample_end_s);
-    spans_.add("encode", tile.sample_end_s, tile.encode_end_s);
-    // A packer that is slow or being restarted: hold this tile for a while, then let its lease expire.
-    for (const double until = monotonic_s() + 1.0; !tiles_->send_frames({}, wire::DepthTile::kName, body);) {
-      net::wait_readable({&link_.socket()}, 25);
-      receive_control(!net::stop_requested());
-      if (link_.shutdown_requested() || monotonic_s() > until) return;
-    }
+    spans_.add("sample", link_.to_master_s(made.begin_s), link_.to_master_s(made.sampled_s));
+    spans_.add("encode", link_.to_master_s(made.sampled_s), link_.to_master_s(made.encoded_s));
+    unsent_ = std::move(made);
+    send_out(monotonic_s());
+  }
+
+  // A packer that is slow or being restarted: what was sampled is held for a while, then its lease may expire.
+  void send_out(double now_s) {
+    if (!unsent_) return;
+    if ((tiles_ && tiles_->send_frames({}, unsent_->type, unsent_->body)) || now_s > unsent_->encoded_s + kSendFor_s)
+      unsent_.reset();
   }
 
   const SamplerServiceOptions& options_;
   net::Context& context_;
   std::unique_ptr<Sampler> mesh_sampler_;
-  std::unique_ptr<LeaseWork> work_;  // none before the session's kind is known
   const bool replays_;
   metrics::SpanRecorder spans_;
   net::MasterLink link_;
+  std::unique_ptr<SamplingWork> work_;  // none before the session's kind is known
   std::optional<net::Socket> tiles_;
   std::string tiles_endpoint_, kind_;
   InstanceId master_;
-  std::deque<HeldLease> leases_;
+  std::optional<Delivery> unsent_;
   int leases_asked_ = 0;
   bool failed_ = false;
   uint64_t tiles_sampled_ = 0;
