@@ -139,7 +139,7 @@ class SamplerService {
                                       .extend = [this](const wire::LeaseExtend& m) { link_.socket().send(m); },
                                       .to_master_s = [this](double s) { return link_.to_master_s(s); }};
       set_work(std::make_unique<VolumeWork>(make_shear_slabs(options_.threads), options_.threads, cache_bytes,
-                                            options_.service.name, context_, master, spans_));
+                                            options_.service.name, context_, master, spans_, options_.repeat_views));
     } else {
       log::error("the session's data are of kind '{}'; this sampler knows julia, mesh and volume", kind.substr(0, 64));
     }
@@ -235,6 +235,12 @@ void add_flags(CLI::App& app, SamplerServiceOptions& o) {
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1e6));
   app.add_option("--replay", o.replay, "sample nothing: deliver this file's rows, after as long as they took");
+  app.add_option("--repeat-views", o.repeat_views,
+                 "a view of a volume that was sampled so often is not sampled again, but sent again after as long as "
+                 "it took the thread (with "
+                 "--threads 1): for studies with more samplers than processors; 0: never")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1000));
   app.add_option("--cost-scale", o.cost_scale, "with --replay: rows take so many times as long")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1e6));

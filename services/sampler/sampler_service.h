@@ -12,6 +12,7 @@ struct SamplerServiceOptions {
   int threads = 0;               ///< 0: all cores
   double chunk_cache_mb = 8192;  ///< bytes of chunks held at most, unless one view needs more
   std::string replay;            ///< file of rows sampled before (replay_file.h); empty: samples itself
+  int repeat_views = 0;          ///< a view of a volume that was sampled so often is sent again after as long; 0: never
   double cost_scale = 1;         ///< a replayed lease takes this times what its rows took
 };
 

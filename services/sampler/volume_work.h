@@ -1,6 +1,7 @@
 // Leases of a volume (T4.5, T5.3): fetches the voxels of the slab it was assigned, round by round, and splats it into slice images, one a layer.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <functional>
 #include <map>
@@ -9,6 +10,7 @@
 
 #include "common/metrics/recorder.h"
 #include "common/volume/session.h"
+#include "services/sampler/repeated_views.h"
 #include "services/sampler/sampling_work.h"
 #include "services/sampler/slab_store.h"
 
@@ -32,8 +34,9 @@ class VolumeWork final : public SamplingWork {
   };
 
   /// make: arranges slabs. threads: to encode with; 0: one a core. cache_bytes: of voxels. Keeps references to the context and the spans.
+  /// repeat_after: a view that was sampled so often is sent again after as long as that took (repeated_views.h); 0: never.
   VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name, net::Context& context,
-             Master master, metrics::SpanRecorder& spans);
+             Master master, metrics::SpanRecorder& spans, int repeat_after = 0);
 
   const char* name() const override { return "volume"; }
   /// Remembers the epoch's transfer function and step. Bad ones are told once, and that epoch's leases are hopeless.
@@ -69,6 +72,11 @@ class VolumeWork final : public SamplingWork {
   };
 
   Readiness readiness(const Held& held, double now_s);
+  /// When what a lease costs has passed: it begins when the one before ended, or when it came; instants as they should be, not as this process
+  /// woke up.
+  double repeated_end_s(const Held& held, const RepeatedViews::View& view) const {
+    return std::max(held.received_s, repeated_end_s_) + view.cost_s();
+  }
   static SlabWant want(EpochId epoch, const Epoch& of, int begin, int end);
   std::optional<VoxelAsk> next_ask();
   void ask(double now_s);
@@ -77,6 +85,8 @@ class VolumeWork final : public SamplingWork {
   void forget_servers();
 
   SlabStore store_;
+  RepeatedViews repeated_;
+  double repeated_end_s_ = 0;  // of the view that was sent again last
   int threads_;
   std::string service_name_;
   net::Context& context_;
