@@ -38,7 +38,9 @@ Result<Arguments> set_arguments(const std::vector<std::string>& given) {
 }
 
 Result<Arguments> animate_arguments(const std::vector<std::string>& given) {
-  if (given.size() != 1) return Error{"ctl animate: needs one timeline, such as c.y=-0.4:0.4:10s, or off; for a series of volumes on or off"};
+  if (given.size() != 1)
+    return Error{
+        "ctl animate: needs one timeline, such as c.y=-0.4:0.4:10s, or off; for a series of volumes on or off"};
   if (given.front() != "off" && given.front() != "on")
     if (const auto timeline = julia::parse_timeline(given.front()); !timeline) return timeline.error();
   return Arguments{{"timeline", given.front()}};

@@ -29,6 +29,8 @@ class DirectScene {
   /// One sampling frame, as a sampler takes it. Error: as draw().
   virtual Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) = 0;
 
+  /// Whether light goes through: then a pixel has no one depth, and displayed ones are compared by whether they have any.
+  virtual bool translucent() const { return false; }
   virtual geometry::Box box_room() const = 0;
   virtual uint64_t primitives() const = 0;  ///< triangles; 0 of a scene without
   virtual std::string size() const = 0;     ///< "20000 triangles", for captions

@@ -22,6 +22,7 @@ class DirectVolume : public DirectScene {
   Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override {
     return Error{fmt::format("{}: is a volume, of which no depth images are sampled", recorded_.file)};
   }
+  bool translucent() const override { return true; }
   geometry::Box box_room() const override { return store_->session().grid.box_room(); }
   uint64_t primitives() const override { return 0; }
   std::string size() const override {

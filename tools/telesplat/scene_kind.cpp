@@ -19,7 +19,8 @@ constexpr double kJuliaLeastSampling = 0.4, kJuliaMaxPoints = 8e6;
 // The tiles of a wall are compared where the head stands still.
 constexpr double kWallHold_s = 2;
 
-constexpr std::initializer_list<const char*> kOfVolumes{"--tf", "--lighting", "--series-rate", "--data-servers", "--layers"};
+constexpr std::initializer_list<const char*> kOfVolumes{"--tf", "--lighting", "--series-rate", "--data-servers",
+                                                        "--layers"};
 constexpr std::initializer_list<const char*> kOfRasters{"--z-scale", "--texture"};
 constexpr std::initializer_list<const char*> kOfPoints{
     "--sampler",        "--splat",        "--splat-scale",        "--finish",
