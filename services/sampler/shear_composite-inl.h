@@ -62,8 +62,10 @@ inline void CompositeRow(const float* paths, uint64_t mask, const Line& a, const
         if constexpr (!kTwo) return va;
         return hn::Add(va, hn::Mul(hn::Sub(hn::Load(d, pb + channel * kSplatBlock + l), va), weight));
       };
-      const auto path =
-          hn::Add(hn::Set(d, paths[2 * block]), hn::Mul(hn::Set(d, paths[2 * block + 1]), hn::Iota(d, float(l))));
+      const auto at = hn::Iota(d, float(l));
+      const float* polynomial = paths + 3 * block;
+      const auto slope = hn::Add(hn::Set(d, polynomial[1]), hn::Mul(hn::Set(d, polynomial[2]), at));
+      const auto path = hn::Add(hn::Set(d, polynomial[0]), hn::Mul(slope, at));
       const auto x = hn::Mul(hn::Max(value(3), hn::Zero(d)), path);
       const auto attenuation = Attenuation(x);
       const auto light = hn::Load(d, p + 3 * kSplatBlock + l);

@@ -52,7 +52,7 @@ void MakeLine(const SliceInTile& s, int v, uint64_t needed, Scratch& scratch, Li
 }
 
 const float* PathsOf(const SliceInTile& s, int y) {
-  return s.scene.paths + 2 * (size_t(s.job.y0 + y) * size_t(s.scene.blocks_across) + size_t(s.job.x0 / kSplatBlock));
+  return s.scene.paths + 3 * (size_t(s.job.y0 + y) * size_t(s.scene.blocks_across) + size_t(s.job.x0 / kSplatBlock));
 }
 
 // Voxel rows at least as high as pixel rows: every pixel row lies between two.

@@ -43,7 +43,7 @@ struct SplatScene {
   const float* colours = nullptr;        ///< r, g, b times extinction, and extinction of every level; 16-byte aligned
   const uint8_t* light = nullptr;        ///< intensity by normal, in 1/255
   const float* light_factors = nullptr;  ///< (i, i, i, 1) of every intensity i; 16-byte aligned
-  /// For each raster row and block: path from a plane to the next at its first pixel, and how much it grows a pixel.
+  /// For each raster row and block: path from a plane to the next, as the coefficients of 1, n and n^2 of its pixel n.
   const float* paths = nullptr;
   int blocks_across = 0;  ///< of the raster, rounded up
   int width = 0, height = 0;

@@ -43,9 +43,9 @@ Floats colour_table(const std::vector<volume::LevelColour>& colours) {
   return out;
 }
 
-// Path lengths (ShearFrame::path) by block: at the first pixel, and growth a pixel so that the last one's is right, too.
+// Path lengths (ShearFrame::path) by block, as a polynomial of the pixel in it that is right at the first, middle and last one.
 std::vector<float> block_paths(const volume::Grid& grid, const volume::ShearFrame& frame, int across, int planes) {
-  std::vector<float> out(2 * size_t(across) * size_t(frame.height));
+  std::vector<float> out(3 * size_t(across) * size_t(frame.height));
   // The ray's direction is a + x b + y c; its length the root of a quadratic form.
   const glm::dmat3 m(grid.index_to_room);
   glm::dvec3 first(0.0);
@@ -60,8 +60,10 @@ std::vector<float> block_paths(const volume::Grid& grid, const volume::ShearFram
       const int last = std::max(std::min(kSplatBlock, frame.width - b * kSplatBlock) - 1, 1);
       const double from = glm::length(row + right * double(b * kSplatBlock)) * unit;
       const double to = glm::length(row + right * double(b * kSplatBlock + last)) * unit;
-      float* at = out.data() + 2 * (size_t(y) * size_t(across) + size_t(b));
-      at[0] = float(from), at[1] = float((to - from) / last);
+      float* at = out.data() + 3 * (size_t(y) * size_t(across) + size_t(b));
+      const double middle = glm::length(row + right * (b * kSplatBlock + last / 2.0)) * unit;
+      const double bend = 2 * (from - 2 * middle + to) / (double(last) * last);
+      at[0] = float(from), at[1] = float((to - from) / last - bend * last), at[2] = float(bend);
     }
   }
   return out;
@@ -239,16 +241,15 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
     return kHeadMove * middle_t * sides / pitch;
   };
   const double move_x = moved(frame.u(), frame.du), move_y = moved(frame.v(), frame.dv);
-  double margin_x = 0, margin_y = 0;  // pixels that are still to be taken off
 
   std::vector<volume::SliceImage> images;
   SplatOutcome total;
   for (size_t l = 0; l < frame.layers.size(); ++l) {
     if (l > 0) {
       const double shift = std::abs(1 / frame.t(frame.layers[l - 1].plane) - 1 / frame.t(frame.layers[l].plane));
-      margin_x += move_x * shift, margin_y += move_y * shift;
-      const int dx = int(std::min(margin_x, 4096.0)), dy = int(std::min(margin_y, 4096.0));
-      margin_x -= dx, margin_y -= dy;
+      // Rounded up, and half a pixel for what the warp interpolates: newly opaque pixels have no margin yet.
+      const int dx = int(std::ceil(std::min(move_x * shift + 0.5, 4096.0)));
+      const int dy = int(std::ceil(std::min(move_y * shift + 0.5, 4096.0)));
       for (size_t n = 0; n < opaque.size(); ++n) hidden.bytes()[n] |= opaque[n];
       hidden.shrink(dx, dy);
     }

@@ -38,7 +38,7 @@ struct ShearStats {
 /// and extinction times colour are interpolated bilinearly (a tent of one voxel; where a voxel is smaller than a pixel, of one pixel), the
 /// kernel being the same for all voxels of a slice (T4.5.1), its weights adding up to 1 at every pixel. A slice adds
 /// opacity 1 - exp(-extinction * path), path = ShearFrame::path; slices are composited front to back in single precision. Where the most opaque level
-/// has an extinction of more than 0.6 a slice, so do planes half way between slices, then with half the path each. Images are cropped to what is not transparent; empty ones are left out.
+/// has an extinction of more than 0.6 a slice in the middle of the raster, so do planes half way between slices, then with half the path each. Images are cropped to what is not transparent; empty ones are left out.
 /// Early termination: what lies behind opaque pixels is skipped, but for a margin around them, so that small head movements reveal no holes.
 class ShearSplatter {
  public:
