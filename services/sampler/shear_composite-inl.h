@@ -111,11 +111,16 @@ inline void FinishLayer(const SplatScene& scene, const SplatTile& job, const Til
                                    hn::Or(hn::ShiftLeft<8>(channel(1)), channel(2)));
         hn::Store(colour, di, reinterpret_cast<int32_t*>(pixels) + l);
         const auto before = fresh ? one : hn::Load(d, remaining + l);
+        alignas(32) float earlier[kSplatBlock];
+        hn::Store(before, d, earlier);
         const auto now = hn::Mul(before, left);
         hn::Store(now, d, remaining + l);
         job.begun[y] |= uint64_t{1} << block;
         for (int n = 0; n < int(hn::Lanes(d)); ++n) {
-          opaque |= uint32_t{remaining[l + n] < kOpaque} << (l + n);
+          // By this layer, alone or last: what was opaque before has lost a margin since, which must not come back.
+          opaque |=
+              uint32_t{remaining[l + n] < kOpaque && (earlier[n] >= kOpaque || p[3 * kSplatBlock + l + n] < kOpaque)}
+              << (l + n);
           seen |= uint32_t{pixels[l + n] != 0} << (l + n);
         }
       }

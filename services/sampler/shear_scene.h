@@ -57,7 +57,7 @@ struct SplatTile {
       nullptr;  ///< a byte for each block of the raster, of `blocks_across`: 255 where nearer layers hide it
   float* remaining = nullptr;  ///< light that comes through the layers so far: raster rows of 8 * blocks_across
   uint64_t* begun = nullptr;   ///< for each row of the tile: blocks of `remaining` that have a value; others are 1
-  uint8_t* opaque = nullptr;   ///< as hidden: bits of pixels that are opaque now, added
+  uint8_t* opaque = nullptr;   ///< as hidden: bits of pixels that this layer made opaque, added
   /// Pixels of the image, 0xAARRGGBB premultiplied; raster pixel (image_x, image_y) is the first. Blocks outside have nothing.
   uint32_t* image = nullptr;
   int image_x = 0, image_y = 0, image_width = 0, image_height = 0;

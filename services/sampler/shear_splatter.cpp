@@ -251,6 +251,7 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
       const int dx = int(std::ceil(std::min(move_x * shift + 0.5, 4096.0)));
       const int dy = int(std::ceil(std::min(move_y * shift + 0.5, 4096.0)));
       for (size_t n = 0; n < opaque.size(); ++n) hidden.bytes()[n] |= opaque[n];
+      std::fill(opaque.begin(), opaque.end(), uint8_t{0});
       hidden.shrink(dx, dy);
     }
     const LayerSlices& layer = geometry.layers[l];

@@ -19,7 +19,7 @@ const test::VolumeScene& crusts(int side) {
   if (const auto it = made.find(side); it != made.end()) return it->second;
   const auto value = [](glm::dvec3 p) {
     const double b = test::blobs(p) + 0.02 * std::sin(31 * p.x) * std::sin(29 * p.y) * std::sin(37 * p.z);
-    return b > 0.35 && b < 0.5 ? b : 0.0;
+    return b > 0.185 && b < 0.5 ? b : 0.0;
   };
   return made[side] = test::make_scene(test::make_grid({side, side, side}, 0.5), value, test::ramp(0.1));
 }
