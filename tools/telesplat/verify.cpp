@@ -88,7 +88,7 @@ Status verify_run(const std::string& directory, DirectScene& scene, const image:
     if (!(frame->use & viewer::kVerify) || frame->view.depth_m.empty()) continue;
     const auto reference = scene.draw(frame->camera, shading, frame->epoch);
     if (!reference) return reference.error();
-    views.push_back({paths[i], frame->number, frame->t_s, image::compare(*reference, frame->view)});
+    views.push_back({paths[i], frame->number, frame->t_s, scene.compare(*reference, frame->view, shading)});
     progress(i + 1, paths.size());
   }
 
