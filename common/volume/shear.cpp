@@ -13,6 +13,9 @@ namespace {
 constexpr double kSteepest =
     8.0;  // slopes beyond this, in voxels a voxel, are not sampled: near the plane of the eye they have no end
 
+// Of an eye near the grid or inside: slices nearer than this part of the farthest one's distance do not make the raster coarser.
+constexpr double kNearPart = 0.4;
+
 glm::dvec3 transform(const glm::dmat4& m, const glm::dvec3& p) { return m * glm::dvec4(p, 1); }
 glm::dvec3 direction_of(const glm::dmat4& m, const glm::dvec3& d) { return m * glm::dvec4(d, 0); }
 
@@ -138,7 +141,7 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
 
   // What the cameras see of them: the box [-1, n] between the first and last slice, clipped by each frustum, in slopes.
   Span slope_u, slope_v;
-  double nearest_t = 1e300;
+  double nearest_t = 1e300, farthest_t = 0;
   for (const auto& camera : cameras) {
     std::vector<glm::dvec3> seen;
     for (int corner = 0; corner < 8; ++corner) {
@@ -165,6 +168,7 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
       slope_u.extend(std::clamp((p[u] - out.eye[u]) / t, -kSteepest, kSteepest));
       slope_v.extend(std::clamp((p[v] - out.eye[v]) / t, -kSteepest, kSteepest));
       nearest_t = std::min(nearest_t, t);
+      farthest_t = std::max(farthest_t, t);
     }
   }
   if (!(slope_u.hi > slope_u.lo) || !(slope_v.hi > slope_v.lo)) return std::nullopt;
@@ -185,7 +189,8 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
     const glm::dvec3 perpendicular = across - at * (glm::dot(across, at) / (distance * distance));
     const double angle_per_slope = glm::length(perpendicular) / distance;
     const double pixel_angle = 1 / std::max(first.focal_x(), first.focal_y());
-    return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), options.finest / std::max(nearest_t, 1e-3));
+    const double fine_enough = options.finest / std::max(nearest_t, kNearPart * farthest_t);
+    return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), fine_enough);
   };
   const auto size = [](const Span& s, double& pitch) {
     const double pixels = std::ceil((s.hi - s.lo) / pitch);

@@ -59,8 +59,10 @@ struct ShearFrame {
 Status validate(const ShearFrame& frame, const Grid& grid);
 
 struct PlanOptions {
-  int layers = 16;         ///< at most; fewer where there are fewer slices
-  double finest = 0.3;     ///< a pixel is not smaller than this part of a voxel at the nearest slice that is in view
+  int layers = 16;  ///< at most; fewer where there are fewer slices
+  double finest =
+      0.3;  ///< a pixel is not smaller than this part of a voxel at the nearest slice in view, or at 0.4 times the farthest one's
+      ///< distance, whichever is farther
   double near_slices = 1;  ///< slices nearer to the eye than this many are left out
 };
 

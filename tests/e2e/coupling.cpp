@@ -54,7 +54,9 @@ TEST_P(Couplings, OneFrameForEachViewUpdate) {
   ASSERT_EQ(waits.size(), requests.size());
   EXPECT_LE(*std::max_element(filled.begin(), filled.end()), buffers);
   EXPECT_GE(*std::min_element(waits.begin(), waits.end()), 0);
-  if (c.coupling == "sync") EXPECT_GT(*std::max_element(waits.begin(), waits.end()), 0) << "it never waited for data";
+  if (c.coupling == "sync") {
+    EXPECT_GT(*std::max_element(waits.begin(), waits.end()), 0) << "it never waited for data";
+  }
 }
 
 const Coupled kCoupled[] = {{"mesh", "sync"},     {"julia", "sync"},     {"volume", "sync"},

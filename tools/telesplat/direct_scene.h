@@ -11,6 +11,7 @@
 #include "common/geometry/camera.h"
 #include "common/image/depth_image.h"
 #include "common/image/file.h"
+#include "common/image/quality.h"
 #include "common/image/shading.h"
 #include "services/data/mesh_store.h"
 #include "tools/telesplat/recorded_julia.h"
@@ -29,8 +30,13 @@ class DirectScene {
   /// One sampling frame, as a sampler takes it. Error: as draw().
   virtual Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) = 0;
 
-  /// Whether light goes through: then a pixel has no one depth, and displayed ones are compared by whether they have any.
-  virtual bool translucent() const { return false; }
+  /// How good `view` is. The pixels that count are those where either shows the data set: of surfaces by their depth.
+  virtual image::Quality compare(const image::View& reference, const image::View& view,
+                                 const image::ShadingParameters& shading) const {
+    (void)shading;
+    return image::compare(reference, view);
+  }
+
   virtual geometry::Box box_room() const = 0;
   virtual uint64_t primitives() const = 0;  ///< triangles; 0 of a scene without
   virtual std::string size() const = 0;     ///< "20000 triangles", for captions

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
-#include <optional>
+#include <cstdlib>
+#include <limits>
 
 #include "common/volume/session.h"
 #include "services/sampler/volume_raycaster.h"
@@ -8,6 +9,17 @@
 
 namespace telesplat::launcher {
 namespace {
+
+// The picture with depth 1 where it differs visibly from the background, and none elsewhere.
+image::View with_outline(image::View view, uint32_t background) {
+  constexpr int kVisible = 3;  // steps of 255
+  view.depth_m.assign(view.colour.size(), std::numeric_limits<float>::infinity());
+  for (size_t i = 0; i < view.colour.size(); ++i)
+    for (const int shift : {0, 8, 16})
+      if (std::abs(int(view.colour[i] >> shift & 255) - int(background >> shift & 255)) >= kVisible)
+        view.depth_m[i] = 1;
+  return view;
+}
 
 class DirectVolume : public DirectScene {
  public:
@@ -19,10 +31,14 @@ class DirectVolume : public DirectScene {
     if (const Status s = prepare(epoch); !s) return s.error();
     return raycaster_->draw(camera, shading.background);
   }
+  // A volume has no surface: it shows where the picture is not the background.
+  image::Quality compare(const image::View& reference, const image::View& view,
+                         const image::ShadingParameters& shading) const override {
+    return image::compare(with_outline(reference, shading.background), with_outline(view, shading.background));
+  }
   Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override {
     return Error{fmt::format("{}: is a volume, of which no depth images are sampled", recorded_.file)};
   }
-  bool translucent() const override { return true; }
   geometry::Box box_room() const override { return store_->session().grid.box_room(); }
   uint64_t primitives() const override { return 0; }
   std::string size() const override {

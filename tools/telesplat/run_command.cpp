@@ -71,12 +71,8 @@ Status check_usage(const RunOptions& o) {
   } else if (o.kind == SceneKind::kVolume && o.join_master.empty()) {
     if (const auto found = data::find_volume(o.scene, o.volume.raw); !found) return found.error();
   }
-  if (!o.wall.empty()) {
-    const auto wall = parse_wall(o.wall);
-    if (!wall) return wall.error();
-    if (o.viewers != wall->tiles())
-      return Error{fmt::format("--viewers {}: a wall of {} has {}", o.viewers, o.wall, wall->tiles())};
-  }
+  if (!o.wall.empty() && o.viewers != parse_wall(o.wall)->tiles())
+    return Error{fmt::format("--viewers {}: a wall of {} has {}", o.viewers, o.wall, parse_wall(o.wall)->tiles())};
   if (const auto size = viewer::parse_size(o.viewer.size, "--size"); !size) return size.error();
   if (const auto size = viewer::parse_sampling_size(o.viewer.sampling_size); !size) return size.error();
   if (o.viewer.trajectory != "orbit" && o.viewer.trajectory != "still")

@@ -8,6 +8,7 @@
 
 #include "services/data/volume.h"
 #include "tools/telesplat/run_command.h"
+#include "tools/telesplat/wall.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -92,7 +93,12 @@ Status settle_scene(const CLI::App& flags, RunOptions& o) {
     if (!given("--least-sampling")) o.viewer.requests.min_scale = kJuliaLeastSampling;
     if (!given("--packing.max_points")) o.master.master.settings["packing.max_points"] = kJuliaMaxPoints;
   }
-  if (!o.wall.empty() && !given("--hold")) o.viewer.display.hold_s = kWallHold_s;
+  if (!o.wall.empty()) {
+    const auto wall = parse_wall(o.wall);
+    if (!wall) return wall.error();
+    if (!given("--viewers")) o.viewers = wall->tiles();
+    if (!given("--hold")) o.viewer.display.hold_s = kWallHold_s;
+  }
   return ok_status();
 }
 

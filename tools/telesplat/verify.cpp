@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -76,13 +75,6 @@ Status write_summary(const std::string& directory, const std::vector<Verified>& 
   return ok_status();
 }
 
-// One depth wherever there is any.
-image::View flattened(image::View view) {
-  for (float& d : view.depth_m)
-    if (std::isfinite(d)) d = 1;
-  return view;
-}
-
 }  // namespace
 
 Status verify_run(const std::string& directory, DirectScene& scene, const image::ShadingParameters& shading,
@@ -96,9 +88,7 @@ Status verify_run(const std::string& directory, DirectScene& scene, const image:
     if (!(frame->use & viewer::kVerify) || frame->view.depth_m.empty()) continue;
     const auto reference = scene.draw(frame->camera, shading, frame->epoch);
     if (!reference) return reference.error();
-    views.push_back({paths[i], frame->number, frame->t_s,
-                     scene.translucent() ? image::compare(flattened(*reference), flattened(frame->view))
-                                         : image::compare(*reference, frame->view)});
+    views.push_back({paths[i], frame->number, frame->t_s, scene.compare(*reference, frame->view, shading)});
     progress(i + 1, paths.size());
   }
 
