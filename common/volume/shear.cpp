@@ -193,16 +193,19 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
     return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), fine_enough);
   };
   const auto size = [](const Span& s, double& pitch) {
+    constexpr int kMost = kMaxRasterSide - 2;
     const double pixels = std::ceil((s.hi - s.lo) / pitch);
-    if (pixels > kMaxRasterSide) pitch = (s.hi - s.lo) / kMaxRasterSide;
-    return std::clamp(int(std::ceil((s.hi - s.lo) / pitch - 1e-9)), 1, kMaxRasterSide);
+    if (pixels > kMost) pitch = (s.hi - s.lo) / kMost;
+    return std::clamp(int(std::ceil((s.hi - s.lo) / pitch - 1e-9)), 1, kMost) + 2;
   };
+  // One pixel more on every side: look-ups between pixels reach half a pixel beyond what is seen. Without it pictures fade at their borders,
+  // which shows where they are tiles of a wall.
   out.du = finest(u);
   out.dv = finest(v);
   out.width = size(slope_u, out.du);
   out.height = size(slope_v, out.dv);
-  out.u0 = slope_u.lo;
-  out.v0 = slope_v.lo;
+  out.u0 = slope_u.lo - out.du;
+  out.v0 = slope_v.lo - out.dv;
 
   // Layers: bounds at multiples of the same thickness, whatever part of the grid is in front of the eye, so that they stay in place.
   const int layers = std::clamp(options.layers, 1, std::min(kMaxLayers, slices));

@@ -68,7 +68,7 @@ struct PlanOptions {
 
 /// The view of `cameras` (at least one; all near the same place), sampled from cameras[0]'s eye. The principal axis is the one to which their rays
 /// through the grid are closest, be the eye outside the grid or inside. The raster covers what of the grid's box any of the cameras sees, and
-/// no more; its pixels are as large as cameras[0]'s where it sees the grid's nearest part. Nothing: no camera sees any of it.
+/// a pixel more on every side; its pixels are as large as cameras[0]'s where it sees the grid's nearest part. Nothing: no camera sees any of it.
 std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry::Camera> cameras,
                                      const PlanOptions& options = {});
 

@@ -130,7 +130,7 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
   ASSERT_EQ(stitched->width, 640);
   ASSERT_EQ(stitched->height, 400);
   ASSERT_EQ(whole->width, 640);
-  EXPECT_GT(psnr_db(*whole, *stitched), 38);
+  EXPECT_GT(psnr_db(*whole, *stitched), 42);  // 48 dB; tiles may have been sampled on rasters of their own
 
   // At the seam neighbours differ no more than in the single viewer's picture, where the same two columns are neighbours, too.
   const auto step = [](const image::View& v, int x) {
@@ -142,7 +142,7 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
       }
     return sum / v.height / 3;
   };
-  EXPECT_NEAR(step(*stitched, 320), step(*whole, 320), 0.5);
+  EXPECT_NEAR(step(*stitched, 320), step(*whole, 320), 1.0);  // of 255
 }
 
 TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
