@@ -8,6 +8,7 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kReportPeriod_s = 1.0;
+constexpr size_t kSummariesAtOnce = 8;
 constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
 // How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each cycle.
 constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
@@ -41,7 +42,8 @@ ReplicaWorker::ReplicaWorker(net::Context& context, const Options& options, View
       link_(context, options.service.master, make_hello(options)),
       points_({link_.instance(), options.epoch_patience_s, options.events, caches.gate.waits()},
               {[this] {
-                 return points::ModelConfig{link_.session()->box_room, int(link_.session()->octree_depth)};
+                 return points::ModelConfig{link_.session()->box_room, int(link_.session()->octree_depth),
+                                            !keeps_redundant_};
                },
                [this](InstanceId packer, Sequence after) {
                  if (state_) state_->send(wire::StateRequest{link_.instance(), packer, after});
@@ -123,6 +125,7 @@ void ReplicaWorker::loop() {
         points_.receive_answers(*state_, kMessagesAtOnce);
         points_.receive_events(*patches_, kMessagesAtOnce);
         points_.tick(monotonic_s());  // by time: no message need come
+        if (!caches_.gate.waits()) caches_.points.summarise(kSummariesAtOnce);
         caches_.points.free_dropped();
       }
     }

@@ -67,6 +67,14 @@ bool Frustum::may_contain(const Box& b) const {
   return true;
 }
 
+bool Frustum::contains(const Box& b) const {
+  for (const glm::vec4& p : planes_) {
+    const float x = p.x > 0 ? b.lo.x : b.hi.x, y = p.y > 0 ? b.lo.y : b.hi.y, z = p.z > 0 ? b.lo.z : b.hi.z;
+    if (p.x * x + p.y * y + p.z * z + p.w < 0) return false;
+  }
+  return true;
+}
+
 Camera crop(const Camera& c, const Rect& r) {
   Camera out = c;
   const double du = (c.right - c.left) / c.width, dv = (c.top - c.bottom) / c.height;

@@ -71,6 +71,8 @@ class Frustum {
   explicit Frustum(const Camera& camera);
   /// False only if the box is wholly outside one plane (conservative: true does not promise visibility).
   bool may_contain(const Box& box) const;
+  /// True only if all of the box is inside.
+  bool contains(const Box& box) const;
 
  private:
   glm::vec4 planes_[5];

@@ -8,17 +8,23 @@
 #include <glm/common.hpp>
 
 #include "common/points/allocation.h"
+#include "common/points/compaction.h"
 
 namespace telesplat::points {
 namespace {
 
-// A node of the map (link, key, pointer) and the cluster it points to, without its mosaics.
+// A node of the map (link, key, pointer), the cluster it points to, without its mosaics.
 constexpr uint64_t kClusterBytes = allocated_bytes(3 * sizeof(void*)) + allocated_bytes(sizeof(Cluster));
 
 // Makes room for one more, by a quarter instead of doubling: most clusters hold many small mosaics.
-void reserve_one_more(std::vector<Mosaic>& mosaics) {
-  if (mosaics.size() == mosaics.capacity()) mosaics.reserve(mosaics.size() + 1 + mosaics.size() / 4);
+void reserve_one_more(auto& list) {
+  if (list.size() == list.capacity()) list.reserve(list.size() + 1 + list.size() / 4);
 }
+
+// The same of a block, without its list of clusters.
+constexpr uint64_t kBlockBytes = allocated_bytes(3 * sizeof(void*)) + allocated_bytes(sizeof(Block));
+
+uint64_t list_bytes(const Block& block) { return allocated_bytes(block.clusters.capacity() * sizeof(void*)); }
 
 uint64_t header_bytes(const std::vector<Mosaic>& mosaics) {
   return allocated_bytes(mosaics.capacity() * sizeof(Mosaic));
@@ -58,20 +64,77 @@ geometry::Box leaf_box(const ModelConfig& config, ClusterKey key) {
 
 PointModel::PointModel(const ModelConfig& config) : config_(config) { CHECK(validate(config).ok()); }
 
-void PointModel::insert(PreparedPatch patch) {
-  for (auto& [key, mosaic] : patch.mosaics) {
-    auto& cluster = clusters_[key];
-    if (!cluster) {
-      cluster = std::make_unique<Cluster>(Cluster{key, leaf_box(config_, key), {}});
-      cluster_bytes_ += kClusterBytes;
-    }
-    points_ += mosaic.count(0);
-    cluster_bytes_ += mosaic.bytes() - sizeof(Mosaic);
-    cluster_bytes_ -= header_bytes(cluster->mosaics);
-    reserve_one_more(cluster->mosaics);
-    cluster->mosaics.push_back(std::move(mosaic));
-    cluster_bytes_ += header_bytes(cluster->mosaics);
+Block& PointModel::block_of(ClusterKey key) {
+  auto& block = blocks_[block_key(key)];
+  if (!block) {
+    cluster_bytes_ += kBlockBytes;
+    const ClusterKey side = std::min(3, (1 << config_.depth) - 1), first = block_key(key);
+    block = std::make_unique<Block>(
+        Block{{leaf_box(config_, first).lo, leaf_box(config_, first + side * (1u | 1u << 10 | 1u << 20)).hi}, {}});
   }
+  ++block->changes;
+  return *block;
+}
+
+Insertion PointModel::plan(PreparedPatch patch) const {
+  Insertion out{patch.sequence, {}};
+  out.changes.reserve(patch.mosaics.size());
+  for (auto& [key, mosaic] : patch.mosaics) {
+    Insertion::Change& change = out.changes.emplace_back(Insertion::Change{key, {}, {}});
+    const Cluster* cluster = config_.compact ? find(key) : nullptr;
+    if (!cluster) {
+      change.added.push_back(std::move(mosaic));
+      continue;
+    }
+    Merge merge = plan_merge(cluster->mosaics, std::move(mosaic));
+    change.replaced = std::move(merge.replaced);
+    change.added = std::move(merge.added);
+  }
+  return out;
+}
+
+std::vector<Mosaic> PointModel::commit(Insertion insertion) {
+  std::vector<Mosaic> replaced;
+  for (auto& change : insertion.changes) {
+    auto& cluster = clusters_[change.key];
+    if (!cluster) {
+      cluster = std::make_unique<Cluster>(Cluster{change.key, leaf_box(config_, change.key), {}});
+      cluster_bytes_ += kClusterBytes;
+      Block& block = block_of(change.key);
+      cluster_bytes_ -= list_bytes(block);
+      reserve_one_more(block.clusters);
+      block.clusters.push_back(cluster.get());
+      cluster_bytes_ += list_bytes(block);
+    } else {
+      block_of(change.key);
+    }
+    std::vector<Mosaic>& mosaics = cluster->mosaics;
+    cluster_bytes_ -= header_bytes(mosaics);
+    if (!change.replaced.empty()) {
+      // What stays closes up.
+      auto next = change.replaced.begin();
+      size_t end = *next;
+      for (size_t i = end; i < mosaics.size(); ++i) {
+        if (next == change.replaced.end() || *next != i) {
+          mosaics[end++] = std::move(mosaics[i]);
+          continue;
+        }
+        ++next;
+        points_ -= mosaics[i].count(0);
+        cluster_bytes_ -= mosaics[i].bytes() - sizeof(Mosaic);
+        replaced.push_back(std::move(mosaics[i]));
+      }
+      mosaics.erase(mosaics.begin() + static_cast<ptrdiff_t>(end), mosaics.end());
+    }
+    for (Mosaic& mosaic : change.added) {
+      points_ += mosaic.count(0);
+      cluster_bytes_ += mosaic.bytes() - sizeof(Mosaic);
+      reserve_one_more(mosaics);
+      mosaics.push_back(std::move(mosaic));
+    }
+    cluster_bytes_ += header_bytes(mosaics);
+  }
+  return replaced;
 }
 
 std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const ClusterKey> keys) {
@@ -85,6 +148,14 @@ std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const Clust
       cluster_bytes_ -= mosaic.bytes() - sizeof(Mosaic);
     }
     cluster_bytes_ -= kClusterBytes + header_bytes(found->second->mosaics);
+    Block& block = block_of(key);
+    ++block.removals;
+    auto& in_block = block.clusters;
+    in_block.erase(std::find(in_block.begin(), in_block.end(), found->second.get()));
+    if (in_block.empty()) {
+      cluster_bytes_ -= kBlockBytes + list_bytes(block);
+      blocks_.erase(block_key(key));
+    }
     dropped.push_back(std::move(found->second));
     clusters_.erase(found);
   }
@@ -127,6 +198,7 @@ std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const Clust
       mosaics.push_back(std::move(*m));
     }
     cluster.mosaics.erase(end, cluster.mosaics.end());
+    ++block_of(cluster.key).removals;
     dropped.push_back(std::make_unique<Cluster>(Cluster{cluster.key, cluster.leaf_room, std::move(mosaics)}));
   }
   return dropped;
@@ -139,6 +211,7 @@ std::vector<Cluster> PointModel::forget(std::span<const ClusterKey> keys, std::s
 }
 
 void PointModel::clear() {
+  blocks_.clear();
   clusters_.clear();
   points_ = cluster_bytes_ = 0;
 }
@@ -149,7 +222,8 @@ const Cluster* PointModel::find(ClusterKey key) const {
 }
 
 uint64_t PointModel::bytes() const {
-  return sizeof(PointModel) + cluster_bytes_ + allocated_bytes(clusters_.bucket_count() * sizeof(void*));
+  return sizeof(PointModel) + cluster_bytes_ + allocated_bytes(clusters_.bucket_count() * sizeof(void*)) +
+         allocated_bytes(blocks_.bucket_count() * sizeof(void*));
 }
 
 uint64_t PointModel::points_in(ClusterKey key) const {

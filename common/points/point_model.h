@@ -35,7 +35,8 @@ struct ModelConfig {
   geometry::Box
       box_room;   ///< the data set's box; the octree's cube is its smallest enclosing cube about the same centre, grown
                   ///< by 1/1000, so that points on the boundary lie inside
-  int depth = 6;  ///< octree depth: 2^depth leaves a side
+  int depth = 5;  ///< octree depth: 2^depth leaves a side
+  bool compact = false;  ///< mosaics of a cluster are merged (compaction.h); false: each stays as it came
   bool operator==(const ModelConfig&) const = default;
 };
 
@@ -43,7 +44,8 @@ struct ModelConfig {
 /// arrive from outside; every other function here requires a configuration that passed.
 Status validate(const ModelConfig& config);
 
-/// The part of one patch (of one tile) inside one cluster: one allocation with three levels of detail.
+/// Points of one cluster, of about equal density: the part of one patch (of one tile) inside it, or what several such parts were merged to
+/// (compaction.h). One allocation with three levels of detail.
 /// Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB (top
 /// byte = flags, 0). A coarse level's points are the first ones of the finer level, so that it shares their positions and
 /// normals and adds its mean colours alone. With n0 >= n1 >= n2 points the allocation holds
@@ -67,12 +69,12 @@ class Mosaic {
   }
   uint32_t count(int l) const { return counts_[l]; }
 
-  /// Of the event that brought it, modulo 2^40.
+  /// Of the event that brought it, or of the newest that was merged into it, modulo 2^40.
   Sequence sequence() const { return {sequence_and_frame_ & ((uint64_t{1} << kSequenceBits) - 1)}; }
   /// The sampling frame's number modulo 2^24: equal for all tiles of one frame, that is, for the mosaics of one patch (T4.3.2).
   uint32_t frame_tag() const { return static_cast<uint32_t>(sequence_and_frame_ >> kSequenceBits); }
   /// Projected pixels across the cluster's cube in the sampling view: leaf size * focal / depth of the leaf's centre
-  /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l.
+  /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l. Of merged mosaics the mean.
   float pixel_range() const { return pixel_range_; }
   /// Normal cone [Shirman 93]: every normal n of the mosaic has dot(n, axis) >= cosine. cosine = -1: no cone.
   glm::vec3 cone_axis() const { return image::decode_normal16(cone_axis_); }
@@ -80,8 +82,10 @@ class Mosaic {
   /// cone_axis() before it is normalised.
   glm::vec3 cone_axis_direction() const { return image::octahedral16(cone_axis_); }
   /// Unit vector from the leaf's centre towards the eye of the sampling view: with pixel_range() it tells how far apart the samples lie
-  /// on the surface (T4.4.1).
-  glm::vec3 direction_to_eye() const { return glm::normalize(image::octahedral16(direction_to_eye_)); }
+  /// on the surface (T4.4.1). Zero of points merged from views in different directions: they are as far apart along all directions.
+  glm::vec3 direction_to_eye() const {
+    return direction_to_eye_ == kNoDirection ? glm::vec3(0) : glm::normalize(image::octahedral16(direction_to_eye_));
+  }
   /// Mean position of the level-0 points, room space, to 1/256 of the leaf.
   glm::vec3 centroid_room(const geometry::Box& leaf) const;
   /// Bytes this mosaic occupies: header, points and what the allocator adds.
@@ -92,6 +96,7 @@ class Mosaic {
  private:
   friend class MosaicBuilder;
   static constexpr int kSequenceBits = 40;
+  static constexpr uint16_t kNoDirection = 0xffff;  // which encode_normal16 never gives
   size_t data_bytes() const;
   std::unique_ptr<std::byte[]> data_;
   uint64_t sequence_and_frame_ = 0;  // the frame in the top 24 bits
@@ -106,7 +111,16 @@ class Mosaic {
 struct Cluster {
   ClusterKey key = 0;
   geometry::Box leaf_room;      ///< the leaf's cube
-  std::vector<Mosaic> mosaics;  ///< in order of sequence
+  std::vector<Mosaic> mosaics;  ///< rising in sequence
+};
+
+/// A cube of 4 x 4 x 4 leaves, two levels above them (fewer where the octree is less deep), and the clusters in it: so that who walks the model looks at
+/// cubes first.
+struct Block {
+  geometry::Box box_room;
+  std::vector<const Cluster*> clusters;  ///< in no particular order; at least one
+  uint64_t changes = 0;                  ///< counts insertions and removals
+  uint64_t removals = 0;                 ///< counts removals of points
 };
 
 /// The points of one patch part, sorted into leaves and levels, ready to be inserted. Made without touching a model, so a
@@ -134,13 +148,28 @@ PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const 
 /// Projected pixels across a leaf's cube: leaf_size * focal_x / depth of its centre (of half a leaf where it is less).
 float pixel_range(const geometry::Camera& camera, const glm::dvec3& leaf_centre_room, double leaf_size_m);
 
+/// What inserting a patch does to each of its clusters.
+struct Insertion {
+  struct Change {
+    ClusterKey key;
+    std::vector<uint32_t> replaced;  ///< of the cluster's mosaics, ascending
+    std::vector<Mosaic> added;       ///< follow those that stay
+  };
+  Sequence sequence;
+  std::vector<Change> changes;  ///< ascending keys
+};
+
 class PointModel {
  public:
   explicit PointModel(const ModelConfig& config);
 
   const ModelConfig& config() const { return config_; }
-  /// Event "patch": takes every mosaic over, without copying points. Sequences must rise; O(mosaics).
-  void insert(PreparedPatch patch);
+  /// Event "patch". Sequences must rise. Where mosaics are merged, points are copied; else every mosaic is taken over.
+  void insert(PreparedPatch patch) { commit(plan(std::move(patch))); }
+  /// The same in two steps, the first of which only reads the model, so that others may read it too. No event may come between them.
+  Insertion plan(PreparedPatch patch) const;
+  /// O(mosaics). Returns those that were replaced: a viewer keeps them alive until its frame is drawn.
+  std::vector<Mosaic> commit(Insertion insertion);
   /// Event "forget": drops whole clusters. Unknown keys are ignored. Returns what was dropped.
   std::vector<Cluster> forget(std::span<const ClusterKey> keys);
   /// The same, but the clusters stay where they are in memory: a viewer keeps them alive until its frame is drawn, since draw
@@ -160,6 +189,8 @@ class PointModel {
   /// grows on insert.
   const std::unordered_map<ClusterKey, std::unique_ptr<Cluster>>& clusters() const { return clusters_; }
   const Cluster* find(ClusterKey key) const;
+  /// The same clusters by blocks. Pointers are stable until the block's last cluster is forgotten.
+  const std::unordered_map<ClusterKey, std::unique_ptr<Block>>& blocks() const { return blocks_; }
 
   uint64_t points() const { return points_; }  ///< level-0 points held
   uint64_t bytes() const;                      ///< memory of the whole model: points, headers, containers
@@ -168,11 +199,17 @@ class PointModel {
   uint64_t digest() const;
 
  private:
+  Block& block_of(ClusterKey key);  // counts a change
+
   ModelConfig config_;
   std::unordered_map<ClusterKey, std::unique_ptr<Cluster>> clusters_;
+  std::unordered_map<ClusterKey, std::unique_ptr<Block>> blocks_;  // by block_key
   uint64_t points_ = 0;
   uint64_t cluster_bytes_ = 0;  // of all clusters and what they hold
 };
+
+/// A leaf's block: its coordinates without their last two bits.
+constexpr ClusterKey block_key(ClusterKey leaf) { return leaf & ~(3u | 3u << 10 | 3u << 20); }
 
 /// The octree's cube and a leaf's cube.
 geometry::Box octree_cube(const ModelConfig& config);

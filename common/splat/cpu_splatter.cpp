@@ -133,12 +133,13 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
   runs.build(list.items);
   binning.begin(grid, runs.runs.size(), near_m, static_cast<float>(layout.reach) + overhang);
   const auto room_to_pixel = camera.room_to_pixel();
+  const glm::vec3 eye(camera.pose.position_room);
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<size_t>(0, runs.runs.size(), 512), [&](const tbb::blocked_range<size_t>& r) {
       for (size_t i = r.begin(); i < r.end(); ++i) {
         // Clusters lie scattered in memory.
         if (i + kBoxesAhead < r.end()) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
-        runs.transform(i, list.items, room_to_pixel);
+        runs.transform(i, list.items, room_to_pixel, eye);
         binning.place(i, runs.transforms[i], reach_of(list, runs.runs[i]), static_cast<float>(kMargin));
       }
     });
@@ -243,7 +244,7 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTa
   const ResolvedTile tile = layout.tile(workspace.keys.get(), rect);
   const TileInput input{
       grown(rect, layout.reach), rect, resolve.near_m, entries, runs.runs.data(), runs.transforms.data(),
-      list.items.data()};
+      runs.facing.data(),        list.items.data()};
   const TileCounts counts = splat(input, tile, workspace);
   stats.points_projected += counts.projected;
   stats.points_drawn += counts.drawn;

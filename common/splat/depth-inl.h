@@ -16,9 +16,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
 
-template <bool kWhole>
-HWY_NOINLINE void DepthLevel(const LeafTransform& transform_reference, const points::Mosaic::Level& level_reference,
-                             const geometry::Rect& rect, float near_m, uint32_t* depth_bits) {
+template <bool kWhole, bool kMayFaceAway>
+HWY_NOINLINE void DepthLevel(const LeafTransform& transform_reference, const glm::vec3& facing,
+                             const points::Mosaic::Level& level_reference, const geometry::Rect& rect, float near_m, uint32_t* depth_bits) {
   const I32 di;
   const U32 du;
   const LeafTransform transform = transform_reference;
@@ -29,18 +29,27 @@ HWY_NOINLINE void DepthLevel(const LeafTransform& transform_reference, const poi
   HWY_ALIGN uint32_t bits[kMaxLanes];
   // A point met twice changes nothing, so lanes that overlap are not left out.
   ForVectors(0, level.count, [&](size_t offset, size_t, size_t valid) HWY_ATTR {
-    const Projected p = Project(transform, LoadLanes(level, offset), near_m, 1.0f, 0.0f);
-    const auto px = hn::Sub(p.x, x0), py = hn::Sub(p.y, y0);
-    const auto at = hn::BitCast(du, hn::Add(hn::Mul(py, width), px)), depth = hn::BitCast(du, p.w);
+    const Projected p = Project(transform, LoadLanes(level, offset), near_m, 1 << kReferenceSubBits, 0.0f);
+    const auto px = hn::Sub(hn::ShiftRight<kReferenceSubBits>(p.x), x0),
+               py = hn::Sub(hn::ShiftRight<kReferenceSubBits>(p.y), y0);
+    const auto at = hn::BitCast(du, hn::Add(hn::Mul(py, width), px));
+    const auto sub_mask = hn::Set(di, (1 << kReferenceSubBits) - 1);
+    const auto sub =
+        hn::Or(hn::ShiftLeft<kReferenceSubBits>(hn::And(p.y, sub_mask)), hn::And(p.x, sub_mask));
+    const auto depth = hn::Or(hn::AndNot(hn::Set(du, kReferencePlaceMask), hn::BitCast(du, p.w)), hn::BitCast(du, sub));
     size_t n = valid;
-    if (kWhole) {
+    if (kWhole && !kMayFaceAway) {
       hn::Store(at, du, place);
       hn::Store(depth, du, bits);
     } else {
       const auto in_x = hn::And(hn::Gt(px, minus_one), hn::Lt(px, width));
       const auto in_y = hn::And(hn::Gt(py, minus_one), hn::Lt(py, height));
       const auto beyond_near = hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m)));
-      const auto keep = hn::And(hn::FirstN(di, valid), hn::And(hn::And(in_x, in_y), beyond_near));
+      auto keep = hn::And(hn::FirstN(di, valid), hn::And(hn::And(in_x, in_y), beyond_near));
+      if (kMayFaceAway) {
+        const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
+        keep = hn::AndNot(hn::RebindMask(di, FacesAway(normal, facing)), keep);
+      }
       if (hn::AllFalse(di, keep)) return;
       const Compressor compress(hn::RebindMask(du, keep));
       hn::Store(compress(at), du, place);
@@ -55,24 +64,25 @@ void DepthTile(const TileInput& input, uint32_t* depth_bits) {
   const size_t lanes = hn::Lanes(F32());
   Stage stage;
   for (const TileBinning::Entry& entry : input.entries) {
-    const auto draw = [&](const points::Mosaic::Level& level) {
-      (entry.whole ? DepthLevel<true> : DepthLevel<false>)(input.transforms[entry.box], level, input.rect, input.near_m,
-                                                           depth_bits);
+    const auto draw = [&](const points::Mosaic::Level& level, bool may_face_away) {
+      const auto of = entry.whole ? (may_face_away ? DepthLevel<true, true> : DepthLevel<true, false>)
+                                  : (may_face_away ? DepthLevel<false, true> : DepthLevel<false, false>);
+      of(input.transforms[entry.box], input.facing[entry.box], level, input.rect, input.near_m, depth_bits);
     };
     const auto drain = [&] {
-      draw(stage.level());
+      draw(stage.level(), stage.may_face_away());
       stage.clear();
     };
     const ItemRun run = input.runs[entry.box];
     PrefetchRun(input, &entry + 1);
     for (uint32_t i = run.first; i < run.last; ++i) {
       if (i + kItemsAhead < run.last) PrefetchLevel(input.items[i + kItemsAhead].level);
-      const points::Mosaic::Level& level = input.items[i].level;
-      if (level.count >= lanes) {
-        draw(level);
+      const DrawItem& item = input.items[i];
+      if (item.level.count >= lanes) {
+        draw(item.level, item.may_face_away);
       } else {
-        if (!stage.has_room(level.count)) drain();
-        stage.append(level);
+        if (!stage.has_room(item.level.count)) drain();
+        stage.append(item);
       }
     }
     drain();

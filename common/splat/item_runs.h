@@ -1,6 +1,7 @@
 // Consecutive draw items of one cluster share their leaf's transform and their place in the tiles.
 #pragma once
 
+#include "common/splat/facing.h"
 #include "common/splat/splat_kernels.h"
 
 namespace telesplat::splat {
@@ -8,11 +9,13 @@ namespace telesplat::splat {
 struct ItemRuns {
   std::vector<ItemRun> runs;
   std::vector<LeafTransform> transforms;  ///< one a run
+  std::vector<glm::vec3> facing;          ///< likewise: facing_vector
 
   void build(const std::vector<DrawItem>& items, const geometry::Camera& camera) {
     build(items);
     const auto room_to_pixel = camera.room_to_pixel();
-    for (size_t i = 0; i < runs.size(); ++i) transform(i, items, room_to_pixel);
+    const glm::vec3 eye(camera.pose.position_room);
+    for (size_t i = 0; i < runs.size(); ++i) transform(i, items, room_to_pixel, eye);
   }
 
   /// The same in two steps, the second of which can be taken for all runs at once.
@@ -27,10 +30,19 @@ struct ItemRuns {
       runs.back().last = i + 1;
     }
     transforms.resize(runs.size());
+    facing.resize(runs.size());
   }
-  void transform(size_t run, const std::vector<DrawItem>& items,
-                 const geometry::Camera::PixelTransform& room_to_pixel) {
-    transforms[run] = leaf_transform(room_to_pixel, items[runs[run].first].cluster->leaf_room);
+  void transform(size_t run, const std::vector<DrawItem>& items, const geometry::Camera::PixelTransform& room_to_pixel,
+                 const glm::vec3& eye_room) {
+    const ItemRun& r = runs[run];
+    const geometry::Box& leaf = items[r.first].cluster->leaf_room;
+    transforms[run] = leaf_transform(room_to_pixel, leaf);
+    facing[run] = glm::vec3(0);
+    for (uint32_t i = r.first; i < r.last; ++i) {
+      if (!items[i].may_face_away) continue;
+      facing[run] = facing_vector(leaf_view(leaf, eye_room));
+      break;
+    }
   }
 };
 

@@ -80,24 +80,23 @@ class TileSplatter {
     const size_t lanes = hn::Lanes(F32());
     for (const TileBinning::Entry& entry : input_.entries) {
       const ItemRun run = input_.runs[entry.box];
-      const LeafTransform& transform = input_.transforms[entry.box];
       PrefetchRun(input_, &entry + 1);
       for (uint32_t i = run.first; i < run.last; ++i) {
         if (i + kItemsAhead < run.last) PrefetchLevel(input_.items[i + kItemsAhead].level);
         if (styles[i] != style_) {
-          drain(transform, entry.whole);
+          drain(entry);
           if (styles[i].shape != style_.shape) flush();
           style_ = styles[i];
         }
-        const points::Mosaic::Level& level = input_.items[i].level;
-        if (level.count >= lanes) {
-          add(transform, level, entry.whole);
+        const DrawItem& item = input_.items[i];
+        if (item.level.count >= lanes) {
+          add(entry, item.level, item.may_face_away);
         } else {
-          if (!stage_.has_room(level.count)) drain(transform, entry.whole);
-          stage_.append(level);
+          if (!stage_.has_room(item.level.count)) drain(entry);
+          stage_.append(item);
         }
       }
-      drain(transform, entry.whole);
+      drain(entry);
     }
     flush();
     return counts_;
@@ -110,32 +109,36 @@ class TileSplatter {
   }
 
   // Stage -> batch. What is staged belongs to one cluster and has one shape.
-  void drain(const LeafTransform& transform, bool whole) {
+  void drain(const TileBinning::Entry& entry) {
     const points::Mosaic::Level level = stage_.level();
-    if (level.count > 0) add(transform, level, whole);
+    if (level.count > 0) add(entry, level, stage_.may_face_away());
     stage_.clear();
   }
 
-  void add(const LeafTransform& transform, const points::Mosaic::Level& level, bool whole) {
+  void add(const TileBinning::Entry& entry, const points::Mosaic::Level& level, bool may_face_away) {
+    const LeafTransform& transform = input_.transforms[entry.box];
+    const glm::vec3& facing = input_.facing[entry.box];
+    const auto piece = entry.whole
+                           ? (may_face_away ? &TileSplatter::add_piece<true, true> : &TileSplatter::add_piece<true, false>)
+                           : (may_face_away ? &TileSplatter::add_piece<false, true>
+                                            : &TileSplatter::add_piece<false, false>);
     counts_.projected += level.count;
     for (size_t first = 0; first < level.count; first += kPiece) {
       const size_t last = std::min<size_t>(first + kPiece, level.count);
       if (batch_.count + (last - first) > kBatch) flush();
-      if (whole)
-        add_piece<true>(transform, level, first, last);
-      else
-        add_piece<false>(transform, level, first, last);
+      (this->*piece)(transform, facing, level, first, last);
     }
   }
 
-  template <bool kWhole>
-  HWY_NOINLINE void add_piece(const LeafTransform& transform_reference, const points::Mosaic::Level& level_reference,
-                              size_t first, size_t last) {
+  template <bool kWhole, bool kMayFaceAway>
+  HWY_NOINLINE void add_piece(const LeafTransform& transform_reference, const glm::vec3& facing_reference,
+                              const points::Mosaic::Level& level_reference, size_t first, size_t last) {
     const I32 di;
     const U32 du;
     // Copies, which no store can change: the compiler need not read them again.
     const LeafTransform transform = transform_reference;
     const points::Mosaic::Level level = level_reference;
+    const glm::vec3 facing = facing_reference;
     uint32_t* const places = batch_.place;
     uint64_t* const keys = batch_.key;
     const int bits = style_.shape->sub_bits;
@@ -158,12 +161,21 @@ class TileSplatter {
         first, last, [&](size_t offset, size_t skip, size_t valid) HWY_ATTR __attribute__((always_inline)) {
           const Projected p = Project(transform, LoadLanes(level, offset), near_m, scale, shift);
           const auto px = hn::Sub(hn::ShiftRightSame(p.x, bits), x0), py = hn::Sub(hn::ShiftRightSame(p.y, bits), y0);
+          const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
           hn::Mask<I32> keep;
+          if (kWhole && kMayFaceAway) {
+            keep = hn::Not(hn::RebindMask(di, FacesAway(normal, facing)));
+            if (valid - skip < hn::Lanes(di))
+              keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
+            if (hn::AllFalse(di, keep)) return;
+            drawn += hn::CountTrue(di, keep);
+          }
           if (!kWhole) {
             const auto in_x = hn::And(hn::Gt(px, outside), hn::Lt(px, width)),
                        in_y = hn::And(hn::Gt(py, outside), hn::Lt(py, height));
             const auto beyond_near = hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m)));
             keep = hn::And(hn::And(in_x, in_y), beyond_near);
+            if (kMayFaceAway) keep = hn::AndNot(hn::RebindMask(di, FacesAway(normal, facing)), keep);
             if (valid - skip < hn::Lanes(di))
               keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
             if (hn::AllFalse(di, keep)) return;
@@ -177,13 +189,12 @@ class TileSplatter {
           const auto place = hn::BitCast(du, hn::Or(hn::ShiftLeftSame(pixel, 2 * bits), sub));
 
           // The key, in halves.
-          const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
           const auto code =
               hn::Min(hn::ShiftRight<kDepthCodeShift>(hn::Sub(hn::BitCast(du, p.w), near_bits)), farthest);
           const auto high = hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(code), hn::ShiftRight<8>(normal)), head);
           const auto low = hn::Or(hn::ShiftLeft<24>(normal), hn::And(hn::LoadU(du, level.colour + offset), albedo));
 
-          if (kWhole) {
+          if (kWhole && !kMayFaceAway) {
             // Lanes below `skip` are the batch's last points: they are written once more, as they are. (None are there if the batch
             // was emptied in between; then they are splatted twice, which changes nothing.)
             const size_t at = count >= skip ? count - skip : 0;
@@ -205,7 +216,7 @@ class TileSplatter {
           }
         });
     batch_.count = count;
-    counts_.drawn += kWhole ? last - first : drawn;
+    counts_.drawn += kWhole && !kMayFaceAway ? last - first : drawn;
   }
 
   const TileInput& input_;

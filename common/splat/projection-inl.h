@@ -61,6 +61,25 @@ HWY_INLINE hn::Vec<I32> FloorToInt(hn::Vec<F32> v) {
                  hn::Set(I32(), std::bit_cast<int32_t>(kWhole)));
 }
 
+// Lanes whose points face away (facing.h).
+HWY_INLINE hn::Mask<F32> FacesAway(hn::Vec<U32> normal, const glm::vec3& facing) {
+  const F32 d;
+  const I32 di;
+  const auto at = [&](hn::Vec<U32> c) HWY_ATTR {
+    return hn::Min(hn::Sub(hn::ConvertTo(d, hn::BitCast(di, c)), hn::Set(d, 127.0f)), hn::Set(d, 127.0f));
+  };
+  auto x = at(hn::And(normal, hn::Set(U32(), 255u)));
+  auto y = at(hn::ShiftRight<8>(normal));
+  const auto z = hn::Sub(hn::Sub(hn::Set(d, 127.0f), hn::Abs(x)), hn::Abs(y));
+  const auto fold = hn::Max(hn::Neg(z), hn::Zero(d));
+  x = hn::Sub(x, hn::CopySign(fold, x));
+  y = hn::Sub(y, hn::CopySign(fold, y));
+  const auto towards = hn::Add(hn::Add(hn::Mul(x, hn::Set(d, facing.x)), hn::Mul(y, hn::Set(d, facing.y))),
+                               hn::Mul(z, hn::Set(d, facing.z)));
+  const auto length2 = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
+  return hn::And(hn::Lt(towards, hn::Zero(d)), hn::Gt(hn::Mul(towards, towards), length2));
+}
+
 struct Projected {
   hn::Vec<I32> x, y;  // 2^-sub_bits pixels
   hn::Vec<F32> w;
@@ -116,8 +135,15 @@ class Compressor {
 class Stage {
  public:
   bool has_room(size_t n) const { return count_ + n <= kCapacity; }
-  void clear() { count_ = 0; }
-  HWY_INLINE void append(const points::Mosaic::Level& l) {
+  void clear() {
+    count_ = 0;
+    may_face_away_ = false;
+  }
+  /// That some item's points may: then all are asked.
+  bool may_face_away() const { return may_face_away_; }
+  HWY_INLINE void append(const DrawItem& item) {
+    const points::Mosaic::Level& l = item.level;
+    may_face_away_ |= item.may_face_away;
     const size_t n = l.count;
     copy(l.x, x_ + count_, n), copy(l.y, y_ + count_, n), copy(l.z, z_ + count_, n),
         copy(l.normal, normal_ + count_, n);
@@ -152,6 +178,7 @@ class Stage {
   uint16_t normal_[kCapacity + kMaxLanes] = {};
   uint32_t colour_[kCapacity + kMaxLanes] = {};
   size_t count_ = 0;
+  bool may_face_away_ = false;
 };
 
 // Calls visit(offset, skip, valid) for vectors that cover the points [first, last) of a level: lanes skip..valid-1 are points not

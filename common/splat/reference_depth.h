@@ -10,7 +10,8 @@
 namespace telesplat::splat {
 
 /// Depth in metres of the nearest point in each pixel of `camera`, +infinity where none: all level-0 points of the model,
-/// unsplatted (one pixel each), mosaics that face away left out. SIMD; `threads` oneTBB threads (0 = all).
+/// unsplatted (one pixel each), those that face away left out. The last bits of a depth tell where in the pixel the point lies
+/// (splat_kernels.h, kReferenceSubBits): depths are off by at most 2^-15 of themselves. SIMD; `threads` oneTBB threads (0 = all).
 void render_reference_depth(const points::PointModel& model, const geometry::Camera& camera, int threads,
                             std::vector<float>& depth_m);
 
@@ -18,10 +19,17 @@ struct Elimination {
   uint64_t samples = 0, kept = 0;
 };
 
-/// Clears every pixel of `image` (the tile `tile` of the frame `camera`) that the model already shows: a pixel is kept only if
-/// it is nearer than the reference by more than epsilon (T4.3.1), epsilon = relative_epsilon * depth. Keeps canonical form.
+/// A sample is not needed where the model has a point of its surface within this many pixels: splats reach as far. It bounds a model's points:
+/// no two are nearer to each other than this times the sample distance of the finer one, so a surface has at most 2 / sqrt 3 / kNearestSample^2
+/// of them a pixel, however many views it is sampled from. Set by bench cache.
+inline constexpr float kNearestSample = 0.6f;
+
+/// Clears every pixel of `image` (the tile `tile` of the frame `camera`) that the model already shows. A pixel is kept only if
+///   it is nearer than the reference by more than epsilon (T4.3.1), epsilon = relative_epsilon * depth; and
+///   no point of the eight pixels around it lies within `nearest` pixels of its centre and within epsilon of its tangent plane.
+/// Keeps canonical form. nearest 0: the first condition alone.
 Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry::Rect& tile,
                                  const std::vector<float>& reference_depth_m, float relative_epsilon,
-                                 image::DepthImage& image);
+                                 image::DepthImage& image, float nearest = kNearestSample);
 
 }  // namespace telesplat::splat

@@ -33,6 +33,7 @@ struct TileInput {
   std::span<const TileBinning::Entry> entries;
   const ItemRun* runs = nullptr;              ///< one a box of the binning
   const LeafTransform* transforms = nullptr;  ///< likewise
+  const glm::vec3* facing = nullptr;          ///< likewise: points of items that may face away are asked (facing.h)
   const DrawItem* items = nullptr;
 };
 
@@ -86,8 +87,13 @@ void write_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, 
 /// The same as resolve_tile and write_tile, in one pass, for tiles without reach.
 void resolve_and_write_tile(const ResolvedTile& tile, const ResolveInput& input, const TileTarget& target);
 
-/// Least depth (bits of a positive float) of all points in each pixel, one pixel a point. depth_bits: rect.width * rect.height,
-/// row-major, holding +infinity or what is there already.
+/// A reference depth's last bits are not depth but where in its pixel the point lies: x, and above it y, in 2^-kReferenceSubBits pixels.
+/// So depths are off by at most 2^-15 of themselves.
+inline constexpr int kReferenceSubBits = 4;
+inline constexpr uint32_t kReferencePlaceMask = (1u << 2 * kReferenceSubBits) - 1;
+
+/// Least depth (bits of a positive float, with the point's place: kReferenceSubBits) of all points in each pixel, one pixel a point. depth_bits:
+/// rect.width * rect.height, row-major, holding +infinity or what is there already.
 void depth_tile(const TileInput& input, uint32_t* depth_bits);
 
 /// The name of the instruction set in use.

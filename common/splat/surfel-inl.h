@@ -196,48 +196,56 @@ class SurfelStream {
     for (const TileBinning::Entry& entry : input_.entries) {
       const ItemRun run = input_.runs[entry.box];
       const LeafTransform& transform = input_.transforms[entry.box];
+      const glm::vec3& facing = input_.facing[entry.box];
       PrefetchRun(input_, &entry + 1);
       for (uint32_t i = run.first; i < run.last; ++i) {
         if (i + kItemsAhead < run.last) PrefetchLevel(input_.items[i + kItemsAhead].level);
         const points::Mosaic::Level& level = input_.items[i].level;
         if (level.count >= lanes) {
-          drain(transform);
-          add<false>(transform, level, surfels_.sources[i]);
+          drain(transform, facing);
+          if (input_.items[i].may_face_away)
+            add<false, true>(transform, facing, level, surfels_.sources[i]);
+          else
+            add<false, false>(transform, facing, level, surfels_.sources[i]);
         } else {
-          if (!stage_.has_room(level.count)) drain(transform);
-          stage(level, surfels_.sources[i]);
+          if (!stage_.has_room(level.count)) drain(transform, facing);
+          stage(input_.items[i], surfels_.sources[i]);
         }
       }
-      drain(transform);
+      drain(transform, facing);
     }
     return counts_;
   }
 
  private:
   // Levels of less than a vector wait here, each point with its own source.
-  void stage(const points::Mosaic::Level& level, const SurfelSource& s) {
+  void stage(const DrawItem& item, const SurfelSource& s) {
     const size_t at = stage_.level().count;
-    stage_.append(level);
-    for (size_t i = at; i < at + level.count; ++i) {
+    stage_.append(item);
+    for (size_t i = at; i < at + item.level.count; ++i) {
       radius_[i] = s.radius_m;
       x_[i] = s.to_eye[0], y_[i] = s.to_eye[1], z_[i] = s.to_eye[2];
     }
   }
-  void drain(const LeafTransform& transform) {
+  void drain(const LeafTransform& transform, const glm::vec3& facing) {
     const points::Mosaic::Level level = stage_.level();
-    if (level.count > 0) add<true>(transform, level, {});
+    if (level.count > 0 && stage_.may_face_away())
+      add<true, true>(transform, facing, level, {});
+    else if (level.count > 0)
+      add<true, false>(transform, facing, level, {});
     stage_.clear();
   }
 
   // Projects a level's points, keeps those that may touch the tile, and gives them to the sink by whole vectors.
-  template <bool kStaged>
-  HWY_NOINLINE void add(const LeafTransform& transform_reference, const points::Mosaic::Level& level_reference,
-                        const SurfelSource& source) {
+  template <bool kStaged, bool kMayFaceAway>
+  HWY_NOINLINE void add(const LeafTransform& transform_reference, const glm::vec3& facing_reference,
+                        const points::Mosaic::Level& level_reference, const SurfelSource& source) {
     const F32 d;
     const U32 du;
     // Copies, which no store can change: the compiler need not read them again.
     const LeafTransform transform = transform_reference;
     const points::Mosaic::Level level = level_reference;
+    const glm::vec3 facing = facing_reference;
     const auto near_m = Const(input_.near_m);
     const geometry::Rect own = input_.own;
     const auto x0 = Const(static_cast<float>(input_.rect.x)), y0 = Const(static_cast<float>(input_.rect.y)),
@@ -263,6 +271,8 @@ class SurfelStream {
       const auto in_rect = hn::And(hn::And(hn::Ge(x, hn::Sub(x0, reach)), hn::Lt(x, hn::Add(x1, reach))),
                                    hn::And(hn::Ge(y, hn::Sub(y0, reach)), hn::Lt(y, hn::Add(y1, reach))));
       auto keep = hn::And(hn::Ge(w, near_m), in_rect);
+      const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
+      if (kMayFaceAway) keep = hn::AndNot(FacesAway(normal, facing), keep);
       if (valid - skip < hn::Lanes(d)) keep = hn::And(keep, hn::AndNot(hn::FirstN(d, skip), hn::FirstN(d, valid)));
       if (hn::AllFalse(d, keep)) return;
       drawn += hn::CountTrue(d, hn::And(keep, hn::And(hn::And(hn::Ge(x, own_x0), hn::Lt(x, own_x1)),
@@ -272,7 +282,6 @@ class SurfelStream {
         hn::StoreU(hn::BitCast(d, compress(hn::BitCast(du, v))), d, to + points_.count);
       };
       put(points_.x, x), put(points_.y, y), put(points_.w, w);
-      const auto normal = hn::PromoteTo(du, hn::LoadU(U16(), level.normal + offset));
       hn::StoreU(compress(normal), du, points_.normal + points_.count);
       hn::StoreU(compress(hn::LoadU(du, level.colour + offset)), du, points_.colour + points_.count);
       if (kStaged) {

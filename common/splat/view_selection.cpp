@@ -4,45 +4,13 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/splat/cluster_walk.h"
+#include "common/splat/facing.h"
 #include "common/splat/level_choice.h"
 #include "common/splat/patch_choice.h"
 
 namespace telesplat::splat {
 namespace {
-
-// Normals interpolated over a mesh turn away before the surface does: cones are widened by 10 degrees.
-constexpr float kCosMargin = 0.98480775f, kSinMargin = 0.17364818f;
-
-// A leaf's cube as seen from the eye: what of the cone test is the same for all its mosaics.
-struct LeafView {
-  glm::vec3 to_eye;  // from the cube's centre
-  float sin_beta,
-      cos_beta;  // beta = margin + half the angle under which the cube's sphere is seen; cos_beta < 0: never away
-  float distance;
-};
-
-LeafView leaf_view(const geometry::Box& leaf, const glm::vec3& eye) {
-  const glm::vec3 to_eye = eye - leaf.centre();
-  const float distance2 = glm::dot(to_eye, to_eye), radius2 = 0.25f * glm::dot(leaf.size(), leaf.size());
-  if (!(distance2 > radius2)) return {to_eye, 1.0f, -1.0f, 0.0f};
-  const float sin_half = std::sqrt(radius2 / distance2), cos_half = std::sqrt(1.0f - radius2 / distance2);
-  return {to_eye, sin_half * kCosMargin + cos_half * kSinMargin, cos_half * kCosMargin - sin_half * kSinMargin,
-          std::sqrt(distance2)};
-}
-
-// Away if the angle between the cone's axis and the direction to the eye exceeds 90 degrees + cone + beta.
-bool cone_faces_away(const points::Mosaic& m, const LeafView& view) {
-  // Most mosaics that are drawn face the eye: they need no root.
-  const glm::vec3 axis = m.cone_axis_direction();
-  const float towards = glm::dot(axis, view.to_eye);
-  if (towards >= 0) return false;
-  const float cos_cone = m.cone_cosine();
-  if (cos_cone <= 0 || view.cos_beta <= 0) return false;
-  const float sin_cone = std::sqrt(1.0f - cos_cone * cos_cone);
-  if (cos_cone * view.cos_beta - sin_cone * view.sin_beta <= 0) return false;  // cone + beta >= 90 degrees
-  const float sin_sum = sin_cone * view.cos_beta + cos_cone * view.sin_beta;
-  return towards < -sin_sum * view.distance * std::sqrt(glm::dot(axis, axis));
-}
 
 // A mosaic chosen from the cluster at hand, before its size is final.
 struct Chosen {
@@ -50,6 +18,7 @@ struct Chosen {
   Drawn drawn;
   float size;      // splat size by T eq. 4.8 for points spread evenly, not clamped
   float coverage;  // share of the leaf's face that its points cover: points * (sample size / leaf size)^2
+  bool may_face_away;
 };
 
 // 0 up to `from`, 1 from `to` on.
@@ -106,67 +75,145 @@ DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int 
           .of = a.count};
 }
 
+// A summary is made anew once its block changed more often: what it lacks is drawn beside it until then.
+constexpr uint64_t kStaleChanges = 16;
+
+// One walk over a model.
+class Selector {
+ public:
+  Selector(const geometry::Camera& camera, const SelectionOptions& options, DrawList& out)
+      : options_(options),
+        out_(out),
+        eye_(camera.pose.position_room),
+        backward_(camera.pose.orientation * glm::dvec3(0, 0, 1)),
+        position_(camera.pose.position_room),
+        focal_(camera.focal_x()),
+        patches_(patch_view(camera)) {}
+
+  /// The block's summary and what it lacks; false if its clusters must be drawn.
+  bool add_summary(points::ClusterKey key, const points::Block& block, const points::Summaries& summaries) {
+    const float range = pixel_range(block.box_room, double{block.box_room.hi.x} - double{block.box_room.lo.x});
+    if (range > points::kMostSummaryRange) return false;
+    const auto found = summaries.find(key);
+    const points::Summary* summary = found == summaries.end() ? nullptr : found->second.get();
+    if (!summary || summary->removals != block.removals || block.changes - summary->changes > kStaleChanges)
+      out_.summaries_wanted.push_back(key);
+    if (!summary || summary->removals != block.removals || range > summary->pixel_range) return false;
+    add(summary->cluster);
+    out_.clusters_seen.pop_back();
+    for (const points::Cluster* cluster : block.clusters)
+      if (block.changes == summary->changes)
+        out_.clusters_seen.push_back(cluster->key);
+      else
+        add(*cluster, summary->built);
+    return true;
+  }
+
+  /// after: mosaics of earlier events are left out.
+  void add(const points::Cluster& cluster, Sequence after = {}) {
+    const geometry::Box& leaf = cluster.leaf_room;
+    const float leaf_m = leaf.hi.x - leaf.lo.x;
+    const float range = pixel_range(leaf, double{leaf_m});
+    const LeafView view = leaf_view(leaf, eye_);
+    choose_mosaics(cluster, view, after);
+    chosen_.clear();
+    for (const Visible& v : visible_) {
+      const points::Mosaic& m = *v.mosaic;
+      const float ratio = range / m.pixel_range(), wanted = options_.detail * std::min(ratio, 1.0f);
+      const Drawn drawn =
+          options_.transitions ? between_levels(m, wanted, dither_of(cluster.key, m)) : closest_level(m, wanted);
+      chosen_.push_back({&m, drawn, options_.scale * ratio * drawn.spacing,
+                         static_cast<float>(m.count(0)) / (m.pixel_range() * m.pixel_range()), v.may_face_away});
+    }
+    if (chosen_.size() > 1) revise_sizes(options_, chosen_);
+    for (const Chosen& c : chosen_) add(cluster, c, 0.5f * leaf_m / range, view.distance);
+  }
+
+  double distance_sum() const { return distance_sum_; }
+
+ private:
+  struct Visible {
+    const points::Mosaic* mosaic;
+    bool may_face_away;
+  };
+
+  // points::pixel_range, with what is the same for all leaves taken out.
+  float pixel_range(const geometry::Box& leaf, double leaf_m) const {
+    const double depth = glm::dot(position_ - glm::dvec3(leaf.centre()), backward_);
+    return static_cast<float>(leaf_m * focal_ / std::max(depth, 0.5 * leaf_m));
+  }
+
+  void choose_mosaics(const points::Cluster& cluster, const LeafView& view, Sequence after) {
+    visible_.clear();
+    for (const points::Mosaic& m : cluster.mosaics) {
+      if (after.value != 0 && m.sequence() <= after) continue;
+      const Facing facing = options_.cone_culling ? facing_of(m, view) : Facing::kTowards;
+      if (facing != Facing::kAway) visible_.push_back({&m, facing == Facing::kMixed});
+    }
+    if (!options_.best_patch_only) return out_.clusters_seen.push_back(cluster.key);
+    candidates_.clear();
+    for (const Visible& v : visible_) candidates_.push_back(v.mosaic);
+    chooser_.choose(cluster.leaf_room, patches_, candidates_);
+    note_patches(cluster.key, candidates_, out_);
+    // Both are in the cluster's order.
+    auto next = candidates_.begin();
+    std::erase_if(visible_, [&](const Visible& v) {
+      if (next == candidates_.end() || *next != v.mosaic) return true;
+      ++next;
+      return false;
+    });
+  }
+
+  void add(const points::Cluster& cluster, const Chosen& c, float radius_m_of_px, float distance) {
+    const float size = c.size * c.drawn.widest / c.drawn.spacing;
+    const float px = std::min(size, std::max(1.0f, options_.max_splat_px));
+    const auto add_points = [&](int l, uint32_t first, uint32_t last) {
+      if (first == last) return;
+      DrawItem& item = out_.items.emplace_back(make_item(cluster, *c.mosaic, l, first, last));
+      item.splat_px = std::max(px, 1.0f);
+      item.radius_m = px * radius_m_of_px;
+      item.may_face_away = c.may_face_away;
+    };
+    add_points(c.drawn.fine + 1, 0, c.drawn.mean);
+    add_points(c.drawn.fine, c.drawn.mean, c.drawn.count);
+    out_.points += c.drawn.count;
+    distance_sum_ += static_cast<double>(c.drawn.count) * static_cast<double>(distance);
+  }
+
+  const SelectionOptions& options_;
+  DrawList& out_;
+  const glm::vec3 eye_;
+  const glm::dvec3 backward_, position_;
+  const double focal_;
+  const PatchView patches_;
+  PatchChooser chooser_;
+  std::vector<Visible> visible_;
+  std::vector<const points::Mosaic*> candidates_;
+  std::vector<Chosen> chosen_;
+  double distance_sum_ = 0;
+};
+
 }  // namespace
 
 bool faces_away(const points::Mosaic& mosaic, const geometry::Box& leaf_room, const glm::vec3& eye_room) {
-  return cone_faces_away(mosaic, leaf_view(leaf_room, eye_room));
+  return facing_of(mosaic, leaf_view(leaf_room, eye_room)) == Facing::kAway;
 }
 
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
-                 DrawList& out) {
+                 DrawList& out, const points::Summaries* summaries) {
   out.items.clear();
+  out.summaries_wanted.clear();
   out.clusters_seen.clear();
   out.frames_seen.clear();
   out.points = 0;
   out.scale = options.scale;
   const geometry::Frustum frustum(camera);
-  const glm::vec3 eye(camera.pose.position_room);
-  const PatchView patches = patch_view(camera);
-  PatchChooser chooser;
-  std::vector<const points::Mosaic*> visible;
-  std::vector<Chosen> chosen;
-  double distance_sum = 0;
-  for (const auto& [key, cluster] : model.clusters()) {
-    const geometry::Box& leaf = cluster->leaf_room;
-    if (!frustum.may_contain(leaf)) continue;
-    const float leaf_m = leaf.hi.x - leaf.lo.x;
-    const float range = points::pixel_range(camera, glm::dvec3(leaf.centre()), static_cast<double>(leaf_m));
-    const float radius_m_of_px = 0.5f * leaf_m / range;
-    const LeafView view = leaf_view(leaf, eye);
-    visible.clear();
-    for (const points::Mosaic& m : cluster->mosaics)
-      if (!(options.cone_culling && cone_faces_away(m, view))) visible.push_back(&m);
-    if (options.best_patch_only) {
-      chooser.choose(leaf, patches, visible);
-      note_patches(key, visible, out);
-    } else {
-      out.clusters_seen.push_back(key);
-    }
-    chosen.clear();
-    for (const points::Mosaic* mosaic : visible) {
-      const points::Mosaic& m = *mosaic;
-      const float ratio = range / m.pixel_range(), wanted = options.detail * std::min(ratio, 1.0f);
-      const Drawn drawn = options.transitions ? between_levels(m, wanted, dither_of(key, m)) : closest_level(m, wanted);
-      chosen.push_back({&m, drawn, options.scale * ratio * drawn.spacing,
-                        static_cast<float>(m.count(0)) / (m.pixel_range() * m.pixel_range())});
-    }
-    if (chosen.size() > 1) revise_sizes(options, chosen);
-    for (const Chosen& c : chosen) {
-      const float size = c.size * c.drawn.widest / c.drawn.spacing;
-      const float px = std::min(size, std::max(1.0f, options.max_splat_px));
-      const auto add = [&](int l, uint32_t first, uint32_t last) {
-        if (first == last) return;
-        DrawItem& item = out.items.emplace_back(make_item(*cluster, *c.mosaic, l, first, last));
-        item.splat_px = std::max(px, 1.0f);
-        item.radius_m = px * radius_m_of_px;
-      };
-      add(c.drawn.fine + 1, 0, c.drawn.mean);
-      add(c.drawn.fine, c.drawn.mean, c.drawn.count);
-      out.points += c.drawn.count;
-      distance_sum += static_cast<double>(c.drawn.count) * view.distance;
-    }
+  Selector selector(camera, options, out);
+  for (const SeenBlock& seen : seen_blocks(model, frustum, glm::vec3(camera.pose.position_room))) {
+    if (summaries && !options.best_patch_only && selector.add_summary(seen.key, *seen.block, *summaries)) continue;
+    for_seen_clusters(seen, frustum, [&](const points::Cluster& cluster) { selector.add(cluster); });
   }
-  out.distance_m = out.points > 0 ? distance_sum / static_cast<double>(out.points) : 0.0;
+  out.distance_m = out.points > 0 ? selector.distance_sum() / static_cast<double>(out.points) : 0.0;
 }
 
 }  // namespace telesplat::splat

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/geometry/camera.h"
-#include "common/points/point_model.h"
+#include "common/points/summary.h"
 
 namespace telesplat::splat {
 
@@ -31,9 +31,10 @@ struct DrawItem {
   float radius_m =
       0;  ///< radius of a splat that faces its sampling view, metres in room space: half of splat_px at the leaf's centre,
           ///< but not widened to a pixel (ellipse, ewa)
-  glm::vec3 to_eye{0, 0, 1};  ///< from the leaf towards the eye of the sampling view, unit length (ellipse, ewa)
+  glm::vec3 to_eye{0, 0, 1};  ///< from the leaf towards the eye of the sampling view, unit length; or zero (ellipse, ewa)
   uint32_t first = 0;         ///< where level[0] lies in arrays()
   uint32_t of = 0;            ///< how many points arrays() has; 0: as many as are drawn
+  bool may_face_away = false;  ///< some of its points may; those that do are not drawn (facing.h)
 
   /// The whole level that the points drawn are part of: points [first, first + level.count) of it. It stays the same from frame
   /// to frame while the part changes, so it is what renderers keep copies of.
@@ -49,6 +50,8 @@ struct DrawList {
   /// that is drawn, and frames_seen, as long, has that patch's frame tag; else frames_seen is empty.
   std::vector<points::ClusterKey> clusters_seen;
   std::vector<uint32_t> frames_seen;
+  /// Blocks that a summary would be drawn of, or a newer one, if there were one.
+  std::vector<points::ClusterKey> summaries_wanted;
   uint64_t points = 0;
   float scale =
       1.0f;  ///< SelectionOptions::scale: splat_px / scale is how far apart an item's samples lie on the screen
@@ -63,8 +66,10 @@ struct DrawList {
 /// desired pixel range is the display's, or the sampling view's if that is less, times detail. Splat size = scale * display's
 /// pixel range / pixel range of the points drawn (T eq. 4.8), revised as in T4.4.3. A mosaic between two levels becomes two
 /// items, next to each other.
+///   summaries: of the model's blocks, or null. A block that spans no more pixels than its summary has samples is drawn as that, and what came since; so what is
+///   far away costs what its pixels cost. Not with options.best_patch_only.
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
-                 DrawList& out);
+                 DrawList& out, const points::Summaries* summaries = nullptr);
 
 /// True if every point of the mosaic faces away from the camera. The packer's reference depth map and the viewers use this one
 /// test, so that what viewers cull is not taken as seen.

@@ -16,24 +16,25 @@ bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequenc
 }  // namespace
 
 uint64_t EventLog::Patch::bytes() const {
-  return sizeof(Patch) + kNodeBytes + event.blob->capacity() + forgotten.capacity() * sizeof forgotten[0] +
+  return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() + forgotten.capacity() * sizeof forgotten[0] +
          patch_forgotten.capacity() * sizeof patch_forgotten[0];
 }
 
 uint64_t EventLog::bytes() const {
-  return patch_bytes_ + last_forget_.size() * kForgetBytes +
+  return patch_bytes_ + (patches_of_.size() + last_forget_.size()) * kForgetBytes +
          patches_forgotten_ * (sizeof(points::ClusterKey) + sizeof(uint32_t));
 }
 
-void EventLog::add_patch(const Event& event, size_t mosaics) {
-  if (mosaics == 0) return;
-  const Patch& patch = patches_.emplace_hint(patches_.end(), event.sequence, Patch{event, mosaics})->second;
+void EventLog::add_patch(const Event& event, std::span<const points::ClusterKey> clusters) {
+  if (clusters.empty()) return;
+  const Patch& patch = patches_.emplace_hint(patches_.end(), event.sequence, Patch{event, clusters.size()})->second;
   patch_bytes_ += patch.bytes();
+  for (const points::ClusterKey key : clusters) patches_of_[key].push_back(event.sequence);
 }
 
-void EventLog::drop_mosaic(const points::Mosaic& mosaic, points::ClusterKey key, Sequence sequence, bool patch_alone) {
-  const auto found = patches_.find(mosaic.sequence());
-  CHECK(found != patches_.end());  // a patch stays as long as it has a mosaic in the model
+void EventLog::drop_part(Sequence sequence_of_patch, points::ClusterKey key, Sequence sequence, bool patch_alone) {
+  const auto found = patches_.find(sequence_of_patch);
+  CHECK(found != patches_.end());  // a patch stays as long as it has points in the model
   Patch& patch = found->second;
   patch_bytes_ -= patch.bytes();
   if (--patch.alive == 0) {
@@ -47,16 +48,26 @@ void EventLog::drop_mosaic(const points::Mosaic& mosaic, points::ClusterKey key,
   patch_bytes_ += patch.bytes();
 }
 
-void EventLog::add_forget(Sequence sequence, std::span<const points::Cluster> dropped) {
-  for (const points::Cluster& cluster : dropped) {
-    last_forget_[cluster.key] = sequence;
-    for (const points::Mosaic& mosaic : cluster.mosaics) drop_mosaic(mosaic, cluster.key, sequence, false);
+void EventLog::add_forget(Sequence sequence, std::span<const points::ClusterKey> clusters) {
+  for (const points::ClusterKey key : clusters) {
+    last_forget_[key] = sequence;
+    const auto found = patches_of_.find(key);
+    CHECK(found != patches_of_.end());
+    for (const Sequence patch : found->second) drop_part(patch, key, sequence, false);
+    patches_of_.erase(found);
   }
 }
 
 void EventLog::add_patch_forget(const Event& event, std::span<const points::Cluster> dropped) {
-  for (const points::Cluster& cluster : dropped)
-    for (const points::Mosaic& mosaic : cluster.mosaics) drop_mosaic(mosaic, cluster.key, event.sequence, true);
+  for (const points::Cluster& cluster : dropped) {
+    const auto found = patches_of_.find(cluster.key);
+    CHECK(found != patches_of_.end());
+    for (const points::Mosaic& mosaic : cluster.mosaics) {
+      drop_part(mosaic.sequence(), cluster.key, event.sequence, true);
+      std::erase(found->second, mosaic.sequence());
+    }
+    if (found->second.empty()) patches_of_.erase(found);
+  }
   patch_forgets_.push_back(event);
   patches_forgotten_ += event.clusters.size();
   while (patches_forgotten_ > max_patches_) {
@@ -72,6 +83,7 @@ bool EventLog::remembers(Sequence after) const {
 
 void EventLog::add_epoch(const Event& event) {
   patches_.clear();
+  patches_of_.clear();
   last_forget_.clear();
   patch_forgets_.clear();
   patch_bytes_ = patches_forgotten_ = 0;

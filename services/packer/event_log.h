@@ -22,10 +22,10 @@ class EventLog {
  public:
   explicit EventLog(size_t max_patches_forgotten = kMaxPatchesForgotten) : max_patches_(max_patches_forgotten) {}
 
-  /// mosaics: how many clusters it has points in; none: nothing to keep.
-  void add_patch(const Event& event, size_t mosaics);
-  /// dropped: what the model handed out.
-  void add_forget(Sequence sequence, std::span<const points::Cluster> dropped);
+  /// clusters: those it has points in; none: nothing to keep.
+  void add_patch(const Event& event, std::span<const points::ClusterKey> clusters);
+  /// clusters: those that were there.
+  void add_forget(Sequence sequence, std::span<const points::ClusterKey> clusters);
   /// The same of single patches: each element of `dropped` has mosaics of one frame. event: as it is published.
   void add_patch_forget(const Event& event, std::span<const points::Cluster> dropped);
   void add_epoch(const Event& event);
@@ -37,22 +37,27 @@ class EventLog {
 
   struct Patch {
     Event event;
-    size_t alive = 0;                             ///< mosaics not forgotten
-    std::vector<points::ClusterKey> forgotten{};  ///< where its other mosaics were, if whole clusters were forgotten
+    size_t alive = 0;                             ///< clusters in which it is not forgotten
+    std::vector<points::ClusterKey> forgotten{};  ///< where else it was, if whole clusters were forgotten
     std::vector<std::pair<Sequence, points::ClusterKey>> patch_forgotten{};  ///< if this patch of them was, and when
-    uint64_t bytes() const;
+    uint64_t bytes() const;  ///< with its places in patches_of_clusters()
   };
   const std::map<Sequence, Patch>& patches() const { return patches_; }
+  /// Of each cluster that has points, the patches that brought them.
+  const std::unordered_map<points::ClusterKey, std::vector<Sequence>>& patches_of_clusters() const {
+    return patches_of_;
+  }
   uint64_t patch_bytes() const { return patch_bytes_; }
   uint64_t bytes() const;
 
  private:
-  void drop_mosaic(const points::Mosaic& mosaic, points::ClusterKey key, Sequence sequence, bool patch_alone);
+  void drop_part(Sequence patch, points::ClusterKey key, Sequence sequence, bool patch_alone);
   std::vector<Event> forgets(Sequence after, bool from_nothing) const;
   std::vector<Event> patch_forgets(Sequence after, bool from_nothing) const;
 
   const size_t max_patches_;
   std::map<Sequence, Patch> patches_;
+  std::unordered_map<points::ClusterKey, std::vector<Sequence>> patches_of_;
   std::unordered_map<points::ClusterKey, Sequence> last_forget_;
   std::deque<Event> patch_forgets_;  // newest ones
   size_t patches_forgotten_ = 0;     // in them

@@ -35,15 +35,14 @@ std::vector<points::ClusterKey> Obsolescence::choose(const points::PointModel& m
   return out;
 }
 
-std::vector<points::ClusterKey> Obsolescence::choose_patches(const points::PointModel& model, const EventLog& log,
-                                                             uint64_t max_bytes) const {
+std::vector<points::ClusterKey> Obsolescence::choose_patches(const EventLog& log, uint64_t max_bytes) const {
   if (log.patch_bytes() <= max_bytes) return {};
   // A patch was last used when any of its clusters was.
   std::unordered_map<Sequence, double> used_s;
-  for (const auto& [key, cluster] : model.clusters()) {
+  for (const auto& [key, patches] : log.patches_of_clusters()) {
     const double access_s = access_s_.at(key);
-    for (const points::Mosaic& mosaic : cluster->mosaics) {
-      const auto [at, is_new] = used_s.emplace(mosaic.sequence(), access_s);
+    for (const Sequence patch : patches) {
+      const auto [at, is_new] = used_s.emplace(patch, access_s);
       if (!is_new) at->second = std::max(at->second, access_s);
     }
   }
@@ -60,11 +59,9 @@ std::vector<points::ClusterKey> Obsolescence::choose_patches(const points::Point
     chosen.insert(sequence);
   }
   std::vector<points::ClusterKey> out;
-  for (const auto& [key, cluster] : model.clusters()) {
-    const auto& mosaics = cluster->mosaics;
-    if (std::any_of(mosaics.begin(), mosaics.end(), [&](const auto& m) { return chosen.count(m.sequence()) != 0; }))
+  for (const auto& [key, patches] : log.patches_of_clusters())
+    if (std::any_of(patches.begin(), patches.end(), [&](Sequence s) { return chosen.count(s) != 0; }))
       out.push_back(key);
-  }
   std::sort(out.begin(), out.end());
   return out;
 }

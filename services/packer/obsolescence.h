@@ -24,8 +24,7 @@ class Obsolescence {
 
   /// Every cluster of the least recently accessed patches, until the patches left have at most 90 % of max_bytes; none
   /// if they have no more than max_bytes. Ascending.
-  std::vector<points::ClusterKey> choose_patches(const points::PointModel& model, const EventLog& log,
-                                                 uint64_t max_bytes) const;
+  std::vector<points::ClusterKey> choose_patches(const EventLog& log, uint64_t max_bytes) const;
 
  private:
   std::unordered_map<points::ClusterKey, double> access_s_;  // of every cluster of the model

@@ -50,7 +50,8 @@ struct PackerCore::Impl {
   Obsolescence obsolescence;             // of clusters, kEliminate
   PatchObsolescence patch_obsolescence;  // kKeep
   Statistics statistics;
-  std::vector<float> reference_depth_m;  // kept for its memory
+  std::vector<float> reference_depth_m;              // kept for its memory
+  std::vector<points::ClusterKey> clusters_of_patch;  // likewise
   struct CoarsePass {
     FrameId frame;
     InstanceId viewer;
@@ -76,11 +77,16 @@ struct PackerCore::Impl {
       return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
     }
     // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters
-    // outside the tile's frustum cost next to nothing.
-    const geometry::Camera view = geometry::crop(tile.camera, tile.rect);
+    // outside the tile's frustum cost next to nothing. It has a pixel more on each side, inside the frame, for the tile's border.
+    const geometry::Rect& r = tile.rect;
+    const int left = std::min(r.x, 1), top = std::min(r.y, 1);
+    const int right = std::min(tile.camera.width - r.x - r.width, 1),
+              bottom = std::min(tile.camera.height - r.y - r.height, 1);
+    const geometry::Rect around{r.x - left, r.y - top, r.width + left + right, r.height + top + bottom};
+    const geometry::Camera view = geometry::crop(tile.camera, around);
     hooks.reference_depth(model, view, config.threads, reference_depth_m);
-    return hooks.eliminate(view, {0, 0, tile.rect.width, tile.rect.height}, reference_depth_m, config.relative_epsilon,
-                           tile.image);
+    return hooks.eliminate(view, {left, top, r.width, r.height}, reference_depth_m, config.relative_epsilon, tile.image,
+                           config.nearest_sample);
   }
 
   using Stream = std::shared_ptr<const std::vector<uint8_t>>;
@@ -119,14 +125,16 @@ struct PackerCore::Impl {
 
     points::PreparedPatch patch =
         points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
+    clusters_of_patch.clear();
     for (const auto& [key, mosaic] : patch.mosaics) {
+      clusters_of_patch.push_back(key);
       if (keeps())
         patch_obsolescence.added(key, mosaic, now_s);
       else
         obsolescence.accessed(key, now_s);
     }
     if (keeps()) note_pass(event, patch);
-    log.add_patch(event, patch.mosaics.size());
+    log.add_patch(event, clusters_of_patch);
     statistics.points_outside += patch.outside;
     model.insert(std::move(patch));
 
@@ -144,7 +152,8 @@ struct PackerCore::Impl {
       Event event = next_event(Event::Kind::kForget);
       event.clusters.assign(some.begin(), some.end());
       const uint64_t points = model.points();
-      const std::vector<points::Cluster> dropped = model.forget(some);
+      std::vector<points::ClusterKey> dropped;
+      for (const points::Cluster& cluster : model.forget(some)) dropped.push_back(cluster.key);
       log.add_forget(event.sequence, dropped);
       for (const points::ClusterKey key : some) obsolescence.forgotten(key);
       statistics.clusters_forgotten += dropped.size();
@@ -226,7 +235,7 @@ std::vector<Event> PackerCore::tick(double now_s) {
     if (c.max_log_bytes > 0) i.forget_patches(i.patch_obsolescence.choose_events(i.model, i.log, c.max_log_bytes), out);
   } else {
     i.forget(i.obsolescence.choose(i.model, now_s, c.obsolete_after_s, c.max_points), out);
-    if (c.max_log_bytes > 0) i.forget(i.obsolescence.choose_patches(i.model, i.log, c.max_log_bytes), out);
+    if (c.max_log_bytes > 0) i.forget(i.obsolescence.choose_patches(i.log, c.max_log_bytes), out);
   }
   return out;
 }

@@ -31,6 +31,7 @@ struct Config {
   points::ModelConfig model;
   Redundancy redundancy = Redundancy::kEliminate;
   float relative_epsilon = 0.005f;  ///< of T4.3.1, as a fraction of the depth
+  float nearest_sample = splat::kNearestSample;  ///< pixels: of splat::eliminate_redundancy
   double obsolete_after_s = 0;      ///< clusters that nobody drew for so long are forgotten; 0 = never (T4.3.3)
   uint64_t max_points = 0;  ///< above it, least recently drawn clusters are forgotten down to 90 % of it; 0 = no limit
   uint64_t max_log_bytes = 0;  ///< of the patches kept for events_since(): above it, those least recently drawn are
@@ -101,7 +102,7 @@ class PackerCore {
         reference_depth = splat::render_reference_depth;
     std::function<splat::Elimination(const geometry::Camera&, const geometry::Rect&,
                                      const std::vector<float>& reference_depth_m, float relative_epsilon,
-                                     image::DepthImage&)>
+                                     image::DepthImage&, float nearest)>
         eliminate = splat::eliminate_redundancy;
   };
 

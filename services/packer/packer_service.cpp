@@ -85,12 +85,13 @@ class PackerService {
       return it == s.settings.end() ? fallback : it->second;
     };
     Config config;
-    config.model = {s.box_room, int(s.octree_depth)};
+    const bool keep = setting("packing.keep_redundant", 0) != 0;
+    config.model = {s.box_room, int(s.octree_depth), !keep};
     if (const Status valid = points::validate(config.model); !valid) {
       log::error("the master's session cannot be packed: {}", valid.error().text);
       return;
     }
-    config.redundancy = setting("packing.keep_redundant", 0) != 0 ? Redundancy::kKeep : Redundancy::kEliminate;
+    config.redundancy = keep ? Redundancy::kKeep : Redundancy::kEliminate;
     config.relative_epsilon = float(setting("packing.epsilon", config.relative_epsilon));
     config.obsolete_after_s = setting("packing.obsolete_after_s", 0);
     config.max_points = uint64_t(setting("packing.max_points", 0));

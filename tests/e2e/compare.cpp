@@ -49,7 +49,8 @@ double number(const Row& row, const std::string& key) {
   return it == row.end() ? NAN : std::strtod(it->second.c_str(), nullptr);
 }
 
-void expect_plausible(const Row& row) {
+// least_ssim: without finish pin-holes stay.
+void expect_plausible(const Row& row, double least_ssim = 0.4) {
   const std::string name = row.at("kernel") + " " + row.at("renderer");
   EXPECT_GT(number(row, "psnr_db"), 15) << name;
   EXPECT_LE(number(row, "psnr_db"), 99) << name;
@@ -60,7 +61,7 @@ void expect_plausible(const Row& row) {
   }
   EXPECT_NEAR(number(row, "error_silhouette") + number(row, "error_depth_edge") + number(row, "error_interior"), 1,
               1e-3);
-  EXPECT_GT(number(row, "ssim"), 0.4) << name;
+  EXPECT_GT(number(row, "ssim"), least_ssim) << name;
   EXPECT_LT(number(row, "flip"), 0.3) << name;
   EXPECT_LT(number(row, "hole_fraction"), 0.2) << name;
   EXPECT_GT(number(row, "object_pixels"), 1000) << name;
@@ -149,7 +150,7 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   EXPECT_EQ(found.wait(60), 0) << found.err();
   const auto found_rows = read_csv(run.folder() / "found/compare.csv");
   ASSERT_EQ(found_rows.size(), 1u);
-  expect_plausible(found_rows[0]);
+  expect_plausible(found_rows[0], 0.25);
 
   // Told to stop, it keeps the poses that it has and says so.
   Program stopped("telesplat",
@@ -218,7 +219,7 @@ TEST_P(CompareRefuses, WithCodeTwoAndOneLine) {
                                        << "[scene]\nfile = \"" << (folder / "terrain.ply") << "\"\ncache = \""
                                        << (folder / "cache") << "\"\n[display]\nfov = 90\nnear = 0.02\n";
   std::ofstream(run + "/frames.csv") << kFrames;
-  std::ofstream(run + "/points.events") << "TSEVENT1";
+  std::ofstream(run + "/points.events") << "TSEVENT2";
   if (r.content == "GONE")
     fs::remove(folder / r.file);
   else if (!r.file.empty())

@@ -38,7 +38,7 @@ void expect_identical(const points::PointModel& a, const points::PointModel& b) 
 
 class ReplicaCheck : public testing::TestWithParam<int> {};
 
-TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
+TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
   std::mt19937_64 random(static_cast<uint64_t>(GetParam()));
   const auto chance = [&](double p) { return std::uniform_real_distribution<double>(0, 1)(random) < p; };
   packer::Config config = test::packer_config();
@@ -47,6 +47,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
   config.max_points = GetParam() % 4 < 2 ? 60000 : 0;
   config.max_log_bytes = GetParam() % 3 ? 400000 : 0;
   const bool keep = GetParam() % 2 == 1;  // then single patches of clusters are forgotten
+  config.model.compact = !keep;
   config.redundancy = keep ? packer::Redundancy::kKeep : packer::Redundancy::kEliminate;
   config.patches_per_cluster = GetParam() % 5 == 4 ? 0 : static_cast<uint32_t>(1 + GetParam() % 3);
   packer::PackerCore core(config, {1});
@@ -75,9 +76,9 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
     }
   };
 
-  // At least 200 events, and on until each kind has come.
-  for (int step = 0; published < 200 || forgets < 3 || epochs < 1 || gaps < 3; ++step) {
-    ASSERT_LT(step, 5000);
+  // At least 2000 events, and on until each kind has come.
+  for (int step = 0; published < 2000 || forgets < 3 || epochs < 1 || gaps < 3; ++step) {
+    ASSERT_LT(step, 50000);
     now_s += 0.2;
     if (chance(0.01) && step > 20) {
       if (const auto event = core.begin_epoch({core.epoch().value + 1})) publish(*event);
@@ -108,7 +109,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter200RandomEvents) {
       if (event->has_value()) publish(**event);
     }
     if (HasFatalFailure()) return;
-    if (step % 50 == 0) {
+    if (step % 100 == 0) {
       test::Replica late(config.model);
       late.catch_up(core);
       ASSERT_EQ(late.model().digest(), core.model().digest()) << "a late joiner at step " << step;
@@ -135,6 +136,7 @@ TEST_P(ReplicaResume, FromEverySequence) {
   std::mt19937_64 random(5);
   packer::Config config = test::packer_config();
   config.redundancy = GetParam();
+  config.model.compact = GetParam() == packer::Redundancy::kEliminate;
   config.patches_per_cluster = 2;
   config.model.depth = 3;
   config.obsolete_after_s = 2;

@@ -4,7 +4,9 @@
 #include <glm/geometric.hpp>
 
 #include "common/geometry/trajectory.h"
+#include "common/splat/facing.h"
 #include "common/splat/reference_depth.h"
+#include "common/splat/splat_kernels.h"
 #include "common/splat/view_selection.h"
 #include "tests/unit/splat_scene.h"
 
@@ -56,7 +58,12 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
       for (const points::Mosaic& m : cluster->mosaics) {
         if (splat::faces_away(m, cluster->leaf_room, eye)) continue;
         const points::Mosaic::Level level = m.level(0);
+        const glm::vec3 facing = splat::facing_vector(splat::leaf_view(cluster->leaf_room, eye));
         for (uint32_t i = 0; i < level.count; ++i) {
+          // Points that face away are not seen; where rounding decides they may be.
+          const glm::dvec3 n(image::octahedral16(level.normal[i]));
+          const double away = -glm::dot(n, glm::dvec3(facing)) / glm::length(n);
+          if (away > 1 + 1e-4) continue;
           const glm::dvec3 q(level.x[i], level.y[i], level.z[i]);
           const glm::dvec4 p(
               glm::dvec3(cluster->leaf_room.lo) + (q + 0.5) / 65536.0 * glm::dvec3(cluster->leaf_room.size()), 1.0);
@@ -70,7 +77,7 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
               nearest[at] = std::min(nearest[at], w);
               const bool sure =
                   std::floor(x - 0.01) == std::floor(x + 0.01) && std::floor(y - 0.01) == std::floor(y + 0.01);
-              if (sure) farthest[at] = std::min(farthest[at], w);
+              if (sure && away < 1 - 1e-4) farthest[at] = std::min(farthest[at], w);
             }
         }
       }
@@ -81,7 +88,8 @@ TEST(ReferenceDepth, EqualsProjectingEveryPointInDoublePrecision) {
       size_t wrong = 0, covered = 0;
       for (size_t i = 0; i < pixels; ++i) {
         covered += std::isfinite(depth[i]);
-        wrong += !(depth[i] >= nearest[i] * (1 - 1e-5) && (depth[i] <= farthest[i] * (1 + 1e-5)));
+        // The last bits tell where in its pixel the point lies.
+        wrong += !(depth[i] >= nearest[i] * (1 - 4e-5) && (depth[i] <= farthest[i] * (1 + 4e-5)));
       }
       EXPECT_EQ(wrong, 0u) << threads << " threads, of " << pixels << " pixels";
       EXPECT_GT(covered, pixels / 4);
@@ -111,6 +119,88 @@ TEST(Elimination, WhatTheModelShowsIsNotSentAgain) {
   EXPECT_LT(result.kept, image.pixels() / 100) << "over 99 % are eliminated";
 }
 
+// Points of one plane that faces the camera, at random places of some pixels: what is kept lies farther from all of them than `nearest`, and
+// what is dropped does not.
+TEST(Elimination, DropsWhatHasAPointOfItsSurfaceNearby) {
+  const geometry::Camera camera = camera_at(0.0, 64, 48);
+  const geometry::Rect whole{0, 0, 64, 48};
+  const glm::vec3 towards(camera.pose.orientation * glm::dvec3(0, 0, 1));
+  std::mt19937 rng(7);
+  constexpr double kDepth = 0.8;
+  constexpr float kNearest = 0.7f;
+  struct Place {
+    float x, y;
+  };
+  std::vector<Place> places;
+  std::vector<float> reference(64 * 48, std::numeric_limits<float>::infinity());
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) {
+      if (rng() % 3 != 0) continue;
+      const uint32_t sub = rng() & splat::kReferencePlaceMask;
+      // One in four is of another surface, farther away: it shows nothing of this one.
+      const bool other = rng() % 4 == 0;
+      const float depth = float(other ? 1.1 * kDepth : kDepth);
+      reference[size_t(y) * 64 + x] =
+          std::bit_cast<float>((std::bit_cast<uint32_t>(depth) & ~splat::kReferencePlaceMask) | sub);
+      if (!other)
+        places.push_back({float(x) + (float(sub & 15) + 0.5f) / 16, float(y) + (float(sub >> 4) + 0.5f) / 16});
+    }
+  image::DepthImage image(64, 48);
+  std::fill(image.depth.begin(), image.depth.end(), image::encode_depth(kDepth, camera.near_m));
+  std::fill(image.normal.begin(), image.normal.end(), image::encode_normal16(towards));
+  const auto result = splat::eliminate_redundancy(camera, whole, reference, 0.005f, image, kNearest);
+  uint64_t kept = 0, wrong = 0;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) {
+      bool own = false;
+      float nearest = 100;
+      for (const Place& p : places) {
+        own |= int(p.x) == x && int(p.y) == y;
+        nearest = std::min(nearest, std::hypot(p.x - (x + 0.5f), p.y - (y + 0.5f)));
+      }
+      const bool keeps = image.depth[size_t(y) * 64 + x] != 0;
+      kept += keeps;
+      wrong += keeps == (own || nearest <= kNearest);
+    }
+  EXPECT_EQ(wrong, 0u);
+  EXPECT_EQ(result.kept, kept);
+  EXPECT_GT(kept, 300u);
+  EXPECT_LT(kept, 64u * 48 * 3 / 4);
+}
+
+// Views of one surface from all around: points come to an end.
+TEST(Elimination, PointsOfASurfaceAreBounded) {
+  points::PointModel model({{{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}, 4, true});
+  std::mt19937 rng(11);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  uint64_t last = 0, sampled = 0;
+  for (int view = 0; view < 60; ++view) {
+    // A plane, y = 0, seen from above at about the same distance.
+    const geometry::Camera camera = geometry::make_camera(
+        geometry::look_at({0.2 * uniform(rng), 1.0, 0.2 * uniform(rng)}, {0.02 * uniform(rng), 0, 0}), 50, 160, 120);
+    image::DepthImage image(camera.width, camera.height);
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width; ++x) {
+        const glm::dvec3 at = camera.unproject(x + 0.5, y + 0.5, 1.0), ray = at - camera.pose.position_room;
+        const double t = -camera.pose.position_room.y / ray.y;
+        const glm::dvec3 hit = camera.pose.position_room + t * ray;
+        if (std::abs(hit.x) > 0.25 || std::abs(hit.z) > 0.25) continue;
+        const size_t i = size_t(y) * camera.width + x;
+        image.depth[i] = image::encode_depth(t, camera.near_m);
+        image.normal[i] = image::encode_normal16({0, 1, 0});
+      }
+    std::vector<float> depth;
+    splat::render_reference_depth(model, camera, 1, depth);
+    const geometry::Rect whole{0, 0, camera.width, camera.height};
+    const auto result = splat::eliminate_redundancy(camera, whole, depth, 0.005f, image);
+    sampled = result.samples, last = result.kept;
+    model.insert(points::prepare_patch(model.config(), Sequence{uint64_t(view) + 1}, camera, whole, image));
+  }
+  EXPECT_LT(last, sampled / 30) << "a view adds next to nothing in the end";
+  EXPECT_LT(static_cast<double>(model.points()), 1.1547 / (splat::kNearestSample * splat::kNearestSample) * static_cast<double>(sampled));
+  EXPECT_GT(model.points(), sampled);
+}
+
 TEST(Elimination, KeepsWhatIsNearerByMoreThanEpsilonInCanonicalForm) {
   const geometry::Camera camera = camera_at(0.0, 64, 48);
   const geometry::Rect tile{16, 8, 37, 21};
@@ -128,7 +218,7 @@ TEST(Elimination, KeepsWhatIsNearerByMoreThanEpsilonInCanonicalForm) {
   }
   const image::DepthImage before = image;
   constexpr float kEpsilon = 0.01f;
-  const auto result = splat::eliminate_redundancy(camera, tile, reference, kEpsilon, image);
+  const auto result = splat::eliminate_redundancy(camera, tile, reference, kEpsilon, image, 0);
   uint64_t samples = 0, kept = 0;
   for (int y = 0; y < tile.height; ++y)
     for (int x = 0; x < tile.width; ++x) {

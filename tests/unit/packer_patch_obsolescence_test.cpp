@@ -263,7 +263,9 @@ TEST(EventLogOfPatches, KnowsHowFarItRemembers) {
     event.sequence = {++sequence}, event.frame = tile.frame, event.camera = tile.camera, event.rect = tile.rect;
     event.blob = std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
     auto patch = points::prepare_patch(config, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
-    log.add_patch(event, patch.mosaics.size());
+    std::vector<points::ClusterKey> clusters;
+    for (const auto& [key, mosaic] : patch.mosaics) clusters.push_back(key);
+    log.add_patch(event, clusters);
     model.insert(std::move(patch));
   };
   std::vector<Event> forgets;

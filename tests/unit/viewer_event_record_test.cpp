@@ -112,7 +112,7 @@ class EventRecord : public testing::Test {
   }
   static std::string replica(float lo, float hi, uint32_t depth) {
     const float box[6] = {lo, lo, lo, hi, hi, hi};
-    std::string body(28, '\0');
+    std::string body(32, '\0');
     std::memcpy(body.data(), box, 24);
     std::memcpy(body.data() + 24, &depth, 4);
     return part("replica", body);
@@ -221,7 +221,7 @@ TEST_F(EventRecord, CutAtEveryLengthItEndsBeforeTheCut) {
   record(events);
   const std::string whole = bytes();
   std::vector<size_t> ends;  // of each event
-  size_t end = 8 + part("replica", std::string(28, '\0')).size();
+  size_t end = 8 + part("replica", std::string(32, '\0')).size();
   for (const auto& e : events) ends.push_back(end += event(e).size());
   ASSERT_EQ(ends.back(), whole.size());
   for (size_t length = whole.size(); length-- > 0;) {
@@ -245,7 +245,7 @@ TEST_F(EventRecord, CutAtEveryLengthItEndsBeforeTheCut) {
 
 TEST_F(EventRecord, WhatIsNoRecordIsRefusedByName) {
   for (const std::string& content :
-       {std::string(), std::string("TSEVENT"), std::string("TSEVENT2 and more"), std::string(1000, '\xff')}) {
+       {std::string(), std::string("TSEVENT"), std::string("TSEVENT1 and more"), std::string(1000, '\xff')}) {
     const std::string error = error_of(content);
     EXPECT_NE(error.find(path_), std::string::npos) << error;
   }
@@ -258,7 +258,7 @@ TEST_F(EventRecord, WhatIsNoRecordIsRefusedByName) {
 
 TEST_F(EventRecord, EventsThatCannotBeAreErrorsThatNameTheFile) {
   const auto events = published(40, 40);
-  const std::string magic = "TSEVENT1", good = replica(-0.4f, 0.4f, 6);
+  const std::string magic = "TSEVENT2", good = replica(-0.4f, 0.4f, 6);
   packer::Event outside = events[0];
   outside.rect.x += 7;
   packer::Event undecodable = events[0];
@@ -275,7 +275,7 @@ TEST_F(EventRecord, EventsThatCannotBeAreErrorsThatNameTheFile) {
       {magic + good + event(outside), "not inside"},
       {magic + good + event(undecodable), "patch"},
       {magic + good + event(unfit), "patch"},
-      {magic + part("replica", "short"), "5 bytes instead of 28"},
+      {magic + part("replica", "short"), "5 bytes instead of 32"},
       {magic + replica(0.4f, -0.4f, 6), "replica"},
       {magic + replica(std::numeric_limits<float>::quiet_NaN(), 1, 6), "replica"},
       {magic + replica(-1e30f, 1e30f, 6), "replica"},
@@ -290,7 +290,7 @@ TEST_F(EventRecord, EventsThatCannotBeAreErrorsThatNameTheFile) {
 
 TEST_F(EventRecord, ClaimedLengthsAllocateNothing) {
   for (const uint64_t claimed : {uint64_t(1) << 40, ~uint64_t(0), ~uint64_t(0) - 11}) {
-    std::string content = "TSEVENT1" + replica(-1, 1, 6) + part("patch", "abc");
+    std::string content = "TSEVENT2" + replica(-1, 1, 6) + part("patch", "abc");
     std::memcpy(content.data() + content.size() - 16, &claimed, 8);
     EXPECT_EQ(error_of(content), "") << "it ends before that event";
   }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/image/flip.h"
+#include "common/points/point_model.h"
 #include "services/data/mesh_store.h"
 
 namespace CLI {
@@ -31,7 +32,7 @@ struct CompareOptions {
   bool pictures = false;
   std::string size = "1280x800";  ///< of the display, for a data file
   double fov_deg = 90, near_m = 0.02;
-  int octree_depth = 6;
+  int octree_depth = points::ModelConfig{}.depth;
   data::MeshOptions mesh;
 };
 

@@ -128,7 +128,7 @@ Result<const points::PointModel*> PoseModels::of(const DisplayedFrame& frame) {
   sampling.width = std::max(1, sampling.width / magnify_);
   sampling.height = std::max(1, sampling.height / magnify_);
   const geometry::Rect whole{0, 0, sampling.width, sampling.height};
-  const points::ModelConfig config{scene_.box_room(), subject_.octree_depth};
+  const points::ModelConfig config{scene_.box_room(), subject_.octree_depth, !subject_.best_patch_only};
   if (const Status s = points::validate(config); !s) return Error{fmt::format("{}: {}", subject_.name, s.error().text)};
   auto image = scene_.sample(sampling, frame.epoch);
   if (!image) return image.error();

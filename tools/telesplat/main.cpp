@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "tools/telesplat/bench_cache.h"
 #include "tools/telesplat/bench_scaling.h"
 #include "tools/telesplat/bench_volume.h"
 #include "tools/telesplat/compare_command.h"
@@ -57,6 +58,10 @@ int telesplat_main(int argc, char** argv) {
       "volume",
       "how fast views of a volume are made with 1-4 samplers and 1-4 viewers, beside tables 7.3 and 7.4 of the thesis");
   launcher::add_volume_bench_flags(*bench_volume, volume_options);
+  launcher::CacheBenchOptions cache_options;
+  auto* bench_cache = bench->add_subcommand(
+      "cache", "what a point model costs, minute by minute of a walk that is replayed without waiting");
+  launcher::add_cache_bench_flags(*bench_cache, cache_options);
   launcher::PresetsOptions presets_options;
   auto* presets = app.add_subcommand(
       "presets", "tell the Julia sets and transfer functions that have names, or draw the Julia sets");
@@ -73,6 +78,7 @@ int telesplat_main(int argc, char** argv) {
   if (*run) return launcher::run(*run, run_options);
   if (*view) return launcher::run(*view, view_options);
   if (*bench_volume) return launcher::bench_volume(volume_options);
+  if (*bench_cache) return launcher::bench_cache(cache_options);
   if (*bench) return launcher::bench_scaling(scaling_options);
   if (*presets) return launcher::presets(presets_options);
   if (*compare) return launcher::compare(compare_options);

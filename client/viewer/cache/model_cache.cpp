@@ -16,8 +16,10 @@ void move_to_end(std::vector<T>& from, std::vector<T>& to) {
 }  // namespace
 
 void ModelCache::drop(Replica& replica) {
-  auto& models = dropped_of(replica.model.get()).models;
-  models.push_back(std::move(replica.model));
+  Dropped& dropped = dropped_of(replica.model.get());
+  for (auto& [key, summary] : replica.summaries) dropped.summaries.push_back(std::move(summary));
+  replica.summaries.clear();
+  dropped.models.push_back(std::move(replica.model));
 }
 
 bool ModelCache::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence applied) {
@@ -29,16 +31,19 @@ bool ModelCache::begin_replica(const points::ModelConfig& config, EpochId epoch,
     else
       drop(newest_);
   }
-  newest_ = {std::move(fresh), epoch, applied, ++replicas_};
+  newest_ = {std::move(fresh), epoch, applied, ++replicas_, {}};
+  wanted_.clear();
   return older_.model != nullptr;
 }
 
 void ModelCache::insert(points::PreparedPatch patch, EpochId epoch) {
+  points::Insertion insertion = newest_.model->plan(std::move(patch));
   const std::lock_guard lock(mutex_);
   CHECK(newest_.epoch == epoch || newest_.epoch.value == 0);
   newest_.epoch = epoch;
-  newest_.applied = patch.sequence;
-  newest_.model->insert(std::move(patch));
+  newest_.applied = insertion.sequence;
+  auto replaced = newest_.model->commit(std::move(insertion));
+  move_to_end(replaced, dropped_of(newest_.model.get()).mosaics);
   ++patches_;
 }
 
@@ -60,6 +65,24 @@ void ModelCache::free_dropped() {
   std::swap(free, free_);
 }
 
+void ModelCache::summarise(size_t most) {
+  std::vector<points::ClusterKey> wanted;
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(wanted, wanted_);
+  }
+  if (wanted.size() > most) wanted.resize(most);  // the display asks again
+  for (const points::ClusterKey key : wanted) {
+    const auto block = newest_.model->blocks().find(key);
+    if (block == newest_.model->blocks().end()) continue;
+    auto summary = points::summarise(*newest_.model, key, *block->second, newest_.applied);
+    const std::lock_guard lock(mutex_);
+    auto& place = newest_.summaries[key];
+    if (place) dropped_of(newest_.model.get()).summaries.push_back(std::move(place));
+    place = std::move(summary);
+  }
+}
+
 uint64_t ModelCache::digest() const {
   const std::lock_guard lock(mutex_);
   return newest_.model ? newest_.model->digest() : 0;
@@ -69,9 +92,10 @@ void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOp
   const std::lock_guard lock(mutex_);
   const Replica& replica = displayed();
   if (replica.model)
-    splat::select_view(*replica.model, camera, options, out);
+    splat::select_view(*replica.model, camera, options, out, &replica.summaries);
   else
     out = {};
+  if (&replica == &newest_) wanted_ = out.summaries_wanted;
   out.applied = replica.applied;
   out.epoch = replica.epoch;
   out.replica = replica.number;
@@ -82,6 +106,8 @@ void ModelCache::end_frame() {
   const std::lock_guard lock(mutex_);
   drawn_ = nullptr;
   move_to_end(parked_.clusters, free_.clusters);
+  move_to_end(parked_.mosaics, free_.mosaics);
+  move_to_end(parked_.summaries, free_.summaries);
   move_to_end(parked_.models, free_.models);
 }
 

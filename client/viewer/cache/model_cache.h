@@ -1,5 +1,5 @@
 // The viewer's replica of the point model, shared by the worker that applies events and the display thread that draws. Events are
-// prepared without the lock and committed under it in microseconds. What is dropped is freed by the worker, and not before the
+// prepared and merged without the lock and committed under it in microseconds. What is dropped is freed by the worker, and not before the
 // frame that may draw it is finished.
 #pragma once
 
@@ -22,7 +22,8 @@ class ModelCache {
   const points::ModelConfig& config() const { return newest_.model->config(); }
   /// Of the newest replica; 0: not known yet.
   EpochId epoch() const { return newest_.epoch; }
-  /// Precondition: `epoch` is the newest replica's, or that is not known yet.
+  /// Precondition: `epoch` is the newest replica's, or that is not known yet. Only one thread at a time may change the cache: mosaics are merged
+  /// while the display draws.
   void insert(points::PreparedPatch patch, EpochId epoch);
   /// frames: empty, or one a key: then only the mosaics with that frame tag (PointModel::forget).
   void forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames = {});
@@ -30,6 +31,8 @@ class ModelCache {
   void show_newest();
   /// Frees what was dropped and no frame draws any more. To be called often: to free a million points takes milliseconds.
   void free_dropped();
+  /// Makes up to `most` of the summaries that the display asked for (points/summary.h), while it draws. Only where no other thread changes the cache.
+  void summarise(size_t most);
   /// Digest of the newest replica, for tests of replication.
   uint64_t digest() const;
 
@@ -52,9 +55,12 @@ class ModelCache {
     EpochId epoch;
     Sequence applied;     // newest event
     uint64_t number = 0;  // of all replicas this cache had
+    points::Summaries summaries;
   };
   struct Dropped {
     std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were, or what was dropped of them: draw lists point to it
+    std::vector<points::Mosaic> mosaics;                     // merged into others
+    std::vector<std::unique_ptr<points::Summary>> summaries;
     std::vector<std::unique_ptr<points::PointModel>> models;
   };
   const Replica& displayed() const { return older_.model ? older_ : newest_; }
@@ -67,6 +73,7 @@ class ModelCache {
   const points::PointModel* drawn_ = nullptr;
   Dropped parked_, free_;
   uint64_t replicas_ = 0, patches_ = 0;
+  std::vector<points::ClusterKey> wanted_;  // summaries of the newest replica
 };
 
 }  // namespace telesplat::viewer

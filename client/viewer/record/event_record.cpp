@@ -13,7 +13,7 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr char kMagic[8] = {'T', 'S', 'E', 'V', 'E', 'N', 'T', '1'};
+constexpr char kMagic[8] = {'T', 'S', 'E', 'V', 'E', 'N', 'T', '2'};
 constexpr std::string_view kReplica = "replica";
 constexpr uint32_t kMaxType = 32;
 
@@ -25,8 +25,9 @@ struct RecordHead {
 struct ReplicaBody {
   float lo[3], hi[3];
   uint32_t depth;
+  uint32_t compact;
 };
-static_assert(sizeof(ReplicaBody) == 28);
+static_assert(sizeof(ReplicaBody) == 32);
 
 }  // namespace
 
@@ -42,7 +43,7 @@ Result<std::unique_ptr<EventRecorder>> EventRecorder::open(const std::string& pa
 
 void EventRecorder::begin_replica(const points::ModelConfig& config) {
   const auto& b = config.box_room;
-  const ReplicaBody body{{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}, static_cast<uint32_t>(config.depth)};
+  const ReplicaBody body{{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}, static_cast<uint32_t>(config.depth), config.compact};
   write(kReplica, {reinterpret_cast<const char*>(&body), sizeof body});
 }
 
@@ -107,7 +108,7 @@ struct EventReplay::Impl {
     if (body.size() != sizeof b) return wrong(fmt::format("{} bytes instead of {}", body.size(), sizeof b));
     std::memcpy(&b, body.data(), sizeof b);
     const points::ModelConfig config{{{b.lo[0], b.lo[1], b.lo[2]}, {b.hi[0], b.hi[1], b.hi[2]}},
-                                     static_cast<int>(std::min<uint32_t>(b.depth, 1000))};
+                                     static_cast<int>(std::min<uint32_t>(b.depth, 1000)), b.compact != 0};
     if (const Status s = points::validate(config); !s) return wrong(s.error().text);
     model = std::make_unique<points::PointModel>(config);
     applied = {};

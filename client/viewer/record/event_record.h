@@ -1,8 +1,8 @@
 // The point-model events that a viewer applied, kept as they came, so that any displayed frame's model can be made again: what was
 // sent is all that is needed (DESIGN section 2, "Replicated state").
 //
-// File: "TSEVENT1", then records  u32 type length, u64 body length, type, body  (little-endian). Types: "replica" (six floats: the
-// box in room space, lo then hi; u32: octree depth) where a replica begins, and the wire's "patch", "forget", "epoch_begin".
+// File: "TSEVENT2", then records  u32 type length, u64 body length, type, body  (little-endian). Types: "replica" (six floats: the
+// box in room space, lo then hi; u32: octree depth; u32: 1 if mosaics are merged) where a replica begins, and the wire's "patch", "forget", "epoch_begin".
 #pragma once
 
 #include <cstdio>

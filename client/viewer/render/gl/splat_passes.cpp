@@ -120,6 +120,8 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
     std::copy(t.x.begin(), t.x.end(), cluster.row_x);
     std::copy(t.y.begin(), t.y.end(), cluster.row_y);
     std::copy(t.w.begin(), t.w.end(), cluster.row_w);
+    const glm::vec3& facing = runs_.facing[r];
+    cluster.facing[0] = facing.x, cluster.facing[1] = facing.y, cluster.facing[2] = facing.z, cluster.facing[3] = 0;
     std::memcpy(clusters.data + r * sizeof cluster, &cluster, sizeof cluster);
     for (uint32_t i = runs_.runs[r].first; i < runs_.runs[r].last; ++i) {
       const splat::DrawItem& item = list.items[i];

@@ -34,6 +34,7 @@ static_assert(sizeof(ViewRecord) == 176);
 /// What the draws of one cluster share (std430).
 struct ClusterRecord {
   float row_x[4], row_y[4], row_w[4];  ///< splat::LeafTransform
+  float facing[4];                     ///< splat::facing_vector
 };
 
 /// What one draw needs (std430).

@@ -61,7 +61,7 @@ float depth_test_value(uint high) { return float(high >> 7) * (1.0 / 16777216.0)
 
 /// The vertex stage's view of points and of what draws them. DrawRecord and ClusterRecord in splat_passes.h.
 inline constexpr std::string_view kPoints = R"(
-struct Cluster { vec4 row_x, row_y, row_w; };
+struct Cluster { vec4 row_x, row_y, row_w, facing; };
 struct Draw {
   uint word, count, cluster, spacing;
   float size, bias_growth;
@@ -85,6 +85,19 @@ float row(vec4 r, vec3 p) {
   precise float xy = p.x * r.x + p.y * r.y;
   precise float h = (xy + p.z * r.z) + r.w;
   return h;
+}
+
+// Normal of 16 bits, not of unit length: whole numbers, as on the CPU.
+vec3 whole_normal(uint code) {
+  vec2 n = min(vec2(code & 255u, code >> 8) - 127.0, 127.0);
+  float z = (127.0 - abs(n.x)) - abs(n.y), fold = max(-z, 0.0);
+  return vec3(n.x - (n.x < 0.0 ? -fold : fold), n.y - (n.y < 0.0 ? -fold : fold), z);
+}
+// common/splat/facing.h
+bool faces_away(Cluster c, uint normal) {
+  vec3 n = whole_normal(normal);
+  float towards = dot(n, c.facing.xyz);
+  return towards < 0.0 && towards * towards > dot(n, n);
 }
 
 // A square of `side` pixels from `first` (margin included) on, or nothing.

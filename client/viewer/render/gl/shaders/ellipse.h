@@ -18,7 +18,7 @@ void main() {
   bias = min(surfel_share(d.source.w, s.w, BIAS_PER_RADIUS, LEAST_BIAS, MOST_BIAS), float(MAX_BIAS));
   uint normal = point_normal(d, i);
   splat = uvec2(key_low(normal, point_albedo(d, i)), normal | surfel_spacing(s.determinant) << 16);
-  place_conic(c, s.w >= view.near_m);
+  place_conic(c, s.w >= view.near_m && !faces_away(clusters[d.cluster], normal));
 }
 )";
 

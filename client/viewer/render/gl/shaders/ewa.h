@@ -12,7 +12,7 @@ void main() {
   Surfel s = project_surfel(d, uint(gl_VertexID));
   Conic c = surfel_conic(s, 1.0, OPAQUE_VARIANCE);
   send_conic(c, surfel_depth(s));
-  place_conic(c, s.w >= view.near_m);
+  place_conic(c, s.w >= view.near_m && !faces_away(clusters[d.cluster], point_normal(d, uint(gl_VertexID))));
 }
 )";
 
@@ -42,7 +42,7 @@ void main() {
   albedo = vec3(uvec3(colour >> 16, colour >> 8, colour) & 255u);
   normal = s.contour.normal;
   scale = vec2(1.0 / min(c.determinant, 1e6), surfel_share(d.source.w, s.w, EPSILON_PER_RADIUS, LEAST_EPSILON, MOST_EPSILON));
-  place_conic(c, s.w >= view.near_m);
+  place_conic(c, s.w >= view.near_m && !faces_away(clusters[d.cluster], point_normal(d, uint(gl_VertexID))));
 }
 )";
 

@@ -31,7 +31,7 @@ void main() {
 
   uint normal = point_normal(d, i);
   splat = uvec3(key_low(normal, point_albedo(d, i)), normal | d.spacing << 16, depth_code_of(w));
-  place_square(first_pixel, d.side, w >= view.near_m);
+  place_square(first_pixel, d.side, w >= view.near_m && !faces_away(c, normal));
 }
 )";
 

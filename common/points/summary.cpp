@@ -1,0 +1,40 @@
+#include "common/points/summary.h"
+
+#include <algorithm>
+
+#include "common/points/compaction.h"
+
+namespace telesplat::points {
+
+std::unique_ptr<Summary> summarise(const PointModel& model, ClusterKey block_key, const Block& block,
+                                   Sequence applied) {
+  // Leaves along the block's edge.
+  const int shift = std::min(2, model.config().depth);
+  const auto leaves = static_cast<float>(1 << shift);
+  float range = kMostSummaryRange;
+  for (const Cluster* cluster : block.clusters) {
+    float finest = 0;
+    for (const Mosaic& m : cluster->mosaics) finest = std::max(finest, m.pixel_range());
+    range = std::min(range, leaves * finest);
+  }
+  std::vector<PlacedLevel> parts;
+  for (const Cluster* cluster : block.clusters) {
+    const auto place = [&](int axis) { return static_cast<uint16_t>(cluster->key >> (10 * axis) & 3); };
+    for (const Mosaic& m : cluster->mosaics) {
+      // The coarsest level that has a point for each cell.
+      int level = 0;
+      while (level + 1 < kLevels && leaves * m.pixel_range() >= range * static_cast<float>(2 << level)) ++level;
+      parts.push_back({&m, level, place(0), place(1), place(2)});
+    }
+  }
+  auto out = std::make_unique<Summary>();
+  out->cluster = {block_key | kSummaryKey, block.box_room, {}};
+  out->cluster.mosaics.push_back(representatives(parts, shift, range, applied));
+  out->built = applied;
+  out->changes = block.changes;
+  out->removals = block.removals;
+  out->pixel_range = range;
+  return out;
+}
+
+}  // namespace telesplat::points

@@ -1,0 +1,48 @@
+// The clusters of a model that a view may show, block by block.
+#pragma once
+
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <vector>
+
+#include "common/geometry/camera.h"
+#include "common/points/point_model.h"
+
+namespace telesplat::splat {
+
+/// The blocks that the frustum meets, nearest first.
+struct SeenBlock {
+  float distance2;
+  bool whole;  ///< the block lies wholly inside
+  points::ClusterKey key;
+  const points::Block* block;
+};
+inline std::vector<SeenBlock> seen_blocks(const points::PointModel& model, const geometry::Frustum& frustum,
+                                          const glm::vec3& eye) {
+  std::vector<SeenBlock> out;
+  for (const auto& [key, block] : model.blocks()) {
+    if (!frustum.may_contain(block->box_room)) continue;
+    const glm::vec3 between = block->box_room.centre() - eye;
+    out.push_back({glm::dot(between, between), frustum.contains(block->box_room), key, block.get()});
+  }
+  std::sort(out.begin(), out.end(), [](const SeenBlock& a, const SeenBlock& b) { return a.distance2 < b.distance2; });
+  return out;
+}
+
+/// Calls visit(cluster) for each cluster of a block that the frustum meets. Clusters lie scattered in memory, and what comes next is known: asks for it
+/// in time.
+template <class Visit>
+void for_seen_clusters(const SeenBlock& seen, const geometry::Frustum& frustum, const Visit& visit) {
+  constexpr size_t kClustersAhead = 8, kMosaicsAhead = 4;
+  const auto& clusters = seen.block->clusters;
+  for (size_t i = 0; i < clusters.size(); ++i) {
+    if (i + kClustersAhead < clusters.size()) hwy::Prefetch(clusters[i + kClustersAhead]);
+    if (i + kMosaicsAhead < clusters.size()) hwy::Prefetch(clusters[i + kMosaicsAhead]->mosaics.data());
+    const points::Cluster& cluster = *clusters[i];
+    if (seen.whole || frustum.may_contain(cluster.leaf_room)) visit(cluster);
+  }
+}
+
+}  // namespace telesplat::splat
