@@ -253,6 +253,21 @@ bool may_merge(const Mosaic& m, int fresh_class, uint32_t total) {
   return apart == 0 || (apart <= kSmallApart && total < kSmallMosaic && m.count(0) < kSmallMosaic);
 }
 
+// Gathers the levels' points, in fractions of the cube.
+void gather(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, PointSet& p) {
+  p.clear();
+  for (const PlacedLevel& part : parts) {
+    const Mosaic::Level l = part.mosaic->level(part.level);
+    const auto add = [&](std::vector<uint16_t>& to, const uint16_t* q, uint32_t leaf) {
+      for (uint32_t i = 0; i < l.count; ++i) to.push_back(static_cast<uint16_t>((leaf << 16 | q[i]) >> shift));
+    };
+    add(p.x, l.x, part.x), add(p.y, l.y, part.y), add(p.z, l.z, part.z);
+    p.normal.insert(p.normal.end(), l.normal, l.normal + l.count);
+    p.colour.insert(p.colour.end(), l.colour, l.colour + l.count);
+    p.note_source(*part.mosaic, l.count, pixel_range);
+  }
+}
+
 }  // namespace
 
 int density_class(float pixel_range) {
@@ -269,19 +284,14 @@ Mosaic merge_mosaics(const std::vector<const Mosaic*>& parts, Sequence sequence)
   return build(p, sequence, FrameId{parts.back()->frame_tag()});
 }
 
+Mosaic merge_levels(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence) {
+  gather(parts, shift, pixel_range, scratch.points);
+  return build(scratch.points, sequence, {});
+}
+
 Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence) {
   PointSet& p = scratch.points;
-  p.clear();
-  for (const PlacedLevel& part : parts) {
-    const Mosaic::Level l = part.mosaic->level(part.level);
-    const auto add = [&](std::vector<uint16_t>& to, const uint16_t* q, uint32_t leaf) {
-      for (uint32_t i = 0; i < l.count; ++i) to.push_back(static_cast<uint16_t>((leaf << 16 | q[i]) >> shift));
-    };
-    add(p.x, l.x, part.x), add(p.y, l.y, part.y), add(p.z, l.z, part.z);
-    p.normal.insert(p.normal.end(), l.normal, l.normal + l.count);
-    p.colour.insert(p.colour.end(), l.colour, l.colour + l.count);
-    p.note_source(*part.mosaic, l.count, 2 * pixel_range);
-  }
+  gather(parts, shift, 2 * pixel_range, p);
   // With samples half as far apart, level 1 is what is wanted.
   const Mosaic dense = build(p, sequence, {});
   const Mosaic::Level l1 = dense.level(1), l2 = dense.level(2);

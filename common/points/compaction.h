@@ -53,6 +53,9 @@ struct PlacedLevel {
   uint16_t x, y, z;
 };
 
+/// All their points as one mosaic of that pixel range, in fractions of the cube. Precondition: at least one point.
+Mosaic merge_levels(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence);
+
 /// One point for each cell of a grid that has pixel_range cells along that cube's edge, as merge_mosaics chooses them, with coarser levels of its own.
 /// Positions are fractions of the cube. Precondition: at least one point.
 Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence);

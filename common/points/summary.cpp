@@ -17,23 +17,37 @@ std::unique_ptr<Summary> summarise(const PointModel& model, ClusterKey block_key
     for (const Mosaic& m : cluster->mosaics) finest = std::max(finest, m.pixel_range());
     range = std::min(range, leaves * finest);
   }
+  uint64_t points = 0;
+  double range_sum = 0;
+  for (const Cluster* cluster : block.clusters)
+    for (const Mosaic& m : cluster->mosaics) {
+      points += m.count(0);
+      range_sum += static_cast<double>(m.count(0)) * static_cast<double>(m.pixel_range());
+    }
+  // Where they are few, all of them.
+  const bool all = points <= kMostSummaryPoints;
   std::vector<PlacedLevel> parts;
   for (const Cluster* cluster : block.clusters) {
     const auto place = [&](int axis) { return static_cast<uint16_t>(cluster->key >> (10 * axis) & 3); };
     for (const Mosaic& m : cluster->mosaics) {
       // The coarsest level that has a point for each cell.
       int level = 0;
-      while (level + 1 < kLevels && leaves * m.pixel_range() >= range * static_cast<float>(2 << level)) ++level;
+      while (!all && level + 1 < kLevels && leaves * m.pixel_range() >= range * static_cast<float>(2 << level)) ++level;
       parts.push_back({&m, level, place(0), place(1), place(2)});
     }
   }
   auto out = std::make_unique<Summary>();
   out->cluster = {block_key | kSummaryKey, block.box_room, {}};
-  out->cluster.mosaics.push_back(representatives(parts, shift, range, applied));
+  if (all) {
+    const auto mean = leaves * static_cast<float>(range_sum / static_cast<double>(points));
+    out->cluster.mosaics.push_back(merge_levels(parts, shift, mean, applied));
+  } else {
+    out->cluster.mosaics.push_back(representatives(parts, shift, range, applied));
+  }
   out->built = applied;
   out->changes = block.changes;
   out->removals = block.removals;
-  out->pixel_range = range;
+  out->most_range = all ? kMostSummaryRange : range;
   return out;
 }
 

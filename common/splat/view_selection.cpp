@@ -98,7 +98,7 @@ class Selector {
     const points::Summary* summary = found == summaries.end() ? nullptr : found->second.get();
     if (!summary || summary->removals != block.removals || block.changes - summary->changes > kStaleChanges)
       out_.summaries_wanted.push_back(key);
-    if (!summary || summary->removals != block.removals || range > summary->pixel_range) return false;
+    if (!summary || summary->removals != block.removals || range > summary->most_range) return false;
     add(summary->cluster);
     out_.clusters_seen.pop_back();
     for (const points::Cluster* cluster : block.clusters)

@@ -17,6 +17,7 @@
 #include "common/image/quality.h"
 #include "common/metrics/statistics.h"
 #include "common/net/service.h"
+#include "common/points/compaction.h"
 #include "common/splat/cpu_splatter.h"
 #include "services/packer/packer_core.h"
 #include "tools/telesplat/direct_scene.h"
@@ -27,7 +28,7 @@ namespace {
 
 constexpr int kTile = 256;          // as the master cuts frames
 constexpr double kDrawEvery_s = 1;  // of the walk
-constexpr double kCompareEvery_s = 10;
+constexpr double kCompareEvery_s = 5;
 
 // Several recorded walks, one after the other, or an orbit.
 class Walk {
@@ -73,13 +74,23 @@ image::DepthImage cut(const image::DepthImage& whole, const geometry::Rect& r) {
   return out;
 }
 
-// What a frame of a model costs.
-struct Drawn {
-  double items = 0, points = 0, select_ms = 0, splat_ms = 0;
-};
+// The same points in a model of one mosaic a cluster, as if they had all come at once.
+points::PointModel made_at_once(const points::PointModel& model) {
+  points::PointModel out(model.config());
+  points::PreparedPatch all{Sequence{1}, {}};
+  for (const auto& [key, cluster] : model.clusters()) {
+    std::vector<const points::Mosaic*> parts;
+    for (const points::Mosaic& m : cluster->mosaics) parts.push_back(&m);
+    all.mosaics.emplace_back(key, points::merge_mosaics(parts, Sequence{1}));
+  }
+  std::sort(all.mosaics.begin(), all.mosaics.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  out.insert(std::move(all));
+  return out;
+}
 
 struct Minute {
   std::vector<double> clusters, items, points, select_ms, splat_ms, psnr_db, holes;
+  double at_once_items = 0, at_once_ms = 0;
   double cached = 0, bytes_a_point = 0, sent_points = 0, sent_mb = 0, pack_ms = 0, insert_ms = 0;
   uint64_t views = 0;
 };
@@ -118,14 +129,56 @@ class CacheBench {
       }
       if (t + step_s >= std::min(60.0 * number, end_s)) {
         progress_.close();
+        if (!minute.items.empty()) draw_at_once(t + o_.latency_s, minute);
         print(number++, minute);
         minute = {};
       }
     }
+    progress_.close();
+    print_late_joiner();
     return ok_status();
   }
 
  private:
+  void draw_at_once(double t, Minute& minute) {
+    const geometry::Camera camera = geometry::make_camera(walk_.at(t), o_.fov_deg, display_.first, display_.second);
+    const points::PointModel model = made_at_once(packer_.model());
+    splat::DrawList list;
+    std::vector<double> select_ms, splat_ms;
+    for (int pass = 0; pass < 5; ++pass) {
+      const double begin = monotonic_s();
+      splat::select_view(model, camera, selection(), list);
+      const double selected = monotonic_s();
+      splatter_.render(list, camera, render_options(), image::Shading(image::ShadingParameters{}, camera),
+                       {camera.width, camera.height, frame_.colour.data(), frame_.depth_m.data()});
+      select_ms.push_back((selected - begin) * 1e3);
+      splat_ms.push_back((monotonic_s() - selected) * 1e3);
+    }
+    minute.at_once_items = double(list.items.size());
+    minute.at_once_ms = median(select_ms) + median(splat_ms);
+  }
+
+  // What a viewer that joins now is sent, beside the patches that have points in the model.
+  void print_late_joiner() const {
+    uint64_t patches = 0, others = 0, points = 0;
+    for (const auto& event : packer_.events_since(Sequence{})) {
+      if (event.kind == packer::Event::Kind::kPatch)
+        patches += event.blob->size(), points += event.kept;
+      else
+        others += 4 * (event.clusters.size() + event.frames.size());
+    }
+    std::printf("a viewer that joins now is sent %.2f MB, %.3f times the patches of the live points; %.2f bytes a point\n",
+                double(patches + others) * 1e-6, patches ? double(patches + others) / double(patches) : 0.0,
+                points ? double(patches + others) / double(packer_.model().points()) : 0.0);
+  }
+
+  splat::SelectionOptions selection() const {
+    splat::SelectionOptions out;
+    out.scale = o_.splat_scale > 0 ? float(o_.splat_scale) : splat::suitable_scale(render_options().kernel);
+    return out;
+  }
+  splat::RenderOptions render_options() const { return {*splat::kernel_named(o_.splat), {}}; }
+
   static packer::Config packer_config(const CacheBenchOptions& o, const points::ModelConfig& model) {
     packer::Config out{.model = model, .threads = o.threads};
     if (o.nearest >= 0) out.nearest_sample = float(o.nearest);
@@ -170,17 +223,14 @@ class CacheBench {
 
   Status draw(double t, bool compare, Minute& minute) {
     const geometry::Camera camera = geometry::make_camera(walk_.at(t), o_.fov_deg, display_.first, display_.second);
-    splat::SelectionOptions selection;
-    const auto kernel = *splat::kernel_named(o_.splat);
-    selection.scale = o_.splat_scale > 0 ? float(o_.splat_scale) : splat::suitable_scale(kernel);
     const image::ShadingParameters lit;
     // The second time is what counts: a display draws all the time.
     double begin = 0, selected = 0, drawn = 0;
     for (int pass = 0; pass < 2; ++pass) {
       begin = monotonic_s();
-      cache_.select(camera, selection, list_);
+      cache_.select(camera, selection(), list_);
       selected = monotonic_s();
-      splatter_.render(list_, camera, splat::RenderOptions{kernel, {}}, image::Shading(lit, camera),
+      splatter_.render(list_, camera, render_options(), image::Shading(lit, camera),
                        {camera.width, camera.height, frame_.colour.data(), frame_.depth_m.data()});
       drawn = monotonic_s();
       cache_.end_frame();
@@ -208,15 +258,16 @@ class CacheBench {
   static double median(std::vector<double> v) { return metrics::distribution(std::move(v)).median; }
 
   void print_header() const {
-    std::printf("%6s %8s %9s %9s %9s %8s %9s %9s %8s %8s %9s %9s %9s %9s\n", "minute", "clusters", "items", "drawn", "cached", "B/point",
-                "select ms", "splat ms", "PSNR dB", "holes %", "sent k/s", "sent MB/s", "pack ms", "insert ms");
+    std::printf("%6s %8s %9s %9s %9s %8s %9s %9s %8s %8s %9s %9s %9s %9s %12s %10s\n", "minute", "clusters", "items", "drawn", "cached", "B/point",
+                "select ms", "splat ms", "PSNR dB", "holes %", "sent k/s", "sent MB/s", "pack ms", "insert ms",
+                "once: items", "once: ms");
   }
   void print(int number, const Minute& m) const {
     const double views = double(std::max<uint64_t>(m.views, 1)), seconds = views / o_.views_per_s;
-    std::printf("%6d %8.0f %9.0f %9.0f %9.0f %8.1f %9.2f %9.2f %8.2f %8.3f %9.1f %9.3f %9.2f %9.2f\n", number,
+    std::printf("%6d %8.0f %9.0f %9.0f %9.0f %8.1f %9.2f %9.2f %8.2f %8.3f %9.1f %9.3f %9.2f %9.2f %12.0f %10.2f\n", number,
                 median(m.clusters), median(m.items), median(m.points), m.cached, m.bytes_a_point, median(m.select_ms), median(m.splat_ms),
                 median(m.psnr_db), median(m.holes), m.sent_points / seconds * 1e-3, m.sent_mb / seconds,
-                m.pack_ms / views, m.insert_ms / views);
+                m.pack_ms / views, m.insert_ms / views, m.at_once_items, m.at_once_ms);
     std::fflush(stdout);
   }
 
@@ -278,6 +329,8 @@ void add_cache_bench_flags(CLI::App& app, CacheBenchOptions& o) {
   app.add_option("--out", o.out, "folder for pictures of every compared frame, beside direct rendering");
 }
 
+// Columns: median clusters, draw items and points of a frame; points cached, bytes each; median times; quality against direct rendering; what was sent; times a
+// view; and of the newest view, items and time of a model made at once.
 int bench_cache(const CacheBenchOptions& o) {
   const auto refuse = [](const Error& e) {
     std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());

@@ -212,7 +212,14 @@ class Display {
     }
     ++result_.frames;
     surface_.report(live_figures(presented_s, result_.frames, drawn, *source_, worker_));
-    if (o_.target_fps > 0) sleep_until(begin_s + 1.0 / o_.target_fps);
+    if (o_.target_fps > 0) sleep_until(next_frame_s(begin_s));
+  }
+
+  // Frames are due at equal distances: one that began late, because sleep ended late, does not delay those after it.
+  double next_frame_s(double begin_s) {
+    const double period_s = 1.0 / o_.target_fps;
+    due_s_ = begin_s - due_s_ < period_s ? due_s_ + period_s : begin_s + period_s;
+    return due_s_;
   }
 
   void add_row(double begin_s, double end_s, double presented_s, const geometry::Camera& camera, const DrawnFrame& d,
@@ -270,6 +277,7 @@ class Display {
   image::View view_;
   bool view_intact_ = false;  // it holds what is on display
   DisplayResult result_;
+  double due_s_ = 0;  // when the frame at hand was
   double start_s_ = 0, previous_s_ = 0, next_picture_s_ = 0;
   bool last_ = false;
 };
