@@ -134,10 +134,11 @@ struct Scratch {
   std::vector<Cell> cells1, cells2;
   std::vector<uint32_t> cell1, cell2;  // of each point; of each cell of level 1
   std::vector<uint32_t> counts;
-  std::vector<uint8_t> rank;
+  std::vector<uint8_t> rank, surrounded;
 };
 thread_local Scratch scratch;
 
+constexpr uint32_t kLeastTaken = 4;  // of a coarser mosaic one point in four is taken in, or none: it is built anew for it
 constexpr int kMergedRanks = 5;  // of level 2; of level 1 alone, two halves; of level 0 alone, two halves
 
 // Gathers points into cells: `count` of them, point i at place(i), with key(i).
@@ -253,6 +254,50 @@ bool may_merge(const Mosaic& m, int fresh_class, uint32_t total) {
   return apart == 0 || (apart <= kSmallApart && total < kSmallMosaic && m.count(0) < kSmallMosaic);
 }
 
+bool contains(const std::vector<uint32_t>& list, uint32_t i) { return std::find(list.begin(), list.end(), i) != list.end(); }
+
+// The mosaics that `fresh` is merged with, ascending: smallest first, as long as they are of a size with what there is.
+std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic& fresh) {
+  std::vector<uint32_t> out;
+  const int fresh_class = density_class(fresh.pixel_range());
+  uint32_t total = fresh.count(0);
+  while (true) {
+    const Mosaic* smallest = nullptr;
+    for (const Mosaic& m : mosaics)
+      if (may_merge(m, fresh_class, total) && !contains(out, static_cast<uint32_t>(&m - mosaics.data())) &&
+          (!smallest || m.count(0) < smallest->count(0)))
+        smallest = &m;
+    if (!smallest) break;
+    const uint32_t count = smallest->count(0);
+    if (count >= kSmallMosaic && count > kGrowth * total) break;
+    total += count;
+    out.push_back(static_cast<uint32_t>(smallest - mosaics.data()));
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Which points of `coarse` are surrounded by the first `own` of p and by those of finer mosaics that stay: scratch.surrounded. Returns how many.
+uint32_t find_surrounded(const std::vector<Mosaic>& mosaics, const std::vector<uint32_t>& replaced, const Mosaic& coarse,
+                         int fresh_class, const PointSet& p, uint32_t own) {
+  FinerPoints finer(coarse, fresh_class);
+  const auto for_finer = [&](const auto& visit) {
+    for (uint32_t j = 0; j < mosaics.size(); ++j)
+      if (density_class(mosaics[j].pixel_range()) > density_class(coarse.pixel_range()) && !contains(replaced, j))
+        visit(mosaics[j].level(0));
+  };
+  size_t most = own;
+  for_finer([&](const Mosaic::Level& l) { most += l.count; });
+  finer.begin(most);
+  finer.add(own, p.x.data(), p.y.data(), p.z.data(), p.normal.data());
+  for_finer([&](const Mosaic::Level& l) { finer.add(l.count, l.x, l.y, l.z, l.normal); });
+  const Mosaic::Level l = coarse.level(0);
+  scratch.surrounded.resize(l.count);
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < l.count; ++i) count += scratch.surrounded[i] = finer.surround(l, i);
+  return count;
+}
+
 // Gathers the levels' points, in fractions of the cube.
 void gather(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, PointSet& p) {
   p.clear();
@@ -306,67 +351,23 @@ Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float p
 }
 
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
-  Merge out;
   const int fresh_class = density_class(fresh.pixel_range());
-  const auto is_replaced = [&](uint32_t i) {
-    return std::find(out.replaced.begin(), out.replaced.end(), i) != out.replaced.end();
-  };
-
-  // Smallest first, as long as it is of a size with what there is.
-  uint32_t total = fresh.count(0);
-  while (true) {
-    uint32_t smallest = static_cast<uint32_t>(mosaics.size());
-    for (uint32_t i = 0; i < mosaics.size(); ++i)
-      if (!is_replaced(i) && may_merge(mosaics[i], fresh_class, total) &&
-          (smallest == mosaics.size() || mosaics[i].count(0) < mosaics[smallest].count(0)))
-        smallest = i;
-    if (smallest == mosaics.size()) break;
-    const uint32_t count = mosaics[smallest].count(0);
-    if (count >= kSmallMosaic && count > kGrowth * total) break;
-    total += count;
-    out.replaced.push_back(smallest);
-  }
-  std::sort(out.replaced.begin(), out.replaced.end());
-
+  Merge out{mergeable(mosaics, fresh), {}};
   PointSet& p = scratch.points;
   p.clear();
   for (const uint32_t i : out.replaced) p.add(mosaics[i]);
-  const size_t merged = out.replaced.size();
-  const bool looks_at_coarser =
-      total >= kSmallMosaic && std::any_of(mosaics.begin(), mosaics.end(), [&](const Mosaic& m) {
-        return density_class(m.pixel_range()) < fresh_class;
-      });
-  if (merged == 0 && !looks_at_coarser) {
-    out.added.push_back(std::move(fresh));
-    return out;
-  }
   p.add(fresh);
 
   const uint32_t own = p.size();
   const float range = p.pixel_range();
-  for (uint32_t i = 0; looks_at_coarser && i < mosaics.size(); ++i) {
+  for (uint32_t i = 0; own >= kSmallMosaic && i < mosaics.size(); ++i) {
     const Mosaic& coarse = mosaics[i];
-    const int coarse_class = density_class(coarse.pixel_range());
-    if (coarse_class >= fresh_class || is_replaced(i)) continue;
-    FinerPoints finer(coarse, fresh_class);
-    size_t most = own;
-    const auto for_finer = [&](const auto& visit) {
-      for (uint32_t j = 0; j < mosaics.size(); ++j)
-        if (density_class(mosaics[j].pixel_range()) > coarse_class && !is_replaced(j)) visit(mosaics[j].level(0));
-    };
-    for_finer([&](const Mosaic::Level& l) { most += l.count; });
-    finer.begin(most);
-    finer.add(own, p.x.data(), p.y.data(), p.z.data(), p.normal.data());
-    for_finer([&](const Mosaic::Level& l) { finer.add(l.count, l.x, l.y, l.z, l.normal); });
-
-    const Mosaic::Level l = coarse.level(0);
-    scratch.rank.assign(l.count, 0);
-    uint32_t surrounded = 0;
-    for (uint32_t k = 0; k < l.count; ++k) surrounded += scratch.rank[k] = finer.surround(l, k);
-    if (surrounded == 0 || surrounded * 4 < l.count) continue;
+    if (density_class(coarse.pixel_range()) >= fresh_class || contains(out.replaced, i)) continue;
+    const uint32_t surrounded = find_surrounded(mosaics, out.replaced, coarse, fresh_class, p, own);
+    if (surrounded == 0 || surrounded * kLeastTaken < coarse.count(0)) continue;
     PointSet& rest = scratch.rest;
     rest.clear();
-    for (uint32_t k = 0; k < l.count; ++k) (scratch.rank[k] ? p : rest).add(coarse, k);
+    for (uint32_t k = 0; k < coarse.count(0); ++k) (scratch.surrounded[k] ? p : rest).add(coarse, k);
     p.note_source(coarse, surrounded, range);
     out.replaced.push_back(i);
     if (rest.size() == 0) continue;
@@ -375,7 +376,7 @@ Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
   }
   std::sort(out.replaced.begin(), out.replaced.end());
   if (out.replaced.empty())
-    out.added.push_back(std::move(fresh));
+    out.added.push_back(std::move(fresh));  // as it came
   else
     out.added.push_back(build(p, fresh.sequence(), FrameId{fresh.frame_tag()}));
   return out;

@@ -21,10 +21,10 @@ void reserve_one_more(auto& list) {
   if (list.size() == list.capacity()) list.reserve(list.size() + 1 + list.size() / 4);
 }
 
-// The same of a block, without its list of clusters.
-constexpr uint64_t kBlockBytes = allocated_bytes(3 * sizeof(void*)) + allocated_bytes(sizeof(Block));
+// The same of a brick, without its list of clusters.
+constexpr uint64_t kBrickBytes = allocated_bytes(3 * sizeof(void*)) + allocated_bytes(sizeof(Brick));
 
-uint64_t list_bytes(const Block& block) { return allocated_bytes(block.clusters.capacity() * sizeof(void*)); }
+uint64_t list_bytes(const Brick& brick) { return allocated_bytes(brick.clusters.capacity() * sizeof(void*)); }
 
 uint64_t header_bytes(const std::vector<Mosaic>& mosaics) {
   return allocated_bytes(mosaics.capacity() * sizeof(Mosaic));
@@ -64,16 +64,19 @@ geometry::Box leaf_box(const ModelConfig& config, ClusterKey key) {
 
 PointModel::PointModel(const ModelConfig& config) : config_(config) { CHECK(validate(config).ok()); }
 
-Block& PointModel::block_of(ClusterKey key) {
-  auto& block = blocks_[block_key(key)];
-  if (!block) {
-    cluster_bytes_ += kBlockBytes;
-    const ClusterKey side = std::min(3, (1 << config_.depth) - 1), first = block_key(key);
-    block = std::make_unique<Block>(
-        Block{{leaf_box(config_, first).lo, leaf_box(config_, first + side * (1u | 1u << 10 | 1u << 20)).hi}, {}});
+Brick& PointModel::brick_of(ClusterKey key) {
+  auto& brick = bricks_[brick_key(key)];
+  if (!brick) {
+    cluster_bytes_ += kBrickBytes;
+    const ClusterKey side = std::min(3, (1 << config_.depth) - 1), first = brick_key(key);
+    brick = std::make_unique<Brick>(
+        Brick{{leaf_box(config_, first).lo, leaf_box(config_, first + side * (1u | 1u << 10 | 1u << 20)).hi},
+              {},
+              0,
+              removals_});
   }
-  ++block->changes;
-  return *block;
+  ++brick->changes;
+  return *brick;
 }
 
 Insertion PointModel::plan(PreparedPatch patch) const {
@@ -100,13 +103,13 @@ std::vector<Mosaic> PointModel::commit(Insertion insertion) {
     if (!cluster) {
       cluster = std::make_unique<Cluster>(Cluster{change.key, leaf_box(config_, change.key), {}});
       cluster_bytes_ += kClusterBytes;
-      Block& block = block_of(change.key);
-      cluster_bytes_ -= list_bytes(block);
-      reserve_one_more(block.clusters);
-      block.clusters.push_back(cluster.get());
-      cluster_bytes_ += list_bytes(block);
+      Brick& brick = brick_of(change.key);
+      cluster_bytes_ -= list_bytes(brick);
+      reserve_one_more(brick.clusters);
+      brick.clusters.push_back(cluster.get());
+      cluster_bytes_ += list_bytes(brick);
     } else {
-      block_of(change.key);
+      brick_of(change.key);
     }
     std::vector<Mosaic>& mosaics = cluster->mosaics;
     cluster_bytes_ -= header_bytes(mosaics);
@@ -148,13 +151,13 @@ std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const Clust
       cluster_bytes_ -= mosaic.bytes() - sizeof(Mosaic);
     }
     cluster_bytes_ -= kClusterBytes + header_bytes(found->second->mosaics);
-    Block& block = block_of(key);
-    ++block.removals;
-    auto& in_block = block.clusters;
-    in_block.erase(std::find(in_block.begin(), in_block.end(), found->second.get()));
-    if (in_block.empty()) {
-      cluster_bytes_ -= kBlockBytes + list_bytes(block);
-      blocks_.erase(block_key(key));
+    Brick& brick = brick_of(key);
+    brick.removals = ++removals_;
+    auto& in_brick = brick.clusters;
+    in_brick.erase(std::find(in_brick.begin(), in_brick.end(), found->second.get()));
+    if (in_brick.empty()) {
+      cluster_bytes_ -= kBrickBytes + list_bytes(brick);
+      bricks_.erase(brick_key(key));
     }
     dropped.push_back(std::move(found->second));
     clusters_.erase(found);
@@ -198,7 +201,7 @@ std::vector<std::unique_ptr<Cluster>> PointModel::take_out(std::span<const Clust
       mosaics.push_back(std::move(*m));
     }
     cluster.mosaics.erase(end, cluster.mosaics.end());
-    ++block_of(cluster.key).removals;
+    brick_of(cluster.key).removals = ++removals_;
     dropped.push_back(std::make_unique<Cluster>(Cluster{cluster.key, cluster.leaf_room, std::move(mosaics)}));
   }
   return dropped;
@@ -211,7 +214,7 @@ std::vector<Cluster> PointModel::forget(std::span<const ClusterKey> keys, std::s
 }
 
 void PointModel::clear() {
-  blocks_.clear();
+  bricks_.clear();
   clusters_.clear();
   points_ = cluster_bytes_ = 0;
 }
@@ -223,7 +226,7 @@ const Cluster* PointModel::find(ClusterKey key) const {
 
 uint64_t PointModel::bytes() const {
   return sizeof(PointModel) + cluster_bytes_ + allocated_bytes(clusters_.bucket_count() * sizeof(void*)) +
-         allocated_bytes(blocks_.bucket_count() * sizeof(void*));
+         allocated_bytes(bricks_.bucket_count() * sizeof(void*));
 }
 
 uint64_t PointModel::points_in(ClusterKey key) const {

@@ -111,16 +111,16 @@ class Mosaic {
 struct Cluster {
   ClusterKey key = 0;
   geometry::Box leaf_room;      ///< the leaf's cube
-  std::vector<Mosaic> mosaics;  ///< rising in sequence
+  std::vector<Mosaic> mosaics;  ///< in order of sequence
 };
 
 /// A cube of 4 x 4 x 4 leaves, two levels above them (fewer where the octree is less deep), and the clusters in it: so that who walks the model looks at
 /// cubes first.
-struct Block {
+struct Brick {
   geometry::Box box_room;
   std::vector<const Cluster*> clusters;  ///< in no particular order; at least one
   uint64_t changes = 0;                  ///< counts insertions and removals
-  uint64_t removals = 0;                 ///< counts removals of points
+  uint64_t removals = 0;                 ///< differs after every removal of points from it, also when it was gone in between
 };
 
 /// The points of one patch part, sorted into leaves and levels, ready to be inserted. Made without touching a model, so a
@@ -189,8 +189,8 @@ class PointModel {
   /// grows on insert.
   const std::unordered_map<ClusterKey, std::unique_ptr<Cluster>>& clusters() const { return clusters_; }
   const Cluster* find(ClusterKey key) const;
-  /// The same clusters by blocks. Pointers are stable until the block's last cluster is forgotten.
-  const std::unordered_map<ClusterKey, std::unique_ptr<Block>>& blocks() const { return blocks_; }
+  /// The same clusters by bricks. Pointers are stable until the brick's last cluster is forgotten.
+  const std::unordered_map<ClusterKey, std::unique_ptr<Brick>>& bricks() const { return bricks_; }
 
   uint64_t points() const { return points_; }  ///< level-0 points held
   uint64_t bytes() const;                      ///< memory of the whole model: points, headers, containers
@@ -199,17 +199,18 @@ class PointModel {
   uint64_t digest() const;
 
  private:
-  Block& block_of(ClusterKey key);  // counts a change
+  Brick& brick_of(ClusterKey key);  // counts a change
 
   ModelConfig config_;
   std::unordered_map<ClusterKey, std::unique_ptr<Cluster>> clusters_;
-  std::unordered_map<ClusterKey, std::unique_ptr<Block>> blocks_;  // by block_key
+  std::unordered_map<ClusterKey, std::unique_ptr<Brick>> bricks_;  // by brick_key
   uint64_t points_ = 0;
+  uint64_t removals_ = 0;       // of clusters or mosaics, so far
   uint64_t cluster_bytes_ = 0;  // of all clusters and what they hold
 };
 
-/// A leaf's block: its coordinates without their last two bits.
-constexpr ClusterKey block_key(ClusterKey leaf) { return leaf & ~(3u | 3u << 10 | 3u << 20); }
+/// A leaf's brick: its coordinates without their last two bits.
+constexpr ClusterKey brick_key(ClusterKey leaf) { return leaf & ~(3u | 3u << 10 | 3u << 20); }
 
 /// The octree's cube and a leaf's cube.
 geometry::Box octree_cube(const ModelConfig& config);

@@ -1,4 +1,4 @@
-// The clusters of a model that a view may show, block by block.
+// The clusters of a model that a view may show, brick by brick.
 #pragma once
 
 #include <hwy/cache_control.h>
@@ -12,31 +12,31 @@
 
 namespace telesplat::splat {
 
-/// The blocks that the frustum meets, nearest first.
-struct SeenBlock {
+/// The bricks that the frustum meets, nearest first.
+struct SeenBrick {
   float distance2;
-  bool whole;  ///< the block lies wholly inside
+  bool whole;  ///< the brick lies wholly inside
   points::ClusterKey key;
-  const points::Block* block;
+  const points::Brick* brick;
 };
-inline std::vector<SeenBlock> seen_blocks(const points::PointModel& model, const geometry::Frustum& frustum,
+inline std::vector<SeenBrick> seen_bricks(const points::PointModel& model, const geometry::Frustum& frustum,
                                           const glm::vec3& eye) {
-  std::vector<SeenBlock> out;
-  for (const auto& [key, block] : model.blocks()) {
-    if (!frustum.may_contain(block->box_room)) continue;
-    const glm::vec3 between = block->box_room.centre() - eye;
-    out.push_back({glm::dot(between, between), frustum.contains(block->box_room), key, block.get()});
+  std::vector<SeenBrick> out;
+  for (const auto& [key, brick] : model.bricks()) {
+    if (!frustum.may_contain(brick->box_room)) continue;
+    const glm::vec3 between = brick->box_room.centre() - eye;
+    out.push_back({glm::dot(between, between), frustum.contains(brick->box_room), key, brick.get()});
   }
-  std::sort(out.begin(), out.end(), [](const SeenBlock& a, const SeenBlock& b) { return a.distance2 < b.distance2; });
+  std::sort(out.begin(), out.end(), [](const SeenBrick& a, const SeenBrick& b) { return a.distance2 < b.distance2; });
   return out;
 }
 
-/// Calls visit(cluster) for each cluster of a block that the frustum meets. Clusters lie scattered in memory, and what comes next is known: asks for it
+/// Calls visit(cluster) for each cluster of a brick that the frustum meets. Clusters lie scattered in memory, and what comes next is known: asks for it
 /// in time.
 template <class Visit>
-void for_seen_clusters(const SeenBlock& seen, const geometry::Frustum& frustum, const Visit& visit) {
+void for_seen_clusters(const SeenBrick& seen, const geometry::Frustum& frustum, const Visit& visit) {
   constexpr size_t kClustersAhead = 8, kMosaicsAhead = 4;
-  const auto& clusters = seen.block->clusters;
+  const auto& clusters = seen.brick->clusters;
   for (size_t i = 0; i < clusters.size(); ++i) {
     if (i + kClustersAhead < clusters.size()) hwy::Prefetch(clusters[i + kClustersAhead]);
     if (i + kMosaicsAhead < clusters.size()) hwy::Prefetch(clusters[i + kMosaicsAhead]->mosaics.data());

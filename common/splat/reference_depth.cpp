@@ -26,7 +26,7 @@ std::vector<DrawItem> visible_items(const points::PointModel& model, const geome
   std::vector<DrawItem> items;
   const geometry::Frustum frustum(camera);
   const glm::vec3 eye(camera.pose.position_room);
-  for (const SeenBlock& seen : seen_blocks(model, frustum, eye))
+  for (const SeenBrick& seen : seen_bricks(model, frustum, eye))
     for_seen_clusters(seen, frustum, [&](const points::Cluster& cluster) {
       const LeafView view = leaf_view(cluster.leaf_room, eye);
       for (const points::Mosaic& mosaic : cluster.mosaics) {

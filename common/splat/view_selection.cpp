@@ -75,7 +75,7 @@ DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int 
           .of = a.count};
 }
 
-// A summary is made anew once its block changed more often: what it lacks is drawn beside it until then.
+// A summary is made anew once its brick changed more often: what it lacks is drawn beside it until then.
 constexpr uint64_t kStaleChanges = 16;
 
 // One walk over a model.
@@ -90,19 +90,19 @@ class Selector {
         focal_(camera.focal_x()),
         patches_(patch_view(camera)) {}
 
-  /// The block's summary and what it lacks; false if its clusters must be drawn.
-  bool add_summary(points::ClusterKey key, const points::Block& block, const points::Summaries& summaries) {
-    const float range = pixel_range(block.box_room, double{block.box_room.hi.x} - double{block.box_room.lo.x});
+  /// The brick's summary and what it lacks; false if its clusters must be drawn.
+  bool add_summary(points::ClusterKey key, const points::Brick& brick, const points::Summaries& summaries) {
+    const float range = pixel_range(brick.box_room, double{brick.box_room.hi.x} - double{brick.box_room.lo.x});
     if (range > points::kMostSummaryRange) return false;
     const auto found = summaries.find(key);
     const points::Summary* summary = found == summaries.end() ? nullptr : found->second.get();
-    if (!summary || summary->removals != block.removals || block.changes - summary->changes > kStaleChanges)
+    if (!summary || summary->removals != brick.removals || brick.changes - summary->changes > kStaleChanges)
       out_.summaries_wanted.push_back(key);
-    if (!summary || summary->removals != block.removals || range > summary->most_range) return false;
+    if (!summary || summary->removals != brick.removals || range > summary->most_range) return false;
     add(summary->cluster);
     out_.clusters_seen.pop_back();
-    for (const points::Cluster* cluster : block.clusters)
-      if (block.changes == summary->changes)
+    for (const points::Cluster* cluster : brick.clusters)
+      if (brick.changes == summary->changes)
         out_.clusters_seen.push_back(cluster->key);
       else
         add(*cluster, summary->built);
@@ -209,8 +209,8 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
   out.scale = options.scale;
   const geometry::Frustum frustum(camera);
   Selector selector(camera, options, out);
-  for (const SeenBlock& seen : seen_blocks(model, frustum, glm::vec3(camera.pose.position_room))) {
-    if (summaries && !options.best_patch_only && selector.add_summary(seen.key, *seen.block, *summaries)) continue;
+  for (const SeenBrick& seen : seen_bricks(model, frustum, glm::vec3(camera.pose.position_room))) {
+    if (summaries && !options.best_patch_only && selector.add_summary(seen.key, *seen.brick, *summaries)) continue;
     for_seen_clusters(seen, frustum, [&](const points::Cluster& cluster) { selector.add(cluster); });
   }
   out.distance_m = out.points > 0 ? selector.distance_sum() / static_cast<double>(out.points) : 0.0;

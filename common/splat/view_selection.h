@@ -50,7 +50,7 @@ struct DrawList {
   /// that is drawn, and frames_seen, as long, has that patch's frame tag; else frames_seen is empty.
   std::vector<points::ClusterKey> clusters_seen;
   std::vector<uint32_t> frames_seen;
-  /// Blocks that a summary would be drawn of, or a newer one, if there were one.
+  /// Bricks that a summary would be drawn of, or a newer one, if there were one.
   std::vector<points::ClusterKey> summaries_wanted;
   uint64_t points = 0;
   float scale =
@@ -66,7 +66,7 @@ struct DrawList {
 /// desired pixel range is the display's, or the sampling view's if that is less, times detail. Splat size = scale * display's
 /// pixel range / pixel range of the points drawn (T eq. 4.8), revised as in T4.4.3. A mosaic between two levels becomes two
 /// items, next to each other.
-///   summaries: of the model's blocks, or null. A block that spans no more pixels than its summary has samples is drawn as that, and what came since; so what is
+///   summaries: of the model's bricks, or null. A brick that spans no more pixels than its summary has samples is drawn as that, and what came since; so what is
 ///   far away costs what its pixels cost. Not with options.best_patch_only.
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
                  DrawList& out, const points::Summaries* summaries = nullptr);

@@ -127,26 +127,36 @@ BENCHMARK(points_unproject<points::unproject_row_scalar>)
     ->Name("points_unproject_scalar")
     ->Unit(benchmark::kMillisecond);
 
-// Inserting a prepared frame: what viewers do under their lock, into a model of 20 earlier frames.
+// Inserting a prepared frame into a model of 20 earlier frames of 1 %. Arguments: percent of the samples that elimination left; 1: mosaics are
+// merged (which viewers do without their lock), 0: they stay as they come, the baseline.
 void points_insert(benchmark::State& state) {
   const Frame& f = frame(static_cast<int>(state.range(0)));
-  points::PointModel model(f.config);
+  points::ModelConfig config = f.config;
+  config.compact = state.range(1) != 0;
+  points::PointModel model(config);
   uint64_t sequence = 0;
   for (int i = 0; i < 20; ++i)
     for (const Tile& t : frame(1).tiles)
-      model.insert(points::prepare_patch(f.config, {++sequence}, f.camera, t.rect, t.image));
+      model.insert(points::prepare_patch(config, {++sequence}, f.camera, t.rect, t.image));
   for (auto _ : state) {
     state.PauseTiming();
     std::vector<points::PreparedPatch> patches;
     for (const Tile& t : f.tiles)
-      patches.push_back(points::prepare_patch(f.config, {++sequence}, f.camera, t.rect, t.image));
+      patches.push_back(points::prepare_patch(config, {++sequence}, f.camera, t.rect, t.image));
     state.ResumeTiming();
     for (auto& patch : patches) model.insert(std::move(patch));
   }
   finish(state, f.samples);
+  size_t mosaics = 0;
+  for (const auto& [key, cluster] : model.clusters()) mosaics += cluster->mosaics.size();
   state.counters["bytes_point"] = static_cast<double>(model.bytes()) / static_cast<double>(model.points());
+  state.counters["mosaics"] = static_cast<double>(mosaics);
 }
-BENCHMARK(points_insert)->Arg(100)->Arg(1)->Iterations(50)->Unit(benchmark::kMillisecond);
+BENCHMARK(points_insert)
+    ->ArgNames({"per_cent", "merged"})
+    ->ArgsProduct({{100, 1}, {0, 1}})
+    ->Iterations(50)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace telesplat

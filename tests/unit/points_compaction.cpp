@@ -176,22 +176,22 @@ TEST(Summary, HasAPointForEachCellOfTheBlock) {
   PointModel model(compact_config());
   for (uint64_t s = 1; s <= 30; ++s) model.insert(view(s, 0.5, 640));
   size_t summaries = 0;
-  for (const auto& [key, block] : model.blocks()) {
+  for (const auto& [key, brick] : model.bricks()) {
     uint64_t points = 0;
-    for (const Cluster* c : block->clusters) points += model.points_in(c->key);
+    for (const Cluster* c : brick->clusters) points += model.points_in(c->key);
     if (points <= kMostSummaryPoints) {
-      const auto all = summarise(model, key, *block, Sequence{30});
+      const auto all = summarise(model, key, *brick, Sequence{30});
       EXPECT_EQ(all->cluster.mosaics.at(0).count(0), points);
       continue;
     }
     ++summaries;
-    const auto summary = summarise(model, key, *block, Sequence{30});
+    const auto summary = summarise(model, key, *brick, Sequence{30});
     const Mosaic& m = summary->cluster.mosaics.at(0);
     EXPECT_LE(m.pixel_range(), kMostSummaryRange);
-    EXPECT_EQ(summary->cluster.leaf_room, block->box_room);
+    EXPECT_EQ(summary->cluster.leaf_room, brick->box_room);
     EXPECT_LT(m.count(0), points);
     // Each point of the model has a representative no farther than two cells.
-    const geometry::Box& box = block->box_room;
+    const geometry::Box& box = brick->box_room;
     const float cell = (box.hi.x - box.lo.x) / m.pixel_range();
     std::vector<glm::vec3> representatives;
     const auto at = [](const geometry::Box& b, const Mosaic::Level& l, uint32_t i) {
@@ -199,7 +199,7 @@ TEST(Summary, HasAPointForEachCellOfTheBlock) {
     };
     for (uint32_t i = 0; i < m.count(0); ++i) representatives.push_back(at(box, m.level(0), i));
     uint64_t far = 0, asked = 0;
-    for (const Cluster* c : block->clusters)
+    for (const Cluster* c : brick->clusters)
       for (const Mosaic& part : c->mosaics)
         for (uint32_t i = 0; i < part.count(0); i += 37) {
           const glm::vec3 p = at(c->leaf_room, part.level(0), i);

@@ -1,6 +1,7 @@
 // What is selected for a view, against a search through everything.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <glm/geometric.hpp>
 #include <set>
 
@@ -198,6 +199,95 @@ TEST(ViewSelection, LessDetailMeansFewerAndLargerPoints) {
     return sum / double(list.points);
   };
   EXPECT_GT(mean_px(half), mean_px(full) * 1.2);
+}
+
+// What stands far away is drawn by bricks, and as completely as by clusters.
+TEST(ViewSelection, WhatIsFarAwayCostsItsBlocks) {
+  points::PointModel model({{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}, 5, true});
+  for (int i = 0; i < 9; ++i) {
+    const geometry::Camera camera = view(0.7 * i, 1.2);
+    model.insert(points::prepare_patch(model.config(), Sequence{uint64_t(i) + 1}, camera, {0, 0, 320, 240},
+                                       sphere_image(camera, 0, 1)));
+  }
+  const geometry::Camera far = view(0.3, 5.0);
+  DrawList plain, first, with;
+  splat::select_view(model, far, {}, plain);
+  points::Summaries summaries;
+  splat::select_view(model, far, {}, first, &summaries);
+  EXPECT_EQ(first.items.size(), plain.items.size()) << "there are none yet";
+  ASSERT_GT(first.summaries_wanted.size(), 20u);
+  for (const points::ClusterKey key : first.summaries_wanted)
+    summaries[key] = points::summarise(model, key, *model.bricks().at(key), Sequence{9});
+  splat::select_view(model, far, {}, with, &summaries);
+  EXPECT_TRUE(with.summaries_wanted.empty());
+  EXPECT_LE(with.items.size(), 2 * summaries.size());
+  EXPECT_GT(plain.items.size(), 4 * with.items.size());
+  const std::set<points::ClusterKey> seen(with.clusters_seen.begin(), with.clusters_seen.end());
+  for (const points::ClusterKey key : plain.clusters_seen) EXPECT_TRUE(seen.contains(key));
+
+  const auto draw = [&](const DrawList& list) {
+    std::vector<uint32_t> colour(size_t(far.width) * far.height);
+    std::vector<float> depth(colour.size());
+    splat::CpuSplatter(1).render(list, far, splat::Kernel::kDisc, image::Shading(image::ShadingParameters{}, far),
+                                 {far.width, far.height, colour.data(), depth.data()});
+    return std::count_if(depth.begin(), depth.end(), [](float d) { return std::isfinite(d); });
+  };
+  const auto covered = draw(plain);
+  EXPECT_GT(covered, 300);
+  EXPECT_NEAR(double(draw(with)), double(covered), 0.1 * double(covered));
+
+  // What came since is drawn beside the summary; what was forgotten makes it useless.
+  const geometry::Camera near = view(2.0, 1.0);
+  model.insert(points::prepare_patch(model.config(), Sequence{10}, near, {0, 0, 320, 240}, sphere_image(near, 0, 1)));
+  DrawList later;
+  splat::select_view(model, far, {}, later, &summaries);
+  EXPECT_GT(later.points, with.points);
+  model.forget(std::vector<points::ClusterKey>{plain.clusters_seen.front()});
+  splat::select_view(model, far, {}, later, &summaries);
+  const points::ClusterKey brick = points::brick_key(plain.clusters_seen.front());
+  EXPECT_TRUE(std::find(later.summaries_wanted.begin(), later.summaries_wanted.end(), brick) !=
+              later.summaries_wanted.end());
+  for (const auto& item : later.items) EXPECT_NE(item.cluster->key, brick | points::kSummaryKey);
+
+  // Nor is a brick that was gone taken for the one that was summarised.
+  model.forget(plain.clusters_seen);
+  model.insert(points::prepare_patch(model.config(), Sequence{11}, near, {0, 0, 320, 240}, sphere_image(near, 0, 8)));
+  splat::select_view(model, far, {}, later, &summaries);
+  EXPECT_FALSE(later.items.empty());
+  std::set<points::ClusterKey> there;
+  for (const auto& [key, cluster] : model.clusters()) there.insert(key);
+  for (const auto& item : later.items) EXPECT_TRUE(there.contains(item.cluster->key));
+}
+
+// Points that face away are left out one by one, and only those.
+TEST(ViewSelection, PointsThatFaceAwayAreNotDrawn) {
+  points::PointModel model({{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}, 0, true});  // one cluster, all directions
+  for (int i = 0; i < 9; ++i) {
+    const geometry::Camera camera = view(0.7 * i, 1.2);
+    model.insert(points::prepare_patch(model.config(), Sequence{uint64_t(i) + 1}, camera, {0, 0, 320, 240},
+                                       sphere_image(camera, 0, 1)));
+  }
+  const geometry::Camera camera = view(0.3, 6.0);
+  for (const splat::Kernel kernel : {splat::Kernel::kDisc, splat::Kernel::kEllipse}) {
+    const auto drawn = [&](bool cull) {
+      SelectionOptions options;
+      options.cone_culling = cull;
+      options.detail = 1;
+      DrawList list;
+      splat::select_view(model, camera, options, list);
+      std::vector<uint32_t> colour(size_t(camera.width) * camera.height);
+      const auto stats = splat::CpuSplatter(1).render(
+          list, camera, kernel, image::Shading(image::ShadingParameters{}, camera),
+          {camera.width, camera.height, colour.data(), nullptr});
+      return std::pair(double(stats.points_drawn) / double(list.points), colour);
+    };
+    const auto [all, plain] = drawn(false);
+    const auto [facing, culled] = drawn(true);
+    EXPECT_GT(all, 0.99);
+    EXPECT_LT(facing, 0.8);
+    EXPECT_GT(facing, 0.4);
+    EXPECT_EQ(plain, culled) << "they were hidden";
+  }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <optional>
 
 #include "client/viewer/cache/model_cache.h"
 #include "client/viewer/viewer_service.h"
@@ -20,6 +21,7 @@
 #include "common/points/compaction.h"
 #include "common/splat/cpu_splatter.h"
 #include "services/packer/packer_core.h"
+#include "tools/telesplat/bench_surfel_grid.h"
 #include "tools/telesplat/direct_scene.h"
 #include "tools/telesplat/progress_line.h"
 
@@ -108,6 +110,7 @@ class CacheBench {
         packer_(packer_config(o, config_), EpochId{1}),
         splatter_(o.threads) {
     cache_.begin_replica(config_, EpochId{1});
+    if (o.grid) grid_.emplace(points::ModelConfig{config_.box_room, config_.depth});
     frame_.colour.resize(size_t(display.first) * display.second);
     frame_.depth_m.resize(frame_.colour.size());
     frame_.width = display.first, frame_.height = display.second;
@@ -129,6 +132,8 @@ class CacheBench {
       }
       if (t + step_s >= std::min(60.0 * number, end_s)) {
         progress_.close();
+        if (grid_)
+          if (const Status s = draw_grid(t + o_.latency_s); !s) return s;
         if (!minute.items.empty()) draw_at_once(t + o_.latency_s, minute);
         print(number++, minute);
         minute = {};
@@ -156,6 +161,26 @@ class CacheBench {
     }
     minute.at_once_items = double(list.items.size());
     minute.at_once_ms = median(select_ms) + median(splat_ms);
+  }
+
+  // The newest view, by the surfel grid and by what sessions have.
+  Status draw_grid(double t) {
+    const geometry::Camera camera = geometry::make_camera(walk_.at(t), o_.fov_deg, display_.first, display_.second);
+    const image::ShadingParameters lit;
+    const auto reference = scene_.draw(camera, lit, EpochId{1});
+    if (!reference) return reference.error();
+    const auto draw = [&](const char* name, const points::PointModel& model) {
+      splat::DrawList list;
+      splat::select_view(model, camera, selection(), list);
+      splatter_.render(list, camera, render_options(), image::Shading(lit, camera),
+                       {camera.width, camera.height, frame_.colour.data(), frame_.depth_m.data()});
+      const auto quality = image::compare(*reference, frame_);
+      std::printf("%20s: %9zu items %9zu points drawn of %9zu, %.2f dB, holes %.3f %%\n", name, list.items.size(),
+                  size_t(list.points), size_t(model.points()), quality.psnr_db, 100 * quality.hole_fraction);
+    };
+    draw("surfel grid", grid_->model());
+    draw("merged mosaics", packer_.model());
+    return ok_status();
   }
 
   // What a viewer that joins now is sent, beside the patches that have points in the model.
@@ -191,6 +216,9 @@ class CacheBench {
     const auto image = scene_.sample(camera, EpochId{1});
     if (!image) return image.error();
     ++frames_;
+    if (grid_)
+      grid_->add(points::prepare_patch({config_.box_room, config_.depth}, {frames_}, camera,
+                                       {0, 0, camera.width, camera.height}, *image));
     const int columns = (camera.width + kTile - 1) / kTile, rows = (camera.height + kTile - 1) / kTile;
     for (int i = 0; i < columns * rows; ++i) {
       const int x = i % columns * kTile, y = i / columns * kTile;
@@ -278,6 +306,7 @@ class CacheBench {
   points::ModelConfig config_;
   packer::PackerCore packer_;
   viewer::ModelCache cache_;
+  std::optional<SurfelGrid> grid_;
   splat::CpuSplatter splatter_;
   splat::DrawList list_;
   image::View frame_;
@@ -319,6 +348,7 @@ void add_cache_bench_flags(CLI::App& app, CacheBenchOptions& o) {
   app.add_option("--threads", o.threads, "threads to sample and draw with; 0: one a core")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
+  app.add_flag("--grid", o.grid, "measure the design that was not taken, too: a hierarchical surfel grid (docs/cache.md)");
   app.add_option("--iso", o.mesh.iso, "of a volume: the surface where it has this value");
   app.add_option("--room-size", o.mesh.room_size_m, "largest extent in room space in metres")
       ->capture_default_str()

@@ -22,6 +22,7 @@ struct CacheBenchOptions {
   std::string sampling_size;         ///< empty: the display's
   double fov_deg = 90;
   int octree_depth = 0;  ///< 0: as the master chooses for meshes
+  bool grid = false;     ///< measure the other design too (bench_surfel_grid.h)
   int threads = 0;       ///< to sample and to draw with; 0: all cores
   std::string splat = "disc";
   double splat_scale = 0;    ///< 0: what suits the kernel

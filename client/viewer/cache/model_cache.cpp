@@ -73,9 +73,9 @@ void ModelCache::summarise(size_t most) {
   }
   if (wanted.size() > most) wanted.resize(most);  // the display asks again
   for (const points::ClusterKey key : wanted) {
-    const auto block = newest_.model->blocks().find(key);
-    if (block == newest_.model->blocks().end()) continue;
-    auto summary = points::summarise(*newest_.model, key, *block->second, newest_.applied);
+    const auto brick = newest_.model->bricks().find(key);
+    if (brick == newest_.model->bricks().end()) continue;
+    auto summary = points::summarise(*newest_.model, key, *brick->second, newest_.applied);
     const std::lock_guard lock(mutex_);
     auto& place = newest_.summaries[key];
     if (place) dropped_of(newest_.model.get()).summaries.push_back(std::move(place));
