@@ -279,8 +279,8 @@ std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic
 
 // Which points of `coarse` are surrounded by the first `own` of p and by those of finer mosaics that stay: scratch.surrounded. Returns how many.
 uint32_t find_surrounded(const std::vector<Mosaic>& mosaics, const std::vector<uint32_t>& replaced, const Mosaic& coarse,
-                         int fresh_class, const PointSet& p, uint32_t own) {
-  FinerPoints finer(coarse, fresh_class);
+                         int merged_class, const PointSet& p, uint32_t own) {
+  FinerPoints finer(coarse, merged_class);
   const auto for_finer = [&](const auto& visit) {
     for (uint32_t j = 0; j < mosaics.size(); ++j)
       if (density_class(mosaics[j].pixel_range()) > density_class(coarse.pixel_range()) && !contains(replaced, j))
@@ -351,7 +351,6 @@ Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float p
 }
 
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
-  const int fresh_class = density_class(fresh.pixel_range());
   Merge out{mergeable(mosaics, fresh), {}};
   PointSet& p = scratch.points;
   p.clear();
@@ -360,10 +359,11 @@ Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
 
   const uint32_t own = p.size();
   const float range = p.pixel_range();
+  const int merged_class = density_class(range);  // not fresh's, where small ones of another class were merged
   for (uint32_t i = 0; own >= kSmallMosaic && i < mosaics.size(); ++i) {
     const Mosaic& coarse = mosaics[i];
-    if (density_class(coarse.pixel_range()) >= fresh_class || contains(out.replaced, i)) continue;
-    const uint32_t surrounded = find_surrounded(mosaics, out.replaced, coarse, fresh_class, p, own);
+    if (density_class(coarse.pixel_range()) >= merged_class || contains(out.replaced, i)) continue;
+    const uint32_t surrounded = find_surrounded(mosaics, out.replaced, coarse, merged_class, p, own);
     if (surrounded == 0 || surrounded * kLeastTaken < coarse.count(0)) continue;
     PointSet& rest = scratch.rest;
     rest.clear();

@@ -2,7 +2,8 @@
 //
 // Each patch adds a few points to many clusters. Left alone, these become mosaics of two or three points, and a frame costs what its mosaics
 // number. So a cluster is a log-structured merge tree: mosaics of about equal density whose sizes are within kGrowth of each other become
-// one. A point is copied once for each time that the mosaic around it has grown by kGrowth, so insertion stays logarithmic.
+// one. A point is copied once for each time that the mosaic around it has grown by kGrowth, so copying stays logarithmic. Where a cluster has coarser mosaics,
+// each merge of kSmallMosaic points or more also looks at all of its points.
 // Based on: P. O'Neil, E. Cheng, D. Gawlick, E. O'Neil, "The log-structured merge-tree (LSM-tree)", Acta Informatica 33, 1996.
 //
 // The rule looks at nothing but the cluster and the patch. Packer and viewers apply the same events, so they merge the same mosaics at the

@@ -18,6 +18,7 @@ struct Summary {
   Sequence built;        ///< the model's newest event then: mosaics with a later sequence are not in it
   uint64_t changes = 0;  ///< Brick::changes then
   uint64_t removals = 0;
+  uint64_t bytes() const { return sizeof(Summary) + cluster.mosaics.front().bytes(); }
   float most_range = 0;  ///< views in which the brick spans more pixels need the clusters
 };
 

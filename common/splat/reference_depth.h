@@ -19,9 +19,9 @@ struct Elimination {
   uint64_t samples = 0, kept = 0;
 };
 
-/// A sample is not needed where the model has a point of its surface within this many pixels: splats reach as far. It bounds a model's points:
-/// no two are nearer to each other than this times the sample distance of the finer one, so a surface has at most 2 / sqrt 3 / kNearestSample^2
-/// of them a pixel, however many views it is sampled from. Set by bench cache.
+/// A sample is not needed where the model has a point of its surface within this many pixels: splats reach as far. It bounds a model's points: but
+/// for those that a nearer one of their pixel hides, no two are nearer to each other than this times the sample distance of the finer one, so a surface has
+/// about 2 / sqrt 3 / kNearestSample^2 of them a pixel at most, however many views it is sampled from. Set by bench cache.
 inline constexpr float kNearestSample = 0.6f;
 
 /// Clears every pixel of `image` (the tile `tile` of the frame `camera`) that the model already shows. A pixel is kept only if

@@ -75,7 +75,7 @@ DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int 
           .of = a.count};
 }
 
-// A summary is made anew once its brick changed more often: what it lacks is drawn beside it until then.
+// A summary is made anew once its brick changed more often: mosaics that have what it lacks are drawn beside it until then, whole.
 constexpr uint64_t kStaleChanges = 16;
 
 // One walk over a model.
@@ -91,21 +91,25 @@ class Selector {
         patches_(patch_view(camera)) {}
 
   /// The brick's summary and what it lacks; false if its clusters must be drawn.
-  bool add_summary(points::ClusterKey key, const points::Brick& brick, const points::Summaries& summaries) {
+  bool add_summary(const SeenBrick& seen, const geometry::Frustum& frustum, const points::Summaries& summaries) {
+    const points::Brick& brick = *seen.brick;
     const float range = pixel_range(brick.box_room, double{brick.box_room.hi.x} - double{brick.box_room.lo.x});
     if (range > points::kMostSummaryRange) return false;
-    const auto found = summaries.find(key);
+    const auto found = summaries.find(seen.key);
     const points::Summary* summary = found == summaries.end() ? nullptr : found->second.get();
-    if (!summary || summary->removals != brick.removals || brick.changes - summary->changes > kStaleChanges)
-      out_.summaries_wanted.push_back(key);
-    if (!summary || summary->removals != brick.removals || range > summary->most_range) return false;
+    const bool valid = summary && summary->removals == brick.removals, fits = valid && range <= summary->most_range;
+    // One that does not fit may do so once the brick is sampled more finely: that takes many changes.
+    const uint64_t most_changes = fits ? kStaleChanges : kStaleChanges + brick.changes / 2;
+    if (!valid || brick.changes - summary->changes > most_changes) out_.summaries_wanted.push_back(seen.key);
+    if (!fits) return false;
     add(summary->cluster);
     out_.clusters_seen.pop_back();
-    for (const points::Cluster* cluster : brick.clusters)
+    for_seen_clusters(seen, frustum, [&](const points::Cluster& cluster) {
       if (brick.changes == summary->changes)
-        out_.clusters_seen.push_back(cluster->key);
+        out_.clusters_seen.push_back(cluster.key);
       else
-        add(*cluster, summary->built);
+        add(cluster, summary->built);
+    });
     return true;
   }
 
@@ -210,7 +214,7 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
   const geometry::Frustum frustum(camera);
   Selector selector(camera, options, out);
   for (const SeenBrick& seen : seen_bricks(model, frustum, glm::vec3(camera.pose.position_room))) {
-    if (summaries && !options.best_patch_only && selector.add_summary(seen.key, *seen.brick, *summaries)) continue;
+    if (summaries && !options.best_patch_only && selector.add_summary(seen, frustum, *summaries)) continue;
     for_seen_clusters(seen, frustum, [&](const points::Cluster& cluster) { selector.add(cluster); });
   }
   out.distance_m = out.points > 0 ? selector.distance_sum() / static_cast<double>(out.points) : 0.0;

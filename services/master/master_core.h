@@ -31,7 +31,7 @@ struct MasterOptions {
   ScheduleOptions schedule;
   Progressive progressive = Progressive::kAuto;
   julia::Timeline animation;  ///< of the scene's parameters, from the first view on; empty: what the data server says
-  uint64_t octree_depth = 0;  ///< 0: what suits the scene (MasterCore::octree_depth)
+  uint64_t octree_depth = 0;  ///< 0: MasterCore::octree_depth
   std::map<std::string, double> settings;  ///< packing.* values for the packer, passed on in every welcome;
                                            ///< packing.keep_redundant below 0: 1 for Julia sets, else 0;
                                            ///< volume.layers: of a volume's frames

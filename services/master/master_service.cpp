@@ -73,7 +73,7 @@ void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
       ->default_str("auto")
       ->transform(CLI::CheckedTransformer(progressive_names()));
   app.add_option("--octree-depth", o.master.octree_depth,
-                 "levels of the point model's octree; 0: 5 for Julia sets, else 6")
+                 "levels of the point model's octree; 0: 5")
       ->capture_default_str()
       ->check(CLI::Range(0, 10));
   double& layers = o.master.settings["volume.layers"];

@@ -185,7 +185,10 @@ struct PackerCore::Impl {
 
 PackerCore::PackerCore(const Config& config, EpochId epoch) : PackerCore(config, epoch, Hooks{}) {}
 PackerCore::PackerCore(const Config& config, EpochId epoch, Hooks hooks)
-    : impl_(new Impl{.config = config, .hooks = std::move(hooks), .epoch = epoch}) {}
+    : impl_(new Impl{.config = config, .hooks = std::move(hooks), .epoch = epoch}) {
+  // Single patches are forgotten by their mosaics.
+  CHECK(!(config.redundancy == Redundancy::kKeep && config.model.compact));
+}
 PackerCore::~PackerCore() = default;
 
 Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, Impl::Stream stream,

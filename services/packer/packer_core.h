@@ -106,7 +106,7 @@ class PackerCore {
         eliminate = splat::eliminate_redundancy;
   };
 
-  /// Precondition: points::validate(config.model). Sequences start at 1.
+  /// Preconditions: points::validate(config.model); mosaics are not merged (model.compact) with kKeep. Sequences start at 1.
   PackerCore(const Config& config, EpochId epoch);
   PackerCore(const Config& config, EpochId epoch, Hooks hooks);
   ~PackerCore();

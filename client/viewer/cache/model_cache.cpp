@@ -31,7 +31,7 @@ bool ModelCache::begin_replica(const points::ModelConfig& config, EpochId epoch,
     else
       drop(newest_);
   }
-  newest_ = {std::move(fresh), epoch, applied, ++replicas_, {}};
+  newest_ = {std::move(fresh), epoch, applied, ++replicas_, {}, 0};
   wanted_.clear();
   return older_.model != nullptr;
 }
@@ -51,7 +51,16 @@ void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> k
   const std::lock_guard lock(mutex_);
   auto dropped = frames.empty() ? newest_.model->take_out(keys) : newest_.model->take_out(keys, frames);
   newest_.applied = sequence;
-  move_to_end(dropped, dropped_of(newest_.model.get()).clusters);
+  Dropped& place = dropped_of(newest_.model.get());
+  move_to_end(dropped, place.clusters);
+  for (const points::ClusterKey key : keys) {
+    const points::ClusterKey brick = points::brick_key(key);
+    const auto summary = newest_.summaries.find(brick);
+    if (summary == newest_.summaries.end() || newest_.model->bricks().contains(brick)) continue;
+    newest_.summary_bytes -= summary->second->bytes();
+    place.summaries.push_back(std::move(summary->second));
+    newest_.summaries.erase(summary);
+  }
 }
 
 void ModelCache::show_newest() {
@@ -75,11 +84,20 @@ void ModelCache::summarise(size_t most) {
   for (const points::ClusterKey key : wanted) {
     const auto brick = newest_.model->bricks().find(key);
     if (brick == newest_.model->bricks().end()) continue;
+    // The display may have asked again while this one was made.
+    const auto held = newest_.summaries.find(key);
+    if (held != newest_.summaries.end() && held->second->changes == brick->second->changes &&
+        held->second->removals == brick->second->removals)
+      continue;
     auto summary = points::summarise(*newest_.model, key, *brick->second, newest_.applied);
     const std::lock_guard lock(mutex_);
     auto& place = newest_.summaries[key];
-    if (place) dropped_of(newest_.model.get()).summaries.push_back(std::move(place));
+    if (place) {
+      newest_.summary_bytes -= place->bytes();
+      dropped_of(newest_.model.get()).summaries.push_back(std::move(place));
+    }
     place = std::move(summary);
+    newest_.summary_bytes += place->bytes();
   }
 }
 
@@ -114,7 +132,7 @@ void ModelCache::end_frame() {
 ModelCache::Figures ModelCache::figures() const {
   const std::lock_guard lock(mutex_);
   if (!newest_.model) return {};
-  return {newest_.model->points(), newest_.model->bytes(), displayed().model->points(), patches_};
+  return {newest_.model->points(), newest_.model->bytes() + newest_.summary_bytes, displayed().model->points(), patches_};
 }
 
 }  // namespace telesplat::viewer

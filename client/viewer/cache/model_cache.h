@@ -43,7 +43,7 @@ class ModelCache {
 
   // ---- any thread ----
   struct Figures {
-    uint64_t points = 0, bytes = 0;  ///< of the newest replica
+    uint64_t points = 0, bytes = 0;  ///< of the newest replica; bytes with its summaries
     uint64_t points_displayed = 0;   ///< of the one on display
     uint64_t patches = 0;            ///< inserted so far
   };
@@ -56,6 +56,7 @@ class ModelCache {
     Sequence applied;     // newest event
     uint64_t number = 0;  // of all replicas this cache had
     points::Summaries summaries;
+    uint64_t summary_bytes = 0;  // of them
   };
   struct Dropped {
     std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were, or what was dropped of them: draw lists point to it

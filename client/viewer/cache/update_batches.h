@@ -1,5 +1,6 @@
 // Changes of the point model that wait until a whole view update is there (synchronous and loose coupling): what is on display never shows a part of
-// one. Patches are prepared before they come here, so that the display applies an update in microseconds a patch.
+// one. Patches are prepared before they come here; merging them into the model is
+// left to the display, which waits for the update anyway.
 #pragma once
 
 #include <deque>
