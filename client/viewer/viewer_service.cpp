@@ -8,9 +8,9 @@
 #include <thread>
 
 #include "client/viewer/display/headless_surface.h"
-#include "client/viewer/display/point_source.h"
-#include "client/viewer/display/volume_source.h"
 #include "client/viewer/display/window_surface.h"
+#include "client/viewer/points/source.h"
+#include "client/viewer/slices/source.h"
 #include "common/core/clock.h"
 #include "common/net/control.h"
 

@@ -16,7 +16,7 @@
 #include "common/core/clock.h"
 #include "common/splat/item_runs.h"
 #include "common/splat/splat_kernels.h"
-#include "common/splat/surfel_kernels.h"
+#include "common/splat/surfel/kernels.h"
 
 namespace telesplat::splat {
 namespace {

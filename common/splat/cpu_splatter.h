@@ -6,7 +6,7 @@
 #include "common/image/file.h"
 #include "common/image/shading.h"
 #include "common/splat/render_options.h"
-#include "common/splat/view_selection.h"
+#include "common/splat/select/view_selection.h"
 
 namespace telesplat::splat {
 

@@ -11,11 +11,11 @@
 #include <limits>
 
 #include "common/core/check.h"
-#include "common/splat/cluster_walk.h"
 #include "common/splat/facing.h"
 #include "common/splat/item_runs.h"
-#include "common/splat/surfel_contour.h"
-#include "common/splat/view_selection.h"
+#include "common/splat/select/cluster_walk.h"
+#include "common/splat/select/view_selection.h"
+#include "common/splat/surfel/contour.h"
 
 namespace telesplat::splat {
 namespace {

@@ -13,9 +13,9 @@
 
 #include "common/splat/finish.h"
 #include "common/splat/pixel_key.h"
+#include "common/splat/select/view_selection.h"
 #include "common/splat/splat_table.h"
 #include "common/splat/tile_binning.h"
-#include "common/splat/view_selection.h"
 
 namespace telesplat::splat {
 

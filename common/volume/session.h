@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/volume/grid.h"
-#include "common/volume/transfer_function.h"
+#include "common/volume/transfer/function.h"
 
 namespace telesplat::volume {
 

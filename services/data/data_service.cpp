@@ -7,8 +7,8 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
-#include "services/data/julia_service.h"
-#include "services/data/volume_service.h"
+#include "services/data/julia/service.h"
+#include "services/data/volume/service.h"
 
 namespace telesplat::data {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "common/julia/flags.h"
 #include "common/net/service.h"
-#include "services/data/mesh_store.h"
-#include "services/data/volume_flags.h"
+#include "services/data/mesh/store.h"
+#include "services/data/volume/flags.h"
 
 namespace telesplat::data {
 

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "services/data/mapped_file.h"
-#include "services/data/mesh_reader.h"
+#include "services/data/base/mapped_file.h"
+#include "services/data/mesh/reader.h"
 
 namespace telesplat::data {
 

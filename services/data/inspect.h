@@ -4,8 +4,8 @@
 #include <array>
 #include <string>
 
-#include "services/data/mesh_store.h"
-#include "services/data/volume.h"
+#include "services/data/mesh/store.h"
+#include "services/data/volume/volume.h"
 
 namespace telesplat::data {
 

@@ -9,11 +9,11 @@
 
 #include "common/metrics/run_record.h"
 #include "common/wire/serial.h"
-#include "services/master/frame_schedule.h"
-#include "services/master/scene_parameters.h"
-#include "services/master/slab_partition.h"
-#include "services/master/volume_scene.h"
-#include "services/master/volume_schedule.h"
+#include "services/master/slabs/partition.h"
+#include "services/master/slabs/scene.h"
+#include "services/master/slabs/schedule.h"
+#include "services/master/tiles/frame_schedule.h"
+#include "services/master/tiles/julia_parameters.h"
 
 namespace telesplat::master {
 

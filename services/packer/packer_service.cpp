@@ -8,11 +8,11 @@
 #include "common/metrics/recorder.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
-#include "services/packer/block_gatherer.h"
-#include "services/packer/depth_recorder.h"
 #include "services/packer/epoch_hold.h"
-#include "services/packer/packer_core.h"
-#include "services/packer/volume_packing.h"
+#include "services/packer/points/block_gatherer.h"
+#include "services/packer/points/depth_recorder.h"
+#include "services/packer/points/packer_core.h"
+#include "services/packer/slices/packing.h"
 
 namespace telesplat::packer {
 namespace {

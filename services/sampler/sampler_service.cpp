@@ -9,12 +9,12 @@
 #include "common/metrics/recorder.h"
 #include "common/net/master_link.h"
 #include "services/sampler/drain_guard.h"
-#include "services/sampler/julia_work.h"
-#include "services/sampler/mesh_work.h"
-#include "services/sampler/replay_work.h"
-#include "services/sampler/shear_slabs.h"
-#include "services/sampler/tile_work.h"
-#include "services/sampler/volume_work.h"
+#include "services/sampler/julia/work.h"
+#include "services/sampler/mesh/work.h"
+#include "services/sampler/tiles/replay.h"
+#include "services/sampler/tiles/work.h"
+#include "services/sampler/volume/shear/slabs.h"
+#include "services/sampler/volume/work.h"
 
 namespace telesplat::sampler {
 namespace {

@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/julia_sampler.h"
+#include "services/sampler/julia/sampler.h"
 #include "tests/support/simd_targets.h"
 
 namespace telesplat::sampler {

@@ -14,9 +14,9 @@
 #include "common/geometry/trajectory.h"
 #include "common/image/quality.h"
 #include "common/splat/cpu_splatter.h"
-#include "common/splat/frame_budget.h"
-#include "services/packer/packer_core.h"
-#include "services/sampler/ray_sampler.h"
+#include "common/splat/select/frame_budget.h"
+#include "services/packer/points/packer_core.h"
+#include "services/sampler/mesh/ray_sampler.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat {

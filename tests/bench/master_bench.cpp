@@ -7,7 +7,7 @@
 
 #include "common/julia/parameters.h"
 #include "services/master/master_core.h"
-#include "services/master/scatter_schedule.h"
+#include "services/master/slabs/scatter_schedule.h"
 
 namespace telesplat {
 namespace {

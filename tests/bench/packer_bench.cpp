@@ -6,9 +6,9 @@
 
 #include "common/points/mosaic_builder.h"
 #include "common/wire/serial.h"
-#include "services/packer/block_gatherer.h"
-#include "services/packer/patch_obsolescence.h"
-#include "tests/unit/packer_scenes.h"
+#include "services/packer/points/block_gatherer.h"
+#include "services/packer/points/patch_obsolescence.h"
+#include "tests/support/packer_scenes.h"
 
 namespace telesplat {
 namespace {

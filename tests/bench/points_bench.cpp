@@ -7,7 +7,7 @@
 
 #include "common/points/point_model.h"
 #include "common/points/unproject.h"
-#include "tests/unit/points_scenes.h"
+#include "tests/support/points_scenes.h"
 
 namespace telesplat {
 namespace {

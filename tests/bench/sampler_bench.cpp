@@ -3,8 +3,8 @@
 #include <benchmark/benchmark.h>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/ray_packets.h"
-#include "services/sampler/ray_sampler.h"
+#include "services/sampler/mesh/ray_packets.h"
+#include "services/sampler/mesh/ray_sampler.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat::sampler {

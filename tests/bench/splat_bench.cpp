@@ -18,7 +18,7 @@
 #include "common/image/normal.h"
 #include "common/splat/cpu_splatter.h"
 #include "common/splat/reference_depth.h"
-#include "common/splat/view_selection.h"
+#include "common/splat/select/view_selection.h"
 
 namespace telesplat {
 namespace {

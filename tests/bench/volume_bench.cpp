@@ -5,9 +5,9 @@
 #include <cstring>
 #include <map>
 
-#include "services/sampler/shear_rows.h"
-#include "services/sampler/shear_splatter.h"
-#include "services/sampler/volume_raycaster.h"
+#include "services/sampler/volume/raycaster.h"
+#include "services/sampler/volume/shear/rows.h"
+#include "services/sampler/volume/shear/splatter.h"
 #include "tests/support/volume_scenes.h"
 
 namespace telesplat::sampler {

@@ -9,7 +9,7 @@
 #include <map>
 #include <random>
 
-#include "services/data/volume_store.h"
+#include "services/data/volume/store.h"
 
 namespace telesplat::data {
 namespace {

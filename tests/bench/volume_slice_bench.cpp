@@ -7,7 +7,7 @@
 #include <cstring>
 #include <map>
 
-#include "common/volume/slice_image.h"
+#include "common/volume/slices/image.h"
 
 namespace telesplat::volume {
 namespace {

@@ -8,7 +8,7 @@
 #include <map>
 #include <thread>
 
-#include "client/viewer/render/volume_renderer.h"
+#include "client/viewer/render/slices/renderer.h"
 #include "common/core/clock.h"
 #include "tests/support/volume_frames.h"
 

@@ -4,8 +4,8 @@
 #include <cstdlib>
 
 #include "common/geometry/mesh_chunk.h"
-#include "services/data/chunker.h"
-#include "services/data/mesh_reader.h"
+#include "services/data/mesh/chunker.h"
+#include "services/data/mesh/reader.h"
 
 namespace telesplat::data {
 

@@ -1,7 +1,7 @@
 // Any bytes through the decoder of slice images: an error, or images that survive another round trip. The raster's size stands in the first two bytes.
 #include <cstdlib>
 
-#include "common/volume/slice_image.h"
+#include "common/volume/slices/image.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace telesplat::volume;

@@ -3,8 +3,8 @@
 #include <cstdlib>
 
 #include "common/volume/grid.h"
-#include "services/data/dicom_header.h"
-#include "services/data/volume_header.h"
+#include "services/data/volume/formats/dicom_header.h"
+#include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "client/viewer/render/gl/gl_renderer.h"
 #include "common/splat/finish.h"
-#include "tests/unit/splat_scene.h"
-#include "tests/unit/splat_surfel_plain.h"
+#include "tests/support/splat_scene.h"
+#include "tests/support/splat_surfel_plain.h"
 
 namespace telesplat {
 namespace {

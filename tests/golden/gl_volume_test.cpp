@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "client/viewer/render/volume_renderer.h"
+#include "client/viewer/render/slices/renderer.h"
 #include "common/gl/egl_context.h"
 #include "common/image/file.h"
 #include "tests/support/volume_frames.h"

@@ -9,7 +9,7 @@
 #include <filesystem>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/sampler.h"
+#include "services/sampler/mesh/sampler.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat::sampler {

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/julia_sampler.h"
+#include "services/sampler/julia/sampler.h"
 #include "tests/support/julia_reference.h"
 
 namespace telesplat::sampler {

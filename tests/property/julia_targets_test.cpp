@@ -4,7 +4,7 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/julia_sampler.h"
+#include "services/sampler/julia/sampler.h"
 #include "tests/support/simd_targets.h"
 
 namespace telesplat::sampler {

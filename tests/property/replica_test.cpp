@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "tests/unit/packer_scenes.h"
+#include "tests/support/packer_scenes.h"
 
 namespace telesplat {
 namespace {

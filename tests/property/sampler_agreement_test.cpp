@@ -5,7 +5,7 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
-#include "services/sampler/sampler.h"
+#include "services/sampler/mesh/sampler.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat::sampler {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "services/sampler/hit_packet.h"
+#include "services/sampler/mesh/hit_packet.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat::sampler {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
-#include "tests/unit/surfel_oracle.h"
+#include "tests/support/surfel_oracle.h"
 
 namespace telesplat {
 namespace {

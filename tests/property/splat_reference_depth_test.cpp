@@ -6,9 +6,9 @@
 #include "common/geometry/trajectory.h"
 #include "common/splat/facing.h"
 #include "common/splat/reference_depth.h"
+#include "common/splat/select/view_selection.h"
 #include "common/splat/splat_kernels.h"
-#include "common/splat/view_selection.h"
-#include "tests/unit/splat_scene.h"
+#include "tests/support/splat_scene.h"
 
 namespace telesplat {
 namespace {

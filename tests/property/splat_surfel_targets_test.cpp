@@ -6,9 +6,9 @@
 #include <random>
 
 #include "common/geometry/trajectory.h"
-#include "common/splat/surfel_kernels.h"
-#include "tests/unit/splat_scene.h"
-#include "tests/unit/splat_surfel_plain.h"
+#include "common/splat/surfel/kernels.h"
+#include "tests/support/splat_scene.h"
+#include "tests/support/splat_surfel_plain.h"
 
 namespace telesplat {
 namespace {

@@ -6,7 +6,7 @@
 #include "common/geometry/trajectory.h"
 #include "common/splat/splat_kernels.h"
 #include "tests/support/simd_targets.h"
-#include "tests/unit/splat_scene.h"
+#include "tests/support/splat_scene.h"
 
 namespace telesplat {
 namespace {

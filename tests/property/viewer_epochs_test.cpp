@@ -5,9 +5,9 @@
 #include <map>
 #include <random>
 
-#include "client/viewer/cache/epoch_switch.h"
-#include "client/viewer/cache/model_cache.h"
-#include "tests/unit/points_scenes.h"
+#include "client/viewer/points/epoch_switch.h"
+#include "client/viewer/points/model_cache.h"
+#include "tests/support/points_scenes.h"
 
 namespace telesplat::viewer {
 namespace {

@@ -4,7 +4,7 @@
 #include <deque>
 #include <random>
 
-#include "client/viewer/cache/event_sequencer.h"
+#include "client/viewer/points/event_sequencer.h"
 
 namespace telesplat::viewer {
 namespace {

@@ -1,8 +1,8 @@
 // Splatted, layered, rounded to 8 bits and warped, against rays in double precision.
 #include <gtest/gtest.h>
 
-#include "services/sampler/shear_splatter.h"
-#include "services/sampler/volume_raycaster.h"
+#include "services/sampler/volume/raycaster.h"
+#include "services/sampler/volume/shear/splatter.h"
 #include "tests/support/volume_scenes.h"
 
 namespace telesplat::sampler {

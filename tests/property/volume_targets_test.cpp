@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "services/sampler/shear_splatter.h"
+#include "services/sampler/volume/shear/splatter.h"
 #include "tests/support/simd_targets.h"
 #include "tests/support/volume_scenes.h"
 

@@ -1,8 +1,8 @@
 // The warp gives the same pixels on every instruction set, for every width of tile and place of its borders, as the plain pixel of its definition.
 #include <gtest/gtest.h>
 
-#include "common/volume/warp_pixel.h"
-#include "common/volume/warp_plan.h"
+#include "common/volume/warp/pixel.h"
+#include "common/volume/warp/plan.h"
 #include "tests/support/simd_targets.h"
 #include "tests/support/volume_frames.h"
 

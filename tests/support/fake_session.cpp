@@ -6,8 +6,8 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/volume/session.h"
+#include "tests/support/points_scenes.h"
 #include "tests/support/volume_frames.h"
-#include "tests/unit/points_scenes.h"
 
 namespace telesplat::test {
 namespace {

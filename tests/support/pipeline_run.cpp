@@ -16,7 +16,7 @@
 #include <thread>
 
 #include "common/core/clock.h"
-#include "tools/telesplat/control_client.h"
+#include "tools/telesplat/control/client.h"
 
 namespace telesplat::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "common/volume/warper.h"
+#include "common/volume/warp/warper.h"
 
 namespace telesplat::testing {
 

@@ -1,4 +1,4 @@
-// Shear-splatting as services/sampler/shear_splatter.h defines it, pixel by pixel in double precision: every slice is gathered at every pixel,
+// Shear-splatting as services/sampler/volume/shear/splatter.h defines it, pixel by pixel in double precision: every slice is gathered at every pixel,
 // nothing is skipped.
 #pragma once
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "services/data/volume_store.h"
+#include "services/data/volume/store.h"
 
 namespace telesplat::data {
 

@@ -12,8 +12,8 @@
 #include "common/image/file.h"
 #include "common/image/normal.h"
 #include "common/volume/shear.h"
-#include "common/volume/slice_image.h"
-#include "common/volume/transfer_function.h"
+#include "common/volume/slices/image.h"
+#include "common/volume/transfer/function.h"
 #include "common/volume/voxels.h"
 
 namespace telesplat::test {

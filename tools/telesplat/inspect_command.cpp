@@ -13,7 +13,7 @@
 #include "client/viewer/record/frame_spool.h"
 #include "common/codec/depth_codec.h"
 #include "services/data/inspect.h"
-#include "tools/telesplat/recorded_julia.h"
+#include "tools/telesplat/scene/recorded_julia.h"
 
 namespace telesplat::launcher {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "services/data/mesh_store.h"
+#include "services/data/mesh/store.h"
 
 namespace telesplat::launcher {
 

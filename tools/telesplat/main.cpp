@@ -2,15 +2,15 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-#include "tools/telesplat/bench_cache.h"
-#include "tools/telesplat/bench_scaling.h"
-#include "tools/telesplat/bench_volume.h"
-#include "tools/telesplat/compare_command.h"
-#include "tools/telesplat/control_command.h"
+#include "tools/telesplat/bench/cache.h"
+#include "tools/telesplat/bench/scaling.h"
+#include "tools/telesplat/bench/volume.h"
+#include "tools/telesplat/compare/command.h"
+#include "tools/telesplat/control/command.h"
 #include "tools/telesplat/inspect_command.h"
 #include "tools/telesplat/presets_command.h"
-#include "tools/telesplat/run_command.h"
-#include "tools/telesplat/scene_file.h"
+#include "tools/telesplat/run/run_command.h"
+#include "tools/telesplat/scene/scene_file.h"
 
 namespace {
 

@@ -9,9 +9,9 @@
 #include "common/geometry/trajectory.h"
 #include "common/image/canvas.h"
 #include "common/julia/flags.h"
-#include "common/volume/transfer_function.h"
-#include "tools/telesplat/direct_scene.h"
+#include "common/volume/transfer/function.h"
 #include "tools/telesplat/progress_line.h"
+#include "tools/telesplat/scene/direct_scene.h"
 
 namespace telesplat::launcher {
 namespace {

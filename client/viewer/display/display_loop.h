@@ -6,9 +6,9 @@
 
 #include "client/viewer/display/view_source.h"
 #include "client/viewer/record/frame_spool.h"
-#include "client/viewer/replica_worker.h"
+#include "client/viewer/viewer_worker.h"
 #include "common/image/shading.h"
-#include "common/splat/view_selection.h"
+#include "common/splat/select/view_selection.h"
 
 namespace telesplat::viewer {
 

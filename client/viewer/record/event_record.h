@@ -10,7 +10,7 @@
 #include <memory>
 #include <string>
 
-#include "client/viewer/cache/event_sequencer.h"
+#include "client/viewer/points/event_sequencer.h"
 #include "common/points/point_model.h"
 
 namespace telesplat::viewer {

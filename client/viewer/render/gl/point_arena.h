@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "common/splat/view_selection.h"
+#include "common/splat/select/view_selection.h"
 
 namespace telesplat::viewer {
 

@@ -12,7 +12,7 @@
 #include "client/viewer/render/gl/shaders/resolve.h"
 #include "client/viewer/render/gl/shaders/surfel.h"
 #include "common/splat/finish.h"
-#include "common/splat/surfel_splat.h"
+#include "common/splat/surfel/splat.h"
 
 namespace telesplat::viewer {
 namespace {

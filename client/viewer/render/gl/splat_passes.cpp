@@ -11,9 +11,9 @@
 #include <glm/vec4.hpp>
 #include <numeric>
 
-#include "common/splat/ewa_shading.h"
+#include "common/splat/ewa/shading.h"
 #include "common/splat/splat_table.h"
-#include "common/splat/surfel_splat.h"
+#include "common/splat/surfel/splat.h"
 
 namespace telesplat::viewer {
 namespace {

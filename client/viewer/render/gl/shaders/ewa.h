@@ -1,4 +1,4 @@
-// Elliptical weighted average: visibility, weighted sums of what is visible, and their means (common/splat/ewa-inl.h).
+// Elliptical weighted average: visibility, weighted sums of what is visible, and their means (common/splat/ewa/ewa-inl.h).
 #pragma once
 
 #include <string_view>
@@ -70,7 +70,7 @@ void main() {
 }
 )";
 
-/// The means, shaded with the interpolated normal (common/splat/ewa_shading.h).
+/// The means, shaded with the interpolated normal (common/splat/ewa/shading.h).
 inline constexpr std::string_view kEwaResolve = R"(
 layout(binding = 0) uniform sampler2D colour_sums;
 layout(binding = 1) uniform sampler2D normal_sums;

@@ -1,4 +1,4 @@
-// Ellipse and ewa: contours become pixels (common/splat/surfel_splat.h, operation by operation).
+// Ellipse and ewa: contours become pixels (common/splat/surfel/splat.h, operation by operation).
 #pragma once
 
 #include <string_view>

@@ -1,0 +1,95 @@
+#include "client/viewer/points/event_sequencer.h"
+
+namespace telesplat::viewer {
+namespace {
+// More than this is not kept while an answer is awaited; the gap that dropping leaves is asked for afterwards.
+constexpr size_t kMaxKeptEvents = 8192, kMaxKeptBytes = 256u << 20;
+}  // namespace
+
+size_t ModelEvent::bytes() const {
+  const auto* patch = std::get_if<wire::Patch>(&body);
+  return 512 + (patch ? patch->image.size() : 0);
+}
+
+void EventSequencer::start() {
+  packer_ = {};
+  ask();
+}
+
+void EventSequencer::ask() {
+  waiting_ = true;
+  callbacks_.request_state(packer_, packer_.value ? applied_ : Sequence{});
+}
+
+void EventSequencer::retry() {
+  if (waiting_) ask();
+}
+
+void EventSequencer::follow(InstanceId packer) {
+  packer_ = packer;
+  applied_ = {};
+  kept_.clear();
+  kept_bytes_ = 0;
+  callbacks_.begin_replica();
+}
+
+void EventSequencer::keep(ModelEvent event) {
+  if (kept_.size() >= kMaxKeptEvents || kept_bytes_ >= kMaxKeptBytes) return;
+  kept_bytes_ += event.bytes();
+  kept_.push_back(std::move(event));
+}
+
+void EventSequencer::on_published(ModelEvent event) {
+  if (event.packer() != packer_) {
+    follow(event.packer());
+    // The very first event of a new packer needs no history.
+    if (event.sequence().value != 1) {
+      keep(std::move(event));
+      return ask();
+    }
+    waiting_ = false;
+  }
+  if (waiting_) return keep(std::move(event));
+  if (event.sequence() <= applied_) return;
+  if (event.sequence() != applied_.next()) {
+    ++gaps_;
+    keep(std::move(event));
+    return ask();
+  }
+  callbacks_.apply(event);
+  applied_ = event.sequence();
+}
+
+void EventSequencer::on_replayed(const ModelEvent& event) {
+  if (event.packer() != packer_) follow(event.packer());
+  if (event.sequence() <= applied_) return;
+  callbacks_.apply(event);
+  applied_ = event.sequence();
+}
+
+void EventSequencer::on_mark(const wire::StateMark& mark) {
+  if (mark.packer != packer_) {
+    follow(mark.packer);
+    // An answer that held no event: there is nothing yet.
+    if (!mark.answer) return ask();
+  }
+  if (mark.answer) {
+    if (!waiting_) return;
+    applied_ = std::max(applied_, mark.sequence);
+    waiting_ = false;
+    return drain();
+  }
+  if (!waiting_ && mark.sequence > applied_) {  // the last events were lost
+    ++gaps_;
+    ask();
+  }
+}
+
+void EventSequencer::drain() {
+  std::deque<ModelEvent> kept;
+  kept.swap(kept_);
+  kept_bytes_ = 0;
+  for (auto& event : kept) on_published(std::move(event));
+}
+
+}  // namespace telesplat::viewer

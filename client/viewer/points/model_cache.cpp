@@ -1,0 +1,138 @@
+#include "client/viewer/points/model_cache.h"
+
+#include <iterator>
+
+#include "common/core/check.h"
+
+namespace telesplat::viewer {
+namespace {
+
+template <class T>
+void move_to_end(std::vector<T>& from, std::vector<T>& to) {
+  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  from.clear();
+}
+
+}  // namespace
+
+void ModelCache::drop(Replica& replica) {
+  Dropped& dropped = dropped_of(replica.model.get());
+  for (auto& [key, summary] : replica.summaries) dropped.summaries.push_back(std::move(summary));
+  replica.summaries.clear();
+  dropped.models.push_back(std::move(replica.model));
+}
+
+bool ModelCache::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence applied) {
+  auto fresh = std::make_unique<points::PointModel>(config);
+  const std::lock_guard lock(mutex_);
+  if (newest_.model) {
+    if (!older_.model && newest_.model->points() > 0)
+      older_ = std::move(newest_);
+    else
+      drop(newest_);
+  }
+  newest_ = {std::move(fresh), epoch, applied, ++replicas_, {}, 0};
+  wanted_.clear();
+  return older_.model != nullptr;
+}
+
+void ModelCache::insert(points::PreparedPatch patch, EpochId epoch) {
+  points::Insertion insertion = newest_.model->plan(std::move(patch));
+  const std::lock_guard lock(mutex_);
+  CHECK(newest_.epoch == epoch || newest_.epoch.value == 0);
+  newest_.epoch = epoch;
+  newest_.applied = insertion.sequence;
+  auto replaced = newest_.model->commit(std::move(insertion));
+  move_to_end(replaced, dropped_of(newest_.model.get()).mosaics);
+  ++patches_;
+}
+
+void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames) {
+  const std::lock_guard lock(mutex_);
+  auto dropped = frames.empty() ? newest_.model->take_out(keys) : newest_.model->take_out(keys, frames);
+  newest_.applied = sequence;
+  Dropped& place = dropped_of(newest_.model.get());
+  move_to_end(dropped, place.clusters);
+  for (const points::ClusterKey key : keys) {
+    const points::ClusterKey brick = points::brick_key(key);
+    const auto summary = newest_.summaries.find(brick);
+    if (summary == newest_.summaries.end() || newest_.model->bricks().contains(brick)) continue;
+    newest_.summary_bytes -= summary->second->bytes();
+    place.summaries.push_back(std::move(summary->second));
+    newest_.summaries.erase(summary);
+  }
+}
+
+void ModelCache::show_newest() {
+  const std::lock_guard lock(mutex_);
+  if (older_.model) drop(older_);
+}
+
+void ModelCache::free_dropped() {
+  Dropped free;  // freed after the lock is released
+  const std::lock_guard lock(mutex_);
+  std::swap(free, free_);
+}
+
+void ModelCache::summarise(size_t most) {
+  std::vector<points::ClusterKey> wanted;
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(wanted, wanted_);
+  }
+  if (wanted.size() > most) wanted.resize(most);  // the display asks again
+  for (const points::ClusterKey key : wanted) {
+    const auto brick = newest_.model->bricks().find(key);
+    if (brick == newest_.model->bricks().end()) continue;
+    // The display may have asked again while this one was made.
+    const auto held = newest_.summaries.find(key);
+    if (held != newest_.summaries.end() && held->second->changes == brick->second->changes &&
+        held->second->removals == brick->second->removals)
+      continue;
+    auto summary = points::summarise(*newest_.model, key, *brick->second, newest_.applied);
+    const std::lock_guard lock(mutex_);
+    auto& place = newest_.summaries[key];
+    if (place) {
+      newest_.summary_bytes -= place->bytes();
+      dropped_of(newest_.model.get()).summaries.push_back(std::move(place));
+    }
+    place = std::move(summary);
+    newest_.summary_bytes += place->bytes();
+  }
+}
+
+uint64_t ModelCache::digest() const {
+  const std::lock_guard lock(mutex_);
+  return newest_.model ? newest_.model->digest() : 0;
+}
+
+void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {
+  const std::lock_guard lock(mutex_);
+  const Replica& replica = displayed();
+  if (replica.model)
+    splat::select_view(*replica.model, camera, options, out, &replica.summaries);
+  else
+    out = {};
+  if (&replica == &newest_) wanted_ = out.summaries_wanted;
+  out.applied = replica.applied;
+  out.epoch = replica.epoch;
+  out.replica = replica.number;
+  drawn_ = replica.model.get();
+}
+
+void ModelCache::end_frame() {
+  const std::lock_guard lock(mutex_);
+  drawn_ = nullptr;
+  move_to_end(parked_.clusters, free_.clusters);
+  move_to_end(parked_.mosaics, free_.mosaics);
+  move_to_end(parked_.summaries, free_.summaries);
+  move_to_end(parked_.models, free_.models);
+}
+
+ModelCache::Figures ModelCache::figures() const {
+  const std::lock_guard lock(mutex_);
+  if (!newest_.model) return {};
+  return {newest_.model->points(), newest_.model->bytes() + newest_.summary_bytes, displayed().model->points(), patches_};
+}
+
+}  // namespace telesplat::viewer

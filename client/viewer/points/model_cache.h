@@ -1,0 +1,80 @@
+// The viewer's replica of the point model, shared by the worker that applies events and the display thread that draws. Events are
+// prepared and merged without the lock and committed under it in microseconds. What is dropped is freed by the worker, and not before the
+// frame that may draw it is finished.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "common/points/point_model.h"
+#include "common/splat/select/view_selection.h"
+
+namespace telesplat::viewer {
+
+class ModelCache {
+ public:
+  // ---- worker ----
+  /// Starts an empty replica, of another packer's model or of a new epoch; epoch 0: not known yet. What is on display stays there
+  /// until show_newest(), unless it is empty; a newer one that was not shown is dropped. Returns whether an older one stays.
+  bool begin_replica(const points::ModelConfig& config, EpochId epoch = {}, Sequence applied = {});
+  bool has_replica() const { return newest_.model != nullptr; }
+  const points::ModelConfig& config() const { return newest_.model->config(); }
+  /// Of the newest replica; 0: not known yet.
+  EpochId epoch() const { return newest_.epoch; }
+  /// Precondition: `epoch` is the newest replica's, or that is not known yet. Only one thread at a time may change the cache: mosaics are merged
+  /// while the display draws.
+  void insert(points::PreparedPatch patch, EpochId epoch);
+  /// frames: empty, or one a key: then only the mosaics with that frame tag (PointModel::forget).
+  void forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames = {});
+  /// Replaces the older replica on display by the newest. No effect if it is displayed already.
+  void show_newest();
+  /// Frees what was dropped and no frame draws any more. To be called often: to free a million points takes milliseconds.
+  void free_dropped();
+  /// Makes up to `most` of the summaries that the display asked for (points/summary.h), while it draws. Only where no other thread changes the cache.
+  void summarise(size_t most);
+  /// Digest of the newest replica, for tests of replication.
+  uint64_t digest() const;
+
+  // ---- display thread ----
+  /// Selects what to draw of the replica on display. The list stays drawable until end_frame().
+  void select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out);
+  void end_frame();
+
+  // ---- any thread ----
+  struct Figures {
+    uint64_t points = 0, bytes = 0;  ///< of the newest replica; bytes with its summaries
+    uint64_t points_displayed = 0;   ///< of the one on display
+    uint64_t patches = 0;            ///< inserted so far
+  };
+  Figures figures() const;
+
+ private:
+  struct Replica {
+    std::unique_ptr<points::PointModel> model;
+    EpochId epoch;
+    Sequence applied;     // newest event
+    uint64_t number = 0;  // of all replicas this cache had
+    points::Summaries summaries;
+    uint64_t summary_bytes = 0;  // of them
+  };
+  struct Dropped {
+    std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were, or what was dropped of them: draw lists point to it
+    std::vector<points::Mosaic> mosaics;                     // merged into others
+    std::vector<std::unique_ptr<points::Summary>> summaries;
+    std::vector<std::unique_ptr<points::PointModel>> models;
+  };
+  const Replica& displayed() const { return older_.model ? older_ : newest_; }
+  // Where to put what was part of a model: it waits for the end of the frame if that frame draws the model.
+  Dropped& dropped_of(const points::PointModel* model) { return model == drawn_ ? parked_ : free_; }
+  void drop(Replica& replica);
+
+  mutable std::mutex mutex_;
+  Replica newest_, older_;  // older_ only while it is on display in place of the newest
+  const points::PointModel* drawn_ = nullptr;
+  Dropped parked_, free_;
+  uint64_t replicas_ = 0, patches_ = 0;
+  std::vector<points::ClusterKey> wanted_;  // summaries of the newest replica
+};
+
+}  // namespace telesplat::viewer

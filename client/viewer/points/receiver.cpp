@@ -1,0 +1,140 @@
+#include "client/viewer/points/receiver.h"
+
+#include "common/codec/depth_codec.h"
+#include "common/core/clock.h"
+#include "common/net/dispatch.h"
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr double kAnswerPatience_s = 2.0;
+
+}  // namespace
+
+PointReceiver::PointReceiver(const Options& options, Links links, ModelCache& cache, UpdateBatches& batches,
+                             metrics::SpanRecorder& spans)
+    : options_(options),
+      links_(std::move(links)),
+      cache_(cache),
+      batches_(batches),
+      spans_(spans),
+      sequencer_({[this](const ModelEvent& e) { apply(e); },
+                  [this] {
+                    begin_replica(links_.config(), {}, {});
+                    if (options_.events) options_.events->begin_replica(config_);
+                  },
+                  [this](InstanceId packer, Sequence after) {
+                    asked_s_ = monotonic_s();
+                    links_.request_state(packer, after);
+                  }}),
+      switch_(options.epoch_patience_s) {}
+
+void PointReceiver::receive_events(net::Socket& patches, int most) {
+  for (int n = 0; n < most; ++n) {
+    const auto message = patches.receive();
+    if (!message) return;
+    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(patches, *message, [&](auto& m) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
+        sequencer_.on_mark(m);
+      else
+        sequencer_.on_published({m, message->owner});
+    });
+  }
+}
+
+void PointReceiver::receive_answers(net::Socket& state, int most) {
+  for (int n = 0; n < most; ++n) {
+    const auto message = state.receive();
+    if (!message) return;
+    asked_s_ = monotonic_s();  // an answer that is coming in is not late
+    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(state, *message, [&](auto& m) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
+        sequencer_.on_mark(m);
+      else
+        sequencer_.on_replayed({m, message->owner});
+    });
+  }
+}
+
+void PointReceiver::tick(double now_s) {
+  if (sequencer_.waiting() && now_s - asked_s_ > kAnswerPatience_s) sequencer_.retry();
+  if (!switch_.due(now_s)) return;
+  cache_.show_newest();
+  if (const auto since_s = switch_.waiting_since_s()) {
+    ++epochs_shown_;
+    spans_.add("epoch held", links_.to_master_s(*since_s), links_.to_master_s(now_s), 3);
+  }
+  switch_.shown();
+}
+
+void PointReceiver::apply(const ModelEvent& event) {
+  const bool applied = std::visit(
+      [this](const auto& e) {
+        using E = std::decay_t<decltype(e)>;
+        if constexpr (std::is_same_v<E, wire::Patch>) {
+          return apply_patch(e);
+        } else if constexpr (std::is_same_v<E, wire::Forget>) {
+          if (options_.hold)
+            batches_.add(UpdateBatches::Forget{e.sequence, {e.clusters.begin(), e.clusters.end()}, e.frames}, cache_);
+          else
+            cache_.forget(e.sequence, e.clusters, e.frames);
+        } else {
+          begin_replica(config_, e.epoch, e.sequence);
+          links_.on_epoch();
+        }
+        return true;
+      },
+      event.body);
+  // After it: points are shown first. What could not be applied could not be replayed either.
+  if (applied && options_.events) options_.events->add(event);
+}
+
+void PointReceiver::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence) {
+  config_ = config;
+  epoch_ = epoch;
+  if (options_.hold)
+    batches_.add(UpdateBatches::Begin{config, epoch, sequence}, cache_);
+  else
+    switch_.begin(epoch, cache_.begin_replica(config, epoch, sequence), monotonic_s());
+}
+
+bool PointReceiver::apply_patch(const wire::Patch& patch) {
+  const double begin = monotonic_s();
+  // Events in order always tell of an epoch before its first patch; a replica is never of two.
+  if (epoch_.value != 0 && patch.epoch != epoch_) {
+    ++decode_errors_;
+    log::warn("patch {} is of epoch {} while the model is of epoch {}: dropped", patch.sequence.value,
+              patch.epoch.value, epoch_.value);
+    return false;
+  }
+  const auto bytes = std::span(reinterpret_cast<const uint8_t*>(patch.image.data()), patch.image.size());
+  if (const Status decoded = codec::decode_into(tile_, bytes, patch.rect.width, patch.rect.height); !decoded) {
+    ++decode_errors_;
+    log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
+    return false;
+  }
+  const double decoded = monotonic_s();
+  epoch_ = patch.epoch;
+  auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_, patch.frame);
+  if (options_.hold)
+    batches_.add(UpdateBatches::Insert{std::move(prepared), patch.epoch}, cache_);
+  else
+    cache_.insert(std::move(prepared), patch.epoch);
+  const double inserted = monotonic_s();
+  spans_.add("decode", links_.to_master_s(begin), links_.to_master_s(decoded), 1);
+  spans_.add("insert", links_.to_master_s(decoded), links_.to_master_s(inserted), 1);
+  points_received_ += patch.kept;
+  if (!options_.hold) {
+    switch_.on_part({patch.epoch, patch.step, patch.frame_complete, patch.viewer == options_.viewer}, inserted);
+    tick(inserted);
+  }
+  links_.on_part(part_of(patch));
+  return true;
+}
+
+PointReceiver::Figures PointReceiver::figures() const {
+  return {points_received_, decode_errors_,      sequencer_.gaps(),
+          epochs_shown_,    switch_.displayed(), sequencer_.applied()};
+}
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,71 @@
+// The worker's part for scenes of points: puts model events in order, decodes and prepares them, applies them to the cache - at once, or, where the
+// display waits for whole updates, when the display takes them.
+#pragma once
+
+#include <functional>
+
+#include "client/viewer/coupling/view_requester.h"
+#include "client/viewer/points/epoch_switch.h"
+#include "client/viewer/points/event_sequencer.h"
+#include "client/viewer/points/model_cache.h"
+#include "client/viewer/points/update_batches.h"
+#include "client/viewer/record/event_record.h"
+#include "common/image/depth_image.h"
+#include "common/metrics/recorder.h"
+#include "common/net/socket.h"
+
+namespace telesplat::viewer {
+
+class PointReceiver {
+ public:
+  struct Options {
+    InstanceId viewer;
+    double epoch_patience_s = 0.15;   ///< EpochSwitch
+    EventRecorder* events = nullptr;  ///< keeps every event that is taken; null: nothing is kept
+    bool hold = false;                ///< changes go to the batches, not to the cache
+  };
+  struct Links {
+    std::function<points::ModelConfig()> config;              ///< of a model that begins
+    std::function<void(InstanceId, Sequence)> request_state;  ///< EventSequencer
+    std::function<void(const ViewPart&)> on_part;             ///< a patch was applied, or is in the batches
+    std::function<void()> on_epoch;                           ///< a new epoch began
+    std::function<double(double)> to_master_s;
+  };
+  PointReceiver(const Options& options, Links links, ModelCache& cache, UpdateBatches& batches,
+                metrics::SpanRecorder& spans);
+
+  /// A packer at another address.
+  void start() { sequencer_.start(); }
+  void receive_events(net::Socket& patches, int most);
+  void receive_answers(net::Socket& state, int most);
+  /// What is due by time alone. To be called every few milliseconds.
+  void tick(double now_s);
+
+  struct Figures {
+    uint64_t points_received = 0, decode_errors = 0, gaps = 0, epochs_shown = 0;
+    EpochId epoch;  ///< on display; only where nothing is held
+    Sequence sequence;
+  };
+  Figures figures() const;
+
+ private:
+  void apply(const ModelEvent& event);
+  /// False if it cannot be decoded.
+  bool apply_patch(const wire::Patch& patch);
+  void begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence);
+
+  Options options_;
+  Links links_;
+  ModelCache& cache_;
+  UpdateBatches& batches_;
+  metrics::SpanRecorder& spans_;
+  EventSequencer sequencer_;
+  EpochSwitch switch_;
+  points::ModelConfig config_;  // of the newest replica, and its epoch, held or not; 0: not known yet
+  EpochId epoch_;
+  image::DepthImage tile_;  // memory that decoding reuses
+  double asked_s_ = 0;
+  uint64_t points_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,61 @@
+// Changes of the point model that wait until a whole view update is there (synchronous and loose coupling): what is on display never shows a part of
+// one. Patches are prepared before they come here; merging them into the model is
+// left to the display, which waits for the update anyway.
+#pragma once
+
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "client/viewer/points/model_cache.h"
+#include "client/viewer/points/shown_update.h"
+
+namespace telesplat::viewer {
+
+class UpdateBatches {
+ public:
+  /// Points that are held back at most (other viewers' updates while none of one's own becomes complete): beyond, everything is applied at once.
+  static constexpr uint64_t kMaxPoints = 16u << 20;
+
+  struct Insert {
+    points::PreparedPatch patch;
+    EpochId epoch;
+  };
+  struct Forget {
+    Sequence sequence;
+    std::vector<points::ClusterKey> clusters;
+    std::vector<uint32_t> frames;
+  };
+  struct Begin {
+    points::ModelConfig config;
+    EpochId epoch;
+    Sequence sequence;
+  };
+  using Change = std::variant<Insert, Forget, Begin>;
+
+  // ---- worker ----
+  void add(Change change, ModelCache& cache);
+  /// Everything added so far belongs to this update or to earlier ones.
+  void close(const ShownUpdate& update);
+
+  // ---- display thread ----
+  /// Applies all changes up to the end of this update and shows the newest replica. Nothing: it was not closed.
+  std::optional<ShownUpdate> apply(RequestId request, ModelCache& cache);
+
+ private:
+  void apply_front(ModelCache& cache);
+
+  std::mutex mutex_;
+  std::deque<Change> changes_;
+  struct End {
+    ShownUpdate update;
+    uint64_t change = 0;  // number of the first that does not belong to it
+  };
+  std::deque<End> ends_;
+  uint64_t first_ = 0;  // number of changes_.front()
+  uint64_t points_ = 0;
+};
+
+}  // namespace telesplat::viewer

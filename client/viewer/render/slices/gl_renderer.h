@@ -1,0 +1,38 @@
+// Warping by OpenGL: each pixel of the display looks through the layers, which lie in one array texture. The CPU's pixels, but for roundings.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "client/viewer/render/slices/renderer.h"
+#include "common/core/log.h"
+#include "common/gl/egl_context.h"
+
+namespace telesplat::viewer {
+
+class VolumeGlRenderer final : public VolumeRenderer {
+ public:
+  /// With a context of its own, off-screen, which is current during its calls only.
+  static Result<std::unique_ptr<VolumeGlRenderer>> make();
+  ~VolumeGlRenderer() override;
+
+  const char* name() const override { return "gl"; }
+  /// A frame's layers are uploaded when it is first drawn: frames are told apart by their ids, epochs and addresses. warp_cpu_ms is the calling
+  /// thread's time, waiting included; samples are those of all layers and pixels, few of which an eye far away needs. A frame that
+  /// the GPU cannot hold is drawn as the background alone, and logged.
+  volume::WarpStats render(const volume::VolumeFrame* frame, const geometry::Camera& camera, uint32_t background,
+                           const volume::WarpTarget& target) override;
+
+  const std::string& device() const { return context_->renderer(); }
+  bool is_software() const { return context_->software(); }
+
+ private:
+  struct Parts;  // what lives in the context
+  VolumeGlRenderer(std::unique_ptr<gl::EglContext> context, std::unique_ptr<Parts> parts);
+
+  std::unique_ptr<gl::EglContext> context_;
+  std::unique_ptr<Parts> parts_;
+  log::RateLimiter refusals_;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,73 @@
+#include "client/viewer/slices/cache.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace telesplat::viewer {
+
+void SliceCache::show(BufferedFrame frame) {
+  if (displayed_.frame) dropped_.push_back(std::move(displayed_.frame));
+  displayed_ = std::move(frame);
+}
+
+void SliceCache::put(BufferedFrame frame) {
+  const std::lock_guard lock(mutex_);
+  ++frames_;
+  if (in_order_)
+    waiting_.push_back(std::move(frame));
+  else
+    show(std::move(frame));
+}
+
+void SliceCache::free_dropped() {
+  std::vector<std::shared_ptr<const volume::VolumeFrame>> free;  // freed after the lock is released
+  const std::lock_guard lock(mutex_);
+  // New holders come from displayed() only, so that a frame that nobody else holds stays that way.
+  const auto held = std::partition(dropped_.begin(), dropped_.end(), [](const auto& f) { return f.use_count() > 1; });
+  free.assign(std::make_move_iterator(held), std::make_move_iterator(dropped_.end()));
+  dropped_.erase(held, dropped_.end());
+}
+
+std::vector<FrameId> SliceCache::take_left() {
+  std::vector<FrameId> out;
+  const std::lock_guard lock(mutex_);
+  out.swap(left_);
+  return out;
+}
+
+BufferedFrame SliceCache::displayed() const {
+  const std::lock_guard lock(mutex_);
+  return displayed_;
+}
+
+void SliceCache::advance(RequestId request) {
+  const std::lock_guard lock(mutex_);
+  const auto next = std::find_if(waiting_.begin(), waiting_.end(),
+                                 [&](const BufferedFrame& f) { return f.update.request == request; });
+  if (next == waiting_.end()) return;
+  for (auto f = waiting_.begin(); f != next; ++f) {
+    left_.push_back(f->frame->frame);
+    dropped_.push_back(std::move(f->frame));
+  }
+  if (!counted_) left_.push_back(displayed_.frame->frame);
+  show(std::move(*next));
+  counted_ = false;
+  waiting_.erase(waiting_.begin(), std::next(next));
+}
+
+void SliceCache::frame_done() {
+  const std::lock_guard lock(mutex_);
+  if (counted_) return;
+  left_.push_back(displayed_.frame->frame);
+  counted_ = true;
+}
+
+SliceCache::Figures SliceCache::figures() const {
+  const std::lock_guard lock(mutex_);
+  Figures out{frames_, waiting_.size(), displayed_.pixels, 0};
+  for (const auto& f : waiting_) out.pixels += f.pixels;
+  out.bytes = out.pixels * sizeof(uint32_t);
+  return out;
+}
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,64 @@
+// The viewer's complete volume frames, shared by the worker that decodes them and the display thread that warps them. Frames change hands as pointers;
+// nothing is copied, and none is freed by the display thread.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "client/viewer/points/shown_update.h"
+#include "common/volume/warp/warper.h"
+
+namespace telesplat::viewer {
+
+/// A complete frame and what it answers.
+struct BufferedFrame {
+  std::shared_ptr<const volume::VolumeFrame> frame;
+  ShownUpdate update;
+  uint64_t pixels = 0;  ///< that it holds
+};
+
+class SliceCache {
+ public:
+  /// in_order false (asynchronous): the newest frame is the one on display. true: frames wait in order until the display advances to them;
+  /// whoever puts them in takes care that they are not too many.
+  explicit SliceCache(bool in_order) : in_order_(in_order) {}
+
+  // ---- worker ----
+  void put(BufferedFrame frame);
+  /// Frees frames that are not on display any more and that no draw holds. To be called often.
+  void free_dropped();
+  /// In order: frames that have been displayed, or passed over, since the last call: they have left their buffers.
+  std::vector<FrameId> take_left();
+
+  // ---- display thread ----
+  /// The frame on display; frame.frame is null before the first.
+  BufferedFrame displayed() const;
+  /// In order: the frame of this request goes on display, those before it that still wait are passed over. No effect if none waits for it.
+  void advance(RequestId request);
+  /// The frame on display has been displayed.
+  void frame_done();
+
+  // ---- any thread ----
+  struct Figures {
+    uint64_t frames = 0;             ///< put in so far
+    uint64_t buffered = 0;           ///< waiting to be displayed
+    uint64_t pixels = 0, bytes = 0;  ///< held, the one on display included; memory of their pixels
+  };
+  Figures figures() const;
+
+ private:
+  void show(BufferedFrame frame);
+
+  const bool in_order_;
+  mutable std::mutex mutex_;
+  BufferedFrame displayed_;
+  std::deque<BufferedFrame> waiting_;
+  std::vector<std::shared_ptr<const volume::VolumeFrame>> dropped_;
+  std::vector<FrameId> left_;
+  bool counted_ = true;  // the one on display is in left_ already
+  uint64_t frames_ = 0;
+};
+
+}  // namespace telesplat::viewer

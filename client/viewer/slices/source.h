@@ -1,0 +1,28 @@
+// The display's source for volumes: warps the newest complete frame of slice images, or where the display waits the next one, into the view of now.
+#pragma once
+
+#include "client/viewer/display/display_loop.h"
+#include "client/viewer/display/view_source.h"
+#include "client/viewer/render/slices/renderer.h"
+
+namespace telesplat::viewer {
+
+class VolumeSource final : public ViewSource {
+ public:
+  /// background: 0x00RRGGBB.
+  VolumeSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache, uint32_t background)
+      : renderer_(std::move(renderer)), cache_(cache), background_(background) {}
+
+  void advance(RequestId request) override { cache_.advance(request); }
+  DrawnFrame draw(const FrameInput& input, image::View& view) override;
+  void displayed() override { cache_.frame_done(); }
+  const char* drawn_name() const override { return "samples"; }
+  const char* cached_name() const override { return " pixels"; }
+
+ private:
+  std::unique_ptr<VolumeRenderer> renderer_;
+  SliceCache& cache_;
+  uint32_t background_;
+};
+
+}  // namespace telesplat::viewer

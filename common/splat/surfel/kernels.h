@@ -1,0 +1,51 @@
+// The kernels `ellipse` and `ewa` inside one tile, on the widest vectors the machine has (Highway, chosen at run time). Every target
+// computes the same pixels: those of the plain functions in surfel_contour.h, surfel_splat.h and ewa_shading.h.
+#pragma once
+
+#include <hwy/aligned_allocator.h>
+
+#include <cstddef>
+
+#include "common/splat/ewa/shading.h"
+#include "common/splat/splat_kernels.h"
+#include "common/splat/surfel/splat.h"
+
+namespace telesplat::splat {
+
+/// What of a view these kernels need beside TileInput.
+struct SurfelInput {
+  SurfelCamera camera;
+  const SurfelSource* sources = nullptr;  ///< one an item
+  SpacingLimits limits{};
+  float widest = 0;  ///< widest_contour(camera)
+};
+
+/// No splat touches pixels farther from its projected centre than growth * SurfelInput::widest * radius over depth + least_px, nor farther
+/// than kMaxSplatSide. growth: of S; least_px: the low-pass, and a pixel.
+struct SurfelReach {
+  float growth, least_px;
+};
+inline constexpr SurfelReach kEllipseReach{1.0f, 1.5f}, kEwaReach{1.6f, 2.0f};
+static_assert(kEwaReach.growth * kEwaReach.growth >= kSupportGrowth);
+
+/// Splats ellipses into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h). One pass.
+TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, const KeyBuffer& buffer);
+
+/// What ewa keeps of a tile beside its pixels: 36 bytes a pixel, and its splats between its passes. One a thread, kept from tile to tile.
+/// `width` x `height` pixels are empty, nothing visible and sums 0, between tiles; splats hang over to the right and below.
+struct EwaBuffer {
+  /// Splats kept between the passes; a tile with more meets its points twice. 72 bytes each.
+  static constexpr size_t kRecordSplats = 32768;
+  hwy::AlignedFreeUniquePtr<float[]> visible;  ///< least depth code of the opaque ellipses
+  hwy::AlignedFreeUniquePtr<float[]> sums;     ///< 8 a pixel: EwaSum
+  hwy::AlignedFreeUniquePtr<std::byte[]> record;
+  int width = 0, height = 0, stride = 0;
+  size_t pixels = 0;  ///< that there is room for
+};
+
+/// Splats `input.rect`, which is the tile and `reach` pixels around it, in two passes and writes it as shaded colours and infos. What lies
+/// within kFinishSlack to the right of that may change too. Depth codes carry no bias. background: 0x00RRGGBB, of empty pixels.
+TileCounts ewa_tile(const TileInput& input, const SurfelInput& surfels, const EwaLight& light, EwaBuffer& buffer,
+                    const ResolvedTile& tile, int reach, uint32_t background);
+
+}  // namespace telesplat::splat

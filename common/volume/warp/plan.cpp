@@ -1,0 +1,199 @@
+#include "common/volume/warp/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/matrix.hpp>
+
+namespace telesplat::volume {
+namespace {
+
+static_assert(kWarpSolid == static_cast<int>(static_cast<float>(kWarpOpaque) * (1 - kSolid)));
+static_assert((kMaxRasterSide + 3) * kWarpSubtexels < static_cast<int>(kWarpMagic));
+
+int64_t floor_to(int64_t value, int64_t step) {
+  const int64_t rest = value % step;
+  return value - (rest < 0 ? rest + step : rest);
+}
+
+// A pixel's corner at whole lattice numbers: what to_texel is made from.
+geometry::Camera of_lattice(const geometry::Camera& camera, const PixelLattice& across, const PixelLattice& down) {
+  geometry::Camera out = camera;
+  out.width = out.height = 1;
+  out.left = across.offset * across.pitch;
+  out.right = out.left + across.pitch;
+  out.top = -down.offset * down.pitch;
+  out.bottom = out.top - down.pitch;
+  return out;
+}
+
+struct Range {
+  float lo = INFINITY, hi = -INFINITY;
+  void extend(float v) { lo = std::min(lo, v), hi = std::max(hi, v); }
+};
+
+}  // namespace
+
+PixelLattice PixelLattice::make(double lo, double hi, int pixels) {
+  PixelLattice out;
+  int exponent = 0;
+  const double mantissa = std::frexp((hi - lo) / pixels, &exponent);
+  out.pitch = std::ldexp(std::nearbyint(std::ldexp(mantissa, 36)), exponent - 36);
+  // Whole and half numbers are the usual ones: what splits numbers from offsets lies away from both.
+  const double at = std::nearbyint(lo / out.pitch * 4096) / 4096;
+  out.first = static_cast<int64_t>(std::floor(at + 0.3));
+  out.offset = at - static_cast<double>(out.first);
+  return out;
+}
+
+std::vector<PlacedLayer> place_layers(const VolumeFrame& frame, const geometry::Camera& camera) {
+  std::vector<PlacedLayer> out;
+  const glm::dvec3 eye = frame.grid.room_to_index() * glm::dvec4(camera.pose.position_room, 1);
+  for (const int i : front_to_back(frame, eye)) {
+    const LayerImage& image = frame.layers[static_cast<size_t>(i)];
+    const double plane = frame.shear.layers[static_cast<size_t>(image.layer)].plane;
+    const auto to_raster = warp(frame.grid, frame.shear, plane, camera);
+    if (!to_raster) continue;
+    // Raster pixel (rect.x, rect.y) has its centre at + 0.5 and is texel (1, 1).
+    glm::dmat3 rows = glm::transpose(*to_raster);
+    rows[0] += (0.5 - image.rect.x) * rows[2];
+    rows[1] += (0.5 - image.rect.y) * rows[2];
+    out.push_back({&image, rows, std::abs(plane - eye[frame.shear.axis])});
+  }
+  return out;
+}
+
+WarpPlan::WarpPlan(const VolumeFrame& frame, const geometry::Camera& camera)
+    : across_(PixelLattice::make(camera.left, camera.right, camera.width)),
+      down_(PixelLattice::make(-camera.top, -camera.bottom, camera.height)),
+      width_(camera.width),
+      height_(camera.height) {
+  const auto tiles = [](int64_t first, int pixels, int64_t side) {
+    return static_cast<int>((first + pixels - 1 - floor_to(first, side)) / side + 1);
+  };
+  tiles_x_ = tiles(across_.first, width_, kWarpTileWidth);
+  tiles_y_ = tiles(down_.first, height_, kWarpTileHeight);
+  layers_ = place_layers(frame, of_lattice(camera, across_, down_));
+}
+
+geometry::Rect WarpPlan::rect(int tx, int ty) const {
+  const auto x0 =
+      static_cast<int>(floor_to(across_.first, kWarpTileWidth) + int64_t{tx} * kWarpTileWidth - across_.first);
+  const auto y0 =
+      static_cast<int>(floor_to(down_.first, kWarpTileHeight) + int64_t{ty} * kWarpTileHeight - down_.first);
+  const int left = std::max(x0, 0), top = std::max(y0, 0);
+  return {left, top, std::min(x0 + kWarpTileWidth, width_) - left, std::min(y0 + kWarpTileHeight, height_) - top};
+}
+
+bool WarpPlan::place(const PlacedLayer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile,
+                     WarpLayer& out) const {
+  const LayerImage& image = *layer.image;
+  constexpr double w = kWarpTileWidth, h = kWarpTileHeight;
+  const auto at = [&](int row, double px, double py) {
+    return glm::dot(layer.to_texel[row], glm::dvec3(static_cast<double>(x) + px, static_cast<double>(y) + py, 1));
+  };
+  double nearest = INFINITY, farthest = -INFINITY;
+  for (const auto& [px, py] : {std::pair{0.0, 0.0}, {w, 0.0}, {0.0, h}, {w, h}}) {
+    nearest = std::min(nearest, at(2, px, py));
+    farthest = std::max(farthest, at(2, px, py));
+  }
+  if (!(farthest > 0)) return false;
+  const bool whole = nearest > farthest * 1e-3;  // else the plane's horizon goes through the tile, or nearly
+  const double last_x = image.rect.width + 1, last_y = image.rect.height + 1;
+  // W is scaled to at most 1, X and Y counted from the texel in the tile's middle.
+  const double scale = 1 / farthest;
+  glm::dvec3 rows[3] = {layer.to_texel[0] * scale, layer.to_texel[1] * scale, layer.to_texel[2] * scale};
+  double middle_x = 0, middle_y = 0;
+  if (whole) {
+    const double middle_w = at(2, w / 2, h / 2);
+    middle_x = std::clamp(std::floor(at(0, w / 2, h / 2) / middle_w), 0.0, last_x);
+    middle_y = std::clamp(std::floor(at(1, w / 2, h / 2) / middle_w), 0.0, last_y);
+  }
+  rows[0] = (rows[0] - middle_x * rows[2]) * static_cast<double>(kWarpSubtexels);
+  rows[1] = (rows[1] - middle_y * rows[2]) * static_cast<double>(kWarpSubtexels);
+  // Pixel (0, 0) of the tile, at its centre.
+  const glm::dvec3 first(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, 1);
+  const auto f = [](double v) { return static_cast<float>(v); };
+  out = {.x0 = f(glm::dot(rows[0], first)),
+         .xx = f(rows[0].x),
+         .xy = f(rows[0].y),
+         .y0 = f(glm::dot(rows[1], first)),
+         .yx = f(rows[1].x),
+         .yy = f(rows[1].y),
+         .w0 = f(glm::dot(rows[2], first)),
+         .wx = f(rows[2].x),
+         .wy = f(rows[2].y),
+         .least_x = f(-middle_x * kWarpSubtexels),
+         .most_x = f((last_x - middle_x) * kWarpSubtexels),
+         .shift_x = f(middle_x * kWarpSubtexels) + kWarpMagic,
+         .least_y = f(-middle_y * kWarpSubtexels),
+         .most_y = f((last_y - middle_y) * kWarpSubtexels),
+         .shift_y = f(middle_y * kWarpSubtexels) + kWarpMagic,
+         .depth = f(layer.depth * scale),
+         .pitch = image.pitch,
+         .texels = image.texels.data()};
+  if (!whole) {
+    for (uint64_t& part : tile.parts) part |= bit;
+    return true;
+  }
+
+  // Corners of parts, in texels; a part's pixels lie between its corners' places, since W > 0.
+  constexpr int kCornersX = kWarpPartsX + 1, kCornersY = kWarpPartsY + 1;
+  float corner_x[kCornersY][kCornersX], corner_y[kCornersY][kCornersX];
+  Range range_x, range_y;
+  const auto corner = [&](int i, int j) {
+    const float px = static_cast<float>(i * kWarpPartWidth) - 0.5f, py = static_cast<float>(j * kWarpPartHeight) - 0.5f;
+    const float inverse = 1 / (out.w0 + py * out.wy + px * out.wx) / static_cast<float>(kWarpSubtexels);
+    corner_x[j][i] = (out.x0 + py * out.xy + px * out.xx) * inverse + f(middle_x);
+    corner_y[j][i] = (out.y0 + py * out.yy + px * out.yx) * inverse + f(middle_y);
+  };
+  // True if there may be anything; beyond the image there is nothing.
+  constexpr float kSlack = 0.02f;  // what floats may be off by, texels
+  const auto filled = [&](const Range& rx, const Range& ry) {
+    if (rx.hi + kSlack < 0 || ry.hi + kSlack < 0 || rx.lo - kSlack > f(last_x) || ry.lo - kSlack > f(last_y))
+      return false;
+    const auto cell = [](float v, float last) { return static_cast<int>(std::clamp(v, 0.0f, last)); };
+    return image.may_fill(cell(rx.lo - kSlack, f(last_x)), cell(ry.lo - kSlack, f(last_y)),
+                          cell(rx.hi + kSlack, f(last_x)) + 1, cell(ry.hi + kSlack, f(last_y)) + 1);
+  };
+  for (const int j : {0, kCornersY - 1})
+    for (const int i : {0, kCornersX - 1}) {
+      corner(i, j);
+      range_x.extend(corner_x[j][i]);
+      range_y.extend(corner_y[j][i]);
+    }
+  if (!filled(range_x, range_y)) return false;
+  for (int j = 0; j < kCornersY; ++j)
+    for (int i = 0; i < kCornersX; ++i) corner(i, j);
+  bool any = false;
+  for (int j = 0; j < kWarpPartsY; ++j)
+    for (int i = 0; i < kWarpPartsX; ++i) {
+      Range rx, ry;
+      for (int c = 0; c < 4; ++c) {
+        rx.extend(corner_x[j + c / 2][i + c % 2]);
+        ry.extend(corner_y[j + c / 2][i + c % 2]);
+      }
+      if (!filled(rx, ry)) continue;
+      tile.parts[static_cast<size_t>(j * kWarpPartsX + i)] |= bit;
+      any = true;
+    }
+  return any;
+}
+
+void WarpPlan::place(int tx, int ty, WarpTile& tile, std::vector<WarpLayer>& layers) const {
+  const int64_t x = floor_to(across_.first, kWarpTileWidth) + int64_t{tx} * kWarpTileWidth;
+  const int64_t y = floor_to(down_.first, kWarpTileHeight) + int64_t{ty} * kWarpTileHeight;
+  const geometry::Rect drawn = rect(tx, ty);
+  tile.x0 = static_cast<int>(drawn.x - (x - across_.first));
+  tile.y0 = static_cast<int>(drawn.y - (y - down_.first));
+  tile.x1 = tile.x0 + drawn.width;
+  tile.y1 = tile.y0 + drawn.height;
+  tile.parts.fill(0);
+  layers.clear();
+  for (const PlacedLayer& layer : layers_) {
+    WarpLayer placed;
+    if (place(layer, x, y, uint64_t{1} << layers.size(), tile, placed)) layers.push_back(placed);
+  }
+  tile.layers = layers.data();
+}
+
+}  // namespace telesplat::volume

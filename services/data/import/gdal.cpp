@@ -1,0 +1,160 @@
+#include <cpl_error.h>
+#include <fmt/format.h>
+#include <gdal.h>
+#include <ogr_srs_api.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "services/data/base/elevation.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr int kMaxSide = 1 << 18;
+
+struct Close {
+  void operator()(void* dataset) const { GDALClose(dataset); }
+};
+using Dataset = std::unique_ptr<void, Close>;
+
+Result<Dataset> open(const std::string& path, const char* what) {
+  Dataset dataset(GDALOpenEx(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, nullptr, nullptr, nullptr));
+  if (dataset) return dataset;
+  std::string why = CPLGetLastErrorMsg();
+  why = why.substr(0, std::min(why.find('\n'), size_t{200}));
+  return Error{fmt::format("{}: cannot be read as {}: {}", path, what, why.empty() ? "GDAL does not know it" : why)};
+}
+
+// Where pixels lie. In degrees, or in some unit of length.
+struct Placement {
+  double transform[6] = {0, 1, 0, 0, 0, -1};  // corner of pixel (c, r): x = t0 + c t1 + r t2, y = t3 + c t4 + r t5
+  bool georeferenced = false, degrees = false;
+  double metres = 1;  // a unit of length
+};
+
+Placement placement_of(GDALDatasetH dataset) {
+  Placement out;
+  if (GDALGetGeoTransform(dataset, out.transform) != CE_None) return {};
+  for (const double v : out.transform)
+    if (!std::isfinite(v)) return {};
+  if (out.transform[1] == 0 || out.transform[5] == 0) return {};
+  if (const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset)) {
+    out.georeferenced = true;
+    out.degrees = OSRIsGeographic(reference);
+    if (!out.degrees) out.metres = OSRGetLinearUnits(reference, nullptr);
+    if (!(out.metres > 0) || !std::isfinite(out.metres)) out.metres = 1;
+  } else {
+    // Without a reference system, but with coordinates that can only be degrees.
+    const double *t = out.transform, w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset);
+    out.degrees =
+        t[0] >= -180.1 && t[0] + w * t[1] <= 180.1 && t[3] <= 90.1 && t[3] + h * t[5] >= -90.1 && std::abs(t[1]) < 0.5;
+    out.georeferenced = out.degrees;
+  }
+  return out;
+}
+
+// The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the raster.
+Status drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
+  auto opened = open(path, "an image");
+  if (!opened) return opened.error();
+  const GDALDatasetH image = opened->get();
+  const int bands = GDALGetRasterCount(image), w = GDALGetRasterXSize(image), h = GDALGetRasterYSize(image);
+  if (bands < 1 || w < 1 || h < 1 || w > kMaxSide || h > kMaxSide)
+    return Error{fmt::format("{}: {} bands of {} x {} pixels, limit {}", path, bands, w, h, kMaxSide)};
+  // No finer than the raster can show: at most twice its samples on each axis.
+  const int tw = std::min(w, 2 * raster.width), th = std::min(h, 2 * raster.height);
+  std::vector<uint8_t> texels(size_t(3) * size_t(tw) * size_t(th));
+  for (int c = 0; c < 3; ++c) {
+    const GDALRasterBandH band = GDALGetRasterBand(image, std::min(c, bands - 1) + 1);
+    if (GDALGetRasterDataType(band) != GDT_Byte)
+      return Error{fmt::format("{}: has {} channels, only 8-bit ones can be draped", path,
+                               GDALGetDataTypeName(GDALGetRasterDataType(band)))};
+    if (GDALRasterIO(band, GF_Read, 0, 0, w, h, texels.data() + c, tw, th, GDT_Byte, 3, 3 * tw) != CE_None)
+      return Error{fmt::format("{}: cannot be read: {}", path, CPLGetLastErrorMsg())};
+  }
+  const Placement of = placement_of(image);
+  const bool by_place = of.georeferenced && at.georeferenced && of.degrees == at.degrees;
+  raster.colours.resize(raster.heights.size());
+  for (int y = 0; y < raster.height; ++y)
+    for (int x = 0; x < raster.width; ++x) {
+      const double column = x * raster.step + 0.5, row = y * raster.step + 0.5;
+      double fx = column / full_width, fy = row / full_height;
+      if (by_place) {
+        const double* t = at.transform;
+        fx = (t[0] + column * t[1] - of.transform[0]) / (of.transform[1] * w);
+        fy = (t[3] + row * t[5] - of.transform[3]) / (of.transform[5] * h);
+      }
+      const auto i = size_t(std::clamp(int(fx * tw), 0, tw - 1)), j = size_t(std::clamp(int(fy * th), 0, th - 1));
+      const uint8_t* texel = &texels[3 * (j * size_t(tw) + i)];
+      const bool inside = fx >= 0 && fx < 1 && fy >= 0 && fy < 1;
+      raster.colours[size_t(y) * size_t(raster.width) + size_t(x)] =
+          inside ? pack_rgb(texel[0], texel[1], texel[2]) : kNeutralAlbedo;
+    }
+  return ok_status();
+}
+
+}  // namespace
+
+Result<ElevationRaster> read_elevation(const std::string& path, const std::string& texture) {
+  CPLSetErrorHandler(CPLQuietErrorHandler);
+  GDALAllRegister();
+  auto opened = open(path, "an elevation raster");
+  if (!opened) return opened.error();
+  const GDALDatasetH dataset = opened->get();
+  const int w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset), bands = GDALGetRasterCount(dataset);
+  if (bands != 1)
+    return Error{fmt::format("{}: has {} bands: a picture, not an elevation raster, which has one", path, bands)};
+  if (w < 2 || h < 2 || w > kMaxSide || h > kMaxSide)
+    return Error{fmt::format("{}: a raster of {} x {} samples, limits 2 and {}", path, w, h, kMaxSide)};
+  const GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
+  if (GDALDataTypeIsComplex(GDALGetRasterDataType(band)))
+    return Error{fmt::format("{}: has complex samples, not heights", path)};
+  if (GDALGetRasterDataType(band) == GDT_Byte && GDALGetRasterColorTable(band))
+    return Error{fmt::format("{}: has a palette: a picture, not an elevation raster", path)};
+
+  ElevationRaster out;
+  while (int64_t{(w + out.step - 1) / out.step} * ((h + out.step - 1) / out.step) > kMaxRasterSamples) ++out.step;
+  out.width = (w + out.step - 1) / out.step;
+  out.height = (h + out.step - 1) / out.step;
+  out.heights.resize(size_t(out.width) * size_t(out.height));
+  std::vector<float> row(size_t(w), 0.0f);
+  int has_none = 0, has_scale = 0, has_offset = 0;
+  const double none = GDALGetRasterNoDataValue(band, &has_none);
+  const double scale = GDALGetRasterScale(band, &has_scale), offset = GDALGetRasterOffset(band, &has_offset);
+  for (int y = 0; y < out.height; ++y) {
+    if (GDALRasterIO(band, GF_Read, 0, y * out.step, w, 1, row.data(), w, 1, GDT_Float32, 0, 0) != CE_None)
+      return Error{fmt::format("{}: row {} of {} cannot be read: {}", path, y * out.step, h, CPLGetLastErrorMsg())};
+    for (int x = 0; x < out.width; ++x) {
+      float v = row[size_t(x) * size_t(out.step)];
+      // -32768 and -9999 are what void samples usually have, said or not.
+      const bool no_data =
+          !std::isfinite(v) || (has_none && v == float(none)) || v == -32768.0f || v == -9999.0f || std::abs(v) > 1e9f;
+      if (!no_data && has_scale) v *= float(scale);
+      if (!no_data && has_offset) v += float(offset);
+      out.heights[size_t(y) * size_t(out.width) + size_t(x)] = no_data ? std::numeric_limits<float>::quiet_NaN() : v;
+    }
+  }
+
+  const Placement at = placement_of(dataset);
+  const double* t = at.transform;
+  double east = at.metres, north = at.metres;  // metres a unit
+  if (at.degrees) {
+    const double latitude = (t[3] + t[5] * h / 2) * kPi / 180;
+    east = 111'320 * std::max(std::cos(latitude), 0.01);
+    north = 110'574;
+  }
+  out.georeferenced = at.georeferenced;
+  out.dx = std::abs(t[1]) * east * out.step;
+  out.dy = std::abs(t[5]) * north * out.step;
+  out.x0 = t[0] * east;
+  out.y0 = t[3] * north;
+  if (!texture.empty())
+    if (const Status s = drape(texture, at, w, h, out); !s) return s.error();
+  return out;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,106 @@
+// telesplat-import FORMAT FILE: reads a mesh, raster or volume file with VTK or GDAL and leaves it on standard output for the process that asked
+// (import_process.cpp; volumes: vtk_volume_reader.cpp). A program of its own so that neither a crash of VTK, nor its messages, nor the time that its libraries take to load reach anyone.
+#include <fmt/format.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <new>
+
+#include "services/data/base/elevation.h"
+#include "services/data/import/report.h"
+#include "services/data/import/vtk_import.h"
+#include "services/data/import/vtk_volume.h"
+#include "services/data/mesh/isosurface.h"
+#include "services/data/volume/formats/import_stream.h"
+
+namespace {
+
+// A hostile file must not keep us for ever.
+void limit_time(uint64_t bytes) { alarm(static_cast<unsigned>(60 + bytes / 1'000'000)); }
+
+// A reader may take what this process has mapped already, a gigabyte, and `more`. Sanitizers map terabytes of shadow, so there the limit is
+// left out.
+void limit_memory(uint64_t more) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t bytes = pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + (uint64_t{1} << 30) + more;
+  const rlimit limit{bytes, bytes};
+  setrlimit(RLIMIT_AS, &limit);
+#else
+  static_cast<void>(more);
+#endif
+}
+
+telesplat::Result<telesplat::data::Mesh> import_elevation(const std::string& path, double z_scale,
+                                                          const std::string& texture) {
+  const auto raster = telesplat::data::read_elevation(path, texture);
+  if (!raster) return raster.error();
+  return telesplat::data::elevation_mesh(*raster, {z_scale, texture}, path);
+}
+
+bool import_volume(int out, const std::string& path, uint64_t file_bytes) {
+  namespace data = telesplat::data;
+  const auto header = data::read_volume_header(path, "");
+  if (!header) return data::send_error(out, header.error().text);
+  // The voxels, of any type, twice more while they are unpacked or turned; the packed file.
+  const uint64_t bytes = header->voxels() * 8;
+  limit_time(file_bytes + bytes / 10);
+  limit_memory(3 * bytes + 2 * file_bytes);
+  try {
+    const auto volume =
+        data::read_vtk_volume(*header, path, [&](double fraction) { data::send_progress(out, fraction); });
+    if (!volume) return data::send_error(out, volume.error().text);
+    return data::send_volume(out, volume->header, volume->image->GetScalarPointer());
+  } catch (const std::bad_alloc&) {
+    return data::send_error(out, fmt::format("{}: takes more memory than its {} x {} x {} voxels can need", path,
+                                             header->size[0], header->size[1], header->size[2]));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3 && argc != 5) {
+    std::fputs(
+        "usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n"
+        "       telesplat-import nifti|vti FILE      (standard output: import_stream.h)\n"
+        "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
+        "       telesplat-import iso NAME            (standard input: isosurface.h)\n",
+        stderr);
+    return 2;
+  }
+  const std::string format = argv[1], path = argv[2];
+  struct stat status {};
+  if (format == "iso")
+    fstat(STDIN_FILENO, &status);
+  else
+    stat(path.c_str(), &status);
+  const auto file_bytes = static_cast<uint64_t>(status.st_size);
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody waits any more
+  const int out = dup(STDOUT_FILENO);
+  dup2(STDERR_FILENO, STDOUT_FILENO);  // whatever VTK prints must not get between
+  try {
+    if (telesplat::data::reads_with_vtk(format)) return import_volume(out, path, file_bytes) ? 0 : 1;
+    limit_time(file_bytes);
+    limit_memory(100 * file_bytes);
+    const auto mesh = argc == 5         ? import_elevation(path, std::atof(argv[3]), argv[4])
+                      : format == "iso" ? telesplat::data::flying_edges(STDIN_FILENO, path)
+                                        : telesplat::data::import_with_vtk(path, format);
+    return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
+  } catch (const std::bad_alloc&) {
+    const telesplat::Error error{
+        fmt::format("{}: claims more data than a file of {} bytes can hold", path, file_bytes)};
+    return telesplat::data::write_import_report(out, error) ? 0 : 1;
+  } catch (...) {
+    return 1;
+  }
+}

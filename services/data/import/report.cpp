@@ -1,0 +1,84 @@
+#include "services/data/import/report.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "services/data/base/mapped_file.h"
+
+namespace telesplat::data {
+namespace {
+
+// At the start of the file; then follow the error's text or the mesh's arrays.
+struct Report {
+  uint64_t text_bytes = 0;  // of an error; 0: a mesh follows
+  uint64_t vertices = 0, triangles = 0, degenerate = 0;
+  uint32_t normals = 0, colours = 0;
+};
+
+bool write_all(int descriptor, const void* data, size_t bytes) {
+  const char* p = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t n = write(descriptor, p, std::min(bytes, size_t{1} << 30));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    p += n, bytes -= static_cast<size_t>(n);
+  }
+  return true;
+}
+
+template <class T>
+bool take(std::span<const std::byte>& bytes, uint64_t count, std::vector<T>& out) {
+  if (count > bytes.size() / sizeof(T)) return false;
+  out.resize(count);
+  if (count > 0) std::memcpy(out.data(), bytes.data(), count * sizeof(T));
+  bytes = bytes.subspan(count * sizeof(T));
+  return true;
+}
+
+}  // namespace
+
+bool write_import_report(int descriptor, const Result<Mesh>& result) {
+  Report report;
+  if (!result) {
+    const std::string& text = result.error().text;
+    report.text_bytes = text.size();
+    return write_all(descriptor, &report, sizeof report) && write_all(descriptor, text.data(), text.size());
+  }
+  const Mesh& mesh = *result;
+  report = {0,
+            mesh.positions.size(),
+            mesh.indices.size() / 3,
+            mesh.degenerate_dropped,
+            !mesh.normals.empty(),
+            !mesh.colours.empty()};
+  const auto put = [&](const auto& array) {
+    return write_all(descriptor, array.data(), array.size() * sizeof(array[0]));
+  };
+  return write_all(descriptor, &report, sizeof report) && put(mesh.positions) && put(mesh.normals) &&
+         put(mesh.colours) && put(mesh.indices);
+}
+
+Result<Mesh> read_import_report(int descriptor, const std::string& path, const std::string& format) {
+  const auto mapped = MappedFile::map(descriptor, path);
+  const Error incomplete{fmt::format("{}: what {} left of it is incomplete", path, kImportProgram)};
+  if (!mapped || (*mapped)->bytes().size() < sizeof(Report)) return incomplete;
+  Report report;
+  std::memcpy(&report, (*mapped)->bytes().data(), sizeof report);
+  auto rest = (*mapped)->bytes().subspan(sizeof report);
+  if (report.text_bytes > 0) return Error{std::string((*mapped)->text().substr(sizeof report, report.text_bytes))};
+  Mesh mesh;
+  mesh.format = format;
+  mesh.degenerate_dropped = report.degenerate;
+  const bool whole = take(rest, report.vertices, mesh.positions) &&
+                     take(rest, report.normals ? report.vertices : 0, mesh.normals) &&
+                     take(rest, report.colours ? report.vertices : 0, mesh.colours) &&
+                     report.triangles <= kMaxTriangles && take(rest, 3 * report.triangles, mesh.indices);
+  if (!whole) return incomplete;
+  return mesh;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,228 @@
+#include "services/data/import/vtk_import.h"
+
+#include <fmt/format.h>
+#include <vtkCellArray.h>
+#include <vtkCellArrayIterator.h>
+#include <vtkCompositeDataIterator.h>
+#include <vtkDataArray.h>
+#include <vtkFieldData.h>
+#include <vtkGLTFReader.h>
+#include <vtkImageData.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkPolyDataReader.h>
+#include <vtkSmartPointer.h>
+#include <vtkStringOutputWindow.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkXMLPolyDataReader.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "services/data/import/vtk_complaint.h"
+
+namespace telesplat::data {
+namespace {
+
+using Linear = std::array<double, 3>;  // linear light, 0..1
+
+double to_linear(double srgb) { return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4); }
+uint32_t to_srgb8(double linear) {
+  const double c = std::clamp(linear, 0.0, 1.0);  // NaN becomes 0 below
+  const double v = c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
+  return v > 0 ? static_cast<uint32_t>(v * 255 + 0.5) : 0;
+}
+uint32_t to_rgb(const Linear& c) { return pack_rgb(to_srgb8(c[0]), to_srgb8(c[1]), to_srgb8(c[2])); }
+
+// A point data array that holds colours, or null.
+vtkDataArray* find_colours(vtkPointData* data) {
+  vtkDataArray* scalars = data->GetScalars();
+  const auto fits = [](vtkDataArray* a) {
+    return a && (a->GetNumberOfComponents() == 3 || a->GetNumberOfComponents() == 4);
+  };
+  if (fits(scalars) && scalars->GetDataType() == VTK_UNSIGNED_CHAR) return scalars;
+  for (const char* name :
+       {"RGB", "RGBA", "rgb", "rgba", "Color", "color", "Colors", "colors", "Colours", "colours", "COLOR_0", "color_0"})
+    if (vtkDataArray* array = data->GetArray(name); fits(array)) return array;
+  return nullptr;
+}
+
+// What a channel must be multiplied with to lie in 0..1.
+double channel_scale(vtkDataArray* colours) {
+  switch (colours->GetDataType()) {
+    case VTK_UNSIGNED_CHAR:
+      return 1 / 255.0;
+    case VTK_UNSIGNED_SHORT:
+      return 1 / 65535.0;
+    default:
+      return colours->GetMaxNorm() > 2.0 ? 1 / 255.0
+                                         : 1.0;  // of three fractions, the norm is at most 1.73 (with alpha, 2)
+  }
+}
+
+// The glTF material of a block, from the field data that vtkGLTFReader leaves.
+struct Material {
+  Linear factor{1, 1, 1};
+  vtkImageData* texture = nullptr;
+
+  Material(vtkPolyData* block, vtkGLTFReader& reader) {
+    vtkFieldData* fields = block->GetFieldData();
+    if (vtkDataArray* a = fields->GetArray("BaseColorMultiplier");
+        a && a->GetNumberOfComponents() >= 3 && a->GetNumberOfTuples() > 0)
+      for (int k = 0; k < 3; ++k) factor[k] = a->GetComponent(0, k);
+    vtkDataArray* index = fields->GetArray("BaseColorTextureIndex");
+    if (!index || index->GetNumberOfTuples() == 0) return;
+    const auto i = static_cast<vtkIdType>(index->GetTuple1(0));
+    if (i < 0 || i >= reader.GetNumberOfTextures()) return;
+    const auto found = reader.GetGLTFTexture(i);
+    if (found.Image && found.Image->GetScalarType() == VTK_UNSIGNED_CHAR &&
+        found.Image->GetNumberOfScalarComponents() >= 3)
+      texture = found.Image;
+  }
+
+  // Repeats in both directions, as glTF does unless told otherwise; nearest texel.
+  Linear sample(double u, double v) const {
+    if (!texture || !std::isfinite(u) || !std::isfinite(v)) return {1, 1, 1};
+    int size[3];
+    texture->GetDimensions(size);
+    const auto texel = [](double t, int n) { return std::min(static_cast<int>((t - std::floor(t)) * n), n - 1); };
+    const auto* p =
+        static_cast<const unsigned char*>(texture->GetScalarPointer(texel(u, size[0]), texel(v, size[1]), 0));
+    if (!p) return {1, 1, 1};
+    return {to_linear(p[0] / 255.0), to_linear(p[1] / 255.0), to_linear(p[2] / 255.0)};
+  }
+};
+
+class Collector {
+ public:
+  explicit Collector(const std::string& format) { mesh_.format = format; }
+
+  void add(vtkPolyData* block, const Material* material) {
+    const auto base = static_cast<uint32_t>(mesh_.positions.size());
+    const vtkIdType points = block->GetNumberOfPoints();
+    if (points <= 0 || static_cast<uint64_t>(points) + base > kMaxVertices) return;
+    mesh_.positions.reserve(base + static_cast<size_t>(points));
+    for (vtkIdType i = 0; i < points; ++i) {
+      double p[3];
+      block->GetPoint(i, p);
+      mesh_.positions.emplace_back(p[0], p[1], p[2]);
+    }
+    add_normals(block->GetPointData()->GetNormals(), points);
+    add_colours(block, material);
+    add_cells(block->GetPolys(), base, points, false);
+    add_cells(block->GetStrips(), base, points, true);
+  }
+
+  Mesh finish() {
+    if (!any_normals_) mesh_.normals = {};
+    if (!any_colours_) mesh_.colours = {};
+    return std::move(mesh_);
+  }
+
+ private:
+  void add_normals(vtkDataArray* normals, vtkIdType points) {
+    const bool fits = normals && normals->GetNumberOfComponents() == 3 && normals->GetNumberOfTuples() == points;
+    any_normals_ |= fits;
+    for (vtkIdType i = 0; i < points; ++i) {
+      double n[3] = {};
+      if (fits) normals->GetTuple(i, n);
+      mesh_.normals.emplace_back(n[0], n[1], n[2]);
+    }
+  }
+
+  void add_colours(vtkPolyData* block, const Material* material) {
+    const vtkIdType points = block->GetNumberOfPoints();
+    vtkDataArray* colours = find_colours(block->GetPointData());
+    if (colours && colours->GetNumberOfTuples() != points) colours = nullptr;
+    vtkDataArray* uv = block->GetPointData()->GetTCoords();
+    if (uv && (uv->GetNumberOfTuples() != points || uv->GetNumberOfComponents() < 2)) uv = nullptr;
+    const bool tinted = material && (material->texture || material->factor != Linear{1, 1, 1});
+    any_colours_ |= colours || tinted;
+    const double scale = colours ? channel_scale(colours) : 0;
+    for (vtkIdType i = 0; i < points; ++i) {
+      if (!colours && !tinted) {
+        mesh_.colours.push_back(kNeutralAlbedo);
+        continue;
+      }
+      Linear c{1, 1, 1};
+      // glTF says that its vertex colours are linear; everyone else's are what the screen shall show.
+      if (colours)
+        for (int k = 0; k < 3; ++k)
+          c[k] = colours->GetComponent(i, k) * scale, c[k] = material ? c[k] : to_linear(c[k]);
+      if (material) {
+        const Linear texel = uv ? material->sample(uv->GetComponent(i, 0), uv->GetComponent(i, 1)) : Linear{1, 1, 1};
+        for (int k = 0; k < 3; ++k) c[k] *= material->factor[k] * texel[k];
+      }
+      mesh_.colours.push_back(to_rgb(c));
+    }
+  }
+
+  // Polygons as fans, strips with alternating orientation. An index that is out of range stays so, for validate_mesh to name.
+  void add_cells(vtkCellArray* cells, uint32_t base, vtkIdType points, bool strips) {
+    if (!cells) return;
+    const auto corner = [&](vtkIdType i) {
+      return i >= 0 && i < points ? base + static_cast<uint32_t>(i) : ~uint32_t{0};
+    };
+    const auto iterator = vtk::TakeSmartPointer(cells->NewIterator());
+    for (iterator->GoToFirstCell(); !iterator->IsDoneWithTraversal(); iterator->GoToNextCell()) {
+      vtkIdType count = 0;
+      const vtkIdType* ids = nullptr;
+      iterator->GetCurrentCell(count, ids);
+      if (count < 3) ++mesh_.degenerate_dropped;
+      for (vtkIdType k = 2; k < count; ++k) {
+        const bool odd = strips && k % 2 == 1;
+        const vtkIdType a = strips ? ids[k - 2] : ids[0];
+        mesh_.indices.insert(mesh_.indices.end(),
+                             {corner(a), corner(ids[odd ? k : k - 1]), corner(ids[odd ? k - 1 : k])});
+      }
+    }
+  }
+
+  Mesh mesh_;
+  bool any_normals_ = false, any_colours_ = false;
+};
+
+template <class Reader>
+void read_poly_data(const std::string& path, Collector& collector) {
+  vtkNew<Reader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  if (reader->GetOutput()) collector.add(reader->GetOutput(), nullptr);
+}
+
+void read_gltf(const std::string& path, Collector& collector) {
+  vtkNew<vtkGLTFReader> reader;
+  reader->SetFileName(path.c_str());
+  reader->ApplyDeformationsToGeometryOn();
+  reader->Update();
+  auto* blocks = vtkMultiBlockDataSet::SafeDownCast(reader->GetOutputDataObject(0));
+  if (!blocks) return;
+  const auto iterator = vtk::TakeSmartPointer(blocks->NewIterator());
+  for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem())
+    if (auto* block = vtkPolyData::SafeDownCast(iterator->GetCurrentDataObject())) {
+      const Material material(block, *reader.GetPointer());
+      collector.add(block, &material);
+    }
+}
+
+}  // namespace
+
+Result<Mesh> import_with_vtk(const std::string& path, const std::string& format) {
+  vtkNew<vtkStringOutputWindow> output;
+  vtkOutputWindow::SetInstance(output);
+  Collector collector(format);
+  if (format == "gltf")
+    read_gltf(path, collector);
+  else if (format == "vtp")
+    read_poly_data<vtkXMLPolyDataReader>(path, collector);
+  else
+    read_poly_data<vtkPolyDataReader>(path, collector);
+  const std::string complaint = first_complaint(output->GetOutput());
+  if (!complaint.empty()) return Error{fmt::format("{}: {}", path, complaint)};
+  return collector.finish();
+}
+
+}  // namespace telesplat::data

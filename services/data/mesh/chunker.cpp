@@ -1,0 +1,142 @@
+#include "services/data/mesh/chunker.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "common/geometry/mesh_chunk.h"
+
+namespace telesplat::data {
+namespace {
+
+using geometry::Box;
+
+// A triangle by its centroid (times three).
+struct Item {
+  glm::vec3 centroid;
+  uint32_t triangle;
+};
+
+Item item_of(const PlacedMesh& mesh, uint32_t triangle) {
+  const uint32_t* t = &mesh.indices[3 * size_t{triangle}];
+  return {mesh.positions_room[t[0]] + mesh.positions_room[t[1]] + mesh.positions_room[t[2]], triangle};
+}
+
+Box box_of(std::span<const Item> items) {
+  Box box;
+  for (const Item& item : items) box.extend(item.centroid);
+  return box;
+}
+
+// Splits items[0..] into `parts` parts of equal size (to one triangle), recursively; starts.. receives where parts start.
+void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> starts) {
+  if (parts == 1) {
+    starts[0] = first;
+    return;
+  }
+  const glm::vec3 size = box_of(items).size();
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  const size_t left_parts = parts / 2, middle = items.size() * left_parts / parts;
+  // Ties by number, so that the result depends on the mesh alone.
+  std::nth_element(items.begin(), items.begin() + middle, items.end(), [axis](const Item& a, const Item& b) {
+    return a.centroid[axis] != b.centroid[axis] ? a.centroid[axis] < b.centroid[axis] : a.triangle < b.triangle;
+  });
+  tbb::parallel_invoke(
+      [&] { split(items.first(middle), first, left_parts, starts.first(left_parts)); },
+      [&] { split(items.subspan(middle), first + middle, parts - left_parts, starts.subspan(left_parts)); });
+}
+
+// Spreads the lower 10 bits, two zeros between each.
+uint32_t spread(uint32_t v) {
+  v = (v | v << 16) & 0x030000ff;
+  v = (v | v << 8) & 0x0300f00f;
+  v = (v | v << 4) & 0x030c30c3;
+  return (v | v << 2) & 0x09249249;
+}
+
+// The triangles along a Morton curve.
+std::vector<uint32_t> morton_order(const PlacedMesh& mesh, std::span<const uint32_t> triangles) {
+  Box box;
+  for (uint32_t t : triangles) box.extend(item_of(mesh, t).centroid);
+  const glm::vec3 size = box.size();
+  const float scale = 1023.0f / std::max({size.x, size.y, size.z, 1e-30f});
+  std::vector<uint64_t> keys;
+  keys.reserve(triangles.size());
+  for (uint32_t t : triangles) {
+    const glm::vec3 cell = glm::min((item_of(mesh, t).centroid - box.lo) * scale, glm::vec3(1023.0f));
+    const uint32_t code = spread(static_cast<uint32_t>(cell.x)) | spread(static_cast<uint32_t>(cell.y)) << 1 |
+                          spread(static_cast<uint32_t>(cell.z)) << 2;
+    keys.push_back(uint64_t{code} << 32 | t);
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<uint32_t> order(keys.size());
+  std::transform(keys.begin(), keys.end(), order.begin(), [](uint64_t key) { return static_cast<uint32_t>(key); });
+  return order;
+}
+
+// Gives each vertex of the whole mesh a number within the chunk, in the order of first use. An open hash table.
+class Renumbering {
+ public:
+  explicit Renumbering(size_t triangles) : table_(std::bit_ceil(std::max<size_t>(6 * triangles, 16)), kFree) {}
+
+  uint32_t operator()(uint32_t vertex) {
+    const size_t mask = table_.size() - 1;
+    for (size_t slot = (vertex * uint64_t{0x9e3779b97f4a7c15} >> 20) & mask;; slot = (slot + 1) & mask) {
+      if (table_[slot] == kFree) {
+        table_[slot] = static_cast<uint32_t>(used_.size());
+        used_.push_back(vertex);
+      }
+      if (used_[table_[slot]] == vertex) return table_[slot];
+    }
+  }
+  const std::vector<uint32_t>& used() const { return used_; }  ///< the vertex of the whole mesh behind each number
+
+ private:
+  static constexpr uint32_t kFree = ~uint32_t{0};
+  std::vector<uint32_t> table_, used_;
+};
+
+}  // namespace
+
+ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most) {
+  const size_t triangles = mesh.indices.size() / 3;
+  CHECK(triangles >= 1 && most >= 1);
+  std::vector<Item> items(triangles);
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, triangles, 1 << 16), [&](const auto& range) {
+    for (size_t t = range.begin(); t < range.end(); ++t) items[t] = item_of(mesh, static_cast<uint32_t>(t));
+  });
+  ChunkPlan plan;
+  const size_t parts = (triangles + most - 1) / most;
+  plan.begin.resize(parts + 1);
+  split(items, 0, parts, std::span(plan.begin).first(parts));
+  plan.begin[parts] = triangles;
+  plan.order.resize(triangles);
+  for (size_t i = 0; i < triangles; ++i) plan.order[i] = items[i].triangle;
+  return plan;
+}
+
+std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32_t> triangles) {
+  Renumbering number(triangles.size());
+  std::vector<uint32_t> indices;
+  indices.reserve(3 * triangles.size());
+  for (uint32_t t : morton_order(mesh, triangles))
+    for (int k = 0; k < 3; ++k) indices.push_back(number(mesh.indices[3 * size_t{t} + k]));
+  const std::vector<uint32_t>& used = number.used();
+  std::vector<float> positions;
+  positions.reserve(3 * used.size());
+  std::vector<uint32_t> normals, colours;
+  normals.reserve(used.size());
+  colours.reserve(used.size());
+  for (uint32_t v : used) {
+    const glm::vec3& p = mesh.positions_room[v];
+    positions.insert(positions.end(), {p.x, p.y, p.z});
+    normals.push_back(mesh.normals[v]);
+    colours.push_back(mesh.colours[v]);
+  }
+  return geometry::build_chunk(positions, normals, colours, indices);
+}
+
+}  // namespace telesplat::data

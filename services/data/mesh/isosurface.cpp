@@ -1,0 +1,54 @@
+#include "services/data/mesh/isosurface.h"
+
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+
+#include "services/data/import/process.h"
+
+namespace telesplat::data {
+namespace {
+
+bool write_all(int descriptor, const void* data, size_t bytes) {
+  const auto* at = static_cast<const std::byte*>(data);
+  while (bytes > 0) {
+    const ssize_t n = write(descriptor, at, std::min(bytes, size_t{1} << 30));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    at += n, bytes -= size_t(n);
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name) {
+  if (!std::isfinite(iso) || iso <= volume.lo || iso > volume.hi)
+    return Error{
+        fmt::format("{}: --iso {}: no surface there; its values are {} to {}", name, iso, volume.lo, volume.hi)};
+  for (const int n : volume.size)
+    if (n < 2)
+      return Error{fmt::format("{}: {} x {} x {} voxels are too flat for a surface", name, volume.size[0],
+                               volume.size[1], volume.size[2])};
+  VolumeHeader header;
+  for (size_t a = 0; a < 3; ++a) header.size[a] = volume.size[a];
+  header.type = int32_t(volume.type);
+  header.iso = (iso - volume.offset) / volume.scale;
+  std::memcpy(header.index_to_data, &volume.index_to_data[0][0], sizeof header.index_to_data);
+  const int input = memfd_create("telesplat-volume", MFD_CLOEXEC);
+  if (input < 0 || !write_all(input, &header, sizeof header) ||
+      !write_all(input, volume.stored.data(), volume.stored.size())) {
+    const int reason = errno;
+    if (input >= 0) close(input);
+    return Error{fmt::format("{}: no memory file for its voxels: {}", name, std::strerror(reason))};
+  }
+  auto mesh = import("VTK's surface", {"iso", name}, input);
+  close(input);
+  return mesh;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,127 @@
+#include "services/data/mesh/reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <new>
+
+#include "services/data/base/mapped_file.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr const char* kSupported =
+    "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTK (polygonal data), glTF and GLB, and elevation rasters "
+    "(GeoTIFF, HGT, 16-bit PNG)";
+
+std::string extension_of(const std::string& path) {
+  std::string out = std::filesystem::path(path).extension().string();
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return out;
+}
+
+bool is_one_of(const std::string& word, std::initializer_list<const char*> words) {
+  return std::any_of(words.begin(), words.end(), [&](const char* w) { return word == w; });
+}
+
+// Files that people may well take for meshes: what they are, in words.
+std::string other_kind(std::string_view content, const std::string& extension) {
+  using namespace std::string_view_literals;
+  if (content.starts_with("\xff\xd8\xff"sv)) return "a JPEG image";
+  if (content.starts_with("\x89PNG"sv)) return "a PNG image of 8-bit colours";
+  if (content.starts_with("NRRD") || content.starts_with("ObjectType = Image") ||
+      is_one_of(extension, {".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".raw", ".dcm", ".vti"}) ||
+      (content.size() > 132 && content.substr(128, 4) == "DICM"))
+    return "a volume";
+  if (content.starts_with("\x1f\x8b"sv) || content.starts_with("PK\3\4"sv) ||
+      content.starts_with("\xfd"
+                          "7zXZ"sv))
+    return "a compressed file (unpack it first)";
+  return "";
+}
+
+// Elevation rasters, by content or name: TIFF, PNG of 16 bits of grey, and formats without a signature.
+bool looks_like_raster(std::string_view content, const std::string& extension) {
+  using namespace std::string_view_literals;
+  if (content.starts_with("II*\0"sv) || content.starts_with("MM\0*"sv) || content.starts_with("II+\0"sv)) return true;
+  // Of a PNG the header chunk comes first: bit depth in byte 24, colour type (0: grey) in byte 25.
+  if (content.starts_with("\x89PNG"sv)) return content.size() > 26 && content[24] == 16 && content[25] == 0;
+  return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2"});
+}
+
+// Ascii STL starts with "solid", and so do some binary ones: their size gives them away.
+bool is_binary_stl(std::string_view content) {
+  if (content.size() < 84) return false;
+  uint32_t triangles;
+  std::copy_n(content.data() + 80, 4, reinterpret_cast<char*>(&triangles));
+  return content.size() == 84 + 50 * uint64_t{triangles};
+}
+
+// OBJ has no signature: the first line that is neither empty nor a comment starts with one of its words.
+bool looks_like_obj(std::string_view content) {
+  size_t at = 0;
+  while (at < content.size()) {
+    const size_t end = std::min(content.find('\n', at), content.size());
+    std::string_view line = content.substr(at, end - at);
+    while (!line.empty() && static_cast<unsigned char>(line.front()) <= ' ') line.remove_prefix(1);
+    if (!line.empty() && line.front() != '#') {
+      const std::string word(line.substr(0, std::min(line.find_first_of(" \t\r"), size_t{12})));
+      return is_one_of(word, {"v", "vn", "vt", "o", "g", "s", "mtllib", "usemtl", "f"});
+    }
+    at = end + 1;
+  }
+  return false;
+}
+
+}  // namespace
+
+DetectedFormat detect_format(std::string_view content, const std::string& path) {
+  const std::string extension = extension_of(path);
+  if (content.starts_with("ply\n") || content.starts_with("ply\r")) return {"ply", ""};
+  if (content.starts_with("glTF")) return {"gltf", ""};
+  if (content.starts_with("# vtk DataFile")) return {"vtk", ""};
+  if (const std::string_view start = content.substr(0, 1000); start.find("<VTKFile") != start.npos) {
+    if (start.find("type=\"PolyData\"") != start.npos) return {"vtp", ""};
+    return {"", fmt::format("is a VTK file, but not of polygonal data (type=\"PolyData\"); {}", kSupported)};
+  }
+  if (looks_like_raster(content, extension)) return {"raster", ""};
+  if (const std::string kind = other_kind(content, extension); !kind.empty())
+    return {"", fmt::format("is {}, not a mesh; {}", kind, kSupported)};
+  if (is_binary_stl(content)) return {"stl", ""};
+  for (const char* start : {"OFF", "COFF", "NOFF", "CNOFF", "STOFF", "STCOFF", "STNOFF", "STCNOFF"})
+    if (content.starts_with(start)) return {"off", ""};
+  if (content.starts_with("solid") && (extension == ".stl" || content.substr(0, 4096).find("facet") != content.npos))
+    return {"stl", ""};
+  // By name, where the content says nothing (or is broken, which the reader will say better).
+  if (is_one_of(extension, {".ply", ".off", ".stl", ".obj", ".vtp", ".vtk"})) return {extension.substr(1), ""};
+  if (is_one_of(extension, {".gltf", ".glb"})) return {"gltf", ""};
+  const std::string_view start = content.substr(0, 4096);
+  if (start.starts_with("{") && start.find("\"asset\"") != start.npos) return {"gltf", ""};
+  if (looks_like_obj(content)) return {"obj", ""};
+  return {"", fmt::format("is of no known format; {}", kSupported)};
+}
+
+Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  const std::string_view content = (*file)->text();
+  const DetectedFormat detected = detect_format(content, path);
+  if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
+  try {
+    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress)
+                : detected.format == "off"    ? read_off(content, path, progress)
+                : detected.format == "stl"    ? read_stl(content, path, progress)
+                : detected.format == "obj"    ? read_obj(content, path, progress)
+                : detected.format == "raster" ? read_with_gdal(path, elevation, progress)
+                                              : read_with_vtk(content, detected.format, path, progress);
+    if (!mesh) return mesh;
+    if (auto status = validate_mesh(*mesh, path); !status) return status.error();
+    return mesh;
+  } catch (const std::bad_alloc&) {
+    return Error{fmt::format("{}: this machine's memory does not suffice to read its {} bytes", path, content.size())};
+  }
+}
+
+}  // namespace telesplat::data

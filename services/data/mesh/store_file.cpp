@@ -1,0 +1,166 @@
+#include "services/data/mesh/store_file.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+
+namespace telesplat::data {
+namespace {
+
+constexpr size_t kPage = 4096;
+constexpr size_t round_up(size_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
+
+struct StoreHeader {
+  uint64_t magic = kStoreMagic;
+  uint32_t version = kStoreVersion;
+  uint32_t chunks = 0;
+  uint64_t file_bytes = 0;
+  uint64_t content_hash = 0;
+  uint64_t triangles = 0, vertices = 0, degenerate_dropped = 0;
+  uint32_t had_normals = 0, had_colours = 0;
+  double data_lo[3] = {}, data_hi[3] = {};
+  float room_lo[3] = {}, room_hi[3] = {};
+  char format[16] = {}, up[8] = {};
+  uint64_t checksum = 0;  ///< of all the above and the table of contents
+};
+static_assert(sizeof(StoreHeader) <= kPage);
+
+struct StoreEntry {
+  uint64_t offset = 0, bytes = 0, triangles = 0, checksum = 0;
+  float lo[3] = {}, hi[3] = {};
+};
+
+uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entries) {
+  const uint64_t seed = XXH3_64bits(&header, offsetof(StoreHeader, checksum));
+  return XXH3_64bits_withSeed(entries.data(), entries.size_bytes(), seed);
+}
+
+// Writes all of it; returns 0 or an errno.
+int write_at(int descriptor, const void* data, size_t bytes, size_t offset) {
+  const char* p = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t n = pwrite(descriptor, p, bytes, static_cast<off_t>(offset));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return n == 0 ? EIO : errno;
+    p += n, offset += static_cast<size_t>(n), bytes -= static_cast<size_t>(n);
+  }
+  return 0;
+}
+
+template <class Vec, class T>
+void put(const Vec& v, T (&out)[3]) {
+  for (int a = 0; a < 3; ++a) out[a] = v[a];
+}
+
+StoreHeader make_header(const MeshStoreInfo& info) {
+  StoreHeader h;
+  h.content_hash = info.content_hash;
+  h.triangles = info.triangles, h.vertices = info.vertices, h.degenerate_dropped = info.degenerate_dropped;
+  h.had_normals = info.had_normals, h.had_colours = info.had_colours;
+  put(info.box_data.lo, h.data_lo), put(info.box_data.hi, h.data_hi);
+  put(info.box_room.lo, h.room_lo), put(info.box_room.hi, h.room_hi);
+  std::strncpy(h.format, info.format.c_str(), sizeof h.format - 1);
+  std::strncpy(h.up, info.up.c_str(), sizeof h.up - 1);
+  return h;
+}
+
+MeshStoreInfo info_of(const StoreHeader& h) {
+  MeshStoreInfo info;
+  info.content_hash = h.content_hash;
+  info.triangles = h.triangles, info.vertices = h.vertices, info.degenerate_dropped = h.degenerate_dropped;
+  info.had_normals = h.had_normals != 0, info.had_colours = h.had_colours != 0;
+  info.box_data = {{h.data_lo[0], h.data_lo[1], h.data_lo[2]}, {h.data_hi[0], h.data_hi[1], h.data_hi[2]}};
+  info.box_room = {{h.room_lo[0], h.room_lo[1], h.room_lo[2]}, {h.room_hi[0], h.room_hi[1], h.room_hi[2]}};
+  info.format = std::string(h.format, strnlen(h.format, sizeof h.format));
+  info.up = std::string(h.up, strnlen(h.up, sizeof h.up));
+  return info;
+}
+
+}  // namespace
+
+Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
+                   const Progress& progress) {
+  progress("chunk", 0.0);
+  const ChunkPlan plan = plan_chunks(mesh);
+  if (plan.chunks() > geometry::kMaxChunks)
+    return Error{
+        fmt::format("{}: would be split into {} chunks, the limit is {}", name, plan.chunks(), geometry::kMaxChunks)};
+  progress("chunk", 1.0);
+  std::vector<StoreEntry> entries(plan.chunks());
+  std::atomic<size_t> end = kPage + round_up(entries.size() * sizeof(StoreEntry));
+  std::atomic<int> failure = 0;
+
+  // Batches, so that progress is told from this thread; a chunk takes its place in the file when its size is known.
+  constexpr size_t kBatch = 16;
+  for (size_t first = 0; first < plan.chunks() && failure == 0; first += kBatch) {
+    progress("write", static_cast<double>(first) / static_cast<double>(plan.chunks()));
+    tbb::parallel_for(first, std::min(first + kBatch, plan.chunks()), [&](size_t i) {
+      const auto triangles = std::span(plan.order).subspan(plan.begin[i], plan.begin[i + 1] - plan.begin[i]);
+      const std::vector<std::byte> bytes = make_chunk(mesh, triangles);
+      StoreEntry& entry = entries[i];
+      std::memcpy(entry.lo, bytes.data() + offsetof(geometry::ChunkHeader, lo), sizeof entry.lo + sizeof entry.hi);
+      entry.bytes = bytes.size();
+      entry.triangles = triangles.size();
+      entry.checksum = XXH3_64bits(bytes.data(), bytes.size());
+      entry.offset = end.fetch_add(round_up(bytes.size()));
+      if (const int error = write_at(descriptor, bytes.data(), bytes.size(), entry.offset)) failure = error;
+    });
+  }
+
+  StoreHeader header = make_header(info);
+  header.chunks = static_cast<uint32_t>(entries.size());
+  header.file_bytes = end;
+  header.checksum = checksum_of(header, entries);
+  if (failure == 0 && ftruncate(descriptor, static_cast<off_t>(header.file_bytes)) != 0) failure = errno;
+  if (failure == 0) failure = write_at(descriptor, entries.data(), entries.size() * sizeof(StoreEntry), kPage);
+  if (failure == 0) failure = write_at(descriptor, &header, sizeof header, 0);
+  if (failure != 0)
+    return Error{fmt::format("{}: chunk store of {} bytes cannot be written: {}", name, header.file_bytes,
+                             std::strerror(failure))};
+  progress("write", 1.0);
+  return ok_status();
+}
+
+Result<StoreContent> read_store(int descriptor, const std::string& name) {
+  auto mapped = MappedFile::map(descriptor, name);
+  if (!mapped) return mapped.error();
+  const auto bytes = (*mapped)->bytes();
+  StoreHeader header;
+  if (bytes.size() < kPage) return Error{fmt::format("{}: chunk store of {} bytes is truncated", name, bytes.size())};
+  std::memcpy(&header, bytes.data(), sizeof header);
+  if (header.magic != kStoreMagic || header.version != kStoreVersion)
+    return Error{fmt::format("{}: is no chunk store of version {}", name, kStoreVersion)};
+  if (header.file_bytes != bytes.size())
+    return Error{
+        fmt::format("{}: chunk store has {} bytes, its header says {}", name, bytes.size(), header.file_bytes)};
+  if (header.chunks == 0 || header.chunks > geometry::kMaxChunks ||
+      kPage + header.chunks * sizeof(StoreEntry) > bytes.size())
+    return Error{fmt::format("{}: chunk store claims {} chunks in {} bytes", name, header.chunks, bytes.size())};
+  const std::span entries(reinterpret_cast<const StoreEntry*>(bytes.data() + kPage), header.chunks);
+  if (checksum_of(header, entries) != header.checksum)
+    return Error{fmt::format("{}: chunk store's table of contents is damaged", name)};
+
+  StoreContent out{*mapped, info_of(header), {}, {}};
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const StoreEntry& e = entries[i];
+    if (e.offset % kPage != 0 || e.offset > bytes.size() || e.bytes > bytes.size() - e.offset)
+      return Error{fmt::format("{}: chunk {} lies outside its store", name, i)};
+    out.chunks.push_back(
+        {ChunkId{i}, {{e.lo[0], e.lo[1], e.lo[2]}, {e.hi[0], e.hi[1], e.hi[2]}}, e.triangles, e.bytes});
+    out.offsets.push_back(e.offset);
+  }
+  std::atomic<size_t> damaged = entries.size();
+  tbb::parallel_for(size_t{0}, entries.size(), [&](size_t i) {
+    if (XXH3_64bits(bytes.data() + entries[i].offset, entries[i].bytes) != entries[i].checksum) damaged = i;
+  });
+  if (damaged != entries.size())
+    return Error{fmt::format("{}: chunk {} of the store is damaged", name, damaged.load())};
+  return out;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,76 @@
+// What a data server of a volume does between its sockets: learns epochs, keeps requests that wait in order, answers the most urgent one.
+#pragma once
+
+#include <deque>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "common/wire/messages.h"
+#include "services/data/volume/store.h"
+
+namespace telesplat::data {
+
+inline constexpr size_t kEpochsKept = 8;
+inline constexpr size_t kRequestsAPeer = 8;      ///< that wait; a newer one replaces the peer's oldest
+inline constexpr size_t kRequestsWaiting = 512;  ///< of all peers
+inline constexpr int kSlicesAnAnswer = 64;
+inline constexpr uint64_t kVoxelsAnAnswer = 8u << 20;  ///< about 32 MB
+
+/// follow() and ask() are for the thread of the sockets, work() for another one.
+class VolumeAnswers {
+ public:
+  /// The store is used by work() alone.
+  explicit VolumeAnswers(VolumeStore& store);
+
+  /// Takes notice of a session. A new epoch's weights become due. Error: a session that is not this volume's.
+  Status follow(const wire::Welcome& welcome);
+
+  /// What is to be sent: VoxelData to a peer, SliceWeights (without `data`) to the master.
+  struct Reply {
+    std::string peer;  ///< empty: the master
+    std::string_view type;
+    std::string body;
+    uint64_t voxels = 0, bytes = 0;  ///< of VoxelData
+  };
+
+  /// Queues a request, or says at once that it cannot be answered (unknown epoch, slices of others, too many wait). Error: nonsense.
+  Result<std::optional<Reply>> ask(const std::string& peer, const wire::VoxelRequest& request);
+
+  bool has_work() const;
+  /// Does what is most urgent: weights first, then the request of the earliest round, of those the oldest. Nothing: there is nothing to do.
+  std::optional<Reply> work(InstanceId self);
+
+ private:
+  struct Epoch {
+    EpochId id;
+    int step = 0;
+    volume::LevelSet shown;
+    std::string transfer;
+    bool weights_due = true;
+  };
+  struct Waiting {
+    std::string peer;
+    EpochId epoch;
+    int step, begin, end;
+    uint64_t round;
+    volume::LevelSet have, shown;
+  };
+  const Epoch* epoch(EpochId id) const;  // precondition: mutex_ is held
+  std::optional<Reply> weigh(const Epoch& epoch, InstanceId self);
+  Reply answer(const Waiting& request);
+  double bytes_per_voxel(int step, const volume::LevelSet& shown, const std::vector<uint32_t>& weights);
+
+  VolumeStore& store_;
+  const volume::Session session_;
+  const int begin_, end_;  // this store's slices
+  mutable std::mutex mutex_;
+  InstanceId master_;
+  std::deque<Epoch> epochs_;         // newest last
+  std::list<Waiting> waiting_;       // in the order in which they came
+  uint64_t voxels_ = 0, bytes_ = 0;  // encoded so far
+};
+
+}  // namespace telesplat::data

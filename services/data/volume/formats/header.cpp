@@ -1,0 +1,258 @@
+#include "services/data/volume/formats/header.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include "common/volume/grid.h"
+#include "services/data/volume/formats/header_text.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr uint64_t kBestPacking = 1032;  // of deflate, to 1
+
+std::string extension_of(const std::string& path) { return lower(std::filesystem::path(path).extension().string()); }
+
+std::string claim_of(const VolumeFileHeader& h) {
+  return fmt::format("{} x {} x {} voxels of {} ({} bytes)", h.size[0], h.size[1], h.size[2], name_of(h.stored),
+                     h.voxel_bytes());
+}
+
+// As much as fits of what a gzip stream's beginning holds.
+std::string unpack_start(std::string_view packed) {
+  std::string out(kHeaderBytes, '\0');
+  z_stream stream{};
+  if (inflateInit2(&stream, 15 + 32) != Z_OK) return {};
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
+  stream.avail_in = static_cast<uInt>(packed.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  inflate(&stream, Z_SYNC_FLUSH);  // whatever it returns: what it gave is what there is
+  out.resize(out.size() - stream.avail_out);
+  inflateEnd(&stream);
+  return out;
+}
+
+bool is_nifti(std::string_view start) {
+  if (start.size() < 348) return false;
+  const std::string_view one = start.substr(344, 4), two = start.substr(4, 4);
+  using namespace std::string_view_literals;
+  return one == "n+1\0"sv || one == "ni1\0"sv || two == "n+2\0"sv || two == "ni2\0"sv;
+}
+
+}  // namespace
+
+size_t stored_bytes(StoredType type) {
+  switch (type) {
+    case StoredType::kU8:
+    case StoredType::kI8:
+      return 1;
+    case StoredType::kU16:
+    case StoredType::kI16:
+      return 2;
+    case StoredType::kU32:
+    case StoredType::kI32:
+    case StoredType::kF32:
+      return 4;
+    default:
+      return 8;
+  }
+}
+
+const char* name_of(StoredType type) {
+  constexpr const char* kNames[] = {"u8", "i8", "u16", "i16", "u32", "i32", "u64", "i64", "f32", "f64"};
+  return kNames[static_cast<size_t>(type)];
+}
+
+bool reads_with_vtk(const std::string& format) { return format == "nifti" || format == "vti"; }
+
+Status check_header(const VolumeFileHeader& h, uint64_t data_bytes, const std::string& path) {
+  for (const int64_t n : h.size)
+    if (n < 1 || n > volume::kMaxSide)
+      return Error{fmt::format("{}: claims {} x {} x {} voxels; limits are 1 and {} on each axis", path, h.size[0],
+                               h.size[1], h.size[2], volume::kMaxSide)};
+  const volume::Grid grid{{int(h.size[0]), int(h.size[1]), int(h.size[2])}, h.index_to_data};
+  if (auto status = volume::validate(grid); !status) return Error{path + ": " + status.error().text};
+  if (!std::isfinite(h.scale) || !std::isfinite(h.offset) || h.scale == 0)
+    return Error{fmt::format("{}: its values are scaled by {} and shifted by {}", path, h.scale, h.offset)};
+  const std::string where = h.data_path == path || h.data_path.empty() ? "the file" : h.data_path;
+  if (!h.data_at_end && h.data_at >= data_bytes)
+    return Error{fmt::format("{}: claims {} from byte {} on, but {} has {} bytes", path, claim_of(h), h.data_at, where,
+                             data_bytes)};
+  const uint64_t there = data_bytes - (h.data_at_end ? 0 : h.data_at);
+  const uint64_t needed = h.voxel_bytes() + h.skip_unpacked;
+  const bool fits = h.encoding == Encoding::kRaw    ? needed <= there
+                    : h.encoding == Encoding::kGzip ? needed / kBestPacking <= there
+                                                    : 2 * h.voxels() - 1 <= there;
+  if (!fits)
+    return Error{fmt::format("{}: claims {}, but {} has {} bytes{}", path, claim_of(h), where, there,
+                             h.encoding == Encoding::kGzip   ? " of compressed ones"
+                             : h.encoding == Encoding::kText ? " of text"
+                                                             : " for them")};
+  if (h.format == "raw" && needed != there)
+    return Error{fmt::format("{}: has {} bytes; --raw says {}", path, there, claim_of(h))};
+  return ok_status();
+}
+
+Result<FileStart> read_start(const std::string& path) {
+  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return Error{fmt::format("{}: cannot be opened: {}", path, std::strerror(errno))};
+  struct stat status {};
+  FileStart out;
+  const auto problem = [&]() -> std::string {
+    if (fstat(descriptor, &status) != 0) return std::strerror(errno);
+    if (S_ISDIR(status.st_mode)) return "is a directory, not a volume file";
+    if (!S_ISREG(status.st_mode)) return "is not a regular file";
+    if (status.st_size <= 0) return "is empty (0 bytes)";
+    out.file_bytes = static_cast<uint64_t>(status.st_size);
+    out.bytes.resize(std::min<uint64_t>(out.file_bytes, kHeaderBytes));
+    const ssize_t n = pread(descriptor, out.bytes.data(), out.bytes.size(), 0);
+    if (n < 0) return fmt::format("cannot be read: {}", std::strerror(errno));
+    out.bytes.resize(static_cast<size_t>(n));
+    return "";
+  }();
+  close(descriptor);
+  if (!problem.empty()) return Error{fmt::format("{}: {}", path, problem)};
+  if (out.bytes.starts_with("\x1f\x8b")) out.packed = true, out.bytes = unpack_start(out.bytes);
+  return out;
+}
+
+std::string volume_format(const FileStart& start, const std::string& path) {
+  const std::string_view content = start.bytes;
+  if (is_nifti(content)) return "nifti";
+  const std::string extension = extension_of(path);
+  const std::string lower_path = lower(path);
+  if (extension == ".nii" || lower_path.ends_with(".nii.gz")) return "nifti";
+  if (!start.packed) {
+    if (content.starts_with("NRRD000")) return "nrrd";
+    if (content.size() > 132 && content.substr(128, 4) == "DICM") return "dicom";
+    const std::string_view head = content.substr(0, 1000);
+    if (head.find("<VTKFile") != head.npos)
+      return head.find("type=\"ImageData\"") != head.npos || (extension == ".vti" && head.find("type=") == head.npos)
+                 ? "vti"
+                 : "";
+    if (content.starts_with("ObjectType") && content.substr(0, 100).find("Image") != content.npos) return "metaimage";
+  }
+  if (extension == ".nrrd" || extension == ".nhdr") return "nrrd";
+  if (extension == ".mha" || extension == ".mhd") return "metaimage";
+  if (extension == ".vti") return "vti";
+  if (extension == ".dcm") return "dicom";
+  return "";
+}
+
+Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& path) {
+  constexpr std::string_view kKey = "WholeExtent=\"";
+  const size_t at = content.find(kKey);
+  if (content.find("<ImageData") == content.npos || at == content.npos)
+    return Error{path + ": is no VTK image: no ImageData with a WholeExtent near its start"};
+  const std::string_view text = content.substr(at + kKey.size(), 200);
+  const auto extent = numbers(text.substr(0, text.find('"')));
+  if (!extent || extent->size() != 6)
+    return Error{
+        fmt::format("{}: its WholeExtent is {}, not six numbers", path, quoted(text.substr(0, text.find('"'))))};
+  VolumeFileHeader h;
+  h.format = "vti";
+  h.data_path = path;
+  for (size_t a = 0; a < 3; ++a) {
+    const double n = (*extent)[2 * a + 1] - (*extent)[2 * a] + 1;
+    if (!(n >= 1 && n <= volume::kMaxSide + 1) || n != std::floor(n) || !(std::abs((*extent)[2 * a]) < 1e6))
+      return Error{fmt::format("{}: claims the extent {}; limits are 1 and {} voxels on each axis", path,
+                               quoted(text.substr(0, text.find('"'))), volume::kMaxSide)};
+    h.size[a] = static_cast<int64_t>(n);
+  }
+  // Cells are one fewer than points; a file with nothing but cells holds that many.
+  const bool cells = content.find("<PointData") == content.npos || content.find("<CellData Scalars") != content.npos;
+  if (cells)
+    for (auto& n : h.size) n = std::max<int64_t>(n - 1, 1);
+  h.encoding = content.substr(0, 1000).find("compressor=\"") != content.npos ? Encoding::kGzip : Encoding::kRaw;
+  return h;
+}
+
+Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path) {
+  VolumeFileHeader h;
+  h.format = "raw";
+  h.data_path = path;
+  const Error bad{
+      fmt::format("{}: --raw {} is not as 256x256x256:u8 or 512x512x100:i16be:0.5,0.5,2 (types: u8, i8, u16, "
+                  "i16, f32)",
+                  path, quoted(spec))};
+  const size_t colon = spec.find(':');
+  if (colon == spec.npos || spec.size() > 200) return bad;
+  std::string_view sizes = spec.substr(0, colon), type = spec.substr(colon + 1), spacing;
+  if (const size_t second = type.find(':'); second != type.npos)
+    spacing = type.substr(second + 1), type = type.substr(0, second);
+  const char* at = sizes.data();
+  const char* end = at + sizes.size();
+  for (size_t a = 0; a < 3; ++a) {
+    if (a > 0 && (at == end || *at++ != 'x')) return bad;
+    const auto parsed = std::from_chars(at, end, h.size[a]);
+    if (parsed.ec != std::errc() || h.size[a] < 0) return bad;
+    at = parsed.ptr;
+  }
+  if (at != end) return bad;
+  if (type.ends_with("be")) h.big_endian = true, type.remove_suffix(2);
+  if (type == "u8")
+    h.stored = StoredType::kU8;
+  else if (type == "i8")
+    h.stored = StoredType::kI8;
+  else if (type == "u16")
+    h.stored = StoredType::kU16;
+  else if (type == "i16")
+    h.stored = StoredType::kI16;
+  else if (type == "f32")
+    h.stored = StoredType::kF32;
+  else
+    return bad;
+  if (spec.back() == ':') return bad;
+  if (!spacing.empty()) {
+    const auto s = numbers(spacing, true);
+    if (!s || s->size() != 3 || !((*s)[0] > 0 && (*s)[1] > 0 && (*s)[2] > 0)) return bad;
+    h.index_to_data = placement({(*s)[0], 0, 0}, {0, (*s)[1], 0}, {0, 0, (*s)[2]}, glm::dvec3(0));
+  }
+  return h;
+}
+
+Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw) {
+  const auto start = read_start(path);
+  if (!start) return start.error();
+  const auto header = [&]() -> Result<VolumeFileHeader> {
+    if (!raw.empty()) return parse_raw_spec(raw, path);
+    const std::string format = volume_format(*start, path);
+    if (format == "nrrd") return parse_nrrd(start->bytes, path);
+    if (format == "metaimage") return parse_metaimage(start->bytes, path);
+    if (format == "nifti") return parse_nifti(start->bytes, path);
+    if (format == "vti") return parse_vti(start->bytes, path);
+    if (format == "dicom") return Error{path + ": is one slice of a DICOM series; give the folder that it lies in"};
+    return Error{path +
+                 ": is no volume; supported are NRRD, MetaImage, NIfTI, VTI, folders of DICOM slices, and raw "
+                 "files with --raw"};
+  }();
+  if (!header) return header;
+  VolumeFileHeader h = *header;
+  uint64_t data_bytes = start->file_bytes;
+  if (h.data_path != path) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(h.data_path, error))
+      return Error{fmt::format("{}: its data file is missing: {}", path, h.data_path)};
+    data_bytes = std::filesystem::file_size(h.data_path, error);
+    if (error) return Error{fmt::format("{}: {}: {}", path, h.data_path, error.message())};
+  }
+  if (h.format == "nifti" && (start->packed || lower(h.data_path).ends_with(".gz"))) {
+    h.encoding = Encoding::kGzip;  // all of the file is packed, header included
+    h.skip_unpacked = h.data_at;
+    h.data_at = 0;
+  }
+  if (auto status = check_header(h, data_bytes, path); !status) return status.error();
+  return h;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,225 @@
+// NRRD headers: "field: value" lines up to an empty one. https://teem.sourceforge.net/nrrd/format.html
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "services/data/volume/formats/header_text.h"
+
+namespace telesplat::data {
+namespace {
+
+using Fields = std::map<std::string, std::string_view>;
+
+std::optional<StoredType> type_named(const std::string& name) {
+  static const std::map<std::string, StoredType> kTypes = [] {
+    std::map<std::string, StoredType> all;
+    const auto add = [&](StoredType type, std::initializer_list<const char*> names) {
+      for (const char* n : names) all[n] = type;
+    };
+    add(StoredType::kI8, {"signed char", "int8", "int8_t"});
+    add(StoredType::kU8, {"uchar", "unsigned char", "uint8", "uint8_t"});
+    add(StoredType::kI16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"});
+    add(StoredType::kU16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"});
+    add(StoredType::kI32, {"int", "signed int", "int32", "int32_t"});
+    add(StoredType::kU32, {"uint", "unsigned int", "uint32", "uint32_t"});
+    add(StoredType::kI64,
+        {"longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"});
+    add(StoredType::kU64, {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"});
+    add(StoredType::kF32, {"float"});
+    add(StoredType::kF64, {"double"});
+    return all;
+  }();
+  const auto found = kTypes.find(name);
+  return found == kTypes.end() ? std::nullopt : std::optional(found->second);
+}
+
+// The fields, by lower-case names without blanks, and where the data begins: behind the first empty line.
+struct Lines {
+  Fields fields;
+  bool ct = false;
+  bool ended = false;  // by an empty line
+  size_t data_at = 0;
+};
+
+Lines split(std::string_view content) {
+  Lines out;
+  size_t at = content.find('\n');
+  while (at != content.npos && at + 1 < content.size()) {
+    const size_t begin = at + 1;
+    at = content.find('\n', begin);
+    const std::string_view line = trim(content.substr(begin, (at == content.npos ? content.size() : at) - begin));
+    if (line.empty()) {
+      out.ended = at != content.npos;
+      out.data_at = at == content.npos ? content.size() : at + 1;
+      return out;
+    }
+    if (line.front() == '#') continue;
+    const size_t colon = line.find(':');
+    if (colon == line.npos) continue;
+    if (line.substr(colon).starts_with(":=")) {  // key/value pairs
+      out.ct |=
+          lower(line.substr(0, colon)).find("modality") != std::string::npos && trim(line.substr(colon + 2)) == "CT";
+      continue;
+    }
+    std::string name = lower(line.substr(0, colon));
+    std::erase(name, ' ');
+    out.fields.emplace(std::move(name), trim(line.substr(colon + 1)));
+  }
+  return out;
+}
+
+std::string_view field(const Fields& fields, std::initializer_list<const char*> names) {
+  for (const char* name : names)
+    if (const auto found = fields.find(name); found != fields.end()) return found->second;
+  return {};
+}
+
+// A vector an axis, "(a,b,c)" or "none"; the latter have no numbers.
+std::optional<std::vector<std::vector<double>>> vectors(std::string_view text) {
+  std::vector<std::vector<double>> out;
+  for (text = trim(text); !text.empty() && out.size() < 16; text = trim(text)) {
+    if (text.starts_with("none")) {
+      out.emplace_back();
+      text.remove_prefix(4);
+      continue;
+    }
+    const size_t end = text.find(')');
+    if (text.front() != '(' || end == text.npos) return std::nullopt;
+    const auto inside = numbers(text.substr(1, end - 1), true);
+    if (!inside || inside->size() != 3) return std::nullopt;
+    out.push_back(*inside);
+    text.remove_prefix(end + 1);
+  }
+  return out;
+}
+
+glm::dvec3 to_vec(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
+
+// Spaces with left-handed axes would show a body's mirror image.
+bool left_handed(std::string_view space) {
+  const std::string name = lower(space);
+  return name == "left-anterior-superior" || name == "las" || name == "left-anterior-superior-time" || name == "last" ||
+         name == "3d-left-handed" || name == "3d-left-handed-time";
+}
+
+// Directions and origin of the three axes that are kept.
+Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>& axes, size_t dimension,
+                                const std::string& path) {
+  std::array<glm::dvec3, 3> step{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
+  glm::dvec3 origin(0);
+  if (const auto text = field(fields, {"spacedirections"}); !text.empty()) {
+    const auto all = vectors(text);
+    if (!all || all->size() != dimension)
+      return Error{
+          fmt::format("{}: its space directions are {}, not {} vectors of 3 numbers", path, quoted(text), dimension)};
+    for (size_t a = 0; a < 3; ++a)
+      if (!(*all)[axes[a]].empty()) step[a] = to_vec((*all)[axes[a]]);
+  } else if (const auto spacings = field(fields, {"spacings"}); !spacings.empty()) {
+    const auto all = numbers(spacings);
+    if (!all || all->size() != dimension)
+      return Error{fmt::format("{}: its spacings are {}, not {} numbers", path, quoted(spacings), dimension)};
+    for (size_t a = 0; a < 3; ++a)
+      if (const double s = (*all)[axes[a]]; !std::isnan(s)) step[a] *= s;
+  }
+  if (const auto text = field(fields, {"spaceorigin"}); !text.empty()) {
+    const auto all = vectors(text);
+    if (!all || all->size() != 1 || all->front().empty())
+      return Error{fmt::format("{}: its space origin is {}, not a vector of 3 numbers", path, quoted(text))};
+    origin = to_vec(all->front());
+  }
+  glm::dmat4 m = placement(step[0], step[1], step[2], origin);
+  if (left_handed(field(fields, {"space"})))
+    for (int c = 0; c < 4; ++c) m[c][0] = -m[c][0];
+  return m;
+}
+
+// The three axes that make the volume; one more may be there if it is one long.
+Result<std::vector<size_t>> choose_axes(const std::vector<int64_t>& sizes, const std::string& path) {
+  std::vector<size_t> axes;
+  for (size_t a = 0; a < sizes.size(); ++a) axes.push_back(a);
+  for (size_t a = sizes.size(); a-- > 0 && axes.size() > 3;)
+    if (sizes[a] == 1) axes.erase(axes.begin() + ptrdiff_t(a));
+  if (axes.size() == 3) return axes;
+  std::string text;
+  for (const int64_t n : sizes) text += fmt::format("{}{}", text.empty() ? "" : " x ", n);
+  if (axes.size() < 3) return Error{fmt::format("{}: has {} axes ({}); a volume has 3", path, sizes.size(), text)};
+  return Error{
+      fmt::format("{}: has {} axes ({}): several components a voxel, or time steps; a volume has 3 axes and one "
+                  "component (a series is a folder of numbered files)",
+                  path, sizes.size(), text)};
+}
+
+}  // namespace
+
+Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path) {
+  if (content.size() < 9 || !content.starts_with("NRRD000"))
+    return Error{path + ": is no NRRD file: it does not begin with NRRD000"};
+  if (content[7] < '1' || content[7] > '5')
+    return Error{fmt::format("{}: is NRRD version {}, known are 1 to 5", path, quoted(content.substr(4, 4)))};
+  const Lines lines = split(content);
+  const Fields& fields = lines.fields;
+  VolumeFileHeader h;
+  h.format = "nrrd";
+  h.ct = lines.ct;
+
+  const std::string type = lower(field(fields, {"type"}));
+  const auto stored = type_named(type);
+  if (!stored) return Error{fmt::format("{}: its voxels' type is {}; {}", path, quoted(type), kSupportedTypes)};
+  h.stored = *stored;
+
+  const auto dimension = number(field(fields, {"dimension"}));
+  const auto sizes = whole_numbers(field(fields, {"sizes"}));
+  if (!dimension || !sizes || double(sizes->size()) != *dimension || sizes->size() > 16)
+    return Error{fmt::format("{}: its sizes are {} with dimension {}", path, quoted(field(fields, {"sizes"})),
+                             quoted(field(fields, {"dimension"})))};
+  const auto axes = choose_axes(*sizes, path);
+  if (!axes) return axes.error();
+  for (size_t a = 0; a < 3; ++a) h.size[a] = (*sizes)[(*axes)[a]];
+  const auto m = placement_of(fields, *axes, sizes->size(), path);
+  if (!m) return m.error();
+  h.index_to_data = *m;
+
+  const std::string encoding = lower(field(fields, {"encoding"}));
+  if (encoding == "raw")
+    h.encoding = Encoding::kRaw;
+  else if (encoding == "gzip" || encoding == "gz")
+    h.encoding = Encoding::kGzip;
+  else if (encoding == "text" || encoding == "txt" || encoding == "ascii")
+    h.encoding = Encoding::kText;
+  else
+    return Error{fmt::format("{}: its encoding is {}; supported are raw, gzip and text", path, quoted(encoding))};
+  const std::string endian = lower(field(fields, {"endian"}));
+  if (stored_bytes(h.stored) > 1 && h.encoding != Encoding::kText && endian != "little" && endian != "big")
+    return Error{fmt::format("{}: its endian is {}, neither little nor big", path, quoted(endian))};
+  h.big_endian = endian == "big";
+
+  const std::string_view data = field(fields, {"datafile"});
+  if (data.empty() && !lines.ended)
+    return Error{fmt::format("{}: its header does not end (no empty line) and names no data file", path)};
+  if (data.starts_with("LIST") || data.find('%') != data.npos)
+    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, quoted(data))};
+  h.data_path = data.empty() ? path : beside(path, data);
+  h.data_at = data.empty() ? lines.data_at : 0;
+
+  const auto skipped = [&](std::initializer_list<const char*> names) {
+    const auto text = field(fields, names);
+    return text.empty() ? std::optional(0.0) : number(text);
+  };
+  const auto line_skip = skipped({"lineskip"}), byte_skip = skipped({"byteskip"});
+  if (!line_skip || *line_skip != 0)
+    return Error{
+        fmt::format("{}: skips {} lines of its data; supported is none", path, quoted(field(fields, {"lineskip"})))};
+  if (!byte_skip || *byte_skip < -1 || *byte_skip > 1e15 || *byte_skip != std::floor(*byte_skip) ||
+      (*byte_skip < 0 && h.encoding != Encoding::kRaw))
+    return Error{fmt::format("{}: skips {} bytes of its data", path, quoted(field(fields, {"byteskip"})))};
+  if (*byte_skip < 0)
+    h.data_at_end = true;
+  else
+    (h.encoding == Encoding::kGzip ? h.skip_unpacked : h.data_at) += uint64_t(*byte_skip);
+  return h;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,138 @@
+#include "services/data/volume/slices.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <glm/matrix.hpp>
+#include <numeric>
+
+#include "common/core/check.h"
+#include "common/image/normal.h"
+
+namespace telesplat::data {
+namespace {
+
+// A voxel's neighbours along an axis and what one over their distance is: those of the outermost voxels are the voxels themselves.
+struct Neighbours {
+  ptrdiff_t before, after;
+  float weight;
+};
+Neighbours neighbours(int at, int size, ptrdiff_t stride) {
+  const bool first = at == 0, last = at == size - 1;
+  return {first ? 0 : -stride, last ? 0 : stride, first && last ? 0.0f : first || last ? 1.0f : 0.5f};
+}
+
+// A row's wanted voxels, before their number is known.
+struct RowBuffer {
+  uint16_t i[volume::kMaxSide + 1], level[volume::kMaxSide + 1];
+};
+
+}  // namespace
+
+VolumeSlices::VolumeSlices(const Volume& v, const volume::Session& session, int begin, int end)
+    : size_(v.size),
+      begin_(begin),
+      end_(end),
+      stored_begin_(std::max(begin - 1, 0)),
+      stored_end_(std::min(end + 1, v.size[2])),
+      level_count_(session.levels.count),
+      lit_(session.lit) {
+  CHECK(v.size == session.grid.size && begin >= 0 && begin < end && end <= size_[2]);
+  // Gradients are covectors: with room = M index, the gradient by room is transpose(inverse(M)) times the one by index.
+  const glm::dmat3 m(session.grid.index_to_room);
+  outward_ = glm::mat3(-session.grid.unit_m() * glm::transpose(glm::inverse(m)));
+  levels_ = to_levels(v, session.levels, stored_begin_, stored_end_);
+  levels_.narrow.empty() ? count(levels_.wide) : count(levels_.narrow);
+}
+
+size_t VolumeSlices::bytes() const {
+  return levels_.narrow.size() + levels_.wide.size() * sizeof(uint16_t) + counts_.size() * sizeof(uint32_t);
+}
+
+template <class Level>
+void VolumeSlices::count(const std::vector<Level>& levels) {
+  const size_t slice = size_t(size_[0]) * size_t(size_[1]);
+  counts_.resize(size_t(end_ - begin_) * size_t(level_count_));
+  tbb::parallel_for(begin_, end_, [&](int k) {
+    uint32_t* const mine = &counts_[size_t(k - begin_) * size_t(level_count_)];
+    const Level* const first = &levels[size_t(k - stored_begin_) * slice];
+    for (size_t n = 0; n < slice; ++n) ++mine[first[n]];
+  });
+}
+
+uint32_t VolumeSlices::weight(int k, const volume::LevelSet& wanted) const {
+  const uint32_t* const mine = &counts_[size_t(k - begin_) * size_t(level_count_)];
+  uint32_t sum = 0;
+  for (int l = 0; l < level_count_; ++l) sum += wanted.has(l) ? mine[l] : 0;
+  return sum;
+}
+
+std::vector<uint32_t> VolumeSlices::weights(const volume::LevelSet& wanted) const {
+  std::vector<uint32_t> out;
+  for (int k = begin_; k < end_; ++k) out.push_back(weight(k, wanted));
+  return out;
+}
+
+template <class Level>
+void VolumeSlices::classify(const std::vector<Level>& levels, int k, const std::vector<uint8_t>& wanted,
+                            volume::Voxels& out, size_t row, size_t at) const {
+  static thread_local RowBuffer buffer;
+  const size_t size_x = size_t(size_[0]), slice = size_x * size_t(size_[1]);
+  const float negligible = float(level_count_) / 512, least = negligible * negligible;
+  const Neighbours z = neighbours(k, size_[2], ptrdiff_t(slice));
+  for (int j = 0; j < size_[1]; ++j, ++row) {
+    const Level* const from = &levels[size_t(k - stored_begin_) * slice + size_t(j) * size_x];
+    size_t n = 0;
+    for (size_t i = 0; i < size_x; ++i) {
+      buffer.i[n] = uint16_t(i), buffer.level[n] = from[i];
+      n += wanted[from[i]];
+    }
+    std::copy_n(buffer.i, n, &out.i[at]);
+    std::copy_n(buffer.level, n, &out.level[at]);
+    if (lit_) {
+      const Neighbours y = neighbours(j, size_[1], ptrdiff_t(size_x));
+      for (size_t r = 0; r < n; ++r) {
+        const Level* const p = from + buffer.i[r];
+        const Neighbours x = neighbours(buffer.i[r], size_[0], 1);
+        const glm::vec3 normal = outward_ * glm::vec3(x.weight * float(int(p[x.after]) - int(p[x.before])),
+                                                      y.weight * float(int(p[y.after]) - int(p[y.before])),
+                                                      z.weight * float(int(p[z.after]) - int(p[z.before])));
+        out.normal[at + r] = glm::dot(normal, normal) < least ? volume::kNoNormal : image::encode_normal16(normal);
+      }
+    }
+    at += n;
+    out.rows[row + 1] = uint32_t(at);
+  }
+}
+
+volume::Voxels VolumeSlices::voxels(int k_begin, int k_end, const volume::LevelSet& wanted) const {
+  CHECK(begin_ <= k_begin && k_begin <= k_end && k_end <= end_);
+  volume::Voxels out;
+  out.k_begin = k_begin, out.k_end = k_end;
+  const size_t rows_a_slice = size_t(size_[1]);
+  out.rows.resize(size_t(k_end - k_begin) * rows_a_slice + 1);
+
+  // The counts of levels say where each slice's voxels go.
+  std::vector<uint64_t> first{0};
+  for (int k = k_begin; k < k_end; ++k) first.push_back(first.back() + weight(k, wanted));
+  CHECK(first.back() <= UINT32_MAX);
+  const size_t total = size_t(first.back());
+  // One more, so that an empty tail has an address.
+  out.i.reserve(total + 1), out.level.reserve(total + 1), out.normal.reserve(lit_ ? total + 1 : 0);
+  out.i.resize(total), out.level.resize(total), out.normal.resize(lit_ ? total : 0);
+
+  std::vector<uint8_t> table;
+  for (int l = 0; l < level_count_; ++l) table.push_back(wanted.has(l));
+  tbb::parallel_for(k_begin, k_end, [&](int k) {
+    const size_t index = size_t(k - k_begin), row = index * rows_a_slice;
+    if (first[index] == first[index + 1])
+      std::fill_n(out.rows.begin() + ptrdiff_t(row) + 1, rows_a_slice, uint32_t(first[index]));
+    else if (levels_.narrow.empty())
+      classify(levels_.wide, k, table, out, row, size_t(first[index]));
+    else
+      classify(levels_.narrow, k, table, out, row, size_t(first[index]));
+  });
+  return out;
+}
+
+}  // namespace telesplat::data

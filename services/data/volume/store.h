@@ -1,0 +1,60 @@
+// A data server's volume: read, placed in the room, classified and cut into slices on demand. Several servers may hold different parts of one volume.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/volume/session.h"
+#include "common/volume/voxels.h"
+#include "services/data/mesh/store.h"
+#include "services/data/volume/volume.h"
+
+namespace telesplat::data {
+
+struct VolumeOptions {
+  std::string raw;       ///< VolumeSource::raw
+  std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
+  bool lit = true;
+  std::optional<double>
+      steps_per_s;      ///< of a series; nothing: as many as make a second, at most 12.5; 0: it does not play
+  std::string part;     ///< "1/2": the second of two parts; empty: all of it
+  int cache_mb = 2048;  ///< steps of a series that are kept
+};
+
+/// Reads one step of a volume.
+using StepReader = std::function<Result<Volume>(size_t step, const ReadProgress&)>;
+
+/// Used from one thread at a time.
+class VolumeStore {
+ public:
+  /// mesh: room size, up (auto: z). Reads the first step; all of them if they fit in cache_mb, so that levels cover the values of all. Otherwise
+  /// values of later steps that are beyond the first one's count as its smallest or largest. Steps that are read later, and one step
+  /// ahead, are read in a thread of their own. Errors name the file.
+  static Result<std::unique_ptr<VolumeStore>> open(const std::string& path, const VolumeOptions& options,
+                                                   const MeshOptions& mesh, const Progress& progress);
+  /// The same of volumes from anywhere. name: for errors.
+  static Result<std::unique_ptr<VolumeStore>> make(StepReader read, size_t steps, const std::string& name,
+                                                   const VolumeOptions& options, const MeshOptions& mesh,
+                                                   const Progress& progress);
+  virtual ~VolumeStore() = default;
+
+  /// As it begins; part and parts are this store's. Valid: read_session takes it.
+  virtual const volume::Session& session() const = 0;
+  virtual std::string format() const = 0;
+  /// Of the steps that were read when it was opened, whatever the part: other data, another hash.
+  virtual uint64_t content_hash() const = 0;
+
+  /// Voxels of slices [k_begin, k_end) of a step whose level is in `shown` and not in `have`; with normals if the session is lit. Slices outside
+  /// this part are left out: the answer's own k_begin and k_end say what it has. Error: a step that cannot be read.
+  virtual Result<volume::Voxels> voxels(int step, int k_begin, int k_end, const volume::LevelSet& shown,
+                                        const volume::LevelSet& have) = 0;
+  /// Visible voxels of every slice of this part, for a set of levels. Error: as voxels().
+  virtual Result<std::vector<uint32_t>> slice_weights(int step, const volume::LevelSet& shown) = 0;
+};
+
+/// The levels that a transfer function does not make transparent.
+volume::LevelSet shown_levels(const volume::TransferFunction& transfer, const volume::Levels& levels);
+
+}  // namespace telesplat::data

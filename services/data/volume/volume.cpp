@@ -1,0 +1,81 @@
+#include "services/data/volume/volume.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <new>
+
+#include "services/data/volume/formats/dicom_series.h"
+#include "services/data/volume/formats/import_stream.h"
+#include "services/data/volume/formats/payload.h"
+
+namespace telesplat::data {
+
+namespace {
+
+// The checked header of a step, a DICOM folder's included; its size is that of the first step.
+Result<VolumeFileHeader> read_step_header(const VolumeSource& source, size_t step) {
+  if (step >= source.steps.size())
+    return Error{fmt::format("{}: has no step {}, it has {}", source.name, step, source.steps.size())};
+  const auto header_of = [&](const std::string& path) -> Result<VolumeFileHeader> {
+    std::error_code error;
+    if (!std::filesystem::is_directory(path, error)) return read_volume_header(path, source.raw);
+    auto series = find_dicom_series(path);
+    if (!series) return series.error();
+    return series->header;
+  };
+  auto header = header_of(source.steps[step]);
+  if (!header || step == 0) return header;
+  const auto first = header_of(source.steps[0]);
+  if (first && first->size != header->size)
+    return Error{fmt::format("{}: has {} x {} x {} voxels, the first of its series, {}, has {} x {} x {}",
+                             source.steps[step], header->size[0], header->size[1], header->size[2], source.steps[0],
+                             first->size[0], first->size[1], first->size[2])};
+  return header;
+}
+
+// Without VTK, in this process.
+Result<Volume> read_step_here(const VolumeFileHeader& header, const VolumeSource& source, size_t step,
+                              const ReadProgress& progress) {
+  const std::string& path = source.steps[step];
+  if (header.format == "dicom") return read_dicom(path, progress);
+  auto bytes = read_payload(header, path, progress);
+  if (!bytes) return bytes.error();
+  return make_volume(header, std::move(*bytes), path);
+}
+
+}  // namespace
+
+Result<Volume> read_volume(const VolumeSource& source, size_t step, const ReadProgress& progress) {
+  const auto header = read_step_header(source, step);
+  if (!header) return header.error();
+  const std::string& path = source.steps[step];
+  // VTK's copy lives beside ours until it has been handed over.
+  const uint64_t bytes = header->voxel_bytes() * (reads_with_vtk(header->format) ? 2 : 1);
+  if (auto status = check_memory(bytes, path); !status) return status.error();
+  if (progress) progress(0.0);
+  try {
+    if (!reads_with_vtk(header->format)) {
+      auto volume = read_step_here(*header, source, step, progress);
+      if (volume && progress) progress(1.0);
+      return volume;
+    }
+    auto streamed = read_volume_with_vtk(*header, path, progress);
+    if (!streamed) return streamed.error();
+    streamed->header.format = header->format;
+    // What VTK found must be a grid too; the header of its own format says only part of it.
+    if (auto status = check_header(streamed->header, streamed->bytes.size(), path); !status) return status.error();
+    return make_volume(streamed->header, std::move(streamed->bytes), path);
+  } catch (const std::bad_alloc&) {
+    return Error{fmt::format("{}: this machine's memory does not suffice for its {} bytes of voxels", path,
+                             header->voxel_bytes())};
+  }
+}
+
+Status check_steps(const VolumeSource& source) {
+  for (size_t step = 0; step < source.steps.size(); ++step)
+    if (const auto header = read_step_header(source, step); !header) return header.error();
+  return ok_status();
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,218 @@
+#include "services/master/slabs/schedule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <set>
+#include <utility>
+
+#include "common/core/check.h"
+
+namespace telesplat::master {
+namespace {
+
+constexpr double kLeastSilent_s = 0.25;
+
+// A frame without a picture: one pixel that looks past the grid on the plane of one slice in front of the eye.
+volume::ShearFrame empty_frame(const volume::Grid& grid, const glm::dvec3& eye_room) {
+  volume::ShearFrame out;
+  const glm::dvec4 eye = grid.room_to_index() * glm::dvec4(eye_room, 1);
+  for (int a = 0; a < 3; ++a) out.eye[a] = std::isfinite(eye[a]) ? std::clamp(eye[a], -1e8, 1e8) : 0.0;
+  // The axis along which some slice is farthest away.
+  double farthest = -1;
+  for (int a = 0; a < 3; ++a)
+    for (const int direction : {1, -1}) {
+      const double t = direction * ((direction > 0 ? grid.size[size_t(a)] - 1 : 0) - out.eye[a]);
+      if (t > farthest) farthest = t, out.axis = a, out.direction = direction;
+    }
+  const int slice = out.direction > 0 ? grid.size[size_t(out.axis)] - 1 : 0;
+  if (farthest < 1) out.eye[out.axis] = slice - out.direction;  // in the middle of a single voxel
+  out.layers = {{slice, slice + 1, double(slice)}};
+  // Where this slope meets the slice is beyond the grid's farthest voxel.
+  out.u0 = (std::abs(out.eye[out.u()]) + 2.0 * volume::kMaxSide) / out.t(slice);
+  out.v0 = (std::abs(out.eye[out.v()]) + 2.0 * volume::kMaxSide) / out.t(slice);
+  return out;
+}
+
+}  // namespace
+
+volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRequest>& requests, int layers) {
+  CHECK(!requests.empty());
+  std::vector<geometry::Camera> cameras;
+  for (const auto& r : requests) cameras.push_back(r.camera);
+  const auto planned = volume::plan_frame(grid, cameras, {.layers = layers});
+  if (planned && volume::validate(*planned, grid)) return *planned;
+  return empty_frame(grid, cameras[0].pose.position_room);
+}
+
+void VolumeSchedule::request_view(const wire::ViewRequest& request) {
+  const auto same = [&](const wire::ViewRequest& r) {
+    return r.viewer == request.viewer && r.request == request.request;
+  };
+  if (request.buffers > 0 && std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) {
+        return std::any_of(f.requests.begin(), f.requests.end(), same);
+      }))
+    return;
+  waiting_.add(request);
+}
+
+void VolumeSchedule::forget_viewer(InstanceId viewer) {
+  waiting_.forget(viewer);
+  for (Frame& f : frames_) f.left.push_back(viewer);
+}
+
+ViewQueue VolumeSchedule::release_views() {
+  drop_frames();
+  return std::exchange(waiting_, {});
+}
+
+bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only) {
+  const wire::ViewRequest* next = waiting_.next(turns_only);
+  // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two they might not.
+  if (!frames_.empty() && frames_.back().partition != partition) return false;
+  if (!partition || !next || frames_.size() >= views_at_once(options_.frames_in_flight, next->buffers)) return false;
+  std::vector<wire::ViewRequest> requests{waiting_.take(next->viewer)};
+  const glm::dvec3 eye = requests[0].camera.pose.position_room;
+  const InstanceId first = requests[0].viewer;
+  for (auto& r : waiting_.take_all(
+           [&](const wire::ViewRequest& other) {
+             return other.viewer != first && glm::distance(other.camera.pose.position_room, eye) <= kSameEye_m;
+           },
+           wire::kMaxViews - 1))
+    requests.push_back(std::move(r));
+  volume::ShearFrame shear = plan(grid_, requests, layers_);
+  const size_t slabs = partition->slabs.size();
+  frames_.push_back({next_frame_,
+                     epoch,
+                     std::move(partition),
+                     std::move(shear),
+                     std::move(requests),
+                     std::vector<SlabState>(slabs),
+                     {}});
+  next_frame_ = next_frame_.next();
+  return true;
+}
+
+std::optional<wire::SliceLease> VolumeSchedule::lease(const std::string& sampler, double now_s) {
+  for (Frame& f : frames_) {
+    const auto slab = f.partition->slab_of(sampler);
+    if (!slab || f.slabs[*slab].state != SlabState::State::kOpen) continue;
+    const LeaseId id = next_lease_;
+    next_lease_ = next_lease_.next();
+    f.slabs[*slab] = {SlabState::State::kLeased, id, now_s, now_s + lease_time_s()};
+    const SlabRange range = f.partition->slabs[*slab].range;
+    wire::SliceLease out{.lease = id,
+                         .frame = f.id,
+                         .epoch = f.epoch,
+                         .partition = f.partition->number,
+                         .slab = *slab,
+                         .slabs = f.slabs.size(),
+                         .begin = uint64_t(range.begin),
+                         .end = uint64_t(range.end),
+                         .shear = f.shear,
+                         .views = {},
+                         .leased_s = now_s};
+    for (const auto& r : f.requests) out.views.push_back({r.viewer, r.request, r.camera, r.buffers});
+    return out;
+  }
+  return std::nullopt;
+}
+
+void VolumeSchedule::extend(LeaseId lease, double now_s) {
+  for (Frame& f : frames_)
+    for (SlabState& s : f.slabs)
+      if (s.state == SlabState::State::kLeased && s.lease == lease) s.expires_s = now_s + lease_time_s();
+}
+
+bool VolumeSchedule::tile_done(const wire::TileDone& m, double now_s) {
+  const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
+  if (f == frames_.end() || m.tile >= f->slabs.size()) return false;
+  SlabState& slab = f->slabs[size_t(m.tile)];
+  if (slab.state != SlabState::State::kLeased || slab.lease != m.lease) return false;
+  slab.state = SlabState::State::kDone;
+  const double took_s = now_s - slab.leased_s;
+  slab_time_s_ = slab_time_s_ == 0 ? took_s : 0.9 * slab_time_s_ + 0.1 * took_s;
+  if (std::all_of(f->slabs.begin(), f->slabs.end(),
+                  [](const SlabState& s) { return s.state == SlabState::State::kDone; })) {
+    frames_.erase(f);
+    ++completed_;
+    patience_ = 1;
+  }
+  return true;
+}
+
+int VolumeSchedule::drop_where(const std::function<bool(const Frame&)>& lost) {
+  // With a frame go the later ones of its viewers that take views in order.
+  std::vector<bool> dropped;
+  std::set<InstanceId> in_order;
+  for (const Frame& f : frames_) {
+    dropped.push_back(lost(f) || std::any_of(f.requests.begin(), f.requests.end(),
+                                             [&](const auto& r) { return in_order.contains(r.viewer); }));
+    for (const auto& r : f.requests)
+      if (dropped.back() && r.buffers > 0) in_order.insert(r.viewer);
+  }
+  int out = 0;
+  // Newest first, so that the views wait in the order in which they were asked for.
+  for (size_t i = frames_.size(); i-- > 0;) {
+    if (!dropped[i]) continue;
+    const Frame& f = frames_[i];
+    for (const SlabState& s : f.slabs) out += s.state == SlabState::State::kLeased;
+    for (const auto& r : f.requests)
+      if (std::find(f.left.begin(), f.left.end(), r.viewer) == f.left.end()) waiting_.put_back(r);
+    frames_.erase(frames_.begin() + std::ptrdiff_t(i));
+  }
+  return out;
+}
+
+int VolumeSchedule::expire(double now_s, const std::function<void(const std::string&)>& lost_sampler) {
+  int expired = 0;
+  std::set<std::string> lost;
+  const auto ran_out = [&](const SlabState& s) { return s.state == SlabState::State::kLeased && now_s > s.expires_s; };
+  for (const Frame& f : frames_)
+    for (size_t i = 0; i < f.slabs.size(); ++i)
+      if (ran_out(f.slabs[i])) ++expired, lost.insert(f.partition->slabs[i].sampler);
+  if (expired == 0) return 0;
+  released_ +=
+      uint64_t(drop_where([&](const Frame& f) { return std::any_of(f.slabs.begin(), f.slabs.end(), ran_out); }));
+  patience_ *= 2;
+  for (const auto& sampler : lost) lost_sampler(sampler);
+  return expired;
+}
+
+int VolumeSchedule::release_sampler(const std::string& sampler) {
+  const int held = int(leases_of(sampler));
+  released_ += uint64_t(drop_where([&](const Frame& f) {
+    const auto slab = f.partition->slab_of(sampler);
+    return slab && f.slabs[*slab].state != SlabState::State::kDone;
+  }));
+  return held;
+}
+
+void VolumeSchedule::drop_frames() {
+  drop_where([](const Frame&) { return true; });
+}
+
+size_t VolumeSchedule::leases_of(const std::string& sampler) const {
+  size_t out = 0;
+  for (const Frame& f : frames_)
+    if (const auto slab = f.partition->slab_of(sampler)) out += f.slabs[*slab].state == SlabState::State::kLeased;
+  return out;
+}
+
+std::vector<std::string> VolumeSchedule::overdue(double now_s) const {
+  std::vector<std::string> out;
+  if (slab_time_s_ == 0) return out;
+  const double after_s = std::max(kLeastSilent_s, 3 * slab_time_s_);
+  for (const Frame& f : frames_)
+    for (size_t i = 0; i < f.slabs.size(); ++i)
+      if (f.slabs[i].state == SlabState::State::kLeased && now_s - f.slabs[i].leased_s > after_s)
+        out.push_back(f.partition->slabs[i].sampler);
+  return out;
+}
+
+double VolumeSchedule::lease_time_s() const {
+  const double usual_s = std::max(options_.lease_timeout_s, 4 * slab_time_s_);
+  return std::min(usual_s * patience_, std::max(kLongestLease_s, options_.lease_timeout_s));
+}
+
+}  // namespace telesplat::master

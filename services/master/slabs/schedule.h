@@ -1,0 +1,105 @@
+// View requests -> sampling frames of a volume -> a slice lease for each slab (T4.5, T7.4). Every sampler of a partition has a part in every frame,
+// so there is nothing to steal and no backups: a frame that loses a sampler is dropped, and its views wait again. No sockets, no clocks.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/volume/shear.h"
+#include "services/master/slabs/partition.h"
+#include "services/master/tiles/frame_schedule.h"
+#include "services/master/view_queue.h"
+
+namespace telesplat::master {
+
+inline constexpr double kSameEye_m = 0.02;       ///< views from eyes that are no farther apart are sampled as one
+inline constexpr double kLongestLease_s = 60.0;  ///< however slow samplers are known to be
+
+/// The frame that shows `requests` (at least one, seen from the first one's eye). Where nothing of the grid is in view: a raster of one pixel that
+/// looks past the grid, and one layer of one slice, so that the request is answered with an empty picture at hardly any cost.
+volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRequest>& requests, int layers);
+
+class VolumeSchedule {
+ public:
+  /// Of the options: frames_in_flight, lease_timeout_s.
+  explicit VolumeSchedule(const ScheduleOptions& options) : options_(options) {}
+
+  /// For frames that begin from now on.
+  void set_grid(const volume::Grid& grid) { grid_ = grid; }
+  void set_layers(int layers) { layers_ = layers; }
+  int layers() const { return layers_; }
+
+  /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
+  void request_view(const wire::ViewRequest& request);
+  void forget_viewer(InstanceId viewer);
+  bool view_waiting() const { return !waiting_.empty(); }
+  /// See ViewQueue.
+  void begin_turns() { waiting_.begin_turns(); }
+  bool turn_waiting() const { return waiting_.turn_waiting(); }
+  /// What waits, to go on elsewhere: the scene became one of another kind.
+  ViewQueue release_views();
+  void take_views(ViewQueue views) { waiting_ = std::move(views); }
+
+  /// Begins the frame of the next view that waits, and of the first view of every other viewer whose eye is within kSameEye_m of its. Viewers take
+  /// turns; turns_only: only those that have a turn. False: none waits, as many frames are in flight as may be (views_at_once()), or some of
+  /// another partition are: so all of a viewer's views become complete in order.
+  bool begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only = false);
+
+  /// The slab of `sampler` in the oldest frame that still needs it. nullopt: there is none.
+  std::optional<wire::SliceLease> lease(const std::string& sampler, double now_s);
+  /// Gives a lease its full time again. Unknown leases are ignored.
+  void extend(LeaseId lease, double now_s);
+  /// The packer has this slab. True the first time; false for duplicates, slabs never leased and unknown frames.
+  bool tile_done(const wire::TileDone& tile, double now_s);
+
+  /// Drops the frames of leases that ran out; leases then last twice as long, until a frame is complete. lost_sampler is told whose. Returns
+  /// how many ran out.
+  int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
+  /// A sampler is gone: drops the frames that lack its slab. Returns how many of its leases were out.
+  int release_sampler(const std::string& sampler);
+  /// Drops all frames (new epoch, new packer). Their views wait again; of asynchronous viewers only if no newer request does.
+  void drop_frames();
+
+  size_t leases_of(const std::string& sampler) const;
+  /// Samplers that have had a lease for longer than three typical ones: worth finding out whether they live.
+  std::vector<std::string> overdue(double now_s) const;
+  size_t frames_in_flight() const { return frames_.size(); }
+  uint64_t frames_completed() const { return completed_; }
+  uint64_t slabs_released() const { return released_; }
+  /// Seconds after which a lease expires now: lease_timeout_s, or four typical slab times if that is more; doubled for each time leases ran out.
+  double lease_time_s() const;
+
+ private:
+  struct SlabState {
+    enum class State { kOpen, kLeased, kDone } state = State::kOpen;
+    LeaseId lease;
+    double leased_s = 0, expires_s = 0;
+  };
+  struct Frame {
+    FrameId id;
+    EpochId epoch;
+    std::shared_ptr<const Partition> partition;
+    volume::ShearFrame shear;
+    std::vector<wire::ViewRequest> requests;
+    std::vector<SlabState> slabs;
+    std::vector<InstanceId> left;  // viewers that are gone
+  };
+  /// Drops where `lost`; returns how many leases were out.
+  int drop_where(const std::function<bool(const Frame&)>& lost);
+
+  ScheduleOptions options_;
+  volume::Grid grid_;
+  int layers_ = 16;
+  ViewQueue waiting_;
+  std::deque<Frame> frames_;
+  FrameId next_frame_{1};
+  LeaseId next_lease_{1};
+  double slab_time_s_ = 0;  // running mean of lease -> done
+  double patience_ = 1;
+  uint64_t completed_ = 0, released_ = 0;
+};
+
+}  // namespace telesplat::master

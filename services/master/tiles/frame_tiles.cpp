@@ -1,0 +1,150 @@
+#include "services/master/tiles/frame_tiles.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/core/check.h"
+
+namespace telesplat::master {
+
+std::vector<geometry::Rect> cut_tiles(int width, int height, int tile_size) {
+  std::vector<geometry::Rect> out;
+  for (int y = 0; y < height; y += tile_size)
+    for (int x = 0; x < width; x += tile_size)
+      out.push_back({x, y, std::min(tile_size, width - x), std::min(tile_size, height - y)});
+  const auto distance = [&](const geometry::Rect& r) {
+    return std::hypot(r.x + r.width / 2.0 - width / 2.0, r.y + r.height / 2.0 - height / 2.0);
+  };
+  std::stable_sort(out.begin(), out.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+  return out;
+}
+
+FrameTiles FrameTiles::of_squares(int width, int height, int tile_size) {
+  // A hostile viewer could ask for a frame of very many tiles; larger tiles keep the count bounded.
+  while (uint64_t((width + tile_size - 1) / tile_size) * uint64_t((height + tile_size - 1) / tile_size) > 1024)
+    tile_size *= 2;
+  FrameTiles out;
+  out.blocks_ = cut_tiles(width, height, tile_size);
+  out.tiles_.resize(out.blocks_.size());
+  for (size_t i = 0; i < out.tiles_.size(); ++i) out.tiles_[i].rect = out.blocks_[i], out.tiles_[i].block = i;
+  return out;
+}
+
+FrameTiles FrameTiles::of_rows(int width, int height) {
+  FrameTiles out;
+  out.blocks_ = cut_blocks(width, height);
+  out.rows_ = RowBands(out.blocks_);
+  return out;
+}
+
+std::optional<size_t> FrameTiles::take(const std::string& sampler, int rows, bool even_own) {
+  for (const size_t i : reopened_)
+    if (tiles_[i].given_up_by != sampler) return i;
+  if (unleased_ < tiles_.size()) return unleased_;
+  if (rows_.rows_left() > 0) {
+    const auto band = rows_.carve(rows);
+    tiles_.push_back({band.rect, band.block, Tile::State::kOpen, {}, {}});
+    return tiles_.size() - 1;
+  }
+  if (even_own && !reopened_.empty()) return *reopened_.begin();
+  return std::nullopt;
+}
+
+std::optional<size_t> FrameTiles::overdue(double before_s, const std::string* sampler) const {
+  for (const auto& [id, out] : out_) {
+    if (out.leased_s > before_s) break;  // the later ones are younger
+    if (out.heard_s > before_s || tiles_[out.tile].leases[1].value != 0) continue;
+    if (!sampler || out.sampler != *sampler) return out.tile;
+  }
+  return std::nullopt;
+}
+
+void FrameTiles::lease(size_t i, LeaseId id, const std::string& sampler, double now_s, double expires_s) {
+  Tile& t = tiles_[i];
+  CHECK(t.state != Tile::State::kDone && t.leases[1].value == 0);
+  t.leases[t.leases[0].value ? 1 : 0] = id;
+  if (t.state == Tile::State::kOpen) {
+    if (i == unleased_)
+      ++unleased_;
+    else
+      reopened_.erase(i);
+    t.state = Tile::State::kLeased;
+  }
+  out_.emplace_hint(out_.end(), id, Out{i, sampler, now_s, now_s, expires_s});
+  ++held_[sampler];
+}
+
+bool FrameTiles::extend(LeaseId id, double now_s, double expires_s) {
+  const auto found = out_.find(id);
+  if (found == out_.end()) return false;
+  found->second.heard_s = now_s;
+  found->second.expires_s = expires_s;
+  return true;
+}
+
+const FrameTiles::Out* FrameTiles::out(LeaseId id) const {
+  const auto found = out_.find(id);
+  return found == out_.end() ? nullptr : &found->second;
+}
+
+bool FrameTiles::done(uint64_t i) {
+  if (i >= unleased_ || tiles_[i].state == Tile::State::kDone) return false;
+  Tile& t = tiles_[i];
+  for (LeaseId& id : t.leases) {
+    if (const auto lease = out_.find(id); lease != out_.end()) end(lease);
+    id = {};
+  }
+  if (t.state == Tile::State::kOpen) reopened_.erase(i);
+  t.state = Tile::State::kDone;
+  ++done_;
+  return true;
+}
+
+std::map<LeaseId, FrameTiles::Out>::iterator FrameTiles::take_back(std::map<LeaseId, Out>::iterator lease) {
+  Tile& t = tiles_[lease->second.tile];
+  if (t.leases[0] == lease->first) t.leases[0] = t.leases[1];
+  t.leases[1] = {};
+  if (t.leases[0].value == 0) {
+    t.state = Tile::State::kOpen;
+    reopened_.insert(lease->second.tile);
+  }
+  return end(lease);
+}
+
+std::map<LeaseId, FrameTiles::Out>::iterator FrameTiles::end(std::map<LeaseId, Out>::iterator lease) {
+  const auto held = held_.find(lease->second.sampler);
+  if (--held->second == 0) held_.erase(held);
+  return out_.erase(lease);
+}
+
+int FrameTiles::expire(double now_s, const std::function<void(const std::string&)>& lost_sampler) {
+  int count = 0;
+  for (auto it = out_.begin(); it != out_.end();) {
+    if (now_s <= it->second.expires_s) {
+      ++it;
+      continue;
+    }
+    lost_sampler(it->second.sampler);
+    tiles_[it->second.tile].given_up_by = it->second.sampler;
+    it = take_back(it);
+    ++count;
+  }
+  return count;
+}
+
+int FrameTiles::release(const std::string& sampler) {
+  int count = 0;
+  for (auto it = out_.begin(); it != out_.end();)
+    if (it->second.sampler == sampler)
+      it = take_back(it), ++count;
+    else
+      ++it;
+  return count;
+}
+
+size_t FrameTiles::leases_of(const std::string& sampler) const {
+  const auto held = held_.find(sampler);
+  return held == held_.end() ? 0 : held->second;
+}
+
+}  // namespace telesplat::master

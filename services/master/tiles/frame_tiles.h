@@ -1,0 +1,87 @@
+// The tiles of one sampling frame: which are open, which are out with whom, which are done. No step looks at all of them, except those that
+// happen when a sampler leaves.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "common/core/ids.h"
+#include "services/master/tiles/row_bands.h"
+
+namespace telesplat::master {
+
+/// Cuts a frame into tiles of tile_size, those nearest the centre first (that is where the person looks).
+std::vector<geometry::Rect> cut_tiles(int width, int height, int tile_size);
+
+class FrameTiles {
+ public:
+  /// Square tiles, each a block of its own; larger ones where there would be more than 1024.
+  static FrameTiles of_squares(int width, int height, int tile_size);
+  /// Bands of rows, carved when they are taken.
+  static FrameTiles of_rows(int width, int height);
+
+  struct Tile {
+    geometry::Rect rect;
+    size_t block = 0;
+    enum class State { kOpen, kLeased, kDone } state = State::kOpen;
+    std::array<LeaseId, 2> leases;  ///< that are out; 0: none. The second is a backup
+    std::string given_up_by;        ///< whose lease ran out
+  };
+  /// A lease that is out.
+  struct Out {
+    size_t tile;
+    std::string sampler;
+    double leased_s;
+    double heard_s;  ///< leased, or extended since
+    double expires_s;
+  };
+
+  bool open() const { return !reopened_.empty() || unleased_ < tiles_.size() || rows_.rows_left() > 0; }
+  bool complete() const { return done_ == tiles_.size() && rows_.rows_left() == 0; }
+  int rows_left() const { return rows_.rows_left(); }
+  const Tile& tile(size_t i) const { return tiles_[i]; }
+  size_t tiles() const { return tiles_.size(); }
+  const std::vector<geometry::Rect>& blocks() const { return blocks_; }
+
+  /// A tile to lease to `sampler`: first those taken back, then those never leased, carved with `rows` rows. Tiles whose lease ran out at
+  /// this very sampler only if even_own. The tile counts as leased from lease() on, which must follow.
+  std::optional<size_t> take(const std::string& sampler, int rows, bool even_own);
+  /// The tile that has been out longest, if nothing was heard of it since before_s, it has no backup and is not with `sampler`
+  /// (nullptr: with whom does not matter).
+  std::optional<size_t> overdue(double before_s, const std::string* sampler) const;
+
+  /// Precondition: the tile came from take() or overdue(). Lease ids rise.
+  void lease(size_t tile, LeaseId id, const std::string& sampler, double now_s, double expires_s);
+  /// False: not out.
+  bool extend(LeaseId id, double now_s, double expires_s);
+  /// nullptr: not out.
+  const Out* out(LeaseId id) const;
+  /// True the first time; false for what is done, was never leased or is not there. All leases of the tile end.
+  bool done(uint64_t tile);
+
+  /// Takes back leases; a tile that has none left is open again. Return how many.
+  int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
+  int release(const std::string& sampler);
+  size_t leases_of(const std::string& sampler) const;
+
+ private:
+  std::map<LeaseId, Out>::iterator take_back(std::map<LeaseId, Out>::iterator lease);
+  std::map<LeaseId, Out>::iterator end(std::map<LeaseId, Out>::iterator lease);
+
+  std::vector<geometry::Rect> blocks_;
+  std::vector<Tile> tiles_;
+  RowBands rows_;
+  size_t unleased_ = 0;                           // tiles before it were leased at least once
+  std::set<size_t> reopened_;                     // of these, the open ones
+  std::map<LeaseId, Out> out_;                    // oldest first
+  std::unordered_map<std::string, size_t> held_;  // leases out, by sampler
+  size_t done_ = 0;
+};
+
+}  // namespace telesplat::master

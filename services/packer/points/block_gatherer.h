@@ -1,0 +1,67 @@
+// Puts the tiles of a block together: samplers lease single rows, what is packed and published at once is a block of them.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "services/packer/points/packer_core.h"
+
+namespace telesplat::packer {
+
+/// Frames of which blocks are being gathered; of more the oldest one's blocks are dropped.
+inline constexpr size_t kMaxGatheredFrames = 64;
+/// A block that is gathered has at most so many pixels: 64 rows of the widest image. One tile of it allocates them all.
+inline constexpr size_t kMaxBlockPixels = size_t{1} << 20;
+/// All of them together (ten bytes each); beyond it the oldest frame's are dropped.
+inline constexpr size_t kMaxGatheredPixels = size_t{1} << 25;
+
+class BlockGatherer {
+ public:
+  struct Gathered {
+    uint64_t samples = 0;              ///< covered pixels that this tile brought and none before it had
+    std::optional<SampledTile> block;  ///< the tile's block, if this tile completes it
+    bool is_block = false;             ///< the tile is its block: the tile's stream is the block's too
+  };
+  struct Statistics {
+    uint64_t tiles = 0;            ///< taken
+    uint64_t tiles_duplicate = 0;  ///< dropped: all of their rows were there
+    uint64_t tiles_refused = 0;    ///< dropped: contradict themselves, their block or their frame
+    uint64_t blocks_dropped = 0;   ///< incomplete, to make room
+  };
+
+  /// Decodes a tile and puts its rows in their place; rows that are there already stay as they are.
+  ///   block: what the tile says of its block: all of SampledTile but the image; `rect` and `tile` are the block's.
+  ///   rect: the tile, in the frame: whole rows of the block.
+  /// A tile that is its block passes through without a copy. Nothing: all of its rows are there (it is not even decoded). Error:
+  /// camera, rectangles, block or stream do not fit together, or not with earlier tiles; nothing has changed then.
+  /// Precondition: the block was not packed yet (PackerCore::has).
+  Result<std::optional<Gathered>> add(SampledTile block, const geometry::Rect& rect, std::span<const uint8_t> stream);
+
+  void clear();
+  size_t open_blocks() const;
+  const Statistics& statistics() const { return statistics_; }
+
+ private:
+  struct Block {
+    SampledTile gathered;  // image: of the block's size; rows not there yet are not covered
+    std::vector<bool> has_row;
+    int rows_left = 0;
+  };
+  struct Frame {
+    FrameId id;
+    std::vector<Block> blocks;  // incomplete ones
+  };
+  Frame* find(FrameId id);
+  void make_room(FrameId frame, size_t pixels);
+  Result<std::optional<Gathered>> pass(SampledTile block, std::span<const uint8_t> stream);
+  std::optional<Gathered> take(Frame& frame, Block& block, const geometry::Rect& rect);
+
+  std::deque<Frame> frames_;  // oldest first
+  size_t pixels_ = 0;         // of all blocks
+  image::DepthImage tile_;    // kept for its memory
+  Statistics statistics_;
+};
+
+}  // namespace telesplat::packer

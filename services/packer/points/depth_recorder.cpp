@@ -1,0 +1,51 @@
+#include "services/packer/points/depth_recorder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "common/codec/depth_codec.h"
+
+namespace telesplat::packer {
+namespace {
+constexpr size_t kMaxOpen = 4;  // frames being composed
+}
+
+Result<DepthRecorder> DepthRecorder::open(const std::string& directory, int max_frames) {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  if (error) return Error{fmt::format("{}: cannot be made a folder for depth images: {}", directory, error.message())};
+  DepthRecorder out;
+  out.directory_ = directory;
+  out.left_ = max_frames;
+  return out;
+}
+
+Status DepthRecorder::add(FrameId id, const geometry::Camera& camera, const geometry::Rect& rect, size_t tiles_in_frame,
+                          const image::DepthImage& tile) {
+  if (left_ <= 0 || size_t(camera.width) * camera.height > codec::kMaxPixels) return ok_status();
+  Frame& frame = open_.try_emplace(id, Frame{image::DepthImage(camera.width, camera.height)}).first->second;
+  if (frame.image.width != camera.width || frame.image.height != camera.height) return ok_status();
+  for (int y = 0; y < rect.height; ++y) {
+    const auto from = size_t(y) * rect.width, to = size_t(rect.y + y) * camera.width + rect.x;
+    std::copy_n(&tile.depth[from], rect.width, &frame.image.depth[to]);
+    std::copy_n(&tile.colour[from], rect.width, &frame.image.colour[to]);
+    std::copy_n(&tile.normal[from], rect.width, &frame.image.normal[to]);
+  }
+  if (++frame.tiles < tiles_in_frame) {
+    if (open_.size() > kMaxOpen) open_.erase(open_.begin());
+    return ok_status();
+  }
+  const auto stream = codec::encode(frame.image);
+  open_.erase(id);
+  --left_;
+  const std::string path = fmt::format("{}/frame-{:06d}.depth", directory_, id.value);
+  std::ofstream out(path, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(stream.data()), std::streamsize(stream.size()));
+  if (!out) return Error{fmt::format("{}: cannot be written", path)};
+  return ok_status();
+}
+
+}  // namespace telesplat::packer

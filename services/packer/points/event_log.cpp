@@ -1,0 +1,165 @@
+#include "services/packer/points/event_log.h"
+
+#include <algorithm>
+#include <iterator>
+#include <tuple>
+
+namespace telesplat::packer {
+namespace {
+
+// A map node's links and the allocator's headers of node and blob.
+constexpr uint64_t kNodeBytes = 96;
+constexpr uint64_t kForgetBytes = 40;  // a hash node and its bucket
+
+bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequence; }
+
+}  // namespace
+
+uint64_t EventLog::Patch::bytes() const {
+  return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() + forgotten.capacity() * sizeof forgotten[0] +
+         patch_forgotten.capacity() * sizeof patch_forgotten[0];
+}
+
+uint64_t EventLog::bytes() const {
+  return patch_bytes_ + (patches_of_.size() + last_forget_.size()) * kForgetBytes +
+         patches_forgotten_ * (sizeof(points::ClusterKey) + sizeof(uint32_t));
+}
+
+void EventLog::add_patch(const Event& event, std::span<const points::ClusterKey> clusters) {
+  if (clusters.empty()) return;
+  const Patch& patch = patches_.emplace_hint(patches_.end(), event.sequence, Patch{event, clusters.size()})->second;
+  patch_bytes_ += patch.bytes();
+  for (const points::ClusterKey key : clusters) patches_of_[key].push_back(event.sequence);
+}
+
+void EventLog::drop_part(Sequence sequence_of_patch, points::ClusterKey key, Sequence sequence, bool patch_alone) {
+  const auto found = patches_.find(sequence_of_patch);
+  CHECK(found != patches_.end());  // a patch stays as long as it has points in the model
+  Patch& patch = found->second;
+  patch_bytes_ -= patch.bytes();
+  if (--patch.alive == 0) {
+    patches_.erase(found);
+    return;
+  }
+  if (patch_alone)
+    patch.patch_forgotten.emplace_back(sequence, key);
+  else
+    patch.forgotten.push_back(key);
+  patch_bytes_ += patch.bytes();
+}
+
+void EventLog::add_forget(Sequence sequence, std::span<const points::ClusterKey> clusters) {
+  for (const points::ClusterKey key : clusters) {
+    last_forget_[key] = sequence;
+    const auto found = patches_of_.find(key);
+    CHECK(found != patches_of_.end());
+    for (const Sequence patch : found->second) drop_part(patch, key, sequence, false);
+    patches_of_.erase(found);
+  }
+}
+
+void EventLog::add_patch_forget(const Event& event, std::span<const points::Cluster> dropped) {
+  for (const points::Cluster& cluster : dropped) {
+    const auto found = patches_of_.find(cluster.key);
+    CHECK(found != patches_of_.end());
+    for (const points::Mosaic& mosaic : cluster.mosaics) {
+      drop_part(mosaic.sequence(), cluster.key, event.sequence, true);
+      std::erase(found->second, mosaic.sequence());
+    }
+    if (found->second.empty()) patches_of_.erase(found);
+  }
+  patch_forgets_.push_back(event);
+  patches_forgotten_ += event.clusters.size();
+  while (patches_forgotten_ > max_patches_) {
+    patches_forgotten_ -= patch_forgets_.front().clusters.size();
+    horizon_ = patch_forgets_.front().sequence;
+    patch_forgets_.pop_front();
+  }
+}
+
+bool EventLog::remembers(Sequence after) const {
+  return after.value == 0 || after >= horizon_ || (epoch_ && after < epoch_->sequence);
+}
+
+void EventLog::add_epoch(const Event& event) {
+  patches_.clear();
+  patches_of_.clear();
+  last_forget_.clear();
+  patch_forgets_.clear();
+  patch_bytes_ = patches_forgotten_ = 0;
+  horizon_ = {};
+  epoch_ = event;
+}
+
+std::vector<Event> EventLog::since(Sequence after) const {
+  std::vector<Event> out;
+  bool from_nothing = after.value == 0;
+  if (epoch_ && after < epoch_->sequence) {
+    out.push_back(*epoch_);
+    after = epoch_->sequence;
+    from_nothing = true;
+  }
+  std::vector<Event> live;
+  for (auto patch = patches_.upper_bound(after); patch != patches_.end(); ++patch) live.push_back(patch->second.event);
+  // One sequence is of one event, so of one of the three.
+  std::vector<Event> wiping;
+  for (const bool patches_alone : {false, true}) {
+    const std::vector<Event> more = patches_alone ? patch_forgets(after, from_nothing) : forgets(after, from_nothing);
+    wiping.insert(wiping.end(), more.begin(), more.end());
+  }
+  std::sort(wiping.begin(), wiping.end(), by_sequence);
+  std::merge(live.begin(), live.end(), wiping.begin(), wiping.end(), std::back_inserter(out), by_sequence);
+  return out;
+}
+
+// from_nothing: the replica holds nothing but what it will get from the patches kept.
+std::vector<Event> EventLog::forgets(Sequence after, bool from_nothing) const {
+  std::vector<std::pair<Sequence, points::ClusterKey>> keys;
+  if (from_nothing) {
+    for (const auto& [sequence, patch] : patches_)
+      for (const points::ClusterKey key : patch.forgotten) keys.emplace_back(last_forget_.at(key), key);
+  } else {
+    for (const auto& [key, sequence] : last_forget_)
+      if (sequence > after) keys.emplace_back(sequence, key);
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+
+  std::vector<Event> out;
+  for (const auto& [sequence, key] : keys) {
+    if (out.empty() || out.back().sequence != sequence) {
+      Event& event = out.emplace_back();
+      event.sequence = sequence;
+      event.kind = Event::Kind::kForget;
+    }
+    out.back().clusters.push_back(key);
+  }
+  return out;
+}
+
+std::vector<Event> EventLog::patch_forgets(Sequence after, bool from_nothing) const {
+  std::vector<Event> out;
+  if (!from_nothing) {
+    for (const Event& event : patch_forgets_)
+      if (event.sequence > after) out.push_back(event);
+    return out;
+  }
+  std::vector<std::tuple<Sequence, points::ClusterKey, uint32_t>> keys;
+  for (const auto& [sequence, patch] : patches_)
+    for (const auto& [forgotten, key] : patch.patch_forgotten)
+      keys.emplace_back(forgotten, key, static_cast<uint32_t>(patch.event.frame.value & points::kFrameTagMask));
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  for (const auto& [sequence, key, frame] : keys) {
+    if (out.empty() || out.back().sequence != sequence) {
+      Event& event = out.emplace_back();
+      event.sequence = sequence;
+      event.kind = Event::Kind::kForget;
+    }
+    out.back().clusters.push_back(key);
+    out.back().frames.push_back(frame);
+  }
+  return out;
+}
+
+}  // namespace telesplat::packer

@@ -1,0 +1,61 @@
+#include "services/packer/points/frame_book.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace telesplat::packer {
+
+const FrameBook::Frame* FrameBook::find(FrameId id) const {
+  const auto found = std::find_if(open_.begin(), open_.end(), [&](const Frame& f) { return f.id == id; });
+  return found == open_.end() ? nullptr : &*found;
+}
+
+bool FrameBook::has(FrameId id, uint32_t tile) const {
+  if (is_finished_.count(id)) return true;
+  const Frame* frame = find(id);
+  return frame && tile < frame->has_tile.size() && frame->has_tile[tile];
+}
+
+Status FrameBook::check(const SampledTile& tile) const {
+  const Frame* frame = find(tile.frame);
+  if (!frame) return ok_status();
+  if (frame->has_tile.size() != tile.tiles_in_frame)
+    return Error{fmt::format("tile {} of frame {} says its frame has {} tiles, earlier ones said {}", tile.tile,
+                             tile.frame.value, tile.tiles_in_frame, frame->has_tile.size())};
+  if (!(frame->camera == tile.camera))
+    return Error{fmt::format("tile {} of frame {} has another camera than its frame", tile.tile, tile.frame.value)};
+  return ok_status();
+}
+
+FrameBook::Frame FrameBook::add(const SampledTile& tile, const splat::Elimination& elimination) {
+  if (!find(tile.frame)) {
+    if (open_.size() == kMaxOpenFrames) open_.pop_front();
+    open_.push_back({tile.frame, tile.camera, std::vector<bool>(tile.tiles_in_frame), tile.tiles_in_frame});
+  }
+  const auto at = std::find_if(open_.begin(), open_.end(), [&](const Frame& f) { return f.id == tile.frame; });
+  at->has_tile[tile.tile] = true;
+  --at->tiles_left;
+  at->samples += elimination.samples;
+  at->kept += elimination.kept;
+
+  Frame frame = *at;
+  if (frame.tiles_left == 0) {
+    open_.erase(at);
+    finished_.push_back(frame.id);
+    is_finished_.insert(frame.id);
+    if (finished_.size() > kMaxFinishedFrames) {
+      is_finished_.erase(finished_.front());
+      finished_.pop_front();
+    }
+  }
+  return frame;
+}
+
+void FrameBook::clear() {
+  open_.clear();
+  finished_.clear();
+  is_finished_.clear();
+}
+
+}  // namespace telesplat::packer

@@ -1,0 +1,45 @@
+// Which tiles of which frames were packed already. Bounded: frames that are never finished do not pile up.
+#pragma once
+
+#include <deque>
+#include <unordered_set>
+#include <vector>
+
+#include "services/packer/points/packer_core.h"
+
+namespace telesplat::packer {
+
+/// Unfinished frames remembered: more than viewers have under way at once. Of an older one the tiles are forgotten;
+/// should one come twice then, elimination makes little of it.
+inline constexpr size_t kMaxOpenFrames = 64;
+/// Finished frames remembered, to tell duplicates that come late.
+inline constexpr size_t kMaxFinishedFrames = 4096;
+
+class FrameBook {
+ public:
+  struct Frame {
+    FrameId id;
+    geometry::Camera camera;
+    std::vector<bool> has_tile;
+    uint32_t tiles_left = 0;
+    uint64_t samples = 0, kept = 0;
+  };
+
+  /// True if this tile was packed before.
+  bool has(FrameId frame, uint32_t tile) const;
+  /// Refuses a tile whose frame was said to have another camera or another number of tiles.
+  Status check(const SampledTile& tile) const;
+  /// Notes the tile as packed. Returns its frame as it is then; finished and forgotten if tiles_left is 0.
+  /// Preconditions: not a duplicate, checked, tile < tiles_in_frame.
+  Frame add(const SampledTile& tile, const splat::Elimination& elimination);
+  void clear();
+
+ private:
+  const Frame* find(FrameId id) const;
+
+  std::deque<Frame> open_;  // oldest first
+  std::deque<FrameId> finished_;
+  std::unordered_set<FrameId> is_finished_;
+};
+
+}  // namespace telesplat::packer

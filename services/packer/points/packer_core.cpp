@@ -1,0 +1,291 @@
+#include "services/packer/points/packer_core.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <deque>
+#include <utility>
+
+#include "common/codec/depth_codec.h"
+#include "services/packer/points/event_log.h"
+#include "services/packer/points/frame_book.h"
+#include "services/packer/points/obsolescence.h"
+#include "services/packer/points/patch_obsolescence.h"
+
+namespace telesplat::packer {
+namespace {
+
+Status check(const SampledTile& t) {
+  if (Status camera = geometry::validate(t.camera); !camera)
+    return Error{fmt::format("tile {} of frame {}: {}", t.tile, t.frame.value, camera.error().text)};
+  if (t.tiles_in_frame > kMaxTilesInFrame || t.tile >= t.tiles_in_frame)
+    return Error{fmt::format("frame {} has no tile {} of {} (at most {})", t.frame.value, t.tile, t.tiles_in_frame,
+                             kMaxTilesInFrame)};
+  const geometry::Rect& r = t.rect;
+  if (r.x < 0 || r.y < 0 || r.width < 1 || r.height < 1 || r.width > t.camera.width || r.height > t.camera.height ||
+      r.x > t.camera.width - r.width || r.y > t.camera.height - r.height)
+    return Error{fmt::format("tile {} of frame {}: {}x{} pixels at ({}, {}) do not lie in the frame's {}x{}", t.tile,
+                             t.frame.value, r.width, r.height, r.x, r.y, t.camera.width, t.camera.height)};
+  const size_t pixels = static_cast<size_t>(r.width) * r.height;
+  if (pixels > codec::kMaxPixels)
+    return Error{fmt::format("tile {} of frame {} has {} pixels, at most {} are coded", t.tile, t.frame.value, pixels,
+                             codec::kMaxPixels)};
+  if (t.image.width != r.width || t.image.height != r.height || t.image.depth.size() != pixels ||
+      t.image.colour.size() != pixels || t.image.normal.size() != pixels)
+    return Error{fmt::format("tile {} of frame {}: its image has {}x{} pixels, its rectangle {}x{}", t.tile,
+                             t.frame.value, t.image.width, t.image.height, r.width, r.height)};
+  return ok_status();
+}
+
+}  // namespace
+
+struct PackerCore::Impl {
+  const Config config;
+  const Hooks hooks;
+  EpochId epoch;
+  Sequence sequence;  // of the newest event
+  points::PointModel model{config.model};
+  EventLog log{};
+  FrameBook frames;
+  Obsolescence obsolescence;             // of clusters, kEliminate
+  PatchObsolescence patch_obsolescence;  // kKeep
+  Statistics statistics;
+  std::vector<float> reference_depth_m;              // kept for its memory
+  std::vector<points::ClusterKey> clusters_of_patch;  // likewise
+  struct CoarsePass {
+    FrameId frame;
+    InstanceId viewer;
+    RequestId request;
+    std::vector<PatchKey> patches;
+  };
+  std::deque<CoarsePass> coarse;     // kKeep: coarse frames whose complete ones are not there yet, oldest first
+  std::vector<PatchKey> superseded;  // what complete frames made superfluous
+
+  Event next_event(Event::Kind kind) {
+    Event event;
+    event.sequence = sequence = sequence.next();
+    event.kind = kind;
+    event.epoch = epoch;
+    return event;
+  }
+
+  bool keeps() const { return config.redundancy == Redundancy::kKeep; }
+
+  splat::Elimination eliminate(SampledTile& tile) {
+    if (keeps()) {
+      const auto nothing = static_cast<uint64_t>(std::count(tile.image.depth.begin(), tile.image.depth.end(), 0u));
+      return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
+    }
+    // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters
+    // outside the tile's frustum cost next to nothing. It has a pixel more on each side, inside the frame, for the tile's border.
+    const geometry::Rect& r = tile.rect;
+    const int left = std::min(r.x, 1), top = std::min(r.y, 1);
+    const int right = std::min(tile.camera.width - r.x - r.width, 1),
+              bottom = std::min(tile.camera.height - r.y - r.height, 1);
+    const geometry::Rect around{r.x - left, r.y - top, r.width + left + right, r.height + top + bottom};
+    const geometry::Camera view = geometry::crop(tile.camera, around);
+    hooks.reference_depth(model, view, config.threads, reference_depth_m);
+    return hooks.eliminate(view, {left, top, r.width, r.height}, reference_depth_m, config.relative_epsilon, tile.image,
+                           config.nearest_sample);
+  }
+
+  using Stream = std::shared_ptr<const std::vector<uint8_t>>;
+
+  // A coarse frame is over when a complete one answers the same request of its viewer, or a later one.
+  void note_pass(const Event& event, const points::PreparedPatch& patch) {
+    if (event.step > 1) {
+      if (coarse.empty() || coarse.back().frame != event.frame)
+        coarse.push_back({event.frame, event.viewer, event.request, {}});
+      if (coarse.size() > kMaxOpenFrames) coarse.pop_front();
+      auto& patches = coarse.back().patches;
+      for (const auto& [key, mosaic] : patch.mosaics) patches.push_back({key, mosaic.frame_tag()});
+    } else if (event.frame_complete) {
+      std::erase_if(coarse, [&](const CoarsePass& pass) {
+        const bool over = pass.viewer == event.viewer && pass.request <= event.request;
+        if (over) superseded.insert(superseded.end(), pass.patches.begin(), pass.patches.end());
+        return over;
+      });
+    }
+  }
+
+  Event pack(SampledTile& tile, double now_s, Stream stream, const std::function<void(const Event&)>& publish) {
+    const splat::Elimination elimination = eliminate(tile);
+    Event event = next_event(Event::Kind::kPatch);
+    const FrameBook::Frame frame = frames.add(tile, elimination);
+    event.frame = tile.frame, event.viewer = tile.viewer, event.request = tile.request;
+    event.tile = tile.tile, event.tiles_in_frame = tile.tiles_in_frame, event.step = tile.step;
+    event.frame_complete = frame.tiles_left == 0;
+    event.camera = tile.camera, event.rect = tile.rect;
+    event.samples = elimination.samples, event.kept = elimination.kept;
+    event.frame_samples = frame.samples, event.frame_kept = frame.kept;
+    const bool as_it_came = stream && keeps();
+    event.blob =
+        as_it_came ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
+    if (publish) publish(event);
+
+    points::PreparedPatch patch =
+        points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
+    clusters_of_patch.clear();
+    for (const auto& [key, mosaic] : patch.mosaics) {
+      clusters_of_patch.push_back(key);
+      if (keeps())
+        patch_obsolescence.added(key, mosaic, now_s);
+      else
+        obsolescence.accessed(key, now_s);
+    }
+    if (keeps()) note_pass(event, patch);
+    log.add_patch(event, clusters_of_patch);
+    statistics.points_outside += patch.outside;
+    model.insert(std::move(patch));
+
+    ++statistics.tiles;
+    statistics.frames_complete += event.frame_complete;
+    statistics.samples += event.samples;
+    statistics.kept += event.kept;
+    return event;
+  }
+
+  void forget(std::span<const points::ClusterKey> keys, std::vector<Event>& out) {
+    while (!keys.empty()) {
+      const auto some = keys.first(std::min(keys.size(), kMaxForgetKeys));
+      keys = keys.subspan(some.size());
+      Event event = next_event(Event::Kind::kForget);
+      event.clusters.assign(some.begin(), some.end());
+      const uint64_t points = model.points();
+      std::vector<points::ClusterKey> dropped;
+      for (const points::Cluster& cluster : model.forget(some)) dropped.push_back(cluster.key);
+      log.add_forget(event.sequence, dropped);
+      for (const points::ClusterKey key : some) obsolescence.forgotten(key);
+      statistics.clusters_forgotten += dropped.size();
+      statistics.points_forgotten += points - model.points();
+      out.push_back(std::move(event));
+    }
+  }
+
+  void forget_patches(std::span<const PatchKey> keys, std::vector<Event>& out) {
+    while (!keys.empty()) {
+      const auto some = keys.first(std::min(keys.size(), kMaxForgetKeys));
+      keys = keys.subspan(some.size());
+      Event event = next_event(Event::Kind::kForget);
+      for (const PatchKey& key : some) {
+        event.clusters.push_back(key.cluster);
+        event.frames.push_back(key.frame);
+        patch_obsolescence.forgotten(key);
+      }
+      const uint64_t points = model.points(), clusters = model.clusters().size();
+      const std::vector<points::Cluster> dropped = model.forget(event.clusters, event.frames);
+      log.add_patch_forget(event, dropped);
+      statistics.clusters_forgotten += clusters - model.clusters().size();
+      statistics.patches_forgotten += dropped.size();
+      statistics.points_forgotten += points - model.points();
+      out.push_back(std::move(event));
+    }
+  }
+};
+
+PackerCore::PackerCore(const Config& config, EpochId epoch) : PackerCore(config, epoch, Hooks{}) {}
+PackerCore::PackerCore(const Config& config, EpochId epoch, Hooks hooks)
+    : impl_(new Impl{.config = config, .hooks = std::move(hooks), .epoch = epoch}) {
+  // Single patches are forgotten by their mosaics.
+  CHECK(!(config.redundancy == Redundancy::kKeep && config.model.compact));
+}
+PackerCore::~PackerCore() = default;
+
+Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, Impl::Stream stream,
+                                                const std::function<void(const Event&)>& publish) {
+  Impl& i = *impl_;
+  if (tile.epoch != i.epoch) {
+    ++i.statistics.tiles_other_epoch;
+    return std::optional<Event>();
+  }
+  Status good = check(tile);
+  if (good && i.frames.has(tile.frame, tile.tile)) {
+    ++i.statistics.tiles_duplicate;
+    return std::optional<Event>();
+  }
+  if (good) good = i.frames.check(tile);
+  if (!good) {
+    ++i.statistics.tiles_refused;
+    return good.error();
+  }
+  return std::optional<Event>(i.pack(tile, now_s, std::move(stream), publish));
+}
+
+bool PackerCore::has(FrameId frame, uint32_t tile) const { return impl_->frames.has(frame, tile); }
+
+void PackerCore::accessed(std::span<const points::ClusterKey> clusters, double now_s,
+                          std::span<const uint32_t> frames) {
+  CHECK(frames.empty() || frames.size() == clusters.size());
+  Impl& i = *impl_;
+  for (size_t n = 0; n < clusters.size(); ++n) {
+    if (!i.keeps()) {
+      if (i.obsolescence.knows(clusters[n])) i.obsolescence.accessed(clusters[n], now_s);
+    } else if (frames.empty()) {
+      i.patch_obsolescence.accessed(clusters[n], now_s);
+    } else {
+      i.patch_obsolescence.accessed({clusters[n], frames[n]}, now_s);
+    }
+  }
+}
+
+std::vector<Event> PackerCore::tick(double now_s) {
+  Impl& i = *impl_;
+  const Config& c = i.config;
+  std::vector<Event> out;
+  if (i.keeps()) {
+    const PatchLimits limits{c.obsolete_after_s, c.age_weight, c.rate_weight, c.patches_per_cluster, c.max_points};
+    i.forget_patches(i.patch_obsolescence.choose(limits, now_s), out);
+    if (c.max_log_bytes > 0) i.forget_patches(i.patch_obsolescence.choose_events(i.model, i.log, c.max_log_bytes), out);
+  } else {
+    i.forget(i.obsolescence.choose(i.model, now_s, c.obsolete_after_s, c.max_points), out);
+    if (c.max_log_bytes > 0) i.forget(i.obsolescence.choose_patches(i.log, c.max_log_bytes), out);
+  }
+  return out;
+}
+
+std::vector<Event> PackerCore::forget_superseded() {
+  std::vector<Event> out;
+  std::vector<PatchKey> keys = std::exchange(impl_->superseded, {});
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  impl_->forget_patches(keys, out);
+  return out;
+}
+
+void PackerCore::forget_frames() {
+  impl_->frames.clear();
+  impl_->coarse.clear();
+}
+
+std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
+  Impl& i = *impl_;
+  if (epoch == i.epoch) return std::nullopt;
+  i.epoch = epoch;
+  Event event = i.next_event(Event::Kind::kEpoch);
+  i.model.clear();
+  i.frames.clear();
+  i.obsolescence.clear();
+  i.patch_obsolescence.clear();
+  i.coarse.clear();
+  i.superseded.clear();
+  i.log.add_epoch(event);
+  return event;
+}
+
+std::vector<Event> PackerCore::events_since(Sequence after) const {
+  CHECK(remembers(after));
+  std::vector<Event> events = impl_->log.since(after);
+  for (Event& event : events) event.epoch = impl_->epoch;
+  return events;
+}
+
+bool PackerCore::remembers(Sequence after) const { return impl_->log.remembers(after); }
+
+Sequence PackerCore::sequence() const { return impl_->sequence; }
+EpochId PackerCore::epoch() const { return impl_->epoch; }
+Redundancy PackerCore::redundancy() const { return impl_->config.redundancy; }
+const points::PointModel& PackerCore::model() const { return impl_->model; }
+const Statistics& PackerCore::statistics() const { return impl_->statistics; }
+uint64_t PackerCore::log_bytes() const { return impl_->log.bytes(); }
+
+}  // namespace telesplat::packer

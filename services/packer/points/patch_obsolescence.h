@@ -1,0 +1,68 @@
+// Which patches of which clusters to forget where packing keeps redundant ones (T7.3): those that nobody drew for long and those
+// that are coarse beside others of their cluster.
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "services/packer/points/event_log.h"
+
+namespace telesplat::packer {
+
+/// A patch within a cluster: the cluster's mosaics with that frame tag.
+struct PatchKey {
+  points::ClusterKey cluster = 0;
+  uint32_t frame = 0;
+  auto operator<=>(const PatchKey&) const = default;
+};
+
+struct PatchLimits {
+  double obsolete_after_s = 0;       ///< forget what was not drawn for longer; 0: never
+  double age_weight = 1;             ///< per second since it was drawn
+  double rate_weight = 4;            ///< per halving of the sampling rate below the cluster's best
+  uint32_t patches_per_cluster = 0;  ///< at most; 0: no limit
+  uint64_t max_points = 0;           ///< above it, forget until at most 90 % of it are left; 0: no limit
+};
+
+class PatchObsolescence {
+ public:
+  /// A patch got points in a cluster, which counts as being drawn.
+  void added(points::ClusterKey key, const points::Mosaic& mosaic, double now_s);
+  /// A patch was drawn; unknown ones are ignored. Time never runs backwards for it.
+  void accessed(const PatchKey& key, double now_s);
+  /// Every patch of a cluster was.
+  void accessed(points::ClusterKey key, double now_s);
+  void forgotten(const PatchKey& key);
+  void clear();
+
+  /// What to forget, ascending: patches not drawn for longer than obsolete_after_s; of what is left those by which a cluster has
+  /// more than patches_per_cluster; and while there are too many points of the rest, in order of falling
+  ///   score = age_weight * seconds since it was drawn + rate_weight * max(0, log2(best pixel range / its pixel range)),
+  /// the best of the cluster's patches that are not obsolete. Of equal scores the older patch goes first, then the lower key.
+  std::vector<PatchKey> choose(const PatchLimits& limits, double now_s) const;
+
+  /// Every patch of the least recently drawn events, until the events left have at most 90 % of max_bytes; none if they have no
+  /// more than max_bytes. Ascending.
+  std::vector<PatchKey> choose_events(const points::PointModel& model, const EventLog& log, uint64_t max_bytes) const;
+
+ private:
+  struct Patch {
+    uint32_t frame, points;
+    float pixel_range;
+    Sequence first;  // of its mosaics
+    double access_s;
+  };
+  struct Scored {
+    double score;
+    Sequence first;
+    PatchKey key;
+    uint32_t points;
+    bool goes_before(const Scored& other) const;
+  };
+  double score(const Patch& patch, float best_range, const PatchLimits& limits, double now_s) const;
+
+  std::unordered_map<points::ClusterKey, std::vector<Patch>> clusters_;
+  uint64_t points_ = 0;
+};
+
+}  // namespace telesplat::packer

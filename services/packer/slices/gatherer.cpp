@@ -1,0 +1,257 @@
+#include "services/packer/slices/gatherer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/volume/slices/view.h"
+
+namespace telesplat::packer {
+namespace {
+
+constexpr size_t kMaxWaiting = 2 * wire::kMaxBuffers;  // frames of a viewer that wants all; the master begins no more
+
+bool same_frame(const wire::SliceLease& a, const wire::SliceLease& b) {
+  const auto same_view = [](const wire::SliceView& x, const wire::SliceView& y) {
+    return x.viewer == y.viewer && x.request == y.request && x.camera == y.camera && x.buffers == y.buffers;
+  };
+  return a.epoch == b.epoch && a.partition == b.partition && a.slabs == b.slabs && a.shear == b.shear &&
+         std::equal(a.views.begin(), a.views.end(), b.views.begin(), b.views.end(), same_view);
+}
+
+}  // namespace
+
+void SliceGatherer::set_scene(const volume::Grid& grid, EpochId epoch) {
+  if (grid_ && *grid_ != grid) clear_frames();
+  if (epoch != epoch_ || !grid_) {
+    statistics_.frames_dropped += open_.size();
+    open_.clear();
+    newest_ = nullptr;
+  }
+  grid_ = grid;
+  epoch_ = epoch;
+}
+
+void SliceGatherer::clear_frames() {
+  statistics_.frames_dropped += open_.size();
+  open_.clear();
+  closed_.clear();
+  newest_ = nullptr;
+  for (auto& [id, v] : viewers_) {
+    v.unacknowledged.clear();
+    v.waiting.clear();
+    v.newest = {};
+  }
+}
+
+Status SliceGatherer::check(const wire::SliceLease& l) const {
+  if (l.slabs < 1 || l.slabs > wire::kMaxSlabs || l.slab >= l.slabs)
+    return Error{fmt::format("slab {} of {}, limit {}", l.slab, l.slabs, wire::kMaxSlabs)};
+  if (l.begin >= l.end || l.end > uint64_t(grid_->size[2]))
+    return Error{fmt::format("a slab of slices {} to {} of {}", l.begin, l.end, grid_->size[2])};
+  if (l.views.empty() || l.views.size() > wire::kMaxViews)
+    return Error{fmt::format("{} views, limits 1 and {}", l.views.size(), wire::kMaxViews)};
+  return volume::validate(l.shear, *grid_);
+}
+
+void SliceGatherer::drop(Frames::iterator frame) {
+  ++statistics_.frames_dropped;
+  open_.erase(frame);
+}
+
+// For a frame's first slab, and for its bytes.
+void SliceGatherer::make_room(size_t bytes) {
+  size_t held = bytes;
+  for (const auto& f : open_) held += f->bytes;
+  while (!open_.empty() && (open_.size() >= kMaxOpenVolumeFrames || held > kMaxOpenVolumeBytes)) {
+    held -= open_.front()->bytes;
+    drop(open_.begin());
+  }
+}
+
+Result<SliceGatherer::Added> SliceGatherer::add(Slab slab, double now_s) {
+  const wire::SliceLease& lease = slab.images.lease;
+  const auto refuse = [&](std::string why) -> Result<Added> {
+    ++statistics_.slabs_refused;
+    return Error{fmt::format("frame {}: {}", lease.frame.value, why)};
+  };
+  if (lease.epoch != epoch_) {
+    ++statistics_.slabs_other_epoch;
+    return Added{};
+  }
+  if (const Status s = check(lease); !s) return refuse(s.error().text);
+  const auto open =
+      std::find_if(open_.begin(), open_.end(), [&](const auto& f) { return f->lease.frame == lease.frame; });
+  if (open == open_.end() && std::find(closed_.begin(), closed_.end(), lease.frame) != closed_.end()) {
+    ++statistics_.slabs_duplicate;
+    return Added{};
+  }
+  if (open != open_.end()) {
+    const Frame& frame = **open;
+    if (!same_frame(frame.lease, lease)) return refuse("its slabs were leased with another view, raster or partition");
+    if (frame.slabs[lease.slab].owner) {
+      ++statistics_.slabs_duplicate;
+      return Added{};
+    }
+    for (const Slab& s : frame.slabs)
+      if (s.owner && lease.begin < s.images.lease.end && s.images.lease.begin < lease.end)
+        return refuse(fmt::format("slab {} has slices of slab {}", lease.slab, s.images.lease.slab));
+  }
+  const std::span bytes(reinterpret_cast<const uint8_t*>(slab.images.data.data()), slab.images.data.size());
+  auto slices = volume::parse_slices(bytes, lease.shear.width, lease.shear.height, int(lease.shear.layers.size()));
+  if (!slices) return refuse(slices.error().text);
+  Added out{.is_new = true};
+  for (const auto& s : *slices) {
+    if (uint64_t(s.k_begin) != lease.begin || uint64_t(s.k_end) != lease.end)
+      return refuse(
+          fmt::format("an image of slices {} to {} in the slab {} to {}", s.k_begin, s.k_end, lease.begin, lease.end));
+    out.blocks += s.blocks.size();
+  }
+  std::shared_ptr<Frame> frame;
+  if (open != open_.end()) {
+    frame = *open;
+  } else {
+    make_room(bytes.size());
+    frame = std::make_shared<Frame>();
+    frame->lease = lease;
+    frame->slabs.resize(lease.slabs);
+    frame->slices.resize(lease.slabs);
+    frame->missing = lease.slabs;
+    frame->leased_s = lease.leased_s;
+    open_.push_back(frame);
+  }
+  ++statistics_.slabs;
+  frame->leased_s = std::min(frame->leased_s, lease.leased_s);
+  frame->voxels += slab.images.voxels;
+  frame->bytes += bytes.size();
+  frame->slices[lease.slab] = std::move(*slices);
+  const uint64_t number = lease.slab;
+  frame->slabs[number] = std::move(slab);
+  if (--frame->missing > 0) return out;
+  out.frame_complete = true;
+  open_.erase(std::find(open_.begin(), open_.end(), frame));
+  complete(frame, now_s);
+  return out;
+}
+
+void SliceGatherer::complete(const std::shared_ptr<const Frame>& frame, double now_s) {
+  ++statistics_.frames_complete;
+  closed_.push_back(frame->lease.frame);
+  if (closed_.size() > kMaxClosedFrames) closed_.pop_front();
+  if (!newest_ || newest_->lease.frame < frame->lease.frame) newest_ = frame;
+  for (const auto& view : frame->lease.views) {
+    const bool is_new = !viewers_.contains(view.viewer);
+    Viewer& v = viewer(view.viewer, now_s);
+    if (is_new) v.in_order = view.buffers > 0;
+    queue(v, {frame, view});
+  }
+}
+
+SliceGatherer::Viewer& SliceGatherer::viewer(InstanceId id, double now_s) {
+  const auto known = viewers_.find(id);
+  if (known != viewers_.end()) return known->second;
+  if (viewers_.size() >= kMaxSliceViewers) {
+    viewers_.erase(std::min_element(viewers_.begin(), viewers_.end(),
+                                    [](const auto& a, const auto& b) { return a.second.heard_s < b.second.heard_s; }));
+    ++statistics_.viewers_forgotten;
+  }
+  Viewer& v = viewers_[id];
+  v.heard_s = now_s;
+  return v;
+}
+
+void SliceGatherer::queue(Viewer& v, Waiting waiting) {
+  const FrameId id = waiting.frame->lease.frame;
+  if (id <= v.newest) {
+    ++statistics_.frames_skipped;
+    return;
+  }
+  v.newest = id;
+  const size_t most = v.in_order ? kMaxWaiting : 1;
+  v.waiting.push_back(std::move(waiting));
+  for (; v.waiting.size() > most; v.waiting.pop_front()) ++statistics_.frames_skipped;
+}
+
+Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s) {
+  if (ack.buffers < 1 || ack.buffers > wire::kMaxBuffers)
+    return Error{fmt::format("a viewer with {} buffers, limits 1 and {}", ack.buffers, wire::kMaxBuffers)};
+  const auto known = viewers_.find(ack.viewer);
+  const bool begins = known == viewers_.end() || known->second.peer.empty() || ack.frame.value == 0;
+  Viewer& v = viewer(ack.viewer, now_s);
+  v.peer = peer;
+  v.buffers = ack.buffers;
+  v.in_order = ack.in_order;
+  v.heard_s = now_s;
+  if (begins) {
+    // Or it believes that it is not known, or its connection broke: whatever was under way is lost.
+    v.waiting.insert(v.waiting.begin(), v.unacknowledged.begin(), v.unacknowledged.end());
+    v.unacknowledged.clear();
+  } else {
+    std::erase_if(v.unacknowledged, [&](const Waiting& w) { return w.frame->lease.frame == ack.frame; });
+  }
+  for (; !v.in_order && v.waiting.size() > 1; v.waiting.pop_front()) ++statistics_.frames_skipped;
+  if (!begins || !newest_ || v.in_order || !v.waiting.empty()) return ok_status();
+  const auto& views = newest_->lease.views;
+  const auto own =
+      std::find_if(views.begin(), views.end(), [&](const auto& view) { return view.viewer == ack.viewer; });
+  v.newest = newest_->lease.frame;
+  v.waiting.push_back({newest_, own != views.end() ? *own : wire::SliceView{ack.viewer, {}, views.front().camera, 0},
+                       own == views.end()});
+  return ok_status();
+}
+
+void SliceGatherer::unreachable(const std::string& peer) {
+  statistics_.viewers_forgotten += std::erase_if(viewers_, [&](const auto& v) { return v.second.peer == peer; });
+}
+
+void SliceGatherer::expire(double now_s) {
+  statistics_.viewers_forgotten += std::erase_if(viewers_, [&](const auto& entry) {
+    const Viewer& v = entry.second;
+    const bool owes = v.peer.empty() || !v.unacknowledged.empty();
+    return owes && now_s - v.heard_s > kViewerPatience_s;
+  });
+}
+
+std::optional<SliceGatherer::Outgoing> SliceGatherer::take_outgoing(double now_s) {
+  // The viewers after the one that was served last come first.
+  auto next = viewers_.upper_bound(turn_);
+  for (size_t n = 0; n < viewers_.size(); ++n, ++next) {
+    if (next == viewers_.end()) next = viewers_.begin();
+    Viewer& v = next->second;
+    if (v.peer.empty() || v.waiting.empty() || v.unacknowledged.size() >= v.buffers) continue;
+    turn_ = next->first;
+    if (v.unacknowledged.empty()) v.heard_s = std::max(v.heard_s, now_s);
+    v.unacknowledged.push_back(std::move(v.waiting.front()));
+    v.waiting.pop_front();
+    ++statistics_.frames_sent;
+    return make(next->first, v, v.unacknowledged.back());
+  }
+  return std::nullopt;
+}
+
+SliceGatherer::Outgoing SliceGatherer::make(InstanceId id, const Viewer& v, const Waiting& waiting) const {
+  const Frame& frame = *waiting.frame;
+  const volume::SliceView view(*grid_, frame.lease.shear, waiting.view.camera, kViewMargin);
+  std::vector<volume::EncodedSlice> seen;
+  for (const auto& slab : frame.slices)
+    for (const auto& slice : slab) {
+      volume::EncodedSlice& part = seen.emplace_back();
+      part.layer = slice.layer, part.k_begin = slice.k_begin, part.k_end = slice.k_end;
+      std::copy_if(slice.blocks.begin(), slice.blocks.end(), std::back_inserter(part.blocks),
+                   [&](const auto& b) { return waiting.whole || view.may_see(slice.layer, b.x, b.y); });
+    }
+  Outgoing out{v.peer, {}, std::make_shared<const std::vector<uint8_t>>(volume::join_slices(seen))};
+  out.frame.epoch = frame.lease.epoch;
+  out.frame.frame = frame.lease.frame;
+  out.frame.viewer = id;
+  out.frame.request = waiting.view.request;
+  out.frame.camera = waiting.view.camera;
+  out.frame.shear = frame.lease.shear;
+  out.frame.slabs = frame.lease.slabs;
+  out.frame.voxels = frame.voxels;
+  out.frame.leased_s = frame.leased_s;
+  out.frame.data = std::as_bytes(std::span(*out.bytes));
+  return out;
+}
+
+}  // namespace telesplat::packer

@@ -1,0 +1,125 @@
+// Puts the slabs of a volume's frames together and deals complete frames out to viewers, to each what its camera may see (T4.5.2). No sockets, no
+// clocks. One thread.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/volume/grid.h"
+#include "common/volume/slices/image.h"
+#include "common/wire/messages.h"
+
+namespace telesplat::packer {
+
+inline constexpr size_t kMaxOpenVolumeFrames = 8;        ///< unfinished ones remembered; of more the oldest is dropped
+inline constexpr size_t kMaxOpenVolumeBytes = 1u << 30;  ///< of them
+inline constexpr size_t kMaxClosedFrames = 256;          ///< complete ones remembered, to tell duplicates
+inline constexpr size_t kMaxSliceViewers = 256;
+inline constexpr double kViewerPatience_s =
+    10;  ///< a viewer that acknowledges nothing of what it was sent for so long is forgotten
+inline constexpr double kViewMargin = 0.1;  ///< of a camera's width and height, that is kept of images on every side
+
+class SliceGatherer {
+ public:
+  /// A slab as it came. data of `images` points to memory that `owner` keeps alive.
+  struct Slab {
+    wire::SliceImages images;
+    std::shared_ptr<const void> owner;
+  };
+  /// A frame for a viewer. frame.data points into `bytes`; packer and packed_s are the service's to fill in.
+  struct Outgoing {
+    std::string peer;  ///< of the socket on which the viewer acknowledges
+    wire::SliceFrame frame;
+    std::shared_ptr<const std::vector<uint8_t>> bytes;
+  };
+  struct Added {
+    bool is_new = false;          ///< false: it was here already
+    bool frame_complete = false;  ///< it was the last one lacking
+    uint64_t blocks = 0;          ///< coded blocks in it
+  };
+  struct Statistics {
+    uint64_t slabs = 0;            ///< taken
+    uint64_t slabs_duplicate = 0;  ///< dropped: was here already
+    uint64_t slabs_other_epoch = 0;
+    uint64_t slabs_refused = 0;  ///< dropped: contradict themselves or their frame
+    uint64_t frames_complete = 0;
+    uint64_t frames_dropped = 0;  ///< never completed
+    uint64_t frames_sent = 0;     ///< to viewers, each counted
+    uint64_t frames_skipped = 0;  ///< a newer one was there before the viewer was ready for them
+    uint64_t viewers_forgotten = 0;
+  };
+
+  /// The volume that frames are of and the epoch that is shown. Another one: unfinished frames are dropped, and newcomers get none of the old
+  /// complete ones; those who wait for such a frame still get it.
+  void set_scene(const volume::Grid& grid, EpochId epoch);
+  bool ready() const { return grid_.has_value(); }
+  EpochId epoch() const { return epoch_; }
+  /// Frames are numbered anew (another master), or are of another volume. Viewers stay known; nothing is under way to them any more.
+  void clear_frames();
+
+  /// Takes a slab; the last one that its frame lacked makes the frame ready for take_outgoing(). Error: lease or images make no sense, or
+  /// contradict the frame's other slabs; nothing has changed then. Precondition: ready().
+  Result<Added> add(Slab slab, double now_s);
+  /// A viewer is there (frame 0), or has let a frame go. One that was there before gets anew what was under way to it; one that comes late gets the newest complete frame, unless it wants its own in order. Error:
+  /// buffers that are none.
+  Status acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s);
+  /// It could not be sent to.
+  void unreachable(const std::string& peer);
+  /// Forgets viewers that do not answer.
+  void expire(double now_s);
+  /// The next frame to send: in order for each viewer, never more unacknowledged than it has buffers. It counts as sent.
+  std::optional<Outgoing> take_outgoing(double now_s);
+
+  const Statistics& statistics() const { return statistics_; }
+  size_t open_frames() const { return open_.size(); }
+  size_t viewers() const { return viewers_.size(); }
+
+ private:
+  /// All slabs of a frame, or those that have come.
+  struct Frame {
+    wire::SliceLease lease;                                 // of the first slab that came
+    std::vector<Slab> slabs;                                // by their numbers; without an owner: not here yet
+    std::vector<std::vector<volume::EncodedSlice>> slices;  // of each slab
+    size_t missing = 0;
+    size_t bytes = 0;
+    double leased_s = 0;  // the first lease
+    uint64_t voxels = 0;
+  };
+  using Frames = std::deque<std::shared_ptr<Frame>>;
+  struct Waiting {
+    std::shared_ptr<const Frame> frame;
+    wire::SliceView view;
+    bool whole = false;  // the camera is another viewer's: nothing is left out
+  };
+  struct Viewer {
+    std::string peer;  // empty: frames are made for it, but it did not introduce itself yet
+    uint64_t buffers = 1;
+    bool in_order = false;
+    std::deque<Waiting> unacknowledged, waiting;  // in order of frames
+    FrameId newest;                               // that ever waited: older ones come too late
+    double heard_s = 0;                           // or when it was first sent something since
+  };
+
+  Status check(const wire::SliceLease& lease) const;
+  void drop(Frames::iterator frame);
+  void make_room(size_t bytes);
+  void complete(const std::shared_ptr<const Frame>& frame, double now_s);
+  Viewer& viewer(InstanceId id, double now_s);
+  void queue(Viewer& viewer, Waiting waiting);
+  Outgoing make(InstanceId id, const Viewer& viewer, const Waiting& waiting) const;
+
+  std::optional<volume::Grid> grid_;
+  EpochId epoch_;
+  Frames open_;  // oldest first
+  std::deque<FrameId> closed_;
+  std::shared_ptr<const Frame> newest_;  // complete
+  std::map<InstanceId, Viewer> viewers_;
+  InstanceId turn_;  // the viewer served last
+  Statistics statistics_;
+};
+
+}  // namespace telesplat::packer

@@ -1,0 +1,113 @@
+#include "services/packer/slices/packing.h"
+
+#include "common/core/log.h"
+#include "common/volume/session.h"
+
+namespace telesplat::packer {
+
+bool VolumePacking::follow(const wire::Welcome& session, double now_s) {
+  const auto kind = session.facts.find("kind");
+  if (kind == session.facts.end() || kind->second != "volume") return false;
+  const auto read = volume::read_session(session.parameters, session.facts);
+  const Status valid = read ? volume::validate(read->grid) : Status(read.error());
+  if (!valid) {
+    log::error("the master's volume cannot be packed: {}", valid.error().text);
+    return true;
+  }
+  // Frames are told apart by their numbers, which another master counts from 1 again: viewers must see that these are others.
+  if (master_ != session.master || grid_ != read->grid) {
+    gatherer_.clear_frames();
+    instance_ = net::make_instance_id();
+    master_ = session.master;
+    grid_ = read->grid;
+  }
+  gatherer_.set_scene(read->grid, session.epoch);
+  for (const auto& [received, bytes, since_s] : ahead_.take()) {
+    if (is_ahead(received.images))
+      ahead_.add(received, bytes, since_s);
+    else if (const Status s = receive(received.message, received.images, now_s); !s)
+      log::warn("a slab that came early was refused: {}", s.error().text);
+  }
+  return true;
+}
+
+Status VolumePacking::receive(const net::Message& message, const wire::SliceImages& m, double now_s) {
+  if (is_ahead(m)) {
+    ahead_.add({message, m}, message.body.size(), now_s);
+    return ok_status();
+  }
+  if (m.lease.epoch != gatherer_.epoch()) {
+    (void)gatherer_.add({m, message.owner}, now_s);  // which counts it
+    return ok_status();
+  }
+  const double receive_s = links_.to_master_s(now_s);
+  const auto added = gatherer_.add({m, message.owner}, now_s);
+  if (!added) return added.error();
+  bytes_received_ += m.data.size();
+  wire::TileDone done{.frame = m.lease.frame,
+                      .tile = m.lease.slab,
+                      .lease = m.lease.lease,
+                      .sampler = m.sampler,
+                      .rect = {0, 0, m.lease.shear.width, m.lease.shear.height},
+                      .samples = m.voxels,
+                      .kept = added->blocks * volume::kSliceBlock * volume::kSliceBlock,
+                      .bytes_sampled = m.data.size(),
+                      .leased_s = m.lease.leased_s,
+                      .sample_begin_s = m.sample_begin_s,
+                      .sample_end_s = m.sample_end_s,
+                      .encode_end_s = m.encode_end_s,
+                      .receive_s = receive_s};
+  // What a frame gives is counted to the slab that completed it. What was here already is done, should the master not know.
+  if (added->frame_complete) {
+    done.bytes_sent = send_out(now_s);
+    spans_.add("pack", receive_s, links_.master_now());
+  }
+  done.packed_s = links_.master_now();
+  links_.tell(done);
+  return ok_status();
+}
+
+uint64_t VolumePacking::send_out(double now_s) {
+  uint64_t bytes = 0;
+  while (auto out = gatherer_.take_outgoing(now_s)) {
+    out->frame.packer = instance_;
+    out->frame.packed_s = links_.master_now();
+    if (!links_.send(out->frame, out->peer)) {
+      gatherer_.unreachable(out->peer);
+      continue;
+    }
+    bytes += out->frame.data.size();
+  }
+  bytes_sent_ += bytes;
+  return bytes;
+}
+
+Status VolumePacking::acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s) {
+  const Status s = gatherer_.acknowledged(peer, ack, now_s);
+  send_out(now_s);
+  return s;
+}
+
+void VolumePacking::tick(double now_s) {
+  gatherer_.expire(now_s);
+  ahead_.expire(now_s);
+}
+
+void VolumePacking::add_status(net::MasterLink::Values& values) const {
+  if (!gatherer_.ready()) return;
+  const auto& s = gatherer_.statistics();
+  values["bytes_sent"] += double(bytes_sent_);
+  values["slice_bytes_received"] = double(bytes_received_);
+  values["slabs"] = double(s.slabs);
+  values["slabs_duplicate"] = double(s.slabs_duplicate);
+  values["slabs_other_epoch"] = double(s.slabs_other_epoch + ahead_.dropped());
+  values["slabs_refused"] = double(s.slabs_refused);
+  values["volume_frames_complete"] = double(s.frames_complete);
+  values["volume_frames_dropped"] = double(s.frames_dropped);
+  values["volume_frames_sent"] = double(s.frames_sent);
+  values["volume_frames_skipped"] = double(s.frames_skipped);
+  values["volume_viewers"] = double(gatherer_.viewers());
+  values["volume_viewers_forgotten"] = double(s.viewers_forgotten);
+}
+
+}  // namespace telesplat::packer

@@ -1,0 +1,284 @@
+// The scalar oracle of the Julia kernels: one ray after the other, the same operations in the same order. Read this one first.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "services/sampler/julia/steps.h"
+#include "services/sampler/julia/trace.h"
+
+namespace telesplat::sampler {
+namespace {
+
+using Constants = JuliaScene::Constants;
+
+struct Vec4 {
+  float v[4];
+};
+Vec4 along(const float* origin, const Vec4& d, float t) {
+  Vec4 q;
+  for (int i = 0; i < 4; ++i) q.v[i] = origin[i] + t * d.v[i];
+  return q;
+}
+// What a step of `length` set units in the room-space direction n gains in orbit coordinates.
+Vec4 orbit_vector(const Constants& k, const float* n) {
+  Vec4 d;
+  for (int i = 0; i < 4; ++i) d.v[i] = (n[0] * k.axes[0][i] + n[1] * k.axes[1][i]) + n[2] * k.axes[2][i];
+  return d;
+}
+
+// log x for normal x > 0: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh s, s = (m - 1) / (m + 1). Error below 2e-7.
+float log_of(float x) {
+  const uint32_t offset = std::bit_cast<uint32_t>(x) - kSqrtHalfBits;
+  const auto e = static_cast<float>(static_cast<int32_t>(offset) >> 23);
+  const float m = std::bit_cast<float>((offset & 0x7fffff) + kSqrtHalfBits);
+  const float s = (m - 1.0f) / (m + 1.0f), z = s * s;
+  const float series = z * (kArtanh3 + z * (kArtanh5 + z * kArtanh7));
+  return e * kLog2 + (s + s) * (1.0f + series);
+}
+
+// The distance estimate in set units.
+float estimate(const Constants& k, const Vec4& q) {
+  float w = q.v[0], p = q.v[1], r = q.v[2] * q.v[2] + q.v[3] * q.v[3], d = 1;
+  for (int i = 0; i <= k.iterations; ++i) {
+    const float ww = w * w, n = ww + (p * p + r);
+    if (n > k.limit) return std::min(0.125f * std::sqrt(n / d) * log_of(n * 0.25f), k.radius);
+    d = d * n;
+    p = w * p + k.c_p;
+    r = ww * r;
+    w = (ww - n * 0.5f) + k.c_w;
+  }
+  return 0;
+}
+
+// Depths between which a line lies in the ball |q| <= radius and in the box grown by `margin`; none if t1 < t0.
+struct Interval {
+  float t0, t1;
+};
+Interval clip(const Constants& k, const JuliaRays& rays, const float* d, float ball, float margin) {
+  const float* o = rays.origin;
+  float a = 0, b = 0, c = -(ball * ball);
+  for (int i = 0; i < 4; ++i) a = a + d[i] * d[i], b = b + o[i] * d[i], c = c + o[i] * o[i];
+  const float inside = b * b - a * c, root = std::sqrt(std::max(inside, 0.0f));
+  Interval out{std::max(rays.near_m, (-b - root) / a), (-b + root) / a};
+  if (inside < 0) out.t1 = -1;
+  for (int i = 0; i < 3; ++i) {
+    const float v = d[4 + i], inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
+    const float ta = ((k.box_lo[i] - margin) - o[4 + i]) * inverse, tb = ((k.box_hi[i] + margin) - o[4 + i]) * inverse;
+    out.t0 = std::max(out.t0, std::min(ta, tb));
+    out.t1 = std::min(out.t1, std::max(ta, tb));
+  }
+  return out;
+}
+
+float speed_of(const float* d) { return 0.5f * std::sqrt((d[0] * d[0] + d[1] * d[1]) + (d[2] * d[2] + d[3] * d[3])); }
+
+// Depth up to which the rays of a block are free, kNothing if they meet nothing.
+float cone_start(const Constants& k, const JuliaRays& rays, int block_x, int block_y) {
+  float d[7];
+  for (int i = 0; i < 7; ++i) d[i] = rays.block_column[i][block_x] + rays.block_row[i][block_y];
+  const Interval range = clip(k, rays, d, rays.block_ball, rays.block_margin);
+  const float growth = rays.spread + kConeMargin * k.lod * rays.footprint;
+  const float scale = 1.0f / (speed_of(d) + growth);
+  float t = range.t0;
+  for (int i = 0; i < kMaxConeSteps; ++i) {
+    if (t > range.t1) return kNothing;
+    const float radius = growth * t, free = estimate(k, along(rays.origin, {d[0], d[1], d[2], d[3]}, t)) - radius;
+    if (free < kConeStop * radius) break;
+    t = t + free * scale;
+  }
+  return t;
+}
+
+// Depths about the surface and what the estimate exceeds the threshold by there: g0 > 0 >= g1, or t0 = t1 where a ray begins below it.
+struct Bracket {
+  float t0, g0, t1, g1;
+};
+bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Interval range, Bracket& out) {
+  const float inverse = 1.0f / speed_of(d.v), threshold = (k.lod * rays.footprint) * inverse;  // set units -> depth
+  float t = range.t0, last_t = t, last_r = 0;
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const float r = estimate(k, along(rays.origin, d, t)) * inverse, gone = t - last_t;
+    if (gone >
+        last_r * kSlack + r * kTrust) {  // the free balls about the two points do not meet: take the safe step instead
+      t = last_t + last_r;
+      continue;
+    }
+    const float g = r - threshold * t;
+    if (g <= 0) {
+      out = gone == 0 ? Bracket{t, 0, t, -1} : Bracket{last_t, last_r - threshold * last_t, t, g};
+      return true;
+    }
+    if (t + r >= range.t1) return false;
+    // If the estimate goes on changing as it did, the next free ball touches this one: r + r' = step, r' = r + slope * step.
+    const float slope = gone > 0 ? (r - last_r) / gone : -1.0f;
+    const float ratio = std::max(kRelax / (1.0f - std::min(std::max(slope, -1.0f), kMaxSlope)), 1.0f);
+    // Close by, the surface may come within the threshold for less than a step: go carefully.
+    const float most = r < kNear * (threshold * t) ? kNearRatio : ratio;
+    last_t = t, last_r = r;
+    t = std::min(t + r * std::min(ratio, most), range.t1);
+  }
+  return false;
+}
+
+// Regula falsi, the Illinois way: an end that stays has its value halved.
+float refine(const Constants& k, const JuliaRays& rays, const Vec4& d, Bracket b) {
+  const float inverse = 1.0f / speed_of(d.v), threshold = (k.lod * rays.footprint) * inverse;
+  const auto secant = [&] { return b.t0 + (b.t1 - b.t0) * (b.g0 / std::max(b.g0 - b.g1, kTiny)); };
+  for (int i = 0; i < kRefinements; ++i) {
+    const float t = secant(), g = estimate(k, along(rays.origin, d, t)) * inverse - threshold * t;
+    if (g > 0) {
+      b.t0 = t, b.g0 = g, b.g1 = b.g1 * 0.5f;
+    } else {
+      b.t1 = t, b.g1 = g, b.g0 = b.g0 * 0.5f;
+    }
+  }
+  return secant();
+}
+
+// The orbit of a surface point with its derivatives along X, Y, Z: half the gradient of N where it escaped (0 where it did not), and the
+// square of the least length that the colour asks for.
+struct Orbit {
+  float gradient[3], trap;
+};
+Orbit follow(const Constants& k, const Vec4& q) {
+  const float r0 = q.v[2] * q.v[2] + q.v[3] * q.v[3];
+  const float across = k.plane[1] * q.v[2] + k.plane[2] * q.v[3];
+  float w = q.v[0], p = q.v[1], s = 1;  // s: what r1 and r2 have been multiplied by
+  float dw[3], dp[3], ds[3] = {0, 0, 0}, dr0[3];
+  for (int i = 0; i < 3; ++i)
+    dw[i] = k.axes[i][0], dp[i] = k.axes[i][1], dr0[i] = q.v[2] * k.axes[i][2] + q.v[3] * k.axes[i][3];
+  Orbit out{{0, 0, 0}, k.limit};
+  for (int i = 0; i <= k.iterations; ++i) {
+    const float ww = w * w, ss = s * s, rr = ss * r0, off_axis = p * p + rr, n = ww + off_axis, sr0 = s * r0;
+    float wdw[3], rest[3];
+    for (int a = 0; a < 3; ++a) wdw[a] = w * dw[a], rest[a] = (p * dp[a] + sr0 * ds[a]) + ss * dr0[a];
+    if (n > k.limit) {
+      for (int a = 0; a < 3; ++a) out.gradient[a] = wdw[a] + rest[a];
+      break;
+    }
+    const float off_plane = k.plane[0] * p + across * s;
+    out.trap =
+        std::min(out.trap, k.colour == static_cast<int>(julia::Colour::kTrap) ? off_axis : off_plane * off_plane);
+    for (int a = 0; a < 3; ++a) {
+      dp[a] = dw[a] * p + w * dp[a];
+      ds[a] = dw[a] * s + w * ds[a];
+      dw[a] = wdw[a] - rest[a];
+    }
+    p = w * p + k.c_p;
+    s = w * s;
+    w = (ww - n * 0.5f) + k.c_w;
+  }
+  if (k.colour == static_cast<int>(julia::Colour::kDistance)) out.trap = (q.v[0] * q.v[0] + q.v[1] * q.v[1]) + r0;
+  return out;
+}
+
+float dot(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
+
+// To unit length; false if it has none or is not finite.
+bool normalise(float* n) {
+  const float most = std::max(std::max(std::abs(n[0]), std::abs(n[1])), std::abs(n[2]));
+  for (int i = 0; i < 3; ++i)
+    if (!(std::abs(n[i]) < kNothing)) return false;
+  if (!(most > kTiny)) return false;
+  for (int i = 0; i < 3; ++i) n[i] = n[i] / most;
+  const float length = std::sqrt(dot(n, n));
+  for (int i = 0; i < 3; ++i) n[i] = n[i] / length;
+  return true;
+}
+
+// The gradient where it is good; else the estimate's differences over a footprint; else the direction towards the viewer. What still faces
+// away, at a silhouette, is turned until it just does not.
+void normal_at(const Constants& k, const Vec4& q, const float* gradient, float reach, const float* ray, float* n) {
+  float back[3] = {-ray[0], -ray[1], -ray[2]};
+  normalise(back);
+  std::copy_n(gradient, 3, n);
+  if (!normalise(n) || dot(n, back) < 0) {
+    for (int i = 0; i < 3; ++i) {
+      Vec4 step;
+      for (int j = 0; j < 4; ++j) step.v[j] = k.axes[i][j];
+      n[i] = estimate(k, along(q.v, step, reach)) - estimate(k, along(q.v, step, -reach));
+    }
+    if (!normalise(n)) std::copy_n(back, 3, n);
+  }
+  const float lean = dot(n, back);
+  if (lean < 0) {
+    for (int i = 0; i < 3; ++i) n[i] = n[i] + back[i] * (kLeast - lean);
+    normalise(n);
+  }
+}
+
+float occlusion_at(const Constants& k, const Vec4& q, const float* n) {
+  const Vec4 step = orbit_vector(k, n);
+  float sum = 0;
+  for (int i = 0; i < kOcclusionSteps; ++i) {
+    const float h = kOcclusionAt[i] * k.radius;
+    const float open = std::min(estimate(k, along(q.v, step, h)) / (kOpen * h), 1.0f);
+    sum = sum + kOcclusionWeight[i] * (1.0f - open);
+  }
+  return sum;
+}
+
+// 0 in full shadow .. 1 in full light.
+float lit_at(const Constants& k, const Vec4& q) {
+  const Vec4 step = orbit_vector(k, k.light);
+  float lit = 1, s = kShadowBegin * k.radius;
+  for (int i = 0; i < kShadowSteps && s < kShadowEnd * k.radius && lit > 0; ++i) {
+    const float r = estimate(k, along(q.v, step, s));
+    lit = std::min(lit, kShadowSharpness * r / s);
+    s = s + std::max(r, kShadowLeast * k.radius);
+  }
+  return lit;
+}
+
+void add_point(const Constants& k, const JuliaRays& rays, int x, int y, const float* d, const Bracket& bracket,
+               JuliaPoints& out) {
+  const Vec4 direction{d[0], d[1], d[2], d[3]};
+  const float t = refine(k, rays, direction, bracket);
+  const Vec4 q = along(rays.origin, direction, t);
+  const Orbit orbit = follow(k, q);
+  float n[3];
+  normal_at(k, q, orbit.gradient, rays.footprint * t, d + 4, n);
+  if (bracket.t0 == bracket.t1) face_normal(k, rays, d + 4, t, n);
+  float light = 1;
+  if (k.ambient > 0) light = light * (1.0f - k.ambient * occlusion_at(k, q, n));
+  if (k.shadow > 0) light = light * (1.0f - k.shadow * (1.0f - lit_at(k, q)));
+
+  const int i = out.count++;
+  out.x[i] = x, out.y[i] = y;
+  out.depth_m[i] = t;
+  for (int a = 0; a < 3; ++a) out.normal[a][i] = n[a];
+  out.tone[i] = std::sqrt(orbit.trap) * k.tone_scale + k.tone_shift;
+  out.light[i] = light;
+}
+
+}  // namespace
+
+bool face_normal(const Constants& k, const JuliaRays& rays, const float* direction, float t, float* normal) {
+  for (int i = 0; i < 3; ++i) {
+    const float v = direction[i], inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
+    const float ta = (k.box_lo[i] - rays.origin[4 + i]) * inverse, tb = (k.box_hi[i] - rays.origin[4 + i]) * inverse;
+    if (std::min(ta, tb) != t) continue;
+    std::fill_n(normal, 3, 0.0f);
+    normal[i] = v < 0 ? 1.0f : -1.0f;
+    return true;
+  }
+  return false;
+}
+
+void julia_trace_plainly(const Constants& k, const JuliaRays& rays, const JuliaPart& part, JuliaPoints& out) {
+  float start[JuliaPart::kBlocks];
+  for (int block = part.block_begin; block < part.block_end; ++block)
+    start[block - part.block_begin] = cone_start(k, rays, block, part.block_row);
+  for (int y = part.y_begin; y < part.y_end; ++y)
+    for (int x = part.x_begin; x < part.x_end; ++x) {
+      float d[7];
+      for (int i = 0; i < 7; ++i) d[i] = rays.column[i][x] + rays.row[i][y];
+      Interval range = clip(k, rays, d, rays.ball, 0);
+      range.t0 = std::max(range.t0, start[x / kJuliaBlock - part.block_begin]);
+      Bracket bracket;
+      if (range.t0 <= range.t1 && march(k, rays, {d[0], d[1], d[2], d[3]}, range, bracket))
+        add_point(k, rays, x, y, d, bracket, out);
+    }
+}
+
+}  // namespace telesplat::sampler

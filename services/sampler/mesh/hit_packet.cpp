@@ -1,0 +1,132 @@
+#include "services/sampler/mesh/hit_packet.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "services/sampler/mesh/hit_packet.cpp"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
+#include <glm/geometric.hpp>
+
+#include "common/image/normal.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace telesplat::sampler {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F = hn::CappedTag<float, kPacket>;
+using I = hn::RebindToSigned<F>;
+using U = hn::RebindToUnsigned<F>;
+using VF = hn::Vec<F>;
+using VU = hn::Vec<U>;
+constexpr F f;
+constexpr I si;
+constexpr U un;
+
+struct V3 {
+  VF x, y, z;
+};
+HWY_INLINE VF dot(const V3& a, const V3& b) { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); }
+HWY_INLINE VF to_float(VU v) { return hn::ConvertTo(f, hn::BitCast(si, v)); }
+HWY_INLINE VU to_unsigned(VF v) { return hn::BitCast(un, hn::ConvertTo(si, v)); }
+
+// image/normal.h: decode_normal32
+HWY_INLINE V3 decode32(VU code) {
+  const VF one = hn::Set(f, 1.0f), scale = hn::Set(f, 1.0f / 32767.0f);
+  VF x = hn::Min(hn::Sub(hn::Mul(to_float(hn::And(code, hn::Set(un, 65535))), scale), one), one);
+  VF y = hn::Min(hn::Sub(hn::Mul(to_float(hn::ShiftRight<16>(code)), scale), one), one);
+  const VF z = hn::Sub(hn::Sub(one, hn::Abs(x)), hn::Abs(y));
+  const VF fold = hn::Max(hn::Neg(z), hn::Zero(f));
+  x = hn::Sub(x, hn::CopySign(fold, x));
+  y = hn::Sub(y, hn::CopySign(fold, y));
+  const V3 n{x, y, z};
+  const VF inverse = hn::Div(one, hn::Sqrt(dot(n, n)));
+  return {hn::Mul(x, inverse), hn::Mul(y, inverse), hn::Mul(z, inverse)};
+}
+
+// image/normal.h: encode_normal16
+HWY_INLINE VU quantise(VF v) {
+  const VF scaled =
+      hn::Add(hn::Mul(hn::Add(hn::Mul(v, hn::Set(f, 0.5f)), hn::Set(f, 0.5f)), hn::Set(f, 254.0f)), hn::Set(f, 0.5f));
+  return to_unsigned(hn::Min(hn::Max(scaled, hn::Zero(f)), hn::Set(f, 254.0f)));
+}
+HWY_INLINE VU encode16(const V3& n) {
+  const VF one = hn::Set(f, 1.0f);
+  const VF scale = hn::Div(one, hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z)));
+  const VF x = hn::Mul(n.x, scale), y = hn::Mul(n.y, scale);
+  const auto below = hn::Lt(n.z, hn::Zero(f));
+  const VF fx = hn::CopySign(hn::Sub(one, hn::Abs(y)), x), fy = hn::CopySign(hn::Sub(one, hn::Abs(x)), y);
+  return hn::Or(quantise(hn::IfThenElse(below, fx, x)), hn::ShiftLeft<8>(quantise(hn::IfThenElse(below, fy, y))));
+}
+
+void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* HWY_RESTRICT normal) {
+  for (size_t lane = 0; lane < kPacket; lane += hn::Lanes(f)) {
+    const VF w1 = hn::Load(f, hits.u + lane), w2 = hn::Load(f, hits.v + lane);
+    const VF w0 = hn::Sub(hn::Sub(hn::Set(f, 1.0f), w1), w2);
+    const auto blend = [&](VF a, VF b, VF c) { return hn::MulAdd(w2, c, hn::MulAdd(w1, b, hn::Mul(w0, a))); };
+
+    // Normal: decode three corners, interpolate.
+    const V3 n0 = decode32(hn::Load(un, hits.corner_normal[0] + lane));
+    const V3 n1 = decode32(hn::Load(un, hits.corner_normal[1] + lane));
+    const V3 n2 = decode32(hn::Load(un, hits.corner_normal[2] + lane));
+    V3 n{blend(n0.x, n1.x, n2.x), blend(n0.y, n1.y, n2.y), blend(n0.z, n1.z, n2.z)};
+
+    // Opposite corner normals may cancel: then the triangle's own normal stands in.
+    const V3 g{hn::Load(f, hits.geometric_normal[0] + lane), hn::Load(f, hits.geometric_normal[1] + lane),
+               hn::Load(f, hits.geometric_normal[2] + lane)};
+    const auto cancelled = hn::Lt(dot(n, n), hn::Set(f, 1e-6f));
+    n = {hn::IfThenElse(cancelled, g.x, n.x), hn::IfThenElse(cancelled, g.y, n.y), hn::IfThenElse(cancelled, g.z, n.z)};
+
+    // Flip: the signs of n . g and d . g are equal where n points away from the viewer's side.
+    const V3 d{hn::Load(f, hits.direction[0] + lane), hn::Load(f, hits.direction[1] + lane),
+               hn::Load(f, hits.direction[2] + lane)};
+    const VF sign = hn::And(hn::Xor(hn::Xor(dot(n, g), dot(d, g)), hn::Set(f, -0.0f)), hn::Set(f, -0.0f));
+    n = {hn::Xor(n.x, sign), hn::Xor(n.y, sign), hn::Xor(n.z, sign)};
+    hn::Store(encode16(n), un, normal + lane);
+
+    // Colour: per channel, rounded.
+    const VU c0 = hn::Load(un, hits.corner_colour[0] + lane), c1 = hn::Load(un, hits.corner_colour[1] + lane),
+             c2 = hn::Load(un, hits.corner_colour[2] + lane);
+    const VU mask = hn::Set(un, 255);
+    const auto channel = [&](VU a, VU b, VU c) {
+      const VF v = hn::Add(blend(to_float(hn::And(a, mask)), to_float(hn::And(b, mask)), to_float(hn::And(c, mask))),
+                           hn::Set(f, 0.5f));
+      return to_unsigned(hn::Min(hn::Max(v, hn::Zero(f)), hn::Set(f, 255.0f)));
+    };
+    const VU red = channel(hn::ShiftRight<16>(c0), hn::ShiftRight<16>(c1), hn::ShiftRight<16>(c2));
+    const VU green = channel(hn::ShiftRight<8>(c0), hn::ShiftRight<8>(c1), hn::ShiftRight<8>(c2));
+    hn::Store(hn::Or(hn::Or(hn::ShiftLeft<16>(red), hn::ShiftLeft<8>(green)), channel(c0, c1, c2)), un, colour + lane);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace telesplat::sampler
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace telesplat::sampler {
+
+HWY_EXPORT(ShadeHits);
+
+void shade_hits(const HitPacket& hits, uint32_t* colour, uint32_t* normal) {
+  HWY_DYNAMIC_DISPATCH(ShadeHits)(hits, colour, normal);
+}
+
+SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, float u, float v,
+                           const glm::vec3& g, const glm::vec3& direction) {
+  const float weight[3] = {1 - u - v, u, v};
+  SurfacePoint out{glm::vec3(0), glm::vec3(0)};
+  for (int corner = 0; corner < 3; ++corner) {
+    const uint32_t vertex = chunk.indices[3 * size_t{triangle} + corner], c = chunk.colours[vertex];
+    out.colour += weight[corner] * glm::vec3(c >> 16 & 255, c >> 8 & 255, c & 255);
+    out.normal += weight[corner] * image::decode_normal32(chunk.normals[vertex]);
+  }
+  out.colour = glm::clamp(out.colour, 0.0f, 255.0f);
+  if (glm::dot(out.normal, out.normal) < 1e-6f) out.normal = g;
+  if (glm::dot(out.normal, g) * glm::dot(direction, g) > 0) out.normal = -out.normal;
+  out.normal = glm::normalize(out.normal);
+  return out;
+}
+
+}  // namespace telesplat::sampler
+#endif

@@ -1,0 +1,104 @@
+#include "services/sampler/mesh/ray_sampler.h"
+
+#include "services/sampler/mesh/ray_packets.h"
+
+namespace telesplat::sampler {
+namespace {
+
+// Hits of one task, waiting for their attributes. Indices and vertices of neighbouring hits lie far apart in memory, so that
+// fetching them one hit after the other would wait for each: instead the hits are collected, what they need is prefetched
+// step by step, and eight at a time are shaded when it has arrived.
+class PendingHits {
+ public:
+  PendingHits(const RayScene& scene, double near_m, image::DepthImage& out)
+      : scene_(scene), near_m_(near_m), out_(out) {}
+
+  /// Keeps the hits of a packet that lie in the tile.
+  void add(const RTCRayHit8& packet, int x, int y, const geometry::Rect& tile) {
+    if (count_ + kPacket > kCapacity) flush();
+    for (int k = 0; k < kPacket; ++k) {
+      const int px = x + k % kPacketWidth - tile.x, py = y + k / kPacketWidth - tile.y;
+      if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID || px < 0 || py < 0 || px >= tile.width || py >= tile.height)
+        continue;
+      const geometry::MeshChunkView& chunk = scene_.chunk(packet.hit.instID[0][k]);
+      const int i = count_++, group = i / kPacket, lane = i % kPacket;
+      corners_[i] = chunk.indices.data() + 3 * size_t{packet.hit.primID[k]};
+      chunks_[i] = &chunk;
+      pixels_[i] = size_t(py) * tile.width + px;
+      depths_m_[i] = packet.ray.tfar[k];
+      __builtin_prefetch(corners_[i]);
+      HitPacket& hits = hits_[group];
+      hits.u[lane] = packet.hit.u[k];
+      hits.v[lane] = packet.hit.v[k];
+      hits.geometric_normal[0][lane] = packet.hit.Ng_x[k];
+      hits.geometric_normal[1][lane] = packet.hit.Ng_y[k];
+      hits.geometric_normal[2][lane] = packet.hit.Ng_z[k];
+      hits.direction[0][lane] = packet.ray.dir_x[k];
+      hits.direction[1][lane] = packet.ray.dir_y[k];
+      hits.direction[2][lane] = packet.ray.dir_z[k];
+    }
+  }
+
+  /// Shades what is there and writes it to the image.
+  void flush() {
+    for (int i = 0; i < count_; ++i)
+      for (int c = 0; c < 3; ++c) {
+        __builtin_prefetch(&chunks_[i]->normals[corners_[i][c]]);
+        __builtin_prefetch(&chunks_[i]->colours[corners_[i][c]]);
+      }
+    for (int first = 0; first < count_; first += kPacket) {
+      HitPacket& hits = hits_[first / kPacket];
+      const int lanes = std::min(kPacket, count_ - first);
+      for (int k = 0; k < lanes; ++k)
+        for (int c = 0; c < 3; ++c) {
+          const uint32_t vertex = corners_[first + k][c];
+          hits.corner_normal[c][k] = chunks_[first + k]->normals[vertex];
+          hits.corner_colour[c][k] = chunks_[first + k]->colours[vertex];
+        }
+      alignas(32) uint32_t colour[kPacket], normal[kPacket];
+      shade_hits(hits, colour, normal);
+      for (int k = 0; k < lanes; ++k) {
+        const size_t at = pixels_[first + k];
+        out_.depth[at] = image::encode_depth(depths_m_[first + k], near_m_);
+        out_.colour[at] = colour[k];
+        out_.normal[at] = static_cast<uint16_t>(normal[k]);
+      }
+    }
+    count_ = 0;
+  }
+
+ private:
+  static constexpr int kCapacity =
+      64;  // eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet
+
+  const RayScene& scene_;
+  double near_m_;
+  image::DepthImage& out_;
+  int count_ = 0;
+  const uint32_t* corners_[kCapacity];
+  const geometry::MeshChunkView* chunks_[kCapacity];
+  size_t pixels_[kCapacity];
+  float depths_m_[kCapacity];
+  HitPacket hits_[kCapacity / kPacket] = {};  // lanes of the last, partly filled packet hold older hits or zeros
+};
+
+}  // namespace
+
+Status RaySampler::add_chunk(ChunkId id, geometry::ChunkBytes chunk) {
+  std::vector<std::pair<ChunkId, geometry::ChunkBytes>> one;
+  one.emplace_back(id, std::move(chunk));
+  return scene_.add(std::move(one));
+}
+
+image::DepthImage RaySampler::sample(const geometry::Camera& camera, const geometry::Rect& tile) {
+  image::DepthImage out(tile.width, tile.height);
+  trace_tile(
+      scene_, camera, tile, [&] { return PendingHits(scene_, camera.near_m, out); },
+      [&tile](PendingHits& pending, const RTCRayHit8& packet, int x, int y) { pending.add(packet, x, y, tile); },
+      [](PendingHits& pending) { pending.flush(); });
+  return out;
+}
+
+std::unique_ptr<Sampler> make_ray_sampler(int threads) { return std::make_unique<RaySampler>(threads); }
+
+}  // namespace telesplat::sampler

@@ -1,0 +1,66 @@
+// The mesh as Embree sees it: one bounding volume hierarchy a chunk, instanced into one small hierarchy over all chunks.
+//
+// Chunks are built when they arrive, in parallel and independently, so that adding or replacing one never rebuilds another;
+// Embree reads positions and indices where they lie. Measured with 5.76M triangles in 98 chunks on two cores (1280x800):
+//                                    all chunks to first ray    replacing one    frame
+//   instanced chunk scenes                            0.99 s            0.01 s    55 ms
+//   one flat scene                                    1.89 s            1.8  s    51 ms
+//   one RTC_SCENE_FLAG_DYNAMIC scene                  1.35 s            2.1  s    57 ms
+#pragma once
+
+#include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
+
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "services/sampler/mesh/chunk_input.h"
+
+namespace telesplat::sampler {
+
+class RayScene {
+ public:
+  /// threads: how many oneTBB threads build and trace, 0 = all cores.
+  explicit RayScene(int threads);
+
+  /// As Sampler::add_chunks.
+  Status add(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks);
+  void remove(ChunkId id);
+
+  /// Brings the hierarchy over the chunks up to date. To be called before scene() is traced: until then it may refer to
+  /// chunks that are gone.
+  void commit();
+
+  RTCScene scene() const { return top_.get(); }
+  /// The chunk behind a hit's instID.
+  const geometry::MeshChunkView& chunk(unsigned slot) const { return slots_[slot].held.view; }
+  /// Everything parallel runs in here.
+  tbb::task_arena& arena() { return arena_; }
+
+ private:
+  struct Release {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+  };
+  using Device = std::unique_ptr<RTCDeviceTy, Release>;
+  using Scene = std::unique_ptr<RTCSceneTy, Release>;
+
+  struct Slot {
+    HeldChunk held;
+    Scene scene;
+  };
+
+  Result<Slot> build(ChunkId id, geometry::ChunkBytes chunk) const;
+  void install(ChunkId id, Slot slot);
+
+  tbb::task_arena arena_;
+  Device device_;
+  std::vector<Slot> slots_;  // index = geometry id in the top scene = a hit's instID
+  std::vector<unsigned> free_;
+  std::unordered_map<ChunkId, unsigned> slot_of_;
+  Scene top_;  // after the slots, so that it goes first
+  bool changed_ = true;
+};
+
+}  // namespace telesplat::sampler

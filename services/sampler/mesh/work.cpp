@@ -1,0 +1,139 @@
+#include "services/sampler/mesh/work.h"
+
+#include "common/net/dispatch.h"
+
+namespace telesplat::sampler {
+namespace {
+
+constexpr size_t kChunksInFlight = 8;  // requests to the data server not yet answered
+constexpr double kRetry_s = 2.0;       // a data server that does not answer is asked again
+constexpr double kExtend_s = 0.1;      // between two requests for more time
+
+// Chunk bytes must be 4-byte aligned to be used in place; a received field may lie anywhere.
+geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
+  if (reinterpret_cast<uintptr_t>(data.data()) % 16 == 0) return {data, message.owner};
+  auto copy = std::make_shared<std::vector<std::byte>>(data.begin(), data.end());
+  return {*copy, copy};
+}
+
+geometry::Camera part(const wire::Lease& lease) { return geometry::crop(lease.camera, lease.rect); }
+
+}  // namespace
+
+MeshWork::MeshWork(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
+                   net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans)
+    : sampler_(std::move(sampler)),
+      cache_(cache_bytes),
+      service_name_(service_name),
+      context_(context),
+      link_(link),
+      spans_(spans) {}
+
+void MeshWork::on_welcome(const wire::Welcome& session) {
+  const auto chunks = session.endpoints.find("chunks");
+  if (chunks == session.endpoints.end() || chunks->second.empty() ||
+      (chunks->second == endpoint_ && session.epoch == epoch_))
+    return;
+  epoch_ = session.epoch;
+  if (chunks->second != endpoint_) {
+    endpoint_ = chunks->second;
+    blocks_.emplace(context_, net::Kind::kDealer, service_name_ + ":chunks",
+                    net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes});
+    if (const Status s = blocks_->connect(endpoint_); !s) log::error("{}", s.error().text);
+  }
+  // A restarted data server with the same data has the same chunks: keep what we hold.
+  const auto hash = session.facts.find("content_hash");
+  if (hash == session.facts.end() || hash->second.empty() || hash->second != content_hash_) {
+    for (const auto& c : cache_.chunks()) sampler_->remove_chunk(c.id);
+    cache_.reset({});
+    content_hash_ = hash == session.facts.end() ? "" : hash->second;
+    prefetched_ = false;
+  }
+  cache_.forget_waiting();
+  last_request_s_ = -1e9;
+}
+
+Readiness MeshWork::readiness(const HeldLease& held, double) {
+  const bool ready = cache_.known() && cache_.missing(part(held.lease)).empty();
+  return {ready ? Readiness::State::kReady : Readiness::State::kWaits};
+}
+
+Sampled MeshWork::sample(const HeldLease& held) {
+  return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect); });
+}
+
+// Asks for the list of chunks, then for what the next tile needs, then for the rest as far as the budget goes.
+void MeshWork::fetch(const HeldLease* next, double now_s) {
+  if (!blocks_) return;
+  if (!cache_.known()) {
+    if (now_s - last_request_s_ > kRetry_s) {
+      blocks_->send(wire::ChunkListRequest{epoch_});
+      last_request_s_ = now_s;
+    }
+    return;
+  }
+  if (cache_.waiting_count() && now_s - last_request_s_ > kRetry_s) cache_.forget_waiting();
+  std::vector<ChunkId> wanted;
+  if (next) {
+    wanted = cache_.missing(part(next->lease));
+    if (!wanted.empty() && now_s - last_extend_s_ > kExtend_s) {
+      link_.socket().send(wire::LeaseExtend{link_.instance(), next->lease.lease});
+      last_extend_s_ = now_s;
+    }
+  }
+  if (wanted.empty() && !prefetched_) {
+    wanted = cache_.prefetch();
+    if (wanted.empty()) {
+      prefetched_ = true;
+      log::info("{} of {} chunks held ({:.0f} MB)", cache_.chunks().size() - missing_count(), cache_.chunks().size(),
+                double(cache_.bytes()) / 1e6);
+    }
+  }
+  for (const ChunkId id : wanted) {
+    if (cache_.waiting_count() >= kChunksInFlight) break;
+    if (cache_.waiting(id)) continue;
+    blocks_->send(wire::ChunkRequest{epoch_, id});
+    cache_.mark_waiting(id);
+    last_request_s_ = now_s;
+  }
+}
+
+size_t MeshWork::missing_count() const {
+  size_t n = 0;
+  for (const auto& c : cache_.chunks()) n += !cache_.held(c.id);
+  return n;
+}
+
+std::vector<net::Socket*> MeshWork::sockets() {
+  return blocks_ ? std::vector<net::Socket*>{&*blocks_} : std::vector<net::Socket*>{};
+}
+
+void MeshWork::receive() {
+  if (!blocks_) return;
+  std::vector<std::pair<ChunkId, geometry::ChunkBytes>> batch;
+  while (const auto message = blocks_->receive()) {
+    net::dispatch<wire::ChunkList, wire::Chunk>(*blocks_, *message, [&](const auto& m) {
+      if (m.epoch != epoch_) return;
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::ChunkList>) {
+        if (!cache_.known()) cache_.reset(m.chunks);
+      } else if (!m.data.empty() && cache_.waiting(m.chunk)) {
+        batch.emplace_back(m.chunk, aligned(*message, m.data));
+      }
+    });
+    if (batch.size() >= kChunksInFlight) break;
+  }
+  if (batch.empty()) return;
+  const double begin_s = monotonic_s();
+  for (const auto& [id, bytes] : batch)
+    for (const ChunkId old : cache_.insert(id)) sampler_->remove_chunk(old);
+  if (const Status s = sampler_->add_chunks(std::move(batch)); !s)
+    log::warn("a chunk from {} was refused: {}", endpoint_, s.error().text);
+  spans_.add("add chunks", link_.to_master_s(begin_s), link_.to_master_s(monotonic_s()));
+}
+
+void MeshWork::add_status(net::MasterLink::Values& values) const {
+  values["chunk_mb"] = double(cache_.bytes()) / 1e6;
+  values["messages_rejected"] = blocks_ ? double(blocks_->rejected()) : 0.0;
+}
+
+}  // namespace telesplat::sampler

@@ -1,0 +1,47 @@
+// Leases of a mesh: chunks are fetched from the data server, nearest first, and held as far as memory goes.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "common/metrics/recorder.h"
+#include "services/sampler/mesh/chunk_cache.h"
+#include "services/sampler/mesh/sampler.h"
+#include "services/sampler/tiles/tile_source.h"
+
+namespace telesplat::sampler {
+
+class MeshWork final : public LeaseWork {
+ public:
+  /// Keeps references to the context, the link (to ask for more time while chunks are on their way) and the spans.
+  MeshWork(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
+           net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans);
+
+  const char* name() const override { return sampler_->name(); }
+  void on_welcome(const wire::Welcome& session) override;
+  /// A lease may have to wait for its chunks, but then they come first: the earliest tiles need not wait for the whole mesh.
+  bool takes_leases() const override { return cache_.known(); }
+  Readiness readiness(const HeldLease& lease, double now_s) override;
+  Sampled sample(const HeldLease& lease) override;
+  void fetch(const HeldLease* next, double now_s) override;
+  std::vector<net::Socket*> sockets() override;
+  void receive() override;
+  void add_status(net::MasterLink::Values& values) const override;
+
+ private:
+  size_t missing_count() const;
+
+  std::unique_ptr<Sampler> sampler_;
+  ChunkCache cache_;
+  std::string service_name_;
+  net::Context& context_;
+  net::MasterLink& link_;
+  metrics::SpanRecorder& spans_;
+  std::optional<net::Socket> blocks_;
+  std::string endpoint_, content_hash_;
+  EpochId epoch_;
+  bool prefetched_ = false;
+  double last_request_s_ = -1e9, last_extend_s_ = -1e9;
+};
+
+}  // namespace telesplat::sampler

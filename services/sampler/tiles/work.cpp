@@ -1,0 +1,38 @@
+#include "services/sampler/tiles/work.h"
+
+#include "common/codec/depth_codec.h"
+#include "common/net/dispatch.h"
+
+namespace telesplat::sampler {
+
+void TileWork::take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) {
+  net::dispatch<wire::Lease>(from, message, [&](const wire::Lease& lease) {
+    if (takes_leases && leases_.size() < kMaxHeld) leases_.push_back({lease, now_s});
+  });
+}
+
+Readiness TileWork::look_at_next(double now_s) {
+  while (!leases_.empty()) {
+    const Readiness r = work_->readiness(leases_.front(), now_s);
+    if (r.state != Readiness::State::kHopeless) return r;
+    leases_.pop_front();
+  }
+  return {Readiness::State::kWaits};
+}
+
+Delivery TileWork::sample_next() {
+  const HeldLease held = std::move(leases_.front());
+  leases_.pop_front();
+  const Sampled sampled = work_->sample(held);
+  const auto stream = codec::encode(sampled.image);
+  Delivery out{wire::DepthTile::kName, {}, sampled.begin_s, sampled.end_s, monotonic_s()};
+  wire::DepthTile tile{link_.instance(), held.lease};
+  tile.sample_begin_s = link_.to_master_s(out.begin_s);
+  tile.sample_end_s = link_.to_master_s(out.sampled_s);
+  tile.encode_end_s = link_.to_master_s(out.encoded_s);
+  tile.image = std::as_bytes(std::span(stream));
+  out.body = wire::encode(tile);
+  return out;
+}
+
+}  // namespace telesplat::sampler

@@ -1,0 +1,92 @@
+#include "services/sampler/volume/shear/rows.h"
+
+#include <algorithm>
+
+namespace telesplat::sampler {
+namespace {
+
+// Where the voxels of axis p go: its slices, rows, and columns as functions of (i, j, k).
+template <class Visit>
+void for_each_run(const volume::Grid& grid, const volume::Voxels& voxels, const Visit& visit) {
+  size_t row = 0;
+  for (int k = voxels.k_begin; k < voxels.k_end; ++k)
+    for (int j = 0; j < grid.size[1]; ++j, ++row)
+      if (voxels.rows[row] != voxels.rows[row + 1]) visit(j, k, voxels.rows[row], voxels.rows[row + 1]);
+}
+
+}  // namespace
+
+ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int axis) {
+  ShearRows out;
+  const int held = voxels.k_end - voxels.k_begin;
+  const auto extent = [&](int of) { return of == 2 ? held : grid.size[size_t(of)]; };
+  const auto start = [&](int of) { return of == 2 ? voxels.k_begin : 0; };
+  out.slices = extent(axis), out.slice_begin = start(axis);
+  out.rows = extent((axis + 2) % 3), out.row_begin = start((axis + 2) % 3);
+  out.cells.resize(voxels.size());
+  const bool lit = !voxels.normal.empty();
+  const auto cell = [&](int u, uint32_t n) {
+    return ShearCell{uint16_t(u), voxels.level[n], lit ? voxels.normal[n] : volume::kNoNormal};
+  };
+  if (axis == 2) {  // already in order
+    out.first = voxels.rows;
+    for (uint32_t n = 0; n < voxels.size(); ++n) out.cells[n] = cell(voxels.i[n], n);
+  } else {
+    // Rows of axis 0 are those of one (i, k), with j in order; of axis 1 of one (j, i), with k in order. Voxels come in order of (k, j, i), so
+    // that appending keeps columns in order.
+    const auto row_of = [&](int i, int j, int k) {
+      return axis == 0 ? size_t(i) * size_t(out.rows) + size_t(k - voxels.k_begin)
+                       : size_t(j) * size_t(out.rows) + size_t(i);
+    };
+    out.first.assign(size_t(out.slices) * size_t(out.rows) + 1, 0);
+    for_each_run(grid, voxels, [&](int j, int k, uint32_t begin, uint32_t end) {
+      for (uint32_t n = begin; n < end; ++n) ++out.first[row_of(voxels.i[n], j, k) + 1];
+    });
+    for (size_t r = 1; r < out.first.size(); ++r) out.first[r] += out.first[r - 1];
+    // first[r] moves on to the row's end while cells are put in place, and is put back by one afterwards.
+    for_each_run(grid, voxels, [&](int j, int k, uint32_t begin, uint32_t end) {
+      const int u = axis == 0 ? j : k;
+      for (uint32_t n = begin; n < end; ++n) out.cells[out.first[row_of(voxels.i[n], j, k)]++] = cell(u, n);
+    });
+    for (size_t r = out.first.size() - 1; r > 0; --r) out.first[r] = out.first[r - 1];
+    out.first[0] = 0;
+  }
+  out.bounds.resize(size_t(out.slices));
+  for (int s = 0; s < out.slices; ++s) {
+    ShearRows::Bounds& b = out.bounds[size_t(s)];
+    for (int v = 0; v < out.rows; ++v) {
+      const size_t r = size_t(s) * size_t(out.rows) + size_t(v);
+      if (out.first[r] == out.first[r + 1]) continue;
+      b.u_lo = std::min(b.u_lo, int(out.cells[out.first[r]].u));
+      b.u_hi = std::max(b.u_hi, int(out.cells[out.first[r + 1] - 1].u));
+      b.v_lo = std::min(b.v_lo, v + out.row_begin);
+      b.v_hi = v + out.row_begin;
+    }
+  }
+  return out;
+}
+
+const ShearRows& SlabVolume::Impl::rows(int axis) const {
+  std::call_once(made_[axis], [&] { rows_[axis] = arrange(grid, voxels, axis); });
+  return rows_[axis];
+}
+
+SlabVolume::SlabVolume(const volume::Grid& grid, volume::Voxels voxels) {
+  auto impl = std::make_unique<Impl>();
+  impl->grid = grid;
+  impl->voxels = std::move(voxels);
+  impl_ = std::move(impl);
+}
+SlabVolume::~SlabVolume() = default;
+const volume::Grid& SlabVolume::grid() const { return impl_->grid; }
+const volume::Voxels& SlabVolume::voxels() const { return impl_->voxels; }
+
+size_t SlabVolume::bytes() const {
+  const volume::Voxels& v = impl_->voxels;
+  const size_t held = size_t(v.k_end - v.k_begin);
+  const auto& size = impl_->grid.size;
+  const size_t rows = held * size_t(size[1]) + size_t(size[0]) * held + size_t(size[0]) * size_t(size[1]);
+  return v.size() * (6 + 3 * sizeof(ShearCell)) + (rows + held * size_t(size[1])) * sizeof(uint32_t);
+}
+
+}  // namespace telesplat::sampler

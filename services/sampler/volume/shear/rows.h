@@ -1,0 +1,45 @@
+// The voxels of a slab, arranged for one principal axis: cells of the same slice and row lie together, in the order of the raster's columns.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+#include "services/sampler/volume/shear/splatter.h"
+
+namespace telesplat::sampler {
+
+struct ShearCell {
+  uint16_t u;  ///< index along ShearFrame::u()
+  uint16_t level, normal;
+};
+
+struct ShearRows {
+  int slice_begin = 0, slices = 0;  ///< slices along p that are held: [slice_begin, slice_begin + slices)
+  int row_begin = 0, rows = 0;      ///< rows along v that are held
+  /// Row v of slice s has the cells [first[r], first[r + 1]), r = (s - slice_begin) * rows + (v - row_begin).
+  std::vector<uint32_t> first;
+  std::vector<ShearCell> cells;
+  /// What of a slice has cells: u in [u_lo, u_hi], v in [v_lo, v_hi]; empty where u_lo > u_hi.
+  struct Bounds {
+    int u_lo = 65536, u_hi = -1, v_lo = 65536, v_hi = -1;
+  };
+  std::vector<Bounds> bounds;  ///< one a held slice
+};
+
+/// Arranges by counting: O(voxels + rows). axis: the principal one.
+ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int axis);
+
+struct SlabVolume::Impl {
+  volume::Grid grid;
+  volume::Voxels voxels;
+
+  /// Made when a frame first needs it, once; safe to ask for from several threads.
+  const ShearRows& rows(int axis) const;
+
+ private:
+  mutable std::once_flag made_[3];
+  mutable ShearRows rows_[3];
+};
+
+}  // namespace telesplat::sampler

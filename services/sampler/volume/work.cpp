@@ -1,0 +1,323 @@
+#include "services/sampler/volume/work.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "common/core/clock.h"
+#include "common/net/dispatch.h"
+
+namespace telesplat::sampler {
+namespace {
+
+constexpr size_t kMaxServers = 256;  // connections to data servers
+
+Result<volume::Session> read(const wire::Welcome& welcome) {
+  auto session = volume::read_session(welcome.parameters, welcome.facts);
+  if (!session) return session;
+  if (const Status s = volume::validate(session->grid); !s) return s.error();
+  return session;
+}
+
+std::string fact(const wire::Welcome& welcome, const char* name) {
+  const auto found = welcome.facts.find(name);
+  return found == welcome.facts.end() ? "" : found->second;
+}
+
+// Each image by itself, then one after the other.
+std::vector<uint8_t> encode(const std::vector<volume::SliceImage>& images) {
+  std::vector<std::vector<uint8_t>> parts(images.size());
+  tbb::parallel_for(size_t{0}, images.size(), [&](size_t i) { parts[i] = volume::encode_slice(images[i]); });
+  size_t size = 0;
+  for (const auto& p : parts) size += p.size();
+  std::vector<uint8_t> out;
+  out.reserve(size);
+  for (const auto& p : parts) out.insert(out.end(), p.begin(), p.end());
+  return out;
+}
+
+}  // namespace
+
+VolumeWork::VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name,
+                       net::Context& context, Master master, metrics::SpanRecorder& spans, int repeat_after)
+    : store_(std::move(make), cache_bytes),
+      repeated_(repeat_after),
+      threads_(threads > 0 ? threads : tbb::task_arena::automatic),
+      service_name_(std::move(service_name)),
+      context_(context),
+      master_(std::move(master)),
+      spans_(spans) {}
+
+void VolumeWork::on_welcome(const wire::Welcome& welcome) {
+  if (welcome.master != master_instance_) {
+    epochs_.clear();
+    told_ready_ = {};
+  }
+  master_instance_ = welcome.master;
+  const std::string transfer = fact(welcome, "transfer");
+  const auto known = epochs_.find(welcome.epoch);
+  if (known != epochs_.end() && known->second.parameters == welcome.parameters && known->second.transfer == transfer)
+    return;
+  Epoch epoch{.parameters = welcome.parameters, .transfer = transfer};
+  if (const auto session = read(welcome)) {
+    epoch.scene = SlabScene{session->grid, session->levels, session->lit, session->steps,
+                            fact(welcome, "scene") + "\n" + fact(welcome, "content_hash")};
+    epoch.step = session->step;
+    epoch.colours = volume::level_colours(session->transfer, session->levels);
+    for (size_t l = 0; l < epoch.colours.size(); ++l)
+      if (epoch.colours[l].extinction > 0) epoch.shown.add(int(l));
+    if (store_.scene() != epoch.scene) {
+      store_.set_scene(*epoch.scene);
+      asked_.reset();
+      told_ready_ = {};
+      forget_servers();
+    }
+  } else {
+    log::error("epoch {} cannot be sampled: {}", welcome.epoch.value, session.error().text);
+  }
+  epochs_.insert_or_assign(welcome.epoch, std::move(epoch));
+  while (epochs_.size() > kEpochs) epochs_.erase(epochs_.begin());
+}
+
+void VolumeWork::take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) {
+  net::dispatch<wire::SliceLease, wire::SlabAssignment>(from, message, [&](const auto& m) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::SliceLease>) {
+      if (takes_leases && leases_.size() < kMaxHeld) leases_.push_back({m, now_s});
+    } else {
+      if (!store_.scene()) return from.reject(message, "a slab of a volume that is not known yet");
+      if (const Status s = store_.assign(m); !s) return from.reject(message, s.error().text);
+      told_ready_ = {};
+      bytes_before_ = bytes_received_;
+      progress_s_ = now_s;
+      // An answer to what the old sheet asked for is as good as any.
+      forget_servers();
+    }
+  });
+}
+
+SlabWant VolumeWork::want(EpochId epoch, const Epoch& of, int begin, int end) {
+  return {of.step, begin, end, epoch, &of.shown};
+}
+
+Readiness VolumeWork::readiness(const Held& held, double now_s) {
+  using State = Readiness::State;
+  const wire::SliceLease& lease = held.lease;
+  const auto epoch = epochs_.find(lease.epoch);
+  if (epoch == epochs_.end()) {
+    const double until_s = held.received_s + kUnknownEpoch_s;
+    if (now_s < until_s) return {State::kWaits, until_s};
+    log::warn("a lease of epoch {} was dropped: no welcome told its transfer function", lease.epoch.value);
+    return {State::kHopeless};
+  }
+  const Epoch& e = epoch->second;
+  if (!e.scene || store_.scene() != e.scene) return {State::kHopeless};
+  if (lease.begin >= lease.end || lease.end > uint64_t(e.scene->grid.size[2])) {
+    log::warn("a lease of slices {} to {} of {} was dropped", lease.begin, lease.end, e.scene->grid.size[2]);
+    return {State::kHopeless};
+  }
+  if (const Status s = volume::validate(lease.shear, e.scene->grid); !s) {
+    log::warn("a lease was dropped: {}", s.error().text);
+    return {State::kHopeless};
+  }
+  const SlabWant w = want(lease.epoch, e, int(lease.begin), int(lease.end));
+  if (store_.arranged(w) || store_.holds(w)) {
+    const auto* view = repeated_.find(lease);
+    if (!view || repeated_end_s(held, *view) <= now_s) return {};
+    return {State::kWaits, repeated_end_s(held, *view)};
+  }
+  return {State::kWaits};
+}
+
+Readiness VolumeWork::look_at_next(double now_s) {
+  while (!leases_.empty()) {
+    const Readiness r = readiness(leases_.front(), now_s);
+    if (r.state != Readiness::State::kHopeless) return r;
+    leases_.pop_front();
+  }
+  return {Readiness::State::kWaits};
+}
+
+Delivery VolumeWork::sample_next() {
+  const Held held = std::move(leases_.front());
+  const wire::SliceLease& lease = held.lease;
+  leases_.pop_front();
+  const Epoch& epoch = epochs_.at(lease.epoch);
+  store_.use(int(lease.begin), int(lease.end));
+  const auto slab = store_.slab(want(lease.epoch, epoch, int(lease.begin), int(lease.end)));
+  Delivery out{wire::SliceImages::kName, {}, monotonic_s()};
+  wire::SliceImages m{.sampler = master_.instance, .lease = lease};
+  const auto send = [&](const std::vector<uint8_t>& bytes) {
+    m.sample_begin_s = master_.to_master_s(out.begin_s);
+    m.sample_end_s = master_.to_master_s(out.sampled_s);
+    m.encode_end_s = master_.to_master_s(out.encoded_s);
+    m.data = std::as_bytes(std::span(bytes));
+    out.body = wire::encode(m);
+    return out;
+  };
+  if (const auto* view = repeated_.find(lease)) {
+    out.encoded_s = repeated_end_s_ = repeated_end_s(held, *view);
+    out.sampled_s = out.encoded_s - view->encode_s;
+    out.begin_s = out.sampled_s - view->splat_s;
+    m.voxels = view->voxels;
+    return send(view->bytes);
+  }
+  const double begin_cpu_s = thread_cpu_s();
+  const auto images = slab->splat(epoch.colours, lease.shear, int(lease.begin), int(lease.end), m.voxels);
+  out.sampled_s = monotonic_s();
+  const double sampled_cpu_s = thread_cpu_s();
+  tbb::task_arena arena(threads_);
+  const auto bytes = arena.execute([&] { return encode(images); });
+  out.encoded_s = monotonic_s();
+  repeated_.add(lease, bytes, m.voxels, sampled_cpu_s - begin_cpu_s, thread_cpu_s() - sampled_cpu_s);
+  return send(bytes);
+}
+
+// What the first lease lacks, then what the newest epoch lacks of the assigned slab, then what the steps after it do.
+std::optional<VoxelAsk> VolumeWork::next_ask() {
+  if (!leases_.empty()) {
+    const wire::SliceLease& lease = leases_.front().lease;
+    const auto epoch = epochs_.find(lease.epoch);
+    if (epoch != epochs_.end() && epoch->second.scene && lease.begin < lease.end)
+      if (const auto w = want(lease.epoch, epoch->second, int(lease.begin), int(lease.end)); !store_.arranged(w))
+        if (const auto ask = store_.next(w)) return ask;
+  }
+  const auto& a = store_.assignment();
+  if (a.partition == 0 || a.begin >= a.end || epochs_.empty()) return std::nullopt;
+  const auto& [id, newest] = *epochs_.rbegin();
+  if (!newest.scene) return std::nullopt;
+  SlabWant w = want(id, newest, int(a.begin), int(a.end));
+  if (const auto ask = store_.next(w)) return ask;
+  if (!store_.arranged(w)) return std::nullopt;
+  for (int ahead = 1; ahead <= store_.steps_ahead(newest.step); ++ahead) {
+    w.step = (newest.step + ahead) % newest.scene->steps;
+    if (const auto ask = store_.next(w)) return ask;
+  }
+  return std::nullopt;
+}
+
+void VolumeWork::ask(double now_s) {
+  if (asked_ && now_s - asked_->asked_s < kRetry_s) return;
+  asked_.reset();
+  if (now_s < pause_until_s_) return;
+  const auto next = next_ask();
+  if (!next) return;
+  auto server = servers_.find(next->endpoint);
+  if (server == servers_.end()) {
+    if (servers_.size() >= kMaxServers) servers_.clear();
+    server =
+        servers_
+            .emplace(next->endpoint, net::Socket(context_, net::Kind::kDealer, service_name_ + ":voxels",
+                                                 {.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes}))
+            .first;
+    if (const Status s = server->second.connect(next->endpoint); !s) log::error("{}", s.error().text);
+  }
+  wire::VoxelRequest request{next->epoch,         uint64_t(next->step), uint64_t(next->begin),
+                             uint64_t(next->end), next->round,          {}};
+  if (!next->have.empty()) request.have = std::as_bytes(next->have.bytes());
+  server->second.send(request);
+  asked_ = {*next, now_s};
+}
+
+void VolumeWork::tell_ready() {
+  const auto& a = store_.assignment();
+  if (a.partition == 0 || epochs_.empty()) return;
+  const auto& [id, newest] = *epochs_.rbegin();
+  if (told_ready_ == std::pair{a.partition, id} || !newest.scene) return;
+  // Arranged at once: the first lease shall not wait for it. A spare holds nothing, and is ready for that.
+  if (a.begin < a.end) {
+    const SlabWant w = want(id, newest, int(a.begin), int(a.end));
+    if (!store_.arranged(w)) {
+      const double begin_s = monotonic_s();
+      if (!store_.slab(w)) return;
+      spans_.add("arrange voxels", master_.to_master_s(begin_s), master_.to_master_s(monotonic_s()));
+    }
+    store_.trim(newest.step, newest.shown);
+  }
+  told_ready_ = {a.partition, id};
+  master_.ready({master_.instance, a.partition, id, store_.voxels(), bytes_received_ - bytes_before_});
+}
+
+// A step of a series that is here already, while there is nothing else to do.
+void VolumeWork::arrange_ahead() {
+  const auto& a = store_.assignment();
+  if (a.partition == 0 || a.begin >= a.end || epochs_.empty()) return;
+  const auto& [id, newest] = *epochs_.rbegin();
+  if (!newest.scene) return;
+  SlabWant w = want(id, newest, int(a.begin), int(a.end));
+  for (int ahead = 1; ahead <= store_.steps_ahead(newest.step); ++ahead) {
+    w.step = (newest.step + ahead) % newest.scene->steps;
+    if (!store_.arranged(w) && store_.slab(w)) return;
+  }
+}
+
+void VolumeWork::fetch(double now_s) {
+  ask(now_s);
+  tell_ready();
+  if (!asked_ && leases_.empty()) arrange_ahead();
+  if (leases_.empty() || !asked_ || now_s - last_extend_s_ < kExtend_s) return;
+  if (now_s - std::max(progress_s_, leases_.front().received_s) > kPatience_s) return;
+  if (readiness(leases_.front(), now_s).state != Readiness::State::kWaits) return;
+  for (const Held& held : leases_) master_.extend({master_.instance, held.lease.lease});
+  last_extend_s_ = now_s;
+}
+
+std::vector<net::Socket*> VolumeWork::sockets() {
+  std::vector<net::Socket*> out;
+  for (auto& [endpoint, socket] : servers_) out.push_back(&socket);
+  return out;
+}
+
+// Of servers that no sheet names any more.
+void VolumeWork::forget_servers() {
+  std::erase_if(servers_, [&](const auto& server) {
+    const bool named = store_.names(server.first);
+    if (!named && asked_ && asked_->ask.endpoint == server.first) asked_.reset();
+    if (!named) rejected_ += server.second.rejected();
+    return !named;
+  });
+}
+
+void VolumeWork::receive(double now_s) {
+  for (auto& [endpoint, socket] : servers_)
+    while (const auto message = socket.receive()) {
+      net::dispatch<wire::VoxelData>(socket, *message, [&](const wire::VoxelData& data) {
+        if (!asked_ || asked_->ask.endpoint != endpoint || data.epoch != asked_->ask.epoch ||
+            data.step != uint64_t(asked_->ask.step))
+          return;  // too late: it was asked again, or is not needed any more
+        const VoxelAsk ask = asked_->ask;
+        if (!data.known || data.begin >= data.end) {
+          asked_.reset();
+          pause_until_s_ = now_s + kPause_s;
+          progress_s_ = now_s;
+          return;
+        }
+        const auto epoch = epochs_.find(data.epoch);
+        if (epoch == epochs_.end()) return asked_.reset();
+        const double begin_s = monotonic_s();
+        const auto taken = store_.take(ask, data, epoch->second.shown);
+        if (!taken) {
+          // It is asked again when its time is up.
+          return socket.reject(*message, taken.error().text);
+        }
+        if (!*taken) return;
+        asked_.reset();
+        progress_s_ = now_s;
+        bytes_received_ += message->body.size();
+        const Epoch& newest = epochs_.rbegin()->second;
+        store_.trim(newest.step, newest.shown);
+        spans_.add("add voxels", master_.to_master_s(begin_s), master_.to_master_s(monotonic_s()));
+      });
+    }
+}
+
+void VolumeWork::add_status(net::MasterLink::Values& values) const {
+  values["voxels"] = double(store_.voxels());
+  values["voxel_mb"] = double(store_.bytes()) / 1e6;
+  values["voxel_bytes_received"] = double(bytes_received_);
+  double rejected = double(rejected_);
+  for (const auto& [endpoint, socket] : servers_) rejected += double(socket.rejected());
+  values["messages_rejected"] = rejected;
+}
+
+}  // namespace telesplat::sampler

@@ -1,0 +1,105 @@
+// Leases of a volume (T4.5, T5.3): fetches the voxels of the slab it was assigned, round by round, and splats it into slice images, one a layer.
+#pragma once
+
+#include <algorithm>
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "common/metrics/recorder.h"
+#include "common/volume/session.h"
+#include "services/sampler/volume/repeated_views.h"
+#include "services/sampler/volume/slab_store.h"
+#include "services/sampler/work.h"
+
+namespace telesplat::sampler {
+
+class VolumeWork final : public SamplingWork {
+ public:
+  static constexpr size_t kEpochs = 8;          ///< whose transfer functions are remembered, the newest ones
+  static constexpr double kUnknownEpoch_s = 1;  ///< a lease waits so long for its epoch's welcome
+  static constexpr double kRetry_s = 2;         ///< a data server that does not answer is asked again
+  static constexpr double kPause_s = 0.05;      ///< and so long after one that does not know the epoch yet
+  static constexpr double kExtend_s = 0.1;      ///< between two requests for more time
+  static constexpr double kPatience_s = 6;  ///< a lease whose voxels do not come for so long is not extended any more
+
+  /// What it says to the master.
+  struct Master {
+    InstanceId instance;  ///< ours
+    std::function<void(const wire::SlabReady&)> ready;
+    std::function<void(const wire::LeaseExtend&)> extend;
+    std::function<double(double)> to_master_s;
+  };
+
+  /// make: arranges slabs. threads: to encode with; 0: one a core. cache_bytes: of voxels. Keeps references to the context and the spans.
+  /// repeat_after: a view that was sampled so often is sent again after as long as that took (repeated_views.h); 0: never.
+  VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name, net::Context& context,
+             Master master, metrics::SpanRecorder& spans, int repeat_after = 0);
+
+  const char* name() const override { return "volume"; }
+  /// Remembers the epoch's transfer function and step. Bad ones are told once, and that epoch's leases are hopeless.
+  void on_welcome(const wire::Welcome& session) override;
+  bool takes_leases() const override { return !epochs_.empty(); }
+  /// Slice leases and slab assignments.
+  void take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) override;
+  size_t leases() const override { return leases_.size(); }
+  void drop_leases() override { leases_.clear(); }
+  Readiness look_at_next(double now_s) override;
+  Delivery sample_next() override;
+  void fetch(double now_s) override;
+  std::vector<net::Socket*> sockets() override;
+  void receive(double now_s) override;
+  void add_status(net::MasterLink::Values& values) const override;
+
+ private:
+  struct Epoch {
+    std::map<std::string, double> parameters;
+    std::string transfer;
+    std::optional<SlabScene> scene;  // none: the parameters are bad
+    int step = 0;
+    std::vector<volume::LevelColour> colours;  // by level
+    volume::LevelSet shown;
+  };
+  struct Held {
+    wire::SliceLease lease;
+    double received_s = 0;
+  };
+  struct Asked {
+    VoxelAsk ask;
+    double asked_s = 0;
+  };
+
+  Readiness readiness(const Held& held, double now_s);
+  /// When what a lease costs has passed: it begins when the one before ended, or when it came; instants as they should be, not as this process
+  /// woke up.
+  double repeated_end_s(const Held& held, const RepeatedViews::View& view) const {
+    return std::max(held.received_s, repeated_end_s_) + view.cost_s();
+  }
+  static SlabWant want(EpochId epoch, const Epoch& of, int begin, int end);
+  std::optional<VoxelAsk> next_ask();
+  void ask(double now_s);
+  void tell_ready();
+  void arrange_ahead();
+  void forget_servers();
+
+  SlabStore store_;
+  RepeatedViews repeated_;
+  double repeated_end_s_ = 0;  // of the view that was sent again last
+  int threads_;
+  std::string service_name_;
+  net::Context& context_;
+  Master master_;
+  metrics::SpanRecorder& spans_;
+  InstanceId master_instance_;  // of another one the same number is another epoch
+  std::map<EpochId, Epoch> epochs_;
+  std::deque<Held> leases_;
+  std::map<std::string, net::Socket> servers_;  // by endpoint
+  std::optional<Asked> asked_;
+  std::pair<uint64_t, EpochId> told_ready_;  // partition and epoch
+  uint64_t bytes_received_ = 0, bytes_before_ = 0, rejected_ = 0;
+  double pause_until_s_ = 0, last_extend_s_ = -1e9, progress_s_ = -1e9;
+};
+
+}  // namespace telesplat::sampler

@@ -1,0 +1,183 @@
+// Services started one by one, as on machines and in containers of their own: they find each other, and end when they are told to.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "common/net/service.h"
+#include "tests/support/pipeline_run.h"
+#include "tools/telesplat/control/client.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A master, and what joins it by name of its role.
+class Deployment {
+ public:
+  Deployment() {
+    write_terrain(folder_ / "hill.ply");
+    start("master", {"--bind", "tcp://127.0.0.1:*", "--out", out()});
+    EXPECT_TRUE(wait_until([&] { return service("master").out().find("listening on ") != std::string::npos; }));
+    const std::string line = service("master").out();
+    const size_t begin = line.find("tcp://");
+    master_ = line.substr(begin, line.find('\n', begin) - begin);
+  }
+
+  Program& start(const std::string& role, std::vector<std::string> arguments) {
+    if (role != "master") arguments.insert(arguments.end(), {"--master", master_});
+    return services_.try_emplace(role, "telesplat-" + role, arguments, folder_ / role).first->second;
+  }
+  void start_servers() {
+    start("data", {folder_ / "hill.ply", "--cache", folder_ / "cache", "--bind", "tcp://0.0.0.0:*", "--insecure",
+                   "--advertise", "127.0.0.1"});
+    start("packer", {"--bind", "tcp://*:*", "--insecure", "--advertise", "127.0.0.1"});
+    start("sampler", {"--threads", "1"});
+  }
+  Program& start_viewer(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--size", "320x200", "--out", out()});
+    return start("viewer", arguments);
+  }
+
+  Program& service(const std::string& role) { return services_.at(role); }
+  nlohmann::json status() {
+    launcher::ControlClient client(master_);
+    const auto answer = client.ask("status", 2);
+    return answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
+  }
+  bool wait_status(const std::function<bool(const nlohmann::json&)>& condition) {
+    return wait_until([&] {
+      const auto s = status();
+      return s.is_object() && condition(s);
+    });
+  }
+  // The living process of a role, or null.
+  static nlohmann::json of_role(const nlohmann::json& status, const std::string& role) {
+    for (const auto& p : status["processes"])
+      if (p["role"] == role && p["alive"]) return p;
+    return nullptr;
+  }
+  int health(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--master", master_});
+    return Program("telesplat-health", arguments, folder_ / "health").wait();
+  }
+  const std::string& master() const { return master_; }
+  std::string out() const { return folder_ / "run"; }
+  const TemporaryFolder& folder() const { return folder_; }
+
+ private:
+  TemporaryFolder folder_;
+  std::string master_;
+  std::map<std::string, Program> services_;
+};
+
+TEST(Deployment, AViewerEndsTheSessionWhenItsRunIsOver) {
+  Deployment d;
+  d.start_servers();
+  EXPECT_EQ(d.start_viewer({"--frames", "20", "--end-session"}).wait(), 0) << d.service("viewer").err();
+  for (const char* role : {"sampler", "packer", "data", "master"})
+    EXPECT_EQ(d.service(role).wait(), 0) << role << ": " << d.service(role).err();
+  const auto summary = nlohmann::json::parse(read_text(d.out() + "/summary.json"), nullptr, false);
+  ASSERT_TRUE(summary.is_object());
+  EXPECT_EQ(summary["frames"], 20);
+  EXPECT_GT(summary["updates"], 0);
+}
+
+TEST(Deployment, ASessionThatEndsBeforeAnythingWasShownFailed) {
+  Deployment d;
+  Program& viewer = d.start_viewer({"--frames", "20", "--end-session"});
+  ASSERT_TRUE(d.wait_status([](const auto& s) { return Deployment::of_role(s, "viewer").is_object(); }));
+  d.service("master").signal(SIGTERM);
+  EXPECT_EQ(viewer.wait(), 1);
+  EXPECT_NE(viewer.err().find("before anything was shown"), std::string::npos) << viewer.err();
+  EXPECT_EQ(d.service("master").wait(), 0);
+}
+
+TEST(Deployment, AddressesAnnouncedCanBeReached) {
+  Deployment d;
+  d.start_servers();
+  // As in containers: nobody says what to announce.
+  ASSERT_TRUE(d.wait_status([](const auto& s) {
+    return Deployment::of_role(s, "data").is_object() && Deployment::of_role(s, "packer").is_object();
+  }));
+  auto status = d.status();
+  for (const auto& [role, key] :
+       {std::pair{"data", "chunks"}, {"packer", "tiles"}, {"packer", "patches"}, {"packer", "state"}})
+    EXPECT_TRUE(
+        Deployment::of_role(status, role)["endpoints"][key].template get<std::string>().starts_with("tcp://127.0.0.1:"))
+        << role << " " << key;
+  d.service("packer").signal(SIGTERM);
+  EXPECT_EQ(d.service("packer").wait(), 0);
+  Program again("telesplat-packer",
+                {"--bind", "tcp://*:*", "--insecure", "--name", "unadvertised", "--master", d.master()},
+                d.folder() / "again");
+  ASSERT_TRUE(d.wait_status([](const auto& s) { return Deployment::of_role(s, "packer").is_object(); }));
+  status = d.status();
+  for (const char* key : {"tiles", "patches", "state"})
+    EXPECT_TRUE(Deployment::of_role(status, "packer")["endpoints"][key].template get<std::string>().starts_with(
+        "tcp://" + net::host_name() + ":"));
+}
+
+TEST(Deployment, HealthFollowsTheProcess) {
+  Deployment d;
+  EXPECT_EQ(d.health({}), 0);
+  EXPECT_EQ(d.health({"--role", "sampler", "--host"}), 1) << "none is there yet";
+  d.start("sampler", {"--name", "s", "--threads", "1"});
+  ASSERT_TRUE(d.wait_status([](const auto& s) { return Deployment::of_role(s, "sampler").is_object(); }));
+  EXPECT_EQ(d.health({"--role", "sampler", "--host"}), 0);
+  EXPECT_EQ(d.health({"--name", "s"}), 0);
+  EXPECT_EQ(d.health({"--name", "t"}), 1);
+  EXPECT_EQ(d.health({"--role", "packer"}), 1);
+  EXPECT_EQ(d.health({"--role", "wizard"}), 2) << "bad usage";
+  // A process that hangs still has its connection: it is its silence that tells.
+  d.service("sampler").signal(SIGSTOP);
+  EXPECT_TRUE(wait_until([&] { return d.health({"--name", "s"}) == 1; }));
+  d.service("sampler").signal(SIGCONT);
+  EXPECT_TRUE(wait_until([&] { return d.health({"--name", "s"}) == 0; }));
+  d.service("sampler").signal(SIGTERM);
+  EXPECT_EQ(d.service("sampler").wait(), 0);
+  EXPECT_EQ(d.health({"--name", "s"}), 1);
+  d.service("master").signal(SIGTERM);
+  EXPECT_EQ(d.service("master").wait(), 0);
+  EXPECT_EQ(d.health({}), 1) << "no master";
+}
+
+TEST(Deployment, EveryServiceEndsOnASignal) {
+  Deployment d;
+  d.start_servers();
+  d.start_viewer({"--duration", "0"});
+  ASSERT_TRUE(d.wait_status([](const auto& s) {
+    const auto viewer = Deployment::of_role(s, "viewer");
+    return viewer.is_object() && viewer.contains("values") && viewer["values"].value("updates", 0.0) > 0;
+  }));
+  for (const char* role : {"sampler", "viewer", "packer", "data", "master"}) {
+    d.service(role).signal(SIGTERM);
+    EXPECT_EQ(d.service(role).wait(), 0) << role << ": " << d.service(role).err();
+  }
+}
+
+TEST(Deployment, AMasterDoesNotWaitLongForTheDead) {
+  Deployment d;
+  d.start("sampler", {"--threads", "1"});
+  ASSERT_TRUE(d.wait_status([](const auto& s) { return Deployment::of_role(s, "sampler").is_object(); }));
+  d.service("sampler").signal(SIGSTOP);
+  d.service("master").signal(SIGTERM);
+  EXPECT_EQ(d.service("master").wait(), 0);
+  EXPECT_TRUE(fs::exists(d.out() + "/summary.json"));
+  d.service("sampler").signal(SIGCONT);
+}
+
+// What is being read is given up: the chunk store that the file would have become is not there afterwards.
+TEST(Deployment, ADataServerEndsOnASignalWhileItReads) {
+  Deployment d;
+  write_terrain(d.folder() / "mountains.ply", 1500);
+  Program& data = d.start("data", {d.folder() / "mountains.ply", "--cache", d.folder() / "cache", "--report-progress"});
+  ASSERT_TRUE(wait_until([&] { return data.out().find("progress read") != std::string::npos; }));
+  data.signal(SIGTERM);
+  EXPECT_EQ(data.wait(), 0);
+  for (const auto& entry : fs::directory_iterator(d.folder() / "cache")) EXPECT_NE(entry.path().extension(), ".mesh");
+}
+
+}  // namespace
+}  // namespace telesplat::test

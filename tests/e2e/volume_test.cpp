@@ -1,0 +1,301 @@
+// Volumes: whole runs of a small one, made here.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "common/image/file.h"
+#include "tests/support/pipeline_run.h"
+#include "tools/telesplat/record/csv_line.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Balls of tinted glass around a rod.
+constexpr const char* kGlass =
+    "0:#000000:0,60:#204080:0,150:#40a0e0:0.08,200:#f0a040:0.2,240:#f0a040:0.2,250:#ffffff:0.9";
+
+/// The volume of a test, in a folder of its own.
+class VolumeRun : public ::testing::Test {
+ protected:
+  VolumeRun() { write_volume(volume()); }
+  std::string volume() const { return folder_ / "balls.mha"; }
+  static std::vector<std::string> with(std::vector<std::string> more) {
+    more.insert(more.begin(), {"--sampling-size", "auto"});
+    return more;
+  }
+  TemporaryFolder folder_;
+};
+
+/// Runs `telesplat ctl` and returns its exit code.
+int ctl(PipelineRun& run, std::vector<std::string> arguments, std::string* err = nullptr) {
+  arguments.insert(arguments.begin(), "ctl");
+  arguments.insert(arguments.end(), {"--master", run.master()});
+  Program program("telesplat", arguments, run.folder() / "ctl");
+  const int code = program.wait(30);
+  if (err) *err = program.err();
+  return code;
+}
+
+std::vector<std::string> texts(const PipelineRun& run, const std::string& file, const std::string& name) {
+  std::vector<std::string> out;
+  std::ifstream in(run.out() + "/" + file);
+  std::string line;
+  std::getline(in, line);
+  const auto header = launcher::csv_fields(line).value_or(std::vector<std::string>{});
+  const size_t at = size_t(std::find(header.begin(), header.end(), name) - header.begin());
+  while (at < header.size() && std::getline(in, line))
+    if (const auto fields = launcher::csv_fields(line); fields && at < fields->size()) out.push_back((*fields)[at]);
+  return out;
+}
+
+std::string newest_picture(const std::string& folder) {
+  std::string out;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (const std::string path = entry.path().string();
+        path.find("frame-") != std::string::npos && path.ends_with(".png"))
+      out = std::max(out, path);
+  return out;
+}
+
+// Over all pixels, those of the background too.
+double psnr_db(const image::View& a, const image::View& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.colour.size(); ++i)
+    for (const int shift : {0, 8, 16}) {
+      const double d = double(a.colour[i] >> shift & 255) - double(b.colour[i] >> shift & 255);
+      sum += d * d;
+    }
+  return sum == 0 ? 99 : 10 * std::log10(255.0 * 255.0 * 3 * double(a.colour.size()) / sum);
+}
+
+TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
+  PipelineRun run(with({"--tf", kGlass, "--duration", "4", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
+                  volume());
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  const auto s = run.summary();
+  ASSERT_TRUE(s.is_object());
+  EXPECT_EQ(s["kind"], "volume");
+  EXPECT_EQ(s["scene"], "balls.mha");
+  EXPECT_EQ(s["samplers"], 2);
+  EXPECT_GT(s["updates"], 2);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  EXPECT_GE(s["quality"]["views"], 2);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], 26);
+  // The head stands still, and what it sees was sampled from there.
+  EXPECT_GT(s["quality"]["last_view"]["psnr_db"], 32);
+  EXPECT_NE(run.program().out().find("balls.mha"), std::string::npos) << run.program().out();
+  // Both samplers take part in every frame: the volume is cut in two.
+  const auto samplers = texts(run, "tiles.csv", "sampler");
+  EXPECT_EQ(std::set<std::string>(samplers.begin(), samplers.end()), (std::set<std::string>{"sampler-1", "sampler-2"}));
+
+  Program inspect("telesplat", {"inspect", run.out()}, run.folder() / "inspect");
+  EXPECT_EQ(inspect.wait(), 0) << inspect.err();
+  EXPECT_NE(inspect.out().find("summary.json"), std::string::npos);
+  Program compare("telesplat", {"compare", run.out()}, run.folder() / "compare");
+  EXPECT_EQ(compare.wait(), 2);
+  EXPECT_NE(compare.err().find("volume"), std::string::npos) << compare.err();
+}
+
+TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
+  const std::vector<std::string> common{"--tf", kGlass,   "--fov", "60",           "--duration",
+                                        "3",    "--hold", "2",     "--target-fps", "20"};
+  auto arguments = common;
+  arguments.insert(arguments.end(), {"--size", "320x400", "--data-servers", "2", "--samplers", "3", "--wall", "2x1"});
+  PipelineRun wall(with(arguments), volume());
+  ASSERT_EQ(wall.program().wait(100), 0) << wall.program().err();
+  EXPECT_TRUE(wall.all_gone());
+  EXPECT_NE(wall.program().out().find("viewer-2 frame"), std::string::npos) << wall.program().out();
+  const auto s = wall.summary();
+  EXPECT_EQ(s["samplers"], 3);
+  EXPECT_EQ(s["viewers"], 2);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+
+  arguments = common;
+  arguments.insert(arguments.end(), {"--size", "640x400"});
+  PipelineRun single(with(arguments), volume());
+  ASSERT_EQ(single.program().wait(100), 0) << single.program().err();
+  const auto stitched = image::read_view(wall.out() + "/images/wall.png"),
+             whole = image::read_view(newest_picture(single.out() + "/images"));
+  ASSERT_TRUE(stitched.ok()) << stitched.error().text;
+  ASSERT_TRUE(whole.ok()) << whole.error().text;
+  ASSERT_EQ(stitched->width, 640);
+  ASSERT_EQ(stitched->height, 400);
+  ASSERT_EQ(whole->width, 640);
+  EXPECT_GT(psnr_db(*whole, *stitched), 42);  // 48 dB; tiles may have been sampled on rasters of their own
+
+  // At the seam neighbours differ no more than in the single viewer's picture, where the same two columns are neighbours, too.
+  const auto step = [](const image::View& v, int x) {
+    double sum = 0;
+    for (int y = 0; y < v.height; ++y)
+      for (const int shift : {0, 8, 16}) {
+        const uint32_t* row = &v.colour[size_t(y) * v.width];
+        sum += std::abs(int(row[x - 1] >> shift & 255) - int(row[x] >> shift & 255));
+      }
+    return sum / v.height / 3;
+  };
+  EXPECT_NEAR(step(*stitched, 320), step(*whole, 320), 1.0);  // of 255
+}
+
+TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
+  PipelineRun run(with({"--tf", kGlass, "--duration", "0", "--trajectory", "still", "--verify", "15"}), volume());
+  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; })) << run.program().err();
+  std::string err;
+  EXPECT_EQ(ctl(run, {"tf", "0:#000000:0,100:#ff0000:0,160:#ff0000:0.6"}), 0);
+  EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") == 2; }))
+      << run.status().dump(1);
+  EXPECT_EQ(ctl(run, {"tf", "bone"}), 0);
+  EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") == 3; }));
+  // A colour-map file's points lie between 0 and 1 and are spread over the volume's range.
+  std::ofstream(run.folder() / "map.json")
+      << R"([{"Name": "two", "RGBPoints": [0, 0, 0, 1, 1, 1, 1, 0], "Points": [0, 0, 0.5, 0, 1, 0.8, 0.5, 0]}])";
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json"}, &err), 0) << err;
+  EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") == 4; }));
+  const double updates = value(run.status(), "viewer-1", "updates");
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates + 1; }));
+
+  EXPECT_NE(ctl(run, {"tf", "nonesuch"}, &err), 0);
+  EXPECT_NE(err.find("nonesuch"), std::string::npos) << err;
+  EXPECT_NE(ctl(run, {"tf", "5:#00:0"}), 0);
+  EXPECT_EQ(ctl(run, {"tf"}), 2);
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "none.json"}, &err), 2);
+  EXPECT_NE(err.find("none.json"), std::string::npos) << err;
+  std::ofstream(run.folder() / "broken.json") << "{\"RGBPoints\": [0, 1";
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "broken.json"}), 2);
+  EXPECT_EQ(value(run.status(), "viewer-1", "epoch"), 4) << "what was refused changed something";
+
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  const auto transfers = texts(run, "epochs.csv", "transfer");
+  ASSERT_EQ(transfers.size(), 4u);
+  EXPECT_EQ(std::set<std::string>(transfers.begin(), transfers.end()).size(), 4u);
+  const auto epochs = run.column("frames.csv", "epoch");
+  EXPECT_TRUE(std::is_sorted(epochs.begin(), epochs.end()));
+  EXPECT_EQ(std::set<double>(epochs.begin(), epochs.end()), (std::set<double>{1, 2, 3, 4}));
+  // Each frame is compared with rays through its own epoch's volume.
+  const auto s = run.summary();
+  EXPECT_GE(s["quality"]["views"], 2);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], 30);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST_F(VolumeRun, ASeriesPlaysAndStands) {
+  const std::string series = folder_ / "series";
+  fs::create_directory(series);
+  for (int i = 0; i < 4; ++i) write_volume(series + "/phase" + std::to_string(i) + ".mha", 32, i / 4.0);
+  PipelineRun run(
+      with({"--tf", kGlass, "--series-rate", "4", "--duration", "0", "--trajectory", "still", "--verify", "5"}),
+      series);
+  EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") >= 7; })) << run.program().err();
+  EXPECT_EQ(ctl(run, {"set", "volume.step=2"}), 0);
+  EXPECT_NE(ctl(run, {"set", "volume.step=4"}), 0);
+  EXPECT_TRUE(run.wait_status([](const auto& s) { return s["parameters"].value("volume.step", -1.0) == 2; }));
+  const double stopped = run.status()["epoch"];
+  const double updates = value(run.status(), "viewer-1", "updates");
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates + 3; }));
+  EXPECT_EQ(run.status()["epoch"], stopped) << "it plays on";
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  const auto steps = run.column("epochs.csv", "volume.step");
+  EXPECT_EQ(std::set<double>(steps.begin(), steps.end()), (std::set<double>{0, 1, 2, 3}));
+  EXPECT_EQ(steps.back(), 2);
+  const auto shown = run.column("frames.csv", "epoch");
+  EXPECT_TRUE(std::is_sorted(shown.begin(), shown.end()));
+  EXPECT_GT(std::set<double>(shown.begin(), shown.end()).size(), 4u);
+  // Every frame against its own step: another step's volume would be 20 dB off.
+  const auto s = run.summary();
+  EXPECT_GE(s["quality"]["views"], 2);
+  EXPECT_GT(s["quality"]["psnr_db"]["median"], 30);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST_F(VolumeRun, ASceneFileAndRawData) {
+  // The last bytes of the file are the voxels.
+  const std::string mha = read_text(volume());
+  std::ofstream(folder_ / "balls.raw", std::ios::binary) << mha.substr(mha.size() - 40 * 40 * 40);
+  std::ofstream(folder_ / "scene.toml")
+      << "[scene]\nkind = \"volume\"\nfile = \"balls.raw\"\nraw = \"40x40x40:u8\"\ntf = \"" << kGlass
+      << "\"\nlighting = false\n[view]\nduration = 2\nhold = 1\nverify = 10\n";
+  PipelineRun run(with({}), folder_ / "scene.toml");
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  const auto s = run.summary();
+  EXPECT_EQ(s["kind"], "volume");
+  EXPECT_EQ(s["scene"], "balls.raw");
+  EXPECT_GT(s["quality"]["last_view"]["psnr_db"], 32);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(VolumeFaults, ASamplersDeathMovesItsSlabAndTheDisplayGoesOn) {
+  TemporaryFolder folder;
+  write_volume(folder / "balls.mha");
+  PipelineRun run({"--sampling-size", "auto", "--tf", kGlass, "--duration", "0", "--samplers", "1"},
+                  folder / "balls.mha");
+  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; })) << run.program().err();
+  // Nobody starts this one again.
+  Program guest("telesplat-sampler", {"--master", run.master(), "--name", "guest", "--threads", "1"},
+                run.folder() / "guest");
+  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "guest", "tiles_sampled") > 2; })) << guest.err();
+  guest.signal(SIGKILL);
+  EXPECT_EQ(guest.wait(), 128 + SIGKILL);
+  const double frames = value(run.status(), "viewer-1", "frames"), updates = value(run.status(), "viewer-1", "updates");
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates + 3; }))
+      << run.status().dump(1);
+  EXPECT_GT(value(run.status(), "viewer-1", "frames"), frames);
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  // The display never stopped: no two frames are as far apart as the slab took to move (a lease must expire first).
+  const auto waits = run.column("frames.csv", "t_s"), drawn = run.column("frames.csv", "points_drawn");
+  ASSERT_GT(waits.size(), 10u);
+  EXPECT_GT(*std::min_element(drawn.begin(), drawn.end()), 0) << "a frame that shows nothing";
+}
+
+TEST(VolumeFaults, ASamplerAndADataServerThatDieAreStartedAgain) {
+  TemporaryFolder folder;
+  write_volume(folder / "balls.mha");
+  PipelineRun run(
+      {"--sampling-size", "auto", "--tf", kGlass, "--duration", "0", "--samplers", "2", "--data-servers", "2"},
+      folder / "balls.mha");
+  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; })) << run.program().err();
+  for (const std::string name : {"sampler-2", "data-2"}) {
+    pid_t victim = 0;
+    ASSERT_TRUE(run.wait_status([&](const auto& s) {
+      const auto p = process(s, name);
+      return p.is_object() && (victim = p["pid"].template get<pid_t>()) > 0;
+    }));
+    ::kill(victim, SIGKILL);
+    EXPECT_TRUE(wait_until([&] { return run.program().err().find(name + " died") != std::string::npos; }));
+    EXPECT_TRUE(run.wait_status([&](const auto& s) {
+      const auto p = process(s, name);
+      return p.is_object() && p["pid"].template get<pid_t>() != victim;
+    }));
+    const double updates = value(run.status(), "viewer-1", "updates");
+    EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates + 3; }))
+        << name << run.status().dump(1);
+  }
+  // A new transfer function needs voxels of both parts.
+  const double epoch = value(run.status(), "viewer-1", "epoch");
+  EXPECT_EQ(ctl(run, {"tf", "0:#000000:0,20:#ff0000:0,160:#ff0000:0.6"}), 0);
+  EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "epoch") > epoch; }))
+      << run.status().dump(1);
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST_F(VolumeRun, CtrlCEndsAWall) {
+  PipelineRun run(with({"--tf", kGlass, "--duration", "0", "--wall", "2x1", "--size", "160x200"}), volume());
+  ASSERT_TRUE(run.wait_status([](const auto& s) {
+    return value(s, "viewer-1", "frames") > 0 && value(s, "viewer-2", "frames") > 0;
+  })) << run.program().err();
+  run.program().signal(SIGINT);
+  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+}
+
+}  // namespace
+}  // namespace telesplat::test

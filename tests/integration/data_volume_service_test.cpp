@@ -1,0 +1,170 @@
+// A volume's data server among sockets: a master that welcomes it, a sampler that asks for voxels.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "common/core/clock.h"
+#include "common/net/dispatch.h"
+#include "services/data/volume/service.h"
+#include "tests/support/volume_samples.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr double kDeadline_s = 30;
+
+class Service : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(master.bind("inproc://master"));
+    options.service.name = "data-1", options.service.master = "inproc://master",
+    options.service.bind = "inproc://voxels";
+    options.scene = "folder/noise.raw";
+    server =
+        std::thread([this] { exit_code = serve_volume(context, *store, options, [this] { return stop.load(); }); });
+  }
+  void TearDown() override {
+    stop = true;
+    if (server.joinable()) server.join();
+  }
+  // The next message of type M that a peer sends; others are passed over.
+  template <class M>
+  std::optional<std::pair<M, net::Message>> next(net::Socket& socket) {
+    for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until; net::wait_readable({&socket}, 20))
+      while (const auto m = socket.receive())
+        if (m->type == M::kName)
+          if (auto decoded = socket.decode<M>(*m)) return std::pair(std::move(*decoded), *m);
+    return std::nullopt;
+  }
+  wire::Hello welcome(uint64_t epoch, const std::string& transfer = {}) {
+    wire::Hello hello;
+    if (peer.empty()) {
+      const auto said = next<wire::Hello>(master);
+      EXPECT_TRUE(said);
+      if (!said) return hello;
+      hello = said->first, peer = said->second.peer, facts = hello.facts, parameters = hello.parameters;
+    }
+    wire::Welcome w;
+    w.master = InstanceId{5}, w.hello_sent_s = hello.sent_s, w.epoch = EpochId{epoch};
+    w.facts = facts, w.parameters = parameters;
+    if (!transfer.empty()) w.facts["transfer"] = transfer;
+    master.send(w, peer);
+    return hello;
+  }
+
+  net::Context context;
+  net::Socket master{context, net::Kind::kRouter, "master"};
+  DataServiceOptions options;
+  std::unique_ptr<VolumeStore> store = open_or_fail(noise(3, {40, 30, 100}));
+  std::map<std::string, std::string> facts;
+  std::map<std::string, double> parameters;
+  std::string peer;
+  std::atomic<bool> stop = false;
+  int exit_code = -1;
+  std::thread server;
+};
+
+TEST_F(Service, SaysWhatItHasWeighsItAndSendsIt) {
+  const wire::Hello hello = welcome(1);
+  EXPECT_EQ(hello.role, "data");
+  EXPECT_EQ(hello.facts.at("kind"), "volume");
+  EXPECT_EQ(hello.facts.at("scene"), "noise.raw");
+  EXPECT_EQ(hello.facts.at("voxels"), "120000");
+  EXPECT_EQ(hello.endpoints.at("voxels"), "inproc://voxels");
+  EXPECT_EQ(*volume::read_session(hello.parameters, hello.facts), store->session());
+
+  const auto weights = next<wire::SliceWeights>(master);
+  ASSERT_TRUE(weights);
+  EXPECT_EQ(weights->first.epoch, EpochId{1});
+  EXPECT_EQ(weights->first.data, hello.instance);
+  ASSERT_EQ(weights->first.voxels.size(), 100u);
+
+  net::Socket sampler(context, net::Kind::kDealer, "sampler", {.max_message_bytes = wire::kMaxBulkBytes});
+  ASSERT_TRUE(sampler.connect("inproc://voxels"));
+  wire::VoxelRequest request;
+  request.epoch = EpochId{2}, request.begin = 10, request.end = 90;
+  sampler.send(request);
+  EXPECT_FALSE(next<wire::VoxelData>(sampler)->first.known) << "no such epoch yet";
+
+  welcome(2, "100:#ffffff:0, 100:#ffffff:1, 150:#ffffff:1, 150:#ffffff:0");
+  const auto again = next<wire::SliceWeights>(master);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->first.epoch, EpochId{2});
+  sampler.send_frames({}, wire::VoxelRequest::kName, "nonsense");
+  request.end = 500;
+  sampler.send(request);  // there are no such slices
+  request.end = 90;
+  uint64_t voxels = 0, bytes = 0;
+  for (int answers = 0; request.begin < 90; ++answers) {
+    ASSERT_LT(answers, 10);
+    sampler.send(request);
+    const auto got = next<wire::VoxelData>(sampler);
+    ASSERT_TRUE(got && got->first.known);
+    const wire::VoxelData& d = got->first;
+    ASSERT_EQ(d.begin, request.begin);
+    const auto decoded = volume::decode_voxels({reinterpret_cast<const uint8_t*>(d.data.data()), d.data.size()}, 40, 30,
+                                               int(d.begin), int(d.end), 256);
+    ASSERT_TRUE(decoded) << decoded.error().text;
+    EXPECT_EQ(decoded->size(), d.voxels);
+    for (const uint16_t l : decoded->level) ASSERT_TRUE(l >= 100 && l < 150);
+    voxels += d.voxels, bytes += d.data.size();
+    request.begin = d.end;
+  }
+  uint64_t expected = 0;
+  for (int k = 10; k < 90; ++k) expected += again->first.voxels[size_t(k)];
+  EXPECT_EQ(voxels, expected);
+
+  for (;;) {
+    const auto report = next<wire::StatusReport>(master);
+    ASSERT_TRUE(report);
+    const auto& values = report->first.values;
+    if (values.at("voxels_sent") < double(voxels)) continue;  // an earlier second's
+    EXPECT_EQ(values.at("voxels_sent"), double(voxels));
+    EXPECT_EQ(values.at("bytes_sent"), double(bytes));
+    EXPECT_NEAR(values.at("bytes_per_voxel"), double(bytes) / double(voxels), 1e-9);
+    EXPECT_EQ(values.at("requests"), 4);
+    EXPECT_EQ(values.at("messages_rejected"), 2);
+    break;
+  }
+  master.send(wire::Shutdown{"enough"}, peer);
+  server.join();
+  EXPECT_EQ(exit_code, 0);
+}
+
+TEST_F(Service, TellsAgainWhatTheScenesNewestEpochWeighs) {
+  welcome(1);
+  ASSERT_TRUE(next<wire::SliceWeights>(master));
+  for (uint64_t epoch = 2; epoch < 40; ++epoch) welcome(epoch);
+  for (;;) {
+    const auto weights = next<wire::SliceWeights>(master);
+    ASSERT_TRUE(weights);
+    if (weights->first.epoch == EpochId{39}) break;
+  }
+}
+
+TEST(DataServer, RefusesAVolumesFlagsWhereThereIsNoVolume) {
+  const auto refusal = [](DataServiceOptions o) {
+    o.service.name = "data";
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run(o), 2);
+    return testing::internal::GetCapturedStderr();
+  };
+  DataServiceOptions julia, file, surface;
+  julia.scene = "julia", julia.volume.transfer = "bone";
+  file.scene = "CMakeLists.txt", file.volume.part = "0/2";
+  surface.scene = "CMakeLists.txt", surface.mesh.iso = 5, surface.volume.lighting = "off";
+  for (const auto& [text, scene] : {std::pair{refusal(julia), "julia"}, {refusal(file), "CMakeLists.txt"}}) {
+    EXPECT_NE(text.find(scene), std::string::npos) << text;
+    EXPECT_NE(text.find("is no volume"), std::string::npos) << text;
+  }
+  EXPECT_NE(refusal(surface).find("--iso"), std::string::npos);
+  julia.volume = {}, julia.mesh.iso = 1;
+  EXPECT_NE(refusal(julia).find("--iso"), std::string::npos);
+  DataServiceOptions missing;
+  missing.scene = "nowhere.raw", missing.volume.raw = "4x4x4:u8";
+  EXPECT_NE(refusal(missing).find("nowhere.raw"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace telesplat::data

@@ -1,0 +1,183 @@
+// A viewer - worker, caches, display loop, renderers - against a session under control: volumes and points, with every coupling.
+#include <gtest/gtest.h>
+
+#include "client/viewer/display/headless_surface.h"
+#include "client/viewer/points/source.h"
+#include "client/viewer/slices/source.h"
+#include "common/core/clock.h"
+#include "tests/support/fake_session.h"
+
+namespace telesplat::viewer {
+namespace {
+
+struct Shown {
+  test::FakeSession::Counts counts;
+  std::vector<double> request, sequence, epoch, wait_ms, filled, drawn;
+  std::vector<double> updates;
+  std::map<std::string, double> status;
+  DisplayResult result;
+};
+
+// A whole life of a viewer: `frames` frames as fast as they come.
+Shown show(const test::FakeSession::Options& session_options, CouplingMode mode, uint64_t frames) {
+  static int number = 0;
+  net::Context context;
+  test::FakeSession session(context, session_options, std::to_string(++number));
+  DisplayOptions display;
+  display.width = 96;
+  display.height = 64;
+  display.target_fps = 0;
+  display.duration_s = 120;  // a deadline
+  display.frames = frames;
+  HeadlessSurface surface(display, geometry::Trajectory::orbit(1.2, 0.4, 20));
+  ViewerCaches caches(buffers_of(mode, 3));
+  metrics::TableRecorder table("frames", frame_columns());
+  metrics::SpanRecorder spans;
+  ReplicaWorker::Options options;
+  options.service.name = "viewer";
+  options.service.master = session.master();
+  options.requests.sampling_width = 96;
+  options.requests.sampling_height = 64;
+  options.requests.max_rate_hz = 200;
+  Shown out;
+  {
+    ReplicaWorker worker(context, options, caches, table, spans);
+    const SourceMaker make = [&](SceneKind kind) -> Result<std::unique_ptr<ViewSource>> {
+      EXPECT_EQ(kind, session_options.volume ? SceneKind::kVolume : SceneKind::kPoints);
+      if (kind == SceneKind::kVolume)
+        return std::unique_ptr<ViewSource>(new VolumeSource(make_cpu_volume_renderer(1), caches.slices, 0x102030));
+      return std::unique_ptr<ViewSource>(new PointSource(display, make_cpu_renderer(1), caches, worker));
+    };
+    out.result = run_display(display, surface, make, caches.gate, worker, table, spans, nullptr);
+  }
+  // The worker's last report is on its way.
+  for (const double until = monotonic_s() + 20;
+       session.column("frames", "frame").size() < frames && monotonic_s() < until;)
+    std::this_thread::yield();
+  out.counts = session.counts();
+  out.request = session.column("frames", "request");
+  out.sequence = session.column("frames", "sequence");
+  out.epoch = session.column("frames", "epoch");
+  out.wait_ms = session.column("frames", "wait_ms");
+  out.filled = session.column("frames", "buffers_filled");
+  out.drawn = session.column("frames", "points_drawn");
+  out.updates = session.column("updates", "request");
+  out.status = session.status();
+  return out;
+}
+
+void expect_complete(const Shown& s, uint64_t frames) {
+  EXPECT_EQ(s.result.error, "");
+  EXPECT_FALSE(s.result.interrupted);
+  EXPECT_EQ(s.result.frames, frames);
+  ASSERT_EQ(s.request.size(), frames);
+  for (const double drawn : s.drawn) EXPECT_GT(drawn, 0);
+}
+
+// Each frame shows another update, in the order of requests. (But the last, which waits for nothing once its time is over.)
+void expect_one_update_a_frame(const Shown& s) {
+  for (size_t i = 1; i < s.request.size(); ++i) EXPECT_GT(s.request[i], s.request[i - 1]) << "frame " << i;
+}
+
+TEST(VolumeSession, AsynchronouslyFramesShowWhateverIsThere) {
+  const Shown s = show({}, CouplingMode::kAsync, 60);
+  expect_complete(s, 60);
+  EXPECT_TRUE(std::is_sorted(s.sequence.begin(), s.sequence.end()));
+  EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0) << "the display never waits";
+  EXPECT_GE(s.counts.introductions, 1u);
+  EXPECT_GT(s.counts.acknowledged, 0u);
+  EXPECT_LE(s.counts.most_unacknowledged, SliceReceiver::kAsyncBuffers);
+  EXPECT_FALSE(s.counts.in_order);
+  EXPECT_EQ(s.counts.buffers, 0u);
+  EXPECT_FALSE(s.updates.empty());
+}
+
+TEST(VolumeSession, SynchronouslyEachFrameAsksAndWaits) {
+  const Shown s = show({}, CouplingMode::kSync, 30);
+  expect_complete(s, 30);
+  expect_one_update_a_frame(s);
+  EXPECT_EQ(s.request.back(), 30) << "one request a frame";
+  EXPECT_EQ(s.counts.most_open, 1u);
+  EXPECT_EQ(s.counts.most_unacknowledged, 1u);
+  EXPECT_TRUE(s.counts.in_order);
+  EXPECT_TRUE(s.counts.rising);
+  EXPECT_EQ(s.counts.buffers, 1u);
+  EXPECT_EQ(*std::max_element(s.filled.begin(), s.filled.end()), 0);
+}
+
+TEST(VolumeSession, LooselyFramesAreBufferedInOrder) {
+  const Shown s = show({}, CouplingMode::kLoose, 30);
+  expect_complete(s, 30);
+  expect_one_update_a_frame(s);
+  EXPECT_EQ(s.request.back(), 30);
+  EXPECT_LE(s.counts.most_open, 3u);
+  EXPECT_LE(s.counts.most_unacknowledged, 3u);
+  EXPECT_TRUE(s.counts.rising);
+  EXPECT_LE(*std::max_element(s.filled.begin(), s.filled.end()), 2);
+}
+
+TEST(VolumeSession, DamagedAndForgottenAnswersAreAskedForAgain) {
+  const Shown s = show({.damaged = {5}, .forgotten = {9}}, CouplingMode::kSync, 20);
+  expect_complete(s, 20);
+  expect_one_update_a_frame(s);
+  EXPECT_EQ(s.counts.repeated, 2u);
+  EXPECT_EQ(s.status.at("messages_rejected"), 1) << "the damaged one, counted and dropped";
+}
+
+TEST(VolumeSession, ShowsEpochsAsTheyCome) {
+  const Shown s = show({.epoch_every = 4}, CouplingMode::kLoose, 20);
+  expect_complete(s, 20);
+  EXPECT_TRUE(std::is_sorted(s.epoch.begin(), s.epoch.end()));
+  EXPECT_GE(s.epoch.back(), 5);
+  EXPECT_EQ(s.status.at("epochs_shown"), s.epoch.back() - s.epoch.front());
+}
+
+TEST(PointSession, SynchronouslyNoFrameShowsPartOfAnUpdate) {
+  const Shown s = show({.volume = false, .coarse_patches = 1}, CouplingMode::kSync, 20);
+  expect_complete(s, 20);
+  expect_one_update_a_frame(s);
+  for (const double sequence : s.sequence) EXPECT_EQ(int(sequence) % 3, 0) << "coarse, upper, lower half: all or none";
+  EXPECT_EQ(s.counts.most_open, 1u);
+  EXPECT_EQ(s.updates.size(), s.request.size());
+}
+
+TEST(PointSession, LooselyUpdatesAreHeldUntilTheirFrame) {
+  const Shown s = show({.volume = false, .epoch_every = 5}, CouplingMode::kLoose, 30);
+  expect_complete(s, 30);
+  expect_one_update_a_frame(s);
+  EXPECT_LE(s.counts.most_open, 3u);
+  // Two patches an update, an event more where an epoch begins: after the n-th answer so many events are shown, and no more.
+  for (size_t i = 0; i < s.sequence.size(); ++i) {
+    const double n = s.request[i];
+    EXPECT_EQ(s.sequence[i], 2 * n + std::floor(n / 5)) << "frame " << i;
+    EXPECT_EQ(s.epoch[i], 1 + std::floor(n / 5));
+  }
+}
+
+TEST(PointSession, AsynchronouslyPointsAreShownAsTheyCome) {
+  const Shown s = show({.volume = false}, CouplingMode::kAsync, 40);
+  expect_complete(s, 40);
+  EXPECT_TRUE(std::is_sorted(s.sequence.begin(), s.sequence.end()));
+  EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0);
+}
+
+TEST(VolumeSession, GoesOnWithAnotherMaster) {
+  for (const auto mode : {CouplingMode::kAsync, CouplingMode::kSync, CouplingMode::kLoose}) {
+    const Shown s = show({.restart_after = 6}, mode, 60);
+    expect_complete(s, 60);
+    if (mode == CouplingMode::kAsync) continue;
+    expect_one_update_a_frame(s);
+    EXPECT_GE(s.counts.repeated, 1u) << "what it had asked for is asked for again";
+    // A request that the new master had before it was asked again overtakes the older ones.
+    EXPECT_LE(s.request.back(), 62);
+  }
+}
+
+TEST(PointSession, AForgottenRequestIsMadeAgain) {
+  const Shown s = show({.volume = false, .forgotten = {3}}, CouplingMode::kLoose, 10);
+  expect_complete(s, 10);
+  expect_one_update_a_frame(s);
+}
+
+}  // namespace
+}  // namespace telesplat::viewer

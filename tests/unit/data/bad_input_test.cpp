@@ -1,0 +1,205 @@
+// Bad files become one clear line that names the file; nothing crashes, hangs or allocates by what a file claims.
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "services/data/inspect.h"
+#include "services/data/mesh/reader.h"
+#include "tests/support/data_files.h"
+
+namespace telesplat::data::test {
+namespace {
+
+using namespace std::string_literals;
+
+long peak_rss_kb() {
+  rusage usage;
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_maxrss;
+}
+
+// Opens a file that must be refused. Returns the error's text, after checking what every such text promises.
+std::string refusal(const std::string& path) {
+  const auto store = MeshStore::open(path, plain_options("auto"), nullptr);
+  EXPECT_FALSE(store.ok()) << path << " was accepted";
+  if (store) return "";
+  const std::string text = store.error().text;
+  EXPECT_TRUE(text.starts_with(path)) << text;
+  EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+  EXPECT_LT(text.size(), path.size() + 300) << text;
+  return text.substr(path.size());
+}
+
+const std::string kPlyVertex = "property float x\nproperty float y\nproperty float z\n";
+const std::string kPlyFace = "property list uchar int vertex_indices\nend_header\n";
+std::string ply(const std::string& vertices, const std::string& faces, const std::string& data) {
+  return "ply\nformat ascii 1.0\nelement vertex " + vertices + "\n" + kPlyVertex + "element face " + faces + "\n" +
+         kPlyFace + data;
+}
+
+struct BadFile {
+  std::string name, content, says;  // says: must occur in the error
+};
+
+class BadInput : public testing::TestWithParam<BadFile> {};
+
+TEST_P(BadInput, IsRefusedWithALineThatSaysWhy) {
+  const TempFolder folder;
+  const long before_kb = peak_rss_kb();
+  const std::string text = refusal(folder.write(GetParam().name, GetParam().content));
+  EXPECT_NE(text.find(GetParam().says), std::string::npos) << text;
+  EXPECT_LT(peak_rss_kb() - before_kb, 64 * 1024) << "memory was taken by a claimed size";
+}
+
+const std::string kThree = "0 0 0\n1 0 0\n0 1 0\n";
+const std::string kVtk = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET ";
+const std::string kVtp =
+    "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\"><PolyData><Piece "
+    "NumberOfPoints=\"";
+
+INSTANTIATE_TEST_SUITE_P(
+    Ply, BadInput,
+    testing::Values(
+        BadFile{"empty.ply", "", "empty"},
+        BadFile{"huge.ply", ply("1000000000000", "1", "0 0 0\n"), "claims 1000000000000 of element 'vertex'"},
+        BadFile{"huge-faces.ply", ply("3", "1000000000000", kThree), "claims 1000000000000 of element 'face'"},
+        BadFile{"overflow.ply", ply("99999999999999999999", "1", kThree), "is not a number"},
+        BadFile{"negative.ply", ply("-1", "1", kThree), "is not a number"},
+        BadFile{"no-end.ply", "ply\nformat ascii 1.0\nelement vertex 3\n", "no 'end_header'"},
+        BadFile{"no-format.ply", "ply\nend_header\n", "no format"},
+        BadFile{"garbage.ply", "ply\nformat ascii 1.0\nelephant 3\nend_header\n", "elephant"},
+        BadFile{"bad-type.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\nend_header\n1\n", "type"},
+        BadFile{"no-z.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
+                "lacks x, y or z"},
+        BadFile{"points.ply", ply("3", "0", kThree), "no triangles"},
+        BadFile{"out-of-range.ply", ply("3", "1", kThree + "3 0 1 3\n"), "names vertex 3, there are 3"},
+        BadFile{"negative-index.ply", ply("3", "1", kThree + "3 0 1 -1\n"), "names vertex -1"},
+        BadFile{"nan.ply", ply("3", "1", "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"), "vertex 1 is not finite"},
+        BadFile{"infinite.ply", ply("3", "1", "0 0 0\n1 0 0\n0 1e999 0\n3 0 1 2\n"), "vertex 2 is not finite"},
+        BadFile{"truncated.ply", ply("3", "2", kThree + "3 0 1 2\n3 0 "), "truncated"},
+        BadFile{"words.ply", ply("3", "1", "0 0 zero\n1 0 0\n0 1 0\n3 0 1 2\n"), "vertex 0 of 3"},
+        BadFile{"long-list.ply", ply("3", "1", kThree + "200 0 1 2\n"), "truncated"},
+        BadFile{"degenerate.ply", ply("3", "2", "0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n3 0 0 1\n"),
+                "all its 2 triangles are degenerate"},
+        BadFile{"one-point.ply", ply("3", "1", "1 1 1\n1 1 1\n1 1 1\n3 0 1 2\n"), "extent"},
+        BadFile{"binary-list.ply",
+                "ply\nformat binary_little_endian 1.0\nelement vertex 1\n" + kPlyVertex +
+                    "element face 1\nproperty list uint int vertex_indices\nend_header\n" + std::string(12, '\0') +
+                    "\xff\xff\xff\xff"s,
+                "face 0 of 1"}),
+    [](const auto& info) {
+      auto n = info.param.name;
+      std::replace_if(
+          n.begin(), n.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
+      return n;
+    });
+
+INSTANTIATE_TEST_SUITE_P(
+    Others, BadInput,
+    testing::Values(
+        BadFile{"huge.off", "OFF\n1000000000000 1 0\n0 0 0\n", "claims 1000000000000 vertices"},
+        BadFile{"huge-faces.off", "OFF\n3 1000000000000 0\n" + kThree, "claims 1000000000000 faces"},
+        BadFile{"corners.off", "OFF\n3 1 0\n" + kThree + "4000000000 0 1 2\n", "lacks corner"},
+        BadFile{"range.off", "OFF\n3 1 0\n" + kThree + "3 0 1 9\n", "names vertex 9"},
+        BadFile{"short.off", "OFF\n3 1 0\n0 0 0\n1 0\n", "vertex 1 of 3"},
+        BadFile{"binary.off", "OFF BINARY\n\1\2\3", "text"},
+        BadFile{"nan.off", "OFF\n3 1 0\n0 0 nan\n1 0 0\n0 1 0\n3 0 1 2\n", "not finite"},
+        BadFile{"huge.stl", std::string(80, 'x') + raw(uint32_t{4000000000}) + std::string(16, '\0'),
+                "claims 4000000000 triangles"},
+        BadFile{"none.stl", std::string(80, 'x') + raw(uint32_t{0}), "no triangles"},
+        BadFile{"tiny.stl", "abc", "too few"},
+        BadFile{"cut.stl", "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "truncated"},
+        BadFile{"word.stl", "solid x\nfacet\nvertex 0 0 zero\nendsolid", "three numbers"},
+        BadFile{"range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "names vertex 4, there are 3"},
+        BadFile{"zero.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "names vertex 0"},
+        BadFile{"negative.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 1 2\n", "names vertex -4"},
+        BadFile{"normal.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//2 3//1\n", "names normal 2"},
+        BadFile{"word.obj", "v 0 0 0\nv 1 0 zero\n", "three numbers"},
+        BadFile{"nan.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", "not finite"},
+        BadFile{"huge.vtk", kVtk + "POLYDATA\nPOINTS 1000000000000 float\n0 0 0\n", "claims 1000000000000 POINTS"},
+        BadFile{"huge-polygons.vtk",
+                kVtk + "POLYDATA\nPOINTS 3 float\n" + kThree + "POLYGONS 1000000000000 4000000000000\n3 0 1 2\n",
+                "POLYGONS"},
+        BadFile{"range.vtk", kVtk + "POLYDATA\nPOINTS 3 float\n" + kThree + "POLYGONS 1 4\n3 0 1 77777\n", ""},
+        BadFile{"cut.vtk", kVtk + "POLYDATA\nPOINTS 3 float\n0 0 0 1", ""},
+        BadFile{"volume.vtk", kVtk + "STRUCTURED_POINTS\nDIMENSIONS 2 2 2\n", "STRUCTURED_POINTS"},
+        BadFile{"huge.vtp", kVtp + "1000000000000\" NumberOfPolys=\"1\">", "claims 1000000000000"},
+        BadFile{"cut.vtp", kVtp + "3\" NumberOfPolys=\"1\"><Points>", ""},
+        BadFile{"image.vti", "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\">", "PolyData"},
+        BadFile{"huge.glb", "glTF" + raw(uint32_t{2}) + raw(uint32_t{4000000000}) + raw(uint32_t{12}) + "JSON{}",
+                "claims 4000000000 bytes"},
+        BadFile{"old.glb", "glTF" + raw(uint32_t{1}) + raw(uint32_t{20}) + raw(uint32_t{0}) + "JSON", "version 1"},
+        BadFile{"broken.gltf", "{\"asset\":{\"version\":\"2.0\"},", "damaged"},
+        BadFile{
+            "huge.gltf",
+            R"({"asset":{"version":"2.0"},"accessors":[{"count":1000000000000,"componentType":5126,"type":"VEC3"}]})",
+            "claims 1000000000000 elements"},
+        BadFile{"empty.gltf", R"({"asset":{"version":"2.0"}})", ""},
+        BadFile{"picture.ply.png", "\x89PNG\r\n\x1a\n", "a PNG image"}, BadFile{"scan.nrrd", "NRRD0004\n", "a volume"},
+        BadFile{"raster.tif", "II*\0\10\0\0\0"s, "elevation raster"},
+        BadFile{"cut.tif", "II*\0\10\0\0\0\2\0\0\1\3\0\1\0\0\0\0\2"s, "elevation raster"},
+        BadFile{"odd.hgt", std::string(1000, 'h'), "elevation raster"}, BadFile{"empty.hgt", "", ""},
+        BadFile{"grid.asc", "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n", ""},
+        BadFile{"lying.asc", "ncols 2000000000\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n", ""},
+        BadFile{"void.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\nNODATA_value -9\n-9 -9 -9 -9\n",
+                "data"},
+        BadFile{"mesh.ply.gz", "\x1f\x8b\x08", "compressed"},
+        BadFile{"notes.txt", "Dear diary,\nnothing happened.\n", "no known format"}),
+    [](const auto& info) {
+      auto n = info.param.name;
+      std::replace_if(
+          n.begin(), n.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
+      return n;
+    });
+
+TEST(BadPath, MissingFolderUnreadable) {
+  const TempFolder folder;
+  EXPECT_NE(refusal(folder / "nothing.ply").find("cannot be opened"), std::string::npos);
+  std::filesystem::create_directory(folder / "folder.ply");
+  EXPECT_NE(refusal(folder / "folder.ply").find("is a directory"), std::string::npos);
+  EXPECT_NE(refusal("/dev/null").find("not a regular file"), std::string::npos);
+  EXPECT_FALSE(is_mesh_file(folder / "nothing.ply"));
+  if (geteuid() == 0) GTEST_SKIP() << "root may read everything";
+  const std::string secret = folder.write("secret.ply", ply_of(wavy_grid(2)));
+  std::filesystem::permissions(secret, std::filesystem::perms::none);
+  EXPECT_NE(refusal(secret).find("cannot be opened"), std::string::npos);
+}
+
+TEST(BadOptions, AreRefused) {
+  const TempFolder folder;
+  const std::string path = folder.write("grid.ply", ply_of(wavy_grid(2)));
+  for (double size : {0.0, -1.0, 1e9, std::nan("")}) {
+    const auto store = MeshStore::open(path, {.room_size_m = size, .use_cache = false}, nullptr);
+    ASSERT_FALSE(store.ok());
+    EXPECT_NE(store.error().text.find("room size"), std::string::npos);
+  }
+  const auto store = MeshStore::open(path, {.up = "w", .use_cache = false}, nullptr);
+  ASSERT_FALSE(store.ok());
+  EXPECT_NE(store.error().text.find("'w'"), std::string::npos);
+}
+
+// Any beginning of a good file is refused or read; it never crashes.
+TEST(Truncation, AtEveryLengthOfEachTextFormat) {
+  const Mesh grid = wavy_grid(2);
+  const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n",
+                    off = "COFF\n3 1 0\n0 0 0 1 2 3\n1 0 0 1 2 3\n0 1 0 1 2 3\n3 0 1 2\n";
+  const std::string stl =
+      "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid "
+      "x\n";
+  size_t refused = 0;
+  const auto try_all = [&](const std::string& whole, auto reader) {
+    ASSERT_TRUE(reader(whole, "whole", nullptr).ok());
+    for (size_t length = 0; length < whole.size(); ++length) {
+      const std::vector<char> exact(
+          whole.begin(), whole.begin() + static_cast<long>(length));  // so that sanitizers see every step beyond
+      refused += !reader(std::string_view(exact.data(), length), "cut", nullptr).ok();
+    }
+  };
+  try_all(ply_of(grid), read_ply);
+  try_all(obj, read_obj);
+  try_all(off, read_off);
+  try_all(stl, read_stl);
+  EXPECT_GT(refused, 300u);
+}
+
+}  // namespace
+}  // namespace telesplat::data::test

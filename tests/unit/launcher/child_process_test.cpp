@@ -1,0 +1,123 @@
+// Children of the launcher: what they say, how they end.
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "common/core/clock.h"
+#include "tools/telesplat/run/child_process.h"
+
+namespace telesplat::launcher {
+namespace {
+
+class Child : public ::testing::Test {
+ protected:
+  Child() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "telesplat-child-XXXXXX").string();
+    folder = mkdtemp(pattern.data());
+  }
+  ~Child() override { std::filesystem::remove_all(folder); }
+  ChildProcess shell(const std::string& script) {
+    auto child = ChildProcess::start("child", "/bin/sh", {"-c", script}, folder + "/log", 0);
+    EXPECT_TRUE(child);
+    return std::move(*child);
+  }
+  // Reads until it has ended, 20 s at most.
+  static std::vector<std::string> all_lines(ChildProcess& child) {
+    std::vector<std::string> lines;
+    bool ended = false;
+    for (const double until = monotonic_s() + 20; !ended && monotonic_s() < until;) {
+      ended = child.ended();
+      for (auto& line : child.read_lines()) lines.push_back(std::move(line));
+    }
+    EXPECT_TRUE(ended);
+    return lines;
+  }
+  std::string log() const {
+    std::ifstream in(folder + "/log");
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  std::string folder;
+};
+
+TEST_F(Child, LinesAndExitCodesComeBack) {
+  auto child = shell("echo one; echo two; echo trouble >&2; printf 'no end'; exit 3");
+  EXPECT_EQ(all_lines(child), (std::vector<std::string>{"one", "two"}));
+  EXPECT_EQ(child.exit_code(), 3);
+  EXPECT_EQ(log(), "trouble\n");
+  EXPECT_EQ(child.name(), "child");
+}
+
+TEST_F(Child, MuchOutputDoesNotBlockIt) {
+  auto child =
+      shell("i=0; while [ $i -lt 5000 ]; do echo 'a line of some length, five thousand times'; i=$((i+1)); done");
+  EXPECT_EQ(all_lines(child).size(), 5000u);
+  EXPECT_EQ(child.exit_code(), 0);
+}
+
+TEST_F(Child, AnEndlessLineIsCutShort) {
+  auto child = shell("head -c 100000 /dev/zero | tr '\\0' x; echo; echo end");
+  const auto lines = all_lines(child);
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_LE(lines[0].size(), 4096u);
+  EXPECT_EQ(lines[1], "end");
+}
+
+TEST_F(Child, SignalsShowInTheExitCode) {
+  auto child = shell("exec sleep 60");
+  EXPECT_FALSE(child.ended());
+  child.signal(SIGKILL);
+  all_lines(child);
+  EXPECT_EQ(child.exit_code(), 128 + SIGKILL);
+  child.signal(SIGTERM);  // nobody there: nothing happens
+}
+
+TEST_F(Child, FinishWaitsThenAsksThenKills) {
+  auto willing = shell("trap 'exit 5' TERM; echo ready; while :; do sleep 0.05; done");
+  std::vector<std::string> lines;
+  for (const double until = monotonic_s() + 20; lines.empty() && monotonic_s() < until;) lines = willing.read_lines();
+  ASSERT_EQ(lines.size(), 1u);
+  willing.finish(0.2);
+  ASSERT_TRUE(willing.ended());
+  auto stubborn = shell("trap '' TERM; echo ready; while :; do sleep 0.05; done");
+  lines.clear();
+  for (const double until = monotonic_s() + 20; lines.empty() && monotonic_s() < until;) lines = stubborn.read_lines();
+  stubborn.finish(0.2);
+  ASSERT_TRUE(stubborn.ended());
+  EXPECT_EQ(stubborn.exit_code(), 128 + SIGKILL);
+}
+
+TEST_F(Child, GoesWithItsObject) {
+  pid_t pid = 0;
+  {
+    auto child = shell("exec sleep 60");
+    pid = child.pid();
+    auto moved = std::move(child);
+    EXPECT_EQ(moved.pid(), pid);
+    EXPECT_EQ(::kill(pid, 0), 0);
+  }
+  EXPECT_NE(::kill(pid, 0), 0);
+}
+
+TEST_F(Child, AProgramThatIsNotThereIsToldInItsLog) {
+  auto child = ChildProcess::start("nothing", folder + "/nothing", {}, folder + "/log", 0);
+  ASSERT_TRUE(child);
+  all_lines(*child);
+  EXPECT_EQ(child->exit_code(), 127);
+  EXPECT_NE(log().find(folder + "/nothing"), std::string::npos);
+  EXPECT_FALSE(ChildProcess::start("child", "/bin/true", {}, folder + "/no/such/folder/log", 0));
+}
+
+TEST_F(Child, HasAProcessGroupOfItsOwn) {
+  auto child = shell("exec sleep 60");
+  // Made by the child itself before it becomes its program.
+  for (const double until = monotonic_s() + 20; getpgid(child.pid()) != child.pid() && monotonic_s() < until;) {
+  }
+  EXPECT_EQ(getpgid(child.pid()), child.pid());
+}
+
+}  // namespace
+}  // namespace telesplat::launcher

@@ -1,0 +1,168 @@
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+
+#include "common/julia/flags.h"
+#include "tools/telesplat/scene/scene_file.h"
+
+namespace telesplat::launcher {
+namespace {
+
+class SceneFile : public testing::Test {
+ protected:
+  std::string write(const std::string& text) {
+    path_ =
+        (std::filesystem::temp_directory_path() /
+         (std::string("telesplat-scene-") + testing::UnitTest::GetInstance()->current_test_info()->name() + ".toml"))
+            .string();
+    std::ofstream(path_) << text;
+    return path_;
+  }
+  ~SceneFile() override { std::filesystem::remove(path_); }
+  std::string path_;
+};
+
+TEST_F(SceneFile, KeysBecomeFlagsAndTheFileIsRelativeToTheScene) {
+  const auto flags = read_scene_file(write(
+      "[scene]\nfile = \"a.ply\"\nroom_size = 1.5\n[view]\nexr = true\nframes = 7\n[packing]\nmax_points = 5e6\n"));
+  ASSERT_TRUE(flags.ok()) << flags.error().text;
+  EXPECT_EQ(flags->back(), (std::filesystem::path(path_).parent_path() / "a.ply").string());
+  for (const char* flag : {"--room-size=1.5", "--exr", "--frames=7", "--packing.max_points=5000000"})
+    EXPECT_NE(std::find(flags->begin(), flags->end(), flag), flags->end()) << flag;
+}
+
+TEST_F(SceneFile, SwitchesCanBeTurnedOff) {
+  const auto flags = read_scene_file(
+      write("file = \"a.ply\"\n[view]\ndetail_budget = false\nspeed_detail = true\nfinish = false\nexr = false\n"));
+  ASSERT_TRUE(flags.ok()) << flags.error().text;
+  for (const char* flag : {"--detail-budget=off", "--speed-detail=on", "--finish=off"})
+    EXPECT_NE(std::find(flags->begin(), flags->end(), flag), flags->end()) << flag;
+  EXPECT_EQ(flags->size(), 4u);  // and the file; exr = false is no flag
+}
+
+TEST_F(SceneFile, TheCommandLineComesAfterTheFile) {
+  std::string program = "telesplat", run = "run", flag = "--frames=9",
+              scene = write("file = \"a.ply\"\n[view]\nframes = 7\n");
+  char* argv[] = {program.data(), run.data(), scene.data(), flag.data()};
+  const auto arguments = expand_scene_file(4, argv);
+  ASSERT_TRUE(arguments.ok());
+  EXPECT_EQ(arguments->front(), "run");
+  const auto first = std::find(arguments->begin(), arguments->end(), "--frames=7"),
+             second = std::find(arguments->begin(), arguments->end(), "--frames=9");
+  EXPECT_LT(first, second);
+  EXPECT_NE(second, arguments->end());
+}
+
+TEST_F(SceneFile, ErrorsNameFileAndPlace) {
+  for (const char* text : {"file = ", "up = \"z\"", "[scene]\nfile = \"a.ply\"\n[scene.deeper]\nx = 1\n",
+                           "file = \"a.ply\"\nsize = [1, 2]\n"}) {
+    const auto flags = read_scene_file(write(text));
+    ASSERT_FALSE(flags.ok()) << text;
+    EXPECT_NE(flags.error().text.find(path_), std::string::npos) << flags.error().text;
+  }
+  EXPECT_FALSE(read_scene_file("/nonexistent.toml").ok());
+}
+
+// What the launcher makes of a file's flags.
+Result<julia::Scene> scene_of(const std::vector<std::string>& flags) {
+  CLI::App app;
+  app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+  app.allow_extras();
+  julia::SceneOptions options;
+  julia::add_scene_flags(app, options);
+  std::vector<std::string> reversed(flags.rbegin(), flags.rend());
+  app.parse(reversed);
+  return julia::read_scene(options);
+}
+
+TEST_F(SceneFile, AJuliaSetHasParametersAndKeyFrames) {
+  const auto flags = read_scene_file(write(
+      "[scene]\nkind = \"julia\"\npreset = \"wings\"\nc = [0.1, 0.2, 0, -0.5]\nanimate = [\"ambient=0:1:3s\"]\n"
+      "[julia]\niterations = 99\nslice.turn-x = 30\ncolour.by = \"trap\"\n\"colour.scale\" = 2.5\npalette = \"ice\"\n"
+      "[view]\nframes = 7\n"
+      "[[keyframe]]\nt = 0\nc.y = 0.2\nlod = 0.5\n[[keyframe]]\nt = 1.5\nc.y = 0.3\n"
+      "[[keyframe]]\nt = 3\nc.y = 0.2\nlod = 1\n"));
+  ASSERT_TRUE(flags.ok()) << flags.error().text;
+  EXPECT_EQ(flags->back(), "julia");
+  EXPECT_NE(std::find(flags->begin(), flags->end(), "--frames=7"), flags->end());
+  const auto scene = scene_of(*flags);
+  ASSERT_TRUE(scene.ok()) << scene.error().text;
+  julia::Parameters wanted = *julia::preset_named("wings");
+  wanted.c = {0.1, 0.2, 0, -0.5};
+  wanted.iterations = 99;
+  wanted.slice_turn_deg.x = 30;
+  wanted.colour = julia::Colour::kTrap;
+  wanted.colour_scale = 2.5;
+  wanted.palette = 7;
+  wanted.ambient = 0;  // as animated, at 0 s
+  wanted.lod = 0.5;
+  EXPECT_EQ(scene->parameters, wanted);
+  EXPECT_EQ(scene->timeline.tracks.size(), 3u);
+  EXPECT_NEAR(scene->timeline.values(1.5).at("c.y"), 0.3, 1e-12);
+  EXPECT_NEAR(scene->timeline.values(1.5).at("lod"), 0.75, 1e-12);
+}
+
+TEST_F(SceneFile, TheCommandLineWinsOverAJuliaSetsFile) {
+  std::string program = "telesplat", run = "run",
+              scene =
+                  write("[scene]\nkind = \"julia\"\nc = [0.1, 0.2, 0, -0.5]\n[julia]\nc.x = 0.4\niterations = 99\n");
+  const auto with = [&](std::string flag) {
+    char* argv[] = {program.data(), run.data(), scene.data(), flag.data()};
+    return scene_of(*expand_scene_file(4, argv))->parameters;
+  };
+  EXPECT_EQ(with("--iterations=12").iterations, 12);
+  EXPECT_EQ(with("--iterations=12").c, glm::dvec4(0.4, 0.2, 0, -0.5));
+  EXPECT_EQ(with("--c=0,0,0,-1").c, glm::dvec4(0, 0, 0, -1));
+  EXPECT_EQ(with("--c=0,0,0,-1").iterations, 99);
+  EXPECT_EQ(with("--preset=wings"), *julia::preset_named("wings"));
+}
+
+TEST_F(SceneFile, ErrorsOfJuliaSetsNameTheLine) {
+  const std::vector<std::pair<std::string, const char*>> cases{
+      {"[scene]\nkind = \"cloud\"\n", "kind is \"cloud\""},
+      {"[scene]\nkind = \"julia\"\nfile = \"a.ply\"\n", "no data file"},
+      {"[scene]\nfile = \"a.ply\"\n[julia]\nlod = 1\n", "[julia] needs kind"},
+      {"[scene]\nfile = \"a.ply\"\npreset = \"wings\"\n", "preset needs kind"},
+      {"[scene]\nkind = \"julia\"\nc = [1, 2, 3]\n", ":3: c is not"},
+      {"[scene]\nkind = \"julia\"\n[julia]\nc.q = 1\n", ":4: c.q: no parameter"},
+      {"[scene]\nkind = \"julia\"\n[julia]\nc.x = nan\n", ":4: c.x is nan"},
+      {"[scene]\nkind = \"julia\"\n[julia]\niterations = 0\n", ":4: iterations is 0, limits"},
+      {"[scene]\nkind = \"julia\"\n[julia]\npalette = \"mud\"\n", ":4: palette is \"mud\""},
+      {"[scene]\nkind = \"julia\"\n[julia]\nlod = [1]\n", ":4: lod is neither"},
+      {"[scene]\nkind = \"julia\"\nanimate = 3\n", ":3: animate is neither"},
+      {"[scene]\nkind = \"julia\"\nanimate = \"c.y\"\n", ":3: animation \"c.y\""},
+      {"kind = \"julia\"\n[[keyframe]]\nt = 0\nc.y = 7\n", ":4: c.y is 7"},
+      {"kind = \"julia\"\n[[keyframe]]\nc.y = 1\n", ":2: a key frame's t"},
+      {"kind = \"julia\"\n[[keyframe]]\nt = 0\n", "without parameters"},
+      {"kind = \"julia\"\n[julia]\nt = 1\n", ":3: t belongs"},
+      {"kind = \"julia\"\nkeyframe = 3\n", ":2: keyframe is not"},
+      {"kind = \"julia\"\n[[keyframe]]\nt = 0\nc.y = 1\n", "one key frame"},
+      {"kind = \"julia\"\n[[keyframe]]\nt = 2\nc.y = 1\n[[keyframe]]\nt = 1\nc.y = 1\n", "must be at 0 s"},
+  };
+  for (const auto& [text, part] : cases) {
+    const auto flags = read_scene_file(write(text));
+    ASSERT_FALSE(flags.ok()) << text;
+    EXPECT_TRUE(flags.error().text.starts_with(path_)) << flags.error().text;
+    EXPECT_NE(flags.error().text.find(part), std::string::npos) << flags.error().text;
+  }
+}
+
+TEST_F(SceneFile, TheScenesThatComeWithTelesplatCanBeRead) {
+  int read = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("scenes")) {
+    if (entry.path().extension() != ".toml") continue;
+    const auto flags = read_scene_file(entry.path().string());
+    ASSERT_TRUE(flags.ok()) << flags.error().text;
+    if (flags->back() != "julia") continue;
+    ++read;
+    const auto scene = scene_of(*flags);
+    ASSERT_TRUE(scene.ok()) << scene.error().text;
+    EXPECT_TRUE(julia::place(*scene, 0.8).ok()) << entry.path();
+  }
+  EXPECT_GT(read, 0);
+}
+
+}  // namespace
+}  // namespace telesplat::launcher

@@ -1,0 +1,217 @@
+// Merging the mosaics of a cluster: nothing is lost, little is left lying about, and any prefix covers the cluster.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+#include <set>
+
+#include "common/points/compaction.h"
+#include "common/points/mosaic_builder.h"
+#include "common/points/summary.h"
+#include "tests/support/points_scenes.h"
+
+namespace telesplat::points {
+namespace {
+
+ModelConfig compact_config() {
+  ModelConfig config = test::scene_config();
+  config.compact = true;
+  return config;
+}
+
+// A view of the scene of which a share of the pixels is left, as elimination leaves them.
+PreparedPatch view(uint64_t sequence, double fraction, int width = 320, double distance = 1) {
+  std::mt19937_64 random(sequence);
+  const geometry::Rect tile{0, 0, width, width * 5 / 8};
+  const geometry::Camera camera = test::scene_camera(test::random_eye(random) * distance, tile.width, tile.height);
+  image::DepthImage image = test::sample_scene(camera, tile);
+  test::mask_randomly(image, fraction, sequence);
+  return prepare_patch(compact_config(), {sequence}, camera, tile, image, FrameId{sequence});
+}
+
+struct Point {
+  ClusterKey cluster;
+  uint16_t x, y, z, normal;
+  uint32_t colour;
+  auto operator<=>(const Point&) const = default;
+};
+void gather(ClusterKey key, const Mosaic& m, std::multiset<Point>& out) {
+  const Mosaic::Level l = m.level(0);
+  for (uint32_t i = 0; i < l.count; ++i) out.insert({key, l.x[i], l.y[i], l.z[i], l.normal[i], l.colour[i]});
+}
+
+TEST(Compaction, KeepsEveryPointAsItWas) {
+  PointModel model(compact_config());
+  std::multiset<Point> expected, got;
+  for (uint64_t s = 1; s <= 40; ++s) {
+    PreparedPatch patch = view(s, s % 4 ? 0.03 : 0.4, s % 3 ? 320 : 160, s % 5 ? 1 : 2);
+    for (const auto& [key, mosaic] : patch.mosaics) gather(key, mosaic, expected);
+    model.insert(std::move(patch));
+  }
+  for (const auto& [key, cluster] : model.clusters())
+    for (const Mosaic& m : cluster->mosaics) gather(key, m, got);
+  EXPECT_EQ(got.size(), model.points());
+  EXPECT_TRUE(got == expected);
+}
+
+TEST(Compaction, MosaicsGrowWithTheLogarithmOfPoints) {
+  PointModel model(compact_config());
+  uint64_t parts = 0;
+  for (uint64_t s = 1; s <= 300; ++s) {
+    PreparedPatch patch = view(s, 0.01);
+    parts += patch.mosaics.size();
+    model.insert(std::move(patch));
+  }
+  size_t mosaics = 0;
+  for (const auto& [key, cluster] : model.clusters()) {
+    mosaics += cluster->mosaics.size();
+    std::map<int, std::vector<uint32_t>> sizes;
+    for (const Mosaic& m : cluster->mosaics) sizes[density_class(m.pixel_range())].push_back(m.count(0));
+    for (auto& [density, of_class] : sizes) {
+      std::sort(of_class.begin(), of_class.end());
+      // The two smallest may be waiting for the next one.
+      for (size_t i = 2; i < of_class.size(); ++i) EXPECT_GT(of_class[i], of_class[i - 1]) << "class " << density;
+    }
+  }
+  EXPECT_LT(mosaics, 4 * model.clusters().size());
+  EXPECT_LT(mosaics * 5, parts) << parts << " parts became " << mosaics << " mosaics";
+}
+
+TEST(Compaction, InTwoStepsLeavesTheModelAloneInTheFirst) {
+  PointModel model(compact_config()), other(compact_config());
+  for (uint64_t s = 1; s <= 12; ++s) {
+    const uint64_t digest = model.digest();
+    Insertion insertion = model.plan(view(s, 0.1));
+    EXPECT_EQ(model.digest(), digest);
+    model.commit(std::move(insertion));
+    other.insert(view(s, 0.1));
+    EXPECT_EQ(model.digest(), other.digest());
+  }
+}
+
+// n points at random on a plane across the leaf, sampled `density` of them along its edge.
+Mosaic plane(uint32_t n, float density, uint64_t seed, uint16_t normal = image::encode_normal16({0, 0, 1}),
+             uint16_t z = 32768) {
+  std::mt19937_64 random(seed);
+  MosaicBuilder out({seed}, {seed}, {n, n, n});
+  for (uint32_t i = 0; i < n; ++i) {
+    out.x[i] = static_cast<uint16_t>(random()), out.y[i] = static_cast<uint16_t>(random()), out.z[i] = z;
+    out.normal[i] = normal;
+    out.colour[i] = static_cast<uint32_t>(random() & 255);
+  }
+  return out.finish(density, {0, 0, 1});
+}
+
+TEST(Compaction, EveryPrefixCoversTheClusterEvenly) {
+  const Mosaic a = plane(2000, 40, 1), b = plane(500, 40, 2);
+  const Mosaic merged = merge_mosaics({&a, &b}, Sequence{3});
+  ASSERT_EQ(merged.count(0), 2500u);
+  EXPECT_LT(merged.count(1), merged.count(0));
+  EXPECT_LT(merged.count(2), merged.count(1));
+  const Mosaic::Level l = merged.level(0);
+  for (const uint32_t n : {merged.count(2), (merged.count(2) + merged.count(1)) / 2, merged.count(1),
+                           (merged.count(1) + merged.count(0)) / 2}) {
+    // In how many of about n / 4 squares of the plane is none of the first n points?
+    const auto side = static_cast<uint32_t>(std::max(2.0, std::sqrt(n / 4.0)));
+    std::set<uint32_t> seen;
+    for (uint32_t i = 0; i < n; ++i) seen.insert((l.x[i] * side >> 16) * side + (l.y[i] * side >> 16));
+    EXPECT_GE(seen.size(), side * side * 97 / 100) << "the first " << n << " of " << merged.count(0);
+  }
+}
+
+TEST(Compaction, CoarseColoursAreMeans) {
+  Mosaic a = plane(4000, 20, 5);
+  const Mosaic merged = merge_mosaics({&a}, Sequence{6});
+  const auto mean = [](const Mosaic::Level& l) {
+    double sum = 0;
+    for (uint32_t i = 0; i < l.count; ++i) sum += l.colour[i] & 255;
+    return sum / l.count;
+  };
+  const auto spread = [&](const Mosaic::Level& l) {
+    double sum = 0;
+    for (uint32_t i = 0; i < l.count; ++i) sum += std::pow((l.colour[i] & 255) - mean(merged.level(0)), 2);
+    return std::sqrt(sum / l.count);
+  };
+  // Blue is random in 0..255: means of many spread less.
+  EXPECT_NEAR(mean(merged.level(2)), mean(merged.level(0)), 4);
+  EXPECT_LT(spread(merged.level(1)), 0.5 * spread(merged.level(0)));
+  EXPECT_LT(spread(merged.level(2)), 0.5 * spread(merged.level(1)));
+}
+
+TEST(Compaction, BothSidesOfASheetStayAtEveryLevel) {
+  const uint16_t front = image::encode_normal16({0, 0, 1}), back = image::encode_normal16({0, 0, -1});
+  const Mosaic a = plane(2000, 20, 7, front, 32768), b = plane(2000, 20, 8, back, 32769);
+  const Mosaic merged = merge_mosaics({&a, &b}, Sequence{9});
+  for (int level = 0; level < kLevels; ++level) {
+    const Mosaic::Level l = merged.level(level);
+    const auto n = std::count(l.normal, l.normal + l.count, front);
+    EXPECT_GT(n * 10, static_cast<ptrdiff_t>(l.count) * 4);
+    EXPECT_LT(n * 10, static_cast<ptrdiff_t>(l.count) * 6);
+  }
+}
+
+TEST(Compaction, FinerPointsTakeInTheCoarseOnesTheySurround) {
+  std::vector<Mosaic> cluster;
+  cluster.push_back(plane(100, 10, 1));
+  // Twice as fine, over all of the leaf.
+  Merge merge = plan_merge(cluster, plane(800, 20, 2));
+  ASSERT_FALSE(merge.replaced.empty());
+  uint32_t points = 0, fine = 0;
+  for (const Mosaic& m : merge.added) {
+    points += m.count(0);
+    if (density_class(m.pixel_range()) == density_class(20)) fine += m.count(0);
+  }
+  EXPECT_EQ(points, 900u) << "none is lost";
+  EXPECT_GT(fine, 880u) << "nearly all are surrounded";
+  EXPECT_NEAR(merge.added.back().pixel_range(), 20, 0.01);
+
+  // Of another side of the surface: they surround nothing.
+  Merge apart = plan_merge(cluster, plane(800, 20, 3, image::encode_normal16({0, 0, -1})));
+  EXPECT_TRUE(apart.replaced.empty());
+}
+
+TEST(Summary, HasAPointForEachCellOfTheBlock) {
+  PointModel model(compact_config());
+  for (uint64_t s = 1; s <= 30; ++s) model.insert(view(s, 0.5, 640));
+  size_t summaries = 0;
+  for (const auto& [key, brick] : model.bricks()) {
+    uint64_t points = 0;
+    for (const Cluster* c : brick->clusters) points += model.points_in(c->key);
+    if (points <= kMostSummaryPoints) {
+      const auto all = summarise(model, key, *brick, Sequence{30});
+      EXPECT_EQ(all->cluster.mosaics.at(0).count(0), points);
+      continue;
+    }
+    ++summaries;
+    const auto summary = summarise(model, key, *brick, Sequence{30});
+    const Mosaic& m = summary->cluster.mosaics.at(0);
+    EXPECT_LE(m.pixel_range(), kMostSummaryRange);
+    EXPECT_EQ(summary->cluster.leaf_room, brick->box_room);
+    EXPECT_LT(m.count(0), points);
+    // Each point of the model has a representative no farther than two cells.
+    const geometry::Box& box = brick->box_room;
+    const float cell = (box.hi.x - box.lo.x) / m.pixel_range();
+    std::vector<glm::vec3> representatives;
+    const auto at = [](const geometry::Box& b, const Mosaic::Level& l, uint32_t i) {
+      return b.lo + (glm::vec3(l.x[i], l.y[i], l.z[i]) + 0.5f) / 65536.0f * b.size();
+    };
+    for (uint32_t i = 0; i < m.count(0); ++i) representatives.push_back(at(box, m.level(0), i));
+    uint64_t far = 0, asked = 0;
+    for (const Cluster* c : brick->clusters)
+      for (const Mosaic& part : c->mosaics)
+        for (uint32_t i = 0; i < part.count(0); i += 37) {
+          const glm::vec3 p = at(c->leaf_room, part.level(0), i);
+          float nearest = 1e9f;
+          for (const glm::vec3& r : representatives) nearest = std::min(nearest, glm::distance(p, r));
+          ++asked;
+          far += nearest > 2 * cell;
+        }
+    EXPECT_LE(far * 50, asked) << far << " of " << asked << " have none near";
+  }
+  EXPECT_GT(summaries, 3u);
+}
+
+}  // namespace
+}  // namespace telesplat::points

@@ -1,0 +1,99 @@
+// Which chunks a sampler holds and which it lets go.
+#include <gtest/gtest.h>
+
+#include "common/geometry/trajectory.h"
+#include "services/sampler/mesh/chunk_cache.h"
+
+namespace telesplat::sampler {
+namespace {
+
+// Ten boxes in a row along x, 100 bytes each; ids given in any order.
+std::vector<geometry::ChunkInfo> row() {
+  std::vector<geometry::ChunkInfo> out;
+  for (int i = 9; i >= 0; --i) {
+    const float x = float(i) - 4.5f;
+    out.push_back({ChunkId{uint64_t(i)}, {{x - 0.4f, -0.4f, -0.4f}, {x + 0.4f, 0.4f, 0.4f}}, 10, 100});
+  }
+  return out;
+}
+// Looks along +x from just before chunk `first`.
+geometry::Camera looking_right(int first) {
+  return geometry::make_camera(geometry::look_at({first - 5.1, 0, 0}, {100, 0, 0}), 90, 64, 64);
+}
+std::vector<uint64_t> values(const std::vector<ChunkId>& ids) {
+  std::vector<uint64_t> out;
+  for (const ChunkId id : ids) out.push_back(id.value);
+  return out;
+}
+
+TEST(ChunkCache, AsksForWhatTheViewNeedsNearestFirst) {
+  ChunkCache cache(10000);
+  EXPECT_FALSE(cache.known());
+  cache.reset(row());
+  EXPECT_TRUE(cache.known());
+  EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 7, 8, 9}));
+  cache.mark_waiting({7});
+  EXPECT_TRUE(cache.waiting({7}));
+  EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 7, 8, 9})) << "waiting is not holding";
+  EXPECT_TRUE(cache.insert({7}).empty());
+  EXPECT_FALSE(cache.waiting({7}));
+  EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 8, 9}));
+  EXPECT_EQ(cache.bytes(), 100u);
+  EXPECT_TRUE(cache.insert({7}).empty());
+  EXPECT_EQ(cache.bytes(), 100u) << "the same chunk twice";
+}
+
+TEST(ChunkCache, LetsGoOfTheLeastRecentlyUsed) {
+  ChunkCache cache(300);
+  cache.reset(row());
+  const auto view = [&](int first) {
+    std::vector<uint64_t> removed;
+    for (const ChunkId id : cache.missing(looking_right(first)))
+      for (const ChunkId old : cache.insert(id)) removed.push_back(old.value);
+    return removed;
+  };
+  EXPECT_TRUE(view(8).empty());                                                                     // 8, 9
+  EXPECT_TRUE(view(9).empty());                                                                     // uses 9 again
+  cache.missing(geometry::make_camera(geometry::look_at({-4.5, 0, 5}, {-4.5, 0, 0}), 10, 64, 64));  // sees chunk 0
+  EXPECT_TRUE(cache.insert({0}).empty());
+  cache.missing(geometry::make_camera(geometry::look_at({-3.5, 0, 5}, {-3.5, 0, 0}), 10, 64, 64));  // sees chunk 1
+  EXPECT_EQ(values(cache.insert({1})), (std::vector<uint64_t>{8}));
+  EXPECT_TRUE(cache.held({9}));
+  EXPECT_LE(cache.bytes(), 300u);
+}
+
+TEST(ChunkCache, NeverLetsGoOfWhatTheViewNeeds) {
+  ChunkCache cache(250);
+  cache.reset(row());
+  for (const ChunkId id : cache.missing(looking_right(4))) EXPECT_TRUE(cache.insert(id).empty());
+  EXPECT_EQ(cache.bytes(), 600u) << "over the budget, but all of it is in view";
+  EXPECT_TRUE(cache.missing(looking_right(4)).empty());
+  // The next view needs few: the rest goes.
+  cache.missing(looking_right(9));
+  EXPECT_EQ(cache.insert({9}).size(), 4u);
+  EXPECT_LE(cache.bytes(), 250u);
+}
+
+TEST(ChunkCache, PrefetchesWithinTheBudget) {
+  ChunkCache cache(350);
+  cache.reset(row());
+  EXPECT_EQ(values(cache.prefetch()), (std::vector<uint64_t>{0, 1, 2}));
+  cache.insert({0});
+  EXPECT_EQ(values(cache.prefetch()), (std::vector<uint64_t>{1, 2}));
+  cache.mark_waiting({5});
+  cache.forget_waiting();
+  EXPECT_EQ(cache.waiting_count(), 0u);
+  cache.reset(row());
+  EXPECT_EQ(cache.bytes(), 0u);
+  EXPECT_FALSE(cache.held({0}));
+}
+
+TEST(ChunkCache, SurvivesAnIdThatIsNotInTheList) {
+  ChunkCache cache(250);
+  cache.reset(row());
+  EXPECT_TRUE(cache.insert({1000}).empty());
+  EXPECT_EQ(cache.bytes(), 0u);
+}
+
+}  // namespace
+}  // namespace telesplat::sampler

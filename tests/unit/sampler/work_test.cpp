@@ -1,0 +1,163 @@
+// What samplers do for their leases without sockets: Julia sets by epoch, and replays.
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/geometry/trajectory.h"
+#include "common/julia/parameters.h"
+#include "services/sampler/julia/work.h"
+#include "services/sampler/tiles/replay.h"
+
+namespace telesplat::sampler {
+namespace {
+
+using State = Readiness::State;
+
+HeldLease lease(uint64_t id, EpochId epoch, geometry::Rect rect, double received_s) {
+  const auto camera = geometry::make_camera(geometry::default_pose(), 90, 48, 32);
+  wire::Lease l{.lease = {id}, .epoch = epoch, .camera = camera, .rect = rect};
+  return {l, received_s};
+}
+
+wire::Welcome welcome(EpochId epoch, double c_x, InstanceId master = {7}) {
+  julia::Parameters parameters;
+  parameters.c.x = c_x;
+  const auto placement = julia::place(julia::bounds(parameters), 0.8);
+  wire::Welcome w;
+  w.master = master;
+  w.epoch = epoch;
+  w.parameters = julia::to_map(parameters);
+  w.parameters.merge(julia::to_map(placement));
+  w.box_room = placement.box_room;
+  return w;
+}
+
+TEST(JuliaWork, SamplesEachLeaseWithItsEpochsParameters) {
+  JuliaWork work(1);
+  EXPECT_FALSE(work.takes_leases());
+  work.on_welcome(welcome({1}, 0));
+  work.on_welcome(welcome({2}, -0.6));
+  ASSERT_TRUE(work.takes_leases());
+  const auto first = lease(1, {1}, {0, 8, 48, 16}, 0), second = lease(2, {2}, {0, 8, 48, 16}, 0);
+  ASSERT_EQ(work.readiness(first, 0).state, State::kReady);
+  ASSERT_EQ(work.readiness(second, 0).state, State::kReady);
+  const auto a = work.sample(first), b = work.sample(second);
+  EXPECT_EQ(a.image.width, 48);
+  EXPECT_EQ(a.image.height, 16);
+  EXPECT_GE(a.end_s, a.begin_s);
+  EXPECT_NE(a.image, b.image);
+  EXPECT_EQ(work.sample(first).image, a.image);
+}
+
+TEST(JuliaWork, RemembersTheLastEpochsOnly) {
+  JuliaWork work(1);
+  for (uint64_t e = 1; e <= JuliaWork::kEpochs + 1; ++e) work.on_welcome(welcome({e}, 0.01 * double(e)));
+  EXPECT_EQ(work.readiness(lease(1, {1}, {0, 0, 48, 8}, 0), 5).state, State::kHopeless);
+  EXPECT_EQ(work.readiness(lease(1, {2}, {0, 0, 48, 8}, 0), 5).state, State::kReady);
+}
+
+TEST(JuliaWork, WaitsAMomentForAnEpochsWelcome) {
+  JuliaWork work(1);
+  work.on_welcome(welcome({1}, 0));
+  const auto early = lease(1, {2}, {0, 0, 48, 8}, 10);
+  const auto r = work.readiness(early, 10.1);
+  EXPECT_EQ(r.state, State::kWaits);
+  EXPECT_DOUBLE_EQ(r.again_s, 10 + JuliaWork::kUnknownEpoch_s);
+  EXPECT_EQ(work.readiness(early, r.again_s).state, State::kHopeless);
+  work.on_welcome(welcome({2}, 0.1));
+  EXPECT_EQ(work.readiness(early, 10.2).state, State::kReady);
+}
+
+TEST(JuliaWork, DropsLeasesOfBadParametersAndForgetsAnotherMastersEpochs) {
+  JuliaWork work(1);
+  auto bad = welcome({1}, 0);
+  bad.parameters["iterations"] = 0;
+  work.on_welcome(bad);
+  EXPECT_EQ(work.readiness(lease(1, {1}, {0, 0, 48, 8}, 0), 0).state, State::kHopeless);
+  auto incomplete = welcome({2}, 0);
+  incomplete.parameters.erase("room.scale");
+  work.on_welcome(incomplete);
+  EXPECT_EQ(work.readiness(lease(1, {2}, {0, 0, 48, 8}, 0), 0).state, State::kHopeless);
+  work.on_welcome(welcome({3}, 0));
+  work.on_welcome(welcome({1}, 0, {8}));  // a master in a new life counts anew
+  EXPECT_EQ(work.readiness(lease(1, {1}, {0, 0, 48, 8}, 0), 0).state, State::kReady);
+  EXPECT_EQ(work.readiness(lease(1, {3}, {0, 0, 48, 8}, 0), 0).state, State::kWaits);
+}
+
+Replay replay() {
+  Replay r{{48, 32}, std::vector<double>(32, 0.5)};
+  for (size_t i = 0; i < r.frame.pixels(); ++i) r.frame.depth[i] = uint32_t(i + 1), r.frame.colour[i] = uint32_t(i);
+  r.row_cost_s[9] = 2;
+  return r;
+}
+
+TEST(ReplayWork, ALeaseTakesWhatItsRowsCostAndLateWakingDoesNotAddUp) {
+  ReplayWork work(replay(), 2);
+  const auto first = lease(1, {1}, {0, 8, 48, 2}, 100), second = lease(2, {1}, {0, 0, 48, 1}, 101);
+  const auto r = work.readiness(first, 100.5);
+  EXPECT_EQ(r.state, State::kWaits);
+  EXPECT_DOUBLE_EQ(r.again_s, 105);
+  EXPECT_EQ(work.readiness(first, 105.3).state, State::kReady);
+  const auto sampled = work.sample(first);
+  EXPECT_DOUBLE_EQ(sampled.begin_s, 100);
+  EXPECT_DOUBLE_EQ(sampled.end_s, 105);
+  EXPECT_EQ(sampled.image.width, 48);
+  ASSERT_EQ(sampled.image.height, 2);
+  EXPECT_EQ(sampled.image.depth.front(), 8 * 48 + 1u);
+  EXPECT_EQ(sampled.image.depth.back(), 10 * 48u);
+  EXPECT_DOUBLE_EQ(work.readiness(second, 105.3).again_s, 106);  // from 105, not from 105.3
+}
+
+TEST(ReplayWork, DropsLeasesOfOtherFrames) {
+  ReplayWork work(replay(), 1);
+  auto other = lease(1, {1}, {0, 0, 12, 8}, 0);
+  other.lease.step = 4;
+  EXPECT_EQ(work.readiness(other, 0).state, State::kHopeless);
+  other.lease.step = 1;
+  other.lease.camera.width = 24;
+  EXPECT_EQ(work.readiness(other, 0).state, State::kHopeless);
+}
+
+class ReplayFile : public testing::Test {
+ protected:
+  void TearDown() override { std::filesystem::remove(path_); }
+  void write(const std::string& text) { std::ofstream(path_, std::ios::binary) << text; }
+  std::string refusal() {
+    const auto r = read_replay(path_);
+    return r ? "" : r.error().text;
+  }
+  std::string path_ =
+      (std::filesystem::temp_directory_path() / ("telesplat-replay-" + std::to_string(getpid()))).string();
+};
+
+TEST_F(ReplayFile, ComesBackAsItWasWritten) {
+  const Replay r = replay();
+  ASSERT_TRUE(write_replay(path_, r));
+  const auto back = read_replay(path_);
+  ASSERT_TRUE(back) << back.error().text;
+  EXPECT_EQ(back->frame, r.frame);
+  EXPECT_EQ(back->row_cost_s, r.row_cost_s);
+}
+
+TEST_F(ReplayFile, RefusesWhatIsNone) {
+  EXPECT_NE(refusal().find(path_), std::string::npos);
+  write("");
+  EXPECT_NE(refusal().find("JSON"), std::string::npos);
+  write("{\"width\":2,\"height\":1,\"row_cost_s\":[-1]}\n");
+  EXPECT_NE(refusal().find("-1"), std::string::npos);
+  write("{\"width\":2,\"height\":1,\"row_cost_s\":[1]}\nnothing of the kind");
+  EXPECT_NE(refusal().find(path_), std::string::npos);
+  ASSERT_TRUE(write_replay(path_, replay()));
+  std::ifstream in(path_, std::ios::binary);
+  const std::string all(std::istreambuf_iterator<char>(in), {});
+  for (size_t n = 0; n < all.size(); n += 7) {
+    write(all.substr(0, n));
+    EXPECT_NE(refusal(), "") << n << " of " << all.size() << " bytes";
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::sampler

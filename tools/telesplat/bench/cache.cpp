@@ -1,0 +1,396 @@
+#include "tools/telesplat/bench/cache.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <optional>
+
+#include "client/viewer/points/model_cache.h"
+#include "client/viewer/viewer_service.h"
+#include "common/codec/depth_codec.h"
+#include "common/core/clock.h"
+#include "common/geometry/trajectory.h"
+#include "common/image/quality.h"
+#include "common/metrics/statistics.h"
+#include "common/net/service.h"
+#include "common/points/compaction.h"
+#include "common/splat/cpu_splatter.h"
+#include "services/packer/points/packer_core.h"
+#include "tools/telesplat/bench/surfel_grid.h"
+#include "tools/telesplat/progress_line.h"
+#include "tools/telesplat/scene/direct_scene.h"
+
+namespace telesplat::launcher {
+namespace {
+
+constexpr int kTile = 256;          // as the master cuts frames
+constexpr double kDrawEvery_s = 1;  // of the walk
+constexpr double kCompareEvery_s = 5;
+
+// Several recorded walks, one after the other, or an orbit.
+class Walk {
+ public:
+  static Result<Walk> open(const std::string& names) {
+    Walk walk;
+    for (const auto& name : CLI::detail::split(names, ',')) {
+      if (name == "orbit") {
+        walk.parts_.push_back(geometry::Trajectory::orbit());
+        walk.ends_s_.push_back(walk.length_s() + 20);
+        continue;
+      }
+      auto read = geometry::Trajectory::read_csv(name);
+      if (!read) return read.error();
+      if (!(read->duration_s() > 0)) return Error{fmt::format("{}: takes no time, so nothing is walked", name)};
+      walk.parts_.push_back(std::move(*read));
+      walk.ends_s_.push_back(walk.length_s() + walk.parts_.back().duration_s());
+    }
+    return walk;
+  }
+
+  geometry::Pose at(double t_s) const {
+    t_s = std::fmod(t_s, length_s());
+    size_t i = 0;
+    while (i + 1 < parts_.size() && t_s >= ends_s_[i]) ++i;
+    return parts_[i].at(i == 0 ? t_s : t_s - ends_s_[i - 1]);
+  }
+
+ private:
+  double length_s() const { return ends_s_.empty() ? 0 : ends_s_.back(); }
+  std::vector<geometry::Trajectory> parts_;
+  std::vector<double> ends_s_;
+};
+
+image::DepthImage cut(const image::DepthImage& whole, const geometry::Rect& r) {
+  image::DepthImage out(r.width, r.height);
+  for (int y = 0; y < r.height; ++y) {
+    const size_t from = size_t(r.y + y) * whole.width + r.x, to = size_t(y) * r.width;
+    std::copy_n(whole.depth.data() + from, r.width, out.depth.data() + to);
+    std::copy_n(whole.colour.data() + from, r.width, out.colour.data() + to);
+    std::copy_n(whole.normal.data() + from, r.width, out.normal.data() + to);
+  }
+  return out;
+}
+
+// The same points in a model of one mosaic a cluster, as if they had all come at once.
+points::PointModel made_at_once(const points::PointModel& model) {
+  points::PointModel out(model.config());
+  points::PreparedPatch all{Sequence{1}, {}};
+  for (const auto& [key, cluster] : model.clusters()) {
+    std::vector<const points::Mosaic*> parts;
+    for (const points::Mosaic& m : cluster->mosaics) parts.push_back(&m);
+    all.mosaics.emplace_back(key, points::merge_mosaics(parts, Sequence{1}));
+  }
+  std::sort(all.mosaics.begin(), all.mosaics.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  out.insert(std::move(all));
+  return out;
+}
+
+struct Minute {
+  std::vector<double> clusters, items, points, select_ms, splat_ms, psnr_db, holes;
+  double at_once_items = 0, at_once_ms = 0;
+  double cached = 0, bytes_a_point = 0, sent_points = 0, sent_mb = 0, pack_ms = 0, insert_ms = 0;
+  uint64_t views = 0;
+};
+
+class CacheBench {
+ public:
+  CacheBench(const CacheBenchOptions& o, DirectScene& scene, Walk walk, std::pair<int, int> display,
+             std::pair<int, int> sampling)
+      : o_(o),
+        scene_(scene),
+        walk_(std::move(walk)),
+        display_(display),
+        sampling_(sampling),
+        config_{scene.box_room(), o.octree_depth > 0 ? o.octree_depth : points::ModelConfig{}.depth, true},
+        packer_(packer_config(o, config_), EpochId{1}),
+        splatter_(o.threads) {
+    cache_.begin_replica(config_, EpochId{1});
+    if (o.grid) grid_.emplace(points::ModelConfig{config_.box_room, config_.depth});
+    frame_.colour.resize(size_t(display.first) * display.second);
+    frame_.depth_m.resize(frame_.colour.size());
+    frame_.width = display.first, frame_.height = display.second;
+  }
+
+  Status run() {
+    print_header();
+    const double end_s = o_.minutes * 60, step_s = 1 / o_.views_per_s;
+    double drawn_s = 0, compared_s = 0;
+    Minute minute;
+    int number = 1;
+    for (double t = 0; t < end_s && !net::stop_requested(); t += step_s) {
+      progress_.show(fmt::format("walked {:.0f} of {:.0f} s", t, end_s));
+      if (const Status s = update(t, minute); !s) return s;
+      if (t - drawn_s >= kDrawEvery_s) {
+        drawn_s = t;
+        if (const Status s = draw(t + o_.latency_s, t - compared_s >= kCompareEvery_s, minute); !s) return s;
+        if (t - compared_s >= kCompareEvery_s) compared_s = t;
+      }
+      if (t + step_s >= std::min(60.0 * number, end_s)) {
+        progress_.close();
+        if (grid_)
+          if (const Status s = draw_grid(t + o_.latency_s); !s) return s;
+        if (!minute.items.empty()) draw_at_once(t + o_.latency_s, minute);
+        print(number++, minute);
+        minute = {};
+      }
+    }
+    progress_.close();
+    print_late_joiner();
+    return ok_status();
+  }
+
+ private:
+  void draw_at_once(double t, Minute& minute) {
+    const geometry::Camera camera = geometry::make_camera(walk_.at(t), o_.fov_deg, display_.first, display_.second);
+    const points::PointModel model = made_at_once(packer_.model());
+    splat::DrawList list;
+    std::vector<double> select_ms, splat_ms;
+    for (int pass = 0; pass < 5; ++pass) {
+      const double begin = monotonic_s();
+      splat::select_view(model, camera, selection(), list);
+      const double selected = monotonic_s();
+      splatter_.render(list, camera, render_options(), image::Shading(image::ShadingParameters{}, camera),
+                       {camera.width, camera.height, frame_.colour.data(), frame_.depth_m.data()});
+      select_ms.push_back((selected - begin) * 1e3);
+      splat_ms.push_back((monotonic_s() - selected) * 1e3);
+    }
+    minute.at_once_items = double(list.items.size());
+    minute.at_once_ms = median(select_ms) + median(splat_ms);
+  }
+
+  // The newest view, by the surfel grid and by what sessions have.
+  Status draw_grid(double t) {
+    const geometry::Camera camera = geometry::make_camera(walk_.at(t), o_.fov_deg, display_.first, display_.second);
+    const image::ShadingParameters lit;
+    const auto reference = scene_.draw(camera, lit, EpochId{1});
+    if (!reference) return reference.error();
+    const auto draw = [&](const char* name, const points::PointModel& model) {
+      splat::DrawList list;
+      splat::select_view(model, camera, selection(), list);
+      splatter_.render(list, camera, render_options(), image::Shading(lit, camera),
+                       {camera.width, camera.height, frame_.colour.data(), frame_.depth_m.data()});
+      const auto quality = image::compare(*reference, frame_);
+      std::printf("%20s: %9zu items %9zu points drawn of %9zu, %.2f dB, holes %.3f %%\n", name, list.items.size(),
+                  size_t(list.points), size_t(model.points()), quality.psnr_db, 100 * quality.hole_fraction);
+    };
+    draw("surfel grid", grid_->model());
+    draw("merged mosaics", packer_.model());
+    return ok_status();
+  }
+
+  // What a viewer that joins now is sent, beside the patches that have points in the model.
+  void print_late_joiner() const {
+    uint64_t patches = 0, others = 0, points = 0;
+    for (const auto& event : packer_.events_since(Sequence{})) {
+      if (event.kind == packer::Event::Kind::kPatch)
+        patches += event.blob->size(), points += event.kept;
+      else
+        others += 4 * (event.clusters.size() + event.frames.size());
+    }
+    std::printf("a viewer that joins now is sent %.2f MB, %.3f times the patches of the live points; %.2f bytes a point\n",
+                double(patches + others) * 1e-6, patches ? double(patches + others) / double(patches) : 0.0,
+                points ? double(patches + others) / double(packer_.model().points()) : 0.0);
+  }
+
+  splat::SelectionOptions selection() const {
+    splat::SelectionOptions out;
+    out.scale = o_.splat_scale > 0 ? float(o_.splat_scale) : splat::suitable_scale(render_options().kernel);
+    return out;
+  }
+  splat::RenderOptions render_options() const { return {*splat::kernel_named(o_.splat), {}}; }
+
+  static packer::Config packer_config(const CacheBenchOptions& o, const points::ModelConfig& model) {
+    packer::Config out{.model = model, .threads = o.threads};
+    if (o.nearest >= 0) out.nearest_sample = float(o.nearest);
+    return out;
+  }
+
+  Status update(double t, Minute& minute) {
+    const geometry::Camera camera =
+        geometry::make_camera(walk_.at(t), o_.fov_deg, sampling_.first, sampling_.second);
+    const auto image = scene_.sample(camera, EpochId{1});
+    if (!image) return image.error();
+    ++frames_;
+    if (grid_)
+      grid_->add(points::prepare_patch({config_.box_room, config_.depth}, {frames_}, camera,
+                                       {0, 0, camera.width, camera.height}, *image));
+    const int columns = (camera.width + kTile - 1) / kTile, rows = (camera.height + kTile - 1) / kTile;
+    for (int i = 0; i < columns * rows; ++i) {
+      const int x = i % columns * kTile, y = i / columns * kTile;
+      const geometry::Rect rect{x, y, std::min(kTile, camera.width - x), std::min(kTile, camera.height - y)};
+      packer::SampledTile tile;
+      tile.frame = FrameId{frames_};
+      tile.epoch = EpochId{1};
+      tile.tile = uint32_t(i), tile.tiles_in_frame = uint32_t(columns * rows);
+      tile.camera = camera, tile.rect = rect;
+      tile.image = cut(*image, rect);
+      const double begin = monotonic_s();
+      const auto event = packer_.submit(std::move(tile), t);
+      if (!event) return event.error();
+      const double packed = monotonic_s();
+      minute.pack_ms += (packed - begin) * 1e3;
+      if (!*event) continue;
+      auto decoded = codec::decode(*(*event)->blob);
+      if (!decoded) return decoded.error();
+      cache_.insert(points::prepare_patch(config_, (*event)->sequence, camera, rect, *decoded, FrameId{frames_}),
+                    EpochId{1});
+      minute.insert_ms += (monotonic_s() - packed) * 1e3;
+      minute.sent_points += double((*event)->kept);
+      minute.sent_mb += double((*event)->blob->size()) * 1e-6;
+    }
+    ++minute.views;
+    cache_.summarise(~size_t{0});
+    cache_.free_dropped();
+    return ok_status();
+  }
+
+  Status draw(double t, bool compare, Minute& minute) {
+    const geometry::Camera camera = geometry::make_camera(walk_.at(t), o_.fov_deg, display_.first, display_.second);
+    const image::ShadingParameters lit;
+    // The second time is what counts: a display draws all the time.
+    double begin = 0, selected = 0, drawn = 0;
+    for (int pass = 0; pass < 2; ++pass) {
+      begin = monotonic_s();
+      cache_.select(camera, selection(), list_);
+      selected = monotonic_s();
+      splatter_.render(list_, camera, render_options(), image::Shading(lit, camera),
+                       {camera.width, camera.height, frame_.colour.data(), frame_.depth_m.data()});
+      drawn = monotonic_s();
+      cache_.end_frame();
+    }
+    minute.items.push_back(double(list_.items.size()));
+    minute.clusters.push_back(double(list_.clusters_seen.size()));
+    minute.points.push_back(double(list_.points));
+    minute.select_ms.push_back((selected - begin) * 1e3);
+    minute.splat_ms.push_back((drawn - selected) * 1e3);
+    const auto figures = cache_.figures();
+    minute.cached = double(figures.points);
+    minute.bytes_a_point = figures.points ? double(figures.bytes) / double(figures.points) : 0;
+    if (!compare) return ok_status();
+    const auto reference = scene_.draw(camera, lit, EpochId{1});
+    if (!reference) return reference.error();
+    const auto quality = image::compare(*reference, frame_);
+    if (quality.object_pixels == 0) return ok_status();
+    minute.psnr_db.push_back(quality.psnr_db);
+    minute.holes.push_back(100 * quality.hole_fraction);
+    if (o_.out.empty()) return ok_status();
+    if (const Status s = image::write_png(fmt::format("{}/{:04.0f}-points.png", o_.out, t), frame_); !s) return s;
+    return image::write_png(fmt::format("{}/{:04.0f}-direct.png", o_.out, t), *reference);
+  }
+
+  static double median(std::vector<double> v) { return metrics::distribution(std::move(v)).median; }
+
+  void print_header() const {
+    std::printf("%6s %8s %9s %9s %9s %8s %9s %9s %8s %8s %9s %9s %9s %9s %12s %10s\n", "minute", "clusters", "items", "drawn", "cached", "B/point",
+                "select ms", "splat ms", "PSNR dB", "holes %", "sent k/s", "sent MB/s", "pack ms", "insert ms",
+                "once: items", "once: ms");
+  }
+  void print(int number, const Minute& m) const {
+    const double views = double(std::max<uint64_t>(m.views, 1)), seconds = views / o_.views_per_s;
+    std::printf("%6d %8.0f %9.0f %9.0f %9.0f %8.1f %9.2f %9.2f %8.2f %8.3f %9.1f %9.3f %9.2f %9.2f %12.0f %10.2f\n", number,
+                median(m.clusters), median(m.items), median(m.points), m.cached, m.bytes_a_point, median(m.select_ms), median(m.splat_ms),
+                median(m.psnr_db), median(m.holes), m.sent_points / seconds * 1e-3, m.sent_mb / seconds,
+                m.pack_ms / views, m.insert_ms / views, m.at_once_items, m.at_once_ms);
+    std::fflush(stdout);
+  }
+
+  const CacheBenchOptions& o_;
+  DirectScene& scene_;
+  Walk walk_;
+  std::pair<int, int> display_, sampling_;
+  points::ModelConfig config_;
+  packer::PackerCore packer_;
+  viewer::ModelCache cache_;
+  std::optional<SurfelGrid> grid_;
+  splat::CpuSplatter splatter_;
+  splat::DrawList list_;
+  image::View frame_;
+  ProgressLine progress_;
+  uint64_t frames_ = 0;
+};
+
+}  // namespace
+
+void add_cache_bench_flags(CLI::App& app, CacheBenchOptions& o) {
+  app.add_option("path", o.path, "mesh file, or with --iso a volume")->required();
+  app.add_option("--trajectory", o.trajectory,
+                 "orbit, or CSV files of poses with commas between, walked one after the other, round and round")
+      ->capture_default_str();
+  app.add_option("--minutes", o.minutes, "of the walk, which takes as long as it takes")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 1000.0));
+  app.add_option("--views-per-s", o.views_per_s, "views sampled in a second of the walk")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 100.0));
+  app.add_option("--latency", o.latency_s, "seconds by which the display is ahead of the newest view")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 10.0));
+  app.add_option("--size", o.size, "display size in pixels, WxH")->capture_default_str();
+  app.add_option("--sampling-size", o.sampling_size, "size of the views sampled, WxH; default: the display's");
+  app.add_option("--fov", o.fov_deg, "horizontal field of view in degrees")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 170.0));
+  app.add_option("--octree-depth", o.octree_depth, "levels of the point model's octree; 0: as sessions have them")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 10));
+  app.add_option("--splat", o.splat, "kernel")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"square", "disc", "ellipse", "ewa"}));
+  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
+      ->check(CLI::Range(0.0, 10.0));
+  app.add_option("--nearest", o.nearest, "pixels: samples that have a point of the model so near are not packed; default: as sessions have it")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("--threads", o.threads, "threads to sample and draw with; 0: one a core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("--grid", o.grid, "measure the design that was not taken, too: a hierarchical surfel grid (docs/cache.md)");
+  app.add_option("--iso", o.mesh.iso, "of a volume: the surface where it has this value");
+  app.add_option("--room-size", o.mesh.room_size_m, "largest extent in room space in metres")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e3));
+  app.add_option("--up", o.mesh.up, "data axis that points up")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
+  app.add_option("--out", o.out, "folder for pictures of every compared frame, beside direct rendering");
+}
+
+// Columns: median clusters, draw items and points of a frame; points cached, bytes each; median times; quality against direct rendering; what was sent; times a
+// view; and of the newest view, items and time of a model made at once.
+int bench_cache(const CacheBenchOptions& o) {
+  const auto refuse = [](const Error& e) {
+    std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
+    return 2;
+  };
+  net::install_signal_handlers();
+  log::initialise("telesplat", "warn");
+  const auto display = viewer::parse_size(o.size, "--size");
+  if (!display) return refuse(display.error());
+  const auto sampling = o.sampling_size.empty() ? display : viewer::parse_size(o.sampling_size, "--sampling-size");
+  if (!sampling) return refuse(sampling.error());
+  auto walk = Walk::open(o.trajectory);
+  if (!walk) return refuse(walk.error());
+  std::error_code error;
+  if (!o.out.empty() && !(std::filesystem::create_directories(o.out, error), std::filesystem::is_directory(o.out)))
+    return refuse({fmt::format("--out {}: cannot be made: {}", o.out, error.message())});
+  ProgressLine progress;
+  auto scene = open_direct_mesh(o.path, o.mesh, o.threads, [&](const char* stage, double fraction) {
+    progress.show(fmt::format("{}: {} {:.0f} %", o.path, stage, 100 * fraction));
+  });
+  progress.close();
+  if (!scene) return refuse(scene.error());
+  CacheBench bench(o, **scene, std::move(*walk), *display, *sampling);
+  if (const Status s = bench.run(); !s) {
+    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
+    return 1;
+  }
+  if (!net::stop_requested()) return 0;
+  std::fprintf(stderr, "telesplat: told to stop\n");
+  return 1;
+}
+
+}  // namespace telesplat::launcher

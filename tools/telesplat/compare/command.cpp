@@ -1,0 +1,298 @@
+#include "tools/telesplat/compare/command.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "client/viewer/viewer_service.h"
+#include "tools/telesplat/compare/report.h"
+#include "tools/telesplat/compare/sheet.h"
+#include "tools/telesplat/compare/subject.h"
+#include "tools/telesplat/progress_line.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kMaxStrips = 6;  // columns of the run's sheet
+
+// Which renderers to use: those asked for; without a wish cpu, and gl where it can be had.
+Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
+  if (!o.renderers.empty()) {
+    for (const auto& kind : o.renderers)
+      if (const auto made = viewer::make_renderer(kind, o.threads); !made)
+        return Error{fmt::format("--renderers {}: {}", kind, made.error().text)};
+    return o.renderers;
+  }
+  const auto gl = viewer::make_renderer("gl", o.threads);
+  if (!gl) {
+    std::fprintf(stderr, "telesplat: without the gl renderer: %s\n", gl.error().text.c_str());
+    return std::vector<std::string>{"cpu"};
+  }
+  return std::vector<std::string>{"cpu", "gl"};
+}
+
+class Comparison {
+ public:
+  Comparison(const CompareOptions& options, const CompareSubject& subject, const splat::Finish& finish,
+             const std::vector<std::string>& renderers)
+      : options_(options), subject_(subject), finish_(finish), renderers_(renderers) {}
+
+  /// Reads the data. False texts are about the data file.
+  Status open() {
+    if (subject_.julia) {
+      scene_ = open_direct_julia(*subject_.julia, options_.threads);
+    } else {
+      auto mesh =
+          open_direct_mesh(subject_.scene, subject_.mesh, options_.threads, [&](const char* stage, double fraction) {
+            progress_.show(fmt::format("{}: {} {:.0f} %", subject_.name, stage, 100 * fraction));
+          });
+      if (!mesh) return mesh.error();
+      scene_ = std::move(*mesh);
+    }
+    auto models = PoseModels::open(subject_, options_.magnify, *scene_);
+    if (!models) return models.error();
+    models_ = std::move(*models);
+    return ok_status();
+  }
+
+  /// One pose after the other, until told to stop. What was compared so far counts.
+  Status compare_poses() {
+    for (const auto& frame : subject_.frames) {
+      if (net::stop_requested()) break;
+      if (const Status s = compare_pose(frame); !s) return s;
+    }
+    progress_.close();
+    return ok_status();
+  }
+
+  Status write() const {
+    if (poses_.empty()) return ok_status();
+    if (const Status s = write_text(subject_.out + "/compare.csv", comparison_csv(poses_)); !s) return s;
+    if (const Status s = write_text(subject_.out + "/compare.json", comparison_json(about(), poses_).dump(2) + "\n");
+        !s)
+      return s;
+    std::vector<std::string> rows{"reference"};
+    for (size_t i = 0; i < poses_.front().cells.size(); ++i) rows.push_back(median_label(poses_, i));
+    std::vector<PoseStrip> strips;
+    const size_t n = std::min(kMaxStrips, strips_.size());
+    for (size_t i = 0; i < n; ++i) strips.push_back(strips_[(2 * i + 1) * strips_.size() / (2 * n)]);
+    return image::write_png(subject_.out + "/contact-sheet.png",
+                            run_sheet(strips, rows,
+                                      {caption(),
+                                       "figures of a row: medians over the poses; squares: where all "
+                                       "rows together differ most from the reference, 4 times as large"}));
+  }
+
+  void print() const {
+    std::printf("%s\n\n%s\nPictures and figures lie in %s (contact-sheet.png, pose-*.png, compare.csv, compare.json)\n",
+                caption().c_str(), comparison_table(poses_).c_str(), subject_.out.c_str());
+  }
+
+  size_t compared() const { return poses_.size(); }
+
+ private:
+  std::string caption() const {
+    const auto& c = subject_.frames.front().camera;
+    return fmt::format("{}: {}, display {}x{}, sampled {}, finish {}", subject_.name, scene_->size(), c.width, c.height,
+                       subject_.sampling, splat::finish_name(finish_));
+  }
+  nlohmann::ordered_json about() const {
+    const auto& c = subject_.frames.front().camera;
+    return {{"schema", 1},
+            {"scene", subject_.name},
+            {"primitives", scene_->primitives()},
+            {"mode", subject_.events.empty() ? "still" : "run"},
+            {"size", {c.width, c.height}},
+            {"sampling", subject_.sampling},
+            {"magnify", options_.magnify},
+            {"finish", splat::finish_name(finish_)},
+            {"pixels_per_degree", options_.pixels_per_degree},
+            {"repeat", options_.repeat}};
+  }
+
+  Status compare_pose(const DisplayedFrame& frame) {
+    const std::string where = fmt::format("pose {} of {}", poses_.size() + 1, subject_.frames.size());
+    progress_.show(where + ": direct rendering");
+    const auto model = models_->of(frame);
+    if (!model) return model.error();
+    CellOptions cell_options;
+    cell_options.shading = subject_.shading;
+    cell_options.best_patch_only = subject_.best_patch_only;
+    const auto drawn = scene_->draw(frame.camera, cell_options.shading, frame.epoch);
+    if (!drawn) return drawn.error();
+    const image::View& reference = *drawn;
+    const bool shows = std::any_of(reference.depth_m.begin(), reference.depth_m.end(),
+                                   [](float d) { return d < std::numeric_limits<float>::infinity(); });
+    if (!shows) return Error{fmt::format("frame {} of {}: does not show the data", frame.number, subject_.name)};
+    const image::Flip flip(reference, options_.pixels_per_degree);
+
+    ComparedPose pose{frame, (*model)->points(), {}};
+    // Renderers of its own: they keep copies of points by event number, and a pose may have another model of the same numbers.
+    std::vector<std::unique_ptr<viewer::Renderer>> renderers;
+    for (const auto& kind : renderers_) {
+      auto made = viewer::make_renderer(kind, options_.threads);
+      if (!made) return made.error();
+      renderers.push_back(std::move(*made));
+    }
+    for (const auto& kernel : options_.kernels) {
+      for (const auto& renderer : renderers) {
+        if (net::stop_requested()) return ok_status();
+        progress_.show(fmt::format("{}: {} {}", where, kernel, renderer->name()));
+        cell_options.render = {*splat::kernel_named(kernel), finish_};
+        cell_options.splat_scale =
+            options_.splat_scale > 0 ? float(options_.splat_scale) : splat::suitable_scale(cell_options.render.kernel);
+        cell_options.repeat = options_.repeat;
+        cell_options.detail = float(frame.detail);
+        pose.cells.push_back(
+            measure_cell(*renderer, **model, models_->applied(), frame.camera, cell_options, reference, flip));
+      }
+    }
+    return keep(reference, std::move(pose));
+  }
+
+  Status keep(const image::View& reference, ComparedPose pose) {
+    std::error_code error;
+    fs::create_directories(subject_.out, error);
+    if (error) return Error{fmt::format("{}: cannot be made a folder: {}", subject_.out, error.message())};
+    const std::string name = fmt::format("{}/pose-{:06d}", subject_.out, pose.frame.number);
+    const auto& f = pose.frame;
+    const std::vector<std::string> captions{
+        subject_.name,
+        scene_->size() + ", drawn directly: one ray a pixel",
+        subject_.events.empty() ? std::string("still camera")
+                                : fmt::format("frame {} at {:.2f} s, event {}", f.number, f.t_s, f.sequence.value),
+        fmt::format("display {}x{}", f.camera.width, f.camera.height),
+        "sampled " + subject_.sampling,
+        fmt::format("{} points cached", pose.points_cached),
+        "finish " + splat::finish_name(finish_),
+        "",
+        "below: picture, FLIP error map, the square where it errs most (4x), the reference there"};
+    if (const Status s = image::write_png(name + ".png", pose_sheet(reference, pose.cells, captions)); !s) return s;
+    if (options_.pictures) {
+      if (const Status s = image::write_png(name + "-reference.png", reference); !s) return s;
+      for (const Cell& c : pose.cells) {
+        const std::string cell_name = fmt::format("{}-{}-{}", name, splat::kernel_name(c.kernel), c.renderer);
+        if (const Status s = image::write_png(cell_name + ".png", c.view); !s) return s;
+        const image::View errors = image::picture_of_errors(c.flip_map, reference.width, reference.height);
+        if (const Status s = image::write_png(cell_name + "-flip.png", errors); !s) return s;
+      }
+    }
+    strips_.push_back(make_strip(
+        reference, pose.cells,
+        subject_.events.empty() ? std::string("still camera") : fmt::format("frame {} at {:.2f} s", f.number, f.t_s)));
+    for (Cell& c : pose.cells) c.view = {}, c.flip_map = {};
+    poses_.push_back(std::move(pose));
+    return ok_status();
+  }
+
+  const CompareOptions& options_;
+  const CompareSubject& subject_;
+  splat::Finish finish_;
+  const std::vector<std::string>& renderers_;
+  ProgressLine progress_;
+  std::unique_ptr<DirectScene> scene_;
+  std::unique_ptr<PoseModels> models_;
+  std::vector<ComparedPose> poses_;
+  std::vector<PoseStrip> strips_;
+};
+
+}  // namespace
+
+void add_compare_flags(CLI::App& app, CompareOptions& o) {
+  const auto list = [&](const char* flag, auto& value, const char* help) {
+    return app.add_option(flag, value, help)
+        ->delimiter(',')
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->allow_extra_args(false);  // what follows the list may be the path
+  };
+  app.add_option("path", o.path, "run folder, as telesplat run leaves it; with --still also a mesh file")->required();
+  app.add_option("--scene", o.scene, "the data file, if it is no longer where the run found it");
+  app.add_option("--out", o.out,
+                 "folder for pictures and figures; default: compare (--still: compare-still) in the run folder");
+  app.add_option("--poses", o.poses,
+                 "how many poses, evenly spaced over the frames that show the data; default: 4, with --still 1")
+      ->check(CLI::Range(1, 1000));
+  list("--frames", o.frames, "numbers of the frames to compare instead, as 10,250");
+  list("--kernels", o.kernels, "which of square,disc,ellipse,ewa")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"square", "disc", "ellipse", "ewa"}));
+  list("--renderers", o.renderers, "which of cpu,gl; default: cpu, and gl where there is OpenGL")
+      ->check(CLI::IsMember({"cpu", "gl"}));
+  app.add_option("--finish", o.finish, "work per pixel after splatting: on, off, or some of fill,smooth,antialias")
+      ->capture_default_str();
+  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 10.0));
+  app.add_option("--repeat", o.repeat, "frames timed for each picture; the median counts")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--pixels-per-degree", o.pixels_per_degree,
+                 "of the viewing conditions that FLIP assumes; default: a 0.7 m wide monitor of 3840 pixels at 0.7 m")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1000.0));
+  app.add_option("--threads", o.threads, "threads to draw with; 0: one a core")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("--pictures", o.pictures, "write every picture and error map in full size too");
+  app.add_flag("--still", o.still,
+               "sample each pose itself, at the display's resolution, instead of replaying what the run had cached");
+  app.add_option("--magnify", o.magnify, "with --still: sample at this fraction of the display's resolution")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 16));
+  app.add_option("--size", o.size, "display size in pixels, WxH, for a mesh file")->capture_default_str();
+  app.add_option("--fov", o.fov_deg, "horizontal field of view in degrees, for a mesh file")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 170.0));
+  app.add_option("--near", o.near_m, "nearest depth seen in metres, for a mesh file")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-5, 1e3));
+  app.add_option("--octree-depth", o.octree_depth, "levels of the point model's octree, for a mesh file")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10));
+  app.add_option("--room-size", o.mesh.room_size_m, "largest extent in room space in metres, for a mesh file")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e3));
+  app.add_option("--up", o.mesh.up, "data axis that points up, for a mesh file")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
+  app.add_option("--cache", o.mesh.cache_dir,
+                 "folder of the chunk store; default: the run's, or telesplat in the user's cache folder");
+  app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
+}
+
+int compare(const CompareOptions& o) {
+  const auto refuse = [](const Error& e) {
+    std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
+    return 2;
+  };
+  net::install_signal_handlers();
+  log::initialise("telesplat", "warn");
+  const auto finish = splat::finish_named(o.finish);
+  if (!finish) return refuse({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
+  const auto subject = find_subject(o);
+  if (!subject) return refuse(subject.error());
+
+  const auto renderers = choose_renderers(o);
+  if (!renderers) return refuse(renderers.error());
+
+  Comparison comparison(o, *subject, *finish, *renderers);
+  if (const Status s = comparison.open(); !s) return refuse(s.error());
+  if (const Status s = comparison.compare_poses(); !s) return refuse(s.error());
+  if (const Status s = comparison.write(); !s) {
+    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
+    return 1;
+  }
+  if (comparison.compared() > 0) comparison.print();
+  if (comparison.compared() == subject->frames.size()) return 0;
+  std::fprintf(stderr, "telesplat: told to stop after %zu of %zu poses\n", comparison.compared(),
+               subject->frames.size());
+  return 1;
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,44 @@
+// `telesplat compare DIR`: poses of a recorded run, drawn by every kernel and renderer and directly from the data.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/image/flip.h"
+#include "common/points/point_model.h"
+#include "services/data/mesh/store.h"
+
+namespace CLI {
+class App;
+}
+
+namespace telesplat::launcher {
+
+struct CompareOptions {
+  std::string path;   ///< a run folder, or with `still` a data file
+  std::string scene;  ///< the data file, where it is not where the run found it
+  std::string out;
+  int poses = 0;  ///< 0: 4 of a run, 1 with `still`
+  std::vector<uint64_t> frames;
+  std::vector<std::string> kernels{"square", "disc", "ellipse", "ewa"};
+  std::vector<std::string> renderers;  ///< empty: cpu, and gl where there is OpenGL
+  std::string finish = "on";
+  double splat_scale = 0;  ///< 0: what suits the kernel
+  int repeat = 5;
+  double pixels_per_degree = image::kFlipPixelsPerDegree;
+  int threads = 0;
+  bool still = false;  ///< sample each pose itself instead of replaying what the run had cached
+  int magnify = 1;     ///< with `still`: display pixels a side per sampled pixel
+  bool pictures = false;
+  std::string size = "1280x800";  ///< of the display, for a data file
+  double fov_deg = 90, near_m = 0.02;
+  int octree_depth = points::ModelConfig{}.depth;
+  data::MeshOptions mesh;
+};
+
+void add_compare_flags(CLI::App& app, CompareOptions& options);
+
+/// Exit code: 0 done, 1 failed while running or interrupted, 2 bad usage or input.
+int compare(const CompareOptions& options);
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,145 @@
+#include "tools/telesplat/compare/report.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "common/metrics/statistics.h"
+
+namespace telesplat::launcher {
+namespace {
+
+struct Figure {
+  const char* name;
+  const char* format;
+  std::function<double(const Cell&)> of;
+};
+
+const std::vector<Figure>& figures() {
+  static const std::vector<Figure> all{
+      {"splat_scale", "{:.3g}", [](const Cell& c) { return c.splat_scale; }},
+      {"psnr_db", "{:.3f}", [](const Cell& c) { return c.quality.psnr_db; }},
+      {"ssim", "{:.5f}", [](const Cell& c) { return c.quality.ssim; }},
+      {"flip", "{:.5f}", [](const Cell& c) { return c.flip; }},
+      {"hole_fraction", "{:.6f}", [](const Cell& c) { return c.quality.hole_fraction; }},
+      {"object_pixels", "{:.0f}", [](const Cell& c) { return double(c.quality.object_pixels); }},
+      {"error_silhouette", "{:.4f}", [](const Cell& c) { return c.shares.silhouette; }},
+      {"error_depth_edge", "{:.4f}", [](const Cell& c) { return c.shares.depth_edge; }},
+      {"error_interior", "{:.4f}", [](const Cell& c) { return c.shares.interior; }},
+      {"pixels_silhouette", "{:.5f}", [](const Cell& c) { return c.shares.silhouette_pixels; }},
+      {"pixels_depth_edge", "{:.5f}", [](const Cell& c) { return c.shares.depth_edge_pixels; }},
+      {"interior_psnr_db", "{:.3f}", [](const Cell& c) { return c.shares.interior_psnr_db; }},
+      {"frame_ms", "{:.3f}", [](const Cell& c) { return c.times.frame_ms; }},
+      {"select_ms", "{:.3f}", [](const Cell& c) { return c.times.select_ms; }},
+      {"render_ms", "{:.3f}", [](const Cell& c) { return c.times.render_ms; }},
+      {"project_cpu_ms", "{:.3f}", [](const Cell& c) { return c.times.stats.project_ms; }},
+      {"resolve_cpu_ms", "{:.3f}", [](const Cell& c) { return c.times.stats.resolve_ms; }},
+      {"fill_cpu_ms", "{:.3f}", [](const Cell& c) { return c.times.stats.fill_ms; }},
+      {"smooth_cpu_ms", "{:.3f}", [](const Cell& c) { return c.times.stats.smooth_ms; }},
+      {"antialias_cpu_ms", "{:.3f}", [](const Cell& c) { return c.times.stats.antialias_ms; }},
+      {"points_drawn", "{:.0f}", [](const Cell& c) { return double(c.times.stats.points_drawn); }},
+      {"items", "{:.0f}", [](const Cell& c) { return double(c.items); }}};
+  return all;
+}
+
+double median_of(const std::vector<ComparedPose>& poses, size_t cell, const std::function<double(const Cell&)>& of) {
+  std::vector<double> values;
+  for (const auto& p : poses) values.push_back(of(p.cells.at(cell)));
+  return metrics::distribution(values).median;
+}
+
+std::string table_line(std::string_view pose, const Cell& c, const std::function<double(const char*)>& value) {
+  return fmt::format("{:>8} {:8} {:4} {:8.2f} {:8.4f} {:8.4f} {:9.3f} {:5.0f} {:5.0f} {:5.0f} {:10.2f} {:10.2f}\n",
+                     pose, splat::kernel_name(c.kernel), c.renderer, value("psnr_db"), value("ssim"), value("flip"),
+                     100 * value("hole_fraction"), 100 * value("error_silhouette"), 100 * value("error_depth_edge"),
+                     100 * value("error_interior"), value("interior_psnr_db"), value("frame_ms"));
+}
+
+const Figure& figure(std::string_view name) {
+  for (const Figure& f : figures())
+    if (f.name == name) return f;
+  CHECK(false);
+  return figures().front();
+}
+
+}  // namespace
+
+std::string comparison_csv(const std::vector<ComparedPose>& poses) {
+  std::string out = "frame,t_s,sequence,points_cached,kernel,renderer";
+  for (const Figure& f : figures()) out += std::string(",") + f.name;
+  out += "\n";
+  for (const auto& p : poses)
+    for (const Cell& c : p.cells) {
+      out += fmt::format("{},{:.4f},{},{},{},{}", p.frame.number, p.frame.t_s, p.frame.sequence.value, p.points_cached,
+                         splat::kernel_name(c.kernel), c.renderer);
+      for (const Figure& f : figures()) out += "," + fmt::format(fmt::runtime(f.format), f.of(c));
+      out += "\n";
+    }
+  return out;
+}
+
+nlohmann::ordered_json comparison_json(nlohmann::ordered_json about, const std::vector<ComparedPose>& poses) {
+  about["poses"] = nlohmann::ordered_json::array();
+  for (const auto& p : poses) {
+    const auto& e = p.frame.camera.pose.position_room;
+    const auto& q = p.frame.camera.pose.orientation;
+    nlohmann::ordered_json pose{{"frame", p.frame.number},
+                                {"t_s", p.frame.t_s},
+                                {"sequence", p.frame.sequence.value},
+                                {"points_cached", p.points_cached},
+                                {"position_room", {e.x, e.y, e.z}},
+                                {"orientation_wxyz", {q.w, q.x, q.y, q.z}},
+                                {"cells", nlohmann::ordered_json::array()}};
+    for (const Cell& c : p.cells) {
+      nlohmann::ordered_json cell{{"kernel", splat::kernel_name(c.kernel)}, {"renderer", c.renderer}};
+      for (const Figure& f : figures()) cell[f.name] = f.of(c);
+      pose["cells"].push_back(std::move(cell));
+    }
+    about["poses"].push_back(std::move(pose));
+  }
+  about["medians"] = nlohmann::ordered_json::array();
+  for (size_t i = 0; !poses.empty() && i < poses.front().cells.size(); ++i) {
+    const Cell& c = poses.front().cells[i];
+    nlohmann::ordered_json row{{"kernel", splat::kernel_name(c.kernel)}, {"renderer", c.renderer}};
+    for (const Figure& f : figures()) row[f.name] = median_of(poses, i, f.of);
+    about["medians"].push_back(std::move(row));
+  }
+  return about;
+}
+
+std::string comparison_table(const std::vector<ComparedPose>& poses) {
+  std::string out =
+      "                           PSNR                            squared error %    interior      frame\n"
+      "   frame kernel   rend.      dB     SSIM     FLIP   holes %  silh  edge inter    PSNR dB         ms\n";
+  if (poses.empty()) return out;
+  for (const auto& p : poses)
+    for (const Cell& c : p.cells)
+      out += table_line(std::to_string(p.frame.number), c, [&](const char* name) { return figure(name).of(c); });
+  if (poses.size() > 1)
+    for (size_t i = 0; i < poses.front().cells.size(); ++i)
+      out += table_line("median", poses.front().cells[i],
+                        [&](const char* name) { return median_of(poses, i, figure(name).of); });
+  return out;
+}
+
+std::string median_label(const std::vector<ComparedPose>& poses, size_t i) {
+  const Cell& c = poses.front().cells.at(i);
+  const auto value = [&](const char* name) { return median_of(poses, i, figure(name).of); };
+  return fmt::format("{} {}  PSNR {:.2f} dB  SSIM {:.4f}  FLIP {:.4f}  holes {:.2f} %  {:.2f} ms",
+                     splat::kernel_name(c.kernel), c.renderer, value("psnr_db"), value("ssim"), value("flip"),
+                     100 * value("hole_fraction"), value("frame_ms"));
+}
+
+Status write_text(const std::string& path, const std::string& text) {
+  std::ofstream out(path + ".part", std::ios::binary);
+  out << text;
+  out.close();
+  std::error_code error;
+  if (out) std::filesystem::rename(path + ".part", path, error);
+  if (!out || error) return Error{fmt::format("{}: cannot be written", path)};
+  return ok_status();
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,33 @@
+// The figures of a comparison as a table, as CSV and as JSON (docs/metrics.md).
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "tools/telesplat/compare/measure.h"
+#include "tools/telesplat/record/recorded_run.h"
+
+namespace telesplat::launcher {
+
+/// One pose with its cells; their pictures may have been dropped.
+struct ComparedPose {
+  DisplayedFrame frame;
+  uint64_t points_cached = 0;
+  std::vector<Cell> cells;
+};
+
+/// A row per pose and cell.
+std::string comparison_csv(const std::vector<ComparedPose>& poses);
+
+/// `about` with "poses" (each with its "cells") and "medians" (over the poses, a row per kernel and renderer) added.
+nlohmann::ordered_json comparison_json(nlohmann::ordered_json about, const std::vector<ComparedPose>& poses);
+
+/// For a person: a line per pose and cell, then the medians.
+std::string comparison_table(const std::vector<ComparedPose>& poses);
+
+/// Medians over poses of cell `i`'s figures, in a line as long as cell_label's.
+std::string median_label(const std::vector<ComparedPose>& poses, size_t i);
+
+/// Writes a text file whole or not at all.
+Status write_text(const std::string& path, const std::string& text);
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,141 @@
+#include "tools/telesplat/compare/subject.h"
+
+#include <fmt/format.h>
+
+#include <ctime>
+#include <filesystem>
+
+#include "client/viewer/viewer_service.h"
+#include "common/geometry/trajectory.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPosesOfARun = 4;
+
+std::string dated_folder() {
+  char name[64];
+  const std::time_t now = std::time(nullptr);
+  std::strftime(name, sizeof name, "runs/compare-%Y%m%d-%H%M%S", std::localtime(&now));
+  return name;
+}
+
+// A data file, seen from the default pose.
+Result<CompareSubject> find_scene(const CompareOptions& o) {
+  if (!o.frames.empty() || o.poses > 1)
+    return Error{fmt::format("{}: is a data file, which has one pose; --poses and --frames need a run folder", o.path)};
+  const auto size = viewer::parse_size(o.size, "--size");
+  if (!size) return size.error();
+  CompareSubject s;
+  s.name = fs::path(o.path).filename().string();
+  s.scene = o.path;
+  s.mesh = o.mesh;
+  s.octree_depth = o.octree_depth;
+  s.out = o.out.empty() ? dated_folder() : o.out;
+  DisplayedFrame frame;
+  frame.camera = geometry::make_camera(geometry::default_pose(), o.fov_deg, size->first, size->second, o.near_m);
+  s.frames.push_back(frame);
+  return s;
+}
+
+Result<CompareSubject> find_run(const CompareOptions& o) {
+  CompareSubject s;
+  std::error_code error;
+  const auto run = read_recorded_run(o.path);
+  if (!run) return run.error();
+  if (run->volume)
+    return Error{fmt::format(
+        "{}: shows a volume, which is not drawn from points; telesplat run --verify compares its frames", o.path)};
+  if (!o.still) {
+    s.events = o.path + "/points.events";
+    if (!fs::is_regular_file(s.events, error))
+      return Error{
+          fmt::format("{}: is not there, so what the frames showed cannot be made again; telesplat run keeps it unless "
+                      "it is given --record-points 0 (--still samples the poses anew)",
+                      s.events)};
+  }
+  s.scene = o.scene.empty() ? run->scene : o.scene;
+  s.mesh = run->mesh;
+  if (!o.mesh.cache_dir.empty()) s.mesh.cache_dir = o.mesh.cache_dir;
+  if (!o.mesh.use_cache) s.mesh.use_cache = false;
+  s.julia = run->julia;
+  if (s.julia && !o.scene.empty())
+    return Error{fmt::format("--scene {}: {} shows a Julia set, which has no data file", o.scene, o.path)};
+  if (s.scene.empty() && !s.julia)
+    return Error{fmt::format("{}/session.toml: does not tell where the data is (key file of [scene]); --scene names it",
+                             o.path)};
+  if (!s.julia && !fs::exists(s.scene, error))
+    return Error{fmt::format("{}: the data file is not there{}", s.scene,
+                             o.scene.empty() ? "; if it was moved, --scene tells where to" : "")};
+  s.name = s.julia ? s.julia->title : fs::path(s.scene).filename().string();
+  s.octree_depth = run->octree_depth;
+  s.shading = run->shading;
+  s.best_patch_only = run->keeps_redundant;
+  s.sampling = run->sampling_size;
+  s.out = o.out.empty() ? o.path + (o.still ? "/compare-still" : "/compare") : o.out;
+  auto frames = choose_frames(*run, o.poses ? o.poses : o.still ? 1 : kPosesOfARun, o.frames);
+  if (!frames) return frames.error();
+  s.frames = std::move(*frames);
+  return s;
+}
+
+}  // namespace
+
+Result<CompareSubject> find_subject(const CompareOptions& o) {
+  std::error_code error;
+  if (!fs::exists(o.path, error)) return Error{fmt::format("{}: no such file or folder", o.path)};
+  const bool folder = fs::is_directory(o.path, error);
+  if (!folder && !o.still)
+    return Error{fmt::format("{}: is not a run folder; a data file can be compared with --still", o.path)};
+  if (!o.still && o.magnify != 1) return Error{fmt::format("--magnify {}: needs --still", o.magnify)};
+  auto subject = folder ? find_run(o) : find_scene(o);
+  if (!subject) return subject;
+  if (o.still) {
+    const auto& c = subject->frames.front().camera;
+    subject->sampling =
+        fmt::format("{}x{}, each pose anew", std::max(1, c.width / o.magnify), std::max(1, c.height / o.magnify));
+  }
+  return subject;
+}
+
+Result<std::unique_ptr<PoseModels>> PoseModels::open(const CompareSubject& subject, int magnify, DirectScene& scene) {
+  std::unique_ptr<PoseModels> out(new PoseModels(subject, magnify, scene));
+  if (subject.events.empty()) return out;
+  auto events = viewer::EventReplay::open(subject.events);
+  if (!events) return events.error();
+  out->events_ = std::move(*events);
+  return out;
+}
+
+Result<const points::PointModel*> PoseModels::replay(const DisplayedFrame& frame) {
+  for (; replica_ < frame.replica; ++replica_)
+    if (const Status s = events_->next_replica(); !s) return s.error();
+  if (const Status s = events_->advance(frame.sequence); !s) return s.error();
+  applied_ = events_->applied();
+  if (!events_->model() || applied_ != frame.sequence)
+    return Error{fmt::format(
+        "{}: ends at event {}, frame {} displayed event {}; --frames chooses earlier frames, and telesplat run "
+        "--record-points keeps more",
+        subject_.events, applied_.value, frame.number, frame.sequence.value)};
+  return events_->model();
+}
+
+Result<const points::PointModel*> PoseModels::of(const DisplayedFrame& frame) {
+  if (events_) return replay(frame);
+  geometry::Camera sampling = frame.camera;
+  sampling.width = std::max(1, sampling.width / magnify_);
+  sampling.height = std::max(1, sampling.height / magnify_);
+  const geometry::Rect whole{0, 0, sampling.width, sampling.height};
+  const points::ModelConfig config{scene_.box_room(), subject_.octree_depth, !subject_.best_patch_only};
+  if (const Status s = points::validate(config); !s) return Error{fmt::format("{}: {}", subject_.name, s.error().text)};
+  auto image = scene_.sample(sampling, frame.epoch);
+  if (!image) return image.error();
+  sampled_ = std::make_unique<points::PointModel>(config);
+  applied_ = {1};
+  sampled_->insert(points::prepare_patch(config, applied_, sampling, whole, std::move(*image)));
+  return sampled_.get();
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,33 @@
+#include "tools/telesplat/control/client.h"
+
+#include "common/net/control.h"
+
+namespace telesplat::launcher {
+
+ControlClient::ControlClient(const std::string& master_endpoint)
+    : endpoint_(master_endpoint),
+      socket_(context_, net::Kind::kDealer, "ctl",
+              {.high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes}) {
+  if (const Status s = socket_.connect(master_endpoint); !s) log::error("{}", s.error().text);
+}
+
+Result<std::string> ControlClient::ask(const std::string& command, double timeout_s,
+                                       const std::map<std::string, std::string>& arguments) {
+  return net::ask_master(socket_, endpoint_, command, timeout_s, arguments);
+}
+
+void ControlClient::request_status() { socket_.send(wire::Control{"status", {}}); }
+
+std::optional<nlohmann::json> ControlClient::poll_status() {
+  std::optional<nlohmann::json> out;
+  while (const auto message = socket_.receive()) {
+    if (message->type != wire::ControlReply::kName) continue;
+    const auto reply = socket_.decode<wire::ControlReply>(*message);
+    if (!reply || !reply->ok) continue;
+    auto json = nlohmann::json::parse(reply->text, nullptr, false);
+    if (json.is_object()) out = std::move(json);
+  }
+  return out;
+}
+
+}  // namespace telesplat::launcher
