@@ -1,0 +1,52 @@
+#include "common/core/utf8.h"
+
+#include <cstddef>
+
+namespace telesplat {
+namespace {
+
+bool in(unsigned char c, int least, int most) { return c >= least && c <= most; }
+
+// Bytes of the character that `text` begins with, or of as much of one as there is. text is not empty; bytes is 1 at least.
+struct Front {
+  size_t bytes;
+  bool valid;
+};
+
+Front front_of(std::string_view text) {
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(0);
+  if (lead < 0x80) return {1, true};
+  if (!in(lead, 0xc2, 0xf4)) return {1, false};  // a trailing byte, an overlong form, or beyond U+10FFFF
+  const size_t length = lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+  // The second byte's range excludes overlong forms, surrogates and what is beyond U+10FFFF.
+  const int least = lead == 0xe0 ? 0xa0 : lead == 0xf0 ? 0x90 : 0x80;
+  const int most = lead == 0xed ? 0x9f : lead == 0xf4 ? 0x8f : 0xbf;
+  for (size_t i = 1; i < length; ++i)
+    if (i == text.size() || !in(byte(i), i == 1 ? least : 0x80, i == 1 ? most : 0xbf)) return {i, false};
+  return {length, true};
+}
+
+}  // namespace
+
+bool valid_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const Front front = front_of(text);
+    if (!front.valid) return false;
+    text.remove_prefix(front.bytes);
+  }
+  return true;
+}
+
+std::string to_utf8(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  while (!text.empty()) {
+    const Front front = front_of(text);
+    out += front.valid ? text.substr(0, front.bytes) : std::string_view("\xef\xbf\xbd");
+    text.remove_prefix(front.bytes);
+  }
+  return out;
+}
+
+}  // namespace telesplat

@@ -1,0 +1,81 @@
+#include "common/core/utf8.h"
+
+#include <gtest/gtest.h>
+
+namespace telesplat {
+namespace {
+
+std::string encoded(uint32_t code) {
+  std::string out;
+  const auto add = [&](uint32_t byte) { out += static_cast<char>(byte); };
+  if (code < 0x80) {
+    add(code);
+  } else if (code < 0x800) {
+    add(0xc0 | code >> 6), add(0x80 | (code & 63));
+  } else if (code < 0x10000) {
+    add(0xe0 | code >> 12), add(0x80 | (code >> 6 & 63)), add(0x80 | (code & 63));
+  } else {
+    add(0xf0 | code >> 18), add(0x80 | (code >> 12 & 63)), add(0x80 | (code >> 6 & 63)), add(0x80 | (code & 63));
+  }
+  return out;
+}
+
+bool is_surrogate(uint32_t code) { return code >= 0xd800 && code < 0xe000; }
+
+TEST(Utf8, TakesEveryCharacterAndNoSurrogate) {
+  for (uint32_t code = 0; code < 0x110000; ++code) {
+    const std::string text = encoded(code);
+    ASSERT_EQ(valid_utf8(text), !is_surrogate(code)) << std::hex << code;
+    if (!is_surrogate(code)) ASSERT_EQ(to_utf8(text), text) << std::hex << code;
+  }
+}
+
+TEST(Utf8, RefusesWhatIsBeyondUnicode) {
+  for (uint32_t code = 0x110000; code < 0x200000; code += 97)
+    ASSERT_FALSE(valid_utf8(encoded(code))) << std::hex << code;
+  EXPECT_FALSE(valid_utf8("\xf8\x88\x80\x80\x80"));
+  EXPECT_FALSE(valid_utf8("\xff"));
+}
+
+TEST(Utf8, RefusesOverlongForms) {
+  for (const char* text :
+       {"\xc0\xaf", "\xc1\xbf", "\xe0\x80\xaf", "\xe0\x9f\xbf", "\xf0\x80\x80\xaf", "\xf0\x8f\xbf\xbf"})
+    EXPECT_FALSE(valid_utf8(text)) << to_utf8(text);
+}
+
+TEST(Utf8, RefusesCharactersThatAreCutOff) {
+  for (const uint32_t code : {0xe9u, 0x20acu, 0x1f600u}) {
+    const std::string whole = encoded(code);
+    for (size_t bytes = 1; bytes < whole.size(); ++bytes) {
+      EXPECT_FALSE(valid_utf8(whole.substr(0, bytes)));
+      EXPECT_EQ(to_utf8(whole.substr(0, bytes)), "\xef\xbf\xbd");
+      EXPECT_EQ(to_utf8(whole.substr(0, bytes) + "a"),
+                "\xef\xbf\xbd"
+                "a");
+    }
+  }
+}
+
+TEST(Utf8, ReplacesTheBytesOfAnotherEncoding) {
+  EXPECT_EQ(to_utf8("caf\xe9.ply"), "caf\xef\xbf\xbd.ply");
+  EXPECT_EQ(to_utf8("\x80\xbf"), "\xef\xbf\xbd\xef\xbf\xbd");
+  EXPECT_EQ(to_utf8("\xed\xa0\x80"), "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd");
+}
+
+TEST(Utf8, EveryPairOfBytesBecomesValid) {
+  for (int a = 0; a < 256; ++a)
+    for (int b = 0; b < 256; ++b) {
+      const std::string text{static_cast<char>(a), static_cast<char>(b)};
+      const std::string made = to_utf8(text);
+      ASSERT_TRUE(valid_utf8(made)) << a << " " << b;
+      ASSERT_EQ(made == text, valid_utf8(text)) << a << " " << b;
+    }
+}
+
+TEST(Utf8, KeepsZeroBytesAndEmptyText) {
+  EXPECT_TRUE(valid_utf8(""));
+  EXPECT_EQ(to_utf8(std::string_view("a\0b", 3)), std::string("a\0b", 3));
+}
+
+}  // namespace
+}  // namespace telesplat
