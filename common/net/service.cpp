@@ -45,6 +45,40 @@ void add_service_flags(CLI::App& app, ServiceOptions& o, Ends ends) {
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
 }
 
+options::Table service_table(ServiceOptions& o, Ends ends) {
+  options::Table out;
+  if (ends != Ends::kBinds)
+    out.push_back({.flag = "--master",
+                   .value = &o.master,
+                   .help = "address of the master",
+                   .reach = options::Reach::kHere,
+                   .environment = "TELESPLAT_MASTER"});
+  out.push_back(
+      {.flag = "--name", .value = &o.name, .help = "name in logs and metrics", .reach = options::Reach::kHere});
+  if (ends != Ends::kConnects)
+    out.push_back({.flag = "--bind",
+                   .value = &o.bind,
+                   .help = "address to bind to; port * takes a free one",
+                   .reach = options::Reach::kHere});
+  if (ends == Ends::kBoth)
+    out.push_back(
+        {.flag = "--advertise",
+         .value = &o.advertise,
+         .help =
+             "host that others are told to connect to; default: as bound, this host's name where that is a wildcard",
+         .limits = options::Check(complain_about_host),
+         .reach = options::Reach::kHere});
+  out.push_back({.flag = "--insecure",
+                 .value = &o.insecure,
+                 .help = "allow addresses other than loopback without encryption",
+                 .reach = options::Reach::kHere});
+  out.push_back({.flag = "--log-level",
+                 .value = &o.log_level,
+                 .help = "trace, debug, info, warn, error or off",
+                 .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}});
+  return out;
+}
+
 void parse_or_exit(CLI::App& app, int argc, char** argv) {
   try {
     app.parse(argc, argv);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/core/result.h"
+#include "common/options/table.h"
 
 namespace CLI {
 class App;
@@ -24,6 +25,7 @@ struct ServiceOptions {
 /// Adds --name, --log-level, --insecure; --bind if the program binds, --master (or TELESPLAT_MASTER in the environment) if it connects
 /// to one, --advertise if it does both.
 enum class Ends { kConnects, kBinds, kBoth };
+options::Table service_table(ServiceOptions& options, Ends ends);
 void add_service_flags(CLI::App& app, ServiceOptions& options, Ends ends);
 
 /// Parses; --help prints and exits 0, bad usage prints what is wrong and exits 2.

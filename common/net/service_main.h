@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "common/net/service.h"
+#include "common/options/parser.h"
 
 namespace telesplat::net {
 
@@ -17,6 +18,19 @@ int service_main(int argc, char** argv, const char* about, Options options, void
     CLI::App app{about};
     add_flags(app, options);
     parse_or_exit(app, argc, argv);
+    return run(options);
+  });
+}
+
+/// The same from a table of flags: table(options) has a row a flag, run(options) serves and returns the exit code.
+template <class Options>
+int service_main(int argc, char** argv, const char* about, Options options,
+                 telesplat::options::Table (*table)(Options&), auto run) {
+  end_on_signals();  // until run() looks at the flag
+  return guarded_main([&] {
+    telesplat::options::Parser parser{about};
+    parser.add(table(options));
+    parser.parse_or_exit(argv[0], {argv + 1, argv + argc});
     return run(options);
   });
 }

@@ -1,0 +1,38 @@
+// Tables of flags as a command line. The one place that knows CLI11.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/options/table.h"
+
+namespace telesplat::options {
+
+/// A command line, or one of its sub-commands. Flags that are given twice take the last value.
+class Parser {
+ public:
+  explicit Parser(const std::string& about);
+  ~Parser();
+  Parser(Parser&&) noexcept;
+
+  /// Adds flags. What the rows point to must outlive parse().
+  void add(const Table& table);
+  /// A sub-command; one of them is then required. The reference lives as long as this.
+  Parser& command(const std::string& name, const std::string& about);
+  /// Text at the end of --help.
+  void footer(const std::string& text);
+
+  /// --help prints and exits 0, bad usage prints what is wrong and exits 2. arguments: without the program's name.
+  void parse_or_exit(const std::string& program, std::vector<std::string> arguments);
+
+  /// After parsing: whether this sub-command was chosen; the flags and arguments that were given here.
+  bool chosen() const;
+  Given given() const;
+
+ private:
+  struct Impl;
+  explicit Parser(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace telesplat::options

@@ -1,0 +1,53 @@
+// What the data of a session are, and how they travel: the two questions every process asks. One row a kind (kind.cpp).
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <string_view>
+
+namespace telesplat::scene {
+
+/// What the data are.
+enum class Kind { kMesh, kJulia, kVolume };
+inline constexpr Kind kKinds[] = {Kind::kMesh, Kind::kJulia, Kind::kVolume};
+
+/// How they travel and are drawn: depth images that become points, or slice images.
+enum class Pipeline { kPoints, kSlices };
+
+/// A set of kinds.
+class Kinds {
+ public:
+  constexpr Kinds(std::initializer_list<Kind> kinds) {
+    for (const Kind k : kinds) bits_ |= bit(k);
+  }
+  static constexpr Kinds all() { return {Kind::kMesh, Kind::kJulia, Kind::kVolume}; }
+  static Kinds of(Pipeline pipeline);
+  constexpr bool has(Kind kind) const { return (bits_ & bit(kind)) != 0; }
+  constexpr bool operator==(const Kinds&) const = default;
+
+ private:
+  static constexpr unsigned bit(Kind kind) { return 1u << static_cast<unsigned>(kind); }
+  unsigned bits_ = 0;
+};
+
+/// "mesh", "julia", "volume": the fact "kind" of a data server's hello, and `kind` of a scene file.
+std::string_view name_of(Kind kind);
+std::optional<Kind> kind_named(std::string_view name);
+/// With its article, for messages: "a mesh".
+std::string_view described(Kind kind);
+
+Pipeline pipeline_of(Kind kind);
+
+/// What a session does with a kind of scene unless told otherwise. The master tells everyone, so that sessions in containers and those of
+/// `telesplat run` agree.
+struct Policy {
+  int octree_depth;       ///< levels of the point model's octree
+  bool keep_redundant;    ///< the packer packs what the model already shows, viewers draw the best patches
+  bool progressive;       ///< a view arrives with every 4th pixel of every 4th row first
+  double max_points;      ///< that the model holds
+  double least_sampling;  ///< sampled pixels a displayed pixel, on each axis, at least
+};
+const Policy& policy_of(Kind kind);
+
+}  // namespace telesplat::scene
