@@ -28,6 +28,13 @@ struct Rect {
   bool operator==(const Rect&) const = default;
 };
 
+/// Whether `inner` has at least one pixel and lies in `outer`. Any numbers may come from outside: nothing overflows.
+constexpr bool contains(const Rect& outer, const Rect& inner) {
+  return inner.width >= 1 && inner.height >= 1 && inner.width <= outer.width && inner.height <= outer.height &&
+         inner.x >= outer.x && inner.y >= outer.y && int64_t{inner.x} + inner.width <= int64_t{outer.x} + outer.width &&
+         int64_t{inner.y} + inner.height <= int64_t{outer.y} + outer.height;
+}
+
 /// A perspective camera. left, right, bottom, top are the tangents of the frustum's edges (the frustum cut at z = -1), so
 /// that off-axis frusta need nothing else. Pixel (x, y) has its centre at
 ///   u = left + (x + 0.5) / width * (right - left),   v = top - (y + 0.5) / height * (top - bottom)
