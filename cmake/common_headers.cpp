@@ -1,0 +1,1 @@
+// Nothing: a library needs a source for its precompiled header to be compiled with.

@@ -1,0 +1,6 @@
+// The same for tests, with GoogleTest.
+#pragma once
+
+#include "cmake/common_headers.h"
+
+#include <gtest/gtest.h>
