@@ -1,8 +1,20 @@
 #include "common/core/log.h"
 
 #include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <string_view>
 
 namespace telesplat::log {
+namespace {
+
+spdlog::level::level_enum library_level(Level level) {
+  constexpr spdlog::level::level_enum kLevels[] = {spdlog::level::debug, spdlog::level::info, spdlog::level::warn,
+                                                   spdlog::level::err};
+  return kLevels[static_cast<int>(level)];
+}
+
+}  // namespace
 
 void initialise(const std::string& service, const std::string& level) {
   auto logger = spdlog::get(service);
@@ -11,6 +23,13 @@ void initialise(const std::string& service, const std::string& level) {
   spdlog::set_pattern("%H:%M:%S.%e %n %l %v");
   spdlog::set_level(spdlog::level::from_str(level));
   spdlog::flush_on(spdlog::level::warn);
+}
+
+void write(Level level, fmt::string_view format, fmt::format_args arguments) {
+  spdlog::logger* logger = spdlog::default_logger_raw();
+  if (!logger->should_log(library_level(level))) return;
+  const std::string line = fmt::vformat(format, arguments);
+  logger->log(library_level(level), std::string_view(line));
 }
 
 bool RateLimiter::allow(double now_s) {

@@ -1,19 +1,37 @@
-// Logging to stderr, one line an event: "time service level text". Thin over spdlog so that formats stand in one place.
+// Logging to stderr, one line an event: "time service level text". The library that writes the lines is seen by log.cpp alone.
 #pragma once
 
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 
 #include <string>
 
 namespace telesplat::log {
 
-using spdlog::debug;
-using spdlog::error;
-using spdlog::info;
-using spdlog::warn;
+enum class Level { kDebug, kInfo, kWarn, kError };
 
 /// Names this process in every line. level: trace, debug, info, warn, error, off.
 void initialise(const std::string& service, const std::string& level);
+
+/// Writes one line if `level` is switched on; formats it only then. Any thread.
+void write(Level level, fmt::string_view format, fmt::format_args arguments);
+
+// Formats are checked against their arguments when the caller is compiled.
+template <class... Arguments>
+void debug(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  write(Level::kDebug, format, fmt::make_format_args(arguments...));
+}
+template <class... Arguments>
+void info(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  write(Level::kInfo, format, fmt::make_format_args(arguments...));
+}
+template <class... Arguments>
+void warn(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  write(Level::kWarn, format, fmt::make_format_args(arguments...));
+}
+template <class... Arguments>
+void error(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  write(Level::kError, format, fmt::make_format_args(arguments...));
+}
 
 /// At most one line a second for each limiter; says how many were left out.
 class RateLimiter {
