@@ -130,8 +130,8 @@ std::string key_of(const Row& row) {
 
 const Row* find(const Table& table, const std::string& flag) {
   for (const Row& row : table) {
-    std::string names = "," + row.flag.substr(clears(row) ? 1 : 0) + ",";
-    if (names.find("," + flag + ",") != std::string::npos) return &row;
+    const std::string names = fmt::format(",{},", row.flag.substr(clears(row) ? 1 : 0));
+    if (names.find(fmt::format(",{},", flag)) != std::string::npos) return &row;
   }
   return nullptr;
 }
