@@ -1,0 +1,220 @@
+"""Rules about documents: they tell all that there is, nothing that there is not, and their links lead somewhere."""
+
+import glob
+import os
+import re
+
+import tables
+from tree import Finding
+
+
+def pages(tree):
+    """Every document that people read."""
+    return [file for file in tree.files(".md") if file.folder in ("", "docs") or file.folder.startswith("compose")]
+
+
+def _without_fences(file):
+    """Lines of a page, those of code blocks blanked."""
+    lines, fenced = [], False
+    for line in file.lines:
+        fence = line.lstrip().startswith("```")
+        fenced ^= fence
+        lines.append("" if fenced or fence else line)
+    return lines
+
+
+# ---- messages --------------------------------------------------------------------------------------------------------
+
+
+def messages(tree):
+    """Every message has its paragraph in docs/protocol.md, and no paragraph is without its message."""
+    declared = {}
+    for file in tree.sources(below=tables.MESSAGES):
+        for match in re.finditer(r'\bkName\s*=\s*"([^"]+)"', file.without_comments):
+            declared[match[1]] = (file.path, file.line_of(match.start()))
+    documented = {}
+    if tree.exists(tables.PROTOCOL_PAGE):
+        for number, line in enumerate(tree.file(tables.PROTOCOL_PAGE).lines, 1):
+            for match in re.finditer(r"^\*\*(\w+)\*\* - ", line):
+                documented[match[1]] = number
+    for name, (path, line) in declared.items():
+        if name not in documented:
+            yield Finding(
+                path, line, "messages",
+                f'"{name}" has no paragraph (**{name}** - ...) in {tables.PROTOCOL_PAGE}',
+            )
+    for name, line in documented.items():
+        if name not in declared:
+            yield Finding(tables.PROTOCOL_PAGE, line, "messages", f"**{name}** is no message of {tables.MESSAGES}*.h")
+
+
+# ---- flags -----------------------------------------------------------------------------------------------------------
+
+# A string that is one flag, or several names of one: "--a", "!--a", "-o,--output", "--a,--b".
+_FLAG_STRING = re.compile(r'"(!?--?[A-Za-z][\w.-]*(?:,!?--?[A-Za-z][\w.-]*)*)"')
+_LONG_FLAG = re.compile(r"--[a-z][\w.-]*")
+
+
+def _programs(tree):
+    return (f for f in tree.sources() if not f.path.startswith("tests/"))
+
+
+def flags(tree):
+    """Every flag stands in docs/flags.md, and every flag there is one of a program."""
+    page = tree.file(tables.FLAGS_PAGE) if tree.exists(tables.FLAGS_PAGE) else None
+    documented = {}
+    if page:
+        for number, line in enumerate(page.lines, 1):
+            for name in re.findall(r"--[a-z](?:[\w.-]*\w)?", line):
+                documented.setdefault(name, number)
+    words = set()
+    for file in _programs(tree):
+        for match in _FLAG_STRING.finditer(file.without_comments):
+            for name in _LONG_FLAG.findall(match[1]):
+                if name not in documented and name not in tables.FOREIGN_FLAGS:
+                    yield Finding(
+                        file.path, file.line_of(match.start()), "flags",
+                        f"{name} does not stand in {tables.FLAGS_PAGE}",
+                    )
+        for text in re.findall(r'"((?:\\.|[^"\\\n])*)"', file.without_comments):
+            words.update(word.lstrip("!-") for word in re.split(r"[,\s=:'|]+", text))
+    for name, number in documented.items():
+        if name[2:] not in words and name not in ("--help", "--version"):
+            yield Finding(tables.FLAGS_PAGE, number, "flags", f"no program has {name}")
+
+
+# ---- metric columns --------------------------------------------------------------------------------------------------
+
+_CSV_HEADER = re.compile(r'"([a-z][a-z0-9_]*(?:,[a-z][a-z0-9_]*){2,},?)(?:\\n)?"')
+# A table of columns: something called ...column..., then a brace; nothing but a type's arguments and an index between.
+_COLUMN_TABLE = re.compile(r"[cC]olumns?\w*\b(?:<[^;{}()]*>)?[\w\s\[\]=]*\{|_table_\(\s*\"\w+\",\s*\{")
+# A name in such a table: an element of a list, or the first thing of a row.
+_COLUMN = re.compile(r'(?:[{,]|\.name\s*=)\s*"([a-z][a-z0-9_]*)"\s*(?=[,}])')
+
+
+def _matching_brace(code, at):
+    depth = 0
+    for match in re.compile(r"[{}]").finditer(code, at):
+        depth += 1 if match[0] == "{" else -1
+        if depth == 0:
+            return match.start()
+    return len(code)
+
+
+def _columns(file):
+    """(name, line) of the columns that a source declares: tables of columns, and headers of CSV files."""
+    text = file.without_comments
+    for match in _CSV_HEADER.finditer(text):
+        for name in match[1].strip(",").split(","):
+            yield name, file.line_of(match.start())
+    for match in _COLUMN_TABLE.finditer(text):
+        end = _matching_brace(file.code, match.end() - 1)
+        for name in _COLUMN.finditer(text, match.end() - 1, end + 1):
+            yield name[1], file.line_of(name.start(1))
+
+
+def _documented_columns(tree):
+    """name -> (page, line) for the tables below headings that end with .csv."""
+    found = {}
+    for page in tree.files(".md", below="docs/"):
+        inside = False
+        for number, line in enumerate(_without_fences(page), 1):
+            if line.startswith("#"):
+                inside = line.rstrip().endswith(".csv")
+            elif inside and line.startswith("|"):
+                for name in line.split("|")[1].split(","):
+                    if re.fullmatch(r"[a-z][a-z0-9_]*", name.strip()) and name.strip() != "column":
+                        found[name.strip()] = (page.path, number)
+    return found
+
+
+def columns(tree):
+    """Every column of a CSV file stands in a table of docs/ below a heading NAME.csv; each one there is written."""
+    documented = _documented_columns(tree)
+    declared = {}
+    for file in _programs(tree):
+        if file.path.startswith("common/geometry/"):
+            continue  # trajectories: people write them
+        for name, line in _columns(file):
+            declared.setdefault(name, (file.path, line))
+    for name, (path, line) in declared.items():
+        if name not in documented:
+            yield Finding(
+                path, line, "columns",
+                f"{name} stands in no table of docs/ below a heading that ends with .csv",
+            )
+    for name, (path, line) in documented.items():
+        if name not in declared and name not in tables.FOREIGN_COLUMNS:
+            yield Finding(path, line, "columns", f"no table of columns has {name}")
+
+
+# ---- links and paths -------------------------------------------------------------------------------------------------
+
+_LINK = re.compile(r"\[[^\]]*\]\(\s*<?([^)\s>]+)>?[^)]*\)")
+
+
+def anchors(page):
+    """The anchors of a page's headings, as GitHub makes them."""
+    found, seen = set(), {}
+    for line in _without_fences(page):
+        match = re.match(r"#{1,6}\s+(.*?)\s*#*$", line)
+        if match:
+            text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", match[1])
+            anchor = re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
+            count = seen.get(anchor, 0)
+            seen[anchor] = count + 1
+            found.add(f"{anchor}-{count}" if count else anchor)
+    return found
+
+
+def links(tree):
+    """Links between pages lead to files and headings that are there."""
+    for page in pages(tree):
+        for number, line in enumerate(_without_fences(page), 1):
+            for match in _LINK.finditer(re.sub(r"`[^`]*`", lambda m: " " * len(m[0]) if "](" in m[0] else m[0], line)):
+                target, _, anchor = match[1].partition("#")
+                if re.match(r"[a-z]+:", target):
+                    continue
+                path = os.path.normpath(os.path.join(page.folder, target)) if target else page.path
+                if not tree.exists(path):
+                    yield Finding(page.path, number, "links", f"{match[1]}: there is no {path}")
+                elif anchor and path.endswith(".md") and anchor not in anchors(tree.file(path)):
+                    yield Finding(page.path, number, "links", f"{match[1]}: {path} has no heading #{anchor}")
+
+
+_TOPS = "|".join(["cmake", "client", "common", "compose", "docs", "scenes", "services", "tests", "tools"])
+_PAGE_PATH = re.compile(rf"`((?:{_TOPS})/[\w./*{{}},-]+|[\w/-]+\.(?:h|cpp))`")
+_COMMENT_PATH = re.compile(r"(?<![\w/.<-])((?:[\w-]+/)*[\w-]+\.(?:h|cpp|md))\b")
+
+
+def _stands(tree, path, suffixes):
+    if path in tables.FOREIGN_FILES:
+        return True
+    if "*" in path or "{" in path:
+        braces = re.search(r"\{([^}]*)\}", path)
+        options = [path.replace(braces[0], part) for part in braces[1].split(",")] if braces else [path]
+        return all(glob.glob(str(tree.root / option)) for option in options)
+    return tree.exists(path) or path in suffixes
+
+
+def paths(tree):
+    """Files and folders that documents and comments name are there."""
+    suffixes = set()
+    for file in tree.files(*(".h", ".cpp", ".md")):
+        parts = file.path.split("/")
+        suffixes.update("/".join(parts[i:]) for i in range(len(parts)))
+    for page in pages(tree):
+        if page.name == "CHANGELOG.md":
+            continue  # tells of the past, too
+        for number, line in enumerate(_without_fences(page), 1):
+            for match in _PAGE_PATH.finditer(line):
+                if not _stands(tree, match[1].rstrip("/"), suffixes):
+                    yield Finding(page.path, number, "paths", f"there is no {match[1]}")
+    for file in tree.sources():
+        for number, comment in file.comments:
+            for match in _COMMENT_PATH.finditer(comment):
+                if not _stands(tree, match[1], suffixes):
+                    yield Finding(file.path, number, "paths", f"there is no {match[1]}")
+
+
+RULES = (messages, flags, columns, links, paths)

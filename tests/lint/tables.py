@@ -1,0 +1,119 @@
+"""What is allowed where. Rules read these tables; whoever changes the house changes a row here.
+
+A room is a folder with all below it, a single file, or a tuple of these. A file belongs to the room that names it
+most closely. FLOORS lists floors from the ground up. A file may include files of its own room and of lower floors.
+Rooms of one floor do not know each other.
+"""
+
+# Which parts of the tree may include which others; "tests" may include everything but other tests' folders.
+PARTS = {
+    "common": ("common",),
+    "services": ("common", "services"),
+    "client": ("common", "client"),
+    "tools": ("common", "services", "client", "tools"),
+    "tests": ("common", "services", "client", "tools", "tests"),
+}
+# Processes: nothing in one includes another.
+PROCESSES = ("services/data", "services/master", "services/packer", "services/sampler", "client/viewer")
+# What one folder of tests may use of the others.
+SHARED_TESTS = "tests/support"
+
+FLOORS = {
+    "common": [
+        ["common/core"],
+        ["common/geometry"],
+        ["common/image", "common/julia", "common/gl"],
+        ["common/codec", "common/points"],
+        [("common/volume", "common/volume/transfer"), "common/splat"],
+        ["common/volume/slices"],
+        ["common/volume/warp"],
+        ["common/wire"],
+        ["common/scene", "common/metrics"],
+        ["common/options"],
+        ["common/net"],
+    ],
+    "services/data": [
+        ["services/data/base"],
+        ["services/data/volume/formats"],
+        ["services/data/import"],
+        ["services/data/volume", "services/data/mesh", "services/data/julia"],
+        ["services/data"],
+    ],
+    "services/sampler": [
+        ["services/sampler/work.h"],
+        ["services/sampler/tiles", "services/sampler/volume"],
+        ["services/sampler/mesh", "services/sampler/julia", "services/sampler/volume/shear"],
+        ["services/sampler"],
+    ],
+    "services/master": [
+        [("services/master/view_queue.h", "services/master/view_queue.cpp", "services/master/plan.h")],
+        ["services/master/tiles", "services/master/slabs"],
+        ["services/master"],
+    ],
+    "services/packer": [
+        [("services/packer/epoch_hold.h", "services/packer/packing.h")],
+        ["services/packer/points", "services/packer/slices"],
+        ["services/packer"],
+    ],
+    "client/viewer": [
+        ["client/viewer/render"],
+        ["client/viewer/coupling"],
+        ["client/viewer/input"],
+        ["client/viewer/record", "client/viewer/display"],
+        ["client/viewer/points", "client/viewer/slices"],
+        ["client/viewer"],
+    ],
+    "tools": [
+        ["tools/make_terrain", "tools/make_volume", "tools/health"],
+        ["tools/telesplat"],
+    ],
+}
+
+# Headers of other people's libraries: pattern of the header -> where it may be included.
+# Benchmarks may use what they compare with.
+OUTSIDE_HEADERS = [
+    (r"msgpack.*", ["common/wire"]),
+    (r"zmq.*", ["common/net"]),
+    (r"vtk.*", ["services/data/import"]),
+    (r"(gdal|ogr|cpl)[_a-z]*\.h", ["services/data/import"]),
+    (r"embree.*", ["services/sampler/mesh", "tests/bench"]),
+    (r"OpenImageIO/.*", ["common/image", "tests/bench"]),
+    (
+        r"epoxy/gl\.h",
+        [
+            "common/gl",
+            "client/viewer/render/gl",
+            "client/viewer/render/slices/gl_renderer.cpp",
+            "client/viewer/display/window.cpp",
+            "client/viewer/display/frame_presenter.cpp",
+            "services/sampler/mesh/raster_sampler.cpp",
+            "tests/golden",
+        ],
+    ),
+    (r"(epoxy/egl\.h|EGL/.*)", ["common/gl", "client/viewer/display/window.cpp"]),
+    (r"GLFW/.*", ["client/viewer/display/window.cpp"]),
+    (r"GL/.*", []),
+    (r"CLI/.*", ["common/options/parser.cpp"]),
+    (r"toml\+\+/.*", ["tools/telesplat"]),
+    (r"spdlog/.*", ["common/core"]),
+    (r"X11/.*", ["tests/support/virtual_display.cpp"]),
+]
+
+# Folders without a limit of files: data, not sources.
+DATA_FOLDERS = ("corpus", "images")
+MOST_FILES = 25
+MOST_COLUMNS = 120
+MOST_FUNCTION_LINES = 60
+# Functions that may be longer: (path, name) -> why.
+LONG_FUNCTIONS = {}
+
+MESSAGES = "common/wire/messages"  # files whose names begin so declare messages
+PROTOCOL_PAGE = "docs/protocol.md"
+FLAGS_PAGE = "docs/flags.md"
+METRICS_PAGE = "docs/metrics.md"
+# Flags of programs that are not ours, which ours start.
+FOREIGN_FLAGS = ()
+# Columns whose names are data: the master passes them on.
+FOREIGN_COLUMNS = ("viewer", "transfer")
+# Files that pages and comments name and that are not in the repository: other people's, or made by a run.
+FOREIGN_FILES = ("highway.h", "nifti1.h", "nifti2.h", "volume.md", "compose/runs/latest", "compose/.env")
