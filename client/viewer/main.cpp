@@ -9,5 +9,5 @@ int main(int argc, char** argv) {
   return net::service_main(
       argc, argv,
       "telesplat-viewer: caches points, splats them at display rate, headless or in a window, records frames", options,
-      viewer::add_flags, viewer::run);
+      viewer::table, viewer::run);
 }

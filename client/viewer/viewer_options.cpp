@@ -1,156 +1,241 @@
+#include "client/viewer/viewer_options.h"
+
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
+#include <tuple>
 
-#include "client/viewer/viewer_service.h"
+#include "client/viewer/coupling/coupling.h"
+#include "common/wire/messages.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr int kMaxWallSide = 16;
+using options::Names;
+using options::Range;
+using options::Reach;
+using options::Row;
+using options::Table;
 
-// "AxB" with both in least..most.
-std::optional<std::pair<int, int>> parse_pair(const std::string& text, int least, int most) {
-  int a = 0, b = 0;
-  const char* end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, a);
-  const bool cross = first.ec == std::errc() && first.ptr != end && *first.ptr == 'x';
-  const auto second = cross ? std::from_chars(first.ptr + 1, end, b) : first;
-  if (!cross || second.ec != std::errc() || second.ptr != end || std::min(a, b) < least || std::max(a, b) > most)
-    return std::nullopt;
-  return std::pair{a, b};
+constexpr scene::Kinds kPoints{scene::Kind::kMesh, scene::Kind::kJulia};
+
+std::string complain_about_finish(const std::string& text) {
+  return splat::finish_named(text) ? "" : "not on, off or some of fill,smooth,antialias";
 }
 
-void add_switch(CLI::App& app, const char* flag, bool& value, const char* text) {
-  app.add_option_function<std::string>(
-         flag, [&value](const std::string& v) { value = v == "on"; }, text)
-      ->default_str(value ? "on" : "off")
-      ->check(CLI::IsMember({"on", "off"}));
+Table sampling_table(ViewerOptions& o) {
+  return {
+      {.flag = "--size", .value = &o.size, .help = "display size in pixels, WxH", .reach = Reach::kRecorded},
+      {.flag = "--sampling-size",
+       .value = &o.sampling_size,
+       .help = "sampling size in pixels, WxH; auto: from --least-sampling of the display's to all of it, as fine as "
+               "updates "
+               "of --target-latency allow"},
+      {.flag = "--least-sampling",
+       .value = &o.least_sampling,
+       .help = "--sampling-size auto: sampled pixels a displayed pixel, on each axis, at least",
+       .limits = Range{0.1, 1.0},
+       .default_text = "what the session tells: 0.4 of Julia sets, else 0.5"},
+      {.flag = "--target-latency",
+       .value = &o.requests.target_latency_s,
+       .help = "seconds from request to complete view update that --sampling-size auto aims at",
+       .limits = Range{0.01, 10}},
+  };
+}
+
+Table head_table(ViewerOptions& o) {
+  auto& d = o.display;
+  return {
+      {.flag = "--trajectory",
+       .value = &o.trajectory,
+       .help = "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)"},
+      {.flag = "--duration",
+       .value = &d.duration_s,
+       .help = "seconds from the first displayed frame; 0: until stopped",
+       .limits = Range{0, 1e6}},
+      {.flag = "--frames", .value = &d.frames, .help = "frames to display; 0: no limit"},
+      {.flag = "--hold",
+       .value = &d.hold_s,
+       .help = "the head stands still for the last so many seconds",
+       .limits = Range{0, 1e6}},
+      {.flag = "--fov",
+       .value = &d.fov_deg,
+       .help = "horizontal field of view, degrees",
+       .limits = Range{1, 170},
+       .reach = Reach::kRecorded},
+      {.flag = "--near",
+       .value = &d.near_m,
+       .help = "nearest depth seen, metres",
+       .limits = Range{1e-5, 1e3},
+       .reach = Reach::kRecorded},
+      {.flag = "--target-fps",
+       .value = &d.target_fps,
+       .help = "display rate aimed at; 0: as fast as possible",
+       .limits = Range{0, 1000}},
+  };
+}
+
+Table drawing_table(ViewerOptions& o) {
+  auto& d = o.display;
+  return {
+      {.flag = "--detail-budget",
+       .value = &d.detail_budget,
+       .help = "on: lower detail where a view takes longer to construct than --target-fps leaves time for",
+       .fits = kPoints,
+       .on_off = true},
+      {.flag = "--least-detail",
+       .value = &d.least_detail,
+       .help = "the budget lowers detail no further than this",
+       .limits = Range{0.3, 1},
+       .fits = kPoints},
+      {.flag = "--speed-detail",
+       .value = &d.speed_detail,
+       .help = "on: lower detail while the head moves fast",
+       .fits = kPoints,
+       .on_off = true},
+      {.flag = "--renderer", .value = &o.renderer, .help = "auto, cpu or gl", .limits = Names{"auto", "cpu", "gl"}},
+      {.flag = "--splat",
+       .value = &o.splat,
+       .help = "kernel: square, disc, ellipse or ewa",
+       .limits = Names{"square", "disc", "ellipse", "ewa"},
+       .fits = kPoints},
+      {.flag = "--splat-scale",
+       .value = &o.splat_scale,
+       .help = "scale factor of splat sizes; 0: what suits the kernel",
+       .limits = Range{0, 10},
+       .fits = kPoints},
+      {.flag = "--finish",
+       .value = &o.finish,
+       .help = "work per pixel after splatting: on, off, or some of fill,smooth,antialias",
+       .limits = options::Check(complain_about_finish),
+       .fits = kPoints},
+      {.flag = "--shading",
+       .value = &o.shading,
+       .help = "lit: head light, directional light, ambient; head: head light; unlit: colours as they are",
+       .limits = Names(image::kShadingNames.begin(), image::kShadingNames.end()),
+       .reach = Reach::kRecorded},
+  };
+}
+
+Table coupling_table(ViewerOptions& o) {
+  return {
+      {.flag = "--coupling",
+       .value = &o.coupling,
+       .help =
+           "async: the display never waits for the server; sync: each frame asks for a view update and waits for it; "
+           "loose: each frame waits for the next update, --buffers of them are asked for ahead",
+       .limits = Names{"async", "sync", "loose"}},
+      {.flag = "--buffers",
+       .value = &o.buffers,
+       .help = "--coupling loose: view updates that are on their way or complete and not displayed, at most",
+       .limits = Range{1, double(wire::kMaxBuffers)}},
+      {.flag = "--update-rate",
+       .value = &o.requests.max_rate_hz,
+       .help = "--coupling async: view requests a second at most",
+       .limits = Range{0.1, 1000}},
+      {.flag = "--epoch-patience",
+       .value = &o.epoch_patience_s,
+       .help = "seconds that a changed scene's last picture is kept while the new one is incomplete",
+       .limits = Range{0, 60},
+       .fits = kPoints},
+  };
+}
+
+Table record_table(ViewerOptions& o) {
+  auto& d = o.display;
+  return {
+      {.flag = "--record-every",
+       .value = &d.picture_every,
+       .help = "record every N-th frame as a PNG; 0: one every 2.5 s and the last"},
+      {.flag = "--record-points",
+       .value = &o.record_points_mb,
+       .help = "keep the point model's events in OUT/points.events for telesplat compare, MiB at most; 0: do not",
+       .limits = Range{0, 1 << 20}},
+      {.flag = "--exr", .value = &d.exr, .help = "record pictures as EXR with depth too"},
+      {.flag = "--verify",
+       .value = &d.verify_every,
+       .help = "compare every N-th frame with direct rendering after the run; 0: none"},
+  };
+}
+
+Table process_table(ViewerOptions& o) {
+  return {
+      {.flag = "--threads",
+       .value = &o.threads,
+       .help = "threads to draw with; 0: one a core",
+       .limits = Range{0, 1024}},
+      {.flag = "--started-at",
+       .value = &o.started_s,
+       .help = "monotonic clock when the session was started, for start-up times; 0: now"},
+      {.flag = "--wall",
+       .value = &o.wall,
+       .help = "COLUMNSxROWS: this display is a tile of a wall; --fov is the wall's, --size the tile's"},
+      {.flag = "--wall-tile", .value = &o.wall_tile, .help = "which tile, counted by rows from the upper left, from 0"},
+      {.flag = "--clock-from",
+       .value = &o.display.clock_from_s,
+       .help =
+           "monotonic clock when the head's movement and --duration begin, for several viewers that follow one head; "
+           "0: with the first displayed frame"},
+      {.flag = "--out", .value = &o.out, .help = "run folder for pictures and frames to verify"},
+      {.flag = "--end-session",
+       .value = &o.end_session,
+       .help = "when this viewer is done, the session is over for everyone"},
+      {.flag = "--window", .value = &o.window, .help = "show a window; the person at it moves the camera"},
+      {.flag = "--fullscreen", .value = &o.fullscreen, .help = "the window fills the screen"},
+  };
+}
+
+Status settle_wall(ViewerOptions& o) {
+  const std::string text = o.wall.empty() ? "1x1" : o.wall;
+  const auto wall = parse_wall(text);
+  if (!wall) return wall.error();
+  if (o.wall_tile < 0 || o.wall_tile >= wall->tiles())
+    return Error{fmt::format("--wall-tile {}: --wall {} has the tiles 0..{}", o.wall_tile, text, wall->tiles() - 1)};
+  o.display.wall = {wall->columns, wall->rows, o.wall_tile};
+  return ok_status();
+}
+
+Status settle_coupling(ViewerOptions& o) {
+  const auto coupling = coupling_named(o.coupling);
+  if (!coupling) return Error{fmt::format("--coupling {}: not async, sync or loose", o.coupling)};
+  if (o.buffers < 1 || uint64_t(o.buffers) > wire::kMaxBuffers)
+    return Error{fmt::format("--buffers {}: not in 1..{}", o.buffers, wire::kMaxBuffers)};
+  o.requests.buffers = uint64_t(buffers_of(*coupling, o.buffers));
+  return ok_status();
 }
 
 }  // namespace
+
+Table view_table(ViewerOptions& o) {
+  const Table seen = joined(joined(sampling_table(o), head_table(o)), drawing_table(o));
+  return joined(seen, joined(coupling_table(o), record_table(o)));
+}
+
+Table table(ViewerOptions& o) {
+  return joined(net::service_table(o.service, net::Ends::kConnects), joined(view_table(o), process_table(o)));
+}
 
 Result<std::pair<int, int>> parse_sampling_size(const std::string& text) {
   if (text == "auto") return std::pair{RequestOptions{}.sampling_width, RequestOptions{}.sampling_height};
   return parse_size(text, "--sampling-size");
 }
 
-Result<std::pair<int, int>> parse_size(const std::string& text, const char* flag) {
-  if (const auto pair = parse_pair(text, 16, geometry::kMaxImageSide)) return *pair;
-  return Error{fmt::format("{} {}: not WIDTHxHEIGHT with both in 16..{}", flag, text, geometry::kMaxImageSide)};
-}
-
-Result<std::pair<int, int>> parse_wall(const std::string& text) {
-  if (const auto pair = parse_pair(text, 1, kMaxWallSide)) return *pair;
-  return Error{fmt::format("--wall {}: not COLUMNSxROWS with both in 1..{}", text, kMaxWallSide)};
-}
-
-void add_view_flags(CLI::App& app, ViewerOptions& o) {
-  auto& d = o.display;
-  app.add_option("--size", o.size, "display size in pixels, WxH")->capture_default_str();
-  app.add_option("--sampling-size", o.sampling_size,
-                 "sampling size in pixels, WxH; auto: from --least-sampling of the display's to all of it, as fine as "
-                 "updates of "
-                 "--target-latency allow")
-      ->capture_default_str();
-  app.add_option("--least-sampling", o.requests.min_scale,
-                 "--sampling-size auto: sampled pixels a displayed pixel, on each axis, at least")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 1.0));
-  app.add_option("--target-latency", o.requests.target_latency_s,
-                 "seconds from request to complete view update that --sampling-size auto aims at")
-      ->capture_default_str()
-      ->check(CLI::Range(0.01, 10.0));
-  app.add_option("--trajectory", o.trajectory, "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)")
-      ->capture_default_str();
-  app.add_option("--duration", d.duration_s, "seconds from the first displayed frame; 0: until stopped")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 1e6));
-  app.add_option("--frames", d.frames, "frames to display; 0: no limit")->capture_default_str();
-  app.add_option("--hold", d.hold_s, "the head stands still for the last so many seconds")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 1e6));
-  app.add_option("--fov", d.fov_deg, "horizontal field of view, degrees")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 170.0));
-  app.add_option("--near", d.near_m, "nearest depth seen, metres")->capture_default_str()->check(CLI::Range(1e-5, 1e3));
-  app.add_option("--target-fps", d.target_fps, "display rate aimed at; 0: as fast as possible")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 1000.0));
-  add_switch(app, "--detail-budget", d.detail_budget,
-             "on: lower detail where a view takes longer to construct than --target-fps leaves time for");
-  app.add_option("--least-detail", d.least_detail, "the budget lowers detail no further than this")
-      ->capture_default_str()
-      ->check(CLI::Range(0.3, 1.0));
-  add_switch(app, "--speed-detail", d.speed_detail, "on: lower detail while the head moves fast");
-  app.add_option("--renderer", o.renderer, "auto, cpu or gl")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "cpu", "gl"}));
-  app.add_option("--splat", o.splat, "kernel: square, disc, ellipse or ewa")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"square", "disc", "ellipse", "ewa"}));
-  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 10.0));
-  app.add_option("--finish", o.finish, "work per pixel after splatting: on, off, or some of fill,smooth,antialias")
-      ->capture_default_str()
-      ->check([](const std::string& v) {
-        return splat::finish_named(v) ? "" : v + ": not on, off or some of fill,smooth,antialias";
-      });
-  app.add_option("--shading", o.shading,
-                 "lit: head light, directional light, ambient; head: head light; unlit: colours as they are")
-      ->capture_default_str()
-      ->check(CLI::IsMember(image::kShadingNames));
-  app.add_option("--coupling", o.coupling,
-                 "async: the display never waits for the server; sync: each frame asks for a view update and waits for "
-                 "it; loose: each frame waits for the next update, --buffers of them are asked for ahead")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"async", "sync", "loose"}));
-  app.add_option("--buffers", o.buffers,
-                 "--coupling loose: view updates that are on their way or complete and not displayed, at most")
-      ->capture_default_str()
-      ->check(CLI::Range(uint64_t{1}, wire::kMaxBuffers));
-  app.add_option("--update-rate", o.requests.max_rate_hz, "--coupling async: view requests a second at most")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 1000.0));
-  app.add_option("--epoch-patience", o.epoch_patience_s,
-                 "seconds that a changed scene's last picture is kept while the new one is incomplete")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 60.0));
-  app.add_option("--record-every", d.picture_every, "record every N-th frame as a PNG; 0: one every 2.5 s and the last")
-      ->capture_default_str();
-  app.add_option("--record-points", o.record_points_mb,
-                 "keep the point model's events in OUT/points.events for telesplat compare, MiB at most; 0: do not")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1 << 20));
-  app.add_flag("--exr", d.exr, "record pictures as EXR with depth too");
-  app.add_option("--verify", d.verify_every, "compare every N-th frame with direct rendering after the run; 0: none")
-      ->capture_default_str();
-}
-
-void add_flags(CLI::App& app, ViewerOptions& o) {
-  net::add_service_flags(app, o.service, net::Ends::kConnects);
-  add_view_flags(app, o);
-  app.add_option("--threads", o.threads, "threads to draw with; 0: one a core")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
-  app.add_option("--started-at", o.started_s,
-                 "monotonic clock when the session was started, for start-up times; 0: now")
-      ->capture_default_str();
-  app.add_option("--wall", o.wall,
-                 "COLUMNSxROWS: this display is a tile of a wall; --fov is the wall's, --size the tile's");
-  app.add_option("--wall-tile", o.wall_tile, "which tile, counted by rows from the upper left, from 0")
-      ->capture_default_str();
-  app.add_option("--clock-from", o.display.clock_from_s,
-                 "monotonic clock when the head's movement and --duration begin, for several viewers that follow one "
-                 "head; 0: with the first displayed frame")
-      ->capture_default_str();
-  app.add_option("--out", o.out, "run folder for pictures and frames to verify");
-  app.add_flag("--end-session", o.end_session, "when this viewer is done, the session is over for everyone");
-  app.add_flag("--window", o.window, "show a window; the person at it moves the camera");
-  app.add_flag("--fullscreen", o.fullscreen, "the window fills the screen");
+Status settle(ViewerOptions& o) {
+  const auto size = parse_size(o.size, "--size"), sampling = parse_sampling_size(o.sampling_size);
+  if (!size) return size.error();
+  if (!sampling) return sampling.error();
+  std::tie(o.display.width, o.display.height) = *size;
+  std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
+  if (const Status s = settle_wall(o); !s) return s;
+  if (const Status s = settle_coupling(o); !s) return s;
+  o.display.render.kernel = *splat::kernel_named(o.splat);
+  o.display.splat_scale = float(o.splat_scale);
+  o.display.shading = *image::shading_named(o.shading);
+  o.display.render.finish = *splat::finish_named(o.finish);
+  if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
+  o.requests.adaptive = o.sampling_size == "auto";
+  o.requests.follow_display = o.window;
+  return ok_status();
 }
 
 }  // namespace telesplat::viewer

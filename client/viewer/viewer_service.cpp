@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/window_surface.h"
 #include "client/viewer/points/source.h"
@@ -53,30 +54,8 @@ Result<std::unique_ptr<DisplaySurface>> make_surface(ViewerOptions& o, geometry:
 int run(ViewerOptions o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
-  const auto size = parse_size(o.size, "--size"), sampling = parse_sampling_size(o.sampling_size);
-  if (!size) return refuse(size.error());
-  if (!sampling) return refuse(sampling.error());
-  std::tie(o.display.width, o.display.height) = *size;
-  std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
-  const auto wall = parse_wall(o.wall.empty() ? "1x1" : o.wall);
-  if (!wall) return refuse(wall.error());
-  std::tie(o.display.wall.columns, o.display.wall.rows) = *wall;
-  if (o.wall_tile < 0 || o.wall_tile >= wall->first * wall->second)
-    return refuse({fmt::format("--wall-tile {}: --wall {} has the tiles 0..{}", o.wall_tile,
-                               o.wall.empty() ? "1x1" : o.wall, wall->first * wall->second - 1)});
-  o.display.wall.tile = o.wall_tile;
-  const auto coupling = coupling_named(o.coupling);
-  if (!coupling) return refuse({fmt::format("--coupling {}: not async, sync or loose", o.coupling)});
-  if (o.buffers < 1 || uint64_t(o.buffers) > wire::kMaxBuffers)
-    return refuse({fmt::format("--buffers {}: not in 1..{}", o.buffers, wire::kMaxBuffers)});
-  const int buffers = buffers_of(*coupling, o.buffers);
-  o.display.render.kernel = *splat::kernel_named(o.splat);
-  o.display.splat_scale = float(o.splat_scale);
-  o.display.shading = *image::shading_named(o.shading);
-  o.display.render.finish = *splat::finish_named(o.finish);
-  if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
-  o.requests.adaptive = o.sampling_size == "auto";
-  o.requests.follow_display = o.window;
+  if (const Status s = settle(o); !s) return refuse(s.error());
+  const int buffers = int(o.requests.buffers);
   auto trajectory = make_trajectory(o.trajectory);
   if (!trajectory) return refuse(trajectory.error());
   auto surface =

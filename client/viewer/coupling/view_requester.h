@@ -9,26 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "client/viewer/coupling/request_options.h"
 #include "common/geometry/camera.h"
 #include "common/wire/messages.h"
 
 namespace telesplat::viewer {
-
-struct RequestOptions {
-  int sampling_width = 1280, sampling_height = 800;
-  double max_rate_hz = 12;          ///< requests a second at most; the master keeps only the newest
-  double max_margin = 0.3;          ///< the sampled frustum is at most this fraction wider than the displayed one
-  double initial_latency_s = 0.25;  ///< assumed until one was measured
-  bool adaptive =
-      false;  ///< sample as finely as updates of target_latency_s allow, and a still view exactly; the size above is not
-              ///< used
-  double target_latency_s = 0.15;  ///< adaptive: longer updates make sampling coarser, shorter ones finer
-  double min_scale = 0.5;          ///< adaptive: sampled pixels a displayed pixel, on each axis, at least (at most 1)
-  double min_scale_changing =
-      0.25;              ///< the same while the scene changes, when each view is displayed for a moment only
-  uint64_t buffers = 0;  ///< 0: asynchronous; else requests are paced by credits (coupling.h) and not by max_rate_hz
-  bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
-};
 
 /// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's aspect, sides
 /// multiples of 8 and at least 16.
@@ -73,6 +58,8 @@ class ViewRequester {
 
   /// A displayed pose; display: the camera it was shown with.
   void on_pose(double t_s, const geometry::Camera& display);
+  /// RequestOptions::min_scale, as the session sets it; within 0.1 to 1.
+  void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
   /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full resolution.
   void on_epoch(double now_s) { epoch_began_s_ = now_s; }
   /// The next request; asynchronously, if one is due.
@@ -96,7 +83,6 @@ class ViewRequester {
   /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution and asked for
   /// by us; a coarse pass may come before it, with the same request.
   std::optional<Update> on_part(const ViewPart& part, double now_s);
-  std::optional<Update> on_applied(const wire::Patch& patch, double now_s) { return on_part(part_of(patch), now_s); }
 
   double latency_s() const { return latency_s_; }
 

@@ -3,17 +3,11 @@
 
 #include <string>
 
+#include "client/viewer/input/look.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/file.h"
-#include "common/splat/render_options.h"
 
 namespace telesplat::viewer {
-
-/// How frames are drawn, as far as a person can change it while looking.
-struct Look {
-  splat::RenderOptions render;
-  bool lit = true;
-};
 
 /// What is known after a frame, for people. Counters count from the beginning.
 struct LiveFigures {

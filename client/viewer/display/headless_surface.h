@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/viewer/display/display_loop.h"
+#include "client/viewer/display/display_options.h"
+#include "client/viewer/display/display_surface.h"
 
 namespace telesplat::viewer {
 

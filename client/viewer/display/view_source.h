@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include "client/viewer/coupling/shown_update.h"
 #include "client/viewer/display/display_surface.h"
-#include "client/viewer/points/shown_update.h"
 
 namespace telesplat::viewer {
 

@@ -3,7 +3,8 @@
 
 #include <functional>
 
-#include "client/viewer/display/display_loop.h"
+#include "client/viewer/display/display_options.h"
+#include "client/viewer/display/display_surface.h"
 #include "client/viewer/display/title_line.h"
 #include "client/viewer/display/window.h"
 #include "client/viewer/record/screenshots.h"

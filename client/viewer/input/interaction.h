@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "client/viewer/display/display_surface.h"
 #include "client/viewer/input/camera_controls.h"
+#include "client/viewer/input/look.h"
 
 namespace telesplat::viewer {
 

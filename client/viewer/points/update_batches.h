@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "client/viewer/points/model_cache.h"
-#include "client/viewer/points/shown_update.h"
+#include "client/viewer/coupling/shown_update.h"
 
 namespace telesplat::viewer {
 

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <vector>
 
-#include "client/viewer/points/shown_update.h"
+#include "client/viewer/coupling/shown_update.h"
 #include "common/volume/warp/warper.h"
 
 namespace telesplat::viewer {

@@ -86,9 +86,9 @@ TEST_F(Requester, AMovingHeadGetsAWiderViewWithinTheLimit) {
 TEST_F(Requester, AnUpdateIsMeasuredFromRequestToItsLastPart) {
   requester.on_pose(0, display);
   const RequestId first = requester.next(0)->request, second = requester.next(1)->request;
-  EXPECT_FALSE(requester.on_applied(part(second, 1, 3, kOther), 1.1).has_value());  // somebody else's
-  EXPECT_FALSE(requester.on_applied(part(second, 0, 2), 1.2).has_value());
-  const auto update = requester.on_applied(part(second, 1, 2), 1.5);
+  EXPECT_FALSE(requester.on_part(part_of(part(second, 1, 3, kOther)), 1.1).has_value());  // somebody else's
+  EXPECT_FALSE(requester.on_part(part_of(part(second, 0, 2)), 1.2).has_value());
+  const auto update = requester.on_part(part_of(part(second, 1, 2)), 1.5);
   ASSERT_TRUE(update.has_value());
   EXPECT_DOUBLE_EQ(update->requested_s, 1);
   EXPECT_DOUBLE_EQ(update->first_s, 1.2);
@@ -96,7 +96,8 @@ TEST_F(Requester, AnUpdateIsMeasuredFromRequestToItsLastPart) {
   EXPECT_EQ(update->points, 20u);
   EXPECT_EQ(update->tiles, 2u);
   EXPECT_DOUBLE_EQ(requester.latency_s(), 0.5);
-  EXPECT_FALSE(requester.on_applied(part(first, 0, 1), 2).has_value());  // replaced at the master: will not be answered
+  EXPECT_FALSE(
+      requester.on_part(part_of(part(first, 0, 1)), 2).has_value());  // replaced at the master: will not be answered
 }
 
 TEST_F(Requester, ACoarsePassBeginsAnUpdateAndDoesNotCompleteIt) {
@@ -105,10 +106,10 @@ TEST_F(Requester, ACoarsePassBeginsAnUpdateAndDoesNotCompleteIt) {
   auto coarse = part(id, 0, 1);
   coarse.step = 4;
   EXPECT_TRUE(coarse.frame_complete);
-  EXPECT_FALSE(requester.on_applied(coarse, 0.1).has_value());
+  EXPECT_FALSE(requester.on_part(part_of(coarse), 0.1).has_value());
   EXPECT_DOUBLE_EQ(requester.latency_s(), 0);
-  EXPECT_FALSE(requester.on_applied(part(id, 0, 2), 0.3).has_value());
-  const auto update = requester.on_applied(part(id, 1, 2), 0.4);
+  EXPECT_FALSE(requester.on_part(part_of(part(id, 0, 2)), 0.3).has_value());
+  const auto update = requester.on_part(part_of(part(id, 1, 2)), 0.4);
   ASSERT_TRUE(update.has_value());
   EXPECT_DOUBLE_EQ(update->first_s, 0.1);
   EXPECT_DOUBLE_EQ(update->complete_s, 0.4);
@@ -119,10 +120,10 @@ TEST_F(Requester, ACoarsePassBeginsAnUpdateAndDoesNotCompleteIt) {
 TEST_F(Requester, ACoarsePartThatComesLastIsNoNewUpdate) {
   requester.on_pose(0, display);
   const RequestId id = requester.next(0)->request;
-  EXPECT_TRUE(requester.on_applied(part(id, 0, 1), 0.3).has_value());
+  EXPECT_TRUE(requester.on_part(part_of(part(id, 0, 1)), 0.3).has_value());
   auto coarse = part(id, 0, 1);
   coarse.step = 4;
-  EXPECT_FALSE(requester.on_applied(coarse, 0.4).has_value());
+  EXPECT_FALSE(requester.on_part(part_of(coarse), 0.4).has_value());
 }
 
 class AdaptiveRequester : public testing::Test {
@@ -144,7 +145,7 @@ class AdaptiveRequester : public testing::Test {
     last.viewer = kMe;
     last.request = request->request;
     last.frame_complete = true;
-    EXPECT_TRUE(requester.on_applied(last, now_s).has_value());
+    EXPECT_TRUE(requester.on_part(part_of(last), now_s).has_value());
     return request->camera;
   }
   double density(const geometry::Camera& c) const { return c.focal_x() / display.focal_x(); }

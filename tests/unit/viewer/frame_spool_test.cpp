@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "client/viewer/record/frame_spool.h"
-#include "client/viewer/viewer_service.h"
+#include "client/viewer/viewer_options.h"
 
 namespace telesplat::viewer {
 namespace {

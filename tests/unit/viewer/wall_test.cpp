@@ -3,13 +3,13 @@
 
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/title_line.h"
-#include "client/viewer/viewer_service.h"
+#include "client/viewer/display/wall.h"
 
 namespace telesplat::viewer {
 namespace {
 
 TEST(Wall, IsNamedByColumnsAndRows) {
-  EXPECT_EQ(parse_wall("3x2").value(), std::pair(3, 2));
+  EXPECT_EQ(parse_wall("3x2").value(), (WallLayout{3, 2}));
   for (const char* bad : {"", "3", "x2", "3x", "0x2", "2x0", "-1x2", "17x1", "1x17", "3x2x1", "3 x2", "axb"})
     EXPECT_FALSE(parse_wall(bad).ok()) << bad;
 }

@@ -14,6 +14,7 @@
 #include "client/viewer/viewer_service.h"
 #include "common/codec/depth_codec.h"
 #include "common/core/clock.h"
+#include "common/core/log.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/quality.h"
 #include "common/metrics/statistics.h"

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "client/viewer/viewer_service.h"
+#include "common/core/log.h"
 #include "tools/telesplat/compare/report.h"
 #include "tools/telesplat/compare/sheet.h"
 #include "tools/telesplat/compare/subject.h"

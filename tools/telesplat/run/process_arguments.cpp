@@ -87,7 +87,7 @@ std::vector<std::string> viewer_arguments(const RunOptions& o, int number, doubl
                              "--sampling-size",
                              v.sampling_size,
                              "--least-sampling",
-                             text(v.requests.min_scale),
+                             text(v.least_sampling.value_or(v.requests.min_scale)),
                              "--trajectory",
                              v.trajectory,
                              "--duration",

@@ -1,0 +1,23 @@
+// How views are asked for.
+#pragma once
+
+#include <cstdint>
+
+namespace telesplat::viewer {
+
+struct RequestOptions {
+  int sampling_width = 1280, sampling_height = 800;
+  double max_rate_hz = 12;          ///< requests a second at most; the master keeps only the newest
+  double max_margin = 0.3;          ///< the sampled frustum is at most this fraction wider than the displayed one
+  double initial_latency_s = 0.25;  ///< assumed until one was measured
+  /// Sample as finely as updates of target_latency_s allow, and a still view exactly; the size above is not used.
+  bool adaptive = false;
+  double target_latency_s = 0.15;  ///< adaptive: longer updates make sampling coarser, shorter ones finer
+  double min_scale = 0.5;          ///< adaptive: sampled pixels a displayed pixel, on each axis, at least (at most 1)
+  /// The same while the scene changes, when each view is displayed for a moment only.
+  double min_scale_changing = 0.25;
+  uint64_t buffers = 0;  ///< 0: asynchronous; else requests are paced by credits (coupling.h) and not by max_rate_hz
+  bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,39 @@
+// What a display is told before it begins: its size, its pace, how it draws and what it keeps.
+#pragma once
+
+#include <cstdint>
+
+#include "client/viewer/display/wall.h"
+#include "common/image/shading.h"
+#include "common/splat/render_options.h"
+#include "common/splat/select/view_selection.h"
+
+namespace telesplat::viewer {
+
+struct DisplayOptions {
+  int width = 1280, height = 800;      ///< of a window: at first
+  double fov_deg = 90, near_m = 0.02;  ///< the field of view is that of the whole wall
+  WallTile wall;
+  double target_fps = 60;     ///< frames are paced to this; 0: as fast as possible
+  int threads = 1;            ///< that the renderer's stage times are summed over
+  bool detail_budget = true;  ///< lower detail where a view takes longer to construct than target_fps leaves time for
+  /// The budget lowers detail no further. Fewer, larger splats save little (bench lod_detail: discs at 2560x1600 take as
+  /// long at 0.7 as at 1) and cost much: along walk-around-a.csv a head had 31.3 dB with 0.5 and 32.2 to 32.8 with 0.8.
+  double least_detail = 0.8;
+  bool speed_detail = false;  ///< lower detail while the head moves fast (T4.4.3.1)
+  /// The monotonic clock when the head's movement, and the duration, begin, for several viewers that follow one head;
+  /// 0: with the first displayed frame.
+  double clock_from_s = 0;
+  double duration_s = 10;  ///< seconds from the first displayed frame; 0: until told to stop
+  uint64_t frames = 0;     ///< frames to display; 0: no limit
+  double hold_s = 0;       ///< the head stands still for so long at the end of duration_s
+  splat::RenderOptions render;
+  splat::SelectionOptions selection;
+  float splat_scale = 0;  ///< selection.scale; 0: what suits the kernel
+  image::ShadingParameters shading;
+  uint64_t picture_every = 0;  ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one
+  uint64_t verify_every = 0;   ///< keep every N-th frame for verification; 0: none
+  bool exr = false;            ///< pictures as EXR with depth too
+};
+
+}  // namespace telesplat::viewer

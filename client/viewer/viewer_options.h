@@ -1,0 +1,55 @@
+// The viewer's flags: one row a flag, and what they come to. Without sockets, OpenGL and the display's code, for the launcher
+// has them too.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "client/viewer/coupling/request_options.h"
+#include "client/viewer/display/display_options.h"
+#include "client/viewer/display/size_text.h"
+#include "common/net/service.h"
+#include "common/options/table.h"
+
+namespace telesplat::viewer {
+
+struct ViewerOptions {
+  net::ServiceOptions service;
+  DisplayOptions display;
+  RequestOptions requests;
+  std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling: or auto
+  /// Sampled pixels a displayed pixel, on each axis, at least; not given: what the session tells, else requests.min_scale.
+  std::optional<double> least_sampling;
+  std::string trajectory = "orbit";  ///< "orbit", "still" or a CSV file
+  std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
+  int buffers = 3;                 ///< of loose coupling
+  std::string wall;                ///< "CxR": this display is a tile of a wall; empty: it is none
+  int wall_tile = 0;               ///< which one, by rows from the upper left
+  double epoch_patience_s = 0.15;  ///< EpochSwitch
+  double splat_scale = 0;          ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
+  int threads = 0;
+  uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none
+  bool window = false;               ///< show a window instead of running headless
+  bool fullscreen = false;           ///< the window fills the screen
+  double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
+  bool end_session = false;          ///< tell the master to end the session once this viewer's run is over and recorded
+  std::string out;                   ///< run folder; empty: nothing is recorded
+};
+
+/// Flags that `telesplat run` and `view` have too: size, trajectory, renderer and the like.
+options::Table view_table(ViewerOptions& options);
+/// All flags of telesplat-viewer.
+options::Table table(ViewerOptions& options);
+
+/// The same as view_table(), for a CLI11 command line.
+void add_view_flags(CLI::App& app, ViewerOptions& options);
+
+/// "WxH", or "auto" (then the value is not used).
+Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
+
+/// Works out what the texts of the flags come to: sizes, the tile of the wall, kernels, buffers of the coupling. Error: names
+/// the flag that cannot be.
+Status settle(ViewerOptions& options);
+
+}  // namespace telesplat::viewer
