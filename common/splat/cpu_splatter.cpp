@@ -14,20 +14,12 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/splat/item_figures.h"
 #include "common/splat/item_runs.h"
-#include "common/splat/splat_kernels.h"
-#include "common/splat/surfel/kernels.h"
+#include "common/splat/tile_work.h"
 
 namespace telesplat::splat {
 namespace {
-
-// Set by bench splat_square, 3 pixels, one thread: 14.5 ms at 256 x 256, 13.3 ms here (384 KiB of keys, which leaves the second-level
-// cache some room), 14.0 ms at 256 x 128, 15.1 ms at 128 x 128 (more clusters straddle tiles), 13.4 ms at 320 x 160.
-constexpr int kTileWidth = 256, kTileHeight = 192;
-
-// ewa keeps 36 bytes more a pixel. Points across borders cost more than the second-level cache gives: a million splats of three pixels took
-// 62.6 ms at 96 x 96, 60.3 ms at 128 x 64, 56.7 ms at 128 x 96, 55.7 ms here.
-constexpr int kEwaTileWidth = 192, kEwaTileHeight = 128;
 
 constexpr int kMargin = kMaxSplatSide;
 constexpr size_t kBoxesAhead = 8;
@@ -86,9 +78,9 @@ struct CpuSplatter::Impl {
 
   void prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                const image::Shading& shading);
-  void prepare_styles(const DrawList& list);
+  void prepare_items(const DrawList& list, const geometry::Camera& camera);
+  void bin(const DrawList& list, const geometry::Camera& camera);
   float reach_of(const DrawList& list, const ItemRun& run) const;
-  void prepare_surfels(const DrawList& list, const geometry::Camera& camera, const image::Shading& shading);
   TileCounts splat(const TileInput& input, const ResolvedTile& tile, Workspace& workspace);
   void draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace);
   void finish_tile(const ResolvedTile& tile, Workspace& workspace);
@@ -96,8 +88,8 @@ struct CpuSplatter::Impl {
   tbb::task_arena arena;
   std::vector<Workspace> workspaces;
 
-  // Of the frame.
-  Kernel kernel = Kernel::kSquare;
+  // The frame.
+  const KernelTraits* kernel = nullptr;
   Finish finish;
   SurfelInput surfels;
   std::vector<SurfelSource> sources;
@@ -108,30 +100,51 @@ struct CpuSplatter::Impl {
   TileGrid grid;
   ItemRuns runs;
   std::vector<ItemStyle> styles;
-  float overhang =
-      0;  // how far from its centre the largest splat reaches, pixels; of contours, beside what reach_of() says
+  /// How far the largest splat reaches from its centre, pixels. Surfels reach farther by what reach_of() says.
+  float overhang = 0;
   TileBinning binning;
   std::vector<uint8_t> intensity = std::vector<uint8_t>(65536 + 3);
 };
 
 void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                                 const image::Shading& shading) {
-  kernel = options.kernel;
+  kernel = &traits_of(options.kernel);
   finish = options.finish;
-  const bool ewa = kernel == Kernel::kEwa;
-  layout = {ewa ? kEwaTileWidth : kTileWidth, ewa ? kEwaTileHeight : kTileHeight, finish_reach(finish)};
+  layout = {kernel->tile_width, kernel->tile_height, finish_reach(finish)};
   grid = {camera.width, camera.height, layout.width, layout.height};
   std::memcpy(intensity.data(), shading.table().data(), shading.table().size());
-  const auto near_m = static_cast<float>(camera.near_m);
-  resolve = {intensity.data(), shading.background(), near_m, {}};
-  if (kernel == Kernel::kEllipse || ewa) {
-    prepare_surfels(list, camera, shading);
+  resolve = {intensity.data(), shading.background(), static_cast<float>(camera.near_m), {}};
+  if (kernel->surfel) {
+    surfels = {surfel_camera(camera), nullptr, spacing_limits(list.scale), widest_contour(camera)};
+    light = ewa_light(shading.parameters(), surfels.camera);
   } else {
     table.set_focal(camera.focal_x());
-    prepare_styles(list);
   }
+  prepare_items(list, camera);
+  bin(list, camera);
+}
+
+void CpuSplatter::Impl::prepare_items(const DrawList& list, const geometry::Camera& camera) {
+  FrameFigures figures(*kernel, camera, list.scale);
+  overhang = kernel->reach.least_px;
+  if (kernel->surfel) {
+    sources.resize(list.items.size());
+    for (size_t i = 0; i < list.items.size(); ++i) sources[i] = figures.add(list.items[i]).source;
+    surfels.sources = sources.data();
+  } else {
+    styles.resize(list.items.size());
+    for (size_t i = 0; i < list.items.size(); ++i) {
+      const ItemFigures item = figures.add(list.items[i]);
+      styles[i] = {&table.shape(*kernel, *item.flat), item.spacing};
+      overhang = std::max(overhang, 0.5f * static_cast<float>(item.flat->side) + 0.5f);
+    }
+  }
+  resolve.rim = figures.rim();
+}
+
+void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera) {
   runs.build(list.items);
-  binning.begin(grid, runs.runs.size(), near_m, static_cast<float>(layout.reach) + overhang);
+  binning.begin(grid, runs.runs.size(), resolve.near_m, static_cast<float>(layout.reach) + overhang);
   const auto room_to_pixel = camera.room_to_pixel();
   const glm::vec3 eye(camera.pose.position_room);
   arena.execute([&] {
@@ -147,65 +160,25 @@ void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& ca
   binning.list();
 }
 
-void CpuSplatter::Impl::prepare_styles(const DrawList& list) {
-  // Squares stay as they are: the fast kernel shows its samples plainly.
-  const bool smoothed = kernel != Kernel::kSquare;
-  styles.resize(list.items.size());
-  std::array<uint64_t, 4> bias{}, points{};
-  overhang = 0;
-  for (size_t i = 0; i < list.items.size(); ++i) {
-    const DrawItem& item = list.items[i];
-    const ItemStyle& style =
-        styles[i] = {&table.shape(kernel, item.splat_px), smoothed ? spacing_class(item.splat_px / list.scale) : 0};
-    overhang = std::max(overhang, 0.5f * static_cast<float>(style.shape->side) + 0.5f);
-    bias[style.spacing] += uint64_t{style.shape->rim_bias} * item.level.count;
-    points[style.spacing] += item.level.count;
-  }
-  for (size_t i = 0; i < 4; ++i)
-    if (points[i] > 0) resolve.rim[i] = static_cast<uint32_t>((bias[i] + points[i] / 2) / points[i]);
-}
-
-// Ellipses differ in bias from point to point: the item's, at its leaf's centre, stands for them. ewa has none.
-void CpuSplatter::Impl::prepare_surfels(const DrawList& list, const geometry::Camera& camera,
-                                        const image::Shading& shading) {
-  surfels.camera = surfel_camera(camera);
-  surfels.limits = spacing_limits(list.scale);
-  surfels.widest = widest_contour(camera);
-  overhang = kernel == Kernel::kEwa ? kEwaReach.least_px : kEllipseReach.least_px;
-  light = ewa_light(shading.parameters(), surfels.camera);
-  sources.resize(list.items.size());
-  const glm::dvec4 w = camera.room_to_pixel().w;
-  std::array<double, 4> bias{}, points{};
-  for (size_t i = 0; i < list.items.size(); ++i) {
-    const DrawItem& item = list.items[i];
-    sources[i] = surfel_source(surfels.camera, item.radius_m, item.to_eye);
-    const auto depth_m = static_cast<float>(glm::dot(w, glm::dvec4(item.cluster->leaf_room.centre(), 1)));
-    if (!(depth_m >= resolve.near_m)) continue;
-    const uint32_t spacing = spacing_class(item.splat_px / list.scale);
-    bias[spacing] += double{ellipse_bias(item.radius_m, depth_m)} * item.level.count;
-    points[spacing] += item.level.count;
-  }
-  surfels.sources = sources.data();
-  if (kernel == Kernel::kEwa) return;
-  for (size_t i = 0; i < 4; ++i)
-    if (points[i] > 0) resolve.rim[i] = static_cast<uint32_t>(std::lround(bias[i] / points[i]));
-}
-
-// Times radius over depth: how far contours of a run reach, in pixels. Bins grown by kMargin for all had each point met 1.63 times at
-// 256 x 256 (bench splat_ellipse).
+// Times radius over depth: how far contours of a run reach, in pixels. Bins grown by kMargin for all had each point met 1.63
+// times at 256 x 256 (bench splat_ellipse).
 float CpuSplatter::Impl::reach_of(const DrawList& list, const ItemRun& run) const {
-  if (kernel != Kernel::kEllipse && kernel != Kernel::kEwa) return 0;
+  if (!kernel->surfel) return 0;
   float radius_m = 0;
   for (uint32_t i = run.first; i < run.last; ++i) radius_m = std::max(radius_m, list.items[i].radius_m);
-  return (kernel == Kernel::kEwa ? kEwaReach.growth : kEllipseReach.growth) * surfels.widest * radius_m;
+  return kernel->reach.growth * surfels.widest * radius_m;
 }
 
 TileCounts CpuSplatter::Impl::splat(const TileInput& input, const ResolvedTile& tile, Workspace& workspace) {
-  const KeyBuffer keys{workspace.keys.get(), tile.stride, kMargin};
-  if (kernel == Kernel::kEllipse) return ellipse_tile(input, surfels, keys);
-  if (kernel == Kernel::kEwa)
-    return ewa_tile(input, surfels, light, workspace.ewa, tile, layout.reach, resolve.background);
-  return splat_tile(input, styles.data(), keys);
+  return kernel->splat_tile({.input = input,
+                             .styles = styles.data(),
+                             .surfels = surfels,
+                             .light = light,
+                             .background = resolve.background,
+                             .keys = {workspace.keys.get(), tile.stride, kMargin},
+                             .tile = tile,
+                             .reach = layout.reach,
+                             .ewa = workspace.ewa});
 }
 
 void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspace) {
@@ -242,9 +215,14 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTa
 
   // Buffers are empty between tiles: writing empties them. Their margins need not be.
   const ResolvedTile tile = layout.tile(workspace.keys.get(), rect);
-  const TileInput input{
-      grown(rect, layout.reach), rect, resolve.near_m, entries, runs.runs.data(), runs.transforms.data(),
-      runs.facing.data(),        list.items.data()};
+  const TileInput input{grown(rect, layout.reach),
+                        rect,
+                        resolve.near_m,
+                        entries,
+                        runs.runs.data(),
+                        runs.transforms.data(),
+                        runs.facing.data(),
+                        list.items.data()};
   const TileCounts counts = splat(input, tile, workspace);
   stats.points_projected += counts.projected;
   stats.points_drawn += counts.drawn;
@@ -252,7 +230,7 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTa
   stats.project_ms += (splatted - start) * 1e3;
 
   double finished = splatted;
-  const bool resolved = kernel == Kernel::kEwa;
+  const bool resolved = kernel->passes == Passes::kSums;
   if (layout.reach == 0 && !resolved) {
     resolve_and_write_tile(tile, resolve, out);
   } else {

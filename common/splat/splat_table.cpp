@@ -9,37 +9,42 @@ namespace {
 // Surfaces up to this slope against the screen resolve to the nearest centre: tan(75 degrees).
 constexpr double kResolvedSlope = 3.73;
 
-SplatShape build(Kernel kernel, double size, double focal_px) {
+uint32_t bias_at(double r2, double growth) {
+  return std::min(static_cast<uint32_t>(std::lround(growth * r2)), kMaxBias);
+}
+
+double contour_r2(const KernelTraits& kernel, double size) { return kernel.flat_contour_r2 * size * size; }
+
+// What each pixel of the splat's square adds to the key of a centre that lies at (cx, cy), from the square's upper left corner.
+void fill_addends(const KernelTraits& kernel, const FlatSplat& flat, double cx, double cy, int row_stride,
+                  uint64_t* out) {
+  const double contour = contour_r2(kernel, flat.size), radius2 = 0.25 * flat.size * flat.size;
+  const int nearest_x = static_cast<int>(cx), nearest_y = static_cast<int>(cy);
+  for (int y = 0; y < flat.side; ++y)
+    for (int x = 0; x < flat.side; ++x) {
+      const double dx = x + 0.5 - cx, dy = y + 0.5 - cy, r2 = dx * dx + dy * dy;
+      const bool nearest = x == nearest_x && y == nearest_y;
+      if (!nearest && kernel.flat_distance2(dx, dy) > radius2) continue;
+      const uint64_t bias = bias_at(r2, flat.bias_growth), ring = ring_of(r2 / contour);
+      out[y * row_stride + x] = bias << kKeyDepthBit | ring << kKeyRingBit;
+    }
+}
+
+SplatShape build(const KernelTraits& kernel, const FlatSplat& flat) {
   SplatShape s;
-  const int side = static_cast<int>(std::ceil(size));
+  const int side = flat.side;
   s.side = side;
   if (side == 1) return s;
-  s.sub_bits = sub_bits(side);
+  s.sub_bits = flat.sub_bits;
   const int steps = 1 << s.sub_bits;
   s.scale = static_cast<float>(steps);
   s.shift = static_cast<float>(steps) * 0.5f * static_cast<float>(1 - side);
   s.row_stride = (side + 3) / 4 * 4;
-  s.addends.assign(static_cast<size_t>(steps) * steps * side * s.row_stride, kOutsideSplat);
-  const bool disc = kernel == Kernel::kDisc;
-  const double contour_r2 = (disc ? 0.25 : 0.5) * size * size;
-  s.rim_bias = splat_bias(contour_r2, side, focal_px);
-  const auto inside = [&](double dx, double dy) {
-    return disc ? dx * dx + dy * dy <= contour_r2 : std::max(std::abs(dx), std::abs(dy)) <= 0.5 * size;
-  };
-  for (int sub = 0; sub < steps * steps; ++sub) {
-    // The centre, from the square's upper left corner.
-    const double cx = (sub % steps + 0.5) / steps + 0.5 * (side - 1),
-                 cy = (sub / steps + 0.5) / steps + 0.5 * (side - 1);
-    const int nearest_x = static_cast<int>(cx), nearest_y = static_cast<int>(cy);
-    for (int y = 0; y < side; ++y)
-      for (int x = 0; x < side; ++x) {
-        const double dx = x + 0.5 - cx, dy = y + 0.5 - cy, r2 = dx * dx + dy * dy;
-        if (!inside(dx, dy) && !(x == nearest_x && y == nearest_y)) continue;
-        const uint64_t bias = splat_bias(r2, side, focal_px), ring = ring_of(r2 / contour_r2);
-        s.addends[(static_cast<size_t>(sub) * side + y) * s.row_stride + x] = bias << kKeyDepthBit | ring
-                                                                                                         << kKeyRingBit;
-      }
-  }
+  const size_t addends = static_cast<size_t>(side) * s.row_stride;
+  s.addends.assign(static_cast<size_t>(steps) * steps * addends, kOutsideSplat);
+  for (int sub = 0; sub < steps * steps; ++sub)
+    fill_addends(kernel, flat, (sub % steps + 0.5) / steps + 0.5 * (side - 1),
+                 (sub / steps + 0.5) / steps + 0.5 * (side - 1), s.row_stride, s.addends.data() + sub * addends);
   return s;
 }
 
@@ -64,8 +69,13 @@ double splat_bias_growth(int side, double focal_px) {
   return std::min(2.0 * gradient / side * (1 << 23) / (1 << kBiasShift), cap);
 }
 
-uint32_t splat_bias(double r2, int side, double focal_px) {
-  return std::min(static_cast<uint32_t>(std::lround(splat_bias_growth(side, focal_px) * r2)), kMaxBias);
+uint32_t splat_bias(double r2, int side, double focal_px) { return bias_at(r2, splat_bias_growth(side, focal_px)); }
+
+FlatSplat flat_splat(const KernelTraits& kernel, float size, double focal_px) {
+  const int side = static_cast<int>(std::ceil(size));
+  const double growth = splat_bias_growth(side, focal_px);
+  // A splat of one pixel has no contour beside its centre.
+  return {size, side, sub_bits(side), growth, side == 1 ? 0 : bias_at(contour_r2(kernel, size), growth)};
 }
 
 void SplatTable::set_focal(double focal_px) {
@@ -75,10 +85,9 @@ void SplatTable::set_focal(double focal_px) {
     for (auto& shape : kernel) shape.reset();
 }
 
-const SplatShape& SplatTable::shape(Kernel kernel, float splat_px) {
-  const float size = square_size(splat_px);
-  auto& shape = shapes_[kernel == Kernel::kDisc][static_cast<int>(size * 4.0f)];
-  if (!shape) shape = std::make_unique<SplatShape>(build(kernel, size, focal_px_));
+const SplatShape& SplatTable::shape(const KernelTraits& kernel, const FlatSplat& flat) {
+  auto& shape = shapes_[static_cast<size_t>(kernel.kernel)][static_cast<int>(flat.size * 4.0f)];
+  if (!shape) shape = std::make_unique<SplatShape>(build(kernel, flat));
   return *shape;
 }
 

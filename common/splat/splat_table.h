@@ -7,23 +7,33 @@
 #include <memory>
 #include <vector>
 
+#include "common/splat/kernel_traits.h"
 #include "common/splat/pixel_key.h"
-#include "common/splat/render_options.h"
 
 namespace telesplat::splat {
 
 inline constexpr int kMaxSplatSide = 16;
 inline constexpr int kBiasShift = kDepthCodeShift;  ///< one bias step = 2^9 units of a float's last place
 
-/// One kernel at one size.
+/// A flat splat of one size: what both renderers know of it.
+struct FlatSplat {
+  float size = 1;          ///< side of a square, diameter of a disc, pixels: a multiple of 0.25, 1..kMaxSplatSide
+  int side = 1;            ///< of the square of pixels that holds it wherever its centre lies, 1..kMaxSplatSide
+  int sub_bits = 0;        ///< the projected centre's place within a pixel is told to 2^-sub_bits pixels on each axis
+  double bias_growth = 0;  ///< splat_bias_growth
+  uint32_t rim_bias = 0;   ///< bias on the contour, q = 1
+};
+/// size: square_size(). Precondition: the kernel is flat.
+FlatSplat flat_splat(const KernelTraits& kernel, float size, double focal_px);
+
+/// One kernel at one size, pixel by pixel.
 struct SplatShape {
-  int side = 1;      ///< the square of pixels that it is cut from, 1..kMaxSplatSide
-  int sub_bits = 0;  ///< the projected centre's place within a pixel is told to 2^-sub_bits pixels on each axis
+  int side = 1;      ///< as FlatSplat
+  int sub_bits = 0;  ///< as FlatSplat
   float scale = 1;   ///< 2^sub_bits
-  float shift =
-      0;  ///< added to the centre's position in 2^-sub_bits pixels: (1 - side) / 2 pixels. The square's first pixel is
-          ///< floor(x_pix + (1 - side) / 2), so that even sides cover the pixels nearest the centre
-  uint32_t rim_bias = 0;          ///< bias on the contour, q = 1
+  /// Added to the centre's position in 2^-sub_bits pixels: (1 - side) / 2 pixels. The square's first pixel is
+  /// floor(x_pix + (1 - side) / 2), so that even sides cover the pixels nearest the centre.
+  float shift = 0;
   int row_stride = 4;             ///< side rounded up to a multiple of 4
   std::vector<uint64_t> addends;  ///< [sub_y][sub_x][side][row_stride], padded with kOutsideSplat; empty if side == 1
 };
@@ -42,11 +52,12 @@ class SplatTable {
  public:
   /// focal_px sets the slope up to which neighbours resolve to the nearest centre. Drops shapes made for another focal length.
   void set_focal(double focal_px);
-  const SplatShape& shape(Kernel kernel, float splat_px);
+  /// flat: made by flat_splat() for this kernel and the focal length set last.
+  const SplatShape& shape(const KernelTraits& kernel, const FlatSplat& flat);
 
  private:
   double focal_px_ = 0;
-  std::unique_ptr<SplatShape> shapes_[2][kMaxSplatSide * 4 + 1];
+  std::unique_ptr<SplatShape> shapes_[kKernels.size()][kMaxSplatSide * 4 + 1];
 };
 
 /// The projected centre's place within a pixel is told to 2^-sub_bits pixels, for a splat of this side.

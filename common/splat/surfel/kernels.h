@@ -20,11 +20,6 @@ struct SurfelInput {
   float widest = 0;  ///< widest_contour(camera)
 };
 
-/// No splat touches pixels farther from its projected centre than growth * SurfelInput::widest * radius over depth + least_px, nor farther
-/// than kMaxSplatSide. growth: of S; least_px: the low-pass, and a pixel.
-struct SurfelReach {
-  float growth, least_px;
-};
 inline constexpr SurfelReach kEllipseReach{1.0f, 1.5f}, kEwaReach{1.6f, 2.0f};
 static_assert(kEwaReach.growth * kEwaReach.growth >= kSupportGrowth);
 

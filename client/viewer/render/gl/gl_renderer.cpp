@@ -92,21 +92,22 @@ GlRenderer::Current GlRenderer::use_context() const {
 
 void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with_depth) {
   struct Step {
-    const Programs::Pass* pass;
+    const FramePass* pass;
     Stage stage;
     int reach;  // how far it looks
   };
-  const bool ewa = options.kernel == splat::Kernel::kEwa;
-  std::vector<Step> steps{{ewa ? &parts_->programs.ewa : &parts_->programs.keys, kResolving, 0}};
-  if (options.finish.fill) steps.push_back({&parts_->programs.fill, kFilling, splat::kFillReach});
-  if (options.finish.smooth) steps.push_back({&parts_->programs.smooth, kSmoothing, 1});
-  if (options.finish.antialias) steps.push_back({&parts_->programs.antialias, kAntialiasing, 1});
+  const bool sums = splat::traits_of(options.kernel).passes == splat::Passes::kSums;
+  const Programs& programs = parts_->programs;
+  std::vector<Step> steps{{sums ? &programs.of(options.kernel).resolve : &programs.keys, kResolving, 0}};
+  if (options.finish.fill) steps.push_back({&programs.fill, kFilling, splat::kFillReach});
+  if (options.finish.smooth) steps.push_back({&programs.smooth, kSmoothing, 1});
+  if (options.finish.antialias) steps.push_back({&programs.antialias, kAntialiasing, 1});
 
   const auto bind = [](uint32_t unit, uint32_t texture) {
     glActiveTexture(GL_TEXTURE0 + unit);
     glBindTexture(GL_TEXTURE_2D, texture);
   };
-  if (ewa) {
+  if (sums) {
     bind(1, parts_->targets.sums(1));
     bind(0, parts_->targets.sums(0));
   } else {
@@ -139,7 +140,7 @@ Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& cam
                         const splat::RenderOptions& options, const image::Shading& shading, bool with_depth) {
   frame_ = {};
   if (const Status resized = parts_->targets.resize(camera.width, camera.height); !resized) return resized;
-  if (options.kernel == splat::Kernel::kEwa)
+  if (splat::traits_of(options.kernel).passes == splat::Passes::kSums)
     if (const Status made = parts_->targets.make_sums(); !made) return made;
   // What others may have left in a shared context.
   for (const GLenum off : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE,

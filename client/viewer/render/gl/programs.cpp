@@ -51,57 +51,93 @@ std::string constants() {
   return out;
 }
 
+using Parts = std::vector<std::string_view>;
+
+Parts joined(Parts parts, const Parts& more) {
+  parts.insert(parts.end(), more.begin(), more.end());
+  return parts;
+}
+
+// The shaders of one kernel, without what all shaders share. A row of the table below.
+struct KernelShaders {
+  splat::Kernel kernel;
+  Parts vertex, fragment;          // of KernelPrograms::splat
+  Parts sum_vertex, sum_fragment;  // of KernelPrograms::sum
+  Parts resolve;                   // of KernelPrograms::resolve
+};
+
+// distance2: the body of KernelTraits::flat_distance2 for an offset d.
+KernelShaders flat(splat::Kernel kernel, std::string_view distance2) {
+  return {kernel, {distance2, kFlatVertex}, {distance2, kFlatFragment}, {}, {}, {}};
+}
+Parts surfel_vertex(std::string_view main) { return {kContour, kSurfel, kConicOut, kConicVertex, main}; }
+Parts surfel_fragment(std::string_view main) { return {kConicIn, kConicFragment, main}; }
+
+std::vector<KernelShaders> kernel_shaders() {
+  return {
+      flat(splat::Kernel::kSquare, "#define DISTANCE2(d) max((d).x * (d).x, (d).y * (d).y)\n"),
+      flat(splat::Kernel::kDisc, "#define DISTANCE2(d) dot(d, d)\n"),
+      {splat::Kernel::kEllipse, surfel_vertex(kEllipseVertex), surfel_fragment(kEllipseFragment), {}, {}, {}},
+      {splat::Kernel::kEwa,
+       surfel_vertex(kEwaVisibilityVertex),
+       surfel_fragment(kEwaVisibilityFragment),
+       surfel_vertex(kEwaSumVertex),
+       surfel_fragment(kEwaSumFragment),
+       {kEwaResolve}},
+  };
+}
+
+// Links programs. A failure leaves an empty program and its text; the first one is reported.
+class Linker {
+ public:
+  // Splats: points that cover squares of pixels.
+  gl::Program splats(const std::string& name, const Parts& vertex, const Parts& fragment) {
+    return link(name, joined({kVersion, shared_, kView, kKeys, kPoints}, vertex),
+                joined({kVersion, shared_, kView, kKeys}, fragment));
+  }
+  FramePass pass(const std::string& name, const Parts& resolve) {
+    return {ending(name, resolve, kToPairs), ending(name, resolve, kToOutput)};
+  }
+  KernelPrograms kernel(const KernelShaders& shaders) {
+    const splat::KernelTraits& traits = splat::traits_of(shaders.kernel);
+    const std::string name(traits.name), contour = contour_of(traits);
+    if (traits.passes == splat::Passes::kKeys)
+      return {splats(name, joined({contour}, shaders.vertex), joined({contour}, shaders.fragment)), {}, {}};
+    return {splats(name + " visibility", shaders.vertex, shaders.fragment),
+            splats(name + " sum", shaders.sum_vertex, shaders.sum_fragment), pass(name, shaders.resolve)};
+  }
+  const std::string& failed() const { return failed_; }
+
+ private:
+  static std::string contour_of(const splat::KernelTraits& traits) {
+    return fmt::format("#define CONTOUR_R2(size) ({:.9e} * (size) * (size))\n", traits.flat_contour_r2);
+  }
+  gl::Program ending(const std::string& name, const Parts& resolve, std::string_view end) {
+    return link(name, {kVersion, kWholeFrame}, joined(joined({kVersion, shared_, kView, kKeys}, resolve), {end}));
+  }
+  gl::Program link(const std::string& name, const Parts& vertex, const Parts& fragment) {
+    auto made = gl::Program::link(name, {{GL_VERTEX_SHADER, vertex}, {GL_FRAGMENT_SHADER, fragment}});
+    if (made) return std::move(*made);
+    if (failed_.empty()) failed_ = made.error().text;
+    return gl::Program();
+  }
+
+  const std::string shared_ = constants();
+  std::string failed_;
+};
+
 }  // namespace
 
 Result<Programs> Programs::make() {
-  const std::string shared = constants();
-  std::string failed;
-  // A failure leaves an empty program and its text; the first one is reported.
-  const auto link = [&](const char* name, const std::vector<gl::ShaderSource>& stages) {
-    auto made = gl::Program::link(name, stages);
-    if (made) return std::move(*made);
-    if (failed.empty()) failed = made.error().text;
-    return gl::Program();
-  };
-  using Parts = std::vector<std::string_view>;
-  const auto splats = [&](const char* name, const Parts& for_vertices, const Parts& for_fragments) {
-    Parts vertex{kVersion, shared, kView, kKeys, kPoints}, fragment{kVersion, shared, kView, kKeys};
-    vertex.insert(vertex.end(), for_vertices.begin(), for_vertices.end());
-    fragment.insert(fragment.end(), for_fragments.begin(), for_fragments.end());
-    return link(name, {{GL_VERTEX_SHADER, vertex}, {GL_FRAGMENT_SHADER, fragment}});
-  };
-  const auto flat = [&](const char* name, std::string_view metric) {
-    return splats(name, {metric, kFlatVertex}, {metric, kFlatFragment});
-  };
-  const auto surfels = [&](const char* name, std::string_view vertex, std::string_view fragment) {
-    return splats(name, {kContour, kSurfel, kConicOut, kConicVertex, vertex}, {kConicIn, kConicFragment, fragment});
-  };
-  const auto pass = [&](const char* name, const Parts& resolve) {
-    const auto ending = [&](const Parts& end) {
-      Parts parts{kVersion, shared, kView, kKeys};
-      parts.insert(parts.end(), resolve.begin(), resolve.end());
-      parts.insert(parts.end(), end.begin(), end.end());
-      return link(name, {{GL_VERTEX_SHADER, {kVersion, kWholeFrame}}, {GL_FRAGMENT_SHADER, parts}});
-    };
-    return Programs::Pass{ending({kToPairs}), ending({kToOutput})};
-  };
-
+  Linker linker;
   Programs p;
-  p.square = flat("square",
-                  "#define DISTANCE2(d) max((d).x * (d).x, (d).y * (d).y)\n"
-                  "#define CONTOUR_R2(size) (0.5 * (size) * (size))\n");
-  p.disc = flat("disc",
-                "#define DISTANCE2(d) dot(d, d)\n"
-                "#define CONTOUR_R2(size) (0.25 * (size) * (size))\n");
-  p.ellipse = surfels("ellipse", kEllipseVertex, kEllipseFragment);
-  p.ewa_visibility = surfels("ewa visibility", kEwaVisibilityVertex, kEwaVisibilityFragment);
-  p.ewa_sum = surfels("ewa sum", kEwaSumVertex, kEwaSumFragment);
-  p.keys = pass("keys", {kResolve});
-  p.ewa = pass("ewa", {kEwaResolve});
-  p.fill = pass("fill", {kFinish, kFill});
-  p.smooth = pass("smooth", {kFinish, kSmooth});
-  p.antialias = pass("antialias", {kFinish, kAntialias});
-  if (!failed.empty()) return Error{failed};
+  for (const KernelShaders& shaders : kernel_shaders())
+    p.kernels[static_cast<size_t>(shaders.kernel)] = linker.kernel(shaders);
+  p.keys = linker.pass("keys", {kResolve});
+  p.fill = linker.pass("fill", {kFinish, kFill});
+  p.smooth = linker.pass("smooth", {kFinish, kSmooth});
+  p.antialias = linker.pass("antialias", {kFinish, kAntialias});
+  if (!linker.failed().empty()) return Error{linker.failed()};
   return p;
 }
 

@@ -1,19 +1,31 @@
 // All programs of the GL renderer, from the sources in shaders/.
 #pragma once
 
+#include <array>
+
 #include "common/gl/program.h"
+#include "common/splat/kernel_traits.h"
 
 namespace telesplat::viewer {
 
+/// A whole-frame pass: the last one of a frame writes the output, the others pairs.
+struct FramePass {
+  gl::Program to_pairs, to_output;
+};
+
+/// What draws the splats of one kernel. Passes::kKeys needs `splat` alone.
+struct KernelPrograms {
+  gl::Program splat;  ///< writes keys, or (Passes::kSums) the depth of opaque splats
+  gl::Program sum;    ///< adds up what is visible
+  FramePass resolve;  ///< shades the sums
+};
+
 struct Programs {
-  gl::Program square, disc, ellipse;
-  gl::Program ewa_visibility, ewa_sum;
-  /// A whole-frame pass: the last one of a frame writes the output, the others pairs.
-  struct Pass {
-    gl::Program to_pairs, to_output;
-  };
-  Pass keys, ewa;                ///< shading of what splatting left: keys, or sums
-  Pass fill, smooth, antialias;  ///< the finish
+  std::array<KernelPrograms, splat::kKernels.size()> kernels;  ///< by splat::Kernel
+  FramePass keys;                                              ///< shades keys
+  FramePass fill, smooth, antialias;                           ///< the finish
+
+  const KernelPrograms& of(splat::Kernel kernel) const { return kernels[static_cast<size_t>(kernel)]; }
 
   /// Fails with the compiler's words.
   static Result<Programs> make();

@@ -3,16 +3,12 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cmath>
 #include <cstring>
-#include <glm/geometric.hpp>
-#include <glm/vec4.hpp>
 #include <numeric>
 
 #include "common/splat/ewa/shading.h"
-#include "common/splat/splat_table.h"
+#include "common/splat/item_figures.h"
 #include "common/splat/surfel/splat.h"
 
 namespace telesplat::viewer {
@@ -27,59 +23,30 @@ void bind(const gl::StreamBuffer& stream, GLenum target, uint32_t binding, const
   glBindBufferRange(target, binding, stream.buffer(), slice.offset, static_cast<GLsizeiptr>(slice.bytes));
 }
 
-// Of one item: what does not depend on where its points lie. spacing_px: between its samples on the screen.
-DrawRecord record(const splat::DrawItem& item, float spacing_px, splat::Kernel kernel,
-                  const splat::SurfelCamera& camera) {
+// What does not depend on where the item's points lie.
+DrawRecord record(const splat::ItemFigures& item) {
   DrawRecord d{};
-  // Squares stay as they are, not smoothed: the fast kernel shows its samples plainly.
-  d.spacing = kernel == splat::Kernel::kSquare ? 0 : splat::spacing_class(spacing_px);
-  if (kernel == splat::Kernel::kEllipse || kernel == splat::Kernel::kEwa) {
-    const splat::SurfelSource source = splat::surfel_source(camera, item.radius_m, item.to_eye);
-    std::copy(source.to_eye.begin(), source.to_eye.end(), d.source);
-    d.source[3] = source.radius_m;
-    return d;
+  d.spacing = item.spacing;
+  if (item.flat) {
+    d.size = item.flat->size;
+    d.side = item.flat->side;
+    d.bias_growth = static_cast<float>(item.flat->bias_growth);
+    d.sub_steps = 1 << item.flat->sub_bits;
+  } else {
+    std::copy(item.source.to_eye.begin(), item.source.to_eye.end(), d.source);
+    d.source[3] = item.source.radius_m;
   }
-  d.size = splat::square_size(item.splat_px);
-  d.side = static_cast<int>(std::ceil(d.size));
-  d.bias_growth = static_cast<float>(splat::splat_bias_growth(d.side, camera.focal_x));
-  d.sub_steps = 1 << splat::sub_bits(d.side);
   return d;
 }
 
-// Mean bias on the contour for each class of spacing, by points: the same figures as the CPU splatter's.
-class MeanBias {
- public:
-  MeanBias(splat::Kernel kernel, const geometry::Camera& camera)
-      : kernel_(kernel), camera_(camera), depth_row_(camera.room_to_pixel().w) {}
-
-  void add(const splat::DrawItem& item, const DrawRecord& d) {
-    double bias = 0;
-    if (kernel_ == splat::Kernel::kEwa) return;
-    if (kernel_ == splat::Kernel::kEllipse) {
-      // Ellipses differ from point to point: the item's at its leaf's centre stands for them.
-      const auto depth_m = static_cast<float>(glm::dot(depth_row_, glm::dvec4(item.cluster->leaf_room.centre(), 1)));
-      if (!(depth_m >= static_cast<float>(camera_.near_m))) return;
-      bias = splat::ellipse_bias(item.radius_m, depth_m);
-    } else if (d.side > 1) {
-      const double contour_r2 = (kernel_ == splat::Kernel::kDisc ? 0.25 : 0.5) * double{d.size} * double{d.size};
-      bias = splat::splat_bias(contour_r2, d.side, camera_.focal_x());
-    }
-    bias_[d.spacing] += bias * item.level.count;
-    points_[d.spacing] += item.level.count;
-  }
-  splat::RimBias rim() const {
-    splat::RimBias rim{};
-    for (size_t i = 0; i < rim.size(); ++i)
-      if (points_[i] > 0) rim[i] = static_cast<uint32_t>(std::lround(bias_[i] / points_[i]));
-    return rim;
-  }
-
- private:
-  splat::Kernel kernel_;
-  const geometry::Camera& camera_;
-  glm::dvec4 depth_row_;
-  std::array<double, 4> bias_{}, points_{};
-};
+ClusterRecord record(const splat::LeafTransform& t, const glm::vec3& facing) {
+  ClusterRecord cluster;
+  std::copy(t.x.begin(), t.x.end(), cluster.row_x);
+  std::copy(t.y.begin(), t.y.end(), cluster.row_y);
+  std::copy(t.w.begin(), t.w.end(), cluster.row_w);
+  cluster.facing[0] = facing.x, cluster.facing[1] = facing.y, cluster.facing[2] = facing.z, cluster.facing[3] = 0;
+  return cluster;
+}
 
 void clear_depth_and_test() {
   glEnable(GL_DEPTH_TEST);
@@ -109,29 +76,21 @@ SplatPasses::~SplatPasses() {
 
 splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geometry::Camera& camera,
                                         splat::Kernel kernel) {
-  const splat::SurfelCamera surfel_camera = splat::surfel_camera(camera);
   const auto clusters = take<ClusterRecord>(stream_, runs_.runs.size());
   const auto draws = take<DrawRecord>(stream_, list.items.size());
-  MeanBias bias(kernel, camera);
+  splat::FrameFigures figures(splat::traits_of(kernel), camera, list.scale);
   for (auto& commands : commands_by_arena_) commands.clear();
   for (uint32_t r = 0; r < runs_.runs.size(); ++r) {
-    const splat::LeafTransform& t = runs_.transforms[r];
-    ClusterRecord cluster;
-    std::copy(t.x.begin(), t.x.end(), cluster.row_x);
-    std::copy(t.y.begin(), t.y.end(), cluster.row_y);
-    std::copy(t.w.begin(), t.w.end(), cluster.row_w);
-    const glm::vec3& facing = runs_.facing[r];
-    cluster.facing[0] = facing.x, cluster.facing[1] = facing.y, cluster.facing[2] = facing.z, cluster.facing[3] = 0;
+    const ClusterRecord cluster = record(runs_.transforms[r], runs_.facing[r]);
     std::memcpy(clusters.data + r * sizeof cluster, &cluster, sizeof cluster);
     for (uint32_t i = runs_.runs[r].first; i < runs_.runs[r].last; ++i) {
       const splat::DrawItem& item = list.items[i];
       if (item.level.count == 0) continue;
       const PointRange range = arenas_.place(item, list.replica);
-      DrawRecord d = record(item, item.splat_px / list.scale, kernel, surfel_camera);
+      DrawRecord d = record(figures.add(item));
       d.word = range.word;
       d.count = item.arrays().count;
       d.cluster = r;
-      bias.add(item, d);
       std::memcpy(draws.data + i * sizeof d, &d, sizeof d);
       if (commands_by_arena_.size() <= range.arena) commands_by_arena_.resize(range.arena + 1);
       commands_by_arena_[range.arena].push_back({item.level.count, 1, item.first, i});
@@ -139,8 +98,12 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
   }
   bind(stream_, GL_SHADER_STORAGE_BUFFER, 1, draws);
   bind(stream_, GL_SHADER_STORAGE_BUFFER, 2, clusters);
+  write_commands(list.items.size());
+  return figures.rim();
+}
 
-  const auto commands = take<DrawCommand>(stream_, list.items.size());
+void SplatPasses::write_commands(size_t most) {
+  const auto commands = take<DrawCommand>(stream_, most);
   size_t written = 0;
   command_offsets_.clear();
   for (const auto& of_arena : commands_by_arena_) {
@@ -149,7 +112,6 @@ splat::RimBias SplatPasses::write_draws(const splat::DrawList& list, const geome
     if (bytes) std::memcpy(commands.data + written, of_arena.data(), bytes);
     written += bytes;
   }
-  return bias.rim();
 }
 
 void SplatPasses::write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
@@ -218,7 +180,7 @@ void SplatPasses::draw_points(const gl::Program& program) {
   }
 }
 
-void SplatPasses::splat_opaque(const FrameTargets& targets, const gl::Program& program) {
+void SplatPasses::splat_keys(const FrameTargets& targets, const gl::Program& program) {
   targets.draw_to(FrameTargets::kSplat);
   const GLuint empty[4] = {~0u, ~0u, ~0u, ~0u};
   glClearBufferuiv(GL_COLOR, 0, empty);
@@ -227,10 +189,10 @@ void SplatPasses::splat_opaque(const FrameTargets& targets, const gl::Program& p
   glDisable(GL_DEPTH_TEST);
 }
 
-void SplatPasses::splat_ewa(const FrameTargets& targets, const Programs& programs) {
+void SplatPasses::splat_sums(const FrameTargets& targets, const KernelPrograms& programs) {
   targets.draw_to(FrameTargets::kVisibility);
   clear_depth_and_test();
-  draw_points(programs.ewa_visibility);
+  draw_points(programs.splat);
   glDisable(GL_DEPTH_TEST);
 
   targets.draw_to(FrameTargets::kSumming);
@@ -242,22 +204,16 @@ void SplatPasses::splat_ewa(const FrameTargets& targets, const Programs& program
   glBlendFunc(GL_ONE, GL_ONE);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, targets.visible());
-  draw_points(programs.ewa_sum);
+  draw_points(programs.sum);
   glDisable(GL_BLEND);
 }
 
 void SplatPasses::splat(const FrameTargets& targets, const Programs& programs, splat::Kernel kernel) {
   glEnable(GL_PROGRAM_POINT_SIZE);
-  switch (kernel) {
-    case splat::Kernel::kSquare:
-      return splat_opaque(targets, programs.square);
-    case splat::Kernel::kDisc:
-      return splat_opaque(targets, programs.disc);
-    case splat::Kernel::kEllipse:
-      return splat_opaque(targets, programs.ellipse);
-    case splat::Kernel::kEwa:
-      return splat_ewa(targets, programs);
-  }
+  if (splat::traits_of(kernel).passes == splat::Passes::kSums)
+    splat_sums(targets, programs.of(kernel));
+  else
+    splat_keys(targets, programs.of(kernel).splat);
 }
 
 void SplatPasses::end_frame() {

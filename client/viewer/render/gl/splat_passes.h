@@ -9,8 +9,8 @@
 #include "common/gl/stream_buffer.h"
 #include "common/image/shading.h"
 #include "common/splat/item_runs.h"
+#include "common/splat/kernel_traits.h"
 #include "common/splat/pixel_key.h"
-#include "common/splat/render_options.h"
 
 namespace telesplat::viewer {
 
@@ -63,7 +63,7 @@ class SplatPasses {
   /// (draws), 2 (clusters), 3 (intensities).
   void prepare(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                const image::Shading& shading);
-  /// Opaque kernels: clears and writes targets.keys(); ewa: targets.sums().
+  /// Clears and writes targets.keys() or, for a kernel of Passes::kSums, targets.sums().
   void splat(const FrameTargets& targets, const Programs& programs, splat::Kernel kernel);
   /// After the frame's last pass.
   void end_frame();
@@ -75,12 +75,14 @@ class SplatPasses {
     uint32_t count, instances, first, base_instance;
   };
   splat::RimBias write_draws(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel);
+  /// At most `most` commands: those of commands_by_arena_.
+  void write_commands(size_t most);
   void write_view(const geometry::Camera& camera, const image::Shading& shading, float scale,
                   const splat::RimBias& rim);
   void number_draws(size_t count);
   void draw_points(const gl::Program& program);
-  void splat_opaque(const FrameTargets& targets, const gl::Program& program);
-  void splat_ewa(const FrameTargets& targets, const Programs& programs);
+  void splat_keys(const FrameTargets& targets, const gl::Program& program);
+  void splat_sums(const FrameTargets& targets, const KernelPrograms& programs);
 
   PointArenas arenas_;
   gl::StreamBuffer stream_;
