@@ -4,9 +4,7 @@
 
 int main(int argc, char** argv) {
   using namespace telesplat;
-  packer::PackerServiceOptions options;
-  options.service.name = "packer";
   return net::service_main(argc, argv,
                            "telesplat-packer: eliminates redundant samples, keeps the point model, publishes patches",
-                           options, packer::add_flags, packer::run);
+                           packer::PackerOptions{}, packer::table, packer::run);
 }

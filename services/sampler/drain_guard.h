@@ -12,13 +12,15 @@ namespace telesplat::sampler {
 
 /// A sampler that was told to stop begins no lease later than this,
 inline constexpr double kDrain_s = 0.8;
-/// and this long after it was told it ends, whatever it does: whoever manages it may wait two seconds before killing it.
+/// and this long after it was told it ends, whatever it does: whoever manages it may wait two seconds before killing
+/// it.
 inline constexpr double kStop_s = 1.3;
 
 class DrainGuard {
  public:
-  /// From then on watches net::stop_requested(). If the process still runs kStop_s after it was told to stop, says goodbye to the
-  /// master in the name of `instance`, so that its leases go to others at once, and ends the process with code 0.
+  /// From then on watches net::stop_requested(). If the process still runs kStop_s after it was told to stop, says
+  /// goodbye to the master in the name of `instance`, so that its leases go to others at once, and ends the process
+  /// with code 0.
   DrainGuard(const std::string& master, InstanceId instance);
   ~DrainGuard();
 

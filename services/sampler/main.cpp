@@ -4,9 +4,7 @@
 
 int main(int argc, char** argv) {
   using namespace telesplat;
-  sampler::SamplerServiceOptions options;
-  options.service.name = net::unique_name("sampler");
   return net::service_main(argc, argv,
                            "telesplat-sampler: samples tiles of requested views; run as many as there are machines",
-                           options, sampler::add_flags, sampler::run);
+                           sampler::SamplerOptions{}, sampler::table, sampler::run);
 }

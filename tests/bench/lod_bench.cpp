@@ -70,7 +70,8 @@ const Moving& moving(int which) {
     m.direct.push_back(sampler::render_directly(*sampler, camera, image::Shading({}, camera)));
     if (i % 30 != 0) continue;
     const geometry::Rect all{0, 0, kWidth, kHeight};
-    packer::SampledTile tile{{i + 1}, {1}, 0, 1, 1, camera, all, {}, {}, sampler->sample(camera, all)};
+    packer::SampledTile tile{{.frame = {i + 1}, .epoch = {1}, .tiles_in_frame = 1, .camera = camera, .rect = all},
+                             sampler->sample(camera, all)};
     CHECK(m.packer->submit(std::move(tile), 0).ok());
   }
   return m;

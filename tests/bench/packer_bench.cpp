@@ -52,9 +52,10 @@ void packer_frame(benchmark::State& state) {
 }
 BENCHMARK(packer_frame)->Arg(0)->Arg(1)->Iterations(16)->Unit(benchmark::kMillisecond);
 
-// Leases of rows, keep mode: a frame of 1024x640 arrives as messages of `rows` rows each, in blocks of 64; everything the packer does
-// but the sockets: messages decoded, blocks gathered, packed, encoded, inserted, what is too much forgotten, each row reported done.
-// 64 rows: tiles that are blocks, the baseline. Frames turn slowly, so that clusters have the six patches they may have.
+// Leases of rows, keep mode: a frame of 1024x640 arrives as messages of `rows` rows each, in blocks of 64; everything
+// the packer does but the sockets: messages decoded, blocks gathered, packed, encoded, inserted, what is too much
+// forgotten, each row reported done. 64 rows: tiles that are blocks, the baseline. Frames turn slowly, so that clusters
+// have the six patches they may have.
 void packer_rows(benchmark::State& state) {
   constexpr int kWidth = 1024, kHeight = 640, kBlock = 64, kViews = 8;
   const int rows = static_cast<int>(state.range(0));
@@ -87,17 +88,15 @@ void packer_rows(benchmark::State& state) {
       const auto m = wire::decode<wire::DepthTile>(std::as_bytes(std::span(body)));
       const wire::Lease& lease = m->lease;
       const std::span stream(reinterpret_cast<const uint8_t*>(m->image.data()), m->image.size());
-      auto got = gatherer.add({{frame},
-                               lease.epoch,
-                               uint32_t(lease.block),
-                               uint32_t(lease.blocks_in_frame),
-                               1,
-                               lease.camera,
-                               lease.block_rect,
-                               lease.viewer,
-                               lease.request,
-                               {}},
-                              lease.rect, stream);
+      const packer::FramePart block{.frame = {frame},
+                                    .epoch = lease.epoch,
+                                    .viewer = lease.viewer,
+                                    .request = lease.request,
+                                    .tile = uint32_t(lease.block),
+                                    .tiles_in_frame = uint32_t(lease.blocks_in_frame),
+                                    .camera = lease.camera,
+                                    .rect = lease.block_rect};
+      auto got = gatherer.add({block, {}}, lease.rect, stream);
       CHECK(got.ok() && got->has_value());
       samples += (*got)->samples;
       if ((*got)->block) {
@@ -123,7 +122,8 @@ void packer_rows(benchmark::State& state) {
 }
 BENCHMARK(packer_rows)->ArgName("rows")->Arg(1)->Arg(4)->Arg(64)->Unit(benchmark::kMillisecond);
 
-// What the packer decides once a second: 17000 clusters of six patches. Argument: how many per cent of the points must go.
+// What the packer decides once a second: 17000 clusters of six patches. Argument: how many per cent of the points must
+// go.
 void packer_choose_patches(benchmark::State& state) {
   packer::PatchObsolescence obsolescence;
   uint64_t points = 0, patches = 0;

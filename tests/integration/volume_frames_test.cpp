@@ -1,5 +1,5 @@
-// Frames of a volume over real sockets: two samplers fetch their slabs from a data server, splat leases, the packer joins what they send, a viewer
-// gets what splatting the slabs directly gives.
+// Frames of a volume over real sockets: two samplers fetch their slabs from a data server, splat leases, the packer
+// joins what they send, a viewer gets what splatting the slabs directly gives.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
-#include "services/packer/slices/packing.h"
+#include "services/packer/slices/slice_packing.h"
 #include "services/sampler/volume/shear/slabs.h"
 #include "services/sampler/volume/work.h"
 
@@ -106,9 +106,10 @@ TEST(VolumeFrames, AViewerGetsWhatTheSamplersSplat) {
              1, uint64_t(n), 2, uint64_t(cut[n]), uint64_t(cut[n + 1]), {{uint64_t(n), data_at, begin, end}}});
   }
   std::vector<wire::TileDone> done;
-  packer::VolumePacking packing(
+  packer::SlicePacking packing(
       {.tell = [&](const wire::TileDone& m) { done.push_back(m); },
-       .send = [&](const wire::SliceFrame& m, const std::string& peer) { return state.send(m, peer); },
+       .to_viewer = [&](std::string_view peer, std::string_view type,
+                        std::string body) { return state.send_frames(peer, type, std::move(body)); },
        .master_now = monotonic_s,
        .to_master_s = [](double at) { return at; }},
       spans);

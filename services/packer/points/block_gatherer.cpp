@@ -9,34 +9,20 @@
 namespace telesplat::packer {
 namespace {
 
-bool lies_in(const geometry::Rect& r, const geometry::Rect& outer) {
-  return r.width >= 1 && r.height >= 1 && r.width <= outer.width && r.height <= outer.height && r.x >= outer.x &&
-         r.y >= outer.y && r.x - outer.x <= outer.width - r.width && r.y - outer.y <= outer.height - r.height;
-}
-
 uint64_t covered(const image::DepthImage& image, size_t first, size_t count) {
   const auto begin = image.depth.begin() + static_cast<ptrdiff_t>(first);
   return count - static_cast<uint64_t>(std::count(begin, begin + static_cast<ptrdiff_t>(count), 0u));
 }
 
-std::string name_of(const SampledTile& block) {
-  return fmt::format("block {} of frame {}", block.tile, block.frame.value);
-}
+std::string name_of(const FramePart& block) { return name_of(block, "block"); }
 
-Status check(const SampledTile& block, const geometry::Rect& rect) {
-  if (Status camera = geometry::validate(block.camera); !camera)
-    return Error{fmt::format("{}: {}", name_of(block), camera.error().text)};
-  if (block.tiles_in_frame > kMaxTilesInFrame || block.tile >= block.tiles_in_frame)
-    return Error{fmt::format("frame {} has no block {} of {} (at most {})", block.frame.value, block.tile,
-                             block.tiles_in_frame, kMaxTilesInFrame)};
+Status check(const FramePart& block, const geometry::Rect& rect) {
+  if (const Status part = check(block, "block"); !part) return part;
   const geometry::Rect& b = block.rect;
-  if (!lies_in(b, {0, 0, block.camera.width, block.camera.height}))
-    return Error{fmt::format("{}: {}x{} pixels at ({}, {}) do not lie in the frame's {}x{}", name_of(block), b.width,
-                             b.height, b.x, b.y, block.camera.width, block.camera.height)};
   if (rect == b) return ok_status();
-  if (!lies_in(rect, b) || rect.width != b.width)
-    return Error{fmt::format("a tile of {}x{} pixels at ({}, {}) is not of whole rows of {}: {}x{} at ({}, {})",
-                             rect.width, rect.height, rect.x, rect.y, name_of(block), b.width, b.height, b.x, b.y)};
+  if (!geometry::contains(b, rect) || rect.width != b.width)
+    return Error{
+        fmt::format("a tile of {} is not of whole rows of {}: {}", describe(rect), name_of(block), describe(b))};
   const size_t pixels = static_cast<size_t>(b.width) * b.height;
   if (pixels > kMaxBlockPixels)
     return Error{fmt::format("{} has {} pixels, at most {} are gathered", name_of(block), pixels, kMaxBlockPixels)};
@@ -44,16 +30,15 @@ Status check(const SampledTile& block, const geometry::Rect& rect) {
 }
 
 // What an earlier tile of the same frame said.
-Status check_frame(const SampledTile& block, const SampledTile& earlier) {
+Status check_frame(const FramePart& block, const FramePart& earlier) {
   if (block.tiles_in_frame != earlier.tiles_in_frame)
     return Error{fmt::format("{} says its frame has {} blocks, earlier ones said {}", name_of(block),
                              block.tiles_in_frame, earlier.tiles_in_frame)};
   if (!(block.camera == earlier.camera) || block.step != earlier.step)
     return Error{fmt::format("{} has another camera than its frame", name_of(block))};
   if (block.tile == earlier.tile && !(block.rect == earlier.rect))
-    return Error{fmt::format("{} lies at ({}, {}), {}x{}, for one tile and at ({}, {}), {}x{}, for another",
-                             name_of(block), block.rect.x, block.rect.y, block.rect.width, block.rect.height,
-                             earlier.rect.x, earlier.rect.y, earlier.rect.width, earlier.rect.height)};
+    return Error{fmt::format("{} is {} for one tile and {} for another", name_of(block), describe(block.rect),
+                             describe(earlier.rect))};
   return ok_status();
 }
 
@@ -64,7 +49,7 @@ BlockGatherer::Frame* BlockGatherer::find(FrameId id) {
   return found == frames_.end() ? nullptr : &*found;
 }
 
-// Drops the oldest frames, but not this one, until a block of so many pixels fits in.
+// Drops the oldest frames, but not this one, until a block of `pixels` pixels fits in.
 void BlockGatherer::make_room(FrameId frame, size_t pixels) {
   const bool is_new = find(frame) == nullptr;
   for (auto oldest = frames_.begin(); oldest != frames_.end();) {

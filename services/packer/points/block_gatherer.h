@@ -1,4 +1,5 @@
-// Puts the tiles of a block together: samplers lease single rows, what is packed and published at once is a block of them.
+// Puts the tiles of a block together: samplers lease single rows, what is packed and published at once is a block of
+// them.
 #pragma once
 
 #include <deque>
@@ -6,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "services/packer/points/packer_core.h"
+#include "services/packer/points/sampled_tile.h"
 
 namespace telesplat::packer {
 
@@ -34,9 +35,9 @@ class BlockGatherer {
   /// Decodes a tile and puts its rows in their place; rows that are there already stay as they are.
   ///   block: what the tile says of its block: all of SampledTile but the image; `rect` and `tile` are the block's.
   ///   rect: the tile, in the frame: whole rows of the block.
-  /// A tile that is its block passes through without a copy. Nothing: all of its rows are there (it is not even decoded). Error:
-  /// camera, rectangles, block or stream do not fit together, or not with earlier tiles; nothing has changed then.
-  /// Precondition: the block was not packed yet (PackerCore::has).
+  /// A tile that is its block passes through without a copy. Nothing: all of its rows are there (it is not even
+  /// decoded). Error: camera, rectangles, block or stream do not fit together, or not with earlier tiles; nothing has
+  /// changed then. Precondition: the block was not packed yet (PackerCore::has).
   Result<std::optional<Gathered>> add(SampledTile block, const geometry::Rect& rect, std::span<const uint8_t> stream);
 
   void clear();

@@ -16,8 +16,8 @@ bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequenc
 }  // namespace
 
 uint64_t EventLog::Patch::bytes() const {
-  return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() + forgotten.capacity() * sizeof forgotten[0] +
-         patch_forgotten.capacity() * sizeof patch_forgotten[0];
+  return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() +
+         forgotten.capacity() * sizeof forgotten[0] + patch_forgotten.capacity() * sizeof patch_forgotten[0];
 }
 
 uint64_t EventLog::bytes() const {
@@ -160,6 +160,23 @@ std::vector<Event> EventLog::patch_forgets(Sequence after, bool from_nothing) co
     out.back().frames.push_back(frame);
   }
   return out;
+}
+
+std::unordered_set<Sequence> oldest_patches(const std::unordered_map<Sequence, double>& used_s, const EventLog& log,
+                                            uint64_t max_bytes) {
+  std::unordered_set<Sequence> chosen;
+  uint64_t bytes = log.patch_bytes();
+  if (bytes <= max_bytes) return chosen;
+  std::vector<std::pair<double, Sequence>> oldest_first;
+  for (const auto& [sequence, at_s] : used_s) oldest_first.emplace_back(at_s, sequence);
+  std::sort(oldest_first.begin(), oldest_first.end());
+  const uint64_t limit = max_bytes / 10 * 9 + max_bytes % 10 * 9 / 10;
+  for (const auto& [at_s, sequence] : oldest_first) {
+    if (bytes <= limit) break;
+    bytes -= log.patches().at(sequence).bytes();
+    chosen.insert(sequence);
+  }
+  return chosen;
 }
 
 }  // namespace telesplat::packer

@@ -2,16 +2,19 @@
 //
 // Forgetting a cluster wipes what patches put there before. So a replica comes to the present state by applying, in
 // order, every patch that has a point left and, for each cluster, its last forget: earlier forgets of it are covered by
-// the last one, and a patch whose every cluster was forgotten later leaves nothing behind. Where single patches of clusters are
-// forgotten the same holds for each of those; but there is no end to them, so that forgets of them are kept for a while only, but
-// for those of which some other cluster's points are alive: they stay with their event.
+// the last one, and a patch whose every cluster was forgotten later leaves nothing behind. The same holds where single
+// patches of clusters are forgotten. There is no end to those forgets, so they are kept for a while only. A patch that
+// still has points in another cluster keeps its own.
 #pragma once
 
 #include <deque>
 #include <map>
+#include <optional>
+#include <span>
 #include <unordered_map>
+#include <unordered_set>
 
-#include "services/packer/points/packer_core.h"
+#include "services/packer/points/event.h"
 
 namespace telesplat::packer {
 
@@ -30,7 +33,7 @@ class EventLog {
   void add_patch_forget(const Event& event, std::span<const points::Cluster> dropped);
   void add_epoch(const Event& event);
 
-  /// False for a replica of which it is not known any more what it would have to forget.
+  /// False: it is not known any more what a replica as of `after` would have to forget.
   bool remembers(Sequence after) const;
   /// See PackerCore::events_since.
   std::vector<Event> since(Sequence after) const;
@@ -43,7 +46,7 @@ class EventLog {
     uint64_t bytes() const;  ///< with its places in patches_of_clusters()
   };
   const std::map<Sequence, Patch>& patches() const { return patches_; }
-  /// Of each cluster that has points, the patches that brought them.
+  /// The patches that brought the points of each cluster that has any.
   const std::unordered_map<points::ClusterKey, std::vector<Sequence>>& patches_of_clusters() const {
     return patches_of_;
   }
@@ -65,5 +68,10 @@ class EventLog {
   std::optional<Event> epoch_;       // the newest one: everything before it is void
   uint64_t patch_bytes_ = 0;
 };
+
+/// The patches least recently used, until the others have at most 90 % of max_bytes; none if all have no more than
+/// max_bytes. used_s: when each patch of the log was used last.
+std::unordered_set<Sequence> oldest_patches(const std::unordered_map<Sequence, double>& used_s, const EventLog& log,
+                                            uint64_t max_bytes);
 
 }  // namespace telesplat::packer

@@ -17,7 +17,7 @@ bool FrameBook::has(FrameId id, uint32_t tile) const {
   return frame && tile < frame->has_tile.size() && frame->has_tile[tile];
 }
 
-Status FrameBook::check(const SampledTile& tile) const {
+Status FrameBook::check(const FramePart& tile) const {
   const Frame* frame = find(tile.frame);
   if (!frame) return ok_status();
   if (frame->has_tile.size() != tile.tiles_in_frame)
@@ -28,7 +28,7 @@ Status FrameBook::check(const SampledTile& tile) const {
   return ok_status();
 }
 
-FrameBook::Frame FrameBook::add(const SampledTile& tile, const splat::Elimination& elimination) {
+FrameBook::Frame FrameBook::add(const FramePart& tile, const splat::Elimination& elimination) {
   if (!find(tile.frame)) {
     if (open_.size() == kMaxOpenFrames) open_.pop_front();
     open_.push_back({tile.frame, tile.camera, std::vector<bool>(tile.tiles_in_frame), tile.tiles_in_frame});

@@ -5,12 +5,13 @@
 #include <unordered_set>
 #include <vector>
 
-#include "services/packer/points/packer_core.h"
+#include "common/splat/reference_depth.h"
+#include "services/packer/points/frame_part.h"
 
 namespace telesplat::packer {
 
-/// Unfinished frames remembered: more than viewers have under way at once. Of an older one the tiles are forgotten;
-/// should one come twice then, elimination makes little of it.
+/// Unfinished frames remembered: more than viewers have under way at once. The tiles of an older one are forgotten; if
+/// one of them comes twice then, elimination makes little of it.
 inline constexpr size_t kMaxOpenFrames = 64;
 /// Finished frames remembered, to tell duplicates that come late.
 inline constexpr size_t kMaxFinishedFrames = 4096;
@@ -28,10 +29,10 @@ class FrameBook {
   /// True if this tile was packed before.
   bool has(FrameId frame, uint32_t tile) const;
   /// Refuses a tile whose frame was said to have another camera or another number of tiles.
-  Status check(const SampledTile& tile) const;
+  Status check(const FramePart& tile) const;
   /// Notes the tile as packed. Returns its frame as it is then; finished and forgotten if tiles_left is 0.
   /// Preconditions: not a duplicate, checked, tile < tiles_in_frame.
-  Frame add(const SampledTile& tile, const splat::Elimination& elimination);
+  Frame add(const FramePart& tile, const splat::Elimination& elimination);
   void clear();
 
  private:

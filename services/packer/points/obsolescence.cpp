@@ -1,7 +1,6 @@
 #include "services/packer/points/obsolescence.h"
 
 #include <algorithm>
-#include <unordered_set>
 
 namespace telesplat::packer {
 
@@ -46,18 +45,7 @@ std::vector<points::ClusterKey> Obsolescence::choose_patches(const EventLog& log
       if (!is_new) at->second = std::max(at->second, access_s);
     }
   }
-  std::vector<std::pair<double, Sequence>> oldest_first;
-  for (const auto& [sequence, access_s] : used_s) oldest_first.emplace_back(access_s, sequence);
-  std::sort(oldest_first.begin(), oldest_first.end());
-
-  std::unordered_set<Sequence> chosen;
-  uint64_t bytes = log.patch_bytes();
-  const uint64_t limit = max_bytes / 10 * 9 + max_bytes % 10 * 9 / 10;
-  for (const auto& [access_s, sequence] : oldest_first) {
-    if (bytes <= limit) break;
-    bytes -= log.patches().at(sequence).bytes();
-    chosen.insert(sequence);
-  }
+  const std::unordered_set<Sequence> chosen = oldest_patches(used_s, log, max_bytes);
   std::vector<points::ClusterKey> out;
   for (const auto& [key, patches] : log.patches_of_clusters())
     if (std::any_of(patches.begin(), patches.end(), [&](Sequence s) { return chosen.count(s) != 0; }))

@@ -15,25 +15,16 @@
 namespace telesplat::packer {
 namespace {
 
-Status check(const SampledTile& t) {
-  if (Status camera = geometry::validate(t.camera); !camera)
-    return Error{fmt::format("tile {} of frame {}: {}", t.tile, t.frame.value, camera.error().text)};
-  if (t.tiles_in_frame > kMaxTilesInFrame || t.tile >= t.tiles_in_frame)
-    return Error{fmt::format("frame {} has no tile {} of {} (at most {})", t.frame.value, t.tile, t.tiles_in_frame,
-                             kMaxTilesInFrame)};
-  const geometry::Rect& r = t.rect;
-  if (r.x < 0 || r.y < 0 || r.width < 1 || r.height < 1 || r.width > t.camera.width || r.height > t.camera.height ||
-      r.x > t.camera.width - r.width || r.y > t.camera.height - r.height)
-    return Error{fmt::format("tile {} of frame {}: {}x{} pixels at ({}, {}) do not lie in the frame's {}x{}", t.tile,
-                             t.frame.value, r.width, r.height, r.x, r.y, t.camera.width, t.camera.height)};
-  const size_t pixels = static_cast<size_t>(r.width) * r.height;
+// Defence in depth: what came over the network was checked there, too.
+Status check_tile(const SampledTile& t) {
+  if (const Status part = check(t, "tile"); !part) return part;
+  const size_t pixels = static_cast<size_t>(t.rect.width) * t.rect.height;
   if (pixels > codec::kMaxPixels)
-    return Error{fmt::format("tile {} of frame {} has {} pixels, at most {} are coded", t.tile, t.frame.value, pixels,
-                             codec::kMaxPixels)};
-  if (t.image.width != r.width || t.image.height != r.height || t.image.depth.size() != pixels ||
+    return Error{fmt::format("{} has {} pixels, at most {} are coded", name_of(t, "tile"), pixels, codec::kMaxPixels)};
+  if (t.image.width != t.rect.width || t.image.height != t.rect.height || t.image.depth.size() != pixels ||
       t.image.colour.size() != pixels || t.image.normal.size() != pixels)
-    return Error{fmt::format("tile {} of frame {}: its image has {}x{} pixels, its rectangle {}x{}", t.tile,
-                             t.frame.value, t.image.width, t.image.height, r.width, r.height)};
+    return Error{fmt::format("{}: its image has {}x{} pixels, its rectangle {}x{}", name_of(t, "tile"), t.image.width,
+                             t.image.height, t.rect.width, t.rect.height)};
   return ok_status();
 }
 
@@ -50,7 +41,7 @@ struct PackerCore::Impl {
   Obsolescence obsolescence;             // of clusters, kEliminate
   PatchObsolescence patch_obsolescence;  // kKeep
   Statistics statistics;
-  std::vector<float> reference_depth_m;              // kept for its memory
+  std::vector<float> reference_depth_m;               // kept for its memory
   std::vector<points::ClusterKey> clusters_of_patch;  // likewise
   struct CoarsePass {
     FrameId frame;
@@ -77,7 +68,8 @@ struct PackerCore::Impl {
       return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
     }
     // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters
-    // outside the tile's frustum cost next to nothing. It has a pixel more on each side, inside the frame, for the tile's border.
+    // outside the tile's frustum cost next to nothing. It has a pixel more on each side, inside the frame, for the
+    // tile's border.
     const geometry::Rect& r = tile.rect;
     const int left = std::min(r.x, 1), top = std::min(r.y, 1);
     const int right = std::min(tile.camera.width - r.x - r.width, 1),
@@ -112,10 +104,8 @@ struct PackerCore::Impl {
     const splat::Elimination elimination = eliminate(tile);
     Event event = next_event(Event::Kind::kPatch);
     const FrameBook::Frame frame = frames.add(tile, elimination);
-    event.frame = tile.frame, event.viewer = tile.viewer, event.request = tile.request;
-    event.tile = tile.tile, event.tiles_in_frame = tile.tiles_in_frame, event.step = tile.step;
+    static_cast<FramePart&>(event) = tile;
     event.frame_complete = frame.tiles_left == 0;
-    event.camera = tile.camera, event.rect = tile.rect;
     event.samples = elimination.samples, event.kept = elimination.kept;
     event.frame_samples = frame.samples, event.frame_kept = frame.kept;
     const bool as_it_came = stream && keeps();
@@ -198,7 +188,7 @@ Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, 
     ++i.statistics.tiles_other_epoch;
     return std::optional<Event>();
   }
-  Status good = check(tile);
+  Status good = check_tile(tile);
   if (good && i.frames.has(tile.frame, tile.tile)) {
     ++i.statistics.tiles_duplicate;
     return std::optional<Event>();

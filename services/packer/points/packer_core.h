@@ -8,19 +8,13 @@
 #include <span>
 #include <vector>
 
-#include "common/core/ids.h"
 #include "common/core/result.h"
-#include "common/geometry/camera.h"
-#include "common/image/depth_image.h"
 #include "common/points/point_model.h"
 #include "common/splat/reference_depth.h"
+#include "services/packer/points/event.h"
+#include "services/packer/points/sampled_tile.h"
 
 namespace telesplat::packer {
-
-/// More tiles than this a frame are refused.
-inline constexpr uint32_t kMaxTilesInFrame = 1u << 16;
-/// A forget event names at most this many clusters; more become several events.
-inline constexpr size_t kMaxForgetKeys = 1u << 16;
 
 enum class Redundancy {
   kEliminate,  ///< T4.3.1: only what the model does not show yet is packed
@@ -30,57 +24,20 @@ enum class Redundancy {
 struct Config {
   points::ModelConfig model;
   Redundancy redundancy = Redundancy::kEliminate;
-  float relative_epsilon = 0.005f;  ///< of T4.3.1, as a fraction of the depth
+  float relative_epsilon = 0.005f;               ///< of T4.3.1, as a fraction of the depth
   float nearest_sample = splat::kNearestSample;  ///< pixels: of splat::eliminate_redundancy
-  double obsolete_after_s = 0;      ///< clusters that nobody drew for so long are forgotten; 0 = never (T4.3.3)
-  uint64_t max_points = 0;  ///< above it, least recently drawn clusters are forgotten down to 90 % of it; 0 = no limit
-  uint64_t max_log_bytes = 0;  ///< of the patches kept for events_since(): above it, those least recently drawn are
-                               ///< forgotten with their clusters, down to 90 % of it; 0 = no limit
-  // kKeep only: there single patches of clusters are forgotten, highest score first (patch_obsolescence.h). obsolete_after_s,
-  // max_points and max_log_bytes are then of patches too.
+  /// Clusters that nobody drew for longer are forgotten; 0: never (T4.3.3).
+  double obsolete_after_s = 0;
+  /// Above it the least recently drawn clusters are forgotten, down to 90 % of it; 0: no limit.
+  uint64_t max_points = 0;
+  /// Of the patches kept for events_since(). Above it those least recently drawn are forgotten with their clusters,
+  /// down to 90 % of it; 0: no limit.
+  uint64_t max_log_bytes = 0;
+  // With kKeep single patches of clusters are forgotten instead, highest score first (patch_obsolescence.h); the three
+  // limits above are then about patches.
   double age_weight = 1, rate_weight = 4;
-  uint32_t patches_per_cluster = 6;  ///< at most; 0 = no limit
-  int threads = 1;                   ///< for reference depth maps; 0 = all cores
-};
-
-/// A tile as a sampler sent it, decoded.
-struct SampledTile {
-  FrameId frame;
-  EpochId epoch;
-  uint32_t tile = 0, tiles_in_frame = 0;
-  uint32_t step = 1;        ///< the frame has every step-th pixel of every step-th row of the view
-  geometry::Camera camera;  ///< of the whole frame
-  geometry::Rect rect;      ///< the tile in it
-  InstanceId viewer;        ///< who asked, and with which request: handed through to the event
-  RequestId request;
-  image::DepthImage image;  ///< canonical, of rect's size
-};
-
-/// What replicas apply, in order of sequence.
-struct Event {
-  enum class Kind { kPatch, kForget, kEpoch };
-
-  Sequence sequence;
-  Kind kind = Kind::kPatch;
-  EpochId epoch;
-
-  // kPatch
-  FrameId frame;
-  InstanceId viewer;
-  RequestId request;
-  uint32_t tile = 0, tiles_in_frame = 0;
-  uint32_t step = 1;
-  bool frame_complete = false;                       ///< the last tile of its frame to be packed
-  geometry::Camera camera;                           ///< of the whole frame
-  geometry::Rect rect;                               ///< the tile in it
-  std::shared_ptr<const std::vector<uint8_t>> blob;  ///< codec stream of the tile, eliminated pixels not covered
-  uint64_t samples = 0, kept = 0;                    ///< covered pixels before and after elimination, of this tile
-  uint64_t frame_samples = 0,
-           frame_kept = 0;  ///< the same of the frame's tiles so far: elimination = 1 - kept / samples
-
-  // kForget
-  std::vector<points::ClusterKey> clusters;  ///< ascending, at most kMaxForgetKeys
-  std::vector<uint32_t> frames;  ///< empty: whole clusters; else one a cluster: its mosaics with this frame tag
+  uint32_t patches_per_cluster = 6;  ///< at most; 0: no limit
+  int threads = 1;                   ///< for reference depth maps; 0: all cores
 };
 
 struct Statistics {
@@ -106,7 +63,8 @@ class PackerCore {
         eliminate = splat::eliminate_redundancy;
   };
 
-  /// Preconditions: points::validate(config.model); mosaics are not merged (model.compact) with kKeep. Sequences start at 1.
+  /// Preconditions: points::validate(config.model); mosaics are not merged (model.compact) with kKeep. Sequences start
+  /// at 1.
   PackerCore(const Config& config, EpochId epoch);
   PackerCore(const Config& config, EpochId epoch, Hooks hooks);
   ~PackerCore();
@@ -115,8 +73,8 @@ class PackerCore {
   /// nothing is left is an event too (of no points), so that viewers can tell when a frame is complete. Nothing: the
   /// tile was dropped and counted (duplicate, other epoch). Error: camera, rectangle, image or frame do not fit
   /// together; dropped and counted. now_s: any steady clock; the same one in all calls.
-  ///   stream: codec stream of the tile's image, or null. Where everything is kept it is published as it is; otherwise, or
-  ///   if it is null, the tile is encoded.
+  ///   stream: codec stream of the tile's image, or null. Where everything is kept it is published as it is; otherwise,
+  ///   or if it is null, the tile is encoded.
   ///   publish: called with the event as soon as it is known, while the model has yet to take the points over, so that
   ///   those who wait for them need not wait for that too; or null.
   Result<std::optional<Event>> submit(SampledTile tile, double now_s,
@@ -126,15 +84,15 @@ class PackerCore {
   /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.
   bool has(FrameId frame, uint32_t tile) const;
 
-  /// A viewer drew these clusters; of each the patch with that frame tag, or all of its patches if `frames` is empty. Unknown keys
-  /// are ignored. Precondition: no frames, or as many as clusters.
+  /// A viewer drew these clusters; of each the patch with that frame tag, or all of its patches if `frames` is empty.
+  /// Unknown keys are ignored. Precondition: no frames, or as many as clusters.
   void accessed(std::span<const points::ClusterKey> clusters, double now_s, std::span<const uint32_t> frames = {});
 
   /// Decides what is obsolete (T4.3.3) or too much. Returns the forget events to publish, most often none.
   std::vector<Event> tick(double now_s);
 
-  /// kKeep: the forget events for the coarse passes of frames that were completed since the last call: a complete frame has every sample of
-  /// its coarse pass, whose patches would only be in the way of choosing the best ones.
+  /// kKeep: the forget events for the coarse passes of frames that were completed since the last call: a complete frame
+  /// has every sample of its coarse pass, whose patches would only be in the way of choosing the best ones.
   std::vector<Event> forget_superseded();
 
   /// Frames are numbered anew from here: what came of those so far is of no meaning for what comes.
@@ -148,7 +106,8 @@ class PackerCore {
   /// who applies this list; so sequences rise but may have holes. A replica that has applied the list is as of
   /// sequence(). Precondition: remembers(after).
   std::vector<Event> events_since(Sequence after) const;
-  /// False for a replica of long ago of which it is not known any more what it would have to forget: it must start anew, from 0.
+  /// False for a replica of long ago of which it is not known any more what it would have to forget: it must start
+  /// anew, from 0.
   bool remembers(Sequence after) const;
 
   /// Of the newest event; 0 before the first.

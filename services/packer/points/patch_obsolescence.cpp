@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
-#include <unordered_set>
 
 namespace telesplat::packer {
 
@@ -124,18 +123,7 @@ std::vector<PatchKey> PatchObsolescence::choose_events(const points::PointModel&
       if (!is_new) at->second = std::max(at->second, patch->access_s);
     }
   }
-  std::vector<std::pair<double, Sequence>> oldest_first;
-  for (const auto& [sequence, access_s] : drawn_s) oldest_first.emplace_back(access_s, sequence);
-  std::sort(oldest_first.begin(), oldest_first.end());
-
-  std::unordered_set<Sequence> chosen;
-  uint64_t bytes = log.patch_bytes();
-  const uint64_t limit = max_bytes / 10 * 9 + max_bytes % 10 * 9 / 10;
-  for (const auto& [access_s, sequence] : oldest_first) {
-    if (bytes <= limit) break;
-    bytes -= log.patches().at(sequence).bytes();
-    chosen.insert(sequence);
-  }
+  const std::unordered_set<Sequence> chosen = oldest_patches(drawn_s, log, max_bytes);
   std::vector<PatchKey> out;
   for (const auto& [key, cluster] : model.clusters())
     for (const points::Mosaic& m : cluster->mosaics)

@@ -1,5 +1,5 @@
-// Which patches of which clusters to forget where packing keeps redundant ones (T7.3): those that nobody drew for long and those
-// that are coarse beside others of their cluster.
+// Which patches of which clusters to forget where packing keeps redundant ones (T7.3): those that nobody drew for long
+// and those that are coarse beside others of their cluster.
 #pragma once
 
 #include <unordered_map>
@@ -35,14 +35,16 @@ class PatchObsolescence {
   void forgotten(const PatchKey& key);
   void clear();
 
-  /// What to forget, ascending: patches not drawn for longer than obsolete_after_s; of what is left those by which a cluster has
-  /// more than patches_per_cluster; and while there are too many points of the rest, in order of falling
-  ///   score = age_weight * seconds since it was drawn + rate_weight * max(0, log2(best pixel range / its pixel range)),
-  /// the best of the cluster's patches that are not obsolete. Of equal scores the older patch goes first, then the lower key.
+  /// What to forget, ascending: patches not drawn for longer than obsolete_after_s; of what is left those by which a
+  /// cluster has more than patches_per_cluster; and while there are too many points of the rest, in order of falling
+  ///   score = age_weight * seconds since it was drawn + rate_weight * max(0, log2(best pixel range / its pixel
+  ///   range)),
+  /// the best of the cluster's patches that are not obsolete. Of equal scores the older patch goes first, then the
+  /// lower key.
   std::vector<PatchKey> choose(const PatchLimits& limits, double now_s) const;
 
-  /// Every patch of the least recently drawn events, until the events left have at most 90 % of max_bytes; none if they have no
-  /// more than max_bytes. Ascending.
+  /// Every patch of the least recently drawn events, until the events left have at most 90 % of max_bytes; none if they
+  /// have no more than max_bytes. Ascending.
   std::vector<PatchKey> choose_events(const points::PointModel& model, const EventLog& log, uint64_t max_bytes) const;
 
  private:

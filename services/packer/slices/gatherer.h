@@ -1,5 +1,5 @@
-// Puts the slabs of a volume's frames together and deals complete frames out to viewers, to each what its camera may see (T4.5.2). No sockets, no
-// clocks. One thread.
+// Puts the slabs of a volume's frames together and deals complete frames out to viewers, to each what its camera may
+// see (T4.5.2). No sockets, no clocks. One thread.
 #pragma once
 
 #include <deque>
@@ -15,13 +15,14 @@
 
 namespace telesplat::packer {
 
-inline constexpr size_t kMaxOpenVolumeFrames = 8;        ///< unfinished ones remembered; of more the oldest is dropped
-inline constexpr size_t kMaxOpenVolumeBytes = 1u << 30;  ///< of them
+inline constexpr size_t kMaxOpenVolumeFrames = 8;        ///< unfinished ones remembered; then the oldest is dropped
+inline constexpr size_t kMaxOpenVolumeBytes = 1u << 30;  ///< all unfinished ones together
 inline constexpr size_t kMaxClosedFrames = 256;          ///< complete ones remembered, to tell duplicates
 inline constexpr size_t kMaxSliceViewers = 256;
-inline constexpr double kViewerPatience_s =
-    10;  ///< a viewer that acknowledges nothing of what it was sent for so long is forgotten
-inline constexpr double kViewMargin = 0.1;  ///< of a camera's width and height, that is kept of images on every side
+/// A viewer that was sent something and acknowledges nothing for this long is forgotten.
+inline constexpr double kViewerPatience_s = 10;
+/// Images are kept this far beyond a camera's edges, as a part of its width and height.
+inline constexpr double kViewMargin = 0.1;
 
 class SliceGatherer {
  public:
@@ -53,25 +54,28 @@ class SliceGatherer {
     uint64_t viewers_forgotten = 0;
   };
 
-  /// The volume that frames are of and the epoch that is shown. Another one: unfinished frames are dropped, and newcomers get none of the old
-  /// complete ones; those who wait for such a frame still get it.
+  /// The volume that frames are of and the epoch that is shown. With another one unfinished frames are dropped, and
+  /// newcomers get none of the old complete ones; who waits for such a frame still gets it.
   void set_scene(const volume::Grid& grid, EpochId epoch);
   bool ready() const { return grid_.has_value(); }
   EpochId epoch() const { return epoch_; }
-  /// Frames are numbered anew (another master), or are of another volume. Viewers stay known; nothing is under way to them any more.
+  /// Frames are numbered anew (another master), or are of another volume. Viewers stay known; nothing is under way to
+  /// them any more.
   void clear_frames();
 
-  /// Takes a slab; the last one that its frame lacked makes the frame ready for take_outgoing(). Error: lease or images make no sense, or
-  /// contradict the frame's other slabs; nothing has changed then. Precondition: ready().
+  /// Takes a slab; the last one that its frame lacked makes the frame ready for take_outgoing(). Error: lease or images
+  /// make no sense, or contradict the frame's other slabs; nothing has changed then. Precondition: ready().
   Result<Added> add(Slab slab, double now_s);
-  /// A viewer is there (frame 0), or has let a frame go. One that was there before gets anew what was under way to it; one that comes late gets the newest complete frame, unless it wants its own in order. Error:
-  /// buffers that are none.
+  /// A viewer is there (frame 0), or has let a frame go. One that was there before gets what was under way to it once
+  /// more. One that comes late gets the newest complete frame, unless it wants its own in order. Error: a number of
+  /// buffers beyond its limits.
   Status acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s);
   /// It could not be sent to.
   void unreachable(const std::string& peer);
   /// Forgets viewers that do not answer.
   void expire(double now_s);
-  /// The next frame to send: in order for each viewer, never more unacknowledged than it has buffers. It counts as sent.
+  /// The next frame to send: in order for each viewer, never more unacknowledged than it has buffers. It counts as
+  /// sent.
   std::optional<Outgoing> take_outgoing(double now_s);
 
   const Statistics& statistics() const { return statistics_; }

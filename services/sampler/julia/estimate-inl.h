@@ -1,5 +1,5 @@
-// The distance estimate, a vector of points at a time. Included once a target, by julia_kernels.cpp. See julia_oracle.cpp for the algorithm:
-// operations and their order are the same, so that every target gives equal bits.
+// The distance estimate, a vector of points at a time. Included once a target, by kernels.cpp. See oracle.cpp for the
+// algorithm: operations and their order are the same, so that every target gives equal bits.
 #if defined(TELESPLAT_JULIA_ESTIMATE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_JULIA_ESTIMATE_INL_H_
 #undef TELESPLAT_JULIA_ESTIMATE_INL_H_
@@ -59,8 +59,8 @@ HWY_INLINE VF log_of(VF x) {
   return hn::Add(hn::Mul(e, set(kLog2)), hn::Mul(hn::Add(s, s), hn::Add(set(1), series)));
 }
 
-// Estimates at kWays vectors of points at once: one alone would wait for its own results. What has escaped goes on unmasked, towards
-// infinity, and on to what is not a number, but never comes back below the limit.
+// Estimates at kWays vectors of points at once: one alone would wait for its own results. What has escaped goes on
+// unmasked, towards infinity, and on to what is not a number, but never comes back below the limit.
 template <int kWays>
 HWY_INLINE void Estimate(const Constants& k, const Vec4 (&q)[kWays], VF (&out)[kWays]) {
   const VF limit = set(k.limit), half = set(0.5f), c_w = set(k.c_w), c_p = set(k.c_p);

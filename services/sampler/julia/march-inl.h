@@ -1,5 +1,5 @@
 // Cones, clipping and marching: from a part of an image to brackets of the depths at which its rays meet the surface.
-// Included once a target, by julia_kernels.cpp.
+// Included once a target, by kernels.cpp.
 #if defined(TELESPLAT_JULIA_MARCH_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_JULIA_MARCH_INL_H_
 #undef TELESPLAT_JULIA_MARCH_INL_H_

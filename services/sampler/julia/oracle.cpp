@@ -1,4 +1,5 @@
-// The scalar oracle of the Julia kernels: one ray after the other, the same operations in the same order. Read this one first.
+// The scalar oracle of the Julia kernels: one ray after the other, the same operations in the same order. Read this one
+// first.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -26,7 +27,8 @@ Vec4 orbit_vector(const Constants& k, const float* n) {
   return d;
 }
 
-// log x for normal x > 0: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh s, s = (m - 1) / (m + 1). Error below 2e-7.
+// log x for normal x > 0: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh s, s = (m - 1) / (m + 1). Error below
+// 2e-7.
 float log_of(float x) {
   const uint32_t offset = std::bit_cast<uint32_t>(x) - kSqrtHalfBits;
   const auto e = static_cast<float>(static_cast<int32_t>(offset) >> 23);
@@ -89,7 +91,8 @@ float cone_start(const Constants& k, const JuliaRays& rays, int block_x, int blo
   return t;
 }
 
-// Depths about the surface and what the estimate exceeds the threshold by there: g0 > 0 >= g1, or t0 = t1 where a ray begins below it.
+// Depths about the surface and what the estimate exceeds the threshold by there: g0 > 0 >= g1, or t0 = t1 where a ray
+// begins below it.
 struct Bracket {
   float t0, g0, t1, g1;
 };
@@ -109,7 +112,8 @@ bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Interval ra
       return true;
     }
     if (t + r >= range.t1) return false;
-    // If the estimate goes on changing as it did, the next free ball touches this one: r + r' = step, r' = r + slope * step.
+    // If the estimate goes on changing as it did, the next free ball touches this one: r + r' = step, r' = r + slope *
+    // step.
     const float slope = gone > 0 ? (r - last_r) / gone : -1.0f;
     const float ratio = std::max(kRelax / (1.0f - std::min(std::max(slope, -1.0f), kMaxSlope)), 1.0f);
     // Close by, the surface may come within the threshold for less than a step: go carefully.
@@ -135,8 +139,8 @@ float refine(const Constants& k, const JuliaRays& rays, const Vec4& d, Bracket b
   return secant();
 }
 
-// The orbit of a surface point with its derivatives along X, Y, Z: half the gradient of N where it escaped (0 where it did not), and the
-// square of the least length that the colour asks for.
+// The orbit of a surface point with its derivatives along X, Y, Z: half the gradient of N where it escaped (0 where it
+// did not), and the square of the least length that the colour asks for.
 struct Orbit {
   float gradient[3], trap;
 };
@@ -186,8 +190,8 @@ bool normalise(float* n) {
   return true;
 }
 
-// The gradient where it is good; else the estimate's differences over a footprint; else the direction towards the viewer. What still faces
-// away, at a silhouette, is turned until it just does not.
+// The gradient where it is good; else the estimate's differences over a footprint; else the direction towards the
+// viewer. What still faces away, at a silhouette, is turned until it just does not.
 void normal_at(const Constants& k, const Vec4& q, const float* gradient, float reach, const float* ray, float* n) {
   float back[3] = {-ray[0], -ray[1], -ray[2]};
   normalise(back);

@@ -11,7 +11,8 @@ class JuliaPalette {
  public:
   static constexpr int kEntries = 1024;
 
-  /// A closed Catmull-Rom curve through `stops` (0x00RRGGBB, at least 3), evenly spaced in [0, 1), clamped to the cube of colours.
+  /// A closed Catmull-Rom curve through `stops` (0x00RRGGBB, at least 3), evenly spaced in [0, 1), clamped to the cube
+  /// of colours.
   template <size_t kStops>
   explicit JuliaPalette(const uint32_t (&stops)[kStops]) : JuliaPalette(stops, kStops) {}
 

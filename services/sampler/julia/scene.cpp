@@ -104,7 +104,8 @@ JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, co
   for (int i = 0; i < 3; ++i) origin[4 + i] = static_cast<float>(camera.pose.position_room[i]);
   footprint = static_cast<float>(pixel_x / step * scene.units_per_metre());
 
-  // The farthest pixel centre of a block from its middle; a little more, for rounding. What is in the ball lies no deeper than `deepest`.
+  // The farthest pixel centre of a block from its middle; a little more, for rounding. What is in the ball lies no
+  // deeper than `deepest`.
   const double reach = (kJuliaBlock - 1) * 0.5 * std::hypot(pixel_x, pixel_y) * 1.001;
   const double radius = scene.constants().radius * 1.01;  // so that estimates at its edge are safe from rounding
   const double deepest = (glm::length(orbit) / 2 + radius) / scene.units_per_metre();

@@ -1,15 +1,17 @@
-// A quaternion Julia set made ready for tracing rays: constants in single precision, and the rays of a camera in the set's own coordinates.
+// A quaternion Julia set made ready for tracing rays: constants in single precision, and the rays of a camera in the
+// set's own coordinates.
 //
-// The orbit of q under f(q) = q^2 + c never leaves the three-dimensional space that 1, the vector part of c and the vector part of q span,
-// since q^2 = (w^2 - |v|^2) + 2 w v. With w = Re q, p the component of v along c's vector part and r its length across it, f is
+// The orbit of q under f(q) = q^2 + c never leaves the three-dimensional space that 1, the vector part of c and the
+// vector part of q span, since q^2 = (w^2 - |v|^2) + 2 w v. With w = Re q, p the component of v along c's vector part
+// and r its length across it, f is
 //   w' = w^2 - p^2 - r^2 + Re c          p' = 2 w p + |v(c)|          r' = 2 w r
 // and only R = r^2 is needed: R' = 4 w^2 R. All three are kept doubled (2w, 2p, 4R), which saves multiplications:
 //   N = W + (P + R), W = w^2, P = p^2     w' = (W - N / 2) + 2 Re c    p' = w p + 2 |v(c)|    R' = W R
-// with N = 4 |q|^2, and |f^n'|^2 is the product of the N before. *Orbit coordinates* are (2w, 2p, 2r1, 2r2), r1 and r2 the components of v
-// in two directions across c's: an affine function of set space, hence of a ray's depth.
+// with N = 4 |q|^2, and |f^n'|^2 is the product of the N before. *Orbit coordinates* are (2w, 2p, 2r1, 2r2), r1 and r2
+// the components of v in two directions across c's: an affine function of set space, hence of a ray's depth.
 //
-// The distance estimate is 0.5 |q| log|q| / |q'| = sqrt(N / D) log(N / 4) / 8 at the first N > limit, D = |q'|^2; 0 inside.
-// Source: Hart, Sandin, Kauffman, "Ray tracing deterministic 3-D fractals", SIGGRAPH 1989.
+// The distance estimate is 0.5 |q| log|q| / |q'| = sqrt(N / D) log(N / 4) / 8 at the first N > limit, D = |q'|^2; 0
+// inside. Source: Hart, Sandin, Kauffman, "Ray tracing deterministic 3-D fractals", SIGGRAPH 1989.
 #pragma once
 
 #include <array>
@@ -61,12 +63,13 @@ class JuliaScene {
   int palette_;
 };
 
-/// Pixels of a side of the square blocks that cones are marched for. The blocks lie on a grid fixed to the whole image, so that a pixel's
-/// result does not depend on the rectangle it was asked for with.
+/// Pixels of a side of the square blocks that cones are marched for. The blocks lie on a grid fixed to the whole image,
+/// so that a pixel's result does not depend on the rectangle it was asked for with.
 inline constexpr int kJuliaBlock = 8;
 
-/// The rays of a camera through a scene. A ray's parameter t is depth in metres; the direction of pixel (x, y) is column[x] + row[y],
-/// in orbit coordinates (index 0 to 3) and in room space (4 to 6). Only what `rect` needs is filled, in whole blocks.
+/// The rays of a camera through a scene. A ray's parameter t is depth in metres; the direction of pixel (x, y) is
+/// column[x] + row[y], in orbit coordinates (index 0 to 3) and in room space (4 to 6). Only what `rect` needs is
+/// filled, in whole blocks.
 struct JuliaRays {
   JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect, int step);
 

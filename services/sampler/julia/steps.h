@@ -1,5 +1,5 @@
-// Numbers that the Julia kernels and their oracle share. Those marked (tuned) were set with JuliaFrame of telesplat-bench and
-// julia_reference_test: fewest estimates a ray at which no surface is missed.
+// Numbers that the Julia kernels and their oracle share. Those marked (tuned) were set with JuliaFrame of
+// telesplat-bench and julia_reference_test: fewest estimates a ray at which no surface is missed.
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,8 @@ inline constexpr int kRefill = 2;     ///< lanes that are given new rays at once
 
 inline constexpr float kLeast = 0.02f;  ///< cosine at which normals that faced away are left
 
-// Occlusion: estimates along the normal, in radii of the set's ball; open country has kOpen of the distance from the surface.
+// Occlusion: estimates along the normal, in radii of the set's ball; open country has kOpen of the distance from the
+// surface.
 inline constexpr int kOcclusionSteps = 4;
 inline constexpr float kOcclusionAt[kOcclusionSteps] = {0.03f, 0.08f, 0.18f, 0.36f};
 inline constexpr float kOcclusionWeight[kOcclusionSteps] = {0.3f, 0.3f, 0.25f, 0.15f};

@@ -1,4 +1,5 @@
-// From brackets to surface points: depths refined, normals, colours, occlusion, shadow. Included once a target, by julia_kernels.cpp.
+// From brackets to surface points: depths refined, normals, colours, occlusion, shadow. Included once a target, by
+// kernels.cpp.
 #if defined(TELESPLAT_JULIA_SURFACE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_JULIA_SURFACE_INL_H_
 #undef TELESPLAT_JULIA_SURFACE_INL_H_

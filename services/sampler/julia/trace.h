@@ -1,10 +1,11 @@
-// Tracing a part of an image: from rays to surface points with normals and colours. Two implementations with equal results: a SIMD kernel,
-// chosen for the processor at run time, and its scalar oracle, in which the algorithm is meant to be read.
+// Tracing a part of an image: from rays to surface points with normals and colours. Two implementations with equal
+// results: a SIMD kernel, chosen for the processor at run time, and its scalar oracle, in which the algorithm is meant
+// to be read.
 //
 //   cones    for each block of 8 x 8 pixels the depth up to which none of its rays meets the surface, or that none does
-//   clipping of every ray to the box, to the ball that holds the set, and to what its block's cone left
-//   marching until the estimate is below the threshold lod * footprint(t): a bracket of the surface's depth
-//   surface  the depth refined within its bracket; normal, colour, occlusion, shadow
+//   clipping of every ray to the box, to the ball that holds the set, and to what its block's cone left marching until
+//   the estimate is below the threshold lod * footprint(t): a bracket of the surface's depth surface  the depth refined
+//   within its bracket; normal, colour, occlusion, shadow
 #pragma once
 
 #include <cstdint>
@@ -36,8 +37,8 @@ struct JuliaPoints {
 using JuliaTrace = void (*)(const JuliaScene::Constants& scene, const JuliaRays& rays, const JuliaPart& part,
                             JuliaPoints& points);
 
-/// For a ray that meets the surface where it begins, at depth t: the normal of the face through which it enters the box there; false where it
-/// enters none, which is where the camera is inside the set. direction: room space.
+/// For a ray that meets the surface where it begins, at depth t: the normal of the face through which it enters the box
+/// there; false where it enters none, which is where the camera is inside the set. direction: room space.
 bool face_normal(const JuliaScene::Constants& scene, const JuliaRays& rays, const float* direction, float t,
                  float* normal);
 

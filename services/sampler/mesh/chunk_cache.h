@@ -1,5 +1,5 @@
-// Which chunks a sampler holds, which it waits for, which it lets go: the least recently used ones first when over its budget.
-// No sockets, no clocks.
+// Which chunks a sampler holds, which it waits for, which it lets go: the least recently used ones first when over its
+// budget. No sockets, no clocks.
 #pragma once
 
 #include <map>
@@ -19,7 +19,8 @@ class ChunkCache {
   void reset(std::vector<geometry::ChunkInfo> chunks);
   bool known() const { return !chunks_.empty(); }
 
-  /// Chunks the view needs and that are not held, nearest first; marks the held ones as used. Waiting ones are included.
+  /// Chunks the view needs and that are not held, nearest first; marks the held ones as used. Waiting ones are
+  /// included.
   std::vector<ChunkId> missing(const geometry::Camera& camera);
   /// Chunks worth fetching before any view asks, as far as the budget goes: in order of id.
   std::vector<ChunkId> prefetch() const;

@@ -1,6 +1,6 @@
-// The raster sampler's GLSL. A chunk's block of bytes (geometry/mesh_chunk.h) is vertex buffer, index buffer and storage
-// buffer at once. The rasteriser finds which triangle a pixel sees; the fragment shader then intersects the pixel's ray with
-// that triangle, as the ray sampler does, so that both give the same depths, colours and normals.
+// The raster sampler's GLSL. A chunk's block of bytes (geometry/mesh_chunk.h) is vertex buffer, index buffer and
+// storage buffer at once. The rasteriser finds which triangle a pixel sees; the fragment shader then intersects the
+// pixel's ray with that triangle, as the ray sampler does, so that both give the same depths, colours and normals.
 #pragma once
 
 namespace telesplat::sampler {

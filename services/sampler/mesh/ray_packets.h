@@ -63,10 +63,10 @@ class PixelRays {
 };
 
 /// Traces every packet that touches `tile`. Each task (several run at once) starts with task = begin(), calls
-/// consume(task, packet, x, y) for the packets in which something was hit, and ends with end(task); (x, y) is the packet's
-/// upper left pixel, and its pixels may lie outside the tile.
-/// Packets lie on a grid fixed to the whole image and are always traced whole, so that a pixel's result does not depend on
-/// the tile that asks for it (where two triangles are equally near, the packet decides).
+/// consume(task, packet, x, y) for the packets in which something was hit, and ends with end(task); (x, y) is the
+/// packet's upper left pixel, and its pixels may lie outside the tile. Packets lie on a grid fixed to the whole image
+/// and are always traced whole, so that a pixel's result does not depend on the tile that asks for it (where two
+/// triangles are equally near, the packet decides).
 template <class Begin, class Consume, class End>
 void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile, const Begin& begin,
                 const Consume& consume, const End& end) {

@@ -5,9 +5,9 @@
 namespace telesplat::sampler {
 namespace {
 
-// Hits of one task, waiting for their attributes. Indices and vertices of neighbouring hits lie far apart in memory, so that
-// fetching them one hit after the other would wait for each: instead the hits are collected, what they need is prefetched
-// step by step, and eight at a time are shaded when it has arrived.
+// Hits of one task, waiting for their attributes. Indices and vertices of neighbouring hits lie far apart in memory, so
+// that fetching them one hit after the other would wait for each: instead the hits are collected, what they need is
+// prefetched step by step, and eight at a time are shaded when it has arrived.
 class PendingHits {
  public:
   PendingHits(const RayScene& scene, double near_m, image::DepthImage& out)

@@ -1,4 +1,4 @@
-// The one interface of all mesh samplers (DESIGN section 3): chunks in, depth images of tiles out. No sockets, no clocks.
+// The one interface of all mesh samplers: chunks in, depth images of tiles out. No sockets, no clocks.
 #pragma once
 
 #include <memory>
@@ -24,7 +24,8 @@ class Sampler {
   /// its bytes (the raster sampler only until they are uploaded). Replaces a chunk of the same id. Bytes that do not
   /// validate are refused and nothing changes.
   virtual Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) = 0;
-  /// Adds several chunks at once, in parallel where that helps; refuses as add_chunk does, keeping those that were good.
+  /// Adds several chunks at once, in parallel where that helps; refuses as add_chunk does, keeping those that were
+  /// good.
   virtual Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) = 0;
   virtual void remove_chunk(ChunkId id) = 0;
 

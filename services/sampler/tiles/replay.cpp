@@ -6,11 +6,11 @@
 
 namespace telesplat::sampler {
 
-ReplayWork::ReplayWork(Replay replay, double cost_scale) : replay_(std::move(replay)), cost_before_s_{0} {
+ReplayTiles::ReplayTiles(Replay replay, double cost_scale) : replay_(std::move(replay)), cost_before_s_{0} {
   for (const double cost : replay_.row_cost_s) cost_before_s_.push_back(cost_before_s_.back() + cost * cost_scale);
 }
 
-Readiness ReplayWork::readiness(const HeldLease& held, double now_s) {
+Readiness ReplayTiles::readiness(const HeldLease& held, double now_s) {
   using State = Readiness::State;
   const wire::Lease& lease = held.lease;
   if (lease.camera.width != replay_.frame.width || lease.camera.height != replay_.frame.height || lease.step != 1) {
@@ -28,7 +28,7 @@ Readiness ReplayWork::readiness(const HeldLease& held, double now_s) {
   return {State::kWaits, end_s_};
 }
 
-Sampled ReplayWork::sample(const HeldLease& held) {
+Sampled ReplayTiles::sample(const HeldLease& held) {
   const geometry::Rect& r = held.lease.rect;
   Sampled out{{r.width, r.height}, begin_s_, end_s_};
   const auto copy = [&](const auto& from, auto& to) {

@@ -1,5 +1,5 @@
-// Leases answered from a file: each takes as long as its rows cost when they were sampled, by waiting, so that many more samplers than
-// processors can be studied. Everything else (leases, encoding, messages) is as ever.
+// Tiles from a file. Each takes as long as its rows cost when they were sampled, by waiting, so that many more samplers
+// than processors can be studied. Leases, encoding and messages are those of other tiles.
 #pragma once
 
 #include <optional>
@@ -9,14 +9,14 @@
 
 namespace telesplat::sampler {
 
-class ReplayWork final : public LeaseWork {
+class ReplayTiles final : public TileSource {
  public:
-  ReplayWork(Replay replay, double cost_scale);
+  ReplayTiles(Replay replay, double cost_scale);
 
   const char* name() const override { return "replay"; }
   void on_welcome(const wire::Welcome&) override {}
-  /// A lease begins when the one before has ended, or when it came; both are instants as they should be, not as this process woke up, so
-  /// that late awakenings do not add up. Hopeless: a frame of another size, or a coarse one.
+  /// A lease begins when the one before has ended, or when it came. Both are the instants that were due, not those at
+  /// which this process woke up: late awakenings do not add up. Hopeless: a frame of another size, or a coarse one.
   Readiness readiness(const HeldLease& lease, double now_s) override;
   Sampled sample(const HeldLease& lease) override;
 

@@ -1,5 +1,6 @@
-// What a sampler does for leases of tiles, one implementation a kind of scene: fetch what a lease needs, then sample it. TileWork (tile_work.h) holds the
-// leases and encodes the depth images. One thread; nothing here may wait.
+// The interface of what samples tiles, one implementation a kind of scene: MeshTiles, JuliaTiles; ReplayTiles for
+// studies. It fetches what a lease needs, then samples it. TileWork (work.h) holds the leases and encodes the depth
+// images. One thread; nothing here may wait.
 #pragma once
 
 #include <memory>
@@ -24,15 +25,15 @@ struct Sampled {
   double begin_s = 0, end_s = 0;
 };
 
-class LeaseWork {
+class TileSource {
  public:
-  virtual ~LeaseWork() = default;
+  virtual ~TileSource() = default;
 
   /// How it samples, for people and records: "ray", "raster", "julia", "replay".
   virtual const char* name() const = 0;
   /// A welcome of the master came: every one is told, in order.
   virtual void on_welcome(const wire::Welcome& session) = 0;
-  /// Whether so much is known of the scene that leases can be asked for.
+  /// Whether enough is known of the scene to ask for leases.
   virtual bool takes_leases() const { return true; }
   /// Precondition of sample(): this said kReady for the lease, and nothing happened since.
   virtual Readiness readiness(const HeldLease& lease, double now_s) = 0;

@@ -13,7 +13,7 @@ void TileWork::take(net::Socket& from, const net::Message& message, bool takes_l
 
 Readiness TileWork::look_at_next(double now_s) {
   while (!leases_.empty()) {
-    const Readiness r = work_->readiness(leases_.front(), now_s);
+    const Readiness r = source_->readiness(leases_.front(), now_s);
     if (r.state != Readiness::State::kHopeless) return r;
     leases_.pop_front();
   }
@@ -23,7 +23,7 @@ Readiness TileWork::look_at_next(double now_s) {
 Delivery TileWork::sample_next() {
   const HeldLease held = std::move(leases_.front());
   leases_.pop_front();
-  const Sampled sampled = work_->sample(held);
+  const Sampled sampled = source_->sample(held);
   const auto stream = codec::encode(sampled.image);
   Delivery out{wire::DepthTile::kName, {}, sampled.begin_s, sampled.end_s, monotonic_s()};
   wire::DepthTile tile{link_.instance(), held.lease};

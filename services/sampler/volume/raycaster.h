@@ -11,9 +11,10 @@
 
 namespace telesplat::sampler {
 
-/// Integrates emission and absorption along every pixel's ray: extinction and extinction times colour are interpolated trilinearly between voxels (0
-/// outside [-1, n]), steps of `step` voxels (the smallest side of one), in double precision, without early termination before 1e-6 of
-/// light is left. Classified before interpolation, as voxels travel. Lit by volume/lighting.h for the camera's eye.
+/// Integrates emission and absorption along every pixel's ray: extinction and extinction times colour are interpolated
+/// trilinearly between voxels (0 outside [-1, n]), steps of `step` voxels (the smallest side of one), in double
+/// precision, without early termination before 1e-6 of light is left. Classified before interpolation, as voxels
+/// travel. Lit by volume/lighting.h for the camera's eye.
 class VolumeRaycaster {
  public:
   /// voxels: of all slices.

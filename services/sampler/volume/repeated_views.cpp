@@ -1,7 +1,6 @@
 #include "services/sampler/volume/repeated_views.h"
 
 #include <algorithm>
-#include <ctime>
 
 namespace telesplat::sampler {
 
@@ -28,12 +27,6 @@ void RepeatedViews::add(const wire::SliceLease& lease, const std::vector<uint8_t
   entry->view.voxels = voxels;
   entry->view.splat_s = std::min(entry->view.splat_s, splat_s);
   entry->view.encode_s = std::min(entry->view.encode_s, encode_s);
-}
-
-double thread_cpu_s() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
 }  // namespace telesplat::sampler

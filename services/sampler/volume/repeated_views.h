@@ -1,5 +1,5 @@
-// Views of a volume that were sampled so often that what they cost is known: they are sent again, after as long as that, instead of being
-// sampled. So many more samplers than there are processors can be studied (telesplat bench volume). Everything else is as ever.
+// Views of a volume that were sampled often enough to know what they cost. They are sent again, after as long as that,
+// instead of being sampled, so that more samplers than processors can be studied (telesplat bench volume).
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace telesplat::sampler {
 
 class RepeatedViews {
  public:
-  /// So many different views are remembered; then the one that was not used for longest is sampled anew.
+  /// Different views that are remembered. With one more, the one that was not used for longest is forgotten.
   static constexpr size_t kViews = 64;
 
   struct View {
@@ -22,11 +22,12 @@ class RepeatedViews {
     double cost_s() const { return splat_s + encode_s; }
   };
 
-  /// times: that a view is sampled in earnest. 0: nothing is repeated.
+  /// times: how often a view is really sampled. 0: nothing is repeated.
   explicit RepeatedViews(int times) : times_(times) {}
   bool enabled() const { return times_ > 0; }
 
-  /// The view of a lease, if it was sampled so often: of the same slab, epoch and shear, whoever asked. Valid until add().
+  /// The view of a lease (same slab, epoch and shear, of any viewer) if it was sampled often enough; else null. Valid
+  /// until add().
   const View* find(const wire::SliceLease& lease);
   void add(const wire::SliceLease& lease, const std::vector<uint8_t>& bytes, uint64_t voxels, double splat_s,
            double encode_s);
@@ -47,8 +48,5 @@ class RepeatedViews {
   uint64_t uses_ = 0;
   std::vector<Entry> entries_;
 };
-
-/// CPU time of this thread, seconds.
-double thread_cpu_s();
 
 }  // namespace telesplat::sampler

@@ -1,4 +1,5 @@
-// A sampler's part of a volume, ready to be splatted: what stands between the work for leases and the splatter, so that each can be tested alone.
+// A sampler's part of a volume, ready to be splatted: what stands between the work for leases and the splatter, so that
+// each can be tested alone.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,5 @@
-// The voxels a sampler holds of a volume: what it lacks for a slab, who has it, what it lets go when memory runs short. No sockets, no clocks.
+// The voxels a sampler holds of a volume: what it lacks for a slab, who has it, what it lets go when memory runs short.
+// No sockets, no clocks.
 #pragma once
 
 #include <map>
@@ -49,8 +50,8 @@ class SlabStore {
   const std::optional<SlabScene>& scene() const { return scene_; }
   void clear();
 
-  /// Takes the sheet over; what an older one says of slices this one does not name goes on holding. Error: slabs, ranges or endpoints that make no
-  /// sense in this scene; nothing has changed then. Precondition: there is a scene.
+  /// Takes the sheet over; what an older one says of slices this one does not name goes on holding. Error: slabs,
+  /// ranges or endpoints that make no sense in this scene; nothing has changed then. Precondition: there is a scene.
   Status assign(const wire::SlabAssignment& assignment);
   /// The newest one; partition 0: none.
   const wire::SlabAssignment& assignment() const { return assignment_; }
@@ -63,15 +64,17 @@ class SlabStore {
   bool holds(const SlabWant& want) const;
   /// What is lacking first of it, in the order of the sheet. Nothing: all is here, or no sheet says who has it.
   std::optional<VoxelAsk> next(const SlabWant& want) const;
-  /// The answer to `ask`. shown: levels that the ask's epoch shows, all voxels of which the slices then have. False: not what was asked for, or too late
-  /// (other levels are held by now). Error: bytes that are no such voxels; nothing has changed then.
+  /// The answer to `ask`. shown: levels that the ask's epoch shows, all voxels of which the slices then have. False:
+  /// not what was asked for, or too late (other levels are held by now). Error: bytes that are no such voxels; nothing
+  /// has changed then.
   Result<bool> take(const VoxelAsk& ask, const wire::VoxelData& data, const volume::LevelSet& shown);
-  /// Ready to be splatted, arranged if it was not yet; null: not all is here. It stays valid whatever happens to the store.
+  /// Ready to be splatted, arranged if it was not yet; null: not all is here. It stays valid whatever happens to the
+  /// store.
   std::shared_ptr<const Slab> slab(const SlabWant& want);
   bool arranged(const SlabWant& want) const { return find(want) != nullptr; }
 
-  /// Lets go, if more is held than the budget allows: slices of neither the assigned range nor the one in use; steps, those first that come last after
-  /// `step`; then voxels of levels that are not in `shown`. `step` itself stays.
+  /// Lets go, if more is held than the budget allows: slices of neither the assigned range nor the one in use; steps,
+  /// those first that come last after `step`; then voxels of levels that are not in `shown`. `step` itself stays.
   void trim(int step, const volume::LevelSet& shown);
   /// How many steps after `step`, in the order in which they play, fit in memory beside it if they are as large.
   int steps_ahead(int step) const;

@@ -7,6 +7,7 @@
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
+#include "common/scene/session.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -18,11 +19,6 @@ Result<volume::Session> read(const wire::Welcome& welcome) {
   if (!session) return session;
   if (const Status s = volume::validate(session->grid); !s) return s.error();
   return session;
-}
-
-std::string fact(const wire::Welcome& welcome, const char* name) {
-  const auto found = welcome.facts.find(name);
-  return found == welcome.facts.end() ? "" : found->second;
 }
 
 // Each image by itself, then one after the other.
@@ -50,19 +46,15 @@ VolumeWork::VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::st
       spans_(spans) {}
 
 void VolumeWork::on_welcome(const wire::Welcome& welcome) {
-  if (welcome.master != master_instance_) {
-    epochs_.clear();
-    told_ready_ = {};
-  }
-  master_instance_ = welcome.master;
-  const std::string transfer = fact(welcome, "transfer");
-  const auto known = epochs_.find(welcome.epoch);
-  if (known != epochs_.end() && known->second.parameters == welcome.parameters && known->second.transfer == transfer)
-    return;
+  if (epochs_.follow(welcome.master)) told_ready_ = {};
+  const scene::SessionView view(welcome);
+  const std::string transfer = view.fact("transfer");
+  const Epoch* known = epochs_.find(welcome.epoch);
+  if (known && known->parameters == welcome.parameters && known->transfer == transfer) return;
   Epoch epoch{.parameters = welcome.parameters, .transfer = transfer};
   if (const auto session = read(welcome)) {
     epoch.scene = SlabScene{session->grid, session->levels, session->lit, session->steps,
-                            fact(welcome, "scene") + "\n" + fact(welcome, "content_hash")};
+                            view.fact("scene") + "\n" + view.fact("content_hash")};
     epoch.step = session->step;
     epoch.colours = volume::level_colours(session->transfer, session->levels);
     for (size_t l = 0; l < epoch.colours.size(); ++l)
@@ -76,8 +68,7 @@ void VolumeWork::on_welcome(const wire::Welcome& welcome) {
   } else {
     log::error("epoch {} cannot be sampled: {}", welcome.epoch.value, session.error().text);
   }
-  epochs_.insert_or_assign(welcome.epoch, std::move(epoch));
-  while (epochs_.size() > kEpochs) epochs_.erase(epochs_.begin());
+  epochs_.put(welcome.epoch, std::move(epoch));
 }
 
 void VolumeWork::take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) {
@@ -103,14 +94,9 @@ SlabWant VolumeWork::want(EpochId epoch, const Epoch& of, int begin, int end) {
 Readiness VolumeWork::readiness(const Held& held, double now_s) {
   using State = Readiness::State;
   const wire::SliceLease& lease = held.lease;
-  const auto epoch = epochs_.find(lease.epoch);
-  if (epoch == epochs_.end()) {
-    const double until_s = held.received_s + kUnknownEpoch_s;
-    if (now_s < until_s) return {State::kWaits, until_s};
-    log::warn("a lease of epoch {} was dropped: no welcome told its transfer function", lease.epoch.value);
-    return {State::kHopeless};
-  }
-  const Epoch& e = epoch->second;
+  const Epoch* epoch = epochs_.find(lease.epoch);
+  if (!epoch) return epochs_.wait_for_welcome(lease.epoch, held.received_s, now_s);
+  const Epoch& e = *epoch;
   if (!e.scene || store_.scene() != e.scene) return {State::kHopeless};
   if (lease.begin >= lease.end || lease.end > uint64_t(e.scene->grid.size[2])) {
     log::warn("a lease of slices {} to {} of {} was dropped", lease.begin, lease.end, e.scene->grid.size[2]);
@@ -142,7 +128,7 @@ Delivery VolumeWork::sample_next() {
   const Held held = std::move(leases_.front());
   const wire::SliceLease& lease = held.lease;
   leases_.pop_front();
-  const Epoch& epoch = epochs_.at(lease.epoch);
+  const Epoch& epoch = *epochs_.find(lease.epoch);
   store_.use(int(lease.begin), int(lease.end));
   const auto slab = store_.slab(want(lease.epoch, epoch, int(lease.begin), int(lease.end)));
   Delivery out{wire::SliceImages::kName, {}, monotonic_s()};
@@ -177,14 +163,15 @@ Delivery VolumeWork::sample_next() {
 std::optional<VoxelAsk> VolumeWork::next_ask() {
   if (!leases_.empty()) {
     const wire::SliceLease& lease = leases_.front().lease;
-    const auto epoch = epochs_.find(lease.epoch);
-    if (epoch != epochs_.end() && epoch->second.scene && lease.begin < lease.end)
-      if (const auto w = want(lease.epoch, epoch->second, int(lease.begin), int(lease.end)); !store_.arranged(w))
+    const Epoch* epoch = epochs_.find(lease.epoch);
+    if (epoch && epoch->scene && lease.begin < lease.end)
+      if (const auto w = want(lease.epoch, *epoch, int(lease.begin), int(lease.end)); !store_.arranged(w))
         if (const auto ask = store_.next(w)) return ask;
   }
   const auto& a = store_.assignment();
   if (a.partition == 0 || a.begin >= a.end || epochs_.empty()) return std::nullopt;
-  const auto& [id, newest] = *epochs_.rbegin();
+  const EpochId id = epochs_.newest_id();
+  const Epoch& newest = epochs_.newest();
   if (!newest.scene) return std::nullopt;
   SlabWant w = want(id, newest, int(a.begin), int(a.end));
   if (const auto ask = store_.next(w)) return ask;
@@ -222,9 +209,10 @@ void VolumeWork::ask(double now_s) {
 void VolumeWork::tell_ready() {
   const auto& a = store_.assignment();
   if (a.partition == 0 || epochs_.empty()) return;
-  const auto& [id, newest] = *epochs_.rbegin();
+  const EpochId id = epochs_.newest_id();
+  const Epoch& newest = epochs_.newest();
   if (told_ready_ == std::pair{a.partition, id} || !newest.scene) return;
-  // Arranged at once: the first lease shall not wait for it. A spare holds nothing, and is ready for that.
+  // The slab is arranged at once, so that the first lease does not wait for it. A spare holds nothing: it is ready.
   if (a.begin < a.end) {
     const SlabWant w = want(id, newest, int(a.begin), int(a.end));
     if (!store_.arranged(w)) {
@@ -242,7 +230,8 @@ void VolumeWork::tell_ready() {
 void VolumeWork::arrange_ahead() {
   const auto& a = store_.assignment();
   if (a.partition == 0 || a.begin >= a.end || epochs_.empty()) return;
-  const auto& [id, newest] = *epochs_.rbegin();
+  const EpochId id = epochs_.newest_id();
+  const Epoch& newest = epochs_.newest();
   if (!newest.scene) return;
   SlabWant w = want(id, newest, int(a.begin), int(a.end));
   for (int ahead = 1; ahead <= store_.steps_ahead(newest.step); ++ahead) {
@@ -268,7 +257,7 @@ std::vector<net::Socket*> VolumeWork::sockets() {
   return out;
 }
 
-// Of servers that no sheet names any more.
+// Closes connections to servers that no sheet names any more.
 void VolumeWork::forget_servers() {
   std::erase_if(servers_, [&](const auto& server) {
     const bool named = store_.names(server.first);
@@ -292,10 +281,10 @@ void VolumeWork::receive(double now_s) {
           progress_s_ = now_s;
           return;
         }
-        const auto epoch = epochs_.find(data.epoch);
-        if (epoch == epochs_.end()) return asked_.reset();
+        const Epoch* epoch = epochs_.find(data.epoch);
+        if (!epoch) return asked_.reset();
         const double begin_s = monotonic_s();
-        const auto taken = store_.take(ask, data, epoch->second.shown);
+        const auto taken = store_.take(ask, data, epoch->shown);
         if (!taken) {
           // It is asked again when its time is up.
           return socket.reject(*message, taken.error().text);
@@ -304,7 +293,7 @@ void VolumeWork::receive(double now_s) {
         asked_.reset();
         progress_s_ = now_s;
         bytes_received_ += message->body.size();
-        const Epoch& newest = epochs_.rbegin()->second;
+        const Epoch& newest = epochs_.newest();
         store_.trim(newest.step, newest.shown);
         spans_.add("add voxels", master_.to_master_s(begin_s), master_.to_master_s(monotonic_s()));
       });

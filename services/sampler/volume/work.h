@@ -1,4 +1,5 @@
-// Leases of a volume (T4.5, T5.3): fetches the voxels of the slab it was assigned, round by round, and splats it into slice images, one a layer.
+// Leases of a volume (T4.5, T5.3): fetches the voxels of the slab it was assigned, round by round, and splats the slab
+// into slice images, one a layer.
 #pragma once
 
 #include <algorithm>
@@ -10,20 +11,19 @@
 
 #include "common/metrics/recorder.h"
 #include "common/volume/session.h"
+#include "services/sampler/epoch_book.h"
 #include "services/sampler/volume/repeated_views.h"
 #include "services/sampler/volume/slab_store.h"
 #include "services/sampler/work.h"
 
 namespace telesplat::sampler {
 
-class VolumeWork final : public SamplingWork {
+class VolumeWork final : public Work {
  public:
-  static constexpr size_t kEpochs = 8;          ///< whose transfer functions are remembered, the newest ones
-  static constexpr double kUnknownEpoch_s = 1;  ///< a lease waits so long for its epoch's welcome
-  static constexpr double kRetry_s = 2;         ///< a data server that does not answer is asked again
-  static constexpr double kPause_s = 0.05;      ///< and so long after one that does not know the epoch yet
-  static constexpr double kExtend_s = 0.1;      ///< between two requests for more time
-  static constexpr double kPatience_s = 6;  ///< a lease whose voxels do not come for so long is not extended any more
+  static constexpr double kRetry_s = 2;     ///< a data server that does not answer is asked again after this
+  static constexpr double kPause_s = 0.05;  ///< one that does not know the epoch yet is asked again after this
+  static constexpr double kExtend_s = 0.1;  ///< between two requests for more time
+  static constexpr double kPatience_s = 6;  ///< a lease whose voxels do not come for longer is extended no more
 
   /// What it says to the master.
   struct Master {
@@ -33,8 +33,9 @@ class VolumeWork final : public SamplingWork {
     std::function<double(double)> to_master_s;
   };
 
-  /// make: arranges slabs. threads: to encode with; 0: one a core. cache_bytes: of voxels. Keeps references to the context and the spans.
-  /// repeat_after: a view that was sampled so often is sent again after as long as that took (repeated_views.h); 0: never.
+  /// make: arranges slabs. threads: to encode with; 0: one a core. cache_bytes: of voxels. Keeps references to the
+  /// context and the spans. repeat_after: a view that was sampled this often is sent again, after as long as that took
+  /// (repeated_views.h); 0: never.
   VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::string service_name, net::Context& context,
              Master master, metrics::SpanRecorder& spans, int repeat_after = 0);
 
@@ -72,8 +73,8 @@ class VolumeWork final : public SamplingWork {
   };
 
   Readiness readiness(const Held& held, double now_s);
-  /// When what a lease costs has passed: it begins when the one before ended, or when it came; instants as they should be, not as this process
-  /// woke up.
+  /// When the lease's cost has passed. It begins when the one before ended, or when it came: the instants that were
+  /// due, not those at which this process woke up.
   double repeated_end_s(const Held& held, const RepeatedViews::View& view) const {
     return std::max(held.received_s, repeated_end_s_) + view.cost_s();
   }
@@ -92,8 +93,7 @@ class VolumeWork final : public SamplingWork {
   net::Context& context_;
   Master master_;
   metrics::SpanRecorder& spans_;
-  InstanceId master_instance_;  // of another one the same number is another epoch
-  std::map<EpochId, Epoch> epochs_;
+  EpochBook<Epoch> epochs_;
   std::deque<Held> leases_;
   std::map<std::string, net::Socket> servers_;  // by endpoint
   std::optional<Asked> asked_;

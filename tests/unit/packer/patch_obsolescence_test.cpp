@@ -1,4 +1,5 @@
-// Which patches go first where packing keeps redundant ones: scores, limits, ties, order; and what of it reaches late replicas.
+// Which patches go first where packing keeps redundant ones: scores, limits, ties, order; and what of it reaches late
+// replicas.
 #include "services/packer/points/patch_obsolescence.h"
 
 #include <gtest/gtest.h>

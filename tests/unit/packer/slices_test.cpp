@@ -2,12 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <deque>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 #include <set>
 
 #include "common/volume/session.h"
-#include "services/packer/slices/packing.h"
+#include "services/packer/slices/slice_packing.h"
 
 namespace telesplat::packer {
 namespace {
@@ -278,8 +279,8 @@ TEST(SliceGatherer, AnotherMasterCountsAnew) {
   EXPECT_EQ(out->frame.frame.value, 1u);
 }
 
-// Random frames, late and lost slabs, slow viewers: each gets a complete frame at most once and in order; one that takes only the newest never gets an
-// older one than there is; never more under way than it has buffers.
+// Random frames, late and lost slabs, slow viewers: each gets a complete frame at most once and in order; one that
+// takes only the newest never gets an older one than there is; never more under way than it has buffers.
 TEST(SliceGatherer, RandomFramesReachViewersInOrderAndWithinTheirBuffers) {
   uint64_t delivered = 0, skipped = 0;
   const auto nothing = std::make_shared<int>();  // images without anything in them are images, too
@@ -369,7 +370,7 @@ TEST(SliceGatherer, RandomFramesReachViewersInOrderAndWithinTheirBuffers) {
   EXPECT_GT(skipped, 20u);
 }
 
-class VolumePackingTest : public testing::Test {
+class SlicePackingTest : public testing::Test {
  protected:
   wire::Welcome welcome(EpochId epoch, InstanceId master = {1}) {
     volume::Session s;
@@ -389,20 +390,23 @@ class VolumePackingTest : public testing::Test {
   std::vector<wire::TileDone> told;
   std::vector<std::pair<wire::SliceFrame, std::string>> sent;
   std::set<std::string> gone;
+  std::deque<std::string> bodies;  // which `sent` points into
   metrics::SpanRecorder spans;
-  VolumePacking packing{{.tell = [this](const wire::TileDone& m) { told.push_back(m); },
-                         .send =
-                             [this](const wire::SliceFrame& m, const std::string& peer) {
-                               if (gone.contains(peer)) return false;
-                               sent.emplace_back(m, peer);
-                               return true;
-                             },
-                         .master_now = [] { return 99.0; },
-                         .to_master_s = [](double s) { return s + 50; }},
-                        spans};
+  SlicePacking packing{{.tell = [this](const wire::TileDone& m) { told.push_back(m); },
+                        .to_viewer =
+                            [this](std::string_view peer, std::string_view type, std::string body) {
+                              if (gone.contains(std::string(peer))) return false;
+                              EXPECT_EQ(type, wire::SliceFrame::kName);
+                              const auto& kept = bodies.emplace_back(std::move(body));
+                              sent.emplace_back(*wire::decode<wire::SliceFrame>(std::as_bytes(std::span(kept))), peer);
+                              return true;
+                            },
+                        .master_now = [] { return 99.0; },
+                        .to_master_s = [](double s) { return s + 50; }},
+                       spans};
 };
 
-TEST_F(VolumePackingTest, TellsTheMasterOfEverySlab) {
+TEST_F(SlicePackingTest, TellsTheMasterOfEverySlab) {
   ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
   ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0), 0));
   for (const uint64_t n : {0, 1}) ASSERT_TRUE(receive(slab(lease(1, n, 2, {view(7, 5)})), 3));
@@ -426,7 +430,7 @@ TEST_F(VolumePackingTest, TellsTheMasterOfEverySlab) {
   EXPECT_EQ(told[2].bytes_sent, 0u);
 }
 
-TEST_F(VolumePackingTest, SlabsAheadOfTheirEpochWaitForIt) {
+TEST_F(SlicePackingTest, SlabsAheadOfTheirEpochWaitForIt) {
   EXPECT_FALSE(packing.follow(
       [] {
         wire::Welcome w;
@@ -454,7 +458,7 @@ TEST_F(VolumePackingTest, SlabsAheadOfTheirEpochWaitForIt) {
   EXPECT_EQ(values["slabs_other_epoch"], 2);
 }
 
-TEST_F(VolumePackingTest, OthersFramesAreTakenForOthersAfterAMastersRestart) {
+TEST_F(SlicePackingTest, OthersFramesAreTakenForOthersAfterAMastersRestart) {
   ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
   ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0, 1), 0));
   ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 5)})), 1));
@@ -473,7 +477,7 @@ TEST_F(VolumePackingTest, OthersFramesAreTakenForOthersAfterAMastersRestart) {
   EXPECT_EQ(values["volume_frames_complete"], 3);
 }
 
-TEST_F(VolumePackingTest, BadSessionsArePackedByNobody) {
+TEST_F(SlicePackingTest, BadSessionsArePackedByNobody) {
   auto bad = welcome(kEpoch);
   bad.parameters.erase("volume.size.x");
   EXPECT_TRUE(packing.follow(bad, 0));

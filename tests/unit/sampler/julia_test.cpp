@@ -1,4 +1,5 @@
-// What the Julia sampler promises: canonical images, pixels that do not depend on the rectangle, normals, colours, and odd cameras and sets.
+// What the Julia sampler promises: canonical images, pixels that do not depend on the rectangle, normals, colours, and
+// odd cameras and sets.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -44,8 +45,8 @@ TEST(JuliaSampler, SampledBallIsABall) {
   const geometry::Camera c = camera();
   const image::DepthImage image = whole(s.scene, c);
   ASSERT_GT(covered(image), image.pixels() / 20);
-  // Of q^2 the estimate is 0.5 |q| log|q|, near |q| = 1 half of |q| - 1: half a footprint is reached where |q| is one more than 1, which in the
-  // slice, where the ball's radius is 0.8, takes 1 / 0.8 of a footprint.
+  // Of q^2 the estimate is 0.5 |q| log|q|, near |q| = 1 half of |q| - 1: half a footprint is reached where |q| is one
+  // more than 1, which in the slice, where the ball's radius is 0.8, takes 1 / 0.8 of a footprint.
   const double footprint = 1 / c.focal_x(), radius = 0.8 * s.placement.scale;
   for (int y = 0; y < c.height; ++y)
     for (int x = 0; x < c.width; ++x) {

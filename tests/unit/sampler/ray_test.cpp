@@ -37,7 +37,8 @@ TEST(RaySampler, EmptySceneGivesEmptyImage) {
 }
 
 TEST(RaySampler, TriangleCoversExactlyThePixelsWhoseCentresLieInside) {
-  // At depth 1, pixel (x, y) has its centre at u = (x - 3.5) / 4, v = (3.5 - y) / 4. This triangle's corners lie between centres.
+  // At depth 1, pixel (x, y) has its centre at u = (x - 3.5) / 4, v = (3.5 - y) / 4. This triangle's corners lie
+  // between centres.
   auto s = sampler_with(test::triangle({{-0.51f, -0.51f, -1}, kUp, 0x112233}, {{0.51f, -0.51f, -1}, kUp, 0x112233},
                                        {{-0.51f, 0.51f, -1}, kUp, 0x112233}));
   const Camera camera = camera_8x8();

@@ -114,8 +114,8 @@ TEST(ShearSplatter, CropsImagesAndLeavesOutEmptyOnes) {
   EXPECT_TRUE(ShearSplatter(1).splat(SlabVolume(grid, none), scene.colours, *frame, 0, 32, &stats).empty());
 }
 
-// A solid block, most of which is skipped. Neither the sampled pose nor one 5 degrees beside it may tell: layers splatted one by one, which know of
-// nothing in front of them, look the same.
+// A solid block, most of which is skipped. Neither the sampled pose nor one 5 degrees beside it may tell: layers
+// splatted one by one, which know of nothing in front of them, look the same.
 TEST(ShearSplatter, SkipsOnlyWhatNobodySees) {
   const auto grid = test::make_grid({48, 48, 48}, 0.5);
   auto colours = test::ramp(0.9);
@@ -204,7 +204,8 @@ TEST(Lighting, HeadLightShinesFromTheEyeOnTheCentre) {
   EXPECT_GT(volume::normal_intensities(grid, grid.centre_room())[volume::kNoNormal], 0.1f);
 }
 
-// Through the middle of a uniform block, along an axis: its n voxels, of which the outermost fall to nothing over one more voxel.
+// Through the middle of a uniform block, along an axis: its n voxels, of which the outermost fall to nothing over one
+// more voxel.
 TEST(VolumeRaycaster, IntegratesAUniformBlock) {
   const auto grid = test::make_grid({17, 17, 17}, 0.17);  // a voxel is a centimetre
   for (const double extinction : {0.01, 0.1, 1.0}) {

@@ -1,4 +1,5 @@
-// What a sampler does for leases of a volume: voxels from data servers that answer as they like, slabs that change, epochs, memory.
+// What a sampler does for leases of a volume: voxels from data servers that answer as they like, slabs that change,
+// epochs, memory.
 #include <gtest/gtest.h>
 
 #include <deque>
@@ -545,6 +546,36 @@ TEST_F(VolumeWorkTest, AnotherVolumeOrMasterBeginsAnew) {
   tell(work, slab(1, 0, 12));
   ASSERT_TRUE(asked(work));
   EXPECT_TRUE(take_request().have.empty());
+}
+
+TEST(SlabStore, AnswersMustHaveTheSlicesThatTheirHeaderSays) {
+  const auto high = session(kHigh);
+  const LevelSet show = shown(high);
+  SlabStore store([](const volume::Grid&, Voxels v) { return std::make_shared<const FakeSlab>(std::move(v)); }, 1);
+  store.set_scene({high.grid, high.levels, high.lit, 1, ""});
+  ASSERT_TRUE(store.assign({1, 0, 1, 0, 12, {{0, "tcp://server:1", 0, 12}}}));
+  const auto ask = store.next({0, 0, 12, {1}, &show});
+  ASSERT_TRUE(ask && ask->begin == 0 && ask->end == 12);
+  // The header says slices 2 to 10, the voxels are those of [begin, end).
+  const auto take = [&](int begin, int end) {
+    const auto bytes = volume::encode_voxels(voxels(0, begin, end, show), kSize[0], kSize[1]);
+    wire::VoxelData d{.epoch = {1}, .begin = 2, .end = 10, .known = true};
+    d.shown = std::as_bytes(show.bytes());
+    d.data = std::as_bytes(std::span(bytes));
+    return store.take(*ask, d, show);
+  };
+  for (const auto& [begin, end] : {std::pair{2, 2}, {10, 10}, {2, 9}, {3, 10}, {5, 6}}) {
+    const auto taken = take(begin, end);
+    ASSERT_FALSE(taken.ok()) << begin << " to " << end;
+    const std::string& why = taken.error().text;
+    EXPECT_NE(why.find("tcp://server:1"), std::string::npos) << why;
+    EXPECT_NE(why.find("2 to 10"), std::string::npos) << why;
+    EXPECT_NE(why.find(std::to_string(begin) + " to " + std::to_string(end)), std::string::npos) << why;
+    EXPECT_EQ(store.voxels(), 0u);
+  }
+  const auto taken = take(2, 10);
+  ASSERT_TRUE(taken.ok() && *taken);
+  EXPECT_EQ(store.voxels(), voxels(0, 2, 10, show).size());
 }
 
 TEST(SlabStore, LetsGoOfWhatIsTransparentWhenMemoryRunsShort) {

@@ -8,7 +8,7 @@
 
 #include "common/geometry/trajectory.h"
 #include "common/julia/parameters.h"
-#include "services/sampler/julia/work.h"
+#include "services/sampler/julia/tiles.h"
 #include "services/sampler/tiles/replay.h"
 
 namespace telesplat::sampler {
@@ -35,8 +35,8 @@ wire::Welcome welcome(EpochId epoch, double c_x, InstanceId master = {7}) {
   return w;
 }
 
-TEST(JuliaWork, SamplesEachLeaseWithItsEpochsParameters) {
-  JuliaWork work(1);
+TEST(JuliaTiles, SamplesEachLeaseWithItsEpochsParameters) {
+  JuliaTiles work(1);
   EXPECT_FALSE(work.takes_leases());
   work.on_welcome(welcome({1}, 0));
   work.on_welcome(welcome({2}, -0.6));
@@ -52,27 +52,27 @@ TEST(JuliaWork, SamplesEachLeaseWithItsEpochsParameters) {
   EXPECT_EQ(work.sample(first).image, a.image);
 }
 
-TEST(JuliaWork, RemembersTheLastEpochsOnly) {
-  JuliaWork work(1);
-  for (uint64_t e = 1; e <= JuliaWork::kEpochs + 1; ++e) work.on_welcome(welcome({e}, 0.01 * double(e)));
+TEST(JuliaTiles, RemembersTheLastEpochsOnly) {
+  JuliaTiles work(1);
+  for (uint64_t e = 1; e <= kEpochs + 1; ++e) work.on_welcome(welcome({e}, 0.01 * double(e)));
   EXPECT_EQ(work.readiness(lease(1, {1}, {0, 0, 48, 8}, 0), 5).state, State::kHopeless);
   EXPECT_EQ(work.readiness(lease(1, {2}, {0, 0, 48, 8}, 0), 5).state, State::kReady);
 }
 
-TEST(JuliaWork, WaitsAMomentForAnEpochsWelcome) {
-  JuliaWork work(1);
+TEST(JuliaTiles, WaitsAMomentForAnEpochsWelcome) {
+  JuliaTiles work(1);
   work.on_welcome(welcome({1}, 0));
   const auto early = lease(1, {2}, {0, 0, 48, 8}, 10);
   const auto r = work.readiness(early, 10.1);
   EXPECT_EQ(r.state, State::kWaits);
-  EXPECT_DOUBLE_EQ(r.again_s, 10 + JuliaWork::kUnknownEpoch_s);
+  EXPECT_DOUBLE_EQ(r.again_s, 10 + kUnknownEpoch_s);
   EXPECT_EQ(work.readiness(early, r.again_s).state, State::kHopeless);
   work.on_welcome(welcome({2}, 0.1));
   EXPECT_EQ(work.readiness(early, 10.2).state, State::kReady);
 }
 
-TEST(JuliaWork, DropsLeasesOfBadParametersAndForgetsAnotherMastersEpochs) {
-  JuliaWork work(1);
+TEST(JuliaTiles, DropsLeasesOfBadParametersAndForgetsAnotherMastersEpochs) {
+  JuliaTiles work(1);
   auto bad = welcome({1}, 0);
   bad.parameters["iterations"] = 0;
   work.on_welcome(bad);
@@ -94,8 +94,8 @@ Replay replay() {
   return r;
 }
 
-TEST(ReplayWork, ALeaseTakesWhatItsRowsCostAndLateWakingDoesNotAddUp) {
-  ReplayWork work(replay(), 2);
+TEST(ReplayTiles, ALeaseTakesWhatItsRowsCostAndLateWakingDoesNotAddUp) {
+  ReplayTiles work(replay(), 2);
   const auto first = lease(1, {1}, {0, 8, 48, 2}, 100), second = lease(2, {1}, {0, 0, 48, 1}, 101);
   const auto r = work.readiness(first, 100.5);
   EXPECT_EQ(r.state, State::kWaits);
@@ -111,8 +111,8 @@ TEST(ReplayWork, ALeaseTakesWhatItsRowsCostAndLateWakingDoesNotAddUp) {
   EXPECT_DOUBLE_EQ(work.readiness(second, 105.3).again_s, 106);  // from 105, not from 105.3
 }
 
-TEST(ReplayWork, DropsLeasesOfOtherFrames) {
-  ReplayWork work(replay(), 1);
+TEST(ReplayTiles, DropsLeasesOfOtherFrames) {
+  ReplayTiles work(replay(), 1);
   auto other = lease(1, {1}, {0, 0, 12, 8}, 0);
   other.lease.step = 4;
   EXPECT_EQ(work.readiness(other, 0).state, State::kHopeless);

@@ -22,8 +22,9 @@ struct TilePixels {
 
 alignas(64) inline constexpr float kNothing[kBlockFloats] = {};
 
-// (1 - exp(-x)) / x for x >= 0, as R / (1 + x R) with R a polynomial fitted to (exp(x) - 1) / x such that 1 - x R / (1 + x R) is exp(-x) to 2.3e-4
-// (and to 2.3e-4 x for small x). Neither cancels nor divides by 0, unlike the exponential itself.
+// (1 - exp(-x)) / x for x >= 0, as R / (1 + x R) with R a polynomial fitted to (exp(x) - 1) / x such that 1 - x R / (1
+// + x R) is exp(-x) to 2.3e-4 (and to 2.3e-4 x for small x). Neither cancels nor divides by 0, unlike the exponential
+// itself.
 template <class V>
 HWY_INLINE V Attenuation(V x) {
   const hn::DFromV<V> d;

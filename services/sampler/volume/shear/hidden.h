@@ -14,7 +14,8 @@ class HiddenPixels {
   const uint8_t* bytes() const { return bytes_.data(); }
   int blocks_across() const { return across_; }
 
-  /// Keeps the pixels whose neighbours, to `dx` and `dy` pixels on all sides, have all been set. Beyond the raster everything is.
+  /// Keeps the pixels whose neighbours, to `dx` and `dy` pixels on all sides, have all been set. Beyond the raster
+  /// everything is.
   void shrink(int dx, int dy);
 
  private:

@@ -97,8 +97,8 @@ void AddLine(const Line& added, float weight, uint64_t live, Line& line) {
   line.mask |= mask;
 }
 
-// Pixel rows higher than voxel rows: a pixel row is the mean of the voxel rows within a pixel's height on both sides, weighted by a tent. So a voxel row is
-// part of two pixel rows, of which one is finished when the next but one begins.
+// Pixel rows higher than voxel rows: a pixel row is the mean of the voxel rows within a pixel's height on both sides,
+// weighted by a tent. So a voxel row is part of two pixel rows, of which one is finished when the next but one begins.
 void Minify(const SliceInTile& s, Scratch& scratch, SplatOutcome& out) {
   const double pitch = s.slice.v.pitch;
   const SliceAxis& axis = s.slice.v;

@@ -1,4 +1,5 @@
-// Four floats of a voxel or pixel: (r, g, b, extinction). A vector where the target has one, an array where it has none.
+// Four floats of a voxel or pixel: (r, g, b, extinction). A vector where the target has one, an array where it has
+// none.
 #if defined(TELESPLAT_SHEAR_QUAD_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SHEAR_QUAD_INL_H_
 #undef TELESPLAT_SHEAR_QUAD_INL_H_

@@ -35,7 +35,8 @@ struct DenseRow {
   alignas(64) float at[4 * (volume::kMaxSide + 2 * kMargin)] = {};
 };
 
-// How the columns of a slice lie in a tile. Index coordinates are counted from `base`, so that single precision is enough.
+// How the columns of a slice lie in a tile. Index coordinates are counted from `base`, so that single precision is
+// enough.
 struct TileColumns {
   int base;
   float origin, pitch;         // index coordinate, less base, of the tile's first pixel centre; per pixel
@@ -157,8 +158,8 @@ inline CellRow cells_of(const CellRow& row, const Segment& segment) {
   return out;
 }
 
-// Adds weight times the voxels of a segment to the dense row. Returns the blocks that they reach; `voxels` counts them. row: ends with the last
-// cell that was looked at.
+// Adds weight times the voxels of a segment to the dense row. Returns the blocks that they reach; `voxels` counts them.
+// row: ends with the last cell that was looked at.
 HWY_INLINE uint64_t FillRow(const SplatScene& scene, const TileColumns& c, const Segment& segment, float weight,
                             CellRow& row, DenseRow& dense, uint64_t& voxels) {
   float* at = dense.at + 4 * kMargin;

@@ -32,8 +32,8 @@ ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int ax
     out.first = voxels.rows;
     for (uint32_t n = 0; n < voxels.size(); ++n) out.cells[n] = cell(voxels.i[n], n);
   } else {
-    // Rows of axis 0 are those of one (i, k), with j in order; of axis 1 of one (j, i), with k in order. Voxels come in order of (k, j, i), so
-    // that appending keeps columns in order.
+    // Rows of axis 0 are those of one (i, k), with j in order; of axis 1 of one (j, i), with k in order. Voxels come in
+    // order of (k, j, i), so that appending keeps columns in order.
     const auto row_of = [&](int i, int j, int k) {
       return axis == 0 ? size_t(i) * size_t(out.rows) + size_t(k - voxels.k_begin)
                        : size_t(j) * size_t(out.rows) + size_t(i);
@@ -64,29 +64,6 @@ ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int ax
     }
   }
   return out;
-}
-
-const ShearRows& SlabVolume::Impl::rows(int axis) const {
-  std::call_once(made_[axis], [&] { rows_[axis] = arrange(grid, voxels, axis); });
-  return rows_[axis];
-}
-
-SlabVolume::SlabVolume(const volume::Grid& grid, volume::Voxels voxels) {
-  auto impl = std::make_unique<Impl>();
-  impl->grid = grid;
-  impl->voxels = std::move(voxels);
-  impl_ = std::move(impl);
-}
-SlabVolume::~SlabVolume() = default;
-const volume::Grid& SlabVolume::grid() const { return impl_->grid; }
-const volume::Voxels& SlabVolume::voxels() const { return impl_->voxels; }
-
-size_t SlabVolume::bytes() const {
-  const volume::Voxels& v = impl_->voxels;
-  const size_t held = size_t(v.k_end - v.k_begin);
-  const auto& size = impl_->grid.size;
-  const size_t rows = held * size_t(size[1]) + size_t(size[0]) * held + size_t(size[0]) * size_t(size[1]);
-  return v.size() * (6 + 3 * sizeof(ShearCell)) + (rows + held * size_t(size[1])) * sizeof(uint32_t);
 }
 
 }  // namespace telesplat::sampler

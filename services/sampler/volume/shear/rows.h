@@ -1,11 +1,12 @@
-// The voxels of a slab, arranged for one principal axis: cells of the same slice and row lie together, in the order of the raster's columns.
+// The voxels of a slab, arranged for one principal axis: cells of the same slice and row lie together, in the order of
+// the raster's columns.
 #pragma once
 
 #include <cstdint>
-#include <mutex>
 #include <vector>
 
-#include "services/sampler/volume/shear/splatter.h"
+#include "common/volume/grid.h"
+#include "common/volume/voxels.h"
 
 namespace telesplat::sampler {
 
@@ -20,7 +21,7 @@ struct ShearRows {
   /// Row v of slice s has the cells [first[r], first[r + 1]), r = (s - slice_begin) * rows + (v - row_begin).
   std::vector<uint32_t> first;
   std::vector<ShearCell> cells;
-  /// What of a slice has cells: u in [u_lo, u_hi], v in [v_lo, v_hi]; empty where u_lo > u_hi.
+  /// Where a slice has cells: u in [u_lo, u_hi], v in [v_lo, v_hi]; nowhere if u_lo > u_hi.
   struct Bounds {
     int u_lo = 65536, u_hi = -1, v_lo = 65536, v_hi = -1;
   };
@@ -29,17 +30,5 @@ struct ShearRows {
 
 /// Arranges by counting: O(voxels + rows). axis: the principal one.
 ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int axis);
-
-struct SlabVolume::Impl {
-  volume::Grid grid;
-  volume::Voxels voxels;
-
-  /// Made when a frame first needs it, once; safe to ask for from several threads.
-  const ShearRows& rows(int axis) const;
-
- private:
-  mutable std::once_flag made_[3];
-  mutable ShearRows rows_[3];
-};
 
 }  // namespace telesplat::sampler

@@ -1,8 +1,10 @@
-// What the splatting kernels work on: one frame of one slab, cut into tiles of the raster, and the layers of a tile one after the other.
+// What the splatting kernels work on: one frame of one slab, cut into tiles of the raster, and the layers of a tile one
+// after the other.
 //
-// Extinction and extinction times colour of a slice are resampled separably. A row of voxels becomes a *line* of pixels; pixel rows are mixed from
-// the lines of the voxel rows about them. Everything goes by blocks of 8 pixels, of which a tile is 64 wide, so that one bit of a 64-bit
-// word says whether a block of a row has anything in it, or can still be seen.
+// Extinction and extinction times colour of a slice are resampled separably. A row of voxels becomes a *line* of
+// pixels; pixel rows are mixed from the lines of the voxel rows about them. Everything goes by blocks of 8 pixels. A
+// tile is 64 blocks wide, so that one bit of a 64-bit word says whether a block of a row has anything in it, or can
+// still be seen.
 #pragma once
 
 #include <cstdint>
@@ -58,7 +60,8 @@ struct SplatTile {
   float* remaining = nullptr;  ///< light that comes through the layers so far: raster rows of 8 * blocks_across
   uint64_t* begun = nullptr;   ///< for each row of the tile: blocks of `remaining` that have a value; others are 1
   uint8_t* opaque = nullptr;   ///< as hidden: bits of pixels that this layer made opaque, added
-  /// Pixels of the image, 0xAARRGGBB premultiplied; raster pixel (image_x, image_y) is the first. Blocks outside have nothing.
+  /// Pixels of the image, 0xAARRGGBB premultiplied; raster pixel (image_x, image_y) is the first. Blocks outside have
+  /// nothing.
   uint32_t* image = nullptr;
   int image_x = 0, image_y = 0, image_width = 0, image_height = 0;
 };

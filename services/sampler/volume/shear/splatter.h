@@ -7,25 +7,9 @@
 #include "common/volume/shear.h"
 #include "common/volume/slices/image.h"
 #include "common/volume/transfer/function.h"
-#include "common/volume/voxels.h"
+#include "services/sampler/volume/shear/slab_volume.h"
 
 namespace telesplat::sampler {
-
-/// What a sampler holds of one time step: voxels of the slices [k_begin, k_end), its slab and a slice on both sides, arranged so that the slices of any
-/// principal axis can be gone through in either direction. Immutable.
-class SlabVolume {
- public:
-  SlabVolume(const volume::Grid& grid, volume::Voxels voxels);
-  ~SlabVolume();
-  const volume::Grid& grid() const;
-  const volume::Voxels& voxels() const;
-  size_t bytes() const;
-  struct Impl;
-  const Impl& impl() const { return *impl_; }
-
- private:
-  std::unique_ptr<const Impl> impl_;
-};
 
 struct ShearStats {
   uint64_t voxels = 0;   ///< splatted
@@ -34,20 +18,22 @@ struct ShearStats {
   double arrange_ms = 0, splat_ms = 0;
 };
 
-/// The field that is splatted: every voxel has an extinction (per Grid::unit_m) and a colour, lit by volume/lighting.h. Within a slice both extinction
-/// and extinction times colour are interpolated bilinearly (a tent of one voxel; where a voxel is smaller than a pixel, of one pixel), the
-/// kernel being the same for all voxels of a slice (T4.5.1), its weights adding up to 1 at every pixel. A slice adds
-/// opacity 1 - exp(-extinction * path), path = ShearFrame::path; slices are composited front to back in single precision. Where the most opaque level
-/// has an extinction of more than 0.6 a slice in the middle of the raster, so do planes half way between slices, then with half the path each. Images are cropped to what is not transparent; empty ones are left out.
-/// Early termination: what lies behind opaque pixels is skipped, but for a margin around them, so that small head movements reveal no holes.
+/// The field that is splatted: every voxel has an extinction (per Grid::unit_m) and a colour, lit by volume/lighting.h.
+/// Within a slice, extinction and extinction times colour are interpolated bilinearly: a tent of one voxel, or of one
+/// pixel where a voxel is smaller. The kernel is the same for all voxels of a slice (T4.5.1); its weights add up to 1
+/// at every pixel. A slice adds opacity 1 - exp(-extinction * path), path = ShearFrame::path; slices are composited
+/// front to back in single precision. Where the most opaque level has an extinction of more than 0.6 a slice in the
+/// middle of the raster, planes half-way between slices are composited too, then with half the path each. Images are
+/// cropped to what is not transparent; empty ones are left out. Early termination: what lies behind opaque pixels is
+/// skipped, but for a margin around them, so that small head movements reveal no holes.
 class ShearSplatter {
  public:
   explicit ShearSplatter(int threads);  ///< 0: one a core. Images do not depend on it, nor on the SIMD target
   ~ShearSplatter();
 
-  /// Images of the slab [k_begin, k_end) of the frame: pixels of owned_pixels() only, for which the volume must hold one slice more on both sides where
-  /// the grid has them; where pixels are larger than 1.5 voxels, the kernel ends with what is held. colours:
-  /// one a level of the epoch. Precondition: validate(frame, grid).
+  /// Images of the slab [k_begin, k_end) of the frame: pixels of owned_pixels() only. For those the volume must hold
+  /// one slice more on both sides, where the grid has them; where pixels are larger than 1.5 voxels, the kernel ends
+  /// with what is held. colours: one a level of the epoch. Precondition: validate(frame, grid).
   std::vector<volume::SliceImage> splat(const SlabVolume& volume, const std::vector<volume::LevelColour>& colours,
                                         const volume::ShearFrame& frame, int k_begin, int k_end,
                                         ShearStats* stats = nullptr);

@@ -1,6 +1,7 @@
-#include "services/sampler/mesh/work.h"
+#include "services/sampler/mesh/tiles.h"
 
 #include "common/net/dispatch.h"
+#include "common/scene/session.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -20,8 +21,8 @@ geometry::Camera part(const wire::Lease& lease) { return geometry::crop(lease.ca
 
 }  // namespace
 
-MeshWork::MeshWork(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
-                   net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans)
+MeshTiles::MeshTiles(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
+                     net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans)
     : sampler_(std::move(sampler)),
       cache_(cache_bytes),
       service_name_(service_name),
@@ -29,41 +30,40 @@ MeshWork::MeshWork(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const
       link_(link),
       spans_(spans) {}
 
-void MeshWork::on_welcome(const wire::Welcome& session) {
-  const auto chunks = session.endpoints.find("chunks");
-  if (chunks == session.endpoints.end() || chunks->second.empty() ||
-      (chunks->second == endpoint_ && session.epoch == epoch_))
-    return;
+void MeshTiles::on_welcome(const wire::Welcome& session) {
+  const scene::SessionView view(session);
+  const std::string chunks = view.endpoint("chunks");
+  if (chunks.empty() || (chunks == endpoint_ && session.epoch == epoch_)) return;
   epoch_ = session.epoch;
-  if (chunks->second != endpoint_) {
-    endpoint_ = chunks->second;
+  if (chunks != endpoint_) {
+    endpoint_ = chunks;
     blocks_.emplace(context_, net::Kind::kDealer, service_name_ + ":chunks",
                     net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes});
     if (const Status s = blocks_->connect(endpoint_); !s) log::error("{}", s.error().text);
   }
   // A restarted data server with the same data has the same chunks: keep what we hold.
-  const auto hash = session.facts.find("content_hash");
-  if (hash == session.facts.end() || hash->second.empty() || hash->second != content_hash_) {
+  const std::string hash = view.fact("content_hash");
+  if (hash.empty() || hash != content_hash_) {
     for (const auto& c : cache_.chunks()) sampler_->remove_chunk(c.id);
     cache_.reset({});
-    content_hash_ = hash == session.facts.end() ? "" : hash->second;
+    content_hash_ = hash;
     prefetched_ = false;
   }
   cache_.forget_waiting();
   last_request_s_ = -1e9;
 }
 
-Readiness MeshWork::readiness(const HeldLease& held, double) {
+Readiness MeshTiles::readiness(const HeldLease& held, double) {
   const bool ready = cache_.known() && cache_.missing(part(held.lease)).empty();
   return {ready ? Readiness::State::kReady : Readiness::State::kWaits};
 }
 
-Sampled MeshWork::sample(const HeldLease& held) {
+Sampled MeshTiles::sample(const HeldLease& held) {
   return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect); });
 }
 
 // Asks for the list of chunks, then for what the next tile needs, then for the rest as far as the budget goes.
-void MeshWork::fetch(const HeldLease* next, double now_s) {
+void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
   if (!cache_.known()) {
     if (now_s - last_request_s_ > kRetry_s) {
@@ -98,17 +98,17 @@ void MeshWork::fetch(const HeldLease* next, double now_s) {
   }
 }
 
-size_t MeshWork::missing_count() const {
+size_t MeshTiles::missing_count() const {
   size_t n = 0;
   for (const auto& c : cache_.chunks()) n += !cache_.held(c.id);
   return n;
 }
 
-std::vector<net::Socket*> MeshWork::sockets() {
+std::vector<net::Socket*> MeshTiles::sockets() {
   return blocks_ ? std::vector<net::Socket*>{&*blocks_} : std::vector<net::Socket*>{};
 }
 
-void MeshWork::receive() {
+void MeshTiles::receive() {
   if (!blocks_) return;
   std::vector<std::pair<ChunkId, geometry::ChunkBytes>> batch;
   while (const auto message = blocks_->receive()) {
@@ -131,7 +131,7 @@ void MeshWork::receive() {
   spans_.add("add chunks", link_.to_master_s(begin_s), link_.to_master_s(monotonic_s()));
 }
 
-void MeshWork::add_status(net::MasterLink::Values& values) const {
+void MeshTiles::add_status(net::MasterLink::Values& values) const {
   values["chunk_mb"] = double(cache_.bytes()) / 1e6;
   values["messages_rejected"] = blocks_ ? double(blocks_->rejected()) : 0.0;
 }

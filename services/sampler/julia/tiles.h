@@ -1,20 +1,19 @@
-// Leases of a Julia set: all there is to know of the scene comes with the master's welcomes.
+// Tiles of a Julia set: all there is to know of the scene comes with the master's welcomes.
 #pragma once
 
 #include <map>
 #include <optional>
+#include <string>
 
+#include "services/sampler/epoch_book.h"
 #include "services/sampler/julia/sampler.h"
 #include "services/sampler/tiles/tile_source.h"
 
 namespace telesplat::sampler {
 
-class JuliaWork final : public LeaseWork {
+class JuliaTiles final : public TileSource {
  public:
-  static constexpr size_t kEpochs = 8;          ///< whose parameters are remembered, the newest ones
-  static constexpr double kUnknownEpoch_s = 1;  ///< a lease waits so long for its epoch's welcome
-
-  explicit JuliaWork(int threads) : sampler_(threads) {}
+  explicit JuliaTiles(int threads) : sampler_(threads) {}
 
   const char* name() const override { return "julia"; }
   /// Remembers the epoch's parameters. Bad ones are told once, and that epoch's leases are hopeless.
@@ -30,8 +29,7 @@ class JuliaWork final : public LeaseWork {
     std::optional<JuliaScene> scene;  // none: the parameters are bad
   };
   JuliaSampler sampler_;
-  InstanceId master_;  // of another one the same number is another epoch
-  std::map<EpochId, Epoch> epochs_;
+  EpochBook<Epoch> epochs_;
 };
 
 }  // namespace telesplat::sampler

@@ -1,35 +1,30 @@
-// The packer's part for volumes: slabs come in, complete frames go to their viewers, the master is told. Who sends is not its business.
+// The packer's part for slices (T4.5.2): slabs come in, complete frames go to their viewers.
 #pragma once
 
-#include <functional>
+#include <optional>
 
 #include "common/metrics/recorder.h"
-#include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"
+#include "services/packer/packing.h"
 #include "services/packer/slices/gatherer.h"
 
 namespace telesplat::packer {
 
-class VolumePacking {
+class SlicePacking final : public Packing {
  public:
-  struct Links {
-    std::function<void(const wire::TileDone&)> tell;                             ///< the master
-    std::function<bool(const wire::SliceFrame&, const std::string& peer)> send;  ///< a viewer; false: it is gone
-    std::function<double()> master_now;
-    std::function<double(double)> to_master_s;
-  };
   /// Keeps a reference to the spans.
-  VolumePacking(Links links, metrics::SpanRecorder& spans) : links_(std::move(links)), spans_(spans) {}
+  SlicePacking(Outlets outlets, metrics::SpanRecorder& spans) : outlets_(std::move(outlets)), spans_(spans) {}
 
-  /// Whether the session is of a volume: then it is followed.
-  bool follow(const wire::Welcome& session, double now_s);
+  bool follow(const wire::Welcome& session, double now_s) override;
+  void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
+  void take_state(net::Socket& from, const net::Message& message, double now_s) override;
+  void tick(double now_s) override;
+  void add_status(net::MasterLink::Values& values) const override;
 
-  /// Slabs of an epoch that is not announced yet wait for it. Error: what makes no sense.
+  /// As take_sampled(): slabs of an epoch that is not announced yet wait for it. Error: what makes no sense.
   Status receive(const net::Message& message, const wire::SliceImages& images, double now_s);
+  /// As take_state().
   Status acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s);
-  void tick(double now_s);
-
-  void add_status(net::MasterLink::Values& values) const;
 
  private:
   struct Received {
@@ -41,7 +36,7 @@ class VolumePacking {
   }
   uint64_t send_out(double now_s);
 
-  Links links_;
+  Outlets outlets_;
   metrics::SpanRecorder& spans_;
   SliceGatherer gatherer_;
   EpochHold<Received> ahead_{{.items = 64, .bytes = 256u << 20}};

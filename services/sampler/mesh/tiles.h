@@ -1,4 +1,4 @@
-// Leases of a mesh: chunks are fetched from the data server, nearest first, and held as far as memory goes.
+// Tiles of a mesh: chunks are fetched from the data server, nearest first, and held as far as memory goes.
 #pragma once
 
 #include <optional>
@@ -11,15 +11,16 @@
 
 namespace telesplat::sampler {
 
-class MeshWork final : public LeaseWork {
+class MeshTiles final : public TileSource {
  public:
   /// Keeps references to the context, the link (to ask for more time while chunks are on their way) and the spans.
-  MeshWork(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
-           net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans);
+  MeshTiles(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, const std::string& service_name,
+            net::Context& context, net::MasterLink& link, metrics::SpanRecorder& spans);
 
   const char* name() const override { return sampler_->name(); }
   void on_welcome(const wire::Welcome& session) override;
-  /// A lease may have to wait for its chunks, but then they come first: the earliest tiles need not wait for the whole mesh.
+  /// A lease may have to wait for its chunks, but then they come first: the earliest tiles need not wait for the whole
+  /// mesh.
   bool takes_leases() const override { return cache_.known(); }
   Readiness readiness(const HeldLease& lease, double now_s) override;
   Sampled sample(const HeldLease& lease) override;

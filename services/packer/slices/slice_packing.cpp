@@ -1,20 +1,21 @@
-#include "services/packer/slices/packing.h"
+#include "services/packer/slices/slice_packing.h"
 
 #include "common/core/log.h"
+#include "common/net/dispatch.h"
 #include "common/volume/session.h"
 
 namespace telesplat::packer {
 
-bool VolumePacking::follow(const wire::Welcome& session, double now_s) {
-  const auto kind = session.facts.find("kind");
-  if (kind == session.facts.end() || kind->second != "volume") return false;
+bool SlicePacking::follow(const wire::Welcome& session, double now_s) {
+  if (scene::SessionView(session).pipeline() != scene::Pipeline::kSlices) return false;
   const auto read = volume::read_session(session.parameters, session.facts);
   const Status valid = read ? volume::validate(read->grid) : Status(read.error());
   if (!valid) {
     log::error("the master's volume cannot be packed: {}", valid.error().text);
     return true;
   }
-  // Frames are told apart by their numbers, which another master counts from 1 again: viewers must see that these are others.
+  // Frames are told apart by their numbers. Another master counts from 1 again: viewers must see that its frames are
+  // others.
   if (master_ != session.master || grid_ != read->grid) {
     gatherer_.clear_frames();
     instance_ = net::make_instance_id();
@@ -31,7 +32,19 @@ bool VolumePacking::follow(const wire::Welcome& session, double now_s) {
   return true;
 }
 
-Status VolumePacking::receive(const net::Message& message, const wire::SliceImages& m, double now_s) {
+void SlicePacking::take_sampled(net::Socket& from, const net::Message& message, double now_s) {
+  net::dispatch<wire::SliceImages>(from, message, [&](const wire::SliceImages& m) {
+    if (const Status s = receive(message, m, now_s); !s) from.reject(message, s.error().text);
+  });
+}
+
+void SlicePacking::take_state(net::Socket& from, const net::Message& message, double now_s) {
+  net::dispatch<wire::SliceAck>(from, message, [&](const wire::SliceAck& m) {
+    if (const Status s = acknowledged(message.peer, m, now_s); !s) from.reject(message, s.error().text);
+  });
+}
+
+Status SlicePacking::receive(const net::Message& message, const wire::SliceImages& m, double now_s) {
   if (is_ahead(m)) {
     ahead_.add({message, m}, message.body.size(), now_s);
     return ok_status();
@@ -40,7 +53,7 @@ Status VolumePacking::receive(const net::Message& message, const wire::SliceImag
     (void)gatherer_.add({m, message.owner}, now_s);  // which counts it
     return ok_status();
   }
-  const double receive_s = links_.to_master_s(now_s);
+  const double receive_s = outlets_.to_master_s(now_s);
   const auto added = gatherer_.add({m, message.owner}, now_s);
   if (!added) return added.error();
   bytes_received_ += m.data.size();
@@ -57,22 +70,23 @@ Status VolumePacking::receive(const net::Message& message, const wire::SliceImag
                       .sample_end_s = m.sample_end_s,
                       .encode_end_s = m.encode_end_s,
                       .receive_s = receive_s};
-  // What a frame gives is counted to the slab that completed it. What was here already is done, should the master not know.
+  // What a frame gives is counted to the slab that completed it. A slab that is here already is done: the master may
+  // not know.
   if (added->frame_complete) {
     done.bytes_sent = send_out(now_s);
-    spans_.add("pack", receive_s, links_.master_now());
+    spans_.add("pack", receive_s, outlets_.master_now());
   }
-  done.packed_s = links_.master_now();
-  links_.tell(done);
+  done.packed_s = outlets_.master_now();
+  outlets_.tell(done);
   return ok_status();
 }
 
-uint64_t VolumePacking::send_out(double now_s) {
+uint64_t SlicePacking::send_out(double now_s) {
   uint64_t bytes = 0;
   while (auto out = gatherer_.take_outgoing(now_s)) {
     out->frame.packer = instance_;
-    out->frame.packed_s = links_.master_now();
-    if (!links_.send(out->frame, out->peer)) {
+    out->frame.packed_s = outlets_.master_now();
+    if (!outlets_.send(out->frame, out->peer)) {
       gatherer_.unreachable(out->peer);
       continue;
     }
@@ -82,18 +96,18 @@ uint64_t VolumePacking::send_out(double now_s) {
   return bytes;
 }
 
-Status VolumePacking::acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s) {
+Status SlicePacking::acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s) {
   const Status s = gatherer_.acknowledged(peer, ack, now_s);
   send_out(now_s);
   return s;
 }
 
-void VolumePacking::tick(double now_s) {
+void SlicePacking::tick(double now_s) {
   gatherer_.expire(now_s);
   ahead_.expire(now_s);
 }
 
-void VolumePacking::add_status(net::MasterLink::Values& values) const {
+void SlicePacking::add_status(net::MasterLink::Values& values) const {
   if (!gatherer_.ready()) return;
   const auto& s = gatherer_.statistics();
   values["bytes_sent"] += double(bytes_sent_);

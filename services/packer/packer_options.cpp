@@ -1,0 +1,30 @@
+#include "services/packer/packer_options.h"
+
+namespace telesplat::packer {
+
+options::Table table(PackerOptions& o) {
+  using options::Range;
+  const auto points = scene::Kinds::of(scene::Pipeline::kPoints);
+  return options::joined(net::service_table(o.service, net::Ends::kBoth),
+                         {{.flag = "--threads",
+                           .value = &o.threads,
+                           .help = "threads for reference depth maps; 0: one a core",
+                           .limits = Range{0, 1024},
+                           .fits = points},
+                          {.flag = "--record-depth",
+                           .value = &o.record_depth,
+                           .help = "folder to keep sampled depth images in",
+                           .fits = points},
+                          {.flag = "--record-depth-frames",
+                           .value = &o.record_depth_frames,
+                           .help = "depth images to keep at most",
+                           .limits = Range{1, 1000000},
+                           .fits = points},
+                          {.flag = "--log-limit-mb",
+                           .value = &o.log_limit_mb,
+                           .help = "memory for the events that late joiners get",
+                           .limits = Range{1, 1e6},
+                           .fits = points}});
+}
+
+}  // namespace telesplat::packer

@@ -1,0 +1,19 @@
+// What the packer can be told on its command line.
+#pragma once
+
+#include "common/net/service.h"
+
+namespace telesplat::packer {
+
+struct PackerOptions {
+  net::ServiceOptions service{.name = "packer"};
+  int threads = 0;           ///< for reference depth maps; 0: all cores
+  std::string record_depth;  ///< folder for sampled depth images; empty: none are kept
+  int record_depth_frames = 50;
+  double log_limit_mb = 512;  ///< events kept for late joiners
+};
+
+/// A row a flag; they point into `options`.
+options::Table table(PackerOptions& options);
+
+}  // namespace telesplat::packer

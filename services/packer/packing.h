@@ -1,0 +1,53 @@
+// What a packer does with what samplers send, one implementation a pipeline (points, slices). The service around it
+// owns the sockets and follows the master; everything here happens in its thread, and nothing here may wait.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "common/net/master_link.h"
+#include "common/scene/session.h"
+
+namespace telesplat::packer {
+
+/// Ways out of a packing. Messages are encoded already.
+struct Outlets {
+  std::function<void(const wire::TileDone&)> tell;                          ///< the master
+  std::function<void(std::string_view type, std::string body)> to_viewers;  ///< to all of them
+  /// To one viewer. False: dropped, because its queue is full or it is gone.
+  std::function<bool(std::string_view peer, std::string_view type, std::string body)> to_viewer;
+  std::function<double()> master_now;                 ///< seconds on the master's clock
+  std::function<double(double local_s)> to_master_s;  ///< monotonic_s() of this machine on the master's clock
+
+  template <class M>
+  void publish(const M& message) const {
+    to_viewers(M::kName, wire::encode(message));
+  }
+  template <class M>
+  bool send(const M& message, std::string_view peer) const {
+    return to_viewer(peer, M::kName, wire::encode(message));
+  }
+};
+
+class Packing {
+ public:
+  virtual ~Packing() = default;
+
+  /// A welcome of the master came: every one is told, in order. False: the session is of another pipeline, or it is not
+  /// known yet of which; nothing has changed then. A session that cannot be packed is told in the log, once a welcome.
+  virtual bool follow(const wire::Welcome& session, double now_s) = 0;
+
+  /// A message of a sampler. What makes no sense, or is of no type for this packing, is refused: `from` counts it. What
+  /// is of an epoch that no welcome told yet waits for it a while. `from` outlives the packing.
+  virtual void take_sampled(net::Socket& from, const net::Message& message, double now_s) = 0;
+  /// A message of a viewer: likewise.
+  virtual void take_state(net::Socket& from, const net::Message& message, double now_s) = 0;
+
+  /// To be called at least every 100 ms: what happens by time.
+  virtual void tick(double now_s) = 0;
+  /// Adds what it counts to a status report.
+  virtual void add_status(net::MasterLink::Values& values) const = 0;
+};
+
+}  // namespace telesplat::packer

@@ -1,0 +1,36 @@
+// What replicas of the point model apply, in order of sequence.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/points/point_model.h"
+#include "services/packer/points/frame_part.h"
+
+namespace telesplat::packer {
+
+/// A forget event names at most this many clusters; more become several events.
+inline constexpr size_t kMaxForgetKeys = 1u << 16;
+
+/// Its FramePart is a patch's; of other events only the epoch counts.
+struct Event : FramePart {
+  enum class Kind { kPatch, kForget, kEpoch };
+
+  Sequence sequence;
+  Kind kind = Kind::kPatch;
+
+  // kPatch
+  bool frame_complete = false;  ///< the last tile of its frame to be packed
+  /// Codec stream of the tile; eliminated pixels are not covered.
+  std::shared_ptr<const std::vector<uint8_t>> blob;
+  /// Covered pixels of this tile, before and after elimination.
+  uint64_t samples = 0, kept = 0;
+  /// The sums over the frame's tiles so far: elimination = 1 - kept / samples.
+  uint64_t frame_samples = 0, frame_kept = 0;
+
+  // kForget
+  std::vector<points::ClusterKey> clusters;  ///< ascending, at most kMaxForgetKeys
+  std::vector<uint32_t> frames;              ///< empty: whole clusters; else one a cluster: its mosaics with this tag
+};
+
+}  // namespace telesplat::packer

@@ -1,0 +1,253 @@
+#include "services/packer/points/point_packing.h"
+
+#include <algorithm>
+
+#include "common/core/log.h"
+#include "common/net/dispatch.h"
+
+namespace telesplat::packer {
+namespace {
+
+Config config_of(const wire::Welcome& session, const PointPacking::Options& options) {
+  const scene::SessionView view(session);
+  Config c;
+  const bool keep = view.setting("packing.keep_redundant", 0) != 0;
+  c.model = {session.box_room, int(session.octree_depth), !keep};
+  c.redundancy = keep ? Redundancy::kKeep : Redundancy::kEliminate;
+  c.relative_epsilon = float(view.setting("packing.epsilon", c.relative_epsilon));
+  c.obsolete_after_s = view.setting("packing.obsolete_after_s", 0);
+  c.max_points = uint64_t(view.setting("packing.max_points", 0));
+  c.age_weight = view.setting("packing.age_weight", c.age_weight);
+  c.rate_weight = view.setting("packing.rate_weight", c.rate_weight);
+  c.patches_per_cluster =
+      uint32_t(std::clamp(view.setting("packing.patches_per_cluster", c.patches_per_cluster), 0.0, 1e9));
+  c.max_log_bytes = options.max_log_bytes;
+  c.threads = options.threads;
+  return c;
+}
+
+// The block that a leased tile belongs to.
+FramePart block_of(const wire::Lease& l) {
+  return {.frame = l.frame,
+          .epoch = l.epoch,
+          .viewer = l.viewer,
+          .request = l.request,
+          .tile = uint32_t(l.block),
+          .tiles_in_frame = uint32_t(l.blocks_in_frame),
+          .step = uint32_t(l.step),
+          .camera = l.camera,
+          .rect = l.block_rect};
+}
+
+wire::TileDone done_of(const wire::DepthTile& m, double receive_s) {
+  return {.frame = m.lease.frame,
+          .tile = m.lease.tile,
+          .lease = m.lease.lease,
+          .sampler = m.sampler,
+          .step = m.lease.step,
+          .rect = m.lease.rect,
+          .bytes_sampled = m.image.size(),
+          .leased_s = m.lease.leased_s,
+          .sample_begin_s = m.sample_begin_s,
+          .sample_end_s = m.sample_end_s,
+          .encode_end_s = m.encode_end_s,
+          .receive_s = receive_s};
+}
+
+// The event as messages: calls send(message).
+void with_message(InstanceId packer, const Event& e, auto&& send) {
+  switch (e.kind) {
+    case Event::Kind::kPatch:
+      return send(wire::Patch{.packer = packer,
+                              .sequence = e.sequence,
+                              .epoch = e.epoch,
+                              .frame = e.frame,
+                              .viewer = e.viewer,
+                              .request = e.request,
+                              .tile = e.tile,
+                              .tiles_in_frame = e.tiles_in_frame,
+                              .step = e.step,
+                              .frame_complete = e.frame_complete,
+                              .samples = e.samples,
+                              .kept = e.kept,
+                              .camera = e.camera,
+                              .rect = e.rect,
+                              .image = std::as_bytes(std::span(*e.blob))});
+    case Event::Kind::kForget:
+      return send(wire::Forget{packer, e.sequence, e.epoch, e.clusters, e.frames});
+    case Event::Kind::kEpoch:
+      return send(wire::EpochBegin{packer, e.sequence, e.epoch});
+  }
+}
+
+}  // namespace
+
+bool PointPacking::follow(const wire::Welcome& session, double now_s) {
+  if (scene::SessionView(session).pipeline() != scene::Pipeline::kPoints) return false;
+  if (session.box_room.empty()) return true;  // no data server said yet what there is
+  const Config config = config_of(session, options_);
+  if (const Status valid = points::validate(config.model); !valid) {
+    log::error("the master's session cannot be packed: {}", valid.error().text);
+    return true;
+  }
+  begin(config, session);
+  for (const auto& [received, bytes, since_s] : ahead_.take()) pack(received, since_s, now_s);
+  return true;
+}
+
+// The model's box comes with the data server; another box means another model.
+void PointPacking::begin(const Config& config, const wire::Welcome& session) {
+  // Another master counts frames from 1 again, so it says nothing which tiles of the old one's frames came. Where
+  // patches are told apart by their frames, the model starts anew, too.
+  const bool another_master = core_ && master_ != session.master;
+  master_ = session.master;
+  if (another_master) {
+    core_->forget_frames();
+    gatherer_.clear();
+  }
+  if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
+    if (core_) instance_ = net::make_instance_id();  // viewers start anew
+    model_ = config.model;
+    core_.emplace(config, session.epoch);
+    gatherer_.clear();
+  } else if (const auto event = core_->begin_epoch(session.epoch)) {
+    publish(*event);
+    gatherer_.clear();
+  }
+}
+
+void PointPacking::take_sampled(net::Socket& from, const net::Message& message, double now_s) {
+  net::dispatch<wire::DepthTile>(from, message, [&](const wire::DepthTile& tile) {
+    pack({&from, message, tile}, now_s, now_s);
+  });
+}
+
+// since_s: when it came.
+void PointPacking::pack(const Received& received, double since_s, double now_s) {
+  const auto& [from, message, m] = received;
+  const wire::Lease& lease = m.lease;
+  if (!core_) return;
+  // The announcement of its epoch comes on another socket and may be about to.
+  if (lease.epoch > core_->epoch()) return ahead_.add(received, message.body.size(), since_s);
+  if (lease.epoch != core_->epoch()) return void(++other_epoch_);
+  const double begin_s = outlets_.master_now();
+  wire::TileDone done = done_of(m, outlets_.to_master_s(since_s));
+  // A tile that is here already is done. The master may not know; if it does, it takes no notice.
+  if (core_->has(lease.frame, uint32_t(lease.block))) {
+    ++duplicates_;
+    return tell(done);
+  }
+  const std::span stream(reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size());
+  auto gathered = gatherer_.add({block_of(lease), {}}, lease.rect, stream);
+  if (!gathered) return from->reject(message, gathered.error().text);
+  if (!*gathered) return tell(done);
+  BlockGatherer::Gathered& got = **gathered;
+  done.samples = got.samples;
+  if (core_->redundancy() == Redundancy::kKeep) done.kept = done.samples;
+  if (!got.block) return tell(done);
+  spans_.add("decode", begin_s, outlets_.master_now());
+  std::shared_ptr<const std::vector<uint8_t>> ready;
+  if (got.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
+  if (const Status s = pack_block(std::move(*got.block), std::move(ready), done, now_s); !s)
+    from->reject(message, s.error().text);
+}
+
+Status PointPacking::pack_block(SampledTile block, std::shared_ptr<const std::vector<uint8_t>> stream,
+                                wire::TileDone& done, double now_s) {
+  const double begin_s = outlets_.master_now();
+  record(block);
+  // What a block gives is counted to the tile that completed it.
+  const auto announce = [&](const Event& event) {
+    publish(event);
+    if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
+    done.bytes_sent = event.blob->size();
+    bytes_sent_ += done.bytes_sent;
+    tell(done);
+  };
+  const auto event = core_->submit(std::move(block), now_s, std::move(stream), announce);
+  if (!event) return event.error();
+  if (*event && (*event)->frame_complete)
+    for (const auto& forget : core_->forget_superseded()) publish(forget);
+  spans_.add("pack", begin_s, outlets_.master_now());
+  return ok_status();
+}
+
+void PointPacking::tell(wire::TileDone& done) {
+  done.packed_s = outlets_.master_now();
+  outlets_.tell(done);
+}
+
+// Whole views only, as sampled.
+void PointPacking::record(const SampledTile& block) {
+  if (!options_.recorder || block.step != 1) return;
+  const Status s = options_.recorder->add(block.frame, block.camera, block.rect, block.tiles_in_frame, block.image);
+  if (s) return;
+  log::error("{}", s.error().text);
+  options_.recorder = nullptr;
+}
+
+void PointPacking::take_state(net::Socket& from, const net::Message& message, double now_s) {
+  net::dispatch<wire::StateRequest, wire::AccessReport>(from, message, [&](const auto& m) {
+    if (!core_) return;
+    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>)
+      core_->accessed(m.clusters, now_s, m.frames);
+    else
+      answer(m, message.peer);
+  });
+}
+
+void PointPacking::answer(const wire::StateRequest& request, const std::string& peer) {
+  const Sequence after = request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
+  if (!core_->remembers(after)) {
+    // A mark of a packer that the viewer does not know: it then asks for everything.
+    outlets_.send(wire::StateMark{net::make_instance_id(), {}, core_->epoch(), false, 0}, peer);
+    return log::info("a viewer that stopped after {} starts anew", after.value);
+  }
+  const auto events = core_->events_since(after);
+  for (const auto& e : events) with_message(instance_, e, [&](const auto& m) { outlets_.send(m, peer); });
+  outlets_.send(mark(true), peer);
+  log::info("a viewer caught up: {} events after {}", events.size(), after.value);
+}
+
+void PointPacking::publish(const Event& event) {
+  with_message(instance_, event, [&](const auto& m) { outlets_.publish(m); });
+}
+
+wire::StateMark PointPacking::mark(bool answer) const {
+  return {instance_, core_->sequence(), core_->epoch(), answer, core_->model().points()};
+}
+
+void PointPacking::tick(double now_s) {
+  ahead_.expire(now_s);
+  if (!core_) return;
+  if (now_s - last_forget_s_ >= kForgetPeriod_s) {
+    last_forget_s_ = now_s;
+    for (const auto& event : core_->tick(now_s)) publish(event);
+  }
+  if (now_s - last_mark_s_ >= kMarkPeriod_s) {
+    last_mark_s_ = now_s;
+    outlets_.publish(mark(false));
+  }
+}
+
+void PointPacking::add_status(net::MasterLink::Values& values) const {
+  values["bytes_sent"] += double(bytes_sent_);
+  if (!core_) return;
+  const auto& s = core_->statistics();
+  const auto& g = gatherer_.statistics();
+  values.insert({{"points", double(core_->model().points())},
+                 {"model_bytes", double(core_->model().bytes())},
+                 {"log_bytes", double(core_->log_bytes())},
+                 {"sequence", double(core_->sequence().value)},
+                 {"tiles", double(g.tiles)},
+                 {"tiles_duplicate", double(s.tiles_duplicate + g.tiles_duplicate + duplicates_)},
+                 {"tiles_other_epoch", double(s.tiles_other_epoch + other_epoch_ + ahead_.dropped())},
+                 {"blocks", double(s.tiles)},
+                 {"blocks_dropped", double(g.blocks_dropped)},
+                 {"frames_complete", double(s.frames_complete)},
+                 {"patches_forgotten", double(s.patches_forgotten)},
+                 {"points_forgotten", double(s.points_forgotten)},
+                 {"points_outside", double(s.points_outside)}});
+}
+
+}  // namespace telesplat::packer

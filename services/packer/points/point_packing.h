@@ -1,0 +1,65 @@
+// The packer's part for points (T4.3): depth tiles come in, point-model events go out, late joiners are brought up to
+// date.
+#pragma once
+
+#include <optional>
+
+#include "common/metrics/recorder.h"
+#include "services/packer/epoch_hold.h"
+#include "services/packer/packing.h"
+#include "services/packer/points/block_gatherer.h"
+#include "services/packer/points/depth_recorder.h"
+#include "services/packer/points/packer_core.h"
+
+namespace telesplat::packer {
+
+class PointPacking final : public Packing {
+ public:
+  static constexpr double kMarkPeriod_s = 0.5;  ///< between two marks, by which viewers notice that they missed events
+  static constexpr double kForgetPeriod_s = 1.0;  ///< between two looks for what is obsolete
+
+  struct Options {
+    int threads = 1;                    ///< for reference depth maps; 0: all cores
+    uint64_t max_log_bytes = 0;         ///< Config::max_log_bytes
+    DepthRecorder* recorder = nullptr;  ///< of sampled depth images; null: none are kept
+  };
+  /// Keeps a reference to the spans, and the recorder's address.
+  PointPacking(const Options& options, Outlets outlets, metrics::SpanRecorder& spans)
+      : options_(options), outlets_(std::move(outlets)), spans_(spans) {}
+
+  bool follow(const wire::Welcome& session, double now_s) override;
+  void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
+  void take_state(net::Socket& from, const net::Message& message, double now_s) override;
+  void tick(double now_s) override;
+  void add_status(net::MasterLink::Values& values) const override;
+
+ private:
+  struct Received {
+    net::Socket* from;
+    net::Message message;
+    wire::DepthTile tile;  // its image lies in the message
+  };
+  void begin(const Config& config, const wire::Welcome& session);
+  void pack(const Received& received, double since_s, double now_s);
+  /// A block whose every row is here. stream: of the whole block, if it came as one tile; else null.
+  Status pack_block(SampledTile block, std::shared_ptr<const std::vector<uint8_t>> stream, wire::TileDone& done,
+                    double now_s);
+  void tell(wire::TileDone& done);
+  void record(const SampledTile& block);
+  void answer(const wire::StateRequest& request, const std::string& peer);
+  void publish(const Event& event);
+  wire::StateMark mark(bool answer) const;
+
+  Options options_;
+  Outlets outlets_;
+  metrics::SpanRecorder& spans_;
+  InstanceId instance_ = net::make_instance_id(), master_;
+  std::optional<PackerCore> core_;  // none before the data set's box is known
+  points::ModelConfig model_;
+  BlockGatherer gatherer_;
+  EpochHold<Received> ahead_;
+  uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
+  double last_mark_s_ = -1e9, last_forget_s_ = -1e9;
+};
+
+}  // namespace telesplat::packer

@@ -1,0 +1,28 @@
+// The one place that knows which work a kind of scene takes: a row a kind (works.cpp).
+#pragma once
+
+#include <memory>
+
+#include "common/core/result.h"
+#include "common/metrics/recorder.h"
+#include "common/scene/kind.h"
+#include "services/sampler/sampler_options.h"
+#include "services/sampler/work.h"
+
+namespace telesplat::sampler {
+
+class Sampler;
+
+/// What works are made with; all of it outlives them.
+struct WorkTools {
+  const SamplerOptions& options;
+  net::Context& context;
+  net::MasterLink& link;
+  metrics::SpanRecorder& spans;
+  std::unique_ptr<Sampler>& mesh_sampler;  ///< made beforehand, to be taken; null: it is made when a mesh comes
+};
+
+/// Error: this kind cannot be sampled here (no OpenGL, for instance).
+Result<std::unique_ptr<Work>> make_work(scene::Kind kind, const WorkTools& tools);
+
+}  // namespace telesplat::sampler
