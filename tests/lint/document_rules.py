@@ -45,7 +45,7 @@ def messages(tree):
             )
     for name, line in documented.items():
         if name not in declared:
-            yield Finding(tables.PROTOCOL_PAGE, line, "messages", f"**{name}** is no message of {tables.MESSAGES}*.h")
+            yield Finding(tables.PROTOCOL_PAGE, line, "messages", f"**{name}** is no message of {tables.MESSAGES}")
 
 
 # ---- flags -----------------------------------------------------------------------------------------------------------
@@ -86,8 +86,9 @@ def flags(tree):
 # ---- metric columns --------------------------------------------------------------------------------------------------
 
 _CSV_HEADER = re.compile(r'"([a-z][a-z0-9_]*(?:,[a-z][a-z0-9_]*){2,},?)(?:\\n)?"')
-# A table of columns: something called ...column..., then a brace; nothing but a type's arguments and an index between.
-_COLUMN_TABLE = re.compile(r"[cC]olumns?\w*\b(?:<[^;{}()]*>)?[\w\s\[\]=]*\{|_table_\(\s*\"\w+\",\s*\{")
+# A table of columns (or of figures, which become columns), then a brace; nothing but a type's arguments and an index
+# between.
+_COLUMN_TABLE = re.compile(r"(?:[cC]olumns?\w*|Figure)\b(?:<[^;{}()]*>)?[\w\s\[\]=>]*\{")
 # A name in such a table: an element of a list, or the first thing of a row.
 _COLUMN = re.compile(r'(?:[{,]|\.name\s*=)\s*"([a-z][a-z0-9_]*)"\s*(?=[,}])')
 

@@ -73,7 +73,7 @@ VIOLATIONS = [
     ("functions", "common/core/x.cpp", "namespace a {\n" + LONG + "}\n", 2, "f: 62 lines"),
     ("functions", "common/core/x.cpp", "class A {\n public:\n  A() : b_{1} {}\n" + LONG + "};\n", 4, "f: 62 lines"),
     (
-        "messages", "common/wire/messages_more.h",
+        "messages", "common/wire/more_messages.h",
         'struct New {\n  static constexpr auto kName = "new";\n};\n', 2, '"new" has no paragraph',
     ),
     ("messages", "docs/protocol.md", "**hello** - first.\n\n**gone** - was once.\n", 3, "**gone** is no message"),
