@@ -1,25 +1,27 @@
-// Any bytes through the decoder of any message (the first byte selects which): an error, or a message that survives a round trip.
+// Any bytes through the decoder of any message (the first byte selects which): an error, or a message that survives a
+// round trip and has no text that is not UTF-8.
 #include <cstdint>
 #include <cstdlib>
 #include <string>
 
+#include "common/core/utf8.h"
 #include "tests/support/wire_samples.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace telesplat;
   if (size == 0) return 0;
-  const wire::Bytes body = std::as_bytes(std::span(data + 1, size - 1));
-  size_t selected = data[0] % std::tuple_size_v<test::AllMessages>;
-  test::for_each_message([&]<class M>(M*) {
-    if (selected-- != 0) return;
-    const auto message = wire::decode<M>(body);
-    if (!message) {
-      if (message.error().text.find(M::kName) == std::string::npos) std::abort();
-      return;
-    }
-    const std::string encoded = wire::encode(*message);
-    const auto again = wire::decode<M>(test::bytes_of(encoded));
-    if (!again || wire::encode(*again) != encoded) std::abort();
+  const auto& samples = test::message_samples();
+  const test::MessageSample& sample = samples[data[0] % samples.size()];
+  const auto encoded = sample.round_trip(std::as_bytes(std::span(data + 1, size - 1)));
+  if (!encoded) {
+    const std::string& why = encoded.error().text;
+    if (why.find(sample.name) == std::string::npos || !valid_utf8(why)) std::abort();
+    return 0;
+  }
+  test::value_end(*encoded, 0, [](std::string_view text) {
+    if (!valid_utf8(text)) std::abort();
   });
+  const auto again = sample.round_trip(test::bytes_of(*encoded));
+  if (!again || *again != *encoded) std::abort();
   return 0;
 }

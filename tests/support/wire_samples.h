@@ -2,23 +2,25 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <tuple>
+#include <typeinfo>
+#include <vector>
 
 #include "common/wire/serial.h"
 
 namespace telesplat::test {
 
-using AllMessages =
-    std::tuple<wire::Hello, wire::Welcome, wire::WhoAreYou, wire::ViewRequest, wire::LeaseRequest, wire::Lease,
-               wire::LeaseExtend, wire::TileDone, wire::StatusReport, wire::MetricRows, wire::Control,
-               wire::ControlReply, wire::Shutdown, wire::Goodbye, wire::ChunkListRequest, wire::ChunkList,
-               wire::ChunkRequest, wire::Chunk, wire::DepthTile, wire::Patch, wire::Forget, wire::EpochBegin,
-               wire::StateMark, wire::StateRequest, wire::AccessReport, wire::SliceWeights, wire::SlabAssignment,
-               wire::SlabReady, wire::SliceLease, wire::VoxelRequest, wire::VoxelData, wire::SliceImages,
-               wire::SliceFrame, wire::SliceAck>;
-
 inline constexpr std::array<std::byte, 5> kBulk{std::byte{1}, std::byte{2}, std::byte{0}, std::byte{255}, std::byte{5}};
+
+struct AnyVisitor {};
+/// A message, or a struct within one.
+template <class M>
+concept Composed = requires(AnyVisitor f, M& m) {
+  M::fields(f, m);
+};
 
 // Gives every field, whatever its type, a value that is not the default one.
 struct Filler {
@@ -48,12 +50,14 @@ struct Filler {
   void operator()(const char*, std::vector<geometry::ChunkInfo>& v, size_t = 0) {
     v = {{ChunkId{0}, {{-1, -1, -1}, {0, 0, 0}}, 12, 500}, {ChunkId{1}, {{0, 0, 0}, {1, 1, 1}}, 7, 300}};
   }
-  void operator()(const char*, wire::Lease& v, size_t = 0) { fill(v); }
-  void operator()(const char*, wire::SliceLease& v, size_t = 0) { fill(v); }
   void operator()(const char*, volume::ShearFrame& v, size_t = 0) {
     v = {1, -1, {3, 40, 5}, -0.5, 0.01, -0.25, 0.02, 100, 50, {{8, 16, 11.5}, {0, 8, 3.5}}};
   }
-  template <class M>
+  template <Composed M>
+  void operator()(const char*, M& v, size_t = 0) {
+    fill(v);
+  }
+  template <Composed M>
   void operator()(const char*, std::vector<M>& v, size_t = 0) {
     v.resize(2);
     for (M& m : v) fill(m);
@@ -89,44 +93,66 @@ M sample_message() {
   return m;
 }
 
-template <class M>
-M message_sample_of(const M*) {
-  return sample_message<M>();
-}
-
 inline wire::Bytes bytes_of(const std::string& s) { return std::as_bytes(std::span(s)); }
 
-/// Calls f(M*) for every message type.
-template <class F>
-void for_each_message(F&& f) {
-  [&]<class... M>(std::tuple<M...>*) { (f(static_cast<M*>(nullptr)), ...); }(static_cast<AllMessages*>(nullptr));
+/// A kind of message, without its type: what can be said of all of them alike.
+struct MessageSample {
+  std::string_view name;
+  const std::type_info& type;
+  std::string body;          ///< a valid message, no field of which has its default value
+  std::string default_body;  ///< as encoded when nothing was set; need not be valid
+  /// Decodes a body and encodes what came out.
+  Result<std::string> (*round_trip)(wire::Bytes body);
+};
+
+template <class M>
+Result<std::string> round_trip(wire::Bytes body) {
+  const auto message = wire::decode<M>(body);
+  if (!message) return message.error();
+  return wire::encode(*message);
 }
 
-/// One past the msgpack value at `at`; bytes must be well-formed.
-inline size_t value_end(const std::string& bytes, size_t at) {
+/// One of every message.
+inline const std::vector<MessageSample>& message_samples() {
+  static const std::vector<MessageSample> samples = []<class... M>(std::type_identity<std::tuple<M...>>) {
+    return std::vector<MessageSample>{
+        {M::kName, typeid(M), wire::encode(sample_message<M>()), wire::encode(M{}), round_trip<M>}...};
+  }(std::type_identity<wire::Messages>{});
+  return samples;
+}
+
+/// One past the msgpack value at `at`; bytes must be well-formed. Tells `text` every string on the way.
+inline size_t value_end(const std::string& bytes, size_t at, const std::function<void(std::string_view)>& text = {}) {
   const auto u8 = [&](size_t i) { return static_cast<unsigned char>(bytes.at(i)); };
-  const auto number = [&](size_t i, int n) {
+  const auto number = [&](size_t i, size_t n) {
     size_t v = 0;
-    for (int k = 0; k < n; ++k) v = v << 8 | u8(i + static_cast<size_t>(k));
+    for (size_t k = 0; k < n; ++k) v = v << 8 | u8(i + k);
     return v;
   };
   const auto values = [&](size_t i, size_t count) {
-    while (count--) i = value_end(bytes, i);
+    while (count--) i = value_end(bytes, i, text);
     return i;
+  };
+  const auto string = [&](size_t i, size_t size) {
+    if (text) text(std::string_view(bytes).substr(i, size));
+    return i + size;
   };
   const unsigned t = u8(at);
   if (t < 0x80 || t >= 0xe0 || t == 0xc0 || t == 0xc2 || t == 0xc3) return at + 1;
   if (t < 0x90) return values(at + 1, 2 * (t & 15));
   if (t < 0xa0) return values(at + 1, t & 15);
-  if (t < 0xc0) return at + 1 + (t & 31);
-  if (t <= 0xc6) return at + 1 + (size_t{1} << (t - 0xc4)) + number(at + 1, 1 << (t - 0xc4));  // bin
+  if (t < 0xc0) return string(at + 1, t & 31);
+  if (t <= 0xc6) return at + 1 + (size_t{1} << (t - 0xc4)) + number(at + 1, size_t{1} << (t - 0xc4));  // bin
   if (t == 0xca || t == 0xce || t == 0xd2) return at + 5;
   if (t == 0xcb || t == 0xcf || t == 0xd3) return at + 9;
   if (t == 0xcc || t == 0xd0) return at + 2;
   if (t == 0xcd || t == 0xd1) return at + 3;
-  if (t >= 0xd9 && t <= 0xdb) return at + 1 + (size_t{1} << (t - 0xd9)) + number(at + 1, 1 << (t - 0xd9));  // str
-  const int width = t & 1 ? 4 : 2;
-  return values(at + 1 + static_cast<size_t>(width), number(at + 1, width) * (t >= 0xde ? 2 : 1));  // array, map
+  if (t >= 0xd9 && t <= 0xdb) {
+    const size_t width = size_t{1} << (t - 0xd9);
+    return string(at + 1 + width, number(at + 1, width));
+  }
+  const size_t width = t & 1 ? 4 : 2;
+  return values(at + 1 + width, number(at + 1, width) * (t >= 0xde ? 2 : 1));  // array, map
 }
 
 struct Field {

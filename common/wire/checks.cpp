@@ -1,0 +1,103 @@
+#include "common/wire/checks.h"
+
+#include <fmt/format.h>
+
+namespace telesplat::wire {
+namespace {
+
+// A tile's rectangle must lie in its frame, its number among the frame's tiles.
+std::optional<Error> check_tile(const geometry::Camera& c, const geometry::Rect& r, uint64_t tile, uint64_t tiles) {
+  if (tiles < 1 || tiles > kMaxTiles || tile >= tiles)
+    return Error{fmt::format("tile {} of {} is out of range, limit {}", tile, tiles, kMaxTiles)};
+  if (r.x + r.width > c.width || r.y + r.height > c.height)
+    return Error{
+        fmt::format("tile {}x{}+{}+{} is not inside its {}x{} frame", r.width, r.height, r.x, r.y, c.width, c.height)};
+  return std::nullopt;
+}
+
+std::optional<Error> check_step(uint64_t step) {
+  if (step < 1 || step > kMaxStep)
+    return Error{fmt::format("step {} is out of range, limits 1 and {}", step, kMaxStep)};
+  return std::nullopt;
+}
+
+std::optional<Error> check_frames(const std::vector<uint32_t>& clusters, const std::vector<uint32_t>& frames) {
+  if (frames.empty() || frames.size() == clusters.size()) return std::nullopt;
+  return Error{fmt::format("{} frames for {} clusters: neither none nor one each", frames.size(), clusters.size())};
+}
+
+std::optional<Error> check_buffers(uint64_t buffers) {
+  if (buffers <= kMaxBuffers) return std::nullopt;
+  return Error{fmt::format("{} buffers, limit {}", buffers, kMaxBuffers)};
+}
+
+std::optional<Error> check_slices(uint64_t begin, uint64_t end) {
+  if (begin <= end && end <= uint64_t(volume::kMaxSide)) return std::nullopt;
+  return Error{fmt::format("slices {} to {}, limit {}", begin, end, volume::kMaxSide)};
+}
+
+std::optional<Error> check_slab(uint64_t slab, uint64_t slabs, uint64_t begin, uint64_t end) {
+  if (slabs < 1 || slabs > kMaxSlabs || slab >= slabs)
+    return Error{fmt::format("slab {} of {} is out of range, limit {}", slab, slabs, kMaxSlabs)};
+  return check_slices(begin, end);
+}
+
+}  // namespace
+
+std::optional<Error> check(const Lease& m) {
+  if (auto bad = check_tile(m.camera, m.rect, m.tile, kMaxTiles)) return bad;
+  if (int64_t{m.rect.width} * m.rect.height > kMaxTilePixels)
+    return Error{fmt::format("tile of {}x{} pixels, limit {}", m.rect.width, m.rect.height, kMaxTilePixels)};
+  if (auto bad = check_tile(m.camera, m.block_rect, m.block, m.blocks_in_frame)) return bad;
+  const geometry::Rect &r = m.rect, &b = m.block_rect;
+  if (r.x < b.x || r.y < b.y || r.x + r.width > b.x + b.width || r.y + r.height > b.y + b.height)
+    return Error{fmt::format("tile {}x{}+{}+{} is not inside its block {}x{}+{}+{}", r.width, r.height, r.x, r.y,
+                             b.width, b.height, b.x, b.y)};
+  return check_step(m.step);
+}
+
+std::optional<Error> check(const DepthTile& m) { return check(m.lease); }
+
+std::optional<Error> check(const Patch& m) {
+  if (auto bad = check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame)) return bad;
+  return check_step(m.step);
+}
+
+std::optional<Error> check(const Forget& m) { return check_frames(m.clusters, m.frames); }
+
+std::optional<Error> check(const AccessReport& m) { return check_frames(m.clusters, m.frames); }
+
+std::optional<Error> check(const ViewRequest& m) { return check_buffers(m.buffers); }
+
+std::optional<Error> check(const SliceAck& m) {
+  if (m.buffers < 1) return Error{"0 buffers, at least 1"};
+  return check_buffers(m.buffers);
+}
+
+std::optional<Error> check(const SliceWeights& m) {
+  if (m.voxels.size() > size_t(volume::kMaxSide))
+    return Error{fmt::format("{} slices, limit {}", m.voxels.size(), volume::kMaxSide)};
+  return check_slices(m.begin, m.begin + m.voxels.size());
+}
+
+std::optional<Error> check(const SlabAssignment& m) {
+  for (const auto& e : m.sheet)
+    if (auto bad = check_slices(e.begin, e.end)) return bad;
+  return check_slab(m.slab, m.slabs, m.begin, m.end);
+}
+
+std::optional<Error> check(const SliceLease& m) {
+  if (m.views.empty()) return Error{"is for no viewer"};
+  for (const auto& v : m.views)
+    if (auto bad = check_buffers(v.buffers)) return bad;
+  if (m.begin == m.end) return Error{"its slab is empty"};
+  return check_slab(m.slab, m.slabs, m.begin, m.end);
+}
+
+std::optional<Error> check(const SliceImages& m) { return check(m.lease); }
+
+std::optional<Error> check(const VoxelRequest& m) { return check_slices(m.begin, m.end); }
+
+std::optional<Error> check(const VoxelData& m) { return check_slices(m.begin, m.end); }
+
+}  // namespace telesplat::wire

@@ -1,0 +1,236 @@
+#include "common/wire/decoder.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstring>
+#include <msgpack/unpack.hpp>
+
+#include "common/core/utf8.h"
+
+namespace telesplat::wire {
+namespace {
+
+const msgpack::object* find(const msgpack::object& map, std::string_view name) {
+  for (uint32_t i = 0; i < map.via.map.size; ++i) {
+    const auto& key = map.via.map.ptr[i].key;
+    if (key.type == msgpack::type::STR && std::string_view(key.via.str.ptr, key.via.str.size) == name)
+      return &map.via.map.ptr[i].val;
+  }
+  return nullptr;
+}
+
+bool is_integer(double v, double lo, double hi) { return v >= lo && v <= hi && v == std::floor(v); }
+
+std::optional<Error> check_version(const msgpack::object& map) {
+  const msgpack::object* version = find(map, "v");
+  if (!version || version->type != msgpack::type::POSITIVE_INTEGER) return Error{"has no version"};
+  if (version->via.u64 == kProtocolVersion) return std::nullopt;
+  return Error{fmt::format("has version {} instead of {}", version->via.u64, kProtocolVersion)};
+}
+
+}  // namespace
+
+std::optional<Error> read_map(Bytes body, const std::function<std::optional<Error>(Decoder&)>& read) {
+  try {
+    // Strings and binaries are referenced in place. What lists and maps claim is limited before memory is taken for it.
+    const msgpack::unpack_limit limit(geometry::kMaxChunks, kMaxEntries, kMaxControlBytes, kMaxBulkBytes, 0, 8);
+    size_t offset = 0;
+    const msgpack::object_handle handle = msgpack::unpack(
+        reinterpret_cast<const char*>(body.data()), body.size(), offset,
+        [](msgpack::type::object_type, size_t, void*) { return true; }, nullptr, limit);
+    if (offset != body.size()) return Error{fmt::format("{} bytes follow the map", body.size() - offset)};
+    const msgpack::object& map = handle.get();
+    if (map.type != msgpack::type::MAP) return Error{"is not a map"};
+    if (auto bad = check_version(map)) return bad;
+    Decoder decoder(map);
+    return read(decoder);
+  } catch (const std::exception& e) {  // msgpack's own errors: truncated, too deep, too large
+    return Error{e.what()};
+  }
+}
+
+const msgpack::object* Decoder::enter(const char* name, size_t limit) {
+  if (error_) return nullptr;
+  const msgpack::object* o = find(map_, name);
+  if (!o) error_ = Error{fmt::format("field {} is missing", name)};
+  name_ = name;
+  limit_ = limit;
+  return o;
+}
+
+void Decoder::fail(std::string_view why) {
+  if (!error_) error_ = Error{fmt::format("field {} {}", name_, why)};
+}
+
+bool Decoder::within(size_t size, size_t limit) {
+  if (size <= limit) return true;
+  fail(fmt::format("has {} entries or bytes, limit {}", size, limit));
+  return false;
+}
+
+bool Decoder::is_map(const msgpack::object& o) {
+  if (o.type == msgpack::type::MAP) return true;
+  fail("is not a map");
+  return false;
+}
+
+size_t Decoder::list_size(const msgpack::object& o, size_t limit) {
+  if (o.type == msgpack::type::ARRAY) return within(o.via.array.size, limit) ? o.via.array.size : 0;
+  fail("is not a list");
+  return 0;
+}
+
+const msgpack::object& Decoder::entry(const msgpack::object& list, size_t i) { return list.via.array.ptr[i]; }
+
+// ---- numbers and texts ---------------------------------------------------------------------------------------------
+
+void Decoder::get(const msgpack::object& o, bool& v) {
+  if (o.type != msgpack::type::BOOLEAN) return fail("is not a boolean");
+  v = o.via.boolean;
+}
+
+void Decoder::get(const msgpack::object& o, uint64_t& v) {
+  if (o.type != msgpack::type::POSITIVE_INTEGER) return fail("is not an unsigned integer");
+  v = o.via.u64;
+}
+
+void Decoder::get(const msgpack::object& o, double& v) {
+  if (o.type == msgpack::type::FLOAT64 || o.type == msgpack::type::FLOAT32)
+    v = o.via.f64;
+  else if (o.type == msgpack::type::POSITIVE_INTEGER)
+    v = static_cast<double>(o.via.u64);
+  else if (o.type == msgpack::type::NEGATIVE_INTEGER)
+    v = static_cast<double>(o.via.i64);
+  else
+    return fail("is not a number");
+  if (!std::isfinite(v)) fail("is not finite");
+}
+
+// Texts go into JSON, logs and terminals, which take nothing but UTF-8.
+void Decoder::get(const msgpack::object& o, std::string& v) {
+  if (o.type != msgpack::type::STR) return fail("is not a string");
+  const std::string_view text(o.via.str.ptr, o.via.str.size);
+  if (!within(text.size(), limit_ ? limit_ : kMaxString)) return;
+  if (!valid_utf8(text)) return fail("is not UTF-8");
+  v = text;
+}
+
+bool Decoder::numbers(const msgpack::object& o, std::span<double> out) {
+  if (o.type != msgpack::type::ARRAY || o.via.array.size != out.size())
+    fail(fmt::format("is not a list of {} numbers", out.size()));
+  for (size_t i = 0; i < out.size() && !error_; ++i) get(entry(o, i), out[i]);
+  return !error_;
+}
+
+// ---- lists, maps and bulk fields -----------------------------------------------------------------------------------
+
+void Decoder::get(const msgpack::object& o, Bytes& v) {
+  if (o.type != msgpack::type::BIN) return fail("is not binary");
+  if (within(o.via.bin.size, limit_)) v = {reinterpret_cast<const std::byte*>(o.via.bin.ptr), o.via.bin.size};
+}
+
+template <class T>
+void Decoder::get_bin(const msgpack::object& o, std::vector<T>& v, size_t max_entries) {
+  if (o.type != msgpack::type::BIN) return fail("is not binary");
+  if (o.via.bin.size % sizeof(T))
+    return fail(fmt::format("has {} bytes, not a multiple of {}", o.via.bin.size, sizeof(T)));
+  if (!within(o.via.bin.size / sizeof(T), max_entries)) return;
+  v.resize(o.via.bin.size / sizeof(T));
+  if (!v.empty()) std::memcpy(v.data(), o.via.bin.ptr, o.via.bin.size);
+}
+void Decoder::get(const msgpack::object& o, std::vector<uint32_t>& v) { get_bin(o, v, kMaxKeys); }
+void Decoder::get(const msgpack::object& o, std::vector<double>& v) { get_bin(o, v, kMaxBulkBytes / sizeof(double)); }
+
+void Decoder::get(const msgpack::object& o, std::vector<std::string>& v) {
+  v.resize(list_size(o, kMaxEntries));
+  for (size_t i = 0; i < v.size() && !error_; ++i) get(entry(o, i), v[i]);
+}
+
+template <class V>
+void Decoder::get_map(const msgpack::object& o, std::map<std::string, V>& v) {
+  if (!is_map(o) || !within(o.via.map.size, kMaxEntries)) return;
+  const size_t value_limit = limit_;
+  for (uint32_t i = 0; i < o.via.map.size && !error_; ++i) {
+    std::string key;
+    limit_ = 0;  // a field's own limit is its values'
+    get(o.via.map.ptr[i].key, key);
+    limit_ = value_limit;
+    if (!error_) get(o.via.map.ptr[i].val, v[key]);
+  }
+}
+void Decoder::get(const msgpack::object& o, std::map<std::string, std::string>& v) { get_map(o, v); }
+void Decoder::get(const msgpack::object& o, std::map<std::string, double>& v) { get_map(o, v); }
+
+// ---- what is seen, and from where ----------------------------------------------------------------------------------
+
+void Decoder::get(const msgpack::object& o, geometry::Box& b) {
+  double v[6];
+  if (!numbers(o, v)) return;
+  for (const double x : v)
+    if (std::abs(x) > 3.5e38) return fail("is beyond single precision");
+  b = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+}
+
+void Decoder::get(const msgpack::object& o, geometry::Rect& r) {
+  double v[4];
+  if (!numbers(o, v)) return;
+  const double side = geometry::kMaxImageSide;
+  if (!is_integer(v[0], 0, side) || !is_integer(v[1], 0, side) || !is_integer(v[2], 1, side) ||
+      !is_integer(v[3], 1, side))
+    return fail(fmt::format("{}x{}+{}+{} is not a rectangle within {}", v[2], v[3], v[0], v[1], side));
+  r = {int(v[0]), int(v[1]), int(v[2]), int(v[3])};
+}
+
+void Decoder::get(const msgpack::object& o, geometry::Camera& c) {
+  double v[14];
+  if (!numbers(o, v)) return;
+  if (!is_integer(v[12], 1, geometry::kMaxImageSide) || !is_integer(v[13], 1, geometry::kMaxImageSide))
+    return fail(fmt::format("has size {}x{}, limit {}", v[12], v[13], geometry::kMaxImageSide));
+  const geometry::Pose pose{{v[0], v[1], v[2]}, glm::dquat(v[3], v[4], v[5], v[6])};
+  c = {pose, v[7], v[8], v[9], v[10], v[11], int(v[12]), int(v[13])};
+  if (const auto valid = geometry::validate(c); !valid) fail(": " + valid.error().text);
+}
+
+void Decoder::get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks) {
+  const size_t size = list_size(o, geometry::kMaxChunks);
+  for (size_t i = 0; i < size && !error_; ++i) {
+    double v[9];
+    if (!numbers(entry(o, i), v)) return;
+    if (!is_integer(v[0], 0, geometry::kMaxChunks) || !is_integer(v[1], 0, geometry::kMaxChunkTriangles) ||
+        !is_integer(v[2], 0, kMaxBulkBytes))
+      return fail("holds a chunk whose id, triangles or bytes are out of range");
+    chunks.push_back(
+        {ChunkId{uint64_t(v[0])}, {{v[3], v[4], v[5]}, {v[6], v[7], v[8]}}, uint64_t(v[1]), uint64_t(v[2])});
+  }
+}
+
+void Decoder::get(const msgpack::object& o, volume::ShearFrame& s) {
+  constexpr uint32_t kLeast = kShearNumbers + kLayerNumbers;
+  constexpr uint32_t kMost = kShearNumbers + kLayerNumbers * volume::kMaxLayers;
+  if (o.type != msgpack::type::ARRAY) return fail("is not a list");
+  const uint32_t size = o.via.array.size;
+  if (size < kLeast || (size - kShearNumbers) % kLayerNumbers || size > kMost)
+    return fail(fmt::format("is a list of {} numbers, limits {} and {}, three a layer", size, kLeast, kMost));
+  const auto number = [&](uint32_t i) {
+    double v = 0;
+    if (!error_) get(entry(o, i), v);
+    return v;
+  };
+  const auto integer = [&](uint32_t i, double lo, double hi) {
+    const double v = number(i);
+    if (!error_ && !is_integer(v, lo, hi))
+      fail(fmt::format("has {} as number {}, not an integer in {} to {}", v, i, lo, hi));
+    return error_ ? 0 : int(v);
+  };
+  s.axis = integer(0, 0, 2);
+  s.direction = integer(1, -1, 1);
+  s.eye = {number(2), number(3), number(4)};
+  s.u0 = number(5), s.du = number(6), s.v0 = number(7), s.dv = number(8);
+  s.width = integer(9, 1, volume::kMaxRasterSide);
+  s.height = integer(10, 1, volume::kMaxRasterSide);
+  for (uint32_t at = kShearNumbers; at < size && !error_; at += kLayerNumbers)
+    s.layers.push_back({integer(at, 0, volume::kMaxSide), integer(at + 1, 0, volume::kMaxSide), number(at + 2)});
+}
+
+}  // namespace telesplat::wire

@@ -1,0 +1,86 @@
+// Reads messages from msgpack maps, every value against its limits. Private to this library.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <msgpack/object_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "common/core/result.h"
+#include "common/wire/fields.h"
+#include "common/wire/messages.h"
+
+namespace telesplat::wire {
+
+/// A visitor of fields(): fills each from the map. After the first error it does nothing more.
+class Decoder {
+ public:
+  explicit Decoder(const msgpack::object& map) : map_(map) {}
+
+  /// Names the field and what is wrong with it.
+  const std::optional<Error>& error() const { return error_; }
+
+  template <class T>
+  void operator()(const char* name, T& value, size_t limit = 0) {
+    if (const msgpack::object* o = enter(name, limit)) get(*o, value);
+  }
+
+ private:
+  /// The value of a field that is read from now on; null if there is none.
+  const msgpack::object* enter(const char* name, size_t limit);
+  void fail(std::string_view why);
+  bool within(size_t size, size_t limit);
+  bool is_map(const msgpack::object& o);
+  /// How many entries a list has; 0, and an error, if it is no list or has more than `limit`.
+  size_t list_size(const msgpack::object& o, size_t limit);
+  static const msgpack::object& entry(const msgpack::object& list, size_t i);
+  bool numbers(const msgpack::object& o, std::span<double> out);
+  template <class T>
+  void get_bin(const msgpack::object& o, std::vector<T>& v, size_t max_entries);
+  template <class V>
+  void get_map(const msgpack::object& o, std::map<std::string, V>& v);
+
+  void get(const msgpack::object& o, bool& v);
+  void get(const msgpack::object& o, uint64_t& v);
+  void get(const msgpack::object& o, double& v);
+  void get(const msgpack::object& o, std::string& v);
+  void get(const msgpack::object& o, std::vector<std::string>& v);
+  void get(const msgpack::object& o, std::map<std::string, std::string>& v);
+  void get(const msgpack::object& o, std::map<std::string, double>& v);
+  void get(const msgpack::object& o, Bytes& v);
+  void get(const msgpack::object& o, std::vector<uint32_t>& v);
+  void get(const msgpack::object& o, std::vector<double>& v);
+  void get(const msgpack::object& o, geometry::Box& b);
+  void get(const msgpack::object& o, geometry::Rect& r);
+  void get(const msgpack::object& o, geometry::Camera& c);
+  void get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks);
+  void get(const msgpack::object& o, volume::ShearFrame& s);
+  template <class Tag>
+  void get(const msgpack::object& o, Id<Tag>& v) {
+    get(o, v.value);
+  }
+  template <Struct M>
+  void get(const msgpack::object& o, M& m) {
+    if (!is_map(o)) return;
+    Decoder inner(o);
+    M::fields(inner, m);
+    if (inner.error_) fail(": " + inner.error_->text);
+  }
+  template <Struct M>
+  void get(const msgpack::object& o, std::vector<M>& v) {
+    v.resize(list_size(o, limit_));
+    for (size_t i = 0; i < v.size() && !error_; ++i) get(entry(o, i), v[i]);
+  }
+
+  const msgpack::object& map_;
+  const char* name_ = "";
+  size_t limit_ = 0;
+  std::optional<Error> error_;
+};
+
+/// Reads a body: one msgpack map of this protocol's version, whose fields `read` takes. `read` may return an error of
+/// its own. Bulk fields point into `body`.
+std::optional<Error> read_map(Bytes body, const std::function<std::optional<Error>(Decoder&)>& read);
+
+}  // namespace telesplat::wire

@@ -1,0 +1,95 @@
+#include "common/wire/encoder.h"
+
+#include <bit>
+#include <msgpack/pack.hpp>
+
+static_assert(std::endian::native == std::endian::little, "bulk fields are little-endian and copied as they are");
+
+namespace telesplat::wire {
+namespace {
+
+struct Appender {
+  std::string& out;
+  void write(const char* data, size_t size) { out.append(data, size); }
+};
+
+/// msgpack's writer into a string.
+class Packer : Appender, public msgpack::packer<Appender> {
+ public:
+  explicit Packer(std::string& out) : Appender{out}, msgpack::packer<Appender>(static_cast<Appender&>(*this)) {}
+};
+
+}  // namespace
+
+void Encoder::begin_map(uint32_t entries) { Packer(out_).pack_map(entries); }
+void Encoder::begin_array(uint32_t entries) { Packer(out_).pack_array(entries); }
+
+void Encoder::version() {
+  put_text("v");
+  put(kProtocolVersion);
+}
+
+void Encoder::numbers(std::initializer_list<double> values) {
+  begin_array(static_cast<uint32_t>(values.size()));
+  for (const double v : values) put(v);
+}
+
+void Encoder::put_text(std::string_view text) {
+  Packer packer(out_);
+  packer.pack_str(static_cast<uint32_t>(text.size()));
+  packer.pack_str_body(text.data(), static_cast<uint32_t>(text.size()));
+}
+
+void Encoder::put(bool v) { v ? Packer(out_).pack_true() : Packer(out_).pack_false(); }
+void Encoder::put(uint64_t v) { Packer(out_).pack_uint64(v); }
+void Encoder::put(double v) { Packer(out_).pack_double(v); }
+
+void Encoder::put(const std::vector<std::string>& v) {
+  begin_array(static_cast<uint32_t>(v.size()));
+  for (const std::string& text : v) put_text(text);
+}
+
+void Encoder::put(const std::map<std::string, std::string>& v) {
+  begin_map(static_cast<uint32_t>(v.size()));
+  for (const auto& [key, text] : v) put_text(key), put_text(text);
+}
+
+void Encoder::put(const std::map<std::string, double>& v) {
+  begin_map(static_cast<uint32_t>(v.size()));
+  for (const auto& [key, number] : v) put_text(key), put(number);
+}
+
+void Encoder::put(Bytes v) {
+  Packer packer(out_);
+  packer.pack_bin(static_cast<uint32_t>(v.size()));
+  packer.pack_bin_body(reinterpret_cast<const char*>(v.data()), static_cast<uint32_t>(v.size()));
+}
+
+void Encoder::put(const geometry::Box& b) { numbers({b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z}); }
+
+void Encoder::put(const geometry::Rect& r) { numbers({double(r.x), double(r.y), double(r.width), double(r.height)}); }
+
+void Encoder::put(const geometry::Camera& c) {
+  const auto& p = c.pose.position_room;
+  const auto& q = c.pose.orientation;
+  numbers({p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m, double(c.width),
+           double(c.height)});
+}
+
+void Encoder::put(const std::vector<geometry::ChunkInfo>& chunks) {
+  begin_array(static_cast<uint32_t>(chunks.size()));
+  for (const auto& c : chunks)
+    numbers({double(c.id.value), double(c.triangles), double(c.bytes), c.box_room.lo.x, c.box_room.lo.y,
+             c.box_room.lo.z, c.box_room.hi.x, c.box_room.hi.y, c.box_room.hi.z});
+}
+
+void Encoder::put(const volume::ShearFrame& s) {
+  begin_array(kShearNumbers + kLayerNumbers * static_cast<uint32_t>(s.layers.size()));
+  for (const double v : {double(s.axis), double(s.direction), s.eye.x, s.eye.y, s.eye.z, s.u0, s.du, s.v0, s.dv,
+                         double(s.width), double(s.height)})
+    put(v);
+  for (const auto& l : s.layers)
+    for (const double v : {double(l.begin), double(l.end), l.plane}) put(v);
+}
+
+}  // namespace telesplat::wire

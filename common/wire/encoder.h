@@ -1,0 +1,78 @@
+// Writes messages as msgpack maps. Private to this library.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "common/wire/fields.h"
+#include "common/wire/messages.h"
+
+namespace telesplat::wire {
+
+/// A visitor of fields(): appends each to `out`.
+class Encoder {
+ public:
+  explicit Encoder(std::string& out) : out_(out) {}
+
+  /// A whole message: "v", then its fields.
+  template <Struct M>
+  void versioned_map(const M& m) {
+    begin_map(count_fields(m) + 1);
+    version();
+    M::fields(*this, m);
+  }
+
+  template <class T>
+  void operator()(const char* name, const T& value, size_t /*limit*/ = 0) {
+    put_text(name);
+    put(value);
+  }
+
+ private:
+  template <class M>
+  static uint32_t count_fields(const M& m) {
+    uint32_t count = 0;
+    auto counter = [&](const char*, const auto&, size_t = 0) { ++count; };
+    M::fields(counter, m);
+    return count;
+  }
+  void begin_map(uint32_t entries);
+  void begin_array(uint32_t entries);
+  void version();
+  void numbers(std::initializer_list<double> values);
+  void put_text(std::string_view text);
+
+  void put(bool v);
+  void put(uint64_t v);
+  void put(double v);
+  void put(const std::string& v) { put_text(v); }
+  void put(const std::vector<std::string>& v);
+  void put(const std::map<std::string, std::string>& v);
+  void put(const std::map<std::string, double>& v);
+  void put(Bytes v);
+  void put(const std::vector<uint32_t>& v) { put(std::as_bytes(std::span(v))); }
+  void put(const std::vector<double>& v) { put(std::as_bytes(std::span(v))); }
+  void put(const geometry::Box& b);
+  void put(const geometry::Rect& r);
+  void put(const geometry::Camera& c);
+  void put(const std::vector<geometry::ChunkInfo>& chunks);
+  void put(const volume::ShearFrame& s);
+  template <class Tag>
+  void put(Id<Tag> v) {
+    put(v.value);
+  }
+  template <Struct M>
+  void put(const M& m) {
+    begin_map(count_fields(m));
+    M::fields(*this, m);
+  }
+  template <Struct M>
+  void put(const std::vector<M>& structs) {
+    begin_array(static_cast<uint32_t>(structs.size()));
+    for (const M& m : structs) put(m);
+  }
+
+  std::string& out_;
+};
+
+}  // namespace telesplat::wire

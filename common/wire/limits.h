@@ -1,0 +1,38 @@
+// What every message keeps to: the protocol's version, sizes and counts. Decoding refuses what is beyond them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace telesplat::wire {
+
+inline constexpr uint64_t kProtocolVersion = 3;
+
+inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
+inline constexpr size_t kMaxFact = 64u << 10;         ///< bytes of a text in facts and arguments: transfer functions
+inline constexpr size_t kMaxControlBytes = 1u << 20;  ///< whole body of a message without bulk fields
+inline constexpr size_t kMaxBulkBytes = 256u << 20;   ///< all bulk fields of a message
+inline constexpr size_t kMaxKeys = 1u << 21;          ///< cluster keys in one message
+inline constexpr size_t kMaxEntries = 4096;           ///< entries of a map or list
+inline constexpr uint64_t kMaxTiles = 1u << 16;       ///< tiles of a frame, and blocks
+inline constexpr uint64_t kMaxStep = 16;              ///< of a coarse frame
+inline constexpr int64_t kMaxTilePixels = 1 << 24;    ///< of a tile: what the codec takes
+inline constexpr uint64_t kMaxSlabs = 1024;           ///< of a volume, and samplers that share it
+inline constexpr uint64_t kMaxBuffers = 8;            ///< of a loosely coupled viewer
+inline constexpr size_t kMaxViews = 64;               ///< viewers that one sampling frame of a volume serves
+
+/// A bulk field. When encoding it points to the sender's bytes; when decoded it points into the received frame.
+using Bytes = std::span<const std::byte>;
+
+/// Whether a message may be larger than kMaxControlBytes. It says so itself: `static constexpr bool kBulk = true;`.
+template <class M>
+inline constexpr bool kIsBulk = requires {
+  requires M::kBulk;
+};
+
+/// The most bytes of a message's body.
+template <class M>
+inline constexpr size_t kBodyLimit = kIsBulk<M> ? kMaxBulkBytes + kMaxControlBytes : kMaxControlBytes;
+
+}  // namespace telesplat::wire

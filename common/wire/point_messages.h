@@ -1,0 +1,104 @@
+// Messages between the packer and the viewers of a point model.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "common/core/ids.h"
+#include "common/geometry/box.h"
+#include "common/geometry/camera.h"
+#include "common/wire/limits.h"
+
+namespace telesplat::wire {
+
+// Structs and their fields() stand as tables.
+// clang-format off
+
+// ---- events of the model: packer (PUB) -> viewers (SUB), and in answer to state_request (ROUTER -> DEALER) ----------
+
+struct Patch {
+  static constexpr std::string_view kName = "patch";
+  static constexpr bool kBulk = true;
+  InstanceId packer;
+  Sequence sequence;
+  EpochId epoch;
+  FrameId frame;
+  InstanceId viewer;
+  RequestId request;
+  uint64_t tile = 0, tiles_in_frame = 0;  ///< of what is published of a frame at once: the leases' blocks
+  uint64_t step = 1;                      ///< Lease::step
+  bool frame_complete = false;            ///< the last tile of its frame to be packed
+  uint64_t samples = 0, kept = 0;
+  geometry::Camera camera;  ///< of the whole frame
+  geometry::Rect rect;      ///< the tile in it
+  Bytes image;              ///< codec stream; eliminated pixels are not covered
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
+    f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
+    f("frame_complete", m.frame_complete); f("samples", m.samples); f("kept", m.kept); f("camera", m.camera);
+    f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
+  }
+};
+struct Forget {
+  static constexpr std::string_view kName = "forget";
+  static constexpr bool kBulk = true;
+  InstanceId packer;
+  Sequence sequence;
+  EpochId epoch;
+  std::vector<uint32_t> clusters;  ///< keys (as bin, little-endian u32), at most kMaxKeys
+  std::vector<uint32_t> frames;    ///< empty: whole clusters; else one a cluster: only its mosaics with this frame tag
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("clusters", m.clusters);
+    f("frames", m.frames);
+  }
+};
+struct EpochBegin {
+  static constexpr std::string_view kName = "epoch_begin";
+  InstanceId packer;
+  Sequence sequence;
+  EpochId epoch;
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch);
+  }
+};
+/// Twice a second on PUB: lets a viewer notice that it missed the last events. Also ends a state answer.
+struct StateMark {
+  static constexpr std::string_view kName = "state_mark";
+  InstanceId packer;
+  Sequence sequence;    ///< of the newest event
+  EpochId epoch;
+  bool answer = false;  ///< true: everything a state_request asked for has been sent
+  uint64_t points = 0;  ///< points of the model after that event
+  template <class F> static void fields(F& f, auto& m) {
+    f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("answer", m.answer);
+    f("points", m.points);
+  }
+};
+
+// ---- state: viewer (DEALER) <-> packer (ROUTER) --------------------------------------------------------------------
+
+/// Bring me up to date. after = newest sequence applied, of that packer instance; 0: everything.
+struct StateRequest {
+  static constexpr std::string_view kName = "state_request";
+  InstanceId viewer;
+  InstanceId packer;
+  Sequence after;
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("packer", m.packer); f("after", m.after);
+  }
+};
+/// Clusters drawn since the last report.
+struct AccessReport {
+  static constexpr std::string_view kName = "access_report";
+  static constexpr bool kBulk = true;
+  InstanceId viewer;
+  std::vector<uint32_t> clusters;
+  std::vector<uint32_t> frames;  ///< empty: not told; else one a cluster: the frame tag of the mosaics that were drawn
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("clusters", m.clusters); f("frames", m.frames);
+  }
+};
+
+// clang-format on
+
+}  // namespace telesplat::wire

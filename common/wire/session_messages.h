@@ -1,0 +1,139 @@
+// Messages of a session, between every process (DEALER) and the master (ROUTER): who takes part, what is shown,
+// what was measured, when it ends.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/ids.h"
+#include "common/geometry/box.h"
+#include "common/geometry/camera.h"
+#include "common/wire/limits.h"
+
+namespace telesplat::wire {
+
+// Structs and their fields() stand as tables.
+// clang-format off
+
+/// First message of every process. It is repeated when the master asks "who_are_you" or a bound endpoint changes.
+struct Hello {
+  static constexpr std::string_view kName = "hello";
+  std::string role;      ///< "data", "sampler", "packer", "viewer", "ctl"
+  std::string name;      ///< for people: "sampler-1"
+  InstanceId instance;
+  uint64_t pid = 0;
+  double sent_s = 0;     ///< sender's own clock: for the clock offset
+  /// Bound sockets that others connect to. data: "chunks" or "voxels"; packer: "tiles", "patches", "state".
+  std::map<std::string, std::string> endpoints;
+  /// data: "scene", "kind", "triangles"; sampler: "sampler"; viewer: "renderer"; docs/protocol.md has all.
+  std::map<std::string, std::string> facts;
+  /// data: of the scene, as it begins (julia/parameters.h); empty otherwise.
+  std::map<std::string, double> parameters;
+  geometry::Box box_room;  ///< data: the data set's box; empty otherwise
+  template <class F> static void fields(F& f, auto& m) {
+    f("role", m.role); f("name", m.name); f("instance", m.instance); f("pid", m.pid); f("sent_s", m.sent_s);
+    f("endpoints", m.endpoints); f("facts", m.facts, kMaxFact); f("parameters", m.parameters);
+    f("box_room", m.box_room);
+  }
+};
+
+/// The session as the master knows it; sent in answer to hello and again to everyone whenever it changes.
+struct Welcome {
+  static constexpr std::string_view kName = "welcome";
+  InstanceId master;
+  double hello_sent_s = 0;  ///< Hello::sent_s, echoed; 0 in an unasked welcome
+  double master_s = 0;      ///< master's clock when sent
+  EpochId epoch;
+  uint64_t octree_depth = 0;
+  geometry::Box box_room;                        ///< empty until a data server said hello
+  std::map<std::string, std::string> endpoints;  ///< as in the hellos, as far as they are known
+  std::map<std::string, std::string> facts;      ///< "scene", "kind", "triangles"
+  std::map<std::string, double> parameters;      ///< of the scene in this epoch
+  std::map<std::string, double> settings;        ///< packing.* and session.* values
+  template <class F> static void fields(F& f, auto& m) {
+    f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s); f("epoch", m.epoch);
+    f("octree_depth", m.octree_depth); f("box_room", m.box_room); f("endpoints", m.endpoints);
+    f("facts", m.facts, kMaxFact); f("parameters", m.parameters); f("settings", m.settings);
+  }
+};
+
+/// Master to a peer it does not know (it was restarted): say hello again.
+struct WhoAreYou {
+  static constexpr std::string_view kName = "who_are_you";
+  InstanceId master;
+  template <class F> static void fields(F& f, auto& m) { f("master", m.master); }
+};
+
+/// Viewer -> master: sample this view. With `buffers` 0 (asynchronous coupling) only the newest request of a viewer
+/// waits: it replaces the one before. Otherwise (synchronous: 1, loose: the buffers of T6.4) requests wait in order, at
+/// most `buffers` of a viewer; more are dropped.
+struct ViewRequest {
+  static constexpr std::string_view kName = "view_request";
+  InstanceId viewer;
+  RequestId request;
+  geometry::Camera camera;  ///< predicted pose; width x height is the sampling size
+  double sent_s = 0;
+  uint64_t buffers = 0;     ///< at most kMaxBuffers
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("sent_s", m.sent_s);
+    f("buffers", m.buffers);
+  }
+};
+
+/// Every process -> master, once a second: it lives, and its counters ("rss_mb", "messages_rejected", "points", ...).
+struct StatusReport {
+  static constexpr std::string_view kName = "status";
+  InstanceId instance;
+  std::map<std::string, double> values;
+  template <class F> static void fields(F& f, auto& m) { f("instance", m.instance); f("values", m.values); }
+};
+
+/// Every process -> master: rows of a metrics table ("frames", "updates", "spans"; docs/metrics.md).
+struct MetricRows {
+  static constexpr std::string_view kName = "metric_rows";
+  static constexpr bool kBulk = true;
+  InstanceId instance;
+  std::string table;
+  std::vector<std::string> columns;  ///< for "spans": the span names that column "name" indexes
+  std::vector<double> values;        ///< rows x columns, row-major (as bin, little-endian f64)
+  template <class F> static void fields(F& f, auto& m) {
+    f("instance", m.instance); f("table", m.table); f("columns", m.columns); f("values", m.values);
+  }
+};
+
+/// telesplat ctl -> master, and its answer.
+struct Control {
+  static constexpr std::string_view kName = "control";
+  /// "status", "stop", "epoch", "set" (arguments: parameter -> value), "animate" (argument "timeline": as
+  /// julia::parse_timeline takes it, or "off"), "tf" (argument "transfer": a preset's name or points, as
+  /// volume::parse_transfer takes them).
+  std::string command;
+  std::map<std::string, std::string> arguments;
+  template <class F> static void fields(F& f, auto& m) {
+    f("command", m.command); f("arguments", m.arguments, kMaxFact);
+  }
+};
+struct ControlReply {
+  static constexpr std::string_view kName = "control_reply";
+  bool ok = false;
+  std::string text;  ///< JSON for "status", else one line; at most kMaxControlBytes
+  template <class F> static void fields(F& f, auto& m) { f("ok", m.ok); f("text", m.text, kMaxControlBytes); }
+};
+
+/// Master -> everyone: finish, flush metrics, say goodbye, exit 0. A process that leaves by itself sends Goodbye too.
+struct Shutdown {
+  static constexpr std::string_view kName = "shutdown";
+  std::string reason;
+  template <class F> static void fields(F& f, auto& m) { f("reason", m.reason); }
+};
+struct Goodbye {
+  static constexpr std::string_view kName = "goodbye";
+  InstanceId instance;
+  template <class F> static void fields(F& f, auto& m) { f("instance", m.instance); }
+};
+
+// clang-format on
+
+}  // namespace telesplat::wire

@@ -1,0 +1,126 @@
+// Messages about tiles of depth images (surfaces, Julia sets): their leases, what samplers fetch for them and send.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "common/core/ids.h"
+#include "common/geometry/box.h"
+#include "common/geometry/camera.h"
+#include "common/geometry/mesh_chunk.h"
+#include "common/wire/limits.h"
+
+namespace telesplat::wire {
+
+// Structs and their fields() stand as tables.
+// clang-format off
+
+// ---- control: samplers and packer (DEALER) <-> master (ROUTER) -----------------------------------------------------
+
+/// Sampler -> master: one tile, please, as soon as there is one. Samplers of a volume ask for their next frame with it.
+struct LeaseRequest {
+  static constexpr std::string_view kName = "lease_request";
+  InstanceId sampler;
+  template <class F> static void fields(F& f, auto& m) { f("sampler", m.sampler); }
+};
+
+/// Master -> sampler: sample this tile before the lease expires.
+struct Lease {
+  static constexpr std::string_view kName = "lease";
+  LeaseId lease;
+  FrameId frame;
+  EpochId epoch;
+  InstanceId viewer;          ///< who asked
+  RequestId request;          ///< which of its requests
+  uint64_t tile = 0;          ///< its number in the frame; a tile that is leased anew keeps it
+  uint64_t step = 1;          ///< the frame has every step-th pixel of every step-th row (geometry::subsample)
+  uint64_t block = 0, blocks_in_frame = 0;  ///< the packer packs and publishes all tiles of a block as one
+  geometry::Camera camera;    ///< of the whole frame
+  geometry::Rect rect;        ///< the tile in it
+  geometry::Rect block_rect;  ///< the block in it; the tile lies in the block
+  double leased_s = 0;
+  template <class F> static void fields(F& f, auto& m) {
+    f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request);
+    f("tile", m.tile); f("step", m.step); f("block", m.block); f("blocks_in_frame", m.blocks_in_frame);
+    f("camera", m.camera); f("rect", m.rect); f("block_rect", m.block_rect); f("leased_s", m.leased_s);
+  }
+};
+
+/// Sampler -> master: still fetching what this lease needs; do not give it to another yet.
+struct LeaseExtend {
+  static constexpr std::string_view kName = "lease_extend";
+  InstanceId sampler;
+  LeaseId lease;
+  template <class F> static void fields(F& f, auto& m) { f("sampler", m.sampler); f("lease", m.lease); }
+};
+
+/// Packer -> master: the packer has this tile, or this slab of a volume's frame. Times tell who did what when.
+struct TileDone {
+  static constexpr std::string_view kName = "tile_done";
+  FrameId frame;
+  uint64_t tile = 0;
+  LeaseId lease;
+  InstanceId sampler;
+  uint64_t step = 1;                           ///< Lease::step
+  geometry::Rect rect;                         ///< Lease::rect
+  uint64_t samples = 0, kept = 0;              ///< covered pixels before and after redundancy elimination
+  uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< encoded tile as received, as published
+  double leased_s = 0, sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0, receive_s = 0, packed_s = 0;
+  template <class F> static void fields(F& f, auto& m) {
+    f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler); f("step", m.step);
+    f("rect", m.rect); f("samples", m.samples); f("kept", m.kept); f("bytes_sampled", m.bytes_sampled);
+    f("bytes_sent", m.bytes_sent); f("leased_s", m.leased_s); f("sample_begin_s", m.sample_begin_s);
+    f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s); f("receive_s", m.receive_s);
+    f("packed_s", m.packed_s);
+  }
+};
+
+// ---- blocks of a mesh: sampler (DEALER) <-> data (ROUTER) ----------------------------------------------------------
+
+struct ChunkListRequest {
+  static constexpr std::string_view kName = "chunk_list_request";
+  EpochId epoch;
+  template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); }
+};
+struct ChunkList {
+  static constexpr std::string_view kName = "chunk_list";
+  static constexpr bool kBulk = true;
+  EpochId epoch;
+  std::vector<geometry::ChunkInfo> chunks;  ///< at most kMaxChunks
+  template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); f("chunks", m.chunks); }
+};
+struct ChunkRequest {
+  static constexpr std::string_view kName = "chunk_request";
+  EpochId epoch;
+  ChunkId chunk;
+  template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); f("chunk", m.chunk); }
+};
+struct Chunk {
+  static constexpr std::string_view kName = "chunk";
+  static constexpr bool kBulk = true;
+  EpochId epoch;
+  ChunkId chunk;
+  Bytes data;  ///< layout: geometry/mesh_chunk.h; empty if the server has no such chunk
+  template <class F> static void fields(F& f, auto& m) {
+    f("epoch", m.epoch); f("chunk", m.chunk); f("data", m.data, kMaxBulkBytes);
+  }
+};
+
+// ---- depth images: sampler (PUSH) -> packer (PULL) -----------------------------------------------------------------
+
+struct DepthTile {
+  static constexpr std::string_view kName = "depth_tile";
+  static constexpr bool kBulk = true;
+  InstanceId sampler;
+  Lease lease;  ///< as leased
+  double sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0;
+  Bytes image;  ///< codec stream of lease.rect's size
+  template <class F> static void fields(F& f, auto& m) {
+    f("sampler", m.sampler); f("lease", m.lease); f("sample_begin_s", m.sample_begin_s);
+    f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s); f("image", m.image, kMaxBulkBytes);
+  }
+};
+
+// clang-format on
+
+}  // namespace telesplat::wire

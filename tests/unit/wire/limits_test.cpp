@@ -1,0 +1,200 @@
+// What decoding refuses: fields beyond their limits, and fields that do not go together.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/wire_samples.h"
+
+namespace telesplat::wire {
+namespace {
+
+using namespace telesplat::test;
+
+// Refused, with the message and `named` in the text.
+template <class M>
+::testing::AssertionResult refused(const std::string& body, const std::string& named = "") {
+  const auto result = decode<M>(bytes_of(body));
+  if (result) return ::testing::AssertionFailure() << "was accepted";
+  const std::string& text = result.error().text;
+  if (text.find(M::kName) == std::string::npos || text.find(named) == std::string::npos)
+    return ::testing::AssertionFailure() << "the text names neither " << M::kName << " nor " << named << ": " << text;
+  return ::testing::AssertionSuccess();
+}
+
+TEST(Limits, OfStringsListsAndMaps) {
+  Hello hello = sample_message<Hello>();
+  hello.name = std::string(kMaxString, 'n');
+  EXPECT_TRUE(decode<Hello>(bytes_of(encode(hello))));
+  hello.name += 'n';
+  EXPECT_TRUE(refused<Hello>(encode(hello), "name"));
+
+  hello = sample_message<Hello>();
+  hello.facts["transfer"] = std::string(kMaxFact, '0');  // longer than other strings
+  EXPECT_TRUE(decode<Hello>(bytes_of(encode(hello))));
+  hello.facts["transfer"] += '0';
+  EXPECT_TRUE(refused<Hello>(encode(hello), "facts"));
+  hello.facts = {{std::string(kMaxString + 1, 'k'), "v"}};
+  EXPECT_TRUE(refused<Hello>(encode(hello), "facts"));
+
+  StatusReport status = sample_message<StatusReport>();
+  status.values.clear();
+  for (size_t i = 0; i < kMaxEntries; ++i) status.values["k" + std::to_string(i)] = 1;
+  EXPECT_TRUE(decode<StatusReport>(bytes_of(encode(status))));
+  status.values["one more"] = 1;
+  EXPECT_TRUE(refused<StatusReport>(encode(status)));
+
+  MetricRows rows = sample_message<MetricRows>();
+  rows.columns.assign(kMaxEntries + 1, "c");
+  EXPECT_TRUE(refused<MetricRows>(encode(rows), "columns"));
+
+  ControlReply reply{true, std::string(kMaxString * 2, 'x')};  // a status answer is longer than other strings
+  EXPECT_TRUE(decode<ControlReply>(bytes_of(encode(reply))));
+}
+
+// Texts go into JSON, CSV and logs: nothing but UTF-8 comes in.
+TEST(Limits, OfTexts) {
+  const auto with = [](auto message, auto change) {
+    change(message);
+    return encode(message);
+  };
+  const Hello hello = sample_message<Hello>();
+  EXPECT_TRUE(decode<Hello>(bytes_of(with(hello, [](Hello& m) { m.name = "caf\xc3\xa9 \xe2\x82\xac"; }))));
+  EXPECT_TRUE(refused<Hello>(with(hello, [](Hello& m) { m.name = "\xff"; }), "field name is not UTF-8"));
+  EXPECT_TRUE(refused<Hello>(with(hello, [](Hello& m) { m.role = "caf\xe9"; }), "field role is not UTF-8"));
+  EXPECT_TRUE(refused<Hello>(with(hello, [](Hello& m) { m.facts = {{"\xff", ""}}; }), "field facts is not UTF-8"));
+  EXPECT_TRUE(refused<Hello>(with(hello,
+                                  [](Hello& m) {
+                                    m.facts = {{"scene", "caf\xe9.ply"}};
+                                  }),
+                             "field facts is not UTF-8"));
+  EXPECT_TRUE(refused<Hello>(with(hello,
+                                  [](Hello& m) {
+                                    m.parameters = {{"\xc0\x80", 1}};
+                                  }),
+                             "field parameters is not UTF-8"));
+  EXPECT_TRUE(
+      refused<StatusReport>(with(sample_message<StatusReport>(), [](StatusReport& m) { m.values["\xed\xa0\x80"] = 1; }),
+                            "field values is not UTF-8"));
+  EXPECT_TRUE(refused<MetricRows>(with(sample_message<MetricRows>(),
+                                       [](MetricRows& m) {
+                                         m.columns = {"good", "\xff"};
+                                       }),
+                                  "field columns is not UTF-8"));
+  EXPECT_TRUE(refused<SlabAssignment>(
+      with(sample_message<SlabAssignment>(), [](SlabAssignment& m) { m.sheet[1].endpoint = "tcp://\xff"; }),
+      "field sheet : field endpoint is not UTF-8"));
+}
+
+TEST(Limits, OfKeysAndNumbersInBinary) {
+  Forget forget = sample_message<Forget>();
+  forget.clusters.assign(kMaxKeys, 7);
+  forget.frames.clear();
+  EXPECT_TRUE(decode<Forget>(bytes_of(encode(forget))));
+  forget.clusters.push_back(7);
+  EXPECT_TRUE(refused<Forget>(encode(forget), "clusters"));
+  EXPECT_TRUE(refused<Forget>(with_value(encode(sample_message<Forget>()), "clusters",
+                                         std::string("\xc4\x03"
+                                                     "abc")),
+                              "multiple of 4"));
+  EXPECT_TRUE(refused<MetricRows>(with_value(encode(sample_message<MetricRows>()), "values",
+                                             std::string("\xc4\x07"
+                                                         "abcdefg")),
+                                  "multiple of 8"));
+}
+
+TEST(Limits, OfCameras) {
+  const auto refused_camera = [](auto change, const char* named) {
+    ViewRequest m = sample_message<ViewRequest>();
+    change(m.camera);
+    return refused<ViewRequest>(encode(m), named);
+  };
+  using C = geometry::Camera;
+  EXPECT_TRUE(refused_camera([](C& c) { c.width = 0; }, "camera"));
+  EXPECT_TRUE(refused_camera([](C& c) { c.height = geometry::kMaxImageSide + 1; },
+                             std::to_string(geometry::kMaxImageSide).c_str()));
+  EXPECT_TRUE(refused_camera([](C& c) { c.left = c.right; }, "frustum"));
+  EXPECT_TRUE(refused_camera([](C& c) { c.near_m = 0; }, "near"));
+  EXPECT_TRUE(refused_camera([](C& c) { c.pose.orientation = {0, 0, 0, 0}; }, "orientation"));
+  EXPECT_TRUE(refused_camera([](C& c) { c.pose.position_room.x = 1e9; }, "position"));
+  EXPECT_TRUE(
+      refused_camera([](C& c) { c.pose.position_room.y = std::numeric_limits<double>::quiet_NaN(); }, "finite"));
+  EXPECT_TRUE(refused_camera([](C& c) { c.top = std::numeric_limits<double>::infinity(); }, "finite"));
+}
+
+// What tells which part of a frame it is: a lease's block, a patch's tile.
+uint64_t& part(Lease& m) { return m.block; }
+uint64_t& part(Patch& m) { return m.tile; }
+uint64_t& parts(Lease& m) { return m.blocks_in_frame; }
+uint64_t& parts(Patch& m) { return m.tiles_in_frame; }
+
+template <class M>
+void expect_tiles_checked() {
+  const auto change = [](auto how) {
+    M m = sample_message<M>();
+    const auto with_block = [&](auto& part) {
+      if constexpr (requires { part.block_rect; }) part.block_rect = {0, 0, 320, 200};
+      how(part);
+    };
+    if constexpr (requires { m.lease.rect; })
+      with_block(m.lease);
+    else
+      with_block(m);
+    return encode(m);
+  };
+  EXPECT_TRUE(decode<M>(bytes_of(change([](auto& m) { m.rect = {0, 0, 320, 200}; }))));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {1, 0, 320, 200}; }), "320x200"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {0, 150, 10, 51}; }), "frame"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {0, 0, 0, 10}; }), "rect"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {-1, 0, 10, 10}; }), "rect"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.rect = {2147483647, 0, 2147483647, 10}; }), "rect"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { part(m) = 8; }), "tile 8 of 8"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { parts(m) = 0; }), "of 0"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { parts(m) = kMaxTiles + 1; }), "65536"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.step = 0; }), "step 0"));
+  EXPECT_TRUE(refused<M>(change([](auto& m) { m.step = kMaxStep + 1; }), "step 17"));
+}
+TEST(Limits, OfTiles) {
+  expect_tiles_checked<Lease>();
+  expect_tiles_checked<DepthTile>();
+  expect_tiles_checked<Patch>();
+  Lease lease = sample_message<Lease>();
+  lease.tile = kMaxTiles;
+  EXPECT_TRUE(refused<Lease>(encode(lease), "tile 65536"));
+  lease = sample_message<Lease>();
+  lease.camera.width = lease.camera.height = geometry::kMaxImageSide;
+  lease.rect = lease.block_rect = {0, 0, 4097, 4096};
+  EXPECT_TRUE(refused<Lease>(encode(lease), "16777216"));
+  lease = sample_message<Lease>();
+  lease.block_rect = {64, 32, 100, 49};
+  EXPECT_TRUE(refused<Lease>(encode(lease), "not inside its block"));
+}
+
+template <class M>
+void expect_frames_checked() {
+  M m = sample_message<M>();
+  m.frames.clear();
+  EXPECT_TRUE(decode<M>(bytes_of(encode(m))));
+  m.frames.resize(m.clusters.size() - 1);
+  EXPECT_TRUE(refused<M>(encode(m), "2 frames for 3 clusters"));
+}
+TEST(Limits, OfFramesOfClusters) {
+  expect_frames_checked<Forget>();
+  expect_frames_checked<AccessReport>();
+}
+
+TEST(Limits, OfChunkLists) {
+  const auto with = [](geometry::ChunkInfo info) {
+    ChunkList m{EpochId{1}, {info}};
+    return encode(m);
+  };
+  const geometry::Box box{{0, 0, 0}, {1, 1, 1}};
+  EXPECT_TRUE(decode<ChunkList>(bytes_of(with({ChunkId{5}, box, 10, 400}))));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{geometry::kMaxChunks + 1}, box, 10, 400}), "chunk"));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, box, geometry::kMaxChunkTriangles + 1, 400}), "chunk"));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, box, 10, kMaxBulkBytes + 1}), "chunk"));
+  EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, {{NAN, 0, 0}, {1, 1, 1}}, 10, 400}), "finite"));
+}
+
+}  // namespace
+}  // namespace telesplat::wire
