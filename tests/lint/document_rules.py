@@ -51,7 +51,7 @@ def messages(tree):
 # ---- flags -----------------------------------------------------------------------------------------------------------
 
 # A string that is one flag, or several names of one: "--a", "!--a", "-o,--output", "--a,--b".
-_FLAG_STRING = re.compile(r'"(!?--?[A-Za-z][\w.-]*(?:,!?--?[A-Za-z][\w.-]*)*)"')
+_FLAG_STRING = re.compile(r'"(!?--?[A-Za-z](?:[\w.-]*\w)?(?:,!?--?[A-Za-z][\w.-]*)*)"')
 _LONG_FLAG = re.compile(r"--[a-z][\w.-]*")
 
 

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Tests of the rules: each is given a small tree with one violation and must find it, and a tree without any."""
 
+import importlib.machinery
+import importlib.util
 import pathlib
 import subprocess
 import sys
@@ -11,6 +13,8 @@ import lint
 import tables
 import text_rules
 from tree import Tree
+
+ROOT = pathlib.Path(lint.__file__).resolve().parents[2]
 
 CLEAN = {
     "README.md": "[map](docs/architecture.md#where-to-start)\n",
@@ -163,14 +167,36 @@ class RulesTest(unittest.TestCase):
         strange = subprocess.run([*program, wrong.root, "gone"], capture_output=True, text=True, check=False)
         self.assertEqual(strange.returncode, 2)
 
+    def test_the_flags_page_reads_help_texts(self):
+        help_text = (
+            "telesplat-x: does it\nUsage: x [OPTIONS] scene\n\nPositionals:\n"
+            "  scene TEXT REQUIRED         what\n\nOptions:\n"
+            "  -h,--help                   Print\n  --up TEXT:{auto,x}=auto     axis\n"
+            "  --size INT:INT in [1 - 16]=2\n                              pixels\n\n"
+            "Subcommands:\n  run                         run it\n\nKeys:\n  F                           fly\n"
+        )
+        loader = importlib.machinery.SourceFileLoader("flags_page", str(ROOT / "tools/flags-page"))
+        page = importlib.util.module_from_spec(importlib.util.spec_from_loader("flags_page", loader))
+        loader.exec_module(page)
+        rows, commands = page.entries(help_text)
+        self.assertEqual([(name, meaning) for _, name, meaning in rows], [
+            ("scene TEXT REQUIRED", "what"),
+            ("-h,--help", "Print"),
+            ("--up TEXT:{auto,x}=auto", "axis"),
+            ("--size INT:INT in [1 - 16]=2", "pixels"),
+        ])
+        self.assertEqual(commands, ["run"])
+        self.assertEqual(page.spell("--up TEXT:{auto,x}=auto"), ("--up", "auto, x", "auto"))
+        self.assertEqual(page.spell("--size INT:INT in [1 - 16]=2"), ("--size", "whole number, 1 to 16", "2"))
+        self.assertEqual(page.spell("scene TEXT REQUIRED"), ("scene", "text; required", ""))
+
     def test_every_place_in_the_tables_is_there(self):
         """A row about a folder that has gone would hold nothing."""
-        root = pathlib.Path(lint.__file__).resolve().parents[2]
         places = [place for _, allowed in tables.OUTSIDE_HEADERS for place in allowed]
         for rows in tables.FLOORS.values():
             for room in (room for floor in rows for room in floor):
                 places += [room] if isinstance(room, str) else list(room)
-        self.assertEqual([place for place in places if not (root / place).exists()], [])
+        self.assertEqual([place for place in places if not (ROOT / place).exists()], [])
 
 
 if __name__ == "__main__":
