@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 
 namespace telesplat::julia {
@@ -40,40 +40,52 @@ Status read_constant(const std::string& text, Parameters& p) {
   return ok_status();
 }
 
+// What a parameter is, its limits, and its value in the first preset.
+std::string help_of(const ParameterInfo& info) {
+  const Parameters& defaults = presets().front().parameters;
+  std::string limits = fmt::format("{}..{}", info.least, info.most),
+              usual = fmt::format("{}", get(defaults, info.name));
+  if (info.name == "palette") limits = joined(palette_names()), usual = palette_names()[size_t(defaults.palette)];
+  if (info.name == "colour") limits = joined(colour_names()), usual = colour_names()[size_t(defaults.colour)];
+  const std::string text = fmt::format("{}: {}", info.text, limits);
+  return info.name.starts_with("c.") ? text : fmt::format("{}; first preset: {}", text, usual);
+}
+
 }  // namespace
 
+std::vector<std::pair<std::string, std::string>> parameters_not_given() {
+  std::vector<std::pair<std::string, std::string>> out;
+  for (const auto& info : parameter_infos()) out.emplace_back(info.name, "");
+  return out;
+}
+
 bool SceneOptions::any() const {
-  return !preset.empty() || !c.empty() || !animate.empty() || list_presets ||
+  return !preset.empty() || !c.empty() || !animate.empty() ||
          std::any_of(values.begin(), values.end(), [](const auto& v) { return !v.second.empty(); });
 }
 
-void add_scene_flags(CLI::App& app, SceneOptions& o) {
-  const std::string group = "Julia sets";
+options::Table scene_table(SceneOptions& o) {
   std::vector<std::string_view> names;
   for (const auto& p : presets()) names.push_back(p.name);
-  app.add_option("--preset", o.preset, fmt::format("{}; default: {}", joined(names), names.front()))->group(group);
-  app.add_flag("--list-presets", o.list_presets, "tell the presets' constants and end")->group(group);
-  app.add_option("--c", o.c, "the constant: i,j,k,real, each -4..4")->group(group);
-  app.add_option("--animate", o.animate,
-                 "parameters that change: NAME=FROM:TO:SECONDS (and back, for ever) or NAME=@0s:VALUE@5s:VALUE..., "
-                 "several with ; between them; off: nothing")
-      ->group(group);
-  o.values.clear();
-  for (const auto& info : parameter_infos()) o.values.emplace_back(info.name, "");
-  const auto default_text = [defaults = presets().front().parameters](std::string_view name) {
-    if (name == "palette") return std::string(palette_names()[size_t(defaults.palette)]);
-    if (name == "colour") return std::string(colour_names()[size_t(defaults.colour)]);
-    return fmt::format("{}", get(defaults, name));
+  options::Table table{
+      {.flag = "--preset", .value = &o.preset, .help = fmt::format("{}; default: {}", joined(names), names.front())},
+      {.flag = "--list-presets",
+       .value = options::Action{[] { std::fputs(describe_presets().c_str(), stdout); }},
+       .help = "tell the presets' constants and end"},
+      {.flag = "--c", .value = &o.c, .help = "the constant: i,j,k,real, each -4..4"},
+      {.flag = "--animate",
+       .value = &o.animate,
+       .help = "parameters that change: NAME=FROM:TO:SECONDS (and back, over and over) or NAME=@0s:VALUE@5s:VALUE..., "
+               "several with ; between them; off: nothing"},
   };
-  for (size_t i = 0; i < o.values.size(); ++i) {
-    const auto& info = parameter_infos()[i];
-    std::string limits = fmt::format("{}..{}", info.least, info.most);
-    if (info.name == "palette") limits = joined(palette_names());
-    if (info.name == "colour") limits = joined(colour_names());
-    std::string text = fmt::format("{}: {}", info.text, limits);
-    if (!info.name.starts_with("c.")) text += fmt::format("; first preset: {}", default_text(info.name));
-    app.add_option(fmt::format("--{}", info.name), o.values[i].second, text)->group(group);
+  for (size_t i = 0; i < o.values.size(); ++i)
+    table.push_back(
+        {.flag = "--" + o.values[i].first, .value = &o.values[i].second, .help = help_of(parameter_infos()[i])});
+  for (options::Row& row : table) {
+    row.fits = {telesplat::scene::Kind::kJulia};
+    row.group = "Julia sets";
   }
+  return table;
 }
 
 Result<double> read_value(std::string_view name, const std::string& text) {
@@ -115,16 +127,9 @@ Result<Scene> read_scene(const SceneOptions& o) {
   return out;
 }
 
-std::vector<std::string> to_flags(const SceneOptions& o) {
-  std::vector<std::string> out;
-  const auto add = [&](std::string_view name, const std::string& value) {
-    if (!value.empty()) out.push_back(fmt::format("--{}={}", name, value));
-  };
-  add("preset", o.preset);
-  add("c", o.c);
-  for (const auto& [name, text] : o.values) add(name, text);
-  add("animate", o.animate);
-  return out;
+std::vector<std::string> to_flags(SceneOptions o) {
+  SceneOptions none;
+  return options::arguments(scene_table(o), scene_table(none));
 }
 
 std::string describe_presets() {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/julia/animation.h"
+#include "common/options/table.h"
 
 namespace CLI {
 class App;
@@ -16,21 +17,25 @@ namespace telesplat::julia {
 /// The word that stands where a data file would.
 inline constexpr std::string_view kSceneWord = "julia";
 
-inline constexpr size_t kMaxAnimation =
-    4000;  ///< bytes of a scene's animation as text: it travels in one string of a message
+/// Bytes of a scene's animation as text: it travels in one string of a message.
+inline constexpr size_t kMaxAnimation = 4000;
+
+/// The names of parameter_infos(), each with an empty text.
+std::vector<std::pair<std::string, std::string>> parameters_not_given();
 
 /// As given: nothing is read or checked yet.
 struct SceneOptions {
   std::string preset;  ///< empty: the first of presets()
   std::string c;       ///< "i,j,k,real"; empty: not given
-  std::vector<std::pair<std::string, std::string>>
-      values;           ///< parameter name and text, in the order of parameter_infos()
+  /// Parameter name and text, in the order of parameter_infos(); an empty text was not given.
+  std::vector<std::pair<std::string, std::string>> values = parameters_not_given();
   std::string animate;  ///< empty or "off": nothing
   bool list_presets = false;
   bool any() const;  ///< something was given that only a Julia set takes
 };
 
 /// --preset, --c, --animate, --list-presets and one flag a parameter: --c.x, --iterations, ..., limits in their help.
+options::Table scene_table(SceneOptions& options);
 void add_scene_flags(CLI::App& app, SceneOptions& options);
 
 struct Scene {
@@ -42,7 +47,7 @@ struct Scene {
 Result<Scene> read_scene(const SceneOptions& options);
 
 /// The flags that say the same again, for another program.
-std::vector<std::string> to_flags(const SceneOptions& options);
+std::vector<std::string> to_flags(SceneOptions options);
 
 /// A parameter's value as people write it: a number, or the name of a palette or of what colours are made from.
 Result<double> read_value(std::string_view name, const std::string& text);

@@ -71,6 +71,11 @@ bool MasterLink::handle(const Message& message, double now_s) {
   return false;
 }
 
+void MasterLink::receive(double now_s) {
+  while (const auto message = socket_.receive())
+    if (!handle(*message, now_s)) socket_.reject(*message, "its type is not expected here");
+}
+
 void MasterLink::tell(const std::string& fact, const std::string& value) {
   hello_.facts[fact] = value;
   if (!welcomed_) return;  // the hello that is due anyway tells it

@@ -29,6 +29,9 @@ class MasterLink {
   /// message was one of these.
   bool handle(const Message& message, double now_s);
 
+  /// Handles all messages that are here by now; those that handle() does not know are rejected.
+  void receive(double now_s);
+
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }

@@ -1,25 +1,22 @@
-// The data server process (T5.2.1): opens the data set, says hello, serves chunks to whoever asks.
+// The data server process (T5.2.1): opens the data set, says hello, serves whoever asks.
 #pragma once
 
-#include "common/julia/flags.h"
-#include "common/net/service.h"
-#include "services/data/mesh/store.h"
-#include "services/data/volume/flags.h"
+#include <functional>
+
+#include "common/net/socket.h"
+#include "services/data/data_options.h"
+#include "services/data/served.h"
 
 namespace telesplat::data {
 
-struct DataServiceOptions {
-  net::ServiceOptions service;
-  std::string scene;  ///< path of a mesh, raster or volume, or "julia"
-  MeshOptions mesh;   ///< of a Julia set: its room size; of a volume: that and which way is up
-  VolumeFlags volume;
-  julia::SceneOptions julia;
-  bool report_progress = false;  ///< "progress STAGE FRACTION" lines on stdout, for the launcher
-};
+/// What the session is told of the data set; all text in it is UTF-8, even where a file's name is not. endpoint: where requests go to;
+/// empty: nowhere.
+wire::Hello make_hello(const Served& served, const std::string& name, const std::string& endpoint);
 
-void add_flags(CLI::App& app, DataServiceOptions& options);
+/// Binds, says hello, answers until told to stop; `stop` ends it, too. Exit code: 0, or 2 if nothing can be bound.
+int serve(net::Context& context, Served& served, const net::ServiceOptions& options, const std::function<bool()>& stop);
 
-/// Serves until told to stop. Exit code: 0, or 2 if the data cannot be read (one line on stderr says why).
+/// Opens the data set and serves it until told to stop. Exit code: 0, or 2 if the data cannot be read (one line on stderr says why).
 int run(const DataServiceOptions& options);
 
 }  // namespace telesplat::data

@@ -6,11 +6,12 @@
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/open_mesh.h"
 
 namespace telesplat::data {
 
 Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& options, const Progress& progress) {
-  const auto store = MeshStore::open(path, options, progress);
+  const auto store = open_mesh(path, options, progress);
   if (!store) return store.error();
   MeshFileFacts facts;
   facts.info = (*store)->info();

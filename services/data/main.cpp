@@ -7,5 +7,5 @@ int main(int argc, char** argv) {
   data::DataServiceOptions options;
   options.service.name = "data";
   return net::service_main(argc, argv, "telesplat-data: reads a data set and serves its blocks to samplers", options,
-                           data::add_flags, data::run);
+                           data::table, data::run);
 }

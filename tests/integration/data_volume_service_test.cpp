@@ -6,7 +6,8 @@
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
-#include "services/data/volume/service.h"
+#include "services/data/data_service.h"
+#include "services/data/volume/served_volume.h"
 #include "tests/support/volume_samples.h"
 
 namespace telesplat::data {
@@ -21,8 +22,10 @@ class Service : public testing::Test {
     options.service.name = "data-1", options.service.master = "inproc://master",
     options.service.bind = "inproc://voxels";
     options.scene = "folder/noise.raw";
-    server =
-        std::thread([this] { exit_code = serve_volume(context, *store, options, [this] { return stop.load(); }); });
+    server = std::thread([this] {
+      const auto served = serve_volume(store, options.scene);
+      exit_code = serve(context, *served, options.service, [this] { return stop.load(); });
+    });
   }
   void TearDown() override {
     stop = true;
@@ -56,7 +59,7 @@ class Service : public testing::Test {
   net::Context context;
   net::Socket master{context, net::Kind::kRouter, "master"};
   DataServiceOptions options;
-  std::unique_ptr<VolumeStore> store = open_or_fail(noise(3, {40, 30, 100}));
+  std::shared_ptr<VolumeStore> store = open_or_fail(noise(3, {40, 30, 100}));
   std::map<std::string, std::string> facts;
   std::map<std::string, double> parameters;
   std::string peer;
@@ -153,7 +156,7 @@ TEST(DataServer, RefusesAVolumesFlagsWhereThereIsNoVolume) {
   DataServiceOptions julia, file, surface;
   julia.scene = "julia", julia.volume.transfer = "bone";
   file.scene = "CMakeLists.txt", file.volume.part = "0/2";
-  surface.scene = "CMakeLists.txt", surface.mesh.iso = 5, surface.volume.lighting = "off";
+  surface.scene = "CMakeLists.txt", surface.mesh.iso = 5, surface.volume.lit = false;
   for (const auto& [text, scene] : {std::pair{refusal(julia), "julia"}, {refusal(file), "CMakeLists.txt"}}) {
     EXPECT_NE(text.find(scene), std::string::npos) << text;
     EXPECT_NE(text.find("is no volume"), std::string::npos) << text;

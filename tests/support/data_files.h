@@ -16,7 +16,7 @@
 
 #include "common/image/normal.h"
 #include "services/data/base/mesh.h"
-#include "services/data/mesh/store.h"
+#include "services/data/open_mesh.h"
 
 namespace telesplat::data::test {
 
@@ -83,7 +83,10 @@ inline std::string ply_of(const Mesh& mesh) {
 
 /// Options for a test: no cache, data axes kept unless told otherwise.
 inline MeshOptions plain_options(const std::string& up = "y") {
-  return {.room_size_m = 0.8, .up = up, .cache_dir = "", .use_cache = false};
+  MeshOptions options;
+  options.up = up;
+  options.use_cache = false;
+  return options;
 }
 
 /// Everything a store holds, triangle by triangle.
@@ -131,7 +134,7 @@ inline Contents contents_of(const MeshStore& store) {
 }
 
 inline std::shared_ptr<MeshStore> open_or_fail(const std::string& path, const MeshOptions& options) {
-  auto store = MeshStore::open(path, options, nullptr);
+  auto store = open_mesh(path, options, nullptr);
   EXPECT_TRUE(store.ok()) << (store ? "" : store.error().text);
   return store ? *store : nullptr;
 }

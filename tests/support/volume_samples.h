@@ -35,7 +35,8 @@ inline Volume noise(uint32_t seed = 1, std::array<int, 3> size = {19, 11, 13}) {
 }
 
 inline Result<std::unique_ptr<VolumeStore>> open_steps(std::vector<Volume> steps, VolumeOptions options = {},
-                                                       MeshOptions mesh = {}, std::atomic<size_t>* reads = nullptr) {
+                                                       PlacementOptions mesh = {},
+                                                       std::atomic<size_t>* reads = nullptr) {
   if (options.transfer.empty()) options.transfer = "0:#ffffff:0, 100%:#ffffff:1";
   const size_t count = steps.size();
   auto shared = std::make_shared<std::vector<Volume>>(std::move(steps));
@@ -45,7 +46,7 @@ inline Result<std::unique_ptr<VolumeStore>> open_steps(std::vector<Volume> steps
   };
   return VolumeStore::make(read, count, "test", options, mesh, [](const char*, double) {});
 }
-inline std::unique_ptr<VolumeStore> open_or_fail(Volume v, VolumeOptions options = {}, MeshOptions mesh = {}) {
+inline std::unique_ptr<VolumeStore> open_or_fail(Volume v, VolumeOptions options = {}, PlacementOptions mesh = {}) {
   std::vector<Volume> steps;
   steps.push_back(std::move(v));
   auto store = open_steps(std::move(steps), options, mesh);

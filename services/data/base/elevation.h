@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "services/data/base/elevation_options.h"
 #include "services/data/base/mesh.h"
 
 namespace telesplat::data {
@@ -20,12 +21,6 @@ struct ElevationRaster {
   int step = 1;                   ///< every step-th sample of the file
   std::vector<float> heights;     ///< row by row from the north, metres; NaN: no data
   std::vector<uint32_t> colours;  ///< of a texture, 0x00RRGGBB, one a sample; empty: none
-};
-
-/// Heights are multiplied by z_scale; 0: by 1 where the raster is georeferenced, else so that the relief is a seventh of the longer side.
-struct ElevationOptions {
-  double z_scale = 0;
-  std::string texture;  ///< an image draped over the raster (orthophoto), path; empty: coloured by height
 };
 
 /// Two triangles a cell whose four corners have data, one where three have. x east, y north, z up. Colours are the texture's, or tints by height: blue

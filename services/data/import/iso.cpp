@@ -21,7 +21,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "services/data/mesh/isosurface.h"
+#include "services/data/surface/isosurface.h"
 
 namespace telesplat::data {
 namespace {

@@ -16,7 +16,7 @@
 #include "services/data/import/report.h"
 #include "services/data/import/vtk_import.h"
 #include "services/data/import/vtk_volume.h"
-#include "services/data/mesh/isosurface.h"
+#include "services/data/surface/isosurface.h"
 #include "services/data/volume/formats/import_stream.h"
 
 namespace {

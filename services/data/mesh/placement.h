@@ -1,7 +1,6 @@
 // From a file's own coordinates to room space (docs/architecture.md, "Room space").
 #pragma once
 
-#include <glm/mat3x3.hpp>
 #include <string>
 #include <vector>
 
@@ -21,9 +20,6 @@ struct PlacedMesh {
   std::string up;  ///< x, y, z, -x, -y or -z
   uint64_t degenerate_dropped = 0;
 };
-
-/// The rotation (determinant +1) that turns data axis `up` to +y. Error unless `up` is x, y, z, -x, -y or -z.
-Result<glm::dmat3> rotation_for_up(const std::string& up);
 
 /// Which data axis points up, "y" or "z":
 ///   z for terrains: elevation rasters; or the box is less than 0.35 times as high in z as it is wide in x and y, and the surface is an open height field in z

@@ -1,17 +1,14 @@
 // Reading mesh files: one function a format, and one that finds out which.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <string_view>
 
 #include "services/data/base/elevation.h"
 #include "services/data/base/mesh.h"
+#include "services/data/base/progress.h"
 
 namespace telesplat::data {
-
-/// Fraction of the file read, 0..1; called now and then on the reading thread.
-using ReadProgress = std::function<void(double fraction)>;
 
 /// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtk", "gltf", "raster", or
 /// "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and what is supported.

@@ -4,20 +4,15 @@
 #include <fmt/format.h>
 #include <sys/file.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <utility>
 
 #include "common/core/log.h"
-#include "services/data/mesh/isosurface.h"
 #include "services/data/mesh/placement.h"
-#include "services/data/mesh/reader.h"
 #include "services/data/mesh/store_file.h"
 
 namespace telesplat::data {
@@ -67,88 +62,8 @@ fs::path default_cache_dir() {
   return fs::temp_directory_path() / fmt::format("telesplat-{}", getuid());
 }
 
-// Text as hexadecimal digits of its hash: for file names.
-std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
-
-// What a store is made from.
-struct Source {
-  uint64_t hash = 0;    // of all files' content
-  std::string variant;  // what else decides what the mesh is, for the store's name
-  std::function<Result<Mesh>(const ReadProgress&)> read;
-};
-
-// Of these files' content; those that cannot be read are left out: reading says why.
-uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progress) {
-  constexpr size_t kStep = 64 << 20;
-  XXH3_state_t* state = XXH3_createState();
-  XXH3_64bits_reset(state);
-  for (size_t n = 0; n < paths.size(); ++n) {
-    const auto file = MappedFile::open(paths[n]);
-    if (!file) continue;
-    const auto bytes = (*file)->bytes();
-    for (size_t at = 0; at < bytes.size(); at += kStep) {
-      const double of_file = static_cast<double>(at) / static_cast<double>(bytes.size());
-      progress("hash", (static_cast<double>(n) + of_file) / static_cast<double>(paths.size()));
-      XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
-    }
-  }
-  const uint64_t hash = XXH3_64bits_digest(state);
-  XXH3_freeState(state);
-  progress("hash", 1.0);
-  return hash;
-}
-
-Result<Source> mesh_source(const std::string& path, const MeshOptions& options, const Progress& progress) {
-  const auto file = MappedFile::open(path);
-  if (!file) return file.error();
-  const DetectedFormat detected = detect_format((*file)->text(), path);
-  if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
-  std::vector<std::string> files{path};
-  for (auto& companion : companion_files((*file)->text(), detected.format, path)) files.push_back(std::move(companion));
-  const ElevationOptions& elevation = options.elevation;
-  const bool raster = detected.format == "raster";
-  if (!raster && (elevation.z_scale != 0 || !elevation.texture.empty()))
-    return Error{fmt::format("{}: is no elevation raster, but --z-scale or --texture is given", path)};
-  if (!elevation.texture.empty()) {
-    const auto texture = MappedFile::open(elevation.texture);
-    if (!texture) return texture.error();
-    files.push_back(elevation.texture);
-  }
-  return Source{hash_files(files, progress), raster ? fmt::format("-z{}", elevation.z_scale) : "",
-                [=](const ReadProgress& p) { return read_mesh(path, p, elevation); }};
-}
-
-Result<Source> surface_source(const std::string& path, const MeshOptions& options, const Progress& progress) {
-  auto found = find_volume(path, options.raw);
-  if (!found) return found.error();
-  std::vector<std::string> files{found->steps.front()};
-  std::error_code error;
-  if (fs::is_directory(files.front(), error)) {  // a folder of slices
-    const std::string folder = std::exchange(files, {}).front();
-    for (const auto& entry : fs::directory_iterator(folder, error))
-      if (entry.is_regular_file(error)) files.push_back(entry.path().string());
-    std::sort(files.begin(), files.end());
-  }
-  const double iso = *options.iso;
-  return Source{hash_files(files, progress),
-                fmt::format("-iso{}{}", iso, options.raw.empty() ? "" : "-" + hex(options.raw)),
-                [source = std::move(*found), iso](const ReadProgress& p) -> Result<Mesh> {
-                  const auto volume = read_volume(source, 0, p);
-                  if (!volume) return volume.error();
-                  return isosurface(*volume, iso, source.name);
-                }};
-}
-
-Status validate_options(const MeshOptions& options) {
-  if (!(options.room_size_m >= 1e-3 && options.room_size_m <= 1e4))
-    return Error{fmt::format("room size {} m is outside [0.001, 10000]", options.room_size_m)};
-  if (options.up != "auto")
-    if (auto rotation = rotation_for_up(options.up); !rotation) return rotation.error();
-  return ok_status();
-}
-
 // Reads the mesh file and writes its store into the descriptor.
-Status build_store(int descriptor, const std::string& path, const MeshOptions& options, const Source& source,
+Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
                    const Progress& progress) {
   auto mesh = source.read([&](double fraction) { progress("read", fraction); });
   if (!mesh) return mesh.error();
@@ -172,8 +87,8 @@ Status build_store(int descriptor, const std::string& path, const MeshOptions& o
 }
 
 // Without a cache: a file that has no name and goes away with its last mapping.
-Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const MeshOptions& options,
-                                                const Source& source, const Progress& progress) {
+Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const StoreOptions& options,
+                                                const MeshSource& source, const Progress& progress) {
   std::error_code ignored;
   std::string name = (fs::temp_directory_path(ignored) / "telesplat-XXXXXX").string();
   const Descriptor file(mkostemp(name.data(), O_CLOEXEC));
@@ -192,21 +107,48 @@ Result<StoreContent> open_existing(const std::string& name) {
   return read_store(file.get(), name);
 }
 
+// Makes a store in the cache. It gets its name once it is whole.
+Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const std::string& path,
+                                               const StoreOptions& options, const MeshSource& source,
+                                               const Progress& progress) {
+  const std::string name = stem + ".mesh", part = stem + ".part";
+  {
+    const Descriptor out(::open(part.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (!out.valid()) {
+      log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
+      return open_unnamed(path, options, source, progress);
+    }
+    const Status built = build_store(out.get(), path, options, source, progress);
+    if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
+      const std::string reason =
+          built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
+      std::error_code error;
+      fs::remove(part, error);
+      return Error{reason};
+    }
+  }
+  auto content = open_existing(name);
+  if (!content) return content.error();
+  return make_store(std::move(*content), path, false);
+}
+
 }  // namespace
 
-Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, const MeshOptions& options,
-                                                   const Progress& user_progress) {
-  const Progress progress = user_progress ? user_progress : [](const char*, double) {};
-  if (auto status = validate_options(options); !status) return status.error();
-  const auto source = options.iso ? surface_source(path, options, progress) : mesh_source(path, options, progress);
-  if (!source) return source.error();
-  if (!options.use_cache) return open_unnamed(path, options, *source, progress);
+Status validate(const StoreOptions& options) {
+  if (!(options.room_size_m >= 1e-3 && options.room_size_m <= 1e4))
+    return Error{fmt::format("room size {} m is outside [0.001, 10000]", options.room_size_m)};
+  if (options.up != "auto")
+    if (const auto rotation = rotation_for_up(options.up); !rotation) return rotation.error();
+  return ok_status();
+}
 
+Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, const MeshSource& source,
+                                                   const StoreOptions& options, const Progress& progress) {
+  if (!options.use_cache) return open_unnamed(path, options, source, progress);
   const fs::path folder = options.cache_dir.empty() ? default_cache_dir() : fs::path(options.cache_dir);
   const std::string stem =
-      (folder / fmt::format("{:016x}-{}-{}{}", source->hash, options.up, options.room_size_m, source->variant))
-          .string();
-  const std::string name = stem + ".mesh", part = stem + ".part";
+      (folder / fmt::format("{:016x}-{}-{}{}", source.hash, options.up, options.room_size_m, source.variant)).string();
+  const std::string name = stem + ".mesh";
   if (auto content = open_existing(name)) return make_store(std::move(*content), path, true);
 
   std::error_code error;
@@ -215,7 +157,7 @@ Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, cons
   const Descriptor lock(::open((stem + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
   if (!lock.valid() || flock(lock.get(), LOCK_EX) != 0) {
     log::warn("cache folder {} cannot be written ({}); going on without", folder.string(), std::strerror(errno));
-    return open_unnamed(path, options, *source, progress);
+    return open_unnamed(path, options, source, progress);
   }
   auto content = open_existing(name);
   if (content) return make_store(std::move(*content), path, true);
@@ -223,23 +165,7 @@ Result<std::shared_ptr<MeshStore>> MeshStore::open(const std::string& path, cons
     log::warn("{}; making it anew", content.error().text);
     fs::remove(name, error);
   }
-  {
-    const Descriptor out(::open(part.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-    if (!out.valid()) {
-      log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
-      return open_unnamed(path, options, *source, progress);
-    }
-    const Status built = build_store(out.get(), path, options, *source, progress);
-    if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
-      const std::string reason =
-          built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
-      fs::remove(part, error);
-      return Error{reason};
-    }
-  }
-  content = open_existing(name);
-  if (!content) return content.error();
-  return make_store(std::move(*content), path, false);
+  return make_cached(stem, path, options, source, progress);
 }
 
 }  // namespace telesplat::data

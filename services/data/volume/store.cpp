@@ -9,7 +9,6 @@
 #include <future>
 #include <list>
 
-#include "services/data/mesh/placement.h"
 #include "services/data/volume/slices.h"
 
 namespace telesplat::data {
@@ -40,7 +39,7 @@ Result<Part> read_part(const std::string& text, int slices) {
 }
 
 // As a mesh's: the box centred, `up` turned to +y, the largest extent the room's size.
-Result<glm::dmat4> place_volume(const Volume& v, const MeshOptions& options) {
+Result<glm::dmat4> place_volume(const Volume& v, const PlacementOptions& options) {
   const auto rotation = rotation_for_up(options.up == "auto" ? "z" : options.up);
   if (!rotation) return rotation.error();
   geometry::DBox box;
@@ -72,14 +71,14 @@ class Store final : public VolumeStore {
     session_.steps_per_s = steps < 2 ? 0 : options.steps_per_s.value_or(std::min(double(steps), kFastestDefault_hz));
   }
 
-  Status initialise(const VolumeOptions& options, const MeshOptions& mesh, const Progress& progress) {
+  Status initialise(const VolumeOptions& options, const PlacementOptions& placement, const Progress& progress) {
     auto first = read_(0, [&](double f) { progress("read", f / session_.steps); });
     if (!first) return first.error();
     const auto refuse = [&](const Error& e) { return Error{name_ + ": " + e.text}; };
-    const auto placement = place_volume(*first, mesh);
-    if (!placement) return refuse(placement.error());
+    const auto index_to_room = place_volume(*first, placement);
+    if (!index_to_room) return refuse(index_to_room.error());
     format_ = first->format;
-    session_.grid = {first->size, *placement};
+    session_.grid = {first->size, *index_to_room};
     if (const Status valid = volume::validate(session_.grid); !valid) return refuse(valid.error());
     const auto part = read_part(options.part, first->size[2]);
     if (!part) return refuse(part.error());
@@ -217,13 +216,23 @@ class Store final : public VolumeStore {
 
 }  // namespace
 
+Result<std::unique_ptr<VolumeStore>> VolumeStore::open(const std::string& path, const VolumeOptions& options,
+                                                       const PlacementOptions& placement, const Progress& progress) {
+  const auto source = find_volume(path, options.raw);
+  if (!source) return source.error();
+  const StepReader read = [source = *source](size_t step, const ReadProgress& told) {
+    return read_volume(source, step, told);
+  };
+  return make(read, source->steps.size(), path, options, placement, progress);
+}
+
 Result<std::unique_ptr<VolumeStore>> VolumeStore::make(StepReader read, size_t steps, const std::string& name,
-                                                       const VolumeOptions& options, const MeshOptions& mesh,
+                                                       const VolumeOptions& options, const PlacementOptions& placement,
                                                        const Progress& progress) {
   if (steps < 1 || steps > size_t(volume::kMaxSteps))
     return Error{fmt::format("{}: {} steps, limits are 1..{}", name, steps, volume::kMaxSteps)};
   auto store = std::make_unique<Store>(std::move(read), steps, name, options);
-  if (const Status done = store->initialise(options, mesh, progress); !done) return done.error();
+  if (const Status done = store->initialise(options, placement, progress); !done) return done.error();
   return std::unique_ptr<VolumeStore>(std::move(store));
 }
 

@@ -1,27 +1,18 @@
-// A data server's volume: read, placed in the room, classified and cut into slices on demand. Several servers may hold different parts of one volume.
+// A data server's volume: read, placed in the room, classified and cut into slices on demand. Several servers may hold different parts of
+// one volume.
 #pragma once
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "common/volume/session.h"
 #include "common/volume/voxels.h"
-#include "services/data/mesh/store.h"
+#include "services/data/base/placement_options.h"
+#include "services/data/volume/options.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {
-
-struct VolumeOptions {
-  std::string raw;       ///< VolumeSource::raw
-  std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
-  bool lit = true;
-  std::optional<double>
-      steps_per_s;      ///< of a series; nothing: as many as make a second, at most 12.5; 0: it does not play
-  std::string part;     ///< "1/2": the second of two parts; empty: all of it
-  int cache_mb = 2048;  ///< steps of a series that are kept
-};
 
 /// Reads one step of a volume.
 using StepReader = std::function<Result<Volume>(size_t step, const ReadProgress&)>;
@@ -29,14 +20,14 @@ using StepReader = std::function<Result<Volume>(size_t step, const ReadProgress&
 /// Used from one thread at a time.
 class VolumeStore {
  public:
-  /// mesh: room size, up (auto: z). Reads the first step; all of them if they fit in cache_mb, so that levels cover the values of all. Otherwise
-  /// values of later steps that are beyond the first one's count as its smallest or largest. Steps that are read later, and one step
-  /// ahead, are read in a thread of their own. Errors name the file.
+  /// up "auto": z. Reads the first step; all of them if they fit in cache_mb, so that levels cover the values of all. Otherwise values of
+  /// later steps that are beyond the first one's count as its smallest or largest. Steps that are read later, and one step ahead, are
+  /// read in a thread of their own. Errors name the file.
   static Result<std::unique_ptr<VolumeStore>> open(const std::string& path, const VolumeOptions& options,
-                                                   const MeshOptions& mesh, const Progress& progress);
+                                                   const PlacementOptions& placement, const Progress& progress);
   /// The same of volumes from anywhere. name: for errors.
   static Result<std::unique_ptr<VolumeStore>> make(StepReader read, size_t steps, const std::string& name,
-                                                   const VolumeOptions& options, const MeshOptions& mesh,
+                                                   const VolumeOptions& options, const PlacementOptions& placement,
                                                    const Progress& progress);
   virtual ~VolumeStore() = default;
 

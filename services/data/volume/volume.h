@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <glm/mat4x4.hpp>
 #include <memory>
 #include <string>
@@ -11,7 +10,7 @@
 #include <vector>
 
 #include "common/core/result.h"
-#include "services/data/mesh/reader.h"
+#include "services/data/base/progress.h"
 
 namespace telesplat::data {
 

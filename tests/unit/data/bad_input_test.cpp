@@ -19,7 +19,7 @@ long peak_rss_kb() {
 
 // Opens a file that must be refused. Returns the error's text, after checking what every such text promises.
 std::string refusal(const std::string& path) {
-  const auto store = MeshStore::open(path, plain_options("auto"), nullptr);
+  const auto store = open_mesh(path, plain_options("auto"), nullptr);
   EXPECT_FALSE(store.ok()) << path << " was accepted";
   if (store) return "";
   const std::string text = store.error().text;
@@ -168,11 +168,13 @@ TEST(BadOptions, AreRefused) {
   const TempFolder folder;
   const std::string path = folder.write("grid.ply", ply_of(wavy_grid(2)));
   for (double size : {0.0, -1.0, 1e9, std::nan("")}) {
-    const auto store = MeshStore::open(path, {.room_size_m = size, .use_cache = false}, nullptr);
+    MeshOptions options = plain_options("auto");
+    options.room_size_m = size;
+    const auto store = open_mesh(path, options, nullptr);
     ASSERT_FALSE(store.ok());
     EXPECT_NE(store.error().text.find("room size"), std::string::npos);
   }
-  const auto store = MeshStore::open(path, {.up = "w", .use_cache = false}, nullptr);
+  const auto store = open_mesh(path, plain_options("w"), nullptr);
   ASSERT_FALSE(store.ok());
   EXPECT_NE(store.error().text.find("'w'"), std::string::npos);
 }

@@ -1,4 +1,4 @@
-#include "services/data/mesh/isosurface.h"
+#include "services/data/surface/isosurface.h"
 
 #include <gtest/gtest.h>
 

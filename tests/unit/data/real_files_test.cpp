@@ -68,7 +68,7 @@ TEST(RealRasters, BecomeColouredHeightFields) {
   for (const char* name : {"formats/N42W123.hgt", "formats/andes-srtm3.tif"}) {
     const std::string path = data_folder() + "/" + name;
     if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
-    const auto store = MeshStore::open(path, {.use_cache = false}, nullptr);
+    const auto store = open_mesh(path, plain_options("auto"), nullptr);
     ASSERT_TRUE(store.ok()) << store.error().text;
     const auto& info = (*store)->info();
     EXPECT_EQ(info.format, "raster");
@@ -89,7 +89,8 @@ TEST(RealCache, FiveMillionTrianglesComeFromTheStoreTheSecondTime) {
   const std::string path = data_folder() + "/meshes/colorado-5760k.ply";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there (set TELESPLAT_DATA)";
   const TempFolder folder;
-  const MeshOptions options{.cache_dir = folder / "cache"};
+  MeshOptions options;
+  options.cache_dir = folder / "cache";
   const auto first = open_or_fail(path, options);
   ASSERT_TRUE(first);
   EXPECT_FALSE(first->info().from_cache);

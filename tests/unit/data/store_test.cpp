@@ -9,12 +9,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+MeshOptions cached_in(const std::string& folder) {
+  MeshOptions options;
+  options.cache_dir = folder;
+  return options;
+}
+
 // A grid and a folder to cache it in.
 class StoreTest : public testing::Test {
  protected:
   TempFolder folder_;
   std::string path_ = folder_.write("grid.ply", ply_of(wavy_grid(40)));
-  MeshOptions options_{.room_size_m = 0.8, .up = "auto", .cache_dir = folder_ / "cache", .use_cache = true};
+  MeshOptions options_ = cached_in(folder_ / "cache");
 
   fs::path store_file() const {
     for (const auto& entry : fs::directory_iterator(options_.cache_dir))
@@ -56,7 +62,7 @@ TEST_F(StoreTest, KeepsEveryTriangleColourAndBox) {
 TEST_F(StoreTest, SecondOpenIsFromTheCacheAndTheSame) {
   std::vector<std::string> stages;
   const auto first = open_or_fail(path_, options_);
-  const auto again = MeshStore::open(path_, options_, [&](const char* stage, double fraction) {
+  const auto again = open_mesh(path_, options_, [&](const char* stage, double fraction) {
     EXPECT_GE(fraction, 0.0);
     EXPECT_LE(fraction, 1.0);
     stages.push_back(stage);
@@ -128,7 +134,7 @@ TEST_F(StoreTest, DamagedStoresAreMadeAnew) {
 TEST_F(StoreTest, FailedReadingLeavesNothingBehind) {
   const std::string whole = ply_of(wavy_grid(5));
   const std::string bad = folder_.write("bad.ply", whole.substr(0, whole.size() - 20));
-  EXPECT_FALSE(MeshStore::open(bad, options_, nullptr).ok());
+  EXPECT_FALSE(open_mesh(bad, options_, nullptr).ok());
   EXPECT_EQ(store_files(), 0u);
   for (const auto& entry : fs::directory_iterator(options_.cache_dir)) EXPECT_NE(entry.path().extension(), ".part");
 }

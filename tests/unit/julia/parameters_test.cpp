@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <limits>
 #include <set>
 
 #include "common/julia/flags.h"
+#include "common/options/parser.h"
 
 namespace telesplat::julia {
 namespace {
@@ -120,19 +120,16 @@ TEST(JuliaPlacement, GoesThroughMessagesAndPutsTheBoxInTheMiddle) {
 }
 
 Result<Scene> read_flags(std::vector<std::string> flags) {
-  CLI::App app;
   SceneOptions o;
-  add_scene_flags(app, o);
-  std::reverse(flags.begin(), flags.end());
-  app.parse(flags);
+  options::Parser parser("Julia sets");
+  parser.add(scene_table(o));
+  parser.parse_or_exit("test", std::move(flags));
   // What is handed on to another program says the same.
   const auto scene = read_scene(o);
-  CLI::App other;
   SceneOptions again;
-  add_scene_flags(other, again);
-  auto handed = to_flags(o);
-  std::reverse(handed.begin(), handed.end());
-  other.parse(handed);
+  options::Parser other("Julia sets");
+  other.add(scene_table(again));
+  other.parse_or_exit("other", to_flags(o));
   const auto same = read_scene(again);
   EXPECT_EQ(scene.ok(), same.ok());
   if (scene && same) {

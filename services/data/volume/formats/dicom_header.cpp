@@ -62,7 +62,7 @@ class Parser {
       big_ = true;
     else if (syntax_ != "1.2.840.10008.1.2.1")
       return Error{fmt::format("{}: its transfer syntax is {}; supported are uncompressed ones ({}, {}.1, {}.2)", path_,
-                               quoted(syntax_), kBase, kBase, kBase)};
+                               in_quotes(syntax_), kBase, kBase, kBase)};
     out_.big_endian = big_;
     return ok_status();
   }

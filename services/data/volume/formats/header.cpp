@@ -158,7 +158,7 @@ Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& 
   const auto extent = numbers(text.substr(0, text.find('"')));
   if (!extent || extent->size() != 6)
     return Error{
-        fmt::format("{}: its WholeExtent is {}, not six numbers", path, quoted(text.substr(0, text.find('"'))))};
+        fmt::format("{}: its WholeExtent is {}, not six numbers", path, in_quotes(text.substr(0, text.find('"'))))};
   VolumeFileHeader h;
   h.format = "vti";
   h.data_path = path;
@@ -166,7 +166,7 @@ Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& 
     const double n = (*extent)[2 * a + 1] - (*extent)[2 * a] + 1;
     if (!(n >= 1 && n <= volume::kMaxSide + 1) || n != std::floor(n) || !(std::abs((*extent)[2 * a]) < 1e6))
       return Error{fmt::format("{}: claims the extent {}; limits are 1 and {} voxels on each axis", path,
-                               quoted(text.substr(0, text.find('"'))), volume::kMaxSide)};
+                               in_quotes(text.substr(0, text.find('"'))), volume::kMaxSide)};
     h.size[a] = static_cast<int64_t>(n);
   }
   // Cells are one fewer than points; a file with nothing but cells holds that many.
@@ -184,7 +184,7 @@ Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string
   const Error bad{
       fmt::format("{}: --raw {} is not as 256x256x256:u8 or 512x512x100:i16be:0.5,0.5,2 (types: u8, i8, u16, "
                   "i16, f32)",
-                  path, quoted(spec))};
+                  path, in_quotes(spec))};
   const size_t colon = spec.find(':');
   if (colon == spec.npos || spec.size() > 200) return bad;
   std::string_view sizes = spec.substr(0, colon), type = spec.substr(colon + 1), spacing;

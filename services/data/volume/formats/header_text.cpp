@@ -55,7 +55,7 @@ std::string beside(const std::string& path, std::string_view name) {
   return (std::filesystem::path(path).parent_path() / std::filesystem::path(name)).string();
 }
 
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   std::string out = "\"" + std::string(text.substr(0, 60)) + (text.size() > 60 ? "...\"" : "\"");
   std::replace_if(
       out.begin(), out.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }, '?');

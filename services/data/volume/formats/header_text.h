@@ -22,7 +22,7 @@ std::optional<std::vector<int64_t>> whole_numbers(std::string_view text);
 /// A path beside another one's file.
 std::string beside(const std::string& path, std::string_view name);
 /// What a file may say, cut and without control characters: for error texts.
-std::string quoted(std::string_view text);
+std::string in_quotes(std::string_view text);
 /// The matrix of three axis steps and an origin.
 glm::dmat4 placement(const glm::dvec3& i, const glm::dvec3& j, const glm::dvec3& k, const glm::dvec3& origin);
 

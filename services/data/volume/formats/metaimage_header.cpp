@@ -37,7 +37,7 @@ Result<std::vector<double>> per_axis(const Keys& keys, std::initializer_list<std
   if (text.empty()) return otherwise;
   const auto all = numbers(text);
   if (!all || all->size() < count)
-    return Error{fmt::format("{}: its {} is {}, not {} numbers", path, *names.begin(), quoted(text), count)};
+    return Error{fmt::format("{}: its {} is {}, not {} numbers", path, *names.begin(), in_quotes(text), count)};
   return *all;
 }
 
@@ -54,7 +54,7 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
     const size_t equals = line.find('=');
     if (equals == line.npos) {
       if (trim(line).empty()) continue;
-      return Error{fmt::format("{}: its header has a line without \"=\": {}", path, quoted(line))};
+      return Error{fmt::format("{}: its header has a line without \"=\": {}", path, in_quotes(line))};
     }
     const std::string_view key = trim(line.substr(0, equals));
     keys.emplace(key, trim(line.substr(equals + 1)));
@@ -70,16 +70,16 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
   h.ct = value(keys, {"Modality"}) == "MET_MOD_CT";
   const std::string_view type = value(keys, {"ElementType"});
   const auto stored = type_named(type);
-  if (!stored) return Error{fmt::format("{}: its ElementType is {}; {}", path, quoted(type), kSupportedTypes)};
+  if (!stored) return Error{fmt::format("{}: its ElementType is {}; {}", path, in_quotes(type), kSupportedTypes)};
   h.stored = *stored;
   if (const auto channels = value(keys, {"ElementNumberOfChannels"}); !channels.empty() && number(channels) != 1.0)
-    return Error{fmt::format("{}: has {} components a voxel, supported is 1", path, quoted(channels))};
+    return Error{fmt::format("{}: has {} components a voxel, supported is 1", path, in_quotes(channels))};
 
   const auto sizes = whole_numbers(value(keys, {"DimSize"}));
   const auto axes = number(value(keys, {"NDims"}));
   if (!sizes || !axes || double(sizes->size()) != *axes || sizes->size() > 10)
-    return Error{fmt::format("{}: its DimSize is {} with NDims {}", path, quoted(value(keys, {"DimSize"})),
-                             quoted(value(keys, {"NDims"})))};
+    return Error{fmt::format("{}: its DimSize is {} with NDims {}", path, in_quotes(value(keys, {"DimSize"})),
+                             in_quotes(value(keys, {"NDims"})))};
   if (sizes->size() != 3)
     return Error{fmt::format("{}: has {} axes ({}); a volume has 3 (a series is a folder of numbered files)", path,
                              sizes->size(), value(keys, {"DimSize"}).substr(0, 60))};
@@ -107,14 +107,14 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
   h.encoding = packed ? Encoding::kGzip : binary ? Encoding::kRaw : Encoding::kText;
   const std::string_view data = value(keys, {"ElementDataFile"});
   if (data.empty() || data == "LIST" || data.starts_with("LIST ") || data.find('%') != data.npos)
-    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, quoted(data))};
+    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, in_quotes(data))};
   const bool local = data == "LOCAL" || data == "Local" || data == "local";
   h.data_path = local ? path : beside(path, data);
   h.data_at = local ? data_at : 0;
   if (const auto text = value(keys, {"HeaderSize"}); !text.empty() && !local) {
     const auto bytes = number(text);
     if (!bytes || *bytes < -1 || *bytes > 1e15 || (*bytes < 0 && h.encoding != Encoding::kRaw))
-      return Error{fmt::format("{}: its HeaderSize is {}", path, quoted(text))};
+      return Error{fmt::format("{}: its HeaderSize is {}", path, in_quotes(text))};
     if (*bytes < 0)
       h.data_at_end = true;
     else

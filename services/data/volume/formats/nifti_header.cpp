@@ -135,7 +135,7 @@ Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string
   const std::string_view magic = content.substr(two ? 4 : 344, 3);
   const bool single = magic == (two ? "n+2" : "n+1");
   if (!single && magic != (two ? "ni2" : "ni1"))
-    return Error{fmt::format("{}: is no NIfTI file (an Analyze file?): its magic is {}", path, quoted(magic))};
+    return Error{fmt::format("{}: is no NIfTI file (an Analyze file?): its magic is {}", path, in_quotes(magic))};
   const Fields f(content, swapped);
   Values v = two ? values_of<double, int64_t, int32_t>(f, 16, 12, 104, 176, 344, 348, 352, 400)
                  : values_of<float, int16_t, int16_t>(f, 40, 70, 76, 112, 252, 254, 256, 280);

@@ -113,21 +113,21 @@ Result<glm::dmat4> placement_of(const Fields& fields, const std::vector<size_t>&
   if (const auto text = field(fields, {"spacedirections"}); !text.empty()) {
     const auto all = vectors(text);
     if (!all || all->size() != dimension)
-      return Error{
-          fmt::format("{}: its space directions are {}, not {} vectors of 3 numbers", path, quoted(text), dimension)};
+      return Error{fmt::format("{}: its space directions are {}, not {} vectors of 3 numbers", path, in_quotes(text),
+                               dimension)};
     for (size_t a = 0; a < 3; ++a)
       if (!(*all)[axes[a]].empty()) step[a] = to_vec((*all)[axes[a]]);
   } else if (const auto spacings = field(fields, {"spacings"}); !spacings.empty()) {
     const auto all = numbers(spacings);
     if (!all || all->size() != dimension)
-      return Error{fmt::format("{}: its spacings are {}, not {} numbers", path, quoted(spacings), dimension)};
+      return Error{fmt::format("{}: its spacings are {}, not {} numbers", path, in_quotes(spacings), dimension)};
     for (size_t a = 0; a < 3; ++a)
       if (const double s = (*all)[axes[a]]; !std::isnan(s)) step[a] *= s;
   }
   if (const auto text = field(fields, {"spaceorigin"}); !text.empty()) {
     const auto all = vectors(text);
     if (!all || all->size() != 1 || all->front().empty())
-      return Error{fmt::format("{}: its space origin is {}, not a vector of 3 numbers", path, quoted(text))};
+      return Error{fmt::format("{}: its space origin is {}, not a vector of 3 numbers", path, in_quotes(text))};
     origin = to_vec(all->front());
   }
   glm::dmat4 m = placement(step[0], step[1], step[2], origin);
@@ -158,7 +158,7 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   if (content.size() < 9 || !content.starts_with("NRRD000"))
     return Error{path + ": is no NRRD file: it does not begin with NRRD000"};
   if (content[7] < '1' || content[7] > '5')
-    return Error{fmt::format("{}: is NRRD version {}, known are 1 to 5", path, quoted(content.substr(4, 4)))};
+    return Error{fmt::format("{}: is NRRD version {}, known are 1 to 5", path, in_quotes(content.substr(4, 4)))};
   const Lines lines = split(content);
   const Fields& fields = lines.fields;
   VolumeFileHeader h;
@@ -167,14 +167,14 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
 
   const std::string type = lower(field(fields, {"type"}));
   const auto stored = type_named(type);
-  if (!stored) return Error{fmt::format("{}: its voxels' type is {}; {}", path, quoted(type), kSupportedTypes)};
+  if (!stored) return Error{fmt::format("{}: its voxels' type is {}; {}", path, in_quotes(type), kSupportedTypes)};
   h.stored = *stored;
 
   const auto dimension = number(field(fields, {"dimension"}));
   const auto sizes = whole_numbers(field(fields, {"sizes"}));
   if (!dimension || !sizes || double(sizes->size()) != *dimension || sizes->size() > 16)
-    return Error{fmt::format("{}: its sizes are {} with dimension {}", path, quoted(field(fields, {"sizes"})),
-                             quoted(field(fields, {"dimension"})))};
+    return Error{fmt::format("{}: its sizes are {} with dimension {}", path, in_quotes(field(fields, {"sizes"})),
+                             in_quotes(field(fields, {"dimension"})))};
   const auto axes = choose_axes(*sizes, path);
   if (!axes) return axes.error();
   for (size_t a = 0; a < 3; ++a) h.size[a] = (*sizes)[(*axes)[a]];
@@ -190,17 +190,17 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   else if (encoding == "text" || encoding == "txt" || encoding == "ascii")
     h.encoding = Encoding::kText;
   else
-    return Error{fmt::format("{}: its encoding is {}; supported are raw, gzip and text", path, quoted(encoding))};
+    return Error{fmt::format("{}: its encoding is {}; supported are raw, gzip and text", path, in_quotes(encoding))};
   const std::string endian = lower(field(fields, {"endian"}));
   if (stored_bytes(h.stored) > 1 && h.encoding != Encoding::kText && endian != "little" && endian != "big")
-    return Error{fmt::format("{}: its endian is {}, neither little nor big", path, quoted(endian))};
+    return Error{fmt::format("{}: its endian is {}, neither little nor big", path, in_quotes(endian))};
   h.big_endian = endian == "big";
 
   const std::string_view data = field(fields, {"datafile"});
   if (data.empty() && !lines.ended)
     return Error{fmt::format("{}: its header does not end (no empty line) and names no data file", path)};
   if (data.starts_with("LIST") || data.find('%') != data.npos)
-    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, quoted(data))};
+    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, in_quotes(data))};
   h.data_path = data.empty() ? path : beside(path, data);
   h.data_at = data.empty() ? lines.data_at : 0;
 
@@ -211,10 +211,10 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   const auto line_skip = skipped({"lineskip"}), byte_skip = skipped({"byteskip"});
   if (!line_skip || *line_skip != 0)
     return Error{
-        fmt::format("{}: skips {} lines of its data; supported is none", path, quoted(field(fields, {"lineskip"})))};
+        fmt::format("{}: skips {} lines of its data; supported is none", path, in_quotes(field(fields, {"lineskip"})))};
   if (!byte_skip || *byte_skip < -1 || *byte_skip > 1e15 || *byte_skip != std::floor(*byte_skip) ||
       (*byte_skip < 0 && h.encoding != Encoding::kRaw))
-    return Error{fmt::format("{}: skips {} bytes of its data", path, quoted(field(fields, {"byteskip"})))};
+    return Error{fmt::format("{}: skips {} bytes of its data", path, in_quotes(field(fields, {"byteskip"})))};
   if (*byte_skip < 0)
     h.data_at_end = true;
   else

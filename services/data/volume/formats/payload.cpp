@@ -179,7 +179,7 @@ Result<std::vector<std::byte>> read_text(const VolumeFileHeader& h, Source& sour
       while (end < window.size() && !blank(window[end])) ++end;
       if (end == window.size() && !ended) {  // a word may go on in what follows
         window.erase(0, at), at = 0;
-        if (window.size() > 1000) return Error{fmt::format("{}: {} is no number", path, quoted(window))};
+        if (window.size() > 1000) return Error{fmt::format("{}: {} is no number", path, in_quotes(window))};
         const size_t old = window.size();
         window.resize(old + kBlock);
         const auto n = source.read(window.data() + old, kBlock);
@@ -191,7 +191,7 @@ Result<std::vector<std::byte>> read_text(const VolumeFileHeader& h, Source& sour
       if (end == at) break;
       const std::string_view word = std::string_view(window).substr(at, end - at);
       if (!parse_stored(h.stored, word, to + have))
-        return Error{fmt::format("{}: {} is no number of type {}", path, quoted(word), name_of(h.stored))};
+        return Error{fmt::format("{}: {} is no number of type {}", path, in_quotes(word), name_of(h.stored))};
       at = end, have += size;
     }
     return have;

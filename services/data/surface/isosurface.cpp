@@ -1,12 +1,15 @@
-#include "services/data/mesh/isosurface.h"
+#include "services/data/surface/isosurface.h"
 
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
+#include <xxhash.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 
 #include "services/data/import/process.h"
 
@@ -24,7 +27,36 @@ bool write_all(int descriptor, const void* data, size_t bytes) {
   return true;
 }
 
+// What the volume's first step is read from: one file, or all files of a folder of slices.
+std::vector<std::string> files_of(const VolumeSource& volume) {
+  namespace fs = std::filesystem;
+  const std::string& first = volume.steps.front();
+  std::error_code error;
+  if (!fs::is_directory(first, error)) return {first};
+  std::vector<std::string> files;
+  for (const auto& entry : fs::directory_iterator(first, error))
+    if (entry.is_regular_file(error)) files.push_back(entry.path().string());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// Text as hexadecimal digits of its hash: for file names.
+std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size())); }
+
 }  // namespace
+
+Result<MeshSource> surface_source(const std::string& path, const std::string& raw, double iso,
+                                  const Progress& progress) {
+  auto found = find_volume(path, raw);
+  if (!found) return found.error();
+  const auto read = [source = *found, iso](const ReadProgress& p) -> Result<Mesh> {
+    const auto volume = read_volume(source, 0, p);
+    if (!volume) return volume.error();
+    return isosurface(*volume, iso, source.name);
+  };
+  return MeshSource{hash_files(files_of(*found), progress),
+                    fmt::format("-iso{}{}", iso, raw.empty() ? "" : fmt::format("-{}", hex(raw))), read};
+}
 
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name) {
   if (!std::isfinite(iso) || iso <= volume.lo || iso > volume.hi)

@@ -1,0 +1,20 @@
+// Where in the room a data set is shown, and which way up.
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <string>
+
+#include "common/core/result.h"
+
+namespace telesplat::data {
+
+struct PlacementOptions {
+  double room_size_m = 0.8;  ///< the largest extent of the data set's box in room space
+  /// x, y, z, -x, -y, -z: the data axis that points up; auto: z for terrains, volumes and other medical data, else y.
+  std::string up = "auto";
+};
+
+/// The rotation (determinant +1) that turns data axis `up` to +y. Error unless `up` is x, y, z, -x, -y or -z.
+Result<glm::dmat3> rotation_for_up(const std::string& up);
+
+}  // namespace telesplat::data

@@ -1,0 +1,168 @@
+#include "services/data/data_options.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "common/volume/transfer/function.h"
+
+namespace telesplat::data {
+namespace {
+
+using options::Names;
+using options::Range;
+using options::Reach;
+using options::Table;
+using scene::Kind;
+using scene::Kinds;
+
+constexpr Kinds kMeshes{Kind::kMesh}, kVolumes{Kind::kVolume};
+constexpr Kinds kVolumesAndTheirSurfaces{Kind::kVolume, Kind::kMesh};
+
+// Absolute, because a run's session.toml names the folder.
+options::Text folder(std::string& path) {
+  return {[&path](const std::string& text) {
+            std::error_code error;
+            path = text.empty() ? text : std::filesystem::absolute(text, error).string();
+            return error ? Status(Error{error.message()}) : ok_status();
+          },
+          [&path] { return path; }};
+}
+
+std::string transfer_names() {
+  std::string out;
+  for (const auto& preset : volume::transfer_presets())
+    out += fmt::format("{}{}", out.empty() ? "" : ", ", preset.name);
+  return out;
+}
+
+void list_transfer_presets() {
+  for (const auto& preset : volume::transfer_presets())
+    std::fputs(fmt::format("{:10} {}\n", preset.name, preset.text).c_str(), stdout);
+}
+
+Table grouped(Table table, const std::string& group) {
+  for (options::Row& row : table) row.group = group;
+  return table;
+}
+
+Table placement_table(PlacementOptions& o) {
+  return {
+      {.flag = "--room-size",
+       .value = &o.room_size_m,
+       .help = "largest extent of the data set in room space, metres",
+       .limits = Range{1e-3, 1e3},
+       .reach = Reach::kRecorded},
+      {.flag = "--up",
+       .value = &o.up,
+       .help = "data axis that points up",
+       .limits = Names{"auto", "x", "y", "z", "-x", "-y", "-z"},
+       .reach = Reach::kRecorded},
+  };
+}
+
+Table mesh_table(MeshOptions& o) {
+  return {
+      {.flag = "--z-scale",
+       .value = &o.elevation.z_scale,
+       .help = "elevation rasters: heights times this; 0: 1 where the file says where it lies, else so that the relief "
+               "is a seventh of its side",
+       .limits = Range{-1e6, 1e6},
+       .fits = kMeshes,
+       .reach = Reach::kRecorded},
+      {.flag = "--texture",
+       .value = &o.elevation.texture,
+       .help = "elevation rasters: an image draped over them",
+       .fits = kMeshes,
+       .reach = Reach::kRecorded,
+       .is_file = true},
+      {.flag = "--cache",
+       .value = folder(o.cache_dir),
+       .help = "folder of the chunk store; default: telesplat in the user's cache folder",
+       .reach = Reach::kRecorded},
+      {.flag = "!--no-cache", .value = &o.use_cache, .help = "keep no chunk store", .reach = Reach::kRecorded},
+  };
+}
+
+Table volume_table(DataOptions& o) {
+  return grouped(
+      {
+          {.flag = "--raw",
+           .value = &o.volume.raw,
+           .help = "layout of a file that does not tell: SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING], TYPE one of "
+                   "u8, i8, u16, i16, f32",
+           .fits = kVolumesAndTheirSurfaces,
+           .reach = Reach::kRecorded},
+          {.flag = "--iso",
+           .value = &o.mesh.iso,
+           .help = "show the surface where a volume has this value, as a mesh",
+           .fits = kVolumesAndTheirSurfaces,
+           .reach = Reach::kRecorded},
+          {.flag = "--tf",
+           .value = &o.volume.transfer,
+           .help = fmt::format("transfer function: a preset ({}), a ParaView colour map (.json), or points "
+                               "VALUE:#RRGGBB:OPACITY,... with values in the data's units or per cent of their range; "
+                               "default: a preset that fits",
+                               transfer_names()),
+           .fits = kVolumes,
+           .reach = Reach::kRecorded,
+           .is_file = true},
+          {.flag = "--lighting",
+           .value = &o.volume.lit,
+           .help = "on: a volume's voxels are shaded by their gradients",
+           .fits = kVolumes,
+           .reach = Reach::kRecorded,
+           .on_off = true},
+          {.flag = "--series-rate",
+           .value = &o.volume.steps_per_s,
+           .help = "steps a second of a numbered series; 0: it does not play; default: all steps in a second, at most "
+                   "12.5 a second",
+           .limits = Range{0, 1000},
+           .fits = kVolumes},
+      },
+      "Volumes");
+}
+
+}  // namespace
+
+Table scene_table(DataOptions& o) {
+  return joined(joined(placement_table(o.mesh), mesh_table(o.mesh)),
+                joined(volume_table(o), julia::scene_table(o.julia)));
+}
+
+Table server_table(DataOptions& o) {
+  Table table{{.flag = "scene",
+               .value = &o.scene,
+               .help = "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), elevation raster (GeoTIFF, HGT, 16-bit "
+                       "PNG), volume (NRRD, MetaImage, NIfTI, VTI, raw with --raw, a folder of DICOM slices or of a "
+                       "numbered series), or julia",
+               .required = true}};
+  Table volume{
+      {.flag = "--part",
+       .value = &o.volume.part,
+       .help = "I/N: this server has the part I (from 0) of N of the volume's slices; default: all",
+       .fits = kVolumes},
+      {.flag = "--volume-cache-mb",
+       .value = &o.volume.cache_mb,
+       .help = "memory for the steps of a series",
+       .limits = Range{16, 1 << 20},
+       .fits = kVolumes},
+      {.flag = "--list-tf",
+       .value = options::Action{list_transfer_presets},
+       .help = "tell the transfer functions there are and end",
+       .fits = kVolumes},
+  };
+  return joined(std::move(table), grouped(std::move(volume), "Volumes"));
+}
+
+Table table(DataServiceOptions& o) {
+  Table own{{.flag = "--report-progress",
+             .value = &o.report_progress,
+             .help = "print progress lines on stdout",
+             .reach = Reach::kHere}};
+  return joined(joined(net::service_table(o.service, net::Ends::kBoth), std::move(own)),
+                joined(server_table(o), scene_table(o)));
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,50 @@
+#include "services/data/julia/served_julia.h"
+
+#include <fmt/format.h>
+
+#include "common/core/clock.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr double kQuiet_s = 2;  // what takes longer tells how far it is
+
+class ServedJulia final : public Served {
+ public:
+  ServedJulia(julia::Scene scene, const julia::Placement& placement)
+      : scene_(std::move(scene)), placement_(placement) {}
+
+  scene::Kind kind() const override { return scene::Kind::kJulia; }
+  std::string title() const override { return scene_.title; }
+  std::string summary() const override {
+    const auto& c = scene_.parameters.c;
+    return fmt::format("c = ({}, {}, {}, {}), {} iterations, {:.3f} units a metre", c.x, c.y, c.z, c.w,
+                       scene_.parameters.iterations, 1 / placement_.scale);
+  }
+  void describe(wire::Hello& hello) const override {
+    if (!scene_.timeline.empty()) hello.facts["animate"] = scene_.timeline.text();
+    hello.parameters = julia::to_map(scene_.parameters);
+    hello.parameters.merge(julia::to_map(placement_));
+    hello.box_room = placement_.box_room;
+  }
+
+ private:
+  const julia::Scene scene_;
+  const julia::Placement placement_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Served>> serve_julia(const julia::SceneOptions& options, double room_size_m,
+                                            const Progress& progress) {
+  auto scene = julia::read_scene(options);
+  if (!scene) return scene.error();
+  const double begin_s = monotonic_s();
+  const auto placement = julia::place(*scene, room_size_m, [&](size_t done, size_t of) {
+    if (monotonic_s() - begin_s >= kQuiet_s) progress("looking for the set", double(done) / double(of));
+  });
+  if (!placement) return placement.error();
+  return std::unique_ptr<Served>(std::make_unique<ServedJulia>(std::move(*scene), *placement));
+}
+
+}  // namespace telesplat::data

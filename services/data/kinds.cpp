@@ -1,0 +1,107 @@
+#include "services/data/kinds.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "services/data/julia/served_julia.h"
+#include "services/data/mesh/served_mesh.h"
+#include "services/data/open_mesh.h"
+#include "services/data/volume/served_volume.h"
+#include "services/data/volume/volume.h"
+
+namespace telesplat::data {
+namespace {
+
+using scene::Kind;
+using OpenServed = Result<std::unique_ptr<Served>>;
+
+bool is_julia(const DataOptions& o) { return o.scene == julia::kSceneWord; }
+bool holds_volume(const DataOptions& o) { return !o.volume.raw.empty() || looks_like_volume(o.scene); }
+bool is_volume(const DataOptions& o) { return !o.mesh.iso && holds_volume(o); }
+// A file that nobody else claims is a mesh or a raster; which one, or why not, its reader tells.
+bool is_mesh(const DataOptions& o) {
+  std::error_code error;
+  return o.mesh.iso ? holds_volume(o) : !std::filesystem::is_directory(o.scene, error);
+}
+
+OpenServed open_as_mesh(const DataOptions& o, const Progress& progress) {
+  auto store = open_mesh(o.scene, o.mesh_options(), progress);
+  if (!store) return store.error();
+  return serve_mesh(std::move(*store), o.scene);
+}
+OpenServed open_as_volume(const DataOptions& o, const Progress& progress) {
+  auto store = VolumeStore::open(o.scene, o.volume, o.mesh, progress);
+  if (!store) return store.error();
+  return serve_volume(std::move(*store), o.scene);
+}
+OpenServed open_as_julia(const DataOptions& o, const Progress& progress) {
+  return serve_julia(o.julia, o.mesh.room_size_m, progress);
+}
+
+// One row a kind of scene; the first that claims a data set has it.
+struct Row {
+  Kind kind;
+  bool (*claims)(const DataOptions&);
+  OpenServed (*open)(const DataOptions&, const Progress&);
+};
+constexpr Row kRows[] = {
+    {Kind::kJulia, is_julia, open_as_julia},
+    {Kind::kVolume, is_volume, open_as_volume},
+    {Kind::kMesh, is_mesh, open_as_mesh},
+};
+
+Result<const Row*> row_of(const DataOptions& o) {
+  std::error_code error;
+  if (!is_julia(o) && !std::filesystem::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
+  for (const Row& row : kRows)
+    if (row.claims(o)) return &row;
+  if (o.mesh.iso) return Error{fmt::format("--iso: {} is no volume", o.scene)};
+  return Error{fmt::format(
+      "{}: is a folder, and not one of DICOM slices or of a numbered series of volume files; a data file is needed, "
+      "or the word julia",
+      o.scene)};
+}
+
+// "--tf: terrain.ply is no volume but a mesh"
+Error misfit(const options::Row& row, Kind kind, const DataOptions& o) {
+  const std::string flag = options::name_of(row);
+  if (o.mesh.iso && kind == Kind::kMesh)
+    return Error{fmt::format("{}: {} is shown as a surface (--iso), which has no {}", flag, o.scene, flag)};
+  for (const Kind owner : scene::kKinds)
+    if (row.fits == scene::Kinds{owner})
+      return Error{fmt::format("{}: {} is no {} but {}", flag, o.scene, scene::described(owner).substr(2),
+                               scene::described(kind))};
+  return Error{fmt::format("{}: {} is {}, which has no {}", flag, o.scene, scene::described(kind), flag)};
+}
+
+// What differs from its default was given.
+Status refuse_misfits(DataOptions o, Kind kind) {
+  DataOptions none;
+  const auto all = [](DataOptions& of) {
+    return joined(options::without(server_table(of), {"scene"}), scene_table(of));
+  };
+  const options::Table given = all(o), defaults = all(none);
+  for (size_t i = 0; i < given.size(); ++i)
+    if (!given[i].fits.has(kind) && options::text_of(given[i]) != options::text_of(defaults[i]))
+      return misfit(given[i], kind, o);
+  return ok_status();
+}
+
+}  // namespace
+
+Result<Kind> kind_of(const DataOptions& o) {
+  const auto row = row_of(o);
+  if (!row) return row.error();
+  if (const Status fits = refuse_misfits(o, (*row)->kind); !fits) return fits.error();
+  return (*row)->kind;
+}
+
+OpenServed open(const DataOptions& o, const Progress& progress) {
+  const auto row = row_of(o);
+  if (!row) return row.error();
+  if (const Status fits = refuse_misfits(o, (*row)->kind); !fits) return fits.error();
+  return (*row)->open(o, progress);
+}
+
+}  // namespace telesplat::data

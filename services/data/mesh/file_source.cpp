@@ -1,0 +1,29 @@
+#include "services/data/mesh/file_source.h"
+
+#include <fmt/format.h>
+
+#include "services/data/base/mapped_file.h"
+#include "services/data/mesh/reader.h"
+
+namespace telesplat::data {
+
+Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const Progress& progress) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  const DetectedFormat detected = detect_format((*file)->text(), path);
+  if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
+  std::vector<std::string> files{path};
+  for (auto& companion : companion_files((*file)->text(), detected.format, path)) files.push_back(std::move(companion));
+  const bool raster = detected.format == "raster";
+  if (!raster && (elevation.z_scale != 0 || !elevation.texture.empty()))
+    return Error{fmt::format("{}: is no elevation raster, but --z-scale or --texture is given", path)};
+  if (!elevation.texture.empty()) {
+    const auto texture = MappedFile::open(elevation.texture);
+    if (!texture) return texture.error();
+    files.push_back(elevation.texture);
+  }
+  return MeshSource{hash_files(files, progress), raster ? fmt::format("-z{}", elevation.z_scale) : "",
+                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation); }};
+}
+
+}  // namespace telesplat::data

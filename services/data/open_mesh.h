@@ -1,0 +1,17 @@
+// Whatever is shown as a mesh: mesh files, elevation rasters, surfaces of volumes.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "services/data/mesh/options.h"
+#include "services/data/mesh/store.h"
+
+namespace telesplat::data {
+
+/// Opens the store of the mesh file or raster at `path`, or with options.iso that of the volume's surface; makes it first if the cache
+/// has none. progress may be empty. Errors (exit code 2 for a user) name the file.
+Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const MeshOptions& options,
+                                             const Progress& progress);
+
+}  // namespace telesplat::data

@@ -1,0 +1,19 @@
+// What of a volume is served, and how.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace telesplat::data {
+
+struct VolumeOptions {
+  std::string raw;       ///< VolumeSource::raw
+  std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
+  bool lit = true;
+  /// Of a series; nothing: as many as make a second, at most 12.5; 0: it does not play.
+  std::optional<double> steps_per_s;
+  std::string part;     ///< "1/2": the second of two parts; empty: all of it
+  int cache_mb = 2048;  ///< for the steps of a series that are kept
+};
+
+}  // namespace telesplat::data

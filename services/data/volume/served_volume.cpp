@@ -1,0 +1,153 @@
+#include "services/data/volume/served_volume.h"
+
+#include <fmt/format.h>
+
+#include <condition_variable>
+#include <filesystem>
+#include <optional>
+#include <thread>
+
+#include "common/net/dispatch.h"
+#include "services/data/volume/answers.h"
+
+namespace telesplat::data {
+namespace {
+
+// The thread that works off requests, so that the serve loop keeps talking to the master meanwhile.
+class Worker {
+ public:
+  Worker(VolumeAnswers& answers, InstanceId self)
+      : answers_(answers), self_(self), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+  ~Worker() {
+    thread_.request_stop();
+    wake_.notify_one();
+  }
+  /// There may be something to do.
+  void wake() {
+    { const std::lock_guard lock(mutex_); }  // not between its look at what there is to do and its wait
+    wake_.notify_one();
+  }
+  bool busy() const {
+    const std::lock_guard lock(mutex_);
+    return working_ || !done_.empty() || answers_.has_work();
+  }
+  std::vector<VolumeAnswers::Reply> take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(done_, {});
+  }
+
+ private:
+  void run(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (!stop.stop_requested()) {
+      // What is done and not taken yet stays within memory.
+      if (done_.size() >= kRepliesWaiting || !answers_.has_work()) {
+        wake_.wait_for(lock, std::chrono::milliseconds(50));
+        continue;
+      }
+      working_ = true;
+      lock.unlock();
+      auto reply = answers_.work(self_);
+      lock.lock();
+      working_ = false;
+      if (reply) done_.push_back(std::move(*reply));
+    }
+  }
+
+  static constexpr size_t kRepliesWaiting = 4;
+  VolumeAnswers& answers_;
+  const InstanceId self_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  bool working_ = false;
+  std::vector<VolumeAnswers::Reply> done_;
+  std::jthread thread_;  // last: it uses the others
+};
+
+class ServedVolume final : public Served {
+ public:
+  ServedVolume(std::shared_ptr<VolumeStore> store, std::string title)
+      : store_(std::move(store)), title_(std::move(title)), answers_(*store_) {}
+
+  scene::Kind kind() const override { return scene::Kind::kVolume; }
+  std::string title() const override { return title_; }
+  std::string summary() const override;
+  void describe(wire::Hello& hello) const override;
+  // Few answers wait for a peer: they are large, and samplers ask for one at a time.
+  Requests requests() const override { return {"voxels", 8}; }
+
+  void begin(InstanceId self) override { worker_.emplace(answers_, self); }
+  Status follow(const wire::Welcome& session) override {
+    const Status followed = answers_.follow(session);
+    worker_->wake();
+    return followed;
+  }
+  void answer(const net::Message& message, const Outlets& outlets) override {
+    net::dispatch<wire::VoxelRequest>(outlets.requests, message, [&](const wire::VoxelRequest& request) {
+      ++asked_;
+      auto reply = answers_.ask(message.peer, request);
+      if (!reply)
+        outlets.requests.reject(message, reply.error().text);
+      else if (*reply)
+        send(std::move(**reply), outlets);
+      else
+        worker_->wake();
+    });
+  }
+  void send_finished(const Outlets& outlets) override {
+    auto done = worker_->take();
+    if (!done.empty()) worker_->wake();
+    for (auto& reply : done) send(std::move(reply), outlets);
+  }
+  bool busy() const override { return worker_->busy(); }
+  void add_status(std::map<std::string, double>& values) const override {
+    values["requests"] = double(asked_);
+    values["bytes_sent"] = double(bytes_);
+    values["voxels_sent"] = double(voxels_);
+    values["bytes_per_voxel"] = voxels_ ? double(bytes_) / double(voxels_) : 0;
+  }
+
+ private:
+  void send(VolumeAnswers::Reply reply, const Outlets& outlets) {
+    net::Socket& to = reply.peer.empty() ? outlets.master : outlets.requests;
+    if (to.send_frames(reply.peer, reply.type, std::move(reply.body))) bytes_ += reply.bytes, voxels_ += reply.voxels;
+  }
+
+  const std::shared_ptr<VolumeStore> store_;
+  const std::string title_;
+  uint64_t asked_ = 0, bytes_ = 0, voxels_ = 0;
+  VolumeAnswers answers_;
+  std::optional<Worker> worker_;  // from begin() on; last: its thread uses the others
+};
+
+std::string ServedVolume::summary() const {
+  const volume::Session& session = store_->session();
+  const auto& size = session.grid.size;
+  const auto& range = session.range;
+  return fmt::format("{} x {} x {} voxels{}, values {:g} to {:g} (mostly {:g} to {:g}{}) in {} levels", size[0],
+                     size[1], size[2], session.steps > 1 ? fmt::format(", {} steps", session.steps) : "", range.lo,
+                     range.hi, range.typical_lo, range.typical_hi, range.hounsfield ? ", Hounsfield units" : "",
+                     session.levels.count);
+}
+
+void ServedVolume::describe(wire::Hello& hello) const {
+  const volume::Session& session = store_->session();
+  const auto& size = session.grid.size;
+  hello.facts.merge(volume::to_facts(session));
+  hello.facts.insert({{"format", store_->format()},
+                      {"voxels", std::to_string(session.grid.voxels())},
+                      {"content_hash", fmt::format("{:016x}", store_->content_hash())},
+                      {"size", fmt::format("{} x {} x {}", size[0], size[1], size[2])}});
+  hello.parameters = volume::to_parameters(session);
+  hello.box_room = session.grid.box_room();
+}
+
+}  // namespace
+
+std::unique_ptr<Served> serve_volume(std::shared_ptr<VolumeStore> store, const std::string& path) {
+  std::filesystem::path file = std::filesystem::path(path).lexically_normal();
+  if (!file.has_filename()) file = file.parent_path();  // a folder's name that ends in a slash
+  return std::make_unique<ServedVolume>(std::move(store), file.filename().string());
+}
+
+}  // namespace telesplat::data
