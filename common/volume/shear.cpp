@@ -100,6 +100,100 @@ void clip(std::vector<glm::dvec3>& vertices, const auto& distance) {
   vertices = std::move(out);
 }
 
+// First slice in front of the eye, and the one behind the last; none: equal.
+std::pair<int, int> slices_in_front(const ShearFrame& frame, int slices, double near_slices) {
+  const double near = std::max(near_slices, 0.25);
+  int begin = 0, end = slices;
+  if (frame.direction > 0)
+    begin = std::max(begin, int(std::ceil(std::max(frame.eye[frame.axis] + near, 0.0))));
+  else
+    end = std::min(end, int(std::floor(std::min(frame.eye[frame.axis] - near, slices - 1.0))) + 1);
+  return {begin, std::max(begin, end)};
+}
+
+// The corners of the box [-1, n] between slices begin and end - 1, index space.
+std::vector<glm::dvec3> corners_of_slices(const Grid& grid, const ShearFrame& frame, int begin, int end) {
+  std::vector<glm::dvec3> out;
+  for (int corner = 0; corner < 8; ++corner) {
+    glm::dvec3 p;
+    p[frame.axis] = corner & 1 ? end - 1 : begin;
+    p[frame.u()] = corner & 2 ? grid.size[size_t(frame.u())] : -1.0;
+    p[frame.v()] = corner & 4 ? grid.size[size_t(frame.v())] : -1.0;
+    out.push_back(p);
+  }
+  return out;
+}
+
+// Keeps what lies between the planes through the camera's eye and two neighbouring corner rays.
+void clip_by_frustum(std::vector<glm::dvec3>& vertices, const geometry::Camera& camera, const glm::dmat4& to_index) {
+  const glm::dvec3 eye = transform(to_index, camera.pose.position_room);
+  const double w = camera.width, h = camera.height;
+  const std::array<std::pair<double, double>, 4> corners{{{0, 0}, {w, 0}, {w, h}, {0, h}}};
+  std::array<glm::dvec3, 4> rays{};
+  for (size_t i = 0; i < 4; ++i) rays[i] = direction_of(to_index, ray(camera, corners[i].first, corners[i].second));
+  const glm::dvec3 middle = direction_of(to_index, ray(camera, w / 2, h / 2));
+  for (size_t i = 0; i < 4; ++i) {
+    glm::dvec3 normal = glm::cross(rays[i], rays[(i + 1) % 4]);
+    if (glm::dot(normal, middle) < 0) normal = -normal;  // inwards
+    clip(vertices, [&](const glm::dvec3& p) { return glm::dot(p - eye, normal); });
+  }
+}
+
+// What cameras see of some slices: slopes of the rays, and how far the seen parts are.
+struct Seen {
+  Span u, v;
+  double nearest_t = 1e300, farthest_t = 0;
+  bool empty() const { return !(u.hi > u.lo) || !(v.hi > v.lo); }
+};
+
+Seen see(const Grid& grid, const ShearFrame& frame, std::span<const geometry::Camera> cameras,
+         const glm::dmat4& to_index, int begin, int end) {
+  Seen out;
+  const int u = frame.u(), v = frame.v();
+  for (const auto& camera : cameras) {
+    auto vertices = corners_of_slices(grid, frame, begin, end);
+    clip_by_frustum(vertices, camera, to_index);
+    for (const auto& p : vertices) {
+      const double t = frame.t(p[frame.axis]);
+      out.u.extend(std::clamp((p[u] - frame.eye[u]) / t, -kSteepest, kSteepest));
+      out.v.extend(std::clamp((p[v] - frame.eye[v]) / t, -kSteepest, kSteepest));
+      out.nearest_t = std::min(out.nearest_t, t);
+      out.farthest_t = std::max(out.farthest_t, t);
+    }
+  }
+  return out;
+}
+
+// Slope between pixels along index axis `of`: as fine as the display where the display is finest in slopes, which is where it sees the
+// principal axis most squarely. The raster's point nearest to slope 0 lies there.
+double finest_pitch(const Grid& grid, const ShearFrame& frame, const Seen& seen, const geometry::Camera& display,
+                    double finest, int of) {
+  glm::dvec3 d;
+  d[frame.axis] = frame.direction;
+  d[frame.u()] = std::clamp(0.0, seen.u.lo, seen.u.hi);
+  d[frame.v()] = std::clamp(0.0, seen.v.lo, seen.v.hi);
+  const glm::dvec3 at = direction_of(grid.index_to_room, d);
+  glm::dvec3 side(0.0);
+  side[of] = 1;
+  const glm::dvec3 across = direction_of(grid.index_to_room, side);
+  // Angle that one unit of slope spans there, against the angle of a display pixel in its middle.
+  const double distance = glm::length(at);
+  const glm::dvec3 perpendicular = across - at * (glm::dot(across, at) / (distance * distance));
+  const double angle_per_slope = glm::length(perpendicular) / distance;
+  const double pixel_angle = 1 / std::max(display.focal_x(), display.focal_y());
+  const double fine_enough = finest / std::max(seen.nearest_t, kNearPart * seen.farthest_t);
+  return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), fine_enough);
+}
+
+// Pixels of one side of the raster. One pixel more at both ends: look-ups between pixels reach half a pixel beyond what is seen. Without it
+// pictures fade at their borders, which shows where they are tiles of a wall. `pitch` grows where the side would be too long.
+int raster_side(const Span& slopes, double& pitch) {
+  constexpr int kMost = kMaxRasterSide - 2;
+  const double pixels = std::ceil((slopes.hi - slopes.lo) / pitch);
+  if (pixels > kMost) pitch = (slopes.hi - slopes.lo) / kMost;
+  return std::clamp(int(std::ceil((slopes.hi - slopes.lo) / pitch - 1e-9)), 1, kMost) + 2;
+}
+
 }  // namespace
 
 glm::dvec3 ShearFrame::unproject(double x, double y, double at) const {
@@ -121,91 +215,24 @@ double ShearFrame::path(const Grid& grid, double x, double y) const {
 std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry::Camera> cameras,
                                      const PlanOptions& options) {
   if (cameras.empty()) return std::nullopt;
-  const geometry::Camera& first = cameras[0];
   const glm::dmat4 to_index = grid.room_to_index();
   ShearFrame out;
-  out.eye = transform(to_index, first.pose.position_room);
+  out.eye = transform(to_index, cameras[0].pose.position_room);
   const auto [axis, direction] = choose_axis(grid, cameras, to_index);
   out.axis = axis;
   out.direction = direction;
-  const int u = out.u(), v = out.v(), slices = grid.size[size_t(axis)];
-
-  // Slices in front of the eye.
-  const double near = std::max(options.near_slices, 0.25);
-  int begin = 0, end = slices;
-  if (direction > 0)
-    begin = std::max(begin, int(std::ceil(std::max(out.eye[axis] + near, 0.0))));
-  else
-    end = std::min(end, int(std::floor(std::min(out.eye[axis] - near, slices - 1.0))) + 1);
+  const int slices = grid.size[size_t(axis)];
+  const auto [begin, end] = slices_in_front(out, slices, options.near_slices);
   if (begin >= end) return std::nullopt;
+  const Seen seen = see(grid, out, cameras, to_index, begin, end);
+  if (seen.empty()) return std::nullopt;
 
-  // What the cameras see of them: the box [-1, n] between the first and last slice, clipped by each frustum, in slopes.
-  Span slope_u, slope_v;
-  double nearest_t = 1e300, farthest_t = 0;
-  for (const auto& camera : cameras) {
-    std::vector<glm::dvec3> seen;
-    for (int corner = 0; corner < 8; ++corner) {
-      glm::dvec3 p;
-      p[axis] = corner & 1 ? end - 1 : begin;
-      p[u] = corner & 2 ? grid.size[size_t(u)] : -1.0;
-      p[v] = corner & 4 ? grid.size[size_t(v)] : -1.0;
-      seen.push_back(p);
-    }
-    const glm::dvec3 eye = transform(to_index, camera.pose.position_room);
-    // Planes through the camera's eye and two neighbouring corner rays, pointing inwards.
-    std::array<glm::dvec3, 4> rays{};
-    const double w = camera.width, h = camera.height;
-    const std::array<std::pair<double, double>, 4> corners{{{0, 0}, {w, 0}, {w, h}, {0, h}}};
-    for (size_t i = 0; i < 4; ++i) rays[i] = direction_of(to_index, ray(camera, corners[i].first, corners[i].second));
-    const glm::dvec3 middle = direction_of(to_index, ray(camera, w / 2, h / 2));
-    for (size_t i = 0; i < 4; ++i) {
-      glm::dvec3 normal = glm::cross(rays[i], rays[(i + 1) % 4]);
-      if (glm::dot(normal, middle) < 0) normal = -normal;
-      clip(seen, [&](const glm::dvec3& p) { return glm::dot(p - eye, normal); });
-    }
-    for (const auto& p : seen) {
-      const double t = out.t(p[axis]);
-      slope_u.extend(std::clamp((p[u] - out.eye[u]) / t, -kSteepest, kSteepest));
-      slope_v.extend(std::clamp((p[v] - out.eye[v]) / t, -kSteepest, kSteepest));
-      nearest_t = std::min(nearest_t, t);
-      farthest_t = std::max(farthest_t, t);
-    }
-  }
-  if (!(slope_u.hi > slope_u.lo) || !(slope_v.hi > slope_v.lo)) return std::nullopt;
-
-  // As fine as the display where the display is finest in slopes, which is where it sees the principal axis most squarely: of the raster's
-  // points the one nearest to slope 0 lies there.
-  const auto finest = [&](int of) {
-    glm::dvec3 d;
-    d[axis] = direction;
-    d[u] = std::clamp(0.0, slope_u.lo, slope_u.hi);
-    d[v] = std::clamp(0.0, slope_v.lo, slope_v.hi);
-    const glm::dvec3 at = direction_of(grid.index_to_room, d);
-    glm::dvec3 side(0.0);
-    side[of] = 1;
-    const glm::dvec3 across = direction_of(grid.index_to_room, side);
-    // Angle that one unit of slope spans there, against the angle of a display pixel in its middle.
-    const double distance = glm::length(at);
-    const glm::dvec3 perpendicular = across - at * (glm::dot(across, at) / (distance * distance));
-    const double angle_per_slope = glm::length(perpendicular) / distance;
-    const double pixel_angle = 1 / std::max(first.focal_x(), first.focal_y());
-    const double fine_enough = options.finest / std::max(nearest_t, kNearPart * farthest_t);
-    return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), fine_enough);
-  };
-  const auto size = [](const Span& s, double& pitch) {
-    constexpr int kMost = kMaxRasterSide - 2;
-    const double pixels = std::ceil((s.hi - s.lo) / pitch);
-    if (pixels > kMost) pitch = (s.hi - s.lo) / kMost;
-    return std::clamp(int(std::ceil((s.hi - s.lo) / pitch - 1e-9)), 1, kMost) + 2;
-  };
-  // One pixel more on every side: look-ups between pixels reach half a pixel beyond what is seen. Without it pictures fade at their borders,
-  // which shows where they are tiles of a wall.
-  out.du = finest(u);
-  out.dv = finest(v);
-  out.width = size(slope_u, out.du);
-  out.height = size(slope_v, out.dv);
-  out.u0 = slope_u.lo - out.du;
-  out.v0 = slope_v.lo - out.dv;
+  out.du = finest_pitch(grid, out, seen, cameras[0], options.finest, out.u());
+  out.dv = finest_pitch(grid, out, seen, cameras[0], options.finest, out.v());
+  out.width = raster_side(seen.u, out.du);
+  out.height = raster_side(seen.v, out.dv);
+  out.u0 = seen.u.lo - out.du;
+  out.v0 = seen.v.lo - out.dv;
 
   // Layers: bounds at multiples of the same thickness, whatever part of the grid is in front of the eye, so that they stay in place.
   const int layers = std::clamp(options.layers, 1, std::min(kMaxLayers, slices));

@@ -84,95 +84,134 @@ geometry::Rect WarpPlan::rect(int tx, int ty) const {
   return {left, top, std::min(x0 + kWarpTileWidth, width_) - left, std::min(y0 + kWarpTileHeight, height_) - top};
 }
 
-bool WarpPlan::place(const PlacedLayer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile,
-                     WarpLayer& out) const {
-  const LayerImage& image = *layer.image;
+// A layer against one tile: where the tile's pixels meet its image.
+struct WarpPlan::Placing {
+  const PlacedLayer& layer;
+  int64_t x, y;                       // the tile's first pixel on the lattice
+  double scale = 0;                   // that makes W at most 1
+  bool whole = false;                 // false: the plane's horizon goes through the tile, or nearly
+  double middle_x = 0, middle_y = 0;  // the texel in the tile's middle, from which X and Y are counted
+
+  double at(int row, double px, double py) const {
+    return glm::dot(layer.to_texel[row], glm::dvec3(double(x) + px, double(y) + py, 1));
+  }
+  double last_x() const { return layer.image->rect.width + 1; }
+  double last_y() const { return layer.image->rect.height + 1; }
+  bool begin();
+  WarpLayer kernel_layer() const;
+};
+
+// False: the layer is behind all of the tile.
+bool WarpPlan::Placing::begin() {
   constexpr double w = kWarpTileWidth, h = kWarpTileHeight;
-  const auto at = [&](int row, double px, double py) {
-    return glm::dot(layer.to_texel[row], glm::dvec3(static_cast<double>(x) + px, static_cast<double>(y) + py, 1));
-  };
   double nearest = INFINITY, farthest = -INFINITY;
   for (const auto& [px, py] : {std::pair{0.0, 0.0}, {w, 0.0}, {0.0, h}, {w, h}}) {
     nearest = std::min(nearest, at(2, px, py));
     farthest = std::max(farthest, at(2, px, py));
   }
   if (!(farthest > 0)) return false;
-  const bool whole = nearest > farthest * 1e-3;  // else the plane's horizon goes through the tile, or nearly
-  const double last_x = image.rect.width + 1, last_y = image.rect.height + 1;
-  // W is scaled to at most 1, X and Y counted from the texel in the tile's middle.
-  const double scale = 1 / farthest;
-  glm::dvec3 rows[3] = {layer.to_texel[0] * scale, layer.to_texel[1] * scale, layer.to_texel[2] * scale};
-  double middle_x = 0, middle_y = 0;
+  scale = 1 / farthest;
+  whole = nearest > farthest * 1e-3;
   if (whole) {
     const double middle_w = at(2, w / 2, h / 2);
-    middle_x = std::clamp(std::floor(at(0, w / 2, h / 2) / middle_w), 0.0, last_x);
-    middle_y = std::clamp(std::floor(at(1, w / 2, h / 2) / middle_w), 0.0, last_y);
+    middle_x = std::clamp(std::floor(at(0, w / 2, h / 2) / middle_w), 0.0, last_x());
+    middle_y = std::clamp(std::floor(at(1, w / 2, h / 2) / middle_w), 0.0, last_y());
   }
-  rows[0] = (rows[0] - middle_x * rows[2]) * static_cast<double>(kWarpSubtexels);
-  rows[1] = (rows[1] - middle_y * rows[2]) * static_cast<double>(kWarpSubtexels);
+  return true;
+}
+
+WarpLayer WarpPlan::Placing::kernel_layer() const {
+  glm::dvec3 rows[3] = {layer.to_texel[0] * scale, layer.to_texel[1] * scale, layer.to_texel[2] * scale};
+  rows[0] = (rows[0] - middle_x * rows[2]) * double(kWarpSubtexels);
+  rows[1] = (rows[1] - middle_y * rows[2]) * double(kWarpSubtexels);
   // Pixel (0, 0) of the tile, at its centre.
-  const glm::dvec3 first(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5, 1);
-  const auto f = [](double v) { return static_cast<float>(v); };
-  out = {.x0 = f(glm::dot(rows[0], first)),
-         .xx = f(rows[0].x),
-         .xy = f(rows[0].y),
-         .y0 = f(glm::dot(rows[1], first)),
-         .yx = f(rows[1].x),
-         .yy = f(rows[1].y),
-         .w0 = f(glm::dot(rows[2], first)),
-         .wx = f(rows[2].x),
-         .wy = f(rows[2].y),
-         .least_x = f(-middle_x * kWarpSubtexels),
-         .most_x = f((last_x - middle_x) * kWarpSubtexels),
-         .shift_x = f(middle_x * kWarpSubtexels) + kWarpMagic,
-         .least_y = f(-middle_y * kWarpSubtexels),
-         .most_y = f((last_y - middle_y) * kWarpSubtexels),
-         .shift_y = f(middle_y * kWarpSubtexels) + kWarpMagic,
-         .depth = f(layer.depth * scale),
-         .pitch = image.pitch,
-         .texels = image.texels.data()};
-  if (!whole) {
+  const glm::dvec3 first(double(x) + 0.5, double(y) + 0.5, 1);
+  const auto f = [](double v) { return float(v); };
+  return {.x0 = f(glm::dot(rows[0], first)),
+          .xx = f(rows[0].x),
+          .xy = f(rows[0].y),
+          .y0 = f(glm::dot(rows[1], first)),
+          .yx = f(rows[1].x),
+          .yy = f(rows[1].y),
+          .w0 = f(glm::dot(rows[2], first)),
+          .wx = f(rows[2].x),
+          .wy = f(rows[2].y),
+          .least_x = f(-middle_x * kWarpSubtexels),
+          .most_x = f((last_x() - middle_x) * kWarpSubtexels),
+          .shift_x = f(middle_x * kWarpSubtexels) + kWarpMagic,
+          .least_y = f(-middle_y * kWarpSubtexels),
+          .most_y = f((last_y() - middle_y) * kWarpSubtexels),
+          .shift_y = f(middle_y * kWarpSubtexels) + kWarpMagic,
+          .depth = f(layer.depth * scale),
+          .pitch = layer.image->pitch,
+          .texels = layer.image->texels.data()};
+}
+
+namespace {
+
+constexpr int kCornersX = kWarpPartsX + 1, kCornersY = kWarpPartsY + 1;
+
+// Where the corners of a tile's parts meet a layer's image, in texels. A part's pixels lie between its corners' places, since W > 0.
+class PartCorners {
+ public:
+  PartCorners(const WarpLayer& layer, double middle_x, double middle_y)
+      : layer_(layer), middle_x_(float(middle_x)), middle_y_(float(middle_y)) {}
+
+  void find(int i, int j) {
+    const float px = float(i * kWarpPartWidth) - 0.5f, py = float(j * kWarpPartHeight) - 0.5f;
+    const float w = layer_.w0 + py * layer_.wy + px * layer_.wx;
+    const float inverse = 1 / w / float(kWarpSubtexels);
+    x_[j][i] = (layer_.x0 + py * layer_.xy + px * layer_.xx) * inverse + middle_x_;
+    y_[j][i] = (layer_.y0 + py * layer_.yy + px * layer_.yx) * inverse + middle_y_;
+  }
+  void extend(Range& x, Range& y, int i, int j) const {
+    x.extend(x_[j][i]);
+    y.extend(y_[j][i]);
+  }
+
+ private:
+  const WarpLayer& layer_;
+  float middle_x_, middle_y_;
+  float x_[kCornersY][kCornersX], y_[kCornersY][kCornersX];
+};
+
+// True if there may be anything between these texels; beyond the image there is nothing.
+bool may_fill(const LayerImage& image, const Range& x, const Range& y) {
+  constexpr float kSlack = 0.02f;  // what floats may be off by, texels
+  const auto last_x = float(image.rect.width + 1), last_y = float(image.rect.height + 1);
+  if (x.hi + kSlack < 0 || y.hi + kSlack < 0 || x.lo - kSlack > last_x || y.lo - kSlack > last_y) return false;
+  const auto cell = [](float v, float last) { return int(std::clamp(v, 0.0f, last)); };
+  return image.may_fill(cell(x.lo - kSlack, last_x), cell(y.lo - kSlack, last_y), cell(x.hi + kSlack, last_x) + 1,
+                        cell(y.hi + kSlack, last_y) + 1);
+}
+
+}  // namespace
+
+bool WarpPlan::place(const PlacedLayer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile,
+                     WarpLayer& out) const {
+  Placing placing{layer, x, y};
+  if (!placing.begin()) return false;
+  out = placing.kernel_layer();
+  if (!placing.whole) {
     for (uint64_t& part : tile.parts) part |= bit;
     return true;
   }
-
-  // Corners of parts, in texels; a part's pixels lie between its corners' places, since W > 0.
-  constexpr int kCornersX = kWarpPartsX + 1, kCornersY = kWarpPartsY + 1;
-  float corner_x[kCornersY][kCornersX], corner_y[kCornersY][kCornersX];
-  Range range_x, range_y;
-  const auto corner = [&](int i, int j) {
-    const float px = static_cast<float>(i * kWarpPartWidth) - 0.5f, py = static_cast<float>(j * kWarpPartHeight) - 0.5f;
-    const float inverse = 1 / (out.w0 + py * out.wy + px * out.wx) / static_cast<float>(kWarpSubtexels);
-    corner_x[j][i] = (out.x0 + py * out.xy + px * out.xx) * inverse + f(middle_x);
-    corner_y[j][i] = (out.y0 + py * out.yy + px * out.yx) * inverse + f(middle_y);
-  };
-  // True if there may be anything; beyond the image there is nothing.
-  constexpr float kSlack = 0.02f;  // what floats may be off by, texels
-  const auto filled = [&](const Range& rx, const Range& ry) {
-    if (rx.hi + kSlack < 0 || ry.hi + kSlack < 0 || rx.lo - kSlack > f(last_x) || ry.lo - kSlack > f(last_y))
-      return false;
-    const auto cell = [](float v, float last) { return static_cast<int>(std::clamp(v, 0.0f, last)); };
-    return image.may_fill(cell(rx.lo - kSlack, f(last_x)), cell(ry.lo - kSlack, f(last_y)),
-                          cell(rx.hi + kSlack, f(last_x)) + 1, cell(ry.hi + kSlack, f(last_y)) + 1);
-  };
+  PartCorners corners(out, placing.middle_x, placing.middle_y);
+  Range all_x, all_y;
   for (const int j : {0, kCornersY - 1})
     for (const int i : {0, kCornersX - 1}) {
-      corner(i, j);
-      range_x.extend(corner_x[j][i]);
-      range_y.extend(corner_y[j][i]);
+      corners.find(i, j);
+      corners.extend(all_x, all_y, i, j);
     }
-  if (!filled(range_x, range_y)) return false;
+  if (!may_fill(*layer.image, all_x, all_y)) return false;
   for (int j = 0; j < kCornersY; ++j)
-    for (int i = 0; i < kCornersX; ++i) corner(i, j);
+    for (int i = 0; i < kCornersX; ++i) corners.find(i, j);
   bool any = false;
   for (int j = 0; j < kWarpPartsY; ++j)
     for (int i = 0; i < kWarpPartsX; ++i) {
       Range rx, ry;
-      for (int c = 0; c < 4; ++c) {
-        rx.extend(corner_x[j + c / 2][i + c % 2]);
-        ry.extend(corner_y[j + c / 2][i + c % 2]);
-      }
-      if (!filled(rx, ry)) continue;
+      for (int c = 0; c < 4; ++c) corners.extend(rx, ry, i + c % 2, j + c / 2);
+      if (!may_fill(*layer.image, rx, ry)) continue;
       tile.parts[static_cast<size_t>(j * kWarpPartsX + i)] |= bit;
       any = true;
     }

@@ -48,6 +48,7 @@ class WarpPlan {
   void place(int tx, int ty, WarpTile& tile, std::vector<WarpLayer>& layers) const;
 
  private:
+  struct Placing;
   bool place(const PlacedLayer& layer, int64_t x, int64_t y, uint64_t bit, WarpTile& tile, WarpLayer& out) const;
 
   PixelLattice across_, down_;
