@@ -189,7 +189,7 @@ _COMMENT_PATH = re.compile(r"(?<![\w/.<-])((?:[\w-]+/)*[\w-]+\.(?:h|cpp|md))\b")
 
 
 def _stands(tree, path, suffixes):
-    if path in tables.FOREIGN_FILES:
+    if path in tables.FOREIGN_FILES or any(word in path for word in tables.PLACEHOLDERS):
         return True
     if "*" in path or "{" in path:
         braces = re.search(r"\{([^}]*)\}", path)

@@ -1,7 +1,7 @@
 """Rules about includes: who may know whom."""
 
-import collections
 import re
+from fnmatch import fnmatch
 
 import tables
 from tree import Finding
@@ -103,7 +103,7 @@ class House:
         self._places.sort(key=lambda entry: -len(entry[0]))
 
     def room(self, path):
-        return next((room for place, room in self._places if _is_in(path, place)), None)
+        return next((room for place, room in self._places if _is_in(path, place) or fnmatch(path, place)), None)
 
 
 def floors(tree):

@@ -1,8 +1,11 @@
 """What is allowed where. Rules read these tables; whoever changes the house changes a row here.
 
-A room is a folder with all below it, a single file, or a tuple of these. A file belongs to the room that names it
-most closely. FLOORS lists floors from the ground up. A file may include files of its own room and of lower floors.
-Rooms of one floor do not know each other.
+A room is a folder with all below it, a file, a pattern of files, or a tuple of these. A file belongs to the room that
+names it most closely. FLOORS lists floors from the ground up. A file may include files of its own room and of lower
+floors. Rooms of one floor do not know each other.
+
+The folder of a process stands on two floors: below its kinds and pipelines what these share, doors and options; above
+them the service, which puts all together.
 """
 
 # Which parts of the tree may include which others; "tests" may include everything but other tests' folders.
@@ -22,33 +25,45 @@ FLOORS = {
     "common": [
         ["common/core"],
         ["common/geometry"],
-        ["common/image", "common/julia", "common/gl"],
+        ["common/image", "common/gl"],
         ["common/codec", "common/points"],
         [("common/volume", "common/volume/transfer"), "common/splat"],
         ["common/volume/slices"],
         ["common/volume/warp"],
         ["common/wire"],
-        ["common/scene", "common/metrics"],
-        ["common/options"],
-        ["common/net"],
+        ["common/scene"],
+        ["common/options", "common/metrics"],
+        ["common/julia", "common/net"],
     ],
     "services/data": [
         ["services/data/base"],
+        [("services/data/volume/volume.h", "services/data/surface/isosurface.h")],
         ["services/data/volume/formats"],
         ["services/data/import"],
+        ["services/data/surface"],
+        ["services/data/served.h"],
         ["services/data/volume", "services/data/mesh", "services/data/julia"],
         ["services/data"],
     ],
     "services/sampler": [
-        [("services/sampler/epoch_book.h", "services/sampler/work.h")],
+        [("services/sampler/work.h", "services/sampler/epoch_book.h")],
         ["services/sampler/tiles", "services/sampler/volume"],
         ["services/sampler/mesh", "services/sampler/julia", "services/sampler/volume/shear"],
         ["services/sampler"],
     ],
     "services/master": [
-        [("services/master/view_queue.h", "services/master/view_queue.cpp", "services/master/plan.h")],
+        [("services/master", "services/master/master_options.*")],
         ["services/master/tiles", "services/master/slabs"],
-        ["services/master"],
+        ["services/master/plan.cpp"],
+        [
+            (
+                "services/master/master_*",
+                "services/master/session.cpp",
+                "services/master/session_flags.cpp",
+                "services/master/status.cpp",
+                "services/master/main.cpp",
+            )
+        ],
     ],
     "services/packer": [
         [("services/packer/epoch_hold.h", "services/packer/packing.h")],
@@ -56,14 +71,15 @@ FLOORS = {
         ["services/packer"],
     ],
     "client/viewer": [
-        ["client/viewer/render"],
-        ["client/viewer/coupling"],
-        ["client/viewer/input"],
-        ["client/viewer/record", "client/viewer/display"],
-        ["client/viewer/points", "client/viewer/slices"],
+        ["client/viewer/render", "client/viewer/coupling", "client/viewer/input"],
+        ["client/viewer/record"],
+        ["client/viewer/display"],
+        [("client/viewer/received.h", "client/viewer/feeds.*")],
+        [("client/viewer/points", "client/viewer/record/event_record.*"), "client/viewer/slices"],
         ["client/viewer"],
     ],
     "tools": [
+        ["tools/common"],
         ["tools/make_terrain", "tools/make_volume", "tools/health"],
         ["tools/telesplat"],
     ],
@@ -116,4 +132,5 @@ FOREIGN_FLAGS = ()
 # Columns whose names are data: the master passes them on.
 FOREIGN_COLUMNS = ("viewer", "transfer")
 # Files that pages and comments name and that are not in the repository: other people's, or made by a run.
+PLACEHOLDERS = ("NAME", "KIND")
 FOREIGN_FILES = ("highway.h", "nifti1.h", "nifti2.h", "volume.md", "compose/runs/latest", "compose/.env")
