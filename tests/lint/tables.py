@@ -40,9 +40,9 @@ FLOORS = {
         [("services/data/volume/volume.h", "services/data/surface/isosurface.h")],
         ["services/data/volume/formats"],
         ["services/data/import"],
-        ["services/data/surface"],
         ["services/data/served.h"],
         ["services/data/volume", "services/data/mesh", "services/data/julia"],
+        ["services/data/surface"],
         ["services/data"],
     ],
     "services/sampler": [
@@ -76,7 +76,7 @@ FLOORS = {
         ["client/viewer/display"],
         [("client/viewer/received.h", "client/viewer/feeds.*")],
         [("client/viewer/points", "client/viewer/record/event_record.*"), "client/viewer/slices"],
-        ["client/viewer"],
+        [("client/viewer", "client/viewer/display/display_loop.*")],
     ],
     "tools": [
         ["tools/common"],
