@@ -7,10 +7,11 @@ from tree import Finding
 
 
 def folders(tree):
-    """A folder holds no more files than a person takes in at a glance."""
+    """A folder holds no more files than a person takes in at a glance, its CMake list aside."""
     for folder, names in tree.names.items():
-        if len(names) > tables.MOST_FILES and not set(folder.split("/")) & set(tables.DATA_FOLDERS):
-            yield Finding(folder or ".", 1, "folders", f"{len(names)} files, more than {tables.MOST_FILES}")
+        files = [name for name in names if name != "CMakeLists.txt"]
+        if len(files) > tables.MOST_FILES and not set(folder.split("/")) & set(tables.DATA_FOLDERS):
+            yield Finding(folder or ".", 1, "folders", f"{len(files)} files, more than {tables.MOST_FILES}")
 
 
 def cmake(tree):
