@@ -48,7 +48,8 @@ Table head_table(ViewerOptions& o) {
   return {
       {.flag = "--trajectory",
        .value = &o.trajectory,
-       .help = "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)"},
+       .help = "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)",
+       .is_file = true},
       {.flag = "--duration",
        .value = &d.duration_s,
        .help = "seconds from the first displayed frame; 0: until stopped",

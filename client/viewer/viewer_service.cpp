@@ -10,9 +10,9 @@
 #include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/window_surface.h"
-#include "client/viewer/points/source.h"
-#include "client/viewer/slices/source.h"
+#include "client/viewer/record/event_record.h"
 #include "common/core/clock.h"
+#include "common/core/log.h"
 #include "common/net/control.h"
 
 namespace telesplat::viewer {
@@ -31,6 +31,11 @@ int refuse(const Error& error) {
   return 2;
 }
 
+int fail(const Error& error) {
+  log::error("{}", error.text);
+  return 1;
+}
+
 // To the person: on a terminal as it is, else marked so that the launcher passes it on.
 void tell(const std::string& text) {
   std::printf("%s%s\n", isatty(1) ? "" : "note ", text.c_str());
@@ -38,15 +43,126 @@ void tell(const std::string& text) {
 }
 
 // A window may be given another size than it asked for: the options follow.
-Result<std::unique_ptr<DisplaySurface>> make_surface(ViewerOptions& o, geometry::Trajectory trajectory) {
-  if (!o.window) return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, std::move(trajectory)));
+Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o) {
+  auto trajectory = make_trajectory(o.trajectory);
+  if (!trajectory) return trajectory.error();
+  if (!o.window) return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, std::move(*trajectory)));
   WindowSurface::Options options{o.display, std::nullopt, o.fullscreen, o.out.empty() ? "." : o.out};
-  if (o.trajectory != "still") options.recorded = std::move(trajectory);
+  if (o.trajectory != "still") options.recorded = std::move(*trajectory);
   auto opened = WindowSurface::open(options, tell);
   if (!opened) return opened.error();
   o.display.width = (*opened)->width();
   o.display.height = (*opened)->height();
   return std::unique_ptr<DisplaySurface>(std::move(*opened));
+}
+
+Result<Renderers> open_renderers(ViewerOptions& o) {
+  auto renderers = Renderers::make(o.renderer, o.threads);
+  if (renderers && std::string_view(renderers->name()) == "cpu")
+    o.display.threads = o.threads > 0 ? o.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+  return renderers;
+}
+
+// What of the session is kept in the run folder; both null if nothing is.
+struct Record {
+  std::unique_ptr<FrameSpool> spool;
+  std::unique_ptr<EventRecorder> events;
+};
+
+std::string spool_directory(const ViewerOptions& o) { return o.out + "/spool"; }
+
+Result<Record> open_record(const ViewerOptions& o) {
+  Record record;
+  if (o.out.empty()) return record;
+  auto spool = FrameSpool::open(spool_directory(o));
+  if (!spool) return spool.error();
+  record.spool = std::move(*spool);
+  if (o.record_points_mb == 0) return record;
+  auto events = EventRecorder::open(o.out + "/points.events", o.record_points_mb << 20);
+  if (!events) return events.error();
+  record.events = std::move(*events);
+  return record;
+}
+
+// What the master is told of this viewer.
+std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers& renderers) {
+  const auto& d = o.display;
+  const auto& r = o.requests;
+  const double scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(d.render.kernel);
+  std::map<std::string, std::string> out{{"coupling", o.coupling},
+                                         {"buffers", std::to_string(r.buffers)},
+                                         {"renderer", renderers.name()},
+                                         {"splat", o.splat},
+                                         {"finish", splat::finish_name(d.render.finish)},
+                                         {"shading", o.shading},
+                                         {"width", std::to_string(d.width)},
+                                         {"height", std::to_string(d.height)},
+                                         {"sampling_width", std::to_string(r.adaptive ? d.width : r.sampling_width)},
+                                         {"sampling_height", std::to_string(r.adaptive ? d.height : r.sampling_height)},
+                                         {"sampling", r.adaptive ? "adaptive" : "fixed"},
+                                         {"trajectory", o.trajectory},
+                                         {"fov_deg", fmt::format("{}", d.fov_deg)},
+                                         {"target_fps", fmt::format("{}", d.target_fps)},
+                                         {"update_rate", fmt::format("{}", r.max_rate_hz)},
+                                         {"splat_scale", fmt::format("{}", scale)}};
+  if (o.wall.empty()) return out;
+  out["wall"] = o.wall;
+  out["wall_tile"] = std::to_string(o.wall_tile);
+  return out;
+}
+
+struct Served {
+  DisplayResult display;
+  bool session_ended = false;
+};
+
+// Shows the session until it, the person or the clock ends it.
+Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& renderers, const Record& record) {
+  net::Context context;
+  CouplingGate gate(int(o.requests.buffers));
+  metrics::TableRecorder frames("frames", frame_columns());
+  metrics::SpanRecorder spans;
+  const ViewerWorker::Options options{.service = o.service,
+                                      .requests = o.requests,
+                                      .least_sampling = o.least_sampling,
+                                      .facts = facts(o, renderers),
+                                      .received = {o.epoch_patience_s, record.events.get()},
+                                      .started_s = o.started_s};
+  ViewerWorker worker(context, options, gate, frames, spans);
+  const SourceMaker make_source = [&](Received& r) { return r.make_source(o.display, renderers); };
+  Served served;
+  served.display = run_display(o.display, surface, make_source, gate, worker, frames, spans, record.spool.get());
+  served.session_ended = worker.shutdown_requested();
+  return served;
+}
+
+// Recorded frames become pictures. After a signal there is a second for it; the rest stays where it is.
+Status develop(const ViewerOptions& o, FrameSpool& spool) {
+  spool.flush();
+  if (spool.dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool.dropped());
+  const auto progress = [](size_t done, size_t of) {
+    std::printf("progress pictures %.3f\n", double(done) / double(of));
+    std::fflush(stdout);
+  };
+  const auto in_time = [signalled_s = 0.0]() mutable {
+    if (!net::stop_requested()) return true;
+    if (signalled_s == 0) signalled_s = monotonic_s();
+    return monotonic_s() - signalled_s < kPicturesAfterSignal_s;
+  };
+  if (const Status s = develop_frames(spool_directory(o), o.out + "/images", progress, in_time); !s) return s;
+  std::error_code error;
+  if (std::filesystem::is_empty(spool_directory(o), error)) std::filesystem::remove(spool_directory(o), error);
+  return ok_status();
+}
+
+// Ends the session for everyone, if that is this viewer's part. Exit code.
+int farewell(const ViewerOptions& o, const Served& served) {
+  if (!o.end_session) return 0;
+  if (!served.session_ended && !net::stop_requested())
+    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s); !answer)
+      log::warn("the session could not be ended: {}", answer.error().text);
+  if (served.display.frames == 0) log::error("the session ended before anything was shown");
+  return served.display.frames == 0 ? 1 : 0;
 }
 
 }  // namespace
@@ -55,111 +171,19 @@ int run(ViewerOptions o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   if (const Status s = settle(o); !s) return refuse(s.error());
-  const int buffers = int(o.requests.buffers);
-  auto trajectory = make_trajectory(o.trajectory);
-  if (!trajectory) return refuse(trajectory.error());
-  auto surface =
-      make_surface(o, std::move(*trajectory));  // before the renderer, whose context may depend on the window's
+  auto surface = open_surface(o);  // before the renderers, whose contexts may depend on the window's
   if (!surface) return refuse(surface.error());
-  auto renderer = make_renderer(o.renderer, o.threads);
-  if (!renderer) {
-    log::error("{}", renderer.error().text);
-    return 1;
-  }
-  if (std::string_view((*renderer)->name()) == "cpu")
-    o.display.threads = o.threads > 0 ? o.threads : int(std::max(1u, std::thread::hardware_concurrency()));
-  std::unique_ptr<FrameSpool> spool;
-  const std::string spool_directory = o.out + "/spool";
-  if (!o.out.empty()) {
-    auto opened = FrameSpool::open(spool_directory);
-    if (!opened) return refuse(opened.error());
-    spool = std::move(*opened);
-  }
+  auto renderers = open_renderers(o);
+  if (!renderers) return fail(renderers.error());
+  auto record = open_record(o);
+  if (!record) return refuse(record.error());
 
-  std::unique_ptr<EventRecorder> events;
-  if (!o.out.empty() && o.record_points_mb > 0) {
-    auto opened = EventRecorder::open(o.out + "/points.events", o.record_points_mb << 20);
-    if (!opened) return refuse(opened.error());
-    events = std::move(*opened);
-  }
-
-  net::Context context;
-  ViewerCaches caches(buffers);
-  metrics::TableRecorder frames("frames", frame_columns());
-  metrics::SpanRecorder spans;
-  ReplicaWorker::Options worker_options{
-      o.service,
-      o.requests,
-      {{"coupling", o.coupling},
-       {"buffers", std::to_string(buffers)},
-       {"renderer", (*renderer)->name()},
-       {"splat", o.splat},
-       {"finish", splat::finish_name(o.display.render.finish)},
-       {"shading", o.shading},
-       {"width", std::to_string(o.display.width)},
-       {"height", std::to_string(o.display.height)},
-       {"sampling_width", std::to_string(o.requests.adaptive ? o.display.width : o.requests.sampling_width)},
-       {"sampling_height", std::to_string(o.requests.adaptive ? o.display.height : o.requests.sampling_height)},
-       {"sampling", o.requests.adaptive ? "adaptive" : "fixed"},
-       {"trajectory", o.trajectory},
-       {"fov_deg", fmt::format("{}", o.display.fov_deg)},
-       {"target_fps", fmt::format("{}", o.display.target_fps)},
-       {"update_rate", fmt::format("{}", o.requests.max_rate_hz)},
-       {"splat_scale",
-        fmt::format("{}", o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(o.display.render.kernel))}},
-      o.epoch_patience_s,
-      events.get(),
-      o.started_s};
-  if (!o.wall.empty()) {
-    worker_options.facts["wall"] = o.wall;
-    worker_options.facts["wall_tile"] = std::to_string(o.wall_tile);
-  }
-  DisplayResult result;
-  bool session_ended = false;
-  {
-    ReplicaWorker worker(context, worker_options, caches, frames, spans);
-    const SourceMaker make_source = [&](SceneKind kind) -> Result<std::unique_ptr<ViewSource>> {
-      if (kind == SceneKind::kPoints)
-        return std::unique_ptr<ViewSource>(new PointSource(o.display, std::move(*renderer), caches, worker));
-      renderer->reset();  // its context must not be the current one
-      auto volumes = make_volume_renderer(o.renderer, o.threads);
-      if (!volumes) return volumes.error();
-      return std::unique_ptr<ViewSource>(
-          new VolumeSource(std::move(*volumes), caches.slices, o.display.shading.background));
-    };
-    result = run_display(o.display, **surface, make_source, caches.gate, worker, frames, spans, spool.get());
-    session_ended = worker.shutdown_requested();
-  }
-  if (!result.error.empty()) {
-    log::error("{}", result.error);
-    return 1;
-  }
-  surface->reset();  // the window goes at once, whatever there is to write
-  if (spool) {
-    spool->flush();
-    if (spool->dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool->dropped());
-    const auto progress = [](size_t done, size_t of) {
-      std::printf("progress pictures %.3f\n", double(done) / double(of));
-      std::fflush(stdout);
-    };
-    const auto in_time = [signalled_s = 0.0]() mutable {
-      if (!net::stop_requested()) return true;
-      if (signalled_s == 0) signalled_s = monotonic_s();
-      return monotonic_s() - signalled_s < kPicturesAfterSignal_s;
-    };
-    if (const Status s = develop_frames(spool_directory, o.out + "/images", progress, in_time); !s) {
-      log::error("{}", s.error().text);
-      return 1;
-    }
-    std::error_code error;
-    if (std::filesystem::is_empty(spool_directory, error)) std::filesystem::remove(spool_directory, error);
-  }
-  if (!o.end_session) return 0;
-  if (!session_ended && !net::stop_requested())
-    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s); !answer)
-      log::warn("the session could not be ended: {}", answer.error().text);
-  if (result.frames == 0) log::error("the session ended before anything was shown");
-  return result.frames == 0 ? 1 : 0;
+  const Served served = serve(o, **surface, *renderers, *record);
+  if (!served.display.error.empty()) return fail({served.display.error});
+  surface->reset();  // the window goes at once, however much there is to write
+  if (record->spool)
+    if (const Status s = develop(o, *record->spool); !s) return fail(s.error());
+  return farewell(o, served);
 }
 
 }  // namespace telesplat::viewer

@@ -1,5 +1,6 @@
-// The viewer's network side, on a thread of its own: receives updates (point-model events, frames of volumes), decodes them and puts them into the
-// caches, asks for views, reports what was drawn, measures updates. It never holds up a display frame.
+// The viewer's network side, on a thread of its own: keeps the link to the master, receives updates, asks for views, measures updates,
+// reports what was drawn. What it receives is a Received's business; the worker does not know of what kind the scene is. It never
+// holds up a display frame.
 #pragma once
 
 #include <atomic>
@@ -7,46 +8,29 @@
 #include <mutex>
 #include <thread>
 
-#include "client/viewer/coupling/coupling_gate.h"
-#include "client/viewer/coupling/view_requester.h"
-#include "client/viewer/points/access_log.h"
-#include "client/viewer/points/receiver.h"
-#include "client/viewer/slices/receiver.h"
-#include "common/metrics/recorder.h"
-#include "common/net/master_link.h"
+#include "client/viewer/received.h"
+#include "client/viewer/succession.h"
 #include "common/net/service.h"
 
 namespace telesplat::viewer {
 
-/// What a session shows; unknown until the master told it.
-enum class SceneKind { kUnknown, kPoints, kVolume };
-
-/// What the worker fills and the display draws.
-struct ViewerCaches {
-  ModelCache points;
-  UpdateBatches batches;  ///< of points, where the display waits for whole updates
-  SliceCache slices;
-  CouplingGate gate;
-  /// buffers: as buffers_of(); 0: asynchronous.
-  explicit ViewerCaches(int buffers) : slices(buffers > 0), gate(buffers) {}
-};
-
-class ReplicaWorker {
+class ViewerWorker {
  public:
   struct Options {
     net::ServiceOptions service;
-    RequestOptions requests;                   ///< buffers are the gate's
+    RequestOptions requests;  ///< buffers are the gate's
+    /// RequestOptions::min_scale whatever the session tells; nothing: what the session tells ("viewer.least_sampling"), if it does.
+    std::optional<double> least_sampling;
     std::map<std::string, std::string> facts;  ///< for the hello
-    double epoch_patience_s = 0.15;            ///< EpochSwitch
-    EventRecorder* events = nullptr;  ///< keeps every applied event; null: nothing is kept. Outlives the worker
-    double started_s = 0;             ///< when the session was started, on the monotonic clock; 0: now
+    ReceivedOptions received;
+    double started_s = 0;  ///< when the session was started, on the monotonic clock; 0: now
   };
 
   /// Starts the thread.
-  ReplicaWorker(net::Context& context, const Options& options, ViewerCaches& caches, metrics::TableRecorder& frames,
-                metrics::SpanRecorder& spans);
+  ViewerWorker(net::Context& context, const Options& options, CouplingGate& gate, metrics::TableRecorder& frames,
+               metrics::SpanRecorder& spans);
   /// Stops it, after a last flush of metrics and a goodbye.
-  ~ReplicaWorker();
+  ~ViewerWorker();
 
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.
@@ -55,16 +39,12 @@ class ReplicaWorker {
   void on_first_points(double now_s);
   /// A frame of this epoch was displayed with this camera. waited_for: the update that it waited for, if it did.
   void on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate* waited_for);
-  /// What a frame drew of the point model.
-  void on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames);
-  SceneKind kind() const { return kind_; }
+  /// What to draw from, see Succession::at. Null: it is not known yet what the session shows.
+  std::shared_ptr<Received> received_at(RequestId request) { return succession_.at(request); }
   /// True once one view update is complete.
   bool first_update_complete() const { return updates_ > 0; }
   bool shutdown_requested() const { return shutdown_; }
   double to_master_s(double local_s) const { return local_s + offset_s_; }
-
-  /// The newest that is complete and, without coupling, in the cache.
-  ShownUpdate last_update() const;
 
   /// For people who watch.
   struct Figures {
@@ -75,57 +55,54 @@ class ReplicaWorker {
     uint64_t epochs_shown = 0;  ///< times a new epoch took the place of one on display
   };
   Figures figures() const;
-  /// The session packs without eliminating redundancy: of each cluster the best patches are to be drawn (T4.4.3.3).
-  bool keeps_redundant() const { return keeps_redundant_; }
 
  private:
   void loop();
-  void connect_if_changed();
-  void connect(const std::string& patches, const std::string& state);
+  void receive();
+  void follow_session();
+  Status follow(scene::Pipeline pipeline, const wire::Welcome& session);
+  void retire();
   void receive_control();
   void on_part(const ViewPart& part);
+  void may_display(const ShownUpdate& update);
   void release(const std::vector<RequestId>& requests);
-  void on_epoch();
-  void send_access_reports();
+  void take_poses();
+  void ask_again(double now_s);
   void request_views(double now_s);
   void report(double now_s, bool last);
+  ReceivedLinks links();
   net::MasterLink::Values status() const;
 
-  net::Context& context_;
   Options options_;
-  ViewerCaches& caches_;
+  CouplingGate& gate_;
   metrics::TableRecorder& frames_;
   metrics::SpanRecorder& spans_;
   metrics::TableRecorder updates_table_;
   net::MasterLink link_;
-  std::optional<net::Socket> patches_, state_;
-  std::string patches_endpoint_, state_endpoint_;
-  PointReceiver points_;
-  SliceReceiver slices_;
+  Feeds feeds_;
   ViewRequester requester_;
+  std::optional<scene::Pipeline> pipeline_;
+  std::shared_ptr<Received> received_;  // the newest of the succession
+  Succession succession_;
   std::map<RequestId, ShownUpdate> complete_;  // where the display waits: those that wait for earlier ones
-  AccessLog reported_;                         // takes turns with seen_
   int seen_version_ = 0;
   InstanceId master_;
-  bool other_master_ = false;
+  bool all_again_ = false;  // what is open is to be asked for again
   double started_s_ = 0, last_report_s_ = 0;
 
   struct SeenPose {
     double t_s = 0;
     geometry::Camera camera;
-    double waited_since_s =
-        0;  // master's clock: when the update was requested that the frame waited for; 0: it did not
+    /// Master's clock: when the update was requested that the frame waited for; 0: it did not.
+    double waited_since_s = 0;
   };
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
   std::vector<SeenPose> poses_;
-  AccessLog seen_;
-  ShownUpdate last_update_;
   std::string scene_;
   double extent_m_ = 0, latency_ms_ = 0;
 
-  std::atomic<SceneKind> kind_{SceneKind::kUnknown};
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
-  std::atomic<bool> shutdown_{false}, stop_{false}, keeps_redundant_{false};
+  std::atomic<bool> shutdown_{false}, stop_{false};
   std::atomic<double> offset_s_{0}, first_points_s_{0};
   std::thread thread_;
 };

@@ -9,10 +9,10 @@ namespace {
 constexpr size_t kMaxBuffered = 1u << 20;  // values kept if the master is away; newer ones are dropped then
 }
 
-void TableRecorder::add(std::initializer_list<double> row) {
+void TableRecorder::add(std::span<const double> row) {
   CHECK(row.size() == columns_.size());
   const std::lock_guard lock(mutex_);
-  if (values_.size() < kMaxBuffered) values_.insert(values_.end(), row);
+  if (values_.size() < kMaxBuffered) values_.insert(values_.end(), row.begin(), row.end());
 }
 
 std::optional<wire::MetricRows> TableRecorder::flush(InstanceId instance) {

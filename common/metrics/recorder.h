@@ -1,8 +1,10 @@
 // What a process measures before it is sent to the master: rows of a table, and spans for the trace. Thread-safe.
 #pragma once
 
+#include <initializer_list>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,7 +18,8 @@ class TableRecorder {
   TableRecorder(std::string table, std::vector<std::string> columns)
       : table_(std::move(table)), columns_(std::move(columns)) {}
   /// Precondition: row has one value a column.
-  void add(std::initializer_list<double> row);
+  void add(std::span<const double> row);
+  void add(std::initializer_list<double> row) { add(std::span(row.begin(), row.size())); }
   /// The rows since the last call, if any.
   std::optional<wire::MetricRows> flush(InstanceId instance);
 

@@ -1,9 +1,9 @@
 // A viewer - worker, caches, display loop, renderers - against a session under control: volumes and points, with every coupling.
 #include <gtest/gtest.h>
 
+#include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
-#include "client/viewer/points/source.h"
-#include "client/viewer/slices/source.h"
+#include "client/viewer/slices/receiver.h"
 #include "common/core/clock.h"
 #include "tests/support/fake_session.h"
 
@@ -15,25 +15,28 @@ struct Shown {
   std::vector<double> request, sequence, epoch, wait_ms, filled, drawn;
   std::vector<double> updates;
   std::map<std::string, double> status;
+  std::vector<std::string> sources;  // what each one drew: points, samples
   DisplayResult result;
 };
 
-// A whole life of a viewer: `frames` frames as fast as they come.
-Shown show(const test::FakeSession::Options& session_options, CouplingMode mode, uint64_t frames) {
+// A whole life of a viewer: `frames` frames as fast as they come, or at target_fps.
+Shown show(const test::FakeSession::Options& session_options, CouplingMode mode, uint64_t frames,
+           double target_fps = 0) {
   static int number = 0;
   net::Context context;
   test::FakeSession session(context, session_options, std::to_string(++number));
   DisplayOptions display;
   display.width = 96;
   display.height = 64;
-  display.target_fps = 0;
+  display.target_fps = target_fps;
   display.duration_s = 120;  // a deadline
   display.frames = frames;
   HeadlessSurface surface(display, geometry::Trajectory::orbit(1.2, 0.4, 20));
-  ViewerCaches caches(buffers_of(mode, 3));
+  CouplingGate gate(buffers_of(mode, 3));
+  auto renderers = Renderers::make("cpu", 1);
   metrics::TableRecorder table("frames", frame_columns());
   metrics::SpanRecorder spans;
-  ReplicaWorker::Options options;
+  ViewerWorker::Options options;
   options.service.name = "viewer";
   options.service.master = session.master();
   options.requests.sampling_width = 96;
@@ -41,14 +44,16 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   options.requests.max_rate_hz = 200;
   Shown out;
   {
-    ReplicaWorker worker(context, options, caches, table, spans);
-    const SourceMaker make = [&](SceneKind kind) -> Result<std::unique_ptr<ViewSource>> {
-      EXPECT_EQ(kind, session_options.volume ? SceneKind::kVolume : SceneKind::kPoints);
-      if (kind == SceneKind::kVolume)
-        return std::unique_ptr<ViewSource>(new VolumeSource(make_cpu_volume_renderer(1), caches.slices, 0x102030));
-      return std::unique_ptr<ViewSource>(new PointSource(display, make_cpu_renderer(1), caches, worker));
+    ViewerWorker worker(context, options, gate, table, spans);
+    const SourceMaker make = [&](Received& received) {
+      auto made = received.make_source(display, *renderers);
+      out.sources.push_back((*made)->drawn_name());
+      return made;
     };
-    out.result = run_display(display, surface, make, caches.gate, worker, table, spans, nullptr);
+    out.result = run_display(display, surface, make, gate, worker, table, spans, nullptr);
+  }
+  if (session_options.change_every == 0) {
+    EXPECT_EQ(out.sources, std::vector<std::string>{session_options.volume ? "samples" : "points"});
   }
   // The worker's last report is on its way.
   for (const double until = monotonic_s() + 20;
@@ -171,6 +176,42 @@ TEST(VolumeSession, GoesOnWithAnotherMaster) {
     // A request that the new master had before it was asked again overtakes the older ones.
     EXPECT_LE(s.request.back(), 62);
   }
+}
+
+// Mesh, volume, mesh: the viewer follows, and what was on display stays there until the next scene has a picture.
+TEST(ChangingSession, FramesThatWaitShowEachUpdateFromTheSceneItIsOf) {
+  for (const auto mode : {CouplingMode::kSync, CouplingMode::kLoose}) {
+    const Shown s = show({.volume = false, .change_every = 15, .changes = 2}, mode, 50);
+    expect_complete(s, 50);
+    expect_one_update_a_frame(s);
+    EXPECT_EQ(s.sources, (std::vector<std::string>{"points", "samples", "points"}));
+    EXPECT_TRUE(std::is_sorted(s.epoch.begin(), s.epoch.end()));
+    EXPECT_EQ(s.epoch.front(), 1);
+    EXPECT_EQ(s.epoch.back(), 3);
+    EXPECT_GE(s.counts.repeated, 2u) << "what was open at a change is asked for again";
+    EXPECT_GT(s.status.at("points"), 0);
+  }
+}
+
+TEST(ChangingSession, AsynchronouslyNoFrameIsEmpty) {
+  const Shown s = show({.volume = false, .change_every = 15, .changes = 2}, CouplingMode::kAsync, 300, 100);
+  expect_complete(s, 300);
+  EXPECT_EQ(s.sources, (std::vector<std::string>{"points", "samples", "points"}));
+  EXPECT_TRUE(std::is_sorted(s.epoch.begin(), s.epoch.end()));
+  EXPECT_EQ(s.epoch.back(), 3);
+  EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0);
+}
+
+TEST(ChangingSession, AVolumeMayBecomeAMeshToo) {
+  const Shown s = show({.change_every = 10, .changes = 1}, CouplingMode::kLoose, 25);
+  expect_complete(s, 25);
+  EXPECT_EQ(s.sources, (std::vector<std::string>{"samples", "points"}));
+}
+
+TEST(PointSession, ABoxBeyondTheLimitIsRefusedAndTheSessionGoesOn) {
+  const Shown s = show({.volume = false, .strange_after = 5}, CouplingMode::kSync, 15);
+  expect_complete(s, 15);
+  expect_one_update_a_frame(s);
 }
 
 TEST(PointSession, AForgottenRequestIsMadeAgain) {

@@ -121,6 +121,20 @@ TEST(EventSequencer, AMarkTellsOfLostLastEvents) {
   s.expect_complete();
 }
 
+TEST(EventSequencer, APackerWithTheIdZeroIsFollowedBeforeItsFirstEventIsApplied) {
+  for (const bool published : {false, true}) {
+    bool begun = false;
+    EventSequencer sequencer({[&](const ModelEvent&) { EXPECT_TRUE(begun) << "there is no replica to apply it to"; },
+                              [&] { begun = true; }, [](InstanceId, Sequence) {}});
+    sequencer.start();
+    if (published)
+      sequencer.on_published(event({0}, 1));
+    else
+      sequencer.on_replayed(event({0}, 1));
+    EXPECT_TRUE(begun);
+  }
+}
+
 TEST(EventSequencer, AnAnswerMaySkipWhatWasForgottenSince) {
   Session s;
   s.sequencer.start();

@@ -12,8 +12,6 @@
 namespace telesplat::test {
 namespace {
 
-constexpr InstanceId kPacker{12};
-
 wire::Bytes bytes_of(const std::vector<uint8_t>& v) { return {reinterpret_cast<const std::byte*>(v.data()), v.size()}; }
 
 }  // namespace
@@ -78,6 +76,8 @@ wire::Welcome FakeSession::welcome() const {
   w.facts = {{"scene", "made up"}, {"kind", options_.volume ? "volume" : "mesh"}};
   w.endpoints = {{"state", state_endpoint_}, {"patches", patches_endpoint_}};
   w.box_room = options_.volume ? grid_.box_room() : scene_config().box_room;
+  w.settings = options_.settings;
+  if (strange_) w.box_room.hi = glm::vec3(3e6f);
   if (!options_.volume) return w;
   volume::Session session;
   session.grid = grid_;
@@ -122,6 +122,7 @@ void FakeSession::receive_master() {
 void FakeSession::receive_state() {
   while (const auto m = state_.receive()) {
     const std::lock_guard lock(mutex_);
+    if (m->peer == former_state_) continue;  // said before it heard of the change
     viewer_state_ = m->peer;
     if (m->type == wire::SliceAck::kName) {
       const auto ack = state_.decode<wire::SliceAck>(*m);
@@ -139,11 +140,51 @@ void FakeSession::receive_state() {
     } else if (m->type == wire::StateRequest::kName) {
       const auto request = state_.decode<wire::StateRequest>(*m);
       if (!request) continue;
-      const uint64_t after = request->packer == kPacker ? request->after.value : 0;
+      const uint64_t after = request->packer == packer_ ? request->after.value : 0;
       for (size_t i = after; i < log_.size(); ++i) state_.send_frames(m->peer, log_[i].first, log_[i].second);
-      state_.send(wire::StateMark{kPacker, {log_.size()}, epoch_, true, 0}, m->peer);
+      state_.send(wire::StateMark{packer_, {log_.size()}, epoch_, true, 0}, m->peer);
     }
   }
+}
+
+// Whether something happened in place of an answer.
+bool FakeSession::disturb() {
+  if (options_.restart_after && answers_ == options_.restart_after) {
+    master_id_ = {13};
+    frame_ = last_acknowledged_ = 0;
+    unacknowledged_.clear();
+    open_.clear();
+    options_.restart_after = 0;
+  } else if (options_.change_every && options_.changes > 0 &&
+             answers_ % options_.change_every == options_.change_every - 1) {
+    --options_.changes;
+    ++answers_;
+    change_kind();
+  } else if (options_.strange_after && answers_ == options_.strange_after) {
+    strange_ = true;
+    begin_packer();
+    options_.strange_after = 0;
+  } else {
+    return false;
+  }
+  master_.send(welcome(), viewer_);
+  return true;
+}
+
+void FakeSession::begin_packer() {
+  packer_ = packer_.next();
+  sequence_ = 0;
+  log_.clear();
+}
+
+void FakeSession::change_kind() {
+  options_.volume = !options_.volume;
+  epoch_ = epoch_.next();
+  begin_packer();
+  frame_ = last_acknowledged_ = 0;
+  unacknowledged_.clear();
+  open_.clear();
+  former_state_ = std::exchange(viewer_state_, {});
 }
 
 void FakeSession::answer_next() {
@@ -153,19 +194,11 @@ void FakeSession::answer_next() {
   if (options_.epoch_every && answers_ % options_.epoch_every == options_.epoch_every - 1) {
     epoch_ = epoch_.next();
     if (!options_.volume) {
-      log_.emplace_back(wire::EpochBegin::kName, wire::encode(wire::EpochBegin{kPacker, {++sequence_}, epoch_}));
+      log_.emplace_back(wire::EpochBegin::kName, wire::encode(wire::EpochBegin{packer_, {++sequence_}, epoch_}));
       patches_.send_frames({}, log_.back().first, log_.back().second);
     }
   }
-  if (options_.restart_after && answers_ == options_.restart_after) {
-    master_id_ = {13};
-    frame_ = last_acknowledged_ = 0;
-    unacknowledged_.clear();
-    open_.clear();
-    master_.send(welcome(), viewer_);
-    options_.restart_after = 0;
-    return;
-  }
+  if (disturb()) return;
   ++answers_;
   const wire::ViewRequest request = open_.front();
   open_.pop_front();
@@ -177,7 +210,7 @@ void FakeSession::answer_next() {
 
 void FakeSession::send_slices(const wire::ViewRequest& request) {
   wire::SliceFrame f;
-  f.packer = kPacker;
+  f.packer = packer_;
   f.epoch = epoch_;
   f.frame = {++frame_};
   f.viewer = request.viewer;
@@ -208,7 +241,7 @@ void FakeSession::publish_points(const wire::ViewRequest& request) {
     const geometry::Rect rect{0, tile * height, camera.width, height};
     const auto image = codec::encode(sample_scene(camera, rect));
     wire::Patch p;
-    p.packer = kPacker;
+    p.packer = packer_;
     p.sequence = {++sequence_};
     p.epoch = epoch_;
     p.frame = {frame_};

@@ -24,8 +24,14 @@ class FakeSession {
     /// Answers of these requests (1, 2, ...) are damaged, or not given when they are asked for the first time.
     std::set<uint64_t> damaged, forgotten;
     uint64_t epoch_every = 0;  ///< a new epoch after so many answers; 0: never
-    uint64_t restart_after =
-        0;  ///< another master after so many answers: requests are lost, frames numbered anew; 0: never
+    /// Another master after so many answers: requests are lost, frames numbered anew; 0: never.
+    uint64_t restart_after = 0;
+    /// The scene becomes one of the other kind after each so many answers, `changes` times; 0: never. Another packer packs it, at the
+    /// same endpoints; requests are lost.
+    uint64_t change_every = 0, changes = 2;
+    /// After so many answers the master tells of a box that no model can have, and another packer begins; 0: never.
+    uint64_t strange_after = 0;
+    std::map<std::string, double> settings;  ///< of the welcome
   };
   FakeSession(net::Context& context, const Options& options, std::string name);
   ~FakeSession();
@@ -51,6 +57,9 @@ class FakeSession {
   void receive_master();
   void receive_state();
   void answer_next();
+  bool disturb();
+  void begin_packer();
+  void change_kind();
   void send_slices(const wire::ViewRequest& request);
   void publish_points(const wire::ViewRequest& request);
   wire::Welcome welcome() const;
@@ -59,12 +68,13 @@ class FakeSession {
   volume::Grid grid_;
   std::string master_endpoint_, state_endpoint_, patches_endpoint_;
   net::Socket master_, state_, patches_;
-  std::string viewer_, viewer_state_;  // routing ids
+  std::string viewer_, viewer_state_, former_state_;  // routing ids
   std::deque<wire::ViewRequest> open_;
   std::set<uint64_t> seen_, unacknowledged_;
   uint64_t frame_ = 0, sequence_ = 0, answers_ = 0, last_acknowledged_ = 0, buffers_ = 1;
   EpochId epoch_{1};
-  InstanceId master_id_{11};
+  InstanceId master_id_{11}, packer_{12};
+  bool strange_ = false;
   std::vector<std::pair<std::string, std::string>> log_;  // published events: type, body
 
   mutable std::mutex mutex_;

@@ -48,6 +48,10 @@ class Coupling {
   /// The patience begins anew. Empty: it is not over, or nothing is open. Where a later update is complete, the
   /// earlier ones are given up instead: `released` gets those that can be displayed now.
   std::vector<RequestId> overdue(double now_s, std::vector<RequestId>& released);
+  /// What is complete and waits for earlier ones will not be displayed: its credits are free.
+  void drop_complete() {
+    std::erase_if(open_, [](const Open& o) { return o.complete; });
+  }
   /// Another master: it knows nothing of what is open. All of it is to be sent again.
   std::vector<RequestId> open() const;
 

@@ -137,8 +137,17 @@ std::optional<double> ViewRequester::requested_s(RequestId request) const {
 }
 
 ViewPart part_of(const wire::Patch& p) {
-  return {p.viewer, p.request, p.epoch,   p.frame,        p.frame_complete && p.step <= 1,
-          1,        p.kept,    p.samples, p.image.size(), p.camera};
+  return {.viewer = p.viewer,
+          .request = p.request,
+          .epoch = p.epoch,
+          .frame = p.frame,
+          .complete = p.frame_complete && p.step <= 1,
+          .tiles = 1,
+          .points = p.kept,
+          .samples = p.samples,
+          .bytes = p.image.size(),
+          .camera = p.camera,
+          .eliminated = p.samples - std::min(p.kept, p.samples)};
 }
 
 std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part, double now_s) {
@@ -151,6 +160,7 @@ std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part
   u.points += part.points;
   u.samples += part.samples;
   u.bytes += part.bytes;
+  u.eliminated += part.eliminated;
   if (!part.complete) return std::nullopt;
   u.complete_s = last_update_s_ = now_s;
   // The master's clock as seen from here may be set back when the connection is made anew.

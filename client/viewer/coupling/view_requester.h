@@ -49,6 +49,7 @@ struct ViewPart {
   bool complete = false;  ///< the last part of the frame of full resolution
   uint64_t tiles = 1, points = 0, samples = 0, bytes = 0;
   geometry::Camera camera;  ///< that was sampled
+  uint64_t eliminated = 0;  ///< samples of which no points came, because the model has them already
 };
 ViewPart part_of(const wire::Patch& patch);
 
@@ -74,11 +75,12 @@ class ViewRequester {
   struct Update {
     RequestId request;
     uint64_t ahead = 0;  ///< requests that were open when it was sent: it is answered after them
-    double requested_s = 0, first_s = 0,
-           complete_s = 0;  ///< first_s: the first part, of the coarse pass if there is one
+    /// first_s: the first part, of the coarse pass if there is one.
+    double requested_s = 0, first_s = 0, complete_s = 0;
     geometry::Camera camera;
-    bool still = false;                                      ///< asked for at full resolution, while the head rested
-    uint64_t points = 0, samples = 0, bytes = 0, tiles = 0;  ///< the coarse pass included
+    bool still = false;  ///< asked for at full resolution, while the head rested
+    /// The coarse pass included.
+    uint64_t points = 0, samples = 0, bytes = 0, tiles = 0, eliminated = 0;
   };
   /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution and asked for
   /// by us; a coarse pass may come before it, with the same request.

@@ -12,17 +12,13 @@ namespace {
 
 constexpr double kPicturePeriod_s = 2.5, kRestPeriod_s = 1.0 / 30, kLookAfterSurface_s = 0.1;
 
-bool told_to_stop(const ReplicaWorker& worker, const DisplaySurface& surface) {
+bool told_to_stop(const ViewerWorker& worker, const DisplaySurface& surface) {
   return net::stop_requested() || worker.shutdown_requested() || surface.wants_to_stop();
 }
 
 void sleep_until(double t_s) {
   const double wait_s = t_s - monotonic_s();
   if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
-}
-
-double angle_deg(const glm::dquat& a, const glm::dquat& b) {
-  return 2 * std::acos(std::min(1.0, std::abs(glm::dot(a, b)))) * 180 / 3.14159265358979323846;
 }
 
 // Room for a frame of this camera. A view that may be recorded has room for depth all the time: growing it costs milliseconds.
@@ -35,7 +31,7 @@ void fit(image::View& view, const geometry::Camera& camera, bool with_depth) {
 }
 
 LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
-                         const ReplicaWorker& worker) {
+                         const ViewerWorker& worker) {
   const auto network = worker.figures();
   return {now_s,
           network.scene,
@@ -51,51 +47,11 @@ LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn,
           source.cached_name()};
 }
 
-}  // namespace
-
-const std::vector<std::string>& frame_columns() {
-  static const std::vector<std::string> columns{"frame",
-                                                "t_s",
-                                                "inter_frame_ms",
-                                                "construction_ms",
-                                                "select_ms",
-                                                "render_ms",
-                                                "project_cpu_ms",
-                                                "resolve_cpu_ms",
-                                                "fill_cpu_ms",
-                                                "smooth_cpu_ms",
-                                                "antialias_cpu_ms",
-                                                "points_selected",
-                                                "points_drawn",
-                                                "items",
-                                                "points_cached",
-                                                "sequence",
-                                                "update_age_ms",
-                                                "view_error_m",
-                                                "view_error_deg",
-                                                "px",
-                                                "py",
-                                                "pz",
-                                                "qw",
-                                                "qx",
-                                                "qy",
-                                                "qz",
-                                                "present_ms",
-                                                "detail",
-                                                "budget_ms",
-                                                "epoch",
-                                                "wait_ms",
-                                                "request",
-                                                "buffers_filled"};
-  return columns;
-}
-
-namespace {
-
 class Display {
  public:
-  Display(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ReplicaWorker& worker,
-          metrics::TableRecorder& frames, metrics::SpanRecorder& spans, FrameSpool* spool)
+  Display(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ViewerWorker& worker,
+          metrics::TableRecorder& frames, metrics::SpanRecorder& spans, FrameSpool* spool,
+          const SourceMaker& make_source)
       : o_(o),
         surface_(surface),
         gate_(gate),
@@ -103,14 +59,11 @@ class Display {
         frames_(frames),
         spans_(spans),
         spool_(spool),
+        make_source_(make_source),
         look_{o.render, o.shading.lit} {}
 
-  DisplayResult run(const SourceMaker& make_source) {
-    if (!wait_for_scene()) return {0, true, {}};
-    auto made = make_source(worker_.kind());
-    if (!made) return {0, true, made.error().text};
-    source_ = std::move(*made);
-    if (!rest()) return {0, true, {}};
+  DisplayResult run() {
+    if (!wait_for_scene() || !draw_from(newest_drawn()) || !rest()) return stopped_early();
     worker_.on_first_points(monotonic_s());
     start_s_ = o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s();
     while (!last_) frame();
@@ -118,9 +71,32 @@ class Display {
   }
 
  private:
+  DisplayResult stopped_early() {
+    result_.interrupted = true;
+    return result_;
+  }
+
+  // Draws from what frames are to show that show the update of this request; the same as before, unless the session changed between
+  // points and slice images. False: it cannot be drawn, result_ says why.
+  bool draw_from(RequestId request) {
+    auto received = worker_.received_at(request);
+    if (received == received_) return true;
+    source_.reset();  // its renderer's context must be gone before another one is made
+    received_ = std::move(received);
+    auto made = make_source_(*received_);
+    if (!made) {
+      result_.error = made.error().text;
+      return false;
+    }
+    source_ = std::move(*made);
+    return true;
+  }
+  // The request of what is drawn next, where nothing is waited for.
+  RequestId newest_drawn() const { return gate_.waits() ? RequestId{} : Succession::kNewest; }
+
   // Until it is known what there is to show.
   bool wait_for_scene() {
-    for (; worker_.kind() == SceneKind::kUnknown; sleep_until(monotonic_s() + kRestPeriod_s)) {
+    for (; !worker_.received_at({}); sleep_until(monotonic_s() + kRestPeriod_s)) {
       if (told_to_stop(worker_, surface_)) return false;
       const geometry::Camera camera = surface_.begin_frame(monotonic_s(), -1, look_);
       if (!surface_.visible()) continue;
@@ -137,6 +113,7 @@ class Display {
   bool rest() {
     for (; !worker_.first_update_complete(); sleep_until(monotonic_s() + kRestPeriod_s)) {
       if (told_to_stop(worker_, surface_)) return false;
+      if (!draw_from(newest_drawn())) return false;
       const double now_s = monotonic_s();
       const geometry::Camera camera = surface_.begin_frame(now_s, -1, look_);
       worker_.on_pose(now_s, camera);
@@ -162,7 +139,7 @@ class Display {
     const double begin_s = monotonic_s();
     for (;;) {
       if (const auto request = gate_.take(kLookAfterSurface_s)) {
-        source_->advance(*request);
+        if (draw_from(*request)) source_->advance(*request);
         return monotonic_s() - begin_s;
       }
       const double now_s = monotonic_s(), t_s = now_s - start_s_;
@@ -182,31 +159,51 @@ class Display {
   }
 
   void frame() {
-    const double wait_s = wait_for_update();
-    const double begin_s = monotonic_s(), t_s = begin_s - start_s_;
+    MeasuredFrame m{
+        .number = result_.frames, .start_s = start_s_, .previous_s = previous_s_, .wait_s = wait_for_update()};
+    if (!gate_.waits()) draw_from(Succession::kNewest);
+    if (!source_) {
+      result_.interrupted = last_ = true;
+      return;
+    }
+    m.begin_s = monotonic_s();
+    const double t_s = m.begin_s - start_s_;
     see_whether_last(t_s);
     // The view of now, from what is cached now.
-    const geometry::Camera camera = surface_.begin_frame(begin_s, t_s, look_);
+    m.camera = surface_.begin_frame(m.begin_s, t_s, look_);
     const uint32_t use = use_of_frame(t_s);
     const bool with_depth = use & (kVerify | kExr);
-    fit(view_, camera, spool_ != nullptr);
-    const DrawnFrame drawn = source_->draw({begin_s, camera, look_, with_depth}, view_);
-    const double end_s = monotonic_s();
-    worker_.on_frame(end_s, camera, drawn.epoch, gate_.waits() ? &drawn.update : nullptr);
+    fit(view_, m.camera, spool_ != nullptr);
+    m.drawn = source_->draw({m.begin_s, m.camera, look_, with_depth}, view_);
+    m.end_s = monotonic_s();
+    worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, gate_.waits() ? &m.drawn.update : nullptr);
     surface_.present(view_);
-    const double presented_s = monotonic_s();
-    const int filled = gate_.filled();
+    m.presented_s = monotonic_s();
+    m.filled = gate_.filled();
     source_->displayed();
     gate_.displayed();
-    add_row(begin_s, end_s, presented_s, camera, drawn, wait_s, filled);
-    view_intact_ = use == 0;
-    if (use) {
-      if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
-      view_ = spool_->exchange({result_.frames, t_s, use, camera, std::move(view_), drawn.epoch});
-    }
+    record(m);
+    keep(use, t_s, m);
     ++result_.frames;
-    surface_.report(live_figures(presented_s, result_.frames, drawn, *source_, worker_));
-    if (o_.target_fps > 0) sleep_until(next_frame_s(begin_s));
+    surface_.report(live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_));
+    if (o_.target_fps > 0) sleep_until(next_frame_s(m.begin_s));
+  }
+
+  void record(MeasuredFrame& m) {
+    m.update_age_s = worker_.to_master_s(m.end_s) - m.drawn.update.requested_s;
+    frames_.add(frame_row(m));
+    if (m.wait_s > 0)
+      spans_.add("wait for update", worker_.to_master_s(m.begin_s - m.wait_s), worker_.to_master_s(m.begin_s), 0);
+    spans_.add("display frame", worker_.to_master_s(m.begin_s), worker_.to_master_s(m.end_s), 0);
+    previous_s_ = m.end_s;
+  }
+
+  // Hands the picture to the spool, if it is to be kept.
+  void keep(uint32_t use, double t_s, const MeasuredFrame& m) {
+    view_intact_ = use == 0;
+    if (!use) return;
+    if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
+    view_ = spool_->exchange({m.number, t_s, use, m.camera, std::move(view_), m.drawn.epoch});
   }
 
   // Frames are due at equal distances: one that began late, because sleep ended late, does not delay those after it.
@@ -216,58 +213,17 @@ class Display {
     return due_s_;
   }
 
-  void add_row(double begin_s, double end_s, double presented_s, const geometry::Camera& camera, const DrawnFrame& d,
-               double wait_s, int filled) {
-    const auto& p = camera.pose.position_room;
-    const auto& q = camera.pose.orientation;
-    frames_.add({double(result_.frames),
-                 begin_s - start_s_,
-                 previous_s_ > 0 ? (end_s - previous_s_) * 1e3 : 0.0,
-                 (end_s - begin_s) * 1e3,
-                 (d.chosen_s - begin_s) * 1e3,
-                 (end_s - d.chosen_s) * 1e3,
-                 d.project_cpu_ms,
-                 d.resolve_cpu_ms,
-                 d.fill_cpu_ms,
-                 d.smooth_cpu_ms,
-                 d.antialias_cpu_ms,
-                 double(d.selected),
-                 double(d.drawn),
-                 double(d.items),
-                 double(d.cached),
-                 double(d.sequence),
-                 (worker_.to_master_s(end_s) - d.update.requested_s) * 1e3,
-                 glm::distance(p, d.update.pose.position_room),
-                 angle_deg(q, d.update.pose.orientation),
-                 p.x,
-                 p.y,
-                 p.z,
-                 q.w,
-                 q.x,
-                 q.y,
-                 q.z,
-                 (presented_s - end_s) * 1e3,
-                 d.detail,
-                 d.budget_ms,
-                 double(d.epoch.value),
-                 wait_s * 1e3,
-                 double(d.update.request.value),
-                 double(filled)});
-    if (wait_s > 0)
-      spans_.add("wait for update", worker_.to_master_s(begin_s - wait_s), worker_.to_master_s(begin_s), 0);
-    spans_.add("display frame", worker_.to_master_s(begin_s), worker_.to_master_s(end_s), 0);
-    previous_s_ = end_s;
-  }
-
   const DisplayOptions& o_;
   DisplaySurface& surface_;
   CouplingGate& gate_;
-  ReplicaWorker& worker_;
+  ViewerWorker& worker_;
   metrics::TableRecorder& frames_;
   metrics::SpanRecorder& spans_;
   FrameSpool* spool_;
+  const SourceMaker& make_source_;
   Look look_;
-  std::unique_ptr<ViewSource> source_;
+  std::shared_ptr<Received> received_;
+  std::unique_ptr<ViewSource> source_;  // draws received_; null: it cannot be drawn
   image::View view_;
   bool view_intact_ = false;  // it holds what is on display
   DisplayResult result_;
@@ -279,9 +235,9 @@ class Display {
 }  // namespace
 
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
-                          CouplingGate& gate, ReplicaWorker& worker, metrics::TableRecorder& frames,
+                          CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
                           metrics::SpanRecorder& spans, FrameSpool* spool) {
-  return Display(options, surface, gate, worker, frames, spans, spool).run(make_source);
+  return Display(options, surface, gate, worker, frames, spans, spool, make_source).run();
 }
 
 }  // namespace telesplat::viewer

@@ -5,14 +5,12 @@
 #include <string>
 
 #include "client/viewer/display/display_options.h"
+#include "client/viewer/display/frame_table.h"
 #include "client/viewer/display/view_source.h"
 #include "client/viewer/record/frame_spool.h"
 #include "client/viewer/viewer_worker.h"
 
 namespace telesplat::viewer {
-
-/// The columns of frames.csv (docs/metrics.md).
-const std::vector<std::string>& frame_columns();
 
 struct DisplayResult {
   uint64_t frames = 0;
@@ -20,15 +18,16 @@ struct DisplayResult {
   std::string error;         ///< what made a display impossible; empty: nothing
 };
 
-/// Makes what the display draws from, once it is known what the session shows. Called in the display's thread.
-using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(SceneKind)>;
+/// Makes what the display draws from. Called in the display's thread: when it is known what the session shows, and again when the session
+/// goes on with something that is drawn another way; what was made before is destroyed by then.
+using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&)>;
 
-/// Waits until it is known what there is to show and for the first complete view update (the head rests at the trajectory's beginning), then displays
-/// frames on the surface. Where the coupling says so each frame waits for a complete view update and shows the view of now from it; meanwhile the surface
-/// is looked after ten times a second. Only the last frame, when told to stop or at the end of the duration, waits for nothing.
-/// `spool` may be null: nothing is recorded.
+/// Waits until it is known what there is to show and for the first complete view update (the head rests at the trajectory's beginning),
+/// then displays frames on the surface. Where the coupling says so each frame waits for a complete view update and shows the view of now
+/// from it; meanwhile the surface is looked after ten times a second. Only the last frame, when told to stop or at the end of the
+/// duration, waits for nothing. `spool` may be null: nothing is recorded.
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
-                          CouplingGate& gate, ReplicaWorker& worker, metrics::TableRecorder& frames,
+                          CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
                           metrics::SpanRecorder& spans, FrameSpool* spool);
 
 }  // namespace telesplat::viewer

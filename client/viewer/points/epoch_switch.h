@@ -1,5 +1,5 @@
-// When a new replica takes the place of the one on display (issue 4: the old epoch stays until the new one covers the view or the
-// patience is over). Times come as arguments, decisions go out; no sockets, no clocks, no model.
+// When a new replica takes the place of the one on display: the old epoch stays until the new one covers the view or the patience is
+// over, so that a changing scene neither flickers nor lags. Times come as arguments, decisions go out; no sockets, no clocks, no model.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@ namespace telesplat::viewer {
 /// One replica is on display, at most one newer grows behind it. The newer one is shown
 ///   - as soon as a complete frame of full resolution is in it that this viewer asked for, or
 ///   - when `patience_s` have passed since the first epoch began that has not been shown, and there is something that covers a
-///     view: a complete frame, be it a coarse one or another viewer's; of frames without a coarse pass, any part.
+///     view: a complete frame, also a coarse one or another viewer's; where frames have no coarse pass, any part.
 /// An epoch that is superseded before it was shown does not start the clock again: however fast epochs follow each other, something
 /// newer is shown after the patience and the time to a coarse frame.
 /// A replica of the displayed epoch (the packer was restarted, the scene is the same) has no hurry: it waits for a complete frame

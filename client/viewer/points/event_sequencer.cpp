@@ -12,13 +12,13 @@ size_t ModelEvent::bytes() const {
 }
 
 void EventSequencer::start() {
-  packer_ = {};
+  packer_.reset();
   ask();
 }
 
 void EventSequencer::ask() {
   waiting_ = true;
-  callbacks_.request_state(packer_, packer_.value ? applied_ : Sequence{});
+  callbacks_.request_state(packer_.value_or(InstanceId{}), packer_ ? applied_ : Sequence{});
 }
 
 void EventSequencer::retry() {

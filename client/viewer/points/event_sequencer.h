@@ -45,9 +45,8 @@ class EventSequencer {
   /// An answer takes too long (a packer that died): ask again.
   void retry();
 
-  bool synchronised() const { return !waiting_ && packer_.value != 0; }
+  bool synchronised() const { return !waiting_ && packer_; }
   bool waiting() const { return waiting_; }
-  InstanceId packer() const { return packer_; }
   Sequence applied() const { return applied_; }
   uint64_t gaps() const { return gaps_; }
 
@@ -58,7 +57,7 @@ class EventSequencer {
   void drain();
 
   Callbacks callbacks_;
-  InstanceId packer_;
+  std::optional<InstanceId> packer_;  // none is followed yet
   Sequence applied_;
   bool waiting_ = false;
   std::deque<ModelEvent> kept_;  // published while an answer is awaited

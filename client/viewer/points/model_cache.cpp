@@ -132,7 +132,8 @@ void ModelCache::end_frame() {
 ModelCache::Figures ModelCache::figures() const {
   const std::lock_guard lock(mutex_);
   if (!newest_.model) return {};
-  return {newest_.model->points(), newest_.model->bytes() + newest_.summary_bytes, displayed().model->points(), patches_};
+  return {newest_.model->points(), newest_.model->bytes() + newest_.summary_bytes, displayed().model->points(),
+          patches_};
 }
 
 }  // namespace telesplat::viewer

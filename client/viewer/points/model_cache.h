@@ -59,8 +59,9 @@ class ModelCache {
     uint64_t summary_bytes = 0;  // of them
   };
   struct Dropped {
-    std::vector<std::unique_ptr<points::Cluster>> clusters;  // where they were, or what was dropped of them: draw lists point to it
-    std::vector<points::Mosaic> mosaics;                     // merged into others
+    std::vector<std::unique_ptr<points::Cluster>>
+        clusters;                         // where they were, or what was dropped of them: draw lists point to it
+    std::vector<points::Mosaic> mosaics;  // merged into others
     std::vector<std::unique_ptr<points::Summary>> summaries;
     std::vector<std::unique_ptr<points::PointModel>> models;
   };

@@ -12,30 +12,24 @@ constexpr double kBudgetShare = 0.85;
 
 }  // namespace
 
-PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ViewerCaches& caches,
-                         ReplicaWorker& worker)
+PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ReceivedPoints& received)
     : options_(options),
       renderer_(std::move(renderer)),
-      caches_(caches),
-      worker_(worker),
+      received_(received),
       budget_(options.detail_budget && options.target_fps > 0 ? kBudgetShare * 1e3 / options.target_fps : 0,
               options.least_detail) {}
-
-void PointSource::advance(RequestId request) {
-  if (const auto update = caches_.batches.apply(request, caches_.points)) shown_ = *update;
-}
 
 DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   auto& o = options_;
   const geometry::Camera& camera = input.camera;
   o.shading.lit = input.look.lit;
   o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(input.look.render.kernel);
-  o.selection.best_patch_only = worker_.keeps_redundant();
+  o.selection.best_patch_only = received_.keeps_redundant();
   if (!input.resting) {
     if (o.speed_detail) speed_.frame(input.begin_s, camera, list_.distance_m > 0 ? list_.distance_m : 1);
     o.selection.detail = float(std::min(budget_.detail(), speed_.detail()));
   }
-  caches_.points.select(camera, o.selection, list_);
+  received_.cache().select(camera, o.selection, list_);
   DrawnFrame out;
   out.empty = list_.points == 0;
   out.chosen_s = monotonic_s();
@@ -44,7 +38,7 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
     stats = renderer_->render(
         list_, camera, input.look.render, image::Shading(o.shading, camera),
         {camera.width, camera.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr});
-  caches_.points.end_frame();
+  received_.cache().end_frame();
   if (!input.resting) {
     const double end_s = monotonic_s();
     // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
@@ -53,7 +47,7 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
                                                   std::max(o.threads, 1);
     budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, std::min((end_s - out.chosen_s) * 1e3, work_ms),
                        double(list_.points), o.selection.detail);
-    worker_.on_seen(list_.clusters_seen, list_.frames_seen);
+    received_.on_seen(list_.clusters_seen, list_.frames_seen);
   }
   out.project_cpu_ms = stats.project_ms;
   out.resolve_cpu_ms = stats.resolve_ms;
@@ -63,12 +57,12 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   out.selected = list_.points;
   out.drawn = stats.points_drawn;
   out.items = list_.items.size();
-  out.cached = caches_.points.figures().points_displayed;
+  out.cached = received_.cache().figures().points_displayed;
   out.sequence = list_.applied.value;
   out.detail = o.selection.detail;
   out.budget_ms = budget_.budget_ms();
   out.epoch = list_.epoch;
-  out.update = caches_.gate.waits() ? shown_ : worker_.last_update();
+  out.update = received_.shown();
   return out;
 }
 

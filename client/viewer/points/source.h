@@ -1,8 +1,9 @@
 // The display's source for scenes of points: selects from the model cache, splats.
 #pragma once
 
-#include "client/viewer/display/display_loop.h"
+#include "client/viewer/display/display_options.h"
 #include "client/viewer/display/view_source.h"
+#include "client/viewer/points/received_points.h"
 #include "client/viewer/render/renderer.h"
 #include "common/splat/select/frame_budget.h"
 
@@ -10,10 +11,9 @@ namespace telesplat::viewer {
 
 class PointSource final : public ViewSource {
  public:
-  PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ViewerCaches& caches,
-              ReplicaWorker& worker);
+  PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ReceivedPoints& received);
 
-  void advance(RequestId request) override;
+  void advance(RequestId request) override { received_.advance(request); }
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
   const char* drawn_name() const override { return "points"; }
   const char* cached_name() const override { return ""; }
@@ -21,12 +21,10 @@ class PointSource final : public ViewSource {
  private:
   DisplayOptions options_;
   std::unique_ptr<Renderer> renderer_;
-  ViewerCaches& caches_;
-  ReplicaWorker& worker_;
+  ReceivedPoints& received_;
   splat::FrameBudget budget_;
   splat::SpeedDetail speed_;
   splat::DrawList list_;
-  ShownUpdate shown_;  // where the display waits
 };
 
 }  // namespace telesplat::viewer

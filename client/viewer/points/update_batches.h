@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "client/viewer/points/model_cache.h"
 #include "client/viewer/coupling/shown_update.h"
+#include "client/viewer/points/model_cache.h"
 
 namespace telesplat::viewer {
 

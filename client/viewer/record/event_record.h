@@ -1,5 +1,5 @@
-// The point-model events that a viewer applied, kept as they came, so that any displayed frame's model can be made again: what was
-// sent is all that is needed (DESIGN section 2, "Replicated state").
+// The point-model events that a viewer applied, kept as they came, so that any displayed frame's model can be made again: a replica is
+// nothing but its packer's events in their order (docs/architecture.md), so that what was sent is all that is needed.
 //
 // File: "TSEVENT2", then records  u32 type length, u64 body length, type, body  (little-endian). Types: "replica" (six floats: the
 // box in room space, lo then hi; u32: octree depth; u32: 1 if mosaics are merged) where a replica begins, and the wire's "patch", "forget", "epoch_begin".

@@ -100,8 +100,16 @@ void SliceReceiver::on(const wire::SliceFrame& f, net::Socket& state) {
   spans_.add("decode", links_.to_master_s(begin_s), links_.to_master_s(monotonic_s()), 1);
   cache_.put(std::move(*frame));
   if (options_.buffers == 0) acknowledge(f.frame, state);
-  links_.on_part({f.viewer, f.request, f.epoch, f.frame, true, std::max<uint64_t>(f.slabs, 1), pixels, f.voxels,
-                  f.data.size(), f.camera});
+  links_.on_part({.viewer = f.viewer,
+                  .request = f.request,
+                  .epoch = f.epoch,
+                  .frame = f.frame,
+                  .complete = true,
+                  .tiles = std::max<uint64_t>(f.slabs, 1),
+                  .points = pixels,
+                  .samples = f.voxels,
+                  .bytes = f.data.size(),
+                  .camera = f.camera});
 }
 
 void SliceReceiver::acknowledge(FrameId frame, net::Socket& state) {

@@ -4,7 +4,7 @@
 
 namespace telesplat::viewer {
 
-DrawnFrame VolumeSource::draw(const FrameInput& input, image::View& view) {
+DrawnFrame SliceSource::draw(const FrameInput& input, image::View& view) {
   const BufferedFrame shown = cache_.displayed();
   DrawnFrame out;
   out.empty = shown.frame == nullptr;

@@ -1,16 +1,16 @@
-// The display's source for volumes: warps the newest complete frame of slice images, or where the display waits the next one, into the view of now.
+// The display's source for slice images: warps the newest complete frame of slice images, or where the display waits the next one, into the view of now.
 #pragma once
 
-#include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/view_source.h"
 #include "client/viewer/render/slices/renderer.h"
+#include "client/viewer/slices/cache.h"
 
 namespace telesplat::viewer {
 
-class VolumeSource final : public ViewSource {
+class SliceSource final : public ViewSource {
  public:
   /// background: 0x00RRGGBB.
-  VolumeSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache, uint32_t background)
+  SliceSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache, uint32_t background)
       : renderer_(std::move(renderer)), cache_(cache), background_(background) {}
 
   void advance(RequestId request) override { cache_.advance(request); }

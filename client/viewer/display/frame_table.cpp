@@ -1,0 +1,61 @@
+#include "client/viewer/display/frame_table.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/metrics/columns.h"
+
+namespace telesplat::viewer {
+namespace {
+
+using F = const MeasuredFrame&;
+
+double angle_deg(const glm::dquat& a, const glm::dquat& b) {
+  return 2 * std::acos(std::min(1.0, std::abs(glm::dot(a, b)))) * 180 / 3.14159265358979323846;
+}
+
+const glm::dvec3& position(F f) { return f.camera.pose.position_room; }
+const glm::dquat& orientation(F f) { return f.camera.pose.orientation; }
+
+constexpr metrics::Column<MeasuredFrame> kColumns[] = {
+    {"frame", [](F f) { return double(f.number); }},
+    {"t_s", [](F f) { return f.begin_s - f.start_s; }},
+    {"inter_frame_ms", [](F f) { return f.previous_s > 0 ? (f.end_s - f.previous_s) * 1e3 : 0.0; }},
+    {"construction_ms", [](F f) { return (f.end_s - f.begin_s) * 1e3; }},
+    {"select_ms", [](F f) { return (f.drawn.chosen_s - f.begin_s) * 1e3; }},
+    {"render_ms", [](F f) { return (f.end_s - f.drawn.chosen_s) * 1e3; }},
+    {"project_cpu_ms", [](F f) { return f.drawn.project_cpu_ms; }},
+    {"resolve_cpu_ms", [](F f) { return f.drawn.resolve_cpu_ms; }},
+    {"fill_cpu_ms", [](F f) { return f.drawn.fill_cpu_ms; }},
+    {"smooth_cpu_ms", [](F f) { return f.drawn.smooth_cpu_ms; }},
+    {"antialias_cpu_ms", [](F f) { return f.drawn.antialias_cpu_ms; }},
+    {"points_selected", [](F f) { return double(f.drawn.selected); }},
+    {"points_drawn", [](F f) { return double(f.drawn.drawn); }},
+    {"items", [](F f) { return double(f.drawn.items); }},
+    {"points_cached", [](F f) { return double(f.drawn.cached); }},
+    {"sequence", [](F f) { return double(f.drawn.sequence); }},
+    {"update_age_ms", [](F f) { return f.update_age_s * 1e3; }},
+    {"view_error_m", [](F f) { return glm::distance(position(f), f.drawn.update.pose.position_room); }},
+    {"view_error_deg", [](F f) { return angle_deg(orientation(f), f.drawn.update.pose.orientation); }},
+    {"px", [](F f) { return position(f).x; }},
+    {"py", [](F f) { return position(f).y; }},
+    {"pz", [](F f) { return position(f).z; }},
+    {"qw", [](F f) { return orientation(f).w; }},
+    {"qx", [](F f) { return orientation(f).x; }},
+    {"qy", [](F f) { return orientation(f).y; }},
+    {"qz", [](F f) { return orientation(f).z; }},
+    {"present_ms", [](F f) { return (f.presented_s - f.end_s) * 1e3; }},
+    {"detail", [](F f) { return f.drawn.detail; }},
+    {"budget_ms", [](F f) { return f.drawn.budget_ms; }},
+    {"epoch", [](F f) { return double(f.drawn.epoch.value); }},
+    {"wait_ms", [](F f) { return f.wait_s * 1e3; }},
+    {"request", [](F f) { return double(f.drawn.update.request.value); }},
+    {"buffers_filled", [](F f) { return double(f.filled); }},
+};
+
+}  // namespace
+
+std::vector<std::string> frame_columns() { return metrics::names(kColumns); }
+std::vector<double> frame_row(const MeasuredFrame& frame) { return metrics::values(kColumns, frame); }
+
+}  // namespace telesplat::viewer

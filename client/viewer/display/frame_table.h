@@ -1,0 +1,27 @@
+// frames.csv (docs/metrics.md): a row for each displayed frame, a line of frame_table.cpp for each column.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/viewer/display/view_source.h"
+
+namespace telesplat::viewer {
+
+/// A displayed frame as it was measured. Times are those of the monotonic clock.
+struct MeasuredFrame {
+  uint64_t number = 0;
+  double start_s = 0;     ///< the display began
+  double previous_s = 0;  ///< the frame before was finished; 0: there was none
+  double begin_s = 0, end_s = 0, presented_s = 0;
+  double wait_s = 0;        ///< for the update, before begin_s
+  double update_age_s = 0;  ///< since the update that it shows was requested
+  geometry::Camera camera{};
+  DrawnFrame drawn{};
+  int filled = 0;  ///< complete updates that waited to be displayed
+};
+
+std::vector<std::string> frame_columns();
+std::vector<double> frame_row(const MeasuredFrame& frame);
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,33 @@
+// Where a display's sources get their renderers: made when a source needs one, on the CPU or with OpenGL.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "client/viewer/render/renderer.h"
+#include "client/viewer/render/slices/renderer.h"
+
+namespace telesplat::viewer {
+
+/// Used by one thread, the display's. A renderer's context must be gone before another renderer is made: sources are destroyed first.
+class Renderers {
+ public:
+  /// kind: "auto" (gl on a hardware GPU, else cpu), "cpu", "gl". Makes the first one of points at once, so that what cannot be is
+  /// found out before the session begins. Error: what was tried.
+  static Result<Renderers> make(const std::string& kind, int threads);
+
+  /// What draws points: "cpu" or "gl".
+  const char* name() const { return name_; }
+  Result<std::unique_ptr<Renderer>> for_points();
+  Result<std::unique_ptr<VolumeRenderer>> for_slices();
+
+ private:
+  Renderers(std::string kind, int threads, std::unique_ptr<Renderer> first);
+
+  std::string kind_;
+  int threads_;
+  const char* name_;
+  std::unique_ptr<Renderer> first_;  // until somebody needs one
+};
+
+}  // namespace telesplat::viewer

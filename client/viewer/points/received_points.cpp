@@ -1,0 +1,109 @@
+#include "client/viewer/points/received_points.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "client/viewer/points/source.h"
+#include "common/scene/session.h"
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr Feed kFeeds[] = {{net::Kind::kSub, "patches"}, {net::Kind::kDealer, "state"}};
+constexpr size_t kSummariesAtOnce = 8;
+
+}  // namespace
+
+ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLinks& links)
+    : links_(links),
+      waits_(links.gate.waits()),
+      receiver_({links.viewer, options.epoch_patience_s, options.events, waits_},
+                {[this] { return config_; },
+                 [this](InstanceId packer, Sequence after) {
+                   if (auto* state = links_.feeds.find("state"))
+                     state->send(wire::StateRequest{links_.viewer, packer, after});
+                 },
+                 links.on_part, links.on_epoch, links.to_master_s},
+                cache_, batches_, links.spans) {}
+
+Status ReceivedPoints::follow(const wire::Welcome& session) {
+  const bool keep = scene::SessionView(session).setting("packing.keep_redundant", 0) != 0;
+  const int depth = int(std::min<uint64_t>(session.octree_depth, std::numeric_limits<int>::max()));
+  const points::ModelConfig config{session.box_room, depth, !keep};
+  if (const Status s = points::validate(config); !s) return s;
+  config_ = config;
+  keeps_redundant_ = keep;
+  return ok_status();
+}
+
+std::span<const Feed> ReceivedPoints::feeds() const { return kFeeds; }
+
+void ReceivedPoints::receive(int most) {
+  receiver_.receive_answers(*links_.feeds.find("state"), most);
+  receiver_.receive_events(*links_.feeds.find("patches"), most);
+}
+
+void ReceivedPoints::tick(double now_s) {
+  receiver_.tick(now_s);
+  if (!waits_) cache_.summarise(kSummariesAtOnce);
+  cache_.free_dropped();
+}
+
+void ReceivedPoints::on_update(const ShownUpdate& update) {
+  if (waits_) return batches_.close(update);
+  const std::lock_guard lock(mutex_);
+  shown_ = update;
+}
+
+void ReceivedPoints::advance(RequestId request) {
+  const auto update = batches_.apply(request, cache_);
+  if (!update) return;
+  const std::lock_guard lock(mutex_);
+  shown_ = *update;
+}
+
+ShownUpdate ReceivedPoints::shown() const {
+  const std::lock_guard lock(mutex_);
+  return shown_;
+}
+
+void ReceivedPoints::on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames) {
+  if (retired_) return;  // nobody takes the log any more
+  const std::lock_guard lock(mutex_);
+  seen_.add(clusters, frames);
+}
+
+void ReceivedPoints::report() {
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(seen_, reported_);
+  }
+  auto reports = reported_.reports();
+  auto* state = links_.feeds.find("state");
+  if (!state) return;
+  for (auto& part : reports)
+    state->send(wire::AccessReport{links_.viewer, std::move(part.clusters), std::move(part.frames)});
+}
+
+void ReceivedPoints::add_status(net::MasterLink::Values& values) const {
+  const auto model = cache_.figures();
+  const auto received = receiver_.figures();
+  values["points"] = double(model.points);
+  values["model_bytes"] = double(model.bytes);
+  values["points_received"] = double(received.points_received);
+  values["gaps_resynced"] = double(received.gaps);
+  values["sequence"] = double(received.sequence.value);
+  values["messages_rejected"] += double(received.decode_errors);
+  if (waits_) return;
+  // Where nothing is held back it is the receiver that knows when an epoch is shown.
+  values["epochs_shown"] = double(received.epochs_shown);
+  values["epoch"] = double(received.epoch.value);
+}
+
+Result<std::unique_ptr<ViewSource>> ReceivedPoints::make_source(const DisplayOptions& options, Renderers& renderers) {
+  auto renderer = renderers.for_points();
+  if (!renderer) return renderer.error();
+  return std::unique_ptr<ViewSource>(new PointSource(options, std::move(*renderer), *this));
+}
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,56 @@
+// Points of a session: a replica of the packer's model, kept up to date by its events.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+
+#include "client/viewer/points/access_log.h"
+#include "client/viewer/points/model_cache.h"
+#include "client/viewer/points/receiver.h"
+#include "client/viewer/points/update_batches.h"
+#include "client/viewer/received.h"
+
+namespace telesplat::viewer {
+
+class ReceivedPoints final : public Received {
+ public:
+  ReceivedPoints(const ReceivedOptions& options, const ReceivedLinks& links);
+
+  Status follow(const wire::Welcome& session) override;
+  std::span<const Feed> feeds() const override;
+  void on_connected() override { receiver_.start(); }
+  void receive(int most) override;
+  void tick(double now_s) override;
+  void on_update(const ShownUpdate& update) override;
+  void report() override;
+  void on_retired() override { retired_ = true; }
+  void add_status(net::MasterLink::Values& values) const override;
+  Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) override;
+
+  // ---- for its source, in the display's thread ----
+  ModelCache& cache() { return cache_; }
+  /// Where the display waits: shows this update, which is complete.
+  void advance(RequestId request);
+  /// The newest update that what is on display contains.
+  ShownUpdate shown() const;
+  /// What a frame drew.
+  void on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames);
+  /// The session packs without eliminating redundancy: of each cluster the best patches are to be drawn (T4.4.3.3).
+  bool keeps_redundant() const { return keeps_redundant_; }
+
+ private:
+  ReceivedLinks links_;
+  const bool waits_;  // the display, for whole updates
+  ModelCache cache_;
+  UpdateBatches batches_;
+  PointReceiver receiver_;
+  points::ModelConfig config_;  // valid once the feeds are connected
+  AccessLog reported_;          // takes turns with seen_
+  std::atomic<bool> keeps_redundant_{false}, retired_{false};
+
+  mutable std::mutex mutex_;  // guards what both threads use, below
+  AccessLog seen_;
+  ShownUpdate shown_;
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,14 @@
+#include "client/viewer/received.h"
+
+#include "client/viewer/points/received_points.h"
+#include "client/viewer/slices/received_slices.h"
+
+namespace telesplat::viewer {
+
+std::shared_ptr<Received> make_received(scene::Pipeline pipeline, const ReceivedOptions& options,
+                                        const ReceivedLinks& links) {
+  if (pipeline == scene::Pipeline::kSlices) return std::make_shared<ReceivedSlices>(links);
+  return std::make_shared<ReceivedPoints>(options, links);
+}
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,79 @@
+// What a viewer receives of a session, keeps and draws: points of a model, or frames of slice images. One implementation for each
+// pipeline (points/received_points.h, slices/received_slices.h), each with a cache of its own. Nobody else asks which it is.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "client/viewer/coupling/coupling_gate.h"
+#include "client/viewer/coupling/shown_update.h"
+#include "client/viewer/coupling/view_requester.h"
+#include "client/viewer/display/display_options.h"
+#include "client/viewer/display/renderers.h"
+#include "client/viewer/display/view_source.h"
+#include "client/viewer/feeds.h"
+#include "common/metrics/recorder.h"
+#include "common/net/master_link.h"
+#include "common/scene/kind.h"
+
+namespace telesplat::viewer {
+
+class Received {
+ public:
+  virtual ~Received() = default;
+
+  // ---- worker thread ----
+  /// The session as its master tells of it now. Error: it cannot be shown; names the value and its limit. All stays as it was then.
+  virtual Status follow(const wire::Welcome& session) = 0;
+  /// Where updates come from.
+  virtual std::span<const Feed> feeds() const = 0;
+  /// Its feeds were connected anew: there is another packer, which knows nothing of this viewer.
+  virtual void on_connected() = 0;
+  /// Another master took over, which counts frames anew.
+  virtual void on_new_master() {}
+  /// Takes at most `most` messages from each feed. Its feeds are connected.
+  virtual void receive(int most) = 0;
+  /// What is due by time alone. To be called every few milliseconds.
+  virtual void tick(double now_s) = 0;
+  /// A view update of this viewer's is complete. Where the display waits for whole updates: and may be displayed from now on, since
+  /// all before it may.
+  virtual void on_update(const ShownUpdate&) {}
+  /// Tells the packer what was drawn since the last call.
+  virtual void report() {}
+  /// The session goes on with another one: nothing of the above is called any more. What is here can still be drawn.
+  virtual void on_retired() {}
+  /// Puts in what it knows better than the zeros that are there; adds to "messages_rejected".
+  virtual void add_status(net::MasterLink::Values& values) const = 0;
+
+  // ---- display thread ----
+  /// What draws it, to be used no longer than this lives. Error: no renderer could be made.
+  virtual Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) = 0;
+};
+
+/// What the worker lends. References and functions are used in the worker's thread, as long as it has not retired the Received.
+struct ReceivedLinks {
+  InstanceId viewer;
+  CouplingGate& gate;
+  Feeds& feeds;
+  metrics::SpanRecorder& spans;
+  std::function<void(const ViewPart&)>
+      on_part;                     ///< part of an update can be drawn, or is held until its update is complete
+  std::function<void()> on_epoch;  ///< a new epoch began
+  std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester
+  std::function<double(double)> to_master_s;
+};
+
+class EventRecorder;
+
+struct ReceivedOptions {
+  double epoch_patience_s = 0.15;  ///< EpochSwitch
+  EventRecorder* events =
+      nullptr;  ///< keeps every applied event of points; null: nothing is kept. Outlives the Received
+};
+
+std::shared_ptr<Received> make_received(scene::Pipeline pipeline, const ReceivedOptions& options,
+                                        const ReceivedLinks& links);
+
+}  // namespace telesplat::viewer

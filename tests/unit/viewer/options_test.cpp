@@ -1,0 +1,178 @@
+// The viewer's flags and the columns of its tables.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "client/viewer/coupling/update_table.h"
+#include "client/viewer/display/frame_table.h"
+#include "client/viewer/viewer_options.h"
+
+namespace telesplat::viewer {
+namespace {
+
+using Texts = std::vector<std::string>;
+
+Texts names_of(const options::Table& table, auto&& which) {
+  Texts out;
+  for (const auto& row : table)
+    if (which(row)) out.push_back(options::name_of(row));
+  return out;
+}
+
+TEST(ViewerFlags, ThoseOfPointsFitMeshesAndJuliaSetsAlone) {
+  ViewerOptions o;
+  const auto points = names_of(table(o), [](const options::Row& r) { return !r.fits.has(scene::Kind::kVolume); });
+  EXPECT_EQ(points, (Texts{"--detail-budget", "--least-detail", "--speed-detail", "--splat", "--splat-scale",
+                           "--finish", "--epoch-patience"}));
+}
+
+TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {
+  ViewerOptions o;
+  const auto recorded =
+      names_of(view_table(o), [](const options::Row& r) { return r.reach == options::Reach::kRecorded; });
+  EXPECT_EQ(recorded, (Texts{"--size", "--fov", "--near", "--shading"}));
+}
+
+TEST(ViewerFlags, SayWhatDiffersAndReadItBack) {
+  ViewerOptions usual, o;
+  EXPECT_EQ(options::arguments(table(o), table(usual)), Texts{}) << "what nobody gave is not passed on";
+  o.size = "640x400";
+  o.least_sampling = 0.4;
+  o.display.detail_budget = false;
+  o.display.exr = true;
+  o.buffers = 5;
+  const auto arguments = options::arguments(table(o), table(usual));
+  EXPECT_EQ(arguments,
+            (Texts{"--size=640x400", "--least-sampling=0.4", "--detail-budget=off", "--buffers=5", "--exr"}));
+  const auto again = table(usual);
+  for (const auto& argument : arguments) {
+    const size_t equals = argument.find('=');
+    const auto* row = options::find(again, argument.substr(0, equals));
+    ASSERT_NE(row, nullptr) << argument;
+    EXPECT_TRUE(options::set(*row, equals == std::string::npos ? "true" : argument.substr(equals + 1)).ok());
+  }
+  EXPECT_EQ(usual.least_sampling, 0.4);
+  EXPECT_EQ(options::arguments(table(o), table(usual)), Texts{});
+}
+
+TEST(ViewerFlags, HaveLimits) {
+  ViewerOptions o;
+  const auto rows = table(o);
+  for (const auto& [flag, text] : {std::pair{"--least-sampling", "0.05"},
+                                   {"--least-sampling", "nan"},
+                                   {"--fov", "171"},
+                                   {"--buffers", "9"},
+                                   {"--finish", "fill,shine"},
+                                   {"--shading", "dim"},
+                                   {"--splat", "cube"},
+                                   {"--record-points", "1048577"},
+                                   {"--coupling", "tight"},
+                                   {"--detail-budget", "yes"}})
+    EXPECT_FALSE(options::set(*options::find(rows, flag), text).ok()) << flag << " " << text;
+}
+
+TEST(ViewerFlags, AreSettledOrRefused) {
+  ViewerOptions o;
+  o.size = "640x400";
+  o.wall = "3x2";
+  o.wall_tile = 5;
+  o.coupling = "loose";
+  ASSERT_TRUE(settle(o).ok());
+  EXPECT_EQ(o.display.width, 640);
+  EXPECT_EQ(o.display.wall.tile, 5);
+  EXPECT_EQ(o.requests.buffers, 3u);
+  EXPECT_TRUE(o.requests.adaptive);
+  o.wall_tile = 6;
+  const Status s = settle(o);
+  ASSERT_FALSE(s.ok());
+  EXPECT_EQ(s.error().text, "--wall-tile 6: --wall 3x2 has the tiles 0..5");
+}
+
+TEST(Wall, HasNoMoreTilesThanItMay) {
+  EXPECT_EQ(parse_wall("4x4", 16).value(), (WallLayout{4, 4}));
+  EXPECT_FALSE(parse_wall("5x4", 16).ok());
+  EXPECT_EQ(parse_wall("16x16").value().tiles(), 256);
+}
+
+TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
+  EXPECT_EQ(frame_columns(), (Texts{"frame",
+                                    "t_s",
+                                    "inter_frame_ms",
+                                    "construction_ms",
+                                    "select_ms",
+                                    "render_ms",
+                                    "project_cpu_ms",
+                                    "resolve_cpu_ms",
+                                    "fill_cpu_ms",
+                                    "smooth_cpu_ms",
+                                    "antialias_cpu_ms",
+                                    "points_selected",
+                                    "points_drawn",
+                                    "items",
+                                    "points_cached",
+                                    "sequence",
+                                    "update_age_ms",
+                                    "view_error_m",
+                                    "view_error_deg",
+                                    "px",
+                                    "py",
+                                    "pz",
+                                    "qw",
+                                    "qx",
+                                    "qy",
+                                    "qz",
+                                    "present_ms",
+                                    "detail",
+                                    "budget_ms",
+                                    "epoch",
+                                    "wait_ms",
+                                    "request",
+                                    "buffers_filled"}));
+  MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
+  f.drawn.chosen_s = 3.25;
+  f.filled = 2;
+  const auto row = frame_row(f);
+  ASSERT_EQ(row.size(), frame_columns().size());
+  EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
+  EXPECT_EQ(row.back(), 2);
+}
+
+TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
+  EXPECT_EQ(update_columns(),
+            (Texts{"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
+                   "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch"}));
+  ViewRequester::Update u;
+  u.requested_s = 1, u.first_s = 1.25, u.complete_s = 1.5;
+  u.samples = 100, u.points = 25, u.eliminated = 75;
+  const auto row = update_row({u, {}});
+  EXPECT_EQ(row[5], 500);
+  EXPECT_EQ(row[6], 250);
+  EXPECT_EQ(row[11], 0.75);
+}
+
+TEST(LeastSampling, IsWhatTheSessionTellsWithinItsLimits) {
+  for (const auto& [told, scale] : {std::pair{0.4, 0.4}, {0.01, 0.1}, {7.0, 1.0}, {std::nan(""), 0.1}}) {
+    ViewRequester requester({.max_rate_hz = 1000, .adaptive = true, .target_latency_s = 0.01}, {5});
+    requester.set_min_scale(told);
+    geometry::Camera display = geometry::make_camera({}, 90, 2000, 2000);
+    int width = 0;
+    // The head turns and every update takes far too long: sampling becomes as coarse as it may.
+    for (int i = 0; i < 60; ++i) {
+      const double now_s = i * 2.0;
+      for (int k = 0; k < 5; ++k) {
+        display.pose.orientation = glm::angleAxis(0.002 * (5 * i + k), glm::dvec3(0, 1, 0));
+        requester.on_pose(now_s + k * 0.02, display);
+      }
+      const auto request = requester.next(now_s + 0.1);
+      ASSERT_TRUE(request);
+      width = request->camera.width;
+      const double wider = (request->camera.right - request->camera.left) / (display.right - display.left);
+      width = int(std::lround(width / wider));
+      requester.on_part({.viewer = {5}, .request = request->request, .complete = true}, now_s + 1.9);
+    }
+    EXPECT_NEAR(width, 2000 * scale, 16) << told;
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::viewer

@@ -1,0 +1,141 @@
+// What a viewer receives: sessions that cannot be shown are refused, and one that changes its kind is followed picture by picture.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "client/viewer/received.h"
+#include "client/viewer/succession.h"
+#include "tests/support/points_scenes.h"
+
+namespace telesplat::viewer {
+namespace {
+
+class Receiving : public testing::Test {
+ protected:
+  wire::Welcome session() const {
+    wire::Welcome w;
+    w.octree_depth = 5;
+    w.box_room = test::scene_config().box_room;
+    return w;
+  }
+  std::shared_ptr<Received> make(scene::Pipeline pipeline) {
+    return make_received(pipeline, {},
+                         {.viewer = {5},
+                          .gate = gate,
+                          .feeds = feeds,
+                          .spans = spans,
+                          .on_part = [](const ViewPart&) {},
+                          .on_epoch = [] {},
+                          .requested_s = [](RequestId) { return std::nullopt; },
+                          .to_master_s = [](double s) { return s; }});
+  }
+
+  net::Context context;
+  CouplingGate gate{0};
+  Feeds feeds{context, "viewer"};
+  metrics::SpanRecorder spans;
+};
+
+TEST_F(Receiving, PointsTakeASessionThatAModelCanHave) {
+  EXPECT_TRUE(make(scene::Pipeline::kPoints)->follow(session()).ok());
+}
+
+TEST_F(Receiving, PointsRefuseBoxesAndDepthsThatNoModelCanHave) {
+  const auto received = make(scene::Pipeline::kPoints);
+  const auto refused = [&](const wire::Welcome& w) {
+    const Status s = received->follow(w);
+    return s.ok() ? std::string() : s.error().text;
+  };
+  for (const float side : {3e6f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    wire::Welcome w = session();
+    w.box_room.hi.y = side;
+    EXPECT_NE(refused(w).find("outside [-1e6, 1e6]"), std::string::npos) << refused(w);
+  }
+  for (const uint64_t depth : {uint64_t{11}, uint64_t{1} << 32, ~uint64_t{0}}) {
+    wire::Welcome w = session();
+    w.octree_depth = depth;
+    EXPECT_NE(refused(w).find("is outside 0..10"), std::string::npos) << refused(w);
+  }
+  EXPECT_TRUE(received->follow(session()).ok()) << "what was refused left nothing behind";
+}
+
+TEST_F(Receiving, SlicesRefuseASessionWithoutAVolume) {
+  EXPECT_FALSE(make(scene::Pipeline::kSlices)->follow(session()).ok());
+}
+
+TEST_F(Receiving, FeedsAreConnectedAnewWhereASessionIsElsewhere) {
+  wire::Welcome w = session();
+  const auto points = make(scene::Pipeline::kPoints), slices = make(scene::Pipeline::kSlices);
+  w.endpoints = {{"state", "inproc://state"}};
+  EXPECT_FALSE(feeds.connect(points->feeds(), w)) << "it is not known where patches come from";
+  EXPECT_FALSE(feeds.connected());
+  w.endpoints["patches"] = "inproc://patches";
+  EXPECT_TRUE(feeds.connect(points->feeds(), w));
+  EXPECT_NE(feeds.find("patches"), nullptr);
+  EXPECT_FALSE(feeds.connect(points->feeds(), w));
+  w.endpoints["state"] = "inproc://other";
+  EXPECT_TRUE(feeds.connect(points->feeds(), w));
+  EXPECT_TRUE(feeds.connect(slices->feeds(), w)) << "another packer, at the same place";
+  EXPECT_EQ(feeds.find("patches"), nullptr);
+  EXPECT_NE(feeds.find("state"), nullptr);
+  w.endpoints.clear();
+  EXPECT_FALSE(feeds.connect(slices->feeds(), w));
+  EXPECT_TRUE(feeds.connected()) << "nobody serves it now: what is open stays";
+}
+
+class Successors : public Receiving {
+ protected:
+  std::shared_ptr<Received> begin(scene::Pipeline pipeline) {
+    auto out = make(pipeline);
+    succession.begin(out);
+    return out;
+  }
+  Succession succession;
+};
+
+TEST_F(Successors, TheFirstIsDrawnBeforeItHasAPicture) {
+  EXPECT_EQ(succession.at({}), nullptr);
+  const auto first = begin(scene::Pipeline::kPoints);
+  EXPECT_EQ(succession.at({}), first);
+  const auto second = begin(scene::Pipeline::kSlices);
+  EXPECT_EQ(succession.at({}), second) << "the first never had one";
+}
+
+TEST_F(Successors, TheNextIsDrawnOnceItHasAPicture) {
+  const auto first = begin(scene::Pipeline::kPoints);
+  succession.on_update({3});
+  const auto second = begin(scene::Pipeline::kSlices);
+  EXPECT_EQ(succession.at(Succession::kNewest), first);
+  succession.on_update({7});
+  EXPECT_EQ(succession.at({6}), first) << "an update of the first still waits for the display";
+  EXPECT_EQ(succession.at({7}), second);
+  EXPECT_EQ(succession.at(Succession::kNewest), second);
+}
+
+TEST_F(Successors, OneWithoutAPictureIsPassedOver) {
+  const auto first = begin(scene::Pipeline::kPoints);
+  succession.on_update({3});
+  begin(scene::Pipeline::kSlices);
+  const auto third = begin(scene::Pipeline::kPoints);
+  EXPECT_EQ(succession.at(Succession::kNewest), first);
+  succession.on_update({9});
+  EXPECT_EQ(succession.at(Succession::kNewest), third);
+}
+
+TEST_F(Successors, NothingIsFreedThatTheDisplayHolds) {
+  auto first = begin(scene::Pipeline::kPoints);
+  succession.on_update({1});
+  const std::weak_ptr<Received> watched = first;
+  begin(scene::Pipeline::kSlices);
+  succession.on_update({2});
+  succession.at({2});
+  succession.free_dropped();
+  EXPECT_FALSE(watched.expired());
+  first.reset();
+  EXPECT_FALSE(watched.expired()) << "not freed by the display";
+  succession.free_dropped();
+  EXPECT_TRUE(watched.expired());
+}
+
+}  // namespace
+}  // namespace telesplat::viewer
