@@ -36,13 +36,12 @@ FLOORS = {
         ["common/julia", "common/net"],
     ],
     "services/data": [
-        ["services/data/base", "services/data/served.h"],
+        ["services/data/base"],
         [("services/data/volume/volume.h", "services/data/surface/isosurface.h")],
         ["services/data/volume/formats"],
         ["services/data/import"],
         ["services/data/served.h"],
         ["services/data/volume", "services/data/mesh", "services/data/julia"],
-        ["services/data/surface"],
         ["services/data/surface"],
         ["services/data"],
     ],
@@ -82,6 +81,11 @@ FLOORS = {
     "tools": [
         ["tools/common"],
         ["tools/make_terrain", "tools/make_volume", "tools/health"],
+        ["tools/telesplat/command.h"],
+        ["tools/telesplat/scene", "tools/telesplat/control"],
+        ["tools/telesplat/record"],
+        ["tools/telesplat/run"],
+        ["tools/telesplat/compare", "tools/telesplat/bench"],
         ["tools/telesplat"],
     ],
 }
