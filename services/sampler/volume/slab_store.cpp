@@ -180,6 +180,10 @@ Result<bool> SlabStore::take(const VoxelAsk& ask, const wire::VoxelData& data, c
   auto voxels = volume::decode_voxels({reinterpret_cast<const uint8_t*>(data.data.data()), data.data.size()}, size[0],
                                       size[1], int(data.begin), int(data.end), scene_->levels.count);
   if (!voxels) return voxels.error();
+  // The decoder takes any part of the slices; what is cut below must be all of them.
+  if (voxels->k_begin != int(data.begin) || voxels->k_end != int(data.end))
+    return Error{fmt::format("{} sent voxels of slices {} to {} in an answer of slices {} to {}", ask.endpoint,
+                             voxels->k_begin, voxels->k_end, data.begin, data.end)};
   if (voxels->size() > 0 && voxels->normal.empty() == scene_->lit)
     return Error{
         fmt::format("voxels {} normals, expected {}", scene_->lit ? "without" : "with", scene_->lit ? "some" : "none")};
@@ -196,7 +200,7 @@ Result<bool> SlabStore::take(const VoxelAsk& ask, const wire::VoxelData& data, c
     }
     slice.have = ask.have;
     slice.have.add(*has);
-    slice.have.add(shown);  // an answer is all there is, lest we ask for ever
+    slice.have.add(shown);  // the server sent all that it has: asking again would bring no more
     taken.emplace_back(key, std::move(slice));
   }
   for (auto& [key, slice] : taken) put(key, std::move(slice));

@@ -50,31 +50,31 @@ class SlabStore {
   const std::optional<SlabScene>& scene() const { return scene_; }
   void clear();
 
-  /// Takes the sheet over; what an older one says of slices this one does not name goes on holding. Error: slabs,
-  /// ranges or endpoints that make no sense in this scene; nothing has changed then. Precondition: there is a scene.
+  /// Takes the sheet over. For slices that it does not name, older sheets go on holding. Error: slabs, ranges or
+  /// endpoints that make no sense in this scene; nothing has changed then. Precondition: there is a scene.
   Status assign(const wire::SlabAssignment& assignment);
   /// The newest one; partition 0: none.
   const wire::SlabAssignment& assignment() const { return assignment_; }
   /// Whether a sheet that holds names this server.
   bool names(const std::string& endpoint) const;
-  /// Leases go by this range from now on: others than it and the assigned one are not kept for long.
+  /// Leases are of this range from now on. Other slabs than it and the assigned one are not kept for long.
   void use(int begin, int end);
 
-  /// Whether all that it takes to splat it is here: its slices and one more on both sides.
+  /// Whether everything for splatting it is here: its slices and one more on both sides.
   bool holds(const SlabWant& want) const;
-  /// What is lacking first of it, in the order of the sheet. Nothing: all is here, or no sheet says who has it.
+  /// What lacks first, in the order of the sheet. Nothing: all is here, or no sheet says who has it.
   std::optional<VoxelAsk> next(const SlabWant& want) const;
-  /// The answer to `ask`. shown: levels that the ask's epoch shows, all voxels of which the slices then have. False:
-  /// not what was asked for, or too late (other levels are held by now). Error: bytes that are no such voxels; nothing
-  /// has changed then.
+  /// Takes the answer to `ask`; it comes from outside. shown: the levels that the ask's epoch shows. The slices then
+  /// count as having all voxels of those. False: not what was asked for, or too late (other levels are held by now).
+  /// Error: the bytes are no voxels of just the slices that the answer's header names; nothing has changed then.
   Result<bool> take(const VoxelAsk& ask, const wire::VoxelData& data, const volume::LevelSet& shown);
-  /// Ready to be splatted, arranged if it was not yet; null: not all is here. It stays valid whatever happens to the
-  /// store.
+  /// The slab, arranged for splatting; null: not all of it is here. It stays valid when the store lets go of it.
   std::shared_ptr<const Slab> slab(const SlabWant& want);
   bool arranged(const SlabWant& want) const { return find(want) != nullptr; }
 
-  /// Lets go, if more is held than the budget allows: slices of neither the assigned range nor the one in use; steps,
-  /// those first that come last after `step`; then voxels of levels that are not in `shown`. `step` itself stays.
+  /// If more is held than the budget allows, lets go: first slices of neither the assigned range nor the one in use;
+  /// then steps, the one farthest after `step` first; then voxels of levels that are not in `shown`. `step` itself
+  /// stays.
   void trim(int step, const volume::LevelSet& shown);
   /// How many steps after `step`, in the order in which they play, fit in memory beside it if they are as large.
   int steps_ahead(int step) const;
