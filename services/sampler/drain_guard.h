@@ -1,4 +1,4 @@
-// Sees to it that a sampler that is told to stop does stop in time, even in the middle of a lease that takes for ever.
+// Makes a sampler that is told to stop end in time, even in the middle of a lease that never ends.
 #pragma once
 
 #include <condition_variable>
@@ -10,10 +10,9 @@
 
 namespace telesplat::sampler {
 
-/// A sampler that was told to stop begins no lease later than this,
+/// A sampler begins no lease later than this after it was told to stop.
 inline constexpr double kDrain_s = 0.8;
-/// and this long after it was told it ends, whatever it does: whoever manages it may wait two seconds before killing
-/// it.
+/// This long after it was told to stop it ends, in the middle of anything: its manager may kill it after two seconds.
 inline constexpr double kStop_s = 1.3;
 
 class DrainGuard {

@@ -39,7 +39,7 @@ class EpochBook {
   EpochId newest_id() const { return epochs_.rbegin()->first; }
   const T& newest() const { return epochs_.rbegin()->second; }
 
-  /// Of a lease whose epoch is not known: it waits, then it is hopeless.
+  /// For a lease whose epoch is not known: it waits, then it is hopeless.
   static Readiness wait_for_welcome(EpochId epoch, double received_s, double now_s) {
     const double until_s = received_s + kUnknownEpoch_s;
     if (now_s < until_s) return {Readiness::State::kWaits, until_s};

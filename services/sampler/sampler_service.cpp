@@ -24,7 +24,7 @@ constexpr double kSendFor_s = 1;        // to a packer that is slow or being res
 
 class SamplerService {
  public:
-  /// mesh_sampler: made beforehand, or null. replay: samples whatever the session's kind is, or null.
+  /// mesh_sampler: made beforehand, or null. replay: samples scenes of every kind, or null.
   SamplerService(const SamplerOptions& o, InstanceId instance, std::unique_ptr<Sampler> mesh_sampler,
                  std::unique_ptr<TileSource> replay, net::Context& context)
       : options_(o),
@@ -117,7 +117,7 @@ class SamplerService {
     if (const Status s = tiles_->connect(endpoint); !s) log::error("{}", s.error().text);
   }
 
-  // Of another kind of scene other work is made of.
+  // Another kind of scene takes other work.
   void follow_kind(const std::string& name) {
     if (name.empty() || name == kind_) return;
     kind_ = name;

@@ -1,5 +1,4 @@
-// Puts the tiles of a block together: samplers lease single rows, what is packed and published at once is a block of
-// them.
+// Puts the tiles of a block together: samplers may lease single rows; a block of rows is packed and published at once.
 #pragma once
 
 #include <deque>
@@ -11,11 +10,11 @@
 
 namespace telesplat::packer {
 
-/// Frames of which blocks are being gathered; of more the oldest one's blocks are dropped.
+/// Frames whose blocks are being gathered. With one more, the oldest one's blocks are dropped.
 inline constexpr size_t kMaxGatheredFrames = 64;
-/// A block that is gathered has at most so many pixels: 64 rows of the widest image. One tile of it allocates them all.
+/// Pixels of a block that is gathered, at most: 64 rows of the widest image. Its first tile allocates them all.
 inline constexpr size_t kMaxBlockPixels = size_t{1} << 20;
-/// All of them together (ten bytes each); beyond it the oldest frame's are dropped.
+/// Pixels of all blocks together (ten bytes each). Beyond it the oldest frame's blocks are dropped.
 inline constexpr size_t kMaxGatheredPixels = size_t{1} << 25;
 
 class BlockGatherer {
@@ -33,7 +32,7 @@ class BlockGatherer {
   };
 
   /// Decodes a tile and puts its rows in their place; rows that are there already stay as they are.
-  ///   block: what the tile says of its block: all of SampledTile but the image; `rect` and `tile` are the block's.
+  ///   block: the label of the tile's block; no image yet.
   ///   rect: the tile, in the frame: whole rows of the block.
   /// A tile that is its block passes through without a copy. Nothing: all of its rows are there (it is not even
   /// decoded). Error: camera, rectangles, block or stream do not fit together, or not with earlier tiles; nothing has

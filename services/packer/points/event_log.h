@@ -18,18 +18,19 @@
 
 namespace telesplat::packer {
 
-/// Patches of clusters in the forget events kept, at most (eight bytes each).
+/// Patches of clusters named by the forget events that are kept, at most (eight bytes each).
 inline constexpr size_t kMaxPatchesForgotten = size_t{1} << 20;
 
 class EventLog {
  public:
   explicit EventLog(size_t max_patches_forgotten = kMaxPatchesForgotten) : max_patches_(max_patches_forgotten) {}
 
-  /// clusters: those it has points in; none: nothing to keep.
+  /// clusters: those in which the patch has points; none: nothing is kept.
   void add_patch(const Event& event, std::span<const points::ClusterKey> clusters);
   /// clusters: those that were there.
   void add_forget(Sequence sequence, std::span<const points::ClusterKey> clusters);
-  /// The same of single patches: each element of `dropped` has mosaics of one frame. event: as it is published.
+  /// Single patches of clusters were forgotten: each element of `dropped` has mosaics of one frame. event: as
+  /// published.
   void add_patch_forget(const Event& event, std::span<const points::Cluster> dropped);
   void add_epoch(const Event& event);
 

@@ -30,8 +30,8 @@ struct Config {
   double obsolete_after_s = 0;
   /// Above it the least recently drawn clusters are forgotten, down to 90 % of it; 0: no limit.
   uint64_t max_points = 0;
-  /// Of the patches kept for events_since(). Above it those least recently drawn are forgotten with their clusters,
-  /// down to 90 % of it; 0: no limit.
+  /// Bytes of the patches kept for events_since(). Above it those least recently drawn are forgotten with their
+  /// clusters, down to 90 % of it; 0: no limit.
   uint64_t max_log_bytes = 0;
   // With kKeep single patches of clusters are forgotten instead, highest score first (patch_obsolescence.h); the three
   // limits above are then about patches.
@@ -84,8 +84,8 @@ class PackerCore {
   /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.
   bool has(FrameId frame, uint32_t tile) const;
 
-  /// A viewer drew these clusters; of each the patch with that frame tag, or all of its patches if `frames` is empty.
-  /// Unknown keys are ignored. Precondition: no frames, or as many as clusters.
+  /// A viewer drew these clusters: from each one the patch with that frame tag, or all of its patches if `frames` is
+  /// empty. Unknown keys are ignored. Precondition: no frames, or as many as clusters.
   void accessed(std::span<const points::ClusterKey> clusters, double now_s, std::span<const uint32_t> frames = {});
 
   /// Decides what is obsolete (T4.3.3) or too much. Returns the forget events to publish, most often none.
@@ -95,7 +95,7 @@ class PackerCore {
   /// has every sample of its coarse pass, whose patches would only be in the way of choosing the best ones.
   std::vector<Event> forget_superseded();
 
-  /// Frames are numbered anew from here: what came of those so far is of no meaning for what comes.
+  /// Frames are numbered anew from here: the tiles that came so far are of other frames.
   void forget_frames();
 
   /// A new version of the data set: forgets everything. Nothing if that is the epoch already.
@@ -106,11 +106,10 @@ class PackerCore {
   /// who applies this list; so sequences rise but may have holes. A replica that has applied the list is as of
   /// sequence(). Precondition: remembers(after).
   std::vector<Event> events_since(Sequence after) const;
-  /// False for a replica of long ago of which it is not known any more what it would have to forget: it must start
-  /// anew, from 0.
+  /// False: it is not known any more what a replica as of `after` would have to forget. It must start anew, from 0.
   bool remembers(Sequence after) const;
 
-  /// Of the newest event; 0 before the first.
+  /// The newest event's; 0 before the first.
   Sequence sequence() const;
   EpochId epoch() const;
   Redundancy redundancy() const;

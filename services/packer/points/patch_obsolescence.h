@@ -30,17 +30,17 @@ class PatchObsolescence {
   void added(points::ClusterKey key, const points::Mosaic& mosaic, double now_s);
   /// A patch was drawn; unknown ones are ignored. Time never runs backwards for it.
   void accessed(const PatchKey& key, double now_s);
-  /// Every patch of a cluster was.
+  /// Every patch of a cluster was drawn.
   void accessed(points::ClusterKey key, double now_s);
   void forgotten(const PatchKey& key);
   void clear();
 
-  /// What to forget, ascending: patches not drawn for longer than obsolete_after_s; of what is left those by which a
-  /// cluster has more than patches_per_cluster; and while there are too many points of the rest, in order of falling
-  ///   score = age_weight * seconds since it was drawn + rate_weight * max(0, log2(best pixel range / its pixel
-  ///   range)),
-  /// the best of the cluster's patches that are not obsolete. Of equal scores the older patch goes first, then the
-  /// lower key.
+  /// What to forget, ascending: first the patches not drawn for longer than obsolete_after_s; then those by which a
+  /// cluster has more than patches_per_cluster; then more while there are too many points. The order is that of falling
+  ///   score = age_weight * seconds since it was drawn
+  ///           + rate_weight * max(0, log2(best pixel range / its pixel range)),
+  /// with the best pixel range of the cluster's patches that are not obsolete. At equal scores the older patch goes
+  /// first, then the lower key.
   std::vector<PatchKey> choose(const PatchLimits& limits, double now_s) const;
 
   /// Every patch of the least recently drawn events, until the events left have at most 90 % of max_bytes; none if they

@@ -69,9 +69,43 @@ void SliceGatherer::make_room(size_t bytes) {
   }
 }
 
+std::shared_ptr<SliceGatherer::Frame> SliceGatherer::frame_of(const wire::SliceLease& lease, size_t bytes) {
+  if (const auto open = find_open(lease.frame); open != open_.end()) return *open;
+  make_room(bytes);
+  const auto frame = std::make_shared<Frame>();
+  frame->lease = lease;
+  frame->slabs.resize(lease.slabs);
+  frame->slices.resize(lease.slabs);
+  frame->missing = lease.slabs;
+  frame->leased_s = lease.leased_s;
+  open_.push_back(frame);
+  return frame;
+}
+
+SliceGatherer::Frames::iterator SliceGatherer::find_open(FrameId id) {
+  return std::find_if(open_.begin(), open_.end(), [&](const auto& f) { return f->lease.frame == id; });
+}
+
+bool SliceGatherer::is_here(const wire::SliceLease& lease) {
+  if (const auto open = find_open(lease.frame); open != open_.end())
+    return same_frame((*open)->lease, lease) && (*open)->slabs[lease.slab].owner != nullptr;
+  return std::find(closed_.begin(), closed_.end(), lease.frame) != closed_.end();
+}
+
+// Contradictions to the slabs of the frame that came before.
+Status SliceGatherer::check_beside_others(const wire::SliceLease& lease) {
+  const auto open = find_open(lease.frame);
+  if (open == open_.end()) return ok_status();
+  if (!same_frame((*open)->lease, lease)) return Error{"its slabs were leased with another view, raster or partition"};
+  for (const Slab& s : (*open)->slabs)
+    if (s.owner && lease.begin < s.images.lease.end && s.images.lease.begin < lease.end)
+      return Error{fmt::format("slab {} has slices of slab {}", lease.slab, s.images.lease.slab)};
+  return ok_status();
+}
+
 Result<SliceGatherer::Added> SliceGatherer::add(Slab slab, double now_s) {
-  const wire::SliceLease& lease = slab.images.lease;
-  const auto refuse = [&](std::string why) -> Result<Added> {
+  const wire::SliceLease lease = slab.images.lease;
+  const auto refuse = [&](const std::string& why) -> Result<Added> {
     ++statistics_.slabs_refused;
     return Error{fmt::format("frame {}: {}", lease.frame.value, why)};
   };
@@ -80,23 +114,11 @@ Result<SliceGatherer::Added> SliceGatherer::add(Slab slab, double now_s) {
     return Added{};
   }
   if (const Status s = check(lease); !s) return refuse(s.error().text);
-  const auto open =
-      std::find_if(open_.begin(), open_.end(), [&](const auto& f) { return f->lease.frame == lease.frame; });
-  if (open == open_.end() && std::find(closed_.begin(), closed_.end(), lease.frame) != closed_.end()) {
+  if (is_here(lease)) {
     ++statistics_.slabs_duplicate;
     return Added{};
   }
-  if (open != open_.end()) {
-    const Frame& frame = **open;
-    if (!same_frame(frame.lease, lease)) return refuse("its slabs were leased with another view, raster or partition");
-    if (frame.slabs[lease.slab].owner) {
-      ++statistics_.slabs_duplicate;
-      return Added{};
-    }
-    for (const Slab& s : frame.slabs)
-      if (s.owner && lease.begin < s.images.lease.end && s.images.lease.begin < lease.end)
-        return refuse(fmt::format("slab {} has slices of slab {}", lease.slab, s.images.lease.slab));
-  }
+  if (const Status s = check_beside_others(lease); !s) return refuse(s.error().text);
   const std::span bytes(reinterpret_cast<const uint8_t*>(slab.images.data.data()), slab.images.data.size());
   auto slices = volume::parse_slices(bytes, lease.shear.width, lease.shear.height, int(lease.shear.layers.size()));
   if (!slices) return refuse(slices.error().text);
@@ -107,29 +129,16 @@ Result<SliceGatherer::Added> SliceGatherer::add(Slab slab, double now_s) {
           fmt::format("an image of slices {} to {} in the slab {} to {}", s.k_begin, s.k_end, lease.begin, lease.end));
     out.blocks += s.blocks.size();
   }
-  std::shared_ptr<Frame> frame;
-  if (open != open_.end()) {
-    frame = *open;
-  } else {
-    make_room(bytes.size());
-    frame = std::make_shared<Frame>();
-    frame->lease = lease;
-    frame->slabs.resize(lease.slabs);
-    frame->slices.resize(lease.slabs);
-    frame->missing = lease.slabs;
-    frame->leased_s = lease.leased_s;
-    open_.push_back(frame);
-  }
+  const std::shared_ptr<Frame> frame = frame_of(lease, bytes.size());
   ++statistics_.slabs;
   frame->leased_s = std::min(frame->leased_s, lease.leased_s);
   frame->voxels += slab.images.voxels;
   frame->bytes += bytes.size();
   frame->slices[lease.slab] = std::move(*slices);
-  const uint64_t number = lease.slab;
-  frame->slabs[number] = std::move(slab);
+  frame->slabs[lease.slab] = std::move(slab);
   if (--frame->missing > 0) return out;
   out.frame_complete = true;
-  open_.erase(std::find(open_.begin(), open_.end(), frame));
+  open_.erase(find_open(lease.frame));
   complete(frame, now_s);
   return out;
 }
@@ -183,7 +192,8 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
   v.in_order = ack.in_order;
   v.heard_s = now_s;
   if (begins) {
-    // Or it believes that it is not known, or its connection broke: whatever was under way is lost.
+    // A known viewer says so if it believes that it is not known, or if its connection broke: what was under way is
+    // lost.
     v.waiting.insert(v.waiting.begin(), v.unacknowledged.begin(), v.unacknowledged.end());
     v.unacknowledged.clear();
   } else {

@@ -109,6 +109,11 @@ class SliceGatherer {
   };
 
   Status check(const wire::SliceLease& lease) const;
+  Status check_beside_others(const wire::SliceLease& lease);
+  Frames::iterator find_open(FrameId id);
+  bool is_here(const wire::SliceLease& lease);
+  /// The frame's entry among the open ones, made if `lease` is of its first slab. bytes: of the slab.
+  std::shared_ptr<Frame> frame_of(const wire::SliceLease& lease, size_t bytes);
   void drop(Frames::iterator frame);
   void make_room(size_t bytes);
   void complete(const std::shared_ptr<const Frame>& frame, double now_s);

@@ -151,6 +151,32 @@ struct Lanes {
     t1[i] = queue.t1[next];
   }
 
+  // One vector a way.
+  HWY_INLINE void load(int lanes, Vec4 (&d_of)[kWays], VF (&inverse_of)[kWays], VF (&t_of)[kWays], VF (&t1_of)[kWays],
+                       VF (&last_t_of)[kWays], VF (&last_r_of)[kWays], VF (&steps_of)[kWays]) const {
+    for (int j = 0; j < kWays; ++j) {
+      const int at = j * lanes;
+      for (int a = 0; a < 4; ++a) d_of[j].v[a] = hn::Load(f, d[a] + at);
+      inverse_of[j] = hn::Load(f, inverse + at);
+      t_of[j] = hn::Load(f, t + at), t1_of[j] = hn::Load(f, t1 + at);
+      last_t_of[j] = hn::Load(f, last_t + at), last_r_of[j] = hn::Load(f, last_r + at);
+      steps_of[j] = hn::Load(f, steps + at);
+    }
+  }
+
+  // What a march changes.
+  HWY_INLINE void store(int lanes, const VF (&t_of)[kWays], const VF (&last_t_of)[kWays], const VF (&last_r_of)[kWays],
+                        const VF (&steps_of)[kWays], const VF (&g_of)[kWays]) {
+    for (int j = 0; j < kWays; ++j) {
+      const int at = j * lanes;
+      hn::Store(t_of[j], f, t + at);
+      hn::Store(last_t_of[j], f, last_t + at);
+      hn::Store(last_r_of[j], f, last_r + at);
+      hn::Store(steps_of[j], f, steps + at);
+      hn::Store(g_of[j], f, g + at);
+    }
+  }
+
   HWY_INLINE void end(int i, bool hit, float threshold, Queue& queue) const {
     const int at = ray[i];
     queue.met[at] = hit;
@@ -174,17 +200,7 @@ HWY_NOINLINE void March(const Constants& k, const JuliaRays& rays, Queue& queue)
   const float threshold = k.lod * rays.footprint;  // set units a metre of depth
   Vec4 d[kWays];
   VF inverse[kWays], t[kWays], t1[kWays], last_t[kWays], last_r[kWays], steps[kWays];
-  const auto load = [&]() HWY_ATTR {
-    for (int j = 0; j < kWays; ++j) {
-      const int at = j * lanes;
-      for (int a = 0; a < 4; ++a) d[j].v[a] = hn::Load(f, lane.d[a] + at);
-      inverse[j] = hn::Load(f, lane.inverse + at);
-      t[j] = hn::Load(f, lane.t + at), t1[j] = hn::Load(f, lane.t1 + at);
-      last_t[j] = hn::Load(f, lane.last_t + at), last_r[j] = hn::Load(f, lane.last_r + at);
-      steps[j] = hn::Load(f, lane.steps + at);
-    }
-  };
-  load();
+  lane.load(lanes, d, inverse, t, t1, last_t, last_r, steps);
   while (lane.busy != 0) {
     Vec4 q[kWays];
     VF r[kWays], g[kWays];
@@ -220,21 +236,14 @@ HWY_NOINLINE void March(const Constants& k, const JuliaRays& rays, Queue& queue)
 
     finished &= lane.busy;
     if (finished == 0 || (hwy::PopCount(finished) < kRefill && finished != lane.busy)) continue;
-    for (int j = 0; j < kWays; ++j) {
-      const int at = j * lanes;
-      hn::Store(t[j], f, lane.t + at);
-      hn::Store(last_t[j], f, lane.last_t + at);
-      hn::Store(last_r[j], f, lane.last_r + at);
-      hn::Store(steps[j], f, lane.steps + at);
-      hn::Store(g[j], f, lane.g + at);
-    }
+    lane.store(lanes, t, last_t, last_r, steps, g);
     for (; finished != 0; finished &= finished - 1) {
       const int i = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero64(finished));
       lane.end(i, hits >> i & 1, threshold, queue);
       lane.begin(i, next < queue.count ? next : -1, queue);
       ++next;
     }
-    load();
+    lane.load(lanes, d, inverse, t, t1, last_t, last_r, steps);
   }
 }
 

@@ -10,6 +10,8 @@
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "common/volume/lighting.h"
 #include "common/volume/warp/warper.h"
@@ -47,6 +49,8 @@ struct VolumeRaycaster::Impl {
   void put(int i, int j, int k, uint32_t value);
   struct Light;
   struct Ray;
+  std::optional<std::pair<double, double>> span_of(const Ray& ray) const;
+  static double end_of(const std::array<int, 3>& brick, const Ray& ray, double leave);
   void march(const Light& light, const Ray& ray, glm::dvec3& colour, double& left, double& solid) const;
 };
 
@@ -95,19 +99,38 @@ struct VolumeRaycaster::Impl::Ray {
   double from, step;  // metres
 };
 
-void VolumeRaycaster::Impl::march(const Light& light, const Ray& ray, glm::dvec3& colour, double& left,
-                                  double& solid) const {
+// The part of the ray that lies in the grid and a voxel around it. None: it misses.
+std::optional<std::pair<double, double>> VolumeRaycaster::Impl::span_of(const Ray& ray) const {
   double enter = ray.from, leave = std::numeric_limits<double>::infinity();
   for (int a = 0; a < 3; ++a) {
     const double lo = -1, hi = grid.size[size_t(a)];
     if (std::abs(ray.direction[a]) < 1e-300) {
-      if (ray.start[a] < lo || ray.start[a] > hi) return;
+      if (ray.start[a] < lo || ray.start[a] > hi) return std::nullopt;
       continue;
     }
     const double t0 = (lo - ray.start[a]) / ray.direction[a], t1 = (hi - ray.start[a]) / ray.direction[a];
     enter = std::max(enter, std::min(t0, t1)), leave = std::min(leave, std::max(t0, t1));
   }
-  if (!(enter < leave)) return;
+  if (!(enter < leave)) return std::nullopt;
+  return std::pair(enter, leave);
+}
+
+// Where the ray leaves the brick, at the latest at `leave`.
+double VolumeRaycaster::Impl::end_of(const std::array<int, 3>& brick, const Ray& ray, double leave) {
+  double out = leave;
+  for (int a = 0; a < 3; ++a) {
+    if (std::abs(ray.direction[a]) < 1e-300) continue;
+    const double side = (brick[size_t(a)] + (ray.direction[a] > 0)) * double(kBrick) - 1;
+    out = std::min(out, (side - ray.start[a]) / ray.direction[a]);
+  }
+  return out;
+}
+
+void VolumeRaycaster::Impl::march(const Light& light, const Ray& ray, glm::dvec3& colour, double& left,
+                                  double& solid) const {
+  const auto span = span_of(ray);
+  if (!span) return;
+  const auto [enter, leave] = *span;
   const double unit = grid.unit_m(), length = ray.step / unit;  // of a step, as extinctions count it
   std::array<int, 3> cell{-9, -9, -9};
   std::array<glm::dvec4, 8> corners;
@@ -128,13 +151,7 @@ void VolumeRaycaster::Impl::march(const Light& light, const Ray& ray, glm::dvec3
       const int32_t slot = index[at(brick[0], brick[1], brick[2])];
       if (slot < 0) {
         // On to the first step in another brick.
-        double out = leave;
-        for (int a = 0; a < 3; ++a) {
-          if (std::abs(ray.direction[a]) < 1e-300) continue;
-          const double side = (brick[size_t(a)] + (ray.direction[a] > 0)) * double(kBrick) - 1;
-          out = std::min(out, (side - ray.start[a]) / ray.direction[a]);
-        }
-        n = std::max(n, int64_t(std::floor((out - enter) / ray.step - 0.5)));
+        n = std::max(n, int64_t(std::floor((end_of(brick, ray, leave) - enter) / ray.step - 0.5)));
         cell = {-9, -9, -9};
         continue;
       }

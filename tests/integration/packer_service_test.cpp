@@ -1,0 +1,145 @@
+// The packer process in a thread, between a master, a sampler and a viewer made for the test.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <glm/gtc/matrix_transform.hpp>
+#include <optional>
+#include <thread>
+
+#include "common/core/clock.h"
+#include "common/net/socket.h"
+#include "common/volume/session.h"
+#include "services/packer/packer_service.h"
+
+namespace telesplat {
+namespace {
+
+constexpr double kDeadline_s = 20;
+
+class PackerServiceTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto bound = master.bind("tcp://127.0.0.1:*");
+    ASSERT_TRUE(bound);
+    options.service.master = *bound;
+    options.service.log_level = "off";
+    thread = std::thread([this] { code = packer::run(options); });
+    const auto message = next(master, wire::Hello::kName);
+    ASSERT_TRUE(message);
+    packer_peer = message->peer;
+    hello = *wire::decode<wire::Hello>(message->body);
+    ASSERT_TRUE(viewer.connect(hello.endpoints.at("state")));
+    ASSERT_TRUE(sampler.connect(hello.endpoints.at("tiles")));
+  }
+  void TearDown() override {
+    master.send(wire::Shutdown{"the test is over"}, packer_peer);
+    thread.join();
+    EXPECT_EQ(code, 0);
+  }
+
+  // The next message of that type; others are dropped. ask: sent again now and then.
+  std::optional<net::Message> next(net::Socket& from, std::string_view type, const std::function<void()>& ask = {}) {
+    double asked_s = -1e9;
+    for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
+      if (ask && monotonic_s() - asked_s > 0.2) {
+        asked_s = monotonic_s();
+        ask();
+      }
+      net::wait_readable({&from, &master}, 20);
+      while (auto message = from.receive())
+        if (message->type == type) return message;
+      if (&from != &master)
+        while (master.receive()) {
+        }
+    }
+    return std::nullopt;
+  }
+
+  wire::Welcome mesh() {
+    wire::Welcome w;
+    w.master = {1}, w.epoch = {1}, w.octree_depth = 6;
+    w.hello_sent_s = hello.sent_s;
+    w.box_room = {{-1, -1, -1}, {1, 1, 1}};
+    w.facts["kind"] = "mesh";
+    return w;
+  }
+  wire::Welcome a_volume() {
+    volume::Session s;
+    s.grid = grid;
+    s.transfer.points = {{0, 1, 1, 1, 0.5f}};
+    wire::Welcome w = mesh();
+    w.epoch = {2};
+    w.facts = volume::to_facts(s);
+    w.facts["kind"] = "volume";
+    w.parameters = volume::to_parameters(s);
+    return w;
+  }
+  // The mark that ends the answer to a viewer of points.
+  std::optional<wire::StateMark> ask_for_points() {
+    const auto message = next(viewer, wire::StateMark::kName, [this] {
+      viewer.send(wire::StateRequest{{77}, {}, {}});
+    });
+    if (!message) return std::nullopt;
+    return viewer.decode<wire::StateMark>(*message);
+  }
+  // A frame of slices, as soon as the packer knows the volume.
+  std::optional<wire::SliceFrame> ask_for_slices() {
+    const auto camera = geometry::make_camera({{0, 0, 0.6}, {1, 0, 0, 0}}, 60, 64, 48);
+    uint64_t frame = 0;
+    const auto message = next(viewer, wire::SliceFrame::kName, [&] {
+      viewer.send(wire::SliceAck{{77}, {0}, 2, false});
+      wire::SliceLease lease{.lease = {++frame}, .frame = {frame}, .epoch = {2}, .partition = 1};
+      lease.end = uint64_t(grid.size[2]);
+      lease.shear = *volume::plan_frame(grid, std::span(&camera, 1));
+      lease.views = {{{77}, {5}, camera, 0}};
+      sampler.send(wire::SliceImages{.sampler = {9}, .lease = lease, .voxels = 3});
+    });
+    if (!message) return std::nullopt;
+    return viewer.decode<wire::SliceFrame>(*message);
+  }
+
+  const volume::Grid grid{{16, 16, 16}, glm::scale(glm::translate(glm::dmat4(1), glm::dvec3(-0.08)), glm::dvec3(0.01))};
+  net::Context context;
+  net::Socket master{context, net::Kind::kRouter, "master"};
+  net::Socket viewer{context, net::Kind::kDealer, "viewer", {.max_message_bytes = wire::kMaxBulkBytes}};
+  net::Socket sampler{context, net::Kind::kPush, "sampler"};
+  packer::PackerOptions options;
+  std::thread thread;
+  std::string packer_peer;
+  wire::Hello hello;
+  int code = -1;
+};
+
+TEST_F(PackerServiceTest, FollowsASessionThatChangesFromPointsToSlicesAndBack) {
+  master.send(mesh(), packer_peer);
+  const auto first = ask_for_points();
+  ASSERT_TRUE(first);
+  EXPECT_TRUE(first->answer);
+  EXPECT_EQ(first->epoch.value, 1u);
+
+  master.send(a_volume(), packer_peer);
+  const auto frame = ask_for_slices();
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->epoch.value, 2u);
+  EXPECT_EQ(frame->voxels, 3u);
+
+  auto back = mesh();
+  back.epoch = {3};
+  master.send(back, packer_peer);
+  const auto second = ask_for_points();
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->epoch.value, 3u);
+  EXPECT_NE(second->packer, first->packer) << "viewers start anew";
+}
+
+TEST_F(PackerServiceTest, WhatComesBeforeItsSessionWaitsForIt) {
+  viewer.send(wire::StateRequest{{77}, {}, {}});
+  net::wait_readable({&viewer}, 300);
+  EXPECT_FALSE(viewer.receive());
+  master.send(mesh(), packer_peer);
+  const auto message = next(viewer, wire::StateMark::kName);
+  ASSERT_TRUE(message) << "it was asked for once";
+}
+
+}  // namespace
+}  // namespace telesplat

@@ -1,0 +1,223 @@
+// The packer's part for points, without a network: tiles and state requests in, events and reports out.
+#include "services/packer/points/point_packing.h"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+
+#include "services/packer/slices/slice_packing.h"
+#include "tests/support/packer_scenes.h"
+
+namespace telesplat::packer {
+namespace {
+
+const geometry::Camera kCamera = test::scene_camera({0.7, 0.4, 0}, 96, 64);
+
+wire::Welcome welcome(EpochId epoch = test::kEpoch, InstanceId master = {1}) {
+  const points::ModelConfig model = test::scene_config();
+  wire::Welcome w;
+  w.master = master;
+  w.epoch = epoch;
+  w.octree_depth = uint64_t(model.depth);
+  w.box_room = model.box_room;
+  w.facts["kind"] = "mesh";
+  w.settings["packing.keep_redundant"] = 0;
+  return w;
+}
+
+class PointPackingTest : public testing::Test {
+ protected:
+  struct Sent {
+    std::string peer;  // empty: to all
+    std::string type, body;
+  };
+  template <class M>
+  static M decoded(const Sent& sent) {
+    EXPECT_EQ(sent.type, M::kName);
+    auto m = wire::decode<M>(std::as_bytes(std::span(sent.body)));
+    EXPECT_TRUE(m.ok());
+    return m.ok() ? *m : M{};
+  }
+  // The frame in one block that comes as two tiles of 32 rows.
+  wire::DepthTile tile(uint64_t frame, int half, EpochId epoch = test::kEpoch) {
+    wire::DepthTile m{.sampler = {9}};
+    wire::Lease& l = m.lease;
+    l.lease = {frame * 10 + uint64_t(half)}, l.frame = {frame}, l.epoch = epoch, l.viewer = {77}, l.request = {5};
+    l.tile = uint64_t(half), l.block = 0, l.blocks_in_frame = 1;
+    l.camera = kCamera, l.rect = {0, 32 * half, 96, 32}, l.block_rect = {0, 0, 96, 64};
+    l.leased_s = 2;
+    return m;
+  }
+  void sample(wire::DepthTile m, double now_s) {
+    const auto stream = codec::encode(test::sample_scene(m.lease.camera, m.lease.rect));
+    m.image = std::as_bytes(std::span(stream));
+    packing.take_sampled(socket, message(m), now_s);
+  }
+  template <class M>
+  net::Message message(const M& m, const std::string& peer = {}) {
+    const auto body = std::make_shared<std::string>(wire::encode(m));
+    return {peer, std::string(M::kName), std::as_bytes(std::span(*body)), body};
+  }
+  void ask(Sequence after, InstanceId packer, double now_s) {
+    packing.take_state(socket, message(wire::StateRequest{{77}, packer, after}, "peer"), now_s);
+  }
+  double status(const std::string& key) {
+    net::MasterLink::Values values;
+    packing.add_status(values);
+    return values.contains(key) ? values.at(key) : -1;
+  }
+  Outlets outlets() {
+    return {.tell = [this](const wire::TileDone& m) { told.push_back(m); },
+            .to_viewers =
+                [this](std::string_view type, std::string body) {
+                  sent.push_back({"", std::string(type), std::move(body)});
+                },
+            .to_viewer =
+                [this](std::string_view peer, std::string_view type, std::string body) {
+                  sent.push_back({std::string(peer), std::string(type), std::move(body)});
+                  return true;
+                },
+            .master_now = [] { return 99.0; },
+            .to_master_s = [](double s) { return s + 50; }};
+  }
+
+  net::Context context;
+  net::Socket socket{context, net::Kind::kDealer, "from"};
+  std::vector<wire::TileDone> told;
+  std::deque<Sent> sent;
+  metrics::SpanRecorder spans;
+  PointPacking packing{{}, outlets(), spans};
+};
+
+TEST_F(PointPackingTest, ATileKeepsItsLabelFromLeaseToPatch) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  sample(tile(1, 0), 3);
+  EXPECT_TRUE(sent.empty()) << "half a block";
+  sample(tile(1, 1), 4);
+  ASSERT_EQ(sent.size(), 1u);
+  const auto patch = decoded<wire::Patch>(sent[0]);
+  EXPECT_EQ(sent[0].peer, "");
+  EXPECT_EQ(patch.sequence.value, 1u);
+  EXPECT_EQ(patch.epoch, test::kEpoch);
+  EXPECT_EQ(patch.frame.value, 1u);
+  EXPECT_EQ(patch.viewer.value, 77u);
+  EXPECT_EQ(patch.request.value, 5u);
+  EXPECT_EQ(patch.tile, 0u);
+  EXPECT_EQ(patch.tiles_in_frame, 1u);
+  EXPECT_EQ(patch.step, 1u);
+  EXPECT_TRUE(patch.frame_complete);
+  EXPECT_TRUE(patch.camera == kCamera);
+  EXPECT_EQ(patch.rect, (geometry::Rect{0, 0, 96, 64}));
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[0].tile, 0u);
+  EXPECT_EQ(told[0].lease.value, 10u);
+  EXPECT_EQ(told[0].sampler.value, 9u);
+  EXPECT_EQ(told[0].rect, (geometry::Rect{0, 0, 96, 32}));
+  EXPECT_EQ(told[0].leased_s, 2);
+  EXPECT_EQ(told[0].receive_s, 53);
+  EXPECT_EQ(told[0].packed_s, 99);
+  EXPECT_EQ(told[0].bytes_sent, 0u);
+  EXPECT_EQ(told[0].samples + told[1].samples, patch.samples);
+  EXPECT_EQ(told[1].kept, patch.kept) << "counted to the tile that completed the block";
+  EXPECT_EQ(told[1].bytes_sent, patch.image.size());
+  sample(tile(1, 1), 5);
+  EXPECT_EQ(told.size(), 3u) << "a duplicate is done, too";
+  EXPECT_EQ(status("tiles_duplicate"), 1);
+}
+
+TEST_F(PointPackingTest, TilesAheadOfTheirEpochWaitForIt) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  const EpochId next = test::kEpoch.next();
+  for (const int half : {0, 1}) sample(tile(1, half, next), 1);
+  EXPECT_TRUE(told.empty());
+  packing.tick(1.5);
+  ASSERT_TRUE(packing.follow(welcome(next), 1.6));
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[0].receive_s, 51) << "when it came";
+  sample(tile(2, 0), 2);
+  EXPECT_EQ(told.size(), 2u) << "the epoch is over";
+  sample(tile(2, 0, next.next()), 3);
+  packing.tick(4.5);
+  ASSERT_TRUE(packing.follow(welcome(next.next()), 4.6));
+  EXPECT_EQ(told.size(), 2u) << "it waited too long";
+  EXPECT_EQ(status("tiles_other_epoch"), 2);
+}
+
+TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
+  ask({}, {}, 0);
+  EXPECT_TRUE(sent.empty()) << "nothing is known yet";
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  for (const int half : {0, 1}) sample(tile(1, half), 1);
+  const InstanceId packer = decoded<wire::Patch>(sent[0]).packer;
+  sent.clear();
+  ask({}, {}, 2);
+  ASSERT_EQ(sent.size(), 2u);
+  EXPECT_EQ(sent[0].peer, "peer");
+  EXPECT_EQ(decoded<wire::Patch>(sent[0]).sequence.value, 1u);
+  const auto mark = decoded<wire::StateMark>(sent[1]);
+  EXPECT_TRUE(mark.answer);
+  EXPECT_EQ(mark.packer, packer);
+  EXPECT_GT(mark.points, 0u);
+  sent.clear();
+  ask({1}, packer, 2);
+  ASSERT_EQ(sent.size(), 1u) << "it has everything";
+  sent.clear();
+  packing.tick(3);
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_FALSE(decoded<wire::StateMark>(sent[0]).answer);
+  packing.tick(3 + PointPacking::kMarkPeriod_s / 2);
+  EXPECT_EQ(sent.size(), 1u);
+  packing.tick(3 + PointPacking::kMarkPeriod_s);
+  EXPECT_EQ(sent.size(), 2u);
+}
+
+TEST_F(PointPackingTest, AnotherBoxMeansAnotherModel) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  packing.tick(1);
+  const InstanceId first = decoded<wire::StateMark>(sent.back()).packer;
+  ASSERT_TRUE(packing.follow(welcome(), 1));
+  packing.tick(2);
+  EXPECT_EQ(decoded<wire::StateMark>(sent.back()).packer, first);
+  auto other = welcome();
+  other.box_room.hi.x += 1;
+  ASSERT_TRUE(packing.follow(other, 2));
+  packing.tick(3);
+  EXPECT_NE(decoded<wire::StateMark>(sent.back()).packer, first) << "viewers start anew";
+}
+
+TEST_F(PointPackingTest, SessionsOfAnotherPipelineAreNotFollowed) {
+  auto volume = welcome();
+  volume.facts["kind"] = "volume";
+  EXPECT_FALSE(packing.follow(volume, 0));
+  SlicePacking slices(outlets(), spans);
+  EXPECT_FALSE(slices.follow(welcome(), 0));
+  auto unknown = welcome();
+  unknown.facts.clear();
+  EXPECT_FALSE(packing.follow(unknown, 0));
+  EXPECT_FALSE(slices.follow(unknown, 0));
+  auto julia = welcome();
+  julia.facts["kind"] = "julia";
+  EXPECT_TRUE(packing.follow(julia, 0));
+  // What is for the other pipeline is refused.
+  packing.take_state(socket, message(wire::SliceAck{{77}, {0}, 2, false}), 1);
+  EXPECT_EQ(socket.rejected(), 1u);
+  slices.take_state(socket, message(wire::StateRequest{{77}, {}, {}}), 1);
+  EXPECT_EQ(socket.rejected(), 2u);
+}
+
+TEST_F(PointPackingTest, TilesThatMakeNoSenseAreRefused) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  auto bad = tile(1, 0);
+  bad.image = {};
+  packing.take_sampled(socket, message(bad), 1);
+  EXPECT_EQ(socket.rejected(), 1u);
+  sample(tile(1, 0), 1);
+  auto other = tile(1, 1);
+  other.lease.camera.near_m *= 2;
+  sample(other, 1);
+  EXPECT_EQ(socket.rejected(), 2u);
+  EXPECT_EQ(told.size(), 1u);
+}
+
+}  // namespace
+}  // namespace telesplat::packer
