@@ -183,6 +183,27 @@ def links(tree):
                     yield Finding(page.path, number, "links", f"{match[1]}: {path} has no heading #{anchor}")
 
 
+# A sentence's end with another sentence behind it; list marks and bold words at the beginning of a line do not count.
+_SENTENCE_END = re.compile(r"(\S+[.?!])[)*\"]*\s+(?=[A-Z`*\[\"(])")
+_LINE_BEGIN = re.compile(r"^\s*(?:[-*]\s+|\d+\.\s+)?(?:\*\*[^*]+\*\*\s+)?")
+_ABBREVIATIONS = ("al.", "eq.", "cf.", "vs.", "e.g.", "i.e.")
+
+
+def sentences(tree):
+    """Pages have one sentence a line, so that a change of one shows as one."""
+    for page in pages(tree):
+        if page.folder not in ("", "docs") or page.name == "CHANGELOG.md":
+            continue
+        for number, line in enumerate(_without_fences(page), 1):
+            if line.startswith(("|", "#", "!")):
+                continue
+            text = line[_LINE_BEGIN.match(line).end() :]
+            text = re.sub(r"`[^`]*`|\([^()]*\)", lambda m: re.sub(r"[.?!]", "_", m[0]), text)
+            ends = [m for m in _SENTENCE_END.finditer(text) if m[1].split("(")[-1] not in _ABBREVIATIONS]
+            if ends:
+                yield Finding(page.path, number, "sentences", f'a second sentence begins behind "{ends[0][1]}"')
+
+
 _TOPS = "|".join(["cmake", "client", "common", "compose", "docs", "scenes", "services", "tests", "tools"])
 _PAGE_PATH = re.compile(rf"`((?:{_TOPS})/[\w./*{{}},-]+|[\w/-]+\.(?:h|cpp))`")
 _COMMENT_PATH = re.compile(r"(?<![\w/.<-])((?:[\w-]+/)*[\w-]+\.(?:h|cpp|md))\b")
@@ -218,4 +239,4 @@ def paths(tree):
                     yield Finding(file.path, number, "paths", f"there is no {match[1]}")
 
 
-RULES = (messages, flags, columns, links, paths)
+RULES = (messages, flags, columns, links, paths, sentences)

@@ -102,6 +102,7 @@ VIOLATIONS = [
         "links", "docs/metrics.md",
         "![picture](images/gone.png)\n## a.csv\n| t_s |\n| wait_ms |\n", 1, "there is no docs/images/gone.png",
     ),
+    ("sentences", "docs/architecture.md", "## Where to start\n\n- **Here.** One (a. B) at `x. Y`. Two.\n", 3, "Y`."),
     ("paths", "README.md", "Read `services/data/gone`.\n", 1, "there is no services/data/gone"),
     ("paths", "common/core/x.h", "// As gone.h does.\n", 1, "there is no gone.h"),
 ]

@@ -59,7 +59,6 @@ FLOORS = {
             (
                 "services/master/master_*",
                 "services/master/session.cpp",
-                "services/master/session_flags.cpp",
                 "services/master/status.cpp",
                 "services/master/main.cpp",
             )
