@@ -9,5 +9,5 @@ int main(int argc, char** argv) {
   options.service.bind = "tcp://127.0.0.1:7700";
   return net::service_main(argc, argv,
                            "telesplat-master: leads a Telesplat session; every other process connects to it", options,
-                           master::add_flags, master::run);
+                           master::table, master::run);
 }

@@ -1,33 +1,29 @@
 #include "services/master/master_service.h"
 
-#include <CLI/CLI.hpp>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <fstream>
 
 #include "common/core/clock.h"
+#include "common/core/log.h"
 #include "common/net/dispatch.h"
+#include "services/master/guarded.h"
+#include "services/master/master_core.h"
 
 namespace telesplat::master {
 namespace {
 
 // How long others may take to say goodbye; less where someone waits for the master itself to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
-
-std::map<std::string, Progressive> progressive_names() {
-  std::map<std::string, Progressive> out;
-  for (const auto p : {Progressive::kAuto, Progressive::kOn, Progressive::kOff}) out[name_of(p)] = p;
-  return out;
-}
-
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (char c : text) (c == '"' || c == '\\' ? out += '\\' : out) += (static_cast<unsigned char>(c) < 32 ? ' ' : c);
-  return out + '"';
-}
+constexpr int kMessagesAtOnce = 1000;  // between two ticks
 
 // The effective configuration of everyone who took part.
 void write_session(const std::string& directory, const MasterServiceOptions& o, const MasterCore& core,
                    const std::vector<metrics::Process>& processes) {
+  using options::quoted;
   std::ofstream out(directory + "/session.toml");
   out << "# The effective configuration of this run.\n[session]\ntile_size = " << o.master.schedule.tile_size
       << "\nframes_in_flight = " << o.master.schedule.frames_in_flight
@@ -35,145 +31,112 @@ void write_session(const std::string& directory, const MasterServiceOptions& o, 
       << "\nlease_target_s = " << o.master.schedule.lease_target_s << "\noctree_depth = " << core.octree_depth()
       << "\nprogressive = " << quoted(core.progressive() ? "on" : "off") << "\nanimation = " << quoted(core.animation())
       << "\n\n[settings]\n";
-  for (const auto& [key, value] : core.settings()) out << '"' << key << "\" = " << fmt::format("{}", value) << "\n";
+  for (const auto& [key, value] : core.settings()) out << quoted(key) << " = " << fmt::format("{}", value) << "\n";
   for (const auto& p : processes) {
-    out << "\n[[process]]\nrole = \"" << p.role << "\"\nname = \"" << p.name << "\"\n";
+    out << "\n[[process]]\nrole = " << quoted(p.role) << "\nname = " << quoted(p.name) << "\n";
     for (const auto& [key, value] : p.facts) out << quoted(key) << " = " << quoted(value) << "\n";
   }
 }
 
-}  // namespace
-
-void add_flags(CLI::App& app, MasterServiceOptions& o) {
-  net::add_service_flags(app, o.service, net::Ends::kBinds);
-  app.add_option("--out", o.out, "folder for the run's record");
-  app.add_option(
-      "--animate", o.animate,
-      "change a Julia set's parameters with time: c.y=-0.4:0.4:10s, or c.y=@0s:-0.4@5s:0.4@10s:-0.4; several "
-      "are separated by \";\"");
-  add_session_flags(app, o);
+Result<MasterOptions> core_options(const MasterServiceOptions& o) {
+  MasterOptions out = o.master;
+  if (o.animate.empty()) return out;
+  auto timeline = julia::parse_timeline(o.animate);
+  if (!timeline) return Error{"--animate: " + timeline.error().text};
+  out.animation = *std::move(timeline);
+  return out;
 }
 
-void add_session_flags(CLI::App& app, MasterServiceOptions& o) {
-  app.add_option("--tile-size", o.master.schedule.tile_size, "pixels a side of a tile")
-      ->capture_default_str()
-      ->check(CLI::Range(16, 4096));
-  app.add_option("--frames-in-flight", o.master.schedule.frames_in_flight, "sampling frames begun and not complete")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 16));
-  app.add_option("--lease-timeout", o.master.schedule.lease_timeout_s, "seconds before a lease goes to another sampler")
-      ->capture_default_str()
-      ->check(CLI::Range(0.05, 3600.0));
-  app.add_option("--lease-target", o.master.schedule.lease_target_s,
-                 "seconds that a lease of a Julia set's rows should take")
-      ->capture_default_str()
-      ->check(CLI::Range(1e-4, 10.0));
-  app.add_option("--progressive", o.master.progressive,
-                 "on: a view arrives with every 4th pixel of every 4th row first; auto: of Julia sets")
-      ->default_str("auto")
-      ->transform(CLI::CheckedTransformer(progressive_names()));
-  app.add_option("--octree-depth", o.master.octree_depth,
-                 "levels of the point model's octree; 0: 5")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 10));
-  double& layers = o.master.settings["volume.layers"];
-  layers = 16;
-  app.add_option("--layers,--volume.layers", layers,
-                 "slice images that a frame of a volume has at most; more: better when the head moves")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, double(volume::kMaxLayers)));
-  for (const auto& [name, text, value] :
-       {std::tuple{"packing.max_points", "points the model holds at most", 20e6},
-        {"packing.obsolete_after_s", "forget clusters not seen for so long; 0: never", 0.0},
-        {"packing.epsilon", "redundancy threshold, relative to depth", 0.004},
-        {"packing.age_weight", "patches that are kept: how fast one not drawn comes to be forgotten, per second", 1.0},
-        {"packing.rate_weight", "patches that are kept: how much coarser ones come before finer ones, per halving",
-         4.0},
-        {"packing.patches_per_cluster", "patches that are kept of a cluster at most; 0: no limit", 6.0}}) {
-    o.master.settings[name] = value;
-    app.add_option(std::string("--") + name, o.master.settings[name], text)
-        ->capture_default_str()
-        ->check(CLI::Range(0.0, 1e12));
+/// The control socket, and the core that answers what comes over it.
+class MasterService {
+ public:
+  MasterService(const MasterServiceOptions& o, const MasterOptions& core, std::unique_ptr<metrics::RunRecord> record)
+      : options_(o), record_(std::move(record)), core_(core, net::make_instance_id(), *record_) {}
+
+  /// Binds, and says so on stdout: whoever started this process waits for the line.
+  Status listen() {
+    const auto endpoint = control_.bind(options_.service.bind, options_.service.insecure);
+    if (!endpoint) return endpoint.error();
+    log::info("listening on {}", endpoint->c_str());
+    std::printf("listening on %s\n", endpoint->c_str());
+    std::fflush(stdout);
+    return ok_status();
   }
-  double& keep = o.master.settings["packing.keep_redundant"];
-  keep = -1;
-  app.add_option("--packing.redundancy,--packing.keep_redundant", keep,
-                 "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches; "
-                 "auto: keep of Julia sets")
-      ->default_str("auto")
-      ->check(CLI::Range(-1.0, 1.0, "auto, eliminate or keep"))
-      ->transform(CLI::Transformer(std::map<std::string, double>{{"auto", -1.0}, {"eliminate", 0.0}, {"keep", 1.0}}));
-}
+
+  void serve() {
+    while (!net::stop_requested() && !core_.stop_requested()) serve_for(core_.hurried() ? 5 : 20);
+  }
+
+  /// Tells everyone to finish, and listens to their last words.
+  void say_goodbye() {
+    core_.shut_down(net::stop_requested() ? "the master was told to stop" : "stop was commanded");
+    const auto patience_s = [] { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; };
+    for (const double begin = monotonic_s(); !core_.everyone_left() && monotonic_s() - begin < patience_s();)
+      serve_for(10);
+  }
+
+  Status write_record() {
+    auto processes = core_.processes();
+    processes.push_back(
+        {"master",
+         options_.service.name,
+         uint64_t(getpid()),
+         {},
+         {{"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(control_.rejected())}}});
+    if (!options_.out.empty()) write_session(options_.out, options_, core_, processes);
+    return record_->finish(processes, core_.counters());
+  }
+
+ private:
+  void serve_for(int timeout_ms) {
+    net::wait_readable({&control_}, timeout_ms);
+    for (int n = 0; n < kMessagesAtOnce; ++n) {
+      const auto message = control_.receive();
+      if (!message) break;
+      guarded(control_, *message, [&] { take(*message, monotonic_s()); });
+    }
+    core_.tick(monotonic_s());
+    for (auto& out : core_.take_outgoing())
+      if (!control_.send_frames(out.peer, out.type, std::move(out.body))) core_.undeliverable(out.peer);
+  }
+
+  void take(const net::Message& message, double now_s) {
+    net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
+                  wire::TileDone, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::Goodbye, wire::Control>(
+        control_, message, [&](const auto& m) {
+          if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
+            core_.on(message.peer, m, now_s);
+          else if (const Status s = core_.on(message.peer, m, now_s); !s)
+            control_.reject(message, s.error().text);
+        });
+  }
+
+  const MasterServiceOptions& options_;
+  net::Context context_;
+  net::Socket control_{
+      context_, net::Kind::kRouter, "master", {.high_water_mark = 10000, .max_message_bytes = 16u << 20}};
+  std::unique_ptr<metrics::RunRecord> record_;
+  MasterCore core_;
+};
+
+}  // namespace
 
 int run(const MasterServiceOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
-  MasterOptions options = o.master;
-  if (!o.animate.empty()) {
-    auto timeline = julia::parse_timeline(o.animate);
-    if (!timeline) {
-      log::error("--animate: {}", timeline.error().text);
-      return 2;
-    }
-    options.animation = *std::move(timeline);
-  }
-  auto record = metrics::RunRecord::open(o.out);
-  if (!record) {
-    log::error("{}", record.error().text);
-    return 2;
-  }
-  net::Context context;
-  net::Socket control(context, net::Kind::kRouter, "master",
-                      {.high_water_mark = 10000, .max_message_bytes = 16u << 20});
-  const auto endpoint = control.bind(o.service.bind, o.service.insecure);
-  if (!endpoint) {
-    log::error("{}", endpoint.error().text);
-    return 2;
-  }
-  log::info("listening on {}", endpoint->c_str());
-  std::printf("listening on %s\n", endpoint->c_str());
-  std::fflush(stdout);
-
-  MasterCore core(options, net::make_instance_id(), **record);
-  const auto serve_for = [&](int timeout_ms) {
-    net::wait_readable({&control}, timeout_ms);
-    for (int n = 0; n < 1000; ++n) {
-      const auto message = control.receive();
-      if (!message) break;
-      const double now = monotonic_s();
-      net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
-                    wire::TileDone, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::Goodbye,
-                    wire::Control>(control, *message, [&](const auto& m) {
-        using M = std::decay_t<decltype(m)>;
-        if constexpr (std::is_same_v<M, wire::MetricRows> || std::is_same_v<M, wire::SliceWeights>) {
-          if (const Status s = core.on(message->peer, m, now); !s) control.reject(*message, s.error().text);
-        } else {
-          core.on(message->peer, m, now);
-        }
-      });
-    }
-    core.tick(monotonic_s());
-    for (auto& out : core.take_outgoing())
-      if (!control.send_frames(out.peer, out.type, std::move(out.body))) core.undeliverable(out.peer);
+  const auto fail = [](int code, const Error& e) {
+    log::error("{}", e.text);
+    return code;
   };
-
-  while (!net::stop_requested() && !core.stop_requested()) serve_for(core.hurried() ? 5 : 20);
-  core.shut_down(net::stop_requested() ? "the master was told to stop" : "stop was commanded");
-  const auto patience_s = [] { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; };
-  for (const double begin = monotonic_s(); !core.everyone_left() && monotonic_s() - begin < patience_s();)
-    serve_for(10);
-
-  auto processes = core.processes();
-  processes.push_back({"master",
-                       o.service.name,
-                       uint64_t(getpid()),
-                       {},
-                       {{"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(control.rejected())}}});
-  if (!o.out.empty()) write_session(o.out, o, core, processes);
-  if (const Status s = (*record)->finish(processes, core.counters()); !s) {
-    log::error("{}", s.error().text);
-    return 1;
-  }
+  const auto options = core_options(o);
+  if (!options) return fail(2, options.error());
+  auto record = metrics::RunRecord::open(o.out);
+  if (!record) return fail(2, record.error());
+  MasterService service(o, *options, *std::move(record));
+  if (const Status s = service.listen(); !s) return fail(2, s.error());
+  service.serve();
+  service.say_goodbye();
+  if (const Status s = service.write_record(); !s) return fail(1, s.error());
   return 0;
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "common/julia/parameters.h"
+#include "common/volume/session.h"
 #include "services/master/master_core.h"
 #include "services/master/slabs/scatter_schedule.h"
 

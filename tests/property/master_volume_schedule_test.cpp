@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <random>
 
+#include "common/volume/session.h"
 #include "services/master/master_core.h"
 
 namespace telesplat::master {

@@ -1,5 +1,7 @@
 #include "services/master/slabs/partition.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <numeric>
 
@@ -90,9 +92,11 @@ void SlabPartitions::set_slices(int slices) {
   changed_ = true;
 }
 
-void SlabPartitions::set_weights(std::vector<uint32_t> weights) {
-  CHECK(weights.size() == weights_.size());
+Status SlabPartitions::set_weights(std::vector<uint32_t> weights) {
+  if (weights.size() != weights_.size())
+    return Error{fmt::format("weights of {} slices; the volume has {}", weights.size(), weights_.size())};
   weights_ = std::move(weights);
+  return ok_status();
 }
 
 bool SlabPartitions::has(const std::string& sampler) const {

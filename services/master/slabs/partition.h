@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "common/core/result.h"
+
 namespace telesplat::master {
 
 inline constexpr double kUneven = 1.5;  ///< a slab heavier than this many means is cut anew
@@ -50,8 +52,8 @@ class SlabPartitions {
  public:
   /// Another volume of so many slices: everything but the samplers is forgotten. Precondition: slices >= 1.
   void set_slices(int slices);
-  /// Precondition: one a slice.
-  void set_weights(std::vector<uint32_t> weights);
+  /// One a slice. Error: another number of them; the weights stay.
+  Status set_weights(std::vector<uint32_t> weights);
   std::span<const uint32_t> weights() const { return weights_; }
 
   /// Twice the same: nothing happens.
@@ -79,7 +81,7 @@ class SlabPartitions {
   std::vector<uint32_t> weights_;
   std::vector<std::string> samplers_;  // in order of their slabs
   std::shared_ptr<Partition> newest_, in_use_;
-  bool changed_ = false;  // something that asks for a new partition
+  bool changed_ = false;                // something that asks for a new partition
   std::optional<double> none_since_s_;  // since when there is none to use, or only one that was not waited for
   uint64_t made_ = 0;
 };

@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/master/tiles/julia_parameters.h"
+#include "common/scene/session.h"
+#include "services/master/control.h"
 
 namespace telesplat::master {
 namespace {
@@ -15,11 +16,6 @@ constexpr double kGuessedBytesPerVoxel = 4;
 // The volume that a part is of.
 bool same_volume(const volume::Session& a, const volume::Session& b) {
   return a.grid == b.grid && a.levels == b.levels && a.lit == b.lit && a.steps == b.steps && a.parts == b.parts;
-}
-
-std::string fact_of(const wire::Hello& m, const std::string& key) {
-  const auto found = m.facts.find(key);
-  return found == m.facts.end() ? std::string() : found->second;
 }
 
 std::string described(const volume::Session& s) {
@@ -50,7 +46,8 @@ Result<VolumeScene::Change> VolumeScene::adopt(const wire::Hello& data) {
     if (i == p) return Error{fmt::format("part {} of {} is held by {}", p + 1, session.parts, s.name)};
   }
   Change change;
-  change.another = !same || (known_[p] && content_hash_[p] != fact_of(data, "content_hash"));
+  change.another =
+      !same || (known_[p] && content_hash_[p] != scene::value_or(data.facts, "content_hash", std::string()));
   if (!same) {
     const auto parts = size_t(session.parts);
     servers_.assign(parts, {});
@@ -74,7 +71,7 @@ Result<VolumeScene::Change> VolumeScene::adopt(const wire::Hello& data) {
   const bool was_complete = complete();
   const bool says_the_same = known_[p] && told_[p] == session && !change.another;
   told_[p] = session;
-  content_hash_[p] = fact_of(data, "content_hash");
+  content_hash_[p] = scene::value_or(data.facts, "content_hash", std::string());
   known_[p] = true;
   // The first part's server says what the volume looks like as it begins.
   if (p == 0 && !says_the_same) {

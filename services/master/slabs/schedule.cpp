@@ -45,51 +45,25 @@ volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRe
   return empty_frame(grid, cameras[0].pose.position_room);
 }
 
-void VolumeSchedule::request_view(const wire::ViewRequest& request) {
-  const auto same = [&](const wire::ViewRequest& r) {
-    return r.viewer == request.viewer && r.request == request.request;
-  };
-  if (request.buffers > 0 && std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) {
-        return std::any_of(f.requests.begin(), f.requests.end(), same);
-      }))
-    return;
-  waiting_.add(request);
-}
-
-void VolumeSchedule::forget_viewer(InstanceId viewer) {
-  waiting_.forget(viewer);
-  for (Frame& f : frames_) f.left.push_back(viewer);
-}
-
-ViewQueue VolumeSchedule::release_views() {
-  drop_frames();
-  return std::exchange(waiting_, {});
-}
-
 bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only) {
-  const wire::ViewRequest* next = waiting_.next(turns_only);
   // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two they might not.
-  if (!frames_.empty() && frames_.back().partition != partition) return false;
-  if (!partition || !next || frames_.size() >= views_at_once(options_.frames_in_flight, next->buffers)) return false;
-  std::vector<wire::ViewRequest> requests{waiting_.take(next->viewer)};
-  const glm::dvec3 eye = requests[0].camera.pose.position_room;
-  const InstanceId first = requests[0].viewer;
-  for (auto& r : waiting_.take_all(
+  if (!partition || (!frames_.empty() && frames_.back().partition != partition)) return false;
+  const auto first = take_view(turns_only);
+  if (!first) return false;
+  const glm::dvec3 eye = first->camera.pose.position_room;
+  std::vector<wire::ViewRequest> requests{*first};
+  for (auto& r : take_more(
            [&](const wire::ViewRequest& other) {
-             return other.viewer != first && glm::distance(other.camera.pose.position_room, eye) <= kSameEye_m;
+             return other.viewer != first->viewer && glm::distance(other.camera.pose.position_room, eye) <= kSameEye_m;
            },
            wire::kMaxViews - 1))
     requests.push_back(std::move(r));
   volume::ShearFrame shear = plan(grid_, requests, layers_);
   const size_t slabs = partition->slabs.size();
-  frames_.push_back({next_frame_,
-                     epoch,
-                     std::move(partition),
-                     std::move(shear),
-                     std::move(requests),
-                     std::vector<SlabState>(slabs),
-                     {}});
-  next_frame_ = next_frame_.next();
+  const FrameId id = next_frame();
+  begin(id, requests);
+  frames_.push_back(
+      {id, epoch, std::move(partition), std::move(shear), std::move(requests), std::vector<SlabState>(slabs)});
   return true;
 }
 
@@ -97,8 +71,7 @@ std::optional<wire::SliceLease> VolumeSchedule::lease(const std::string& sampler
   for (Frame& f : frames_) {
     const auto slab = f.partition->slab_of(sampler);
     if (!slab || f.slabs[*slab].state != SlabState::State::kOpen) continue;
-    const LeaseId id = next_lease_;
-    next_lease_ = next_lease_.next();
+    const LeaseId id = next_lease();
     f.slabs[*slab] = {SlabState::State::kLeased, id, now_s, now_s + lease_time_s()};
     const SlabRange range = f.partition->slabs[*slab].range;
     wire::SliceLease out{.lease = id,
@@ -130,12 +103,11 @@ bool VolumeSchedule::tile_done(const wire::TileDone& m, double now_s) {
   SlabState& slab = f->slabs[size_t(m.tile)];
   if (slab.state != SlabState::State::kLeased || slab.lease != m.lease) return false;
   slab.state = SlabState::State::kDone;
-  const double took_s = now_s - slab.leased_s;
-  slab_time_s_ = slab_time_s_ == 0 ? took_s : 0.9 * slab_time_s_ + 0.1 * took_s;
+  slab_time_s_.add(now_s - slab.leased_s);
   if (std::all_of(f->slabs.begin(), f->slabs.end(),
                   [](const SlabState& s) { return s.state == SlabState::State::kDone; })) {
+    complete(f->id);
     frames_.erase(f);
-    ++completed_;
     patience_ = 1;
   }
   return true;
@@ -157,8 +129,7 @@ int VolumeSchedule::drop_where(const std::function<bool(const Frame&)>& lost) {
     if (!dropped[i]) continue;
     const Frame& f = frames_[i];
     for (const SlabState& s : f.slabs) out += s.state == SlabState::State::kLeased;
-    for (const auto& r : f.requests)
-      if (std::find(f.left.begin(), f.left.end(), r.viewer) == f.left.end()) waiting_.put_back(r);
+    put_back(f.id);
     frames_.erase(frames_.begin() + std::ptrdiff_t(i));
   }
   return out;
@@ -201,8 +172,8 @@ size_t VolumeSchedule::leases_of(const std::string& sampler) const {
 
 std::vector<std::string> VolumeSchedule::overdue(double now_s) const {
   std::vector<std::string> out;
-  if (slab_time_s_ == 0) return out;
-  const double after_s = std::max(kLeastSilent_s, 3 * slab_time_s_);
+  if (!slab_time_s_.known()) return out;
+  const double after_s = std::max(kLeastSilent_s, 3 * slab_time_s_.value());
   for (const Frame& f : frames_)
     for (size_t i = 0; i < f.slabs.size(); ++i)
       if (f.slabs[i].state == SlabState::State::kLeased && now_s - f.slabs[i].leased_s > after_s)
@@ -211,8 +182,8 @@ std::vector<std::string> VolumeSchedule::overdue(double now_s) const {
 }
 
 double VolumeSchedule::lease_time_s() const {
-  const double usual_s = std::max(options_.lease_timeout_s, 4 * slab_time_s_);
-  return std::min(usual_s * patience_, std::max(kLongestLease_s, options_.lease_timeout_s));
+  const double usual_s = std::max(options().lease_timeout_s, 4 * slab_time_s_.value());
+  return std::min(usual_s * patience_, std::max(kLongestLease_s, options().lease_timeout_s));
 }
 
 }  // namespace telesplat::master

@@ -10,8 +10,7 @@
 
 #include "common/volume/shear.h"
 #include "services/master/slabs/partition.h"
-#include "services/master/tiles/frame_schedule.h"
-#include "services/master/view_queue.h"
+#include "services/master/views.h"
 
 namespace telesplat::master {
 
@@ -22,26 +21,15 @@ inline constexpr double kLongestLease_s = 60.0;  ///< however slow samplers are 
 /// looks past the grid, and one layer of one slice, so that the request is answered with an empty picture at hardly any cost.
 volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRequest>& requests, int layers);
 
-class VolumeSchedule {
+class VolumeSchedule : public Views {
  public:
-  /// Of the options: frames_in_flight, lease_timeout_s.
-  explicit VolumeSchedule(const ScheduleOptions& options) : options_(options) {}
+  /// The options' frames_in_flight and lease_timeout_s count here.
+  explicit VolumeSchedule(const ScheduleOptions& options) : Views(options) {}
 
   /// For frames that begin from now on.
   void set_grid(const volume::Grid& grid) { grid_ = grid; }
   void set_layers(int layers) { layers_ = layers; }
   int layers() const { return layers_; }
-
-  /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
-  void request_view(const wire::ViewRequest& request);
-  void forget_viewer(InstanceId viewer);
-  bool view_waiting() const { return !waiting_.empty(); }
-  /// See ViewQueue.
-  void begin_turns() { waiting_.begin_turns(); }
-  bool turn_waiting() const { return waiting_.turn_waiting(); }
-  /// What waits, to go on elsewhere: the scene became one of another kind.
-  ViewQueue release_views();
-  void take_views(ViewQueue views) { waiting_ = std::move(views); }
 
   /// Begins the frame of the next view that waits, and of the first view of every other viewer whose eye is within kSameEye_m of its. Viewers take
   /// turns; turns_only: only those that have a turn. False: none waits, as many frames are in flight as may be (views_at_once()), or some of
@@ -67,7 +55,6 @@ class VolumeSchedule {
   /// Samplers that have had a lease for longer than three typical ones: worth finding out whether they live.
   std::vector<std::string> overdue(double now_s) const;
   size_t frames_in_flight() const { return frames_.size(); }
-  uint64_t frames_completed() const { return completed_; }
   uint64_t slabs_released() const { return released_; }
   /// Seconds after which a lease expires now: lease_timeout_s, or four typical slab times if that is more; doubled for each time leases ran out.
   double lease_time_s() const;
@@ -85,21 +72,16 @@ class VolumeSchedule {
     volume::ShearFrame shear;
     std::vector<wire::ViewRequest> requests;
     std::vector<SlabState> slabs;
-    std::vector<InstanceId> left;  // viewers that are gone
   };
   /// Drops where `lost`; returns how many leases were out.
   int drop_where(const std::function<bool(const Frame&)>& lost);
 
-  ScheduleOptions options_;
   volume::Grid grid_;
   int layers_ = 16;
-  ViewQueue waiting_;
   std::deque<Frame> frames_;
-  FrameId next_frame_{1};
-  LeaseId next_lease_{1};
-  double slab_time_s_ = 0;  // running mean of lease -> done
+  RunningMean slab_time_s_{0.1};  // lease -> done
   double patience_ = 1;
-  uint64_t completed_ = 0, released_ = 0;
+  uint64_t released_ = 0;
 };
 
 }  // namespace telesplat::master

@@ -6,44 +6,20 @@
 
 namespace telesplat::master {
 
-void FrameSchedule::request_view(const wire::ViewRequest& request) {
-  if (request.buffers > 0 && std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) {
-        return f.request.viewer == request.viewer && f.request.request == request.request;
-      }))
-    return;
-  waiting_.add(request);
-}
-
-void FrameSchedule::forget_viewer(InstanceId viewer) {
-  waiting_.forget(viewer);
-  for (Frame& f : frames_)
-    if (f.request.viewer == viewer) f.viewer_left = true;
-}
-
-ViewQueue FrameSchedule::release_views() {
-  drop_frames();
-  return std::exchange(waiting_, {});
-}
-
-size_t FrameSchedule::views_in_flight() const {
-  return size_t(std::count_if(frames_.begin(), frames_.end(), [](const Frame& f) { return f.step == 1; }));
-}
-
 bool FrameSchedule::begin_view(EpochId epoch, bool turns_only) {
-  const wire::ViewRequest* next = waiting_.next(turns_only);
-  if (!next || views_in_flight() >= views_at_once(options_.frames_in_flight, next->buffers)) return false;
-  const wire::ViewRequest request = waiting_.take(next->viewer);
-  if (cut_.coarse) begin_frame(epoch, request, kCoarseStep);
-  begin_frame(epoch, request, 1);
+  const auto request = take_view(turns_only);
+  if (!request) return false;
+  if (cut_.coarse) begin_frame(epoch, *request, kCoarseStep);
+  begin(begin_frame(epoch, *request, 1), {*request});
   return true;
 }
 
-void FrameSchedule::begin_frame(EpochId epoch, const wire::ViewRequest& request, int step) {
+FrameId FrameSchedule::begin_frame(EpochId epoch, const wire::ViewRequest& request, int step) {
   const geometry::Camera camera = step == 1 ? request.camera : geometry::subsample(request.camera, step);
   auto tiles = cut_.rows ? FrameTiles::of_rows(camera.width, camera.height)
-                         : FrameTiles::of_squares(camera.width, camera.height, options_.tile_size);
-  frames_.push_back({next_frame_, epoch, request, step, camera, std::move(tiles)});
-  next_frame_ = next_frame_.next();
+                         : FrameTiles::of_squares(camera.width, camera.height, options().tile_size);
+  frames_.push_back({next_frame(), epoch, request, step, camera, std::move(tiles)});
+  return frames_.back().id;
 }
 
 bool FrameSchedule::tile_open() const {
@@ -59,7 +35,7 @@ bool FrameSchedule::backup_due(double now_s) const {
 std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, double now_s, bool even_own, bool idle) {
   costs_.join(sampler);
   const double pixel_s = costs_.pixel_s(sampler);
-  const double target_s = std::max(options_.lease_target_s, kTargetPerSampler_s * double(costs_.samplers()));
+  const double target_s = std::max(options().lease_target_s, kTargetPerSampler_s * double(costs_.samplers()));
   for (Frame& f : frames_) {
     const double row_s = pixel_s * f.camera.width;
     // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would keep all waiting.
@@ -78,8 +54,7 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
 }
 
 wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& sampler, double now_s) {
-  const LeaseId id = next_lease_;
-  next_lease_ = next_lease_.next();
+  const LeaseId id = next_lease();
   f.tiles.lease(tile, id, sampler, now_s, now_s + lease_time_s());
   const auto& t = f.tiles.tile(tile);
   return {.lease = id,
@@ -99,9 +74,9 @@ wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& 
 
 void FrameSchedule::extend(LeaseId lease, double now_s) {
   for (Frame& f : frames_)
-    if (f.tiles.extend(lease, now_s, now_s + options_.lease_timeout_s)) return;
+    if (f.tiles.extend(lease, now_s, now_s + options().lease_timeout_s)) return;
   if (const auto o = overtaken_.find(lease); o != overtaken_.end())
-    o->second.expires_s = now_s + options_.lease_timeout_s;
+    o->second.expires_s = now_s + options().lease_timeout_s;
 }
 
 bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
@@ -113,7 +88,7 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   for (const LeaseId id : f->tiles.tile(m.tile).leases)
     if (const auto* out = f->tiles.out(id); out && id != m.lease) overtaken_[id] = {out->sampler, out->expires_s};
   if (!f->tiles.done(m.tile)) return false;
-  if (took_s) tile_time_s_ = tile_time_s_ == 0 ? *took_s : 0.95 * tile_time_s_ + 0.05 * *took_s;
+  if (took_s) tile_time_s_.add(*took_s);
   const auto& rect = f->tiles.tile(m.tile).rect;
   costs_.learn(sampler, m.encode_end_s - m.sample_begin_s, double(rect.width) * rect.height);
   if (f->tiles.complete()) end_frame(f);
@@ -124,9 +99,9 @@ void FrameSchedule::end_frame(std::deque<Frame>::iterator frame) {
   const bool whole = frame->step == 1;
   const auto viewer = frame->request.viewer;
   const auto request = frame->request.request;
+  if (whole) complete(frame->id);
   frames_.erase(frame);
   if (!whole) return;
-  ++completed_;
   // A coarse frame that is not there yet shows nothing any more.
   std::erase_if(frames_, [&](const Frame& f) {
     return f.step != 1 && f.request.viewer == viewer && f.request.request == request;
@@ -134,12 +109,13 @@ void FrameSchedule::end_frame(std::deque<Frame>::iterator frame) {
 }
 
 double FrameSchedule::lease_time_s() const {
-  if (tile_time_s_ == 0) return options_.lease_timeout_s;
-  return std::clamp(25 * tile_time_s_, std::min(0.3, options_.lease_timeout_s), options_.lease_timeout_s);
+  const double longest_s = options().lease_timeout_s;
+  return tile_time_s_.known() ? std::clamp(25 * tile_time_s_.value(), std::min(0.3, longest_s), longest_s) : longest_s;
 }
 
 double FrameSchedule::backup_after_s() const {
-  return tile_time_s_ == 0 ? std::numeric_limits<double>::infinity() : std::max(3 * tile_time_s_, kLeastOverdue_s);
+  return tile_time_s_.known() ? std::max(3 * tile_time_s_.value(), kLeastOverdue_s)
+                              : std::numeric_limits<double>::infinity();
 }
 
 void FrameSchedule::heard_of(const std::string& sampler) {
@@ -177,7 +153,7 @@ size_t FrameSchedule::leases_of(const std::string& sampler) const {
 void FrameSchedule::drop_frames() {
   // Newest first, each view once.
   for (auto f = frames_.rbegin(); f != frames_.rend(); ++f)
-    if (!f->viewer_left && f->step == 1) waiting_.put_back(f->request);
+    if (f->step == 1) put_back(f->id);
   frames_.clear();
   overtaken_.clear();
 }

@@ -11,11 +11,10 @@
 #include "common/wire/messages.h"
 #include "services/master/tiles/frame_tiles.h"
 #include "services/master/tiles/sampling_costs.h"
-#include "services/master/view_queue.h"
+#include "services/master/views.h"
 
 namespace telesplat::master {
 
-inline constexpr int kCoarseStep = 4;             ///< a coarse frame has every 4th pixel of every 4th row
 inline constexpr double kLeastOverdue_s = 0.015;  ///< nothing that has been out for less gets a backup
 
 /// Seconds of lease_target_s that each sampler adds at least: so master and packer have no more than 4000 leases of rows a second to look
@@ -26,14 +25,6 @@ inline constexpr double kTargetPerSampler_s = 0.25e-3;
 /// in store (3 to 8 ms between idle and busy with 40 samplers on two cores; `telesplat bench scaling`).
 inline constexpr double kDearRow_s = 0.01;
 
-struct ScheduleOptions {
-  int tile_size = 256;       ///< pixels a side; the last column and row may be smaller
-  int frames_in_flight = 2;  ///< views begun and not complete, at most
-  double lease_timeout_s =
-      2.0;  ///< longest time before a lease goes to another sampler; shorter once tile times are known
-  double lease_target_s = 0.004;  ///< what a lease of rows should take its sampler
-};
-
 /// How the frames of a scene are leased.
 struct Cut {
   bool rows = false;    ///< bands of rows of blocks instead of square tiles
@@ -41,33 +32,20 @@ struct Cut {
   bool operator==(const Cut&) const = default;
 };
 
-class FrameSchedule {
+class FrameSchedule : public Views {
  public:
-  explicit FrameSchedule(const ScheduleOptions& options) : options_(options) {}
+  explicit FrameSchedule(const ScheduleOptions& options) : Views(options) {}
 
   /// For frames that begin from now on.
   void set_cut(Cut cut) { cut_ = cut; }
   Cut cut() const { return cut_; }
 
-  /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
-  void request_view(const wire::ViewRequest& request);
-  void forget_viewer(InstanceId viewer);
-  bool view_waiting() const { return !waiting_.empty(); }
-  /// See ViewQueue.
-  void begin_turns() { waiting_.begin_turns(); }
-  bool turn_waiting() const { return waiting_.turn_waiting(); }
-  /// What waits, to go on elsewhere: the scene became one of another kind.
-  ViewQueue release_views();
-  void take_views(ViewQueue views) { waiting_ = std::move(views); }
-
-  /// Begins the frame or frames of the next view that waits; viewers take turns. turns_only: only those that have a turn. False: none
-  /// waits, or as many views are in flight as may be: frames_in_flight, or as many as the viewer has buffers, if that is more, but no
-  /// more than kBufferedInFlight for that.
+  /// Begins the frame or frames of the next view that waits; see Views::take_view(). False: there is none.
   bool begin_view(EpochId epoch, bool turns_only = false);
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been out for long in a
-  /// frame that has none (see backup_after_s()). The newest frame's last rows,
-  /// one a sampler, go only to samplers that hold no other lease, if they take longer than kDearRow_s. even_own: tiles whose lease ran out at this very sampler, too.
+  /// frame that has none (see backup_after_s()). The newest frame's last rows, one a sampler, go only to samplers that hold no other lease,
+  /// if they take longer than kDearRow_s. even_own: tiles whose lease ran out at this very sampler, too.
   /// idle: it is known to hold none, though the packer may not have said so yet.
   std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true, bool idle = false);
   /// Gives a lease its full time again. Unknown leases are ignored.
@@ -76,7 +54,7 @@ class FrameSchedule {
   /// for duplicates, tiles never leased and unknown frames. Learns from the tile's times.
   bool tile_done(const wire::TileDone& tile, const std::string& sampler, double now_s);
 
-  /// A sign of life: whatever `sampler` had that a backup was faster with, it is through with.
+  /// A sign of life: `sampler` is through with everything that a backup was faster with.
   void heard_of(const std::string& sampler);
   /// Takes back leases that ran out, those that a backup was faster with included. Returns how many; lost_sampler is told whose.
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
@@ -90,8 +68,6 @@ class FrameSchedule {
   /// A tile has been out so long that any other sampler than its own could take a backup.
   bool backup_due(double now_s) const;
   size_t frames_in_flight() const { return frames_.size(); }
-  size_t views_in_flight() const;
-  uint64_t frames_completed() const { return completed_; }  ///< those of step 1: views
   uint64_t tiles_released() const { return released_; }
   uint64_t backups() const { return backups_; }
   const SamplingCosts& costs() const { return costs_; }
@@ -109,27 +85,22 @@ class FrameSchedule {
     int step = 1;
     geometry::Camera camera;
     FrameTiles tiles;
-    bool viewer_left = false;
   };
   // A lease whose tile another sampler delivered first; its own may be dead or slow.
   struct Overtaken {
     std::string sampler;
     double expires_s;
   };
-  void begin_frame(EpochId epoch, const wire::ViewRequest& request, int step);
+  FrameId begin_frame(EpochId epoch, const wire::ViewRequest& request, int step);
   void end_frame(std::deque<Frame>::iterator frame);
   wire::Lease lease_tile(Frame& frame, size_t tile, const std::string& sampler, double now_s);
 
-  ScheduleOptions options_;
   Cut cut_;
-  ViewQueue waiting_;
   std::deque<Frame> frames_;
   std::map<LeaseId, Overtaken> overtaken_;
   SamplingCosts costs_;
-  FrameId next_frame_{1};
-  LeaseId next_lease_{1};
-  double tile_time_s_ = 0;  // running mean of lease -> done
-  uint64_t completed_ = 0, released_ = 0, backups_ = 0;
+  RunningMean tile_time_s_{0.05};  // lease -> done
+  uint64_t released_ = 0, backups_ = 0;
 };
 
 }  // namespace telesplat::master

@@ -3,27 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
 #include "common/julia/animation.h"
+#include "common/scene/session.h"
+#include "services/master/control.h"
 
 namespace telesplat::master {
 
-Result<double> read_number(const std::string& name, const std::string& text) {
-  double value = 0;
-  const auto end = text.data() + text.size();
-  const auto read = std::from_chars(text.data(), end, value);
-  if (text.empty() || read.ec != std::errc() || read.ptr != end || !std::isfinite(value))
-    return Error{fmt::format("{} is \"{}\", not a finite number", name.substr(0, 64), text.substr(0, 40))};
-  return value;
-}
-
-bool SceneParameters::adopt(const wire::Hello& data, std::string& problem) {
-  const auto fact = [&](const char* key) {
-    const auto found = data.facts.find(key);
-    return found == data.facts.end() ? std::string() : found->second;
-  };
+bool JuliaParameters::adopt(const wire::Hello& data, std::string& problem) {
+  const auto fact = [&](const char* key) { return scene::value_or(data.facts, key, std::string()); };
   const bool other_data = fact("content_hash") != content_hash_;
   if (fact("kind") == kind_ && data.parameters == told_ && !other_data) return false;
   kind_ = fact("kind");
@@ -33,7 +21,7 @@ bool SceneParameters::adopt(const wire::Hello& data, std::string& problem) {
   values_ = told_;
   julia_.reset();
   timeline_ = {};
-  if (kind_ != "julia") {
+  if (!is_julia()) {
     if (!wished_.empty()) problem = fmt::format("--animate: a scene of kind \"{}\" has no parameters", kind_);
     return changed;
   }
@@ -58,13 +46,13 @@ bool SceneParameters::adopt(const wire::Hello& data, std::string& problem) {
   return changed;
 }
 
-std::map<std::string, double> SceneParameters::with(const julia::Parameters& parameters) const {
+std::map<std::string, double> JuliaParameters::with(const julia::Parameters& parameters) const {
   auto out = values_;  // the placement is among them
   for (const auto& [name, value] : julia::to_map(parameters)) out[name] = value;
   return out;
 }
 
-Status SceneParameters::set(const std::map<std::string, std::string>& arguments) {
+Status JuliaParameters::set(const std::map<std::string, std::string>& arguments) {
   if (!julia_)
     return Error{kind_.empty() ? std::string("set: there is no data server yet")
                                : fmt::format("set: a scene of kind \"{}\" has no parameters", kind_)};
@@ -86,14 +74,14 @@ Status SceneParameters::set(const std::map<std::string, std::string>& arguments)
   return ok_status();
 }
 
-Status SceneParameters::begin(julia::Timeline timeline) {
+Status JuliaParameters::begin(julia::Timeline timeline) {
   if (const Status s = julia::validate(*julia_, timeline); !s) return s;
   timeline_ = std::move(timeline);
   begun_s_.reset();
   return ok_status();
 }
 
-Status SceneParameters::animate(const std::string& text) {
+Status JuliaParameters::animate(const std::string& text) {
   if (!julia_)
     return Error{kind_.empty() ? std::string("animate: there is no data server yet")
                                : fmt::format("animate: a scene of kind \"{}\" has no parameters", kind_)};
@@ -106,7 +94,7 @@ Status SceneParameters::animate(const std::string& text) {
   return begin(*std::move(timeline));
 }
 
-bool SceneParameters::step(double now_s) {
+bool JuliaParameters::step(double now_s) {
   if (!animated()) return false;
   if (!begun_s_) begun_s_ = now_s;
   auto next = julia::parameters_at(*julia_, timeline_, now_s - *begun_s_);

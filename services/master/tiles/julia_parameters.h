@@ -1,4 +1,5 @@
-// The scene's parameters in the current epoch, what may change them, and the animation that does (T7.3). No clocks: times come in.
+// The parameters of a scene that travels as points in the current epoch, what may change them, and the animation that does (T7.3): what
+// differs between meshes, which have none, and Julia sets. No clocks: times come in.
 #pragma once
 
 #include <map>
@@ -7,23 +8,23 @@
 
 #include "common/julia/parameters.h"
 #include "common/julia/timeline.h"
+#include "common/scene/kind.h"
 #include "common/wire/messages.h"
 
 namespace telesplat::master {
 
-/// Reads the value that someone wants a parameter to have. Error: no finite number; names it.
-Result<double> read_number(const std::string& name, const std::string& text);
-
-class SceneParameters {
+class JuliaParameters {
  public:
   /// `timeline`: what animates the scene from its first view on; empty: what the data server's fact "animate" says, if anything.
-  explicit SceneParameters(julia::Timeline timeline = {}) : wished_(std::move(timeline)) {}
+  explicit JuliaParameters(julia::Timeline timeline = {}) : wished_(std::move(timeline)) {}
 
   /// A data server said hello. One that says the same as the one before (it was restarted) changes nothing: values set or animated since
-  /// then stay. True: values() are others than before. Whatever is wrong with what it says is in `problem`, and then nothing can be set.
+  /// then stay. True: values() are others than before. problem: what is wrong with what it says; then nothing can be set.
   bool adopt(const wire::Hello& data, std::string& problem);
 
   const std::string& kind() const { return kind_; }
+  /// A Julia set: only these have parameters, and their frames are leased by rows.
+  bool is_julia() const { return scene::kind_named(kind_) == scene::Kind::kJulia; }
   const std::map<std::string, double>& values() const { return values_; }
 
   /// Sets parameters by name. Error: the scene has none, no such parameter, one that is fixed or animated, no number, limits; then nothing

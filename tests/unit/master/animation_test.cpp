@@ -1,6 +1,8 @@
 // Epochs of a Julia set's parameters: who is told what, in which order. The master without sockets and clocks.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "common/julia/animation.h"
 #include "services/master/master_core.h"
 
@@ -324,7 +326,7 @@ TEST_F(ProgressiveAnimation, CoarseAndFineShareAnEpoch) {
 
 TEST_F(ProgressiveAnimation, PackingKeepsEverythingByDefault) {
   MasterOptions o;
-  o.settings["packing.keep_redundant"] = -1;
+  o.redundancy = Redundancy::kAuto;
   MasterCore other(o, {1}, *record);
   EXPECT_EQ(other.settings().at("packing.keep_redundant"), 0);
   other.on("d", hello("data", 1), 0);

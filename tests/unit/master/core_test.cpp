@@ -1,6 +1,8 @@
 // The master without sockets and clocks: who is told what.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "services/master/master_core.h"
 
 namespace telesplat::master {

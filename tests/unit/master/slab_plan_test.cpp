@@ -4,10 +4,12 @@
 #include <filesystem>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "services/master/master_core.h"
 #include "services/master/slabs/assignment.h"
+#include "services/master/slabs/schedule.h"
 
 namespace telesplat::master {
 namespace {

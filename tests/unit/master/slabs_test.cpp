@@ -173,7 +173,7 @@ TEST_F(Partitions, SamplersThatJoinMoveLittle) {
 TEST_F(Partitions, MoreSamplersThanSlicesAreSpare) {
   std::vector<uint32_t> weights(12, 0);
   weights[3] = weights[8] = 10;
-  p.set_weights(weights);
+  EXPECT_TRUE(p.set_weights(weights));
   for (const char* s : {"a", "b", "c"}) p.join(s);
   const auto made = p.update(0);
   EXPECT_EQ(made->slabs.size(), 2u);
@@ -186,19 +186,19 @@ TEST_F(Partitions, UnevenWeightsCutAnewButNotAllTheTime) {
   p.update(0);
   std::vector<uint32_t> weights(12, 1);
   weights[0] = weights[1] = 30;
-  p.set_weights(weights);
+  EXPECT_TRUE(p.set_weights(weights));
   EXPECT_FALSE(p.update(kRecutAfter_s - 0.1)) << "too soon";
   const auto made = p.update(kRecutAfter_s);
   ASSERT_TRUE(made);
   EXPECT_EQ(made->slabs[0].range, (SlabRange{0, 1}));
   weights[2] = 10;  // a little heavier
-  p.set_weights(weights);
+  EXPECT_TRUE(p.set_weights(weights));
   EXPECT_FALSE(p.update(100));
   // One heavy slice cannot be cut.
   weights.assign(12, 0);
   weights[0] = 1000;
   weights[11] = 1;
-  p.set_weights(weights);
+  EXPECT_TRUE(p.set_weights(weights));
   EXPECT_FALSE(p.update(200)) << "no other cut is better";
 }
 
@@ -215,6 +215,14 @@ TEST_F(Partitions, AnotherVolumeBeginsAnew) {
   all_ready();
   p.invalidate();
   EXPECT_TRUE(p.update(2)) << "samplers are told again where to fetch";
+}
+
+TEST_F(Partitions, WeightsOfAnotherVolumeAreRefused) {
+  const std::vector<uint32_t> before(p.weights().begin(), p.weights().end());
+  const Status s = p.set_weights(std::vector<uint32_t>(before.size() + 8, 3));
+  ASSERT_FALSE(s);
+  EXPECT_NE(s.error().text.find(std::to_string(before.size() + 8)), std::string::npos) << s.error().text;
+  EXPECT_EQ(std::vector<uint32_t>(p.weights().begin(), p.weights().end()), before);
 }
 
 }  // namespace

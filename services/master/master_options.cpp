@@ -1,0 +1,137 @@
+#include "services/master/master_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <iterator>
+
+#include <fmt/format.h>
+
+#include "common/volume/shear.h"
+
+namespace telesplat::master {
+namespace {
+
+using scene::Kinds;
+using scene::Pipeline;
+
+// A row whose value is one of the names that name_of() has for `values`.
+template <class Enum, size_t n>
+options::Row named(options::Row row, Enum& value, const Enum (&values)[n]) {
+  options::Names names;
+  for (const Enum v : values) names.emplace_back(name_of(v));
+  row.limits = names;
+  row.value = options::Text{
+      .read =
+          [&value, names, all = std::vector<Enum>(std::begin(values), std::end(values))](const std::string& text) {
+            const auto found = std::find(names.begin(), names.end(), text);
+            if (found == names.end()) return Status(Error{"is none of its names"});
+            value = all[size_t(found - names.begin())];
+            return ok_status();
+          },
+      .write = [&value] { return std::string(name_of(value)); }};
+  return row;
+}
+
+// A setting of the session, which has `usual` unless it is given.
+options::Row setting(MasterOptions& o, const std::string& name, double usual, const char* help) {
+  return {.flag = "--" + name,
+          .value = &o.settings.try_emplace(name, usual).first->second,
+          .help = help,
+          .limits = options::Range{0.0, 1e12},
+          .fits = Kinds::of(Pipeline::kPoints)};
+}
+
+// A setting that the kind of scene decides unless it is given: then it is not among the settings.
+options::Row setting_by_kind(MasterOptions& o, const std::string& name, const char* help, const char* usual) {
+  options::Row row{.flag = "--" + name, .value = {}, .help = help, .limits = options::Range{0.0, 1e12}};
+  row.value = options::Text{.read =
+                                [&o, name](const std::string& text) {
+                                  double value = 0;
+                                  const auto [stop, error] =
+                                      std::from_chars(text.data(), text.data() + text.size(), value);
+                                  if (error != std::errc() || stop != text.data() + text.size())
+                                    return Status(Error{"is not a number"});
+                                  o.settings[name] = value;
+                                  return ok_status();
+                                },
+                            .write =
+                                [&o, name] {
+                                  const auto found = o.settings.find(name);
+                                  return found == o.settings.end() ? std::string() : fmt::format("{}", found->second);
+                                }};
+  row.fits = Kinds::of(Pipeline::kPoints);
+  row.default_text = usual;
+  return row;
+}
+
+options::Table lease_table(MasterOptions& o) {
+  return {{.flag = "--tile-size",
+           .value = &o.schedule.tile_size,
+           .help = "pixels a side of a tile",
+           .limits = options::Range{16, 4096}},
+          {.flag = "--frames-in-flight",
+           .value = &o.schedule.frames_in_flight,
+           .help = "sampling frames begun and not complete",
+           .limits = options::Range{1, 16}},
+          {.flag = "--lease-timeout",
+           .value = &o.schedule.lease_timeout_s,
+           .help = "seconds before a lease goes to another sampler",
+           .limits = options::Range{0.05, 3600}},
+          {.flag = "--lease-target",
+           .value = &o.schedule.lease_target_s,
+           .help = "seconds that a lease of a Julia set's rows should take",
+           .limits = options::Range{1e-4, 10},
+           .fits = Kinds::of(Pipeline::kPoints)},
+          named({.flag = "--progressive",
+                 .value = {},
+                 .help = "on: a view arrives with every 4th pixel of every 4th row first; auto: of Julia sets",
+                 .fits = Kinds::of(Pipeline::kPoints)},
+                o.progressive, {Progressive::kAuto, Progressive::kOn, Progressive::kOff}),
+          {.flag = "--octree-depth",
+           .value = &o.octree_depth,
+           .help = "levels of the point model's octree; 0: 5",
+           .limits = options::Range{0, 10}},
+          {.flag = "--layers,--volume.layers",
+           .value = &o.settings.try_emplace("volume.layers", 16).first->second,
+           .help = "slice images that a frame of a volume has at most; more: better when the head moves",
+           .limits = options::Range{1, double(volume::kMaxLayers)},
+           .fits = Kinds::of(Pipeline::kSlices)}};
+}
+
+options::Table packing_table(MasterOptions& o) {
+  return {
+      setting_by_kind(o, "packing.max_points", "points the model holds at most", "20e6; of Julia sets 8e6"),
+      setting(o, "packing.obsolete_after_s", 0, "forget clusters not seen for so long; 0: never"),
+      setting(o, "packing.epsilon", 0.004, "redundancy threshold, relative to depth"),
+      setting(o, "packing.age_weight", 1,
+              "patches that are kept: how fast one not drawn comes to be forgotten, per second"),
+      setting(o, "packing.rate_weight", 4,
+              "patches that are kept: how much coarser ones come before finer ones, per halving"),
+      setting(o, "packing.patches_per_cluster", 6, "patches that are kept of a cluster at most; 0: no limit"),
+      named(
+          {.flag = "--packing.redundancy,--packing.keep_redundant",
+           .value = {},
+           .help = "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches; "
+                   "auto: keep of Julia sets",
+           .fits = Kinds::of(Pipeline::kPoints)},
+          o.redundancy, {Redundancy::kAuto, Redundancy::kEliminate, Redundancy::kKeep})};
+}
+
+}  // namespace
+
+options::Table session_table(MasterServiceOptions& o) {
+  return options::joined(lease_table(o.master), packing_table(o.master));
+}
+
+options::Table table(MasterServiceOptions& o) {
+  const options::Table own{
+      {.flag = "--out", .value = &o.out, .help = "folder for the run's record", .reach = options::Reach::kHere},
+      {.flag = "--animate",
+       .value = &o.animate,
+       .help = "change a Julia set's parameters with time: c.y=-0.4:0.4:10s, or c.y=@0s:-0.4@5s:0.4@10s:-0.4; several "
+               "are separated by \";\"",
+       .reach = options::Reach::kHere}};
+  return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own), session_table(o));
+}
+
+}  // namespace telesplat::master

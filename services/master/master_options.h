@@ -1,0 +1,25 @@
+// The flags of telesplat-master.
+#pragma once
+
+#include <string>
+
+#include "common/net/service.h"
+#include "common/options/table.h"
+#include "services/master/settings.h"
+
+namespace telesplat::master {
+
+struct MasterServiceOptions {
+  net::ServiceOptions service;  ///< bind: the control socket's address
+  MasterOptions master;
+  std::string out;      ///< run folder; empty: no record is written
+  std::string animate;  ///< as julia::parse_timeline takes it; empty: what the data server says
+};
+
+/// Flags that `telesplat run` has too: tiles, leases, packing. (There the data server is told of animations.) Rows point into `options`, whose
+/// settings get their default values here where they have none.
+options::Table session_table(MasterServiceOptions& options);
+/// All flags.
+options::Table table(MasterServiceOptions& options);
+
+}  // namespace telesplat::master

@@ -1,0 +1,116 @@
+// What a session shows: its scene, its epochs, and the commands that begin them.
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "common/points/point_model.h"
+#include "common/scene/session.h"
+#include "services/master/master_core.h"
+
+namespace telesplat::master {
+
+// Of data servers that name no kind, or one that this program does not know: points.
+Plan& MasterCore::plan_of(const wire::Hello& data) {
+  const auto kind = scene::kind_named(scene::value_or(data.facts, "kind", std::string()));
+  return *plans_.at(scene::pipeline_of(kind.value_or(scene::Kind::kMesh)));
+}
+
+Status MasterCore::adopt_scene(const wire::Hello& data, double now_s) {
+  // As the packer and viewers demand it, for whom an empty box is no scene.
+  if (!data.box_room.empty())
+    if (Status s = points::validate({.box_room = data.box_room}); !s) return s;
+  Plan& plan = plan_of(data);
+  const auto adopted = plan.adopt(data, now_s);
+  if (!adopted) return adopted.error();
+  if (!adopted->whole) return ok_status();
+  const bool other_plan = plan_ != &plan;
+  if (other_plan) {
+    plan_->put_aside();
+    plan.views().take_views(plan_->views().release_views());
+    plan_ = &plan;
+  }
+  kind_ = scene::kind_named(scene::value_or(data.facts, "kind", std::string()));
+  if (!std::exchange(scene_known_, true) && !adopted->in_parts)
+    record_epoch(now_s);
+  else if (other_plan || adopted->changed)
+    next_epoch(now_s);  // another scene than that of the server before
+  return ok_status();
+}
+
+wire::Welcome MasterCore::scene_as_told() const {
+  wire::Welcome w;
+  w.octree_depth = octree_depth();
+  w.settings = master::settings(options_, kind_);
+  plan_->describe(w);  // the scene stays what it is while its data server is away
+  return w;
+}
+
+wire::Welcome MasterCore::welcome(double now_s) const {
+  wire::Welcome w = scene_as_told();
+  w.master = instance_;
+  w.master_s = now_s;
+  w.epoch = epoch_;
+  for (const auto& [id, p] : peers_)
+    if (!p.gone && !p.refused) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
+  w.endpoints.erase("voxels");  // each part of a volume has its own: samplers get them in their sheets
+  return w;
+}
+
+void MasterCore::announce(double now_s) {
+  const std::string body = wire::encode(welcome(now_s));
+  // The packer first: it should know an epoch before tiles of it come.
+  for (const bool packer : {true, false})
+    for (const auto& [id, p] : peers_)
+      if (!p.gone && p.hello.role != "ctl" && (p.hello.role == "packer") == packer)
+        outbox_.send({id, std::string(wire::Welcome::kName), body});
+}
+
+void MasterCore::record_epoch(double now_s) {
+  if (scene_known_) record_.add_epoch(epoch_, now_s, scene_as_told().parameters, plan_->epoch_texts());
+}
+
+void MasterCore::next_epoch(double now_s) {
+  epoch_ = epoch_.next();
+  plan_->drop_frames();
+  record_epoch(now_s);
+  announce(now_s);
+}
+
+Status MasterCore::on(const std::string& peer, const wire::SliceWeights& m, double now_s) {
+  const Peer* p = known(peer, now_s);
+  if (!p) return ok_status();
+  if (p->hello.role != "data" || p->hello.instance != m.data)
+    return Error{fmt::format("slice weights of another process than {} {}", p->hello.role, p->hello.name)};
+  if (Status s = plan_of(p->hello).weigh(m); !s) return s;
+  dispatch(now_s);
+  return ok_status();
+}
+
+void MasterCore::on(const std::string& peer, const wire::Control& m, double now_s) {
+  if (m.command == "status") return outbox_.send(peer, wire::ControlReply{true, status_json(now_s)});
+  if (m.command == "stop") {
+    outbox_.send(peer, wire::ControlReply{true, "stopping"});
+    stop_ = true;
+    return;
+  }
+  const auto done = obey(m, now_s);
+  outbox_.send(peer, wire::ControlReply{done.ok(), done ? *done : done.error().text});
+  if (done) dispatch(now_s);
+}
+
+Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
+  Obeyed obeyed{.begins_epoch = true, .answer = {}};  // "epoch"
+  if (m.command == "set" || m.command == "animate" || m.command == "tf") {
+    auto by_scene = plan_->obey(m);
+    if (!by_scene) return by_scene.error();
+    obeyed = *std::move(by_scene);
+  } else if (m.command != "epoch") {
+    return Error{
+        fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf", m.command.substr(0, 64))};
+  }
+  if (!obeyed.begins_epoch) return obeyed.answer;
+  next_epoch(now_s);
+  return fmt::format("epoch {}", epoch_.value);
+}
+
+}  // namespace telesplat::master

@@ -1,0 +1,37 @@
+#include "services/master/settings.h"
+
+namespace telesplat::master {
+namespace {
+
+const scene::Policy& policy(std::optional<scene::Kind> kind) {
+  return scene::policy_of(kind.value_or(scene::Kind::kMesh));
+}
+
+}  // namespace
+
+const char* name_of(Progressive progressive) {
+  return progressive == Progressive::kAuto ? "auto" : progressive == Progressive::kOn ? "on" : "off";
+}
+
+const char* name_of(Redundancy redundancy) {
+  return redundancy == Redundancy::kAuto ? "auto" : redundancy == Redundancy::kKeep ? "keep" : "eliminate";
+}
+
+uint64_t octree_depth(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  return options.octree_depth > 0 ? options.octree_depth : uint64_t(policy(kind).octree_depth);
+}
+
+bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  return options.progressive == Progressive::kAuto ? policy(kind).progressive : options.progressive == Progressive::kOn;
+}
+
+std::map<std::string, double> settings(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  auto out = options.settings;
+  out.try_emplace("packing.max_points", policy(kind).max_points);
+  out["packing.keep_redundant"] =
+      options.redundancy == Redundancy::kAuto ? policy(kind).keep_redundant : options.redundancy == Redundancy::kKeep;
+  out["viewer.least_sampling"] = policy(kind).least_sampling;
+  return out;
+}
+
+}  // namespace telesplat::master

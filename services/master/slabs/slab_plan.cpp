@@ -1,0 +1,202 @@
+#include "services/master/slabs/slab_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/core/log.h"
+#include "common/metrics/run_record.h"
+#include "services/master/outbox.h"
+#include "services/master/settings.h"
+#include "services/master/slabs/assignment.h"
+
+namespace telesplat::master {
+namespace {
+
+constexpr double kWeighPatience_s = 2.0;  // slabs wait no longer for data servers to say what slices weigh
+
+}  // namespace
+
+SlabPlan::SlabPlan(const MasterOptions& options, const PlanLinks& links) : links_(links), schedule_(options.schedule) {
+  if (const auto layers = options.settings.find("volume.layers"); layers != options.settings.end())
+    schedule_.set_layers(int(layers->second));
+}
+
+Result<Adopted> SlabPlan::adopt(const wire::Hello& data, double now_s) {
+  const auto change = volume_.adopt(data);
+  if (!change) return change.error();
+  const int slices = int(volume_.weights().size());
+  if (!volume_.complete()) {
+    if (change->another) {
+      put_aside();
+      partitions_.set_slices(slices);
+    }
+    log::info("{} has a part of a volume; others are still missing", data.name);
+    return Adopted{.whole = false};
+  }
+  const bool begins = !std::exchange(whole_, true);
+  if (begins || change->another) {
+    partitions_.set_slices(slices);
+    schedule_.set_grid(volume_.session().grid);
+    since_s_ = now_s;
+  }
+  if (change->servers) partitions_.invalidate();
+  // Servers that came before the last part were told of an epoch without a scene: what they know now is another one.
+  return Adopted{
+      .whole = true, .changed = begins || change->another || change->values, .in_parts = volume_.servers().size() > 1};
+}
+
+void SlabPlan::put_aside() {
+  schedule_.drop_frames();
+  whole_ = false;
+}
+
+void SlabPlan::describe(wire::Welcome& welcome) const {
+  welcome.settings["volume.layers"] = schedule_.layers();
+  if (!whole_) return;
+  welcome.box_room = volume_.box_room();
+  welcome.facts = volume_.facts();
+  welcome.parameters = volume_.values();
+}
+
+std::map<std::string, std::string> SlabPlan::epoch_texts() const {
+  if (!whole_) return {};
+  return {{"transfer", volume::to_text(volume_.session().transfer)}};
+}
+
+Status SlabPlan::weigh(const wire::SliceWeights& m) {
+  const auto taken = volume_.weigh(m);
+  if (!taken) return taken.error();
+  return *taken && whole_ ? partitions_.set_weights(volume_.weights()) : ok_status();
+}
+
+Result<Obeyed> SlabPlan::obey(const wire::Control& m) {
+  if (!whole_)
+    return Error{fmt::format("{}: the volume is not known yet: data servers of parts are missing", m.command)};
+  if (m.command == "animate") {
+    const auto timeline = m.arguments.find("timeline");
+    if (const Status s = volume_.animate(timeline == m.arguments.end() ? "" : timeline->second); !s) return s.error();
+    return Obeyed{.begins_epoch = false, .answer = "animation " + animation()};
+  }
+  if (m.command == "set") return set(m.arguments);
+  const auto transfer = m.arguments.find("transfer");
+  if (transfer == m.arguments.end()) return Error{"tf: the argument transfer is missing: a preset's name, or points"};
+  if (const Status s = volume_.set_transfer(transfer->second); !s) return s.error();
+  return Obeyed{.begins_epoch = true, .answer = {}};
+}
+
+Result<Obeyed> SlabPlan::set(std::map<std::string, std::string> arguments) {
+  std::optional<int> layers;
+  if (const auto found = arguments.find("volume.layers"); found != arguments.end()) {
+    const auto value = read_number(found->first, found->second);
+    if (!value) return value.error();
+    if (!(*value >= 1 && *value <= volume::kMaxLayers))
+      return Error{fmt::format("volume.layers is {}, limits 1 and {}", *value, volume::kMaxLayers)};
+    layers = int(*value);
+    arguments.erase(found);
+  }
+  if (!layers || !arguments.empty())
+    if (const Status s = volume_.set(arguments); !s) return s.error();
+  if (layers) schedule_.set_layers(*layers);
+  return Obeyed{.begins_epoch = true, .answer = {}};
+}
+
+void SlabPlan::prepare(double now_s) {
+  // Slabs cut without knowing what slices weigh would be fetched in vain.
+  if (!whole_ || (!volume_.weighed() && now_s - since_s_ < kWeighPatience_s)) return;
+  if (const auto made = partitions_.update(now_s)) assign(*made);
+}
+
+void SlabPlan::assign(const Partition& partition) {
+  const auto transfers = assignment(partition, volume_);
+  const auto tell = [&](const std::string& sampler, size_t slab, SlabRange range) {
+    wire::SlabAssignment m{.partition = partition.number,
+                           .slab = slab,
+                           .slabs = partition.slabs.size(),
+                           .begin = uint64_t(range.begin),
+                           .end = uint64_t(range.end),
+                           .sheet = {}};
+    for (const auto& t : transfers)
+      if (range.begin < range.end && t.slab == slab)
+        m.sheet.push_back({t.round, volume_.servers()[t.server].endpoint, uint64_t(t.begin), uint64_t(t.end)});
+    links_.outbox.send(sampler, m);
+  };
+  for (size_t s = 0; s < partition.slabs.size(); ++s) tell(partition.slabs[s].sampler, s, partition.slabs[s].range);
+  for (const auto& sampler : partition.spare) tell(sampler, 0, {});
+  std::vector<metrics::Assignment> rows;
+  for (const auto& t : transfers)
+    rows.push_back({.partition = partition.number,
+                    .round = t.round,
+                    .data_server = volume_.servers()[t.server].name,
+                    .sampler = links_.name_of(partition.slabs[t.slab].sampler),
+                    .begin = uint64_t(t.begin),
+                    .end = uint64_t(t.end),
+                    .bytes = t.bytes});
+  links_.record.add_assignment(rows);
+  log::info("partition {}: {} slabs, {} spare samplers, {} transfers in {} rounds", partition.number,
+            partition.slabs.size(), partition.spare.size(), transfers.size(),
+            transfers.empty() ? 0 : transfers.back().round + 1);
+}
+
+bool SlabPlan::may_begin(const Idle& idle) {
+  const auto partition = partitions_.in_use();
+  // A view that waits in a sampler's queue grows old.
+  const bool wanted =
+      partition && std::any_of(idle.begin(), idle.end(), [&](const Idle::Sampler& s) {
+        return partition->slab_of(s.id) && (s.at_once > 0 ? s.holds_none() : schedule_.leases_of(s.id) == 0);
+      });
+  return wanted && schedule_.view_waiting();
+}
+
+bool SlabPlan::begin(EpochId epoch, bool turns_only) {
+  return schedule_.begin_frame(epoch, partitions_.in_use(), turns_only);
+}
+
+void SlabPlan::give_leases(Idle& idle, double now_s) {
+  for (size_t i = 0; i < idle.size();) {
+    const auto lease = schedule_.lease(idle[i].id, now_s);
+    if (!lease) {
+      ++i;
+      continue;
+    }
+    links_.outbox.send(idle[i].id, *lease);
+    idle.served_in_place(i);
+  }
+}
+
+bool SlabPlan::done(const wire::TileDone& tile, const std::string& /*sampler*/, double now_s) {
+  return schedule_.tile_done(tile, now_s);
+}
+
+Ticked SlabPlan::tick(double now_s) {
+  const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
+    log::warn("a slice lease of sampler {} expired; its slab goes to others until it asks again",
+              links_.name_of(sampler));
+    release_sampler(sampler);
+  });
+  return {.expired = expired, .overdue = schedule_.overdue(now_s)};
+}
+
+void SlabPlan::slab_ready(const std::string& sampler, const wire::SlabReady& slab) {
+  partitions_.ready(sampler, slab.partition, slab.voxels, slab.bytes);
+}
+
+int SlabPlan::release_sampler(const std::string& sampler) {
+  partitions_.leave(sampler);
+  return schedule_.release_sampler(sampler);
+}
+
+Figures SlabPlan::figures() const {
+  return {.frames_completed = schedule_.frames_completed(),
+          .frames_in_flight = schedule_.frames_in_flight(),
+          .released = schedule_.slabs_released(),
+          .backups = 0};
+}
+
+void SlabPlan::add_counters(std::map<std::string, double>& counters) const {
+  counters["partitions"] = double(partitions_.made());
+  counters["bytes_per_voxel"] = whole_ ? volume_.bytes_per_voxel() : 0;
+}
+
+}  // namespace telesplat::master

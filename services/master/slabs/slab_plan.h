@@ -1,0 +1,58 @@
+// Scenes that travel as slice images: samplers hold slabs of the volume, and each has a part in every frame.
+#pragma once
+
+#include "services/master/plan.h"
+#include "services/master/slabs/partition.h"
+#include "services/master/slabs/scene.h"
+#include "services/master/slabs/schedule.h"
+
+namespace telesplat::master {
+
+class SlabPlan final : public Plan {
+ public:
+  SlabPlan(const MasterOptions& options, const PlanLinks& links);
+
+  /// A server of another volume than the one before, while servers of other parts of it are missing: nothing is shown until they come.
+  Result<Adopted> adopt(const wire::Hello& data, double now_s) override;
+  void leave_data(InstanceId data) override { volume_.leave(data); }
+  void describe(wire::Welcome& welcome) const override;
+  std::map<std::string, std::string> epoch_texts() const override;
+  Result<Obeyed> obey(const wire::Control& command) override;
+  std::string animation() const override { return volume_.playing() ? "on" : "off"; }
+  bool playing() const override { return volume_.playing(); }
+  bool step(double now_s) override { return volume_.step(now_s); }
+  Status weigh(const wire::SliceWeights& weights) override;
+
+  Views& views() override { return schedule_; }
+  void drop_frames() override { schedule_.drop_frames(); }
+  /// Samplers let go of their slabs: they are cut and fetched anew when this plan leads again.
+  void put_aside() override;
+  void prepare(double now_s) override;
+  bool may_begin(const Idle& idle) override;
+  bool begin(EpochId epoch, bool turns_only) override;
+  void give_leases(Idle& idle, double now_s) override;
+  void extend(LeaseId lease, double now_s) override { schedule_.extend(lease, now_s); }
+  bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override;
+  Ticked tick(double now_s) override;
+  void join(const std::string& sampler) override { partitions_.join(sampler); }
+  void slab_ready(const std::string& sampler, const wire::SlabReady& slab) override;
+  int release_sampler(const std::string& sampler) override;
+  size_t leases_of(const std::string& sampler) const override { return schedule_.leases_of(sampler); }
+  Figures figures() const override;
+
+  void add_status(nlohmann::ordered_json& status) const override;
+  void add_counters(std::map<std::string, double>& counters) const override;
+
+ private:
+  Result<Obeyed> set(std::map<std::string, std::string> arguments);
+  void assign(const Partition& partition);
+
+  PlanLinks links_;
+  VolumeScene volume_;
+  VolumeSchedule schedule_;
+  SlabPartitions partitions_;
+  bool whole_ = false;  // all of the volume is known, and partitions and schedule are of it
+  double since_s_ = 0;  // since when
+};
+
+}  // namespace telesplat::master

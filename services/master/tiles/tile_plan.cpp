@@ -1,0 +1,77 @@
+#include "services/master/tiles/tile_plan.h"
+
+#include <fmt/format.h>
+
+#include "common/core/log.h"
+#include "services/master/outbox.h"
+
+namespace telesplat::master {
+
+TilePlan::TilePlan(const MasterOptions& options, const PlanLinks& links)
+    : options_(options), links_(links), schedule_(options.schedule), scene_(options.animation) {}
+
+Result<Adopted> TilePlan::adopt(const wire::Hello& data, double /*now_s*/) {
+  box_room_ = data.box_room;
+  facts_ = data.facts;
+  std::string problem;
+  Adopted out{.changed = scene_.adopt(data, problem)};
+  if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
+  const Cut cut{scene_.is_julia(), master::progressive(options_, scene::kind_named(scene_.kind()))};
+  out.changed |= cut != schedule_.cut();
+  schedule_.set_cut(cut);
+  return out;
+}
+
+void TilePlan::describe(wire::Welcome& welcome) const {
+  welcome.box_room = box_room_;
+  welcome.facts = facts_;
+  welcome.parameters = scene_.values();
+}
+
+Result<Obeyed> TilePlan::obey(const wire::Control& m) {
+  if (m.command == "tf")
+    return Error{facts_.empty() ? std::string("tf: there is no data server yet")
+                                : fmt::format("tf: a scene of kind \"{}\" has no transfer function", scene_.kind())};
+  if (m.command == "set") {
+    if (const Status s = scene_.set(m.arguments); !s) return s.error();
+    return Obeyed{.begins_epoch = true, .answer = {}};
+  }
+  const auto timeline = m.arguments.find("timeline");
+  if (timeline == m.arguments.end())
+    return Error{"animate: the argument timeline is missing, such as c.y=-0.4:0.4:10s, or off"};
+  if (const Status s = scene_.animate(timeline->second); !s) return s.error();
+  return Obeyed{.begins_epoch = false, .answer = "animation " + scene_.animation()};
+}
+
+void TilePlan::give_leases(Idle& idle, double now_s) {
+  while (!idle.empty() && (schedule_.tile_open() || schedule_.backup_due(now_s)) && give_one(idle, now_s)) {
+  }
+}
+
+bool TilePlan::give_one(Idle& idle, double now_s) {
+  for (const bool even_own : {false, true})
+    for (size_t i = 0; i < idle.size(); ++i) {
+      const auto lease = schedule_.lease(idle[i].id, now_s, even_own, idle[i].holds_none());
+      if (!lease) continue;
+      links_.outbox.send(idle[i].id, *lease);
+      idle.served(i);
+      return true;
+    }
+  return false;
+}
+
+Ticked TilePlan::tick(double now_s) {
+  const int expired = schedule_.expire(now_s, [&](const std::string& sampler) {
+    log::warn("a lease of sampler {} expired; its tile goes to another", links_.name_of(sampler));
+  });
+  return {.expired = expired, .overdue = {}};
+}
+
+Figures TilePlan::figures() const {
+  return {.frames_completed = schedule_.frames_completed(),
+          .frames_in_flight = schedule_.frames_in_flight(),
+          .released = schedule_.tiles_released(),
+          .backups = schedule_.backups()};
+}
+
+}  // namespace telesplat::master

@@ -1,0 +1,51 @@
+// Scenes that travel as points: a frame is cut into tiles, and each goes to the sampler that asks first.
+#pragma once
+
+#include "services/master/plan.h"
+#include "services/master/settings.h"
+#include "services/master/tiles/frame_schedule.h"
+#include "services/master/tiles/julia_parameters.h"
+
+namespace telesplat::master {
+
+class TilePlan final : public Plan {
+ public:
+  TilePlan(const MasterOptions& options, const PlanLinks& links);
+
+  Result<Adopted> adopt(const wire::Hello& data, double now_s) override;
+  void describe(wire::Welcome& welcome) const override;
+  Result<Obeyed> obey(const wire::Control& command) override;
+  std::string animation() const override { return scene_.animation(); }
+  bool playing() const override { return scene_.animated(); }
+  bool step(double now_s) override { return scene_.step(now_s); }
+  bool progressive() const override { return schedule_.cut().coarse; }
+
+  Views& views() override { return schedule_; }
+  void drop_frames() override { schedule_.drop_frames(); }
+  bool may_begin(const Idle&) override { return schedule_.view_waiting(); }
+  bool begin(EpochId epoch, bool turns_only) override { return schedule_.begin_view(epoch, turns_only); }
+  void give_leases(Idle& idle, double now_s) override;
+  void extend(LeaseId lease, double now_s) override { schedule_.extend(lease, now_s); }
+  bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override {
+    return schedule_.tile_done(tile, sampler, now_s);
+  }
+  /// Samplers idle while tiles are out: a backup may soon be due.
+  bool hurried() const override { return schedule_.frames_in_flight() > 0; }
+  Ticked tick(double now_s) override;
+  void heard_of(const std::string& sampler) override { schedule_.heard_of(sampler); }
+  int release_sampler(const std::string& sampler) override { return schedule_.release_sampler(sampler); }
+  size_t leases_of(const std::string& sampler) const override { return schedule_.leases_of(sampler); }
+  Figures figures() const override;
+
+ private:
+  bool give_one(Idle& idle, double now_s);
+
+  MasterOptions options_;
+  PlanLinks links_;
+  FrameSchedule schedule_;
+  JuliaParameters scene_;
+  geometry::Box box_room_;  // of the last data server
+  std::map<std::string, std::string> facts_;
+};
+
+}  // namespace telesplat::master

@@ -1,0 +1,64 @@
+#include "services/master/views.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "common/core/check.h"
+
+namespace telesplat::master {
+
+void Views::request_view(const wire::ViewRequest& request) {
+  const auto same = [&](const wire::ViewRequest& r) {
+    return r.viewer == request.viewer && r.request == request.request;
+  };
+  if (request.buffers > 0 && std::any_of(in_flight_.begin(), in_flight_.end(), [&](const InFlight& f) {
+        return std::any_of(f.views.begin(), f.views.end(), same);
+      }))
+    return;
+  waiting_.add(request);
+}
+
+void Views::forget_viewer(InstanceId viewer) {
+  waiting_.forget(viewer);
+  for (InFlight& f : in_flight_) f.left.push_back(viewer);
+}
+
+ViewQueue Views::release_views() {
+  CHECK(in_flight_.empty());
+  return std::exchange(waiting_, {});
+}
+
+FrameId Views::next_frame() { return std::exchange(next_frame_, next_frame_.next()); }
+LeaseId Views::next_lease() { return std::exchange(next_lease_, next_lease_.next()); }
+
+std::optional<wire::ViewRequest> Views::take_view(bool turns_only) {
+  const wire::ViewRequest* next = waiting_.next(turns_only);
+  if (!next || views_in_flight() >= views_at_once(options_.frames_in_flight, next->buffers)) return std::nullopt;
+  return waiting_.take(next->viewer);
+}
+
+void Views::begin(FrameId frame, const std::vector<wire::ViewRequest>& views) {
+  in_flight_.push_back({frame, views, {}});
+}
+
+std::vector<Views::InFlight>::iterator Views::find(FrameId frame) {
+  const auto found =
+      std::find_if(in_flight_.begin(), in_flight_.end(), [&](const InFlight& f) { return f.frame == frame; });
+  CHECK(found != in_flight_.end());
+  return found;
+}
+
+void Views::complete(FrameId frame) {
+  in_flight_.erase(find(frame));
+  ++completed_;
+}
+
+void Views::put_back(FrameId frame) {
+  const auto found = find(frame);
+  const InFlight dropped = std::move(*found);
+  in_flight_.erase(found);
+  for (const auto& view : dropped.views)
+    if (std::find(dropped.left.begin(), dropped.left.end(), view.viewer) == dropped.left.end()) waiting_.put_back(view);
+}
+
+}  // namespace telesplat::master

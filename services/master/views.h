@@ -1,0 +1,89 @@
+// What every schedule does with views: they wait, are begun in turn, are complete or wait again. What a frame is cut into is the schedule's own.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "services/master/view_queue.h"
+
+namespace telesplat::master {
+
+inline constexpr int kCoarseStep = 4;  ///< a coarse frame has every 4th pixel of every 4th row
+
+struct ScheduleOptions {
+  int tile_size = 256;       ///< pixels a side; the last column and row may be smaller
+  int frames_in_flight = 2;  ///< views begun and not complete, at most
+  /// Longest time before a lease goes to another sampler; shorter once tile times are known.
+  double lease_timeout_s = 2.0;
+  double lease_target_s = 0.004;  ///< what a lease of rows should take its sampler
+};
+
+/// A mean in which each new value has the same share.
+class RunningMean {
+ public:
+  explicit RunningMean(double share) : share_(share) {}
+  void add(double value) { mean_ = mean_ == 0 ? value : (1 - share_) * mean_ + share_ * value; }
+  bool known() const { return mean_ != 0; }
+  double value() const { return mean_; }  ///< 0: nothing is known
+
+ private:
+  double share_, mean_ = 0;
+};
+
+class Views {
+ public:
+  /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
+  void request_view(const wire::ViewRequest& request);
+  void forget_viewer(InstanceId viewer);
+  bool view_waiting() const { return !waiting_.empty(); }
+  /// See ViewQueue.
+  void begin_turns() { waiting_.begin_turns(); }
+  bool turn_waiting() const { return waiting_.turn_waiting(); }
+  /// Views begun and not complete.
+  size_t views_in_flight() const { return in_flight_.size(); }
+  uint64_t frames_completed() const { return completed_; }  ///< those that views were begun with
+
+  /// What waits, to go on elsewhere: another plan leads the session. Precondition: no view is in flight.
+  ViewQueue release_views();
+  void take_views(ViewQueue views) { waiting_ = std::move(views); }
+
+ protected:
+  explicit Views(const ScheduleOptions& options) : options_(options) {}
+  ~Views() = default;
+
+  const ScheduleOptions& options() const { return options_; }
+  FrameId next_frame();
+  LeaseId next_lease();
+
+  /// The view to begin; viewers take turns. turns_only: only those that have a turn. nullopt: none waits, or as many are in flight as may be
+  /// (views_at_once()).
+  std::optional<wire::ViewRequest> take_view(bool turns_only);
+  /// More views for the same frame, as ViewQueue::take_all().
+  std::vector<wire::ViewRequest> take_more(const std::function<bool(const wire::ViewRequest&)>& wanted, size_t most) {
+    return waiting_.take_all(wanted, most);
+  }
+  /// `frame` shows these views: they are in flight until complete() or put_back().
+  void begin(FrameId frame, const std::vector<wire::ViewRequest>& views);
+  void complete(FrameId frame);
+  /// The frame was dropped: its views wait again, except those of viewers that left; of asynchronous viewers only if no newer request does.
+  /// Where several are put back, the newest comes first.
+  void put_back(FrameId frame);
+
+ private:
+  struct InFlight {
+    FrameId frame;
+    std::vector<wire::ViewRequest> views;
+    std::vector<InstanceId> left;  // viewers that are gone
+  };
+  std::vector<InFlight>::iterator find(FrameId frame);
+
+  ScheduleOptions options_;
+  ViewQueue waiting_;
+  std::vector<InFlight> in_flight_;  // few
+  FrameId next_frame_{1};
+  LeaseId next_lease_{1};
+  uint64_t completed_ = 0;
+};
+
+}  // namespace telesplat::master

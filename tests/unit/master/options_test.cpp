@@ -1,0 +1,100 @@
+// The master's flags, and its socket's patience with messages.
+#include "services/master/master_options.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "services/master/guarded.h"
+
+namespace telesplat::master {
+namespace {
+
+Status give(MasterServiceOptions& o, const std::string& flag, const std::string& text) {
+  const auto t = table(o);
+  const options::Row* row = options::find(t, flag);
+  return row ? options::set(*row, text) : Status(Error{"no such flag"});
+}
+
+TEST(MasterFlags, SettingsHaveTheirUsualValues) {
+  MasterServiceOptions o;
+  table(o);
+  EXPECT_EQ(o.master.settings, (std::map<std::string, double>{{"packing.age_weight", 1},
+                                                              {"packing.epsilon", 0.004},
+                                                              {"packing.obsolete_after_s", 0},
+                                                              {"packing.patches_per_cluster", 6},
+                                                              {"packing.rate_weight", 4},
+                                                              {"volume.layers", 16}}));
+  EXPECT_EQ(o.master.progressive, Progressive::kAuto);
+  EXPECT_EQ(o.master.redundancy, Redundancy::kAuto);
+}
+
+TEST(MasterFlags, AreReadUnderBothTheirNames) {
+  MasterServiceOptions o;
+  EXPECT_TRUE(give(o, "--layers", "4"));
+  EXPECT_EQ(o.master.settings.at("volume.layers"), 4);
+  EXPECT_TRUE(give(o, "--volume.layers", "8"));
+  EXPECT_EQ(o.master.settings.at("volume.layers"), 8) << "another table leaves what was given";
+  EXPECT_TRUE(give(o, "--packing.redundancy", "keep"));
+  EXPECT_EQ(o.master.redundancy, Redundancy::kKeep);
+  EXPECT_TRUE(give(o, "--packing.keep_redundant", "eliminate"));
+  EXPECT_EQ(o.master.redundancy, Redundancy::kEliminate);
+  EXPECT_TRUE(give(o, "--progressive", "off"));
+  EXPECT_EQ(o.master.progressive, Progressive::kOff);
+  EXPECT_TRUE(give(o, "--packing.max_points", "1e6"));
+  EXPECT_EQ(o.master.settings.at("packing.max_points"), 1e6);
+  EXPECT_TRUE(give(o, "--tile-size", "64"));
+  EXPECT_EQ(o.master.schedule.tile_size, 64);
+  EXPECT_TRUE(give(o, "--octree-depth", "6"));
+  EXPECT_EQ(o.master.octree_depth, 6u);
+}
+
+TEST(MasterFlags, HaveLimits) {
+  MasterServiceOptions o;
+  for (const auto& [flag, text] : std::vector<std::pair<std::string, std::string>>{{"--tile-size", "15"},
+                                                                                   {"--frames-in-flight", "17"},
+                                                                                   {"--lease-timeout", "0.01"},
+                                                                                   {"--lease-target", "11"},
+                                                                                   {"--progressive", "maybe"},
+                                                                                   {"--octree-depth", "11"},
+                                                                                   {"--layers", "0"},
+                                                                                   {"--packing.max_points", "-1"},
+                                                                                   {"--packing.max_points", "nan"},
+                                                                                   {"--packing.max_points", "many"},
+                                                                                   {"--packing.epsilon", "x"},
+                                                                                   {"--packing.redundancy", "0"}}) {
+    const Status s = give(o, flag, text);
+    ASSERT_FALSE(s) << flag << " " << text;
+    EXPECT_NE(s.error().text.find(flag), std::string::npos) << s.error().text;
+  }
+  EXPECT_FALSE(o.master.settings.contains("packing.max_points"));
+}
+
+TEST(MasterFlags, OnlyWhatWasGivenIsHandedOn) {
+  MasterServiceOptions o, usual;
+  EXPECT_TRUE(options::arguments(session_table(o), session_table(usual)).empty());
+  ASSERT_TRUE(give(o, "--packing.max_points", "3e6"));
+  ASSERT_TRUE(give(o, "--packing.redundancy", "keep"));
+  ASSERT_TRUE(give(o, "--layers", "4"));
+  EXPECT_EQ(options::arguments(session_table(o), session_table(usual)),
+            (std::vector<std::string>{"--layers=4", "--packing.max_points=3000000", "--packing.redundancy=keep"}));
+}
+
+TEST(MasterSocket, AMessageWhoseHandlingThrowsIsCountedAndTheNextIsHandled) {
+  net::Context context;
+  net::Socket control(context, net::Kind::kRouter, "master");
+  net::Message message;
+  message.peer = "someone";
+  message.type = "control";
+  int handled = 0;
+  for (int i = 0; i < 3; ++i)
+    guarded(control, message, [&] {
+      if (i == 1) throw std::runtime_error("what it was");
+      ++handled;
+    });
+  EXPECT_EQ(handled, 2);
+  EXPECT_EQ(control.rejected(), 1u);
+}
+
+}  // namespace
+}  // namespace telesplat::master
