@@ -1,4 +1,4 @@
-// Logging to stderr, one line an event: "time service level text". The library that writes the lines is seen by log.cpp alone.
+// Logging to stderr, one line an event: "time service level text". Only log.cpp sees the library that writes the lines.
 #pragma once
 
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-// Errors that come from outside: bad files, bad messages, bad flags. See docs/architecture.md, "When something goes wrong".
+// Errors that come from outside: bad files, messages, flags. See docs/architecture.md, "When something goes wrong".
 #pragma once
 
 #include <string>

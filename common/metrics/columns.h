@@ -8,38 +8,39 @@
 
 namespace telesplat::metrics {
 
-template <class Row>
+/// Value: double where rows travel as numbers, std::string where a file says how each number is written.
+template <class Row, class Value = double>
 struct Column {
   const char* name;
-  double (*get)(const Row&);
+  Value (*get)(const Row&);
 };
 
 /// In the order of the columns.
-template <class Row>
-std::vector<std::string> names(std::span<const Column<Row>> columns) {
+template <class Row, class Value>
+std::vector<std::string> names(std::span<const Column<Row, Value>> columns) {
   std::vector<std::string> out;
   out.reserve(columns.size());
-  for (const Column<Row>& c : columns) out.emplace_back(c.name);
+  for (const Column<Row, Value>& c : columns) out.emplace_back(c.name);
   return out;
 }
 
 /// What the columns make of one record, in their order.
-template <class Row>
-std::vector<double> values(std::span<const Column<Row>> columns, const Row& row) {
-  std::vector<double> out;
+template <class Row, class Value>
+std::vector<Value> values(std::span<const Column<Row, Value>> columns, const Row& row) {
+  std::vector<Value> out;
   out.reserve(columns.size());
-  for (const Column<Row>& c : columns) out.push_back(c.get(row));
+  for (const Column<Row, Value>& c : columns) out.push_back(c.get(row));
   return out;
 }
 
 /// The same for an array: `constexpr Column<Row> kColumns[]`.
-template <class Row, size_t N>
-std::vector<std::string> names(const Column<Row> (&columns)[N]) {
-  return names(std::span<const Column<Row>>(columns));
+template <class Row, class Value, size_t N>
+std::vector<std::string> names(const Column<Row, Value> (&columns)[N]) {
+  return names(std::span<const Column<Row, Value>>(columns));
 }
-template <class Row, size_t N>
-std::vector<double> values(const Column<Row> (&columns)[N], const Row& row) {
-  return values(std::span<const Column<Row>>(columns), row);
+template <class Row, class Value, size_t N>
+std::vector<Value> values(const Column<Row, Value> (&columns)[N], const Row& row) {
+  return values(std::span<const Column<Row, Value>>(columns), row);
 }
 
 }  // namespace telesplat::metrics

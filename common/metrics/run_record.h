@@ -1,27 +1,22 @@
-// The record of a run (DESIGN section 6): frames.csv, updates.csv, tiles.csv, epochs.csv, trace.json, summary.json in one folder. Written by
-// the master as rows arrive, so that what was measured survives whatever ends the run.
+// The record of a run: frames.csv, updates.csv, tiles.csv, epochs.csv, assignment.csv, trace.json and summary.json in
+// one folder (docs/metrics.md tells every column and figure). The master writes it as rows arrive: what was measured
+// survives, however the run ends.
 #pragma once
 
-#include <cstdio>
 #include <map>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "common/core/ids.h"
 #include "common/core/result.h"
-#include "common/metrics/statistics.h"
-#include "common/wire/messages.h"
+#include "common/metrics/measured.h"
+#include "common/metrics/process.h"
+#include "common/metrics/text_file.h"
+#include "common/metrics/trace_file.h"
 
 namespace telesplat::metrics {
-
-/// A process as the record knows it.
-struct Process {
-  std::string role, name;
-  uint64_t pid = 0;
-  std::map<std::string, std::string> facts;
-  std::map<std::string, double> values;  ///< newest status report
-  bool replaced = false;                 ///< it died and another of its name took its place
-};
 
 /// A row of assignment.csv: a transfer of a partition's assignment sheet (T5.3).
 struct Assignment {
@@ -33,9 +28,9 @@ struct Assignment {
 
 class RunRecord {
  public:
-  /// Opens a folder for writing, making it if need be; `directory` may be empty: nothing is written, summaries still work.
+  /// Opens a folder for writing, and makes it if need be. `directory` may be empty: nothing is written, summaries still
+  /// work.
   static Result<std::unique_ptr<RunRecord>> open(const std::string& directory);
-  ~RunRecord();
 
   /// Rows of "frames", "updates" or "spans" from `process`. Refuses unknown tables and shapes that do not fit.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
@@ -45,46 +40,25 @@ class RunRecord {
                  const std::map<std::string, std::string>& texts = {});
   void add_assignment(const std::vector<Assignment>& transfers);
 
-  /// The summary of DESIGN section 6 from everything so far. processes: all that took part; counters: "leases_expired",
-  /// "tiles_released".
+  /// The figures of docs/metrics.md, "summary.json", from everything so far. processes: all that took part; counters:
+  /// the master's ("leases_expired", "tiles_released", ...).
   nlohmann::ordered_json summary(const std::vector<Process>& processes,
                                  const std::map<std::string, double>& counters) const;
 
-  /// Writes summary.json and ends trace.json.
+  /// Writes summary.json.
   Status finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters);
 
  private:
-  struct Table {
-    std::vector<std::string> columns;
-    std::vector<double> values;
-    std::vector<uint32_t> viewers;  // of each row: whose, in viewers_
-    FILE* file = nullptr;
-  };
-  /// What one viewer did.
-  struct ViewerFigures {
-    size_t frames = 0, updates = 0;
-    double duration_s = 0;
-    std::vector<double> inter_frame_ms, latency_ms;
-  };
   RunRecord() = default;
-  std::vector<double> column(const std::string& table, const std::string& name) const;
-  std::map<std::string, ViewerFigures> by_viewer() const;
-  Status write_row_table(const std::string& process, const wire::MetricRows& rows);
-  void write_spans(const Process& process, const wire::MetricRows& rows);
+  Status open_files();
+  TextFile& file_of(const std::string& table) { return table == "frames" ? frames_file_ : updates_file_; }
 
   std::string directory_;
-  std::map<std::string, Table> tables_;
-  std::vector<std::string> viewers_;
-  std::vector<wire::TileDone> tiles_;
-  std::map<std::string, double> busy_s_;  // sample begin to encode end, by sampler
+  Measured measured_;
   std::vector<std::string> epoch_columns_, epoch_texts_;
-  size_t epochs_ = 0;
-  FILE* tiles_file_ = nullptr;
-  FILE* epochs_file_ = nullptr;
-  FILE* assignment_file_ = nullptr;  // volumes have one
-  FILE* trace_file_ = nullptr;
-  bool trace_has_events_ = false;
-  std::map<std::string, int> trace_names_;
+  TextFile frames_file_, updates_file_, tiles_file_, epochs_file_;
+  TextFile assignment_file_;  // opened when there is something to write: meshes have none
+  TraceFile trace_;
 };
 
 }  // namespace telesplat::metrics

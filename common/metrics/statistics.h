@@ -1,7 +1,7 @@
 // Distributions of measured values.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 namespace telesplat::metrics {
@@ -10,7 +10,8 @@ struct Distribution {
   double mean = 0, median = 0, p95 = 0, p99 = 0, max = 0;
 };
 
-/// Percentiles by linear interpolation between the nearest ranks; all 0 for no values. Values that are not finite are left out.
+/// Percentiles by linear interpolation between the nearest ranks; all 0 for no values. Values that are not finite are
+/// left out.
 Distribution distribution(std::vector<double> values);
 
 nlohmann::ordered_json to_json(const Distribution& d);

@@ -1,0 +1,252 @@
+#include "common/metrics/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/image/depth_image.h"
+#include "common/metrics/roster.h"
+#include "common/metrics/statistics.h"
+#include "common/scene/session.h"
+
+namespace telesplat::metrics {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr double kRawBytesPerSlicePixel = 4, kRawBytesPerPoint = 12;
+
+double hundredths(double v) { return std::round(v * 100) / 100; }
+double thousandths(double v) { return std::round(v * 1000) / 1000; }
+uint64_t whole(double v) { return uint64_t(v); }
+
+/// What one viewer did.
+struct ViewerFigures {
+  size_t frames = 0, updates = 0;
+  double duration_s = 0;
+  std::vector<double> inter_frame_ms, latency_ms;
+
+  double per_second(size_t count) const { return duration_s > 0 ? double(count) / std::max(duration_s, 1e-9) : 0; }
+};
+
+/// Each viewer by itself: they need not have begun, nor ended, together.
+std::map<std::string, ViewerFigures> by_viewer(const Measured& m) {
+  std::map<std::string, ViewerFigures> out;
+  const auto whose = [&](const Rows& rows, size_t row) -> ViewerFigures& { return out[m.viewers[rows.viewers[row]]]; };
+  const auto times = m.frames.column("t_s"), delays = m.frames.column("inter_frame_ms");
+  std::map<const ViewerFigures*, double> last_s;
+  for (size_t i = 0; i < times.size(); ++i) {
+    ViewerFigures& v = whose(m.frames, i);
+    // A viewer that was started again counts its time anew.
+    if (const auto last = last_s.find(&v); last != last_s.end() && times[i] > last->second)
+      v.duration_s += times[i] - last->second;
+    last_s[&v] = times[i];
+    ++v.frames;
+    if (i < delays.size() && delays[i] > 0) v.inter_frame_ms.push_back(delays[i]);  // its first frame has none
+  }
+  const auto latencies = m.updates.column("latency_ms");
+  for (size_t i = 0; i < latencies.size(); ++i) {
+    ViewerFigures& v = whose(m.updates, i);
+    ++v.updates;
+    v.latency_ms.push_back(latencies[i]);
+  }
+  return out;
+}
+
+/// How long each frame took. Coarse frames are a part of their view only: they would flatter these figures.
+struct FrameDurations {
+  std::vector<double> leased_ms, sampling_ms, packing_ms;
+};
+
+FrameDurations frame_durations(const std::vector<wire::TileDone>& tiles) {
+  struct Times {
+    double leased = 1e300, begin = 1e300, end = 0, packing_s = 0;
+  };
+  std::map<uint64_t, Times> frames;
+  for (const wire::TileDone& t : tiles) {
+    if (t.step != 1) continue;
+    Times& f = frames[t.frame.value];
+    f.leased = std::min(f.leased, t.leased_s);
+    f.begin = std::min(f.begin, t.sample_begin_s);
+    f.end = std::max(f.end, t.encode_end_s);
+    f.packing_s += t.packed_s - t.receive_s;
+  }
+  FrameDurations out;
+  for (const auto& [id, f] : frames) {
+    out.leased_ms.push_back((f.end - f.leased) * 1e3);
+    out.sampling_ms.push_back((f.end - f.begin) * 1e3);
+    out.packing_ms.push_back(f.packing_s * 1e3);
+  }
+  return out;
+}
+
+/// What samplers made, what was sent of it, what viewers took.
+struct Traffic {
+  double bytes_raw = 0, bytes_sent = 0, bytes_consumed = 0;
+  double redundancy = 0;  ///< share of the samples that elimination left out
+};
+
+Traffic traffic(const Measured& m, const Roster& roster) {
+  Traffic out;
+  double samples = 0, kept = 0;
+  for (const wire::TileDone& t : m.tiles) {
+    out.bytes_sent += double(t.bytes_sent);
+    samples += double(t.samples);
+    kept += double(t.kept);
+  }
+  const auto kind = scene::kind_named(roster.fact("data", "kind"));
+  out.bytes_consumed = roster.counted("viewer", "points_received") * kRawBytesPerPoint;
+  if (kind && scene::pipeline_of(*kind) == scene::Pipeline::kSlices) {
+    // Samples are voxels, and kept are pixels that they made.
+    out.bytes_raw = kept * kRawBytesPerSlicePixel;
+    for (const double pixels : m.updates.column("points")) out.bytes_consumed += pixels * kRawBytesPerSlicePixel;
+  } else {
+    out.bytes_raw = samples * image::kRawBytesPerPixel;
+    out.redundancy = samples > 0 ? 1 - kept / samples : 0;
+  }
+  return out;
+}
+
+/// How evenly samplers were kept busy: (most - least) / mean.
+ordered_json busy_spread(const std::map<std::string, double>& busy_s) {
+  double least = 1e300, most = 0, sum = 0;
+  auto by_name = ordered_json::object();
+  for (const auto& [name, s] : busy_s) {
+    least = std::min(least, s);
+    most = std::max(most, s);
+    sum += s;
+    by_name[name] = std::round(s * 1e6) / 1e6;
+  }
+  const double spread = sum > 0 ? (most - least) * double(busy_s.size()) / sum : 0;
+  return {{"spread", std::round(spread * 1e4) / 1e4}, {"busy_s", by_name}};
+}
+
+/// One number where there is one process of a role, a list where there may be several.
+ordered_json peak_rss(const Roster& roster) {
+  const auto tenths = [](double v) { return std::round(v * 10) / 10; };
+  ordered_json out = ordered_json::object();
+  for (const char* role : {"master", "data", "packer"})
+    for (const double mb : roster.each(role, "peak_rss_mb")) out[role] = tenths(mb);
+  for (const char* role : {"sampler", "viewer"}) {
+    out[role] = ordered_json::array();
+    for (const double mb : roster.each(role, "peak_rss_mb")) out[role].push_back(tenths(mb));
+  }
+  return out;
+}
+
+// ---- the sections of the summary, in its order ---------------------------------------------------------------------
+
+ordered_json what_was_shown(const Roster& roster) {
+  const auto pixels = [&](const char* key) { return whole(roster.number("viewer", key)); };
+  // A data set has one of these facts, or none.
+  const double primitives = roster.number("data", "triangles") + roster.number("data", "voxels");
+  return {{"schema", 1},
+          {"scene", roster.fact("data", "scene")},
+          {"kind", roster.fact("data", "kind")},
+          {"primitives", whole(primitives)},
+          {"samplers", roster.count("sampler")},
+          {"viewers", roster.count("viewer")},
+          {"coupling", roster.fact("viewer", "coupling")},
+          {"buffers", whole(roster.number("viewer", "buffers"))},
+          {"renderer", roster.fact("viewer", "renderer")},
+          {"splat", roster.fact("viewer", "splat")},
+          {"finish", roster.fact("viewer", "finish")},
+          {"shading", roster.fact("viewer", "shading")},
+          {"size", {pixels("width"), pixels("height")}},
+          {"sampling_size", {pixels("sampling_width"), pixels("sampling_height")}},
+          {"sampling", roster.fact("viewer", "sampling")}};
+}
+
+double longest_s(const std::map<std::string, ViewerFigures>& viewers) {
+  double out = 0;
+  for (const auto& [name, v] : viewers) out = std::max(out, v.duration_s);
+  return out;
+}
+
+ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigures>& viewers,
+                       double frames_completed) {
+  auto each = ordered_json::object();
+  double fps = 0, updates_per_s = 0;
+  for (const auto& [name, v] : viewers) {
+    fps += v.per_second(v.frames) / double(viewers.size());
+    updates_per_s += v.per_second(v.updates) / double(viewers.size());
+    each[name] = {{"frames", v.frames},
+                  {"updates", v.updates},
+                  {"duration_s", thousandths(v.duration_s)},
+                  {"fps", hundredths(v.per_second(v.frames))},
+                  {"updates_per_s", hundredths(v.per_second(v.updates))},
+                  {"inter_frame_delay_ms", to_json(distribution(v.inter_frame_ms))},
+                  {"view_update_latency_ms", to_json(distribution(v.latency_ms))}};
+  }
+  return {{"epochs", m.epochs},
+          {"frames", m.frames.column("t_s").size()},
+          {"updates", m.updates.column("latency_ms").size()},
+          {"duration_s", thousandths(longest_s(viewers))},
+          {"fps", hundredths(fps)},
+          {"updates_per_s", hundredths(updates_per_s)},
+          {"by_viewer", each},
+          {"frames_sampled", whole(frames_completed)}};
+}
+
+ordered_json how_long(const Measured& m) {
+  auto delays = m.frames.column("inter_frame_ms");
+  std::erase_if(delays, [](double d) { return d <= 0; });  // the first frame of a viewer has none
+  const FrameDurations durations = frame_durations(m.tiles);
+  return {{"inter_frame_delay_ms", to_json(distribution(delays))},
+          {"view_construction_ms", to_json(distribution(m.frames.column("construction_ms")))},
+          {"view_update_latency_ms", to_json(distribution(m.updates.column("latency_ms")))},
+          {"start_up_latency_ms", to_json(distribution(m.updates.column("start_up_ms")))},
+          {"sampling_ms", to_json(distribution(durations.sampling_ms))},
+          {"lease_to_sampled_ms", to_json(distribution(durations.leased_ms))},
+          {"packing_ms", to_json(distribution(durations.packing_ms))},
+          {"samplers_busy", busy_spread(m.busy_s)}};
+}
+
+ordered_json how_much(const Traffic& t, double run_s, double viewers) {
+  return {{"data_generating_rate_mb_s", t.bytes_raw / 1e6 / run_s},
+          {"data_transfer_rate_mb_s", t.bytes_sent / 1e6 / run_s},
+          {"data_consuming_rate_mb_s", t.bytes_consumed / 1e6 / viewers / run_s},
+          {"bytes_raw", whole(t.bytes_raw)},
+          {"bytes_sent", whole(t.bytes_sent)},
+          {"compression_ratio", t.bytes_sent > 0 ? t.bytes_raw / t.bytes_sent : 0.0},
+          {"redundancy_eliminated", t.redundancy}};
+}
+
+ordered_json what_was_held(const Measured& m, const Roster& roster, double partitions, double viewers) {
+  const double points = roster.present("packer", "points"), voxels = roster.counted("data", "voxels_sent");
+  return {{"points_cached", whole(points)},
+          {"bytes_per_cached_point", points > 0 ? roster.present("packer", "model_bytes") / points : 0.0},
+          {"points_drawn", to_json(distribution(m.frames.column("points_drawn")))},
+          {"update_age_ms", to_json(distribution(m.frames.column("update_age_ms")))},
+          {"voxels_fetched", whole(voxels)},
+          {"bytes_per_voxel", voxels > 0 ? roster.counted("data", "bytes_sent") / voxels : 0.0},
+          {"partitions", whole(partitions)},
+          {"first_points_s", roster.present("viewer", "first_points_s") / viewers}};
+}
+
+}  // namespace
+
+ordered_json summarise(const Measured& measured, const std::vector<Process>& processes,
+                       const std::map<std::string, double>& counters) {
+  const Roster roster(processes);
+  const auto counter = [&](const char* key) { return scene::value_or(counters, key, 0.0); };
+  const auto figures = by_viewer(measured);
+  const double viewers = std::max<double>(1, double(roster.count("viewer")));
+  const double run_s = std::max(longest_s(figures), 1e-9);
+  ordered_json out = what_was_shown(roster);
+  out.update(how_often(measured, figures, counter("frames_completed")));
+  out.update(how_long(measured));
+  out.update(how_much(traffic(measured, roster), run_s, viewers));
+  out.update(what_was_held(measured, roster, counter("partitions"), viewers));
+  out.update(ordered_json{{"tiles_released", whole(counter("tiles_released"))},
+                          {"leases_backup", whole(counter("leases_backup"))},
+                          {"quality", nullptr},
+                          {"peak_rss_mb", peak_rss(roster)},
+                          {"errors",
+                           {{"messages_rejected", whole(roster.counted("", "messages_rejected"))},
+                            {"gaps_resynced", whole(roster.counted("viewer", "gaps_resynced"))},
+                            {"leases_expired", whole(counter("leases_expired"))}}}});
+  return out;
+}
+
+}  // namespace telesplat::metrics

@@ -1,0 +1,18 @@
+// summary.json: a run in figures. docs/metrics.md says how each is computed.
+#pragma once
+
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "common/metrics/measured.h"
+#include "common/metrics/process.h"
+
+namespace telesplat::metrics {
+
+/// processes: all that took part; counters: the master's ("leases_expired", "tiles_released", ...).
+nlohmann::ordered_json summarise(const Measured& measured, const std::vector<Process>& processes,
+                                 const std::map<std::string, double>& counters);
+
+}  // namespace telesplat::metrics

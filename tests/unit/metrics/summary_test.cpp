@@ -1,0 +1,201 @@
+// A run in figures.
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "tests/unit/metrics/record_fixture.h"
+
+namespace telesplat::metrics {
+namespace {
+
+TEST_F(Record, TheSummaryIsCompleteAndTrue) {
+  ASSERT_TRUE(record->add_rows(viewer, {{5},
+                                        "frames",
+                                        {"t_s", "inter_frame_ms", "construction_ms", "points_drawn", "update_age_ms"},
+                                        {0, 0, 5, 100, 50, 1, 20, 6, 200, 60, 2, 30, 7, 300, 70}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"latency_ms", "start_up_ms"}, {200, 50, 300, 60}}));
+  record->add_tile("sampler-1", tile(1, 0, 1.0));
+  record->add_tile("sampler-2", tile(1, 1, 1.005));
+  record->add_tile("sampler-1", tile(2, 0, 2.0));
+  Process data{"data",
+               "data",
+               1,
+               {{"scene", "hill.ply"}, {"kind", "mesh"}, {"triangles", "1234"}},
+               {{"peak_rss_mb", 10}, {"messages_rejected", 2}}};
+  Process old_packer{"packer", "packer", 2, {}, {{"points", 900}, {"model_bytes", 9000}, {"messages_rejected", 3}},
+                     true};
+  Process packer{"packer", "packer", 3, {}, {{"points", 1000}, {"model_bytes", 20000}, {"peak_rss_mb", 30}}};
+  Process sampler{"sampler", "sampler-1", 4, {}, {{"peak_rss_mb", 40}}};
+  ASSERT_TRUE(
+      record->finish({data, old_packer, packer, sampler, viewer}, {{"leases_expired", 4}, {"tiles_released", 6}}));
+  const auto s = nlohmann::json::parse(text("summary.json"), nullptr, false);
+  ASSERT_TRUE(s.is_object());
+  for (const char* key : {"schema",
+                          "scene",
+                          "kind",
+                          "primitives",
+                          "samplers",
+                          "viewers",
+                          "coupling",
+                          "buffers",
+                          "renderer",
+                          "splat",
+                          "size",
+                          "sampling_size",
+                          "frames",
+                          "updates",
+                          "fps",
+                          "inter_frame_delay_ms",
+                          "view_construction_ms",
+                          "view_update_latency_ms",
+                          "start_up_latency_ms",
+                          "sampling_ms",
+                          "lease_to_sampled_ms",
+                          "samplers_busy",
+                          "epochs",
+                          "leases_backup",
+                          "packing_ms",
+                          "data_generating_rate_mb_s",
+                          "data_transfer_rate_mb_s",
+                          "data_consuming_rate_mb_s",
+                          "bytes_raw",
+                          "bytes_sent",
+                          "compression_ratio",
+                          "redundancy_eliminated",
+                          "points_cached",
+                          "points_drawn",
+                          "tiles_released",
+                          "quality",
+                          "peak_rss_mb",
+                          "errors"})
+    EXPECT_TRUE(s.contains(key)) << key;
+  EXPECT_EQ(s["primitives"], 1234);
+  EXPECT_EQ(s["samplers"], 1);
+  EXPECT_EQ(s["frames"], 3);
+  EXPECT_EQ(s["fps"], 1.5);
+  EXPECT_EQ(s["inter_frame_delay_ms"]["mean"], 25) << "the first frame has no delay";
+  EXPECT_EQ(s["view_update_latency_ms"]["max"], 300);
+  EXPECT_EQ(s["sampling_ms"]["max"], 17) << "from the frame's first tile to its last";
+  EXPECT_EQ(s["packing_ms"]["max"], 10);
+  EXPECT_NEAR(double(s["redundancy_eliminated"]), 0.9, 1e-12);
+  EXPECT_EQ(s["bytes_sent"], 1500);
+  EXPECT_EQ(s["points_cached"], 1000) << "what the packer's former life held is gone";
+  EXPECT_EQ(s["bytes_per_cached_point"], 20);
+  EXPECT_EQ(s["tiles_released"], 6);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 5) << "what it counted stays counted";
+  EXPECT_EQ(s["errors"]["leases_expired"], 4);
+  EXPECT_EQ(s["peak_rss_mb"]["sampler"], nlohmann::json::array({40.0}));
+  const std::string tiles = text("tiles.csv");
+  EXPECT_EQ(std::count(tiles.begin(), tiles.end(), '\n'), 4);
+}
+
+TEST_F(Record, TilesTellWhereTheyLieAndCoarseFramesAreNotTimed) {
+  auto coarse = tile(1, 0, 0.5), fine = tile(2, 3, 1.0);
+  coarse.step = 4;
+  fine.rect = {0, 128, 640, 3};
+  fine.leased_s = 0.99;
+  record->add_tile("a", coarse);
+  record->add_tile("a", fine);
+  const auto s = record->summary({}, {});
+  EXPECT_EQ(s["sampling_ms"]["max"], 12);
+  EXPECT_EQ(s["lease_to_sampled_ms"]["max"], 22);
+  EXPECT_EQ(s["packing_ms"]["max"], 5);
+  EXPECT_EQ(s["bytes_sent"], 1000) << "what coarse frames sent counts";
+  ASSERT_TRUE(record->finish({}, {}));
+  const std::string tiles = text("tiles.csv");
+  EXPECT_TRUE(tiles.starts_with("frame,tile,lease,sampler,samples,")) << tiles;
+  EXPECT_NE(tiles.find("packed_s,x,y,width,height,step\n"), std::string::npos);
+  EXPECT_NE(tiles.find(",0,128,640,3,1\n"), std::string::npos) << tiles;
+  EXPECT_NE(tiles.find(",0,0,0,0,4\n"), std::string::npos) << tiles;
+}
+
+TEST_F(Record, SaysHowEvenlySamplersWereBusy) {
+  for (int i = 0; i < 10; ++i) record->add_tile("a", tile(1, uint64_t(i), i));
+  for (int i = 0; i < 5; ++i) record->add_tile("b", tile(1, uint64_t(10 + i), i));
+  auto backwards = tile(1, 15, 1);
+  backwards.encode_end_s = 0;
+  record->add_tile("b", backwards);  // clocks that disagree
+  const auto busy = record->summary({}, {})["samplers_busy"];
+  EXPECT_NEAR(double(busy["busy_s"]["a"]), 0.12, 1e-9);
+  EXPECT_NEAR(double(busy["busy_s"]["b"]), 0.06, 1e-9);
+  EXPECT_NEAR(double(busy["spread"]), 0.06 / 0.09, 1e-4);
+}
+
+TEST_F(Record, ViewersAreCountedEachByItself) {
+  Process second = viewer;
+  second.name = "viewer-2";
+  // The first shows 5 frames in 1 s. The second begins later and is started again: 3 frames in 0.25 s, twice.
+  const std::vector<std::string> columns{"t_s", "inter_frame_ms"};
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 0.25, 250, 0.5, 250, 0.75, 250, 1, 250}}));
+  ASSERT_TRUE(record->add_rows(second, {{6}, "frames", columns, {0, 0, 0.125, 125, 0.25, 125}}));
+  ASSERT_TRUE(record->add_rows(second, {{7}, "frames", columns, {0, 0, 0.125, 125, 0.25, 125}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"latency_ms", "points"}, {100, 1000, 200, 3000}}));
+  ASSERT_TRUE(record->add_rows(second, {{6}, "updates", {"latency_ms", "points"}, {50, 6000}}));
+  const auto s = record->summary({viewer, second}, {{"frames_completed", 3}});
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["fps"], 5);
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["updates_per_s"], 2);
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["view_update_latency_ms"]["mean"], 150);
+  EXPECT_EQ(s["by_viewer"]["viewer-1"]["inter_frame_delay_ms"]["max"], 250);
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["frames"], 6);
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["duration_s"], 0.5) << "of both its lives";
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["fps"], 12);
+  EXPECT_EQ(s["by_viewer"]["viewer-2"]["inter_frame_delay_ms"]["max"], 125);
+  EXPECT_EQ(s["fps"], 8.5) << "the mean over viewers";
+  EXPECT_EQ(s["updates_per_s"], 2);
+  EXPECT_EQ(s["frames"], 11);
+  EXPECT_EQ(s["updates"], 3);
+  EXPECT_EQ(s["duration_s"], 1);
+  EXPECT_EQ(s["frames_sampled"], 3);
+}
+
+TEST_F(Record, OfAVolumeCountsVoxelsAndPixels) {
+  Process data{
+      "data", "data-1", 1, {{"kind", "volume"}, {"voxels", "16777216"}}, {{"bytes_sent", 3000}, {"voxels_sent", 1000}}};
+  Process more{
+      "data", "data-2", 2, {{"kind", "volume"}, {"voxels", "16777216"}}, {{"bytes_sent", 3000}, {"voxels_sent", 1000}}};
+  viewer.facts["coupling"] = "loose";
+  viewer.facts["buffers"] = "3";
+  auto slab = tile(1, 0, 1.0);
+  slab.samples = 50000;  // voxels
+  slab.kept = 250'000;   // pixels
+  slab.bytes_sent = 100'000;
+  record->add_tile("sampler-1", slab);
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s"}, {0, 2}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"latency_ms", "points"}, {100, 100'000, 200, 400'000}}));
+  const auto s = record->summary({data, more, viewer}, {{"partitions", 2}});
+  EXPECT_EQ(s["kind"], "volume");
+  EXPECT_EQ(s["primitives"], 16777216);
+  EXPECT_EQ(s["coupling"], "loose");
+  EXPECT_EQ(s["buffers"], 3);
+  EXPECT_EQ(s["bytes_raw"], 1'000'000) << "four bytes a pixel";
+  EXPECT_EQ(s["compression_ratio"], 10);
+  EXPECT_EQ(s["redundancy_eliminated"], 0);
+  EXPECT_EQ(s["data_generating_rate_mb_s"], 0.5);
+  EXPECT_EQ(s["data_transfer_rate_mb_s"], 0.05);
+  EXPECT_EQ(s["data_consuming_rate_mb_s"], 1);
+  EXPECT_EQ(s["bytes_per_voxel"], 3);
+  EXPECT_EQ(s["voxels_fetched"], 2000);
+  EXPECT_EQ(s["partitions"], 2);
+}
+
+TEST_F(Record, OfARunWithoutAnythingHoldsZeros) {
+  const auto s = record->summary({}, {});
+  EXPECT_EQ(s["frames"], 0);
+  EXPECT_EQ(s["fps"], 0);
+  EXPECT_EQ(s["redundancy_eliminated"], 0);
+  EXPECT_EQ(s.dump().find("null,\"peak"), s.dump().find("null")) << "only quality is null: " << s.dump();
+}
+
+TEST_F(Record, TheSummaryIsUtf8WhateverNamesAre) {
+  const Process data{"data", "data", 1, {{"scene", "caf\xe9.ply"}, {"kind", "\xff"}}, {}};
+  viewer.name = "viewer \xff";
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s"}, {0, 1}}));
+  record->add_tile("sampler \xff", tile(1, 0, 1.0));
+  ASSERT_TRUE(record->finish({data, viewer}, {}));
+  const auto s = nlohmann::json::parse(text("summary.json"));  // refuses what is not UTF-8
+  EXPECT_EQ(s["scene"], "caf\xef\xbf\xbd.ply");
+  EXPECT_EQ(s["by_viewer"]["viewer \xef\xbf\xbd"]["frames"], 2);
+  EXPECT_TRUE(s["samplers_busy"]["busy_s"].contains("sampler \xef\xbf\xbd"));
+}
+
+}  // namespace
+}  // namespace telesplat::metrics
