@@ -26,24 +26,46 @@ def _without_fences(file):
 # ---- messages --------------------------------------------------------------------------------------------------------
 
 
-def messages(tree):
-    """Every message has its paragraph in docs/protocol.md, and no paragraph is without its message."""
-    declared = {}
+def _declared_messages(tree):
+    """name -> (file, line, [(field, line)]) of the messages in the sources."""
+    found = {}
     for file in tree.sources(below=tables.MESSAGES):
-        for match in re.finditer(r'\bkName\s*=\s*"([^"]+)"', file.without_comments):
-            declared[match[1]] = (file.path, file.line_of(match.start()))
-    documented = {}
-    if tree.exists(tables.PROTOCOL_PAGE):
-        for number, line in enumerate(tree.file(tables.PROTOCOL_PAGE).lines, 1):
-            for match in re.finditer(r"^\*\*(\w+)\*\* - ", line):
-                documented[match[1]] = number
-    for name, (path, line) in declared.items():
+        text = file.without_comments
+        for match in re.finditer(r'\bkName\s*=\s*"([^"]+)"', text):
+            fields = re.finditer(r'\bf\("(\w+)"', text[match.end() : text.find("\n};", match.end())])
+            lines = [(f[1], file.line_of(match.end() + f.start())) for f in fields]
+            found[match[1]] = (file.path, file.line_of(match.start()), lines)
+    return found
+
+
+def _documented_messages(tree):
+    """name -> (line, words of its paragraphs and tables) of the messages in docs/protocol.md."""
+    found, name = {}, None
+    for number, line in enumerate(tree.file(tables.PROTOCOL_PAGE).lines, 1):
+        if match := re.match(r"\*\*(\w+)\*\* - ", line):
+            name = match[1]
+            found[name] = (number, set())
+        elif line.startswith("#"):
+            name = None
+        if name:
+            found[name][1].update(re.findall(r"\w+", line))
+    return found
+
+
+def messages(tree):
+    """Every message, with every field, stands in docs/protocol.md; none stands there that is not in the sources."""
+    declared = _declared_messages(tree)
+    documented = _documented_messages(tree) if tree.exists(tables.PROTOCOL_PAGE) else {}
+    for name, (path, line, fields) in declared.items():
         if name not in documented:
-            yield Finding(
-                path, line, "messages",
-                f'"{name}" has no paragraph (**{name}** - ...) in {tables.PROTOCOL_PAGE}',
-            )
-    for name, line in documented.items():
+            text = f'"{name}" has no paragraph (**{name}** - ...) in {tables.PROTOCOL_PAGE}'
+            yield Finding(path, line, "messages", text)
+            continue
+        for field, field_line in fields:
+            if field not in documented[name][1]:
+                text = f'"{field}" of "{name}" does not stand in its paragraph of {tables.PROTOCOL_PAGE}'
+                yield Finding(path, field_line, "messages", text)
+    for name, (line, _) in documented.items():
         if name not in declared:
             yield Finding(tables.PROTOCOL_PAGE, line, "messages", f"**{name}** is no message of {tables.MESSAGES}")
 

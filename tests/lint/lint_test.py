@@ -82,6 +82,11 @@ VIOLATIONS = [
         "messages", "common/wire/more_messages.h",
         'struct New {\n  static constexpr auto kName = "new";\n};\n', 2, '"new" has no paragraph',
     ),
+    (
+        "messages", "common/wire/messages.h",
+        'struct Hello {\n  static constexpr auto kName = "hello";\n  void fields(F& f) { f("gone", gone); }\n};\n',
+        3, '"gone" of "hello" does not stand',
+    ),
     ("messages", "docs/protocol.md", "**hello** - first.\n\n**gone** - was once.\n", 3, "**gone** is no message"),
     ("flags", "services/data/x.cpp", 'Table t{{.flag = "--room-size,--room"}};\n', 1, "--room-size does not stand"),
     ("flags", "services/data/x.cpp", '\nTable t{{.flag = "!--no-cache"}};\n', 2, "--no-cache does not stand"),
