@@ -112,8 +112,8 @@ bool march(const Constants& k, const JuliaRays& rays, const Vec4& d, Interval ra
       return true;
     }
     if (t + r >= range.t1) return false;
-    // If the estimate goes on changing as it did, the next free ball touches this one: r + r' = step, r' = r + slope *
-    // step.
+    // If the estimate goes on changing as it did, the next free ball touches this one:
+    // r + r' = step, r' = r + slope * step.
     const float slope = gone > 0 ? (r - last_r) / gone : -1.0f;
     const float ratio = std::max(kRelax / (1.0f - std::min(std::max(slope, -1.0f), kMaxSlope)), 1.0f);
     // Close by, the surface may come within the threshold for less than a step: go carefully.

@@ -3,9 +3,9 @@
 // to be read.
 //
 //   cones    for each block of 8 x 8 pixels the depth up to which none of its rays meets the surface, or that none does
-//   clipping of every ray to the box, to the ball that holds the set, and to what its block's cone left marching until
-//   the estimate is below the threshold lod * footprint(t): a bracket of the surface's depth surface  the depth refined
-//   within its bracket; normal, colour, occlusion, shadow
+//   clipping of every ray to the box, to the ball that holds the set, and to what its block's cone left
+//   marching until the estimate is below the threshold lod * footprint(t): a bracket of the surface's depth
+//   surface  the depth refined within its bracket; normal, colour, occlusion, shadow
 #pragma once
 
 #include <cstdint>

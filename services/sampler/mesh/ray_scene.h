@@ -5,9 +5,9 @@
 // another; Embree reads positions and indices where they lie. Measured with 5.76M triangles in 98 chunks on two cores
 // (1280x800):
 //                                    all chunks to first ray    replacing one    frame
-//   instanced chunk scenes                            0.99 s            0.01 s    55 ms one flat scene
-//   1.89 s            1.8  s    51 ms one RTC_SCENE_FLAG_DYNAMIC scene                  1.35 s            2.1  s    57
-//   ms
+//   instanced chunk scenes                            0.99 s            0.01 s    55 ms
+//   one flat scene                                    1.89 s            1.8  s    51 ms
+//   one RTC_SCENE_FLAG_DYNAMIC scene                  1.35 s            2.1  s    57 ms
 #pragma once
 
 #include <embree3/rtcore.h>

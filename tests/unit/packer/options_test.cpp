@@ -1,0 +1,29 @@
+// What a packer is told: limits, what fits which scene, what another process is handed.
+#include <gtest/gtest.h>
+
+#include "services/packer/packer_options.h"
+
+namespace telesplat::packer {
+namespace {
+
+TEST(PackerOptions, AChildIsToldWhatDiffers) {
+  PackerOptions options, defaults;
+  EXPECT_EQ(options.service.name, "packer");
+  EXPECT_TRUE(options::arguments(table(options), table(defaults)).empty());
+  options.record_depth = "run/depth";
+  options.log_limit_mb = 64;
+  EXPECT_EQ(options::arguments(table(options), table(defaults)),
+            (std::vector<std::string>{"--record-depth=run/depth", "--log-limit-mb=64"}));
+}
+
+TEST(PackerOptions, ValuesBeyondTheirLimitsAreRefused) {
+  PackerOptions options;
+  const options::Table rows = table(options);
+  for (const auto& [flag, value] :
+       {std::pair{"--threads", "1025"}, {"--record-depth-frames", "0"}, {"--log-limit-mb", "0.5"}})
+    EXPECT_FALSE(options::set(*options::find(rows, flag), value).ok()) << flag;
+  EXPECT_FALSE(options::refuse_misfits(rows, {"--record-depth"}, scene::Kind::kVolume, "a.nii").ok());
+}
+
+}  // namespace
+}  // namespace telesplat::packer
