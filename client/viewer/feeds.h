@@ -22,8 +22,8 @@ class Feeds {
   /// viewer: its name, for logs.
   Feeds(net::Context& context, std::string viewer) : context_(context), viewer_(std::move(viewer)) {}
 
-  /// Connects to where the session says that these are. True: anew, because it is not where it was; what was open is closed.
-  /// While the session does not know all of them everything stays as it is.
+  /// Connects to where the session says that these are. True: anew, because it is not where it was; what was open is
+  /// closed. While the session does not know all of them everything stays as it is.
   bool connect(std::span<const Feed> wanted, const wire::Welcome& session);
   void close() { open_.clear(); }
 

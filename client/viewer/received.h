@@ -1,5 +1,6 @@
-// What a viewer receives of a session, keeps and draws: points of a model, or frames of slice images. One implementation for each
-// pipeline (points/received_points.h, slices/received_slices.h), each with a cache of its own. Nobody else asks which it is.
+// What a viewer receives of a session, keeps and draws: points of a model, or frames of slice images. One
+// implementation for each pipeline (points/received_points.h, slices/received_slices.h), each with a cache of its own.
+// Nobody else asks which it is.
 #pragma once
 
 #include <functional>
@@ -25,7 +26,8 @@ class Received {
   virtual ~Received() = default;
 
   // ---- worker thread ----
-  /// The session as its master tells of it now. Error: it cannot be shown; names the value and its limit. All stays as it was then.
+  /// The session as its master tells of it now. Error: it cannot be shown; names the value and its limit. All stays as
+  /// it was then.
   virtual Status follow(const wire::Welcome& session) = 0;
   /// Where updates come from.
   virtual std::span<const Feed> feeds() const = 0;
@@ -37,8 +39,8 @@ class Received {
   virtual void receive(int most) = 0;
   /// What is due by time alone. To be called every few milliseconds.
   virtual void tick(double now_s) = 0;
-  /// A view update of this viewer's is complete. Where the display waits for whole updates: and may be displayed from now on, since
-  /// all before it may.
+  /// A view update of this viewer's is complete. Where the display waits for whole updates: and may be displayed from
+  /// now on, since all before it may.
   virtual void on_update(const ShownUpdate&) {}
   /// Tells the packer what was drawn since the last call.
   virtual void report() {}
@@ -52,7 +54,8 @@ class Received {
   virtual Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) = 0;
 };
 
-/// What the worker lends. References and functions are used in the worker's thread, as long as it has not retired the Received.
+/// What the worker lends. References and functions are used in the worker's thread, as long as it has not retired the
+/// Received.
 struct ReceivedLinks {
   InstanceId viewer;
   CouplingGate& gate;

@@ -1,4 +1,5 @@
-// Where a session changes between points and slice images: which Received the display draws, and when it goes on to the next one.
+// Where a session changes between points and slice images: which Received the display draws, and when it goes on to the
+// next one.
 #pragma once
 
 #include <deque>
@@ -11,7 +12,8 @@
 
 namespace telesplat::viewer {
 
-/// The display goes on to a Received once that has its first picture; until then the one before stays on display. Thread-safe.
+/// The display goes on to a Received once that has its first picture; until then the one before stays on display.
+/// Thread-safe.
 class Succession {
  public:
   // ---- worker ----
@@ -23,8 +25,8 @@ class Succession {
   void free_dropped();
 
   // ---- display thread ----
-  /// What frames are drawn from that show the update of this request; kNewest: the newest that has a picture. Those before it are given
-  /// up. While none has a picture: the newest. Null before the first.
+  /// What frames are drawn from that show the update of this request; kNewest: the newest that has a picture. Those
+  /// before it are given up. While none has a picture: the newest. Null before the first.
   std::shared_ptr<Received> at(RequestId request);
   static constexpr RequestId kNewest{~uint64_t{0}};
 

@@ -1,5 +1,5 @@
-// The viewer's flags: one row a flag, and what they come to. Without sockets, OpenGL and the display's code, for the launcher
-// has them too.
+// The viewer's flags: one row a flag, and what they come to. Without sockets, OpenGL and the display's code, for the
+// launcher has them too.
 #pragma once
 
 #include <optional>
@@ -19,7 +19,8 @@ struct ViewerOptions {
   DisplayOptions display;
   RequestOptions requests;
   std::string size = "1280x800", sampling_size = "auto";  ///< pixels, WxH; sampling: or auto
-  /// Sampled pixels a displayed pixel, on each axis, at least; not given: what the session tells, else requests.min_scale.
+  /// Sampled pixels a displayed pixel, on each axis, at least; not given: what the session tells, else
+  /// requests.min_scale.
   std::optional<double> least_sampling;
   std::string trajectory = "orbit";  ///< "orbit", "still" or a CSV file
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
@@ -42,14 +43,11 @@ options::Table view_table(ViewerOptions& options);
 /// All flags of telesplat-viewer.
 options::Table table(ViewerOptions& options);
 
-/// The same as view_table(), for a CLI11 command line.
-void add_view_flags(CLI::App& app, ViewerOptions& options);
-
 /// "WxH", or "auto" (then the value is not used).
 Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
 
-/// Works out what the texts of the flags come to: sizes, the tile of the wall, kernels, buffers of the coupling. Error: names
-/// the flag that cannot be.
+/// Works out what the texts of the flags come to: sizes, the tile of the wall, kernels, buffers of the coupling. Error:
+/// names the flag that cannot be.
 Status settle(ViewerOptions& options);
 
 }  // namespace telesplat::viewer

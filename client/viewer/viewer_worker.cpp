@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kReportPeriod_s = 1.0;
 constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
-// How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each cycle.
+// How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each
+// cycle.
 constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
 
 wire::Hello make_hello(const ViewerWorker::Options& o) {

@@ -1,6 +1,6 @@
-// The viewer's network side, on a thread of its own: keeps the link to the master, receives updates, asks for views, measures updates,
-// reports what was drawn. What it receives is a Received's business; the worker does not know of what kind the scene is. It never
-// holds up a display frame.
+// The viewer's network side, on a thread of its own: keeps the link to the master, receives updates, asks for views,
+// measures updates, reports what was drawn. What it receives is a Received's business; the worker does not know of what
+// kind the scene is. It never holds up a display frame.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,8 @@ class ViewerWorker {
   struct Options {
     net::ServiceOptions service;
     RequestOptions requests;  ///< buffers are the gate's
-    /// RequestOptions::min_scale whatever the session tells; nothing: what the session tells ("viewer.least_sampling"), if it does.
+    /// RequestOptions::min_scale. Nothing: the session's setting "viewer.least_sampling"; without that:
+    /// requests.min_scale.
     std::optional<double> least_sampling;
     std::map<std::string, std::string> facts;  ///< for the hello
     ReceivedOptions received;

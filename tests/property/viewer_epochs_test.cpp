@@ -1,5 +1,5 @@
-// Whatever the order and the times of epochs, parts and restarts: a displayed list is of one epoch, displayed epochs never go back,
-// and something newer is shown within the promised time once there is something that covers a view.
+// Whatever the order and the times of epochs, parts and restarts: a displayed list is of one epoch, displayed epochs
+// never go back, and something newer is shown within the promised time once there is something that covers a view.
 #include <gtest/gtest.h>
 
 #include <map>

@@ -1,5 +1,5 @@
-// The server side of a session as one thread: a master that answers every view request and a packer that sends what was asked for, so that
-// viewers are tested with every message under control.
+// The server side of a session as one thread: a master that answers every view request and a packer that sends what was
+// asked for, so that viewers are tested with every message under control.
 #pragma once
 
 #include <atomic>
@@ -23,13 +23,13 @@ class FakeSession {
     int coarse_patches = 0;  ///< of points: parts that are published before the first part of full resolution
     /// Answers of these requests (1, 2, ...) are damaged, or not given when they are asked for the first time.
     std::set<uint64_t> damaged, forgotten;
-    uint64_t epoch_every = 0;  ///< a new epoch after so many answers; 0: never
-    /// Another master after so many answers: requests are lost, frames numbered anew; 0: never.
+    uint64_t epoch_every = 0;  ///< a new epoch after N answers; 0: never
+    /// Another master after N answers: requests are lost, frames numbered anew; 0: never.
     uint64_t restart_after = 0;
-    /// The scene becomes one of the other kind after each so many answers, `changes` times; 0: never. Another packer packs it, at the
-    /// same endpoints; requests are lost.
+    /// The scene becomes one of the other kind after every N answers, `changes` times; 0: never. Another packer packs
+    /// it, at the same endpoints; requests are lost.
     uint64_t change_every = 0, changes = 2;
-    /// After so many answers the master tells of a box that no model can have, and another packer begins; 0: never.
+    /// After N answers the master tells of a box that no model can have, and another packer begins; 0: never.
     uint64_t strange_after = 0;
     std::map<std::string, double> settings;  ///< of the welcome
   };

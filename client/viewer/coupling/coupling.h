@@ -1,5 +1,5 @@
-// How the display and the server wait for each other (T6.3-6.5). Requests, updates and frames go in as they happen, decisions come out; no sockets,
-// no clocks, no threads.
+// How the display and the server wait for each other (T6.3-6.5). Requests, updates and frames go in as they happen,
+// decisions come out; no sockets, no clocks, no threads.
 #pragma once
 
 #include <deque>
@@ -11,20 +11,23 @@
 
 namespace telesplat::viewer {
 
-/// async: the display shows whatever is there, requests go out at a rate. sync: ask, wait, display one frame, ask again. loose: the same with up
-/// to `buffers` requests on their way or complete and not displayed, so that server and display work at the same time.
+/// async: the display shows what is there, requests go out at a rate. sync: ask, wait, display one frame, ask again.
+/// loose: the same with up to `buffers` requests on their way or complete and not displayed, so that server and display
+/// work at the same time.
 enum class CouplingMode { kAsync, kSync, kLoose };
 
 std::optional<CouplingMode> coupling_named(std::string_view name);
 const char* coupling_name(CouplingMode mode);
-/// Of ViewRequest::buffers: 0, 1, or `loose`.
+/// ViewRequest::buffers: 0, 1, or `loose`.
 int buffers_of(CouplingMode mode, int loose);
 
-/// Credits of a viewer that waits (sync, loose). A request holds a credit from when it is sent until the frame that shows its update has been displayed.
-/// Updates are displayed in the order of their requests, each in exactly one frame.
+/// Credits of a viewer that waits (sync, loose). A request holds a credit from when it is sent until the frame that
+/// shows its update has been displayed. Updates are displayed in the order of their requests, each in exactly one
+/// frame.
 class Coupling {
  public:
-  /// Without any sign of an answer for so long the master may have forgotten the requests (it was restarted) or found nothing to sample.
+  /// Without any sign of an answer for so long the master may have forgotten the requests (it was restarted) or found
+  /// nothing to sample.
   static constexpr double kPatience_s = 2;
 
   /// buffers: as buffers_of(); 0: asynchronous, nothing below applies and may_ask() is always true.
@@ -39,14 +42,15 @@ class Coupling {
   bool is_open(RequestId request) const;
   /// Part of an answer came.
   void progress(double now_s) { heard_s_ = now_s; }
-  /// Answers come in the order of requests: those before this one will not be answered any more. Their credits are free.
+  /// Answers come in the order of requests: those before this one will not be answered any more. Their credits are
+  /// free.
   void skip_before(RequestId request);
-  /// The update is complete. Returns the requests whose updates can be displayed from now on, in order: none while an earlier one is open. One that is
-  /// not open changes nothing.
+  /// The update is complete. Returns the requests whose updates can be displayed from now on, in order: none while an
+  /// earlier one is open. One that is not open changes nothing.
   std::vector<RequestId> completed(RequestId request, double now_s);
-  /// Nothing came for kPatience_s: the open requests, which are to be sent again - the master knows them by their ids, if it does.
-  /// The patience begins anew. Empty: it is not over, or nothing is open. Where a later update is complete, the
-  /// earlier ones are given up instead: `released` gets those that can be displayed now.
+  /// Nothing came for kPatience_s: the open requests, which are to be sent again - the master knows them by their ids,
+  /// if it does. The patience begins anew. Empty: it is not over, or nothing is open. Where a later update is complete,
+  /// the earlier ones are given up instead: `released` gets those that can be displayed now.
   std::vector<RequestId> overdue(double now_s, std::vector<RequestId>& released);
   /// What is complete and waits for earlier ones will not be displayed: its credits are free.
   void drop_complete() {

@@ -166,7 +166,8 @@ std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part
   // The master's clock as seen from here may be set back when the connection is made anew.
   const double latency_s = std::max(now_s - u.requested_s, 1e-3);
   latency_s_ = latency_s_ == 0 ? latency_s : 0.8 * latency_s_ + 0.2 * latency_s;
-  // Time goes with the number of pixels, hence the root; by small steps, since views differ. Requests that were sent before it took their share.
+  // Time goes with the number of pixels, hence the root; by small steps, since views differ. Requests that were sent
+  // before it took their share.
   if (options_.adaptive && !u.still) {
     const double own_s = latency_s / double(1 + u.ahead);
     scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / own_s), 0.85, 1.1), min_scale(), 1.0);

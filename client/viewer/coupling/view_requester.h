@@ -15,8 +15,8 @@
 
 namespace telesplat::viewer {
 
-/// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's aspect, sides
-/// multiples of 8 and at least 16.
+/// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's
+/// aspect, sides multiples of 8 and at least 16.
 std::pair<int, int> sampling_size(const RequestOptions& options, int width, int height);
 
 /// Extrapolates a head pose with its recent velocity.
@@ -61,13 +61,15 @@ class ViewRequester {
   void on_pose(double t_s, const geometry::Camera& display);
   /// RequestOptions::min_scale, as the session sets it; within 0.1 to 1.
   void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
-  /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full resolution.
+  /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full
+  /// resolution.
   void on_epoch(double now_s) { epoch_began_s_ = now_s; }
   /// The next request; asynchronously, if one is due.
   std::optional<wire::ViewRequest> next(double now_s);
   /// These requests once more, for the view that is wanted now.
   std::vector<wire::ViewRequest> again(std::span<const RequestId> requests, double now_s);
-  /// A frame that waited for its update was displayed so long after the update had been requested: predictions reach to there.
+  /// A frame that waited for its update was displayed so long after the update had been requested: predictions reach to
+  /// there.
   void on_displayed(double latency_s);
   /// When it was requested; nothing: not by us, or it has been answered.
   std::optional<double> requested_s(RequestId request) const;
@@ -82,8 +84,8 @@ class ViewRequester {
     /// The coarse pass included.
     uint64_t points = 0, samples = 0, bytes = 0, tiles = 0, eliminated = 0;
   };
-  /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution and asked for
-  /// by us; a coarse pass may come before it, with the same request.
+  /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution
+  /// and asked for by us; a coarse pass may come before it, with the same request.
   std::optional<Update> on_part(const ViewPart& part, double now_s);
 
   double latency_s() const { return latency_s_; }

@@ -21,7 +21,8 @@ void sleep_until(double t_s) {
   if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
 }
 
-// Room for a frame of this camera. A view that may be recorded has room for depth all the time: growing it costs milliseconds.
+// Room for a frame of this camera. A view that may be recorded has room for depth all the time: growing it costs
+// milliseconds.
 void fit(image::View& view, const geometry::Camera& camera, bool with_depth) {
   const size_t pixels = size_t(camera.width) * size_t(camera.height);
   view.width = camera.width;
@@ -76,8 +77,8 @@ class Display {
     return result_;
   }
 
-  // Draws from what frames are to show that show the update of this request; the same as before, unless the session changed between
-  // points and slice images. False: it cannot be drawn, result_ says why.
+  // Draws from what frames are to show that show the update of this request; the same as before, unless the session
+  // changed between points and slice images. False: it cannot be drawn, result_ says why.
   bool draw_from(RequestId request) {
     auto received = worker_.received_at(request);
     if (received == received_) return true;
@@ -109,7 +110,8 @@ class Display {
     return true;
   }
 
-  // The head rests until the first view is complete; what comes of it is shown as it comes, unless the display waits for whole updates.
+  // The head rests until the first view is complete; what comes of it is shown as it comes, unless the display waits
+  // for whole updates.
   bool rest() {
     for (; !worker_.first_update_complete(); sleep_until(monotonic_s() + kRestPeriod_s)) {
       if (told_to_stop(worker_, surface_)) return false;

@@ -1,4 +1,4 @@
-// The display: every frame shows the cached points from where the head is now, whatever the server does (T6.5).
+// The display: every frame shows what is cached from where the head is now, even if the server is late (T6.5).
 #pragma once
 
 #include <functional>
@@ -18,14 +18,15 @@ struct DisplayResult {
   std::string error;         ///< what made a display impossible; empty: nothing
 };
 
-/// Makes what the display draws from. Called in the display's thread: when it is known what the session shows, and again when the session
-/// goes on with something that is drawn another way; what was made before is destroyed by then.
+/// Makes what the display draws from. Called in the display's thread: when it is known what the session shows, and
+/// again when the session goes on with something that is drawn another way; what was made before is destroyed by then.
 using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&)>;
 
-/// Waits until it is known what there is to show and for the first complete view update (the head rests at the trajectory's beginning),
-/// then displays frames on the surface. Where the coupling says so each frame waits for a complete view update and shows the view of now
-/// from it; meanwhile the surface is looked after ten times a second. Only the last frame, when told to stop or at the end of the
-/// duration, waits for nothing. `spool` may be null: nothing is recorded.
+/// Waits until it is known what there is to show and for the first complete view update (the head rests at the
+/// trajectory's beginning), then displays frames on the surface. Where the coupling says so each frame waits for a
+/// complete view update and shows the view of now from it; meanwhile the surface is looked after ten times a second.
+/// Only the last frame, when told to stop or at the end of the duration, waits for nothing. `spool` may be null:
+/// nothing is recorded.
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
                           CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
                           metrics::SpanRecorder& spans, FrameSpool* spool);

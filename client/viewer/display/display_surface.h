@@ -1,4 +1,5 @@
-// Where the display's cameras come from and where its frames go: a recorded head and nobody (headless), or a person at a window.
+// Where the display's cameras come from and where its frames go: a recorded head and nobody (headless), or a person at
+// a window.
 #pragma once
 
 #include <string>
@@ -26,8 +27,9 @@ struct LiveFigures {
 class DisplaySurface {
  public:
   virtual ~DisplaySurface() = default;
-  /// Takes in what happened since the last frame; returns the camera of the frame that begins, whose size is the frame's, and changes
-  /// `look` to the person's wishes. t_s: seconds since the first displayed frame; negative before it, while the head rests.
+  /// Takes in what happened since the last frame; returns the camera of the frame that begins, whose size is the
+  /// frame's, and changes `look` to the person's wishes. t_s: seconds since the first displayed frame; negative before
+  /// it, while the head rests.
   virtual geometry::Camera begin_frame(double now_s, double t_s, Look& look) = 0;
   /// Whether frames without points are worth drawing, because somebody sees them.
   virtual bool visible() const = 0;

@@ -9,9 +9,10 @@
 
 namespace telesplat::viewer {
 
-/// A texture that takes each frame, and a triangle that covers the window. Frames go through a ring of persistently mapped pixel
-/// buffers where the context has buffer storage (OpenGL 4.4), so that copying one does not wait for the one before to be read;
-/// elsewhere glTexSubImage2D copies. All calls with the same context current, OpenGL 3.3 core or later.
+/// A texture that takes each frame, and a triangle that covers the window. Frames go through a ring of persistently
+/// mapped pixel buffers where the context has buffer storage (OpenGL 4.4), so that copying one does not wait for the
+/// one before to be read; elsewhere glTexSubImage2D copies. All calls with the same context current, OpenGL 3.3 core or
+/// later.
 class FramePresenter {
  public:
   static Result<std::unique_ptr<FramePresenter>> make();

@@ -9,11 +9,12 @@
 
 namespace telesplat::viewer {
 
-/// Used by one thread, the display's. A renderer's context must be gone before another renderer is made: sources are destroyed first.
+/// Used by one thread, the display's. A renderer's context must be gone before another renderer is made: sources are
+/// destroyed first.
 class Renderers {
  public:
-  /// kind: "auto" (gl on a hardware GPU, else cpu), "cpu", "gl". Makes the first one of points at once, so that what cannot be is
-  /// found out before the session begins. Error: what was tried.
+  /// kind: "auto" (gl on a hardware GPU, else cpu), "cpu", "gl". Makes the first one of points at once, so that what
+  /// cannot be is found out before the session begins. Error: what was tried.
   static Result<Renderers> make(const std::string& kind, int threads);
 
   /// What draws points: "cpu" or "gl".

@@ -123,7 +123,8 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
   const GLFWvidmode* mode = monitor ? glfwGetVideoMode(monitor) : nullptr;
   if (o.fullscreen && !mode) return Error{"there is no screen to fill: " + last_error()};
   std::string tried;
-  // EGL first: a renderer's context without a window is EGL's too, and one thread can have current contexts of one of them only.
+  // EGL first: a renderer's context without a window is EGL's too, and one thread can have current contexts of one of
+  // them only.
   for (const auto& [minor, api] : {std::pair{43, GLFW_EGL_CONTEXT_API},
                                    {43, GLFW_NATIVE_CONTEXT_API},
                                    {33, GLFW_EGL_CONTEXT_API},

@@ -20,13 +20,15 @@ class Window {
     bool fullscreen = false;
     std::string title = "Telesplat";
   };
-  /// One at a time in a process. The context is OpenGL 4.3 core, or 3.3 where that is not to be had. Nothing is left current.
+  /// One at a time in a process. The context is OpenGL 4.3 core, or 3.3 where that is not to be had. Nothing is left
+  /// current.
   static Result<std::unique_ptr<Window>> open(const Options& options);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  /// Its context, current in this thread for a scope; then what was current before, be it of another API (a renderer's own context).
+  /// Its context, current in this thread for a scope; then what was current before, also where that is of another API
+  /// (a renderer's own context).
   class Current {
    public:
     explicit Current(const Window& window);
@@ -42,7 +44,8 @@ class Window {
   void poll(Interaction& interaction);
   /// The person closed it.
   bool closing() const;
-  /// Pixels of the content, which on fine screens are more than screen coordinates; the last ones while it is minimised.
+  /// Pixels of the content, which on fine screens are more than screen coordinates; the last ones while it is
+  /// minimised.
   int width() const { return width_; }
   int height() const { return height_; }
   void set_title(const std::string& title);

@@ -43,7 +43,8 @@ class WindowSurface final : public DisplaySurface {
   Screenshots screenshots_;
 };
 
-/// A camera whose field of view `fov_deg` spans the longer side of the image: a window that is made narrow does not become a tunnel.
+/// A camera whose field of view `fov_deg` spans the longer side of the image: a window that is made narrow does not
+/// become a tunnel.
 geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int width, int height, double near_m);
 
 }  // namespace telesplat::viewer

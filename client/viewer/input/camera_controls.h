@@ -5,12 +5,13 @@
 
 namespace telesplat::viewer {
 
-/// Inputs move a goal; the camera follows it with a short exponential lag that does not depend on the frame rate. Distances on the
-/// screen are in window heights, +x right, +y down. Everything a person does leaves the pose within Limits; numbers that are not
-/// finite are ignored. One thread.
+/// Inputs move a goal; the camera follows it with a short exponential lag that does not depend on the frame rate.
+/// Distances on the screen are in window heights, +x right, +y down. Everything a person does leaves the pose within
+/// Limits; numbers that are not finite are ignored. One thread.
 class CameraControls {
  public:
-  /// In units of the data set's largest extent, which itself is taken to be within metres that cameras can have (geometry::validate).
+  /// In units of the data set's largest extent, which itself is taken to be within metres that cameras can have
+  /// (geometry::validate).
   struct Limits {
     static constexpr double kSmallest_m = 1e-4, kLargest_m = 1e4;
     static constexpr double kNearest = 0.03, kFarthest = 10;           ///< eye to pivot
@@ -35,8 +36,8 @@ class CameraControls {
   /// To (> 0) or from the pivot, a tenth a step. In flight: faster or slower.
   void wheel(double steps);
 
-  /// In flight the camera turns about itself; leaving it, about the point ahead that is as far as the data set's centre. The view
-  /// does not change with either.
+  /// In flight the camera turns about itself; leaving it, about the point ahead that is as far as the data set's
+  /// centre. The view does not change with either.
   void set_flying(bool flying);
   bool flying() const { return flying_; }
   /// Where to fly while the keys are held, -1 to 1 each: right and forward of the camera, up of the room.

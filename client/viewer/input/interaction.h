@@ -1,5 +1,5 @@
-// What a person does at the window - keys, mouse, wheel - and what follows from it. Without any window system, so that it is tested
-// without one.
+// What a person does at the window - keys, mouse, wheel - and what follows from it. Without any window system, so that
+// it is tested without one.
 #pragma once
 
 #include <optional>

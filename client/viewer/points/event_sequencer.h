@@ -1,5 +1,5 @@
-// Puts point-model events in order (the "clone" pattern of the ZeroMQ guide, chapter 5): applies what follows, drops what is
-// known, notices gaps and new packers, and asks for what is missing. No sockets, no clocks.
+// Puts point-model events in order (the "clone" pattern of the ZeroMQ guide, chapter 5): applies what follows, drops
+// what is known, notices gaps and new packers, and asks for what is missing. No sockets, no clocks.
 #pragma once
 
 #include <deque>
@@ -34,7 +34,8 @@ class EventSequencer {
   };
   explicit EventSequencer(Callbacks callbacks) : callbacks_(std::move(callbacks)) {}
 
-  /// Forget which packer we followed and ask whatever packer is there for everything (at start, or when its endpoint changes).
+  /// Forgets which packer was followed. Asks the one that is there for everything: at the start, or when its endpoint
+  /// changes.
   void start();
   /// An event from the publisher.
   void on_published(ModelEvent event);

@@ -1,6 +1,6 @@
-// The viewer's replica of the point model, shared by the worker that applies events and the display thread that draws. Events are
-// prepared and merged without the lock and committed under it in microseconds. What is dropped is freed by the worker, and not before the
-// frame that may draw it is finished.
+// The viewer's replica of the point model, shared by the worker that applies events and the display thread that draws.
+// Events are prepared and merged without the lock and committed under it in microseconds. What is dropped is freed by
+// the worker, and not before the frame that may draw it is finished.
 #pragma once
 
 #include <memory>
@@ -15,23 +15,26 @@ namespace telesplat::viewer {
 class ModelCache {
  public:
   // ---- worker ----
-  /// Starts an empty replica, of another packer's model or of a new epoch; epoch 0: not known yet. What is on display stays there
-  /// until show_newest(), unless it is empty; a newer one that was not shown is dropped. Returns whether an older one stays.
+  /// Starts an empty replica, of another packer's model or of a new epoch; epoch 0: not known yet. What is on display
+  /// stays there until show_newest(), unless it is empty; a newer one that was not shown is dropped. Returns whether an
+  /// older one stays.
   bool begin_replica(const points::ModelConfig& config, EpochId epoch = {}, Sequence applied = {});
   bool has_replica() const { return newest_.model != nullptr; }
   const points::ModelConfig& config() const { return newest_.model->config(); }
-  /// Of the newest replica; 0: not known yet.
+  /// The newest replica's; 0: not known yet.
   EpochId epoch() const { return newest_.epoch; }
-  /// Precondition: `epoch` is the newest replica's, or that is not known yet. Only one thread at a time may change the cache: mosaics are merged
-  /// while the display draws.
+  /// Precondition: `epoch` is the newest replica's, or that is not known yet. Only one thread at a time may change the
+  /// cache: mosaics are merged while the display draws.
   void insert(points::PreparedPatch patch, EpochId epoch);
   /// frames: empty, or one a key: then only the mosaics with that frame tag (PointModel::forget).
   void forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames = {});
   /// Replaces the older replica on display by the newest. No effect if it is displayed already.
   void show_newest();
-  /// Frees what was dropped and no frame draws any more. To be called often: to free a million points takes milliseconds.
+  /// Frees what was dropped and no frame draws any more. To be called often: to free a million points takes
+  /// milliseconds.
   void free_dropped();
-  /// Makes up to `most` of the summaries that the display asked for (points/summary.h), while it draws. Only where no other thread changes the cache.
+  /// Makes up to `most` of the summaries that the display asked for (points/summary.h), while it draws. Only where no
+  /// other thread changes the cache.
   void summarise(size_t most);
   /// Digest of the newest replica, for tests of replication.
   uint64_t digest() const;

@@ -1,5 +1,5 @@
-// The worker's part for scenes of points: puts model events in order, decodes and prepares them, applies them to the cache - at once, or, where the
-// display waits for whole updates, when the display takes them.
+// The worker's part for scenes of points: puts model events in order, decodes and prepares them, applies them to the
+// cache - at once, or, where the display waits for whole updates, when the display takes them.
 #pragma once
 
 #include <functional>

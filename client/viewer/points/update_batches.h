@@ -1,6 +1,6 @@
-// Changes of the point model that wait until a whole view update is there (synchronous and loose coupling): what is on display never shows a part of
-// one. Patches are prepared before they come here; merging them into the model is
-// left to the display, which waits for the update anyway.
+// Changes of the point model that wait until a whole view update is there (synchronous and loose coupling): what is on
+// display never shows a part of one. Patches are prepared before they come here; merging them into the model is left to
+// the display, which waits for the update anyway.
 #pragma once
 
 #include <deque>
@@ -16,7 +16,8 @@ namespace telesplat::viewer {
 
 class UpdateBatches {
  public:
-  /// Points that are held back at most (other viewers' updates while none of one's own becomes complete): beyond, everything is applied at once.
+  /// Points that are held back at most (other viewers' updates while none of one's own becomes complete): beyond,
+  /// everything is applied at once.
   static constexpr uint64_t kMaxPoints = 16u << 20;
 
   struct Insert {

@@ -43,7 +43,8 @@ Result<std::unique_ptr<EventRecorder>> EventRecorder::open(const std::string& pa
 
 void EventRecorder::begin_replica(const points::ModelConfig& config) {
   const auto& b = config.box_room;
-  const ReplicaBody body{{b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}, static_cast<uint32_t>(config.depth), config.compact};
+  const ReplicaBody body{
+      {b.lo.x, b.lo.y, b.lo.z}, {b.hi.x, b.hi.y, b.hi.z}, static_cast<uint32_t>(config.depth), config.compact};
   write(kReplica, {reinterpret_cast<const char*>(&body), sizeof body});
 }
 
@@ -108,7 +109,8 @@ struct EventReplay::Impl {
     if (body.size() != sizeof b) return wrong(fmt::format("{} bytes instead of {}", body.size(), sizeof b));
     std::memcpy(&b, body.data(), sizeof b);
     const points::ModelConfig config{{{b.lo[0], b.lo[1], b.lo[2]}, {b.hi[0], b.hi[1], b.hi[2]}},
-                                     static_cast<int>(std::min<uint32_t>(b.depth, 1000)), b.compact != 0};
+                                     static_cast<int>(std::min<uint32_t>(b.depth, 1000)),
+                                     b.compact != 0};
     if (const Status s = points::validate(config); !s) return wrong(s.error().text);
     model = std::make_unique<points::PointModel>(config);
     applied = {};

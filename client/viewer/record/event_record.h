@@ -1,8 +1,9 @@
-// The point-model events that a viewer applied, kept as they came, so that any displayed frame's model can be made again: a replica is
-// nothing but its packer's events in their order (docs/architecture.md), so that what was sent is all that is needed.
+// The point-model events that a viewer applied, kept as they came. They are all that is needed to make any displayed
+// frame's model again: a replica is its packer's events in their order ("Replication" in docs/architecture.md).
 //
-// File: "TSEVENT2", then records  u32 type length, u64 body length, type, body  (little-endian). Types: "replica" (six floats: the
-// box in room space, lo then hi; u32: octree depth; u32: 1 if mosaics are merged) where a replica begins, and the wire's "patch", "forget", "epoch_begin".
+// File: "TSEVENT2", then records  u32 type length, u64 body length, type, body  (little-endian). Types: "replica" (six
+// floats: the box in room space, lo then hi; u32: octree depth; u32: 1 if mosaics are merged) where a replica begins,
+// and the wire's "patch", "forget", "epoch_begin".
 #pragma once
 
 #include <cstdio>
@@ -39,15 +40,16 @@ class EventRecorder {
 /// Plays a record into a model, event by event.
 class EventReplay {
  public:
-  /// Refuses files that are not a record. A record that ends in mid-event (a viewer that was killed) ends before that event.
+  /// Refuses files that are not a record. A record that ends in mid-event (a viewer that was killed) ends before that
+  /// event.
   static Result<std::unique_ptr<EventReplay>> open(const std::string& path);
   ~EventReplay();
 
   /// Applies events until the model holds everything up to and including `sequence`, or the
   /// record ends. Goes forward only. Errors name the file and what is wrong with the event.
   Status advance(Sequence sequence);
-  /// Goes on to where the viewer began its next replica, because another packer took over and numbers began again. A replica that
-  /// holds no event does not count. Fails if there is none.
+  /// Goes on to where the viewer began its next replica, because another packer took over and numbers began again. A
+  /// replica that holds no event does not count. Fails if there is none.
   Status next_replica();
   /// Null before the first event. Pointers into it hold until the next advance().
   const points::PointModel* model() const;

@@ -1,5 +1,5 @@
-// Recorded frames: taken from the display thread without copying, written raw by a thread of their own, turned into pictures after
-// the run, so that recording never stalls the display.
+// Recorded frames: taken from the display thread without copying, written raw by a thread of their own, turned into
+// pictures after the run, so that recording never stalls the display.
 #pragma once
 
 #include <condition_variable>
@@ -32,7 +32,8 @@ struct SpooledFrame {
 
 class FrameSpool {
  public:
-  /// Spools into `directory` (made if need be); at most `max_waiting` frames wait to be written, more are dropped and counted.
+  /// Spools into `directory` (made if need be); at most `max_waiting` frames wait to be written, more are dropped and
+  /// counted.
   static Result<std::unique_ptr<FrameSpool>> open(const std::string& directory, size_t max_waiting = 4);
   ~FrameSpool();
 
@@ -61,8 +62,9 @@ class FrameSpool {
 std::vector<std::string> spooled_frames(const std::string& directory);
 /// Reads one spooled frame; refuses files that are not one, or were written by an earlier version.
 Result<SpooledFrame> read_spooled_frame(const std::string& path);
-/// Turns frames marked kPicture into directory/frame-NNNNNN.png (kExr: .exr too) and deletes spooled frames that are not also
-/// marked kVerify. progress: done, of. go_on: asked before each frame; once it says no, the remaining ones are left as they are.
+/// Turns frames marked kPicture into directory/frame-NNNNNN.png (kExr: .exr too) and deletes spooled frames that are
+/// not also marked kVerify. progress: done, of. go_on: asked before each frame; once it says no, the remaining ones are
+/// left as they are.
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
                       const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on = {});
 

@@ -12,8 +12,8 @@ namespace telesplat::viewer {
 
 class Screenshots {
  public:
-  /// Into `directory` (made if need be). tell: what became of each picture, a line for the person; called from any thread, never
-  /// from two at once.
+  /// Into `directory` (made if need be). tell: what became of each picture, a line for the person; called from any
+  /// thread, never from two at once.
   Screenshots(std::string directory, std::function<void(const std::string&)> tell);
   /// Waits until all are written.
   ~Screenshots();

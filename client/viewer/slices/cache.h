@@ -1,5 +1,5 @@
-// The viewer's complete volume frames, shared by the worker that decodes them and the display thread that warps them. Frames change hands as pointers;
-// nothing is copied, and none is freed by the display thread.
+// The viewer's complete volume frames, shared by the worker that decodes them and the display thread that warps them.
+// Frames change hands as pointers; nothing is copied, and none is freed by the display thread.
 #pragma once
 
 #include <deque>
@@ -21,8 +21,8 @@ struct BufferedFrame {
 
 class SliceCache {
  public:
-  /// in_order false (asynchronous): the newest frame is the one on display. true: frames wait in order until the display advances to them;
-  /// whoever puts them in takes care that they are not too many.
+  /// in_order false (asynchronous): the newest frame is the one on display. true: frames wait in order until the
+  /// display advances to them; whoever puts them in takes care that they are not too many.
   explicit SliceCache(bool in_order) : in_order_(in_order) {}
 
   // ---- worker ----
@@ -35,7 +35,8 @@ class SliceCache {
   // ---- display thread ----
   /// The frame on display; frame.frame is null before the first.
   BufferedFrame displayed() const;
-  /// In order: the frame of this request goes on display, those before it that still wait are passed over. No effect if none waits for it.
+  /// In order: the frame of this request goes on display, those before it that still wait are passed over. No effect if
+  /// none waits for it.
   void advance(RequestId request);
   /// The frame on display has been displayed.
   void frame_done();

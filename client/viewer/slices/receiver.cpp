@@ -21,7 +21,7 @@ geometry::Rect hull(const geometry::Rect& a, const geometry::Rect& b) {
 
 uint64_t pixels_of(const geometry::Rect& r) { return uint64_t(r.width) * uint64_t(r.height); }
 
-// Of all images, and of the layers that they are merged to.
+// Pixels that all images have, and the layers that they are merged to.
 uint64_t pixels_claimed(std::span<const volume::EncodedSlice> slices, const volume::ShearFrame& shear) {
   uint64_t pixels = 0;
   std::map<int, geometry::Rect> layers;

@@ -1,4 +1,5 @@
-// The worker's part for volumes: takes complete frames of slice images, checks and decodes them, puts them into the cache, acknowledges them.
+// The worker's part for volumes: takes complete frames of slice images, checks and decodes them, puts them into the
+// cache, acknowledges them.
 #pragma once
 
 #include <functional>
@@ -14,7 +15,8 @@ namespace telesplat::viewer {
 
 class SliceReceiver {
  public:
-  /// Pixels of all images of a frame, those of its layers included, at most (1 GiB): a few bytes can claim many of them.
+  /// Pixels of all images of a frame, those of its layers included, at most (1 GiB): a few bytes can claim many of
+  /// them.
   static constexpr uint64_t kMaxPixels = 1u << 28;
   /// Frames on their way to an asynchronous viewer: while one is decoded the next one travels.
   static constexpr uint64_t kAsyncBuffers = 2;
@@ -37,11 +39,12 @@ class SliceReceiver {
   /// Another packer, which does not know this viewer; or another master, which numbers frames anew.
   void begin_anew() { heard_s_ = introduced_s_ = -1e9, newest_ = {}; }
   void receive(net::Socket& state, int most);
-  /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come, and when none came for long: a packer
-  /// that was restarted where it was does not know this viewer.
+  /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come, and when
+  /// none came for long: a packer that was restarted where it was does not know this viewer.
   void tick(double now_s, net::Socket& state);
 
-  /// Checks and decodes. Bytes come from outside. Error: what is wrong with it, for the log. images: memory that is used again.
+  /// Checks and decodes. Bytes come from outside. Error: what is wrong with it, for the log. images: memory that is
+  /// used again.
   static Result<BufferedFrame> decode(const wire::SliceFrame& frame, const volume::Grid& grid,
                                       std::vector<volume::SliceImage>& images);
 

@@ -1,4 +1,5 @@
-// The display's source for slice images: warps the newest complete frame of slice images, or where the display waits the next one, into the view of now.
+// The display's source for slice images: warps the newest complete frame of slice images, or where the display waits
+// the next one, into the view of now.
 #pragma once
 
 #include "client/viewer/display/view_source.h"

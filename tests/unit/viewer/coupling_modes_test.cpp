@@ -1,4 +1,5 @@
-// Credits of synchronous and loose coupling: what may be asked for, what is displayed next, what happens without answers.
+// Credits of synchronous and loose coupling: what may be asked for, what is displayed next, what happens without
+// answers.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -133,7 +134,8 @@ TEST(Coupling, GivesUpWhatALaterUpdateWaitsFor) {
   EXPECT_EQ(c.open(), Requests{{3}});
 }
 
-// Whatever is lost, reordered or repeated: credits are never exceeded, updates are displayed in order and once, and nothing hangs.
+// Whatever is lost, reordered or repeated: credits are never exceeded, updates are displayed in order and once, and
+// nothing hangs.
 TEST(Coupling, NeverExceedsItsBuffersAndNeverHangs) {
   for (uint32_t seed = 1; seed <= 200; ++seed) {
     std::mt19937 random(seed);

@@ -1,4 +1,5 @@
-// The record of point-model events: what a viewer applied comes back as it was, and nothing that a file may hold does harm.
+// The record of point-model events: what a viewer applied comes back as it was, and nothing that a file may hold does
+// harm.
 #include <gtest/gtest.h>
 
 #include <cstring>

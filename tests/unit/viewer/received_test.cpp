@@ -1,4 +1,5 @@
-// What a viewer receives: sessions that cannot be shown are refused, and one that changes its kind is followed picture by picture.
+// What a viewer receives: sessions that cannot be shown are refused, and one that changes its kind is followed picture
+// by picture.
 #include <gtest/gtest.h>
 
 #include <limits>
