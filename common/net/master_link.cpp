@@ -22,6 +22,7 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
 void MasterLink::report(const std::function<Values()>& status) {
   wire::StatusReport report{hello_.instance, status()};
   report.values["messages_rejected"] += static_cast<double>(socket_.rejected());
+  report.values["reported_s"] = monotonic_s();
   socket_.send(report);
 }
 

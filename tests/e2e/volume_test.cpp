@@ -10,7 +10,7 @@
 
 #include "common/image/file.h"
 #include "tests/support/pipeline_run.h"
-#include "tools/telesplat/record/csv_line.h"
+#include "tools/common/csv_table.h"
 
 namespace telesplat::test {
 namespace {
@@ -48,10 +48,10 @@ std::vector<std::string> texts(const PipelineRun& run, const std::string& file, 
   std::ifstream in(run.out() + "/" + file);
   std::string line;
   std::getline(in, line);
-  const auto header = launcher::csv_fields(line).value_or(std::vector<std::string>{});
+  const auto header = tools::csv_fields(line).value_or(std::vector<std::string>{});
   const size_t at = size_t(std::find(header.begin(), header.end(), name) - header.begin());
   while (at < header.size() && std::getline(in, line))
-    if (const auto fields = launcher::csv_fields(line); fields && at < fields->size()) out.push_back((*fields)[at]);
+    if (const auto fields = tools::csv_fields(line); fields && at < fields->size()) out.push_back((*fields)[at]);
   return out;
 }
 

@@ -18,8 +18,8 @@ struct Subject {
 /// Processes report every second: who said nothing for so long hangs.
 inline constexpr double kSilent_s = 3.0;
 
-/// ok if the master's answer to "status" names a process that fits `subject`, is alive and not silent. The error says who was looked for
-/// and what is wrong with who was found, or that the answer is not a status.
+/// ok if the master's answer to "status" names a process that fits `subject`, is alive and not silent. The error says
+/// who was looked for and what is wrong with who was found, or that the answer is not a status.
 Status check(std::string_view status, const Subject& subject);
 
 }  // namespace telesplat::health

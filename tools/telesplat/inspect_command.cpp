@@ -1,5 +1,4 @@
-#include "tools/telesplat/inspect_command.h"
-
+// `telesplat inspect PATH`: what a data file or volume folder, a run folder, a recorded frame, a depth image or a picture holds.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,8 +11,10 @@
 
 #include "client/viewer/record/frame_spool.h"
 #include "common/codec/depth_codec.h"
-#include "services/data/inspect.h"
-#include "tools/telesplat/scene/recorded_julia.h"
+#include "services/data/volume/volume.h"
+#include "tools/common/complain.h"
+#include "tools/telesplat/command.h"
+#include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -22,21 +23,18 @@ namespace fs = std::filesystem;
 
 constexpr uintmax_t kMaxDepthImageBytes = 256u << 20;
 
-int refuse(const std::string& why) {
-  std::fprintf(stderr, "telesplat: %s\n", why.c_str());
-  return 2;
-}
+int refuse(const std::string& why) { return tools::complain({why}); }
 
-int inspect_julia(const std::string& directory) {
-  const auto julia = read_recorded_julia(directory);
-  if (!julia) return refuse(julia.error().text);
-  std::printf("%s, %s\n", julia->title.c_str(),
-              julia->animate.empty() ? "not animated when it began" : ("animated: " + julia->animate).c_str());
-  for (const auto& info : julia::parameter_infos())
-    std::printf("  %-14s %-12g %.*s\n", std::string(info.name).c_str(), julia::get(julia->begin, info.name),
-                int(info.text.size()), info.text.data());
-  if (!julia->epochs.empty()) std::printf("  %zu epochs (epochs.csv)\n", julia->epochs.size());
-  return 0;
+// Of a run, or of a data file.
+struct InspectOptions {
+  data::DataOptions data;
+};
+
+options::Table table(InspectOptions& o) {
+  options::Table out{{.flag = "path", .value = &o.data.scene, .help = "file or folder", .required = true}};
+  for (options::Row& row : data::scene_table(o.data))
+    if (const auto name = options::name_of(row); name == "--cache" || name == "--raw") out.push_back(std::move(row));
+  return out;
 }
 
 int inspect_run(const std::string& directory) {
@@ -46,9 +44,12 @@ int inspect_run(const std::string& directory) {
     return refuse(
         fmt::format("{}: is a folder without a readable summary.json, so it is not a finished run", directory));
   std::printf("%s: a run\n%s\n", directory.c_str(), summary.dump(2).c_str());
-  if (summary.value("kind", std::string()) == julia::kSceneWord)
-    if (const int code = inspect_julia(directory)) return code;
   std::error_code error;
+  if (fs::exists(directory + "/session.toml", error)) {
+    const auto scene = recorded_scene(directory);
+    if (!scene) return refuse(scene.error().text);
+    std::fputs((*scene)->describe_record().c_str(), stdout);
+  }
   for (const auto& entry : fs::recursive_directory_iterator(directory, error))
     if (entry.is_regular_file(error))
       std::printf("  %-40s %12ju bytes\n", fs::relative(entry.path(), directory, error).c_str(),
@@ -86,28 +87,36 @@ int inspect_depth_image(const std::string& path, const std::vector<uint8_t>& byt
   return 0;
 }
 
-int inspect_mesh(const std::string& path, const data::MeshOptions& options) {
-  const auto facts = data::inspect_mesh(path, options, [](const char*, double) {});
+int inspect_data(const data::DataOptions& options) {
+  const auto scene = scene_of(options);
+  if (!scene) return refuse(scene.error().text);
+  const auto facts = (*scene)->describe_data();
   if (!facts) return refuse(facts.error().text);
-  std::fputs(data::describe(*facts).c_str(), stdout);
+  std::fputs(facts->c_str(), stdout);
   return 0;
 }
 
-int inspect_volume(const std::string& path, const std::string& raw) {
-  const auto facts = data::inspect_volume(path, raw, nullptr);
-  if (!facts) return refuse(facts.error().text);
-  std::fputs(data::describe(*facts).c_str(), stdout);
-  return 0;
+int inspect_depth_file(const std::string& path) {
+  std::error_code error;
+  if (fs::file_size(path, error) > kMaxDepthImageBytes)
+    return refuse(fmt::format("{}: {} bytes, limit {}", path, fs::file_size(path, error), kMaxDepthImageBytes));
+  std::ifstream in(path, std::ios::binary);
+  const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(in)), {});
+  return inspect_depth_image(path, bytes);
 }
 
-}  // namespace
+// A folder is a run's, unless it holds a volume and no run.
+bool is_run(const data::DataOptions& o) {
+  std::error_code error;
+  return o.volume.raw.empty() && fs::is_directory(o.scene, error) &&
+         (fs::exists(o.scene + "/summary.json", error) || !data::looks_like_volume(o.scene));
+}
 
-int inspect(const std::string& path, const data::MeshOptions& options, const std::string& raw) {
+int inspect(InspectOptions o, const options::Given&) {
+  const std::string& path = o.data.scene;
   std::error_code error;
   if (!fs::exists(path, error)) return refuse(fmt::format("{}: no such file", path));
-  if (!raw.empty() || (!fs::exists(path + "/summary.json", error) && data::looks_like_volume(path)))
-    return inspect_volume(path, raw);
-  if (fs::is_directory(path, error)) return inspect_run(path);
+  if (is_run(o.data)) return inspect_run(path);
   std::string extension = fs::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return char(std::tolower(c)); });
@@ -121,14 +130,14 @@ int inspect(const std::string& path, const data::MeshOptions& options, const std
     if (!view) return refuse(view.error().text);
     return inspect_view(path, *view, view->depth_m.empty() ? "a picture" : "a picture with depth");
   }
-  if (extension == ".depth") {
-    if (fs::file_size(path, error) > kMaxDepthImageBytes)
-      return refuse(fmt::format("{}: {} bytes, limit {}", path, fs::file_size(path, error), kMaxDepthImageBytes));
-    std::ifstream in(path, std::ios::binary);
-    const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(in)), {});
-    return inspect_depth_image(path, bytes);
-  }
-  return inspect_mesh(path, options);
+  return extension == ".depth" ? inspect_depth_file(path) : inspect_data(o.data);
+}
+
+}  // namespace
+
+Command inspect_command() {
+  return make_command("inspect", "tell what a data file, a run folder, a recorded frame or a depth image holds",
+                      InspectOptions{}, table, inspect);
 }
 
 }  // namespace telesplat::launcher

@@ -1,14 +1,25 @@
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
 
 #include "common/julia/flags.h"
+#include "common/options/parser.h"
+#include "tools/telesplat/run/run_options.h"
 #include "tools/telesplat/scene/scene_file.h"
 
 namespace telesplat::launcher {
 namespace {
+
+// As `telesplat run` reads them.
+Result<std::vector<std::string>> read_scene_file(const std::string& path) {
+  RunOptions options;
+  return launcher::read_scene_file(path, table(options));
+}
+Result<std::vector<std::string>> expand(const std::vector<std::string>& arguments) {
+  RunOptions options;
+  return expand_scene_file(arguments, table(options));
+}
 
 class SceneFile : public testing::Test {
  protected:
@@ -43,12 +54,9 @@ TEST_F(SceneFile, SwitchesCanBeTurnedOff) {
 }
 
 TEST_F(SceneFile, TheCommandLineComesAfterTheFile) {
-  std::string program = "telesplat", run = "run", flag = "--frames=9",
-              scene = write("file = \"a.ply\"\n[view]\nframes = 7\n");
-  char* argv[] = {program.data(), run.data(), scene.data(), flag.data()};
-  const auto arguments = expand_scene_file(4, argv);
+  const std::string scene = write("file = \"a.ply\"\n[view]\nframes = 7\n");
+  const auto arguments = expand({scene, "--frames=9"});
   ASSERT_TRUE(arguments.ok());
-  EXPECT_EQ(arguments->front(), "run");
   const auto first = std::find(arguments->begin(), arguments->end(), "--frames=7"),
              second = std::find(arguments->begin(), arguments->end(), "--frames=9");
   EXPECT_LT(first, second);
@@ -67,14 +75,38 @@ TEST_F(SceneFile, ErrorsNameFileAndPlace) {
 
 // What the launcher makes of a file's flags.
 Result<julia::Scene> scene_of(const std::vector<std::string>& flags) {
-  CLI::App app;
-  app.option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-  app.allow_extras();
-  julia::SceneOptions options;
-  julia::add_scene_flags(app, options);
-  std::vector<std::string> reversed(flags.rbegin(), flags.rend());
-  app.parse(reversed);
-  return julia::read_scene(options);
+  RunOptions run;
+  options::Parser parser("run");
+  parser.add(table(run));
+  parser.parse_or_exit("run", flags);
+  return julia::read_scene(run.data.julia);
+}
+
+TEST_F(SceneFile, AKeyThatIsNoFlagIsNamedWithItsLine) {
+  const std::vector<std::pair<std::string, const char*>> cases{
+      {"file = \"a.ply\"\n[view]\nduratoin = 3\n", ":3: key duratoin is none: there is no flag --duratoin"},
+      {"file = \"a.ply\"\n[packing]\nmax_pionts = 3\n",
+       ":3: key max_pionts is none: there is no flag --packing.max_pionts"},
+      {"file = \"a.ply\"\nseed = 3\n", ":2: key seed"},
+  };
+  for (const auto& [text, part] : cases) {
+    const auto flags = read_scene_file(write(text));
+    ASSERT_FALSE(flags.ok()) << text;
+    EXPECT_TRUE(flags.error().text.starts_with(path_)) << flags.error().text;
+    EXPECT_NE(flags.error().text.find(part), std::string::npos) << flags.error().text;
+  }
+}
+
+TEST_F(SceneFile, FilesThatItNamesLieBesideIt) {
+  const auto flags = read_scene_file(write("file = \"a.ply\"\ntexture = \"t.png\"\n[view]\ntrajectory = \"orbit\"\n"));
+  ASSERT_TRUE(flags.ok()) << flags.error().text;
+  const auto folder = std::filesystem::path(path_).parent_path();
+  for (const std::string& flag : {"--texture=" + (folder / "t.png").string(), std::string("--trajectory=orbit")})
+    EXPECT_NE(std::find(flags->begin(), flags->end(), flag), flags->end()) << flag;
+  const char* points = "0:#603010:0,60%:#ffe0b0:0.6";
+  const auto tf = read_scene_file(write(std::string("file = \"a.nrrd\"\ntf = \"") + points + "\"\n"));
+  ASSERT_TRUE(tf.ok()) << tf.error().text;
+  EXPECT_EQ(tf->front(), std::string("--tf=") + points);
 }
 
 TEST_F(SceneFile, AJuliaSetHasParametersAndKeyFrames) {
@@ -105,13 +137,9 @@ TEST_F(SceneFile, AJuliaSetHasParametersAndKeyFrames) {
 }
 
 TEST_F(SceneFile, TheCommandLineWinsOverAJuliaSetsFile) {
-  std::string program = "telesplat", run = "run",
-              scene =
-                  write("[scene]\nkind = \"julia\"\nc = [0.1, 0.2, 0, -0.5]\n[julia]\nc.x = 0.4\niterations = 99\n");
-  const auto with = [&](std::string flag) {
-    char* argv[] = {program.data(), run.data(), scene.data(), flag.data()};
-    return scene_of(*expand_scene_file(4, argv))->parameters;
-  };
+  const std::string scene =
+      write("[scene]\nkind = \"julia\"\nc = [0.1, 0.2, 0, -0.5]\n[julia]\nc.x = 0.4\niterations = 99\n");
+  const auto with = [&](const std::string& flag) { return scene_of(*expand({scene, flag}))->parameters; };
   EXPECT_EQ(with("--iterations=12").iterations, 12);
   EXPECT_EQ(with("--iterations=12").c, glm::dvec4(0.4, 0.2, 0, -0.5));
   EXPECT_EQ(with("--c=0,0,0,-1").c, glm::dvec4(0, 0, 0, -1));

@@ -5,14 +5,34 @@
 #include <fstream>
 
 #include "common/image/file.h"
-#include "tools/telesplat/record/csv_line.h"
+#include "tools/common/csv_table.h"
 #include "tools/telesplat/run/wall.h"
-#include "tools/telesplat/scene/recorded_volume.h"
+#include "tools/telesplat/scene/volume_scene.h"
 
 namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
+
+using tools::csv_fields;
+using viewer::WallLayout;
+
+Result<WallLayout> parse_wall(const std::string& text) { return viewer::parse_wall(text, kMaxViewers); }
+
+// The scene of a run folder, which is a volume's.
+struct RecordedVolume {
+  std::unique_ptr<Scene> scene;
+  const data::DataOptions* operator->() const { return &scene->options(); }
+  Result<VolumeScene::Epoch> at(EpochId epoch) const {
+    return static_cast<const VolumeScene&>(*scene).epochs().at(epoch);
+  }
+};
+Result<RecordedVolume> read_recorded_volume(const std::string& directory) {
+  auto scene = recorded_scene(directory);
+  if (!scene) return scene.error();
+  EXPECT_EQ((*scene)->kind(), scene::Kind::kVolume);
+  return RecordedVolume{std::move(*scene)};
+}
 
 TEST(CsvLine, QuotedTextsHoldCommasAndQuotes) {
   using Fields = std::vector<std::string>;
@@ -91,12 +111,12 @@ TEST_F(RunFolder, EpochsTellTransferFunctionAndStep) {
         "\"4x4x4:u8\"\ntf = \"bone\"\n");
   const auto plain = read_recorded_volume(path_);
   ASSERT_TRUE(plain.ok()) << plain.error().text;
-  EXPECT_EQ(plain->file, "/a/b.nrrd");
-  EXPECT_EQ(plain->mesh.up, "y");
-  EXPECT_EQ(plain->mesh.room_size_m, 0.5);
-  EXPECT_EQ(plain->options.raw, "4x4x4:u8");
-  EXPECT_EQ(plain->options.transfer, "bone");
-  EXPECT_FALSE(plain->options.lit);
+  EXPECT_EQ((*plain)->scene, "/a/b.nrrd");
+  EXPECT_EQ((*plain)->mesh.up, "y");
+  EXPECT_EQ((*plain)->mesh.room_size_m, 0.5);
+  EXPECT_EQ((*plain)->volume.raw, "4x4x4:u8");
+  EXPECT_EQ((*plain)->volume.transfer, "bone");
+  EXPECT_FALSE((*plain)->volume.lit);
   ASSERT_TRUE(plain->at(EpochId{5}).ok());
   EXPECT_EQ(plain->at(EpochId{5})->transfer, "");
 

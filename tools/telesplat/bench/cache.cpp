@@ -1,14 +1,14 @@
-#include "tools/telesplat/bench/cache.h"
-
+// `telesplat bench cache`: what a point model costs after minutes of walking, without waiting for real time. Each view of a walk is sampled by
+// rays, packed, coded, decoded and inserted by the code that packer and viewer run, one view after the other in this process.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <optional>
+#include <sstream>
 
 #include "client/viewer/points/model_cache.h"
 #include "client/viewer/viewer_service.h"
@@ -22,9 +22,11 @@
 #include "common/points/compaction.h"
 #include "common/splat/cpu_splatter.h"
 #include "services/packer/points/packer_core.h"
+#include "tools/common/complain.h"
+#include "tools/common/progress_line.h"
+#include "tools/telesplat/bench/bench_commands.h"
 #include "tools/telesplat/bench/surfel_grid.h"
-#include "tools/telesplat/progress_line.h"
-#include "tools/telesplat/scene/direct_scene.h"
+#include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -33,12 +35,31 @@ constexpr int kTile = 256;          // as the master cuts frames
 constexpr double kDrawEvery_s = 1;  // of the walk
 constexpr double kCompareEvery_s = 5;
 
+struct CacheBenchOptions {
+  data::DataOptions data;            ///< a mesh or its like: what rays sample
+  std::string trajectory = "orbit";  ///< or CSV files with commas between, walked one after the other, round and round
+  double minutes = 5;                ///< of the walk
+  double views_per_s = 4;            ///< sampled, of the walk's seconds
+  double latency_s = 0.2;            ///< the display is as far ahead of the views
+  std::string size = "1280x800";     ///< of the display
+  std::string sampling_size;         ///< empty: the display's
+  double fov_deg = 90;
+  int octree_depth = 0;  ///< 0: as the master chooses for meshes
+  bool grid = false;     ///< measure the other design too (surfel_grid.h)
+  int threads = 0;       ///< to sample and to draw with; 0: all cores
+  std::string splat = "disc";
+  double splat_scale = 0;  ///< 0: what suits the kernel
+  double nearest = -1;     ///< packer::Config::nearest_sample; below 0: as sessions have it
+  std::string out;         ///< folder for cache.csv and pictures; empty: none
+};
+
 // Several recorded walks, one after the other, or an orbit.
 class Walk {
  public:
   static Result<Walk> open(const std::string& names) {
     Walk walk;
-    for (const auto& name : CLI::detail::split(names, ',')) {
+    std::istringstream list(names);
+    for (std::string name; std::getline(list, name, ',');) {
       if (name == "orbit") {
         walk.parts_.push_back(geometry::Trajectory::orbit());
         walk.ends_s_.push_back(walk.length_s() + 20);
@@ -193,9 +214,10 @@ class CacheBench {
       else
         others += 4 * (event.clusters.size() + event.frames.size());
     }
-    std::printf("a viewer that joins now is sent %.2f MB, %.3f times the patches of the live points; %.2f bytes a point\n",
-                double(patches + others) * 1e-6, patches ? double(patches + others) / double(patches) : 0.0,
-                points ? double(patches + others) / double(packer_.model().points()) : 0.0);
+    std::printf(
+        "a viewer that joins now is sent %.2f MB, %.3f times the patches of the live points; %.2f bytes a point\n",
+        double(patches + others) * 1e-6, patches ? double(patches + others) / double(patches) : 0.0,
+        points ? double(patches + others) / double(packer_.model().points()) : 0.0);
   }
 
   splat::SelectionOptions selection() const {
@@ -212,8 +234,7 @@ class CacheBench {
   }
 
   Status update(double t, Minute& minute) {
-    const geometry::Camera camera =
-        geometry::make_camera(walk_.at(t), o_.fov_deg, sampling_.first, sampling_.second);
+    const geometry::Camera camera = geometry::make_camera(walk_.at(t), o_.fov_deg, sampling_.first, sampling_.second);
     const auto image = scene_.sample(camera, EpochId{1});
     if (!image) return image.error();
     ++frames_;
@@ -287,16 +308,17 @@ class CacheBench {
   static double median(std::vector<double> v) { return metrics::distribution(std::move(v)).median; }
 
   void print_header() const {
-    std::printf("%6s %8s %9s %9s %9s %8s %9s %9s %8s %8s %9s %9s %9s %9s %12s %10s\n", "minute", "clusters", "items", "drawn", "cached", "B/point",
-                "select ms", "splat ms", "PSNR dB", "holes %", "sent k/s", "sent MB/s", "pack ms", "insert ms",
-                "once: items", "once: ms");
+    std::printf("%6s %8s %9s %9s %9s %8s %9s %9s %8s %8s %9s %9s %9s %9s %12s %10s\n", "minute", "clusters", "items",
+                "drawn", "cached", "B/point", "select ms", "splat ms", "PSNR dB", "holes %", "sent k/s", "sent MB/s",
+                "pack ms", "insert ms", "once: items", "once: ms");
   }
   void print(int number, const Minute& m) const {
     const double views = double(std::max<uint64_t>(m.views, 1)), seconds = views / o_.views_per_s;
-    std::printf("%6d %8.0f %9.0f %9.0f %9.0f %8.1f %9.2f %9.2f %8.2f %8.3f %9.1f %9.3f %9.2f %9.2f %12.0f %10.2f\n", number,
-                median(m.clusters), median(m.items), median(m.points), m.cached, m.bytes_a_point, median(m.select_ms), median(m.splat_ms),
-                median(m.psnr_db), median(m.holes), m.sent_points / seconds * 1e-3, m.sent_mb / seconds,
-                m.pack_ms / views, m.insert_ms / views, m.at_once_items, m.at_once_ms);
+    std::printf("%6d %8.0f %9.0f %9.0f %9.0f %8.1f %9.2f %9.2f %8.2f %8.3f %9.1f %9.3f %9.2f %9.2f %12.0f %10.2f\n",
+                number, median(m.clusters), median(m.items), median(m.points), m.cached, m.bytes_a_point,
+                median(m.select_ms), median(m.splat_ms), median(m.psnr_db), median(m.holes),
+                m.sent_points / seconds * 1e-3, m.sent_mb / seconds, m.pack_ms / views, m.insert_ms / views,
+                m.at_once_items, m.at_once_ms);
     std::fflush(stdout);
   }
 
@@ -311,87 +333,95 @@ class CacheBench {
   splat::CpuSplatter splatter_;
   splat::DrawList list_;
   image::View frame_;
-  ProgressLine progress_;
+  tools::ProgressLine progress_;
   uint64_t frames_ = 0;
 };
 
-}  // namespace
-
-void add_cache_bench_flags(CLI::App& app, CacheBenchOptions& o) {
-  app.add_option("path", o.path, "mesh file, or with --iso a volume")->required();
-  app.add_option("--trajectory", o.trajectory,
-                 "orbit, or CSV files of poses with commas between, walked one after the other, round and round")
-      ->capture_default_str();
-  app.add_option("--minutes", o.minutes, "of the walk, which takes as long as it takes")
-      ->capture_default_str()
-      ->check(CLI::Range(0.05, 1000.0));
-  app.add_option("--views-per-s", o.views_per_s, "views sampled in a second of the walk")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 100.0));
-  app.add_option("--latency", o.latency_s, "seconds by which the display is ahead of the newest view")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 10.0));
-  app.add_option("--size", o.size, "display size in pixels, WxH")->capture_default_str();
-  app.add_option("--sampling-size", o.sampling_size, "size of the views sampled, WxH; default: the display's");
-  app.add_option("--fov", o.fov_deg, "horizontal field of view in degrees")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 170.0));
-  app.add_option("--octree-depth", o.octree_depth, "levels of the point model's octree; 0: as sessions have them")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 10));
-  app.add_option("--splat", o.splat, "kernel")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"square", "disc", "ellipse", "ewa"}));
-  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
-      ->check(CLI::Range(0.0, 10.0));
-  app.add_option("--nearest", o.nearest, "pixels: samples that have a point of the model so near are not packed; default: as sessions have it")
-      ->check(CLI::Range(0.0, 1.0));
-  app.add_option("--threads", o.threads, "threads to sample and draw with; 0: one a core")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
-  app.add_flag("--grid", o.grid, "measure the design that was not taken, too: a hierarchical surfel grid (docs/cache.md)");
-  app.add_option("--iso", o.mesh.iso, "of a volume: the surface where it has this value");
-  app.add_option("--room-size", o.mesh.room_size_m, "largest extent in room space in metres")
-      ->capture_default_str()
-      ->check(CLI::Range(1e-3, 1e3));
-  app.add_option("--up", o.mesh.up, "data axis that points up")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
-  app.add_option("--out", o.out, "folder for pictures of every compared frame, beside direct rendering");
+options::Table table(CacheBenchOptions& o) {
+  using options::Range;
+  return joined(
+      {{.flag = "path", .value = &o.data.scene, .help = "mesh file, or with --iso a volume", .required = true},
+       {.flag = "--trajectory",
+        .value = &o.trajectory,
+        .help = "orbit, or CSV files of poses with commas between, walked one after the other, round and round"},
+       {.flag = "--minutes",
+        .value = &o.minutes,
+        .help = "of the walk, which takes as long as it takes",
+        .limits = Range{0.05, 1000}},
+       {.flag = "--views-per-s",
+        .value = &o.views_per_s,
+        .help = "views sampled in a second of the walk",
+        .limits = Range{0.1, 100}},
+       {.flag = "--latency",
+        .value = &o.latency_s,
+        .help = "seconds by which the display is ahead of the newest view",
+        .limits = Range{0, 10}},
+       {.flag = "--size", .value = &o.size, .help = "display size in pixels, WxH"},
+       {.flag = "--sampling-size",
+        .value = &o.sampling_size,
+        .help = "size of the views sampled, WxH; default: the display's"},
+       {.flag = "--fov", .value = &o.fov_deg, .help = "horizontal field of view in degrees", .limits = Range{1, 170}},
+       {.flag = "--octree-depth",
+        .value = &o.octree_depth,
+        .help = "levels of the point model's octree; 0: as sessions have them",
+        .limits = Range{0, 10}},
+       {.flag = "--splat",
+        .value = &o.splat,
+        .help = "kernel",
+        .limits = options::Names{"square", "disc", "ellipse", "ewa"}},
+       {.flag = "--splat-scale",
+        .value = &o.splat_scale,
+        .help = "scale factor of splat sizes; 0: what suits the kernel",
+        .limits = Range{0, 10}},
+       {.flag = "--nearest",
+        .value = &o.nearest,
+        .help = "pixels: samples that have a point of the model so near are not packed; below 0: as sessions have it",
+        .limits = Range{-1, 1}},
+       {.flag = "--threads",
+        .value = &o.threads,
+        .help = "threads to sample and draw with; 0: one a core",
+        .limits = Range{0, 1024}},
+       {.flag = "--grid",
+        .value = &o.grid,
+        .help = "measure the design that was not taken, too: a hierarchical surfel grid (docs/cache.md)"},
+       {.flag = "--out",
+        .value = &o.out,
+        .help = "folder for pictures of every compared frame, beside direct rendering"}},
+      data::scene_table(o.data));
 }
 
-// Columns: median clusters, draw items and points of a frame; points cached, bytes each; median times; quality against direct rendering; what was sent; times a
-// view; and of the newest view, items and time of a model made at once.
-int bench_cache(const CacheBenchOptions& o) {
-  const auto refuse = [](const Error& e) {
-    std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
-    return 2;
-  };
+// Columns: median clusters, draw items and points of a frame; points cached, bytes each; median times; quality against direct rendering; what
+// was sent; times a view; and of the newest view, items and time of a model made at once.
+int bench_cache(CacheBenchOptions o, const options::Given&) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
   const auto display = viewer::parse_size(o.size, "--size");
-  if (!display) return refuse(display.error());
+  if (!display) return tools::complain(display.error());
   const auto sampling = o.sampling_size.empty() ? display : viewer::parse_size(o.sampling_size, "--sampling-size");
-  if (!sampling) return refuse(sampling.error());
+  if (!sampling) return tools::complain(sampling.error());
   auto walk = Walk::open(o.trajectory);
-  if (!walk) return refuse(walk.error());
+  if (!walk) return tools::complain(walk.error());
   std::error_code error;
   if (!o.out.empty() && !(std::filesystem::create_directories(o.out, error), std::filesystem::is_directory(o.out)))
-    return refuse({fmt::format("--out {}: cannot be made: {}", o.out, error.message())});
-  ProgressLine progress;
-  auto scene = open_direct_mesh(o.path, o.mesh, o.threads, [&](const char* stage, double fraction) {
-    progress.show(fmt::format("{}: {} {:.0f} %", o.path, stage, 100 * fraction));
+    return tools::complain({fmt::format("--out {}: cannot be made: {}", o.out, error.message())});
+  const auto scene = scene_of(o.data);
+  if (!scene) return tools::complain(scene.error());
+  tools::ProgressLine progress;
+  const auto direct = (*scene)->open_direct(o.threads, [&](const char* stage, double fraction) {
+    progress.show(fmt::format("{}: {} {:.0f} %", o.data.scene, stage, 100 * fraction));
   });
   progress.close();
-  if (!scene) return refuse(scene.error());
-  CacheBench bench(o, **scene, std::move(*walk), *display, *sampling);
-  if (const Status s = bench.run(); !s) {
-    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
-    return 1;
-  }
-  if (!net::stop_requested()) return 0;
-  std::fprintf(stderr, "telesplat: told to stop\n");
-  return 1;
+  if (!direct) return tools::complain(direct.error());
+  CacheBench bench(o, **direct, std::move(*walk), *display, *sampling);
+  if (const Status s = bench.run(); !s) return tools::complain(s.error(), 1);
+  return net::stop_requested() ? tools::complain({"told to stop"}, 1) : 0;
+}
+
+}  // namespace
+
+Command bench_cache_command() {
+  return make_command("cache", "what a point model costs, minute by minute of a walk that is replayed without waiting",
+                      CacheBenchOptions{}, table, bench_cache);
 }
 
 }  // namespace telesplat::launcher

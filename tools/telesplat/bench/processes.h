@@ -1,7 +1,6 @@
 // The processes of a benchmark's session: master, data server, packer and any number of samplers, all real.
 #pragma once
 
-#include <csignal>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,7 +10,7 @@
 
 #include "common/core/result.h"
 #include "tools/telesplat/control/client.h"
-#include "tools/telesplat/run/child_process.h"
+#include "tools/telesplat/run/process_group.h"
 
 namespace telesplat::launcher {
 
@@ -26,7 +25,7 @@ class BenchProcesses {
                                                        const std::string& directory, bool own_machines);
   ~BenchProcesses();
 
-  const std::string& endpoint() const { return endpoint_; }
+  const std::string& endpoint() const { return group_.endpoint(); }
   const std::string& directory() const { return directory_; }
 
   /// What is done while one waits: keeping connections of one's own going.
@@ -35,8 +34,8 @@ class BenchProcesses {
   Status wait_for_data(double patience_s, const Meanwhile& meanwhile);
   /// Starts samplers with these flags until there are `count`; returns when all of them have joined. Errors as start().
   Status add_samplers(size_t count, const std::vector<std::string>& flags, const Meanwhile& meanwhile);
-  /// kill -9.
-  void kill_sampler(size_t index) { samplers_.at(index).signal(SIGKILL); }
+  /// kill -9. index: from 0.
+  void kill_sampler(size_t index);
 
   /// Error: Ctrl-C, or a process died that was not killed with kill_sampler().
   Status alive();
@@ -45,16 +44,14 @@ class BenchProcesses {
   void finish();
 
  private:
-  BenchProcesses() = default;
-  Status launch(std::vector<ChildProcess>& into, const std::string& name, const std::string& program,
-                std::vector<std::string> arguments, int nice);
-  Status wait_for(const char* what, double patience_s, const std::function<bool()>& condition);
-  /// Waits until the master knows so many living processes of a role.
+  explicit BenchProcesses(const std::string& directory);
+  /// Waits until the master knows `count` living processes of a role.
   Status wait_for_role(const char* what, const std::string& role, int count, double patience_s,
                        const Meanwhile& meanwhile);
 
-  std::string directory_, endpoint_;
-  std::vector<ChildProcess> servers_, samplers_;
+  std::string directory_;
+  ProcessGroup group_;
+  size_t samplers_ = 0;
   std::unique_ptr<ControlClient> control_;
 };
 

@@ -1,22 +1,27 @@
-#include "tools/telesplat/bench/scaling.h"
-
+// `telesplat bench scaling`: how a Julia set's frame speeds up with the number of samplers (T7.3, table 7.2), with real processes, leases
+// and messages. Where samplers outnumber the processors, the computing of each row is replaced by a wait of its measured cost. Leaves
+// scaling.csv, scaling.json, scaling.png and the runs' records.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <numeric>
 #include <thread>
 
+#include "client/viewer/display/size_text.h"
 #include "common/core/clock.h"
+#include "common/core/log.h"
 #include "common/geometry/trajectory.h"
 #include "common/metrics/statistics.h"
 #include "common/net/service.h"
+#include "tools/common/complain.h"
+#include "tools/common/progress_line.h"
+#include "tools/telesplat/bench/bench_commands.h"
+#include "tools/telesplat/bench/number_list.h"
 #include "tools/telesplat/bench/rows.h"
 #include "tools/telesplat/bench/scaling_report.h"
 #include "tools/telesplat/bench/session.h"
-#include "tools/telesplat/progress_line.h"
 #include "tools/telesplat/run/pipeline.h"
 
 namespace telesplat::launcher {
@@ -27,6 +32,16 @@ constexpr double kCheap = 20;                   // the second series' rows are s
 constexpr int kPasses = 5;                      // over the rows, when their costs are measured
 constexpr int kComputedFrames = 20, kKillFrames = 5;
 constexpr double kKillAt = 0.5;  // of a frame's normal time
+
+struct ScalingOptions {
+  std::vector<int> nodes{1, 2, 4, 8, 16, 32, 40};
+  std::string size = "1024x640";
+  julia::SceneOptions scene;
+  std::string row_cost = "both";  ///< "thesis", "cheap" (20 times cheaper), "both", "measured", or seconds a frame
+  int frames = 0;                 ///< measured for each number of nodes, the median counts; 0: as many as seem worth it
+  std::string out = "scaling";
+  bool kill = true, computed = true;
+};
 
 class Study {
  public:
@@ -193,7 +208,7 @@ class Study {
   std::string replay_path_;
   double rows_s_ = 0;
   ScalingReport report_;
-  ProgressLine progress_;
+  tools::ProgressLine progress_;
 };
 
 // The plot is made by a script beside the sources or where programs are installed; it is a convenience.
@@ -217,61 +232,59 @@ void plot(const std::string& directory) {
   std::printf("no plot: tools/plot-scaling was not found; run it with %s when you have it\n", directory.c_str());
 }
 
-int refuse(const std::string& why) {
-  std::fprintf(stderr, "telesplat: %s\n", why.c_str());
-  return 2;
+std::string complain_about_cost(const std::string& v) {
+  if (v == "thesis" || v == "cheap" || v == "both" || v == "measured") return {};
+  char* end = nullptr;
+  const double seconds = std::strtod(v.c_str(), &end);
+  return !v.empty() && *end == 0 && seconds >= 0.01 && seconds <= 3600
+             ? std::string()
+             : std::string("is neither thesis, cheap, both, measured nor 0.01..3600 seconds");
+}
+
+options::Table table(ScalingOptions& o) {
+  return joined(
+      {{.flag = "--nodes", .value = number_list(o.nodes, 1, 256), .help = "numbers of samplers"},
+       {.flag = "--size", .value = &o.size, .help = "pixels of the frame, WxH"},
+       {.flag = "--frames",
+        .value = &o.frames,
+        .help = "frames to measure for each number of samplers; 0: as many as seem worth it",
+        .limits = options::Range{0, 1000}},
+       {.flag = "--row-cost",
+        .value = &o.row_cost,
+        .help =
+            "what all rows of a frame cost one sampler, where they are waited for: thesis (69.3 s), cheap (a 20th of "
+            "it), both, measured (what they cost here), or seconds",
+        .limits = options::Check(complain_about_cost)},
+       {.flag = "!--no-kill", .value = &o.kill, .help = "do not kill samplers in mid-frame"},
+       {.flag = "!--no-computed", .value = &o.computed, .help = "compute no frames in earnest"},
+       {.flag = "--out", .value = &o.out, .help = "folder for tables, plot and the runs' records"}},
+      julia::scene_table(o.scene));
+}
+
+int bench_scaling(ScalingOptions o, const options::Given&) {
+  log::initialise("bench", "warn");
+  const auto size = viewer::parse_size(o.size, "--size");
+  if (!size) return tools::complain(size.error());
+  auto scene = julia::read_scene(o.scene);
+  if (!scene) return tools::complain(scene.error());
+  if (!scene->timeline.empty()) return tools::complain({"--animate: the scaling study is of one frame"});
+  std::error_code error;
+  std::filesystem::create_directories(o.out, error);
+  if (error) return tools::complain({fmt::format("{}: cannot be made: {}", o.out, error.message())});
+  net::install_signal_handlers();
+  const auto camera = geometry::make_camera(geometry::default_pose(), kFov_deg, size->first, size->second);
+  if (const Status s = Study(o, std::move(*scene), camera).run(); !s) return tools::complain(s.error(), 1);
+  std::printf("\nrecord: %s\n", o.out.c_str());
+  plot(o.out);
+  return 0;
 }
 
 }  // namespace
 
-void add_scaling_flags(CLI::App& app, ScalingOptions& o) {
-  app.add_option("--nodes", o.nodes, "numbers of samplers")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->check(CLI::Range(1, 256));
-  app.add_option("--size", o.size, "pixels of the frame, WxH")->capture_default_str();
-  app.add_option("--frames", o.frames, "frames to measure for each number of samplers; 0: as many as seem worth it")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1000));
-  app.add_option("--row-cost", o.row_cost,
-                 "what all rows of a frame cost one sampler, where they are waited for: thesis (69.3 s), cheap (a 20th "
-                 "of it), both, "
-                 "measured (what they cost here), or seconds")
-      ->capture_default_str()
-      ->check([](const std::string& v) {
-        if (v == "thesis" || v == "cheap" || v == "both" || v == "measured") return std::string();
-        return CLI::Range(0.01, 3600.0)(const_cast<std::string&>(v));
-      });
-  app.add_flag("!--no-kill", o.kill, "do not kill samplers in mid-frame");
-  app.add_flag("!--no-computed", o.computed, "compute no frames in earnest");
-  app.add_option("--out", o.out, "folder for tables, plot and the runs' records")->capture_default_str();
-  julia::add_scene_flags(app, o.scene);
-}
-
-int bench_scaling(const ScalingOptions& o) {
-  if (o.scene.list_presets) return std::fputs(julia::describe_presets().c_str(), stdout), 0;
-  log::initialise("bench", "warn");
-  int width = 0, height = 0;
-  char rest = 0;
-  if (std::sscanf(o.size.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 16 || height < 16 ||
-      width > geometry::kMaxImageSide || height > geometry::kMaxImageSide)
-    return refuse(fmt::format("--size: {} is not WIDTHxHEIGHT within 16x16 and {}x{}", o.size, geometry::kMaxImageSide,
-                              geometry::kMaxImageSide));
-  auto scene = julia::read_scene(o.scene);
-  if (!scene) return refuse(scene.error().text);
-  if (!scene->timeline.empty()) return refuse("--animate: the scaling study is of one frame");
-  std::error_code error;
-  std::filesystem::create_directories(o.out, error);
-  if (error) return refuse(fmt::format("{}: cannot be made: {}", o.out, error.message()));
-  net::install_signal_handlers();
-  const auto camera = geometry::make_camera(geometry::default_pose(), kFov_deg, width, height);
-  if (const Status s = Study(o, std::move(*scene), camera).run(); !s) {
-    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
-    return 1;
-  }
-  std::printf("\nrecord: %s\n", o.out.c_str());
-  plot(o.out);
-  return 0;
+Command bench_scaling_command() {
+  return make_command("scaling",
+                      "how a Julia set's frame speeds up with the number of samplers, beside table 7.2 of the thesis",
+                      ScalingOptions{}, table, bench_scaling);
 }
 
 }  // namespace telesplat::launcher

@@ -1,12 +1,11 @@
-#include "tools/telesplat/bench/volume.h"
-
+// `telesplat bench volume`: how fast views of a volume are constructed with 1 to 4 samplers and 1 to 4 viewers of a display wall, as tables
+// 7.3 and 7.4 of the thesis have it. Once with all processes computing, on the processors that are here; once with a processor for each, by
+// waiting for what was measured. Leaves volume.csv, volume.md and the runs' records.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <thread>
@@ -16,12 +15,16 @@
 #include "common/metrics/statistics.h"
 #include "common/net/service.h"
 #include "common/volume/session.h"
+#include "services/data/volume/volume.h"
+#include "tools/common/complain.h"
+#include "tools/common/csv_table.h"
+#include "tools/common/progress_line.h"
 #include "tools/make_volume/tree.h"
+#include "tools/telesplat/bench/bench_commands.h"
+#include "tools/telesplat/bench/number_list.h"
 #include "tools/telesplat/bench/processes.h"
 #include "tools/telesplat/bench/volume_report.h"
 #include "tools/telesplat/bench/wall.h"
-#include "tools/telesplat/progress_line.h"
-#include "tools/telesplat/record/csv_line.h"
 #include "tools/telesplat/run/pipeline.h"
 #include "tools/telesplat/run/wall.h"
 
@@ -35,48 +38,48 @@ constexpr int kWarmViews = 12;     // of each viewer, before anything is measure
 constexpr double kSettle_s = 0.5;  // left out at both ends of what is measured
 constexpr double kDataPatience_s = 300, kPatience_s = 60;
 
+struct VolumeBenchOptions {
+  /// Voxels a side of the volume that is made up if data names none.
+  int generated_side = 256;
+  data::DataOptions data;  ///< the volume, transfer function and lighting to show
+  std::vector<int> samplers{1, 2, 3, 4}, viewers{1, 2, 3, 4};
+  std::string size = "1600x1200";  ///< pixels of the wall, shared by its viewers
+  double fov_deg = 60;
+  int buffers = 3;
+  double seconds = 4;  ///< measured of each combination
+  std::string out = "volume-bench";
+  bool computed = true, simulated = true;
+};
+
 double mean_of(const std::vector<double>& v) {
   return v.empty() ? 0 : std::accumulate(v.begin(), v.end(), 0.0) / double(v.size());
 }
 
-// Some columns of a CSV file that this program's own processes wrote: name -> values; texts that are no numbers are 0, `text` keeps them.
-struct Columns {
-  std::map<std::string, std::vector<double>> numbers;
-  std::vector<std::string> text;
-};
-Result<Columns> read_columns(const std::string& path, const std::vector<std::string>& names,
-                             const std::string& text_name = {}) {
-  std::ifstream in(path);
-  std::string line;
-  if (!std::getline(in, line)) return Error{path + ": cannot be read"};
-  const auto header = csv_fields(line).value_or(std::vector<std::string>{});
-  const auto column = [&](const std::string& name) {
-    return size_t(std::find(header.begin(), header.end(), name) - header.begin());
-  };
-  for (const auto& name : names)
-    if (column(name) == header.size()) return Error{fmt::format("{}: has no column {}", path, name)};
-  Columns out;
-  while (std::getline(in, line)) {
-    const auto fields = csv_fields(line);
-    if (!fields || fields->size() != header.size()) continue;
-    for (const auto& name : names) out.numbers[name].push_back(std::strtod((*fields)[column(name)].c_str(), nullptr));
-    if (const size_t at = column(text_name); at < header.size()) out.text.push_back((*fields)[at]);
+// Columns of numbers of a file that this program's own processes wrote.
+Result<std::vector<std::vector<double>>> numbers_of(const tools::CsvTable& table,
+                                                    const std::vector<const char*>& names) {
+  std::vector<std::vector<double>> out;
+  for (const char* name : names) {
+    const auto column = table.column(name);
+    if (!column) return column.error();
+    out.push_back(table.numbers(*column));
   }
   return out;
 }
 
 // Medians over the slabs that were leased in [from_s, to_s) of the master's clock.
 Status add_slab_times(const std::string& directory, double from_s, double to_s, VolumePoint& point) {
-  const auto tiles =
-      read_columns(directory + "/tiles.csv", {"leased_s", "sample_begin_s", "encode_end_s", "receive_s", "packed_s"});
-  if (!tiles) return tiles.error();
+  const auto table = tools::CsvTable::read(directory + "/tiles.csv", {});
+  if (!table) return table.error();
+  const auto columns = numbers_of(*table, {"leased_s", "sample_begin_s", "encode_end_s", "receive_s", "packed_s"});
+  if (!columns) return columns.error();
+  const auto &leased = (*columns)[0], &begin = (*columns)[1], &end = (*columns)[2], &received = (*columns)[3],
+             &packed = (*columns)[4];
   std::vector<double> sampling, packing;
-  const auto& n = tiles->numbers;
-  if (n.empty()) return ok_status();
-  for (size_t i = 0; i < n.at("leased_s").size(); ++i) {
-    if (n.at("leased_s")[i] < from_s || n.at("leased_s")[i] >= to_s) continue;
-    sampling.push_back(1e3 * (n.at("encode_end_s")[i] - n.at("sample_begin_s")[i]));
-    packing.push_back(1e3 * (n.at("packed_s")[i] - n.at("receive_s")[i]));
+  for (size_t i = 0; i < leased.size(); ++i) {
+    if (leased[i] < from_s || leased[i] >= to_s) continue;
+    sampling.push_back(1e3 * (end[i] - begin[i]));
+    packing.push_back(1e3 * (packed[i] - received[i]));
   }
   point.sampling_ms = metrics::distribution(sampling).median;
   point.packing_ms = metrics::distribution(packing).median;
@@ -107,7 +110,7 @@ class VolumeStudy {
 
  private:
   Status find_volume() {
-    path_ = options_.volume;
+    path_ = options_.data.scene;
     report_.volume = fs::path(path_).filename().string();
     if (!path_.empty()) return ok_status();
     const int side = options_.generated_side;
@@ -128,28 +131,49 @@ class VolumeStudy {
   }
 
   Status computed(int samplers, int viewers) {
+    const RunOptions o = run_options(samplers, viewers);
+    if (const Status s = show(o); !s) return s;
+    VolumePoint point{false, samplers, viewers};
+    if (const Status s = read_frames(o.out, point); !s) return s;
+    if (const Status s = add_slab_times(o.out, 0, 1e18, point); !s) return s;
+    add(point);
+    return ok_status();
+  }
+
+  data::DataServiceOptions data_options() const {
+    data::DataServiceOptions out;
+    static_cast<data::DataOptions&>(out) = options_.data;
+    out.scene = path_;
+    out.volume.steps_per_s = 0;
+    return out;
+  }
+
+  RunOptions run_options(int samplers, int viewers) const {
     RunOptions o;
-    o.scene = path_;
-    o.kind = SceneKind::kVolume;
-    o.volume = options_.data;
-    o.series_rate = "0";
+    o.data = data_options();
     o.samplers = samplers;
     o.viewers = viewers;
-    if (viewers > 1) o.wall = fmt::format("{}x1", viewers);
-    o.sampler_threads = 1;
-    o.viewer.size = fmt::format("{}x{}", width_ / viewers, height_);
-    o.viewer.sampling_size = o.viewer.size;
-    o.viewer.trajectory = "still";
-    o.viewer.coupling = "loose";
-    o.viewer.buffers = options_.buffers;
-    o.viewer.display.fov_deg = options_.fov_deg;
-    o.viewer.display.target_fps = 0;
-    o.viewer.display.duration_s = options_.seconds + 2 * kSettle_s;
-    o.viewer.display.picture_every = 0;
-    o.viewer.record_points_mb = 0;
+    o.sampler.threads = 1;
+    auto& v = o.viewer;
+    if (viewers > 1) v.wall = fmt::format("{}x1", viewers);
+    v.size = fmt::format("{}x{}", width_ / viewers, height_);
+    v.sampling_size = v.size;
+    v.trajectory = "still";
+    v.coupling = "loose";
+    v.buffers = options_.buffers;
+    v.display.fov_deg = options_.fov_deg;
+    v.display.target_fps = 0;
+    v.display.duration_s = options_.seconds + 2 * kSettle_s;
+    v.display.picture_every = 0;
+    v.record_points_mb = 0;
+    v.started_s = monotonic_s();
     o.out = fmt::format("{}/computed-{}x{}", options_.out, samplers, viewers);
-    o.master.service.log_level = "warn";
-    o.started_s = monotonic_s();
+    o.log_level = "warn";
+    return o;
+  }
+
+  // A whole run.
+  Status show(const RunOptions& o) {
     std::error_code error;
     fs::remove_all(o.out, error);
     auto pipeline = Pipeline::start(o);
@@ -161,44 +185,48 @@ class VolumeStudy {
       for (const auto& n : news) progress_.line(n);
       if (net::stop_requested()) return Error{"interrupted"};
       if (monotonic_s() > until) return Error{fmt::format("nothing was shown; see {}/logs", o.out)};
-      progress_.show(fmt::format("computed: {} sampler(s), {} viewer(s) {}", samplers, viewers, pipeline->progress()));
+      progress_.show(
+          fmt::format("computed: {} sampler(s), {} viewer(s) {}", o.samplers, o.viewers, pipeline->progress()));
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     pipeline->finish();
     if (state != Pipeline::State::kFinished) return Error{fmt::format("the run failed; see {}/logs", o.out)};
+    return ok_status();
+  }
 
-    VolumePoint point{false, samplers, viewers};
-    const auto frames = read_columns(o.out + "/frames.csv", {"t_s", "construction_ms"}, "viewer");
-    if (!frames) return frames.error();
+  // What the viewers of a run did between its first and last moments.
+  Status read_frames(const std::string& directory, VolumePoint& point) const {
+    const auto table = tools::CsvTable::read(directory + "/frames.csv", {});
+    if (!table) return table.error();
+    const auto columns = numbers_of(*table, {"t_s", "construction_ms"});
+    const auto viewer = table->column("viewer");
+    if (!columns) return columns.error();
+    if (!viewer) return viewer.error();
     std::map<std::string, std::vector<double>> shown;
     std::vector<double> construction;
-    for (size_t i = 0; i < frames->text.size(); ++i) {
-      const double t = frames->numbers.at("t_s")[i];
+    for (size_t i = 0; i < table->rows(); ++i) {
+      const double t = (*columns)[0][i];
       if (t < kSettle_s || t > kSettle_s + options_.seconds) continue;
-      shown[frames->text[i]].push_back(t);
-      construction.push_back(frames->numbers.at("construction_ms")[i]);
+      shown[table->text(i, *viewer)].push_back(t);
+      construction.push_back((*columns)[1][i]);
     }
     std::vector<double> rates;
-    for (const auto& [viewer, t] : shown) rates.push_back(double(t.size()) / options_.seconds);
-    rates.resize(size_t(viewers));  // one that showed nothing counts, too
+    for (const auto& [name, t] : shown) rates.push_back(double(t.size()) / options_.seconds);
+    rates.resize(size_t(point.viewers));  // one that showed nothing counts, too
     point.fps = mean_of(rates);
     point.least_fps = *std::min_element(rates.begin(), rates.end());
     point.construction_ms = metrics::distribution(construction).median;
-    const auto updates = read_columns(o.out + "/updates.csv", {"bytes"});
-    if (updates && updates->numbers.contains("bytes")) point.bytes_per_frame = mean_of(updates->numbers.at("bytes"));
-    if (const Status s = add_slab_times(o.out, 0, 1e18, point); !s) return s;
-    add(point);
+    if (const auto updates = tools::CsvTable::read(directory + "/updates.csv", {}))
+      if (const auto bytes = updates->find("bytes")) point.bytes_per_frame = mean_of(updates->numbers(*bytes));
     return ok_status();
   }
 
   Status simulated(int samplers) {
-    std::vector<std::string> data{path_, "--lighting", options_.data.lit ? "on" : "off", "--series-rate", "0"};
-    if (!options_.data.raw.empty()) data.insert(data.end(), {"--raw", options_.data.raw});
-    if (!options_.data.transfer.empty()) data.push_back("--tf=" + options_.data.transfer);
+    data::DataServiceOptions data = data_options(), usual;
     const std::string directory = fmt::format("{}/simulated-{}", options_.out, samplers);
     std::error_code error;
     fs::remove_all(directory, error);
-    auto processes = BenchProcesses::start(data, {}, directory, true);
+    auto processes = BenchProcesses::start(options::arguments(table(data), table(usual)), {}, directory, true);
     if (!processes) return processes.error();
     if (const Status s = (*processes)->wait_for_data(kDataPatience_s, [] {}); !s) return s;
     if (const Status s =
@@ -224,55 +252,71 @@ class VolumeStudy {
     return ok_status();
   }
 
-  Status simulated_wall(BenchProcesses& processes, VolumePoint& point, double& from_s, double& to_s) {
-    const auto whole = geometry::make_camera(geometry::default_pose(), options_.fov_deg, width_, height_);
-    net::Context context;
-    std::vector<std::unique_ptr<WaitingViewer>> wall;
-    for (int i = 0; i < point.viewers; ++i)
-      wall.push_back(std::make_unique<WaitingViewer>(context, processes.endpoint(), fmt::format("viewer-{}", i + 1),
-                                                     geometry::crop(whole, tile(point.viewers, i)), options_.buffers));
-    std::vector<double> costs(wall.size(), 1e-3);
-    // Turns until `done`, each viewer as often as it needs.
-    const auto go_on = [&](bool asks, double patience_s, const auto& done) -> Status {
-      for (const double until = monotonic_s() + patience_s; !done();) {
-        if (const Status s = processes.alive(); !s) return s;
-        double next_s = monotonic_s() + 1;
-        std::vector<net::Socket*> sockets;
-        for (size_t i = 0; i < wall.size(); ++i) {
-          next_s = std::min(next_s, wall[i]->turn(monotonic_s(), costs[i], asks));
-          for (auto* socket : wall[i]->sockets()) sockets.push_back(socket);
-        }
-        if (monotonic_s() > until) return Error{fmt::format("views do not arrive; see {}/logs", processes.directory())};
-        if (const double wait_s = next_s - monotonic_s(); wait_s > 0) net::wait_readable_s(sockets, wait_s);
+  using Wall = std::vector<std::unique_ptr<WaitingViewer>>;
+
+  // Each viewer has turns as often as it needs, until `done`.
+  Status go_on(BenchProcesses& processes, Wall& wall, const std::vector<double>& costs, bool asks, double patience_s,
+               const std::function<bool()>& done) {
+    for (const double until = monotonic_s() + patience_s; !done();) {
+      if (const Status s = processes.alive(); !s) return s;
+      double next_s = monotonic_s() + 1;
+      std::vector<net::Socket*> sockets;
+      for (size_t i = 0; i < wall.size(); ++i) {
+        next_s = std::min(next_s, wall[i]->turn(monotonic_s(), costs[i], asks));
+        for (auto* socket : wall[i]->sockets()) sockets.push_back(socket);
       }
-      return ok_status();
-    };
-    progress_.show(fmt::format("simulated: {} sampler(s), {} viewer(s)", point.samplers, point.viewers));
-    Status s = go_on(true, kPatience_s, [&] {
+      if (monotonic_s() > until) return Error{fmt::format("views do not arrive; see {}/logs", processes.directory())};
+      if (const double wait_s = next_s - monotonic_s(); wait_s > 0) net::wait_readable_s(sockets, wait_s);
+    }
+    return ok_status();
+  }
+
+  // Until every viewer has had some views and none is on its way.
+  Status warm_up(BenchProcesses& processes, Wall& wall, const std::vector<double>& costs) {
+    const Status s = go_on(processes, wall, costs, true, kPatience_s, [&] {
       return std::all_of(wall.begin(), wall.end(), [](const auto& v) { return v->shown_s().size() >= kWarmViews; });
     });
     if (!s) return s;
-    s = go_on(false, kPatience_s,
-              [&] { return std::all_of(wall.begin(), wall.end(), [](const auto& v) { return v->open() == 0; }); });
-    if (!s) return s;
+    return go_on(processes, wall, costs, false, kPatience_s,
+                 [&] { return std::all_of(wall.begin(), wall.end(), [](const auto& v) { return v->open() == 0; }); });
+  }
 
-    std::vector<double> bytes;
-    for (size_t i = 0; i < wall.size(); ++i) {
-      const auto session = volume::read_session(wall[i]->session()->parameters, wall[i]->session()->facts);
+  // What each viewer's newest view takes to construct.
+  Result<std::vector<ViewCost>> measure(const Wall& wall) const {
+    std::vector<ViewCost> out;
+    for (const auto& viewer : wall) {
+      const auto session = volume::read_session(viewer->session()->parameters, viewer->session()->facts);
       if (!session) return session.error();
-      const auto cost = measure_view(*wall[i]->newest(), session->grid, wall[i]->camera(), 5);
+      const auto cost = measure_view(*viewer->newest(), session->grid, viewer->camera(), 5);
       if (!cost) return cost.error();
-      costs[i] = cost->total_s();
-      bytes.push_back(double(cost->bytes));
+      out.push_back(*cost);
+    }
+    return out;
+  }
+
+  Status simulated_wall(BenchProcesses& processes, VolumePoint& point, double& from_s, double& to_s) {
+    const auto whole = geometry::make_camera(geometry::default_pose(), options_.fov_deg, width_, height_);
+    net::Context context;
+    Wall wall;
+    for (int i = 0; i < point.viewers; ++i)
+      wall.push_back(std::make_unique<WaitingViewer>(context, processes.endpoint(), fmt::format("viewer-{}", i + 1),
+                                                     geometry::crop(whole, tile(point.viewers, i)), options_.buffers));
+    progress_.show(fmt::format("simulated: {} sampler(s), {} viewer(s)", point.samplers, point.viewers));
+    std::vector<double> costs(wall.size(), 1e-3), bytes, rates;
+    if (const Status s = warm_up(processes, wall, costs); !s) return s;
+    const auto measured = measure(wall);
+    if (!measured) return measured.error();
+    for (size_t i = 0; i < wall.size(); ++i) {
+      costs[i] = (*measured)[i].total_s();
+      bytes.push_back(double((*measured)[i].bytes));
     }
     const double begin_s = monotonic_s() + kSettle_s, end_s = begin_s + options_.seconds;
-    s = go_on(true, kPatience_s + options_.seconds, [&] { return monotonic_s() > end_s; });
-    if (!s) return s;
-    std::vector<double> rates;
+    const Status shown =
+        go_on(processes, wall, costs, true, kPatience_s + options_.seconds, [&] { return monotonic_s() > end_s; });
+    if (!shown) return shown;
+    const auto in_time = [&](double t) { return t >= begin_s && t < end_s; };
     for (const auto& v : wall)
-      rates.push_back(double(std::count_if(v->shown_s().begin(), v->shown_s().end(),
-                                           [&](double t) { return t >= begin_s && t < end_s; })) /
-                      options_.seconds);
+      rates.push_back(double(std::count_if(v->shown_s().begin(), v->shown_s().end(), in_time)) / options_.seconds);
     for (auto& v : wall) v->leave();
     point.fps = mean_of(rates);
     point.least_fps = *std::min_element(rates.begin(), rates.end());
@@ -296,63 +340,68 @@ class VolumeStudy {
   int width_, height_;
   std::string path_;
   VolumeReport report_;
-  ProgressLine progress_;
+  tools::ProgressLine progress_;
 };
 
-int refuse(const std::string& why) {
-  std::fprintf(stderr, "telesplat: %s\n", why.c_str());
-  return 2;
+options::Table table(VolumeBenchOptions& o) {
+  using options::Range;
+  options::Table shown;
+  for (options::Row& row : data::scene_table(o.data))
+    if (row.fits == scene::Kinds::of(scene::Pipeline::kSlices) || options::name_of(row) == "--raw")
+      shown.push_back(std::move(row));
+  return joined(
+      {{.flag = "--volume",
+        .value = &o.data.scene,
+        .help = "volume to show; without it a made-up one of --generated voxels a side"},
+       {.flag = "--generated",
+        .value = &o.generated_side,
+        .help = "voxels a side of the made-up volume",
+        .limits = Range{double(made_volume::kMinSide), double(made_volume::kMaxSide)}},
+       {.flag = "!--unlit", .value = &o.data.volume.lit, .help = "do not shade voxels"},
+       {.flag = "--samplers", .value = number_list(o.samplers, 1, 64), .help = "numbers of samplers"},
+       {.flag = "--viewers", .value = number_list(o.viewers, 1, kMaxViewers), .help = "numbers of viewers"},
+       {.flag = "--size", .value = &o.size, .help = "pixels of the wall that the viewers share, WxH"},
+       {.flag = "--fov",
+        .value = &o.fov_deg,
+        .help = "horizontal field of view of the wall, degrees",
+        .limits = Range{1, 170}},
+       {.flag = "--buffers",
+        .value = &o.buffers,
+        .help = "of loose coupling",
+        .limits = Range{1, double(wire::kMaxBuffers)}},
+       {.flag = "--seconds",
+        .value = &o.seconds,
+        .help = "measured for each number of samplers and viewers",
+        .limits = Range{0.5, 600}},
+       {.flag = "!--no-computed", .value = &o.computed, .help = "leave out the runs in which everything computes"},
+       {.flag = "!--no-simulated", .value = &o.simulated, .help = "leave out the runs with simulated nodes"},
+       {.flag = "--out", .value = &o.out, .help = "folder for tables and the runs' records"}},
+      options::without(std::move(shown), {"--lighting", "--series-rate"}));
+}
+
+int bench_volume(VolumeBenchOptions o, const options::Given&) {
+  log::initialise("bench", "warn");
+  const auto size = viewer::parse_size(o.size, "--size");
+  if (!size) return tools::complain(size.error());
+  if (!o.data.scene.empty())
+    if (const auto found = data::find_volume(o.data.scene, o.data.volume.raw); !found)
+      return tools::complain(found.error());
+  std::error_code error;
+  fs::create_directories(o.out, error);
+  if (error) return tools::complain({fmt::format("{}: cannot be made: {}", o.out, error.message())});
+  net::install_signal_handlers();
+  if (const Status s = VolumeStudy(o, size->first, size->second).run(); !s) return tools::complain(s.error(), 1);
+  std::printf("\nrecord: %s (volume.md, volume.csv)\n", o.out.c_str());
+  return 0;
 }
 
 }  // namespace
 
-void add_volume_bench_flags(CLI::App& app, VolumeBenchOptions& o) {
-  app.add_option("--volume", o.volume, "volume to show; without it a made-up one of --generated voxels a side");
-  app.add_option("--generated", o.generated_side, "voxels a side of the made-up volume")
-      ->capture_default_str()
-      ->check(CLI::Range(made_volume::kMinSide, made_volume::kMaxSide));
-  app.add_option("--raw", o.data.raw, "as --raw of run");
-  app.add_option("--tf", o.data.transfer, "as --tf of run");
-  app.add_flag("!--unlit", o.data.lit, "do not shade voxels");
-  app.add_option("--samplers", o.samplers, "numbers of samplers")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->check(CLI::Range(1, 64));
-  app.add_option("--viewers", o.viewers, "numbers of viewers")
-      ->delimiter(',')
-      ->capture_default_str()
-      ->check(CLI::Range(1, kMaxViewers));
-  app.add_option("--size", o.size, "pixels of the wall that the viewers share, WxH")->capture_default_str();
-  app.add_option("--fov", o.fov_deg, "horizontal field of view of the wall, degrees")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 170.0));
-  app.add_option("--buffers", o.buffers, "of loose coupling")
-      ->capture_default_str()
-      ->check(CLI::Range(1, int(wire::kMaxBuffers)));
-  app.add_option("--seconds", o.seconds, "measured for each number of samplers and viewers")
-      ->capture_default_str()
-      ->check(CLI::Range(0.5, 600.0));
-  app.add_flag("!--no-computed", o.computed, "leave out the runs in which everything computes");
-  app.add_flag("!--no-simulated", o.simulated, "leave out the runs with simulated nodes");
-  app.add_option("--out", o.out, "folder for tables and the runs' records")->capture_default_str();
-}
-
-int bench_volume(const VolumeBenchOptions& o) {
-  log::initialise("bench", "warn");
-  const auto size = viewer::parse_size(o.size, "--size");
-  if (!size) return refuse(size.error().text);
-  if (!o.volume.empty())
-    if (const auto found = data::find_volume(o.volume, o.data.raw); !found) return refuse(found.error().text);
-  std::error_code error;
-  fs::create_directories(o.out, error);
-  if (error) return refuse(fmt::format("{}: cannot be made: {}", o.out, error.message()));
-  net::install_signal_handlers();
-  if (const Status s = VolumeStudy(o, size->first, size->second).run(); !s) {
-    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
-    return 1;
-  }
-  std::printf("\nrecord: %s (volume.md, volume.csv)\n", o.out.c_str());
-  return 0;
+Command bench_volume_command() {
+  return make_command(
+      "volume",
+      "how fast views of a volume are made with 1-4 samplers and 1-4 viewers, beside tables 7.3 and 7.4 of the thesis",
+      VolumeBenchOptions{}, table, bench_volume);
 }
 
 }  // namespace telesplat::launcher

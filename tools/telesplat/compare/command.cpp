@@ -1,8 +1,6 @@
-#include "tools/telesplat/compare/command.h"
-
+// `telesplat compare DIR`: poses of a recorded run, drawn by every kernel and renderer and directly from the data.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -10,10 +8,12 @@
 
 #include "client/viewer/viewer_service.h"
 #include "common/core/log.h"
+#include "tools/common/complain.h"
+#include "tools/common/progress_line.h"
+#include "tools/telesplat/command.h"
 #include "tools/telesplat/compare/report.h"
 #include "tools/telesplat/compare/sheet.h"
 #include "tools/telesplat/compare/subject.h"
-#include "tools/telesplat/progress_line.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -32,7 +32,7 @@ Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
   }
   const auto gl = viewer::make_renderer("gl", o.threads);
   if (!gl) {
-    std::fprintf(stderr, "telesplat: without the gl renderer: %s\n", gl.error().text.c_str());
+    tools::complain({"without the gl renderer: " + gl.error().text});
     return std::vector<std::string>{"cpu"};
   }
   return std::vector<std::string>{"cpu", "gl"};
@@ -44,18 +44,13 @@ class Comparison {
              const std::vector<std::string>& renderers)
       : options_(options), subject_(subject), finish_(finish), renderers_(renderers) {}
 
-  /// Reads the data. False texts are about the data file.
+  /// Reads the data. Errors are about the data file or the record.
   Status open() {
-    if (subject_.julia) {
-      scene_ = open_direct_julia(*subject_.julia, options_.threads);
-    } else {
-      auto mesh =
-          open_direct_mesh(subject_.scene, subject_.mesh, options_.threads, [&](const char* stage, double fraction) {
-            progress_.show(fmt::format("{}: {} {:.0f} %", subject_.name, stage, 100 * fraction));
-          });
-      if (!mesh) return mesh.error();
-      scene_ = std::move(*mesh);
-    }
+    auto scene = subject_.scene->open_direct(options_.threads, [&](const char* stage, double fraction) {
+      progress_.show(fmt::format("{}: {} {:.0f} %", subject_.name(), stage, 100 * fraction));
+    });
+    if (!scene) return scene.error();
+    scene_ = std::move(*scene);
     auto models = PoseModels::open(subject_, options_.magnify, *scene_);
     if (!models) return models.error();
     models_ = std::move(*models);
@@ -100,13 +95,13 @@ class Comparison {
  private:
   std::string caption() const {
     const auto& c = subject_.frames.front().camera;
-    return fmt::format("{}: {}, display {}x{}, sampled {}, finish {}", subject_.name, scene_->size(), c.width, c.height,
-                       subject_.sampling, splat::finish_name(finish_));
+    return fmt::format("{}: {}, display {}x{}, sampled {}, finish {}", subject_.name(), scene_->size(), c.width,
+                       c.height, subject_.sampling, splat::finish_name(finish_));
   }
   nlohmann::ordered_json about() const {
     const auto& c = subject_.frames.front().camera;
     return {{"schema", 1},
-            {"scene", subject_.name},
+            {"scene", subject_.name()},
             {"primitives", scene_->primitives()},
             {"mode", subject_.events.empty() ? "still" : "run"},
             {"size", {c.width, c.height}},
@@ -122,18 +117,23 @@ class Comparison {
     progress_.show(where + ": direct rendering");
     const auto model = models_->of(frame);
     if (!model) return model.error();
-    CellOptions cell_options;
-    cell_options.shading = subject_.shading;
-    cell_options.best_patch_only = subject_.best_patch_only;
-    const auto drawn = scene_->draw(frame.camera, cell_options.shading, frame.epoch);
+    const auto drawn = scene_->draw(frame.camera, subject_.shading, frame.epoch);
     if (!drawn) return drawn.error();
     const image::View& reference = *drawn;
     const bool shows = std::any_of(reference.depth_m.begin(), reference.depth_m.end(),
                                    [](float d) { return d < std::numeric_limits<float>::infinity(); });
-    if (!shows) return Error{fmt::format("frame {} of {}: does not show the data", frame.number, subject_.name)};
+    if (!shows) return Error{fmt::format("frame {} of {}: does not show the data", frame.number, subject_.name())};
     const image::Flip flip(reference, options_.pixels_per_degree);
 
     ComparedPose pose{frame, (*model)->points(), {}};
+    const auto complete = measure_cells(**model, reference, flip, where, pose);
+    if (!complete) return complete.error();
+    return *complete ? keep(reference, std::move(pose)) : ok_status();
+  }
+
+  // One cell a kernel and renderer. False: told to stop in between.
+  Result<bool> measure_cells(const points::PointModel& model, const image::View& reference, const image::Flip& flip,
+                             const std::string& where, ComparedPose& pose) {
     // Renderers of its own: they keep copies of points by event number, and a pose may have another model of the same numbers.
     std::vector<std::unique_ptr<viewer::Renderer>> renderers;
     for (const auto& kind : renderers_) {
@@ -141,20 +141,23 @@ class Comparison {
       if (!made) return made.error();
       renderers.push_back(std::move(*made));
     }
+    CellOptions cell;
+    cell.shading = subject_.shading;
+    cell.best_patch_only = subject_.best_patch_only;
+    cell.repeat = options_.repeat;
+    cell.detail = float(pose.frame.detail);
     for (const auto& kernel : options_.kernels) {
+      cell.render = {*splat::kernel_named(kernel), finish_};
+      cell.splat_scale =
+          options_.splat_scale > 0 ? float(options_.splat_scale) : splat::suitable_scale(cell.render.kernel);
       for (const auto& renderer : renderers) {
-        if (net::stop_requested()) return ok_status();
+        if (net::stop_requested()) return false;
         progress_.show(fmt::format("{}: {} {}", where, kernel, renderer->name()));
-        cell_options.render = {*splat::kernel_named(kernel), finish_};
-        cell_options.splat_scale =
-            options_.splat_scale > 0 ? float(options_.splat_scale) : splat::suitable_scale(cell_options.render.kernel);
-        cell_options.repeat = options_.repeat;
-        cell_options.detail = float(frame.detail);
         pose.cells.push_back(
-            measure_cell(*renderer, **model, models_->applied(), frame.camera, cell_options, reference, flip));
+            measure_cell(*renderer, model, models_->applied(), pose.frame.camera, cell, reference, flip));
       }
     }
-    return keep(reference, std::move(pose));
+    return true;
   }
 
   Status keep(const image::View& reference, ComparedPose pose) {
@@ -164,7 +167,7 @@ class Comparison {
     const std::string name = fmt::format("{}/pose-{:06d}", subject_.out, pose.frame.number);
     const auto& f = pose.frame;
     const std::vector<std::string> captions{
-        subject_.name,
+        subject_.name(),
         scene_->size() + ", drawn directly: one ray a pixel",
         subject_.events.empty() ? std::string("still camera")
                                 : fmt::format("frame {} at {:.2f} s, event {}", f.number, f.t_s, f.sequence.value),
@@ -196,104 +199,40 @@ class Comparison {
   const CompareSubject& subject_;
   splat::Finish finish_;
   const std::vector<std::string>& renderers_;
-  ProgressLine progress_;
+  tools::ProgressLine progress_;
   std::unique_ptr<DirectScene> scene_;
   std::unique_ptr<PoseModels> models_;
   std::vector<ComparedPose> poses_;
   std::vector<PoseStrip> strips_;
 };
 
-}  // namespace
-
-void add_compare_flags(CLI::App& app, CompareOptions& o) {
-  const auto list = [&](const char* flag, auto& value, const char* help) {
-    return app.add_option(flag, value, help)
-        ->delimiter(',')
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-        ->allow_extra_args(false);  // what follows the list may be the path
-  };
-  app.add_option("path", o.path, "run folder, as telesplat run leaves it; with --still also a mesh file")->required();
-  app.add_option("--scene", o.scene, "the data file, if it is no longer where the run found it");
-  app.add_option("--out", o.out,
-                 "folder for pictures and figures; default: compare (--still: compare-still) in the run folder");
-  app.add_option("--poses", o.poses,
-                 "how many poses, evenly spaced over the frames that show the data; default: 4, with --still 1")
-      ->check(CLI::Range(1, 1000));
-  list("--frames", o.frames, "numbers of the frames to compare instead, as 10,250");
-  list("--kernels", o.kernels, "which of square,disc,ellipse,ewa")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"square", "disc", "ellipse", "ewa"}));
-  list("--renderers", o.renderers, "which of cpu,gl; default: cpu, and gl where there is OpenGL")
-      ->check(CLI::IsMember({"cpu", "gl"}));
-  app.add_option("--finish", o.finish, "work per pixel after splatting: on, off, or some of fill,smooth,antialias")
-      ->capture_default_str();
-  app.add_option("--splat-scale", o.splat_scale, "scale factor of splat sizes; 0: what suits the kernel")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 10.0));
-  app.add_option("--repeat", o.repeat, "frames timed for each picture; the median counts")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
-  app.add_option("--pixels-per-degree", o.pixels_per_degree,
-                 "of the viewing conditions that FLIP assumes; default: a 0.7 m wide monitor of 3840 pixels at 0.7 m")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 1000.0));
-  app.add_option("--threads", o.threads, "threads to draw with; 0: one a core")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
-  app.add_flag("--pictures", o.pictures, "write every picture and error map in full size too");
-  app.add_flag("--still", o.still,
-               "sample each pose itself, at the display's resolution, instead of replaying what the run had cached");
-  app.add_option("--magnify", o.magnify, "with --still: sample at this fraction of the display's resolution")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 16));
-  app.add_option("--size", o.size, "display size in pixels, WxH, for a mesh file")->capture_default_str();
-  app.add_option("--fov", o.fov_deg, "horizontal field of view in degrees, for a mesh file")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 170.0));
-  app.add_option("--near", o.near_m, "nearest depth seen in metres, for a mesh file")
-      ->capture_default_str()
-      ->check(CLI::Range(1e-5, 1e3));
-  app.add_option("--octree-depth", o.octree_depth, "levels of the point model's octree, for a mesh file")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 10));
-  app.add_option("--room-size", o.mesh.room_size_m, "largest extent in room space in metres, for a mesh file")
-      ->capture_default_str()
-      ->check(CLI::Range(1e-3, 1e3));
-  app.add_option("--up", o.mesh.up, "data axis that points up, for a mesh file")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "x", "y", "z", "-x", "-y", "-z"}));
-  app.add_option("--cache", o.mesh.cache_dir,
-                 "folder of the chunk store; default: the run's, or telesplat in the user's cache folder");
-  app.add_flag("!--no-cache", o.mesh.use_cache, "keep no chunk store");
-}
-
-int compare(const CompareOptions& o) {
-  const auto refuse = [](const Error& e) {
-    std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
-    return 2;
-  };
+int compare(CompareOptions o, const options::Given&) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
   const auto finish = splat::finish_named(o.finish);
-  if (!finish) return refuse({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
+  if (!finish)
+    return tools::complain({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
   const auto subject = find_subject(o);
-  if (!subject) return refuse(subject.error());
-
+  if (!subject) return tools::complain(subject.error());
   const auto renderers = choose_renderers(o);
-  if (!renderers) return refuse(renderers.error());
+  if (!renderers) return tools::complain(renderers.error());
 
   Comparison comparison(o, *subject, *finish, *renderers);
-  if (const Status s = comparison.open(); !s) return refuse(s.error());
-  if (const Status s = comparison.compare_poses(); !s) return refuse(s.error());
-  if (const Status s = comparison.write(); !s) {
-    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
-    return 1;
-  }
+  if (const Status s = comparison.open(); !s) return tools::complain(s.error());
+  if (const Status s = comparison.compare_poses(); !s) return tools::complain(s.error());
+  if (const Status s = comparison.write(); !s) return tools::complain(s.error(), 1);
   if (comparison.compared() > 0) comparison.print();
   if (comparison.compared() == subject->frames.size()) return 0;
-  std::fprintf(stderr, "telesplat: told to stop after %zu of %zu poses\n", comparison.compared(),
-               subject->frames.size());
-  return 1;
+  return tools::complain(
+      {fmt::format("told to stop after {} of {} poses", comparison.compared(), subject->frames.size())}, 1);
+}
+
+}  // namespace
+
+Command compare_command() {
+  return make_command("compare",
+                      "draw poses of a recorded run with every kernel and renderer, and directly from the data",
+                      CompareOptions{}, table, compare);
 }
 
 }  // namespace telesplat::launcher

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <ctime>
 #include <filesystem>
 
-#include "client/viewer/viewer_service.h"
+#include "client/viewer/display/size_text.h"
 #include "common/geometry/trajectory.h"
+#include "tools/telesplat/record/dated_folder.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -15,39 +15,50 @@ namespace fs = std::filesystem;
 
 constexpr int kPosesOfARun = 4;
 
-std::string dated_folder() {
-  char name[64];
-  const std::time_t now = std::time(nullptr);
-  std::strftime(name, sizeof name, "runs/compare-%Y%m%d-%H%M%S", std::localtime(&now));
-  return name;
-}
-
 // A data file, seen from the default pose.
 Result<CompareSubject> find_scene(const CompareOptions& o) {
   if (!o.frames.empty() || o.poses > 1)
     return Error{fmt::format("{}: is a data file, which has one pose; --poses and --frames need a run folder", o.path)};
   const auto size = viewer::parse_size(o.size, "--size");
   if (!size) return size.error();
+  data::DataOptions data = o.data;
+  data.scene = o.path;
+  auto scene = scene_of(data);
+  if (!scene) return scene.error();
   CompareSubject s;
-  s.name = fs::path(o.path).filename().string();
-  s.scene = o.path;
-  s.mesh = o.mesh;
+  s.scene = std::move(*scene);
   s.octree_depth = o.octree_depth;
-  s.out = o.out.empty() ? dated_folder() : o.out;
+  s.out = o.out.empty() ? dated_folder("compare-") : o.out;
   DisplayedFrame frame;
   frame.camera = geometry::make_camera(geometry::default_pose(), o.fov_deg, size->first, size->second, o.near_m);
   s.frames.push_back(frame);
   return s;
 }
 
+Status refuse_what_no_points_show(const CompareOptions& o, const Scene& scene) {
+  if (scene.pipeline() == scene::Pipeline::kPoints) return ok_status();
+  return Error{fmt::format("{}: shows {}, which is not drawn from points; telesplat run --verify compares its frames",
+                           o.path, scene::described(scene.kind()))};
+}
+
+// The scene of a run, where its data lie now.
+Status settle_scene(const CompareOptions& o, Scene& scene) {
+  if (!o.moved.empty())
+    if (const Status s = scene.move_to(o.moved); !s) return s;
+  if (scene.options().scene.empty() && !scene.check())
+    return Error{fmt::format("{}/session.toml: does not tell where the data is (key file of [scene]); --scene names it",
+                             o.path)};
+  const Status there = scene.check();
+  if (there || !o.moved.empty()) return there;
+  return Error{there.error().text + "; if it was moved, --scene tells where to"};
+}
+
 Result<CompareSubject> find_run(const CompareOptions& o) {
+  auto run = read_recorded_run(o.path);
+  if (!run) return run.error();
+  if (const Status s = refuse_what_no_points_show(o, *run->scene); !s) return s.error();
   CompareSubject s;
   std::error_code error;
-  const auto run = read_recorded_run(o.path);
-  if (!run) return run.error();
-  if (run->volume)
-    return Error{fmt::format(
-        "{}: shows a volume, which is not drawn from points; telesplat run --verify compares its frames", o.path)};
   if (!o.still) {
     s.events = o.path + "/points.events";
     if (!fs::is_regular_file(s.events, error))
@@ -56,20 +67,8 @@ Result<CompareSubject> find_run(const CompareOptions& o) {
                       "it is given --record-points 0 (--still samples the poses anew)",
                       s.events)};
   }
-  s.scene = o.scene.empty() ? run->scene : o.scene;
-  s.mesh = run->mesh;
-  if (!o.mesh.cache_dir.empty()) s.mesh.cache_dir = o.mesh.cache_dir;
-  if (!o.mesh.use_cache) s.mesh.use_cache = false;
-  s.julia = run->julia;
-  if (s.julia && !o.scene.empty())
-    return Error{fmt::format("--scene {}: {} shows a Julia set, which has no data file", o.scene, o.path)};
-  if (s.scene.empty() && !s.julia)
-    return Error{fmt::format("{}/session.toml: does not tell where the data is (key file of [scene]); --scene names it",
-                             o.path)};
-  if (!s.julia && !fs::exists(s.scene, error))
-    return Error{fmt::format("{}: the data file is not there{}", s.scene,
-                             o.scene.empty() ? "; if it was moved, --scene tells where to" : "")};
-  s.name = s.julia ? s.julia->title : fs::path(s.scene).filename().string();
+  run->scene->use_cache_of(o.data);
+  if (const Status settled = settle_scene(o, *run->scene); !settled) return settled.error();
   s.octree_depth = run->octree_depth;
   s.shading = run->shading;
   s.best_patch_only = run->keeps_redundant;
@@ -78,6 +77,7 @@ Result<CompareSubject> find_run(const CompareOptions& o) {
   auto frames = choose_frames(*run, o.poses ? o.poses : o.still ? 1 : kPosesOfARun, o.frames);
   if (!frames) return frames.error();
   s.frames = std::move(*frames);
+  s.scene = std::move(run->scene);
   return s;
 }
 
@@ -129,7 +129,8 @@ Result<const points::PointModel*> PoseModels::of(const DisplayedFrame& frame) {
   sampling.height = std::max(1, sampling.height / magnify_);
   const geometry::Rect whole{0, 0, sampling.width, sampling.height};
   const points::ModelConfig config{scene_.box_room(), subject_.octree_depth, !subject_.best_patch_only};
-  if (const Status s = points::validate(config); !s) return Error{fmt::format("{}: {}", subject_.name, s.error().text)};
+  if (const Status s = points::validate(config); !s)
+    return Error{fmt::format("{}: {}", subject_.name(), s.error().text)};
   auto image = scene_.sample(sampling, frame.epoch);
   if (!image) return image.error();
   sampled_ = std::make_unique<points::PointModel>(config);

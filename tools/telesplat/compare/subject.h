@@ -4,18 +4,15 @@
 #include <memory>
 
 #include "client/viewer/record/event_record.h"
-#include "tools/telesplat/compare/command.h"
+#include "tools/telesplat/compare/compare_options.h"
 #include "tools/telesplat/record/recorded_run.h"
-#include "tools/telesplat/scene/direct_scene.h"
+#include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
 
 /// The poses to compare, before any data is read.
 struct CompareSubject {
-  std::string name;   ///< for captions
-  std::string scene;  ///< path of the data file
-  data::MeshOptions mesh;
-  std::optional<RecordedJulia> julia;  ///< instead of a data file
+  std::unique_ptr<Scene> scene;
   std::string out;
   std::string events;                ///< record of point-model events; empty: poses are sampled
   std::string sampling;              ///< how the points were sampled, for captions
@@ -23,6 +20,7 @@ struct CompareSubject {
   bool best_patch_only = false;      ///< the run's packing kept redundant patches
   int octree_depth = 6;
   std::vector<DisplayedFrame> frames;
+  std::string name() const { return scene->name(); }  ///< for captions
 };
 
 /// Error texts are for a user: exit code 2.

@@ -1,14 +1,14 @@
-#include "tools/telesplat/control/command.h"
-
+// `telesplat ctl COMMAND ...`: asks or tells a running session's master.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 
 #include "common/julia/flags.h"
 #include "common/volume/session.h"
+#include "tools/common/complain.h"
+#include "tools/telesplat/command.h"
 #include "tools/telesplat/control/client.h"
 
 namespace telesplat::launcher {
@@ -17,6 +17,11 @@ namespace {
 namespace fs = std::filesystem;
 
 using Arguments = std::map<std::string, std::string>;
+
+struct ControlOptions {
+  std::string command, master = "tcp://127.0.0.1:7700";
+  std::vector<std::string> arguments;
+};
 
 constexpr double kPatience_s = 5;
 constexpr uintmax_t kMaxMapBytes = 4 << 20;  // of a colour-map file
@@ -89,37 +94,34 @@ Result<Arguments> read_arguments(const ControlOptions& o, ControlClient& client)
   return Arguments{};
 }
 
-}  // namespace
-
-void add_control_flags(CLI::App& app, ControlOptions& o) {
-  app.add_option(
-         "command", o.command,
-         "status: who takes part and what they count; stop: end the session; epoch: drop all points; set "
-         "NAME=VALUE...: change a Julia set's parameters, or volume.step of a series; animate TIMELINE: as --animate "
-         "of run, or off; tf TRANSFER: a volume's transfer function, as --tf of run")
-      ->required()
-      ->check(CLI::IsMember({"status", "stop", "epoch", "set", "animate", "tf"}));
-  app.add_option("arguments", o.arguments, "of set, animate and tf")
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  app.add_option("--master", o.master, "address of the master")->capture_default_str();
+options::Table table(ControlOptions& o) {
+  return {{.flag = "command",
+           .value = &o.command,
+           .help = "status: who takes part and what they count; stop: end the session; epoch: drop all points; set "
+                   "NAME=VALUE...: change a Julia set's parameters, or volume.step of a series; animate TIMELINE: as "
+                   "--animate of run, or off; tf TRANSFER: a volume's transfer function, as --tf of run",
+           .limits = options::Names{"status", "stop", "epoch", "set", "animate", "tf"},
+           .required = true},
+          {.flag = "arguments", .value = &o.arguments, .help = "of set, animate and tf"},
+          {.flag = "--master", .value = &o.master, .help = "address of the master"}};
 }
 
-int control(const ControlOptions& o) {
+int control(ControlOptions o, const options::Given&) {
   log::initialise("ctl", "warn");
   ControlClient client(o.master);
   const auto arguments = read_arguments(o, client);
-  if (!arguments) {
-    std::fprintf(stderr, "telesplat: %s\n", arguments.error().text.c_str());
-    return 2;
-  }
+  if (!arguments) return tools::complain(arguments.error());
   const auto answer = client.ask(o.command, kPatience_s, *arguments);
-  if (!answer) {
-    std::fprintf(stderr, "telesplat: %s\n", answer.error().text.c_str());
-    return 1;
-  }
+  if (!answer) return tools::complain(answer.error(), 1);
   const auto json = nlohmann::ordered_json::parse(*answer, nullptr, false);
   std::printf("%s\n", json.is_object() ? json.dump(2).c_str() : answer->c_str());
   return 0;
+}
+
+}  // namespace
+
+Command control_command() {
+  return make_command("ctl", "ask or tell a running session's master", ControlOptions{}, table, control);
 }
 
 }  // namespace telesplat::launcher

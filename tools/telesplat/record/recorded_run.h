@@ -1,15 +1,14 @@
 // A run folder as `telesplat run` left it: what is needed to make its displayed frames again.
 #pragma once
 
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "common/core/ids.h"
 #include "common/geometry/camera.h"
 #include "common/image/shading.h"
-#include "services/data/mesh/store.h"
-#include "tools/telesplat/scene/recorded_julia.h"
+#include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
 
@@ -27,11 +26,8 @@ struct DisplayedFrame {
 
 struct RecordedRun {
   std::string directory;
-  std::string scene;  ///< path of the data file; empty: the folder does not tell
-  data::MeshOptions mesh;
-  std::optional<RecordedJulia> julia;  ///< instead of a data file
-  bool volume = false;                 ///< the data file is a volume: read_recorded_volume() tells more
-  int width = 0, height = 0;           ///< of the display
+  std::unique_ptr<Scene> scene;  ///< its data need not be there
+  int width = 0, height = 0;     ///< of the display
   double fov_deg = 0, near_m = 0;
   std::string sampling_size, renderer, kernel;  ///< as they were, for captions
   image::ShadingParameters shading;

@@ -1,4 +1,4 @@
-// Verification after a run: displayed frames against direct rendering of the data at the same pose (DESIGN section 6, "quality").
+// Verification after a run: displayed frames against direct rendering of the data at the same pose (docs/quality.md).
 #pragma once
 
 #include <functional>

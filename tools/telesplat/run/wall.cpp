@@ -4,16 +4,13 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <map>
 #include <optional>
 
 #include "common/geometry/camera.h"
 #include "common/image/canvas.h"
 #include "common/image/file.h"
-#include "tools/telesplat/record/csv_line.h"
+#include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -35,37 +32,19 @@ std::optional<std::pair<uint64_t, std::string>> newest_picture(const std::string
   return out;
 }
 
-// When the frames of `tiles` were displayed.
-void read_times(const std::string& path, std::vector<WallTile>& tiles) {
-  std::ifstream in(path);
-  std::string line;
-  if (!std::getline(in, line)) return;
-  const auto header = csv_fields(line).value_or(std::vector<std::string>{});
-  const auto column = [&](const char* name) {
-    return size_t(std::find(header.begin(), header.end(), name) - header.begin());
-  };
-  const size_t viewer = column("viewer"), frame = column("frame"), t = column("t_s");
-  if (std::max({viewer, frame, t}) >= header.size()) return;
-  while (std::getline(in, line)) {
-    const auto fields = csv_fields(line);
-    if (!fields || fields->size() != header.size()) continue;
+// When the frames of `tiles` were displayed; 0 where that is not recorded.
+void read_times(const std::string& path, std::vector<TilePicture>& tiles) {
+  const auto table = tools::CsvTable::read(path, {});
+  if (!table) return;
+  const auto viewer = table->find("viewer"), frame = table->find("frame"), t = table->find("t_s");
+  if (!viewer || !frame || !t) return;
+  for (size_t row = 0; row < table->rows(); ++row)
     for (auto& tile : tiles)
-      if ((*fields)[viewer] == tile.viewer && std::strtod((*fields)[frame].c_str(), nullptr) == double(tile.frame))
-        tile.t_s = std::strtod((*fields)[t].c_str(), nullptr);
-  }
+      if (table->text(row, *viewer) == tile.viewer && table->text(row, *frame) == std::to_string(tile.frame))
+        if (const auto t_s = table->number(row, *t)) tile.t_s = *t_s;
 }
 
 }  // namespace
-
-Result<WallLayout> parse_wall(const std::string& text) {
-  WallLayout out;
-  char rest = 0;
-  if (text.size() > 16 || std::sscanf(text.c_str(), "%dx%d%c", &out.columns, &out.rows, &rest) != 2 ||
-      out.columns < 1 || out.rows < 1 || out.columns > kMaxViewers || out.rows > kMaxViewers ||
-      out.tiles() > kMaxViewers)
-    return Error{fmt::format("--wall {}: is not COLUMNSxROWS with 1 to {} tiles", text.substr(0, 40), kMaxViewers)};
-  return out;
-}
 
 std::string viewer_name(int number) { return fmt::format("viewer-{}", number); }
 
@@ -73,8 +52,8 @@ std::string viewer_directory(const std::string& run_directory, int number) {
   return number == 1 ? run_directory : run_directory + "/" + viewer_name(number);
 }
 
-Result<std::vector<WallTile>> stitch_wall(const std::string& directory, const WallLayout& layout) {
-  std::vector<WallTile> tiles;
+Result<std::vector<TilePicture>> stitch_wall(const std::string& directory, const WallLayout& layout) {
+  std::vector<TilePicture> tiles;
   std::optional<image::Canvas> wall;
   int width = 0, height = 0;
   for (int i = 0; i < layout.tiles(); ++i) {

@@ -4,27 +4,21 @@
 #include <string>
 #include <vector>
 
+#include "client/viewer/display/wall.h"
 #include "common/core/result.h"
 
 namespace telesplat::launcher {
 
-/// Tiles are counted by rows, from the upper left.
-struct WallLayout {
-  int columns = 1, rows = 1;
-  int tiles() const { return columns * rows; }
-};
+using viewer::WallLayout;
 
 inline constexpr int kMaxViewers = 16;
-
-/// "2x1": columns x rows. Error: not of that form, or not 1 to kMaxViewers tiles.
-Result<WallLayout> parse_wall(const std::string& text);
 
 /// A viewer's name, and the folder it records into: the first one's is the run's own, the others have one of theirs in it.
 std::string viewer_name(int number);
 std::string viewer_directory(const std::string& run_directory, int number);
 
 /// The newest picture of a tile.
-struct WallTile {
+struct TilePicture {
   std::string viewer;
   uint64_t frame = 0;
   double t_s = 0;  ///< on that viewer's clock, from frames.csv
@@ -32,6 +26,6 @@ struct WallTile {
 
 /// Puts the newest recorded picture of each tile's viewer (1, 2, ...) into one, DIR/images/wall.png. Returns what it was made from.
 /// Error: a viewer recorded none, they differ in size, or the whole is larger than a picture may be.
-Result<std::vector<WallTile>> stitch_wall(const std::string& run_directory, const WallLayout& layout);
+Result<std::vector<TilePicture>> stitch_wall(const std::string& run_directory, const WallLayout& layout);
 
 }  // namespace telesplat::launcher

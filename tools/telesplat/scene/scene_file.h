@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/options/table.h"
 
 namespace telesplat::launcher {
 
@@ -18,11 +19,12 @@ namespace telesplat::launcher {
 ///   [[keyframe]]  t = 0.0  c.y = -0.4                                 two at least of each parameter; they become --animate
 /// A volume may say kind = "volume"; what it is shows anyway. Its files, and those of tf, texture and trajectory, lie beside the scene file:
 ///   [scene]  file = "head.nrrd"  tf = "skin"  lighting = false  data_servers = 2     [view]  wall = "2x1"  coupling = "loose"  buffers = 2
-/// Returns the flags with their values, then the data file or "julia". Errors name the file and the line or key.
-Result<std::vector<std::string>> read_scene_file(const std::string& path);
+/// Returns the flags with their values, then the data file or "julia". table: the flags of the command that reads it. Errors name the file
+/// and the line or key; a key that is no flag is one.
+Result<std::vector<std::string>> read_scene_file(const std::string& path, const options::Table& table);
 
 /// Replaces an argument that names a .toml file by what is in it; flags on the command line win over those of the file: --preset over
-/// all that makes a Julia set, --c over c and its components.
-Result<std::vector<std::string>> expand_scene_file(int argc, char** argv);
+/// all that makes a Julia set, --c over c and its components. arguments: those of a command that takes a scene, without its name.
+Result<std::vector<std::string>> expand_scene_file(std::vector<std::string> arguments, const options::Table& table);
 
 }  // namespace telesplat::launcher

@@ -1,4 +1,4 @@
-// `telesplat compare DIR`: poses of a recorded run, drawn by every kernel and renderer and directly from the data.
+// What `telesplat compare` is told.
 #pragma once
 
 #include <string>
@@ -6,17 +6,13 @@
 
 #include "common/image/flip.h"
 #include "common/points/point_model.h"
-#include "services/data/mesh/store.h"
-
-namespace CLI {
-class App;
-}
+#include "services/data/data_options.h"
 
 namespace telesplat::launcher {
 
 struct CompareOptions {
   std::string path;   ///< a run folder, or with `still` a data file
-  std::string scene;  ///< the data file, where it is not where the run found it
+  std::string moved;  ///< the data file, where it is not where the run found it
   std::string out;
   int poses = 0;  ///< 0: 4 of a run, 1 with `still`
   std::vector<uint64_t> frames;
@@ -33,12 +29,10 @@ struct CompareOptions {
   std::string size = "1280x800";  ///< of the display, for a data file
   double fov_deg = 90, near_m = 0.02;
   int octree_depth = points::ModelConfig{}.depth;
-  data::MeshOptions mesh;
+  data::DataOptions data;  ///< of a data file; of a run the cache alone
 };
 
-void add_compare_flags(CLI::App& app, CompareOptions& options);
-
-/// Exit code: 0 done, 1 failed while running or interrupted, 2 bad usage or input.
-int compare(const CompareOptions& options);
+/// A row a flag; they point into `options`.
+options::Table table(CompareOptions& options);
 
 }  // namespace telesplat::launcher

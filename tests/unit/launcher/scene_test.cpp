@@ -1,0 +1,131 @@
+// What the launcher makes of flags: which scene they name, what processes are told, what session.toml keeps.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "common/options/parser.h"
+#include "tools/telesplat/run/run_options.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Scenes : public testing::Test {
+ protected:
+  Scenes() {
+    folder_ = (fs::temp_directory_path() /
+               (std::string("telesplat-scenes-") + testing::UnitTest::GetInstance()->current_test_info()->name()))
+                  .string();
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    std::ofstream(file("cube.raw"), std::ios::binary) << std::string(16 * 16 * 16, 'a');
+    std::ofstream(file("mesh.ply")) << "ply\n";
+  }
+  ~Scenes() override { fs::remove_all(folder_); }
+  std::string file(const std::string& name) const { return folder_ + "/" + name; }
+
+  // As `telesplat run` reads its command line.
+  static Result<std::shared_ptr<Scene>> settled(RunOptions& options, const std::vector<std::string>& arguments) {
+    options::Parser parser("run");
+    parser.add(table(options));
+    parser.parse_or_exit("run", arguments);
+    return settle(options, parser.given());
+  }
+  static bool holds(const std::vector<std::string>& list, const std::string& text) {
+    return std::find(list.begin(), list.end(), text) != list.end();
+  }
+  std::string folder_;
+};
+
+TEST_F(Scenes, ARawVolumesSurfaceIsAMesh) {
+  RunOptions o;
+  const auto scene = settled(o, {file("cube.raw"), "--raw=16x16x16:u8", "--iso=90"});
+  ASSERT_TRUE(scene.ok()) << scene.error().text;
+  EXPECT_EQ((*scene)->kind(), scene::Kind::kMesh);
+  const auto told = data_arguments(o, 0);
+  for (const char* flag : {"--raw=16x16x16:u8", "--iso=90"}) EXPECT_TRUE(holds(told, flag)) << flag;
+  EXPECT_TRUE(holds(told, file("cube.raw")));
+}
+
+TEST_F(Scenes, WhatSessionTomlKeepsMakesTheSameSceneAgain) {
+  RunOptions o;
+  const auto scene = settled(o, {file("cube.raw"), "--raw=16x16x16:u8", "--iso=90.5", "--up=-y", "--no-cache"});
+  ASSERT_TRUE(scene.ok()) << scene.error().text;
+  std::ofstream(file("session.toml")) << *(*scene)->session_tables() << display_table(o);
+  const auto again = recorded_scene(folder_);
+  ASSERT_TRUE(again.ok()) << again.error().text;
+  EXPECT_EQ((*again)->kind(), scene::Kind::kMesh);
+  const auto& options = (*again)->options();
+  EXPECT_EQ(options.scene, file("cube.raw"));
+  EXPECT_EQ(options.volume.raw, "16x16x16:u8");
+  EXPECT_EQ(options.mesh.iso, 90.5);
+  EXPECT_EQ(options.mesh.up, "-y");
+  EXPECT_FALSE(options.mesh.use_cache);
+}
+
+TEST_F(Scenes, AJuliaSetIsRecordedWithItsParameters) {
+  RunOptions o;
+  const auto scene = settled(o, {"julia", "--preset=wings", "--iterations=33", "--room-size=0.5"});
+  ASSERT_TRUE(scene.ok()) << scene.error().text;
+  std::ofstream(file("session.toml")) << *(*scene)->session_tables();
+  const auto again = recorded_scene(folder_);
+  ASSERT_TRUE(again.ok()) << again.error().text;
+  EXPECT_EQ((*again)->kind(), scene::Kind::kJulia);
+  EXPECT_EQ((*again)->name(), (*scene)->name());
+  EXPECT_EQ((*again)->session_tables().ok(), true);
+  EXPECT_NE((*again)->describe_record().find("33"), std::string::npos);
+  EXPECT_FALSE((*again)->move_to("elsewhere.ply").ok());
+}
+
+TEST_F(Scenes, FlagsThatDoNotFitAreRefused) {
+  const std::vector<std::pair<std::vector<std::string>, const char*>> cases{
+      {{file("mesh.ply"), "--data-servers=2"}, "--data-servers"},
+      {{file("mesh.ply"), "--tf=bone"}, "--tf"},
+      {{file("cube.raw"), "--raw=16x16x16:u8", "--splat=disc"}, "--splat"},
+      {{file("cube.raw"), "--raw=16x16x16:u8", "--record-depth"}, "--record-depth"},
+      {{"julia", "--iso=3"}, "--iso"},
+      {{file("mesh.ply"), "--iterations=9"}, "--iterations"},
+      {{"--master=tcp://127.0.0.1:1", "--tf=bone"}, "no scene"},
+      {{"--master=tcp://127.0.0.1:1", "--c=0,0,0,0"}, "ctl set"},
+      {{file("mesh.ply"), "--wall=2x1", "--viewers=3"}, "--viewers 3"},
+      {{}, "a scene is needed"},
+  };
+  for (const auto& [arguments, part] : cases) {
+    RunOptions o;
+    const auto scene = settled(o, arguments);
+    ASSERT_FALSE(scene.ok()) << part;
+    EXPECT_NE(scene.error().text.find(part), std::string::npos) << scene.error().text;
+  }
+}
+
+// Whatever flag a service has, its process is told of it: the launcher names none of them.
+TEST_F(Scenes, EveryFlagOfAServiceReachesItsProcess) {
+  RunOptions o;
+  ASSERT_TRUE(settled(o, {file("mesh.ply"), "--up=z", "--least-detail=0.5", "--detail-budget=off", "--exr",
+                          "--packing.epsilon=0.01", "--packing.redundancy=keep", "--tile-size=64", "--sampler=raster",
+                          "--sampler-threads=3", "--record-depth", "--out=" + file("run")})
+                  .ok());
+  EXPECT_TRUE(holds(data_arguments(o, 0), "--up=z"));
+  for (const char* flag : {"--least-detail=0.5", "--detail-budget=off", "--exr"})
+    EXPECT_TRUE(holds(viewer_arguments(o, 1, 0), flag)) << flag;
+  for (const char* flag : {"--packing.epsilon=0.01", "--packing.redundancy=keep", "--tile-size=64"})
+    EXPECT_TRUE(holds(master_arguments(o), flag)) << flag;
+  for (const char* flag : {"--sampler=raster", "--threads=3"}) EXPECT_TRUE(holds(sampler_arguments(o), flag)) << flag;
+  EXPECT_TRUE(holds(packer_arguments(o), "--record-depth=" + file("run/depth")));
+}
+
+TEST_F(Scenes, AWallHasAViewerATile) {
+  RunOptions o;
+  ASSERT_TRUE(settled(o, {file("mesh.ply"), "--wall=2x1", "--verify=5", "--out=" + file("run")}).ok());
+  EXPECT_EQ(o.viewers, 2);
+  const auto second = viewer_arguments(o, 2, 0);
+  EXPECT_TRUE(holds(second, "--wall-tile=1"));
+  EXPECT_FALSE(holds(second, "--verify=5")) << "only the first one's frames are verified";
+  EXPECT_TRUE(holds(viewer_arguments(o, 1, 0), "--verify=5"));
+}
+
+}  // namespace
+}  // namespace telesplat::launcher

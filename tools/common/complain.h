@@ -1,0 +1,16 @@
+// How a command line program tells its user what is wrong.
+#pragma once
+
+#include <cstdio>
+
+#include "common/core/result.h"
+
+namespace telesplat::tools {
+
+/// One line on stderr. Returns `code`, so that a command can end with it: 2 bad usage or input, 1 failed while running.
+inline int complain(const Error& error, int code = 2, const char* program = "telesplat") {
+  std::fprintf(stderr, "%s: %s\n", program, error.text.c_str());
+  return code;
+}
+
+}  // namespace telesplat::tools

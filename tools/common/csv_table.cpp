@@ -1,0 +1,145 @@
+#include "tools/common/csv_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+namespace telesplat::tools {
+namespace {
+
+constexpr uintmax_t kMaxBytes = uintmax_t{4} << 30;
+
+// Calls take(text) for each field; a quoted one comes without its quotes. take returns whether to go on. False: a quote that does
+// not end, or text after one.
+template <class Take>
+bool each_field(std::string_view line, Take&& take) {
+  std::string field;
+  enum { kBegin, kPlain, kQuoted, kAfterQuote } state = kBegin;
+  for (const char c : line) {
+    if (state == kQuoted) {
+      if (c == '"')
+        state = kAfterQuote;
+      else
+        field += c;
+    } else if (c == ',') {
+      if (!take(field)) return true;
+      field.clear();
+      state = kBegin;
+    } else if (c == '"' && state != kPlain) {
+      if (state == kAfterQuote) field += '"';
+      state = kQuoted;
+    } else if (state == kAfterQuote) {
+      return false;
+    } else {
+      field += c;
+      state = kPlain;
+    }
+  }
+  if (state == kQuoted) return false;
+  take(field);
+  return true;
+}
+
+std::optional<double> finite(const std::string& text) {
+  double value = 0;
+  const auto end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, value);
+  if (read.ec != std::errc() || read.ptr != end || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::optional<std::vector<std::string>> csv_fields(std::string_view line) {
+  std::vector<std::string> out;
+  const auto keep = [&](const std::string& field) {
+    out.push_back(field);
+    return true;
+  };
+  if (!each_field(line, keep)) return std::nullopt;
+  return out;
+}
+
+Result<CsvTable> CsvTable::read(const std::string& path, const Limits& limits) {
+  CsvTable out;
+  out.path_ = path;
+  std::ifstream in(path, std::ios::binary | std::ios::ate);
+  if (!in || in.tellg() <= 0) return Error{fmt::format("{}: is not there or is empty", path)};
+  if (uintmax_t(in.tellg()) > kMaxBytes) return Error{fmt::format("{}: has more than {} bytes", path, kMaxBytes)};
+  out.bytes_.resize(size_t(in.tellg()));
+  in.seekg(0);
+  if (!in.read(out.bytes_.data(), std::streamsize(out.bytes_.size()))) return Error{path + ": cannot be read"};
+
+  size_t number = 0;
+  for (size_t begin = 0; begin < out.bytes_.size();) {
+    const size_t end = std::min(out.bytes_.find('\n', begin), out.bytes_.size());
+    const std::string_view line(out.bytes_.data() + begin, end - begin);
+    const auto wrong = [&, n = ++number](const std::string& what) {
+      return Error{fmt::format("{}:{}: {}", path, n, what)};
+    };
+    begin = end + 1;
+    if (line.size() > limits.line_bytes) return wrong(fmt::format("a line of more than {} bytes", limits.line_bytes));
+    size_t fields = 0;
+    const bool whole = each_field(line, [&](const std::string& field) {
+      if (number == 1) out.header_.push_back(field);
+      return ++fields > 0;
+    });
+    if (!whole) return wrong("a quoted text that does not end");
+    if (fields != out.header_.size()) return wrong(fmt::format("{} values instead of {}", fields, out.header_.size()));
+    if (number == 1) continue;
+    if (end == out.bytes_.size()) return wrong("the line is cut off");
+    if (out.lines_.size() == limits.rows) return wrong(fmt::format("more than {} rows", limits.rows));
+    out.lines_.push_back(line);
+  }
+  return out;
+}
+
+std::optional<size_t> CsvTable::find(std::string_view name) const {
+  const auto found = std::find(header_.begin(), header_.end(), name);
+  if (found == header_.end()) return std::nullopt;
+  return size_t(found - header_.begin());
+}
+
+Result<size_t> CsvTable::column(std::string_view name) const {
+  if (const auto found = find(name)) return *found;
+  return Error{fmt::format("{}: has no column {}", path_, name)};
+}
+
+std::string CsvTable::text(size_t row, size_t column) const {
+  std::string out;
+  each_field(lines_[row], [&, i = size_t{0}](const std::string& field) mutable {
+    if (i++ == column) out = field;
+    return i <= column;
+  });
+  return out;
+}
+
+Result<double> CsvTable::number(size_t row, size_t column) const {
+  const std::string field = text(row, column);
+  if (const auto value = finite(field)) return *value;
+  return wrong(row, fmt::format("{} is \"{}\", not a number", header_[column], field.substr(0, 40)));
+}
+
+Result<uint64_t> CsvTable::count(size_t row, size_t column, double end) const {
+  const auto value = number(row, column);
+  if (!value) return value.error();
+  if (*value >= 0 && *value < end) return uint64_t(*value);
+  const std::string most = end >= 9e15 ? "9e15" : fmt::format("{}", end - 1);
+  return wrong(row, fmt::format("{} is {}, limits are 0..{}", header_[column], *value, most));
+}
+
+std::vector<double> CsvTable::numbers(size_t column) const {
+  std::vector<double> out;
+  for (size_t row = 0; row < rows(); ++row) out.push_back(finite(text(row, column)).value_or(0));
+  return out;
+}
+
+Error CsvTable::wrong(size_t row, const std::string& what) const {
+  return Error{fmt::format("{}:{}: {}", path_, row + 2, what)};
+}
+
+}  // namespace telesplat::tools

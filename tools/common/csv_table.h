@@ -1,0 +1,54 @@
+// Tables of comma-separated values that processes of a session wrote: epochs.csv, frames.csv, tiles.csv.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/result.h"
+
+namespace telesplat::tools {
+
+/// The fields of a line; texts may be in quotes, where they hold commas, with "" for a quote (RFC 4180, within one line). Nothing:
+/// a quote that does not end, or text after one.
+std::optional<std::vector<std::string>> csv_fields(std::string_view line);
+
+/// A file read whole, its fields taken apart when they are asked for. Errors name file, line, column and value.
+class CsvTable {
+ public:
+  struct Limits {
+    size_t rows = 10'000'000, line_bytes = 1 << 16;
+  };
+  /// Error: the file is not there or empty, a line is longer than the limit, cut off, or has another number of values than the
+  /// header, a quoted text does not end, or there are too many rows. A file may have 4 GiB.
+  static Result<CsvTable> read(const std::string& path, const Limits& limits);
+
+  const std::string& path() const { return path_; }
+  size_t rows() const { return lines_.size(); }
+  const std::vector<std::string>& header() const { return header_; }
+
+  /// Where a column is. Error: there is none of that name.
+  Result<size_t> column(std::string_view name) const;
+  std::optional<size_t> find(std::string_view name) const;
+
+  std::string text(size_t row, size_t column) const;
+  /// Error: not a finite number.
+  Result<double> number(size_t row, size_t column) const;
+  /// A whole number of 0 up to, not including, `end`.
+  Result<uint64_t> count(size_t row, size_t column, double end = 9e15) const;
+  /// A column's numbers; what is no number counts as 0, as programs of this project write none.
+  std::vector<double> numbers(size_t column) const;
+
+  /// "PATH:LINE: what"
+  Error wrong(size_t row, const std::string& what) const;
+
+ private:
+  std::string path_, bytes_;
+  std::vector<std::string> header_;
+  std::vector<std::string_view> lines_;  // of bytes_, without the header
+  std::string_view line(size_t row) const;
+};
+
+}  // namespace telesplat::tools

@@ -1,0 +1,30 @@
+// What a command tells on stderr while it works.
+#pragma once
+
+#include <mutex>
+#include <string>
+
+namespace telesplat::tools {
+
+/// On a terminal one line that rewrites itself, at most 10 times a second; elsewhere one line every 5 seconds. Any thread may call.
+class ProgressLine {
+ public:
+  /// first_after_s: nothing is shown before that many seconds, for work that is often over by then.
+  explicit ProgressLine(double first_after_s = 0);
+  ~ProgressLine() { close(); }
+
+  void show(const std::string& text);
+  /// "WHAT 43 %"
+  void show(const char* what, double fraction);
+  /// A line that stays.
+  void line(const std::string& text);
+  /// Ends the line that is open; what follows begins a new one.
+  void close();
+
+ private:
+  std::mutex mutex_;
+  bool terminal_, open_ = false;
+  double begin_s_, last_s_;
+};
+
+}  // namespace telesplat::tools

@@ -1,0 +1,13 @@
+#include "tools/telesplat/bench/bench_commands.h"
+
+namespace telesplat::launcher {
+
+Command bench_command() {
+  Command out;
+  out.name = "bench";
+  out.help = "measure the pipeline";
+  out.commands = {bench_scaling_command(), bench_volume_command(), bench_cache_command()};
+  return out;
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,12 @@
+// `telesplat bench ...`: its sub-commands. Each prints tables; none leaves a process behind.
+#pragma once
+
+#include "tools/telesplat/command.h"
+
+namespace telesplat::launcher {
+
+Command bench_scaling_command();
+Command bench_volume_command();
+Command bench_cache_command();
+
+}  // namespace telesplat::launcher

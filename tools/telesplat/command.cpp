@@ -1,0 +1,52 @@
+#include "tools/telesplat/command.h"
+
+#include <iterator>
+#include <utility>
+
+#include "common/options/parser.h"
+#include "tools/common/complain.h"
+#include "tools/telesplat/scene/scene_file.h"
+
+namespace telesplat::launcher {
+namespace {
+
+/// The parsers of a tree of commands, beside the commands themselves.
+using Parsers = std::vector<std::pair<const Command*, const options::Parser*>>;
+
+void declare(options::Parser& parser, const std::vector<Command>& commands, Parsers& out) {
+  for (const Command& command : commands) {
+    options::Parser& own = parser.command(command.name, command.help);
+    own.add(command.table);
+    if (!command.footer.empty()) own.footer(command.footer);
+    if (command.run) out.emplace_back(&command, &own);
+    declare(own, command.commands, out);
+  }
+}
+
+// The command's name stays in front of what its scene file says.
+Status expand(const std::vector<Command>& commands, std::vector<std::string>& arguments) {
+  for (const Command& command : commands) {
+    if (!command.takes_scene_file || arguments.empty() || arguments.front() != command.name) continue;
+    auto expanded = expand_scene_file({arguments.begin() + 1, arguments.end()}, command.table);
+    if (!expanded) return expanded.error();
+    arguments.resize(1);
+    arguments.insert(arguments.end(), std::make_move_iterator(expanded->begin()),
+                     std::make_move_iterator(expanded->end()));
+  }
+  return ok_status();
+}
+
+}  // namespace
+
+int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments) {
+  if (const Status s = expand(commands, arguments); !s) return tools::complain(s.error());
+  options::Parser parser(about);
+  Parsers parsers;
+  declare(parser, commands, parsers);
+  parser.parse_or_exit("telesplat", std::move(arguments));
+  for (const auto& [command, own] : parsers)
+    if (own->chosen()) return command->run(own->given());
+  return 2;
+}
+
+}  // namespace telesplat::launcher

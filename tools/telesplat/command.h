@@ -1,0 +1,44 @@
+// The commands of telesplat: one row a command says its name, its help, its flags and what it does.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/options/table.h"
+
+namespace telesplat::launcher {
+
+struct Command {
+  std::string name, help;
+  options::Table table;                           ///< its flags
+  std::function<int(const options::Given&)> run;  ///< exit code: 0 done, 1 failed or interrupted, 2 bad usage or input
+  bool takes_scene_file = false;                  ///< an argument that ends in .toml stands for the flags in that file
+  std::string footer;                             ///< at the end of --help
+  std::vector<Command> commands;                  ///< its sub-commands, instead of flags
+};
+
+/// A command whose flags fill an options struct of its own. table: as tables of options are; it points into the struct.
+template <class Options>
+Command make_command(const std::string& name, const std::string& help, Options defaults,
+                     options::Table (*table)(Options&), int (*run)(Options, const options::Given&)) {
+  auto o = std::make_shared<Options>(std::move(defaults));
+  Command out{.name = name, .help = help, .table = table(*o), .run = {}};
+  out.run = [o, run](const options::Given& given) { return run(*o, given); };
+  return out;
+}
+
+/// Each has its own file.
+Command run_command();
+Command view_command();
+Command control_command();
+Command inspect_command();
+Command compare_command();
+Command bench_command();
+Command presets_command();
+
+/// Runs the command that the arguments name; --help prints and ends the program, bad usage too, with code 2.
+int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments);
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,64 @@
+#include "tools/telesplat/run/live_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace telesplat::launcher {
+namespace {
+
+// The rate of at least these last seconds: frames that come in bursts look steady, a change shows soon.
+constexpr double kWindow_s = 4;
+// A viewer that reported nothing for this long displays nothing, as far as one knows.
+constexpr double kSilence_s = 3.5;
+
+}  // namespace
+
+double SessionFigures::Viewer::rate(double Report::*counter) const {
+  if (reports.size() < 2) return 0;
+  const double seconds = reports.back().at_s - reports.front().at_s;
+  return seconds > 0 ? (reports.back().*counter - reports.front().*counter) / seconds : 0;
+}
+
+void SessionFigures::take(Viewer& viewer, const nlohmann::json& values, double now_s) {
+  if (values == viewer.values) return;  // the report that was there before
+  viewer.values = values;
+  viewer.heard_s = now_s;
+  const Report report{values.value("reported_s", now_s), values.value("frames", 0.0), values.value("updates", 0.0),
+                      values.value("bytes_received", 0.0)};
+  auto& reports = viewer.reports;
+  if (!reports.empty() && (report.frames < reports.back().frames || report.at_s < reports.back().at_s)) reports.clear();
+  // Waiting for the first picture is no low frame rate.
+  if (reports.size() == 1 && reports.front().frames == 0) reports.clear();
+  reports.push_back(report);
+  while (reports.size() > 2 && reports[1].at_s <= report.at_s - kWindow_s) reports.pop_front();
+}
+
+std::string SessionFigures::update(const nlohmann::json& status, double now_s) {
+  double fps = 0, updates = 0, bytes = 0, points = 0;
+  int samplers = 0, viewers = 0, showing = 0;
+  for (const auto& p : status.value("processes", nlohmann::json::array())) {
+    const std::string role = p.value("role", "");
+    if (!p.value("alive", false)) continue;
+    samplers += role == "sampler";
+    viewers += role == "viewer";
+    if (role != "viewer" || !p.contains("values")) continue;
+    Viewer& viewer = viewers_[p.value("name", "") + fmt::format("/{}", p.value("pid", 0))];
+    take(viewer, p["values"], now_s);
+    points = std::max(points, p["values"].value("points", 0.0));
+    if (viewer.reports.size() < 2) continue;
+    ++showing;
+    if (now_s - viewer.heard_s > kSilence_s) continue;
+    fps += viewer.rate(&Report::frames);
+    updates += viewer.rate(&Report::updates);
+    bytes += viewer.rate(&Report::bytes);
+  }
+  if (showing == 0) return {};
+  std::string text = fmt::format("{:5.1f} fps  {:4.1f} updates/s  ", fps / showing, updates / showing);
+  if (points > 0) text += fmt::format("{:5.2f} M points  ", points / 1e6);
+  text += fmt::format("{:5.2f} MB/s  {} sampler{}", bytes / 1e6, samplers, samplers == 1 ? "" : "s");
+  if (viewers > 1) text += fmt::format(", each of {} viewers", viewers);
+  return text;
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,35 @@
+// The line of figures that a person sees while a run goes on.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace telesplat::launcher {
+
+/// Rates of the last seconds from the master's status answers. Processes report their counters once a second, and the launcher asks
+/// when it likes: so a rate is what a process counted between two of its own reports, divided by the time between those reports.
+class SessionFigures {
+ public:
+  /// Takes a status answer that came at now_s. Returns the line: frames and updates a second of a viewer (the mean of those that are
+  /// alive), points, bytes a second of all viewers; empty before there are two reports of a viewer that displayed something.
+  std::string update(const nlohmann::json& status, double now_s);
+
+ private:
+  struct Report {
+    double at_s = 0;  // on the reporter's clock if it tells, else when its counters were first seen
+    double frames = 0, updates = 0, bytes = 0;
+  };
+  struct Viewer {
+    nlohmann::json values;       // of the newest report
+    double heard_s = 0;          // when they were first seen here
+    std::deque<Report> reports;  // from the window's begin to the newest
+    double rate(double Report::*counter) const;
+  };
+  void take(Viewer& viewer, const nlohmann::json& values, double now_s);
+
+  std::map<std::string, Viewer> viewers_;  // by name and process id
+};
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,97 @@
+#include "tools/telesplat/run/process_group.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+#include <utility>
+
+#include "common/core/clock.h"
+#include "common/net/service.h"
+#include "tools/telesplat/control/client.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kViewersFarewell_s = 20, kFarewell_s = 4;
+constexpr std::string_view kListening = "listening on ";
+
+}  // namespace
+
+std::string program_directory() {
+  std::error_code error;
+  return fs::read_symlink("/proc/self/exe", error).parent_path().string();
+}
+
+Status ProcessGroup::start_master(std::vector<std::string> arguments, double patience_s) {
+  if (const Status s = start({.role = "master", .name = "master", .arguments = std::move(arguments)}); !s) return s;
+  auto& master = *members_.back().process;
+  for (const double until = monotonic_s() + patience_s; endpoint_.empty();) {
+    for (const auto& line : master.read_lines())
+      if (line.starts_with(kListening)) endpoint_ = line.substr(kListening.size());
+    if (net::stop_requested()) return Error{"interrupted"};
+    if (master.ended() || monotonic_s() > until)
+      return Error{fmt::format("the master did not start: {}", last_log_line("master"))};
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return ok_status();
+}
+
+Status ProcessGroup::start(Member member) {
+  std::error_code error;
+  fs::create_directories(log_directory_, error);
+  if (error) return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
+  member.arguments.insert(member.arguments.end(), {"--name", member.name, "--log-level", log_level_});
+  if (!endpoint_.empty()) member.arguments.insert(member.arguments.end(), {"--master", endpoint_});
+  members_.push_back(std::move(member));
+  return restart(members_.back());
+}
+
+Status ProcessGroup::restart(Member& member) {
+  auto child =
+      ChildProcess::start(member.name, fmt::format("{}/telesplat-{}", program_directory(), member.role),
+                          member.arguments, fmt::format("{}/{}.log", log_directory_, member.name), member.nice);
+  if (!child) return child.error();
+  member.process.reset();
+  member.process.emplace(std::move(*child));
+  return ok_status();
+}
+
+Member* ProcessGroup::find(const std::string& name) {
+  for (Member& m : members_)
+    if (m.name == name) return &m;
+  return nullptr;
+}
+
+std::string ProcessGroup::last_log_line(const std::string& name) const {
+  std::ifstream in(fmt::format("{}/{}.log", log_directory_, name));
+  std::string line, last;
+  while (std::getline(in, line))
+    if (!line.empty()) last = line;
+  return last.starts_with("telesplat: ") ? last.substr(11) : last;
+}
+
+void ProcessGroup::finish() {
+  const auto end = [&](auto&& which, double patience_s) {
+    for (Member& m : members_)
+      if (m.process && which(m)) m.process->signal(SIGTERM);
+    for (Member& m : members_)
+      if (m.process && which(m)) m.process->finish(patience_s);
+  };
+  end([](const Member& m) { return m.role == "viewer"; }, kViewersFarewell_s);
+  Member* master = find("master");
+  if (master && master->process && !master->process->ended() && !endpoint_.empty()) {
+    ControlClient control(endpoint_);
+    if (!control.ask("stop", 2)) master->process->signal(SIGTERM);
+    master->process->finish(kFarewell_s);
+  }
+  // Those whom the master could not tell, because it is dead or they had not said hello yet.
+  end([](const Member&) { return true; }, kFarewell_s);
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,61 @@
+// Processes of one session on this machine: started with what each must be told, ended together.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/telesplat/run/child_process.h"
+
+namespace telesplat::launcher {
+
+/// Folder of the program that runs: the others lie beside it.
+std::string program_directory();
+
+/// A service program of this project, and how it is started.
+struct Member {
+  std::string role;  ///< "master", "data", "packer", "sampler", "viewer": the program is telesplat-ROLE
+  std::string name;
+  std::vector<std::string> arguments;  ///< beside name, log level and the master's address
+  int nice = 0;
+  int restarts = 0;
+  std::optional<ChildProcess> process;
+};
+
+class ProcessGroup {
+ public:
+  /// stderr of each process goes to LOG_DIRECTORY/NAME.log; the folder is made when the first process starts.
+  ProcessGroup(const std::string& log_directory, const std::string& log_level)
+      : log_directory_(log_directory), log_level_(log_level) {}
+
+  /// Starts a master of the group's own and waits until it listens. Error: it ended, said nothing for `patience_s`, or Ctrl-C came.
+  Status start_master(std::vector<std::string> arguments, double patience_s);
+  /// Instead of start_master(): the session of another master.
+  void join(const std::string& endpoint) { endpoint_ = endpoint; }
+  /// Where the master listens.
+  const std::string& endpoint() const { return endpoint_; }
+
+  /// Starts a process that is told where the master is.
+  Status start(Member member);
+  /// Starts a member that died once more.
+  Status restart(Member& member);
+
+  /// In the order of their start; addresses hold.
+  std::deque<Member>& members() { return members_; }
+  Member* find(const std::string& name);
+
+  /// The last line that a process logged, without the program's name.
+  std::string last_log_line(const std::string& name) const;
+  const std::string& log_directory() const { return log_directory_; }
+
+  /// Ends everything: viewers first, so that their last measurements arrive, then a "stop" to the group's own master, then all others.
+  void finish();
+
+ private:
+  std::string log_directory_, log_level_, endpoint_;
+  std::deque<Member> members_;
+};
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,203 @@
+#include "tools/telesplat/run/run_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "common/geometry/trajectory.h"
+#include "tools/telesplat/run/wall.h"
+
+namespace telesplat::launcher {
+namespace {
+
+using options::Range;
+using options::Table;
+
+// The tiles of a wall are compared where the head stands still.
+constexpr double kWallHold_s = 2;
+
+constexpr const char* kSceneHelp =
+    "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), volume (NRRD, MetaImage, NIfTI, VTI, raw, a folder of DICOM "
+    "slices or of a numbered series), the word julia, or a scene file (TOML)";
+
+// Either `run`'s or `view`'s.
+Table display_rows(RunOptions& o) {
+  if (o.viewer.window)
+    return {{.flag = "--out", .value = &o.out, .help = "run folder; without it nothing is recorded"},
+            {.flag = "--fullscreen", .value = &o.viewer.fullscreen, .help = "the window fills the screen"}};
+  return {
+      {.flag = "--out", .value = &o.out, .help = "run folder; default: runs/DATE-TIME"},
+      {.flag = "--viewers",
+       .value = &o.viewers,
+       .help = "viewers, each of which follows the trajectory; the first one is verified",
+       .limits = Range{1, kMaxViewers}},
+      {.flag = "--wall",
+       .value = &o.viewer.wall,
+       .help = "COLUMNSxROWS: a display wall of one viewer a tile, each with --size pixels of one picture of --fov; "
+               "its picture at the end becomes images/wall.png"}};
+}
+
+Table own_rows(RunOptions& o) {
+  const auto points = scene::Kinds::of(scene::Pipeline::kPoints);
+  return {{.flag = "scene", .value = &o.data.scene, .help = kSceneHelp},
+          {.flag = "--samplers", .value = &o.samplers, .help = "sampler processes", .limits = Range{1, 64}},
+          {.flag = "--sampler-threads",
+           .value = &o.sampler.threads,
+           .help = "threads of each sampler; 0: the cores shared among them",
+           .limits = Range{0, 1024}},
+          {.flag = "--data-servers",
+           .value = &o.data_servers,
+           .help = "processes that each serve a part of a volume",
+           .limits = Range{1, 16},
+           .fits = {scene::Kind::kVolume}},
+          {.flag = "--master",
+           .value = &o.join_master,
+           .help = "join the running session at this address instead of starting one"},
+          {.flag = "!--same-priority",
+           .value = &o.background_servers,
+           .help = "run samplers, packer and data at the viewer's priority"},
+          {.flag = "--record-depth",
+           .value = &o.record_depth,
+           .help = "keep the first 50 sampled depth images (telesplat inspect reads them)",
+           .fits = points},
+          {.flag = "--log-level",
+           .value = &o.log_level,
+           .help = "trace, debug, info, warn, error or off",
+           .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}}};
+}
+
+// --sampler alone: threads and memory of samplers are the launcher's business.
+Table sampler_rows(RunOptions& o) {
+  const Table all = sampler::table(o.sampler);
+  return {*options::find(all, "--sampler")};
+}
+
+// What only some scenes have means nothing where no scene is named.
+Status refuse_scene_flags(RunOptions& o, const options::Given& given) {
+  const Table of_scenes = data::scene_table(o.data);
+  for (const auto& flag : given)
+    if (const auto* row = options::find(of_scenes, flag); row && row->fits != scene::Kinds::all())
+      return Error{
+          fmt::format("{} is given, but no scene; that of a running session is changed with telesplat ctl set, ctl "
+                      "animate and ctl tf",
+                      flag)};
+  return ok_status();
+}
+
+Status settle_wall(RunOptions& o, const options::Given& given) {
+  if (o.viewer.wall.empty()) return ok_status();
+  const auto wall = viewer::parse_wall(o.viewer.wall, kMaxViewers);
+  if (!wall) return wall.error();
+  const auto is_given = [&](const char* flag) { return std::find(given.begin(), given.end(), flag) != given.end(); };
+  if (!is_given("--viewers")) o.viewers = wall->tiles();
+  if (!is_given("--hold")) o.viewer.display.hold_s = kWallHold_s;
+  if (o.viewers == wall->tiles()) return ok_status();
+  return Error{fmt::format("--viewers {}: a wall of {} has {}", o.viewers, o.viewer.wall, wall->tiles())};
+}
+
+// The first of these needs a folder.
+Status refuse_records_without_folder(const RunOptions& o) {
+  const auto& d = o.viewer.display;
+  for (const auto& [asked, flag] : {std::pair{d.verify_every > 0, "--verify"},
+                                    {d.picture_every > 0, "--record-every"},
+                                    {d.exr, "--exr"},
+                                    {o.record_depth, "--record-depth"}})
+    if (asked && o.out.empty())
+      return Error{fmt::format("{} needs --out: nothing is recorded without a run folder", flag)};
+  return ok_status();
+}
+
+Status check_viewer(viewer::ViewerOptions v) {
+  if (const Status s = viewer::settle(v); !s) return s;
+  if (v.trajectory == "orbit" || v.trajectory == "still") return ok_status();
+  const auto read = geometry::Trajectory::read_csv(v.trajectory);
+  return read ? ok_status() : Status(read.error());
+}
+
+// As a program of these options is to be told, where `defaults` is what it does anyway.
+template <class Options>
+std::vector<std::string> arguments(Options o) {
+  Options defaults;
+  return options::arguments(table(o), table(defaults));
+}
+
+}  // namespace
+
+RunOptions view_defaults() {
+  RunOptions o;
+  o.viewer.window = true;
+  o.viewer.trajectory = "still";
+  o.viewer.display.duration_s = 0;
+  return o;
+}
+
+Table table(RunOptions& o) {
+  const Table launcher = joined(joined(own_rows(o), display_rows(o)), sampler_rows(o));
+  const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
+  return joined(joined(launcher, services), master::session_table(o.master));
+}
+
+Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given) {
+  std::shared_ptr<Scene> out;
+  if (o.data.scene.empty()) {
+    if (o.join_master.empty())
+      return Error{"a scene is needed: a mesh or volume file, a folder of DICOM slices, or the word julia"};
+    if (const Status s = refuse_scene_flags(o, given); !s) return s.error();
+  } else {
+    auto scene = scene_of(o.data);
+    if (!scene) return scene.error();
+    if (const Status s = options::refuse_misfits(table(o), given, (*scene)->kind(), o.data.scene); !s) return s.error();
+    out = std::move(*scene);
+    if (o.join_master.empty())
+      if (const Status s = out->check(); !s) return s.error();
+  }
+  if (const Status s = settle_wall(o, given); !s) return s.error();
+  if (const Status s = refuse_records_without_folder(o); !s) return s.error();
+  if (const Status s = check_viewer(o.viewer); !s) return s.error();
+  return out;
+}
+
+std::vector<std::string> master_arguments(const RunOptions& o) {
+  auto out = arguments(o.master);
+  out.insert(out.end(), {"--bind", "tcp://127.0.0.1:*"});
+  if (!o.out.empty()) out.insert(out.end(), {"--out", o.out});
+  return out;
+}
+
+std::vector<std::string> data_arguments(const RunOptions& o, int part) {
+  data::DataServiceOptions d = o.data;
+  if (o.data_servers > 1) d.volume.part = fmt::format("{}/{}", part, o.data_servers);
+  auto out = arguments(d);
+  out.push_back("--report-progress");
+  return out;
+}
+
+std::vector<std::string> packer_arguments(const RunOptions& o) {
+  packer::PackerOptions p = o.packer;
+  if (o.record_depth) p.record_depth = o.out + "/depth";
+  return arguments(p);
+}
+
+std::vector<std::string> sampler_arguments(const RunOptions& o) {
+  const int cores = int(std::max(1u, std::thread::hardware_concurrency()));
+  sampler::SamplerOptions s = o.sampler;
+  if (s.threads == 0) s.threads = std::max(1, cores / o.samplers);
+  return arguments(s);
+}
+
+std::vector<std::string> viewer_arguments(const RunOptions& o, int number, double clock_from_s) {
+  viewer::ViewerOptions v = o.viewer;
+  if (number != 1) v.display.verify_every = 0;
+  if (!o.out.empty()) v.out = viewer_directory(o.out, number);
+  if (!v.wall.empty()) v.wall_tile = number - 1;
+  v.display.clock_from_s = clock_from_s;
+  return arguments(v);
+}
+
+std::string display_table(const RunOptions& o) {
+  viewer::ViewerOptions v = o.viewer;
+  return "\n[display]\n" + options::recorded(viewer::view_table(v), {});
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,211 @@
+#include "tools/telesplat/scene/julia_scene.h"
+
+#include <fmt/format.h>
+
+#include <toml++/toml.h>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "services/sampler/julia/sampler.h"
+#include "tools/common/csv_table.h"
+
+namespace telesplat::launcher {
+namespace {
+
+constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = 1 << 14};
+
+class DirectJulia : public DirectScene {
+ public:
+  DirectJulia(JuliaScene::Record julia, int threads) : julia_(std::move(julia)), threads_(threads), sampler_(threads) {}
+
+  Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading,
+                           EpochId epoch) override {
+    const auto scene = at(epoch);
+    if (!scene) return scene.error();
+    return sampler::render_julia_directly(*scene, camera, image::Shading(shading, camera), threads_);
+  }
+  Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) override {
+    const auto scene = at(epoch);
+    if (!scene) return scene.error();
+    return sampler_.sample(*scene, camera, {0, 0, camera.width, camera.height}, 1);
+  }
+  geometry::Box box_room() const override { return julia_.placement.box_room; }
+  std::string size() const override { return fmt::format("{} iterations", julia_.begin.iterations); }
+
+ private:
+  Result<sampler::JuliaScene> at(EpochId epoch) const {
+    const auto parameters = julia_.at(epoch);
+    if (!parameters) return parameters.error();
+    return sampler::JuliaScene(*parameters, julia_.placement);
+  }
+
+  JuliaScene::Record julia_;
+  int threads_;
+  sampler::JuliaSampler sampler_;
+};
+
+std::map<std::string, double> numbers_of(const toml::node_view<toml::node>& table) {
+  std::map<std::string, double> out;
+  if (const auto* t = table.as_table())
+    for (const auto& [key, node] : *t)
+      if (const auto value = node.value<double>()) out[std::string(key.str())] = *value;
+  return out;
+}
+
+Result<glm::vec3> corner(const std::string& path, toml::table& table, const char* key) {
+  const auto* array = table["placement"][key].as_array();
+  glm::vec3 out(NAN);
+  if (array && array->size() == 3)
+    for (int i = 0; i < 3; ++i) out[i] = float(array->get(size_t(i))->value<double>().value_or(NAN));
+  if (!std::isfinite(out.x + out.y + out.z))
+    return Error{fmt::format("{}: key {} of [placement] is not three numbers", path, key)};
+  return out;
+}
+
+Status read_session(const std::string& path, JuliaScene::Record& out) {
+  try {
+    toml::table table = toml::parse_file(path);
+    out.title = table["scene"]["title"].value_or(std::string(julia::kSceneWord));
+    auto begin = julia::from_map(numbers_of(table["julia"]));
+    if (begin)
+      if (const Status s = julia::validate(*begin); !s) begin = s.error();
+    if (!begin) return Error{fmt::format("{}: {}", path, begin.error().text)};
+    out.begin = *begin;
+    const auto lo = corner(path, table, "lo"), hi = corner(path, table, "hi");
+    if (!lo) return lo.error();
+    if (!hi) return hi.error();
+    const auto placement = julia::placement_from_map(numbers_of(table["placement"]), {*lo, *hi});
+    if (!placement) return Error{fmt::format("{}: {}", path, placement.error().text)};
+    if (placement->box_room.empty())
+      return Error{fmt::format("{}: the box of [placement] is empty: lo is not below hi", path)};
+    out.placement = *placement;
+  } catch (const toml::parse_error& e) {
+    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
+  }
+  return ok_status();
+}
+
+Status read_epochs(const std::string& path, JuliaScene::Record& out) {
+  const auto table = tools::CsvTable::read(path, kEpochs);
+  if (!table) return table.error();
+  const auto epoch = table->column("epoch");
+  if (!epoch) return epoch.error();
+  for (size_t row = 0; row < table->rows(); ++row) {
+    const auto id = table->count(row, *epoch);
+    if (!id) return id.error();
+    std::map<std::string, double> values;
+    for (size_t i = 0; i < table->header().size(); ++i) {
+      const auto value = table->number(row, i);
+      if (!value) return value.error();
+      values[table->header()[i]] = *value;
+    }
+    const auto parameters = julia::from_map(values);
+    if (!parameters) return table->wrong(row, parameters.error().text);
+    out.epochs[*id] = *parameters;
+  }
+  return ok_status();
+}
+
+std::string list_of(const glm::vec3& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
+
+std::string lines_of(const julia::Parameters& parameters) {
+  std::string out;
+  for (const auto& info : julia::parameter_infos())
+    out += fmt::format("  {:<14} {:<12g} {}\n", info.name, julia::get(parameters, info.name), info.text);
+  return out;
+}
+
+}  // namespace
+
+Result<julia::Parameters> JuliaScene::Record::at(EpochId epoch) const {
+  if (epochs.empty()) return begin;
+  const auto found = epochs.find(epoch.value);
+  if (found != epochs.end()) return found->second;
+  return Error{fmt::format("{}/epochs.csv: has no epoch {}; it holds {} to {}", directory, epoch.value,
+                           epochs.begin()->first, epochs.rbegin()->first)};
+}
+
+Result<JuliaScene::Record> JuliaScene::record() const {
+  if (record_) return *record_;
+  const auto scene = julia::read_scene(options_.julia);
+  if (!scene) return scene.error();
+  const auto placement = julia::place(*scene, options_.mesh.room_size_m);
+  if (!placement) return placement.error();
+  return Record{{}, scene->title, scene->parameters, *placement, {}};
+}
+
+std::string JuliaScene::name() const {
+  if (record_) return record_->title;
+  const auto scene = julia::read_scene(options_.julia);
+  return scene ? scene->title : std::string(julia::kSceneWord);
+}
+
+Status JuliaScene::check() const {
+  if (record_) return ok_status();
+  const auto scene = julia::read_scene(options_.julia);
+  return scene ? ok_status() : Status(scene.error());
+}
+
+Result<std::string> JuliaScene::session_tables() const {
+  const auto scene = julia::read_scene(options_.julia);
+  if (!scene) return scene.error();
+  const auto placement = julia::place(*scene, options_.mesh.room_size_m);
+  if (!placement) return placement.error();
+  std::string out = fmt::format("\n[scene]\nkind = \"{}\"\ntitle = {}\nroom_size = {}\n", scene::name_of(kind()),
+                                options::quoted(scene->title), options_.mesh.room_size_m);
+  if (!scene->timeline.empty()) out += fmt::format("animate = {}\n", options::quoted(scene->timeline.text()));
+  out += "\n[julia]\n";
+  for (const auto& [name, value] : julia::to_map(scene->parameters)) out += fmt::format("\"{}\" = {}\n", name, value);
+  out += "\n[placement]\n";
+  for (const auto& [name, value] : julia::to_map(*placement)) out += fmt::format("\"{}\" = {}\n", name, value);
+  return out + fmt::format("lo = {}\nhi = {}\n", list_of(placement->box_room.lo), list_of(placement->box_room.hi));
+}
+
+Status JuliaScene::read_record(const std::string& run_directory) {
+  Record out;
+  out.directory = run_directory;
+  if (const Status s = read_session(run_directory + "/session.toml", out); !s) return s;
+  std::error_code error;
+  if (const std::string path = run_directory + "/epochs.csv"; std::filesystem::exists(path, error))
+    if (const Status s = read_epochs(path, out); !s) return s;
+  record_ = std::move(out);
+  return ok_status();
+}
+
+Status JuliaScene::move_to(const std::string& file) {
+  return Error{fmt::format("--scene {}: {} is a Julia set, which has no data file", file, name())};
+}
+
+Result<std::unique_ptr<DirectScene>> JuliaScene::open_direct(int threads, const data::Progress&) const {
+  auto julia = record();
+  if (!julia) return julia.error();
+  return std::unique_ptr<DirectScene>(std::make_unique<DirectJulia>(std::move(*julia), threads));
+}
+
+std::string JuliaScene::summary(uint64_t) const {
+  const auto julia = record();
+  if (!julia) return {};
+  const auto& c = julia->begin.c;
+  return fmt::format(": c = ({:.4g}, {:.4g}, {:.4g}, {:.4g}), {} epoch(s)", c.x, c.y, c.z, c.w,
+                     std::max<size_t>(1, julia->epochs.size()));
+}
+
+std::string JuliaScene::describe_record() const {
+  const auto julia = record();
+  if (!julia) return {};
+  const std::string& animate = options_.julia.animate;
+  std::string out =
+      fmt::format("{}, {}\n", julia->title, animate.empty() ? "not animated when it began" : "animated: " + animate);
+  out += lines_of(julia->begin);
+  if (!julia->epochs.empty()) out += fmt::format("  {} epochs (epochs.csv)\n", julia->epochs.size());
+  return out;
+}
+
+Result<std::string> JuliaScene::describe_data() const {
+  const auto scene = julia::read_scene(options_.julia);
+  if (!scene) return scene.error();
+  return fmt::format("{}\n{}", scene->title, lines_of(scene->parameters));
+}
+
+}  // namespace telesplat::launcher

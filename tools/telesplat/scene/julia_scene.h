@@ -1,0 +1,42 @@
+// A Julia set: parameters instead of a data file, and in each epoch others.
+#pragma once
+
+#include <map>
+
+#include "tools/telesplat/scene/scene.h"
+
+namespace telesplat::launcher {
+
+class JuliaScene : public Scene {
+ public:
+  using Scene::Scene;
+  scene::Kind kind() const override { return scene::Kind::kJulia; }
+  std::string name() const override;
+  Status check() const override;
+  /// [scene], [julia] with the parameters it begins with, [placement].
+  Result<std::string> session_tables() const override;
+  /// Reads what session_tables() wrote, and epochs.csv (epoch, t_s, a column for each parameter) if there is one.
+  Status read_record(const std::string& run_directory) override;
+  Status move_to(const std::string& file) override;
+  Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const override;
+  std::string summary(uint64_t primitives) const override;
+  std::string describe_record() const override;
+  Result<std::string> describe_data() const override;
+
+  struct Record {
+    std::string directory, title;
+    julia::Parameters begin;
+    julia::Placement placement;
+    std::map<uint64_t, julia::Parameters>
+        epochs;  ///< by EpochId; empty if the run has no epochs.csv, it showed one set only
+    /// Error: epochs.csv has no such epoch.
+    Result<julia::Parameters> at(EpochId epoch) const;
+  };
+
+ private:
+  /// As recorded; before a run as the flags have it.
+  Result<Record> record() const;
+  std::optional<Record> record_;
+};
+
+}  // namespace telesplat::launcher

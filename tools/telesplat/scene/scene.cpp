@@ -1,0 +1,117 @@
+#include "tools/telesplat/scene/scene.h"
+
+#include <fmt/format.h>
+
+#include <toml++/toml.h>
+#include <algorithm>
+#include <filesystem>
+
+#include "services/data/kinds.h"
+#include "tools/telesplat/scene/julia_keys.h"
+#include "tools/telesplat/scene/julia_scene.h"
+#include "tools/telesplat/scene/mesh_scene.h"
+#include "tools/telesplat/scene/volume_scene.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <class Kind>
+std::unique_ptr<Scene> make(data::DataOptions options) {
+  return std::make_unique<Kind>(std::move(options));
+}
+
+const SceneKind& row_of(scene::Kind kind) {
+  return *std::find_if(scene_kinds().begin(), scene_kinds().end(), [&](const auto& row) { return row.kind == kind; });
+}
+
+std::string text_of(const toml::node& node) {
+  if (const auto* text = node.as_string()) return **text;
+  if (const auto* on = node.as_boolean()) return **on ? "true" : "false";
+  return fmt::format("{}", node.value_or(0.0));
+}
+
+// Keys of [scene] that are recorded flags of a data set. Others (kind, file, title) are not its own.
+Status read_options(const std::string& path, const toml::table& scene, data::DataOptions& o) {
+  const options::Table table = data::scene_table(o);
+  for (const auto& [key, node] : scene) {
+    const auto row =
+        std::find_if(table.begin(), table.end(), [&](const auto& r) { return options::key_of(r) == key.str(); });
+    if (row == table.end() || !node.is_value()) continue;
+    if (const Status s = options::set(*row, text_of(node)); !s)
+      return Error{
+          fmt::format("{}:{}: key {} of [scene]: {}", path, node.source().begin.line, key.str(), s.error().text)};
+  }
+  o.scene = scene["file"].value_or(std::string());
+  return ok_status();
+}
+
+}  // namespace
+
+const std::vector<SceneKind>& scene_kinds() {
+  static const std::vector<SceneKind> rows{
+      {scene::Kind::kMesh, make<MeshScene>, nullptr},
+      {scene::Kind::kJulia, make<JuliaScene>, make_julia_keys},
+      {scene::Kind::kVolume, make<VolumeScene>, nullptr},
+  };
+  return rows;
+}
+
+std::string Scene::name() const { return fs::path(options_.scene).filename().string(); }
+
+Status Scene::check() const {
+  std::error_code error;
+  if (!fs::exists(options_.scene, error)) return Error{fmt::format("{}: the data file is not there", options_.scene)};
+  return ok_status();
+}
+
+Result<std::string> Scene::session_tables() const {
+  data::DataOptions given = options_, usual;
+  std::error_code error;
+  const std::string file = fs::absolute(given.scene, error).string();
+  // Where it stood is told even if it stood as usual: what is usual may change.
+  const auto defaults = options::without(data::scene_table(usual), {"--room-size", "--up"});
+  return fmt::format("\n[scene]\nkind = {}\nfile = {}\n{}", options::quoted(std::string(scene::name_of(kind()))),
+                     options::quoted(file), options::recorded(data::scene_table(given), defaults));
+}
+
+Status Scene::read_record(const std::string&) { return ok_status(); }
+
+Status Scene::move_to(const std::string& file) {
+  options_.scene = file;
+  return ok_status();
+}
+
+void Scene::use_cache_of(const data::DataOptions& options) {
+  if (!options.mesh.cache_dir.empty()) options_.mesh.cache_dir = options.mesh.cache_dir;
+  if (!options.mesh.use_cache) options_.mesh.use_cache = false;
+}
+
+Result<std::unique_ptr<Scene>> scene_of(const data::DataOptions& options) {
+  const auto kind = data::kind_of(options);
+  if (!kind) return kind.error();
+  return row_of(*kind).make(options);
+}
+
+Result<std::unique_ptr<Scene>> recorded_scene(const std::string& run_directory) {
+  const std::string path = run_directory + "/session.toml";
+  try {
+    const toml::table session = toml::parse_file(path);
+    const toml::table nothing;
+    const auto* table = session["scene"].as_table();
+    // Runs of meshes did not tell their kind once.
+    const std::string name = session["scene"]["kind"].value_or(std::string("mesh"));
+    const auto kind = scene::kind_named(name);
+    if (!kind) return Error{fmt::format("{}: kind of [scene] is \"{}\", which is unknown", path, name.substr(0, 40))};
+    data::DataOptions options;
+    if (const Status s = read_options(path, table ? *table : nothing, options); !s) return s.error();
+    auto scene = row_of(*kind).make(std::move(options));
+    if (const Status s = scene->read_record(run_directory); !s) return s.error();
+    return scene;
+  } catch (const toml::parse_error& e) {
+    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
+  }
+}
+
+}  // namespace telesplat::launcher

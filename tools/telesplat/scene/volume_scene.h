@@ -1,0 +1,37 @@
+// A volume, its transfer function and the time step it stands at; an epoch has others of both.
+#pragma once
+
+#include <map>
+
+#include "tools/telesplat/scene/scene.h"
+
+namespace telesplat::launcher {
+
+class VolumeScene : public Scene {
+ public:
+  using Scene::Scene;
+  scene::Kind kind() const override { return scene::Kind::kVolume; }
+  Status check() const override;
+  /// Reads epochs.csv (epoch, ..., volume.step, "transfer") if there is one.
+  Status read_record(const std::string& run_directory) override;
+  Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const override;
+  std::string summary(uint64_t primitives) const override;
+  Result<std::string> describe_data() const override;
+
+  struct Epoch {
+    std::string transfer;  ///< text form, absolute values; empty: as the data server begins
+    int step = 0;
+  };
+  struct Epochs {
+    std::string directory;
+    std::map<uint64_t, Epoch> by_id;  ///< empty if the run has no epochs.csv: it showed one
+    /// Error: epochs.csv has no such epoch.
+    Result<Epoch> at(EpochId epoch) const;
+  };
+  const Epochs& epochs() const { return epochs_; }
+
+ private:
+  Epochs epochs_;
+};
+
+}  // namespace telesplat::launcher
