@@ -32,15 +32,15 @@ class Canvas {
   View view_;
 };
 
-/// A smaller picture of `width` x `height` pixels: each the mean of the area that it covers, on sRGB codes. Without depth.
-/// Preconditions: 1 <= width <= picture.width, the same for the height.
+/// A smaller picture of `width` x `height` pixels: each the mean of the area that it covers, on sRGB codes. Without
+/// depth. Preconditions: 1 <= width <= picture.width, the same for the height.
 View shrink(const View& picture, int width, int height);
 
 /// A part of a picture, each pixel a square of `factor` pixels. Precondition: the part lies inside the picture.
 View magnify(const View& picture, const geometry::Rect& part, int factor);
 
-/// The square of `side` pixels with the largest sum of `errors` (row-major, width x height); of equals, the first. A shorter side
-/// where the picture is smaller. For finding where two pictures differ most.
+/// The square of `side` pixels with the largest sum of `errors` (row-major, width x height); of equals, the first. A
+/// shorter side where the picture is smaller. For finding where two pictures differ most.
 geometry::Rect worst_square(const std::vector<float>& errors, int width, int height, int side);
 
 }  // namespace telesplat::image

@@ -14,8 +14,8 @@ inline constexpr uint32_t kMaxDepthCode = (1u << 24) - 1;
 inline constexpr int kRawBytesPerPixel = 8;
 
 /// Planes of width x height pixels, row-major from the upper left, no padding.
-/// Canonical form, which every producer keeps and the codec relies on: depth 0 means nothing there, and colour and normal
-/// are 0 too in such a pixel. "Coverage" is depth != 0.
+/// Canonical form, which every producer keeps and the codec relies on: depth 0 means nothing there, and colour and
+/// normal are 0 too in such a pixel. "Coverage" is depth != 0.
 struct DepthImage {
   int width = 0, height = 0;
   std::vector<uint32_t> depth;   ///< 24-bit reciprocal depth code, 1..kMaxDepthCode, larger is nearer; 0 = nothing
@@ -28,8 +28,8 @@ struct DepthImage {
   bool operator==(const DepthImage&) const = default;
 };
 
-/// Code of a depth: round((near / depth) * (2^24 - 1)), clamped to 1..2^24-1. Reciprocal depth is linear in screen space, so
-/// planes are predicted exactly. Precondition: depth_m > 0.
+/// Code of a depth: round((near / depth) * (2^24 - 1)), clamped to 1..2^24-1. Reciprocal depth is linear in screen
+/// space, so planes are predicted exactly. Precondition: depth_m > 0.
 inline uint32_t encode_depth(double depth_m, double near_m) {
   const double code = std::floor(near_m / depth_m * kMaxDepthCode + 0.5);
   return static_cast<uint32_t>(std::clamp(code, 1.0, static_cast<double>(kMaxDepthCode)));

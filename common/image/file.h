@@ -10,8 +10,8 @@
 
 namespace telesplat::image {
 
-/// A displayed frame. colour: 0x00RRGGBB row-major from the upper left; depth_m: metres along the view axis, +infinity where
-/// nothing is, empty if the frame has no depth.
+/// A displayed frame. colour: 0x00RRGGBB row-major from the upper left; depth_m: metres along the view axis, +infinity
+/// where nothing is, empty if the frame has no depth.
 struct View {
   int width = 0, height = 0;
   std::vector<uint32_t> colour;

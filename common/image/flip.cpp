@@ -4,8 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+
+#include "common/image/srgb.h"
 
 namespace telesplat::image {
 namespace {
@@ -54,21 +57,9 @@ Colour times(const Matrix& m, const Colour& c) {
           m[2][0] * c.x + m[2][1] * c.y + m[2][2] * c.z};
 }
 
-const std::array<float, 256>& linear_of_code() {
-  static const std::array<float, 256> table = [] {
-    std::array<float, 256> t{};
-    for (int i = 0; i < 256; ++i) {
-      const double c = i / 255.0;
-      t[i] = static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
-    }
-    return t;
-  }();
-  return table;
-}
-
 // Opponent space: Yy = 116 Y - 16, Cx = 500 (X - Y), Cz = 200 (Y - Z).
 Colour opponent(uint32_t code) {
-  const auto& linear = linear_of_code();
+  const auto& linear = linear_of_srgb();
   const Colour xyz = times(kToXyz, {linear[code >> 16 & 255], linear[code >> 8 & 255], linear[code & 255]});
   return {116 * xyz.y - 16, 500 * (xyz.x - xyz.y), 200 * (xyz.y - xyz.z)};
 }
@@ -99,7 +90,8 @@ float hyab(const Colour& a, const Colour& b) {
 // A filter's taps from -radius to radius along one axis.
 using Taps = std::vector<float>;
 
-// Gaussians of the CSFs are separable: a channel is a sum of `terms` separable filters. Normalised over the square window.
+// Gaussians of the CSFs are separable: a channel is a sum of `terms` separable filters. Normalised over the square
+// window.
 std::vector<Taps> sensitivity_filters(const Sensitivity& s, int radius, double pixels_per_degree) {
   const auto axis = [&](double b) {
     std::vector<double> t(2 * radius + 1);

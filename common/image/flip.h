@@ -1,6 +1,6 @@
 // Perceived difference of two pictures that alternate on a display: the LDR-FLIP error map.
-// This work is based on: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for
-// Alternating Images", Proc. ACM Comput. Graph. Interact. Tech. (HPG) 3(2), 2020. Written from the paper.
+// This work is based on: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference
+// Evaluator for Alternating Images", Proc. ACM Comput. Graph. Interact. Tech. (HPG) 3(2), 2020. Written from the paper.
 #pragma once
 
 #include <array>
@@ -17,12 +17,13 @@ inline constexpr double kFlipPixelsPerDegree = 67.02;
 /// Compares pictures with one reference; what depends on the reference alone is computed once.
 ///
 /// Per pixel, with colours as sRGB codes (file.h):
-///   colour: linear RGB -> YyCxCz; each channel filtered with its contrast sensitivity function (sums of Gaussians in degrees,
-///     sampled at pixels_per_degree, to 3 standard deviations of the widest); back to linear RGB, clamped to [0, 1];
-///     -> L*a*b* with Hunt's adjustment (a, b times L / 100);
-///     h = |dL| + sqrt(da^2 + db^2) (HyAB), raised to 0.7 and compressed so that 0.4 of the largest (green against blue) becomes
-///     0.95: dE_c in [0, 1];
-///   features: first (edges) and second (points) derivatives of a Gaussian of 0.082 degrees' width on luminance, (Yy + 16) / 116;
+///   colour: linear RGB -> YyCxCz; each channel filtered with its contrast sensitivity function (sums of Gaussians
+///     in degrees, sampled at pixels_per_degree, to 3 standard deviations of the widest); back to linear RGB, clamped to
+///     [0, 1]; -> L*a*b* with Hunt's adjustment (a, b times L / 100);
+///     h = |dL| + sqrt(da^2 + db^2) (HyAB), raised to 0.7 and compressed so that 0.4 of the largest (green against
+///     blue) becomes 0.95: dE_c in [0, 1];
+///   features: first (edges) and second (points) derivatives of a Gaussian of 0.082 degrees' width on luminance,
+///     (Yy + 16) / 116;
 ///     dE_f = sqrt(max(|difference of edge magnitudes|, |difference of point magnitudes|) / sqrt 2), in [0, 1];
 ///   FLIP = dE_c ^ (1 - dE_f).
 /// At borders the nearest pixel is repeated. The map does not depend on how many threads compute it.
@@ -41,8 +42,9 @@ class Flip {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Colour of an error 0..1 in pictures of error maps, 0x00RRGGBB: black - purple - orange - light yellow, rising in lightness (after
-/// the "magma" map of Matplotlib: nine of its colours, interpolated linearly). Values outside are clamped.
+/// Colour of an error 0..1 in pictures of error maps, 0x00RRGGBB: black - purple - orange - light yellow, rising in
+/// lightness (after the "magma" map of Matplotlib: nine of its colours, interpolated linearly). Values outside are
+/// clamped.
 uint32_t magma(float error);
 
 /// The map as a picture.

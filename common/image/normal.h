@@ -36,7 +36,8 @@ inline uint32_t quantise(float v, uint32_t levels) {  // [-1, 1] -> 0..levels
 
 }  // namespace detail
 
-/// Two 8-bit coordinates, x in the low byte. Largest error about 1 degree. n need not be normalised; (0,0,0) becomes +z.
+/// Two 8-bit coordinates, x in the low byte. Largest error about 1 degree. n need not be normalised; (0,0,0) becomes
+/// +z.
 inline uint16_t encode_normal16(const glm::vec3& n) {
   float x = 0, y = 0;
   if (glm::dot(n, n) > 0) detail::to_octahedron(n, x, y);
@@ -47,8 +48,8 @@ inline glm::vec3 decode_normal16(uint16_t code) {
   return detail::from_octahedron(std::min(at(code & 255), 1.0f), std::min(at(code >> 8), 1.0f));
 }
 
-/// A vector along decode_normal16(code), not normalised and free of rounding: its components are integers in [-127, 127]. For
-/// tests that need a direction's side only.
+/// A vector along decode_normal16(code), not normalised and free of rounding: its components are integers in [-127,
+/// 127]. For tests that need a direction's side only.
 inline glm::vec3 octahedral16(uint16_t code) {
   const int x = std::min(code & 255, 254) - 127, y = std::min(code >> 8, 254) - 127;
   const int z = 127 - std::abs(x) - std::abs(y), fold = std::max(-z, 0);

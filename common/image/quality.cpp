@@ -35,7 +35,8 @@ std::array<float, 2 * kRadius + 1> gaussian() {
   return w;
 }
 
-// 1 / (sum of the weights that fall inside [0, size)): windows are cut at the image's edges and normalised to what is left.
+// 1 / (sum of the weights that fall inside [0, size)): windows are cut at the image's edges and normalised to what is
+// left.
 std::vector<float> window_scales(int size, const std::array<float, 2 * kRadius + 1>& w) {
   std::vector<float> scales(size);
   for (int i = 0; i < size; ++i) {
@@ -156,7 +157,7 @@ Quality compare(const View& reference, const View& reconstruction) {
     }
     return sums;
   };
-  // Deterministic: the same views give the same figures whatever the threads do.
+  // Deterministic: the same views give the same figures for any number of threads.
   const Sums sums = tbb::parallel_deterministic_reduce(tbb::blocked_range<int>(0, height, 32), Sums{}, rows,
                                                        [](const Sums& a, const Sums& b) { return a + b; });
 

@@ -1,4 +1,4 @@
-// How good a reconstructed view is, against direct rendering of the data (DESIGN section 6, "quality").
+// How good a reconstructed view is, against direct rendering of the data (docs/quality.md).
 #pragma once
 
 #include "common/image/file.h"

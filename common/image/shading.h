@@ -1,6 +1,7 @@
 // Shading, the same for splatted points, direct rendering and verification: intensity from the normal, times albedo.
 //   I(n) = ambient + head * |n . h| + key * max(0, n . k)
-// h: the camera's backward axis (a head light at infinity), k: a fixed direction in room space. Both sides are lit by the head.
+// h: the camera's backward axis (a head light at infinity), k: a fixed direction in room space. Both sides are lit by
+// the head.
 #pragma once
 
 #include <array>
@@ -21,8 +22,8 @@ struct ShadingParameters {
   bool lit = true;                                           ///< false: albedo as it is
 };
 
-/// Named ways of shading, as --shading has them: "lit" (both lights and ambient), "head" (the head light alone, so that light follows the
-/// viewer), "unlit" (albedo as it is).
+/// Named ways of shading, as --shading has them: "lit" (both lights and ambient), "head" (the head light alone, so that
+/// light follows the viewer), "unlit" (albedo as it is).
 inline constexpr std::array kShadingNames{"lit", "head", "unlit"};
 std::optional<ShadingParameters> shading_named(std::string_view name);
 
