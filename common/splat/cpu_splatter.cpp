@@ -51,7 +51,8 @@ geometry::Rect grown(const geometry::Rect& r, int by) {
   return {r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
 }
 
-// Empties what was written to the right of and below a tile that the image's edge cuts: in a whole tile those are pixels.
+// Empties the pixels to the right of and below a tile that the image's edge cuts, into which splats hang over: a whole
+// tile needs them empty.
 void empty_beyond(const ResolvedTile& tile, const Layout& layout) {
   const int reach = layout.reach, right = tile.width + reach, lower = tile.height + reach;
   const auto fill = [&](int y, int x0) {
@@ -160,8 +161,8 @@ void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera
   binning.list();
 }
 
-// Times radius over depth: how far contours of a run reach, in pixels. Bins grown by kMargin for all had each point met 1.63
-// times at 256 x 256 (bench splat_ellipse).
+// How far contours of a run reach, in pixels, times depth. Bins grown by kMargin for all had each point met
+// 1.63 times at 256 x 256 (bench splat_ellipse).
 float CpuSplatter::Impl::reach_of(const DrawList& list, const ItemRun& run) const {
   if (!kernel->surfel) return 0;
   float radius_m = 0;

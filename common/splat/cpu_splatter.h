@@ -3,14 +3,14 @@
 
 #include <memory>
 
-#include "common/image/file.h"
 #include "common/image/shading.h"
 #include "common/splat/render_options.h"
 #include "common/splat/select/view_selection.h"
 
 namespace telesplat::splat {
 
-/// Where a frame goes. colour: width * height of 0x00RRGGBB (alpha byte 0xff), row-major; depth_m: the same shape, or null.
+/// Where a frame goes. colour: width * height of 0x00RRGGBB (alpha byte 0xff), row-major; depth_m: the same shape, or
+/// null.
 struct FrameTarget {
   int width = 0, height = 0;
   uint32_t* colour = nullptr;
@@ -21,7 +21,7 @@ struct SplatStats {
   uint64_t points_projected = 0, points_drawn = 0;
   double prepare_ms = 0;                                ///< wall-clock: what comes before the first tile
   double project_ms = 0, resolve_ms = 0;                ///< splatting and shading, summed over threads
-  double fill_ms = 0, smooth_ms = 0, antialias_ms = 0;  ///< the finish, likewise
+  double fill_ms = 0, smooth_ms = 0, antialias_ms = 0;  ///< the finish, summed over threads
 };
 
 class CpuSplatter {
@@ -30,8 +30,8 @@ class CpuSplatter {
   explicit CpuSplatter(int threads = 0);
   ~CpuSplatter();
 
-  /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish has on
-  /// (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's.
+  /// Clears, splats, resolves and finishes one frame, tile by tile: splat -> resolve -> the stages that options.finish
+  /// has on (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                     const image::Shading& shading, const FrameTarget& target);
   /// Without any finish.

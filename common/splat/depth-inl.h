@@ -18,7 +18,8 @@ namespace telesplat::splat::HWY_NAMESPACE {
 
 template <bool kWhole, bool kMayFaceAway>
 HWY_NOINLINE void DepthLevel(const LeafTransform& transform_reference, const glm::vec3& facing,
-                             const points::Mosaic::Level& level_reference, const geometry::Rect& rect, float near_m, uint32_t* depth_bits) {
+                             const points::Mosaic::Level& level_reference, const geometry::Rect& rect, float near_m,
+                             uint32_t* depth_bits) {
   const I32 di;
   const U32 du;
   const LeafTransform transform = transform_reference;
@@ -34,8 +35,7 @@ HWY_NOINLINE void DepthLevel(const LeafTransform& transform_reference, const glm
                py = hn::Sub(hn::ShiftRight<kReferenceSubBits>(p.y), y0);
     const auto at = hn::BitCast(du, hn::Add(hn::Mul(py, width), px));
     const auto sub_mask = hn::Set(di, (1 << kReferenceSubBits) - 1);
-    const auto sub =
-        hn::Or(hn::ShiftLeft<kReferenceSubBits>(hn::And(p.y, sub_mask)), hn::And(p.x, sub_mask));
+    const auto sub = hn::Or(hn::ShiftLeft<kReferenceSubBits>(hn::And(p.y, sub_mask)), hn::And(p.x, sub_mask));
     const auto depth = hn::Or(hn::AndNot(hn::Set(du, kReferencePlaceMask), hn::BitCast(du, p.w)), hn::BitCast(du, sub));
     size_t n = valid;
     if (kWhole && !kMayFaceAway) {

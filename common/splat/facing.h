@@ -1,5 +1,5 @@
-// Which points and mosaics face away from the eye. The reference depth map, the viewers' selection and every kernel use this one test, so that what viewers
-// leave out is not taken as seen.
+// Which points and mosaics face away from the eye. The reference depth map, the viewers' selection and every kernel use
+// this one test, so that a point that viewers leave out does not count as seen.
 #pragma once
 
 #include <cmath>
@@ -10,15 +10,16 @@
 
 namespace telesplat::splat {
 
-/// Normals interpolated over a mesh turn away before the surface does: a point faces away if its normal and the direction to the eye are more than
-/// 90 + 10 degrees apart, and half the angle under which its leaf is seen, since the eye is taken to be in one direction from all of the leaf.
+/// A point faces away if the angle between its normal and the direction to the eye exceeds 90 degrees by a margin. The
+/// margin is 10 degrees, because normals interpolated over a mesh turn away before the surface does, plus half the
+/// angle under which the leaf is seen, because the eye is taken to be in one direction from all of the leaf.
 inline constexpr float kCosFacingMargin = 0.98480775f, kSinFacingMargin = 0.17364818f;
 
-/// A leaf's cube as seen from the eye: what of the test is the same for all its points.
+/// A leaf's cube as seen from the eye: the part of the test that all its points share.
 struct LeafView {
   glm::vec3 to_eye;  ///< from the cube's centre
-  float sin_beta,
-      cos_beta;    ///< beta = margin + half the angle under which the cube's sphere is seen; cos_beta < 0: nothing faces away
+  /// beta = 10 degrees + half the angle under which the cube's sphere is seen. cos_beta < 0: nothing faces away.
+  float sin_beta, cos_beta;
   float distance;  ///< of the centre; 0 if the eye is inside the sphere
 };
 
@@ -33,16 +34,17 @@ inline LeafView leaf_view(const geometry::Box& leaf, const glm::vec3& eye) {
 
 enum class Facing {
   kAway,    ///< every point faces away
-  kMixed,   ///< points must be asked one by one
+  kMixed,   ///< points must be tested one by one
   kTowards  ///< none does
 };
 
-/// By the mosaic's normal cone: away if the angle between its axis and the direction to the eye exceeds 90 degrees + cone + beta.
+/// By the mosaic's normal cone: away if the angle between its axis and the direction to the eye exceeds 90 degrees +
+/// cone + beta.
 inline Facing facing_of(const points::Mosaic& m, const LeafView& view) {
   if (view.cos_beta <= 0) return Facing::kTowards;
   const glm::vec3 axis = m.cone_axis_direction();
   const float towards = glm::dot(axis, view.to_eye), cos_cone = m.cone_cosine();
-  // Most mosaics that are drawn face the eye. Towards it all of them do if the axis and the eye are no more than 90 degrees - cone apart.
+  // Most mosaics that are drawn face the eye. All points do if axis and eye are at most 90 degrees - cone - beta apart.
   if (cos_cone <= 0) return Facing::kMixed;
   const float sin_cone = std::sqrt(1.0f - cos_cone * cos_cone);
   const float scale = view.distance * std::sqrt(glm::dot(axis, axis));

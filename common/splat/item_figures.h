@@ -1,4 +1,4 @@
-// What of a draw item does not depend on where its points lie. Both renderers take these figures from here.
+// The figures of a draw item that do not depend on where its points lie. Both renderers take them from here.
 #pragma once
 
 #include <array>
@@ -26,8 +26,9 @@ class FrameFigures {
   /// To be called once for each item: its bias counts in rim().
   ItemFigures add(const DrawItem& item);
 
-  /// Mean bias on the contour for each class of spacing, weighted by points. Ellipses differ from point to point: the bias at the
-  /// item's leaf's centre stands for them, and items whose centre is nearer than the near plane do not count.
+  /// Mean bias on the contour for each class of spacing, weighted by points. Ellipses differ from point to point: the
+  /// bias at the item's leaf's centre stands for them, and items whose centre is nearer than the near plane do not
+  /// count.
   RimBias rim() const;
 
  private:

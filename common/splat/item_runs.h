@@ -9,7 +9,7 @@ namespace telesplat::splat {
 struct ItemRuns {
   std::vector<ItemRun> runs;
   std::vector<LeafTransform> transforms;  ///< one a run
-  std::vector<glm::vec3> facing;          ///< likewise: facing_vector
+  std::vector<glm::vec3> facing;          ///< one a run: facing_vector
 
   void build(const std::vector<DrawItem>& items, const geometry::Camera& camera) {
     build(items);
@@ -18,7 +18,7 @@ struct ItemRuns {
     for (size_t i = 0; i < runs.size(); ++i) transform(i, items, room_to_pixel, eye);
   }
 
-  /// The same in two steps, the second of which can be taken for all runs at once.
+  /// The same in two steps: build() once, then transform() for each run, in any order and on any thread.
   void build(const std::vector<DrawItem>& items) {
     runs.clear();
     const points::Cluster* cluster = nullptr;

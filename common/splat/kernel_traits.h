@@ -1,5 +1,5 @@
-// The splat kernels. One row of a table says what the program must know of a kernel: both renderers, the flags, the window and
-// `telesplat compare` read it. Rows are read once a frame or once an item, never once a point.
+// The splat kernels. One row of a table says what the program must know of a kernel: both renderers, the flags, the
+// window and `telesplat compare` read it. Rows are read once a frame or once an item, never once a point.
 #pragma once
 
 #include <array>
@@ -25,8 +25,8 @@ enum class Passes {
   kSums,  ///< two passes: the depth of opaque splats, then weighted sums of what is visible; leaves shaded colours
 };
 
-/// No splat touches pixels farther from its projected centre than growth * widest_contour() * radius over depth + least_px,
-/// nor farther than kMaxSplatSide. growth: the factor of the contour; least_px: the low-pass, and a pixel.
+/// No splat touches pixels farther from its projected centre than growth * widest_contour() * radius over depth +
+/// least_px, nor farther than kMaxSplatSide. growth: the factor of the contour; least_px: the low-pass, and a pixel.
 struct SurfelReach {
   float growth = 0, least_px = 0;
 };
@@ -45,17 +45,19 @@ struct KernelTraits {
   bool smoothed;
   Passes passes;
 
-  /// True: a splat is its sample's disc on the surface (DrawItem::radius_m and to_eye). False: it is flat and faces the screen,
-  /// and DrawItem::splat_px is its size.
+  /// True: a splat is its sample's disc on the surface (DrawItem::radius_m and to_eye). False: it is flat and faces the
+  /// screen, and DrawItem::splat_px is its size.
   bool surfel;
 
-  /// Flat: squared distance of the offset (dx, dy) in the metric in which a splat is a ball of radius size / 2. Else null.
+  /// Flat: squared distance of the offset (dx, dy) in the metric in which a splat is a ball of radius size / 2. Else
+  /// null.
   double (*flat_distance2)(double dx, double dy) = nullptr;
   /// Flat: squared radius of the contour (the circle on which q = 1), as a share of the squared size.
   double flat_contour_r2 = 0;
 
   SurfelReach reach;  ///< surfels
-  /// Surfels: bias of the depth code on the contour of a splat of this radius at this depth. Null: the kernel has no bias.
+  /// Surfels: bias of the depth code on the contour of a splat of this radius at this depth. Null: the kernel has no
+  /// bias.
   float (*surfel_bias)(float radius_m, float depth_m) = nullptr;
 
   /// The CPU splatter: its tiles in pixels, and the kernel inside one tile (tile_work.h).
@@ -71,12 +73,12 @@ std::optional<Kernel> kernel_named(std::string_view name);
 std::optional<Kernel> kernel_of_key(char window_key);
 /// All names, in the order of the table.
 const std::vector<std::string>& kernel_names();
-/// The same for a help text: "square, disc, ellipse or ewa".
+/// All names for a help text: "square, disc, ellipse or ewa".
 std::string kernel_list();
 
-/// Splats about as large as their samples are apart suit best: larger ones blur and grow silhouettes. The gaps that this leaves
-/// are pin-holes, which the finish fills. Set by comparing frames along walk-around-a.csv at 2560x1600: on a head, discs of 1.5
-/// without finish 31.9 dB, ellipses of 1.0 with finish 36.3 dB.
+/// Splats about as large as their samples are apart suit best: larger ones blur and grow silhouettes. The gaps that
+/// this leaves are pin-holes, which the finish fills. Set by comparing frames along walk-around-a.csv at 2560x1600: on
+/// a head, discs of 1.5 without finish 31.9 dB, ellipses of 1.0 with finish 36.3 dB.
 inline float suitable_scale(Kernel kernel) { return traits_of(kernel).suitable_scale; }
 
 }  // namespace telesplat::splat

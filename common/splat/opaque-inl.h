@@ -50,8 +50,9 @@ void SplatBatch(const SplatShape& shape, const KeyBuffer& buffer, const Batch& b
   const int shift = 2 * shape.sub_bits;
   const uint32_t sub_mask = (1u << shift) - 1;
   const auto stride = static_cast<size_t>(buffer.stride);
-  // Neighbours in the batch often overlap on the screen; a row read right after one was written across its ends would wait for that
-  // write to leave the store buffer. So points far apart in the batch follow one another: the least key wins in any order.
+  // Neighbours in the batch often overlap on the screen. A row that is read right after one was written across its ends
+  // waits for that write to leave the store buffer. So points far apart in the batch follow one another: the least key
+  // wins in any order.
   const size_t step = (batch.count + kApart - 1) / kApart;
   for (size_t j = 0; j < step; ++j)
     for (size_t i = j; i < batch.count; i += step) {
@@ -64,6 +65,66 @@ void SplatBatch(const SplatShape& shape, const KeyBuffer& buffer, const Batch& b
                         static_cast<int64_t>(batch.key[i]));
       }
     }
+}
+
+// Which points of a tile's rect are drawn, and which of those are counted, by the first pixel of their splat (from the
+// rect's first pixel). As vectors.
+class TileArea {
+ public:
+  HWY_INLINE TileArea(const TileInput& input, int side) {
+    const I32 di;
+    const geometry::Rect &rect = input.rect, &own = input.own;
+    width_ = hn::Set(di, rect.width), height_ = hn::Set(di, rect.height), outside_ = hn::Set(di, -side);
+    own_x0_ = hn::Set(di, own.x - rect.x - 1), own_y0_ = hn::Set(di, own.y - rect.y - 1);
+    own_x1_ = hn::Set(di, own.x + own.width - rect.x), own_y1_ = hn::Set(di, own.y + own.height - rect.y);
+  }
+  HWY_INLINE hn::Mask<I32> touched(hn::Vec<I32> x, hn::Vec<I32> y) const {
+    return hn::And(hn::And(hn::Gt(x, outside_), hn::Lt(x, width_)), hn::And(hn::Gt(y, outside_), hn::Lt(y, height_)));
+  }
+  HWY_INLINE hn::Mask<I32> own(hn::Vec<I32> x, hn::Vec<I32> y) const {
+    return hn::And(hn::And(hn::Gt(x, own_x0_), hn::Lt(x, own_x1_)), hn::And(hn::Gt(y, own_y0_), hn::Lt(y, own_y1_)));
+  }
+
+ private:
+  hn::Vec<I32> width_, height_, outside_, own_x0_, own_y0_, own_x1_, own_y1_;
+};
+
+// The halves of keys.
+struct KeyHalves {
+  hn::Vec<U32> low, high;
+};
+// head: the high half of the bits that all points share.
+HWY_INLINE KeyHalves KeysOf(hn::Vec<F32> w, hn::Vec<U32> normal, hn::Vec<U32> colour, hn::Vec<U32> near_bits,
+                            hn::Vec<U32> head) {
+  const U32 du;
+  const auto code =
+      hn::Min(hn::ShiftRight<kDepthCodeShift>(hn::Sub(hn::BitCast(du, w), near_bits)), hn::Set(du, kMaxCentreCode));
+  return {hn::Or(hn::ShiftLeft<24>(normal), hn::And(colour, hn::Set(du, 0x00ffffffu))),
+          hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(code), hn::ShiftRight<8>(normal)), head)};
+}
+
+// Without the lanes outside [skip, valid): see ForVectors.
+HWY_INLINE hn::Mask<I32> OnlyNew(hn::Mask<I32> keep, size_t skip, size_t valid) {
+  const I32 di;
+  if (valid - skip == hn::Lanes(di)) return keep;
+  return hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
+}
+
+// Stores the lanes of `keep` side by side. Returns their number; whole vectors are written.
+HWY_INLINE size_t StoreKept(hn::Mask<I32> keep, hn::Vec<U32> place, const KeyHalves& key, uint32_t* places,
+                            uint64_t* keys) {
+  const U32 du;
+  auto* const halves = reinterpret_cast<uint32_t*>(keys);
+  // Mosaics are scanned in order: most vectors of a cluster that crosses a tile's border lie on one side of it.
+  if (hn::AllTrue(I32(), keep)) {
+    hn::StoreU(place, du, places);
+    hn::StoreInterleaved2(key.low, key.high, du, halves);
+    return hn::Lanes(du);
+  }
+  const Compressor compress(hn::RebindMask(du, keep));
+  hn::StoreU(compress(place), du, places);
+  hn::StoreInterleaved2(compress(key.low), compress(key.high), du, halves);
+  return compress.count();
 }
 
 using SplatBatchFunction = void (*)(const SplatShape&, const KeyBuffer&, const Batch&);
@@ -118,10 +179,9 @@ class TileSplatter {
   void add(const TileBinning::Entry& entry, const points::Mosaic::Level& level, bool may_face_away) {
     const LeafTransform& transform = input_.transforms[entry.box];
     const glm::vec3& facing = input_.facing[entry.box];
-    const auto piece = entry.whole
-                           ? (may_face_away ? &TileSplatter::add_piece<true, true> : &TileSplatter::add_piece<true, false>)
-                           : (may_face_away ? &TileSplatter::add_piece<false, true>
-                                            : &TileSplatter::add_piece<false, false>);
+    const auto piece =
+        entry.whole ? (may_face_away ? &TileSplatter::add_piece<true, true> : &TileSplatter::add_piece<true, false>)
+                    : (may_face_away ? &TileSplatter::add_piece<false, true> : &TileSplatter::add_piece<false, false>);
     counts_.projected += level.count;
     for (size_t first = 0; first < level.count; first += kPiece) {
       const size_t last = std::min<size_t>(first + kPiece, level.count);
@@ -144,14 +204,8 @@ class TileSplatter {
     const int bits = style_.shape->sub_bits;
     const float near_m = input_.near_m, scale = style_.shape->scale, shift = style_.shape->shift;
     const auto x0 = hn::Set(di, input_.rect.x), y0 = hn::Set(di, input_.rect.y);
-    const auto width = hn::Set(di, input_.rect.width), height = hn::Set(di, input_.rect.height);
-    const auto outside = hn::Set(di, -style_.shape->side);
-    const auto own_x0 = hn::Set(di, input_.own.x - input_.rect.x - 1),
-               own_y0 = hn::Set(di, input_.own.y - input_.rect.y - 1);
-    const auto own_x1 = hn::Set(di, input_.own.x + input_.own.width - input_.rect.x),
-               own_y1 = hn::Set(di, input_.own.y + input_.own.height - input_.rect.y);
-    const auto near_bits = hn::Set(du, std::bit_cast<uint32_t>(near_m)), farthest = hn::Set(du, kMaxCentreCode);
-    const auto albedo = hn::Set(du, 0x00ffffffu);
+    const TileArea area(input_, style_.shape->side);
+    const auto near_bits = hn::Set(du, std::bit_cast<uint32_t>(near_m));
     const auto head = hn::Set(du, static_cast<uint32_t>(encode_key(0, style_.spacing, 0, 0, 0) >> 32));
     const auto stride = hn::Set(di, buffer_.stride), origin = hn::Set(di, buffer_.margin * (buffer_.stride + 1));
     const auto sub_mask = hn::Set(di, (1 << bits) - 1);
@@ -165,54 +219,32 @@ class TileSplatter {
           hn::Mask<I32> keep;
           if (kWhole && kMayFaceAway) {
             keep = hn::Not(hn::RebindMask(di, FacesAway(normal, facing)));
-            if (valid - skip < hn::Lanes(di))
-              keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
+            keep = OnlyNew(keep, skip, valid);
             if (hn::AllFalse(di, keep)) return;
             drawn += hn::CountTrue(di, keep);
           }
           if (!kWhole) {
-            const auto in_x = hn::And(hn::Gt(px, outside), hn::Lt(px, width)),
-                       in_y = hn::And(hn::Gt(py, outside), hn::Lt(py, height));
-            const auto beyond_near = hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m)));
-            keep = hn::And(hn::And(in_x, in_y), beyond_near);
+            keep = hn::And(area.touched(px, py), hn::RebindMask(di, hn::Ge(p.w, hn::Set(F32(), near_m))));
             if (kMayFaceAway) keep = hn::AndNot(hn::RebindMask(di, FacesAway(normal, facing)), keep);
-            if (valid - skip < hn::Lanes(di))
-              keep = hn::And(keep, hn::AndNot(hn::FirstN(di, skip), hn::FirstN(di, valid)));
+            keep = OnlyNew(keep, skip, valid);
             if (hn::AllFalse(di, keep)) return;
-            const auto own = hn::And(hn::And(hn::Gt(px, own_x0), hn::Lt(px, own_x1)),
-                                     hn::And(hn::Gt(py, own_y0), hn::Lt(py, own_y1)));
-            drawn += hn::CountTrue(di, hn::And(keep, own));
+            drawn += hn::CountTrue(di, hn::And(keep, area.own(px, py)));
           }
 
           const auto pixel = hn::Add(hn::Add(hn::Mul(py, stride), px), origin);
           const auto sub = hn::Or(hn::ShiftLeftSame(hn::And(p.y, sub_mask), bits), hn::And(p.x, sub_mask));
           const auto place = hn::BitCast(du, hn::Or(hn::ShiftLeftSame(pixel, 2 * bits), sub));
-
-          // The key, in halves.
-          const auto code =
-              hn::Min(hn::ShiftRight<kDepthCodeShift>(hn::Sub(hn::BitCast(du, p.w), near_bits)), farthest);
-          const auto high = hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(code), hn::ShiftRight<8>(normal)), head);
-          const auto low = hn::Or(hn::ShiftLeft<24>(normal), hn::And(hn::LoadU(du, level.colour + offset), albedo));
+          const auto [low, high] = KeysOf(p.w, normal, hn::LoadU(du, level.colour + offset), near_bits, head);
 
           if (kWhole && !kMayFaceAway) {
-            // Lanes below `skip` are the batch's last points: they are written once more, as they are. (None are there if the batch
-            // was emptied in between; then they are splatted twice, which changes nothing.)
+            // Lanes below `skip` are the batch's last points: they are written once more, as they are. (None are there
+            // if the batch was emptied in between; then they are splatted twice, which changes nothing.)
             const size_t at = count >= skip ? count - skip : 0;
             hn::StoreU(place, du, places + at);
             hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + at));
             count = at + valid;
           } else {
-            // Mosaics are scanned in order: of a cluster across a tile's border most vectors lie on one side of it.
-            if (hn::AllTrue(di, keep)) {
-              hn::StoreU(place, du, places + count);
-              hn::StoreInterleaved2(low, high, du, reinterpret_cast<uint32_t*>(keys + count));
-              count += hn::Lanes(di);
-              return;
-            }
-            const Compressor compress(hn::RebindMask(du, keep));
-            hn::StoreU(compress(place), du, places + count);
-            hn::StoreInterleaved2(compress(low), compress(high), du, reinterpret_cast<uint32_t*>(keys + count));
-            count += compress.count();
+            count += StoreKept(keep, place, {low, high}, places + count, keys + count);
           }
         });
     batch_.count = count;

@@ -1,21 +1,22 @@
-// A pixel while a tile is splatted: one 64-bit key, the least of which, as a signed number, wins.
+// A pixel while a tile is splatted: one 64-bit key. The least key wins, compared as signed numbers.
 //
-//   bit 63       1 in every key; 0 makes a key larger than all others: what lies outside a splat (kOutsideSplat flips it)
-//   bits 62..45  depth code, 18 bits: (bits of the depth as float - bits of `near` as float) >> 9, that is 2^14 steps an octave,
-//                16 octaves from `near` on; positive floats are ordered as their bits are
+//   bit 63       1 in every key; 0 outside a splat (kOutsideSplat flips it): larger than all keys
+//   bits 62..45  depth code, 18 bits: (bits of the depth as float - bits of `near` as float) >> 9, that is 2^14 steps an
+//                octave, 16 octaves from `near` on; positive floats are ordered as their bits are
 //   bits 44..43  spacing class: how far apart the samples lie on the screen (spacing_class)
 //   bits 42..40  ring: floor(8 q), at most 7; q = squared distance from the splat's centre, 1 on its contour
 //   bits 39..24  normal (image/normal.h, 16 bits)
 //   bits 23..0   albedo, RRGGBB
 //
-// The depth code is that of the surface at the pixel plus a bias that grows with q, so that where splats of one surface overlap
-// the nearest centre wins, not the nearest depth, and generous splats do not blur.
-// Based on: M. Schuetz, M. Wimmer, "High-quality point-based rendering using fast single-pass interpolation", 2015 (paraboloids).
+// The depth code is that of the surface at the pixel plus a bias that grows with q, so that where splats of one surface
+// overlap the nearest centre wins, not the nearest depth, and generous splats do not blur.
+// Based on: M. Schuetz, M. Wimmer, "High-quality point-based rendering using fast single-pass interpolation", 2015
+// (paraboloids).
 //
 // Resolving turns each key into the shaded colour, 0x00RRGGBB, and the info word
 //   depth code << 8 | spacing class << 3 | ring, or kEmptyInfo where nothing is,
-// which take the keys' place row by row (finish.h, ResolvedTile). Finish stages work on these; where they are written out the ring's mean
-// bias is taken off the depth again (RimBias).
+// which take the keys' place row by row (finish.h, ResolvedTile). Finish stages work on these; where they are written
+// out the ring's mean bias is taken off the depth again (RimBias).
 #pragma once
 
 #include <algorithm>
@@ -42,7 +43,7 @@ inline uint32_t encode_depth_code(float depth_m, float near_m) {
   return std::min((std::bit_cast<uint32_t>(depth_m) - std::bit_cast<uint32_t>(near_m)) >> kDepthCodeShift,
                   kMaxCentreCode);
 }
-/// The depth in metres amid those that have this code: at most 2^-15 of it off.
+/// The middle of the depths, in metres, that have this code: off by at most 2^-15 of itself.
 inline float decode_depth_code(uint32_t code, float near_m) {
   return std::bit_cast<float>(std::bit_cast<uint32_t>(near_m) + (code << kDepthCodeShift) +
                               (1u << (kDepthCodeShift - 1)));
@@ -78,10 +79,11 @@ constexpr uint32_t info_depth_code(uint32_t info) { return info >> 8; }
 constexpr uint32_t info_spacing(uint32_t info) { return info >> 3 & 3; }
 constexpr uint32_t info_ring(uint32_t info) { return info & 7; }
 
-/// For each spacing class, the bias (in depth codes) that splats of a frame have on their contours: the mean over their points.
+/// For each spacing class, the bias (in depth codes) that splats of a frame have on their contours: the mean over their
+/// points.
 using RimBias = std::array<uint32_t, 4>;
-/// The depth code without its bias, taken to be rim * (ring + 1/2) / 8: at most rim / 16 codes off where all splats of a class
-/// have the same bias. Rounded; never below 0.
+/// The depth code without its bias, taken to be rim * (ring + 1/2) / 8: at most rim / 16 codes off where all splats of
+/// a class have the same bias. Rounded; never below 0.
 constexpr uint32_t unbiased_depth_code(uint32_t info, const RimBias& rim) {
   const uint32_t bias = (rim[info_spacing(info)] * (2 * info_ring(info) + 1) + 8) >> 4;
   const uint32_t code = info_depth_code(info);

@@ -1,5 +1,5 @@
-// Points by the vector: loading them, projecting them, putting those that stay side by side; and what makes many short levels fast.
-// Included once a target, by splat_kernels.cpp.
+// Vectors of points: loading, projecting, moving those that stay to the front; and what makes many short levels fast.
+// Included once a target, by splat_kernels.cpp and surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_PROJECTION_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_PROJECTION_INL_H_
 #undef TELESPLAT_SPLAT_PROJECTION_INL_H_
@@ -28,8 +28,8 @@ using U32 = hn::RebindToUnsigned<F32>;
 using U16 = hn::Rebind<uint16_t, F32>;
 
 constexpr size_t kMaxLanes = 64;  // float lanes of the widest vectors there are
-constexpr size_t kPiece =
-    384;  // points of an item taken at once: room for a whole piece is made before it is projected
+// Points of an item taken at once: room for a whole piece is made before it is projected.
+constexpr size_t kPiece = 384;
 
 // Positions of a vector of points, in steps of the leaf's grid.
 struct Lanes {
@@ -50,11 +50,12 @@ HWY_INLINE hn::Vec<F32> Row(const std::array<float, 4>& row, const Lanes& p) {
   return hn::Add(hn::Add(xy, hn::Mul(p.z, hn::Set(d, row[2]))), hn::Set(d, row[3]));
 }
 
-// floor(v), as integers; what does not fit lies far outside every image and must only stay outside.
+// floor(v), as integers. Values that do not fit lie far outside every image and must only stay outside.
 HWY_INLINE hn::Vec<I32> FloorToInt(hn::Vec<F32> v) {
   const F32 d;
   const auto limit = hn::Set(d, 1e6f);
-  // Added to 1.5 * 2^23 a whole number below 2^22 stands in the float's last bits: ConvertTo also guards against what cannot be here.
+  // Added to 1.5 * 2^23 a whole number below 2^22 stands in the float's last bits: ConvertTo also guards against what
+  // cannot be here.
   constexpr float kWhole = 12582912.0f;
   const auto floor = hn::Floor(hn::Max(hn::Min(v, limit), hn::Neg(limit)));
   return hn::Sub(hn::BitCast(I32(), hn::Add(floor, hn::Set(d, kWhole))),
@@ -107,8 +108,8 @@ constexpr CompressTable make_compress_table() {
 }
 alignas(64) constexpr CompressTable kCompress = make_compress_table();
 
-// Moves the lanes of a mask to the front, the same for several vectors. (Highway's own Compress in 1.0 copies its 1 KiB table to the
-// stack at each call when GCC compiles it: bench splat_square was 1.7 times slower with it.)
+// Moves the lanes of a mask to the front, the same for several vectors. (Highway's own Compress in 1.0 copies its 1 KiB
+// table to the stack at each call when GCC compiles it: bench splat_square was 1.7 times slower with it.)
 class Compressor {
  public:
   explicit HWY_INLINE Compressor(hn::Mask<U32> mask) : mask_(mask) {
@@ -131,7 +132,8 @@ class Compressor {
   uint32_t bits_ = 0;
 };
 
-// Collects the points of levels that have fewer of them than a vector has lanes: after many small updates most mosaics do.
+// Collects the points of levels that have fewer of them than a vector has lanes: after many small updates most mosaics
+// do.
 class Stage {
  public:
   bool has_room(size_t n) const { return count_ + n <= kCapacity; }
@@ -139,7 +141,7 @@ class Stage {
     count_ = 0;
     may_face_away_ = false;
   }
-  /// That some item's points may: then all are asked.
+  /// Whether points of any staged item may face away: then all points are tested.
   bool may_face_away() const { return may_face_away_; }
   HWY_INLINE void append(const DrawItem& item) {
     const points::Mosaic::Level& l = item.level;
@@ -181,9 +183,9 @@ class Stage {
   bool may_face_away_ = false;
 };
 
-// Calls visit(offset, skip, valid) for vectors that cover the points [first, last) of a level: lanes skip..valid-1 are points not
-// visited yet. The last vector overlaps the one before, so that nothing is read beyond the arrays of a level that has at least a
-// vector of points; a Stage may have fewer.
+// Calls visit(offset, skip, valid) for vectors that cover the points [first, last) of a level: lanes skip..valid-1 are
+// points not visited yet. The last vector overlaps the one before, so that nothing is read beyond the arrays of a level
+// that has at least a vector of points; a Stage may have fewer.
 template <class Visit>
 HWY_INLINE void ForVectors(size_t first, size_t last, const Visit& visit) {
   const size_t lanes = hn::Lanes(F32());
@@ -194,8 +196,8 @@ HWY_INLINE void ForVectors(size_t first, size_t last, const Visit& visit) {
   }
 }
 
-// Mosaics lie scattered in memory, and what comes next is known: asks for it in time. A level's arrays lie next to each other,
-// except for mean colours, so asking for lines from x on finds nearly all.
+// Mosaics lie scattered in memory, so those that come next are prefetched. A level's arrays lie next to each other,
+// except for mean colours: prefetching lines from x on finds nearly all of them.
 constexpr uint32_t kItemsAhead = 8;
 HWY_INLINE void PrefetchLevel(const points::Mosaic::Level& level) {
   const auto* p = reinterpret_cast<const std::byte*>(level.x);
@@ -206,7 +208,7 @@ HWY_INLINE void PrefetchRun(const TileInput& input, const TileBinning::Entry* en
   const TileBinning::Entry* end = input.entries.data() + input.entries.size();
   if (entry == end) return;
   const ItemRun run = input.runs[entry->box];
-  // The run after it: its items, so that its points can be asked for without waiting.
+  // The items of the run after it, so that its points can be prefetched without waiting.
   if (entry + 1 != end) {
     const auto* items = reinterpret_cast<const std::byte*>(input.items + input.runs[entry[1].box].first);
     for (size_t i = 0; i < kItemsAhead * sizeof(DrawItem); i += 64) hwy::Prefetch(items + i);

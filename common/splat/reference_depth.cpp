@@ -46,7 +46,7 @@ struct PlaneSlope {
   float x, y;
 };
 
-// No steeper than splats follow (surfel_contour.h): normals do not tell more.
+// Slopes are limited to those that splats follow (surfel/contour.h): normals are too coarse for more.
 class TangentPlanes {
  public:
   explicit TangentPlanes(const geometry::Camera& camera) : c_(surfel_camera(camera)) {}
@@ -144,7 +144,8 @@ Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry:
   CHECK(reference_depth_m.size() == static_cast<size_t>(camera.width) * camera.height);
   CHECK(image.width == tile.width && image.height == tile.height);
   CHECK(tile.x >= 0 && tile.y >= 0 && tile.x + tile.width <= camera.width && tile.y + tile.height <= camera.height);
-  // depth = numerator / code; kept if depth < reference - epsilon * depth, that is, if numerator * (1 + epsilon) < code * reference.
+  // A pixel is kept if depth < reference - epsilon * depth. With depth = near * kMaxDepthCode / code that is
+  // near * kMaxDepthCode * (1 + epsilon) < code * reference.
   const auto numerator = static_cast<float>(camera.near_m * image::kMaxDepthCode * (1.0 + relative_epsilon));
   Elimination result;
   for (int y = 0; y < tile.height; ++y) {
@@ -168,7 +169,8 @@ Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry:
     result.samples += samples;
     result.kept += kept;
   }
-  if (nearest > 0 && result.kept > 0) result.kept -= drop_near_points(camera, tile, reference_depth_m, relative_epsilon, nearest, image);
+  if (nearest > 0 && result.kept > 0)
+    result.kept -= drop_near_points(camera, tile, reference_depth_m, relative_epsilon, nearest, image);
   return result;
 }
 

@@ -9,9 +9,10 @@
 
 namespace telesplat::splat {
 
-/// Depth in metres of the nearest point in each pixel of `camera`, +infinity where none: all level-0 points of the model,
-/// unsplatted (one pixel each), those that face away left out. The last bits of a depth tell where in the pixel the point lies
-/// (splat_kernels.h, kReferenceSubBits): depths are off by at most 2^-15 of themselves. SIMD; `threads` oneTBB threads (0 = all).
+/// Depth in metres of the nearest point in each pixel of `camera`, +infinity where none: all level-0 points of the
+/// model, one pixel each, without those that face away. The last bits of a depth tell where in the pixel the point lies
+/// (splat_kernels.h, kReferenceSubBits): depths are off by at most 2^-15 of themselves. SIMD; `threads` oneTBB threads
+/// (0 = all).
 void render_reference_depth(const points::PointModel& model, const geometry::Camera& camera, int threads,
                             std::vector<float>& depth_m);
 
@@ -19,14 +20,16 @@ struct Elimination {
   uint64_t samples = 0, kept = 0;
 };
 
-/// A sample is not needed where the model has a point of its surface within this many pixels: splats reach as far. It bounds a model's points: but
-/// for those that a nearer one of their pixel hides, no two are nearer to each other than this times the sample distance of the finer one, so a surface has
-/// about 2 / sqrt 3 / kNearestSample^2 of them a pixel at most, however many views it is sampled from. Set by bench cache.
+/// A sample is not needed where the model has a point of its surface within this many pixels, since that point's splat
+/// reaches as far. This bounds a model's points, from any number of views. No two points are nearer to each other than
+/// this times the sample distance of the finer one, unless a nearer point of the same pixel hid one of them. So a
+/// surface has at most about 2 / sqrt 3 / kNearestSample^2 points a pixel. Set by bench cache.
 inline constexpr float kNearestSample = 0.6f;
 
-/// Clears every pixel of `image` (the tile `tile` of the frame `camera`) that the model already shows. A pixel is kept only if
+/// Clears every pixel of `image` (the tile `tile` of the frame `camera`) that the model already shows. It is kept if
 ///   it is nearer than the reference by more than epsilon (T4.3.1), epsilon = relative_epsilon * depth; and
-///   no point of the eight pixels around it lies within `nearest` pixels of its centre and within epsilon of its tangent plane.
+///   no point of the eight pixels around it lies within `nearest` pixels of its centre and within epsilon of its
+///   tangent plane.
 /// Keeps canonical form. nearest 0: the first condition alone.
 Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry::Rect& tile,
                                  const std::vector<float>& reference_depth_m, float relative_epsilon,

@@ -11,8 +11,8 @@ namespace telesplat::splat {
 
 /// Per-pixel work after splatting. Each stage can be switched off; SplatStats tells what each costs.
 struct Finish {
-  bool fill = true;       ///< pin-holes: pixels that show nothing, or something farther, amid a surface
-  bool smooth = true;     ///< disc, ellipse: interpolates between magnified splats of one surface
+  bool fill = true;       ///< pin-holes: pixels inside a surface that show nothing, or something farther
+  bool smooth = true;     ///< interpolates between magnified splats of one surface (KernelTraits::smoothed)
   bool antialias = true;  ///< silhouettes
 };
 

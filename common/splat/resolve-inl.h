@@ -86,8 +86,8 @@ HWY_INLINE hn::Vec<PixelF32> DepthOf(Pixels info, const ResolveInput& input) {
   return hn::BitCast(PixelF32(), hn::Add(hn::ShiftLeft<kDepthCodeShift>(hn::BitCast(d, code)), hn::Set(d, first)));
 }
 
-// Pixels are made a chunk at a time in the first-level cache and leave it in whole lines, past the caches: nobody reads them soon,
-// and a line that is not written in one go would first be read from memory.
+// Pixels are made a chunk at a time in the first-level cache. They leave it as whole lines, past the other caches:
+// nobody reads them soon, and a line that is not written in one go would first be read from memory.
 constexpr size_t kChunk = 256;
 
 HWY_INLINE void StreamOut(const uint32_t* HWY_RESTRICT from, uint32_t* HWY_RESTRICT to, size_t n) {

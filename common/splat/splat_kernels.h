@@ -24,16 +24,16 @@ struct ItemRun {
   uint32_t first = 0, last = 0;  ///< items [first, last)
 };
 
-/// What of a view a tile draws. All arrays belong to the caller and are only read.
+/// The part of a view that a tile draws. All arrays belong to the caller and are only read.
 struct TileInput {
-  geometry::Rect
-      rect;  ///< what is drawn: the tile, grown by the reach of what follows; so it may reach beyond the image
+  /// What is drawn: the tile, grown by the pixels around it that the finish reads. So it may reach beyond the image.
+  geometry::Rect rect;
   geometry::Rect own;  ///< the tile itself, inside the image: points are counted where they fall into it
   float near_m = 0;    ///< nearer points are not drawn
   std::span<const TileBinning::Entry> entries;
   const ItemRun* runs = nullptr;              ///< one a box of the binning
-  const LeafTransform* transforms = nullptr;  ///< likewise
-  const glm::vec3* facing = nullptr;          ///< likewise: points of items that may face away are asked (facing.h)
+  const LeafTransform* transforms = nullptr;  ///< one a box
+  const glm::vec3* facing = nullptr;          ///< one a box: facing_vector(), for items that may face away
   const DrawItem* items = nullptr;
 };
 
@@ -44,10 +44,11 @@ struct ItemStyle {
   bool operator==(const ItemStyle&) const = default;
 };
 
-/// Pixel keys of one tile's rect with a margin on all sides, so that splats are not clipped: the margin is written, never read.
+/// Pixel keys of one tile's rect with a margin on all sides, so that splats are not clipped: the margin is written,
+/// never read.
 struct KeyBuffer {
-  uint64_t* keys =
-      nullptr;     ///< (rect.height + 2 margin) rows of `stride`; pixel (x, y) at (y + margin) * stride + x + margin
+  /// (rect.height + 2 margin) rows of `stride`; pixel (x, y) at (y + margin) * stride + x + margin.
+  uint64_t* keys = nullptr;
   int stride = 0;  ///< at least rect.width + 2 margin
   int margin = 0;  ///< at least kMaxSplatSide
 };
@@ -76,24 +77,25 @@ struct TileTarget {
   size_t pitch = 0;
 };
 
-/// Keys to colours and infos, each row in its keys' place: the tile and `reach` pixels around it. Empty pixels get the background's colour.
-/// tile.margin is at least reach + kFinishSlack. scratch: memory that is used again.
+/// Turns keys into colours and infos, each row in its keys' place: the tile and `reach` pixels around it. Empty pixels
+/// get the background's colour. tile.margin is at least reach + kFinishSlack. scratch: memory kept from tile to tile.
 void resolve_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, std::vector<uint64_t>& scratch);
 
-/// Colours (0xff000000 | 0x00RRGGBB) and, if target.depth_m is not null, depths in metres (+infinity where empty), without the bias.
-/// Makes keys of the tile and of its reach again, all of them empty; what else is in the rows stays as the stages left it.
+/// Writes colours (0xff000000 | 0x00RRGGBB) and, if target.depth_m is not null, depths in metres without the bias
+/// (+infinity where empty). Then turns the tile and its reach into empty keys again; the rest of the rows stays as the
+/// stages left it.
 void write_tile(const ResolvedTile& tile, int reach, const ResolveInput& input, const TileTarget& target);
 
-/// The same as resolve_tile and write_tile, in one pass, for tiles without reach.
+/// resolve_tile and write_tile in one pass, for tiles without reach.
 void resolve_and_write_tile(const ResolvedTile& tile, const ResolveInput& input, const TileTarget& target);
 
-/// A reference depth's last bits are not depth but where in its pixel the point lies: x, and above it y, in 2^-kReferenceSubBits pixels.
-/// So depths are off by at most 2^-15 of themselves.
+/// The last bits of a reference depth tell where in its pixel the point lies: x, and above it y, in
+/// 2^-kReferenceSubBits pixels. So depths are off by at most 2^-15 of themselves.
 inline constexpr int kReferenceSubBits = 4;
 inline constexpr uint32_t kReferencePlaceMask = (1u << 2 * kReferenceSubBits) - 1;
 
-/// Least depth (bits of a positive float, with the point's place: kReferenceSubBits) of all points in each pixel, one pixel a point. depth_bits:
-/// rect.width * rect.height, row-major, holding +infinity or what is there already.
+/// Least depth of all points in each pixel, one pixel a point, as the bits of a positive float with the point's place
+/// (kReferenceSubBits). depth_bits: rect.width * rect.height, row-major, holding +infinity or what is there already.
 void depth_tile(const TileInput& input, uint32_t* depth_bits);
 
 /// The name of the instruction set in use.

@@ -15,7 +15,8 @@ uint32_t bias_at(double r2, double growth) {
 
 double contour_r2(const KernelTraits& kernel, double size) { return kernel.flat_contour_r2 * size * size; }
 
-// What each pixel of the splat's square adds to the key of a centre that lies at (cx, cy), from the square's upper left corner.
+// What each pixel of the splat's square adds to the key of a centre that lies at (cx, cy), from the square's upper left
+// corner.
 void fill_addends(const KernelTraits& kernel, const FlatSplat& flat, double cx, double cy, int row_stride,
                   uint64_t* out) {
   const double contour = contour_r2(kernel, flat.size), radius2 = 0.25 * flat.size * flat.size;
@@ -62,8 +63,8 @@ int sub_bits(int side) {
 }
 
 double splat_bias_growth(int side, double focal_px) {
-  // Depth changes by `gradient` of itself from pixel to pixel on the steepest resolved slope. Centres a splat apart then part
-  // their overlap within a quarter of a splat of the middle if k >= 2 gradient / side.
+  // Depth changes by `gradient` of itself from pixel to pixel on the steepest resolved slope. Centres a splat apart
+  // then part their overlap within a quarter of a splat of the middle if k >= 2 gradient / side.
   const double gradient = kResolvedSlope / focal_px;
   const double cap = kMaxBias / (0.5 * side * side);  // kMaxBias in the square's corner
   return std::min(2.0 * gradient / side * (1 << 23) / (1 << kBiasShift), cap);

@@ -1,6 +1,6 @@
-// Splat shapes: what a splat adds to its centre's key (pixel_key.h) in each pixel it covers: a bias of the depth code that grows
-// with the squared distance from the centre, and the ring. Adding steps to a depth code multiplies the depth by nearly a constant,
-// so one integer a pixel does it.
+// Splat shapes: what a splat adds to its centre's key (pixel_key.h) in each pixel it covers: a bias of the depth code
+// that grows with the squared distance from the centre, and the ring. Adding steps to a depth code multiplies the depth
+// by nearly a constant, so one integer a pixel does it.
 #pragma once
 
 #include <cstdint>
@@ -38,19 +38,22 @@ struct SplatShape {
   std::vector<uint64_t> addends;  ///< [sub_y][sub_x][side][row_stride], padded with kOutsideSplat; empty if side == 1
 };
 
-/// Size of the square splat for a size in pixels, and diameter of the disc: rounded up to a multiple of 0.25, 1..kMaxSplatSide.
+/// Size of the square splat for a size in pixels, and diameter of the disc: rounded up to a multiple of 0.25,
+/// 1..kMaxSplatSide.
 float square_size(float splat_px);
 float disc_diameter(float splat_px);
 /// Side of the square of pixels that holds a square splat wherever its centre lies.
 int square_side(float splat_px);
 
-/// The shapes of one view, built when first asked for. With the projected centre's place told to 1/8 or, above 4 pixels, 1/4 of a
-/// pixel (the middle of that step taken), a splat covers the pixel nearest to it and
-///   square: the pixels whose centres lie within size / 2 of it on both axes; contour (q = 1): the circle through its corners;
+/// The shapes of one view, built when first asked for. With the projected centre's place told to 1/8 or, above 4
+/// pixels, 1/4 of a pixel (the middle of that step taken), a splat covers the pixel nearest to it and
+///   square: the pixels whose centres lie within size / 2 of it on both axes; contour (q = 1): the circle through
+///     its corners;
 ///   disc: the pixels whose centres lie within diameter / 2 of it; contour: that circle.
 class SplatTable {
  public:
-  /// focal_px sets the slope up to which neighbours resolve to the nearest centre. Drops shapes made for another focal length.
+  /// focal_px sets the slope up to which neighbours resolve to the nearest centre. Drops shapes made for another focal
+  /// length.
   void set_focal(double focal_px);
   /// flat: made by flat_splat() for this kernel and the focal length set last.
   const SplatShape& shape(const KernelTraits& kernel, const FlatSplat& flat);

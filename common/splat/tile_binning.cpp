@@ -77,7 +77,8 @@ void TileBinning::place(size_t box, const LeafTransform& transform, float reach,
   Range& r = ranges_[box];
   r = {1, 0, 1, 0, false};
   if (!(f.farthest >= near_m_)) return;
-  // A cube that reaches nearer than half the near plane has no bounded footprint. It is rare: such cubes are in your face.
+  // A cube that reaches nearer than half the near plane has no bounded footprint. It is rare: such cubes are in your
+  // face.
   if (!(f.nearest > 0.5f * near_m_)) {
     r = {0, static_cast<int16_t>(last_column), 0, static_cast<int16_t>(last_row), false};
     return;

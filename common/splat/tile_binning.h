@@ -1,5 +1,5 @@
-// The screen cut into tiles, and what of a view falls into which. A tile's keys stay in a core's cache from
-// splatting to the end of the finish, so memory sees the finished colours alone.
+// The screen cut into tiles, and which boxes of a view touch which tile. A tile's keys stay in a core's cache from
+// splatting to the end of the finish, so only finished colours are written to memory.
 #pragma once
 
 #include <array>
@@ -23,8 +23,9 @@ struct TileGrid {
   geometry::Rect rect(int index) const;
 };
 
-/// Leaf coordinates (uint16 x, y, z) -> homogeneous pixels in single precision, dequantisation folded in: row . (x, y, z, 1) =
-/// (x_pix w, y_pix w, w), w = depth in metres. Off the exact position by less than 0.01 pixel on images of 16384 pixels.
+/// Leaf coordinates (uint16 x, y, z) -> homogeneous pixels in single precision, dequantisation folded in: row . (x, y,
+/// z, 1) = (x_pix w, y_pix w, w), w = depth in metres. Off the exact position by less than 0.01 pixel on images of
+/// 16384 pixels.
 struct LeafTransform {
   std::array<float, 4> x, y, w;
 };
@@ -35,16 +36,16 @@ class TileBinning {
  public:
   struct Entry {
     uint32_t box;  ///< index of the box
-    uint32_t
-        whole;  ///< 1: the box with its margin lies wholly inside the tile and beyond the near plane, so no point of
-                ///< it needs a test
+    /// 1: the box with its margin lies wholly inside the tile and beyond the near plane, so none of its points needs a
+    /// test.
+    uint32_t whole;
   };
 
   /// Conservative: a box is listed in every tile that any of its points, grown by margin_px to each side, can touch.
   ///   transforms: one for each box. Boxes wholly nearer than near_m or outside the image are listed nowhere.
   void build(const TileGrid& grid, std::span<const LeafTransform> transforms, float near_m, float margin_px);
 
-  /// The same in three steps; `place` can be called for all boxes at once.
+  /// The same in three steps: begin(), place() for each box in any order and on any thread, list().
   ///   reach: a box's points at depth w touch reach / w pixels more to each side, most_px at most.
   void begin(const TileGrid& grid, size_t boxes, float near_m, float margin_px);
   void place(size_t box, const LeafTransform& transform, float reach = 0, float most_px = 0);

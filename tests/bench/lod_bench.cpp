@@ -1,7 +1,7 @@
-// lod/*: what a viewer sees of the level of detail while the head moves. Frames are splatted from one fixed model, so that nothing
-// changes but the view.
-//   switching: difference between two pictures from the same pose: one with the levels chosen for it, one with those chosen for the
-//     frame before. Mean over pixels and channels in 8-bit steps; movement and aliasing are in neither.
+// lod/*: what a viewer sees of the level of detail while the head moves. Frames are splatted from one fixed model, so
+// that nothing changes but the view.
+//   switching: difference between two pictures from the same pose: one with the levels chosen for it, one with those
+//     chosen for the frame before. Mean over pixels and channels in 8-bit steps; movement and aliasing are in neither.
 //   pops: blocks of 20 x 20 pixels whose switching exceeds 4 steps in a frame.
 //   flicker: mean of |error now - error one frame before|, error = picture - direct rendering from the same pose.
 #include <benchmark/benchmark.h>
@@ -28,8 +28,8 @@ constexpr int kBlock = 20;
 
 geometry::Camera camera_at(const geometry::Pose& pose) { return geometry::make_camera(pose, 90, kWidth, kHeight); }
 
-// 0: away from the surface and back, the distance changing by the same factor from frame to frame. 1: a recorded head movement,
-// leaning in and out.
+// 0: away from the surface and back, the distance changing by the same factor from frame to frame. 1: a recorded head
+// movement, leaning in and out.
 std::vector<geometry::Camera> movement(int which) {
   std::vector<geometry::Camera> out;
   if (which == 0) {
@@ -108,7 +108,8 @@ Blocks differences(const image::View& a, const image::View* b, const image::View
 
 double mean(const Blocks& v) { return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size()); }
 
-// Blocks whose value exceeds 4 steps. Not those at the border: what comes into view there was not chosen in the frame before.
+// Blocks whose value exceeds 4 steps. Not those at the border: what comes into view there was not chosen in the frame
+// before.
 size_t count_pops(const Blocks& blocks) {
   constexpr size_t kColumns = kWidth / kBlock, kRows = kHeight / kBlock;
   size_t pops = 0;

@@ -1,8 +1,9 @@
-// splat/*: one million points on a display of 2560x1600, beside GL_POINTS and what the machine's memory gives, in the same run.
-// The points are those of one 1280x800 depth image of a wavy surface, seen from where it was sampled. Times are wall-clock; core_ms
-// is what all threads together spent. bytes_floor: what must cross the memory bus for a frame, each point read once (12 bytes) and
-// each pixel written once; floor_ms: the time that takes at the bandwidth measured here on two threads; times_floor: how many times
-// that the frame took. times_gl_points: how many times as long GL_POINTS of that size take.
+// splat/*: one million points on a display of 2560x1600, beside GL_POINTS and what the machine's memory gives, in the
+// same run. The points are those of one 1280x800 depth image of a wavy surface, seen from where it was sampled. Times
+// are wall-clock; core_ms is what all threads together spent. bytes_floor: what must cross the memory bus for a frame,
+// each point read once (12 bytes) and each pixel written once; floor_ms: the time that takes at the bandwidth measured
+// here on two threads; times_floor: how many times that the frame took. times_gl_points: how many times as long
+// GL_POINTS of that size take.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -216,8 +217,9 @@ void splat_select_view(benchmark::State& state) {
 }
 BENCHMARK(splat_select_view)->ArgName("patches")->Arg(1)->Arg(64)->Unit(benchmark::kMillisecond);
 
-// Redundant patches, six a cluster: views of 1280x800 that move a little, in blocks of 64 rows, interleaved two by two; every third is
-// coarse (every 4th pixel of every 4th row). best: 1 = the best of each cluster are drawn, 0 = all of them (the baseline).
+// Redundant patches, six a cluster: views of 1280x800 that move a little, in blocks of 64 rows, interleaved two by two;
+// every third is coarse (every 4th pixel of every 4th row). best: 1 = the best of each cluster are drawn, 0 = all of
+// them (the baseline).
 void splat_select_best(benchmark::State& state) {
   static points::PointModel m(model_config());
   if (m.points() == 0) {
@@ -253,7 +255,8 @@ void splat_select_best(benchmark::State& state) {
 }
 BENCHMARK(splat_select_best)->ArgName("best")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
-// A frame as the display makes it, finish included, for one eye or for both: what is drawn is chosen once for the two of them.
+// A frame as the display makes it, finish included, for one eye or for both: what is drawn is chosen once for the two
+// of them.
 void splat_eyes(benchmark::State& state) {
   const auto kernel = static_cast<splat::Kernel>(state.range(0));
   const auto eyes = static_cast<size_t>(state.range(1));

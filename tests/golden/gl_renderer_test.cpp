@@ -1,4 +1,5 @@
-// What only the GL renderer has: contexts of others, frames left on the GPU, and ways to move data that must make no difference.
+// What only the GL renderer has: contexts of others, frames left on the GPU, and ways to move data that must make no
+// difference.
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 

@@ -65,7 +65,8 @@ TEST_F(GlVolumeTest, ShowsWhatTheCpuShows) {
     const double around = 1.1 * n, above = 0.4 * std::sin(2.0 * n);
     const auto sampled = looking_at(grid.centre_room(), orbit(grid, 0.8, around, above), 320, 240);
     volume::VolumeFrame frame = blob_frame(grid, sampled);
-    frame.frame = FrameId{static_cast<uint64_t>(n + 1)};  // frames of one number are one frame: their texels may lie where the last ones did
+    // Frames of one number are one frame: their texels may lie where the last ones did.
+    frame.frame = FrameId{static_cast<uint64_t>(n + 1)};
     const auto display = looking_at(grid.centre_room(), orbit(grid, 0.7, around + 0.12, above + 0.06), 300 + n, 220);
     expect_alike(&frame, display, "aside-" + std::to_string(n));
     expect_alike(&frame, looking_at(grid.centre_room(), orbit(grid, 0.8, around + 3.2, above), 300, 220),

@@ -1,5 +1,6 @@
-// Both renderers against committed pictures, every kernel. A failing case leaves reference, rendered and difference images in
-// the build folder (golden-failures/). To accept new pictures, look at them and run with TELESPLAT_UPDATE_GOLDEN=1.
+// Both renderers against committed pictures, every kernel. A failing case leaves reference, rendered and difference
+// images in the build folder (golden-failures/). To accept new pictures, look at them and run with
+// TELESPLAT_UPDATE_GOLDEN=1.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -17,7 +18,8 @@ namespace {
 
 constexpr int kWidth = 240, kHeight = 150;
 
-// A torus with a coloured stripe around it, above a chequered floor: curved and flat, near and far, edges before a background.
+// A torus with a coloured stripe around it, above a chequered floor: curved and flat, near and far, edges before a
+// background.
 double distance_to_scene(const glm::dvec3& p) {
   const glm::dvec2 q(std::hypot(p.x, p.z) - 0.24, p.y - 0.03);
   return std::min(std::hypot(q.x, q.y) - 0.09, p.y + 0.12);
@@ -171,7 +173,8 @@ void expect_like(const image::View& reference, const image::View& rendered, cons
   keep("difference", {kWidth, kHeight, d.image, {}});
 }
 
-// A renderer that cannot be made fails the test, unless the machine has no OpenGL at all: then it is null, and the reason is told.
+// A renderer that cannot be made fails the test, unless the machine has no OpenGL at all: then it is null, and the
+// reason is told.
 std::unique_ptr<viewer::Renderer> make(const std::string& kind, std::string& why_not) {
   if (kind == "gl")
     if (const auto context = gl::EglContext::make(); !context) {
@@ -237,8 +240,8 @@ bool same_colour(uint32_t a, uint32_t b, splat::Kernel kernel) {
   return true;
 }
 
-// The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept copies, items
-// that it may not keep, and changes of size are tried too.
+// The two renderers beside each other: colours and depths, frame after frame from one GL renderer, so that its kept
+// copies, items that it may not keep, and changes of size are tried too.
 TEST(RenderersAgree, FrameAfterFrame) {
   std::string why_not;
   const auto gl = make("gl", why_not);
@@ -267,8 +270,8 @@ TEST(RenderersAgree, FrameAfterFrame) {
       colours += !same_colour(a.colour[i], b.colour[i], kernel);
       depths += !(a.depth_m[i] == b.depth_m[i] || std::abs(a.depth_m[i] - b.depth_m[i]) < 1e-4f * a.depth_m[i]);
     }
-    // Stated tolerance: at most 0.5 % of pixels show another point, where depths tie (ewa: another mean); antialiasing shows it
-    // in the neighbours too.
+    // Stated tolerance: at most 0.5 % of pixels show another point, where depths tie (ewa: another mean); antialiasing
+    // shows it in the neighbours too.
     const size_t limit = a.colour.size() / (finish.antialias ? 50 : 200);
     EXPECT_LE(colours, limit) << "frame " << frame;
     EXPECT_LE(depths, limit) << "frame " << frame;

@@ -1,5 +1,5 @@
-// The splatter's contour is the projection of the sample's footprint: against the thesis's matrices, and against points of the
-// footprint's rim projected one by one.
+// The splatter's contour is the projection of the sample's footprint: against the thesis's matrices, and against points
+// of the footprint's rim projected one by one.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -22,7 +22,8 @@ class Cases {
  public:
   explicit Cases(uint32_t seed) : rng_(seed) {}
 
-  // A camera anywhere, a sample in its view. `steep`: its slope lies beyond the limit of stretch as its sampling view saw it.
+  // A camera anywhere, a sample in its view. `steep`: its slope lies beyond the limit of stretch as its sampling view
+  // saw it.
   Case next(bool steep) {
     Case c;
     const glm::dvec3 eye = 2.0 * direction();

@@ -1,5 +1,5 @@
-// The finish gives the same pixels on every instruction set, for every width, as the plain loops of its definition; and those do what
-// they are for.
+// The finish gives the same pixels on every instruction set, for every width, as the plain loops of its definition; and
+// those do what they are for.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -119,8 +119,8 @@ TEST(Elimination, WhatTheModelShowsIsNotSentAgain) {
   EXPECT_LT(result.kept, image.pixels() / 100) << "over 99 % are eliminated";
 }
 
-// Points of one plane that faces the camera, at random places of some pixels: what is kept lies farther from all of them than `nearest`, and
-// what is dropped does not.
+// Points of one plane that faces the camera, at random places of some pixels: what is kept lies farther from all of
+// them than `nearest`, and what is dropped does not.
 TEST(Elimination, DropsWhatHasAPointOfItsSurfaceNearby) {
   const geometry::Camera camera = camera_at(0.0, 64, 48);
   const geometry::Rect whole{0, 0, 64, 48};
@@ -197,7 +197,8 @@ TEST(Elimination, PointsOfASurfaceAreBounded) {
     model.insert(points::prepare_patch(model.config(), Sequence{uint64_t(view) + 1}, camera, whole, image));
   }
   EXPECT_LT(last, sampled / 30) << "a view adds next to nothing in the end";
-  EXPECT_LT(static_cast<double>(model.points()), 1.1547 / (splat::kNearestSample * splat::kNearestSample) * static_cast<double>(sampled));
+  EXPECT_LT(static_cast<double>(model.points()),
+            1.1547 / (splat::kNearestSample * splat::kNearestSample) * static_cast<double>(sampled));
   EXPECT_GT(model.points(), sampled);
 }
 

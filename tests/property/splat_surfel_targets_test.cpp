@@ -1,5 +1,5 @@
-// `ellipse` and `ewa` give the same bytes on every instruction set this machine has, for every number of left-over lanes, on any
-// number of threads; and they are those of plain loops.
+// `ellipse` and `ewa` give the same bytes on every instruction set this machine has, for every number of left-over
+// lanes, on any number of threads; and they are those of plain loops.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
@@ -111,7 +111,8 @@ TEST_P(SurfelTargets, EveryTailLength) {
   const image::Shading shading({}, camera);
   for (int size : {1, 3, 9})
     for (int n = 0; n <= 40; ++n) {
-      // One item across a tile's border, one within a tile, one across the near plane, and a second of the same cluster.
+      // One item across a tile's border, one within a tile, one across the near plane, and a second of the same
+      // cluster.
       std::mt19937 rng(static_cast<uint32_t>(n));
       std::vector<testing::HandMadeItem> made;
       made.emplace_back(geometry::Box{{0.3f, -0.2f, -1.5f}, {1.1f, 0.4f, -1.0f}});

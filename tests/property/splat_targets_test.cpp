@@ -1,5 +1,5 @@
-// The splatter gives the same bytes on every instruction set this machine has, for every number of left-over lanes, on any
-// number of threads; and they are those of a plain loop.
+// The splatter gives the same bytes on every instruction set this machine has, for every number of left-over lanes, on
+// any number of threads; and they are those of a plain loop.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 

@@ -94,8 +94,8 @@ inline std::vector<HandMadeItem> random_items(uint32_t seed, int count, int most
   return items;
 }
 
-/// One point after the other, one pixel after the other, by the formulas of splat_kernels.h, splat_table.h and pixel_key.h.
-/// With a finish, by tests/support/finish_plainly.h: there, nothing is beyond the image.
+/// One point after the other, one pixel after the other, by the formulas of splat_kernels.h, splat_table.h and
+/// pixel_key.h. With a finish, by tests/support/finish_plainly.h: there, nothing is beyond the image.
 inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                            const image::Shading& shading, const splat::Finish& finish = {false, false, false}) {
   Frame frame(camera.width, camera.height);

@@ -33,8 +33,8 @@ void for_surfels(const splat::DrawList& list, const geometry::Camera& camera, co
   }
 }
 
-/// Calls pixel(x, y, q, dx, dy) for the pixels of a conic inside the image: those with q <= 1 and, if `centre`, always the one that
-/// holds its centre.
+/// Calls pixel(x, y, q, dx, dy) for the pixels of a conic inside the image: those with q <= 1 and, if `centre`, always
+/// the one that holds its centre.
 template <class Pixel>
 void for_pixels(const splat::SurfelConic& c, int width, int height, bool centre, const Pixel& pixel) {
   const int ix = int(std::floor(c.centre_x)), iy = int(std::floor(c.centre_y));

@@ -26,9 +26,9 @@ inline std::array<glm::dvec3, 2> basis_across(const glm::dvec3& n) {
   return {a, glm::cross(n, a)};
 }
 
-/// Coordinates of the tangent plane -> coordinates of the input screen, M_i of eq. 4.4 for a sampling view far away (row vectors:
-/// (s, t, 1) M_i). The input screen's axes lie across and along the slope; the one along it shrinks by the cosine of the slope, or,
-/// `limited`, by no more than the splatter's limit.
+/// Coordinates of the tangent plane -> coordinates of the input screen, M_i of eq. 4.4 for a sampling view far away
+/// (row vectors: (s, t, 1) M_i). The input screen's axes lie across and along the slope; the one along it shrinks by
+/// the cosine of the slope, or, `limited`, by no more than the splatter's limit.
 inline glm::dmat3 input_mapping(const Sample& sample, const std::array<glm::dvec3, 2>& tangent, bool limited) {
   const glm::dvec3 along = sample.to_eye - glm::dot(sample.to_eye, sample.normal) * sample.normal;
   const double sine = glm::length(along), cosine = std::abs(glm::dot(sample.to_eye, sample.normal));
@@ -67,7 +67,8 @@ inline CentralConic contour_by_matrices(const geometry::Camera& camera, const Sa
   return {centre, glm::dmat2(a, b, b, c) / (f - d * centre.x - e * centre.y)};
 }
 
-/// A point of the footprint's rim, room space: the point of the tangent plane that the sampling view saw at this angle of its circle.
+/// A point of the footprint's rim, room space: the point of the tangent plane that the sampling view saw at this angle
+/// of its circle.
 inline glm::dvec3 rim_point(const Sample& sample, double angle, bool limited) {
   const auto tangent = basis_across(sample.normal);
   const glm::dmat2 m(input_mapping(sample, tangent, limited));

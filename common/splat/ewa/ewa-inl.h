@@ -1,7 +1,8 @@
 // The kernel `ewa`: which surface is visible in each pixel, then the weighted mean of all splats of that surface.
-// Based on: M. Zwicker, H. Pfister, J. van Baar, M. Gross, "EWA splatting", IEEE TVCG 8(3), 2002; M. Botsch, L. Kobbelt,
-// "High-quality point-based rendering on modern GPUs", 2003 (visibility with an epsilon, then accumulation and normalisation).
-// Included once a target, by surfel_kernels.cpp.
+// Based on: M. Zwicker, H. Pfister, J. van Baar, M. Gross, "EWA splatting", IEEE TVCG 8(3), 2002; M. Botsch, L.
+// Kobbelt, "High-quality point-based rendering on modern GPUs", 2003 (visibility with an epsilon, then accumulation and
+// normalisation).
+// Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_EWA_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_EWA_INL_H_
 #undef TELESPLAT_SPLAT_EWA_INL_H_
@@ -17,13 +18,14 @@
 
 #include "common/splat/ewa/blocks-inl.h"
 #include "common/splat/ewa/resolve-inl.h"
-#include "common/splat/surfel/surfel-inl.h"
+#include "common/splat/surfel/stream-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
 
-// What splats add to EwaSum: its first four and its last four terms, for a whole batch. Made splat by splat, scalars written and read as
-// a vector, each waited for all stores before it: a seventh of the second pass.
+// What splats add to EwaSum: its first four and its last four terms, for a whole batch. Made splat by splat instead,
+// from scalars written and then read as a vector, each read waited for all stores before it: a seventh of the second
+// pass.
 struct EwaTerms {
   HWY_ALIGN float low[4 * SumBatch::kCapacity], high[4 * SumBatch::kCapacity];
 };
@@ -127,7 +129,7 @@ HWY_INLINE void EwaPutSums(const Surfels& s, hn::Mask<I32> keep, float near_m, c
   batch.count += compress.count();
 }
 
-// What the second pass needs of splats, kept from the first, which has their contours: each contour is computed once. Batches one after
+// The splats of the second pass, kept from the first pass so that each contour is computed once. Batches lie one after
 // the other in the buffer's memory.
 class EwaRecord {
  public:
@@ -152,7 +154,7 @@ class EwaRecord {
 
   SumBatch& batch(size_t i) { return reinterpret_cast<SumBatch*>(bytes_)[i]; }
   void next() {
-    // What comes once memory is full is written over the last.
+    // Once memory is full, splats overwrite the last batch.
     if ((used_ + 1) * sizeof(SumBatch) > kBytes)
       overflown_ = true;
     else
@@ -168,7 +170,7 @@ class EwaRecord {
 // First pass: the least depth of opaque ellipses. Leaves a record for the second.
 class EwaVisibility {
  public:
-  // Of the second pass, whose splats reach farther.
+  // The reach of the second pass, whose splats reach farther.
   static constexpr SurfelReach kReach = kEwaReach;
 
   EwaVisibility(const TileInput& input, const EwaBuffer& buffer, EwaRecord& record)
@@ -257,8 +259,8 @@ class EwaAccumulation {
   SumBatch batch_;
 };
 
-// Buffers are empty between tiles: resolving empties them, except for what lies beyond the tile, into which splats hang over and which
-// nobody reads unless the next tile is larger.
+// Buffers are empty between tiles: resolving empties them, except for the pixels beyond the tile into which splats hang
+// over. Nobody reads those unless the next tile is larger.
 void PrepareEwa(const geometry::Rect& rect, EwaBuffer& buffer) {
   if (buffer.width == rect.width && buffer.height == rect.height) return;
   const int stride = (rect.width + kMaxSplatSide + 7) / 8 * 8, rows = rect.height + kMaxSplatSide;

@@ -1,5 +1,5 @@
 // The end of the kernel `ewa`: sums to shaded colours and infos.
-// Included once a target, by surfel_kernels.cpp.
+// Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_EWA_RESOLVE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_EWA_RESOLVE_INL_H_
 #undef TELESPLAT_SPLAT_EWA_RESOLVE_INL_H_

@@ -7,7 +7,8 @@
 
 namespace telesplat::splat {
 
-/// I(n) = ambient + head |n . backward| + key max(0, n . key_direction), cut to 0..1; the head light lies along the view axis.
+/// I(n) = ambient + head |n . backward| + key max(0, n . key_direction), cut to 0..1; the head light lies along the
+/// view axis.
 struct EwaLight {
   float ambient = 1, head = 0, key = 0;
   std::array<float, 3> key_direction{};  ///< in camera axes

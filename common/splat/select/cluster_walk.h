@@ -31,8 +31,8 @@ inline std::vector<SeenBrick> seen_bricks(const points::PointModel& model, const
   return out;
 }
 
-/// Calls visit(cluster) for each cluster of a brick that the frustum meets. Clusters lie scattered in memory, and what comes next is known: asks for it
-/// in time.
+/// Calls visit(cluster) for each cluster of a brick that the frustum meets. Clusters lie scattered in memory, so those
+/// that come next are prefetched.
 template <class Visit>
 void for_seen_clusters(const SeenBrick& seen, const geometry::Frustum& frustum, const Visit& visit) {
   constexpr size_t kClustersAhead = 8, kMosaicsAhead = 4;

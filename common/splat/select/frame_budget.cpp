@@ -29,8 +29,9 @@ void FrameBudget::frame_done(double select_ms, double draw_ms, double points, do
 
   double step = 0;
   if (load_ > 1) {
-    // Where time is quadratic in detail the root of the load closes the gap. An eighth of it a frame does not overshoot, though
-    // the load that we see is a few frames old and time may rise with the fourth power where levels change.
+    // Where time is quadratic in detail the root of the load closes the gap. An eighth of it a frame does not
+    // overshoot, though the load that we see is a few frames old and time may rise with the fourth power where levels
+    // change.
     step = -std::min(load_ > 2 ? kLargeStep : kSmallStep, 0.125 * 0.5 * std::log(load_) + 0.001);
   } else if (load_ < kIdle && detail_drawn > 0.999 * detail_) {
     step = std::min(kSmallStep, 0.1 * 0.5 * std::log(kIdle / std::max(load_, 0.05)) + 0.001);

@@ -1,5 +1,6 @@
-// How much detail fits the frame time, and how much a moving head is worth (T4.4.3.1): what SelectionOptions::detail is to be. Times
-// and poses go in, detail comes out; no clocks inside, so that any machine can be simulated.
+// The value of SelectionOptions::detail: how much detail fits the frame time, and how much a moving head can see
+// (T4.4.3.1). Times and poses go in, detail comes out. There are no clocks inside, so that any machine can be
+// simulated.
 #pragma once
 
 #include "common/geometry/camera.h"
@@ -8,20 +9,24 @@ namespace telesplat::splat {
 
 inline constexpr double kLeastDetail = 0.3;
 
-/// A controller that keeps the time for constructing a view (selecting, splatting, finishing) within a budget. Between 82 and 100 %
-/// of it nothing changes, so that noise is not seen as a pulsing picture; above, detail falls; below, it rises to 1 again.
+/// A controller that keeps the time for constructing a view (selecting, splatting, finishing) within a budget. Between
+/// 82 and 100 % of it nothing changes, so that noise is not seen as a pulsing picture; above, detail falls; below, it
+/// rises to 1 again.
 class FrameBudget {
  public:
   /// budget_ms <= 0: no limit, detail stays 1. least: detail falls no lower.
   explicit FrameBudget(double budget_ms, double least = kLeastDetail) : budget_ms_(budget_ms), least_(least) {}
 
-  /// After each frame: how long choosing what to draw took, which detail does not change, and how long drawing it; how many
-  /// points were drawn, and with what detail: if with less than this controller allowed, that it was fast is no reason to allow
-  /// more. Drawing may take what choosing leaves of the budget, but at least 40 % of it: where choosing alone takes too long, to
-  /// coarsen the picture would not help. Figures that are not finite, and frames without points, tell nothing.
+  /// To be called after each frame.
+  ///   select_ms: time to choose what to draw, which does not depend on detail. draw_ms: time to draw it.
+  ///   points: the number drawn. detail_drawn: their detail. If it was less than this controller allowed, a fast frame
+  ///   is no reason to allow more.
+  /// Drawing may take the part of the budget that choosing leaves, but at least 40 % of it: where choosing alone takes
+  /// too long, a coarser picture would not help. Figures that are not finite and frames without points are ignored.
   void frame_done(double select_ms, double draw_ms, double points, double detail_drawn);
 
-  /// For the next frame, in [least, 1]. Changes by at most 2 % a frame, 6 % while frames take more than twice the budget.
+  /// For the next frame, in [least, 1]. Changes by at most 2 % a frame, 6 % while frames take more than twice the
+  /// budget.
   double detail() const { return detail_; }
   double budget_ms() const { return budget_ms_; }
 
@@ -32,13 +37,15 @@ class FrameBudget {
   double load_ = 0;          // smoothed
 };
 
-/// The thesis divides the desired pixel range by the head's velocity. Here: by how fast typical content moves on the screen, over
-/// kFreePixels each 60th of a second; slower movements cost nothing. Detail follows within about 0.3 s.
+/// The thesis divides the desired pixel range by the head's velocity. We divide it by the speed of typical content on
+/// the screen, in units of kFreePixels each 60th of a second; slower movements cost nothing. Detail follows within
+/// about 0.3 s.
 class SpeedDetail {
  public:
   static constexpr double kFreePixels = 12;
 
-  /// Before each frame. depth_m: how far away typical content is. The first frame, and times that do not advance, are no movement.
+  /// Before each frame. depth_m: how far away typical content is. The first frame, and times that do not advance, are
+  /// no movement.
   void frame(double now_s, const geometry::Camera& camera, double depth_m);
   double detail() const { return detail_; }
 
@@ -48,7 +55,8 @@ class SpeedDetail {
   geometry::Pose last_;
 };
 
-/// How far content `depth_m` away moves on the screen between two poses, pixels: at most, over all directions of looking.
+/// How far content `depth_m` away moves on the screen between two poses, pixels: at most, over all directions of
+/// looking.
 double screen_movement(const geometry::Pose& from, const geometry::Pose& to, double depth_m, double focal_px);
 
 }  // namespace telesplat::splat

@@ -1,4 +1,4 @@
-// How much of a mosaic is drawn: level of detail as a function without steps (T4.4.3.1).
+// How many points of a mosaic are drawn: level of detail as a function without steps (T4.4.3.1).
 #pragma once
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 
 namespace telesplat::splat {
 
-/// The mosaic's first `count` points: [0, mean) in the mean colours of level fine + 1, [mean, count) in the colours of level
-/// `fine`. Either part may be empty. Lengths are in samples of level 0.
+/// The mosaic's first `count` points: [0, mean) in the mean colours of level fine + 1, [mean, count) in the colours of
+/// level `fine`. Either part may be empty. Lengths are in samples of level 0.
 struct Drawn {
   uint32_t count, mean;
   int fine;
@@ -16,14 +16,15 @@ struct Drawn {
   float widest;   ///< spacing where the points lie farthest apart: what splats must bridge
 };
 
-/// A mosaic whose next level adds fewer points than this switches as a whole, each at a ratio of its own: no one sees a few
-/// points come, and one draw item is less than two.
+/// A mosaic whose next level adds fewer points than this switches as a whole, each at a ratio of its own: nobody sees a
+/// few points come, and one draw item costs less than two.
 inline constexpr uint32_t kSmallStep = 32;
 
-/// Levels pass into each other within a quarter of an octave to both sides of the ratio at which the closest one changes. Set
-/// by bench lod_transitions, away from a terrain and back: with whole levels 31.0 dB and 7 popping blocks a second, with this width
-/// 30.8 dB and 0.75, with half an octave (all ratios in transition) 30.1 dB and 22, since then even views at the samples' own rate
-/// change. Along a recorded movement, which hardly switches levels, this width costs 0.35 dB.
+/// Levels pass into each other within a quarter of an octave to both sides of the ratio at which the closest one
+/// changes. Set by bench lod_transitions, away from a terrain and back. Whole levels: 31.0 dB and 7 popping blocks a
+/// second. This width: 30.8 dB and 0.75. Half an octave (all ratios in transition): 30.1 dB and 22, since then even
+/// views at the samples' own rate change. Along a recorded movement, which hardly switches levels, this width costs
+/// 0.35 dB.
 inline constexpr float kTransitionBegin = 0.59460356f, kTransitionEnd = 0.84089642f;  ///< 2^(-1/2 -+ 1/4)
 
 /// The level whose pixel range is closest, in ratio, to `wanted` times level 0's.
@@ -34,17 +35,17 @@ inline Drawn closest_level(const points::Mosaic& m, float wanted) {
   return {m.count(l), 0, l, side, side};
 }
 
-/// How far apart points lie at most where `share` of a level's additional points is there, in samples of that level. By the
-/// order of ranks (decimate.h): 2 until half of the level is there (share 1/3), then a quincunx's sqrt 2, and 1 when all are; the
-/// steps are passed within 0.2.
+/// How far apart points lie at most, in samples of a level, where `share` of that level's additional points is drawn.
+/// It follows from the order of ranks (decimate.h): 2 until half of the level is drawn (share 1/3), then a quincunx's
+/// sqrt 2, and 1 when all points are. Each step is spread over a share of 0.2.
 inline float widest_spacing(float share) {
   const auto ramp_down = [share](float from, float to) { return std::clamp((to - share) / (to - from), 0.0f, 1.0f); };
   return 1.0f + 0.58578644f * ramp_down(0.23f, 0.43f) + 0.41421356f * ramp_down(0.8f, 1.0f);
 }
 
-/// As closest_level, but near the ratio at which that changes a share of the points that the finer level adds. The share rises
-/// from 0 to 1 with `wanted`, continuously, such that the density is quadratic in it; as large a share of the coarse level's points
-/// have their own colours instead of mean ones.
+/// As closest_level, but near the ratio at which the level changes only a share of the finer level's additional points
+/// is drawn. The share rises continuously from 0 to 1 with `wanted`, so that the density is quadratic in `wanted`. The
+/// same share of the coarse level's points has its own colours instead of mean ones.
 ///   dither: in [0, 1), differs from mosaic to mosaic: where small ones switch.
 inline Drawn between_levels(const points::Mosaic& m, float wanted, float dither) {
   static_assert(points::kLevels == 3);

@@ -14,7 +14,7 @@ constexpr float kPixelRadius2 = 0.25f;  // of the low-pass
 constexpr float kMoreCovered = 1.1f, kApart = 0.1f;
 constexpr float kAreaOff = 1.5f, kCentreOff = 0.5f;  // of n samples: kAreaOff / sqrt n of the area, kCentreOff spacings
 
-// Of the slope by which samples were taken, not below kMinCosine.
+// Cosine of the slope by which samples were taken, not below kMinCosine.
 float sampled_cosine(const glm::vec3& normal, const glm::vec3& to_eye) {
   return std::max(glm::dot(normal, to_eye), kMinCosine);
 }

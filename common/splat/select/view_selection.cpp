@@ -24,11 +24,11 @@ struct Chosen {
 // 0 up to `from`, 1 from `to` on.
 float ramp(float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0f, 1.0f); }
 
-// T4.4.3: where a low-rate mosaic would hide high-rate ones its splats shrink.
-// We deviate in two things. After redundancy elimination a low-rate mosaic may be all there is in most of the cluster, and a
-// handful of high-rate points elsewhere in it would tear holes: splats shrink only if mosaics of higher rate cover at least as
-// much of the cluster as the low-rate one does. And nothing jumps: sizes and coverages pass the two thresholds over a quarter of
-// their height.
+// T4.4.3: where a low-rate mosaic would hide high-rate ones its splats shrink. We deviate in two things.
+// After redundancy elimination a low-rate mosaic may be all there is in most of the cluster, and a handful of high-rate
+// points elsewhere in it would tear holes. So splats shrink only if mosaics of higher rate cover at least as much of
+// the cluster as the low-rate one does.
+// And nothing jumps: sizes and coverages pass the two thresholds over a quarter of their height.
 void revise_sizes(const SelectionOptions& options, std::vector<Chosen>& chosen) {
   float smallest = chosen.front().size, largest = smallest;
   for (const Chosen& c : chosen) smallest = std::min(smallest, c.size), largest = std::max(largest, c.size);
@@ -52,7 +52,7 @@ float dither_of(points::ClusterKey key, const points::Mosaic& m) {
   return static_cast<float>(h >> 40) * 0x1p-24f;
 }
 
-// The patches that the mosaics drawn of a cluster are of.
+// Notes the patches to which the mosaics drawn from a cluster belong.
 void note_patches(points::ClusterKey key, const std::vector<const points::Mosaic*>& drawn, DrawList& out) {
   const auto first = static_cast<ptrdiff_t>(out.frames_seen.size());
   for (const points::Mosaic* m : drawn) {
@@ -75,7 +75,8 @@ DrawItem make_item(const points::Cluster& cluster, const points::Mosaic& m, int 
           .of = a.count};
 }
 
-// A summary is made anew once its brick changed more often: mosaics that have what it lacks are drawn beside it until then, whole.
+// A summary is made again once its brick has changed more often than this. Until then the mosaics that it lacks are
+// drawn whole, beside it.
 constexpr uint64_t kStaleChanges = 16;
 
 // One walk over a model.
@@ -113,7 +114,7 @@ class Selector {
     return true;
   }
 
-  /// after: mosaics of earlier events are left out.
+  /// after: mosaics of this event and of earlier ones are left out.
   void add(const points::Cluster& cluster, Sequence after = {}) {
     const geometry::Box& leaf = cluster.leaf_room;
     const float leaf_m = leaf.hi.x - leaf.lo.x;
@@ -141,7 +142,7 @@ class Selector {
     bool may_face_away;
   };
 
-  // points::pixel_range, with what is the same for all leaves taken out.
+  // points::pixel_range, with the figures that all leaves share computed once.
   float pixel_range(const geometry::Box& leaf, double leaf_m) const {
     const double depth = glm::dot(position_ - glm::dvec3(leaf.centre()), backward_);
     return static_cast<float>(leaf_m * focal_ / std::max(depth, 0.5 * leaf_m));

@@ -1,4 +1,4 @@
-// What of a point model is drawn for a view, at which level and splat size (T4.4.3).
+// Which points of a model are drawn for a view, at which level and splat size (T4.4.3).
 #pragma once
 
 #include <vector>
@@ -13,31 +13,33 @@ struct SelectionOptions {
   float hide_ratio = 1.5f;     ///< "ratio" of T4.4.3: a splat larger than this times the best one's size is revised ...
   float hide_epsilon = 0.25f;  ///< ... to best + epsilon * its size
   float max_splat_px = 16.0f;  ///< no splat is larger
-  float detail =
-      1.0f;  ///< in (0, 1]: points drawn a sample or display pixel, whichever is larger, on each axis (T4.4.3.1)
+  /// In (0, 1]: points drawn on each axis for a sample or a display pixel, the larger of the two (T4.4.3.1).
+  float detail = 1.0f;
   bool transitions = true;  ///< between neighbouring levels as many points as wanted; false: the closest level whole
   bool cone_culling = true;
-  bool best_patch_only =
-      false;  ///< packing kept redundant patches: of each cluster draw the best ones (patch_choice.h)
+  /// Packing kept redundant patches: the best ones of each cluster are drawn (patch_choice.h).
+  bool best_patch_only = false;
 };
 
-/// Consecutive points of one mosaic level to draw. Pointers live as long as the model is not changed (or the viewer's frame lasts).
+/// Consecutive points of one mosaic level to draw. Pointers live as long as the model is not changed (or the viewer's
+/// frame lasts).
 struct DrawItem {
   const points::Cluster* cluster;
   points::Mosaic::Level level;  ///< the points drawn
   float splat_px;               ///< side (square) or diameter (disc) in display pixels, >= 1
-  Sequence
-      sequence{};  ///< the mosaic's; with cluster->key it names the points, for renderers that keep copies. 0: do not keep
-  float radius_m =
-      0;  ///< radius of a splat that faces its sampling view, metres in room space: half of splat_px at the leaf's centre,
-          ///< but not widened to a pixel (ellipse, ewa)
-  glm::vec3 to_eye{0, 0, 1};  ///< from the leaf towards the eye of the sampling view, unit length; or zero (ellipse, ewa)
+  /// The mosaic's. With cluster->key it names the points, for renderers that keep copies. 0: not to be kept.
+  Sequence sequence{};
+  /// Surfel kernels: radius of a splat that faces its sampling view, metres in room space. It is half of splat_px at the
+  /// leaf's centre, but not widened to a pixel.
+  float radius_m = 0;
+  /// Surfel kernels: from the leaf towards the eye of the sampling view, unit length; or zero.
+  glm::vec3 to_eye{0, 0, 1};
   uint32_t first = 0;         ///< where level[0] lies in arrays()
   uint32_t of = 0;            ///< how many points arrays() has; 0: as many as are drawn
   bool may_face_away = false;  ///< some of its points may; those that do are not drawn (facing.h)
 
-  /// The whole level that the points drawn are part of: points [first, first + level.count) of it. It stays the same from frame
-  /// to frame while the part changes, so it is what renderers keep copies of.
+  /// The whole level: the points drawn are its points [first, first + level.count). The level stays the same from frame
+  /// to frame while that part changes, so renderers keep copies of it.
   points::Mosaic::Level arrays() const {
     return {of ? of : level.count, level.x - first,      level.y - first,
             level.z - first,       level.normal - first, level.colour - first};
@@ -46,33 +48,35 @@ struct DrawItem {
 
 struct DrawList {
   std::vector<DrawItem> items;
-  /// Clusters that passed culling: for access reports. With SelectionOptions::best_patch_only a cluster once for each patch of it
-  /// that is drawn, and frames_seen, as long, has that patch's frame tag; else frames_seen is empty.
+  /// Clusters that passed culling: for access reports. With SelectionOptions::best_patch_only a cluster is listed once
+  /// for each of its patches that is drawn, and frames_seen has the frame tags of those patches, one an entry. Without
+  /// it frames_seen is empty.
   std::vector<points::ClusterKey> clusters_seen;
   std::vector<uint32_t> frames_seen;
-  /// Bricks that a summary would be drawn of, or a newer one, if there were one.
+  /// Bricks that would be drawn as a summary, or as a newer one, if there were one.
   std::vector<points::ClusterKey> summaries_wanted;
   uint64_t points = 0;
-  float scale =
-      1.0f;  ///< SelectionOptions::scale: splat_px / scale is how far apart an item's samples lie on the screen
+  /// SelectionOptions::scale: splat_px / scale is the distance of an item's samples on the screen.
+  float scale = 1.0f;
   double distance_m = 0;  ///< mean distance of the points drawn, by their leaves; 0 if there are none
   Sequence applied;       ///< the newest event of the model they were selected from
-  EpochId epoch;          ///< that model's; a list never has points of two
-  uint64_t replica =
-      0;  ///< with it a DrawItem's cluster and sequence name the points: another packer's sequences begin again
+  EpochId epoch;          ///< that model's; a list never has points of two epochs
+  /// Together with it a DrawItem's cluster and sequence name the points: another packer's sequences begin again.
+  uint64_t replica = 0;
 };
 
-/// Culls clusters by frustum, mosaics by normal cone; chooses how many of each mosaic's points are drawn (level_choice.h): the
-/// desired pixel range is the display's, or the sampling view's if that is less, times detail. Splat size = scale * display's
-/// pixel range / pixel range of the points drawn (T eq. 4.8), revised as in T4.4.3. A mosaic between two levels becomes two
-/// items, next to each other.
-///   summaries: of the model's bricks, or null. A brick that spans no more pixels than its summary has samples is drawn as that, and what came since; so what is
-///   far away costs what its pixels cost. Not with options.best_patch_only.
+/// Culls clusters by frustum, mosaics by normal cone; chooses how many of each mosaic's points are drawn
+/// (level_choice.h): the desired pixel range is the display's, or the sampling view's if that is less, times detail.
+/// Splat size = scale * display's pixel range / pixel range of the points drawn (T eq. 4.8), revised as in T4.4.3. A
+/// mosaic between two levels becomes two items, next to each other.
+///   summaries: of the model's bricks, or null. A brick that spans no more pixels than its summary has samples is drawn
+///   as the summary and the mosaics that came since. So distant bricks cost as much as the pixels they cover. Not with
+///   options.best_patch_only.
 void select_view(const points::PointModel& model, const geometry::Camera& camera, const SelectionOptions& options,
                  DrawList& out, const points::Summaries* summaries = nullptr);
 
-/// True if every point of the mosaic faces away from the camera. The packer's reference depth map and the viewers use this one
-/// test, so that what viewers cull is not taken as seen.
+/// True if every point of the mosaic faces away from the camera. The packer's reference depth map and the viewers use
+/// this one test, so that a mosaic that viewers cull does not count as seen.
 bool faces_away(const points::Mosaic& mosaic, const geometry::Box& leaf_room, const glm::vec3& eye_room);
 
 }  // namespace telesplat::splat

@@ -1,10 +1,12 @@
-// Where a sample's footprint on the surface appears on the screen: a point, its normal and the view that sampled it give an ellipse of
-// pixels and the slope of depth across it (T4.4.1, eq. 4.2-4.7).
-// Based on: M. Zwicker, J. Raesaenen, M. Botsch, C. Dachsbacher, M. Pauly, "Perspective accurate splatting", Graphics Interface 2004.
-// We project the footprint in its dual form: the conic's adjugate, p p^T - V for a centre p and a footprint V in space, needs neither a
-// basis of the tangent plane nor matrices to be inverted, and gives the bounding box at once. The contour is the same.
+// Where a sample's footprint on the surface appears on the screen: a point, its normal and the view that sampled it
+// give an ellipse of pixels and the slope of depth across it (T4.4.1, eq. 4.2-4.7).
+// Based on: M. Zwicker, J. Raesaenen, M. Botsch, C. Dachsbacher, M. Pauly, "Perspective accurate splatting", Graphics
+// Interface 2004. We project the footprint in its dual form: the conic's adjugate, p p^T - V for a centre p and a
+// footprint V in space, needs neither a basis of the tangent plane nor matrices to be inverted, and gives the bounding
+// box at once. The contour is the same.
 //
-// These are the plain functions; surfel-inl.h does the same operations in the same order on vectors, so that both give the same bits.
+// These are the plain functions; surfel-inl.h does the same operations in the same order on vectors, so that both give
+// the same bits.
 #pragma once
 
 #include <algorithm>
@@ -16,17 +18,17 @@
 
 namespace telesplat::splat {
 
-/// Cosine below which a sample's footprint grows no longer with the slope at which it was taken: without a limit splats taken at
-/// silhouettes reach far beyond them.
+/// Cosine below which a sample's footprint no longer grows with the slope at which it was taken. Without a limit,
+/// splats of samples taken at silhouettes would reach far beyond them.
 inline constexpr float kMinSampledCosine = 0.35f;
-/// Steepest surface, as the tangent of its angle to the screen, whose depth is followed across a splat: tan(78 degrees). Beyond it
-/// normals of 16 bits do not tell the depth any more.
+/// Steepest surface, as the tangent of its angle to the screen, whose depth is followed across a splat: tan(78
+/// degrees). Beyond it normals of 16 bits are too coarse to give the depth.
 inline constexpr float kSteepest = 4.7f;
-/// Footprint radius over distance is taken as this at most: larger splats are cut to their largest size on the screen anyway, and
-/// no product overflows.
+/// Footprint radius over distance is taken as this at most: larger splats are cut to their largest size on the screen
+/// anyway, and no product overflows.
 inline constexpr float kMaxRadiusOverDepth = 1.0f;
 
-/// What of a camera contours need. Camera axes: X right, Y down, Z forward; a point w (u, v, 1) lies at pixel
+/// The camera figures that contours need. Camera axes: X right, Y down, Z forward; a point w (u, v, 1) lies at pixel
 /// (focal_x u + centre_x, focal_y v + centre_y).
 struct SurfelCamera {
   float focal_x = 1, focal_y = 1, centre_x = 0, centre_y = 0;
@@ -51,8 +53,8 @@ inline SurfelCamera surfel_camera(const geometry::Camera& c) {
           axis(2, -1)};
 }
 
-/// How an item's samples were taken: the circle that each stands for where the surface faced the sampling view, and the direction
-/// towards that view, unit length, in camera axes.
+/// How an item's samples were taken: the circle that each stands for where the surface faced the sampling view, and the
+/// direction towards that view, unit length, in camera axes.
 struct SurfelSource {
   float radius_m = 0;
   std::array<float, 3> to_eye{0, 0, -1};
@@ -65,7 +67,8 @@ inline SurfelSource surfel_source(const SurfelCamera& c, float radius_m, const g
   return {radius_m, {dot(c.right, x, y, z), dot(c.down, x, y, z), dot(c.forward, x, y, z)}};
 }
 
-/// Normal of 16 bits (image/normal.h) without its division and square root: 127 |x| + ... = 127, so coordinates are whole numbers.
+/// Normal of 16 bits (image/normal.h) without its division and square root: 127 |x| + ... = 127, so coordinates are
+/// whole numbers.
 inline std::array<float, 3> surfel_normal(uint16_t code) {
   const float x = std::min(static_cast<float>(code & 255) - 127.0f, 127.0f),
               y = std::min(static_cast<float>(code >> 8) - 127.0f, 127.0f);
@@ -81,13 +84,14 @@ struct SurfelContour {
   std::array<float, 3> normal{0, 0, -1};  ///< in camera axes, not of unit length
 };
 
-/// With m the normal, i = 1 / m.m, n n^T = i m m^T, e the direction to the sampling view and d = e - (e.n) n, the footprint is
+/// With m the normal, i = 1 / m.m, n n^T = i m m^T, e the direction to the sampling view and d = e - (e.n) n, the
+/// footprint is
 ///   V = radius^2 (I - n n^T + kappa d d^T),  kappa = 1 / max((e.n)^2, kMinSampledCosine^2)
-/// a circle stretched along the slope by 1 / (e.n), or by sqrt(1 + |d|^2 / kMinSampledCosine^2) beyond the limit. With T the shift of
-/// image coordinates by (u, v), s = T m, t = T d:
+/// a circle stretched along the slope by 1 / (e.n), or by sqrt(1 + |d|^2 / kMinSampledCosine^2) beyond the limit. With
+/// T the shift of image coordinates by (u, v), s = T m, t = T d:
 ///   G = T T^T - i s s^T + kappa t t^T,   dual conic about the projected centre: diag(0, 0, 1) - (radius / w)^2 G
-/// and its centre and S follow as k = 1 - (radius / w)^2 Gzz divides. Where the splat reaches the eye (k < 1/4) its projection is taken
-/// as parallel.
+/// and its centre and S follow as k = 1 - (radius / w)^2 Gzz divides. Where the splat reaches the eye (k < 1/4) its
+/// projection is taken as parallel.
 ///   x_pix, y_pix, w: the projected centre. normal_room: see surfel_normal. No low-pass is added to S.
 inline SurfelContour surfel_contour(const SurfelCamera& c, const SurfelSource& source, float x_pix, float y_pix,
                                     float w, const std::array<float, 3>& normal_room) {
@@ -119,7 +123,8 @@ inline SurfelContour surfel_contour(const SurfelCamera& c, const SurfelSource& s
   out.xy = (ax * c.focal_y) * gxy + out.offset_x * out.offset_y;
   out.yy = (ay * c.focal_y) * gyy + out.offset_y * out.offset_y;
 
-  // The tangent plane m . P = m . p, P on the ray through the pixel. Seen edge-on it has no depth to follow: it gets the steepest.
+  // The tangent plane m . P = m . p, P on the ray through the pixel. Seen edge-on it has no depth to follow: it gets
+  // the steepest.
   const float along = (mx * u + my * v) + mz;
   const float inverse = 1.0f / std::copysign(std::max(std::abs(along), 1e-3f), along);
   const float limit_x = kSteepest * c.step_x, limit_y = kSteepest * c.step_y;

@@ -1,5 +1,5 @@
 // The kernel `ellipse`: one pass, opaque, the plane's depth and a paraboloid of bias in each pixel.
-// Included once a target, by surfel_kernels.cpp.
+// Included once a target, by surfel/kernels.cpp.
 #if defined(TELESPLAT_SPLAT_ELLIPSE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_SPLAT_ELLIPSE_INL_H_
 #undef TELESPLAT_SPLAT_ELLIPSE_INL_H_
@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "common/splat/surfel/surfel-inl.h"
+#include "common/splat/surfel/stream-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace telesplat::splat::HWY_NAMESPACE {
@@ -26,22 +26,12 @@ class EllipseSink {
   HWY_INLINE void add(const Surfels& s, hn::Mask<I32> keep) {
     const F32 d;
     const I32 di;
-    const U32 du;
     const auto one = hn::Set(di, 1);
     if (count_ + kMaxLanes > kCapacity) flush();
     const Conics c = ConicOf(s, Const(1.0f), kOpaqueVariance, rect_);
     const Depths depth = DepthsOf(s, near_m_);
     const auto bias = hn::Min(ShareOf(s, kBiasPerRadius, kLeastBias, kMostBias), Const(static_cast<float>(kMaxBias)));
-    // What of the key is the same in all its pixels.
-    const auto det = DeterminantOf(s);
-    const auto reached = [&](float limit) HWY_ATTR {
-      return hn::IfThenElseZero(hn::RebindMask(di, hn::Ge(det, Const(limit))), one);
-    };
-    const auto spacing = hn::Add(hn::Add(reached(limits_[0]), reached(limits_[1])), reached(limits_[2]));
-    const auto high =
-        hn::Or(hn::Or(hn::ShiftLeft<kKeyClassBit - 32>(hn::BitCast(du, spacing)), hn::ShiftRight<8>(s.normal_code)),
-               hn::Set(du, 0x80000000u));
-    const auto low = hn::Or(hn::ShiftLeft<24>(s.normal_code), s.albedo);
+    const SharedKey shared = shared_key(s);
 
     // The pixel that holds the centre is drawn by itself where the ellipse covers no other or misses it.
     const auto half = Const(0.5f);
@@ -54,56 +44,24 @@ class EllipseSink {
     const auto many = hn::And(keep, hn::AndNot(small, tall));
     const auto in_rect = CentreIn(c, rect_);
     const auto missed = hn::Not(hn::RebindMask(di, hn::Le(q, Const(1.0f))));
-    // A box of one pixel may be cut from a larger one that holds the centre elsewhere: then its pixel goes the common way.
+    // A box of one pixel may be cut from a larger one whose centre lies in another pixel: then it is drawn like larger
+    // boxes.
     const auto elsewhere =
         hn::And(hn::And(keep, hn::And(small, tall)), hn::Or(hn::Ne(c.x0, c.pixel_x), hn::Ne(c.y0, c.pixel_y)));
     const auto single = hn::And(hn::And(keep, in_rect), hn::Or(small, missed));
-    const auto stride = hn::Set(di, buffer_.stride);
-    const auto place_of = [&](VI x, VI y) HWY_ATTR {
-      const auto row = hn::Sub(y, hn::Set(di, rect_.y - buffer_.margin)),
-                 column = hn::Sub(x, hn::Set(di, rect_.x - buffer_.margin));
-      return hn::BitCast(du, hn::Add(hn::Mul(row, stride), column));
-    };
-
     if (!hn::AllFalse(di, single)) {
       const auto code = hn::Add(hn::Add(hn::Add(depth.centre, hn::Mul(depth.x, dx)), hn::Mul(depth.y, dy)),
                                 hn::Mul(bias, hn::Min(q, Const(1.0f))));
-      const auto whole = hn::BitCast(du, hn::ConvertTo(di, Clamp(code, hn::Zero(d), Const(kMaxDepthCode))));
-      const auto ring = hn::BitCast(du, hn::ConvertTo(di, hn::Min(hn::Mul(Const(8.0f), q), Const(7.0f))));
-      const auto key =
-          hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(whole), hn::ShiftLeft<kKeyRingBit - 32>(ring)), high);
-      HWY_ALIGN uint32_t places[kMaxLanes];
-      HWY_ALIGN uint64_t keys[kMaxLanes];
-      const Compressor compress(hn::RebindMask(du, single));
-      hn::Store(compress(place_of(c.pixel_x, c.pixel_y)), du, places);
-      hn::StoreInterleaved2(compress(low), compress(key), du, reinterpret_cast<uint32_t*>(keys));
-      const size_t n = compress.count();
-      auto* pixels = reinterpret_cast<int64_t*>(buffer_.keys);
-      for (size_t i = 0; i < n; ++i) pixels[places[i]] = std::min(pixels[places[i]], static_cast<int64_t>(keys[i]));
+      draw_centres(c, single, code, q, shared);
     }
-
     const auto common = hn::Or(many, elsewhere);
-    if (hn::AllFalse(di, common)) return;
-    const Compressor compress(hn::RebindMask(du, common));
-    const auto put = [&](Field field, VU v) HWY_ATTR { hn::StoreU(compress(v), du, batch_[field] + count_); };
-    const auto put_float = [&](Field field, VF v) HWY_ATTR { put(field, hn::BitCast(du, v)); };
-    put(kPlace, place_of(c.x0, c.y0));
-    put(kSize, hn::BitCast(du, hn::Or(hn::Or(columns, hn::ShiftLeft<8>(rows)),
-                                      hn::IfThenElseZero(c.cut, hn::Set(di, 1 << 16)))));
-    put_float(kFirstX, hn::Add(hn::ConvertTo(d, c.x0), half));
-    put_float(kFirstY, hn::Add(hn::ConvertTo(d, c.y0), half));
-    put_float(kCentreX, c.centre_x), put_float(kCentreY, c.centre_y);
-    put_float(kXX, c.xx), put_float(kXY, c.xy), put_float(kYY, c.yy);
-    put_float(kCode, depth.centre), put_float(kCodeX, depth.x), put_float(kCodeY, depth.y);
-    put_float(kBias, bias);
-    put(kHigh, high), put(kLow, low);
-    count_ += compress.count();
+    if (!hn::AllFalse(di, common)) enqueue(c, common, depth, bias, shared);
   }
 
   void flush() {
     for (size_t i = 0; i < count_; ++i) {
-      // Most splats fit into four by four pixels, and are drawn without any loop whose end could be guessed wrong: what lies outside
-      // the ellipse stays as it is.
+      // Most splats fit into four by four pixels, and are drawn without any loop whose end could be predicted wrongly: what
+      // lies outside the ellipse stays as it is.
       const uint32_t size = batch_[kSize][i];
       if ((size & 255) <= 4 && size >> 8 <= 4)
         draw<false>(i, 4, size >> 8 <= 2 ? 2 : 4);
@@ -136,6 +94,76 @@ class EllipseSink {
   };
   static constexpr size_t kCapacity = 256;
 
+  // The part of the key that all pixels of a splat share.
+  struct SharedKey {
+    VU high, low;
+  };
+  HWY_INLINE SharedKey shared_key(const Surfels& s) const {
+    const I32 di;
+    const U32 du;
+    const auto one = hn::Set(di, 1);
+    const auto det = DeterminantOf(s);
+    const auto reached = [&](float limit) HWY_ATTR {
+      return hn::IfThenElseZero(hn::RebindMask(di, hn::Ge(det, Const(limit))), one);
+    };
+    const auto spacing = hn::Add(hn::Add(reached(limits_[0]), reached(limits_[1])), reached(limits_[2]));
+    const auto high =
+        hn::Or(hn::Or(hn::ShiftLeft<kKeyClassBit - 32>(hn::BitCast(du, spacing)), hn::ShiftRight<8>(s.normal_code)),
+               hn::Set(du, 0x80000000u));
+    const auto low = hn::Or(hn::ShiftLeft<24>(s.normal_code), s.albedo);
+    return {high, low};
+  }
+
+  // Index in the buffer.
+  HWY_INLINE VU place_of(VI x, VI y) const {
+    const I32 di;
+    const auto row = hn::Sub(y, hn::Set(di, rect_.y - buffer_.margin)),
+               column = hn::Sub(x, hn::Set(di, rect_.x - buffer_.margin));
+    return hn::BitCast(U32(), hn::Add(hn::Mul(row, hn::Set(di, buffer_.stride)), column));
+  }
+
+  // Draws the pixels that hold the centres. code: their depth codes, bias included.
+  HWY_INLINE void draw_centres(const Conics& c, hn::Mask<I32> wanted, VF code, VF q, const SharedKey& shared) {
+    const F32 d;
+    const I32 di;
+    const U32 du;
+    const auto whole = hn::BitCast(du, hn::ConvertTo(di, Clamp(code, hn::Zero(d), Const(kMaxDepthCode))));
+    const auto ring = hn::BitCast(du, hn::ConvertTo(di, hn::Min(hn::Mul(Const(8.0f), q), Const(7.0f))));
+    const auto key =
+        hn::Or(hn::Or(hn::ShiftLeft<kKeyDepthBit - 32>(whole), hn::ShiftLeft<kKeyRingBit - 32>(ring)), shared.high);
+    HWY_ALIGN uint32_t places[kMaxLanes];
+    HWY_ALIGN uint64_t keys[kMaxLanes];
+    const Compressor compress(hn::RebindMask(du, wanted));
+    hn::Store(compress(place_of(c.pixel_x, c.pixel_y)), du, places);
+    hn::StoreInterleaved2(compress(shared.low), compress(key), du, reinterpret_cast<uint32_t*>(keys));
+    const size_t n = compress.count();
+    auto* pixels = reinterpret_cast<int64_t*>(buffer_.keys);
+    for (size_t i = 0; i < n; ++i) pixels[places[i]] = std::min(pixels[places[i]], static_cast<int64_t>(keys[i]));
+  }
+
+  // Adds splats to the batch.
+  HWY_INLINE void enqueue(const Conics& c, hn::Mask<I32> wanted, const Depths& depth, VF bias,
+                          const SharedKey& shared) {
+    const F32 d;
+    const I32 di;
+    const U32 du;
+    const auto half = Const(0.5f);
+    const Compressor compress(hn::RebindMask(du, wanted));
+    const auto put = [&](Field field, VU v) HWY_ATTR { hn::StoreU(compress(v), du, batch_[field] + count_); };
+    const auto put_float = [&](Field field, VF v) HWY_ATTR { put(field, hn::BitCast(du, v)); };
+    put(kPlace, place_of(c.x0, c.y0));
+    put(kSize, hn::BitCast(du, hn::Or(hn::Or(hn::Sub(c.x1, c.x0), hn::ShiftLeft<8>(hn::Sub(c.y1, c.y0))),
+                                      hn::IfThenElseZero(c.cut, hn::Set(di, 1 << 16)))));
+    put_float(kFirstX, hn::Add(hn::ConvertTo(d, c.x0), half));
+    put_float(kFirstY, hn::Add(hn::ConvertTo(d, c.y0), half));
+    put_float(kCentreX, c.centre_x), put_float(kCentreY, c.centre_y);
+    put_float(kXX, c.xx), put_float(kXY, c.xy), put_float(kYY, c.yy);
+    put_float(kCode, depth.centre), put_float(kCodeX, depth.x), put_float(kCodeY, depth.y);
+    put_float(kBias, bias);
+    put(kHigh, shared.high), put(kLow, shared.low);
+    count_ += compress.count();
+  }
+
 #if HWY_TARGET == HWY_SCALAR
   template <bool kCut>
   void draw(size_t i, uint32_t columns, uint32_t rows) {
@@ -156,9 +184,10 @@ class EllipseSink {
       }
   }
 #else
-  // Two rows of pixels at a time, half a vector of each, so that keys come out of their halves by interleaving within blocks:
-  // 8 lanes are the pixels 0 1 of both rows, then 2 3. Groups of four pixels on every target: the same pixels are met.
-  //   kCut: the box ends before the ellipse does, so its edge is minded.
+  // Two rows of pixels at a time, half a vector of each, so that keys come out of their halves by interleaving within
+  // blocks: 8 lanes are the pixels 0 1 of both rows, then 2 3. Groups of four pixels on every target: the same pixels
+  // are met.
+  //   kCut: the box ends before the ellipse does, so pixels beyond the box are left out.
   template <bool kCut>
   HWY_INLINE void draw(size_t i, uint32_t columns, uint32_t rows) {
     const hn::CappedTag<float, 8> d;

@@ -1,5 +1,5 @@
-// The kernels `ellipse` and `ewa` inside one tile, on the widest vectors the machine has (Highway, chosen at run time). Every target
-// computes the same pixels: those of the plain functions in surfel_contour.h, surfel_splat.h and ewa_shading.h.
+// The kernels `ellipse` and `ewa` inside one tile, on the widest vectors the machine has (Highway, chosen at run time).
+// Every target computes the same pixels: those of the plain functions in contour.h, splat.h and ewa/shading.h.
 #pragma once
 
 #include <hwy/aligned_allocator.h>
@@ -12,7 +12,7 @@
 
 namespace telesplat::splat {
 
-/// What of a view these kernels need beside TileInput.
+/// What these kernels need of a view, in addition to TileInput.
 struct SurfelInput {
   SurfelCamera camera;
   const SurfelSource* sources = nullptr;  ///< one an item
@@ -26,8 +26,9 @@ static_assert(kEwaReach.growth * kEwaReach.growth >= kSupportGrowth);
 /// Splats ellipses into buffer, whose pixels were kEmptyKey or hold what is there already (pixel_key.h). One pass.
 TileCounts ellipse_tile(const TileInput& input, const SurfelInput& surfels, const KeyBuffer& buffer);
 
-/// What ewa keeps of a tile beside its pixels: 36 bytes a pixel, and its splats between its passes. One a thread, kept from tile to tile.
-/// `width` x `height` pixels are empty, nothing visible and sums 0, between tiles; splats hang over to the right and below.
+/// Working memory of ewa, one a thread, kept from tile to tile: 36 bytes a pixel, and the splats between the two
+/// passes. Between tiles `width` x `height` pixels are empty (nothing visible, sums 0). Splats hang over to the right
+/// and below.
 struct EwaBuffer {
   /// Splats kept between the passes; a tile with more meets its points twice. 72 bytes each.
   static constexpr size_t kRecordSplats = 32768;
@@ -38,8 +39,9 @@ struct EwaBuffer {
   size_t pixels = 0;  ///< that there is room for
 };
 
-/// Splats `input.rect`, which is the tile and `reach` pixels around it, in two passes and writes it as shaded colours and infos. What lies
-/// within kFinishSlack to the right of that may change too. Depth codes carry no bias. background: 0x00RRGGBB, of empty pixels.
+/// Splats `input.rect`, which is the tile and `reach` pixels around it, in two passes and writes it as shaded colours
+/// and infos. Pixels within kFinishSlack to the right of it may change too. Depth codes carry no bias. background:
+/// 0x00RRGGBB, of empty pixels.
 TileCounts ewa_tile(const TileInput& input, const SurfelInput& surfels, const EwaLight& light, EwaBuffer& buffer,
                     const ResolvedTile& tile, int reach, uint32_t background);
 

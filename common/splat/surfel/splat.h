@@ -1,5 +1,5 @@
-// How the kernels `ellipse` and `ewa` turn a contour (surfel_contour.h) into pixels: constants and plain functions. surfel-inl.h,
-// ellipse-inl.h and ewa-inl.h do the same operations in the same order on vectors.
+// How the kernels `ellipse` and `ewa` turn a contour (contour.h) into pixels: constants and plain functions.
+// surfel-inl.h, ellipse-inl.h and ewa-inl.h do the same operations in the same order on vectors.
 #pragma once
 
 #include <bit>
@@ -10,18 +10,20 @@
 
 namespace telesplat::splat {
 
-/// Low-pass of an opaque ellipse, squared pixels: S' = S + this. At equal sampling and display resolution the contour then still ends
-/// before the next sample; where samples crowd, each still reaches about a third of a pixel.
+/// Low-pass of an opaque ellipse, squared pixels: S' = S + this. At equal sampling and display resolution the contour
+/// then still ends before the next sample; where samples crowd, each still reaches about a third of a pixel.
 inline constexpr float kOpaqueVariance = 0.1f;
 /// Bias on the contour, as a multiple of radius over depth, and its bounds, as shares of depth.
 inline constexpr float kBiasPerRadius = 1.5f, kLeastBias = 1.0f / 2048, kMostBias = 0.005f;
 
-/// Support of ewa's kernel: V = kFilterVariance I + max(1, kSupportGrowth - kSupportDrop / sqrt(det S)) S. The weight of a pixel at
-/// offset d from the ellipse's centre is (1 - d^T V^-1 d)^4 inside, a Gaussian of variance V / 8 cut smoothly where it would be below
-/// 0.02, divided by det V: samples taken more densely count more. It is narrow where samples lie a pixel apart, so that each pixel shows
-/// its own sample, and reaches over the neighbours where they are magnified. V contains S', and every pixel's corner from its centre.
+/// Support of ewa's kernel: V = kFilterVariance I + max(1, kSupportGrowth - kSupportDrop / sqrt(det S)) S. The weight
+/// of a pixel at offset d from the ellipse's centre is (1 - d^T V^-1 d)^4 inside, a Gaussian of variance V / 8 cut
+/// smoothly where it would be below 0.02, divided by det V: samples taken more densely count more. It is narrow where
+/// samples lie a pixel apart, so that each pixel shows its own sample, and reaches over the neighbours where they are
+/// magnified. V contains S', and every pixel's corner from its centre.
 inline constexpr float kFilterVariance = 0.51f, kSupportGrowth = 2.5f, kSupportDrop = 0.85f;
-/// How far behind the visible surface a splat still counts, as a multiple of radius over depth, and its bounds, as shares of depth.
+/// How far behind the visible surface a splat still counts, as a multiple of radius over depth, and its bounds, as
+/// shares of depth.
 inline constexpr float kEpsilonPerRadius = 2.0f, kLeastEpsilon = 1.0f / 512, kMostEpsilon = 1.0f / 32;
 
 /// Depth codes before rounding: 2^14 an octave, linear inside it.
@@ -38,8 +40,8 @@ inline float codes_per_depth(float w) {
 struct SurfelConic {
   float centre_x = 0, centre_y = 0;
   float xx = 0, xy = 0, yy = 0;
-  int x0 = 0, y0 = 0, x1 = 0,
-      y1 = 0;             ///< pixels whose centres lie in its box, [x0, x1) x [y0, y1), cut to kMaxSplatSide
+  /// Pixels whose centres lie in its box, [x0, x1) x [y0, y1), cut to kMaxSplatSide.
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   float determinant = 0;  ///< of S
 
   float at(float dx, float dy) const { return dx * (xx * dx + xy * dy) + (yy * dy) * dy; }
@@ -83,8 +85,9 @@ inline float surfel_share(float radius_m, float w, float factor, float least, fl
   return codes_per_depth(w) * std::clamp(factor * std::min(radius_m / w, kMaxRadiusOverDepth), least, most);
 }
 
-/// No contour in the image reaches farther from its splat's centre than this times radius over depth, in pixels (unless it reaches
-/// farther than kMaxSplatSide): the footprint stretched most, where perspective stretches most; a tenth for its centre's offset.
+/// No contour in the image reaches farther from its splat's centre than this times radius over depth, in pixels (unless
+/// it reaches farther than kMaxSplatSide): the footprint stretched most, where perspective stretches most; a tenth for
+/// its centre's offset.
 inline float widest_contour(const geometry::Camera& c) {
   const double u = std::max(std::abs(c.left), std::abs(c.right)), v = std::max(std::abs(c.top), std::abs(c.bottom));
   const double stretch2 = 1.0 + 1.0 / (kMinSampledCosine * kMinSampledCosine);

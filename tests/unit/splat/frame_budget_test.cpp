@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kBudget_ms = 14;
 
-// Share of all points drawn at this detail. Mosaics' ratios are spread evenly over an octave, or all are 1; each thins out as
-// between_levels does.
+// Share of all points drawn at this detail. Mosaics' ratios are spread evenly over an octave, or all are 1; each thins
+// out as between_levels does.
 double points_drawn(double detail, int ratios) {
   const auto passed = [](double wanted) {
     const double t = (wanted - kTransitionBegin) / (kTransitionEnd - kTransitionBegin);

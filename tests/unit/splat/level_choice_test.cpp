@@ -131,8 +131,8 @@ TEST(LevelTransitions, MeetTheLevelsAtBothEnds) {
   }
 }
 
-// What widest_spacing promises, on the points themselves: no sample is farther from a point drawn than the corner of a square cell
-// of that side is from its middle, and a little.
+// What widest_spacing promises, on the points themselves: no sample is farther from a point drawn than the corner of a
+// square cell of that side is from its middle, and a little.
 TEST(LevelTransitions, SplatsOfTheWidestSpacingBridgeTheGaps) {
   const points::PointModel model = wall(0);
   const points::Mosaic& m = only_mosaic(model);

@@ -27,8 +27,8 @@ class Square {
   explicit Square(int depth = 0)
       : model_({{{-0.4f, -0.4f, depth ? -0.3687f : -0.4f}, {0.4f, 0.4f, depth ? 0.4313f : 0.4f}}, depth}) {}
 
-  /// Samples the part of the square with x in [x0, x1); in `tiles` tiles side by side, of one frame; every step-th pixel of every
-  /// step-th row.
+  /// Samples the part of the square with x in [x0, x1); in `tiles` tiles side by side, of one frame; every step-th
+  /// pixel of every step-th row.
   void add(const glm::dvec3& eye, double x0 = -0.25, double x1 = 0.25, int tiles = 1, int step = 1) {
     ++frame_;
     for (int tile = 0; tile < tiles; ++tile) add_tile(frame_, eye, tile, tiles, x0, x1, step);
@@ -200,7 +200,8 @@ TEST(PatchChoice, AFinePatchFromTheSideDoesNotReplaceABetterOne) {
   }
 }
 
-// While a frame is half there, an older one is drawn where the new one has nothing yet: no leaf loses much of what it showed.
+// While a frame is half there, an older one is drawn where the new one has nothing yet: no leaf loses much of what it
+// showed.
 TEST(PatchChoice, WhatAFrameHasNotBroughtYetIsShownByOlderOnes) {
   for (const int step : {1, 4}) {
     const glm::dvec3 eye(0.1, 0, 0.8);

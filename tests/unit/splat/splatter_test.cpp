@@ -73,7 +73,8 @@ TEST(CpuSplatter, SquaresOfFractionalSizeCoverThatAreaOnAverage) {
 }
 
 TEST(CpuSplatter, SamplesAlignedWithPixelsStayExact) {
-  // As a still camera of the sampling view's size sees them: splats larger than a pixel (scale 1.3) cover their own pixels alone.
+  // As a still camera of the sampling view's size sees them: splats larger than a pixel (scale 1.3) cover their own
+  // pixels alone.
   const geometry::Camera camera = testing::front_camera(kWidth, kHeight);
   HandMadeItem item(kLeaf);
   for (int y = 90; y < 130; ++y)
@@ -152,8 +153,9 @@ TEST(CpuSplatter, NearestPointWins) {
 }
 
 TEST(CpuSplatter, OverlapOfASlantedSurfaceGoesToTheNearestCentre) {
-  // Two samples a pixel apart on a receding surface: the pixel at the farther one's centre, which the nearer one's splat covers
-  // too, shows the farther one. A focal length of 300 pixels resolves 18 degrees at size 3, one of 1280 54 degrees.
+  // Two samples a pixel apart on a receding surface: the pixel at the farther one's centre, which the nearer one's
+  // splat covers too, shows the farther one. A focal length of 300 pixels resolves 18 degrees at size 3, one of 1280 54
+  // degrees.
   const double slope = std::tan(15 * 3.14159265 / 180) / testing::front_camera(kWidth, kHeight).focal_x();
   HandMadeItem a(kLeaf), b(kLeaf);
   a.add_at(at_pixel(100.5, 100.5, 1.0), 0x0000aa);

@@ -7,8 +7,9 @@ class CpuRenderer final : public Renderer {
  public:
   explicit CpuRenderer(int threads) : splatter_(threads) {}
   const char* name() const override { return "cpu"; }
-  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, const splat::RenderOptions& options,
-                           const image::Shading& shading, const splat::FrameTarget& target) override {
+  splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
+                           const splat::RenderOptions& options, const image::Shading& shading,
+                           const splat::FrameTarget& target) override {
     return splatter_.render(list, camera, options, shading, target);
   }
 

@@ -86,7 +86,7 @@ Status FrameTargets::make_sums() {
   make_texture(kSums0, GL_RGBA32F, true);
   make_texture(kSums1, GL_RGBA32F, true);
   const Status made = make_framebuffer(kSumming, &textures_[kSums0], 2, false);
-  if (!made) release();  // else the next frame would take them for whole
+  if (!made) release();  // otherwise the next frame would take them for complete
   return made;
 }
 

@@ -9,15 +9,15 @@ namespace telesplat::viewer {
 
 /// A finished frame on the GPU, in the renderer's context, until its next frame.
 struct GlFrame {
-  uint32_t colour_texture =
-      0;                       ///< RGBA8, alpha 1. Row 0 is the upper row of the picture: a window draws it upside down
+  /// RGBA8, alpha 1. Row 0 is the upper row of the picture: a window draws it upside down.
+  uint32_t colour_texture = 0;
   uint32_t depth_texture = 0;  ///< R32F, metres, +infinity where nothing is; 0 if depth was not asked for
   uint32_t framebuffer = 0;    ///< has the colour texture as attachment 0: for glBlitFramebuffer
   int width = 0, height = 0;
 };
 
-/// Textures and the frame buffers that they are attached to. "Padded" ones have kMargin more pixels on all sides, since GL drops
-/// points whose centre is outside, however large they are. Needs a current GL context for all it does.
+/// Textures and the frame buffers that they are attached to. "Padded" ones have kMargin more pixels on all sides, since
+/// GL drops points of any size whose centre is outside. Every member function needs a current GL context.
 class FrameTargets {
  public:
   static constexpr int kMargin = 16;  // splat::kMaxSplatSide: no splat reaches farther from its centre
@@ -27,9 +27,10 @@ class FrameTargets {
   FrameTargets(const FrameTargets&) = delete;
   FrameTargets& operator=(const FrameTargets&) = delete;
 
-  /// Keeps what fits. Fails, saying the limit, where the GPU cannot hold such a frame; then width() is 0.
+  /// Does nothing if the size is the same. Fails, saying the limit, where the GPU cannot hold such a frame; then
+  /// width() is 0.
   Status resize(int width, int height);
-  /// The accumulators of ewa, made when first asked for.
+  /// The accumulators of kernels that add up (splat::Passes::kSums), made when first asked for.
   Status make_sums();
 
   int width() const { return width_; }
@@ -40,7 +41,7 @@ class FrameTargets {
   // Textures.
   uint32_t keys() const { return textures_[kKeys]; }            ///< padded, RG32UI: low and high half of a pixel's key
   uint32_t visible() const { return textures_[kVisible]; }      ///< padded, depth component: the depth test's
-  uint32_t sums(int i) const { return textures_[kSums0 + i]; }  ///< padded, RGBA32F: what ewa adds up, 2 of them
+  uint32_t sums(int i) const { return textures_[kSums0 + i]; }  ///< padded, RGBA32F: weighted sums, 2 of them
   uint32_t pairs(int i) const { return textures_[kPairs0 + i]; }  ///< padded, RG32UI: colour and info, 2 of them
   GlFrame output(bool with_depth) const;
 

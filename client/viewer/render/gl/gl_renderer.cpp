@@ -115,7 +115,7 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
   }
   glBindVertexArray(parts_->no_vertices);
   glEnable(GL_SCISSOR_TEST);
-  int reach = splat::finish_reach(options.finish);  // around the image, that the steps to come look at
+  int reach = splat::finish_reach(options.finish);  // pixels around the image that the remaining steps read
   for (size_t i = 0; i < steps.size(); ++i) {
     const bool last = i + 1 == steps.size();
     reach -= steps[i].reach;
@@ -142,7 +142,7 @@ Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& cam
   if (const Status resized = parts_->targets.resize(camera.width, camera.height); !resized) return resized;
   if (splat::traits_of(options.kernel).passes == splat::Passes::kSums)
     if (const Status made = parts_->targets.make_sums(); !made) return made;
-  // What others may have left in a shared context.
+  // Others may have left these on in a shared context.
   for (const GLenum off : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE,
                            GL_RASTERIZER_DISCARD, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_FRAMEBUFFER_SRGB, GL_DITHER})
     glDisable(off);

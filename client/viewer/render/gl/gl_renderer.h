@@ -1,4 +1,4 @@
-// Splatting by OpenGL points. The same pixels as the CPU splatter's, but for ties in depth and rounding of divisions.
+// Splatting by OpenGL points. The pixels are the CPU splatter's, except for ties in depth and rounding of divisions.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@
 
 namespace telesplat::viewer {
 
-/// What a context may offer and what need not be used: the defaults are best, tests try the others.
+/// Features that a context may offer and that need not be used. The defaults are best; tests try the others.
 struct GlOptions {
   bool persistent = true;            ///< buffers that stay mapped, where there are any
   std::optional<bool> pack_buffers;  ///< reading back through them: unless the renderer is software
@@ -22,22 +22,23 @@ class GlRenderer final : public Renderer {
  public:
   /// With a context of its own, off-screen, which is current during its calls only.
   static Result<std::unique_ptr<GlRenderer>> make(const GlOptions& options = {});
-  /// In the context that is current in this thread (a window's): there must be one, and it must be current at each call and at the
-  /// end. Fails where it is older than OpenGL 4.3. Between calls the context may be used for anything: the renderer sets all state that it needs and
-  /// leaves no program, vertex array or frame buffer bound, and blending and depth test off.
+  /// In the context that is current in this thread (a window's). There must be one, and it must be current at each call
+  /// and when the renderer is destroyed. Fails where it is older than OpenGL 4.3. Between calls the context may be used
+  /// for anything: the renderer sets all state that it needs. It leaves no program, vertex array or frame buffer bound,
+  /// and blending and depth test off.
   static Result<std::unique_ptr<GlRenderer>> make_in_current_context(const GlOptions& options = {});
   ~GlRenderer() override;
 
   const char* name() const override { return "gl"; }
   using Renderer::render;
-  /// points_drawn counts every point sent: which of them reach the screen only the GPU knows. project_ms: preparing (processor) and
-  /// splatting, resolve_ms: shading, reading back and what waiting there was. The GPU's stages by its own clock, where it has one; else
-  /// project_ms is all of drawing.
+  /// points_drawn counts every point sent: only the GPU knows which of them reach the screen. project_ms: preparing
+  /// (processor) and splatting. resolve_ms: shading, reading back and waiting. The GPU's own clock times its stages;
+  /// without one, project_ms is all of drawing.
   splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                            const splat::RenderOptions& options, const image::Shading& shading,
                            const splat::FrameTarget& target) override;
-  /// The same frame, left on the GPU: see last_frame(). Does not wait for it, so the times are those of the newest frame whose
-  /// times are there. Fails, with an empty last_frame(), where the GPU cannot hold such a frame.
+  /// The same frame, left on the GPU: see last_frame(). Does not wait for it, so the times are those of the newest
+  /// frame that the GPU has timed. Fails, with an empty last_frame(), where the GPU cannot hold such a frame.
   Result<splat::SplatStats> render_on_gpu(const splat::DrawList& list, const geometry::Camera& camera,
                                           const splat::RenderOptions& options, const image::Shading& shading,
                                           bool with_depth = false);
@@ -60,7 +61,7 @@ class GlRenderer final : public Renderer {
   void release_state() const;
   splat::SplatStats stats(const splat::DrawList& list, bool wait);
 
-  std::unique_ptr<gl::EglContext> context_;  // null: somebody else's
+  std::unique_ptr<gl::EglContext> context_;  // null: the context belongs to the caller
   std::unique_ptr<Parts> parts_;
   std::string device_;
   GlFrame frame_;

@@ -24,9 +24,9 @@ class PointArenas {
   PointArenas(const PointArenas&) = delete;
   PointArenas& operator=(const PointArenas&) = delete;
 
-  /// The place of item.arrays(), uploaded now if it is not there. An entry is taken for the same only if replica (DrawList::replica),
-  /// cluster, sequence, count and address are: a freed mosaic's address may come back with other points, and so may its sequence
-  /// from another packer. Items without a sequence are uploaded every frame.
+  /// The place of item.arrays(), uploaded now if it is not there. An uploaded copy is used again only if replica
+  /// (DrawList::replica), cluster, sequence, count and address are equal: a freed mosaic's address may come back with
+  /// other points, and so may its sequence from another packer. Items without a sequence are uploaded every frame.
   PointRange place(const splat::DrawItem& item, uint64_t replica);
   /// Frees what was not placed during the last kKeptFrames frames (and items without a sequence at once).
   void end_frame();

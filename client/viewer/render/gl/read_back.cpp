@@ -12,7 +12,7 @@ ReadBack::~ReadBack() {
 
 void ReadBack::read_image(uint32_t attachment, bool is_colour, const splat::FrameTarget& target, void* to) {
   glReadBuffer(attachment);
-  if (is_colour)  // 0xAARRGGBB in a word, whatever the machine's byte order
+  if (is_colour)  // 0xAARRGGBB in a word, on machines of either byte order
     glReadPixels(0, 0, target.width, target.height, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, to);
   else
     glReadPixels(0, 0, target.width, target.height, GL_RED, GL_FLOAT, to);

@@ -7,8 +7,9 @@
 
 namespace telesplat::viewer {
 
-/// Reads colour and depth of a frame. Through pixel-pack buffers the GPU copies both by itself, right behind its last pass, and the
-/// caller waits once; a software renderer's frame already lies in host memory, and a second copy would only cost.
+/// Reads colour and depth of a frame. Through pixel-pack buffers the GPU copies both right after its last pass, and the
+/// caller waits once. A software renderer's frame already lies in host memory, so pixel-pack buffers would only add a
+/// copy.
 class ReadBack {
  public:
   explicit ReadBack(bool pack_buffers) : pack_buffers_(pack_buffers) {}

@@ -59,8 +59,8 @@ class SplatPasses {
   SplatPasses(const SplatPasses&) = delete;
   SplatPasses& operator=(const SplatPasses&) = delete;
 
-  /// Uploads points that are not there yet, and writes and binds what shaders read in this frame: uniform block 0, storage buffers 1
-  /// (draws), 2 (clusters), 3 (intensities).
+  /// Uploads points that are not there yet, and writes and binds what shaders read in this frame: uniform block 0,
+  /// storage buffers 1 (draws), 2 (clusters), 3 (intensities).
   void prepare(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                const image::Shading& shading);
   /// Clears and writes targets.keys() or, for a kernel of Passes::kSums, targets.sums().

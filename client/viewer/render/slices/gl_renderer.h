@@ -1,4 +1,5 @@
-// Warping by OpenGL: each pixel of the display looks through the layers, which lie in one array texture. The CPU's pixels, but for roundings.
+// Warping by OpenGL: each pixel of the display looks through the layers, which lie in one array texture. The pixels are
+// the CPU's, except for rounding.
 #pragma once
 
 #include <memory>
@@ -17,9 +18,9 @@ class VolumeGlRenderer final : public VolumeRenderer {
   ~VolumeGlRenderer() override;
 
   const char* name() const override { return "gl"; }
-  /// A frame's layers are uploaded when it is first drawn: frames are told apart by their ids, epochs and addresses. warp_cpu_ms is the calling
-  /// thread's time, waiting included; samples are those of all layers and pixels, few of which an eye far away needs. A frame that
-  /// the GPU cannot hold is drawn as the background alone, and logged.
+  /// A frame's layers are uploaded when it is first drawn: frames are told apart by their ids, epochs and addresses.
+  /// warp_cpu_ms is the calling thread's time, waiting included. samples counts all layers in all pixels, although an
+  /// eye far away needs few of them. A frame that the GPU cannot hold is drawn as the background alone, and logged.
   volume::WarpStats render(const volume::VolumeFrame* frame, const geometry::Camera& camera, uint32_t background,
                            const volume::WarpTarget& target) override;
 

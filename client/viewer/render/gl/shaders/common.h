@@ -1,5 +1,6 @@
 // What all shaders share: the view, the coding of pixels (common/splat/pixel_key.h), points and how they are projected.
-// Arithmetic stands in the same order as on the CPU, and `precise` forbids fusing it, so that both draw the same picture.
+// Arithmetic stands in the same order as on the CPU, and `precise` forbids fusing it, so that both draw the same
+// picture.
 #pragma once
 
 #include <string_view>

@@ -1,5 +1,7 @@
-// Where a sample's footprint on the surface appears on the screen: common/splat/surfel/contour.h, operation by operation.
-// Based on: M. Zwicker, J. Raesaenen, M. Botsch, C. Dachsbacher, M. Pauly, "Perspective accurate splatting", Graphics Interface 2004.
+// Where a sample's footprint on the surface appears on the screen: common/splat/surfel/contour.h, operation by
+// operation.
+// Based on: M. Zwicker, J. Raesaenen, M. Botsch, C. Dachsbacher, M. Pauly, "Perspective accurate splatting", Graphics
+// Interface 2004.
 #pragma once
 
 #include <string_view>
@@ -35,7 +37,8 @@ struct Contour {
   vec3 normal;      // in camera axes, not of unit length
 };
 
-// source: direction to the sampling eye in camera axes, radius in metres. place: projected centre, pixels; w: its depth.
+// source: direction to the sampling eye in camera axes, radius in metres. place: projected centre, pixels; w: its
+// depth.
 Contour surfel_contour(vec4 source, vec2 place, float w, vec3 normal_room) {
   vec3 m = to_camera(normal_room);
   vec3 e = source.xyz;

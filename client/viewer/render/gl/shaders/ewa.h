@@ -1,4 +1,5 @@
-// Elliptical weighted average: visibility, weighted sums of what is visible, and their means (common/splat/ewa/ewa-inl.h).
+// Elliptical weighted average: visibility, weighted sums of what is visible, and their means
+// (common/splat/ewa/ewa-inl.h).
 #pragma once
 
 #include <string_view>
@@ -41,7 +42,8 @@ void main() {
   uint colour = point_albedo(d, i);
   albedo = vec3(uvec3(colour >> 16, colour >> 8, colour) & 255u);
   normal = s.contour.normal;
-  scale = vec2(1.0 / min(c.determinant, 1e6), surfel_share(d.source.w, s.w, EPSILON_PER_RADIUS, LEAST_EPSILON, MOST_EPSILON));
+  scale = vec2(1.0 / min(c.determinant, 1e6),
+               surfel_share(d.source.w, s.w, EPSILON_PER_RADIUS, LEAST_EPSILON, MOST_EPSILON));
   place_conic(c, s.w >= view.near_m && !faces_away(clusters[d.cluster], point_normal(d, uint(gl_VertexID))));
 }
 )";

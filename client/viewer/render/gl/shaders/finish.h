@@ -1,5 +1,6 @@
-// The finish, as common/splat/finish.h defines it: fill, smooth, antialias. Integers throughout: the same pixels as on the CPU.
-// Each stage takes the pairs that the one before left and gives uvec2 resolve(ivec2 at), `at` with margin.
+// The finish, as common/splat/finish.h defines it: fill, smooth, antialias. Integers throughout: the same pixels as on
+// the CPU. Each stage takes the pairs that the stage before it left. It defines uvec2 resolve(ivec2 at), `at` with
+// margin.
 #pragma once
 
 #include <string_view>

@@ -35,7 +35,9 @@ void main() {
 }
 )";
 
-/// CONTOUR_R2(size): squared radius of the circle on which q = 1. DISTANCE2(d): squared distance of the pixel at offset d in the metric in which the splat is a ball of radius shape.y.
+/// CONTOUR_R2(size): squared radius of the circle on which q = 1 (KernelTraits::flat_contour_r2). DISTANCE2(d): squared
+/// distance of the pixel at offset d in the metric in which the splat is a ball of radius shape.y
+/// (KernelTraits::flat_distance2).
 inline constexpr std::string_view kFlatFragment = R"(
 flat in uvec3 splat;
 flat in ivec2 first_pixel;

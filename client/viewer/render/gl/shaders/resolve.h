@@ -1,4 +1,5 @@
-// From keys to pairs (colour, info), and how passes over the whole frame end. Empty pixels have the background's colour.
+// From keys to pairs (colour, info), and how passes over the whole frame end. Empty pixels have the background's
+// colour.
 #pragma once
 
 #include <string_view>
@@ -31,7 +32,7 @@ layout(location = 0) out uvec2 pair;
 void main() { pair = resolve(ivec2(gl_FragCoord.xy)); }
 )";
 
-/// Without the margin. Where nobody wants depth the frame buffer has no second attachment.
+/// Without the margin. A frame buffer without depth has no second attachment.
 inline constexpr std::string_view kToOutput = R"(
 layout(location = 0) out vec4 out_colour;
 layout(location = 1) out float out_depth_m;

@@ -1,4 +1,5 @@
-// The warp of a volume's layers: one pass over the display, each pixel looking through all layers (common/volume/warp/warper.h).
+// The warp of a volume's layers: one pass over the display, each pixel looking through all layers
+// (common/volume/warp/warper.h).
 #pragma once
 
 #include <string_view>

@@ -8,7 +8,9 @@ namespace telesplat::viewer::shaders {
 /// After kContour.
 inline constexpr std::string_view kSurfel = R"(
 // Depth codes before rounding, and how they change as depth changes by its own size.
-float depth_code_linear(float w) { return float(int(floatBitsToUint(w) - view.near_bits)) * (1.0 / float(1 << DEPTH_SHIFT)); }
+float depth_code_linear(float w) {
+  return float(int(floatBitsToUint(w) - view.near_bits)) * (1.0 / float(1 << DEPTH_SHIFT));
+}
 float codes_per_depth(float w) { return uintBitsToFloat((floatBitsToUint(w) & 0x007fffffu) | 0x46800000u); }
 
 struct Surfel {
