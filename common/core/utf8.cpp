@@ -7,7 +7,8 @@ namespace {
 
 bool in(unsigned char c, int least, int most) { return c >= least && c <= most; }
 
-// Bytes of the character that `text` begins with, or of as much of one as there is. text is not empty; bytes is 1 at least.
+// Bytes of the character that `text` begins with, or of as much of one as there is. text is not empty; bytes is 1 at
+// least.
 struct Front {
   size_t bytes;
   bool valid;

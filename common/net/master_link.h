@@ -1,5 +1,5 @@
-// The client side of the master, the same for data, sampler, packer, viewer and ctl: hello until welcomed, a status report a
-// second, hello again when the master asks, a clock offset, shutdown.
+// The client side of the master, the same for data, sampler, packer, viewer and ctl: hello until welcomed, a status
+// report a second, hello again when the master asks, a clock offset, shutdown.
 #pragma once
 
 #include <functional>
@@ -15,7 +15,8 @@ class MasterLink {
  public:
   using Values = std::map<std::string, double>;
 
-  /// Connects to the master at `endpoint`; instance, pid and the fact "host" are filled in. Nothing is sent before the first tick().
+  /// Connects to the master at `endpoint`; instance, pid and the fact "host" are filled in. Nothing is sent before the
+  /// first tick().
   MasterLink(Context& context, const std::string& endpoint, wire::Hello hello);
 
   Socket& socket() { return socket_; }
@@ -25,8 +26,8 @@ class MasterLink {
   /// `status` is asked for its values then.
   void tick(double now_s, const std::function<Values()>& status);
 
-  /// Handles welcome, who_are_you and shutdown, rejects other unknown types unless the caller knows them: returns true if the
-  /// message was one of these.
+  /// Handles welcome, who_are_you and shutdown, rejects other unknown types unless the caller knows them: returns true
+  /// if the message was one of these.
   bool handle(const Message& message, double now_s);
 
   /// Handles all messages that are here by now; those that handle() does not know are rejected.

@@ -9,14 +9,15 @@
 
 namespace telesplat::data {
 
-/// What the session is told of the data set; all text in it is UTF-8, even where a file's name is not. endpoint: where requests go to;
-/// empty: nowhere.
+/// What the session is told of the data set; all text in it is UTF-8, even where a file's name is not. endpoint: where
+/// requests go to; empty: nowhere.
 wire::Hello make_hello(const Served& served, const std::string& name, const std::string& endpoint);
 
 /// Binds, says hello, answers until told to stop; `stop` ends it, too. Exit code: 0, or 2 if nothing can be bound.
 int serve(net::Context& context, Served& served, const net::ServiceOptions& options, const std::function<bool()>& stop);
 
-/// Opens the data set and serves it until told to stop. Exit code: 0, or 2 if the data cannot be read (one line on stderr says why).
+/// Opens the data set and serves it until told to stop. Exit code: 0, or 2 if the data cannot be read (one line on
+/// stderr says why).
 int run(const DataServiceOptions& options);
 
 }  // namespace telesplat::data

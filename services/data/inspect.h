@@ -19,7 +19,8 @@ struct MeshFileFacts {
 /// Opens the file's store (making it if need be: a file whose chunks cannot be made is no good file) and sums it up.
 Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& options, const Progress& progress);
 
-/// The facts as lines of text, each ended by a line feed: format, counts, box in the file's units and in the room, up, normals, colours, chunks.
+/// The facts as lines of text, each ended by a line feed: format, counts, box in the file's units and in the room, up,
+/// normals, colours, chunks.
 std::string describe(const MeshFileFacts& facts);
 
 /// True if the file's content or name is that of a mesh format that open() reads; says nothing on whether it is sound.
@@ -35,7 +36,8 @@ struct VolumeFileFacts {
 /// Finds the volume, checks the headers of all its steps and reads the first. raw: as find_volume takes it.
 Result<VolumeFileFacts> inspect_volume(const std::string& path, const std::string& raw, const ReadProgress& progress);
 
-/// The facts as lines of text: format, size, type, spacing, axes, values, a histogram of them (bars by the logarithm of counts), steps.
+/// The facts as lines of text: format, size, type, spacing, axes, values, a histogram of them (bars by the logarithm of
+/// counts), steps.
 std::string describe(const VolumeFileFacts& facts);
 
 }  // namespace telesplat::data

@@ -1,3 +1,4 @@
+// What `telesplat inspect` says of a volume.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -12,11 +12,13 @@ namespace telesplat::data {
 
 class Served;
 
-/// What the options' scene is, by the options and by the file's content. Error, naming scene or flag: there is no such file; it is a folder
-/// that holds nothing we know; an option is set that scenes of its kind do not have. Whether a file is sound only opening it tells.
+/// What the options' scene is, by the options and by the file's content. Error, naming scene or flag: there is no such
+/// file; it is a folder that holds nothing we know; an option is set that scenes of its kind do not have. Whether a
+/// file is sound only opening it tells.
 Result<scene::Kind> kind_of(const DataOptions& options);
 
-/// Opens the scene, as what kind_of() says. Errors (exit code 2 for a user) name the file, or the parameter of a Julia set.
+/// Opens the scene, as what kind_of() says. Errors (exit code 2 for a user) name the file, or the parameter of a Julia
+/// set.
 Result<std::unique_ptr<Served>> open(const DataOptions& options, const Progress& progress);
 
 }  // namespace telesplat::data

@@ -9,8 +9,8 @@
 
 namespace telesplat::data {
 
-/// Opens the store of the mesh file or raster at `path`, or with options.iso that of the volume's surface; makes it first if the cache
-/// has none. progress may be empty. Errors (exit code 2 for a user) name the file.
+/// Opens the store of the mesh file or raster at `path`, or with options.iso that of the volume's surface; makes it
+/// first if the cache has none. progress may be empty. Errors (exit code 2 for a user) name the file.
 Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const MeshOptions& options,
                                              const Progress& progress);
 

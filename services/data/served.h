@@ -1,4 +1,5 @@
-// What a data server serves: one implementation a kind of scene. The serve loop (data_service.cpp) is the same for all of them.
+// What a data server serves: one implementation a kind of scene. The serve loop (data_service.cpp) is the same for all
+// of them.
 #pragma once
 
 #include <map>

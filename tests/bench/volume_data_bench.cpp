@@ -1,5 +1,5 @@
-// What a data server does with a volume: classification and the voxel codec, beside a copy of the dense slab and zstd of it.
-// Mvoxel/s: visible voxels per second on one core (classify: on all). B/voxel: bytes per visible voxel.
+// What a data server does with a volume: classification and the voxel codec, beside a copy of the dense slab and zstd
+// of it. Mvoxel/s: visible voxels per second on one core (classify: on all). B/voxel: bytes per visible voxel.
 #include <benchmark/benchmark.h>
 #include <zstd.h>
 

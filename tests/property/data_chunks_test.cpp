@@ -100,7 +100,8 @@ TEST(Chunks, HoldEveryTriangleOnceForRandomMeshes) {
   EXPECT_GT(opened, 150);
 }
 
-// On an even grid a chunk's box is about as large as its share of the area: far from the strips or scatter of a bad order.
+// On an even grid a chunk's box is about as large as its share of the area: far from the strips or scatter of a bad
+// order.
 TEST(Chunks, AreCompact) {
   const auto placed = place_mesh(wavy_grid(256, 0.0), 1.0, "z", "grid");
   ASSERT_TRUE(placed.ok());

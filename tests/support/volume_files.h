@@ -1,4 +1,5 @@
-// Small volume files of every format, written by hand, for tests: what readers make of them must be what was written here.
+// Small volume files of every format, written by hand, for tests: what readers make of them must be what was written
+// here.
 #pragma once
 
 #include <zlib.h>
@@ -222,7 +223,8 @@ inline Volume read_or_fail(const std::string& path, const std::string& raw = "",
   return volume ? std::move(*volume) : Volume{};
 }
 
-/// Every voxel of the pattern is found where it lies in data space, whatever order the reader chose; values to `tolerance`.
+/// Every voxel of the pattern is found where it lies in data space, whatever order the reader chose; values to
+/// `tolerance`.
 inline void expect_same(const Volume& volume, const Pattern& p, double scale = 1, double offset = 0,
                         double tolerance = 0) {
   ASSERT_EQ(volume.size, p.size);

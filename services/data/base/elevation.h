@@ -1,4 +1,4 @@
-// Elevation rasters (GeoTIFF, HGT, 16-bit PNG and whatever else GDAL reads) as coloured height fields.
+// Elevation rasters (GeoTIFF, HGT, 16-bit PNG and what else GDAL reads) as coloured height fields.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ namespace telesplat::data {
 
 inline constexpr int64_t kMaxRasterSamples = int64_t{1} << 26;  ///< vertices; larger rasters are read coarser
 
-/// A regular grid of heights. Sample (column, row) stands at east = x0 + column * dx, north = y0 - row * dy, metres (or pixels, if the file
-/// does not say where it lies).
+/// A regular grid of heights. Sample (column, row) stands at east = x0 + column * dx, north = y0 - row * dy, metres (or
+/// pixels, if the file does not say where it lies).
 struct ElevationRaster {
   int width = 0, height = 0;
   double x0 = 0, y0 = 0, dx = 1, dy = 1;
@@ -23,13 +23,14 @@ struct ElevationRaster {
   std::vector<uint32_t> colours;  ///< of a texture, 0x00RRGGBB, one a sample; empty: none
 };
 
-/// Two triangles a cell whose four corners have data, one where three have. x east, y north, z up. Colours are the texture's, or tints by height: blue
-/// at and below sea level where the data have a coast, green to brown to white over the 2nd to 98th percentile of the rest. Error, starting with `name`: fewer than 2 x 2 samples, no
-/// cell with data, a z_scale that is not finite.
+/// Two triangles a cell whose four corners have data, one where three have. x east, y north, z up. Colours are the
+/// texture's, or tints by height: blue at and below sea level where the data have a coast, green to brown to white over
+/// the 2nd to 98th percentile of the rest. Error, starting with `name`: fewer than 2 x 2 samples, no cell with data, a
+/// z_scale that is not finite.
 Result<Mesh> elevation_mesh(const ElevationRaster& raster, const ElevationOptions& options, const std::string& name);
 
-/// Reads with GDAL. It may throw or crash on hostile files: called in the program telesplat-import only. Errors name the file: no raster, several
-/// bands (a picture), more samples than memory.
+/// Reads with GDAL. It may throw or crash on hostile files: called in the program telesplat-import only. Errors name
+/// the file: no raster, several bands (a picture), more samples than memory.
 Result<ElevationRaster> read_elevation(const std::string& path, const std::string& texture);
 
 }  // namespace telesplat::data

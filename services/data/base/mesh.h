@@ -23,8 +23,9 @@ struct Mesh {
   uint64_t degenerate_dropped = 0;    ///< faces with fewer than three corners
 };
 
-/// What every reader promises and validate_mesh checks: at least one triangle, no more than kMaxTriangles, every index below the number of
-/// vertices, every position finite, normals and colours absent or one a vertex. Errors start with `name`.
+/// What every reader promises and validate_mesh checks: at least one triangle, no more than kMaxTriangles, every index
+/// below the number of vertices, every position finite, normals and colours absent or one a vertex. Errors start with
+/// `name`.
 Status validate_mesh(const Mesh& mesh, const std::string& name);
 
 /// 8-bit channels -> 0x00RRGGBB.

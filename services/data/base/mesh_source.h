@@ -18,7 +18,8 @@ struct MeshSource {
   std::function<Result<Mesh>(const ReadProgress&)> read;
 };
 
-/// The hash of the files' contents, in this order. Files that cannot be read are left out: reading them says why. Calls progress with stage "hash".
+/// The hash of the files' contents, in this order. Files that cannot be read are left out: reading them says why. Calls
+/// progress with stage "hash".
 uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progress);
 
 }  // namespace telesplat::data

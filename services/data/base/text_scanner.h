@@ -48,7 +48,8 @@ class TextScanner {
     while (at_<end_&& static_cast<unsigned char>(*at_)> ' ') ++at_;
     return {start, static_cast<size_t>(at_ - start)};
   }
-  /// A number here: decimal, exponent, nan, inf, with or without a leading plus. What follows must not belong to a word.
+  /// A number here: decimal, exponent, nan, inf, with or without a leading plus. What follows must not belong to a
+  /// word.
   bool number(double& out) { return parse(out); }
   bool integer(int64_t& out) { return parse(out); }
   bool skip_char(char c) { return at_ < end_ && *at_ == c ? (++at_, true) : false; }

@@ -1,3 +1,4 @@
+// Elevation rasters, read by GDAL: heights, where they lie on earth, and a texture draped over them.
 #include <cpl_error.h>
 #include <fmt/format.h>
 #include <gdal.h>
@@ -57,7 +58,8 @@ Placement placement_of(GDALDatasetH dataset) {
   return out;
 }
 
-// The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the raster.
+// The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the
+// raster.
 Status drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
   auto opened = open(path, "an image");
   if (!opened) return opened.error();

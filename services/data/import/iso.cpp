@@ -1,3 +1,5 @@
+#include "services/data/import/iso.h"
+
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
@@ -21,7 +23,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "services/data/surface/isosurface.h"
+#include "services/data/base/volume.h"
 
 namespace telesplat::data {
 namespace {

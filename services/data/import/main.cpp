@@ -1,5 +1,6 @@
-// telesplat-import FORMAT FILE: reads a mesh, raster or volume file with VTK or GDAL and leaves it on standard output for the process that asked
-// (import_process.cpp; volumes: vtk_volume_reader.cpp). A program of its own so that neither a crash of VTK, nor its messages, nor the time that its libraries take to load reach anyone.
+// telesplat-import FORMAT FILE: reads a mesh, raster or volume file with VTK or GDAL and leaves it on standard output
+// for the process that asked (process.cpp; volumes: volume/vtk_reader.cpp). A program of its own so that neither
+// a crash of VTK, nor its messages, nor the time that its libraries take to load reach anyone.
 #include <fmt/format.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -13,19 +14,19 @@
 #include <new>
 
 #include "services/data/base/elevation.h"
+#include "services/data/import/iso.h"
 #include "services/data/import/report.h"
 #include "services/data/import/vtk_import.h"
 #include "services/data/import/vtk_volume.h"
-#include "services/data/surface/isosurface.h"
 #include "services/data/volume/formats/import_stream.h"
 
 namespace {
 
-// A hostile file must not keep us for ever.
+// A hostile file must not keep us busy without end.
 void limit_time(uint64_t bytes) { alarm(static_cast<unsigned>(60 + bytes / 1'000'000)); }
 
-// A reader may take what this process has mapped already, a gigabyte, and `more`. Sanitizers map terabytes of shadow, so there the limit is
-// left out.
+// A reader may take what this process has mapped already, a gigabyte, and `more`. Sanitizers map terabytes of shadow,
+// so there the limit is left out.
 void limit_memory(uint64_t more) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   uint64_t pages = 0;
@@ -72,7 +73,7 @@ int main(int argc, char** argv) {
         "usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n"
         "       telesplat-import nifti|vti FILE      (standard output: import_stream.h)\n"
         "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
-        "       telesplat-import iso NAME            (standard input: isosurface.h)\n",
+        "       telesplat-import iso NAME            (standard input: iso.h)\n",
         stderr);
     return 2;
   }
@@ -87,7 +88,7 @@ int main(int argc, char** argv) {
   setrlimit(RLIMIT_CORE, &no_core);
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody waits any more
   const int out = dup(STDOUT_FILENO);
-  dup2(STDERR_FILENO, STDOUT_FILENO);  // whatever VTK prints must not get between
+  dup2(STDERR_FILENO, STDOUT_FILENO);  // what VTK prints must not get between
   try {
     if (telesplat::data::reads_with_vtk(format)) return import_volume(out, path, file_bytes) ? 0 : 1;
     limit_time(file_bytes);

@@ -160,7 +160,8 @@ class Collector {
     }
   }
 
-  // Polygons as fans, strips with alternating orientation. An index that is out of range stays so, for validate_mesh to name.
+  // Polygons as fans, strips with alternating orientation. An index that is out of range stays so, for validate_mesh to
+  // name.
   void add_cells(vtkCellArray* cells, uint32_t base, vtkIdType points, bool strips) {
     if (!cells) return;
     const auto corner = [&](vtkIdType i) {

@@ -9,8 +9,8 @@
 
 namespace telesplat::data {
 
-/// Reads the scene's parameters and finds its box over the whole animation; tells progress if that takes more than two seconds. Error: a
-/// parameter is wrong, or the slice is empty at some time.
+/// Reads the scene's parameters and finds its box over the whole animation; tells progress if that takes more than two
+/// seconds. Error: a parameter is wrong, or the slice is empty at some time.
 Result<std::unique_ptr<Served>> serve_julia(const julia::SceneOptions& options, double room_size_m,
                                             const Progress& progress);
 

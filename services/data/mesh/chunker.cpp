@@ -31,7 +31,8 @@ Box box_of(std::span<const Item> items) {
   return box;
 }
 
-// Splits items[0..] into `parts` parts of equal size (to one triangle), recursively; starts.. receives where parts start.
+// Splits items[0..] into `parts` parts of equal size (to one triangle), recursively; starts.. receives where parts
+// start.
 void split(std::span<Item> items, size_t first, size_t parts, std::span<size_t> starts) {
   if (parts == 1) {
     starts[0] = first;

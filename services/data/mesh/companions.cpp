@@ -1,3 +1,4 @@
+// Which other files a mesh file pulls in: material libraries of an OBJ, buffers and images of a glTF.
 #include <algorithm>
 #include <cstring>
 #include <filesystem>

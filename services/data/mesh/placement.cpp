@@ -28,7 +28,8 @@ geometry::DBox box_of_used(const Mesh& mesh) {
   return box;
 }
 
-// Twice the triangle's area times its normal; double, so that no triangle that has an area in float coordinates loses it.
+// Twice the triangle's area times its normal; double, so that no triangle that has an area in float coordinates loses
+// it.
 glm::dvec3 area_vector(const PlacedMesh& mesh, size_t triangle) {
   const uint32_t* t = &mesh.indices[3 * triangle];
   const glm::dvec3 a(mesh.positions_room[t[0]]), b(mesh.positions_room[t[1]]), c(mesh.positions_room[t[2]]);

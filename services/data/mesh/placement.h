@@ -22,20 +22,20 @@ struct PlacedMesh {
 };
 
 /// Which data axis points up, "y" or "z":
-///   z for terrains: elevation rasters; or the box is less than 0.35 times as high in z as it is wide in x and y, and the surface is an open height field in z
-///     (its area vector, the sum of all triangle normals times areas, is at least 0.4 times the total area and within 30
-///     degrees of z; over a closed surface that sum is zero);
-///   z for medical data: isosurfaces (most vertices have two coordinates, and only two, in common with many others, because marching cubes
-///     puts them on the edges of a voxel grid), VTK's own formats, and surfaces of volumes;
+///   z for terrains: elevation rasters; or the box is less than 0.35 times as high in z as it is wide in x and y, and
+///     the surface is an open height field in z (its area vector, the sum of all triangle normals times areas, is at
+///     least 0.4 times the total area and within 30 degrees of z; over a closed surface that sum is zero);
+///   z for medical data: isosurfaces (most vertices have two coordinates, and only two, in common with many others,
+///     because marching cubes puts them on the edges of a voxel grid), VTK's own formats, and surfaces of volumes;
 ///   y otherwise.
 /// A guess: `up` overrides it. Precondition: validate_mesh passed.
 std::string guess_up(const Mesh& mesh);
 
-/// Centres the box of the used vertices at the origin, turns `up` ("auto": guess_up) to +y and scales uniformly so that the box's largest
-/// extent is room_size_m; all in double precision, rounded to float at the end. Drops degenerate triangles and counts them; computes
-/// normals (area-weighted mean over a vertex's triangles) where the file has none, or where one of them has no direction.
-/// Takes the mesh apart as it goes to save memory. Errors start with `name`: the box has no extent, or one beyond 1e30;
-/// no triangle is left. Precondition: validate_mesh passed.
+/// Centres the box of the used vertices at the origin, turns `up` ("auto": guess_up) to +y and scales uniformly so that
+/// the box's largest extent is room_size_m; all in double precision, rounded to float at the end. Drops degenerate
+/// triangles and counts them; computes normals (area-weighted mean over a vertex's triangles) where the file has none,
+/// or where one of them has no direction. Takes the mesh apart as it goes to save memory. Errors start with `name`: the
+/// box has no extent, or one beyond 1e30; no triangle is left. Precondition: validate_mesh passed.
 Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string& up, const std::string& name);
 
 }  // namespace telesplat::data

@@ -1,3 +1,4 @@
+// Which axis of a mesh points up, guessed from its shape.
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -36,8 +37,9 @@ std::vector<bool> repeated(const std::vector<double>& values) {
   return out;
 }
 
-// Marching cubes puts its vertices on the edges of the voxel grid: two coordinates are those of grid planes and so shared with many
-// other vertices, the third lies in between and is shared with few. Scans share none, CAD models mostly all three.
+// Marching cubes puts its vertices on the edges of the voxel grid: two coordinates are those of grid planes and so
+// shared with many other vertices, the third lies in between and is shared with few. Scans share none, CAD models
+// mostly all three.
 bool is_isosurface(const Mesh& mesh) {
   constexpr size_t kSamples = 1 << 16, kFewest = 2000;
   const size_t vertices = mesh.positions.size(), step = std::max<size_t>(vertices / kSamples, 1);

@@ -46,7 +46,7 @@ std::string other_kind(std::string_view content, const std::string& extension) {
 bool looks_like_raster(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
   if (content.starts_with("II*\0"sv) || content.starts_with("MM\0*"sv) || content.starts_with("II+\0"sv)) return true;
-  // Of a PNG the header chunk comes first: bit depth in byte 24, colour type (0: grey) in byte 25.
+  // A PNG begins with its header chunk: bit depth in byte 24, colour type (0: grey) in byte 25.
   if (content.starts_with("\x89PNG"sv)) return content.size() > 26 && content[24] == 16 && content[25] == 0;
   return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2"});
 }

@@ -10,8 +10,9 @@
 
 namespace telesplat::data {
 
-/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtk", "gltf", "raster", or
-/// "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and what is supported.
+/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtk", "gltf",
+/// "raster", or "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and what is
+/// supported.
 struct DetectedFormat {
   std::string format;
   std::string complaint;
@@ -23,9 +24,9 @@ DetectedFormat detect_format(std::string_view content, const std::string& path);
 /// elevation: of rasters alone.
 Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {});
 
-// The readers of single formats. `content` is the whole file, `name` stands in error texts. They promise what validate_mesh checks only
-// as far as sizes go (arrays one a vertex, three indices a triangle); read_mesh checks the rest. Faces of more than three
-// corners become fans around their first corner, which is right for convex ones.
+// The readers of single formats. `content` is the whole file, `name` stands in error texts. They promise what
+// validate_mesh checks only as far as sizes go (arrays one a vertex, three indices a triangle); read_mesh checks the
+// rest. Faces of more than three corners become fans around their first corner, which is right for convex ones.
 
 /// PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also diffuse_*).
 Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress);
@@ -33,18 +34,21 @@ Result<Mesh> read_ply(std::string_view content, const std::string& name, const R
 Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
 /// STL, binary or ascii. Corners at the same position become one vertex.
 Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// Wavefront OBJ: v (with r g b too), vn, f (negative indices too), usemtl with the Kd colours of its material libraries, which are
-/// looked for beside `name`.
+/// Wavefront OBJ: v (with r g b too), vn, f (negative indices too), usemtl with the Kd colours of its material
+/// libraries, which are looked for beside `name`.
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// VTP, legacy VTK and glTF, through VTK, in the program telesplat-import, which must lie beside this process's own program or in
-/// $PATH: neither VTK's messages nor a crash on a hostile file reach us. Claimed counts are checked here before VTK sees the file.
+/// VTP, legacy VTK and glTF, through VTK, in the program telesplat-import, which must lie beside this process's own
+/// program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us. Claimed counts are checked here
+/// before VTK sees the file.
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
                            const ReadProgress& progress);
 
-/// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated: elevation.h.
+/// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated:
+/// elevation.h.
 Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress);
 
-/// Other files that `path` pulls in (material libraries of an OBJ, buffers and images of a glTF), as paths; existing or not.
+/// Other files that `path` pulls in (material libraries of an OBJ, buffers and images of a glTF), as paths; existing or
+/// not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);
 
 }  // namespace telesplat::data

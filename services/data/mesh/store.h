@@ -30,8 +30,8 @@ struct MeshStoreInfo {
 /// An open chunk store: immutable, safe to read from any thread.
 class MeshStore {
  public:
-  /// Opens the store of `source`, making it first if the cache has none. path: of the file that the source reads, for errors and info().
-  /// Errors (exit code 2 for a user) name it. Precondition: validate(options).
+  /// Opens the store of `source`, making it first if the cache has none. path: of the file that the source reads, for
+  /// errors and info(). Errors (exit code 2 for a user) name it. Precondition: validate(options).
   static Result<std::shared_ptr<MeshStore>> make(const std::string& path, const MeshSource& source,
                                                  const StoreOptions& options, const Progress& progress);
   virtual ~MeshStore() = default;

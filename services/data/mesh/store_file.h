@@ -2,7 +2,7 @@
 //
 //   offset 0      StoreHeader, padded to 4096
 //   4096          StoreEntry[chunks], padded to a multiple of 4096
-//   then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order in which they were finished
+//   then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order they were made
 //
 // Native byte order: the file is a cache and never travels.
 #pragma once
@@ -20,11 +20,12 @@
 namespace telesplat::data {
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
-inline constexpr uint32_t kStoreVersion =
-    2;  ///< goes up whenever readers, placement or layout would make another file of the same mesh
+/// Goes up whenever readers, placement or layout would make another file of the same mesh.
+inline constexpr uint32_t kStoreVersion = 2;
 
-/// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken from there.
-/// On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages "chunk" and "write") is called on this thread.
+/// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken
+/// from there. On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages
+/// "chunk" and "write") is called on this thread.
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
                    const Progress& progress);
 
@@ -35,8 +36,9 @@ struct StoreContent {
   std::vector<size_t> offsets;  ///< of each chunk in the file
 };
 
-/// Maps a store and checks all of it before anything is believed: magic, version, size, the checksum over header and table of contents,
-/// the offsets, and the checksum of every chunk (which also brings the pages into memory that samplers are about to ask for).
+/// Maps a store and checks all of it before anything is believed: magic, version, size, the checksum over header and
+/// table of contents, the offsets, and the checksum of every chunk (which also brings the pages into memory that
+/// samplers are about to ask for).
 Result<StoreContent> read_store(int descriptor, const std::string& name);
 
 }  // namespace telesplat::data

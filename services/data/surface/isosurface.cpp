@@ -11,7 +11,9 @@
 #include <cstring>
 #include <filesystem>
 
+#include "services/data/import/iso.h"
 #include "services/data/import/process.h"
+#include "services/data/volume/volume.h"
 
 namespace telesplat::data {
 namespace {

@@ -2,30 +2,19 @@
 #pragma once
 
 #include "services/data/base/mesh_source.h"
-#include "services/data/volume/volume.h"
+#include "services/data/base/volume.h"
 
 namespace telesplat::data {
 
-/// The surface where the volume has the value `iso`, by flying edges (Schroeder, Maynard, Geveci, "Flying edges: a high-performance
-/// scalable isocontouring algorithm", LDAV 2015; VTK's, in the program telesplat-import). Positions are in the volume's own units and
-/// axes. Normals come from gradients and point to lower values. The volume's border stays open. Error, starting with `name`: iso is not
-/// inside the values, no triangle, too many of them.
+/// The surface where the volume has the value `iso`, by flying edges (Schroeder, Maynard, Geveci, "Flying edges: a
+/// high-performance scalable isocontouring algorithm", LDAV 2015; VTK's, in the program telesplat-import). Positions
+/// are in the volume's own units and axes. Normals come from gradients and point to lower values. The volume's border
+/// stays open. Error, starting with `name`: iso is not inside the values, no triangle, too many of them.
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name);
 
-/// That surface of the volume at `path` (its first step), for a store of chunks. raw: as find_volume takes it. Error: as find_volume.
+/// That surface of the volume at `path` (its first step), for a store of chunks. raw: as find_volume takes it. Error:
+/// as find_volume.
 Result<MeshSource> surface_source(const std::string& path, const std::string& raw, double iso,
                                   const Progress& progress);
-
-/// How a volume travels to the import program: this, then Volume::stored.
-struct VolumeHeader {
-  uint64_t magic = 0x314c4f5653545354;  // "TSTSVOL1"
-  int32_t size[3] = {};
-  int32_t type = 0;  ///< VoxelType
-  double iso = 0;    ///< in stored values
-  double index_to_data[16] = {};
-};
-
-/// The import program's part: reads header and voxels from the descriptor, which is a memory file.
-Result<Mesh> flying_edges(int descriptor, const std::string& name);
 
 }  // namespace telesplat::data

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/core/log.h"
+#include "common/scene/session.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::data {
@@ -33,9 +34,10 @@ const VolumeAnswers::Epoch* VolumeAnswers::epoch(EpochId id) const {
 }
 
 Status VolumeAnswers::follow(const wire::Welcome& welcome) {
-  const auto kind = welcome.facts.find("kind");
-  if (kind == welcome.facts.end()) return ok_status();  // the master does not know the scene yet
-  if (kind->second != "volume") return Error{fmt::format("the session shows a {}, not a volume", kind->second)};
+  const std::string kind = scene::SessionView(welcome).fact("kind");
+  if (kind.empty()) return ok_status();  // the master does not know the scene yet
+  if (kind != scene::name_of(scene::Kind::kVolume))
+    return Error{fmt::format("the session shows a {}, not a volume", kind)};
   const auto session = volume::read_session(welcome.parameters, welcome.facts);
   if (!session) return session.error();
   if (!(session->grid == session_.grid) || !(session->levels == session_.levels) || session->steps != session_.steps)
@@ -107,7 +109,7 @@ std::optional<VolumeAnswers::Reply> VolumeAnswers::work(InstanceId self) {
   return answer(request);
 }
 
-// Of what was sent; before anything was, of the heaviest slice.
+// The mean of what was sent; before anything was, the heaviest slice's.
 double VolumeAnswers::bytes_per_voxel(int step, const volume::LevelSet& shown, const std::vector<uint32_t>& weights) {
   if (voxels_ > 0) return double(bytes_) / double(voxels_);
   const auto heaviest = std::max_element(weights.begin(), weights.end());

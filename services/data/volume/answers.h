@@ -1,4 +1,5 @@
-// What a data server of a volume does between its sockets: learns epochs, keeps requests that wait in order, answers the most urgent one.
+// What a data server of a volume does between its sockets: learns epochs, keeps requests that wait in order, answers
+// the most urgent one.
 #pragma once
 
 #include <deque>
@@ -36,11 +37,13 @@ class VolumeAnswers {
     uint64_t voxels = 0, bytes = 0;  ///< of VoxelData
   };
 
-  /// Queues a request, or says at once that it cannot be answered (unknown epoch, slices of others, too many wait). Error: nonsense.
+  /// Queues a request, or says at once that it cannot be answered (unknown epoch, slices of others, too many wait).
+  /// Error: nonsense.
   Result<std::optional<Reply>> ask(const std::string& peer, const wire::VoxelRequest& request);
 
   bool has_work() const;
-  /// Does what is most urgent: weights first, then the request of the earliest round, of those the oldest. Nothing: there is nothing to do.
+  /// Does what is most urgent: weights first, then the request of the earliest round, of those the oldest. Nothing:
+  /// there is nothing to do.
   std::optional<Reply> work(InstanceId self);
 
  private:

@@ -1,4 +1,4 @@
-// What of a volume is served, and how.
+// Which part of a volume is served, and how.
 #pragma once
 
 #include <optional>
@@ -10,7 +10,7 @@ struct VolumeOptions {
   std::string raw;       ///< VolumeSource::raw
   std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
   bool lit = true;
-  /// Of a series; nothing: as many as make a second, at most 12.5; 0: it does not play.
+  /// Steps of a series a second; nothing: all of them in a second, at most 12.5; 0: it does not play.
   std::optional<double> steps_per_s;
   std::string part;     ///< "1/2": the second of two parts; empty: all of it
   int cache_mb = 2048;  ///< for the steps of a series that are kept

@@ -1,5 +1,5 @@
-// A volume as a data server serves it: samplers ask for the voxels that the session's transfer function shows, the master is told how many
-// those are.
+// A volume as a data server serves it: samplers ask for the voxels that the session's transfer function shows, the
+// master is told how many those are.
 #pragma once
 
 #include <memory>

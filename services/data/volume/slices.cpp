@@ -12,7 +12,8 @@
 namespace telesplat::data {
 namespace {
 
-// A voxel's neighbours along an axis and what one over their distance is: those of the outermost voxels are the voxels themselves.
+// A voxel's neighbours along an axis and what one over their distance is: those of the outermost voxels are the voxels
+// themselves.
 struct Neighbours {
   ptrdiff_t before, after;
   float weight;

@@ -9,7 +9,8 @@
 
 namespace telesplat::data {
 
-/// Immutable once made. Its slices are [begin, end); it holds one more on both sides, where the grid has them, for gradients.
+/// Immutable once made. Its slices are [begin, end); it holds one more on both sides, where the grid has them, for
+/// gradients.
 class VolumeSlices {
  public:
   /// Precondition: volume.size == session.grid.size.
@@ -19,9 +20,9 @@ class VolumeSlices {
   int end() const { return end_; }
   size_t bytes() const;
 
-  /// Voxels whose level is in `wanted`, of slices [k_begin, k_end), which are of this step. A normal is minus the gradient's direction in room space
-  /// (towards lower values), by central differences, at the grid's faces by differences to one side; kNoNormal where the value
-  /// changes by less than a 512th of all levels over Grid::unit_m().
+  /// Voxels whose level is in `wanted`, of slices [k_begin, k_end), which are of this step. A normal is minus the
+  /// gradient's direction in room space (towards lower values), by central differences, at the grid's faces by
+  /// differences to one side; kNoNormal where the value changes by less than a 512th of all levels over Grid::unit_m().
   volume::Voxels voxels(int k_begin, int k_end, const volume::LevelSet& wanted) const;
   /// How many those are, of each of this step's slices.
   std::vector<uint32_t> weights(const volume::LevelSet& wanted) const;

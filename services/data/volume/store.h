@@ -1,5 +1,5 @@
-// A data server's volume: read, placed in the room, classified and cut into slices on demand. Several servers may hold different parts of
-// one volume.
+// A data server's volume: read, placed in the room, classified and cut into slices on demand. Several servers may hold
+// different parts of one volume.
 #pragma once
 
 #include <functional>
@@ -20,9 +20,9 @@ using StepReader = std::function<Result<Volume>(size_t step, const ReadProgress&
 /// Used from one thread at a time.
 class VolumeStore {
  public:
-  /// up "auto": z. Reads the first step; all of them if they fit in cache_mb, so that levels cover the values of all. Otherwise values of
-  /// later steps that are beyond the first one's count as its smallest or largest. Steps that are read later, and one step ahead, are
-  /// read in a thread of their own. Errors name the file.
+  /// up "auto": z. Reads the first step; all of them if they fit in cache_mb, so that levels cover the values of all.
+  /// Otherwise values of later steps that are beyond the first one's count as its smallest or largest. Steps that are
+  /// read later, and one step ahead, are read in a thread of their own. Errors name the file.
   static Result<std::unique_ptr<VolumeStore>> open(const std::string& path, const VolumeOptions& options,
                                                    const PlacementOptions& placement, const Progress& progress);
   /// The same of volumes from anywhere. name: for errors.
@@ -34,11 +34,12 @@ class VolumeStore {
   /// As it begins; part and parts are this store's. Valid: read_session takes it.
   virtual const volume::Session& session() const = 0;
   virtual std::string format() const = 0;
-  /// Of the steps that were read when it was opened, whatever the part: other data, another hash.
+  /// The hash of all steps that were read when it was opened, the same for all parts: other data have another hash.
   virtual uint64_t content_hash() const = 0;
 
-  /// Voxels of slices [k_begin, k_end) of a step whose level is in `shown` and not in `have`; with normals if the session is lit. Slices outside
-  /// this part are left out: the answer's own k_begin and k_end say what it has. Error: a step that cannot be read.
+  /// Voxels of slices [k_begin, k_end) of a step whose level is in `shown` and not in `have`; with normals if the
+  /// session is lit. Slices outside this part are left out: the answer's own k_begin and k_end say what it has. Error:
+  /// a step that cannot be read.
   virtual Result<volume::Voxels> voxels(int step, int k_begin, int k_end, const volume::LevelSet& shown,
                                         const volume::LevelSet& have) = 0;
   /// Visible voxels of every slice of this part, for a set of levels. Error: as voxels().

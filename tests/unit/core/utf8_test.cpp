@@ -26,7 +26,9 @@ TEST(Utf8, TakesEveryCharacterAndNoSurrogate) {
   for (uint32_t code = 0; code < 0x110000; ++code) {
     const std::string text = encoded(code);
     ASSERT_EQ(valid_utf8(text), !is_surrogate(code)) << std::hex << code;
-    if (!is_surrogate(code)) ASSERT_EQ(to_utf8(text), text) << std::hex << code;
+    if (!is_surrogate(code)) {
+      ASSERT_EQ(to_utf8(text), text) << std::hex << code;
+    }
   }
 }
 

@@ -9,7 +9,8 @@
 namespace telesplat::data {
 namespace {
 
-// A ball of radius 8 around (12, 11, 10), value 100 at its surface and 10 more or less a voxel; in a placement that may mirror.
+// A ball of radius 8 around (12, 11, 10), value 100 at its surface and 10 more or less a voxel; in a placement that may
+// mirror.
 template <class T>
 Volume ball(VoxelType type, const glm::dmat4& index_to_data, double scale = 1, double offset = 0) {
   Volume v;

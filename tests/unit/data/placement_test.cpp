@@ -64,7 +64,8 @@ TEST(PlaceMesh, DropsAndCountsDegenerateTriangles) {
 
 TEST(PlaceMesh, NormalsAreMeansOverTrianglesWeightedByArea) {
   Mesh
-      mesh;  // one edge, a large triangle on one side (normal +z), one of a quarter of its area on the other (normal +y)
+      // one edge, a large triangle on one side (normal +z), one of a quarter of its area on the other (normal +y)
+      mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 4, 0}, {0, 0, -1}};
   mesh.indices = {0, 1, 2, 0, 1, 3};
   const auto placed = place(mesh);

@@ -1,4 +1,5 @@
-// Bad volume files become one clear line that names the file; nothing crashes, hangs or allocates by what a file claims.
+// Bad volume files become one clear line that names the file; nothing crashes, hangs or allocates by what a file
+// claims.
 #include <sys/resource.h>
 
 #include "services/data/volume/formats/import_stream.h"
@@ -204,7 +205,8 @@ TEST(BadVolumeFiles, EmptyMissingAndSpecialOnes) {
   EXPECT_FALSE(looks_like_volume(folder / "gone.nrrd"));
 }
 
-// Cut at every length, up to where all voxels are there: a checksum follows compressed ones, of 8 bytes for gzip and 4 for zlib.
+// Cut at every length, up to where all voxels are there: a checksum follows compressed ones, of 8 bytes for gzip and 4
+// for zlib.
 TEST(BadVolumeFiles, CutAnywhereAreRefused) {
   const TempFolder folder;
   const std::string data = kPattern.bytes<int16_t>();
@@ -336,7 +338,8 @@ TEST(BadSeries, StepsOfOtherSizesAreRefusedWithBothSizes) {
   EXPECT_TRUE(read_volume(*source, 0, nullptr).ok());
 }
 
-// A header that is honest about a bomb: what it unpacks to ends the reading, not its claim, and memory stays what was unpacked.
+// A header that is honest about a bomb: what it unpacks to ends the reading, not its claim, and memory stays what was
+// unpacked.
 TEST(Bombs, ThatPackLessThanTheyClaimTakeNoMemory) {
   const TempFolder folder;
   const std::string zeroes = packed(std::string(1 << 20, '\0'));  // a thousand to one, and no more

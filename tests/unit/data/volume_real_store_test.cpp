@@ -1,4 +1,5 @@
-// Real volumes, where they are present: opened, classified by every preset, coded within the bytes that are allowed a voxel.
+// Real volumes, where they are present: opened, classified by every preset, coded within the bytes that are allowed a
+// voxel.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

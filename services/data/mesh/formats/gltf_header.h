@@ -8,11 +8,12 @@
 
 namespace telesplat::data {
 
-/// The JSON text of a .gltf file (all of it) or a .glb file (its first chunk); empty if a .glb is too short for what it claims.
+/// The JSON text of a .gltf file (all of it) or a .glb file (its first chunk); empty if a .glb is too short for what it
+/// claims.
 std::string_view gltf_json(std::string_view content);
 
-/// Checks before VTK sees the file: version 2, well-formed JSON, no accessor of more elements than `data_bytes` (the file and its
-/// companions), a GLB no longer than it is. Errors start with `name`.
+/// Checks before VTK sees the file: version 2, well-formed JSON, no accessor of more elements than `data_bytes` (the
+/// file and its companions), a GLB no longer than it is. Errors start with `name`.
 Status check_gltf(std::string_view content, uint64_t data_bytes, const std::string& name);
 
 }  // namespace telesplat::data

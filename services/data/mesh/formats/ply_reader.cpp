@@ -1,3 +1,4 @@
+// PLY. Source: G. Turk, "The PLY polygon file format", 1994.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +13,8 @@
 namespace telesplat::data {
 namespace {
 
-// Reads one value after the other from the data behind the header. read() returns false where the data ends or is no number.
+// Reads one value after the other from the data behind the header. read() returns false where the data ends or is no
+// number.
 class AsciiCursor {
  public:
   AsciiCursor(std::string_view content, size_t offset) : scan_(content.substr(offset)) {}

@@ -12,7 +12,8 @@ namespace {
 
 constexpr size_t kBinaryHeader = 84, kBinaryTriangle = 50;
 
-// Joins corners that lie at exactly the same place: an open hash table from positions to vertex numbers that grows with them.
+// Joins corners that lie at exactly the same place: an open hash table from positions to vertex numbers that grows with
+// them.
 class Welder {
  public:
   explicit Welder(std::vector<glm::dvec3>& positions) : positions_(positions), table_(1024, kFree) {}

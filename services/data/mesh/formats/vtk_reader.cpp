@@ -1,3 +1,4 @@
+// Meshes of the formats that VTK reads: claims are checked here, the rest is read in the program telesplat-import.
 #include <fmt/format.h>
 
 #include <charconv>

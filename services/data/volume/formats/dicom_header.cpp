@@ -141,87 +141,86 @@ class Parser {
   }
 
   void keep(uint32_t tag, std::string_view value) {
-    const auto text = [&] {
-      std::string_view t = value;
-      while (!t.empty() && (t.back() == '\0' || t.back() == ' ')) t.remove_suffix(1);
-      return trim(t);
-    };
-    // Decimal strings, separated by backslashes. Nothing changes if they are not as many numbers.
-    const auto decimals = [&](auto... to) {
-      std::string plain(text().substr(0, 400));
-      std::replace(plain.begin(), plain.end(), '\\', ' ');
-      const auto all = numbers(plain);
-      if (!all || all->size() < sizeof...(to)) return false;
-      size_t i = 0;
-      ((*to = (*all)[i++]), ...);
-      return true;
-    };
-    const auto word = [&](int& to) {
-      if (value.size() >= 2) to = u16(size_t(value.data() - content_.data()));
-    };
+    if (value.size() >= 2) keep_word(tag, u16(size_t(value.data() - content_.data())));
+    while (!value.empty() && (value.back() == '\0' || value.back() == ' ')) value.remove_suffix(1);
+    keep_text(tag, trim(value));
+  }
+
+  // Decimal strings, separated by backslashes. Nothing changes if they are not as many numbers.
+  static bool decimals(std::string_view text, auto&... to) {
+    std::string plain(text.substr(0, 400));
+    std::replace(plain.begin(), plain.end(), '\\', ' ');
+    const auto all = numbers(plain);
+    if (!all || all->size() < sizeof...(to)) return false;
+    size_t i = 0;
+    ((to = (*all)[i++]), ...);
+    return true;
+  }
+
+  void keep_text(uint32_t tag, std::string_view text) {
+    glm::dvec3 a, b;
+    double frames = 1;
     switch (tag) {
       case 0x00020010:
-        syntax_ = std::string(text().substr(0, 64));
+        syntax_ = std::string(text.substr(0, 64));
         break;
       case 0x00080060:
-        out_.modality = std::string(text().substr(0, 16));
+        out_.modality = std::string(text.substr(0, 16));
         break;
       case 0x0020000e:
-        out_.series = std::string(text().substr(0, 64));
+        out_.series = std::string(text.substr(0, 64));
         break;
       case 0x00200013:
-        decimals(&out_.instance);
+        decimals(text, out_.instance);
         break;
       case 0x00180050:
-        decimals(&out_.thickness);
+        decimals(text, out_.thickness);
         break;
       case 0x00180088:
-        decimals(&out_.slice_spacing);
+        decimals(text, out_.slice_spacing);
         break;
-      case 0x00200032: {
-        glm::dvec3 p;
-        if (decimals(&p.x, &p.y, &p.z)) out_.position = p;
+      case 0x00200032:
+        if (decimals(text, a.x, a.y, a.z)) out_.position = a;
         break;
-      }
-      case 0x00200037: {
-        glm::dvec3 r, c;
-        if (decimals(&r.x, &r.y, &r.z, &c.x, &c.y, &c.z)) out_.along_row = r, out_.along_column = c;
+      case 0x00200037:
+        if (decimals(text, a.x, a.y, a.z, b.x, b.y, b.z)) out_.along_row = a, out_.along_column = b;
         break;
-      }
-      case 0x00280002:
-        word(out_.components);
-        break;
-      case 0x00280008: {
-        double frames = 1;
-        if (decimals(&frames) && frames >= 1 && frames < 1e6) out_.frames = int(frames);
-        break;
-      }
-      case 0x00280010:
-        word(out_.rows);
-        break;
-      case 0x00280011:
-        word(out_.columns);
+      case 0x00280008:
+        if (decimals(text, frames) && frames >= 1 && frames < 1e6) out_.frames = int(frames);
         break;
       case 0x00280030:
-        decimals(&out_.spacing.y, &out_.spacing.x);
+        decimals(text, out_.spacing.y, out_.spacing.x);
         break;  // between rows comes first
-      case 0x00280100:
-        word(out_.bits_allocated);
-        break;
-      case 0x00280101:
-        word(out_.bits_stored);
-        break;
-      case 0x00280103: {
-        int representation = 0;
-        word(representation);
-        out_.is_signed = representation == 1;
-        break;
-      }
       case 0x00281052:
-        decimals(&out_.intercept);
+        decimals(text, out_.intercept);
         break;
       case 0x00281053:
-        decimals(&out_.slope);
+        decimals(text, out_.slope);
+        break;
+      default:
+        break;
+    }
+  }
+
+  void keep_word(uint32_t tag, int word) {
+    switch (tag) {
+      case 0x00280002:
+        out_.components = word;
+        break;
+      case 0x00280010:
+        out_.rows = word;
+        break;
+      case 0x00280011:
+        out_.columns = word;
+        break;
+      case 0x00280100:
+        out_.bits_allocated = word;
+        break;
+      case 0x00280101:
+        out_.bits_stored = word;
+        break;
+      case 0x00280103:
+        out_.is_signed = word == 1;
         break;
       default:
         break;

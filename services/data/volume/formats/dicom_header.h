@@ -29,8 +29,9 @@ struct DicomSlice {
   uint64_t data_at = 0, data_bytes = 0;     ///< of the pixels; 0 bytes: a file without (a directory, a report)
 };
 
-/// Reads the elements up to the pixels. Explicit and implicit little-endian and explicit big-endian transfer syntaxes. Error: no DICOM file, cut, compressed
-/// pixels, elements nested deeper than 16. Source: DICOM PS3.5 chapter 7, PS3.3 C.7.6.2.
+/// Reads the elements up to the pixels. Explicit and implicit little-endian and explicit big-endian transfer syntaxes.
+/// Error: no DICOM file, cut, compressed pixels, elements nested deeper than 16. Source: DICOM PS3.5 chapter 7, PS3.3
+/// C.7.6.2.
 Result<DicomSlice> parse_dicom(std::string_view content, const std::string& path);
 
 }  // namespace telesplat::data

@@ -4,9 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "services/data/base/progress.h"
+#include "services/data/base/volume.h"
 #include "services/data/volume/formats/dicom_header.h"
 #include "services/data/volume/formats/header.h"
-#include "services/data/volume/volume.h"
 
 namespace telesplat::data {
 
@@ -16,11 +17,13 @@ struct DicomSeries {
   std::string remark;              ///< what was left out or evened, for people; often empty
 };
 
-/// The series of most slices among the DICOM files of a folder (not of its subfolders). Slices go by position, or by instance number if they have none. Error: no
-/// slices; a damaged file among them; compressed, coloured and multi-frame ones; slices of different sizes; two at the same position; gaps.
+/// The series of most slices among the DICOM files of a folder (not of its subfolders). Slices go by position, or by
+/// instance number if they have none. Error: no slices; a damaged file among them; compressed, coloured and multi-frame
+/// ones; slices of different sizes; two at the same position; gaps.
 Result<DicomSeries> find_dicom_series(const std::string& folder);
 
-/// Reads its voxels: bits above those stored are cleared (or carry the sign); slices with different rescaling become f32.
+/// Reads its voxels: bits above those stored are cleared (or carry the sign); slices with different rescaling become
+/// f32.
 Result<Volume> read_dicom(const std::string& folder, const ReadProgress& progress);
 
 }  // namespace telesplat::data

@@ -36,7 +36,7 @@ std::string unpack_start(std::string_view packed) {
   stream.avail_in = static_cast<uInt>(packed.size());
   stream.next_out = reinterpret_cast<Bytef*>(out.data());
   stream.avail_out = static_cast<uInt>(out.size());
-  inflate(&stream, Z_SYNC_FLUSH);  // whatever it returns: what it gave is what there is
+  inflate(&stream, Z_SYNC_FLUSH);  // what it returns does not matter: what it gave is what there is
   out.resize(out.size() - stream.avail_out);
   inflateEnd(&stream);
   return out;

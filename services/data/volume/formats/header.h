@@ -1,5 +1,6 @@
-// What a volume file's header says, before a voxel is read: one parser a format. VTK's readers trust headers, and those of some formats leave out
-// placement or compression; so headers are read and checked here, in the process that asked, and voxels elsewhere.
+// What a volume file's header says, before a voxel is read: one parser a format. VTK's readers trust headers, and those
+// of some formats leave out placement or compression; so headers are read and checked here, in the process that asked,
+// and voxels elsewhere.
 #pragma once
 
 #include <array>
@@ -38,29 +39,34 @@ struct VolumeFileHeader {
   uint64_t voxel_bytes() const { return voxels() * stored_bytes(stored); }
 };
 
-// Parsers of one format. `content`: the header's file from its beginning, at least its first kHeaderBytes or all of it. `path`: for errors, and to find
-// detached data beside it. They check syntax and what we support; check_header() checks sizes. Nothing is allocated by a claim.
+// Parsers of one format. `content`: the header's file from its beginning, at least its first kHeaderBytes or all of it.
+// `path`: for errors, and to find detached data beside it. They check syntax and what we support; check_header() checks
+// sizes. Nothing is allocated by a claim.
 
 inline constexpr size_t kHeaderBytes = 1 << 18;
 inline constexpr const char* kSupportedTypes =
     "supported are 8 to 64-bit integers and 32 and 64-bit floating point numbers, one a voxel";
 
-/// NRRD 1..5, attached and detached: encodings raw, gzip, text; spacings or space directions; spaces with left-handed axes are mirrored at x, so that
-/// what is shown is not. Error: list files, other encodings, more axes than three that are longer than one.
-/// Source: teem.sourceforge.net/nrrd/format.html.
+/// NRRD 1..5, attached and detached: encodings raw, gzip, text; spacings or space directions; spaces with left-handed
+/// axes are mirrored at x, so that what is shown is not. Error: list files, other encodings, more axes than three that
+/// are longer than one. Source: teem.sourceforge.net/nrrd/format.html.
 Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path);
 /// MetaImage (.mha, .mhd): TransformMatrix, ElementSpacing, Offset; zlib. Error: LIST files, several channels.
 Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::string& path);
-/// NIfTI 1 and 2, single files and .hdr/.img pairs, in either byte order. `content` is unpacked. The sform if there is one, else the qform, else the
-/// spacing. Error: time steps, colours, Analyze files. Source: nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h.
+/// NIfTI 1 and 2, single files and .hdr/.img pairs, in either byte order. `content` is unpacked. The sform if there is
+/// one, else the qform, else the spacing. Error: time steps, colours, Analyze files. Source:
+/// nifti.nimh.nih.gov/pub/dist/src/niftilib/nifti1.h.
 Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string& path);
-/// VTK's XML images: size (of cells, if there are no point data) and the most bytes a voxel can take; type and placement are VTK's to say.
+/// VTK's XML images: size (of cells, if there are no point data) and the most bytes a voxel can take; type and
+/// placement are VTK's to say.
 Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& path);
-/// What --raw says, for the file at `path`: "WxHxD:TYPE[:SX,SY,SZ]" with TYPE u8, i8, u16, i16, f32 and "be" behind it for big-endian.
+/// What --raw says, for the file at `path`: "WxHxD:TYPE[:SX,SY,SZ]" with TYPE u8, i8, u16, i16, f32 and "be" behind it
+/// for big-endian.
 Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path);
 
-/// Refuses sizes outside [1, volume::kMaxSide] and beyond kMaxVoxels, placements that are no grid's, and claims that data of `data_bytes` cannot hold
-/// (compressed: at 1032 to 1, deflate's best). For raw files, also data that is longer than the claim.
+/// Refuses sizes outside [1, volume::kMaxSide] and beyond kMaxVoxels, placements that are no grid's, and claims that
+/// data of `data_bytes` cannot hold (compressed: at 1032 to 1, deflate's best). For raw files, also data that is longer
+/// than the claim.
 Status check_header(const VolumeFileHeader& header, uint64_t data_bytes, const std::string& path);
 
 /// The beginning of a file; of a gzipped one, of what it unpacks to.
@@ -72,14 +78,15 @@ struct FileStart {
 /// Error: not a regular file, empty, not readable.
 Result<FileStart> read_start(const std::string& path);
 
-/// What kind of volume file this is: "nrrd", "metaimage", "nifti", "vti", "dicom"; "" if none. By content first, then by name.
+/// What kind of volume file this is: "nrrd", "metaimage", "nifti", "vti", "dicom"; "" if none. By content first, then
+/// by name.
 std::string volume_format(const FileStart& start, const std::string& path);
-/// Whether files of a format go through VTK. The others are read without it: VTK 9.1 knows neither NRRD's compression and directions, nor DICOM's order,
-/// orientation and signs of slices, nor MetaImage's directions, and takes damaged compressed MetaImages for whole (what is missing stays whatever
-/// the memory held).
+/// Whether files of a format go through VTK. The others are read without it: VTK 9.1 knows neither NRRD's compression
+/// and directions, nor DICOM's order, orientation and signs of slices, nor MetaImage's directions, and takes damaged
+/// compressed MetaImages for whole (what is missing stays what the memory held).
 bool reads_with_vtk(const std::string& format);
-/// Reads and checks the header of a volume file that is no DICOM slice (dicom_series.h). With `raw`: of a raw file that is as it says. Error: cannot be
-/// read, is no volume; those of the parsers and of check_header.
+/// Reads and checks the header of a volume file that is no DICOM slice (dicom_series.h). With `raw`: of a raw file that
+/// is as it says. Error: cannot be read, is no volume; those of the parsers and of check_header.
 Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw);
 
 }  // namespace telesplat::data

@@ -1,18 +1,20 @@
-// How a volume comes from telesplat-import: through a pipe, so that its voxels are never in memory twice. Messages of a kind, a length and as many bytes.
+// How a volume comes from telesplat-import: through a pipe, so that its voxels are never in memory twice. Messages of a
+// kind, a length and as many bytes.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "services/data/base/progress.h"
+#include "services/data/base/volume.h"
 #include "services/data/volume/formats/header.h"
-#include "services/data/volume/volume.h"
 
 namespace telesplat::data {
 
 struct StreamedVolume {
-  VolumeFileHeader
-      header;  ///< sizes, type and placement as VTK has them; native byte order; scale, offset and ct of the file
+  /// Sizes, type and placement are as VTK has them, in native byte order; scale, offset and ct are the file's.
+  VolumeFileHeader header;
   std::vector<std::byte> bytes;
 };
 
@@ -22,13 +24,13 @@ bool send_error(int descriptor, const std::string& text);
 /// voxels: header.voxel_bytes() of them.
 bool send_volume(int descriptor, const VolumeFileHeader& header, const void* voxels);
 
-/// Reads from the other end until a volume or an error came, trusting nothing. `most_bytes`: of voxels. None: the stream ended before, or is none of ours.
-/// Error: that which was sent; more bytes than `most_bytes`.
+/// Reads from the other end until a volume or an error came, trusting nothing. `most_bytes`: of voxels. None: the
+/// stream ended before, or is none of ours. Error: that which was sent; more bytes than `most_bytes`.
 std::optional<Result<StreamedVolume>> receive_volume(int descriptor, uint64_t most_bytes, const std::string& path,
                                                      const ReadProgress& progress);
 
-/// Reads a volume with VTK in telesplat-import. `header`: what the file's own header says (checked); what VTK finds must fit it. Error: VTK's complaint,
-/// crashes and endless readings of it.
+/// Reads a volume with VTK in telesplat-import. `header`: what the file's own header says (checked); what VTK finds
+/// must fit it. Error: VTK's complaint, crashes and endless readings of it.
 Result<StreamedVolume> read_volume_with_vtk(const VolumeFileHeader& header, const std::string& path,
                                             const ReadProgress& progress);
 

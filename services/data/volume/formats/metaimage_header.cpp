@@ -1,4 +1,5 @@
-// MetaImage headers: "Key = value" lines, the last of which is ElementDataFile. https://itk.org/Wiki/ITK/MetaIO/Documentation
+// MetaImage headers: "Key = value" lines, the last of which is ElementDataFile.
+// https://itk.org/Wiki/ITK/MetaIO/Documentation
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -41,14 +42,15 @@ Result<std::vector<double>> per_axis(const Keys& keys, std::initializer_list<std
   return *all;
 }
 
-}  // namespace
-
-Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::string& path) {
+// The lines up to ElementDataFile, behind which local data begin.
+struct Lines {
   Keys keys;
-  size_t data_at = content.npos;
+  size_t data_at = 0;
+};
+Result<Lines> read_lines(std::string_view content, const std::string& path) {
+  Lines lines;
   for (size_t begin = 0; begin < content.size();) {
-    size_t end = content.find('\n', begin);
-    if (end == content.npos) end = content.size();
+    const size_t end = std::min(content.find('\n', begin), content.size());
     const std::string_view line = content.substr(begin, end - begin);
     begin = end + 1;
     const size_t equals = line.find('=');
@@ -57,24 +59,24 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
       return Error{fmt::format("{}: its header has a line without \"=\": {}", path, in_quotes(line))};
     }
     const std::string_view key = trim(line.substr(0, equals));
-    keys.emplace(key, trim(line.substr(equals + 1)));
-    if (key == "ElementDataFile") {
-      data_at = begin;
-      break;
-    }
+    lines.keys.emplace(key, trim(line.substr(equals + 1)));
+    lines.data_at = begin;
+    if (key == "ElementDataFile") return lines;
   }
-  if (data_at == content.npos) return Error{path + ": its header has no ElementDataFile, so that it has no end"};
+  return Error{path + ": its header has no ElementDataFile, so that it has no end"};
+}
 
-  VolumeFileHeader h;
-  h.format = "metaimage";
-  h.ct = value(keys, {"Modality"}) == "MET_MOD_CT";
+Status read_voxel_type(const Keys& keys, const std::string& path, VolumeFileHeader& h) {
   const std::string_view type = value(keys, {"ElementType"});
   const auto stored = type_named(type);
   if (!stored) return Error{fmt::format("{}: its ElementType is {}; {}", path, in_quotes(type), kSupportedTypes)};
   h.stored = *stored;
   if (const auto channels = value(keys, {"ElementNumberOfChannels"}); !channels.empty() && number(channels) != 1.0)
     return Error{fmt::format("{}: has {} components a voxel, supported is 1", path, in_quotes(channels))};
+  return ok_status();
+}
 
+Status read_size(const Keys& keys, const std::string& path, VolumeFileHeader& h) {
   const auto sizes = whole_numbers(value(keys, {"DimSize"}));
   const auto axes = number(value(keys, {"NDims"}));
   if (!sizes || !axes || double(sizes->size()) != *axes || sizes->size() > 10)
@@ -84,7 +86,10 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
     return Error{fmt::format("{}: has {} axes ({}); a volume has 3 (a series is a folder of numbered files)", path,
                              sizes->size(), value(keys, {"DimSize"}).substr(0, 60))};
   std::copy_n(sizes->begin(), 3, h.size.begin());
+  return ok_status();
+}
 
+Status read_placement(const Keys& keys, const std::string& path, VolumeFileHeader& h) {
   // The matrix has the direction of each axis, one after the other.
   const auto turn =
       per_axis(keys, {"TransformMatrix", "Orientation", "Rotation"}, 9, {1, 0, 0, 0, 1, 0, 0, 0, 1}, path);
@@ -99,7 +104,11 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
     return glm::dvec3((*turn)[3 * a], (*turn)[3 * a + 1], (*turn)[3 * a + 2]) * (*spacing)[a];
   };
   h.index_to_data = placement(axis(0), axis(1), axis(2), {(*origin)[0], (*origin)[1], (*origin)[2]});
+  return ok_status();
+}
 
+Status find_data(const Lines& lines, const std::string& path, VolumeFileHeader& h) {
+  const Keys& keys = lines.keys;
   h.big_endian = is_true(value(keys, {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}));
   const std::string_view said = value(keys, {"BinaryData"});
   const bool binary = said.empty() || is_true(said);
@@ -110,16 +119,31 @@ Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::st
     return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, in_quotes(data))};
   const bool local = data == "LOCAL" || data == "Local" || data == "local";
   h.data_path = local ? path : beside(path, data);
-  h.data_at = local ? data_at : 0;
-  if (const auto text = value(keys, {"HeaderSize"}); !text.empty() && !local) {
-    const auto bytes = number(text);
-    if (!bytes || *bytes < -1 || *bytes > 1e15 || (*bytes < 0 && h.encoding != Encoding::kRaw))
-      return Error{fmt::format("{}: its HeaderSize is {}", path, in_quotes(text))};
-    if (*bytes < 0)
-      h.data_at_end = true;
-    else
-      h.data_at = uint64_t(*bytes);
-  }
+  h.data_at = local ? lines.data_at : 0;
+  const auto text = value(keys, {"HeaderSize"});
+  if (text.empty() || local) return ok_status();
+  const auto bytes = number(text);
+  if (!bytes || *bytes < -1 || *bytes > 1e15 || (*bytes < 0 && h.encoding != Encoding::kRaw))
+    return Error{fmt::format("{}: its HeaderSize is {}", path, in_quotes(text))};
+  if (*bytes < 0)
+    h.data_at_end = true;
+  else
+    h.data_at = uint64_t(*bytes);
+  return ok_status();
+}
+
+}  // namespace
+
+Result<VolumeFileHeader> parse_metaimage(std::string_view content, const std::string& path) {
+  const auto lines = read_lines(content, path);
+  if (!lines) return lines.error();
+  VolumeFileHeader h;
+  h.format = "metaimage";
+  h.ct = value(lines->keys, {"Modality"}) == "MET_MOD_CT";
+  if (const Status s = read_voxel_type(lines->keys, path, h); !s) return s.error();
+  if (const Status s = read_size(lines->keys, path, h); !s) return s.error();
+  if (const Status s = read_placement(lines->keys, path, h); !s) return s.error();
+  if (const Status s = find_data(*lines, path, h); !s) return s.error();
   return h;
 }
 

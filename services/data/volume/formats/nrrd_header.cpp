@@ -152,6 +152,53 @@ Result<std::vector<size_t>> choose_axes(const std::vector<int64_t>& sizes, const
                   path, sizes.size(), text)};
 }
 
+// How the voxels are written.
+Status read_encoding(const Fields& fields, const std::string& path, VolumeFileHeader& h) {
+  const std::string encoding = lower(field(fields, {"encoding"}));
+  if (encoding == "raw")
+    h.encoding = Encoding::kRaw;
+  else if (encoding == "gzip" || encoding == "gz")
+    h.encoding = Encoding::kGzip;
+  else if (encoding == "text" || encoding == "txt" || encoding == "ascii")
+    h.encoding = Encoding::kText;
+  else
+    return Error{fmt::format("{}: its encoding is {}; supported are raw, gzip and text", path, in_quotes(encoding))};
+  const std::string endian = lower(field(fields, {"endian"}));
+  if (stored_bytes(h.stored) > 1 && h.encoding != Encoding::kText && endian != "little" && endian != "big")
+    return Error{fmt::format("{}: its endian is {}, neither little nor big", path, in_quotes(endian))};
+  h.big_endian = endian == "big";
+  return ok_status();
+}
+
+// Where they lie.
+Status find_data(const Lines& lines, const std::string& path, VolumeFileHeader& h) {
+  const Fields& fields = lines.fields;
+  const std::string_view data = field(fields, {"datafile"});
+  if (data.empty() && !lines.ended)
+    return Error{fmt::format("{}: its header does not end (no empty line) and names no data file", path)};
+  if (data.starts_with("LIST") || data.find('%') != data.npos)
+    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, in_quotes(data))};
+  h.data_path = data.empty() ? path : beside(path, data);
+  h.data_at = data.empty() ? lines.data_at : 0;
+
+  const auto skipped = [&](std::initializer_list<const char*> names) {
+    const auto text = field(fields, names);
+    return text.empty() ? std::optional(0.0) : number(text);
+  };
+  const auto line_skip = skipped({"lineskip"}), byte_skip = skipped({"byteskip"});
+  if (!line_skip || *line_skip != 0)
+    return Error{
+        fmt::format("{}: skips {} lines of its data; supported is none", path, in_quotes(field(fields, {"lineskip"})))};
+  if (!byte_skip || *byte_skip < -1 || *byte_skip > 1e15 || *byte_skip != std::floor(*byte_skip) ||
+      (*byte_skip < 0 && h.encoding != Encoding::kRaw))
+    return Error{fmt::format("{}: skips {} bytes of its data", path, in_quotes(field(fields, {"byteskip"})))};
+  if (*byte_skip < 0)
+    h.data_at_end = true;
+  else
+    (h.encoding == Encoding::kGzip ? h.skip_unpacked : h.data_at) += uint64_t(*byte_skip);
+  return ok_status();
+}
+
 }  // namespace
 
 Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string& path) {
@@ -182,43 +229,8 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   if (!m) return m.error();
   h.index_to_data = *m;
 
-  const std::string encoding = lower(field(fields, {"encoding"}));
-  if (encoding == "raw")
-    h.encoding = Encoding::kRaw;
-  else if (encoding == "gzip" || encoding == "gz")
-    h.encoding = Encoding::kGzip;
-  else if (encoding == "text" || encoding == "txt" || encoding == "ascii")
-    h.encoding = Encoding::kText;
-  else
-    return Error{fmt::format("{}: its encoding is {}; supported are raw, gzip and text", path, in_quotes(encoding))};
-  const std::string endian = lower(field(fields, {"endian"}));
-  if (stored_bytes(h.stored) > 1 && h.encoding != Encoding::kText && endian != "little" && endian != "big")
-    return Error{fmt::format("{}: its endian is {}, neither little nor big", path, in_quotes(endian))};
-  h.big_endian = endian == "big";
-
-  const std::string_view data = field(fields, {"datafile"});
-  if (data.empty() && !lines.ended)
-    return Error{fmt::format("{}: its header does not end (no empty line) and names no data file", path)};
-  if (data.starts_with("LIST") || data.find('%') != data.npos)
-    return Error{fmt::format("{}: its data lie in several files ({}); supported is one", path, in_quotes(data))};
-  h.data_path = data.empty() ? path : beside(path, data);
-  h.data_at = data.empty() ? lines.data_at : 0;
-
-  const auto skipped = [&](std::initializer_list<const char*> names) {
-    const auto text = field(fields, names);
-    return text.empty() ? std::optional(0.0) : number(text);
-  };
-  const auto line_skip = skipped({"lineskip"}), byte_skip = skipped({"byteskip"});
-  if (!line_skip || *line_skip != 0)
-    return Error{
-        fmt::format("{}: skips {} lines of its data; supported is none", path, in_quotes(field(fields, {"lineskip"})))};
-  if (!byte_skip || *byte_skip < -1 || *byte_skip > 1e15 || *byte_skip != std::floor(*byte_skip) ||
-      (*byte_skip < 0 && h.encoding != Encoding::kRaw))
-    return Error{fmt::format("{}: skips {} bytes of its data", path, in_quotes(field(fields, {"byteskip"})))};
-  if (*byte_skip < 0)
-    h.data_at_end = true;
-  else
-    (h.encoding == Encoding::kGzip ? h.skip_unpacked : h.data_at) += uint64_t(*byte_skip);
+  if (const Status s = read_encoding(fields, path, h); !s) return s.error();
+  if (const Status s = find_data(lines, path, h); !s) return s.error();
   return h;
 }
 

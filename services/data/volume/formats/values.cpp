@@ -79,28 +79,6 @@ Status narrow(std::vector<std::byte>& bytes, StoredType type, const std::string&
 
 }  // namespace
 
-double Volume::value(size_t at) const {
-  const auto get = [&]<class T>(T) {
-    T v;
-    std::memcpy(&v, stored.data() + at * sizeof(T), sizeof(T));
-    return static_cast<double>(v);
-  };
-  switch (type) {
-    case VoxelType::kU8:
-      return get(uint8_t{}) * scale + offset;
-    case VoxelType::kI8:
-      return get(int8_t{}) * scale + offset;
-    case VoxelType::kU16:
-      return get(uint16_t{}) * scale + offset;
-    case VoxelType::kI16:
-      return get(int16_t{}) * scale + offset;
-    case VoxelType::kF32:
-      break;
-  }
-  const double v = get(float{}) * scale + offset;
-  return std::isfinite(v) ? v : lo;
-}
-
 Result<Volume> make_volume(const VolumeFileHeader& h, std::vector<std::byte> bytes, const std::string& path) {
   if (bytes.size() != h.voxel_bytes())
     return Error{fmt::format("{}: {} bytes of voxels, its header says {}", path, bytes.size(), h.voxel_bytes())};

@@ -1,0 +1,33 @@
+// A volume as its file has it, before any transfer function: what readers make.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <string>
+#include <vector>
+
+namespace telesplat::data {
+
+enum class VoxelType { kU8, kI8, kU16, kI16, kF32 };
+size_t voxel_bytes(VoxelType type);
+const char* name_of(VoxelType type);  ///< "u8", "i8", "u16", "i16", "f32"
+
+struct Volume {
+  std::array<int, 3> size{};
+  glm::dmat4 index_to_data{1.0};  ///< spacing, orientation and origin, in the file's own units and axes; affine
+  VoxelType type = VoxelType::kU8;
+  double scale = 1, offset = 0;  ///< value = stored * scale + offset (a CT's rescale, NIfTI's scl_slope)
+  /// i fastest, then j, k; native byte order; size[0] * size[1] * size[2] * voxel_bytes(type) bytes.
+  std::vector<std::byte> stored;
+  std::string format;       ///< "nrrd", "metaimage", "nifti", "vti", "dicom", "raw"
+  bool hounsfield = false;  ///< a CT, by what the file says or by its range
+  double lo = 0, hi = 0;    ///< smallest and largest finite value
+  uint64_t not_finite = 0;  ///< NaN and infinite ones; they count as lo
+  std::string remark;       ///< for people: what was left out or evened (DICOM); often empty
+
+  double value(size_t at) const;  ///< of voxel `at` in stored order
+};
+
+}  // namespace telesplat::data
