@@ -50,7 +50,8 @@ function(telesplat_program name)
 endfunction()
 
 # telesplat_test(LABEL NAME sources... [DEPS targets...] [TIMEOUT seconds])
-#   one GoogleTest executable, each of its cases a CTest test with LABEL. Its working directory is the repository's root.
+#   one GoogleTest executable, each of its cases a CTest test with LABEL. Its working directory is the repository's
+#   root.
 function(telesplat_test label name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "DEPS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -65,14 +66,16 @@ function(telesplat_test label name)
     PROPERTIES LABELS ${label} TIMEOUT ${ARG_TIMEOUT})
 endfunction()
 
-# telesplat_fuzz(NAME source CORPUS folder [DEPS targets...])
+# telesplat_fuzz(NAME CORPUS folder [DEPS targets...])   of NAME_fuzz.cpp and corpus/folder
 #   with TELESPLAT_FUZZ a libFuzzer program; always a CTest test (label unit) that replays the corpus.
-function(telesplat_fuzz name source)
+function(telesplat_fuzz stem)
   cmake_parse_arguments(ARG "" "CORPUS" "DEPS" ${ARGN})
+  set(name ${stem}_fuzz)
+  set(source ${CMAKE_CURRENT_SOURCE_DIR}/${name}.cpp)
   if(TELESPLAT_FUZZ)
     telesplat_program(${name} ${source} DEPS ${ARG_DEPS} -fsanitize=fuzzer)
   endif()
   telesplat_program(${name}_replay ${source} ${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp DEPS ${ARG_DEPS})
-  add_test(NAME fuzz_corpus.${name} COMMAND ${name}_replay ${ARG_CORPUS})
+  add_test(NAME fuzz_corpus.${name} COMMAND ${name}_replay ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${ARG_CORPUS})
   set_tests_properties(fuzz_corpus.${name} PROPERTIES LABELS unit TIMEOUT 60)
 endfunction()

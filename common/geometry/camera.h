@@ -35,8 +35,8 @@ constexpr bool contains(const Rect& outer, const Rect& inner) {
          int64_t{inner.y} + inner.height <= int64_t{outer.y} + outer.height;
 }
 
-/// A perspective camera. left, right, bottom, top are the tangents of the frustum's edges (the frustum cut at z = -1), so
-/// that off-axis frusta need nothing else. Pixel (x, y) has its centre at
+/// A perspective camera. left, right, bottom, top are the tangents of the frustum's edges (the frustum cut at z = -1),
+/// so that off-axis frusta need nothing else. Pixel (x, y) has its centre at
 ///   u = left + (x + 0.5) / width * (right - left),   v = top - (y + 0.5) / height * (top - bottom)
 /// and sees along (u, v, -1) in camera space. "Depth" is always distance along -z in metres, not along the ray.
 struct Camera {
@@ -88,8 +88,9 @@ class Frustum {
 /// The frustum of a part of the image, as a camera of its own (same pose, off-axis, rect.width x rect.height pixels).
 Camera crop(const Camera& camera, const Rect& rect);
 
-/// The camera whose pixel (i, j) looks where pixel (step * i + step / 2, step * j + step / 2) of `camera` does: ceil(width / step) x
-/// ceil(height / step) pixels, so the last ones may lie outside camera's image. Precondition: step >= 1.
+/// The camera whose pixel (i, j) looks where pixel (step * i + step / 2, step * j + step / 2) of `camera` does:
+/// ceil(width / step) x ceil(height / step) pixels, so the last ones may lie outside camera's image. Precondition: step
+/// >= 1.
 Camera subsample(const Camera& camera, int step);
 
 }  // namespace telesplat::geometry

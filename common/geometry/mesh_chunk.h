@@ -1,15 +1,16 @@
 // Mesh chunks: the blocks that a data server stores and serves and a sampler traces.
 //
-// One chunk is one contiguous block of bytes, the same in the chunk store's file, on the wire and in a sampler's memory, so
-// that it is memory-mapped, sent and handed to Embree without a copy. Little-endian. All positions are in room space.
+// One chunk is one contiguous block of bytes, the same in the chunk store's file, on the wire and in a sampler's
+// memory, so that it is memory-mapped, sent and handed to Embree without a copy. Little-endian. All positions are in
+// room space.
 //
 //   offset                          type            what
 //   0                               ChunkHeader     64 bytes
 //   64                              float[3][V]     positions, metres
-//   64 + 12 V                       uint32[V]       normals, two 16-bit octahedral coordinates (image/normal.h: encode_normal32)
+//   64 + 12 V                       uint32[V]       normals, octahedral, 2 x 16 bits (image/normal.h: encode_normal32)
 //   64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo
 //   64 + 20 V                       uint32[3][T]    vertex indices, each < V
-//   64 + 20 V + 12 T                zero bytes      padding to a multiple of 64, at least 16 (Embree reads past the last vertex)
+//   64 + 20 V + 12 T                zero bytes      to a multiple of 64, at least 16 (Embree reads past the last vertex)
 #pragma once
 
 #include <cstddef>

@@ -12,8 +12,8 @@ namespace telesplat::geometry {
 /// Poses over time, interpolated linearly (position) and spherically (orientation).
 class Trajectory {
  public:
-  /// Reads `t_s,px,py,pz,qw,qx,qy,qz` (header line required, times strictly increasing, at least one row, at most 10^7).
-  /// Errors name file and line.
+  /// Reads `t_s,px,py,pz,qw,qx,qy,qz` (header line required, times strictly increasing, at least one row, at most
+  /// 10^7). Errors name file and line.
   static Result<Trajectory> read_csv(const std::string& path);
   /// A circle around the origin: radius and height in metres, one turn in `period_s`.
   static Trajectory orbit(double radius_m = 0.75, double height_m = 0.35, double period_s = 20.0);

@@ -7,8 +7,8 @@
 
 namespace telesplat::gl {
 
-/// Time stamps between a frame's stages, written by the GPU as it gets there, so that nothing waits for them. Results are read
-/// when there: some frames later, or at once where the caller has waited for the frame anyway.
+/// Time stamps between a frame's stages, written by the GPU as it gets there, so that nothing waits for them. Results
+/// are read when there: some frames later, or at once where the caller has waited for the frame anyway.
 class StageTimer {
  public:
   explicit StageTimer(int stages);
@@ -21,7 +21,8 @@ class StageTimer {
   void begin_frame();
   /// Stages run in order, from begin_frame() on; stages between this one and the last that ended took no time.
   void end_stage(int stage);
-  /// Milliseconds of each stage: of the frame just drawn, for which this waits, or of the newest one whose results are there.
+  /// Milliseconds of each stage: of the frame just drawn, for which this waits, or of the newest one whose results are
+  /// there.
   const std::vector<double>& results(bool wait);
 
  private:

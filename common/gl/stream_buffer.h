@@ -8,11 +8,12 @@
 
 namespace telesplat::gl {
 
-/// One buffer object in three parts, used in turns: the processor writes one while the GPU may still read the others. Where the
-/// context has GL 4.4 (or ARB_buffer_storage) the buffer stays mapped, and writing is all there is to do; otherwise data is
-/// gathered in memory and handed over by commit().
+/// One buffer object in three parts, used in turns: the processor writes one while the GPU may still read the others.
+/// Where the context has GL 4.4 (or ARB_buffer_storage) the buffer stays mapped, and writing is all there is to do;
+/// otherwise data is gathered in memory and handed over by commit().
 ///
-/// Each frame: begin(bytes), take() as often as needed, commit(), draw, end(). All calls need the context that made the buffer.
+/// Each frame: begin(bytes), take() as often as needed, commit(), draw, end(). All calls need the context that made the
+/// buffer.
 class StreamBuffer {
  public:
   /// A place in the buffer. Write to data once, in order and without reading: it may be uncached memory.
@@ -28,8 +29,8 @@ class StreamBuffer {
   StreamBuffer(const StreamBuffer&) = delete;
   StreamBuffer& operator=(const StreamBuffer&) = delete;
 
-  /// Makes room for slices of `bytes` in all, including padded(): waits until the GPU is done with what this part held three
-  /// frames ago, or makes a larger buffer.
+  /// Makes room for slices of `bytes` in all, including padded(): waits until the GPU is done with what this part held
+  /// three frames ago, or makes a larger buffer.
   void begin(size_t bytes);
   /// CHECKs that begin() made room.
   Slice take(size_t bytes);

@@ -10,7 +10,8 @@ namespace {
 
 constexpr int kDepth = 9;  // finest cells are a 512th of the first cube
 
-/// held[n]: only what has |q| <= held[n] can still have |q| <= bailout after n more iterations, because |q^2 + c| <= b only where
+/// held[n]: only what has |q| <= held[n] can still have |q| <= bailout after n more iterations, because |q^2 + c| <= b
+/// only where
 /// |q| <= sqrt(b + |c|). Falls towards radius(c).
 std::vector<double> held_radii(const Parameters& p) {
   std::vector<double> held{p.bailout};
@@ -28,8 +29,8 @@ class BoxSearch {
   const geometry::DBox& box() const { return box_; }
 
  private:
-  // Whether all orbits that begin in a ball of the slice escape. The iterates of a ball about q of radius r lie in one of radius
-  // 2 |q| r + r^2 about q^2 + c. Unlike the distance estimate this needs no connected set.
+  // Whether all orbits that begin in a ball of the slice escape. The iterates of a ball about q of radius r lie in one
+  // of radius 2 |q| r + r^2 about q^2 + c. Unlike the distance estimate this needs no connected set.
   bool all_escape(const glm::dvec3& centre, double r) const {
     glm::dvec4 q = slice_.origin + centre.x * slice_.e[0] + centre.y * slice_.e[1] + centre.z * slice_.e[2];
     for (int n = 0;; ++n) {

@@ -1,4 +1,5 @@
-// How far a point is from a quaternion Julia set, plainly and in double precision: what faster ways are measured against.
+// How far a point is from a quaternion Julia set, plainly and in double precision: what faster ways are measured
+// against.
 #pragma once
 
 #include "common/julia/parameters.h"
@@ -10,10 +11,10 @@ inline glm::dvec4 iterate(const glm::dvec4& q, const glm::dvec4& c) {
   return glm::dvec4(2 * q.w * q.x, 2 * q.w * q.y, 2 * q.w * q.z, q.w * q.w - q.x * q.x - q.y * q.y - q.z * q.z) + c;
 }
 
-/// Distance estimate at p in set space: 0.5 |q| log|q| / |q'| at the first |q| > bailout of q0 = p, q <- q^2 + c, with |q'| <- 2 |q| |q'|
-/// from 1; 0 where no |q| of the first 1 + iterations ones exceeds it. Near the set a lower bound of the distance (Hart, Sandin, Kauffman:
-/// Ray tracing deterministic 3-D fractals, 1989); far from it, where |p| is above about 4, and
-/// between the parts of sets that are not connected it may be none.
+/// Distance estimate at p in set space: 0.5 |q| log|q| / |q'| at the first |q| > bailout of q0 = p, q <- q^2 + c, with
+/// |q'| <- 2 |q| |q'| from 1; 0 where no |q| of the first 1 + iterations ones exceeds it. Near the set a lower bound of
+/// the distance (Hart, Sandin, Kauffman: Ray tracing deterministic 3-D fractals, 1989); far from it, where |p| is above
+/// about 4, and between the parts of sets that are not connected it may be none.
 double distance_estimate(const Parameters& parameters, const Slice& slice, const glm::dvec3& p);
 
 }  // namespace telesplat::julia

@@ -129,7 +129,8 @@ Status validate(const Parameters& parameters) {
 }
 
 Slice slice(const Parameters& parameters) {
-  // Untilted: X is the real axis, Y is i, Z is j, and k is the normal. A turn in the plane (a, k) takes a towards k and k towards -a.
+  // Untilted: X is the real axis, Y is i, Z is j, and k is the normal. A turn in the plane (a, k) takes a towards k and
+  // k towards -a.
   const auto turned = [&](glm::dvec4 v) {
     const int axes[] = {3, 0, 1};
     for (int turn = 0; turn < 3; ++turn) {

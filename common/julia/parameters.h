@@ -1,7 +1,7 @@
 // A quaternion Julia set as a scene (T4.2.2, T7.3): what defines it, its names, its limits. No ray is traced here.
 //
-// The filled-in set of f(q) = q^2 + c is cut by a three-dimensional hyperplane of the quaternions. Set space is that hyperplane's own
-// coordinates (X, Y, Z), with X to the right, Y up and Z towards the viewer, as in room space.
+// The filled-in set of f(q) = q^2 + c is cut by a three-dimensional hyperplane of the quaternions. Set space is that
+// hyperplane's own coordinates (X, Y, Z), with X to the right, Y up and Z towards the viewer, as in room space.
 #pragma once
 
 #include <array>
@@ -43,9 +43,9 @@ struct Parameters {
   bool operator==(const Parameters&) const = default;
 };
 
-/// A parameter by its name, as on the command line, in scene files, in messages and for animation: "c.x", "c.y", "c.z", "c.w",
-/// "slice.offset", "slice.turn-x", "slice.turn-y", "slice.turn-z", "iterations", "bailout", "lod", "bound", "colour", "palette",
-/// "colour.scale", "colour.shift", "ambient", "shadow".
+/// A parameter by its name, as on the command line, in scene files, in messages and for animation: "c.x", "c.y", "c.z",
+/// "c.w", "slice.offset", "slice.turn-x", "slice.turn-y", "slice.turn-z", "iterations", "bailout", "lod", "bound",
+/// "colour", "palette", "colour.scale", "colour.shift", "ambient", "shadow".
 struct ParameterInfo {
   std::string_view name;
   double least, most;
@@ -55,18 +55,20 @@ struct ParameterInfo {
 };
 std::span<const ParameterInfo> parameter_infos();
 
-/// Error: no such name (names the ones there are), not finite, out of [least, most], not whole. Says name, value and limits.
+/// Error: no such name (names the ones there are), not finite, out of [least, most], not whole. Says name, value and
+/// limits.
 Status set(Parameters& parameters, std::string_view name, double value);
 /// Precondition: a name of parameter_infos().
 double get(const Parameters& parameters, std::string_view name);
 
 /// All parameters by name, for messages.
 std::map<std::string, double> to_map(const Parameters& parameters);
-/// Names that are none of ours are ignored (messages hold others too); missing ones keep their default; the rest as set() does.
+/// Names that are none of ours are ignored (messages hold others too); missing ones keep their default; the rest as
+/// set() does.
 Result<Parameters> from_map(const std::map<std::string, double>& values);
 
-/// Each value within its limits, the slice not so far from 0 that it must be empty, and the bailout beyond the ball that holds the set.
-/// Error texts name parameter, value and limit.
+/// Each value within its limits, the slice not so far from 0 that it must be empty, and the bailout beyond the ball
+/// that holds the set. Error texts name parameter, value and limit.
 Status validate(const Parameters& parameters);
 
 struct Preset {
@@ -91,12 +93,13 @@ Slice slice(const Parameters& parameters);
 /// Radius of a ball about 0 that holds the filled-in set: (1 + sqrt(1 + 4 |c|)) / 2.
 double radius(const glm::dvec4& c);
 
-/// Where the set lies in set space: cells of a grid refined where not all orbits can be shown to escape, and a cell more on each side, so
-/// the box is never too small. `bound` > 0: that cube instead. Empty where the slice (in that cube) misses the set. About 10 ms.
-/// Precondition: validate(parameters).
+/// Where the set lies in set space: cells of a grid refined where not all orbits can be shown to escape, and a cell
+/// more on each side, so the box is never too small. `bound` > 0: that cube instead. Empty where the slice (in that
+/// cube) misses the set. About 10 ms. Precondition: validate(parameters).
 geometry::DBox bounds(const Parameters& parameters);
 
-/// Set space in room space: room = (set - centre) * scale. Fixed for a session, so that an animated set does not jump about.
+/// Set space in room space: room = (set - centre) * scale. Fixed for a session, so that an animated set does not jump
+/// about.
 struct Placement {
   glm::dvec3 centre{0.0};
   double scale = 1;        ///< metres a unit of set space
@@ -104,7 +107,8 @@ struct Placement {
 };
 /// The box centred in the room, its largest extent room_size_m. Precondition: !box.empty().
 Placement place(const geometry::DBox& box, double room_size_m);
-/// "room.x", "room.y", "room.z", "room.scale", for messages, and back: errors name the value that is missing or no finite number.
+/// "room.x", "room.y", "room.z", "room.scale", for messages, and back: errors name the value that is missing or no
+/// finite number.
 std::map<std::string, double> to_map(const Placement& placement);
 Result<Placement> placement_from_map(const std::map<std::string, double>& values, const geometry::Box& box_room);
 

@@ -1,4 +1,5 @@
-// How parameters of a scene change with time: key frames, read from the command line or a scene file. Knows names and numbers only.
+// How parameters of a scene change with time: key frames, read from the command line or a scene file. Knows names and
+// numbers only.
 #pragma once
 
 #include <map>
@@ -29,9 +30,10 @@ struct Timeline {
   std::string text() const;
 };
 
-/// Reads "c.y=-0.4:0.4:10s" (from -0.4 to 0.4 in 10 s and back again in 10 s, for ever) or "c.y=@0s:-0.4@5s:0.4@10s:-0.4" (key frames;
-/// for ever, so first and last value should be the same); several are separated by ";". Error: names the part that cannot be read, the value
-/// and the limit; a name twice; times that do not rise; not finite; more than 4096 key frames.
+/// Reads "c.y=-0.4:0.4:10s" (from -0.4 to 0.4 in 10 s and back again in 10 s, for ever) or
+/// "c.y=@0s:-0.4@5s:0.4@10s:-0.4" (key frames; for ever, so first and last value should be the same); several are
+/// separated by ";". Error: names the part that cannot be read, the value and the limit; a name twice; times that do
+/// not rise; not finite; more than 4096 key frames.
 Result<Timeline> parse_timeline(std::string_view text);
 
 }  // namespace telesplat::julia

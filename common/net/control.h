@@ -8,8 +8,8 @@
 
 namespace telesplat::net {
 
-/// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer. Error: the master's
-/// refusal, or that it did not answer within `timeout_s`. Answers to earlier commands are dropped.
+/// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer.
+/// Error: the master's refusal, or that it did not answer within `timeout_s`. Answers to earlier commands are dropped.
 Result<std::string> ask_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                double timeout_s, const std::map<std::string, std::string>& arguments = {});
 

@@ -22,8 +22,8 @@ struct ServiceOptions {
   std::string log_level = "info";
 };
 
-/// Adds --name, --log-level, --insecure; --bind if the program binds, --master (or TELESPLAT_MASTER in the environment) if it connects
-/// to one, --advertise if it does both.
+/// Adds --name, --log-level, --insecure; --bind if the program binds, --master (or TELESPLAT_MASTER in the environment)
+/// if it connects to one, --advertise if it does both.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 void add_service_flags(CLI::App& app, ServiceOptions& options, Ends ends);
@@ -35,14 +35,16 @@ void parse_or_exit(CLI::App& app, int argc, char** argv);
 std::string host_name();
 /// ROLE-HOST-PID: process ids alone are no names, every container has a process 1.
 std::string unique_name(const std::string& role);
-/// What others are told to connect to for `endpoint`, as Socket::bind returned it: tcp://HOST:PORT with `advertise` for HOST, or with
-/// host_name() if it was bound to a wildcard (0.0.0.0, [::]) and `advertise` is empty. Other transports stay as they are.
+/// What others are told to connect to for `endpoint`, as Socket::bind returned it: tcp://HOST:PORT with `advertise` for
+/// HOST, or with host_name() if it was bound to a wildcard (0.0.0.0, [::]) and `advertise` is empty. Other transports
+/// stay as they are.
 std::string announced(const std::string& endpoint, const std::string& advertise);
 /// Empty if `host` is a name or address that others can connect to, else what is wrong with it.
 std::string complain_about_host(const std::string& host);
 
-/// SIGINT and SIGTERM end the process at once with code 0: for the time when there is nothing to lose and no loop that could look at
-/// a flag. To be called first: a first process of a container that has no handlers is not reached by them.
+/// SIGINT and SIGTERM end the process at once with code 0: for the time when there is nothing to lose and no loop that
+/// could look at a flag. To be called first: a first process of a container that has no handlers is not reached by
+/// them.
 void end_on_signals();
 /// From now on SIGINT and SIGTERM set a flag instead of ending the process.
 void install_signal_handlers();

@@ -8,8 +8,8 @@
 
 namespace telesplat::net {
 
-/// Options has a member `service`; add_flags(app, options) declares its flags, run(options) serves and returns the exit code.
-/// Bad usage exits 2; exceptions that escape become one line and exit code 1.
+/// Options has a member `service`; add_flags(app, options) declares its flags, run(options) serves and returns the exit
+/// code. Bad usage exits 2; exceptions that escape become one line and exit code 1.
 template <class Options>
 int service_main(int argc, char** argv, const char* about, Options options, void (*add_flags)(CLI::App&, Options&),
                  auto run) {

@@ -16,8 +16,8 @@
 namespace telesplat::net {
 namespace {
 
-// A frame that is this much over a socket's limit is still read, so that it can be dropped and counted with its peer named; one that
-// claims more ends its connection before anything is allocated for it.
+// A frame that is this much over a socket's limit is still read, so that it can be dropped and counted with its peer
+// named; one that claims more ends its connection before anything is allocated for it.
 constexpr int64_t kOversizedBytes = 16 << 20;
 constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads; handshakes fit
 constexpr size_t kMaxTypeBytes = 64;
@@ -83,8 +83,9 @@ struct Socket::Impl {
     if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);
   }
 
-  // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too much are seen
-  // by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed handshake is certain to be told.
+  // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too
+  // much are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed
+  // handshake is certain to be told.
   void watch_connections() {
     static std::atomic<int> counter{0};
     const std::string address = fmt::format("inproc://monitor-{}", ++counter);
@@ -128,8 +129,9 @@ struct Socket::Impl {
       it->second.has_spoken = true;
   }
 
-  // A connection that ends without ever having brought a whole message counts as one rejected: everyone of ours speaks as soon as it
-  // is connected, but for samplers, who push no tile before they have one. To be called when all messages of `closed` are received.
+  // A connection that ends without ever having brought a whole message counts as one rejected: everyone of ours speaks
+  // as soon as it is connected, but for samplers, who push no tile before they have one. To be called when all messages
+  // of `closed` are received.
   void judge_closed() {
     for (const Connection& c : closed) {
       if (c.has_spoken || (kind == Kind::kPull && monotonic_s() - c.accepted_s > kQuietPusher_s)) continue;

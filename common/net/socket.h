@@ -1,5 +1,5 @@
-// ZeroMQ sockets that carry wire messages. Every queue is bounded, every message size limited; bad input is dropped, counted
-// and logged (at most once a second a socket), never thrown.
+// ZeroMQ sockets that carry wire messages. Every queue is bounded, every message size limited; bad input is dropped,
+// counted and logged (at most once a second a socket), never thrown.
 #pragma once
 
 #include <cstdint>
@@ -51,14 +51,15 @@ class Socket {
   Socket(Socket&&) noexcept;
   Socket& operator=(Socket&&) noexcept;
 
-  /// Binds to tcp://ADDRESS:PORT (PORT may be *), ipc:// or inproc://. Returns the endpoint with its real port. An address
-  /// other than loopback is refused unless `insecure`.
+  /// Binds to tcp://ADDRESS:PORT (PORT may be *), ipc:// or inproc://. Returns the endpoint with its real port. An
+  /// address other than loopback is refused unless `insecure`.
   Result<std::string> bind(const std::string& endpoint, bool insecure = false);
   /// Connects; the peer need not exist yet and may come back after being away.
   Status connect(const std::string& endpoint);
   void disconnect(const std::string& endpoint);
 
-  /// Queues a message without waiting (ROUTER: for `peer`). False: dropped, because the queue is full or the peer is gone.
+  /// Queues a message without waiting (ROUTER: for `peer`). False: dropped, because the queue is full or the peer is
+  /// gone.
   template <class M>
   bool send(const M& message, std::string_view peer = {}) {
     return send_frames(peer, M::kName, wire::encode(message));
@@ -66,7 +67,8 @@ class Socket {
   /// Sends an already encoded message, shared by several receivers.
   bool send_frames(std::string_view peer, std::string_view type, std::string body);
 
-  /// Next message, without waiting (PUB: never one, but viewers' subscriptions are looked at). Messages that are not [peer,] type, body within the limits are dropped and counted.
+  /// Next message, without waiting (PUB: never one, but viewers' subscriptions are looked at). Messages that are not
+  /// [peer,] type, body within the limits are dropped and counted.
   std::optional<Message> receive();
 
   /// Decodes a message of known type; a bad one is counted and logged, naming its peer, and nothing comes back.
@@ -80,8 +82,8 @@ class Socket {
   /// Counts and logs a message that cannot be used.
   void reject(const Message& message, const std::string& why);
 
-  /// Messages dropped for being malformed, oversized or unexpected, and connections accepted that ended without having brought one
-  /// message: random bytes, other protocols, failed handshakes, frames that claim more than is ever read.
+  /// Messages dropped for being malformed, oversized or unexpected, and connections accepted that ended without having
+  /// brought one message: random bytes, other protocols, failed handshakes, frames that claim more than is ever read.
   uint64_t rejected() const;
   const std::string& name() const;
 

@@ -1,5 +1,6 @@
-// One row a flag. A table says what the command line takes, what a child process is told, what a TOML file may hold, which scenes a flag fits,
-// and what --help prints. A program's table is a function of its options struct: Table table(Options&).
+// One row a flag. A table says what the command line takes, what a child process is told, what a TOML file may hold,
+// which scenes a flag fits, and what --help prints. A program's table is a function of its options struct: Table
+// table(Options&).
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@
 
 namespace telesplat::options {
 
-/// A value of any other type: read from text, written as text. read's error says what is wrong with the value, without naming the flag.
+/// A value of any other type: read from text, written as text. read's error says what is wrong with the value, without
+/// naming the flag.
 struct Text {
   std::function<Status(const std::string&)> read;
   std::function<std::string()> write;
@@ -26,8 +28,9 @@ struct Action {
   std::function<void()> act;
 };
 
-/// Where the value lies; pointers are into the struct that the table was made for. An empty optional was not given. A bool is a flag that is
-/// there or not ("!--no-cache": it sets false), or a switch that takes on or off if its row says so.
+/// Where the value lies; pointers are into the struct that the table was made for. An empty optional was not given. A
+/// bool is a flag that is there or not ("!--no-cache": it sets false), or a switch that takes on or off if its row says
+/// so.
 using Value = std::variant<bool*, int*, uint64_t*, double*, std::string*, std::optional<double>*, std::optional<int>*,
                            std::vector<std::string>*, Text, Action>;
 
@@ -79,8 +82,8 @@ std::string text_of(const Row& row);
 /// Gives the row's value. Error: "--flag TEXT: what is wrong", within the row's limits.
 Status set(const Row& row, const std::string& text);
 
-/// What another process must be told so that its options equal `table`'s: rows that differ from the same rows of `defaults` (what that process
-/// takes without being told), of Reach::kChild or more: "--flag=value" or "--flag".
+/// What another process must be told so that its options equal `table`'s: rows that differ from the same rows of
+/// `defaults` (what that process takes without being told), of Reach::kChild or more: "--flag=value" or "--flag".
 std::vector<std::string> arguments(const Table& table, const Table& defaults);
 /// Rows of Reach::kRecorded that differ from `defaults`, as lines "key = value" of TOML. Paths are made absolute.
 std::string recorded(const Table& table, const Table& defaults);

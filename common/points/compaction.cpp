@@ -110,9 +110,7 @@ struct Grid {
   bool is_odd(uint16_t x, uint16_t y, uint16_t z) const { return (along(x) + along(y) + along(z)) & 1; }
   // Twice the distance from the cell's centre along one axis, in parts of the cell's side: -65536..65536.
   int64_t off(uint16_t q) const { return 2 * static_cast<int64_t>(q * side & 0xffff) - 65536; }
-  int64_t off2(uint16_t x, uint16_t y, uint16_t z) const {
-    return off(x) * off(x) + off(y) * off(y) + off(z) * off(z);
-  }
+  int64_t off2(uint16_t x, uint16_t y, uint16_t z) const { return off(x) * off(x) + off(y) * off(y) + off(z) * off(z); }
 };
 
 // Cells a side that have about `distances` sample distances each.
@@ -138,12 +136,13 @@ struct Scratch {
 };
 thread_local Scratch scratch;
 
-constexpr uint32_t kLeastTaken = 4;  // of a coarser mosaic one point in four is taken in, or none: it is built anew for it
+// of a coarser mosaic one point in four is taken in, or none: it is built anew for it
+constexpr uint32_t kLeastTaken = 4;
 constexpr int kMergedRanks = 5;  // of level 2; of level 1 alone, two halves; of level 0 alone, two halves
 
 // Gathers points into cells: `count` of them, point i at place(i), with key(i).
 void fill_cells(const PointSet& p, const Grid& grid, CellTable& table, std::vector<Cell>& cells,
-                     std::vector<uint32_t>& cell_of, uint32_t count, const auto& point, const auto& add_colour) {
+                std::vector<uint32_t>& cell_of, uint32_t count, const auto& point, const auto& add_colour) {
   table.begin(count);
   cells.clear();
   cell_of.resize(count);
@@ -219,7 +218,8 @@ Mosaic build(const PointSet& p, Sequence sequence, FrameId frame) {
   return out.finish(p.pixel_range(), p.direction_to_eye());
 }
 
-// Whether finer points surround those of a coarser mosaic: for each cell of one of its sample distances, how many there are.
+// Whether finer points surround those of a coarser mosaic: for each cell of one of its sample distances, how many there
+// are.
 class FinerPoints {
  public:
   FinerPoints(const Mosaic& coarse, int finest_class)
@@ -254,7 +254,9 @@ bool may_merge(const Mosaic& m, int fresh_class, uint32_t total) {
   return apart == 0 || (apart <= kSmallApart && total < kSmallMosaic && m.count(0) < kSmallMosaic);
 }
 
-bool contains(const std::vector<uint32_t>& list, uint32_t i) { return std::find(list.begin(), list.end(), i) != list.end(); }
+bool contains(const std::vector<uint32_t>& list, uint32_t i) {
+  return std::find(list.begin(), list.end(), i) != list.end();
+}
 
 // The mosaics that `fresh` is merged with, ascending: smallest first, as long as they are of a size with what there is.
 std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic& fresh) {
@@ -277,9 +279,10 @@ std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic
   return out;
 }
 
-// Which points of `coarse` are surrounded by the first `own` of p and by those of finer mosaics that stay: scratch.surrounded. Returns how many.
-uint32_t find_surrounded(const std::vector<Mosaic>& mosaics, const std::vector<uint32_t>& replaced, const Mosaic& coarse,
-                         int merged_class, const PointSet& p, uint32_t own) {
+// Which points of `coarse` are surrounded by the first `own` of p and by those of finer mosaics that stay:
+// scratch.surrounded. Returns how many.
+uint32_t find_surrounded(const std::vector<Mosaic>& mosaics, const std::vector<uint32_t>& replaced,
+                         const Mosaic& coarse, int merged_class, const PointSet& p, uint32_t own) {
   FinerPoints finer(coarse, merged_class);
   const auto for_finer = [&](const auto& visit) {
     for (uint32_t j = 0; j < mosaics.size(); ++j)

@@ -1,13 +1,15 @@
 // Compaction: the points of a cluster stand in few mosaics, however many patches brought them.
 //
-// Each patch adds a few points to many clusters. Left alone, these become mosaics of two or three points, and a frame costs what its mosaics
-// number. So a cluster is a log-structured merge tree: mosaics of about equal density whose sizes are within kGrowth of each other become
-// one. A point is copied once for each time that the mosaic around it has grown by kGrowth, so copying stays logarithmic. Where a cluster has coarser mosaics,
-// each merge of kSmallMosaic points or more also looks at all of its points.
-// Based on: P. O'Neil, E. Cheng, D. Gawlick, E. O'Neil, "The log-structured merge-tree (LSM-tree)", Acta Informatica 33, 1996.
+// Each patch adds a few points to many clusters. Left alone, these become mosaics of two or three points, and a frame
+// costs what its mosaics number. So a cluster is a log-structured merge tree: mosaics of about equal density whose
+// sizes are within kGrowth of each other become one. A point is copied once for each time that the mosaic around it has
+// grown by kGrowth, so copying stays logarithmic. Where a cluster has coarser mosaics, each merge of kSmallMosaic
+// points or more also looks at all of its points.
+// Based on: P. O'Neil, E. Cheng, D. Gawlick, E. O'Neil, "The log-structured merge-tree (LSM-tree)", Acta Informatica
+// 33, 1996.
 //
-// The rule looks at nothing but the cluster and the patch. Packer and viewers apply the same events, so they merge the same mosaics at the
-// same sequence number and hold the same bytes.
+// The rule looks at nothing but the cluster and the patch. Packer and viewers apply the same events, so they merge the
+// same mosaics at the same sequence number and hold the same bytes.
 #pragma once
 
 #include <cstdint>
@@ -17,35 +19,39 @@
 
 namespace telesplat::points {
 
-/// Mosaics of fewer points are merged whatever the other's size, and without levels of detail: to copy them costs little. Set by bench cache:
-/// with 64 the bonsai had 10,500 items after a minute's orbit, with 128 it has 9,100.
+/// Mosaics of fewer points are merged whatever the other's size, and without levels of detail: to copy them costs
+/// little. Set by bench cache: with 64 the bonsai had 10,500 items after a minute's orbit, with 128 it has 9,100.
 inline constexpr uint32_t kSmallMosaic = 128;
 /// Small mosaics are merged also if their density classes differ, by this at most.
 inline constexpr int kSmallApart = 1;
 /// Sizes of the mosaics of one density class in a cluster differ by more than this factor.
 inline constexpr uint32_t kGrowth = 4;
 
-/// Octaves of a mosaic's pixel range: floor(log2(range)), the same on every machine. Half octaves gave the bonsai more mosaics and the same
-/// pictures (26.21 against 26.23 dB, bench cache).
+/// Octaves of a mosaic's pixel range: floor(log2(range)), the same on every machine. Half octaves gave the bonsai more
+/// mosaics and the same pictures (26.21 against 26.23 dB, bench cache).
 int density_class(float pixel_range);
 
-/// What a cluster becomes as `fresh` is added: mosaics[i] for i in `replaced` (ascending) go, `added` come after the others.
+/// What a cluster becomes as `fresh` is added: mosaics[i] for i in `replaced` (ascending) go, `added` come after the
+/// others.
 struct Merge {
   std::vector<uint32_t> replaced;
   std::vector<Mosaic> added;
 };
 
-/// `fresh` takes in mosaics of its density class while the smallest of them is small or no larger than kGrowth times what is merged so
-/// far. If the result is not small, it also takes in the points of coarser mosaics that finer points surround: such a point is as
-/// exact as they are, so it needs no larger splat than they do. What of a coarser mosaic is not surrounded stays a mosaic.
-///   A merged mosaic has the mean pixel range of its parts, by their points, their mean direction if they are alike, and fresh's sequence and frame.
+/// `fresh` takes in mosaics of its density class while the smallest of them is small or no larger than kGrowth times
+/// what is merged so far. If the result is not small, it also takes in the points of coarser mosaics that finer points
+/// surround: such a point is as exact as they are, so it needs no larger splat than they do. What of a coarser mosaic
+/// is not surrounded stays a mosaic.
+///   A merged mosaic has the mean pixel range of its parts, by their points, their mean direction if they are alike,
+///   and fresh's sequence and frame.
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh);
 
 /// All points of some mosaics of one cluster as one mosaic, as a merge makes it. Preconditions: at least one.
-///   A coarser level has one point of each cell of a grid, that nearest to the cell's centre, with the mean colour of those in the cell; where normals
-///   in a cell point along different axes, one of each. Cells of level 1 have about two sample distances a side, those of level 2 four.
-///   Points that a level adds come in two halves, of cells like the black and the white fields of a board: so every prefix covers the
-///   cluster evenly.
+///   A coarser level has one point of each cell of a grid: the one nearest to the cell's centre, with the mean colour
+///   of all points in the cell. Where normals in a cell point along different axes, it has one of each. Cells of level
+///   1 have about two sample distances a side, cells of level 2 four.
+///   Points that a level adds come in two halves, of cells like the black and the white fields of a board: so every
+///   prefix covers the cluster evenly.
 Mosaic merge_mosaics(const std::vector<const Mosaic*>& parts, Sequence sequence);
 
 /// A level of a mosaic, and where its leaf lies in a cube of 2^shift leaves a side.
@@ -58,8 +64,8 @@ struct PlacedLevel {
 /// All their points as one mosaic of that pixel range, in fractions of the cube. Precondition: at least one point.
 Mosaic merge_levels(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence);
 
-/// One point for each cell of a grid that has pixel_range cells along that cube's edge, as merge_mosaics chooses them, with coarser levels of its own.
-/// Positions are fractions of the cube. Precondition: at least one point.
+/// One point for each cell of a grid that has pixel_range cells along that cube's edge, as merge_mosaics chooses them,
+/// with coarser levels of its own. Positions are fractions of the cube. Precondition: at least one point.
 Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence);
 
 }  // namespace telesplat::points

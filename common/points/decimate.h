@@ -12,17 +12,17 @@
 
 namespace telesplat::points {
 
-/// Points lie in a mosaic by rank, then in the order in which their 4x4 blocks are scanned. A rank is a place in the 4x4 block:
-/// rank 0 holds points of all three levels (the pixel near the centre), 1 to 3 those of levels 0 and 1 (the upper left pixels of
-/// the 2x2 blocks), 4 to 15 those of level 0 alone: first the lower right, then the right, then the lower pixels of the 2x2
-/// blocks. So coarse levels are prefixes, and any prefix in between is spread evenly too (ordered dithering, Bayer 1973): half
-/// of the points are a quincunx. Consecutive points lie four pixels apart: a splatter that draws neighbouring pixels one after
-/// the other waits for its own stores.
+/// Points lie in a mosaic by rank, then in the order in which their 4x4 blocks are scanned. A rank is a place in the
+/// 4x4 block: rank 0 holds points of all three levels (the pixel near the centre), 1 to 3 those of levels 0 and 1 (the
+/// upper left pixels of the 2x2 blocks), 4 to 15 those of level 0 alone: first the lower right, then the right, then
+/// the lower pixels of the 2x2 blocks. So coarse levels are prefixes, and any prefix in between is spread evenly too
+/// (ordered dithering, Bayer 1973): half of the points are a quincunx. Consecutive points lie four pixels apart: a
+/// splatter that draws neighbouring pixels one after the other waits for its own stores.
 inline constexpr int kRanks = 16;
 inline constexpr int kFirstRankOfLevel0 = 4;  ///< ranks below are of level 1 too
 
-/// The 2x2 blocks (0 upper left, 1 upper right, 2 lower left, 3 lower right) in the order in which ranks take them: after each
-/// the one diagonally across.
+/// The 2x2 blocks (0 upper left, 1 upper right, 2 lower left, 3 lower right) in the order in which ranks take them:
+/// after each the one diagonally across.
 inline constexpr std::array<int, 4> kBlockOrder{3, 0, 1, 2};
 /// The same backwards: the place of each 2x2 block in that order.
 inline constexpr std::array<int, 4> kBlockPlace{1, 2, 3, 0};

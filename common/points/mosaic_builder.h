@@ -18,8 +18,8 @@ class MosaicBuilder {
   uint16_t *x, *y, *z, *normal;
   uint32_t *colour, *mean1, *mean2;
 
-  /// Computes normal cone and centroid of the points put there, notes how they were sampled, and hands the mosaic out. direction_to_eye: need not be of unit
-  /// length; zero: from several.
+  /// Computes normal cone and centroid of the points put there, notes how they were sampled, and hands the mosaic out.
+  /// direction_to_eye: need not be of unit length; zero: from several.
   Mosaic finish(float pixel_range, const glm::vec3& direction_to_eye);
 
  private:

@@ -1,7 +1,9 @@
-// The point model (T4.3): a level-limited octree of clusters, each a list of mosaics. The packer owns the authoritative one;
-// every viewer replicates it by applying the same events in the same order. No sockets, no clocks, no threads inside.
+// The point model (T4.3): a level-limited octree of clusters, each a list of mosaics. The packer owns the authoritative
+// one; every viewer replicates it by applying the same events in the same order. No sockets, no clocks, no threads
+// inside.
 //
-// Determinism: the same events give the same bytes on every machine and instruction set (IEEE arithmetic without contraction).
+// Determinism: the same events give the same bytes on every machine and instruction set (IEEE arithmetic without
+// contraction).
 #pragma once
 
 #include <array>
@@ -40,15 +42,15 @@ struct ModelConfig {
   bool operator==(const ModelConfig&) const = default;
 };
 
-/// Refuses boxes that are empty, not finite or beyond 1e6 m, and depths outside [0, kMaxOctreeDepth]. For configurations that
-/// arrive from outside; every other function here requires a configuration that passed.
+/// Refuses boxes that are empty, not finite or beyond 1e6 m, and depths outside [0, kMaxOctreeDepth]. For
+/// configurations that arrive from outside; every other function here requires a configuration that passed.
 Status validate(const ModelConfig& config);
 
-/// Points of one cluster, of about equal density: the part of one patch (of one tile) inside it, or what several such parts were merged to
-/// (compaction.h). One allocation with three levels of detail.
-/// Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB (top
-/// byte = flags, 0). A coarse level's points are the first ones of the finer level, so that it shares their positions and
-/// normals and adds its mean colours alone. With n0 >= n1 >= n2 points the allocation holds
+/// Points of one cluster, of about equal density: the part of one patch (of one tile) inside it, or what several such
+/// parts were merged to (compaction.h). One allocation with three levels of detail.
+/// Positions are fractions of the leaf: position_room = leaf.lo + (q + 0.5) / 65536 * leaf_size. Colours are 0x00RRGGBB
+/// (top byte = flags, 0). A coarse level's points are the first ones of the finer level, so that it shares their
+/// positions and normals and adds its mean colours alone. With n0 >= n1 >= n2 points the allocation holds
 ///   uint16 x[n0], y[n0], z[n0], normal[n0]; uint32 colour0[n0]; colour1[n1] if n1 < n0; colour2[n2] if n2 < n1
 /// (where two levels have equally many points they are the same points): 12 to 14 bytes a point.
 class Mosaic {
@@ -71,7 +73,8 @@ class Mosaic {
 
   /// Of the event that brought it, or of the newest that was merged into it, modulo 2^40.
   Sequence sequence() const { return {sequence_and_frame_ & ((uint64_t{1} << kSequenceBits) - 1)}; }
-  /// The sampling frame's number modulo 2^24: equal for all tiles of one frame, that is, for the mosaics of one patch (T4.3.2).
+  /// The sampling frame's number modulo 2^24: equal for all tiles of one frame, that is, for the mosaics of one patch
+  /// (T4.3.2).
   uint32_t frame_tag() const { return static_cast<uint32_t>(sequence_and_frame_ >> kSequenceBits); }
   /// Projected pixels across the cluster's cube in the sampling view: leaf size * focal / depth of the leaf's centre
   /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l. Of merged mosaics the mean.
@@ -81,8 +84,9 @@ class Mosaic {
   float cone_cosine() const { return static_cast<float>(cone_cosine_) / 127.0f; }
   /// cone_axis() before it is normalised.
   glm::vec3 cone_axis_direction() const { return image::octahedral16(cone_axis_); }
-  /// Unit vector from the leaf's centre towards the eye of the sampling view: with pixel_range() it tells how far apart the samples lie
-  /// on the surface (T4.4.1). Zero of points merged from views in different directions: they are as far apart along all directions.
+  /// Unit vector from the leaf's centre towards the eye of the sampling view: with pixel_range() it tells how far apart
+  /// the samples lie on the surface (T4.4.1). Zero of points merged from views in different directions: they are as far
+  /// apart along all directions.
   glm::vec3 direction_to_eye() const {
     return direction_to_eye_ == kNoDirection ? glm::vec3(0) : glm::normalize(image::octahedral16(direction_to_eye_));
   }
@@ -114,17 +118,18 @@ struct Cluster {
   std::vector<Mosaic> mosaics;  ///< in order of sequence
 };
 
-/// A cube of 4 x 4 x 4 leaves, two levels above them (fewer where the octree is less deep), and the clusters in it: so that who walks the model looks at
-/// cubes first.
+/// A cube of 4 x 4 x 4 leaves, two levels above them (fewer where the octree is less deep), and the clusters in it: so
+/// that who walks the model looks at cubes first.
 struct Brick {
   geometry::Box box_room;
   std::vector<const Cluster*> clusters;  ///< in no particular order; at least one
   uint64_t changes = 0;                  ///< counts insertions and removals
-  uint64_t removals = 0;                 ///< differs after every removal of points from it, also when it was gone in between
+  /// differs after every removal of points from it, also when it was gone in between
+  uint64_t removals = 0;
 };
 
-/// The points of one patch part, sorted into leaves and levels, ready to be inserted. Made without touching a model, so a
-/// viewer's worker makes it while its display thread reads the model.
+/// The points of one patch part, sorted into leaves and levels, ready to be inserted. Made without touching a model, so
+/// a viewer's worker makes it while its display thread reads the model.
 struct PreparedPatch {
   Sequence sequence;
   std::vector<std::pair<ClusterKey, Mosaic>> mosaics;  ///< ascending keys
@@ -132,13 +137,14 @@ struct PreparedPatch {
   uint64_t outside = 0;  ///< samples outside the octree's cube: dropped (none if the data set's box is true)
 };
 
-/// Unprojects the covered pixels of a depth-image tile, sorts them into leaves, decimates (T4.3.2, T7.2) and computes each
-/// mosaic's attributes.
+/// Unprojects the covered pixels of a depth-image tile, sorts them into leaves, decimates (T4.3.2, T7.2) and computes
+/// each mosaic's attributes.
 ///   frame: the sampling frame that the tile is of, so that its mosaics know each other.
 ///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
-///   Level l+1 takes of each block of 2x2 pixels of level l (blocks aligned to the frame's pixel grid) the covered pixels that
-///   fall in the same leaf and lie within 2 % of depth of its first, as one point: the sample nearest the block's centre (the
-///   first in Z order of several), with the mean colour of them all; and so on with the pixels that are left, if any.
+///   Level l+1 makes one point of covered pixels in each block of 2x2 pixels of level l (blocks are aligned to the
+///   frame's pixel grid): of those that fall in the same leaf and lie within 2 % of the first one's depth. The point is
+///   the sample nearest the block's centre (the first in Z order of several), with the mean colour of them all. Pixels
+///   that are left make further points in the same way.
 ///   So coverage never vanishes at coarse levels, neither of a surface nor of what is behind its edge.
 /// Runs in the calling thread; several threads may prepare several tiles at once.
 /// Preconditions: valid(config), valid(camera), tile inside the camera's image, image canonical and of the tile's size.
@@ -166,27 +172,28 @@ class PointModel {
   const ModelConfig& config() const { return config_; }
   /// Event "patch". Sequences must rise. Where mosaics are merged, points are copied; else every mosaic is taken over.
   void insert(PreparedPatch patch) { commit(plan(std::move(patch))); }
-  /// The same in two steps, the first of which only reads the model, so that others may read it too. No event may come between them.
+  /// The same in two steps, the first of which only reads the model, so that others may read it too. No event may come
+  /// between them.
   Insertion plan(PreparedPatch patch) const;
   /// O(mosaics). Returns those that were replaced: a viewer keeps them alive until its frame is drawn.
   std::vector<Mosaic> commit(Insertion insertion);
   /// Event "forget": drops whole clusters. Unknown keys are ignored. Returns what was dropped.
   std::vector<Cluster> forget(std::span<const ClusterKey> keys);
-  /// The same, but the clusters stay where they are in memory: a viewer keeps them alive until its frame is drawn, since draw
-  /// lists point to clusters and not only to their points.
+  /// The same, but the clusters stay where they are in memory: a viewer keeps them alive until its frame is drawn,
+  /// since draw lists point to clusters and not only to their points.
   std::vector<std::unique_ptr<Cluster>> take_out(std::span<const ClusterKey> keys);
-  /// Event "forget" of single patches: drops the mosaics with frame tag frames[i] from cluster keys[i], and the cluster when none
-  /// is left. What is not there is ignored. Returns what was dropped: clusters with the dropped mosaics alone, one for each i that
-  /// found some. Precondition: as many frames as keys.
+  /// Event "forget" of single patches: drops the mosaics with frame tag frames[i] from cluster keys[i], and the cluster
+  /// when none is left. What is not there is ignored. Returns what was dropped: clusters with the dropped mosaics
+  /// alone, one for each i that found some. Precondition: as many frames as keys.
   std::vector<Cluster> forget(std::span<const ClusterKey> keys, std::span<const uint32_t> frames);
-  /// The same for a viewer: while it keeps what is returned, draw lists made before stay drawable. A cluster that has none left
-  /// is returned as it lay in memory; one that stays does so with other mosaics, whose points do not move.
+  /// The same for a viewer: while it keeps what is returned, draw lists made before stay drawable. A cluster that has
+  /// none left is returned as it lay in memory; one that stays does so with other mosaics, whose points do not move.
   std::vector<std::unique_ptr<Cluster>> take_out(std::span<const ClusterKey> keys, std::span<const uint32_t> frames);
   /// Event "new epoch": drops everything.
   void clear();
 
-  /// All clusters, in no particular order. Pointers are stable until that cluster is forgotten; a cluster's mosaic vector
-  /// grows on insert.
+  /// All clusters, in no particular order. Pointers are stable until that cluster is forgotten; a cluster's mosaic
+  /// vector grows on insert.
   const std::unordered_map<ClusterKey, std::unique_ptr<Cluster>>& clusters() const { return clusters_; }
   const Cluster* find(ClusterKey key) const;
   /// The same clusters by bricks. Pointers are stable until the brick's last cluster is forgotten.

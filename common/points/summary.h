@@ -1,5 +1,5 @@
-// Levels above the cluster: a brick's clusters as one mosaic, for views in which a brick spans few pixels. A summary is made from the model and is no part
-// of it: whoever draws makes it when it is worth it.
+// Levels above the cluster: a brick's clusters as one mosaic, for views in which a brick spans few pixels. A summary is
+// made from the model and is no part of it: whoever draws makes it when it is worth it.
 #pragma once
 
 #include <memory>
@@ -28,8 +28,9 @@ inline constexpr ClusterKey kSummaryKey = 1u << 31;
 /// By brick_key.
 using Summaries = std::unordered_map<ClusterKey, std::unique_ptr<Summary>>;
 
-/// All points of a brick of few; else a point for each cell of the brick's surface, with the mean colour of those in the cell (merge_mosaics). Cells are as large as the samples of the
-/// brick's most coarsely sampled cluster are apart, or as kMostSummaryRange asks for. applied: the model's newest event.
+/// All points of a brick of few; else a point for each cell of the brick's surface, with the mean colour of those in
+/// the cell (merge_mosaics). Cells are as large as the samples of the brick's most coarsely sampled cluster are apart,
+/// or as kMostSummaryRange asks for. applied: the model's newest event.
 std::unique_ptr<Summary> summarise(const PointModel& model, ClusterKey brick_key, const Brick& brick, Sequence applied);
 
 }  // namespace telesplat::points

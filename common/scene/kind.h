@@ -39,8 +39,8 @@ std::string_view described(Kind kind);
 
 Pipeline pipeline_of(Kind kind);
 
-/// What a session does with a kind of scene unless told otherwise. The master tells everyone, so that sessions in containers and those of
-/// `telesplat run` agree.
+/// What a session does with a kind of scene unless told otherwise. The master tells everyone, so that sessions in
+/// containers and those of `telesplat run` agree.
 struct Policy {
   int octree_depth;       ///< levels of the point model's octree
   bool keep_redundant;    ///< the packer packs what the model already shows, viewers draw the best patches

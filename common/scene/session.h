@@ -20,7 +20,8 @@ class SessionView {
  public:
   explicit SessionView(const wire::Welcome& session) : session_(session) {}
 
-  /// What the data are; none while no data server has said hello, or if it is of a kind that this program does not know.
+  /// What the data are; none while no data server has said hello, or if it is of a kind that this program does not
+  /// know.
   std::optional<Kind> kind() const { return kind_named(fact("kind")); }
   std::optional<Pipeline> pipeline() const {
     const auto k = kind();

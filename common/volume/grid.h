@@ -1,4 +1,5 @@
-// A regular grid of voxels in the room: any affine placement, so spacing may differ by axis and axes need not be those of the room.
+// A regular grid of voxels in the room: any affine placement, so spacing may differ by axis and axes need not be those
+// of the room.
 #pragma once
 
 #include <array>
@@ -13,8 +14,8 @@ namespace telesplat::volume {
 inline constexpr int kMaxSide = 4096;               ///< voxels along an axis
 inline constexpr uint64_t kMaxVoxels = 1ull << 34;  ///< of a grid
 
-/// Voxel (i, j, k) has its centre at index coordinates (i, j, k). What lies between is interpolated; from the outermost centres the field
-/// falls to nothing over one more voxel, so that the grid's box is [-1, n] on each axis.
+/// Voxel (i, j, k) has its centre at index coordinates (i, j, k). What lies between is interpolated; from the outermost
+/// centres the field falls to nothing over one more voxel, so that the grid's box is [-1, n] on each axis.
 struct Grid {
   std::array<int, 3> size{1, 1, 1};
   glm::dmat4 index_to_room{1.0};  ///< affine: room = index_to_room * (i, j, k, 1), metres
@@ -31,7 +32,8 @@ struct Grid {
   glm::dvec3 centre_room() const;
 };
 
-/// Refuses sizes outside [1, kMaxSide], more than kMaxVoxels, placements that are not finite, not affine, or (nearly) flat.
+/// Refuses sizes outside [1, kMaxSide], more than kMaxVoxels, placements that are not finite, not affine, or (nearly)
+/// flat.
 Status validate(const Grid& grid);
 
 }  // namespace telesplat::volume

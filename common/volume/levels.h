@@ -1,5 +1,6 @@
-// Voxel values as they travel: one of at most 4096 levels, evenly spaced over the volume's range and independent of the transfer function, so that a
-// voxel that was sent stays sent when the transfer function changes. 8-bit data keep their values, 12-bit scanners' too.
+// Voxel values as they travel: one of at most 4096 levels, evenly spaced over the volume's range and independent of the
+// transfer function, so that a voxel that was sent stays sent when the transfer function changes. 8-bit data keep their
+// values, 12-bit scanners' too.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// What everyone knows of a volume scene, as it travels in Hello and Welcome: numbers in `parameters`, texts in `facts`. Changes with the epoch: step
-// and transfer function.
+// What everyone knows of a volume scene, as it travels in Hello and Welcome: numbers in `parameters`, texts in `facts`.
+// Changes with the epoch: step and transfer function.
 #pragma once
 
 #include <map>

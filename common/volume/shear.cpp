@@ -13,7 +13,8 @@ namespace {
 constexpr double kSteepest =
     8.0;  // slopes beyond this, in voxels a voxel, are not sampled: near the plane of the eye they have no end
 
-// Of an eye near the grid or inside: slices nearer than this part of the farthest one's distance do not make the raster coarser.
+// Of an eye near the grid or inside: slices nearer than this part of the farthest one's distance do not make the raster
+// coarser.
 constexpr double kNearPart = 0.4;
 
 glm::dvec3 transform(const glm::dmat4& m, const glm::dvec3& p) { return m * glm::dvec4(p, 1); }
@@ -41,7 +42,8 @@ bool meets_box(const Grid& grid, const glm::dvec3& eye, const glm::dvec3& d) {
   return enter < leave;
 }
 
-// The axis to which the rays that meet the grid are closest: of each candidate the steepest ray counts, and the mean of all, in room slopes.
+// The axis to which the rays that meet the grid are closest: of each candidate the steepest ray counts, and the mean of
+// all, in room slopes.
 PrincipalAxis choose_axis(const Grid& grid, std::span<const geometry::Camera> cameras, const glm::dmat4& to_index) {
   constexpr int kRays = 17;  // a side
   constexpr double kUseless = 16;
@@ -85,8 +87,8 @@ struct Span {
   void extend(double v) { lo = std::min(lo, v), hi = std::max(hi, v); }
 };
 
-// A convex polygon or polyhedron's vertices, clipped by a plane: keeps where distance(p) >= 0. Works on the edges of all pairs, which for the
-// few vertices here is cheap and needs no adjacency.
+// A convex polygon or polyhedron's vertices, clipped by a plane: keeps where distance(p) >= 0. Works on the edges of
+// all pairs, which for the few vertices here is cheap and needs no adjacency.
 void clip(std::vector<glm::dvec3>& vertices, const auto& distance) {
   std::vector<glm::dvec3> out;
   for (size_t i = 0; i < vertices.size(); ++i) {
@@ -164,8 +166,8 @@ Seen see(const Grid& grid, const ShearFrame& frame, std::span<const geometry::Ca
   return out;
 }
 
-// Slope between pixels along index axis `of`: as fine as the display where the display is finest in slopes, which is where it sees the
-// principal axis most squarely. The raster's point nearest to slope 0 lies there.
+// Slope between pixels along index axis `of`: as fine as the display where the display is finest in slopes, which is
+// where it sees the principal axis most squarely. The raster's point nearest to slope 0 lies there.
 double finest_pitch(const Grid& grid, const ShearFrame& frame, const Seen& seen, const geometry::Camera& display,
                     double finest, int of) {
   glm::dvec3 d;
@@ -185,8 +187,9 @@ double finest_pitch(const Grid& grid, const ShearFrame& frame, const Seen& seen,
   return std::max(pixel_angle / std::max(angle_per_slope, 1e-12), fine_enough);
 }
 
-// Pixels of one side of the raster. One pixel more at both ends: look-ups between pixels reach half a pixel beyond what is seen. Without it
-// pictures fade at their borders, which shows where they are tiles of a wall. `pitch` grows where the side would be too long.
+// Pixels of one side of the raster. One pixel more at both ends: look-ups between pixels reach half a pixel beyond what
+// is seen. Without it pictures fade at their borders, which shows where they are tiles of a wall. `pitch` grows where
+// the side would be too long.
 int raster_side(const Span& slopes, double& pitch) {
   constexpr int kMost = kMaxRasterSide - 2;
   const double pixels = std::ceil((slopes.hi - slopes.lo) / pitch);
@@ -234,7 +237,8 @@ std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry:
   out.u0 = seen.u.lo - out.du;
   out.v0 = seen.v.lo - out.dv;
 
-  // Layers: bounds at multiples of the same thickness, whatever part of the grid is in front of the eye, so that they stay in place.
+  // Layers: bounds at multiples of the same thickness, whatever part of the grid is in front of the eye, so that they
+  // stay in place.
   const int layers = std::clamp(options.layers, 1, std::min(kMaxLayers, slices));
   for (int l = 0; l < layers; ++l) {
     const int from = std::max(begin, int(int64_t{slices} * l / layers));
@@ -285,8 +289,8 @@ std::optional<glm::dmat3> warp(const Grid& grid, const ShearFrame& frame, double
   const glm::dvec3 d0 = direction_of(to_index, ray(display, 0, 0));
   const glm::dvec3 dx = direction_of(to_index, ray(display, 1, 0)) - d0;
   const glm::dvec3 dy = direction_of(to_index, ray(display, 0, 1)) - d0;
-  // It meets the plane at eye + d * gap / d_p, in front where d_p and gap have the same sign. Raster x = ((eye_u + d_u gap / d_p - e_u) / t - u0) /
-  // du; times w = d_p * sign(gap) it is linear in (px, py).
+  // It meets the plane at eye + d * gap / d_p, in front where d_p and gap have the same sign. Raster x = ((eye_u + d_u
+  // gap / d_p - e_u) / t - u0) / du; times w = d_p * sign(gap) it is linear in (px, py).
   const double sign = gap > 0 ? 1 : -1;
   const auto row = [&](int of, double origin, double pitch) {
     const double a = gap / (t * pitch), b = ((eye[of] - frame.eye[of]) / t - origin) / pitch;

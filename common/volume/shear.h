@@ -1,16 +1,17 @@
 // Factoring a perspective view of a volume into a shear along a principal axis and a warp (T4.5.1, eq. 4.9-4.12).
 //
-// All in index coordinates of the grid, which is affine in room space, so lines stay lines. p is the principal axis, u = (p + 1) % 3 and
-// v = (p + 2) % 3 the others. Seen from the eye e, a point x in front of it has
+// All in index coordinates of the grid, which is affine in room space, so lines stay lines. p is the principal axis, u
+// = (p + 1) % 3 and v = (p + 2) % 3 the others. Seen from the eye e, a point x in front of it has
 //   t = direction * (x_p - e_p) > 0,    slope_u = (x_u - e_u) / t,    slope_v = (x_v - e_v) / t,
 // and the *raster* of the view is a regular grid of slopes, the same for every slice: pixel (x, y) has its centre at
 //   slope_u = u0 + (x + 0.5) * du,    slope_v = v0 + (y + 0.5) * dv.
-// A slice (x_p = s, so one t) is therefore only scaled by 1 / (t du), 1 / (t dv) pixels a voxel and translated: what eq. 4.11-4.12 do with the
-// compositing plane at x_p = 0 (tests compare both). Rays of the sampled eye go through one pixel, whatever the slice.
+// A slice (x_p = s, so one t) is therefore only scaled by 1 / (t du), 1 / (t dv) pixels a voxel and translated: what
+// eq. 4.11-4.12 do with the compositing plane at x_p = 0 (tests compare both). Rays of the sampled eye go through one
+// pixel, whatever the slice.
 //
-// Consecutive slices, front to back, make a *layer*: one slice image, taken for what stands on the plane x_p = Layer::plane. Seen from the
-// sampled eye planes do not matter; from elsewhere they give the parallax (T4.5.2, the intermediate volume). Layers are cut the same way
-// for all samplers, whatever slabs they hold.
+// Consecutive slices, front to back, make a *layer*: one slice image, taken for what stands on the plane x_p =
+// Layer::plane. Seen from the sampled eye planes do not matter; from elsewhere they give the parallax (T4.5.2, the
+// intermediate volume). Layers are cut the same way for all samplers, whatever slabs they hold.
 #pragma once
 
 #include <array>
@@ -51,36 +52,42 @@ struct ShearFrame {
   double t(double at) const { return direction * (at - eye[axis]); }
   /// Index coordinates of continuous raster position (x, y), with pixel centres at + 0.5, on the plane x_p = `at`.
   glm::dvec3 unproject(double x, double y, double at) const;
-  /// Length of the ray through continuous raster position (x, y) from one slice to the next, in units of Grid::unit_m().
+  /// Length of the ray through continuous raster position (x, y) from one slice to the next, in units of
+  /// Grid::unit_m().
   double path(const Grid& grid, double x, double y) const;
 };
 
-/// Refuses what no plan_frame makes: axes, directions, sizes, pitches, layers out of range or order, behind or too near the eye.
+/// Refuses what no plan_frame makes: axes, directions, sizes, pitches, layers out of range or order, behind or too near
+/// the eye.
 Status validate(const ShearFrame& frame, const Grid& grid);
 
 struct PlanOptions {
   int layers = 16;  ///< at most; fewer where there are fewer slices
   double finest =
-      0.3;  ///< a pixel is not smaller than this part of a voxel at the nearest slice in view, or at 0.4 times the farthest one's
-      ///< distance, whichever is farther
+      /// a pixel is not smaller than this part of a voxel at the nearest slice in view, or at 0.4 times the farthest
+      /// one's
+      0.3;
+  ///< distance, whichever is farther
   double near_slices = 1;  ///< slices nearer to the eye than this many are left out
 };
 
-/// The view of `cameras` (at least one; all near the same place), sampled from cameras[0]'s eye. The principal axis is the one to which their rays
-/// through the grid are closest, be the eye outside the grid or inside. The raster covers what of the grid's box any of the cameras sees, and
-/// a pixel more on every side; its pixels are as large as cameras[0]'s where it sees the grid's nearest part. Nothing: no camera sees any of it.
+/// The view of `cameras` (at least one; all near the same place), sampled from cameras[0]'s eye. The principal axis is
+/// the one to which their rays through the grid are closest, be the eye outside the grid or inside. The raster covers
+/// what of the grid's box any of the cameras sees, and a pixel more on every side; its pixels are as large as
+/// cameras[0]'s where it sees the grid's nearest part. Nothing: no camera sees any of it.
 std::optional<ShearFrame> plan_frame(const Grid& grid, std::span<const geometry::Camera> cameras,
                                      const PlanOptions& options = {});
 
-/// The warp (T eq. 4.9, M_warp) of what stands on the plane x_p = `plane` of `frame`, from display pixels to raster positions:
-/// (x w, y w, w) = M (px, py, 1), both continuous with pixel centres at + 0.5. A display ray meets the plane in front of the
-/// camera's eye where w > 0. Nothing: the eye lies in the plane.
+/// The warp (T eq. 4.9, M_warp) of what stands on the plane x_p = `plane` of `frame`, from display pixels to raster
+/// positions: (x w, y w, w) = M (px, py, 1), both continuous with pixel centres at + 0.5. A display ray meets the plane
+/// in front of the camera's eye where w > 0. Nothing: the eye lies in the plane.
 std::optional<glm::dmat3> warp(const Grid& grid, const ShearFrame& frame, double plane,
                                const geometry::Camera& display);
 
-/// Raster rows (axis 0) or columns (axis 1) [first, second) of the plane x_p = `slice` (whole for a slice, or between two) whose index coordinate k lies in [k_begin - 0.5,
-/// k_end - 0.5): the part of a slice that a slab of voxels [k_begin, k_end) owns. The slabs at the grid's ends own what lies beyond them, too.
-/// Every pixel of a slice belongs to exactly one slab, so that slabs meet without a seam. Precondition: axis != 2, t(slice) > 0.
+/// Raster rows (axis 0) or columns (axis 1) [first, second) of the plane x_p = `slice` (whole for a slice, or between
+/// two) whose index coordinate k lies in [k_begin - 0.5, k_end - 0.5): the part of a slice that a slab of voxels
+/// [k_begin, k_end) owns. The slabs at the grid's ends own what lies beyond them, too. Every pixel of a slice belongs
+/// to exactly one slab, so that slabs meet without a seam. Precondition: axis != 2, t(slice) > 0.
 std::pair<int, int> owned_pixels(const Grid& grid, const ShearFrame& frame, double slice, int k_begin, int k_end);
 
 }  // namespace telesplat::volume

@@ -7,8 +7,8 @@
 //     varint size, block  lengths of the runs less 1 (varints)
 //     block  levels, low bytes; [block  high bytes]      differences from the predicted ones, zigzag
 //     [block  normals, x; block  normals, y]             differences from the predicted ones
-// Blocks are those of codec/entropy.h. A voxel is predicted from its neighbours to the left and above, as far as there are any (figures in
-// tests/bench/volume_data_bench.cpp).
+// Blocks are those of codec/entropy.h. A voxel is predicted from its neighbours to the left and above, as far as there
+// are any (figures in tests/bench/volume_data_bench.cpp).
 #include "common/volume/voxels.h"
 
 #include <fmt/format.h>

@@ -1,4 +1,5 @@
-// Non-transparent voxels, sparse: what data servers send and samplers hold. A *row* is all voxels of one (j, k); a *slice* all rows of one k.
+// Non-transparent voxels, sparse: what data servers send and samplers hold. A *row* is all voxels of one (j, k); a
+// *slice* all rows of one k.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,8 @@ namespace telesplat::volume {
 /// Some voxels of the slices [k_begin, k_end), in order of (k, j, i).
 struct Voxels {
   int k_begin = 0, k_end = 0;
-  /// Row (j, k) has the voxels [rows[r], rows[r + 1]) with r = (k - k_begin) * size_y + j; (k_end - k_begin) * size_y + 1 entries.
+  /// Row (j, k) has the voxels [rows[r], rows[r + 1]) with r = (k - k_begin) * size_y + j; (k_end - k_begin) * size_y +
+  /// 1 entries.
   std::vector<uint32_t> rows;
   std::vector<uint16_t> i;      ///< ascending in a row
   std::vector<uint16_t> level;  ///< < Levels::count
@@ -47,17 +49,18 @@ class LevelSet {
 
 inline constexpr size_t kMaxVoxelsCoded = size_t{1} << 25;  ///< in one coded set; a slice has at most half as many
 
-/// Compact form, about two to four bytes a voxel: occupancy as runs, levels and normals as differences from their neighbours', in byte planes,
-/// entropy-coded. Precondition: at most kMaxVoxelsCoded voxels; rows and order as Voxels says.
+/// Compact form, about two to four bytes a voxel: occupancy as runs, levels and normals as differences from their
+/// neighbours', in byte planes, entropy-coded. Precondition: at most kMaxVoxelsCoded voxels; rows and order as Voxels
+/// says.
 std::vector<uint8_t> encode_voxels(const Voxels& voxels, int size_x, int size_y);
-/// Reads it; bytes come from outside. k_begin, k_end: the slices asked for; the answer may have fewer. Error: truncated, more than
-/// kMaxVoxelsCoded, slices, places or levels beyond those asked for or the grid. Memory grows with the rows asked for and with voxels that
-/// are there.
+/// Reads it; bytes come from outside. k_begin, k_end: the slices asked for; the answer may have fewer. Error:
+/// truncated, more than kMaxVoxelsCoded, slices, places or levels beyond those asked for or the grid. Memory grows with
+/// the rows asked for and with voxels that are there.
 Result<Voxels> decode_voxels(std::span<const uint8_t> bytes, int size_x, int size_y, int k_begin, int k_end,
                              int level_count);
 
-/// The union of two disjoint sets of the same slices (a sampler's own, and what a new transfer function adds). Both lit, or neither; a set
-/// without voxels is either.
+/// The union of two disjoint sets of the same slices (a sampler's own, and what a new transfer function adds). Both
+/// lit, or neither; a set without voxels is either.
 Voxels merge(const Voxels& a, const Voxels& b);
 
 }  // namespace telesplat::volume

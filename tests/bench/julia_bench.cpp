@@ -1,5 +1,6 @@
-// Quaternion Julia sets, frames of 1024 x 640 on one core, seen from the default pose and filling the view, by instruction set beside the
-// scalar oracle. The thesis took 69.3 s a frame of this size on one node (table 7.2): counter thesis/this.
+// Quaternion Julia sets, frames of 1024 x 640 on one core, seen from the default pose and filling the view, by
+// instruction set beside the scalar oracle. The thesis took 69.3 s a frame of this size on one node (table 7.2):
+// counter thesis/this.
 #include <benchmark/benchmark.h>
 
 #include "common/geometry/trajectory.h"

@@ -1,4 +1,5 @@
-// What a lease costs the master: requests, leases and completions of frames of rows through MasterCore, without the network.
+// What a lease costs the master: requests, leases and completions of frames of rows through MasterCore, without the
+// network.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -15,8 +16,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Arguments: samplers; rows of a frame, 640 wide, a row a lease; 1 = with a record on disk. An iteration is a lease from request to
-// completion. Only what MasterCore does is timed, encoding of leases included.
+// Arguments: samplers; rows of a frame, 640 wide, a row a lease; 1 = with a record on disk. An iteration is a lease
+// from request to completion. Only what MasterCore does is timed, encoding of leases included.
 void master_leases(benchmark::State& state) {
   const auto samplers = size_t(state.range(0));
   const auto folder = std::filesystem::temp_directory_path() / "telesplat-master-bench";
@@ -100,9 +101,9 @@ BENCHMARK(master_leases)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 
-// Arguments: senders, receivers, transfers. Baseline in the same run: the same transfers coloured in the order in which they come. `rounds_ratio`: rounds
-// over the least there can be (1); `time`, `time_plain`: the rounds' longest transfers, summed, over the busiest node's bytes, with and without
-// regard for bytes.
+// Arguments: senders, receivers, transfers. Baseline in the same run: the same transfers coloured in the order in which
+// they come. `rounds_ratio`: rounds over the least there can be (1); `time`, `time_plain`: the rounds' longest
+// transfers, summed, over the busiest node's bytes, with and without regard for bytes.
 void master_scatter(benchmark::State& state) {
   std::mt19937 random(1);
   std::lognormal_distribution<double> bytes(10, 1);

@@ -127,8 +127,9 @@ BENCHMARK(points_unproject<points::unproject_row_scalar>)
     ->Name("points_unproject_scalar")
     ->Unit(benchmark::kMillisecond);
 
-// Inserting a prepared frame into a model of 20 earlier frames of 1 %. Arguments: percent of the samples that elimination left; 1: mosaics are
-// merged (which viewers do without their lock), 0: they stay as they come, the baseline.
+// Inserting a prepared frame into a model of 20 earlier frames of 1 %. Arguments: percent of the samples that
+// elimination left; 1: mosaics are merged (which viewers do without their lock), 0: they stay as they come, the
+// baseline.
 void points_insert(benchmark::State& state) {
   const Frame& f = frame(static_cast<int>(state.range(0)));
   points::ModelConfig config = f.config;

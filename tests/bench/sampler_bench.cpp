@@ -1,5 +1,5 @@
-// Mesh samplers on a terrain of about a million triangles, whole frames of 1280 x 800. Baselines in the same run: the same
-// rays through Embree without attributes, and the OpenGL rasteriser.
+// Mesh samplers on a terrain of about a million triangles, whole frames of 1280 x 800. Baselines in the same run: the
+// same rays through Embree without attributes, and the OpenGL rasteriser.
 #include <benchmark/benchmark.h>
 
 #include "common/geometry/trajectory.h"

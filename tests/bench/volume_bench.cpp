@@ -1,5 +1,5 @@
-// Volumes on one core: splats a second by pixels a voxel, beside a plain scatter of the same voxels and the time that merely reading them takes; frames
-// of 256^3 with about a million visible voxels at 1600 x 1200; rays of the reference.
+// Volumes on one core: splats a second by pixels a voxel, beside a plain scatter of the same voxels and the time that
+// merely reading them takes; frames of 256^3 with about a million visible voxels at 1600 x 1200; rays of the reference.
 #include <benchmark/benchmark.h>
 
 #include <cstring>

@@ -1,6 +1,7 @@
-// volume_warp/*: sixteen layers over most of the display, a third of each layer's pixels not empty, seen a few degrees aside from where they were
-// sampled. Times are wall-clock; core_ms is what all threads together spent. samples_ns: core time a bilinear look-up. bytes_floor: what must cross the memory
-// bus, each block of texels that is not empty read once and each pixel written once; floor_ms: the time that takes at the bandwidth measured here on as many
+// volume_warp/*: sixteen layers over most of the display, a third of each layer's pixels not empty, seen a few degrees
+// aside from where they were sampled. Times are wall-clock; core_ms is what all threads together spent. samples_ns:
+// core time a bilinear look-up. bytes_floor: what must cross the memory bus, each block of texels that is not empty
+// read once and each pixel written once; floor_ms: the time that takes at the bandwidth measured here on as many
 // threads.
 #include <benchmark/benchmark.h>
 

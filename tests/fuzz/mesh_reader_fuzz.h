@@ -1,4 +1,5 @@
-// What all fuzz targets of mesh readers do with a result: whatever passes validation must go through placement and chunking, too.
+// What all fuzz targets of mesh readers do with a result: whatever passes validation must go through placement and
+// chunking, too.
 #pragma once
 
 #include <cstdlib>

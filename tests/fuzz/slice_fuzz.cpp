@@ -1,4 +1,5 @@
-// Any bytes through the decoder of slice images: an error, or images that survive another round trip. The raster's size stands in the first two bytes.
+// Any bytes through the decoder of slice images: an error, or images that survive another round trip. The raster's size
+// stands in the first two bytes.
 #include <cstdlib>
 
 #include "common/volume/slices/image.h"

@@ -1,4 +1,5 @@
-// The parsers of all volume headers: whatever a header says, what passes the checks must be a grid whose voxels the data can hold.
+// The parsers of all volume headers: whatever a header says, what passes the checks must be a grid whose voxels the
+// data can hold.
 #include <cstdint>
 #include <cstdlib>
 

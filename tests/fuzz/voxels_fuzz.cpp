@@ -1,4 +1,5 @@
-// Any bytes through the voxel decoder: an error, or voxels that survive another round trip. The first bytes choose the grid.
+// Any bytes through the voxel decoder: an error, or voxels that survive another round trip. The first bytes choose the
+// grid.
 #include <cstdlib>
 
 #include "common/volume/voxels.h"

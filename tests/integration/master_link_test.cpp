@@ -1,4 +1,5 @@
-// The client side of the master against a master's socket: hello until welcomed, hello again after the master was restarted.
+// The client side of the master against a master's socket: hello until welcomed, hello again after the master was
+// restarted.
 #include <gtest/gtest.h>
 
 #include "common/core/clock.h"

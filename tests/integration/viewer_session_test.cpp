@@ -21,8 +21,8 @@ struct Shown {
 };
 
 // A whole life of a viewer: `frames` frames as fast as they come, or at target_fps.
-Shown show(const test::FakeSession::Options& session_options, CouplingMode mode, uint64_t frames,
-           double target_fps = 0) {
+Shown show(const test::FakeSession::Options& session_options, CouplingMode mode, uint64_t frames, double target_fps = 0,
+           const std::string& renderer = "cpu") {
   static int number = 0;
   net::Context context;
   test::FakeSession session(context, session_options, std::to_string(++number));
@@ -34,7 +34,7 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   display.frames = frames;
   HeadlessSurface surface(display, geometry::Trajectory::orbit(1.2, 0.4, 20));
   CouplingGate gate(buffers_of(mode, 3));
-  auto renderers = Renderers::make("cpu", 1);
+  auto renderers = Renderers::make(renderer, 1);
   metrics::TableRecorder table("frames", frame_columns());
   metrics::SpanRecorder spans;
   ViewerWorker::Options options;
@@ -202,6 +202,15 @@ TEST(ChangingSession, AsynchronouslyNoFrameIsEmpty) {
   EXPECT_TRUE(std::is_sorted(s.epoch.begin(), s.epoch.end()));
   EXPECT_EQ(s.epoch.back(), 3);
   EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0);
+}
+
+// The context of one renderer is gone before the next one is made.
+TEST(ChangingSession, OpenGlRenderersFollowEachOther) {
+  if (const auto gl = Renderers::make("gl", 1); !gl) GTEST_SKIP() << gl.error().text;
+  const Shown s = show({.volume = false, .change_every = 8, .changes = 2}, CouplingMode::kLoose, 28, 0, "gl");
+  expect_complete(s, 28);
+  expect_one_update_a_frame(s);
+  EXPECT_EQ(s.sources, (std::vector<std::string>{"points", "samples", "points"}));
 }
 
 TEST(ChangingSession, AVolumeMayBecomeAMeshToo) {

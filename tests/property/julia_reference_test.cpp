@@ -1,6 +1,6 @@
-// Surface points of the Julia sampler against a slow marcher in double precision with 128 iterations, on random rays: 99.9 % of those that meet the set must lie
-// within half a pixel's footprint, measured along the ray; a ray of which only one of the two meets anything counts as wrong.
-// TELESPLAT_JULIA_RAYS sets how many rays there are in all.
+// Surface points of the Julia sampler against a slow marcher in double precision with 128 iterations, on random rays:
+// 99.9 % of those that meet the set must lie within half a pixel's footprint, measured along the ray; a ray of which
+// only one of the two meets anything counts as wrong. TELESPLAT_JULIA_RAYS sets how many rays there are in all.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -24,7 +24,8 @@ struct Agreement {
   size_t wrong() const { return only_sampler + only_reference + apart; }
 };
 
-// Cameras about the set, near and far, that look at points in its box; pixels in rows of eight at random places of 1024 x 640.
+// Cameras about the set, near and far, that look at points in its box; pixels in rows of eight at random places of 1024
+// x 640.
 Agreement compare(const julia::Parameters& parameters, size_t rays, unsigned seed) {
   const julia::Placement placement = julia::place(julia::bounds(parameters), 0.8);
   const JuliaScene scene(parameters, placement);

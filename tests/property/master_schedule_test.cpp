@@ -1,5 +1,5 @@
-// Whatever samplers do - slow, fast, dying noticed or not, joining, delivering late or twice - every frame is completed, and its tiles cover
-// it exactly once.
+// Samplers do all they can - slow, fast, dying noticed or not, joining, delivering late or twice - every frame is
+// completed, and its tiles cover it exactly once.
 #include <gtest/gtest.h>
 
 #include <algorithm>

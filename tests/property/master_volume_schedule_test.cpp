@@ -1,5 +1,6 @@
-// Whatever happens to the samplers of a volume - they join, leave, die noticed or not, are slow, come back - every frame's slabs are those of one
-// partition and cover the volume once, buffered requests are answered in order, and nobody starves.
+// All kinds of things happen to the samplers of a volume - they join, leave, die noticed or not, are slow, come back -
+// every frame's slabs are those of one partition and cover the volume once, buffered requests are answered in order,
+// and nobody starves.
 #include <gtest/gtest.h>
 
 #include <algorithm>

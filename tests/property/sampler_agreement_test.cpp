@@ -88,7 +88,8 @@ class RaysAndRaster : public testing::Test {
     ASSERT_TRUE(ray_->add_chunks(chunks).ok());
     ASSERT_TRUE(raster_->add_chunks(chunks).ok());
   }
-  // Differences summed over cameras; `allowed` is the fraction of covered pixels that may differ: those that edges cross.
+  // Differences summed over cameras; `allowed` is the fraction of covered pixels that may differ: those that edges
+  // cross.
   void expect_agreement(const std::vector<Camera>& views, double allowed) {
     Difference sum;
     for (const Camera& c : views) {

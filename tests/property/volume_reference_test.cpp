@@ -91,7 +91,8 @@ TEST(VolumeReference, EyeInside) {
     glm::dvec3 at(0.1, 0.05, 0.08);
     at[view % 3] = view / 3 ? 1 : -1;
     const auto camera = geometry::make_camera(geometry::look_at({0.01, -0.02, 0.015}, at), 60, 160, 120);
-    // The nearest slice being one voxel away, PlanOptions::finest would make pixels of several voxels of the shell: sampled as fine as displayed.
+    // The nearest slice being one voxel away, PlanOptions::finest would make pixels of several voxels of the shell:
+    // sampled as fine as displayed.
     const auto frame = volume::plan_frame(grid, std::span(&camera, 1), {.finest = 0.01});
     ASSERT_TRUE(frame);
     const auto images = ShearSplatter(2).splat(volume, scene.colours, *frame, 0, 48);

@@ -60,8 +60,8 @@ TEST(VolumeTargets, ImagesAreTheSameToTheBit) {
   EXPECT_GT(pixels, 100000u);
 }
 
-// All images over each other, pixel by pixel of the raster, where slabs share out every slice's pixels: nearer layers first, and within one the
-// slabs that are nearer to the eye along k.
+// All images over each other, pixel by pixel of the raster, where slabs share out every slice's pixels: nearer layers
+// first, and within one the slabs that are nearer to the eye along k.
 std::vector<glm::dvec4> composite(const volume::ShearFrame& frame, const std::vector<volume::SliceImage>& images) {
   std::vector<const volume::SliceImage*> order;
   for (const auto& image : images) order.push_back(&image);
@@ -81,7 +81,8 @@ std::vector<glm::dvec4> composite(const volume::ShearFrame& frame, const std::ve
   return out;
 }
 
-// One slab or three, composited: the same but for rounding. Tops and bottoms of slabs in and out of view, seen along all axes both ways.
+// One slab or three, composited: the same but for rounding. Tops and bottoms of slabs in and out of view, seen along
+// all axes both ways.
 TEST(VolumeTargets, SlabsMeetWithoutSeams) {
   std::mt19937 random(5);
   for (int round = 0; round < 12; ++round) {

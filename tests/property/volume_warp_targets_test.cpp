@@ -1,4 +1,5 @@
-// The warp gives the same pixels on every instruction set, for every width of tile and place of its borders, as the plain pixel of its definition.
+// The warp gives the same pixels on every instruction set, for every width of tile and place of its borders, as the
+// plain pixel of its definition.
 #include <gtest/gtest.h>
 
 #include "common/volume/warp/pixel.h"

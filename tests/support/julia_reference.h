@@ -1,5 +1,5 @@
-// Where a ray meets a quaternion Julia set, slowly and in double precision: plain quaternions, short steps, bisection. The same definition of
-// the surface as the sampler's, none of its shortcuts.
+// Where a ray meets a quaternion Julia set, slowly and in double precision: plain quaternions, short steps, bisection.
+// The same definition of the surface as the sampler's, none of its shortcuts.
 #pragma once
 
 #include <cmath>
@@ -30,12 +30,14 @@ class JuliaReference {
     return 0;
   }
 
-  /// By how much the estimate at depth t of a ray exceeds the threshold there, in set units. footprint_m: of the pixel, metres a metre.
+  /// By how much the estimate at depth t of a ray exceeds the threshold there, in set units. footprint_m: of the pixel,
+  /// metres a metre.
   double excess(const glm::dvec3& origin, const glm::dvec3& direction, double t, double footprint_m) const {
     return estimate(origin + t * direction) - parameters_.lod * footprint_m * t / placement_.scale;
   }
 
-  /// Depth of the first point of the ray, in the box and beyond `near_m`, at which the excess is not positive. direction: a unit of depth long.
+  /// Depth of the first point of the ray, in the box and beyond `near_m`, at which the excess is not positive.
+  /// direction: a unit of depth long.
   std::optional<double> meet(const glm::dvec3& origin, const glm::dvec3& direction, double footprint_m,
                              double near_m) const {
     double enter = near_m, leave = 1e30;
@@ -46,7 +48,8 @@ class JuliaReference {
     }
     const double units = glm::length(direction) / placement_.scale,
                  threshold = parameters_.lod * footprint_m / placement_.scale;
-    // A quarter of what is free at most, but no less than a twentieth of the threshold, so that grazing rays come to an end.
+    // A quarter of what is free at most, but no less than a twentieth of the threshold, so that grazing rays come to an
+    // end.
     double before = enter;
     for (double t = enter; t <= leave;) {
       const double free = estimate(origin + t * direction);

@@ -46,8 +46,8 @@ class RawPeer {
     return false;
   }
 
-  /// Opens a ZMTP connection as a socket of this type ("DEALER", ...): nothing may be sent before the other side is ready. False: it
-  /// hung up instead.
+  /// Opens a ZMTP connection as a socket of this type ("DEALER", ...): nothing may be sent before the other side is
+  /// ready. False: it hung up instead.
   bool shake_hands(std::string_view socket_type);
   /// After zmtp_opening() was sent: reads the other side's.
   bool wait_ready() { return read(64) && read(2) && read(last_byte_); }  // greeting; READY's flags and size; READY

@@ -96,7 +96,8 @@ inline int difference(uint32_t a, uint32_t b) {
   return most;
 }
 
-/// The warp in double precision by its definition, with rays and planes in the room instead of matrices: colour 0xffRRGGBB, and depth.
+/// The warp in double precision by its definition, with rays and planes in the room instead of matrices: colour
+/// 0xffRRGGBB, and depth.
 inline std::pair<uint32_t, double> warp_by_rays(const volume::VolumeFrame& frame, const geometry::Camera& camera,
                                                 uint32_t background, int x, int y) {
   const glm::dmat4 to_index = frame.grid.room_to_index();

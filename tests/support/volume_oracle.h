@@ -1,5 +1,5 @@
-// Shear-splatting as services/sampler/volume/shear/splatter.h defines it, pixel by pixel in double precision: every slice is gathered at every pixel,
-// nothing is skipped.
+// Shear-splatting as services/sampler/volume/shear/splatter.h defines it, pixel by pixel in double precision: every
+// slice is gathered at every pixel, nothing is skipped.
 #pragma once
 
 #include <algorithm>

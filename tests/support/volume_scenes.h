@@ -1,4 +1,5 @@
-// Small synthetic volumes for tests, and slice images put together plainly: what a viewer does, without any of its haste.
+// Small synthetic volumes for tests, and slice images put together plainly: what a viewer does, without any of its
+// haste.
 #pragma once
 
 #include <cmath>
@@ -119,8 +120,9 @@ inline glm::dvec4 look_up(const volume::SliceImage& image, double x, double y) {
   return sum;
 }
 
-/// All images (one slab, or slabs in order of their k as `images` has them) as `camera` sees them. Planes front to back; on one plane the slabs nearer to the eye
-/// along k first. Depth: the plane's where more than a quarter is opaque, so that image::compare knows what is object.
+/// All images (one slab, or slabs in order of their k as `images` has them) as `camera` sees them. Planes front to
+/// back; on one plane the slabs nearer to the eye along k first. Depth: the plane's where more than a quarter is
+/// opaque, so that image::compare knows what is object.
 inline image::View warp_plainly(const volume::Grid& grid, const volume::ShearFrame& frame,
                                 const std::vector<volume::SliceImage>& images, const geometry::Camera& camera,
                                 uint32_t background) {

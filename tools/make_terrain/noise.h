@@ -1,4 +1,5 @@
-// Seeded gradient noise in two dimensions. Source: K. Perlin, "Improving Noise", SIGGRAPH 2002 (hashed gradients, quintic fade).
+// Seeded gradient noise in two dimensions. Source: K. Perlin, "Improving Noise", SIGGRAPH 2002 (hashed gradients,
+// quintic fade).
 #pragma once
 
 #include <cmath>

@@ -21,16 +21,19 @@ struct HeightMap {
   double sample(double x_m, double y_m) const;
 };
 
-/// The caldera's outline: distance of a point from its centre over that of the rim's crest in the same direction. Below 1: inside.
+/// The caldera's outline: distance of a point from its centre over that of the rim's crest in the same direction. Below
+/// 1: inside.
 double caldera_radius(double x_m, double y_m, uint64_t seed);
 
-/// Builds a volcano with a collapsed summit, an island in it, side cones, and valleys cut by erosion. The same seed makes the same land.
+/// Builds a volcano with a collapsed summit, an island in it, side cones, and valleys cut by erosion. The same seed
+/// makes the same land.
 HeightMap make_relief(uint64_t seed, const std::function<void(double fraction)>& progress);
 
-/// Cuts valleys: each step routes water over the filled surface to the lowest neighbour, and lowers the ground by the stream-power law
-/// dh/dt = -k A^m S, implicitly; then slopes steeper than `talus` slide. Cells of `fixed` and the border keep their height.
-/// Source: Braun and Willett, "A very efficient O(n), implicit and parallel method to solve the stream power equation", Geomorphology
-/// 180, 2013; Barnes et al., "Priority-flood", Computers & Geosciences 62, 2014.
+/// Cuts valleys: each step routes water over the filled surface to the lowest neighbour, and lowers the ground by the
+/// stream-power law dh/dt = -k A^m S, implicitly; then slopes steeper than `talus` slide. Cells of `fixed` and the
+/// border keep their height. Source: Braun and Willett, "A very efficient O(n), implicit and parallel method to solve
+/// the stream power equation", Geomorphology 180, 2013; Barnes et al., "Priority-flood", Computers & Geosciences 62,
+/// 2014.
 void erode(HeightMap& map, const std::vector<uint8_t>& fixed, int steps, double k,
            const std::function<void(double fraction)>& progress);
 

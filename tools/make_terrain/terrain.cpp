@@ -72,7 +72,8 @@ class Land {
     const Rgb meadow = mix({112, 132, 62}, {140, 142, 82}, smooth(-0.4, 0.5, patchy + 0.4 * fine));
     const Rgb forest = mix({48, 80, 46}, {82, 108, 58}, smooth(-0.5, 0.5, fine + 0.3 * patchy));
     const Rgb snow = {238, 242, 247};
-    // From the valleys upwards: meadows, forest, the timber line, bare pumice; rock where it is steep; snow on what is high and not steep.
+    // From the valleys upwards: meadows, forest, the timber line, bare pumice; rock where it is steep; snow on what is
+    // high and not steep.
     Rgb c = mix(meadow, forest,
                 smooth(-0.25, 0.15, patchy + 0.35 * fine + 0.5 * smooth(1050, 1500, z) - 0.1 + 0.2 * hollow));
     c = mix(c, pumice, smooth(-60, 60, z - 2120 - 130 * patchy - 60 * hollow));

@@ -19,12 +19,14 @@ struct Terrain {
   std::vector<uint32_t> indices;     ///< three a triangle, counter-clockwise from above
 };
 
-/// The land of this seed with exactly this many triangles, on a regular grid (the last row of which may be cut short). The large
-/// forms do not depend on the number of triangles. The same arguments make the same land, whatever the number of threads.
-/// `progress`: fraction done, called on this thread. Precondition: kMinTriangles <= triangles <= kMaxTriangles.
+/// The land of this seed with exactly this many triangles, on a regular grid (the last row of which may be cut short).
+/// The large forms do not depend on the number of triangles. The same arguments make the same land, whatever the number
+/// of threads. `progress`: fraction done, called on this thread. Precondition: kMinTriangles <= triangles <=
+/// kMaxTriangles.
 Terrain make_terrain(uint64_t triangles, uint64_t seed, const std::function<void(double fraction)>& progress = {});
 
-/// Binary little-endian PLY with float positions and uchar colours. The file appears whole or not at all. Errors name the path.
+/// Binary little-endian PLY with float positions and uchar colours. The file appears whole or not at all. Errors name
+/// the path.
 Status write_ply(const Terrain& terrain, const std::string& path,
                  const std::function<void(double fraction)>& progress = {});
 

@@ -1,5 +1,6 @@
-// A made-up CT scan: a potted Christmas tree with hollow glass balls, after the data set with which volume renderers have been compared for long
-// (Kanitsar et al., "Christmas tree case study", IEEE Visualization 2002). Every value here is computed; none is theirs.
+// A made-up CT scan: a potted Christmas tree with hollow glass balls, after the data set with which volume renderers
+// have been compared for long (Kanitsar et al., "Christmas tree case study", IEEE Visualization 2002). Every value here
+// is computed; none is theirs.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,8 @@ namespace telesplat::made_volume {
 
 inline constexpr int kMinSide = 16, kMaxSide = 1024;
 
-/// A cube of side^3 values, x fastest, z up. Air 0 and noise, needles about 9000, wood 14000, soil 18000, earthenware 30000, glass 40000, metal 60000.
+/// A cube of side^3 values, x fastest, z up. Air 0 and noise, needles about 9000, wood 14000, soil 18000, earthenware
+/// 30000, glass 40000, metal 60000.
 struct Scan {
   int side = 0;
   std::vector<uint16_t> values;

@@ -8,12 +8,12 @@ namespace telesplat::volume {
 
 class SliceView {
  public:
-  /// margin: by how much of its width and height the camera's image is widened on every side, so that the view can turn a little before an edge shows.
-  /// Precondition: validate(shear, grid).
+  /// margin: by how much of its width and height the camera's image is widened on every side, so that the view can turn
+  /// a little before an edge shows. Precondition: validate(shear, grid).
   SliceView(const Grid& grid, const ShearFrame& shear, const geometry::Camera& camera, double margin);
 
-  /// False only if nothing of the block (slice_image.h) in column x and row y, on the plane of `layer`, can be seen. Precondition: the
-  /// layer and the block are the frame's.
+  /// False only if nothing of the block (image.h) in column x and row y, on the plane of `layer`, can be seen.
+  /// Precondition: the layer and the block are the frame's.
   bool may_see(int layer, int x, int y) const;
 
  private:

@@ -98,7 +98,8 @@ TransferFunction::Point mix(const TransferFunction::Point& a, const TransferFunc
   return {value, between(a.r, b.r), between(a.g, b.g), between(a.b, b.b), between(a.opacity, b.opacity)};
 }
 
-// How far the points between `begin` and `end` are from the line between these two: the largest difference of any channel.
+// How far the points between `begin` and `end` are from the line between these two: the largest difference of any
+// channel.
 double distance_from_line(const std::vector<TransferFunction::Point>& points, size_t begin, size_t end,
                           size_t& farthest) {
   double most = -1;
@@ -175,7 +176,8 @@ std::string to_text(const TransferFunction& transfer) {
 }
 
 // Douglas and Peucker, "Algorithms for the Reduction of the Number of Points Required to Represent a Digitized Line",
-// Cartographica 10(2), 1973; with the farthest point of all taken first, so that any number of points is the best so far.
+// Cartographica 10(2), 1973; with the farthest point of all taken first, so that any number of points is the best so
+// far.
 TransferFunction shortened(const TransferFunction& transfer, size_t max_bytes) {
   if (to_text(transfer).size() <= max_bytes || transfer.points.size() < 3) return transfer;
   const auto& points = transfer.points;

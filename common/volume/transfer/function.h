@@ -1,5 +1,5 @@
-// Transfer functions: what colour and opacity a voxel's value has. Presets, ParaView's JSON files, points on the command line; one text form
-// that travels in messages and stands in records.
+// Transfer functions: what colour and opacity a voxel's value has. Presets, ParaView's JSON files, points on the
+// command line; one text form that travels in messages and stands in records.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,8 @@ inline constexpr size_t kMaxTransferPoints = 1024;
 inline constexpr size_t kMaxTransferText = 4000;  ///< bytes of the text form: it travels in one string of a message
 inline constexpr double kMaxTransferValue = 1e30;
 
-/// Linear between points, constant outside the first and last. Several points may stand at one value: a jump, at which the last one holds.
+/// Linear between points, constant outside the first and last. Several points may stand at one value: a jump, at which
+/// the last one holds.
 struct TransferFunction {
   struct Point {
     double value = 0;           ///< in the data's own units
@@ -43,20 +44,23 @@ struct ValueRange {
 struct TransferPreset {
   std::string_view name, text;  ///< text: one line for people
 };
-/// bone, skin, ct-angio, mr, fire, and what else looks good; the first is the default where nothing is known of the data.
+/// bone, skin, ct-angio, mr, fire, and what else looks good; the first is the default where nothing is known of the
+/// data.
 std::span<const TransferPreset> transfer_presets();
 /// Error: no such preset; names those there are.
 Result<TransferFunction> transfer_preset(std::string_view name, const ValueRange& range);
 /// What fits data nobody said anything about.
 std::string_view fitting_preset(const ValueRange& range);
 
-/// "value:colour:opacity, ..." such as "0:#000000:0, 80:#ff8800:0.1, 255:#ffffff:0.9"; values may be percentages of [lo, hi] ("30%"), colours
-/// three numbers from 0 to 1 ("1/0.5/0"). Error: what is no such point; as validate(); a text over kMaxTransferText.
+/// "value:colour:opacity, ..." such as "0:#000000:0, 80:#ff8800:0.1, 255:#ffffff:0.9"; values may be percentages of
+/// [lo, hi] ("30%"), colours three numbers from 0 to 1 ("1/0.5/0"). Error: what is no such point; as validate(); a text
+/// over kMaxTransferText.
 Result<TransferFunction> parse_transfer(std::string_view text, const ValueRange& range);
 /// The text form, absolute values; parse_transfer of it gives the same function again, to the last bit.
 std::string to_text(const TransferFunction& transfer);
-/// A ParaView colour-map JSON file's content: RGBPoints with Points (opacity), or without (opacity rises over the range). name: for error
-/// texts. A list of several maps: the first. A map from 0 (or -1) to 1 is stretched over [lo, hi] if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
+/// A ParaView colour-map JSON file's content: RGBPoints with Points (opacity), or without (opacity rises over the
+/// range). name: for error texts. A list of several maps: the first. A map from 0 (or -1) to 1 is stretched over [lo,
+/// hi] if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
 Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name,
                                              const ValueRange& range);
 /// What people give: a path that ends in ".json", points (they have a ':'), or a preset's name.
@@ -68,7 +72,8 @@ Status validate(const TransferFunction& transfer);
 /// Colour and extinction of every level, computed once an epoch.
 struct LevelColour {
   float r = 0, g = 0, b = 0;
-  /// Per Grid::unit_m(): -log(1 - opacity), opacity at most kMaxOpacity. 0, that is transparent and never sent, below kLeastOpacity.
+  /// Per Grid::unit_m(): -log(1 - opacity), opacity at most kMaxOpacity. 0, that is transparent and never sent, below
+  /// kLeastOpacity.
   float extinction = 0;
 };
 inline constexpr float kMaxOpacity = 0.9999f;

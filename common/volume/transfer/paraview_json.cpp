@@ -1,5 +1,5 @@
-// ParaView's colour maps as it exports them (vtkPVTransferFunction presets): a list of maps, each with "RGBPoints" (value, r, g, b a
-// point) and, sometimes, "Points" (value, opacity, midpoint, sharpness a point).
+// ParaView's colour maps as it exports them (vtkPVTransferFunction presets): a list of maps, each with "RGBPoints"
+// (value, r, g, b a point) and, sometimes, "Points" (value, opacity, midpoint, sharpness a point).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -50,8 +50,8 @@ Result<std::vector<double>> read_points(const Json& map, const char* key, const 
   return std::move(*out);
 }
 
-// vtkPiecewiseFunction between two points: the midpoint is where it is half way; sharpness 0 is linear, 1 a step at the midpoint.
-// Between 0.01 and 0.99 VTK draws a Hermite curve through a position that the sharpness bends.
+// vtkPiecewiseFunction between two points: the midpoint is where it is half way; sharpness 0 is linear, 1 a step at the
+// midpoint. Between 0.01 and 0.99 VTK draws a Hermite curve through a position that the sharpness bends.
 double between(const Opacity& a, const Opacity& b, double s) {
   s = s < a.midpoint ? 0.5 * s / a.midpoint : 0.5 + 0.5 * (s - a.midpoint) / (1 - a.midpoint);
   if (a.sharpness > 0.99) return s < 0.5 ? a.opacity : b.opacity;

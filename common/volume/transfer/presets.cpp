@@ -13,7 +13,8 @@ struct PresetPoint {
   float opacity;
 };
 
-// Of CTs in Hounsfield units (air -1000, water 0, muscle 50, contrast agent in vessels 150 to 500, dense bone 1000 and more).
+// Of CTs in Hounsfield units (air -1000, water 0, muscle 50, contrast agent in vessels 150 to 500, dense bone 1000 and
+// more).
 constexpr PresetPoint kBoneHu[] = {{-3024, 0x3a2418, 0},  {140, 0x5a3420, 0},     {260, 0xb87848, 0.08f},
                                    {450, 0xe8c898, 0.3f}, {900, 0xfff4e0, 0.75f}, {3071, 0xffffff, 0.9f}};
 constexpr PresetPoint kSkinHu[] = {{-3024, 0x8a5a48, 0},    {-600, 0x8a5a48, 0},    {-350, 0xd89a7c, 0.12f},

@@ -1,9 +1,10 @@
 // One image a layer, laid out for the warp: what the slabs' images of a layer become when all are there.
 //
-// Slabs share out the pixels of every *slice* (owned_pixels), but in a layer of many slices the borders lie elsewhere in each, so that images of
-// neighbouring slabs overlap by some pixels. Warped one by one they would leave a seam: with bilinear weights f and 1 - f on both sides of a border, "over"
-// gives 1 - (1 - f)(1 - (1 - f)) < 1 of an opaque layer. So they are composited pixel by pixel of the raster first, where each pixel's ray is known exactly; what
-// is interpolated afterwards is one image, which knows of no slabs.
+// Slabs share out the pixels of every *slice* (owned_pixels), but in a layer of many slices the borders lie elsewhere
+// in each, so that images of neighbouring slabs overlap by some pixels. Warped one by one they would leave a seam: with
+// bilinear weights f and 1 - f on both sides of a border, "over" gives 1 - (1 - f)(1 - (1 - f)) < 1 of an opaque layer.
+// So they are composited pixel by pixel of the raster first, where each pixel's ray is known exactly; what is
+// interpolated afterwards is one image, which knows of no slabs.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +17,9 @@
 
 namespace telesplat::volume {
 
-/// A rectangle of the frame's raster, outside which the layer is transparent, with a transparent frame of one pixel to the left of and
-/// above it and two to the right and below, so that a bilinear look-up anywhere within a pixel of it stays inside.
+/// A rectangle of the frame's raster, outside which the layer is transparent, with a transparent frame of one pixel to
+/// the left of and above it and two to the right and below, so that a bilinear look-up anywhere within a pixel of it
+/// stays inside.
 struct LayerImage {
   static constexpr int kBlock = 16;  ///< texels a side, of `filled`
 
@@ -26,8 +28,8 @@ struct LayerImage {
   int pitch = 0;        ///< texels from row to row: rect.width + 3
   /// (rect.height + 3) rows; 0xAARRGGBB, premultiplied. Raster pixel (rect.x + x, rect.y + y) is texel (x + 1, y + 1).
   std::vector<uint32_t> texels;
-  /// One byte for each block of kBlock x kBlock texels, rows of block_pitch: not 0 where it, its right, its lower or its lower right neighbour has
-  /// anything in it. One row and column of blocks more than texels have.
+  /// One byte for each block of kBlock x kBlock texels, rows of block_pitch: not 0 where it, its right, its lower or
+  /// its lower right neighbour has anything in it. One row and column of blocks more than texels have.
   std::vector<uint8_t> filled;
   int block_pitch = 0;
 
@@ -37,12 +39,14 @@ struct LayerImage {
   bool may_fill(int x0, int y0, int x1, int y1) const;
 };
 
-/// Slabs' images in the order in which rays from `eye` (index coordinates) go through them, nearest first, within each layer: by the distance of
-/// [k_begin - 0.5, k_end - 0.5) from the eye along k. Layers in their order in the frame. Indices into images.
+/// Slabs' images in the order in which rays from `eye` (index coordinates) go through them, nearest first, within each
+/// layer: by the distance of [k_begin - 0.5, k_end - 0.5) from the eye along k. Layers in their order in the frame.
+/// Indices into images.
 std::vector<int> slab_order(std::span<const SliceImage> images, const glm::dvec3& eye);
 
-/// All images of a layer composited with "over", nearest slab first seen from shear.eye, pixel by pixel; layers in order, those without
-/// images left out. Images whose layer or rectangle is not of this frame, or whose pixels are not as many as the rectangle's, are dropped.
+/// All images of a layer composited with "over", nearest slab first seen from shear.eye, pixel by pixel; layers in
+/// order, those without images left out. Images whose layer or rectangle is not of this frame, or whose pixels are not
+/// as many as the rectangle's, are dropped.
 std::vector<LayerImage> merge_layers(std::span<const SliceImage> images, const ShearFrame& shear);
 
 }  // namespace telesplat::volume

@@ -151,7 +151,8 @@ namespace {
 
 constexpr int kCornersX = kWarpPartsX + 1, kCornersY = kWarpPartsY + 1;
 
-// Where the corners of a tile's parts meet a layer's image, in texels. A part's pixels lie between its corners' places, since W > 0.
+// Where the corners of a tile's parts meet a layer's image, in texels. A part's pixels lie between its corners' places,
+// since W > 0.
 class PartCorners {
  public:
   PartCorners(const WarpLayer& layer, double middle_x, double middle_y)

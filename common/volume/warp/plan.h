@@ -1,4 +1,5 @@
-// What the warp needs to know before the first pixel: where display pixels lie, and which parts of a tile each layer fills.
+// What the warp needs to know before the first pixel: where display pixels lie, and which parts of a tile each layer
+// fills.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +10,9 @@
 
 namespace telesplat::volume {
 
-/// Display pixels numbered from the point straight ahead instead of from a corner, so that a part of a view (geometry::crop) has the same numbers, and then
-/// to the bit the same rays, as the whole. Along one side: pixel i has its centre at tangent (first + i + 0.5 + offset) * pitch.
+/// Display pixels numbered from the point straight ahead instead of from a corner, so that a part of a view
+/// (geometry::crop) has the same numbers, and then to the bit the same rays, as the whole. Along one side: pixel i has
+/// its centre at tangent (first + i + 0.5 + offset) * pitch.
 struct PixelLattice {
   int64_t first = 0;  ///< number of pixel 0
   double offset = 0;  ///< about [-0.5, 1), in steps of 2^-12
@@ -23,8 +25,8 @@ struct PixelLattice {
 /// A layer, and where the rays of display pixels meet it.
 struct PlacedLayer {
   const LayerImage* image;
-  /// (X, Y, W) = column i . (x, y, 1): the ray through continuous pixel position (x, y) meets texel (X / W, Y / W) of the image (whole numbers are
-  /// texels' centres) if W > 0. Columns, not rows: to_texel[0] gives X.
+  /// (X, Y, W) = column i . (x, y, 1): the ray through continuous pixel position (x, y) meets texel (X / W, Y / W) of
+  /// the image (whole numbers are texels' centres) if W > 0. Columns, not rows: to_texel[0] gives X.
   glm::dmat3 to_texel;
   double depth;  ///< over W: distance along -z, metres
 };

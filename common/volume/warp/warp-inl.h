@@ -1,12 +1,15 @@
-// Included once a target, by warp_kernels.cpp. What is computed stands in warp_kernels.h and warper.h; this is how, with every rounding:
+// Included once a target, by kernels.cpp. What is computed stands in kernels.h and warper.h; this is how,
+// with every rounding:
 //
-//   place    in 128ths of texels: round(clamp(X / W)), by adding 2^23 in floats; texel place >> 7, weights of 128ths fx, fy = place & 127
-//   look-up  row(y) = (128 - fx) c(x, y) + fx c(x + 1, y);  c = row(y) + round((row(y + 1) - row(y)) fy / 128), so 255 is 32640
+//   place    in 128ths of texels: round(clamp(X / W)), by adding 2^23 in floats; texel place >> 7,
+//            weights of 128ths fx, fy = place & 127
+//   look-up  row(y) = (128 - fx) c(x, y) + fx c(x + 1, y)
+//            c = row(y) + round((row(y + 1) - row(y)) fy / 128), so 255 is 32640
 //   over     T = 32640 - A, 0 if below 64;  C += round(c (T + T / 256) / 32768), saturated; the same for A
 //   at last  the background's colour like a layer's; colour = (min(C, 32640) + 64) >> 7
 //
-// Sums of products of 8-bit numbers, signed by unsigned, are one instruction, if colours are taken less 128: since weights add up to 128, so is what
-// comes out.
+// Sums of products of 8-bit numbers, signed by unsigned, are one instruction, if colours are taken less 128: since
+// weights add up to 128, so is what comes out.
 #if defined(TELESPLAT_WARP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef TELESPLAT_WARP_INL_H_
 #undef TELESPLAT_WARP_INL_H_
@@ -63,7 +66,8 @@ uint64_t WarpPart(const WarpTile& tile, uint64_t layers, int left, int top, Part
 
 #else
 
-// Four channels of 16 bits a pixel take two vectors. In each block of 128 bits `first` has the first two of the block's four pixels.
+// Four channels of 16 bits a pixel take two vectors. In each block of 128 bits `first` has the first two of the block's
+// four pixels.
 struct Wide {
   hn::Vec<S16> first, second;
 };

@@ -1,5 +1,5 @@
-// FLIP against a second implementation: written after the paper's formulas alone, in double precision, with whole two-dimensional
-// filters and one pixel at a time.
+// FLIP against a second implementation: written after the paper's formulas alone, in double precision, with whole
+// two-dimensional filters and one pixel at a time.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -171,7 +171,8 @@ TEST(Flip, IdenticalPicturesDoNotDiffer) {
 }
 
 TEST(Flip, BlackAgainstWhite) {
-  // L* differs by 100: 100^0.7 = 25.12; the largest, green against blue: 203.2^0.7 = 41.26; 0.4 of it becomes 0.95, the rest 0.05.
+  // L* differs by 100: 100^0.7 = 25.12; the largest, green against blue: 203.2^0.7 = 41.26; 0.4 of it becomes 0.95, the
+  // rest 0.05.
   for (const float e : Flip(filled(30, 20, 0)).error_map(filled(30, 20, 0xffffff))) ASSERT_NEAR(e, 0.9674, 5e-4);
   for (const float e : Flip(filled(30, 20, 0x00ff00)).error_map(filled(30, 20, 0x0000ff))) ASSERT_NEAR(e, 1.0, 1e-4);
 }
