@@ -13,7 +13,7 @@ class Idle {
   struct Sampler {
     std::string id;   ///< routing id
     int waiting = 0;  ///< its lease requests that are not answered; above 0
-    int at_once = 0;  ///< waiting for so many it holds none; 0: it did not say
+    int at_once = 0;  ///< N: it holds no lease when it waits for N; 0: it did not say
     /// It said that it holds no lease, though the packer may not have said so yet.
     bool holds_none() const { return at_once > 0 && waiting >= at_once; }
   };

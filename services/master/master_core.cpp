@@ -26,7 +26,7 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
   plan_ = &plan_of({});
 }
 
-// ---- who takes part ---------------------------------------------------------------------------------------------------------
+// ---- who takes part -------------------------------------------------------------------------------------------------
 
 MasterCore::Peer* MasterCore::known(const std::string& peer, double now_s) {
   const auto it = peers_.find(peer);
@@ -147,7 +147,7 @@ Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double
   return record_.add_rows(p->process, m);
 }
 
-// ---- leases -----------------------------------------------------------------------------------------------------------------
+// ---- leases ---------------------------------------------------------------------------------------------------------
 
 void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double now_s) {
   Peer* p = known(peer, now_s);
@@ -211,7 +211,8 @@ void MasterCore::tick(double now_s) {
 bool MasterCore::begin_view(double now_s) {
   if (!plan_->may_begin(idle_)) return false;
   if (!plan_->playing()) return plan_->begin(epoch_, false);
-  // One view at a time, so that each epoch has a complete one; all who wait when an epoch begins are served from it, in turn.
+  // One view at a time, so that each epoch has a complete one; all who wait when an epoch begins are served from it, in
+  // turn.
   if (plan_->views().views_in_flight() > 0) return false;
   if (!plan_->views().turn_waiting()) {
     if (plan_->step(now_s)) next_epoch(now_s);

@@ -1,5 +1,5 @@
-// The master (T3.2) without sockets and clocks: messages and times come in, messages go out. It knows who takes part, which epoch it is and
-// what each is told; what a scene is and how its views become leases is its plan's (plan.h).
+// The master (T3.2) without sockets and clocks: messages and times come in, messages go out. It knows who takes part,
+// which epoch it is and what each is told; what a scene is and how its views become leases is its plan's (plan.h).
 #pragma once
 
 #include <map>

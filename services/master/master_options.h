@@ -16,8 +16,8 @@ struct MasterServiceOptions {
   std::string animate;  ///< as julia::parse_timeline takes it; empty: what the data server says
 };
 
-/// Flags that `telesplat run` has too: tiles, leases, packing. (There the data server is told of animations.) Rows point into `options`, whose
-/// settings get their default values here where they have none.
+/// Flags that `telesplat run` has too: tiles, leases, packing. (There the data server is told of animations.) Rows
+/// point into `options`, whose settings get their default values here where they have none.
 options::Table session_table(MasterServiceOptions& options);
 /// All flags.
 options::Table table(MasterServiceOptions& options);

@@ -1,8 +1,9 @@
-// What differs by pipeline (scene::Pipeline) at the master: what a scene is, and how its views become leases. MasterCore knows no more of a
-// scene than this. No sockets, no clocks: messages and times come in, messages go to PlanLinks::outbox.
+// What differs by pipeline (scene::Pipeline) at the master: what a scene is, and how its views become leases.
+// MasterCore knows no more of a scene than this. No sockets, no clocks: messages and times come in, messages go to
+// PlanLinks::outbox.
 //
-// MasterCore has a plan a pipeline; one of them leads the session. The others remember what their data servers said of them, and know who
-// samples, but have no views, no frames and no leases.
+// MasterCore has a plan a pipeline; one of them leads the session. The others remember what their data servers said of
+// them, and know who samples, but have no views, no frames and no leases.
 #pragma once
 
 #include <functional>
@@ -89,13 +90,15 @@ class Schedule {
   virtual void prepare(double /*now_s*/) {}
   /// A view waits, and of the idle samplers there is one that would go on with it at once.
   virtual bool may_begin(const Idle& idle) = 0;
-  /// Begins the frame or frames of the next view. turns_only: of one whose viewer has a turn. False: none, or enough are in flight.
+  /// Begins the frame or frames of the next view. turns_only: of one whose viewer has a turn. False: none, or enough
+  /// are in flight.
   virtual bool begin(EpochId epoch, bool turns_only) = 0;
   /// Gives out all leases that idle samplers can have of the frames in flight.
   virtual void give_leases(Idle& idle, double now_s) = 0;
   /// Gives a lease its full time again. Unknown leases are ignored.
   virtual void extend(LeaseId lease, double now_s) = 0;
-  /// The packer has this tile, from `sampler` (empty: unknown). False: it has it twice, or nobody waits for it any more.
+  /// The packer has this tile, from `sampler` (empty: unknown). False: it has it twice, or nobody waits for it any
+  /// more.
   virtual bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) = 0;
   /// A lease may be due before the next tick of 20 ms, if somebody is idle.
   virtual bool hurried() const { return false; }

@@ -9,7 +9,7 @@
 
 namespace telesplat::master {
 
-// Of data servers that name no kind, or one that this program does not know: points.
+// A data server that names no kind, or one that this program does not know, is taken for one of points.
 Plan& MasterCore::plan_of(const wire::Hello& data) {
   const auto kind = scene::kind_named(scene::value_or(data.facts, "kind", std::string()));
   return *plans_.at(scene::pipeline_of(kind.value_or(scene::Kind::kMesh)));

@@ -1,5 +1,5 @@
-// What the person who starts the master can choose, and what a session makes of it: what was not given is decided by the kind of scene
-// (scene::Policy), here and nowhere else. Everyone else is told the outcome.
+// What the person who starts the master can choose, and what a session makes of it: what was not given is decided by
+// the kind of scene (scene::Policy), here and nowhere else. Everyone else is told the outcome.
 #pragma once
 
 #include <map>
@@ -36,16 +36,18 @@ struct MasterOptions {
   Redundancy redundancy = Redundancy::kAuto;
   julia::Timeline animation;  ///< of the scene's parameters, from the first view on; empty: what the data server says
   uint64_t octree_depth = 0;  ///< 0: as the kind of scene has it
-  /// packing.* values for the packer, volume.layers of a volume's frames; passed on in every welcome. packing.max_points that is not there
-  /// is as the kind of scene has it.
+  /// packing.* values for the packer, volume.layers of a volume's frames; passed on in every welcome.
+  /// packing.max_points that is not there is as the kind of scene has it.
   std::map<std::string, double> settings;
   double silent_after_s = 5.0;  ///< a process that reports nothing for so long is taken for dead
 };
 
-/// kind: of the session's scene; nullopt: none is known yet, or one that this program does not know. It is treated as a mesh.
+/// kind: of the session's scene; nullopt: none is known yet, or one that this program does not know. It is treated as a
+/// mesh.
 uint64_t octree_depth(const MasterOptions& options, std::optional<scene::Kind> kind);
 bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind);
-/// As everyone is told them (docs/protocol.md): the given ones, packing.keep_redundant, packing.max_points and viewer.least_sampling.
+/// As everyone is told them (docs/protocol.md): the given ones, packing.keep_redundant, packing.max_points and
+/// viewer.least_sampling.
 std::map<std::string, double> settings(const MasterOptions& options, std::optional<scene::Kind> kind);
 
 }  // namespace telesplat::master

@@ -1,5 +1,5 @@
-// View requests that wait at the master. Asynchronous viewers have one at most, their newest; the others (T6.4) have as many in order as they have
-// buffers. Viewers take turns.
+// View requests that wait at the master. Asynchronous viewers have one at most, their newest; the others (T6.4) have as
+// many in order as they have buffers. Viewers take turns.
 #pragma once
 
 #include <deque>
@@ -14,23 +14,24 @@ namespace telesplat::master {
 inline constexpr uint64_t kBufferedInFlight =
     3;  ///< views in flight for the sake of one viewer's buffers, at most (T6.4: three buffers)
 
-/// Views that may be in flight while one is begun for a viewer with so many buffers.
+/// How many views may be in flight when one is begun for a viewer that has `buffers` buffers.
 size_t views_at_once(int frames_in_flight, uint64_t buffers);
 
 class ViewQueue {
  public:
-  /// buffers 0: replaces whatever of the viewer waits. Otherwise it waits behind what does, or takes the place of the one with its id, and is dropped
-  /// where as many wait as the viewer has buffers (at most wire::kMaxBuffers).
+  /// buffers 0: it replaces the viewer's requests that wait. Otherwise it waits behind them, or takes the place of the
+  /// one with its id. It is dropped where as many wait as the viewer has buffers (at most wire::kMaxBuffers).
   void add(const wire::ViewRequest& request);
-  /// The view was begun and its frame dropped: it waits again, before all others of its viewer; not at all if it is asynchronous and a newer one waits. Where
-  /// several are put back, the newest comes first.
+  /// The view was begun and its frame dropped: it waits again, before all others of its viewer; not at all if it is
+  /// asynchronous and a newer one waits. Where several are put back, the newest comes first.
   void put_back(const wire::ViewRequest& request);
   void forget(InstanceId viewer) { viewers_.erase(viewer); }
 
   bool empty() const { return viewers_.empty(); }
   size_t waiting(InstanceId viewer) const;
 
-  /// The viewers that wait now have a turn; those who come later have none. A turn ends when a request of the viewer is taken.
+  /// The viewers that wait now have a turn; those who come later have none. A turn ends when a request of the viewer is
+  /// taken.
   void begin_turns();
   bool turn_waiting() const;
 

@@ -1,4 +1,5 @@
-// What every schedule does with views: they wait, are begun in turn, are complete or wait again. What a frame is cut into is the schedule's own.
+// What every schedule does with views: they wait, are begun in turn, are complete or wait again. What a frame is cut
+// into is the schedule's own.
 #pragma once
 
 #include <functional>
@@ -42,7 +43,7 @@ class Views {
   bool turn_waiting() const { return waiting_.turn_waiting(); }
   /// Views begun and not complete.
   size_t views_in_flight() const { return in_flight_.size(); }
-  uint64_t frames_completed() const { return completed_; }  ///< those that views were begun with
+  uint64_t frames_completed() const { return completed_; }  ///< of whole views
 
   /// What waits, to go on elsewhere: another plan leads the session. Precondition: no view is in flight.
   ViewQueue release_views();
@@ -56,8 +57,8 @@ class Views {
   FrameId next_frame();
   LeaseId next_lease();
 
-  /// The view to begin; viewers take turns. turns_only: only those that have a turn. nullopt: none waits, or as many are in flight as may be
-  /// (views_at_once()).
+  /// The view to begin; viewers take turns. turns_only: only those that have a turn. nullopt: none waits, or as many
+  /// are in flight as may be (views_at_once()).
   std::optional<wire::ViewRequest> take_view(bool turns_only);
   /// More views for the same frame, as ViewQueue::take_all().
   std::vector<wire::ViewRequest> take_more(const std::function<bool(const wire::ViewRequest&)>& wanted, size_t most) {
@@ -66,8 +67,8 @@ class Views {
   /// `frame` shows these views: they are in flight until complete() or put_back().
   void begin(FrameId frame, const std::vector<wire::ViewRequest>& views);
   void complete(FrameId frame);
-  /// The frame was dropped: its views wait again, except those of viewers that left; of asynchronous viewers only if no newer request does.
-  /// Where several are put back, the newest comes first.
+  /// The frame was dropped: its views wait again, except those of viewers that left; of asynchronous viewers only if no
+  /// newer request does. Where several are put back, the newest comes first.
   void put_back(FrameId frame);
 
  private:

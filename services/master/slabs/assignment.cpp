@@ -9,7 +9,8 @@ namespace telesplat::master {
 
 std::vector<AssignedTransfer> assignment(const Partition& partition, const VolumeScene& scene) {
   const int slices = scene.session().grid.size[2];
-  // Sheets and messages hold so many: of what is beyond any real volume the pieces are larger.
+  // A sheet has at most kMaxTransfers entries and a message at most wire::kMaxSlabs; huge volumes get larger pieces
+  // instead of more.
   const size_t most_pieces =
       std::max<size_t>(1, std::min(kMaxTransfers / (2 * partition.slabs.size() + scene.servers().size()),
                                    wire::kMaxSlabs / (2 * scene.servers().size())));

@@ -8,7 +8,8 @@
 
 namespace telesplat::master {
 
-/// Transfers that are expected to be larger are cut at slices: they share their rounds with others better, and stay far below what a message may hold.
+/// Transfers that are expected to be larger are cut at slices: they share their rounds with others better, and stay far
+/// below what a message may hold.
 inline constexpr uint64_t kLargestTransfer = 32u << 20;
 
 struct AssignedTransfer {
@@ -18,8 +19,8 @@ struct AssignedTransfer {
   uint64_t bytes = 0;      ///< expected
 };
 
-/// All transfers of the slabs' slices, one slice more on both sides, by rounds. No server sends and no sampler receives twice in a round. A slab has
-/// at most wire::kMaxSlabs.
+/// All transfers of the slabs' slices, one slice more on both sides, by rounds. No server sends and no sampler receives
+/// twice in a round. A slab has at most wire::kMaxSlabs.
 std::vector<AssignedTransfer> assignment(const Partition& partition, const VolumeScene& scene);
 
 }  // namespace telesplat::master

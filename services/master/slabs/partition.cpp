@@ -11,7 +11,8 @@
 namespace telesplat::master {
 namespace {
 
-// The fewest ranges of weight at most `cap` that slices [i, n) can be cut into, for every i; sums[i]: weight of the slices before i.
+// The fewest ranges of weight at most `cap` that slices [i, n) can be cut into, for every i; sums[i]: weight of the
+// slices before i.
 std::vector<int> ranges_needed(const std::vector<uint64_t>& sums, uint64_t cap) {
   const size_t n = sums.size() - 1;
   std::vector<int> needed(n + 1, 0);
@@ -55,7 +56,8 @@ std::vector<SlabRange> cut_slabs(std::span<const uint32_t> weights, int parts) {
   std::vector<SlabRange> out;
   int begin = 0;
   for (int left = parts; left > 1; --left) {
-    // As near to an equal share of what is left as the cap allows, here and for the rest, of which each must have something.
+    // As near to an equal share of what is left as the cap allows, here and for the rest, of which each must have
+    // something.
     const double target = double(sums[size_t(n)] - sums[size_t(begin)]) / left;
     int best = -1;
     double best_off = 0;
@@ -105,7 +107,8 @@ bool SlabPartitions::has(const std::string& sampler) const {
 
 void SlabPartitions::join(const std::string& sampler) {
   if (has(sampler)) return;
-  // In the middle, the bounds of the others' slabs move least: about a quarter of the volume goes to another sampler, half of it at an end.
+  // In the middle, the bounds of the others' slabs move least: about a quarter of the volume goes to another sampler,
+  // half of it at an end.
   samplers_.insert(samplers_.begin() + std::ptrdiff_t((samplers_.size() + 1) / 2), sampler);
   changed_ = true;
 }
@@ -161,8 +164,9 @@ std::shared_ptr<const Partition> SlabPartitions::update(double now_s) {
       in_use_ = newest_;
       none_since_s_.reset();
     } else if (!in_use_ && now_s - *none_since_s_ >= kReadyPatience_s) {
-      in_use_ =
-          newest_;  // and so is the next one, if that happens again before one is ready: samplers may come and go all the time
+      // The next one is not waited for either, if this happens again before one is ready: samplers may come and go all
+      // the time.
+      in_use_ = newest_;
     }
   }
   return made;

@@ -1,5 +1,5 @@
-// How a volume is shared out among samplers: slabs of slices, and one partition after the other as samplers come, go and slices change (T5.1,
-// T7.4). No sockets, no clocks.
+// How a volume is shared out among samplers: slabs of slices, and one partition after the other as samplers come, go
+// and slices change (T5.1, T7.4). No sockets, no clocks.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +24,9 @@ struct SlabRange {
   bool operator==(const SlabRange&) const = default;
 };
 
-/// Cuts slices [0, weights.size()) into at most `parts` ranges, in order and without gaps, each with at least one slice of weight above 0, such that
-/// the heaviest is as light as can be, and the others near the mean where that allows it. Fewer ranges where fewer slices weigh anything; one
-/// where none does. Precondition: weights not empty, parts >= 1.
+/// Cuts slices [0, weights.size()) into at most `parts` ranges, in order and without gaps, each with at least one slice
+/// of weight above 0, such that the heaviest is as light as can be, and the others near the mean where that allows it.
+/// Fewer ranges where fewer slices weigh anything; one where none does. Precondition: weights not empty, parts >= 1.
 std::vector<SlabRange> cut_slabs(std::span<const uint32_t> weights, int parts);
 
 struct Slab {
@@ -50,7 +50,7 @@ struct Partition {
 
 class SlabPartitions {
  public:
-  /// Another volume of so many slices: everything but the samplers is forgotten. Precondition: slices >= 1.
+  /// Another volume, of N slices: everything but the samplers is forgotten. Precondition: slices >= 1.
   void set_slices(int slices);
   /// One a slice. Error: another number of them; the weights stay.
   Status set_weights(std::vector<uint32_t> weights);
@@ -63,8 +63,9 @@ class SlabPartitions {
   /// What the samplers were told is not true any more (a data server has another address): a new partition follows.
   void invalidate() { changed_ = true; }
 
-  /// Makes a new partition if samplers changed or the slabs became uneven, and takes the newest one into use when all its samplers are ready, or
-  /// when that takes long and there is none to use. Returns the new partition: its samplers are to be told. nullptr: no new one.
+  /// Makes a new partition if samplers changed or the slabs became uneven, and takes the newest one into use when all
+  /// its samplers are ready, or when that takes long and there is none to use. Returns the new partition: its samplers
+  /// are to be told. nullptr: no new one.
   std::shared_ptr<const Partition> update(double now_s);
   /// Ignored: unknown partitions, samplers without a slab in it.
   void ready(const std::string& sampler, uint64_t number, uint64_t voxels, uint64_t bytes);

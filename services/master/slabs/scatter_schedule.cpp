@@ -21,7 +21,7 @@ uint64_t key(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
 // A bipartite multigraph whose edges get colours.
 class Colouring {
  public:
-  // Nodes of more than `colours` transfers are taken for several, of at most so many each.
+  // A node of more than `colours` transfers is taken for several nodes of at most `colours` transfers each.
   Colouring(std::span<const Transfer> transfers, uint32_t colours) : colours_(colours), words_((colours + 63) / 64) {
     std::map<std::array<uint32_t, 3>, uint32_t> nodes;
     std::map<std::array<uint32_t, 2>, uint32_t> seen;
@@ -128,7 +128,8 @@ class Colouring {
     return out;
   }
 
-  // Gives two colours the smallest sum of longest edges that they can have. False: they had it.
+  // Recolours the edges of two colours such that the sum of their two longest edges is the smallest possible. False: it
+  // was.
   bool improve(uint32_t a, uint32_t b) {
     const auto longest = [&](const std::vector<uint32_t>& edges, uint32_t colour) {
       uint64_t most = 0;
@@ -138,7 +139,8 @@ class Colouring {
     };
     std::vector<uint32_t> both = by_colour_[a];
     both.insert(both.end(), by_colour_[b].begin(), by_colour_[b].end());
-    // The longest edge of all is in one of them, say a; b's longest is then at least the smaller side's of every component.
+    // The longest edge of all is in one of them, say a; b's longest is then at least the smaller side's of every
+    // component.
     std::vector<uint32_t> turned;
     uint64_t most_a = 0, most_b = 0;
     ++mark_;

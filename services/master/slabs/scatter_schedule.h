@@ -1,15 +1,18 @@
-// Who sends what to whom in which round, from many senders to many receivers (T5.3): an edge colouring of the bipartite multigraph of transfers.
+// Who sends what to whom in which round, from many senders to many receivers (T5.3): an edge colouring of the bipartite
+// multigraph of transfers.
 //
-// Rounds: by Koenig's theorem (D. Koenig, "Ueber Graphen und ihre Anwendung auf Determinantentheorie und Mengenlehre", Math. Annalen 77, 1916)
-// as many as the busiest node has transfers are enough for no node to have two in a round, and with fewer it would. The proof is the algorithm: transfers
-// are coloured one by one, and where no colour is free at both ends, the path of two alternating colours from one end is swapped.
-// T figure 5.1 shows three rounds for transfers of which one receiver gets four, so two of these share a round there (sheet (d): A1 and A4 both send
-// to B2); `rounds` asks for such sheets.
+// Rounds: by Koenig's theorem (D. Koenig, "Ueber Graphen und ihre Anwendung auf Determinantentheorie und Mengenlehre",
+// Math. Annalen 77, 1916) the busiest node's number of transfers is enough rounds for no node to have two in a round,
+// and necessary. The proof is the algorithm: transfers are coloured one by one, and where no colour is free at both
+// ends, the path of two alternating colours from one end is swapped. T figure 5.1 shows three rounds for transfers of
+// which one receiver gets four, so two of these share a round there (sheet (d): A1 and A4 both send to B2); `rounds`
+// asks for such sheets.
 //
-// Time: a round takes as long as its longest transfer. Transfers are coloured in order of their bytes, lowest colour first, so that large ones share
-// rounds; then pairs of rounds are improved: their transfers make paths and cycles that can change sides each for itself, and the best is to
-// have the larger side of each in the same round. (The best colouring of all is NP-hard to find: D. de Werra et al., "Weighted coloring on planar,
-// bipartite and split graphs", Discrete Applied Mathematics 157, 2009.)
+// Time: a round takes as long as its longest transfer. Transfers are coloured in order of their bytes, lowest colour
+// first, so that large ones share rounds; then pairs of rounds are improved: their transfers make paths and cycles that
+// can change sides each for itself, and the best is to have the larger side of each in the same round. (The best
+// colouring of all is NP-hard to find: D. de Werra et al., "Weighted coloring on planar, bipartite and split graphs",
+// Discrete Applied Mathematics 157, 2009.)
 #pragma once
 
 #include <cstdint>
@@ -41,13 +44,14 @@ struct AssignmentSheet {
 /// The largest number of transfers of a node.
 uint32_t busiest(std::span<const Transfer> transfers);
 
-/// A sheet of busiest() rounds, in which no node has two transfers in a round. rounds above 0: of at most so many rounds; a node of more
-/// transfers then has them spread over the rounds as evenly as can be. weighted: false leaves out what concerns the bytes. Error: too many
-/// nodes or transfers.
+/// A sheet of busiest() rounds, in which no node has two transfers in a round. rounds above 0: at most that many
+/// rounds; a node of more transfers then has them spread over the rounds as evenly as can be. weighted: false leaves
+/// out what concerns the bytes. Error: too many nodes or transfers.
 Result<AssignmentSheet> schedule_scatter(std::span<const Transfer> transfers, uint32_t rounds = 0,
                                          bool weighted = true);
 
-/// Refuses sheets of another number of transfers, rounds that are not there, and nodes with more transfers in a round than they must have.
+/// Refuses sheets of another number of transfers, rounds that are not there, and nodes with more transfers in a round
+/// than they must have.
 Status validate(const AssignmentSheet& sheet, std::span<const Transfer> transfers);
 
 }  // namespace telesplat::master

@@ -25,44 +25,52 @@ std::string described(const volume::Session& s) {
 
 }  // namespace
 
-Result<VolumeScene::Change> VolumeScene::adopt(const wire::Hello& data) {
-  const auto read = volume::read_session(data.parameters, data.facts);
-  if (!read) return read.error();
-  const volume::Session& session = *read;
-  const auto endpoint = data.endpoints.find("voxels");
-  if (endpoint == data.endpoints.end()) return Error{"has no endpoint \"voxels\""};
+Status VolumeScene::fits(const volume::Session& session, const wire::Hello& data) const {
+  if (!data.endpoints.contains("voxels")) return Error{"has no endpoint \"voxels\""};
   if (session.parts < 1 || session.parts > session.grid.size[2] || session.part < 0 || session.part >= session.parts)
     return Error{
         fmt::format("part {} of {} of a volume of {} slices", session.part, session.parts, session.grid.size[2])};
   const auto p = size_t(session.part);
-  const bool first = servers_.empty();
-  const bool same = !first && same_volume(session, session_);
   for (size_t i = 0; i < servers_.size(); ++i) {
     const Server& s = servers_[i];
     if (!s.here || s.instance == data.instance) continue;
-    if (!same)
+    if (!same_volume(session, session_))
       return Error{fmt::format("its volume ({}) is another than that of {} ({})", described(session), s.name,
                                described(session_))};
     if (i == p) return Error{fmt::format("part {} of {} is held by {}", p + 1, session.parts, s.name)};
   }
+  return ok_status();
+}
+
+// Forgets the volume before.
+void VolumeScene::begin(const volume::Session& session) {
+  const auto parts = size_t(session.parts);
+  servers_.assign(parts, {});
+  told_.assign(parts, {});
+  content_hash_.assign(parts, "");
+  known_.assign(parts, false);
+  weighed_.assign(parts, std::nullopt);
+  weights_.assign(size_t(session.grid.size[2]), 0);
+  session_ = session;
+}
+
+Result<VolumeScene::Change> VolumeScene::adopt(const wire::Hello& data) {
+  const auto read = volume::read_session(data.parameters, data.facts);
+  if (!read) return read.error();
+  const volume::Session& session = *read;
+  if (const Status s = fits(session, data); !s) return s.error();
+  const auto p = size_t(session.part);
+  const bool same = !servers_.empty() && same_volume(session, session_);
   Change change;
   change.another =
       !same || (known_[p] && content_hash_[p] != scene::value_or(data.facts, "content_hash", std::string()));
-  if (!same) {
-    const auto parts = size_t(session.parts);
-    servers_.assign(parts, {});
-    told_.assign(parts, {});
-    content_hash_.assign(parts, "");
-    known_.assign(parts, false);
-    weighed_.assign(parts, std::nullopt);
-    weights_.assign(size_t(session.grid.size[2]), 0);
-    session_ = session;
-  }
+  if (!same) begin(session);
   Server& server = servers_[p];
   const int64_t slices = session.grid.size[2];
-  change.servers = !server.here || server.endpoint != endpoint->second;
+  const std::string& endpoint = data.endpoints.at("voxels");
+  change.servers = !server.here || server.endpoint != endpoint;
   server = {.name = data.name,
-            .endpoint = endpoint->second,
+            .endpoint = endpoint,
             .instance = data.instance,
             .begin = int(slices * session.part / session.parts),
             .end = int(slices * (session.part + 1) / session.parts),

@@ -1,5 +1,5 @@
-// The volume of a session as the master knows it: what its data servers say of it, the transfer function and step of the current epoch, and what
-// changes them. No sockets, no clocks.
+// The volume of a session as the master knows it: what its data servers say of it, the transfer function and step of
+// the current epoch, and what changes them. No sockets, no clocks.
 #pragma once
 
 #include <map>
@@ -29,9 +29,9 @@ class VolumeScene {
     bool servers = false;  ///< who holds what, and where
   };
 
-  /// A data server of kind "volume" said hello. A server that says the same as the one before of its part (it was restarted) changes no values:
-  /// what was set since stays. Error: what it says cannot be, does not fit the parts that are here, or its part is held by another; then
-  /// nothing changed.
+  /// A data server of kind "volume" said hello. A server that says the same as the one before of its part (it was
+  /// restarted) changes no values: what was set since stays. Error: what it says cannot be, does not fit the parts that
+  /// are here, or its part is held by another; then nothing changed.
   Result<Change> adopt(const wire::Hello& data);
   /// The server is gone; the scene stays.
   void leave(InstanceId data);
@@ -40,19 +40,19 @@ class VolumeScene {
   bool complete() const;
   /// Precondition of what follows: complete().
   const volume::Session& session() const { return session_; }
-  /// Of Welcome, in this epoch.
+  /// For the welcome, in this epoch.
   std::map<std::string, double> values() const;
   std::map<std::string, std::string> facts() const;
   const geometry::Box& box_room() const { return box_room_; }
   /// In the order of their parts, also those that are away.
   const std::vector<Server>& servers() const { return servers_; }
 
-  /// How many voxels of each slice are visible. Ignored: epochs older than the server's last. True: taken. Error: from nobody known, slices that it
-  /// does not hold.
+  /// How many voxels of each slice are visible. Ignored: epochs older than the server's last. True: taken. Error: from
+  /// nobody known, slices that it does not hold.
   Result<bool> weigh(const wire::SliceWeights& m);
   /// All servers said it at least once.
   bool weighed() const;
-  /// Of all slices; 0 where nothing was said.
+  /// One a slice; 0 where nothing was said.
   const std::vector<uint32_t>& weights() const { return weights_; }
   /// Expected for these slices, of one server; 4 bytes a voxel where it did not say.
   uint64_t bytes(const Server& server, int begin, int end) const;
@@ -61,7 +61,8 @@ class VolumeScene {
 
   /// "tf": a preset's name, or points. Error: neither; then nothing changed.
   Status set_transfer(const std::string& text);
-  /// "set": volume.step stops the playing, volume.steps-per-s (0 or above) begins or stops it. Error: other names, limits; then nothing changed.
+  /// "set": volume.step stops the playing, volume.steps-per-s (0 or above) begins or stops it. Error: other names,
+  /// limits; then nothing changed.
   Status set(const std::map<std::string, std::string>& arguments);
   /// "animate": on, off.
   Status animate(const std::string& text);
@@ -71,6 +72,9 @@ class VolumeScene {
   bool step(double now_s);
 
  private:
+  Status fits(const volume::Session& session, const wire::Hello& data) const;
+  void begin(const volume::Session& session);
+
   volume::Session session_;  // of this epoch
   geometry::Box box_room_;
   std::map<std::string, double> parameters_;  // the first part's hello

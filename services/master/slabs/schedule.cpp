@@ -46,7 +46,8 @@ volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRe
 }
 
 bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only) {
-  // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two they might not.
+  // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two
+  // they might not.
   if (!partition || (!frames_.empty() && frames_.back().partition != partition)) return false;
   const auto first = take_view(turns_only);
   if (!first) return false;

@@ -1,5 +1,6 @@
-// View requests -> sampling frames of a volume -> a slice lease for each slab (T4.5, T7.4). Every sampler of a partition has a part in every frame,
-// so there is nothing to steal and no backups: a frame that loses a sampler is dropped, and its views wait again. No sockets, no clocks.
+// View requests -> sampling frames of a volume -> a slice lease for each slab (T4.5, T7.4). Every sampler of a
+// partition has a part in every frame, so there is nothing to steal and no backups: a frame that loses a sampler is
+// dropped, and its views wait again. No sockets, no clocks.
 #pragma once
 
 #include <deque>
@@ -17,8 +18,9 @@ namespace telesplat::master {
 inline constexpr double kSameEye_m = 0.02;       ///< views from eyes that are no farther apart are sampled as one
 inline constexpr double kLongestLease_s = 60.0;  ///< however slow samplers are known to be
 
-/// The frame that shows `requests` (at least one, seen from the first one's eye). Where nothing of the grid is in view: a raster of one pixel that
-/// looks past the grid, and one layer of one slice, so that the request is answered with an empty picture at hardly any cost.
+/// The frame that shows `requests` (at least one, seen from the first one's eye). Where nothing of the grid is in view:
+/// a raster of one pixel that looks past the grid, and one layer of one slice, so that the request is answered with an
+/// empty picture at hardly any cost.
 volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRequest>& requests, int layers);
 
 class VolumeSchedule : public Views {
@@ -31,9 +33,10 @@ class VolumeSchedule : public Views {
   void set_layers(int layers) { layers_ = layers; }
   int layers() const { return layers_; }
 
-  /// Begins the frame of the next view that waits, and of the first view of every other viewer whose eye is within kSameEye_m of its. Viewers take
-  /// turns; turns_only: only those that have a turn. False: none waits, as many frames are in flight as may be (views_at_once()), or some of
-  /// another partition are: so all of a viewer's views become complete in order.
+  /// Begins the frame of the next view that waits, and of the first view of every other viewer whose eye is within
+  /// kSameEye_m of its. Viewers take turns; turns_only: only those that have a turn. False: none waits, as many frames
+  /// are in flight as may be (views_at_once()), or some of another partition are: so all of a viewer's views become
+  /// complete in order.
   bool begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only = false);
 
   /// The slab of `sampler` in the oldest frame that still needs it. nullopt: there is none.
@@ -43,12 +46,13 @@ class VolumeSchedule : public Views {
   /// The packer has this slab. True the first time; false for duplicates, slabs never leased and unknown frames.
   bool tile_done(const wire::TileDone& tile, double now_s);
 
-  /// Drops the frames of leases that ran out; leases then last twice as long, until a frame is complete. lost_sampler is told whose. Returns
-  /// how many ran out.
+  /// Drops the frames of leases that ran out; leases then last twice as long, until a frame is complete. lost_sampler
+  /// is told whose. Returns how many ran out.
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
   /// A sampler is gone: drops the frames that lack its slab. Returns how many of its leases were out.
   int release_sampler(const std::string& sampler);
-  /// Drops all frames (new epoch, new packer). Their views wait again; of asynchronous viewers only if no newer request does.
+  /// Drops all frames (new epoch, new packer). Their views wait again; of asynchronous viewers only if no newer request
+  /// does.
   void drop_frames();
 
   size_t leases_of(const std::string& sampler) const;
@@ -56,7 +60,8 @@ class VolumeSchedule : public Views {
   std::vector<std::string> overdue(double now_s) const;
   size_t frames_in_flight() const { return frames_.size(); }
   uint64_t slabs_released() const { return released_; }
-  /// Seconds after which a lease expires now: lease_timeout_s, or four typical slab times if that is more; doubled for each time leases ran out.
+  /// Seconds after which a lease expires now: lease_timeout_s, or four typical slab times if that is more; doubled for
+  /// each time leases ran out.
   double lease_time_s() const;
 
  private:

@@ -12,7 +12,8 @@ class SlabPlan final : public Plan {
  public:
   SlabPlan(const MasterOptions& options, const PlanLinks& links);
 
-  /// A server of another volume than the one before, while servers of other parts of it are missing: nothing is shown until they come.
+  /// A server of another volume than the one before, while servers of other parts of it are missing: nothing is shown
+  /// until they come.
   Result<Adopted> adopt(const wire::Hello& data, double now_s) override;
   void leave_data(InstanceId data) override { volume_.leave(data); }
   void describe(wire::Welcome& welcome) const override;

@@ -38,7 +38,8 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
   const double target_s = std::max(options().lease_target_s, kTargetPerSampler_s * double(costs_.samplers()));
   for (Frame& f : frames_) {
     const double row_s = pixel_s * f.camera.width;
-    // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would keep all waiting.
+    // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would
+    // keep all waiting.
     const bool last = &f == &frames_.back() && f.tiles.rows_left() > 0 && f.tiles.rows_left() <= int(costs_.samplers());
     if (last && !idle && (row_s == 0 || row_s > kDearRow_s) && leases_of(sampler) > 0) continue;
     const int rows = band_rows(target_s, row_s, f.tiles.rows_left(), costs_.samplers());

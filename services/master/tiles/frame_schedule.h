@@ -1,5 +1,5 @@
-// View requests -> sampling frames -> leases (T7.3): leases are pulled by idle samplers, expire, and are handed out again; a tile is done
-// only when the packer has it. No sockets, no clocks.
+// View requests -> sampling frames -> leases (T7.3): leases are pulled by idle samplers, expire, and are handed out
+// again; a tile is done only when the packer has it. No sockets, no clocks.
 #pragma once
 
 #include <deque>
@@ -17,12 +17,14 @@ namespace telesplat::master {
 
 inline constexpr double kLeastOverdue_s = 0.015;  ///< nothing that has been out for less gets a backup
 
-/// Seconds of lease_target_s that each sampler adds at least: so master and packer have no more than 4000 leases of rows a second to look
-/// after, however many samplers there are. Set by `telesplat bench scaling`: on two cores that leaves the samplers' processes their part.
+/// Seconds of lease_target_s that each sampler adds at least: so master and packer have no more than 4000 leases of
+/// rows a second to look after, however many samplers there are. Set by `telesplat bench scaling`: on two cores that
+/// leaves the samplers' processes their part.
 inline constexpr double kTargetPerSampler_s = 0.25e-3;
 
-/// Rows that take longer are not kept in store at the end of a frame; of cheaper ones it takes longer to fetch the next than to wait for one
-/// in store (3 to 8 ms between idle and busy with 40 samplers on two cores; `telesplat bench scaling`).
+/// Rows that take longer are not kept in store at the end of a frame; of cheaper ones it takes longer to fetch the next
+/// than to wait for one in store (3 to 8 ms between idle and busy with 40 samplers on two cores; `telesplat bench
+/// scaling`).
 inline constexpr double kDearRow_s = 0.01;
 
 /// How the frames of a scene are leased.
@@ -43,20 +45,21 @@ class FrameSchedule : public Views {
   /// Begins the frame or frames of the next view that waits; see Views::take_view(). False: there is none.
   bool begin_view(EpochId epoch, bool turns_only = false);
 
-  /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been out for long in a
-  /// frame that has none (see backup_after_s()). The newest frame's last rows, one a sampler, go only to samplers that hold no other lease,
-  /// if they take longer than kDearRow_s. even_own: tiles whose lease ran out at this very sampler, too.
-  /// idle: it is known to hold none, though the packer may not have said so yet.
+  /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been
+  /// out for long in a frame that has none (see backup_after_s()). The newest frame's last rows, one a sampler, go only
+  /// to samplers that hold no other lease, if they take longer than kDearRow_s. even_own: tiles whose lease ran out at
+  /// this very sampler, too. idle: it is known to hold none, though the packer may not have said so yet.
   std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true, bool idle = false);
   /// Gives a lease its full time again. Unknown leases are ignored.
   void extend(LeaseId lease, double now_s);
-  /// The packer has this tile, which `sampler` (empty: unknown) sampled. Returns true the first time, whichever lease it came from; false
-  /// for duplicates, tiles never leased and unknown frames. Learns from the tile's times.
+  /// The packer has this tile, which `sampler` (empty: unknown) sampled. Returns true the first time, whichever lease
+  /// it came from; false for duplicates, tiles never leased and unknown frames. Learns from the tile's times.
   bool tile_done(const wire::TileDone& tile, const std::string& sampler, double now_s);
 
-  /// A sign of life: `sampler` is through with everything that a backup was faster with.
+  /// The sampler asked for work, so it no longer works on tiles that a backup delivered first.
   void heard_of(const std::string& sampler);
-  /// Takes back leases that ran out, those that a backup was faster with included. Returns how many; lost_sampler is told whose.
+  /// Takes back leases that ran out, those that a backup was faster with included. Returns how many; lost_sampler is
+  /// told whose.
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);
   /// Takes back all leases of a sampler that left. Returns how many.
   int release_sampler(const std::string& sampler);
@@ -73,8 +76,8 @@ class FrameSchedule : public Views {
   const SamplingCosts& costs() const { return costs_; }
   /// Seconds after which a lease expires now: 25 typical tile times, within [0.3, lease_timeout_s].
   double lease_time_s() const;
-  /// Seconds after which a tile that is out may be leased to another sampler too: 3 typical tile times, at least kLeastOverdue_s; never
-  /// while nothing is known.
+  /// Seconds after which a tile that is out may be leased to another sampler too: 3 typical tile times, at least
+  /// kLeastOverdue_s; never while nothing is known.
   double backup_after_s() const;
 
  private:

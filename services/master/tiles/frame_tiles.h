@@ -1,5 +1,5 @@
-// The tiles of one sampling frame: which are open, which are out with whom, which are done. No step looks at all of them, except those that
-// happen when a sampler leaves.
+// The tiles of one sampling frame: which are open, which are out with whom, which are done. No step looks at all of
+// them, except those that happen when a sampler leaves.
 #pragma once
 
 #include <array>
@@ -49,11 +49,12 @@ class FrameTiles {
   size_t tiles() const { return tiles_.size(); }
   const std::vector<geometry::Rect>& blocks() const { return blocks_; }
 
-  /// A tile to lease to `sampler`: first those taken back, then those never leased, carved with `rows` rows. Tiles whose lease ran out at
-  /// this very sampler only if even_own. The tile counts as leased from lease() on, which must follow.
+  /// A tile to lease to `sampler`: first those taken back, then those never leased, carved with `rows` rows. Tiles
+  /// whose lease ran out at this very sampler only if even_own. The tile counts as leased from lease() on, which must
+  /// follow.
   std::optional<size_t> take(const std::string& sampler, int rows, bool even_own);
-  /// The tile that has been out longest, if nothing was heard of it since before_s, it has no backup and is not with `sampler`
-  /// (nullptr: with whom does not matter).
+  /// The tile that has been out longest, if nothing was heard of it since before_s, it has no backup and is not with
+  /// `sampler` (nullptr: with whom does not matter).
   std::optional<size_t> overdue(double before_s, const std::string* sampler) const;
 
   /// Precondition: the tile came from take() or overdue(). Lease ids rise.

@@ -98,7 +98,8 @@ bool JuliaParameters::step(double now_s) {
   if (!animated()) return false;
   if (!begun_s_) begun_s_ = now_s;
   auto next = julia::parameters_at(*julia_, timeline_, now_s - *begun_s_);
-  // Checked at 256 instants when it began; between two of them a combination may still be out of limits: the last values stay.
+  // Checked at 256 instants when it began; between two of them a combination may still be out of limits: the last
+  // values stay.
   if (!next || *next == *julia_) return false;
   julia_ = *next;
   values_ = with(*next);

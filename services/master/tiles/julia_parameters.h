@@ -1,5 +1,5 @@
-// The parameters of a scene that travels as points in the current epoch, what may change them, and the animation that does (T7.3): what
-// differs between meshes, which have none, and Julia sets. No clocks: times come in.
+// The parameters of a scene that travels as points in the current epoch, what may change them, and the animation that
+// does (T7.3): what differs between meshes, which have none, and Julia sets. No clocks: times come in.
 #pragma once
 
 #include <map>
@@ -15,11 +15,13 @@ namespace telesplat::master {
 
 class JuliaParameters {
  public:
-  /// `timeline`: what animates the scene from its first view on; empty: what the data server's fact "animate" says, if anything.
+  /// `timeline`: what animates the scene from its first view on; empty: what the data server's fact "animate" says, if
+  /// anything.
   explicit JuliaParameters(julia::Timeline timeline = {}) : wished_(std::move(timeline)) {}
 
-  /// A data server said hello. One that says the same as the one before (it was restarted) changes nothing: values set or animated since
-  /// then stay. True: values() are others than before. problem: what is wrong with what it says; then nothing can be set.
+  /// A data server said hello. One that says the same as the one before (it was restarted) changes nothing: values set
+  /// or animated since then stay. True: values() are others than before. problem: what is wrong with what it says; then
+  /// nothing can be set.
   bool adopt(const wire::Hello& data, std::string& problem);
 
   const std::string& kind() const { return kind_; }
@@ -27,11 +29,11 @@ class JuliaParameters {
   bool is_julia() const { return scene::kind_named(kind_) == scene::Kind::kJulia; }
   const std::map<std::string, double>& values() const { return values_; }
 
-  /// Sets parameters by name. Error: the scene has none, no such parameter, one that is fixed or animated, no number, limits; then nothing
-  /// changed. Names parameter, value and limit.
+  /// Sets parameters by name. Error: the scene has none, no such parameter, one that is fixed or animated, no number,
+  /// limits; then nothing changed. Names parameter, value and limit.
   Status set(const std::map<std::string, std::string>& arguments);
-  /// Begins the animation `text`, instead of the one that runs; "off" ends it, values stay as they are. Error: cannot be read, does not fit
-  /// the scene; then nothing changed.
+  /// Begins the animation `text`, instead of the one that runs; "off" ends it, values stay as they are. Error: cannot
+  /// be read, does not fit the scene; then nothing changed.
   Status animate(const std::string& text);
 
   bool animated() const { return !timeline_.empty(); }

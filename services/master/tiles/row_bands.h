@@ -1,4 +1,5 @@
-// How the rows of a frame are handed out (T7.3): blocks from the middle outward, and bands of whole rows carved from them as samplers ask.
+// How the rows of a frame are handed out (T7.3): blocks from the middle outward, and bands of whole rows carved from
+// them as samplers ask.
 #pragma once
 
 #include <vector>
@@ -9,8 +10,8 @@ namespace telesplat::master {
 
 inline constexpr int kBlockRows = 64;  ///< rows of a block; what is packed and published at once
 
-/// Blocks of kBlockRows rows, as wide as the frame, the last of the image may be lower; those nearest the middle row first (that is where
-/// the person looks, and where rows take longest, so that the frame ends with cheap ones).
+/// Blocks of kBlockRows rows, as wide as the frame, the last of the image may be lower; those nearest the middle row
+/// first (that is where the person looks, and where rows take longest, so that the frame ends with cheap ones).
 std::vector<geometry::Rect> cut_blocks(int width, int height);
 
 /// Carves bands from the blocks, one block after the other, each from its top.
@@ -34,8 +35,9 @@ class RowBands {
   int rows_left_ = 0;
 };
 
-/// Guided self-scheduling (Polychronopoulos and Kuck, 1987) with a target: as many rows as take target_s, but no more than a third of an
-/// equal share of what is left (rounded up), so that all finish together. At least 1. row_s: seconds a row of this sampler; 0: not known yet, 1 row.
+/// Guided self-scheduling (Polychronopoulos and Kuck, 1987) with a target: as many rows as take target_s, but no more
+/// than a third of an equal share of what is left (rounded up), so that all finish together. At least 1. row_s: seconds
+/// a row of this sampler; 0: not known yet, 1 row.
 int band_rows(double target_s, double row_s, int rows_left, size_t samplers);
 
 }  // namespace telesplat::master

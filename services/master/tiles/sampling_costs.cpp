@@ -2,7 +2,8 @@
 
 namespace telesplat::master {
 
-// Older tiles fade: rows of the frame's middle cost more than those of its edges, so ten tiles tell more than a hundred.
+// Older tiles fade: rows of the frame's middle cost more than those of its edges, so ten tiles tell more than a
+// hundred.
 void SamplingCosts::Mean::add(double s, double n) {
   seconds = 0.9 * seconds + s;
   pixels = 0.9 * pixels + n;

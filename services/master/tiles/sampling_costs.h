@@ -15,7 +15,8 @@ class SamplingCosts {
 
   /// A tile of `pixels` pixels took `sampler` so long. Ignored: samplers that left, times that are not above 0.
   void learn(const std::string& sampler, double seconds, double pixels);
-  /// Seconds a pixel: mean of the sampler's last ten tiles or so, weighted by pixels; while it has none that of all; 0 if nothing is known.
+  /// Seconds a pixel: mean of the sampler's last ten tiles or so, weighted by pixels; while it has none that of all; 0
+  /// if nothing is known.
   double pixel_s(const std::string& sampler) const;
 
  private:

@@ -45,8 +45,8 @@ class Animation : public ::testing::Test {
     r.camera.height = 4;
     core.on("v" + std::to_string(viewer), r, now_s);
   }
-  // Everything sent since the last call goes where it belongs: leases into `leases`, the session into `told`; every lease's epoch must be
-  // the newest that its sampler and the packer were told of before.
+  // Everything sent since the last call goes where it belongs: leases into `leases`, the session into `told`; every
+  // lease's epoch must be the newest that its sampler and the packer were told of before.
   void deliver() {
     for (const auto& out : core.take_outgoing()) {
       const auto body = std::as_bytes(std::span(out.body));

@@ -106,7 +106,7 @@ class KindsOfScenes : public ::testing::Test {
   std::map<std::string, wire::Welcome> last;
 };
 
-// ---- from one pipeline to the other -----------------------------------------------------------------------------------------
+// ---- from one pipeline to the other ---------------------------------------------------------------------------------
 
 TEST_F(KindsOfScenes, FromAMeshToAVolumeAndBackViewsStayAndEpochsBegin) {
   hello(data(1, "mesh"));
@@ -158,7 +158,7 @@ TEST_F(KindsOfScenes, AMeshIsShownUntilAllPartsOfAVolumeAreThere) {
   EXPECT_EQ(told().epoch.value, 2u);
 }
 
-// ---- another volume ---------------------------------------------------------------------------------------------------------
+// ---- another volume -------------------------------------------------------------------------------------------------
 
 TEST_F(KindsOfScenes, AnotherVolumesFirstServerDoesNotEndTheMaster) {
   hello(volume_part(1, 12, 0, 1));
@@ -232,7 +232,7 @@ TEST_F(KindsOfScenes, SliceWeightsOfAMeshAreRefused) {
   EXPECT_FALSE(weigh(1, 0, 10));
 }
 
-// ---- boxes ------------------------------------------------------------------------------------------------------------------
+// ---- boxes ----------------------------------------------------------------------------------------------------------
 
 TEST_F(KindsOfScenes, ABoxBeyondTheLimitsIsRefusedAndNotPassedOn) {
   hello(data(1, "mesh"));
@@ -274,7 +274,7 @@ TEST_F(KindsOfScenes, ARefusedServersEndpointsAreToldNobody) {
   EXPECT_EQ(told().box_room.hi.x, 1);
 }
 
-// ---- what was not given -----------------------------------------------------------------------------------------------------
+// ---- what was not given ---------------------------------------------------------------------------------------------
 
 TEST_F(KindsOfScenes, WhatWasNotGivenIsAsTheKindHasIt) {
   join();
@@ -317,7 +317,7 @@ TEST(Settings, WhatWasGivenIsToldOfEveryKind) {
   }
 }
 
-// ---- text -------------------------------------------------------------------------------------------------------------------
+// ---- text -----------------------------------------------------------------------------------------------------------
 
 TEST_F(KindsOfScenes, StatusShowsTextThatIsNotUtf8) {
   auto mesh = data(1, "mesh");

@@ -69,7 +69,8 @@ TEST(Scatter, LargeTransfersShareRounds) {
   // Two senders, two receivers: large along one diagonal, small along the other.
   const std::vector<Transfer> t{{0, 0, 100}, {0, 1, 1}, {1, 0, 1}, {1, 1, 100}};
   EXPECT_EQ(schedule_scatter(t)->makespan(t), 101u);
-  // What was coloured badly is put right by swaps: three rounds that each have a large transfer in order of their bytes.
+  // What was coloured badly is put right by swaps: three rounds that each have a large transfer in order of their
+  // bytes.
   const std::vector<Transfer> u{{0, 0, 9}, {0, 1, 8}, {1, 1, 7}, {1, 2, 9}, {2, 2, 8}, {2, 0, 1}};
   EXPECT_LE(schedule_scatter(u)->makespan(u), schedule_scatter(u, 0, false)->makespan(u));
 }

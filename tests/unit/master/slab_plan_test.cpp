@@ -54,7 +54,7 @@ wire::TileDone done(const wire::SliceLease& l) {
   return m;
 }
 
-// ---- planning ---------------------------------------------------------------------------------------------------------------
+// ---- planning -------------------------------------------------------------------------------------------------------
 
 TEST(Plan, ViewsThatSeeTheVolumeHaveItsFrame) {
   const auto grid = session().grid;
@@ -93,7 +93,7 @@ TEST(Plan, ViewsThatSeeNothingHaveAnEmptyFrameThatIsValid) {
   }
 }
 
-// ---- frames -----------------------------------------------------------------------------------------------------------------
+// ---- frames ---------------------------------------------------------------------------------------------------------
 
 class Slabs : public ::testing::Test {
  protected:
@@ -278,7 +278,7 @@ TEST_F(Slabs, SaysWhoIsOverdue) {
   EXPECT_TRUE(s.overdue(0.7).empty());
 }
 
-// ---- the scene --------------------------------------------------------------------------------------------------------------
+// ---- the scene ------------------------------------------------------------------------------------------------------
 
 wire::Hello data_hello(const volume::Session& s, const std::string& name, uint64_t instance) {
   wire::Hello h;
@@ -453,7 +453,7 @@ TEST(VolumeScene, PlaysByTheClock) {
   EXPECT_FALSE(scene.animate("c.x=0:1:2s"));
 }
 
-// ---- assignment sheets --------------------------------------------------------------------------------------------------------
+// ---- assignment sheets ----------------------------------------------------------------------------------------------
 
 TEST(Assignment, CoversEverySlabAndItsNeighboursOnceWithoutConflicts) {
   VolumeScene scene;
@@ -488,7 +488,7 @@ TEST(Assignment, CoversEverySlabAndItsNeighboursOnceWithoutConflicts) {
       std::is_sorted(sheet.begin(), sheet.end(), [](const auto& a, const auto& b) { return a.round < b.round; }));
 }
 
-// ---- the master -------------------------------------------------------------------------------------------------------------
+// ---- the master -----------------------------------------------------------------------------------------------------
 
 class VolumeMaster : public ::testing::Test {
  protected:
