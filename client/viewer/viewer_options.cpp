@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "client/viewer/coupling/coupling.h"
+#include "common/splat/kernel_traits.h"
 #include "common/wire/messages.h"
 
 namespace telesplat::viewer {
@@ -97,8 +98,8 @@ Table drawing_table(ViewerOptions& o) {
       {.flag = "--renderer", .value = &o.renderer, .help = "auto, cpu or gl", .limits = Names{"auto", "cpu", "gl"}},
       {.flag = "--splat",
        .value = &o.splat,
-       .help = "kernel: square, disc, ellipse or ewa",
-       .limits = Names{"square", "disc", "ellipse", "ewa"},
+       .help = "kernel: " + splat::kernel_list(),
+       .limits = splat::kernel_names(),
        .fits = kPoints},
       {.flag = "--splat-scale",
        .value = &o.splat_scale,

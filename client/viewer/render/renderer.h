@@ -2,7 +2,9 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
+#include "common/core/result.h"
 #include "common/splat/cpu_splatter.h"
 
 namespace telesplat::viewer {

@@ -6,6 +6,7 @@
 
 #include "common/image/flip.h"
 #include "common/points/point_model.h"
+#include "common/splat/kernel_traits.h"
 #include "services/data/data_options.h"
 
 namespace telesplat::launcher {
@@ -16,7 +17,7 @@ struct CompareOptions {
   std::string out;
   int poses = 0;  ///< 0: 4 of a run, 1 with `still`
   std::vector<uint64_t> frames;
-  std::vector<std::string> kernels{"square", "disc", "ellipse", "ewa"};
+  std::vector<std::string> kernels = splat::kernel_names();
   std::vector<std::string> renderers;  ///< empty: cpu, and gl where there is OpenGL
   std::string finish = "on";
   double splat_scale = 0;  ///< 0: what suits the kernel
