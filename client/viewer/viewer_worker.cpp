@@ -122,6 +122,8 @@ void ViewerWorker::follow_session() {
     if (received_) received_->on_new_master();
   }
   const auto pipeline = view.pipeline();
+  if (!pipeline && !view.fact("kind").empty())
+    log::error("the session's scene is of the kind \"{}\", which this viewer does not know", view.fact("kind"));
   if (session.box_room.empty() || !pipeline) return;
   if (const Status s = follow(*pipeline, session); !s)
     return log::error("the session as the master at {} tells of it cannot be shown: {}", options_.service.master,
