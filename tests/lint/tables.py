@@ -37,7 +37,6 @@ FLOORS = {
     ],
     "services/data": [
         ["services/data/base"],
-        [("services/data/volume/volume.h", "services/data/surface/isosurface.h")],
         ["services/data/volume/formats"],
         ["services/data/import"],
         ["services/data/served.h"],
