@@ -18,8 +18,8 @@ inline constexpr double kFlipPixelsPerDegree = 67.02;
 ///
 /// Per pixel, with colours as sRGB codes (file.h):
 ///   colour: linear RGB -> YyCxCz; each channel filtered with its contrast sensitivity function (sums of Gaussians
-///     in degrees, sampled at pixels_per_degree, to 3 standard deviations of the widest); back to linear RGB, clamped to
-///     [0, 1]; -> L*a*b* with Hunt's adjustment (a, b times L / 100);
+///     in degrees, sampled at pixels_per_degree, to 3 standard deviations of the widest); back to linear RGB, clamped
+///     to [0, 1]; -> L*a*b* with Hunt's adjustment (a, b times L / 100);
 ///     h = |dL| + sqrt(da^2 + db^2) (HyAB), raised to 0.7 and compressed so that 0.4 of the largest (green against
 ///     blue) becomes 0.95: dE_c in [0, 1];
 ///   features: first (edges) and second (points) derivatives of a Gaussian of 0.082 degrees' width on luminance,

@@ -3,10 +3,10 @@
 
 #include <array>
 
+#include "common/splat/flat/splat_table.h"
 #include "common/splat/kernel_traits.h"
 #include "common/splat/pixel_key.h"
 #include "common/splat/select/view_selection.h"
-#include "common/splat/splat_table.h"
 #include "common/splat/surfel/contour.h"
 
 namespace telesplat::splat {

@@ -1,8 +1,8 @@
 // A pixel while a tile is splatted: one 64-bit key. The least key wins, compared as signed numbers.
 //
 //   bit 63       1 in every key; 0 outside a splat (kOutsideSplat flips it): larger than all keys
-//   bits 62..45  depth code, 18 bits: (bits of the depth as float - bits of `near` as float) >> 9, that is 2^14 steps an
-//                octave, 16 octaves from `near` on; positive floats are ordered as their bits are
+//   bits 62..45  depth code, 18 bits: (bits of the depth as float - bits of `near` as float) >> 9, that is 2^14
+//                steps an octave, 16 octaves from `near` on; positive floats are ordered as their bits are
 //   bits 44..43  spacing class: how far apart the samples lie on the screen (spacing_class)
 //   bits 42..40  ring: floor(8 q), at most 7; q = squared distance from the splat's centre, 1 on its contour
 //   bits 39..24  normal (image/normal.h, 16 bits)

@@ -5,7 +5,7 @@
 #include <hwy/highway.h>
 
 #include "common/splat/depth-inl.h"
-#include "common/splat/opaque-inl.h"
+#include "common/splat/flat/opaque-inl.h"
 #include "common/splat/resolve-inl.h"
 
 HWY_BEFORE_NAMESPACE();

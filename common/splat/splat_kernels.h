@@ -4,7 +4,7 @@
 // A point's position:  h = row . (x, y, z, 1)  for the three rows of its leaf's transform, summed from left to right,
 //   fixed = floor(h.xy * (2^sub_bits / h.w) + shift)      (2^-sub_bits pixels; single precision)
 //   first pixel = fixed >> sub_bits,  place within it = fixed & (2^sub_bits - 1)
-// and its key: see pixel_key.h; what a splat adds to it in each pixel it covers: see splat_table.h.
+// and its key: see pixel_key.h; what a splat adds to it in each pixel it covers: see flat/splat_table.h.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "common/splat/finish.h"
+#include "common/splat/flat/splat_table.h"
 #include "common/splat/pixel_key.h"
 #include "common/splat/select/view_selection.h"
-#include "common/splat/splat_table.h"
 #include "common/splat/tile_binning.h"
 
 namespace telesplat::splat {

@@ -88,7 +88,7 @@ struct Changes {
 
 using Blocks = std::vector<double>;  // of a picture, row-major
 
-// Of each block: mean over pixels and channels of |(a - b) - (c - d)|; b and d may be null.
+// The mean of each block over pixels and channels of |(a - b) - (c - d)|; b and d may be null.
 Blocks differences(const image::View& a, const image::View* b, const image::View& c, const image::View* d) {
   Blocks out(size_t{kWidth / kBlock} * (kHeight / kBlock));
   for (int y = 0; y < kHeight; ++y)

@@ -73,7 +73,7 @@ TEST_F(GlRendererTest, WaysToMoveDataMakeNoDifference) {
   }
 }
 
-// Two frames into the same renderer do not show through each other, whatever was drawn before.
+// Two frames into the same renderer do not show through each other, after any frame before.
 TEST_F(GlRendererTest, FramesDoNotDependOnTheOnesBefore) {
   const auto worn = made(GlRenderer::make());
   ASSERT_TRUE(worn);

@@ -77,7 +77,7 @@ TEST_F(GlVolumeTest, ShowsWhatTheCpuShows) {
 TEST_F(GlVolumeTest, ShowsEachFrameAfterTheOtherAndNothing) {
   const volume::Grid grid = turned_grid();
   const auto camera = looking_at(grid.centre_room(), orbit(grid, 0.8, 0.3, 0.2), 200, 150);
-  // Of different sizes and numbers of layers, in the same place in memory.
+  // Frames differ in size and number of layers, and lie in the same place in memory.
   for (int n = 0; n < 4; ++n) {
     const auto sampled = looking_at(grid.centre_room(), orbit(grid, 0.8, 0.3, 0.2), n % 2 ? 90 : 320, n % 2 ? 70 : 240);
     volume::VolumeFrame frame = blob_frame(grid, sampled, n == 2 ? 64 : 5 + n);

@@ -11,7 +11,7 @@
 
 #include "common/image/normal.h"
 #include "common/splat/cpu_splatter.h"
-#include "common/splat/splat_table.h"
+#include "common/splat/flat/splat_table.h"
 #include "common/splat/tile_binning.h"
 #include "tests/support/finish_plainly.h"
 

@@ -29,8 +29,8 @@ struct DrawItem {
   float splat_px;               ///< side (square) or diameter (disc) in display pixels, >= 1
   /// The mosaic's. With cluster->key it names the points, for renderers that keep copies. 0: not to be kept.
   Sequence sequence{};
-  /// Surfel kernels: radius of a splat that faces its sampling view, metres in room space. It is half of splat_px at the
-  /// leaf's centre, but not widened to a pixel.
+  /// Surfel kernels: radius of a splat that faces its sampling view, metres in room space. It is half of splat_px at
+  /// the leaf's centre, but not widened to a pixel.
   float radius_m = 0;
   /// Surfel kernels: from the leaf towards the eye of the sampling view, unit length; or zero.
   glm::vec3 to_eye{0, 0, 1};

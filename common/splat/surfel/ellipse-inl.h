@@ -60,8 +60,8 @@ class EllipseSink {
 
   void flush() {
     for (size_t i = 0; i < count_; ++i) {
-      // Most splats fit into four by four pixels, and are drawn without any loop whose end could be predicted wrongly: what
-      // lies outside the ellipse stays as it is.
+      // Most splats fit into four by four pixels, and are drawn without any loop whose end could be predicted wrongly:
+      // what lies outside the ellipse stays as it is.
       const uint32_t size = batch_[kSize][i];
       if ((size & 255) <= 4 && size >> 8 <= 4)
         draw<false>(i, 4, size >> 8 <= 2 ? 2 : 4);

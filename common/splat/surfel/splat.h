@@ -4,8 +4,8 @@
 
 #include <bit>
 
+#include "common/splat/flat/splat_table.h"
 #include "common/splat/pixel_key.h"
-#include "common/splat/splat_table.h"
 #include "common/splat/surfel/contour.h"
 
 namespace telesplat::splat {

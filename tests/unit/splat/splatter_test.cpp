@@ -3,7 +3,7 @@
 
 #include <set>
 
-#include "common/splat/splat_table.h"
+#include "common/splat/flat/splat_table.h"
 #include "tests/support/splat_scene.h"
 
 namespace telesplat {

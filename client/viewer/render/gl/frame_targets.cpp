@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 
-#include "common/splat/splat_table.h"
+#include "common/splat/flat/splat_table.h"
 
 namespace telesplat::viewer {
 

@@ -14,7 +14,7 @@
 #include "common/core/clock.h"
 #include "common/gl/stage_timer.h"
 #include "common/splat/finish.h"
-#include "common/splat/splat_table.h"
+#include "common/splat/flat/splat_table.h"
 
 namespace telesplat::viewer {
 namespace {

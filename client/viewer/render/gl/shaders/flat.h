@@ -1,4 +1,4 @@
-// Squares and discs: splats that face the screen (common/splat/splat_table.h).
+// Squares and discs: splats that face the screen (common/splat/flat/splat_table.h).
 #pragma once
 
 #include <string_view>

@@ -1,4 +1,4 @@
-#include "common/splat/splat_table.h"
+#include "common/splat/flat/splat_table.h"
 
 #include <algorithm>
 #include <cmath>
