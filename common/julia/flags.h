@@ -8,10 +8,6 @@
 #include "common/julia/animation.h"
 #include "common/options/table.h"
 
-namespace CLI {
-class App;
-}
-
 namespace telesplat::julia {
 
 /// The word that stands where a data file would.
@@ -30,13 +26,11 @@ struct SceneOptions {
   /// Parameter name and text, in the order of parameter_infos(); an empty text was not given.
   std::vector<std::pair<std::string, std::string>> values = parameters_not_given();
   std::string animate;  ///< empty or "off": nothing
-  bool list_presets = false;
-  bool any() const;  ///< something was given that only a Julia set takes
+  bool any() const;     ///< something was given that only a Julia set takes
 };
 
 /// --preset, --c, --animate, --list-presets and one flag a parameter: --c.x, --iterations, ..., limits in their help.
 options::Table scene_table(SceneOptions& options);
-void add_scene_flags(CLI::App& app, SceneOptions& options);
 
 struct Scene {
   std::string title;      ///< "julia (coral)"; "julia" if c was given

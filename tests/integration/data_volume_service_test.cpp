@@ -7,13 +7,25 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "services/data/data_service.h"
+#include "services/data/kinds.h"
 #include "services/data/volume/served_volume.h"
+#include "tests/support/data_files.h"
 #include "tests/support/volume_samples.h"
 
 namespace telesplat::data {
 namespace {
 
 constexpr double kDeadline_s = 30;
+
+// The next message of type M that a peer sends; others are passed over.
+template <class M>
+std::optional<std::pair<M, net::Message>> next(net::Socket& socket) {
+  for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until; net::wait_readable({&socket}, 20))
+    while (const auto m = socket.receive())
+      if (m->type == M::kName)
+        if (auto decoded = socket.decode<M>(*m)) return std::pair(std::move(*decoded), *m);
+  return std::nullopt;
+}
 
 class Service : public testing::Test {
  protected:
@@ -30,15 +42,6 @@ class Service : public testing::Test {
   void TearDown() override {
     stop = true;
     if (server.joinable()) server.join();
-  }
-  // The next message of type M that a peer sends; others are passed over.
-  template <class M>
-  std::optional<std::pair<M, net::Message>> next(net::Socket& socket) {
-    for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until; net::wait_readable({&socket}, 20))
-      while (const auto m = socket.receive())
-        if (m->type == M::kName)
-          if (auto decoded = socket.decode<M>(*m)) return std::pair(std::move(*decoded), *m);
-    return std::nullopt;
   }
   wire::Hello welcome(uint64_t epoch, const std::string& transfer = {}) {
     wire::Hello hello;
@@ -167,6 +170,43 @@ TEST(DataServer, RefusesAVolumesFlagsWhereThereIsNoVolume) {
   DataServiceOptions missing;
   missing.scene = "nowhere.raw", missing.volume.raw = "4x4x4:u8";
   EXPECT_NE(refusal(missing).find("nowhere.raw"), std::string::npos);
+}
+
+TEST(DataServer, SendsTheChunksOfAMesh) {
+  const test::TempFolder folder;
+  DataServiceOptions options;
+  options.service.name = "data-1", options.service.master = "inproc://master";
+  options.service.bind = "inproc://chunks";
+  options.scene = folder.write("grid.ply", test::ply_of(test::wavy_grid(20)));
+  options.mesh.use_cache = false;
+  const auto served = open(options, [](const char*, double) {});
+  ASSERT_TRUE(served) << served.error().text;
+
+  net::Context context;
+  net::Socket master(context, net::Kind::kRouter, "master");
+  ASSERT_TRUE(master.bind("inproc://master"));
+  std::atomic<bool> stop = false;
+  std::thread server([&] { EXPECT_EQ(serve(context, **served, options.service, [&] { return stop.load(); }), 0); });
+  const auto hello = next<wire::Hello>(master);
+  net::Socket sampler(context, net::Kind::kDealer, "sampler", {.max_message_bytes = wire::kMaxBulkBytes});
+  EXPECT_TRUE(sampler.connect("inproc://chunks"));
+  sampler.send(wire::ChunkListRequest{EpochId{3}});
+  const auto list = next<wire::ChunkList>(sampler);
+  sampler.send(wire::ChunkRequest{EpochId{3}, ChunkId{0}});
+  const auto chunk = next<wire::Chunk>(sampler);
+  sampler.send(wire::ChunkRequest{EpochId{3}, ChunkId{99}});
+  const auto none = next<wire::Chunk>(sampler);
+  stop = true;
+  server.join();
+
+  ASSERT_TRUE(hello && list && chunk && none);
+  EXPECT_EQ(hello->first.facts.at("scene"), "grid.ply");
+  EXPECT_EQ(hello->first.facts.at("triangles"), "800");
+  EXPECT_EQ(hello->first.endpoints.at("chunks"), "inproc://chunks");
+  EXPECT_EQ(list->first.epoch, EpochId{3});
+  ASSERT_EQ(list->first.chunks.size(), 1u);
+  EXPECT_EQ(chunk->first.data.size(), list->first.chunks[0].bytes);
+  EXPECT_TRUE(none->first.data.empty());
 }
 
 }  // namespace

@@ -57,7 +57,7 @@ TEST_F(Kinds, TheSurfaceOfARawVolumeIsAMesh) {
   EXPECT_EQ((*served)->kind(), Kind::kMesh);
   const wire::Hello hello = make_hello(**served, "data", "inproc://chunks");
   EXPECT_EQ(hello.facts.at("kind"), "mesh");
-  EXPECT_EQ(hello.facts.at("format"), "isosurface");
+  EXPECT_EQ(hello.facts.at("format"), "iso");
   EXPECT_EQ(hello.endpoints.at("chunks"), "inproc://chunks");
 }
 
@@ -111,7 +111,7 @@ TEST_F(Kinds, AJuliaSetHasNothingToAskFor) {
   EXPECT_FALSE(hello.box_room.empty());
 }
 
-// ---- the table of flags ----------------------------------------------------------------------------------------------
+// ---- the table of flags --------------------------------------------------------------------------------------------
 
 TEST(DataFlags, WhatTheLauncherHandsOnIsReadAgain) {
   DataOptions o, usual;
