@@ -49,13 +49,16 @@ function(telesplat_program name)
   telesplat_headers(${name} common)
 endfunction()
 
-# telesplat_test(LABEL NAME sources... [DEPS targets...] [TIMEOUT seconds])
+# telesplat_test(LABEL NAME sources... [DEPS targets...] [TIMEOUT seconds] [SERIAL])
 #   one GoogleTest executable, each of its cases a CTest test with LABEL. Its working directory is the repository's
-#   root.
+#   root. SERIAL: its cases measure time or need the whole machine, so no other test runs beside them.
 function(telesplat_test label name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "SERIAL" "TIMEOUT" "DEPS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
+  endif()
+  if(ARG_SERIAL)
+    set(serial RUN_SERIAL TRUE)
   endif()
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
@@ -63,7 +66,7 @@ function(telesplat_test label name)
   target_compile_options(${name} PRIVATE ${TELESPLAT_TEST_FLAGS})
   telesplat_headers(${name} test)
   gtest_discover_tests(${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS ${label} TIMEOUT ${ARG_TIMEOUT})
+    PROPERTIES LABELS ${label} TIMEOUT ${ARG_TIMEOUT} ${serial})
 endfunction()
 
 # telesplat_fuzz(NAME CORPUS folder [DEPS targets...])   of NAME_fuzz.cpp and corpus/folder

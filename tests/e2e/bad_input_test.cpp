@@ -89,13 +89,14 @@ INSTANTIATE_TEST_SUITE_P(Cases, BadInput, ::testing::ValuesIn(kCases),
 
 TEST(BadUsage, UnknownFlagsAndAbsentScenesAreRefused) {
   TemporaryFolder folder;
+  // It asks for some seconds.
+  Program ctl("telesplat", {"ctl", "status", "--master", "tcp://127.0.0.1:1"}, folder / "ctl");
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"run"}, {"run", "--no-such-flag"}, {"walk"}, {}, {"inspect", folder / "nothing"}}) {
     Program program("telesplat", arguments, folder / "telesplat");
     EXPECT_EQ(program.wait(30), 2) << program.err();
     EXPECT_FALSE(program.err().empty());
   }
-  Program ctl("telesplat", {"ctl", "status", "--master", "tcp://127.0.0.1:1"}, folder / "ctl");
   EXPECT_EQ(ctl.wait(30), 1);
   EXPECT_NE(ctl.err().find("tcp://127.0.0.1:1"), std::string::npos);
 }

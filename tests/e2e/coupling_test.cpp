@@ -23,8 +23,10 @@ TEST_P(Couplings, OneFrameForEachViewUpdate) {
   std::string scene;  // none: the terrain
   if (c.kind == "julia") scene = "julia";
   if (c.kind == "volume") write_volume(scene = folder / "balls.mha");
-  std::vector<std::string> arguments{"--size",     "320x200", "--sampling-size", "240x150", "--coupling", c.coupling,
-                                     "--duration", "3",       "--record-points", "0"};
+  // Until there are 40 frames.
+  std::vector<std::string> arguments{"--size",     "320x200",  "--sampling-size", "240x150",
+                                     "--coupling", c.coupling, "--duration",      "6",
+                                     "--frames",   "40",       "--record-points", "0"};
   if (c.buffers) arguments.insert(arguments.end(), {"--buffers", std::to_string(c.buffers)});
   PipelineRun run(arguments, scene);
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
@@ -38,7 +40,8 @@ TEST_P(Couplings, OneFrameForEachViewUpdate) {
   EXPECT_EQ(s["errors"]["messages_rejected"], 0);
   EXPECT_GT(s["frames"], 5);
 
-  // Each frame shows the update of another request, in their order. When it ends some may be complete and not yet displayed.
+  // Each frame shows the update of another request, in their order. When it ends some may be complete and not yet
+  // displayed.
   const auto requests = run.column("frames.csv", "request");
   ASSERT_EQ(requests.size(), size_t(s["frames"]));
   EXPECT_TRUE(std::is_sorted(requests.begin(), requests.end()));

@@ -1,4 +1,5 @@
-// Services started one by one, as on machines and in containers of their own: they find each other, and end when they are told to.
+// Services started one by one, as on machines and in containers of their own: they find each other, and end when they
+// are told to.
 #include <gtest/gtest.h>
 
 #include <csignal>

@@ -20,7 +20,7 @@ std::vector<std::string> with(std::vector<std::string> more) {
 }
 
 TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
-  PipelineRun run(with({"--preset", "wings", "--duration", "4", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
+  PipelineRun run(with({"--preset", "wings", "--duration", "3", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
                   "julia");
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
@@ -58,7 +58,7 @@ TEST(Julia, WhatIsDisplayedIsWhatRaysSee) {
 }
 
 TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
-  PipelineRun run(with({"--animate", "c.y=-0.5:-0.3:2s;slice.offset=0:0.2:3s", "--duration", "5", "--verify", "10",
+  PipelineRun run(with({"--animate", "c.y=-0.5:-0.3:2s;slice.offset=0:0.2:3s", "--duration", "4", "--verify", "10",
                         "--trajectory", "still"}),
                   "julia");
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
@@ -94,7 +94,8 @@ TEST(Julia, EveryFrameOfAnAnimationIsOfOneEpochAndCanBeMadeAgain) {
     EXPECT_NE(std::find(epochs.begin(), epochs.end(), shown[i]), epochs.end()) << shown[i];
   }
   EXPECT_GT(displayed.size(), 3u);
-  // Compared with the set of its own epoch each frame is right (31 dB); compared with the first epoch's all are at 21 dB.
+  // Compared with the set of its own epoch each frame is right (31 dB); compared with the first epoch's all are at 21
+  // dB.
   const auto s = run.summary();
   EXPECT_GE(s["quality"]["views"], 2);
   EXPECT_GT(s["quality"]["psnr_db"]["median"], 27);
@@ -135,7 +136,7 @@ TEST(Julia, ASceneFileWithKeyFrames) {
   std::ofstream(path)
       << "[scene]\nkind = \"julia\"\npreset = \"lantern\"\n[julia]\niterations = 40\n"
          "[[keyframe]]\nt = 0\nc.w = -0.2\n[[keyframe]]\nt = 1\nc.w = -0.3\n[[keyframe]]\nt = 2\nc.w = -0.2\n";
-  PipelineRun run(with({"--duration", "3"}), path);
+  PipelineRun run(with({"--duration", "2"}), path);
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   const auto iterations = run.column("epochs.csv", "iterations"), values = run.column("epochs.csv", "c.w");
   ASSERT_GT(iterations.size(), 2u);

@@ -19,7 +19,7 @@ void expect_distribution(const nlohmann::json& d, const std::string& name) {
 }
 
 TEST(Record, EveryFileIsThereAndTrue) {
-  PipelineRun run({"--duration", "3", "--hold", "1", "--verify", "20", "--record-every", "60"});
+  PipelineRun run({"--duration", "2", "--hold", "1", "--verify", "15", "--record-every", "60"});
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   for (const char* name : {"session.toml", "frames.csv", "updates.csv", "tiles.csv", "trace.json", "summary.json",
@@ -126,7 +126,7 @@ TEST(Record, ARealMesh) {
   const std::string data = set ? set : std::string(home ? home : "") + "/.cache/telesplat-data",
                     mesh = data + "/meshes/alderson-bone-718k.ply";
   if (!fs::exists(mesh)) GTEST_SKIP() << mesh << " is not there; TELESPLAT_DATA names the folder of real data sets";
-  PipelineRun run({"--duration", "3", "--hold", "1", "--verify", "30"}, mesh);
+  PipelineRun run({"--duration", "2", "--hold", "1", "--verify", "20"}, mesh);
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   const auto s = run.summary();
   EXPECT_GT(s["primitives"], 700000);

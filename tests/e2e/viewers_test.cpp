@@ -35,7 +35,7 @@ TEST(Viewers, AViewerThatWasStoppedResynchronises) {
   ::kill(viewer, SIGSTOP);
   {
     // Another one walks around meanwhile, so that there is something to miss.
-    Program other("telesplat-viewer", viewer_arguments(run, "viewer-2", "orbit", "3"), run.folder() / "viewer-2");
+    Program other("telesplat-viewer", viewer_arguments(run, "viewer-2", "orbit", "2"), run.folder() / "viewer-2");
     EXPECT_EQ(other.wait(60), 0) << other.err();
   }
   EXPECT_TRUE(run.wait_status([&](const auto& s) {
@@ -50,7 +50,8 @@ TEST(Viewers, AViewerThatWasStoppedResynchronises) {
   EXPECT_TRUE(run.all_gone());
 }
 
-// A version of the data set for which nothing changed: the display goes over from one to the next, and is never without points.
+// A version of the data set for which nothing changed: the display goes over from one to the next, and is never without
+// points.
 TEST(Viewers, ANewEpochReplacesTheOldOneOnDisplay) {
   PipelineRun run({"--duration", "0", "--trajectory", "still"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();

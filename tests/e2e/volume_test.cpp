@@ -77,7 +77,7 @@ double psnr_db(const image::View& a, const image::View& b) {
 }
 
 TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
-  PipelineRun run(with({"--tf", kGlass, "--duration", "4", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
+  PipelineRun run(with({"--tf", kGlass, "--duration", "3", "--hold", "1.5", "--verify", "10", "--samplers", "2"}),
                   volume());
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
@@ -107,7 +107,7 @@ TEST_F(VolumeRun, WhatIsDisplayedIsWhatRaysSee) {
 
 TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
   const std::vector<std::string> common{"--tf", kGlass,   "--fov", "60",           "--duration",
-                                        "3",    "--hold", "2",     "--target-fps", "20"};
+                                        "2.5",  "--hold", "1.5",   "--target-fps", "20"};
   auto arguments = common;
   arguments.insert(arguments.end(), {"--size", "320x400", "--data-servers", "2", "--samplers", "3", "--wall", "2x1"});
   PipelineRun wall(with(arguments), volume());
@@ -146,7 +146,9 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
 }
 
 TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
-  PipelineRun run(with({"--tf", kGlass, "--duration", "0", "--trajectory", "still", "--verify", "15"}), volume());
+  PipelineRun run(
+      with({"--tf", kGlass, "--duration", "0", "--trajectory", "still", "--target-fps", "20", "--verify", "10"}),
+      volume());
   ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 0; })) << run.program().err();
   std::string err;
   EXPECT_EQ(ctl(run, {"tf", "0:#000000:0,100:#ff0000:0,160:#ff0000:0.6"}), 0);
@@ -190,9 +192,9 @@ TEST_F(VolumeRun, ASeriesPlaysAndStands) {
   const std::string series = folder_ / "series";
   fs::create_directory(series);
   for (int i = 0; i < 4; ++i) write_volume(series + "/phase" + std::to_string(i) + ".mha", 32, i / 4.0);
-  PipelineRun run(
-      with({"--tf", kGlass, "--series-rate", "4", "--duration", "0", "--trajectory", "still", "--verify", "5"}),
-      series);
+  PipelineRun run(with({"--tf", kGlass, "--series-rate", "8", "--duration", "0", "--trajectory", "still",
+                        "--target-fps", "20", "--verify", "10"}),
+                  series);
   EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") >= 7; })) << run.program().err();
   EXPECT_EQ(ctl(run, {"set", "volume.step=2"}), 0);
   EXPECT_NE(ctl(run, {"set", "volume.step=4"}), 0);
@@ -229,6 +231,27 @@ TEST_F(VolumeRun, ASceneFileAndRawData) {
   EXPECT_EQ(s["scene"], "balls.raw");
   EXPECT_GT(s["quality"]["last_view"]["psnr_db"], 32);
   EXPECT_TRUE(run.all_gone());
+}
+
+TEST_F(VolumeRun, TheSurfaceOfARawVolumeIsShownVerifiedAndCompared) {
+  const std::string mha = read_text(volume());
+  std::ofstream(folder_ / "balls.raw", std::ios::binary) << mha.substr(mha.size() - 40 * 40 * 40);
+  PipelineRun run({"--raw", "40x40x40:u8", "--iso", "100", "--duration", "2", "--hold", "1", "--verify", "20"},
+                  folder_ / "balls.raw");
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  const auto s = run.summary();
+  EXPECT_EQ(s["kind"], "mesh");
+  EXPECT_EQ(s["scene"], "balls.raw");
+  EXPECT_GT(s["primitives"], 1000);
+  EXPECT_GT(s["quality"]["last_view"]["psnr_db"], 22);
+  EXPECT_LT(s["quality"]["last_view"]["hole_fraction"], 0.02);
+  // The folder alone tells how the surface is made again.
+  Program compare("telesplat",
+                  {"compare", run.out(), "--kernels", "disc", "--renderers", "cpu", "--poses", "1", "--repeat", "1"},
+                  run.folder() / "compare");
+  EXPECT_EQ(compare.wait(90), 0) << compare.err();
+  EXPECT_TRUE(fs::exists(run.out() + "/compare/contact-sheet.png"));
 }
 
 TEST(VolumeFaults, ASamplersDeathMovesItsSlabAndTheDisplayGoesOn) {

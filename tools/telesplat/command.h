@@ -19,11 +19,11 @@ struct Command {
   std::vector<Command> commands;                  ///< its sub-commands, instead of flags
 };
 
-/// A command whose flags fill an options struct of its own. table: as tables of options are; it points into the struct.
+/// A command whose flags fill `o`, an options struct of its own. table: as tables of options are; it points into the struct.
 template <class Options>
-Command make_command(const std::string& name, const std::string& help, Options defaults,
-                     options::Table (*table)(Options&), int (*run)(Options, const options::Given&)) {
-  auto o = std::make_shared<Options>(std::move(defaults));
+Command make_command(const std::string& name, const std::string& help, options::Table (*table)(Options&),
+                     int (*run)(Options, const options::Given&),
+                     std::shared_ptr<Options> o = std::make_shared<Options>()) {
   Command out{.name = name, .help = help, .table = table(*o), .run = {}};
   out.run = [o, run](const options::Given& given) { return run(*o, given); };
   return out;

@@ -136,8 +136,8 @@ int inspect(InspectOptions o, const options::Given&) {
 }  // namespace
 
 Command inspect_command() {
-  return make_command("inspect", "tell what a data file, a run folder, a recorded frame or a depth image holds",
-                      InspectOptions{}, table, inspect);
+  return make_command("inspect", "tell what a data file, a run folder, a recorded frame or a depth image holds", table,
+                      inspect);
 }
 
 }  // namespace telesplat::launcher

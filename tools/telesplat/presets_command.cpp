@@ -99,7 +99,7 @@ int presets(PresetsOptions o, const options::Given&) {
 
 Command presets_command() {
   return make_command("presets", "tell the Julia sets and transfer functions that have names, or draw the Julia sets",
-                      PresetsOptions{}, table, presets);
+                      table, presets);
 }
 
 }  // namespace telesplat::launcher

@@ -418,7 +418,7 @@ int bench_cache(CacheBenchOptions o, const options::Given&) {
 
 Command bench_cache_command() {
   return make_command("cache", "what a point model costs, minute by minute of a walk that is replayed without waiting",
-                      CacheBenchOptions{}, table, bench_cache);
+                      table, bench_cache);
 }
 
 }  // namespace telesplat::launcher

@@ -284,7 +284,7 @@ int bench_scaling(ScalingOptions o, const options::Given&) {
 Command bench_scaling_command() {
   return make_command("scaling",
                       "how a Julia set's frame speeds up with the number of samplers, beside table 7.2 of the thesis",
-                      ScalingOptions{}, table, bench_scaling);
+                      table, bench_scaling);
 }
 
 }  // namespace telesplat::launcher

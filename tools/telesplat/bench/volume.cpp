@@ -401,7 +401,7 @@ Command bench_volume_command() {
   return make_command(
       "volume",
       "how fast views of a volume are made with 1-4 samplers and 1-4 viewers, beside tables 7.3 and 7.4 of the thesis",
-      VolumeBenchOptions{}, table, bench_volume);
+      table, bench_volume);
 }
 
 }  // namespace telesplat::launcher

@@ -231,8 +231,8 @@ int compare(CompareOptions o, const options::Given&) {
 
 Command compare_command() {
   return make_command("compare",
-                      "draw poses of a recorded run with every kernel and renderer, and directly from the data",
-                      CompareOptions{}, table, compare);
+                      "draw poses of a recorded run with every kernel and renderer, and directly from the data", table,
+                      compare);
 }
 
 }  // namespace telesplat::launcher

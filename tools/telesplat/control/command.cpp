@@ -120,8 +120,6 @@ int control(ControlOptions o, const options::Given&) {
 
 }  // namespace
 
-Command control_command() {
-  return make_command("ctl", "ask or tell a running session's master", ControlOptions{}, table, control);
-}
+Command control_command() { return make_command("ctl", "ask or tell a running session's master", table, control); }
 
 }  // namespace telesplat::launcher

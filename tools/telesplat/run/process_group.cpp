@@ -19,6 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kViewersFarewell_s = 20, kFarewell_s = 4;
+// A session whose processes all heard of its end is over by then.
+constexpr double kSoon_s = 0.3;
 constexpr std::string_view kListening = "listening on ";
 
 }  // namespace
@@ -77,9 +79,12 @@ std::string ProcessGroup::last_log_line(const std::string& name) const {
 }
 
 void ProcessGroup::finish() {
-  const auto end = [&](auto&& which, double patience_s) {
+  const auto signal = [&](auto&& which) {
     for (Member& m : members_)
       if (m.process && which(m)) m.process->signal(SIGTERM);
+  };
+  const auto end = [&](auto&& which, double patience_s) {
+    signal(which);
     for (Member& m : members_)
       if (m.process && which(m)) m.process->finish(patience_s);
   };
@@ -88,6 +93,10 @@ void ProcessGroup::finish() {
   if (master && master->process && !master->process->ended() && !endpoint_.empty()) {
     ControlClient control(endpoint_);
     if (!control.ask("stop", 2)) master->process->signal(SIGTERM);
+    for (const double until = monotonic_s() + kSoon_s; !master->process->ended() && monotonic_s() < until;)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    // Who said hello while the session ended has not heard of it, and the master waits for them.
+    signal([](const Member& m) { return m.role != "master"; });
     master->process->finish(kFarewell_s);
   }
   // Those whom the master could not tell, because it is dead or they had not said hello yet.

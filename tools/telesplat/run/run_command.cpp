@@ -164,7 +164,7 @@ class Run {
     if (!direct) return direct.error();
     verify_code_ = 1;
     const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("verifying view {} of {}", done, of)); };
-    const auto& shading = *image::shading_named(o_.viewer.shading);
+    const auto shading = *image::shading_named(o_.viewer.shading);
     const Status verified = verify_run(o_.out, **direct, shading, tell, net::stop_requested);
     progress_.close();
     return verified;
@@ -202,8 +202,8 @@ int run(RunOptions o, const options::Given& given) {
   return Run(std::move(o), std::move(*scene)).go();
 }
 
-Command make(const char* name, const char* help, RunOptions defaults) {
-  Command out = make_command(name, help, std::move(defaults), table, run);
+Command make(const char* name, const char* help, std::shared_ptr<RunOptions> defaults) {
+  Command out = make_command(name, help, table, run, std::move(defaults));
   out.takes_scene_file = true;
   return out;
 }
@@ -211,11 +211,12 @@ Command make(const char* name, const char* help, RunOptions defaults) {
 }  // namespace
 
 Command run_command() {
-  return make("run", "run the whole pipeline on this machine, headless, and record it", RunOptions{});
+  return make("run", "run the whole pipeline on this machine, headless, and record it", std::make_shared<RunOptions>());
 }
 
 Command view_command() {
-  Command out = make("view", "open a window on a data set, with the whole pipeline on this machine", view_defaults());
+  Command out = make("view", "open a window on a data set, with the whole pipeline on this machine",
+                     std::make_shared<RunOptions>(view_defaults()));
   out.footer = "Keys and mouse in the window:";
   for (const auto& line : viewer::key_help()) out.footer += "\n  " + line;
   return out;

@@ -61,7 +61,10 @@ class JuliaKeys : public SceneKeys {
   Status read_constant(const toml::node& node) {
     const auto& parts = *node.as_array();
     std::string text;
-    for (const auto& part : parts) text += (text.empty() ? "" : ",") + (part.is_number() ? flag_text(part) : "?");
+    for (const auto& part : parts) {
+      if (!text.empty()) text += ',';
+      text += part.is_number() ? flag_text(part) : "?";
+    }
     if (parts.size() != 4 || text.find('?') != std::string::npos)
       return wrong(node, "c is not an array of four numbers i, j, k, real");
     flags_.push_back("--c=" + text);
