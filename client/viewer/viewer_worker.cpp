@@ -104,8 +104,7 @@ void ViewerWorker::receive() {
 }
 
 void ViewerWorker::receive_control() {
-  while (const auto message = link_.socket().receive())
-    if (!link_.handle(*message, monotonic_s())) link_.socket().reject(*message, "its type is not expected here");
+  link_.receive(monotonic_s());
   if (link_.shutdown_requested()) shutdown_ = true;
 }
 

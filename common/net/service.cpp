@@ -5,7 +5,6 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -27,23 +26,6 @@ void handle_signals(void (*handler)(int)) {
 
 bool is_wildcard(std::string_view host) { return host == "*" || host == "0.0.0.0" || host == "[::]" || host == "::"; }
 }  // namespace
-
-void add_service_flags(CLI::App& app, ServiceOptions& o, Ends ends) {
-  if (ends != Ends::kBinds)
-    app.add_option("--master", o.master, "address of the master")->capture_default_str()->envname("TELESPLAT_MASTER");
-  app.add_option("--name", o.name, "name in logs and metrics")->capture_default_str();
-  if (ends != Ends::kConnects)
-    app.add_option("--bind", o.bind, "address to bind to; port * takes a free one")->capture_default_str();
-  if (ends == Ends::kBoth)
-    app.add_option(
-           "--advertise", o.advertise,
-           "host that others are told to connect to; default: as bound, this host's name where that is a wildcard")
-        ->check([](const std::string& host) { return complain_about_host(host); });
-  app.add_flag("--insecure", o.insecure, "allow addresses other than loopback without encryption");
-  app.add_option("--log-level", o.log_level, "trace, debug, info, warn, error or off")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
-}
 
 options::Table service_table(ServiceOptions& o, Ends ends) {
   options::Table out;
@@ -77,14 +59,6 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                  .help = "trace, debug, info, warn, error or off",
                  .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}});
   return out;
-}
-
-void parse_or_exit(CLI::App& app, int argc, char** argv) {
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    std::exit(app.exit(e) == 0 ? 0 : 2);
-  }
 }
 
 std::string host_name() {

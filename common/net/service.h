@@ -7,10 +7,6 @@
 #include "common/core/result.h"
 #include "common/options/table.h"
 
-namespace CLI {
-class App;
-}
-
 namespace telesplat::net {
 
 struct ServiceOptions {
@@ -26,10 +22,6 @@ struct ServiceOptions {
 /// if it connects to one, --advertise if it does both.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
-void add_service_flags(CLI::App& app, ServiceOptions& options, Ends ends);
-
-/// Parses; --help prints and exits 0, bad usage prints what is wrong and exits 2.
-void parse_or_exit(CLI::App& app, int argc, char** argv);
 
 /// This machine's name; in a container that of the container.
 std::string host_name();

@@ -1,28 +1,13 @@
 // The main() of every service program: parse the configuration, serve until told to stop.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
 #include "common/net/service.h"
 #include "common/options/parser.h"
 
 namespace telesplat::net {
 
-/// Options has a member `service`; add_flags(app, options) declares its flags, run(options) serves and returns the exit
-/// code. Bad usage exits 2; exceptions that escape become one line and exit code 1.
-template <class Options>
-int service_main(int argc, char** argv, const char* about, Options options, void (*add_flags)(CLI::App&, Options&),
-                 auto run) {
-  end_on_signals();  // until run() looks at the flag
-  return guarded_main([&] {
-    CLI::App app{about};
-    add_flags(app, options);
-    parse_or_exit(app, argc, argv);
-    return run(options);
-  });
-}
-
-/// The same from a table of flags: table(options) has a row a flag, run(options) serves and returns the exit code.
+/// table(options) has a row a flag; run(options) serves and returns the exit code. Bad usage exits 2; exceptions that
+/// escape become one line and exit code 1.
 template <class Options>
 int service_main(int argc, char** argv, const char* about, Options options,
                  telesplat::options::Table (*table)(Options&), auto run) {

@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <iterator>
 
+#include "common/core/utf8.h"
+
 namespace telesplat::options {
 namespace {
 
@@ -175,7 +177,7 @@ std::vector<std::string> arguments(const Table& table, const Table& defaults) {
 
 std::string quoted(const std::string& text) {
   std::string out = "\"";
-  for (const char c : text) {
+  for (const char c : to_utf8(text)) {
     if (c == '"' || c == '\\') out += '\\';
     out += static_cast<unsigned char>(c) < 32 || c == 127 ? ' ' : c;
   }

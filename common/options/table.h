@@ -88,7 +88,7 @@ std::vector<std::string> arguments(const Table& table, const Table& defaults);
 /// Rows of Reach::kRecorded that differ from `defaults`, as lines "key = value" of TOML. Paths are made absolute.
 std::string recorded(const Table& table, const Table& defaults);
 
-/// A text as TOML has it, quoted.
+/// A text as TOML has it, quoted; what is not UTF-8 is replaced.
 std::string quoted(const std::string& text);
 
 /// What a command line gave: names of flags.

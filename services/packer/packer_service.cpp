@@ -71,8 +71,7 @@ class PackerService {
   };
 
   void receive_control() {
-    while (const auto message = link_->socket().receive())
-      if (!link_->handle(*message, monotonic_s())) link_->socket().reject(*message, "its type is not expected here");
+    link_->receive(monotonic_s());
     if (link_->session() && link_->version() != seen_version_) {
       seen_version_ = link_->version();
       follow(*link_->session(), monotonic_s());

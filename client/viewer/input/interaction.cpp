@@ -69,7 +69,7 @@ void Interaction::pressed(Key key) {
     case Key::k2:
     case Key::k3:
     case Key::k4:
-      look_.render.kernel = splat::kKernels[size_t(key) - size_t(Key::k1)];
+      if (const auto kernel = splat::kernel_of_key(char('1' + int(key) - int(Key::k1)))) look_.render.kernel = *kernel;
       notes_.push_back("splats: " + std::string(splat::kernel_name(look_.render.kernel)));
       return;
     case Key::k5:

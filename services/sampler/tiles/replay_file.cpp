@@ -19,7 +19,7 @@ Status write_replay(const std::string& path, const Replay& replay) {
   const nlohmann::ordered_json head{
       {"width", replay.frame.width}, {"height", replay.frame.height}, {"row_cost_s", replay.row_cost_s}};
   std::ofstream out(path, std::ios::binary);
-  out << head.dump() << '\n';
+  out << head.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   out.write(reinterpret_cast<const char*>(stream.data()), std::streamsize(stream.size()));
   out.close();
   if (!out) return Error{path + ": cannot be written"};

@@ -1,10 +1,10 @@
-// Names and addresses that processes give themselves: they must be good for others, on other machines and in other containers.
+// Names and addresses that processes give themselves: they must be good for others, on other machines and in other
+// containers.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
-
 #include "common/net/service.h"
+#include "common/options/parser.h"
 
 namespace telesplat::net {
 namespace {
@@ -34,17 +34,16 @@ TEST(Service, RefusesHostsThatNobodyCanConnectTo) {
   for (const char* host : {"lab-3.example.org", "10.0.0.7", "fe80::1", "[fe80::1%eth0]", "a_container"})
     EXPECT_EQ(complain_about_host(host), "") << host;
   for (const std::string& host : {std::string("0.0.0.0"), std::string("*"), std::string("::"), std::string("[::]"),
-                                 std::string(""), std::string("tcp://lab"), std::string("a b"), std::string(254, 'a')})
+                                  std::string(""), std::string("tcp://lab"), std::string("a b"), std::string(254, 'a')})
     EXPECT_NE(complain_about_host(host), "") << host;
 }
 
 TEST(Service, FlagsTakeTheMasterFromTheEnvironment) {
   const auto parse = [](std::vector<std::string> arguments, Ends ends) {
     ServiceOptions options;
-    CLI::App app;
-    add_service_flags(app, options, ends);
-    std::reverse(arguments.begin(), arguments.end());
-    app.parse(arguments);
+    options::Parser parser("about");
+    parser.add(service_table(options, ends));
+    parser.parse_or_exit("program", std::move(arguments));
     return options;
   };
   setenv("TELESPLAT_MASTER", "tcp://leader:7700", 1);
@@ -53,8 +52,8 @@ TEST(Service, FlagsTakeTheMasterFromTheEnvironment) {
   unsetenv("TELESPLAT_MASTER");
   EXPECT_EQ(parse({}, Ends::kBoth).master, "tcp://127.0.0.1:7700");
   EXPECT_EQ(parse({"--advertise", "lab"}, Ends::kBoth).advertise, "lab");
-  EXPECT_THROW(parse({"--advertise", "0.0.0.0"}, Ends::kBoth), CLI::ValidationError);
-  EXPECT_THROW(parse({"--advertise", "lab"}, Ends::kConnects), CLI::ExtrasError);
+  EXPECT_EXIT(parse({"--advertise", "0.0.0.0"}, Ends::kBoth), testing::ExitedWithCode(2), "--advertise 0.0.0.0");
+  EXPECT_EXIT(parse({"--advertise", "lab"}, Ends::kConnects), testing::ExitedWithCode(2), "--advertise");
 }
 
 }  // namespace
