@@ -103,7 +103,8 @@ TEST(VolumeLayerImage, FilledSaysWhereThereMayBeAnything) {
   EXPECT_GT(empty, 500);
 }
 
-// The point of merging: however a layer's slices are shared out among slabs, what is shown is what one slab alone would have shown.
+// The point of merging: however a layer's slices are shared out among slabs, what is shown is what one slab alone would
+// have shown.
 TEST(VolumeLayerImage, SlabsOfAnOpaqueBlockMeetWithoutASeam) {
   const Grid grid = turned_grid();
   int shared_out = 0;

@@ -34,7 +34,8 @@ std::vector<glm::dvec3> eyes() {
   return out;
 }
 
-// Every principal axis in both directions: what a display pixel of the sampled camera sees is, in every layer, where the shear puts it.
+// Every principal axis in both directions: what a display pixel of the sampled camera sees is, in every layer, where
+// the shear puts it.
 TEST(VolumeShear, WarpOfTheSampledViewIsTheSamePixelInEveryLayer) {
   const Grid grid = a_grid();
   int seen[3][2] = {};
@@ -68,7 +69,8 @@ TEST(VolumeShear, WarpOfTheSampledViewIsTheSamePixelInEveryLayer) {
     for (const int n : axis) EXPECT_GT(n, 0);
 }
 
-// T eq. 4.10-4.12: with the eye permuted, a point of slice z goes to (x + z s_x) / (1 + z s_w) on the compositing plane z = 0.
+// T eq. 4.10-4.12: with the eye permuted, a point of slice z goes to (x + z s_x) / (1 + z s_w) on the compositing plane
+// z = 0.
 TEST(VolumeShear, IsTheShearMatrixOfTheThesis) {
   const Grid grid = a_grid();
   for (const auto& eye : eyes()) {

@@ -246,7 +246,8 @@ Grid a_grid() {
   return g;
 }
 
-// A block any pixel of which the warp puts into the (widened) picture may be seen; of those that it does not, most are left out.
+// A block any pixel of which the warp puts into the (widened) picture may be seen; of those that it does not, most are
+// left out.
 TEST(SliceView, IsConservativeAndUseful) {
   const Grid grid = a_grid();
   Random random(9);
