@@ -132,7 +132,8 @@ TEST_F(VolumeRun, AWallOfManyProcessesShowsWhatASingleViewerShows) {
   ASSERT_EQ(whole->width, 640);
   EXPECT_GT(psnr_db(*whole, *stitched), 42);  // 48 dB; tiles may have been sampled on rasters of their own
 
-  // At the seam neighbours differ no more than in the single viewer's picture, where the same two columns are neighbours, too.
+  // At the seam neighbours differ no more than in the single viewer's picture, where the same two columns are
+  // neighbours, too.
   const auto step = [](const image::View& v, int x) {
     double sum = 0;
     for (int y = 0; y < v.height; ++y)

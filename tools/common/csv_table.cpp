@@ -13,8 +13,8 @@ namespace {
 
 constexpr uintmax_t kMaxBytes = uintmax_t{4} << 30;
 
-// Calls take(text) for each field; a quoted one comes without its quotes. take returns whether to go on. False: a quote that does
-// not end, or text after one.
+// Calls take(text) for each field; a quoted one comes without its quotes. take returns whether to go on. False: a quote
+// that does not end, or text after one.
 template <class Take>
 bool each_field(std::string_view line, Take&& take) {
   std::string field;

@@ -11,8 +11,8 @@
 
 namespace telesplat::tools {
 
-/// The fields of a line; texts may be in quotes, where they hold commas, with "" for a quote (RFC 4180, within one line). Nothing:
-/// a quote that does not end, or text after one.
+/// The fields of a line; texts may be in quotes, where they hold commas, with "" for a quote (RFC 4180, within one
+/// line). Nothing: a quote that does not end, or text after one.
 std::optional<std::vector<std::string>> csv_fields(std::string_view line);
 
 /// A file read whole, its fields taken apart when they are asked for. Errors name file, line, column and value.
@@ -21,8 +21,8 @@ class CsvTable {
   struct Limits {
     size_t rows = 10'000'000, line_bytes = 1 << 16;
   };
-  /// Error: the file is not there or empty, a line is longer than the limit, cut off, or has another number of values than the
-  /// header, a quoted text does not end, or there are too many rows. A file may have 4 GiB.
+  /// Error: the file is not there or empty, a line is longer than the limit, cut off, or has another number of values
+  /// than the header, a quoted text does not end, or there are too many rows. A file may have 4 GiB.
   static Result<CsvTable> read(const std::string& path, const Limits& limits);
 
   const std::string& path() const { return path_; }

@@ -6,7 +6,8 @@
 
 namespace telesplat::tools {
 
-/// On a terminal one line that rewrites itself, at most 10 times a second; elsewhere one line every 5 seconds. Any thread may call.
+/// On a terminal one line that rewrites itself, at most 10 times a second; elsewhere one line every 5 seconds. Any
+/// thread may call.
 class ProgressLine {
  public:
   /// first_after_s: nothing is shown before that many seconds, for work that is often over by then.

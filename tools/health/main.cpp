@@ -1,4 +1,5 @@
-// telesplat-health: exit code 0 if a session's master answers and, where one is asked for, a process takes part in it; 1 if not.
+// telesplat-health: exit code 0 if a session's master answers and, where one is asked for, a process takes part in it;
+// 1 if not.
 #include <cstdio>
 
 #include "common/net/control.h"

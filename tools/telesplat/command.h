@@ -19,7 +19,8 @@ struct Command {
   std::vector<Command> commands;                  ///< its sub-commands, instead of flags
 };
 
-/// A command whose flags fill `o`, an options struct of its own. table: as tables of options are; it points into the struct.
+/// A command whose flags fill `o`, an options struct of its own. table: as tables of options are; it points into the
+/// struct.
 template <class Options>
 Command make_command(const std::string& name, const std::string& help, options::Table (*table)(Options&),
                      int (*run)(Options, const options::Given&),

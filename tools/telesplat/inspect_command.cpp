@@ -1,4 +1,5 @@
-// `telesplat inspect PATH`: what a data file or volume folder, a run folder, a recorded frame, a depth image or a picture holds.
+// `telesplat inspect PATH`: what a data file or volume folder, a run folder, a recorded frame, a depth image or a
+// picture holds.
 #include <fmt/format.h>
 
 #include <algorithm>

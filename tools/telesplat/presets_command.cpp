@@ -1,4 +1,5 @@
-// `telesplat presets`: the Julia sets and the transfer functions that have names; as text, or the Julia sets as a sheet of pictures.
+// `telesplat presets`: the Julia sets and the transfer functions that have names; as text, or the Julia sets as a sheet
+// of pictures.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,5 +1,6 @@
-// `telesplat bench cache`: what a point model costs after minutes of walking, without waiting for real time. Each view of a walk is sampled by
-// rays, packed, coded, decoded and inserted by the code that packer and viewer run, one view after the other in this process.
+// `telesplat bench cache`: what a point model costs after minutes of walking, without waiting for real time. Each view
+// of a walk is sampled by rays, packed, coded, decoded and inserted by the code that packer and viewer run, one view
+// after the other in this process.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -387,8 +388,8 @@ options::Table table(CacheBenchOptions& o) {
       data::scene_table(o.data));
 }
 
-// Columns: median clusters, draw items and points of a frame; points cached, bytes each; median times; quality against direct rendering; what
-// was sent; times a view; and of the newest view, items and time of a model made at once.
+// Columns: median clusters, draw items and points of a frame; points cached, bytes each; median times; quality against
+// direct rendering; what was sent; times a view; and of the newest view, items and time of a model made at once.
 int bench_cache(CacheBenchOptions o, const options::Given&) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");

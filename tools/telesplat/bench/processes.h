@@ -16,10 +16,10 @@ namespace telesplat::launcher {
 
 class BenchProcesses {
  public:
-  /// data_arguments: scene and flags of telesplat-data. The master records into `directory`, logs go to directory/logs. own_machines:
-  /// samplers stand for machines of their own, so the packer gives way to none of them; else all have the priorities that `telesplat
-  /// run` gives them. Returns once the master listens; wait_for_data() waits for the others. Error: what failed to start, or took over
-  /// 20 s, or that Ctrl-C came.
+  /// data_arguments: scene and flags of telesplat-data. The master records into `directory`, logs go to directory/logs.
+  /// own_machines: samplers stand for machines of their own, so the packer gives way to none of them; else all have the
+  /// priorities that `telesplat run` gives them. Returns once the master listens; wait_for_data() waits for the others.
+  /// Error: what failed to start, or took over 20 s, or that Ctrl-C came.
   static Result<std::unique_ptr<BenchProcesses>> start(const std::vector<std::string>& data_arguments,
                                                        const std::vector<std::string>& master_flags,
                                                        const std::string& directory, bool own_machines);

@@ -1,6 +1,6 @@
-// `telesplat bench scaling`: how a Julia set's frame speeds up with the number of samplers (T7.3, table 7.2), with real processes, leases
-// and messages. Where samplers outnumber the processors, the computing of each row is replaced by a wait of its measured cost. Leaves
-// scaling.csv, scaling.json, scaling.png and the runs' records.
+// `telesplat bench scaling`: how a Julia set's frame speeds up with the number of samplers (T7.3, table 7.2), with real
+// processes, leases and messages. Where samplers outnumber the processors, the computing of each row is replaced by a
+// wait of its measured cost. Leaves scaling.csv, scaling.json, scaling.png and the runs' records.
 #include <fmt/format.h>
 
 #include <algorithm>

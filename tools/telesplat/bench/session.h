@@ -1,5 +1,5 @@
-// A pipeline of real processes for benchmarks: master, data server and packer of a Julia set, any number of samplers, and this process
-// in the viewer's place.
+// A pipeline of real processes for benchmarks: master, data server and packer of a Julia set, any number of samplers,
+// and this process in the viewer's place.
 #pragma once
 
 #include <memory>
@@ -14,8 +14,8 @@ namespace telesplat::launcher {
 
 class BenchSession {
  public:
-  /// scene_flags: as telesplat-data julia takes them; the rest and errors as BenchProcesses::start(). Returns when data server and packer have
-  /// joined.
+  /// scene_flags: as telesplat-data julia takes them; the rest and errors as BenchProcesses::start(). Returns when data
+  /// server and packer have joined.
   static Result<std::unique_ptr<BenchSession>> start(const std::vector<std::string>& scene_flags,
                                                      const std::string& directory, bool own_machines);
   ~BenchSession();
@@ -30,8 +30,8 @@ class BenchSession {
     int rows = 0;
     bool complete = false;
   };
-  /// Requests a frame and waits until its last patch is here. `watch` is called every 50 ms or sooner. Error: Ctrl-C, a process died that
-  /// was not killed with kill_sampler(), or nothing arrived for `patience_s`.
+  /// Requests a frame and waits until its last patch is here. `watch` is called every 50 ms or sooner. Error: Ctrl-C, a
+  /// process died that was not killed with kill_sampler(), or nothing arrived for `patience_s`.
   Result<double> frame(const geometry::Camera& camera, double patience_s, auto&& watch) {
     if (const Status s = request(camera); !s) return s.error();
     while (true) {

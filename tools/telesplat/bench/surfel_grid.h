@@ -1,6 +1,7 @@
-// The other design that was weighed for the point cache (docs/cache.md), as far as it takes to measure it: a hierarchical surfel grid.
-// A sample goes to the cell of its cluster whose size fits its footprint. A cell holds one sample, the first; a finer sample in it takes its place.
-// Based on: M. Schuetz, L. Herzberger, M. Wimmer, "SimLOD: Simultaneous LOD generation and rendering for point clouds", 2024 (its voxels).
+// The other design that was weighed for the point cache (docs/cache.md), as far as it takes to measure it: a
+// hierarchical surfel grid. A sample goes to the cell of its cluster whose size fits its footprint. A cell holds one
+// sample, the first; a finer sample in it takes its place. Based on: M. Schuetz, L. Herzberger, M. Wimmer, "SimLOD:
+// Simultaneous LOD generation and rendering for point clouds", 2024 (its voxels).
 #pragma once
 
 #include <unordered_map>

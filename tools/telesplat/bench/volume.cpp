@@ -1,6 +1,7 @@
-// `telesplat bench volume`: how fast views of a volume are constructed with 1 to 4 samplers and 1 to 4 viewers of a display wall, as tables
-// 7.3 and 7.4 of the thesis have it. Once with all processes computing, on the processors that are here; once with a processor for each, by
-// waiting for what was measured. Leaves volume.csv, volume.md and the runs' records.
+// `telesplat bench volume`: how fast views of a volume are constructed with 1 to 4 samplers and 1 to 4 viewers of a
+// display wall, as tables 7.3 and 7.4 of the thesis have it. Once with all processes computing, on the processors that
+// are here; once with a processor for each, by waiting for what was measured. Leaves volume.csv, volume.md and the
+// runs' records.
 #include <fmt/format.h>
 
 #include <algorithm>

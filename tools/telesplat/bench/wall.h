@@ -1,5 +1,6 @@
-// The viewers of a display wall, simulated: real to the master and the packer - they join, ask, receive, acknowledge with loose coupling
-// (T6.4) - but what a view takes them to construct is waited for instead of computed, so that there can be more of them than processors.
+// The viewers of a display wall, simulated: real to the master and the packer - they join, ask, receive, acknowledge
+// with loose coupling (T6.4) - but what a view takes them to construct is waited for instead of computed, so that there
+// can be more of them than processors.
 #pragma once
 
 #include <deque>
@@ -21,8 +22,8 @@ struct ViewCost {
   double total_s() const { return decode_s + warp_s; }
 };
 
-/// Decodes the frame and warps it into `camera`'s view, `passes` times on one thread; each part's least time counts. Error: the frame
-/// cannot be decoded.
+/// Decodes the frame and warps it into `camera`'s view, `passes` times on one thread; each part's least time counts.
+/// Error: the frame cannot be decoded.
 Result<ViewCost> measure_view(const wire::SliceFrame& frame, const volume::Grid& grid, const geometry::Camera& camera,
                               int passes);
 
@@ -32,8 +33,9 @@ class WaitingViewer {
   WaitingViewer(net::Context& context, const std::string& master, const std::string& name,
                 const geometry::Camera& camera, int buffers);
 
-  /// Keeps its connections going, asks for views while a buffer is free, and constructs those that are complete, one after the other, in order, each
-  /// for cost_s. asks: false lets it fall silent. Returns when to look again, if nothing comes before.
+  /// Keeps its connections going, asks for views while a buffer is free, and constructs those that are complete, one
+  /// after the other, in order, each for cost_s. asks: false lets it fall silent. Returns when to look again, if
+  /// nothing comes before.
   double turn(double now_s, double cost_s, bool asks);
   std::vector<net::Socket*> sockets();
 

@@ -134,7 +134,8 @@ class Comparison {
   // One cell a kernel and renderer. False: told to stop in between.
   Result<bool> measure_cells(const points::PointModel& model, const image::View& reference, const image::Flip& flip,
                              const std::string& where, ComparedPose& pose) {
-    // Renderers of its own: they keep copies of points by event number, and a pose may have another model of the same numbers.
+    // Renderers of its own: they keep copies of points by event number, and a pose may have another model of the same
+    // numbers.
     std::vector<std::unique_ptr<viewer::Renderer>> renderers;
     for (const auto& kind : renderers_) {
       auto made = viewer::make_renderer(kind, options_.threads);

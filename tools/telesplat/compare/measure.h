@@ -1,4 +1,5 @@
-// One picture of a comparison: a point model splatted by one kernel and renderer, and how far it is from direct rendering.
+// One picture of a comparison: a point model splatted by one kernel and renderer, and how far it is from direct
+// rendering.
 #pragma once
 
 #include <string>
@@ -10,9 +11,10 @@
 
 namespace telesplat::launcher {
 
-/// Where the squared error lies, as shares of its sum over pixels where reference or reconstruction shows the data set (1 in all, 0
-/// where the pictures are identical):
-///   silhouette: only one of the two shows it;  depth_edge: both do, but their depths differ by more than 2 % of the reference's;
+/// Where the squared error lies, as shares of its sum over pixels where reference or reconstruction shows the data set
+/// (1 in all, 0 where the pictures are identical):
+///   silhouette: only one of the two shows it;  depth_edge: both do, but their depths differ by more than 2 % of the
+/// reference's;
 ///   interior: the rest.
 struct ErrorShares {
   double silhouette = 0, depth_edge = 0, interior = 0;

@@ -51,7 +51,8 @@ Result<Arguments> animate_arguments(const std::vector<std::string>& given) {
   return Arguments{{"timeline", given.front()}};
 }
 
-// A colour-map file's values may lie in any range; the session's is asked for. Otherwise the master reads the text: it knows the range.
+// A colour-map file's values may lie in any range; the session's is asked for. Otherwise the master reads the text: it
+// knows the range.
 Result<Arguments> transfer_arguments(const std::vector<std::string>& given, ControlClient& client) {
   if (given.size() != 1)
     return Error{

@@ -39,8 +39,9 @@ struct RecordedRun {
 /// Reads session.toml, frames.csv and, of a Julia set, epochs.csv. Errors name file, line, value and limit.
 Result<RecordedRun> read_recorded_run(const std::string& directory);
 
-/// The frames of these numbers, in order of display; or, if there are none, `count` of them evenly spaced over the frames that show the
-/// data set: those that drew at least a tenth of what any frame drew. Error: a number is no frame's, or no frame shows anything.
+/// The frames of these numbers, in order of display; or, if there are none, `count` of them evenly spaced over the
+/// frames that show the data set: those that drew at least a tenth of what any frame drew. Error: a number is no
+/// frame's, or no frame shows anything.
 Result<std::vector<DisplayedFrame>> choose_frames(const RecordedRun& run, int count,
                                                   const std::vector<uint64_t>& numbers);
 

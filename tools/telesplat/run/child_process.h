@@ -13,8 +13,9 @@ namespace telesplat::launcher {
 
 class ChildProcess {
  public:
-  /// Starts `program` (a path). stderr goes to `log_path` (appended); stdout lines come back through read_lines(). The child is in
-  /// a process group of its own, so that Ctrl-C reaches the launcher alone, and is ended by the kernel should the launcher die.
+  /// Starts `program` (a path). stderr goes to `log_path` (appended); stdout lines come back through read_lines(). The
+  /// child is in a process group of its own, so that Ctrl-C reaches the launcher alone, and is ended by the kernel
+  /// should the launcher die.
   static Result<ChildProcess> start(const std::string& name, const std::string& program,
                                     const std::vector<std::string>& arguments, const std::string& log_path, int nice);
   ~ChildProcess();  ///< kills the child if it still runs

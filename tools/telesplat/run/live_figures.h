@@ -8,12 +8,14 @@
 
 namespace telesplat::launcher {
 
-/// Rates of the last seconds from the master's status answers. Processes report their counters once a second, and the launcher asks
-/// when it likes: so a rate is what a process counted between two of its own reports, divided by the time between those reports.
+/// Rates of the last seconds from the master's status answers. Processes report their counters once a second, and the
+/// launcher asks when it likes: so a rate is what a process counted between two of its own reports, divided by the time
+/// between those reports.
 class SessionFigures {
  public:
-  /// Takes a status answer that came at now_s. Returns the line: frames and updates a second of a viewer (the mean of those that are
-  /// alive), points, bytes a second of all viewers; empty before there are two reports of a viewer that displayed something.
+  /// Takes a status answer that came at now_s. Returns the line: frames and updates a second of a viewer (the mean of
+  /// those that are alive), points, bytes a second of all viewers; empty before there are two reports of a viewer that
+  /// displayed something.
   std::string update(const nlohmann::json& status, double now_s);
 
  private:

@@ -10,7 +10,8 @@ namespace {
 
 constexpr int kMaxRestarts = 5;
 constexpr double kMasterPatience_s = 10, kAskEvery_s = 0.1;
-// From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view meanwhile.
+// From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view
+// meanwhile.
 constexpr double kWallLead_s = 1.5;
 
 }  // namespace
@@ -57,7 +58,8 @@ Status Pipeline::start_viewers(double clock_from_s) {
   return ok_status();
 }
 
-// The viewers of a wall share a clock, which begins when there is something to see: so they start once the data servers are there.
+// The viewers of a wall share a clock, which begins when there is something to see: so they start once the data servers
+// are there.
 Status Pipeline::start_wall() {
   const double now = monotonic_s();
   if (!control_) control_ = std::make_unique<ControlClient>(group_.endpoint());

@@ -15,15 +15,16 @@ namespace telesplat::launcher {
 
 class Pipeline {
  public:
-  /// Starts master, data servers, packer, samplers and viewers (the viewers alone if options.join_master is set). Those of a wall follow in
-  /// supervise(), once the data servers have read their data.
+  /// Starts master, data servers, packer, samplers and viewers (the viewers alone if options.join_master is set). Those
+  /// of a wall follow in supervise(), once the data servers have read their data.
   static Result<Pipeline> start(const RunOptions& options);
 
   const std::string& master_endpoint() const { return group_.endpoint(); }
 
   enum class State { kRunning, kFinished, kFailed, kBadInput };
-  /// Looks after the children; does not wait. Samplers, packer and data that die are restarted (5 times each at most); the
-  /// master's or a viewer's death ends the run, which is finished when all viewers are. `news` gets lines for the person.
+  /// Looks after the children; does not wait. Samplers, packer and data that die are restarted (5 times each at most);
+  /// the master's or a viewer's death ends the run, which is finished when all viewers are. `news` gets lines for the
+  /// person.
   State supervise(std::vector<std::string>& news);
   /// "reading 43 %" and the like, from the children's progress lines; empty if there is nothing to tell.
   const std::string& progress() const { return progress_; }

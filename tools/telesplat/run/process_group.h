@@ -30,7 +30,8 @@ class ProcessGroup {
   ProcessGroup(const std::string& log_directory, const std::string& log_level)
       : log_directory_(log_directory), log_level_(log_level) {}
 
-  /// Starts a master of the group's own and waits until it listens. Error: it ended, said nothing for `patience_s`, or Ctrl-C came.
+  /// Starts a master of the group's own and waits until it listens. Error: it ended, said nothing for `patience_s`, or
+  /// Ctrl-C came.
   Status start_master(std::vector<std::string> arguments, double patience_s);
   /// Instead of start_master(): the session of another master.
   void join(const std::string& endpoint) { endpoint_ = endpoint; }
@@ -50,7 +51,8 @@ class ProcessGroup {
   std::string last_log_line(const std::string& name) const;
   const std::string& log_directory() const { return log_directory_; }
 
-  /// Ends everything: viewers first, so that their last measurements arrive, then a "stop" to the group's own master, then all others.
+  /// Ends everything: viewers first, so that their last measurements arrive, then a "stop" to the group's own master,
+  /// then all others.
   void finish();
 
  private:

@@ -1,4 +1,5 @@
-// `telesplat run SCENE`: the whole pipeline on this machine, headless and recorded. `telesplat view SCENE`: the same in a window.
+// `telesplat run SCENE`: the whole pipeline on this machine, headless and recorded. `telesplat view SCENE`: the same in
+// a window.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -52,7 +53,8 @@ class PassingFolder {
   std::string path_;
 };
 
-/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input. No process is left behind in any case.
+/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input. No process is left behind
+/// in any case.
 class Run {
  public:
   Run(RunOptions options, std::shared_ptr<Scene> scene) : o_(std::move(options)), scene_(std::move(scene)) {}
@@ -133,8 +135,8 @@ class Run {
     }
   }
 
-  // Adds to the master's session.toml what only the launcher knows: the scene, and the display's camera. `telesplat compare` renders a
-  // run's frames again with it.
+  // Adds to the master's session.toml what only the launcher knows: the scene, and the display's camera. `telesplat
+  // compare` renders a run's frames again with it.
   void complete_session() const {
     std::error_code error;
     const std::string path = o_.out + "/session.toml";

@@ -28,25 +28,28 @@ struct RunOptions {
   bool background_servers = true;  ///< samplers, packer and data run at lower priority than the viewer
 };
 
-/// What `telesplat view` does unless told otherwise: a window, until it is closed, with the camera in the person's hands.
+/// What `telesplat view` does unless told otherwise: a window, until it is closed, with the camera in the person's
+/// hands.
 RunOptions view_defaults();
 
-/// Flags of `run`, or of `view` if options.viewer.window is set: the launcher's own and those of the services. They point into `options`.
+/// Flags of `run`, or of `view` if options.viewer.window is set: the launcher's own and those of the services. They
+/// point into `options`.
 options::Table table(RunOptions& options);
 
-/// Once the flags are read: finds out what the scene is, refuses flags that it does not have, and sets what follows from others (a wall has
-/// as many viewers as tiles). given: the flags of the command line. The scene is null where a session is joined and none is named.
+/// Once the flags are read: finds out what the scene is, refuses flags that it does not have, and sets what follows
+/// from others (a wall has as many viewers as tiles). given: the flags of the command line. The scene is null where a
+/// session is joined and none is named.
 Result<std::shared_ptr<Scene>> settle(RunOptions& options, const options::Given& given);
 
-/// What each process is told, beside its name, its log level and the master's address. A service's flag that is not as its program has it
-/// anyway is among them; the launcher knows none of them by name.
+/// What each process is told, beside its name, its log level and the master's address. A service's flag that is not as
+/// its program has it anyway is among them; the launcher knows none of them by name.
 std::vector<std::string> master_arguments(const RunOptions& options);
 /// part: 0 to options.data_servers - 1.
 std::vector<std::string> data_arguments(const RunOptions& options, int part);
 std::vector<std::string> packer_arguments(const RunOptions& options);
 std::vector<std::string> sampler_arguments(const RunOptions& options);
-/// number: 1 to options.viewers. Only the first one's frames are verified. clock_from_s: when the trajectory of a wall begins, on the
-/// monotonic clock; 0: each viewer's begins with its first frame.
+/// number: 1 to options.viewers. Only the first one's frames are verified. clock_from_s: when the trajectory of a wall
+/// begins, on the monotonic clock; 0: each viewer's begins with its first frame.
 std::vector<std::string> viewer_arguments(const RunOptions& options, int number, double clock_from_s);
 
 /// The table [display] of session.toml.

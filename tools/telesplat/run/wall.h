@@ -13,7 +13,8 @@ using viewer::WallLayout;
 
 inline constexpr int kMaxViewers = 16;
 
-/// A viewer's name, and the folder it records into: the first one's is the run's own, the others have one of theirs in it.
+/// A viewer's name, and the folder it records into: the first one's is the run's own, the others have one of theirs in
+/// it.
 std::string viewer_name(int number);
 std::string viewer_directory(const std::string& run_directory, int number);
 
@@ -24,8 +25,8 @@ struct TilePicture {
   double t_s = 0;  ///< on that viewer's clock, from frames.csv
 };
 
-/// Puts the newest recorded picture of each tile's viewer (1, 2, ...) into one, DIR/images/wall.png. Returns what it was made from.
-/// Error: a viewer recorded none, they differ in size, or the whole is larger than a picture may be.
+/// Puts the newest recorded picture of each tile's viewer (1, 2, ...) into one, DIR/images/wall.png. Returns what it
+/// was made from. Error: a viewer recorded none, they differ in size, or the whole is larger than a picture may be.
 Result<std::vector<TilePicture>> stitch_wall(const std::string& run_directory, const WallLayout& layout);
 
 }  // namespace telesplat::launcher

@@ -1,4 +1,5 @@
-// A scene as rays see it, without points: what displayed frames are compared with, and what poses are sampled from anew.
+// A scene as rays see it, without points: what displayed frames are compared with, and what poses are sampled from
+// anew.
 #pragma once
 
 #include <memory>
@@ -19,8 +20,8 @@ class DirectScene {
  public:
   virtual ~DirectScene() = default;
 
-  /// The scene of `epoch`: every pixel of `camera` traced and shaded with unquantised normals. Depth in metres, +infinity where
-  /// nothing is. Error: the scene of that epoch is not known.
+  /// The scene of `epoch`: every pixel of `camera` traced and shaded with unquantised normals. Depth in metres,
+  /// +infinity where nothing is. Error: the scene of that epoch is not known.
   virtual Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading,
                                    EpochId epoch) = 0;
   /// One sampling frame, as a sampler takes it. Error: as draw(), or the scene has no surface.

@@ -1,5 +1,5 @@
-// A kind of scene as the launcher knows it: what session.toml keeps of it, how its pictures are drawn directly, what is told of it. The
-// one place of the launcher where kinds differ: one class and one row (scene.cpp) a kind.
+// A kind of scene as the launcher knows it: what session.toml keeps of it, how its pictures are drawn directly, what is
+// told of it. The one place of the launcher where kinds differ: one class and one row (scene.cpp) a kind.
 #pragma once
 
 #include <memory>
@@ -25,12 +25,14 @@ class Scene {
 
   /// For captions: the file's name; a Julia set's title.
   virtual std::string name() const;
-  /// Whether it is there and can be shown, as far as that is known without reading all of it. The error names file or parameter.
+  /// Whether it is there and can be shown, as far as that is known without reading all of it. The error names file or
+  /// parameter.
   virtual Status check() const;
   /// The tables [scene] and so on of a run's session.toml, from which recorded_scene() makes the same scene again.
   virtual Result<std::string> session_tables() const;
 
-  /// From here on of a recorded run. Takes in what else the run folder tells: the scene of each epoch. Errors name file, line, value, limit.
+  /// From here on of a recorded run. Takes in what else the run folder tells: the scene of each epoch. Errors name
+  /// file, line, value, limit.
   virtual Status read_record(const std::string& run_directory);
   /// The data lie elsewhere now. Error: it has no data file.
   virtual Status move_to(const std::string& file);
@@ -55,8 +57,8 @@ class Scene {
 /// The scene that options name. Error: as data::kind_of(), which decides what it is.
 Result<std::unique_ptr<Scene>> scene_of(const data::DataOptions& options);
 
-/// The scene that a run showed, from its session.toml and epochs.csv. Its data need not be there: check() tells. A folder that names no
-/// data file has a scene without one. Errors name file, line, value and limit.
+/// The scene that a run showed, from its session.toml and epochs.csv. Its data need not be there: check() tells. A
+/// folder that names no data file has a scene without one. Errors name file, line, value and limit.
 Result<std::unique_ptr<Scene>> recorded_scene(const std::string& run_directory);
 
 /// Keys of a scene file that only one kind of scene has, and that are no flags as they stand.
