@@ -19,12 +19,27 @@ constexpr float kC1 = 0.01f * 255 * 0.01f * 255, kC2 = 0.03f * 255 * 0.03f * 255
 // Luma is stored less 128: variances do not change, and single precision keeps two more bits of them.
 constexpr float kLumaOffset = 128;
 
+bool shows(float depth_m) { return depth_m < std::numeric_limits<float>::infinity(); }
+
 struct Sums {
   double squared_error = 0;  // over three channels
   double ssim = 0;
   size_t pixels = 0, object = 0, holes = 0;
   Sums operator+(const Sums& o) const {
     return {squared_error + o.squared_error, ssim + o.ssim, pixels + o.pixels, object + o.object, holes + o.holes};
+  }
+  void add_pixel(const View& reference, const View& reconstruction, size_t at) {
+    ++pixels;
+    const uint32_t c = reference.colour[at], d = reconstruction.colour[at];
+    int squared = 0;
+    for (int shift : {16, 8, 0}) {
+      const int e = static_cast<int>(c >> shift & 255) - static_cast<int>(d >> shift & 255);
+      squared += e * e;
+    }
+    squared_error += squared;
+    if (!shows(reference.depth_m[at])) return;
+    ++object;
+    if (!(reconstruction.depth_m[at] <= 1.01f * reference.depth_m[at])) ++holes;
   }
 };
 
@@ -52,7 +67,6 @@ float luma(uint32_t c) {
          0.114f * static_cast<float>(c & 255) - kLumaOffset;
 }
 
-bool shows(float depth_m) { return depth_m < std::numeric_limits<float>::infinity(); }
 
 // Window moments of one row: means of x, of y, of x^2 + y^2 and of x y. Lines are padded by the radius on either side.
 class RowMoments {
@@ -139,20 +153,8 @@ Quality compare(const View& reference, const View& reconstruction) {
 
       for (int i = first; i < width; ++i) {
         if (!in_union(i)) continue;
-        ++sums.pixels;
-        const uint32_t c = reference.colour[at + i], d = reconstruction.colour[at + i];
-        int squared = 0;
-        for (int shift : {16, 8, 0}) {
-          const int e = static_cast<int>(c >> shift & 255) - static_cast<int>(d >> shift & 255);
-          squared += e * e;
-        }
-        sums.squared_error += squared;
+        sums.add_pixel(reference, reconstruction, at + i);
         sums.ssim += moments.ssim(i);
-        const float near_m = reference.depth_m[at + i], shown_m = reconstruction.depth_m[at + i];
-        if (shows(near_m)) {
-          ++sums.object;
-          if (!(shown_m <= 1.01f * near_m)) ++sums.holes;
-        }
       }
     }
     return sums;
