@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "common/core/clock.h"
+#include "common/core/utf8.h"
 #include "common/net/service.h"
 
 namespace telesplat::net {
@@ -15,6 +16,9 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
       socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes}) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.emplace("host", host_name());
+  // Names and paths of this machine may be any bytes; messages hold UTF-8.
+  hello_.name = to_utf8(hello_.name);
+  for (auto& [fact, value] : hello_.facts) value = to_utf8(value);
   hello_.pid = static_cast<uint64_t>(getpid());
   if (const Status s = socket_.connect(endpoint); !s) log::error("{}", s.error().text);
 }
@@ -78,7 +82,7 @@ void MasterLink::receive(double now_s) {
 }
 
 void MasterLink::tell(const std::string& fact, const std::string& value) {
-  hello_.facts[fact] = value;
+  hello_.facts[fact] = to_utf8(value);
   if (!welcomed_) return;  // the hello that is due anyway tells it
   hello_.sent_s = 0;       // no exchange to take the time from
   socket_.send(hello_);

@@ -24,7 +24,7 @@ options::Row named(options::Row row, Enum& value, const Enum (&values)[n]) {
       .read =
           [&value, names, all = std::vector<Enum>(std::begin(values), std::end(values))](const std::string& text) {
             const auto found = std::find(names.begin(), names.end(), text);
-            if (found == names.end()) return Status(Error{"is none of its names"});
+            if (found == names.end()) return Status(Error{fmt::format("is not one of {}", fmt::join(names, ", "))});
             value = all[size_t(found - names.begin())];
             return ok_status();
           },
@@ -98,23 +98,33 @@ options::Table lease_table(MasterOptions& o) {
            .fits = Kinds::of(Pipeline::kSlices)}};
 }
 
+// The numbers are what the wire and session.toml say: -1 auto, 0 eliminate, 1 keep.
+options::Row redundancy_row(MasterOptions& o) {
+  options::Row row = named(
+      {.flag = "--packing.redundancy,--packing.keep_redundant",
+       .value = {},
+       .help = "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches; "
+               "auto: keep of Julia sets",
+       .fits = Kinds::of(Pipeline::kPoints)},
+      o.redundancy, {Redundancy::kAuto, Redundancy::kEliminate, Redundancy::kKeep});
+  auto& value = std::get<options::Text>(row.value);
+  value.read = [read = value.read](const std::string& text) {
+    return read(text == "-1" ? "auto" : text == "0" ? "eliminate" : text == "1" ? "keep" : text);
+  };
+  row.limits = {};  // read() refuses what is neither
+  return row;
+}
+
 options::Table packing_table(MasterOptions& o) {
-  return {
-      setting_by_kind(o, "packing.max_points", "points the model holds at most", "20e6; of Julia sets 8e6"),
-      setting(o, "packing.obsolete_after_s", 0, "forget clusters not seen for so long; 0: never"),
-      setting(o, "packing.epsilon", 0.004, "redundancy threshold, relative to depth"),
-      setting(o, "packing.age_weight", 1,
-              "patches that are kept: how fast one not drawn comes to be forgotten, per second"),
-      setting(o, "packing.rate_weight", 4,
-              "patches that are kept: how much coarser ones come before finer ones, per halving"),
-      setting(o, "packing.patches_per_cluster", 6, "patches that are kept of a cluster at most; 0: no limit"),
-      named(
-          {.flag = "--packing.redundancy,--packing.keep_redundant",
-           .value = {},
-           .help = "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches; "
-                   "auto: keep of Julia sets",
-           .fits = Kinds::of(Pipeline::kPoints)},
-          o.redundancy, {Redundancy::kAuto, Redundancy::kEliminate, Redundancy::kKeep})};
+  return {setting_by_kind(o, "packing.max_points", "points the model holds at most", "20e6; of Julia sets 8e6"),
+          setting(o, "packing.obsolete_after_s", 0, "forget clusters not seen for so long; 0: never"),
+          setting(o, "packing.epsilon", 0.004, "redundancy threshold, relative to depth"),
+          setting(o, "packing.age_weight", 1,
+                  "patches that are kept: how fast one not drawn comes to be forgotten, per second"),
+          setting(o, "packing.rate_weight", 4,
+                  "patches that are kept: how much coarser ones come before finer ones, per halving"),
+          setting(o, "packing.patches_per_cluster", 6, "patches that are kept of a cluster at most; 0: no limit"),
+          redundancy_row(o)};
 }
 
 }  // namespace

@@ -56,10 +56,11 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   if (session_options.change_every == 0) {
     EXPECT_EQ(out.sources, std::vector<std::string>{session_options.volume ? "samples" : "points"});
   }
-  // The worker's last report is on its way.
-  for (const double until = monotonic_s() + 20;
-       session.column("frames", "frame").size() < frames && monotonic_s() < until;)
-    std::this_thread::yield();
+  // The worker's last rows and its last report are on their way.
+  const auto wait_until = [](const auto& there) {
+    for (const double until = monotonic_s() + 20; !there() && monotonic_s() < until;) std::this_thread::yield();
+  };
+  wait_until([&] { return session.column("frames", "frame").size() >= frames; });
   out.counts = session.counts();
   out.request = session.column("frames", "request");
   out.sequence = session.column("frames", "sequence");
@@ -68,6 +69,11 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   out.filled = session.column("frames", "buffers_filled");
   out.drawn = session.column("frames", "points_drawn");
   out.updates = session.column("updates", "request");
+  wait_until([&] {
+    const auto status = session.status();
+    const auto told = status.find("frames");
+    return told != status.end() && told->second >= double(frames);
+  });
   out.status = session.status();
   return out;
 }

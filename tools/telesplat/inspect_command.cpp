@@ -48,8 +48,10 @@ int inspect_run(const std::string& directory) {
   std::error_code error;
   if (fs::exists(directory + "/session.toml", error)) {
     const auto scene = recorded_scene(directory);
-    if (!scene) return refuse(scene.error().text);
-    std::fputs((*scene)->describe_record().c_str(), stdout);
+    if (scene)
+      std::fputs((*scene)->describe_record().c_str(), stdout);
+    else
+      std::printf("  its scene cannot be told: %s\n", scene.error().text.c_str());
   }
   for (const auto& entry : fs::recursive_directory_iterator(directory, error))
     if (entry.is_regular_file(error))
@@ -118,6 +120,7 @@ int inspect(InspectOptions o, const options::Given&) {
   std::error_code error;
   if (!fs::exists(path, error)) return refuse(fmt::format("{}: no such file", path));
   if (is_run(o.data)) return inspect_run(path);
+  if (!o.data.volume.raw.empty()) return inspect_data(o.data);
   std::string extension = fs::path(path).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return char(std::tolower(c)); });

@@ -48,6 +48,7 @@ VolumeWork::VolumeWork(MakeSlab make, int threads, uint64_t cache_bytes, std::st
 void VolumeWork::on_welcome(const wire::Welcome& welcome) {
   if (epochs_.follow(welcome.master)) told_ready_ = {};
   const scene::SessionView view(welcome);
+  if (!view.kind()) return;  // no scene for now: parts of another volume are missing, or nobody serves data yet
   const std::string transfer = view.fact("transfer");
   const Epoch* known = epochs_.find(welcome.epoch);
   if (known && known->parameters == welcome.parameters && known->transfer == transfer) return;

@@ -62,6 +62,7 @@ class Run {
   int go() {
     if (const Status s = prepare(); !s) return tools::complain(s.error());
     auto pipeline = Pipeline::start(o_);
+    if (!pipeline && o_.viewer.window && net::stop_requested()) return 0;
     if (!pipeline) return tools::complain(pipeline.error(), 1);
     State state = watch(*pipeline);
     pipeline->finish();
@@ -160,9 +161,9 @@ class Run {
   Status verify(bool interrupted) {
     if (o_.viewer.display.verify_every == 0 || interrupted || !o_.join_master.empty()) return ok_status();
     verify_code_ = 2;
-    const auto recorded = recorded_scene(o_.out);
-    if (!recorded) return recorded.error();
-    auto direct = (*recorded)->open_direct(0, [](const char*, double) {});
+    // The scene as it was opened, with what the record tells of its epochs: session.toml cannot tell every file's name.
+    if (const Status s = scene_->read_record(o_.out); !s) return s;
+    auto direct = scene_->open_direct(0, [](const char*, double) {});
     if (!direct) return direct.error();
     verify_code_ = 1;
     const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("verifying view {} of {}", done, of)); };

@@ -75,9 +75,14 @@ Table sampler_rows(RunOptions& o) {
 
 // What only some scenes have means nothing where no scene is named.
 Status refuse_scene_flags(RunOptions& o, const options::Given& given) {
-  const Table of_scenes = data::scene_table(o.data);
+  const Table of_scenes = data::scene_table(o.data), of_all = table(o);
+  const auto means_nothing = [&](const std::string& flag) {
+    if (const auto* row = options::find(of_scenes, flag)) return row->fits != scene::Kinds::all();
+    const auto* row = options::find(of_all, flag);
+    return row && row->fits == scene::Kinds{scene::Kind::kVolume};
+  };
   for (const auto& flag : given)
-    if (const auto* row = options::find(of_scenes, flag); row && row->fits != scene::Kinds::all())
+    if (means_nothing(flag))
       return Error{
           fmt::format("{} is given, but no scene; that of a running session is changed with telesplat ctl set, ctl "
                       "animate and ctl tf",

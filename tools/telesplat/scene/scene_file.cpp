@@ -113,6 +113,8 @@ class SceneReader {
       std::replace(flag.begin(), flag.end(), '_', '-');
     }
     const options::Row* row = options::find(table_, flag);
+    const bool off = node.is_boolean() && !**node.as_boolean();
+    if (!row && off) return ok_status();  // a flag of another command, and not wanted
     if (!row) return wrong(node, fmt::format("key {} is none: there is no flag {}", name, flag));
     return read_flag(*row, flag, name, node);
   }
@@ -132,11 +134,13 @@ class SceneReader {
     return ok_status();
   }
 
-  // Files that a scene names lie beside it. What may be a file may be a name, too: then it is a file if one is there.
+  // Files that a scene names lie beside it, or where the command is given. What may be a file may be a name, too: then it
+  // is a file if one is there.
   bool names_file(const options::Row& row, const std::string& text) const {
     std::error_code error;
     const bool looks_like_file = text.find_first_of(":,") == text.npos && fs::path(text).has_extension();
-    return row.is_file && (looks_like_file || fs::is_regular_file(beside(text), error));
+    if (!row.is_file || fs::is_regular_file(beside(text), error)) return row.is_file;
+    return looks_like_file && !fs::is_regular_file(text, error);
   }
 
   std::string path_, file_, kind_;
