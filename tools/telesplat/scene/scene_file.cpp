@@ -134,7 +134,7 @@ class SceneReader {
     return ok_status();
   }
 
-  // Files that a scene names lie beside it, or where the command is given. What may be a file may be a name, too: then it
+  // Files that a scene names lie beside it, or where the command is given. What may be a file may be a name, too: then
   // is a file if one is there.
   bool names_file(const options::Row& row, const std::string& text) const {
     std::error_code error;
