@@ -18,7 +18,7 @@ using options::Reach;
 using options::Row;
 using options::Table;
 
-constexpr scene::Kinds kPoints{scene::Kind::kMesh, scene::Kind::kJulia};
+const scene::Kinds kPoints = scene::Kinds::of(scene::Pipeline::kPoints);
 
 std::string complain_about_finish(const std::string& text) {
   return splat::finish_named(text) ? "" : "not on, off or some of fill,smooth,antialias";

@@ -138,8 +138,9 @@ ordered_json peak_rss(const Roster& roster) {
 
 ordered_json what_was_shown(const Roster& roster) {
   const auto pixels = [&](const char* key) { return whole(roster.number("viewer", key)); };
-  // A data set has one of these facts, or none.
-  const double primitives = roster.number("data", "triangles") + roster.number("data", "voxels");
+  // Data servers of earlier versions told one of the other two.
+  double primitives = roster.number("data", "primitives");
+  if (primitives == 0) primitives = roster.number("data", "triangles") + roster.number("data", "voxels");
   return {{"schema", 1},
           {"scene", roster.fact("data", "scene")},
           {"kind", roster.fact("data", "kind")},

@@ -25,6 +25,7 @@ constexpr Row kRows[] = {
     {Kind::kJulia, "julia", "a Julia set", Pipeline::kPoints, {kDepth, true, true, 8e6, 0.4}},
     {Kind::kVolume, "volume", "a volume", Pipeline::kSlices, {kDepth, false, false, 20e6, 0.5}},
 };
+static_assert(std::size(kRows) == std::size(kKinds), "a row a kind");
 
 const Row& row_of(Kind kind) {
   return *std::find_if(std::begin(kRows), std::end(kRows), [&](const Row& r) { return r.kind == kind; });

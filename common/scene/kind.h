@@ -21,7 +21,11 @@ class Kinds {
   constexpr Kinds(std::initializer_list<Kind> kinds) {
     for (const Kind k : kinds) bits_ |= bit(k);
   }
-  static constexpr Kinds all() { return {Kind::kMesh, Kind::kJulia, Kind::kVolume}; }
+  static constexpr Kinds all() {
+    Kinds out{};
+    for (const Kind k : kKinds) out.bits_ |= bit(k);
+    return out;
+  }
   static Kinds of(Pipeline pipeline);
   constexpr bool has(Kind kind) const { return (bits_ & bit(kind)) != 0; }
   constexpr bool operator==(const Kinds&) const = default;

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/volume/transfer/function.h"
+#include "services/data/kinds.h"
 
 namespace telesplat::data {
 namespace {
@@ -132,12 +133,7 @@ Table scene_table(DataOptions& o) {
 }
 
 Table server_table(DataOptions& o) {
-  Table table{{.flag = "scene",
-               .value = &o.scene,
-               .help = "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), elevation raster (GeoTIFF, HGT, 16-bit "
-                       "PNG), volume (NRRD, MetaImage, NIfTI, VTI, raw with --raw, a folder of DICOM slices or of a "
-                       "numbered series), or julia",
-               .required = true}};
+  Table table{{.flag = "scene", .value = &o.scene, .help = scene_help(), .required = true}};
   Table volume{
       {.flag = "--part",
        .value = &o.volume.part,

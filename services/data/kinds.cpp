@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <iterator>
 
 #include "services/data/julia/served_julia.h"
 #include "services/data/mesh/served_mesh.h"
@@ -42,14 +43,19 @@ OpenServed open_as_julia(const DataOptions& o, const Progress& progress) {
 // One row a kind of scene; the first that claims a data set has it.
 struct Row {
   Kind kind;
+  const char* files;  // what its data are, for help texts
   bool (*claims)(const DataOptions&);
   OpenServed (*open)(const DataOptions&, const Progress&);
 };
 constexpr Row kRows[] = {
-    {Kind::kJulia, is_julia, open_as_julia},
-    {Kind::kVolume, is_volume, open_as_volume},
-    {Kind::kMesh, is_mesh, open_as_mesh},
+    {Kind::kJulia, "the word julia", is_julia, open_as_julia},
+    {Kind::kVolume,
+     "volume (NRRD, MetaImage, NIfTI, VTI, raw with --raw, a folder of DICOM slices or of a numbered series)",
+     is_volume, open_as_volume},
+    {Kind::kMesh, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB) or elevation raster (GeoTIFF, HGT, 16-bit PNG)",
+     is_mesh, open_as_mesh},
 };
+static_assert(std::size(kRows) == std::size(scene::kKinds), "a row a kind");
 
 Result<const Row*> row_of(const DataOptions& o) {
   std::error_code error;
@@ -89,6 +95,13 @@ Status refuse_misfits(DataOptions o, Kind kind) {
 }
 
 }  // namespace
+
+std::string scene_help() {
+  std::string out;
+  for (auto row = std::rbegin(kRows); row != std::rend(kRows); ++row)
+    out += fmt::format("{}{}", out.empty() ? "" : ", ", row->files);
+  return out;
+}
 
 Result<Kind> kind_of(const DataOptions& o) {
   const auto row = row_of(o);

@@ -12,6 +12,9 @@ namespace telesplat::data {
 
 class Served;
 
+/// What data sets there are, for help texts: "mesh file (PLY, ...) or ..., volume (...), the word julia".
+std::string scene_help();
+
 /// What the options' scene is, by the options and by the file's content. Error, naming scene or flag: there is no such
 /// file; it is a folder that holds nothing we know; an option is set that scenes of its kind do not have. Whether a
 /// file is sound only opening it tells.

@@ -111,7 +111,7 @@ options::Row redundancy_row(MasterOptions& o) {
   value.read = [read = value.read](const std::string& text) {
     return read(text == "-1" ? "auto" : text == "0" ? "eliminate" : text == "1" ? "keep" : text);
   };
-  row.limits = {};  // read() refuses what is neither
+  row.limits = options::Names{"auto", "eliminate", "keep", "-1", "0", "1"};
   return row;
 }
 

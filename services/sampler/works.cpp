@@ -1,5 +1,7 @@
 #include "services/sampler/works.h"
 
+#include <iterator>
+
 #include "services/sampler/julia/tiles.h"
 #include "services/sampler/mesh/tiles.h"
 #include "services/sampler/tiles/work.h"
@@ -53,6 +55,7 @@ constexpr Row kWorks[] = {
     {scene::Kind::kJulia, julia_work},
     {scene::Kind::kVolume, volume_work},
 };
+static_assert(std::size(kWorks) == std::size(scene::kKinds), "a row a kind");
 
 }  // namespace
 

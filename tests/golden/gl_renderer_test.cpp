@@ -65,7 +65,7 @@ TEST_F(GlRendererTest, WaysToMoveDataMakeNoDifference) {
   ASSERT_TRUE(plain && mapped);
   for (int frame = 0; frame < 8; ++frame) {  // past all parts of the ring, growing
     const Scene scene(frame);
-    const splat::RenderOptions options{splat::kKernels[static_cast<size_t>(frame) % 4],
+    const splat::RenderOptions options{splat::kKernels[static_cast<size_t>(frame) % std::size(splat::kKernels)],
                                        {frame % 2 == 0, true, frame % 3 == 0}};
     const testing::Frame a = render(*plain, scene, options), b = render(*mapped, scene, options);
     EXPECT_TRUE(a == b) << "frame " << frame;

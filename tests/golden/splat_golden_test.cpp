@@ -260,7 +260,7 @@ TEST(RenderersAgree, FrameAfterFrame) {
     splat::select_view(model(), camera, options, list);
     auto made = testing::random_items(static_cast<uint32_t>(frame), 12, 60);
     for (auto& m : made) list.items.push_back(m.item(1.0f + 0.7f * float(frame % 12)));
-    const splat::Kernel kernel = splat::kKernels[static_cast<size_t>(frame) % 4];
+    const splat::Kernel kernel = splat::kKernels[static_cast<size_t>(frame) % std::size(splat::kKernels)];
     testing::Frame a(width, height), b(width, height);
     const splat::Finish finish{frame % 3 == 1, frame % 3 != 0, frame % 5 > 2};
     cpu->render(list, camera, {kernel, finish}, shading, a.target());

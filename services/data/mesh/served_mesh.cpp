@@ -26,6 +26,7 @@ class ServedMesh final : public Served {
   void describe(wire::Hello& hello) const override {
     const MeshStoreInfo& info = store_->info();
     hello.facts.insert({{"format", info.format},
+                        {"primitives", std::to_string(info.triangles)},
                         {"triangles", std::to_string(info.triangles)},
                         {"vertices", std::to_string(info.vertices)},
                         {"degenerate_dropped", std::to_string(info.degenerate_dropped)},

@@ -135,6 +135,7 @@ void ServedVolume::describe(wire::Hello& hello) const {
   const auto& size = session.grid.size;
   hello.facts.merge(volume::to_facts(session));
   hello.facts.insert({{"format", store_->format()},
+                      {"primitives", std::to_string(session.grid.voxels())},
                       {"voxels", std::to_string(session.grid.voxels())},
                       {"content_hash", fmt::format("{:016x}", store_->content_hash())},
                       {"size", fmt::format("{} x {} x {}", size[0], size[1], size[2])}});

@@ -127,5 +127,20 @@ TEST_F(Scenes, AWallHasAViewerATile) {
   EXPECT_TRUE(holds(viewer_arguments(o, 1, 0), "--verify=5"));
 }
 
+TEST_F(Scenes, EveryKindHasARow) {
+  for (const scene::Kind kind : scene::kKinds) {
+    const auto rows = std::count_if(scene_kinds().begin(), scene_kinds().end(),
+                                    [&](const SceneKind& row) { return row.kind == kind; });
+    EXPECT_EQ(rows, 1) << scene::name_of(kind);
+  }
+}
+
+TEST_F(Scenes, FlagsOfVolumesNeedASceneWhereASessionIsJoined) {
+  for (const char* flag : {"--data-servers=2", "--layers=8", "--tf=hot"}) {
+    RunOptions o;
+    EXPECT_FALSE(settled(o, {"--master=tcp://127.0.0.1:1", flag})) << flag;
+  }
+}
+
 }  // namespace
 }  // namespace telesplat::launcher

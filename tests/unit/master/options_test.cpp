@@ -62,7 +62,7 @@ TEST(MasterFlags, HaveLimits) {
                                                                                    {"--packing.max_points", "nan"},
                                                                                    {"--packing.max_points", "many"},
                                                                                    {"--packing.epsilon", "x"},
-                                                                                   {"--packing.redundancy", "0"}}) {
+                                                                                   {"--packing.redundancy", "2"}}) {
     const Status s = give(o, flag, text);
     ASSERT_FALSE(s) << flag << " " << text;
     EXPECT_NE(s.error().text.find(flag), std::string::npos) << s.error().text;

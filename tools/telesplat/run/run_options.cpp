@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "common/geometry/trajectory.h"
+#include "services/data/kinds.h"
 #include "tools/telesplat/run/wall.h"
 
 namespace telesplat::launcher {
@@ -16,10 +17,6 @@ using options::Table;
 
 // The tiles of a wall are compared where the head stands still.
 constexpr double kWallHold_s = 2;
-
-constexpr const char* kSceneHelp =
-    "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB), volume (NRRD, MetaImage, NIfTI, VTI, raw, a folder of DICOM "
-    "slices or of a numbered series), the word julia, or a scene file (TOML)";
 
 // Either `run`'s or `view`'s.
 Table display_rows(RunOptions& o) {
@@ -40,7 +37,7 @@ Table display_rows(RunOptions& o) {
 
 Table own_rows(RunOptions& o) {
   const auto points = scene::Kinds::of(scene::Pipeline::kPoints);
-  return {{.flag = "scene", .value = &o.data.scene, .help = kSceneHelp},
+  return {{.flag = "scene", .value = &o.data.scene, .help = data::scene_help() + ", or a scene file (TOML)"},
           {.flag = "--samplers", .value = &o.samplers, .help = "sampler processes", .limits = Range{1, 64}},
           {.flag = "--sampler-threads",
            .value = &o.sampler.threads,

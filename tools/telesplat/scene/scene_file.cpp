@@ -135,7 +135,7 @@ class SceneReader {
   }
 
   // Files that a scene names lie beside it, or where the command is given. What may be a file may be a name, too: then
-  // is a file if one is there.
+  // it is a file if one is there.
   bool names_file(const options::Row& row, const std::string& text) const {
     std::error_code error;
     const bool looks_like_file = text.find_first_of(":,") == text.npos && fs::path(text).has_extension();
