@@ -151,7 +151,9 @@ TEST(PointSession, SynchronouslyNoFrameShowsPartOfAnUpdate) {
   expect_one_update_a_frame(s);
   for (const double sequence : s.sequence) EXPECT_EQ(int(sequence) % 3, 0) << "coarse, upper, lower half: all or none";
   EXPECT_EQ(s.counts.most_open, 1u);
-  EXPECT_EQ(s.updates.size(), s.request.size());
+  // The last frame, too, asks for an update; it may still come before the viewer leaves.
+  EXPECT_GE(s.updates.size(), s.request.size());
+  EXPECT_LE(s.updates.size(), s.request.size() + 1);
 }
 
 TEST(PointSession, LooselyUpdatesAreHeldUntilTheirFrame) {
