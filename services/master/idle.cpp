@@ -5,8 +5,11 @@
 namespace telesplat::master {
 
 bool Idle::add(const std::string& id, int at_once) {
+  if (ids_.insert(id).second) {
+    samplers_.push_back({id, 1, at_once});
+    return true;
+  }
   auto s = std::find_if(samplers_.begin(), samplers_.end(), [&](const Sampler& x) { return x.id == id; });
-  if (s == samplers_.end()) s = samplers_.insert(samplers_.end(), {id, 0, at_once});
   if (s->waiting >= kMaxWaitingLeases) return false;
   s->at_once = at_once;
   ++s->waiting;
@@ -14,21 +17,25 @@ bool Idle::add(const std::string& id, int at_once) {
 }
 
 void Idle::remove(const std::string& id) {
-  std::erase_if(samplers_, [&](const Sampler& s) { return s.id == id; });
+  if (ids_.erase(id)) std::erase_if(samplers_, [&](const Sampler& s) { return s.id == id; });
 }
 
 void Idle::served(size_t i) {
-  const auto place = samplers_.begin() + std::ptrdiff_t(i);
-  if (--place->waiting > 0)
-    std::rotate(place, place + 1, samplers_.end());
-  else
-    samplers_.erase(place);
+  if (--samplers_[i].waiting == 0) return erase(i);
+  Sampler last = std::move(samplers_[i]);
+  samplers_.erase(samplers_.begin() + std::ptrdiff_t(i));
+  samplers_.push_back(std::move(last));
 }
 
 bool Idle::served_in_place(size_t i) {
   if (--samplers_[i].waiting > 0) return true;
-  samplers_.erase(samplers_.begin() + std::ptrdiff_t(i));
+  erase(i);
   return false;
+}
+
+void Idle::erase(size_t i) {
+  ids_.erase(samplers_[i].id);
+  samplers_.erase(samplers_.begin() + std::ptrdiff_t(i));
 }
 
 }  // namespace telesplat::master
