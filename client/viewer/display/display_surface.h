@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "client/viewer/display/overlay.h"
 #include "client/viewer/input/look.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/file.h"
@@ -37,6 +38,8 @@ class DisplaySurface {
   virtual void present(const image::View& view) = 0;
   /// After the frame's bookkeeping.
   virtual void report(const LiveFigures& figures) = 0;
+  /// What lies over the frames that it shows; null: nobody sees them.
+  virtual Overlays* overlays() { return nullptr; }
   /// Whether the person is done.
   virtual bool wants_to_stop() const = 0;
 };

@@ -17,9 +17,13 @@ void main() {
 })";
 constexpr const char* kFragmentShader = R"(#version 330 core
 uniform sampler2D frame;
+uniform bool keeps_alpha;
 in vec2 place;
 out vec4 colour;
-void main() { colour = vec4(texture(frame, place).rgb, 1.0); }
+void main() {
+  vec4 texel = texture(frame, place);
+  colour = vec4(texel.rgb, keeps_alpha ? texel.a : 1.0);
+}
 )";
 
 Status compile(GLuint program, GLenum kind, const char* source) {
@@ -46,6 +50,7 @@ Result<std::unique_ptr<FramePresenter>> FramePresenter::make() {
   GLint linked = 0;
   glGetProgramiv(out->program_, GL_LINK_STATUS, &linked);
   if (!linked) return Error{"the window's shaders do not link"};
+  out->keeps_alpha_ = glGetUniformLocation(out->program_, "keeps_alpha");
   glGenVertexArrays(1, &out->vertex_array_);
   out->has_ring_ = epoxy_gl_version() >= 44 || epoxy_has_gl_extension("GL_ARB_buffer_storage");
   return out;
@@ -53,6 +58,7 @@ Result<std::unique_ptr<FramePresenter>> FramePresenter::make() {
 
 FramePresenter::~FramePresenter() {
   resize(0, 0);
+  load_overlays({});
   glDeleteVertexArrays(1, &vertex_array_);
   glDeleteProgram(program_);
 }
@@ -105,7 +111,42 @@ void FramePresenter::upload(const image::View& view) {
   s.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
 }
 
-void FramePresenter::draw(const image::View& view, int width, int height) {
+void FramePresenter::load_overlays(const Overlays& overlays) {
+  for (const auto& [name, texture] : overlay_textures_) glDeleteTextures(1, &texture);
+  overlay_textures_.clear();
+  for (const auto& [name, overlay] : overlays.all()) {
+    const image::View& picture = overlay.picture;
+    uint32_t& texture = overlay_textures_[name];
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, picture.width, picture.height, 0, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV,
+                 picture.colour.data());
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  }
+  overlay_version_ = overlays.version();
+}
+
+// With the frame's program and vertices.
+void FramePresenter::draw_overlays(const Overlays& overlays, int width, int height) {
+  if (overlays.version() != overlay_version_) load_overlays(overlays);
+  if (overlay_textures_.empty()) return;
+  glUniform1i(keeps_alpha_, 1);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  for (const auto& [name, overlay] : overlays.all()) {
+    const auto place = place_overlay(overlay, width, height);
+    glViewport(place.x, height - place.y - place.height, place.width, place.height);
+    glBindTexture(GL_TEXTURE_2D, overlay_textures_[name]);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+  glDisable(GL_BLEND);
+}
+
+void FramePresenter::draw(const image::View& view, int width, int height, const Overlays& overlays) {
   if (view.width != width_ || view.height != height_) resize(view.width, view.height);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, texture_);
@@ -118,8 +159,10 @@ void FramePresenter::draw(const image::View& view, int width, int height) {
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
   glUseProgram(program_);
+  glUniform1i(keeps_alpha_, 0);
   glBindVertexArray(vertex_array_);
   glDrawArrays(GL_TRIANGLES, 0, 3);
+  draw_overlays(overlays, width, height);
 }
 
 }  // namespace telesplat::viewer

@@ -2,8 +2,11 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
+#include <string>
 
+#include "client/viewer/display/overlay.h"
 #include "common/core/result.h"
 #include "common/image/file.h"
 
@@ -21,7 +24,8 @@ class FramePresenter {
   FramePresenter& operator=(const FramePresenter&) = delete;
 
   /// Draws the frame over the whole default framebuffer of width x height pixels; scales it if it has another size.
-  void draw(const image::View& view, int width, int height);
+  /// What lies over it is blended on.
+  void draw(const image::View& view, int width, int height, const Overlays& overlays);
   bool has_pixel_ring() const { return has_ring_; }
 
  private:
@@ -29,10 +33,15 @@ class FramePresenter {
   FramePresenter() = default;
   void resize(int width, int height);
   void upload(const image::View& view);
+  void draw_overlays(const Overlays& overlays, int width, int height);
+  void load_overlays(const Overlays& overlays);
 
   bool has_ring_ = false;
   int width_ = 0, height_ = 0, slot_ = 0;
   uint32_t program_ = 0, vertex_array_ = 0, texture_ = 0;
+  int keeps_alpha_ = -1;  // uniform
+  std::map<std::string, uint32_t> overlay_textures_;
+  uint64_t overlay_version_ = 0;
   struct Slot {
     uint32_t buffer = 0;
     void* memory = nullptr;

@@ -210,12 +210,12 @@ void Window::poll(Interaction& interaction) {
 bool Window::closing() const { return glfwWindowShouldClose(impl_->window); }
 void Window::set_title(const std::string& title) { glfwSetWindowTitle(impl_->window, title.c_str()); }
 
-void Window::present(const image::View& view) {
+void Window::present(const image::View& view, const Overlays& overlays) {
   int width = 0, height = 0;
   glfwGetFramebufferSize(impl_->window, &width, &height);
   if (width <= 0 || height <= 0) return;
   const Current current(*this);
-  impl_->presenter->draw(view, width, height);
+  impl_->presenter->draw(view, width, height, overlays);
   glfwSwapBuffers(impl_->window);
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "client/viewer/display/overlay.h"
 #include "client/viewer/input/interaction.h"
 #include "common/core/result.h"
 #include "common/image/file.h"
@@ -49,8 +50,8 @@ class Window {
   int width() const { return width_; }
   int height() const { return height_; }
   void set_title(const std::string& title);
-  /// Shows a frame, in time with the screen; nothing happens while the window is minimised.
-  void present(const image::View& view);
+  /// Shows a frame and what lies over it, in time with the screen; nothing happens while the window is minimised.
+  void present(const image::View& view, const Overlays& overlays);
 
  private:
   struct Impl;

@@ -54,7 +54,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
 }
 
 void WindowSurface::present(const image::View& view) {
-  window_->present(view);
+  window_->present(view, overlays_);
   if (interaction_.take_screenshot_wish()) screenshots_.take(view);
 }
 

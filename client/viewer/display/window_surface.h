@@ -30,6 +30,7 @@ class WindowSurface final : public DisplaySurface {
   bool visible() const override { return true; }
   void present(const image::View& view) override;
   void report(const LiveFigures& figures) override;
+  Overlays* overlays() override { return &overlays_; }
   bool wants_to_stop() const override { return window_->closing() || interaction_.wants_to_quit(); }
 
  private:
@@ -39,6 +40,7 @@ class WindowSurface final : public DisplaySurface {
   std::unique_ptr<Window> window_;
   Interaction interaction_;
   TitleLine title_;
+  Overlays overlays_;
   std::function<void(const std::string&)> tell_;
   Screenshots screenshots_;
 };
