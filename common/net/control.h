@@ -8,8 +8,17 @@
 
 namespace telesplat::net {
 
-/// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer.
-/// Error: the master's refusal, or that it did not answer within `timeout_s`. Answers to earlier commands are dropped.
+/// Of a DEALER that asks a master: it knows when nobody is there.
+inline constexpr SocketOptions kControlSocket{
+    .high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes, .watch_connecting = true};
+
+/// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer,
+/// which may be a refusal. Error: it did not answer within `timeout_s`; if the socket has kControlSocket, at once where
+/// nothing takes connections. Answers to earlier commands are dropped.
+Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& endpoint, const std::string& command,
+                                           double timeout_s, const std::map<std::string, std::string>& arguments = {});
+
+/// The text of the answer. Error: a refusal too.
 Result<std::string> ask_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                double timeout_s, const std::map<std::string, std::string>& arguments = {});
 

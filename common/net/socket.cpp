@@ -86,10 +86,12 @@ struct Socket::Impl {
   // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too
   // much are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed
   // handshake is certain to be told.
-  void watch_connections() {
+  void watch_connections() { watch(ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED); }
+
+  void watch(int events) {
     static std::atomic<int> counter{0};
     const std::string address = fmt::format("inproc://monitor-{}", ++counter);
-    if (zmq_socket_monitor(socket.handle(), address.c_str(), ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED) != 0) return;
+    if (zmq_socket_monitor(socket.handle(), address.c_str(), events) != 0) return;
     monitor.emplace(context, zmq::socket_type::pair);
     monitor->set(zmq::sockopt::linger, 0);
     monitor->set(zmq::sockopt::rcvhwm, 10000);
@@ -107,7 +109,9 @@ struct Socket::Impl {
       int32_t fd = -1;
       std::memcpy(&what, event.data(), 2);
       std::memcpy(&fd, static_cast<const char*>(event.data()) + 2, 4);
-      if (what == ZMQ_EVENT_ACCEPTED) {
+      if (what == ZMQ_EVENT_CONNECT_RETRIED) {
+        ++failed_connections;
+      } else if (what == ZMQ_EVENT_ACCEPTED) {
         connections[fd] = {fd, monotonic_s(), false};
       } else if (const auto it = connections.find(fd); it != connections.end()) {
         closed.push_back(it->second);
@@ -180,7 +184,7 @@ struct Socket::Impl {
   };
   std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
   std::vector<Connection> closed;                   // not judged yet
-  uint64_t rejected = 0;
+  uint64_t rejected = 0, failed_connections = 0;
   log::RateLimiter limiter;
 };
 
@@ -204,6 +208,7 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
 
 Status Socket::connect(const std::string& endpoint) {
   try {
+    if (impl_->options.watch_connecting && !impl_->monitor) impl_->watch(ZMQ_EVENT_CONNECT_RETRIED);
     impl_->socket.connect(endpoint);
     return ok_status();
   } catch (const zmq::error_t& e) {
@@ -289,6 +294,10 @@ void Socket::reject(const Message& message, const std::string& why) {
 uint64_t Socket::rejected() const {
   if (impl_->kind == Kind::kPub) impl_->drain_subscriptions();
   return impl_->rejected;
+}
+uint64_t Socket::failed_connections() const {
+  impl_->drain_monitor();
+  return impl_->failed_connections;
 }
 const std::string& Socket::name() const { return impl_->name; }
 

@@ -41,7 +41,8 @@ struct Message {
 struct SocketOptions {
   int high_water_mark = 1000;  ///< messages queued each way before ROUTER, PUB drop and PUSH, DEALER refuse
   size_t max_message_bytes =
-      wire::kMaxControlBytes;  ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
+      wire::kMaxControlBytes;     ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
+  bool watch_connecting = false;  ///< count attempts to connect that fail
 };
 
 class Socket {
@@ -85,6 +86,9 @@ class Socket {
   /// Messages dropped for being malformed, oversized or unexpected, and connections accepted that ended without having
   /// brought one message: random bytes, other protocols, failed handshakes, frames that claim more than is ever read.
   uint64_t rejected() const;
+  /// With SocketOptions::watch_connecting: attempts to connect so far that came to nothing, because nobody listens
+  /// there or the address is of no machine. ZeroMQ goes on trying.
+  uint64_t failed_connections() const;
   const std::string& name() const;
 
   struct Impl;

@@ -5,15 +5,18 @@
 namespace telesplat::launcher {
 
 ControlClient::ControlClient(const std::string& master_endpoint)
-    : endpoint_(master_endpoint),
-      socket_(context_, net::Kind::kDealer, "ctl",
-              {.high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes}) {
+    : endpoint_(master_endpoint), socket_(context_, net::Kind::kDealer, "ctl", net::kControlSocket) {
   if (const Status s = socket_.connect(master_endpoint); !s) log::error("{}", s.error().text);
 }
 
 Result<std::string> ControlClient::ask(const std::string& command, double timeout_s,
                                        const std::map<std::string, std::string>& arguments) {
   return net::ask_master(socket_, endpoint_, command, timeout_s, arguments);
+}
+
+Result<wire::ControlReply> ControlClient::order(const std::string& command, double timeout_s,
+                                                const std::map<std::string, std::string>& arguments) {
+  return net::reply_of_master(socket_, endpoint_, command, timeout_s, arguments);
 }
 
 void ControlClient::request_status() { socket_.send(wire::Control{"status", {}}); }

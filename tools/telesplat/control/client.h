@@ -12,9 +12,12 @@ class ControlClient {
  public:
   explicit ControlClient(const std::string& master_endpoint);
 
-  /// Sends a command and waits for its answer.
+  /// Sends a command and waits for its answer. Error: the master refused, or there is no answer.
   Result<std::string> ask(const std::string& command, double timeout_s,
                           const std::map<std::string, std::string>& arguments = {});
+  /// The same, but a refusal is an answer.
+  Result<wire::ControlReply> order(const std::string& command, double timeout_s,
+                                   const std::map<std::string, std::string>& arguments = {});
   /// Sends "status" without waiting; poll_status() gives the answer once it is there.
   void request_status();
   std::optional<nlohmann::json> poll_status();

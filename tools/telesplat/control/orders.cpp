@@ -1,0 +1,126 @@
+#include "tools/telesplat/control/orders.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "common/julia/flags.h"
+#include "common/volume/session.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Arguments = Order::Arguments;
+using Words = std::vector<std::string>;
+
+constexpr uintmax_t kMaxMapBytes = 4 << 20;  // of a colour-map file
+
+// "NAME=VALUE"s.
+Result<Arguments> set_arguments(const Words& words, ControlClient&) {
+  Arguments out;
+  if (words.empty()) return Error{"ctl set: needs NAME=VALUE, such as c.y=0.3 or volume.step=3"};
+  for (const auto& a : words) {
+    const size_t equals = a.find('=');
+    if (equals == std::string::npos || equals == 0)
+      return Error{fmt::format("ctl set: \"{}\" is not NAME=VALUE, such as c.y=0.3 or volume.step=3", a.substr(0, 80))};
+    const std::string name = a.substr(0, equals);
+    const auto value = julia::read_value(name, a.substr(equals + 1));
+    if (!value) return Error{"ctl set: " + value.error().text};
+    out[name] = fmt::format("{}", *value);
+  }
+  return out;
+}
+
+Result<Arguments> animate_arguments(const Words& words, ControlClient&) {
+  if (words.size() != 1)
+    return Error{
+        "ctl animate: needs one timeline, such as c.y=-0.4:0.4:10s, or off; for a series of volumes on or off"};
+  if (words.front() != "off" && words.front() != "on")
+    if (const auto timeline = julia::parse_timeline(words.front()); !timeline) return timeline.error();
+  return Arguments{{"timeline", words.front()}};
+}
+
+// A colour-map file's values may lie in any range; the session's is asked for.
+Result<std::string> read_map(const std::string& path, ControlClient& client) {
+  std::error_code error;
+  const uintmax_t bytes = fs::file_size(path, error);
+  if (error) return Error{fmt::format("{}: {}", path, error.message())};
+  if (bytes > kMaxMapBytes) return Error{fmt::format("{}: {} bytes, limit {}", path, bytes, kMaxMapBytes)};
+  std::ifstream in(path, std::ios::binary);
+  const std::string content((std::istreambuf_iterator<char>(in)), {});
+  const auto answer = client.ask("status", kPatience_s);
+  if (!answer) return answer.error();
+  const auto status = nlohmann::json::parse(*answer, nullptr, false);
+  std::map<std::string, double> parameters;
+  if (status.is_object() && status.contains("parameters"))
+    for (const auto& [name, value] : status["parameters"].items())
+      if (value.is_number()) parameters[name] = value.get<double>();
+  const volume::TransferFunction any{{{}}};
+  const auto session = volume::read_session(parameters, {{"transfer", volume::to_text(any)}});
+  if (!session) return Error{fmt::format("ctl tf {}: the session shows no volume: {}", path, session.error().text)};
+  const auto transfer = volume::parse_paraview_json(content, path, session->range);
+  if (!transfer) return transfer.error();
+  return volume::to_text(*transfer);
+}
+
+std::string preset_names() {
+  std::vector<std::string> names;
+  for (const auto& preset : volume::transfer_presets()) names.emplace_back(preset.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+// The master reads presets and points: it knows the range of the volume's values.
+Result<Arguments> transfer_arguments(const Words& words, ControlClient& client) {
+  if (words.size() != 1)
+    return Error{
+        fmt::format("ctl tf: needs one transfer function: a preset ({}), a ParaView JSON file, or points such as "
+                    "\"0:#000000:0,255:#ffffff:0.5\"",
+                    preset_names())};
+  std::string text = words.front();
+  std::error_code error;
+  if (text.ends_with(".json") || fs::is_regular_file(text, error)) {
+    auto map = read_map(text, client);
+    if (!map) return map.error();
+    text = *std::move(map);
+  } else if (text.find(':') == std::string::npos) {
+    const auto presets = volume::transfer_presets();
+    if (std::none_of(presets.begin(), presets.end(), [&](const auto& p) { return p.name == text; }))
+      return Error{
+          fmt::format("ctl tf: \"{}\" is no preset ({}), no file that is there, and no points such as "
+                      "\"0:#000000:0,255:#ffffff:0.5\"",
+                      text.substr(0, 80), preset_names())};
+  }
+  if (text.size() > volume::kMaxTransferText)
+    return Error{fmt::format("ctl tf: the transfer function is a text of {} bytes, limit {}", text.size(),
+                             volume::kMaxTransferText)};
+  return Arguments{{"transfer", text}};
+}
+
+}  // namespace
+
+const std::vector<Order>& orders() {
+  static const std::vector<Order> all{
+      {.name = "stop", .help = "end the session: the master writes the record, everyone exits", .words = {}},
+      {.name = "epoch", .help = "drop all points and sample anew", .words = {}},
+      {.name = "set",
+       .help = "change a Julia set's parameters, or a series' volume.step",
+       .words = "NAME=VALUE, such as c.y=0.3 or volume.step=3",
+       .read = set_arguments},
+      {.name = "animate",
+       .help = "change parameters with time, or play a series",
+       .words = "a timeline as --animate of run takes it, or off; for a series of volumes on or off",
+       .read = animate_arguments},
+      {.name = "tf",
+       .help = "change a volume's transfer function",
+       .words = "as --tf of run: a preset (" + preset_names() +
+                "), a ParaView JSON file, or points VALUE:COLOUR:OPACITY,...",
+       .read = transfer_arguments}};
+  return all;
+}
+
+}  // namespace telesplat::launcher
