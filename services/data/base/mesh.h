@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/geometry/box.h"
 
 namespace telesplat::data {
 
@@ -21,6 +23,9 @@ struct Mesh {
   std::vector<uint32_t> colours;      ///< empty, or one a vertex: 0x00RRGGBB
   std::vector<uint32_t> indices;      ///< three a triangle
   uint64_t degenerate_dropped = 0;    ///< faces with fewer than three corners
+  /// What is placed in the room in place of the mesh's own box: of a surface, the grid of its volume, so that both stand
+  /// at one place and are equally large.
+  std::optional<geometry::DBox> frame;
 };
 
 /// What every reader promises and validate_mesh checks: at least one triangle, no more than kMaxTriangles, every index

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "common/geometry/box.h"
+
 namespace telesplat::data {
 
 enum class VoxelType { kU8, kI8, kU16, kI16, kF32 };
@@ -28,6 +30,8 @@ struct Volume {
   std::string remark;       ///< for people: what was left out or evened (DICOM); often empty
 
   double value(size_t at) const;  ///< of voxel `at` in stored order
+  /// Of all voxels, from edge to edge, in the file's own units: what is centred in the room.
+  geometry::DBox box() const;
 };
 
 }  // namespace telesplat::data

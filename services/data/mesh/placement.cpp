@@ -87,16 +87,18 @@ void set_normals(PlacedMesh& placed, const std::vector<glm::vec3>& from_file, co
 
 Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string& up, const std::string& name) {
   PlacedMesh placed;
-  placed.up = up == "auto" ? guess_up(mesh) : up;
+  const UpGuess guess = up == "auto" ? guess_up(mesh) : UpGuess{up, "--up"};
+  placed.up = guess.axis, placed.up_reason = guess.reason;
   const auto rotation = rotation_for_up(placed.up);
   if (!rotation) return rotation.error();
 
   placed.box_data = box_of_used(mesh);
-  const glm::dvec3 size = placed.box_data.size();
+  const geometry::DBox frame = mesh.frame.value_or(placed.box_data);
+  const glm::dvec3 size = frame.size();
   const double largest = std::max({size.x, size.y, size.z});
   if (!(largest >= 1e-30 && largest <= 1e30))
     return Error{fmt::format("{}: its largest extent is {}, outside [1e-30, 1e30]", name, largest)};
-  const glm::dvec3 centre = placed.box_data.lo + size * 0.5;
+  const glm::dvec3 centre = frame.lo + size * 0.5;
   const double scale = room_size_m / largest;
 
   // Vertices that no triangle uses may lie anywhere; they are not kept, so they need not be placed well.

@@ -17,7 +17,8 @@ struct PlacedMesh {
   std::vector<uint32_t> indices;  ///< three a triangle
   geometry::DBox box_data;        ///< of the vertices that triangles use
   geometry::Box box_room;
-  std::string up;  ///< x, y, z, -x, -y or -z
+  std::string up;         ///< x, y, z, -x, -y or -z
+  std::string up_reason;  ///< why, in a few words
   uint64_t degenerate_dropped = 0;
 };
 
@@ -29,10 +30,15 @@ struct PlacedMesh {
 ///     because marching cubes puts them on the edges of a voxel grid), VTK's own formats, and surfaces of volumes;
 ///   y otherwise.
 /// A guess: `up` overrides it. Precondition: validate_mesh passed.
-std::string guess_up(const Mesh& mesh);
+struct UpGuess {
+  std::string axis;
+  std::string reason;  ///< in a few words, at most 60 bytes
+};
+UpGuess guess_up(const Mesh& mesh);
 
-/// Centres the box of the used vertices at the origin, turns `up` ("auto": guess_up) to +y and scales uniformly so that
-/// the box's largest extent is room_size_m; all in double precision, rounded to float at the end. Drops degenerate
+/// Centres the mesh's frame, or if it has none the box of the used vertices, at the origin, turns `up` ("auto":
+/// guess_up) to +y and scales uniformly so that the largest extent of that box is room_size_m; all in double precision,
+/// rounded to float at the end. Drops degenerate
 /// triangles and counts them; computes normals (area-weighted mean over a vertex's triangles) where the file has none,
 /// or where one of them has no direction. Takes the mesh apart as it goes to save memory. Errors start with `name`: the
 /// box has no extent, or one beyond 1e30; no triangle is left. Precondition: validate_mesh passed.

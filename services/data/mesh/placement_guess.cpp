@@ -59,12 +59,15 @@ bool is_isosurface(const Mesh& mesh) {
 
 }  // namespace
 
-std::string guess_up(const Mesh& mesh) {
-  if (mesh.format == "raster" || mesh.format == "isosurface") return "z";
+UpGuess guess_up(const Mesh& mesh) {
+  if (mesh.format == "raster") return {"z", "an elevation raster"};
+  if (mesh.format == "iso" || mesh.format == "isosurface") return {"z", "the surface of a volume"};
   geometry::DBox box;
   for (uint32_t i : mesh.indices) box.extend(mesh.positions[i]);
-  const bool scientific = mesh.format == "vtp" || mesh.format == "vtk";
-  return scientific || is_height_field(mesh, box.size()) || is_isosurface(mesh) ? "z" : "y";
+  if (mesh.format == "vtp" || mesh.format == "vtk") return {"z", "VTK's formats hold scans and simulations"};
+  if (is_height_field(mesh, box.size())) return {"z", "shaped like a terrain"};
+  if (is_isosurface(mesh)) return {"z", "its vertices lie on a voxel grid, as a scan's surface does"};
+  return {"y", "nothing tells of a terrain or a scan"};
 }
 
 }  // namespace telesplat::data

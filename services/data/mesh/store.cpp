@@ -83,6 +83,7 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.box_data = placed->box_data;
   info.box_room = placed->box_room;
   info.up = placed->up;
+  info.up_reason = placed->up_reason;
   return write_store(descriptor, path, *placed, info, progress);
 }
 

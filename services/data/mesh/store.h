@@ -22,7 +22,8 @@ struct MeshStoreInfo {
   bool had_normals = false, had_colours = false;
   geometry::DBox box_data;  ///< in the file's own units
   geometry::Box box_room;
-  std::string up;  ///< the axis chosen
+  std::string up;         ///< the axis chosen
+  std::string up_reason;  ///< why, in a few words
   bool from_cache = false;
   uint64_t content_hash = 0;
 };

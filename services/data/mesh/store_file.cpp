@@ -25,7 +25,7 @@ struct StoreHeader {
   uint32_t had_normals = 0, had_colours = 0;
   double data_lo[3] = {}, data_hi[3] = {};
   float room_lo[3] = {}, room_hi[3] = {};
-  char format[16] = {}, up[8] = {};
+  char format[16] = {}, up[8] = {}, up_reason[64] = {};
   uint64_t checksum = 0;  ///< of all the above and the table of contents
 };
 static_assert(sizeof(StoreHeader) <= kPage);
@@ -66,6 +66,7 @@ StoreHeader make_header(const MeshStoreInfo& info) {
   put(info.box_room.lo, h.room_lo), put(info.box_room.hi, h.room_hi);
   std::strncpy(h.format, info.format.c_str(), sizeof h.format - 1);
   std::strncpy(h.up, info.up.c_str(), sizeof h.up - 1);
+  std::strncpy(h.up_reason, info.up_reason.c_str(), sizeof h.up_reason - 1);
   return h;
 }
 
@@ -78,6 +79,7 @@ MeshStoreInfo info_of(const StoreHeader& h) {
   info.box_room = {{h.room_lo[0], h.room_lo[1], h.room_lo[2]}, {h.room_hi[0], h.room_hi[1], h.room_hi[2]}};
   info.format = std::string(h.format, strnlen(h.format, sizeof h.format));
   info.up = std::string(h.up, strnlen(h.up, sizeof h.up));
+  info.up_reason = std::string(h.up_reason, strnlen(h.up_reason, sizeof h.up_reason));
   return info;
 }
 

@@ -82,6 +82,7 @@ Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& nam
   }
   auto mesh = import("VTK's surface", {"iso", name}, input);
   close(input);
+  if (mesh) mesh->frame = volume.box();
   return mesh;
 }
 

@@ -40,13 +40,9 @@ Result<Part> read_part(const std::string& text, int slices) {
 
 // As a mesh's: the box centred, `up` turned to +y, the largest extent the room's size.
 Result<glm::dmat4> place_volume(const Volume& v, const PlacementOptions& options) {
-  const auto rotation = rotation_for_up(options.up == "auto" ? "z" : options.up);
+  const auto rotation = rotation_for_up(up_of_volume(options));
   if (!rotation) return rotation.error();
-  geometry::DBox box;
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto at = [&](int axis) { return corner >> axis & 1 ? v.size[size_t(axis)] - 0.5 : -0.5; };
-    box.extend(glm::dvec3(v.index_to_data * glm::dvec4(at(0), at(1), at(2), 1)));
-  }
+  const geometry::DBox box = v.box();
   const glm::dvec3 extent = box.size();
   const double largest = std::max({extent.x, extent.y, extent.z});
   if (!(largest >= 1e-30 && largest <= 1e30))
@@ -215,6 +211,8 @@ class Store final : public VolumeStore {
 };
 
 }  // namespace
+
+std::string up_of_volume(const PlacementOptions& options) { return options.up == "auto" ? "z" : options.up; }
 
 Result<std::unique_ptr<VolumeStore>> VolumeStore::open(const std::string& path, const VolumeOptions& options,
                                                        const PlacementOptions& placement, const Progress& progress) {

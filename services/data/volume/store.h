@@ -46,6 +46,9 @@ class VolumeStore {
   virtual Result<std::vector<uint32_t>> slice_weights(int step, const volume::LevelSet& shown) = 0;
 };
 
+/// The axis of a volume that points up: z, unless the options say otherwise.
+std::string up_of_volume(const PlacementOptions& options);
+
 /// The levels that a transfer function does not make transparent.
 volume::LevelSet shown_levels(const volume::TransferFunction& transfer, const volume::Levels& levels);
 

@@ -61,6 +61,22 @@ TEST_F(Kinds, TheSurfaceOfARawVolumeIsAMesh) {
   EXPECT_EQ(hello.endpoints.at("chunks"), "inproc://chunks");
 }
 
+TEST_F(Kinds, ASurfaceStandsWhereItsVolumeStands) {
+  DataOptions o = of(raw_volume());
+  o.volume.raw = "4x4x4:u8";
+  const auto volume = open(o, [](const char*, double) {});
+  o.mesh.iso = 100;
+  const auto surface = open(o, [](const char*, double) {});
+  ASSERT_TRUE(volume.ok() && surface.ok());
+  EXPECT_EQ(make_hello(**volume, "data", "").box_room, (geometry::Box{{-0.4f, -0.4f, -0.4f}, {0.4f, 0.4f, 0.4f}}));
+  // Half-way up, from the first voxel's centre to the last one's, 0.2 m a voxel; z is up, as of the volume.
+  const geometry::Box box = make_hello(**surface, "data", "").box_room;
+  for (int a = 0; a < 3; ++a) {
+    EXPECT_NEAR(box.lo[a], a == 1 ? 0 : -0.3, 1e-6);
+    EXPECT_NEAR(box.hi[a], a == 1 ? 0 : 0.3, 1e-6);
+  }
+}
+
 TEST_F(Kinds, WhatIsThereButNoSceneIsRefused) {
   EXPECT_EQ(refusal(of(folder_ / "none.nrrd")), (folder_ / "none.nrrd") + ": no such file");
   EXPECT_NE(refusal(of(folder_ / "")).find("is a folder, and not one of DICOM slices"), std::string::npos);

@@ -130,28 +130,28 @@ Mesh sphere(int n) {
 }
 
 TEST(GuessUp, TerrainsAndMedicalDataStandOnZ) {
-  EXPECT_EQ(guess_up(wavy_grid(30)), "z");
+  EXPECT_EQ(guess_up(wavy_grid(30)).axis, "z");
   ASSERT_GT(isosurface(60).positions.size(), 2000u);
-  EXPECT_EQ(guess_up(isosurface(60)), "z");
+  EXPECT_EQ(guess_up(isosurface(60)).axis, "z");
   Mesh vtk = sphere(20);
   vtk.format = "vtp";
-  EXPECT_EQ(guess_up(vtk), "z");
+  EXPECT_EQ(guess_up(vtk).axis, "z");
 }
 
 TEST(GuessUp, OthersOnY) {
-  EXPECT_EQ(guess_up(sphere(80)), "y");
+  EXPECT_EQ(guess_up(sphere(80)).axis, "y");
   Mesh flat = sphere(80);  // flat, but closed: no terrain
   for (auto& p : flat.positions) p.z *= 0.1;
-  EXPECT_EQ(guess_up(flat), "y");
+  EXPECT_EQ(guess_up(flat).axis, "y");
   Mesh boxes;  // a CAD-like model: everything on a grid
   for (int x = 0; x < 20; ++x)
     for (int y = 0; y < 20; ++y)
       for (int z = 0; z < 20; ++z) boxes.positions.emplace_back(x, y, z);
   for (uint32_t i = 2; i < boxes.positions.size(); ++i) boxes.indices.insert(boxes.indices.end(), {i - 2, i - 1, i});
-  EXPECT_EQ(guess_up(boxes), "y");
+  EXPECT_EQ(guess_up(boxes).axis, "y");
   Mesh terrain = wavy_grid(30);  // a terrain that stands on y
   for (auto& p : terrain.positions) std::swap(p.y, p.z);
-  EXPECT_EQ(guess_up(terrain), "y");
+  EXPECT_EQ(guess_up(terrain).axis, "y");
 }
 
 }  // namespace
