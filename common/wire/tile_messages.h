@@ -65,13 +65,15 @@ struct TileDone {
   geometry::Rect rect;                         ///< Lease::rect
   uint64_t samples = 0, kept = 0;              ///< covered pixels before and after redundancy elimination
   uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< encoded tile as received, as published
-  double leased_s = 0, sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0, receive_s = 0, packed_s = 0;
+  double leased_s = 0, sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0, receive_s = 0;
+  double packed_s = 0;                         ///< decoded, reduced and encoded; of a part of a block: taken in
+  double published_s = 0;                      ///< handed to viewers with its block or frame; 0: another tile's was
   template <class F> static void fields(F& f, auto& m) {
     f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler); f("step", m.step);
     f("rect", m.rect); f("samples", m.samples); f("kept", m.kept); f("bytes_sampled", m.bytes_sampled);
     f("bytes_sent", m.bytes_sent); f("leased_s", m.leased_s); f("sample_begin_s", m.sample_begin_s);
     f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s); f("receive_s", m.receive_s);
-    f("packed_s", m.packed_s);
+    f("packed_s", m.packed_s); f("published_s", m.published_s);
   }
 };
 

@@ -135,16 +135,16 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   // A tile that is here already is done. The master may not know; if it does, it takes no notice.
   if (core_->has(lease.frame, uint32_t(lease.block))) {
     ++duplicates_;
-    return tell(done);
+    return tell_taken(done);
   }
   const std::span stream(reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size());
   auto gathered = gatherer_.add({block_of(lease), {}}, lease.rect, stream);
   if (!gathered) return from->reject(message, gathered.error().text);
-  if (!*gathered) return tell(done);
+  if (!*gathered) return tell_taken(done);
   BlockGatherer::Gathered& got = **gathered;
   done.samples = got.samples;
   if (core_->redundancy() == Redundancy::kKeep) done.kept = done.samples;
-  if (!got.block) return tell(done);
+  if (!got.block) return tell_taken(done);
   spans_.add("decode", begin_s, outlets_.master_now());
   std::shared_ptr<const std::vector<uint8_t>> ready;
   if (got.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
@@ -158,11 +158,13 @@ Status PointPacking::pack_block(SampledTile block, std::shared_ptr<const std::ve
   record(block);
   // What a block gives is counted to the tile that completed it.
   const auto announce = [&](const Event& event) {
+    // Taken before it is sent: a viewer may have it in its replica before the send returns.
+    done.packed_s = done.published_s = outlets_.master_now();
     publish(event);
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
     done.bytes_sent = event.blob->size();
     bytes_sent_ += done.bytes_sent;
-    tell(done);
+    outlets_.tell(done);
   };
   const auto event = core_->submit(std::move(block), now_s, std::move(stream), announce);
   if (!event) return event.error();
@@ -172,7 +174,7 @@ Status PointPacking::pack_block(SampledTile block, std::shared_ptr<const std::ve
   return ok_status();
 }
 
-void PointPacking::tell(wire::TileDone& done) {
+void PointPacking::tell_taken(wire::TileDone& done) {
   done.packed_s = outlets_.master_now();
   outlets_.tell(done);
 }

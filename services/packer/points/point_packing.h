@@ -44,7 +44,8 @@ class PointPacking final : public Packing {
   /// A block whose every row is here. stream: of the whole block, if it came as one tile; else null.
   Status pack_block(SampledTile block, std::shared_ptr<const std::vector<uint8_t>> stream, wire::TileDone& done,
                     double now_s);
-  void tell(wire::TileDone& done);
+  /// To the master: taken in, but not published with this tile.
+  void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
   void answer(const wire::StateRequest& request, const std::string& peer);
   void publish(const Event& event);

@@ -72,11 +72,13 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
                       .receive_s = receive_s};
   // What a frame gives is counted to the slab that completed it. A slab that is here already is done: the master may
   // not know.
+  done.packed_s = outlets_.master_now();
   if (added->frame_complete) {
+    // Taken before it is sent: a viewer may have it before the send returns.
+    done.published_s = outlets_.master_now();
     done.bytes_sent = send_out(now_s);
     spans_.add("pack", receive_s, outlets_.master_now());
   }
-  done.packed_s = outlets_.master_now();
   outlets_.tell(done);
   return ok_status();
 }

@@ -116,6 +116,8 @@ TEST_F(PointPackingTest, ATileKeepsItsLabelFromLeaseToPatch) {
   EXPECT_EQ(told[0].leased_s, 2);
   EXPECT_EQ(told[0].receive_s, 53);
   EXPECT_EQ(told[0].packed_s, 99);
+  EXPECT_EQ(told[0].published_s, 0) << "published with the tile that completed the block";
+  EXPECT_EQ(told[1].published_s, 99);
   EXPECT_EQ(told[0].bytes_sent, 0u);
   EXPECT_EQ(told[0].samples + told[1].samples, patch.samples);
   EXPECT_EQ(told[1].kept, patch.kept) << "counted to the tile that completed the block";

@@ -426,6 +426,8 @@ TEST_F(SlicePackingTest, TellsTheMasterOfEverySlab) {
   EXPECT_EQ(first.rect.width, lease(1, 0, 2, {view(7, 5)}).shear.width);
   EXPECT_EQ(first.receive_s, 53);
   EXPECT_EQ(first.bytes_sent, 0u);
+  EXPECT_EQ(first.published_s, 0) << "published with the slab that completed the frame";
+  EXPECT_EQ(told[1].published_s, 99);
   EXPECT_EQ(told[1].bytes_sent, sent[0].first.data.size()) << "counted to the slab that completed the frame";
   EXPECT_EQ(told[2].bytes_sent, 0u);
 }
