@@ -24,7 +24,7 @@ SHARED_TESTS = "tests/support"
 FLOORS = {
     "common": [
         ["common/core"],
-        ["common/geometry"],
+        ["common/geometry", "common/colour"],
         ["common/image", "common/gl"],
         ["common/codec", "common/points"],
         [("common/volume", "common/volume/transfer"), "common/splat"],
@@ -73,7 +73,8 @@ FLOORS = {
         ["client/viewer/record"],
         ["client/viewer/display"],
         [("client/viewer/received.h", "client/viewer/feeds.*")],
-        [("client/viewer/points", "client/viewer/record/event_record.*"), "client/viewer/slices"],
+        [("client/viewer/points", "client/viewer/record/event_record.*"),
+         ("client/viewer/slices", "client/viewer/record/slice_record.*")],
         [("client/viewer", "client/viewer/display/display_loop.*")],
     ],
     "tools": [

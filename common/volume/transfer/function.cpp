@@ -5,16 +5,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <optional>
 
+#include "common/colour/paraview_json.h"
 #include "common/volume/transfer/text.h"
 
 namespace telesplat::volume {
 namespace {
-
-constexpr size_t kMaxJsonBytes = 4u << 20;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n";
@@ -215,15 +213,12 @@ TransferFunction shortened(const TransferFunction& transfer, size_t max_bytes) {
 
 Result<TransferFunction> resolve_transfer(const std::string& text, const ValueRange& range) {
   const std::string_view word = trimmed(text);
-  if (word.ends_with(".json")) {
-    std::ifstream file{std::string(word), std::ios::binary};
-    if (!file) return Error{fmt::format("{}: cannot be opened", word)};
-    std::string content(kMaxJsonBytes + 1, '\0');
-    file.read(content.data(), std::streamsize(content.size()));
-    content.resize(size_t(file.gcount()));
-    if (content.size() > kMaxJsonBytes)
-      return Error{fmt::format("{}: more than {} bytes, too much for a colour map", word, kMaxJsonBytes)};
-    return parse_paraview_json(content, std::string(word), range);
+  const size_t end = word.find(".json");
+  if (end != word.npos && (word.size() == end + 5 || word[end + 5] == ':')) {
+    const std::string path(word.substr(0, end + 5));
+    const auto content = colour::read_map_file(path);
+    if (!content) return content.error();
+    return parse_paraview_json(*content, path, range, word.size() > end + 6 ? word.substr(end + 6) : "");
   }
   return word.find(':') == word.npos ? transfer_preset(word, range) : parse_transfer(word, range);
 }

@@ -59,11 +59,11 @@ Result<TransferFunction> parse_transfer(std::string_view text, const ValueRange&
 /// The text form, absolute values; parse_transfer of it gives the same function again, to the last bit.
 std::string to_text(const TransferFunction& transfer);
 /// A ParaView colour-map JSON file's content: RGBPoints with Points (opacity), or without (opacity rises over the
-/// range). name: for error texts. A list of several maps: the first. A map from 0 (or -1) to 1 is stretched over [lo,
+/// range). name: for error texts. Of several maps the one that is called `wanted`, or the first. A map from 0 (or -1) to 1 is stretched over [lo,
 /// hi] if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
-Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name,
-                                             const ValueRange& range);
-/// What people give: a path that ends in ".json", points (they have a ':'), or a preset's name.
+Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name, const ValueRange& range,
+                                             std::string_view wanted = {});
+/// What people give: FILE.json or FILE.json:NAME, points (they have a ':'), or a preset's name.
 Result<TransferFunction> resolve_transfer(const std::string& text, const ValueRange& range);
 
 /// Refuses no points, too many, values beyond kMaxTransferValue or not ascending, colours or opacities outside [0, 1].

@@ -1,54 +1,17 @@
-// ParaView's colour maps as it exports them (vtkPVTransferFunction presets): a list of maps, each with "RGBPoints"
-// (value, r, g, b a point) and, sometimes, "Points" (value, opacity, midpoint, sharpness a point).
+// ParaView's colour maps as transfer functions: common/colour reads the file, opacities are straightened here.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
-#include <optional>
 
+#include "common/colour/paraview_json.h"
 #include "common/volume/transfer/text.h"
 
 namespace telesplat::volume {
 namespace {
 
-using Json = nlohmann::json;
-
-constexpr size_t kMaxPoints = 1u << 14;  // in a file; what travels is shortened afterwards
-constexpr int kMaxDepth = 16;
-
-struct Opacity {
-  double value, opacity, midpoint, sharpness;
-};
-struct Colour {
-  double value, r, g, b;
-};
-
-// The numbers of an array of them; nothing if it is none.
-std::optional<std::vector<double>> numbers(const Json& array) {
-  if (!array.is_array()) return std::nullopt;
-  std::vector<double> out;
-  for (const Json& n : array) {
-    if (!n.is_number()) return std::nullopt;
-    out.push_back(n.get<double>());
-    if (!std::isfinite(out.back()) || std::abs(out.back()) > kMaxTransferValue) return std::nullopt;
-  }
-  return out;
-}
-
-Result<std::vector<double>> read_points(const Json& map, const char* key, const std::string& name) {
-  const auto found = map.find(key);
-  if (found == map.end()) return std::vector<double>{};
-  auto out = numbers(*found);
-  if (!out || out->empty() || out->size() % 4 != 0 || out->size() / 4 > kMaxPoints)
-    return Error{
-        fmt::format("{}: \"{}\" is no list of four numbers a point, at most {} points", name, key, kMaxPoints)};
-  for (size_t n = 4; n < out->size(); n += 4)
-    if ((*out)[n] < (*out)[n - 4])
-      return Error{
-          fmt::format("{}: \"{}\" has the value {} after {}; values ascend", name, key, (*out)[n], (*out)[n - 4])};
-  return std::move(*out);
-}
+using Colour = colour::ParaviewMap::Colour;
+using Opacity = colour::ParaviewMap::Opacity;
 
 // vtkPiecewiseFunction between two points: the midpoint is where it is half way; sharpness 0 is linear, 1 a step at the
 // midpoint. Between 0.01 and 0.99 VTK draws a Hermite curve through a position that the sharpness bends.
@@ -122,40 +85,11 @@ TransferFunction joined(const std::vector<Colour>& colours, const std::vector<Op
 }  // namespace
 
 Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name,
-                                             const ValueRange& range) {
-  int deepest = 0;
-  const auto watch_depth = [&](int depth, Json::parse_event_t, Json&) {
-    deepest = std::max(deepest, depth);
-    return depth <= kMaxDepth;
-  };
-  const Json file = Json::parse(content, watch_depth, false);
-  if (file.is_discarded() || deepest > kMaxDepth)
-    return Error{fmt::format("{}: not JSON, or nested deeper than {}", name, kMaxDepth)};
-  const Json& map = file.is_array() && !file.empty() ? file.front() : file;
-  if (!map.is_object() || !map.contains("RGBPoints"))
-    return Error{fmt::format("{}: no colour map of ParaView, which would have \"RGBPoints\"", name)};
-  if (const auto indexed = map.find("IndexedColors"); indexed != map.end() && indexed->is_array() && !indexed->empty())
-    return Error{fmt::format("{}: a map of categories (\"IndexedColors\"), not of values", name)};
-
-  const auto rgb = read_points(map, "RGBPoints", name);
-  if (!rgb) return rgb.error();
-  if (rgb->empty()) return Error{fmt::format("{}: \"RGBPoints\" is empty", name)};
-  const auto raw = read_points(map, "Points", name);
-  if (!raw) return raw.error();
-
-  std::vector<Colour> colours;
-  for (size_t n = 0; n < rgb->size(); n += 4)
-    colours.push_back({(*rgb)[n], (*rgb)[n + 1], (*rgb)[n + 2], (*rgb)[n + 3]});
-  std::vector<Opacity> opacities;
-  for (size_t n = 0; n < raw->size(); n += 4)
-    opacities.push_back(
-        {(*raw)[n], (*raw)[n + 1], std::clamp((*raw)[n + 2], 1e-5, 1 - 1e-5), std::clamp((*raw)[n + 3], 0.0, 1.0)});
-  for (const Colour& c : colours)
-    for (const double v : {c.r, c.g, c.b})
-      if (v < 0 || v > 1) return Error{fmt::format("{}: \"RGBPoints\" has a colour of {}, limits are 0..1", name, v)};
-  for (const Opacity& o : opacities)
-    if (o.opacity < 0 || o.opacity > 1)
-      return Error{fmt::format("{}: \"Points\" has an opacity of {}, limits are 0..1", name, o.opacity)};
+                                             const ValueRange& range, std::string_view wanted) {
+  auto map = colour::parse_paraview_map(content, name, wanted);
+  if (!map) return map.error();
+  std::vector<Colour>& colours = map->colours;
+  std::vector<Opacity>& opacities = map->opacity;
 
   // A map from 0 to 1 (or -1 to 1, as older ones of ParaView have it) is one for any range.
   const double lo = colours.front().value, hi = colours.back().value;
