@@ -219,8 +219,12 @@ class Page:
             try:
                 code = process.wait(timeout=20)
             except subprocess.TimeoutExpired:
-                process.kill()
                 code = "none within 20 s"
+                process.terminate()
+                try:
+                    process.wait(timeout=10)
+                except subprocess.TimeoutExpired:
+                    process.kill()
             if code != 0:
                 output.seek(0)
                 self._fail(f"in the background, exit code {code}: {text}", output.read())
