@@ -10,7 +10,7 @@ namespace telesplat::net {
 
 /// Of a DEALER that asks a master: it knows when nobody is there.
 inline constexpr SocketOptions kControlSocket{
-    .high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes, .watch_connecting = true};
+    .high_water_mark = 16, .max_message_bytes = 2 * wire::kMaxControlBytes, .linger_ms = 0, .watch_connecting = true};
 
 /// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer,
 /// which may be a refusal. Error: it did not answer within `timeout_s`; if the socket has kControlSocket, at once where

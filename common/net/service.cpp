@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <fstream>
 
+#include "common/net/master_address.h"
+
 namespace telesplat::net {
 namespace {
 std::atomic<bool> stop_flag{false};
@@ -34,7 +36,7 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                    .value = &o.master,
                    .help = "address of the master",
                    .reach = options::Reach::kHere,
-                   .environment = "TELESPLAT_MASTER"});
+                   .environment = kMasterVariable});
   out.push_back(
       {.flag = "--name", .value = &o.name, .help = "name in logs and metrics", .reach = options::Reach::kHere});
   if (ends != Ends::kConnects)

@@ -73,7 +73,7 @@ struct Socket::Impl {
     socket.set(zmq::sockopt::maxmsgsize, kind == Kind::kPub
                                              ? kSubscriptionBytes
                                              : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes);
-    socket.set(zmq::sockopt::linger, 500);
+    socket.set(zmq::sockopt::linger, options.linger_ms);
     socket.set(zmq::sockopt::reconnect_ivl, 50);
     socket.set(zmq::sockopt::reconnect_ivl_max, 500);
     socket.set(zmq::sockopt::heartbeat_ivl, 2000);

@@ -42,6 +42,7 @@ struct SocketOptions {
   int high_water_mark = 1000;  ///< messages queued each way before ROUTER, PUB drop and PUSH, DEALER refuse
   size_t max_message_bytes =
       wire::kMaxControlBytes;     ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
+  int linger_ms = 500;            ///< for what is still to be sent when the socket goes
   bool watch_connecting = false;  ///< count attempts to connect that fail
 };
 

@@ -1,0 +1,70 @@
+// Asking a master: what it answers, that it refuses, and that nobody is there.
+#include "common/net/control.h"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "common/core/clock.h"
+
+namespace telesplat::net {
+namespace {
+
+constexpr double kLong_s = 20;
+
+TEST(Control, NobodyIsSaidAtOnce) {
+  for (const std::string endpoint : {"tcp://127.0.0.1:1", "ipc:///nonexistent/telesplat"}) {
+    const double begin = monotonic_s();
+    const auto answer = ask_master(endpoint, "status", kLong_s);
+    EXPECT_LT(monotonic_s() - begin, kLong_s / 4) << endpoint;
+    ASSERT_FALSE(answer.ok());
+    EXPECT_EQ(answer.error().text, "no master is at " + endpoint + ": nothing takes connections there");
+  }
+}
+
+TEST(Control, SomebodyWhoSaysNothingIsWaitedFor) {
+  Context context;
+  Socket silent(context, Kind::kRouter, "silent");
+  const auto endpoint = silent.bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(endpoint.ok());
+  const double begin = monotonic_s();
+  const auto answer = ask_master(*endpoint, "status", 0.3);
+  EXPECT_GE(monotonic_s() - begin, 0.3);
+  ASSERT_FALSE(answer.ok());
+  EXPECT_NE(answer.error().text.find("no answer"), std::string::npos) << answer.error().text;
+}
+
+TEST(Control, ARefusalIsAReply) {
+  Context context;
+  Socket master(context, Kind::kRouter, "master");
+  const auto endpoint = master.bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(endpoint.ok());
+  std::thread answering([&] {
+    for (int answered = 0; answered < 3;) {
+      wait_readable({&master}, 50);
+      while (const auto m = master.receive()) {
+        const auto control = master.decode<wire::Control>(*m);
+        if (!control) continue;
+        master.send(wire::ControlReply{control->command == "status", "said to " + control->command}, m->peer);
+        ++answered;
+      }
+    }
+  });
+  Socket socket(context, Kind::kDealer, "ctl", kControlSocket);
+  ASSERT_TRUE(socket.connect(*endpoint).ok());
+  const auto refused = reply_of_master(socket, *endpoint, "tf", kLong_s);
+  const auto refused_too = ask_master(socket, *endpoint, "tf", kLong_s);
+  const auto answer = ask_master(socket, *endpoint, "status", kLong_s);
+  answering.join();
+  ASSERT_TRUE(refused.ok());
+  EXPECT_FALSE(refused->ok);
+  EXPECT_EQ(refused->text, "said to tf");
+  ASSERT_FALSE(refused_too.ok());
+  EXPECT_EQ(refused_too.error().text, "said to tf");
+  ASSERT_TRUE(answer.ok());
+  EXPECT_EQ(*answer, "said to status");
+  EXPECT_EQ(socket.failed_connections(), 0u);
+}
+
+}  // namespace
+}  // namespace telesplat::net
