@@ -11,6 +11,7 @@ Status validate_mesh(const Mesh& mesh, const std::string& name) {
   CHECK(mesh.indices.size() % 3 == 0);
   CHECK(mesh.normals.empty() || mesh.normals.size() == vertices);
   CHECK(mesh.colours.empty() || mesh.colours.size() == vertices);
+  CHECK(mesh.scalars.empty() || mesh.scalars.size() == (mesh.scalars_of_faces ? triangles : vertices));
   if (triangles == 0) return Error{fmt::format("{}: holds no triangles ({} vertices)", name, vertices)};
   if (triangles > kMaxTriangles)
     return Error{fmt::format("{}: {} triangles, the limit is {}", name, triangles, kMaxTriangles)};

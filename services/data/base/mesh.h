@@ -9,6 +9,7 @@
 
 #include "common/core/result.h"
 #include "common/geometry/box.h"
+#include "common/scene/arrays.h"
 
 namespace telesplat::data {
 
@@ -22,7 +23,12 @@ struct Mesh {
   std::vector<glm::vec3> normals;     ///< empty, or one a vertex; of any length; (0, 0, 0): to be computed
   std::vector<uint32_t> colours;      ///< empty, or one a vertex: 0x00RRGGBB
   std::vector<uint32_t> indices;      ///< three a triangle
-  uint64_t degenerate_dropped = 0;    ///< faces with fewer than three corners
+  /// The array that the reader was asked for: one value a vertex, or one a triangle where scalars_of_faces. Each is
+  /// the file's minus scene::scalar_origin() of its span; NaN where that is not finite. Empty: it was asked for none.
+  std::vector<float> scalars;
+  bool scalars_of_faces = false;
+  std::vector<scene::ArrayInfo> arrays;  ///< all that the file holds, asked for or not; make_tellable() was called
+  uint64_t degenerate_dropped = 0;       ///< faces with fewer than three corners
   /// What is placed in the room in place of the mesh's own box: of a surface, the grid of its volume, so that both stand
   /// at one place and are equally large.
   std::optional<geometry::DBox> frame;
