@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "common/geometry/trajectory.h"
+#include "common/net/master_address.h"
 #include "services/data/kinds.h"
 #include "tools/telesplat/run/wall.h"
 
@@ -50,7 +51,8 @@ Table own_rows(RunOptions& o) {
            .fits = {scene::Kind::kVolume}},
           {.flag = "--master",
            .value = &o.join_master,
-           .help = "join the running session at this address instead of starting one"},
+           .help = "join the running session at this address instead of starting one; default, where no scene is named: "
+                   "$TELESPLAT_MASTER"},
           {.flag = "!--same-priority",
            .value = &o.background_servers,
            .help = "run samplers, packer and data at the viewer's priority"},
@@ -143,6 +145,7 @@ Table table(RunOptions& o) {
 Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given) {
   std::shared_ptr<Scene> out;
   if (o.data.scene.empty()) {
+    if (o.join_master.empty()) o.join_master = net::master_from_environment();
     if (o.join_master.empty())
       return Error{"a scene is needed: a mesh or volume file, a folder of DICOM slices, or the word julia"};
     if (const Status s = refuse_scene_flags(o, given); !s) return s.error();
