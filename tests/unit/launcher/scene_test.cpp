@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/net/master_address.h"
 #include "common/options/parser.h"
 #include "tools/telesplat/run/run_options.h"
 
@@ -48,6 +49,20 @@ TEST_F(Scenes, ARawVolumesSurfaceIsAMesh) {
   const auto told = data_arguments(o, 0);
   for (const char* flag : {"--raw=16x16x16:u8", "--iso=90"}) EXPECT_TRUE(holds(told, flag)) << flag;
   EXPECT_TRUE(holds(told, file("cube.raw")));
+}
+
+TEST_F(Scenes, WithoutASceneTheSessionThatTheEnvironmentNamesIsJoined) {
+  setenv(net::kMasterVariable, "tcp://leader:7700", 1);
+  RunOptions joined, told, own;
+  const bool joins = settled(joined, {}).ok(), joins_another = settled(told, {"--master=tcp://other:1"}).ok(),
+             starts = settled(own, {file("cube.raw"), "--raw=16x16x16:u8"}).ok();
+  unsetenv(net::kMasterVariable);
+  EXPECT_TRUE(joins && joins_another && starts);
+  EXPECT_EQ(joined.join_master, "tcp://leader:7700");
+  EXPECT_EQ(told.join_master, "tcp://other:1");
+  EXPECT_EQ(own.join_master, "");
+  RunOptions neither;
+  EXPECT_FALSE(settled(neither, {}).ok());
 }
 
 TEST_F(Scenes, WhatSessionTomlKeepsMakesTheSameSceneAgain) {
