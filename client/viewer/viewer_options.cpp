@@ -24,6 +24,11 @@ std::string complain_about_finish(const std::string& text) {
   return splat::finish_named(text) ? "" : "not on, off or some of fill,smooth,antialias";
 }
 
+std::string complain_about_point(const std::string& text) {
+  const auto point = parse_point(text);
+  return point ? "" : point.error().text;
+}
+
 Table sampling_table(ViewerOptions& o) {
   return {
       {.flag = "--size", .value = &o.size, .help = "display size in pixels, WxH", .reach = Reach::kRecorded},
@@ -49,17 +54,35 @@ Table head_table(ViewerOptions& o) {
   return {
       {.flag = "--trajectory",
        .value = &o.trajectory,
-       .help = "orbit, still, or a CSV file t_s,px,py,pz,qw,qx,qy,qz (room space)",
+       .help =
+           "orbit: around the data set, all of it in the picture; still; or a CSV file with the columns t_s, px, py, "
+           "pz, qw, qx, qy, qz (metres in the room), such as frames.csv of a run. Where it ends the head stands "
+           "still",
+       .default_text = "orbit; with --eye, and in a window, still",
        .is_file = true},
+      {.flag = "--loop", .value = &o.loop, .help = "where the trajectory of a file ends it begins again"},
+      {.flag = "--eye",
+       .value = &o.eye,
+       .help = "where the first view stands, x,y,z in metres in the room, +y up; the data set is centred at 0,0,0. "
+               "Without a window the head stays there",
+       .limits = options::Check(complain_about_point),
+       .default_text = "in front of the data set, all of it in the picture"},
+      {.flag = "--look-at",
+       .value = &o.look_at,
+       .help = "--eye: where it looks, x,y,z",
+       .limits = options::Check(complain_about_point),
+       .default_text = "the data set's centre"},
       {.flag = "--duration",
-       .value = &d.duration_s,
+       .value = &o.duration_s,
        .help = "seconds from the first displayed frame; 0: until stopped",
-       .limits = Range{0, 1e6}},
+       .limits = Range{0, 1e6},
+       .default_text = "10; of a file's trajectory its length and --hold; in a window 0"},
       {.flag = "--frames", .value = &d.frames, .help = "frames to display; 0: no limit"},
       {.flag = "--hold",
        .value = &d.hold_s,
-       .help = "the head stands still for the last so many seconds",
-       .limits = Range{0, 1e6}},
+       .help = "the head stands still for the last so many seconds of --duration",
+       .limits = Range{0, 1e6},
+       .default_text = "0; of a --wall 2"},
       {.flag = "--fov",
        .value = &d.fov_deg,
        .help = "horizontal field of view, degrees",
@@ -151,7 +174,8 @@ Table record_table(ViewerOptions& o) {
        .help = "record every N-th frame as a PNG; 0: one every 2.5 s and the last"},
       {.flag = "--record-points",
        .value = &o.record_points_mb,
-       .help = "keep the point model's events in OUT/points.events for telesplat compare, MiB at most; 0: do not",
+       .help = "keep what was received in OUT, MiB at most, for telesplat compare and movie: the point model's events "
+               "in points.events, a volume's slice images in slices.events; 0: do not",
        .limits = Range{0, 1 << 20}},
       {.flag = "--exr", .value = &d.exr, .help = "record pictures as EXR with depth too"},
       {.flag = "--verify",
@@ -185,6 +209,45 @@ Table process_table(ViewerOptions& o) {
       {.flag = "--window", .value = &o.window, .help = "show a window; the person at it moves the camera"},
       {.flag = "--fullscreen", .value = &o.fullscreen, .help = "the window fills the screen"},
   };
+}
+
+constexpr double kDuration_s = 10;
+
+Status settle_eye(ViewerOptions& o) {
+  if (o.eye.empty())
+    return o.look_at.empty() ? ok_status() : Status(Error{"--look-at needs --eye, where to look from"});
+  if (o.trajectory != "still")
+    return Error{fmt::format("--eye {} and --trajectory {}: the head stands at the one or follows the other", o.eye,
+                             o.trajectory)};
+  for (const auto& [flag, text, point] :
+       {std::tuple{"--eye", &o.eye, &o.movement.eye}, {"--look-at", &o.look_at, &o.movement.look_at}}) {
+    if (text->empty()) continue;
+    const auto parsed = parse_point(*text);
+    if (!parsed) return Error{fmt::format("{} {}: {}", flag, *text, parsed.error().text)};
+    *point = *parsed;
+  }
+  if (o.movement.look_at && glm::distance(*o.movement.eye, *o.movement.look_at) < 1e-9)
+    return Error{fmt::format("--eye {} --look-at {}: are the same point, so there is no direction to look in", o.eye,
+                             o.look_at)};
+  return ok_status();
+}
+
+// How long it takes, once it is known what it follows.
+void settle_duration(ViewerOptions& o) {
+  auto& d = o.display;
+  const double length_s = o.movement.recorded ? o.movement.recorded->duration_s() : 0;
+  d.duration_s = o.duration_s.value_or(o.window ? 0 : length_s > 0 ? length_s + d.hold_s : kDuration_s);
+  if (d.duration_s > 0) d.hold_s = std::min(d.hold_s, d.duration_s);
+}
+
+Status settle_head(ViewerOptions& o) {
+  if (o.trajectory.empty()) o.trajectory = o.window || !o.eye.empty() ? "still" : "orbit";
+  auto movement = head_movement(o.trajectory, o.loop);
+  if (!movement) return movement.error();
+  o.movement = std::move(*movement);
+  if (const Status s = settle_eye(o); !s) return s;
+  settle_duration(o);
+  return ok_status();
 }
 
 Status settle_wall(ViewerOptions& o) {
@@ -228,16 +291,26 @@ Status settle(ViewerOptions& o) {
   if (!sampling) return sampling.error();
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
+  if (const Status s = settle_head(o); !s) return s;
   if (const Status s = settle_wall(o); !s) return s;
   if (const Status s = settle_coupling(o); !s) return s;
   o.display.render.kernel = *splat::kernel_named(o.splat);
   o.display.splat_scale = float(o.splat_scale);
   o.display.shading = *image::shading_named(o.shading);
   o.display.render.finish = *splat::finish_named(o.finish);
-  if (o.display.duration_s > 0) o.display.hold_s = std::min(o.display.hold_s, o.display.duration_s);
   o.requests.adaptive = o.sampling_size == "auto";
   o.requests.follow_display = o.window;
   return ok_status();
+}
+
+std::string end_of_trajectory(const ViewerOptions& o) {
+  const auto& d = o.display;
+  if (!o.movement.recorded || o.window) return {};
+  const double length_s = o.movement.recorded->duration_s();
+  const bool ends = d.duration_s <= 0 || d.duration_s - d.hold_s > length_s + 0.05;
+  if (!ends) return {};
+  return fmt::format("the trajectory ends after {:.1f} s; {}", length_s,
+                     o.loop ? "it begins again then" : "the head stands still then");
 }
 
 }  // namespace telesplat::viewer

@@ -9,6 +9,7 @@
 #include "client/viewer/coupling/request_options.h"
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/size_text.h"
+#include "client/viewer/input/head_movement.h"
 #include "common/net/service.h"
 #include "common/options/table.h"
 
@@ -22,7 +23,13 @@ struct ViewerOptions {
   /// Sampled pixels a displayed pixel, on each axis, at least; not given: what the session tells, else
   /// requests.min_scale.
   std::optional<double> least_sampling;
-  std::string trajectory = "orbit";  ///< "orbit", "still" or a CSV file
+  std::string trajectory;    ///< "orbit", "still" or a CSV file; empty: orbit, in a window or with an eye still
+  std::string eye, look_at;  ///< "x,y,z" of the first view, metres in the room; empty: fitted to the data set
+  bool loop = false;         ///< the trajectory of a file begins again where it ends
+  HeadMovement movement;     ///< what these four come to
+  /// Seconds from the first displayed frame, 0: until stopped; not given: as long as the trajectory of a file (and
+  /// display.hold_s) takes, else 10, in a window until it is closed.
+  std::optional<double> duration_s;
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
   int buffers = 3;                 ///< of loose coupling
   std::string wall;                ///< "CxR": this display is a tile of a wall; empty: it is none
@@ -46,8 +53,12 @@ options::Table table(ViewerOptions& options);
 /// "WxH", or "auto" (then the value is not used).
 Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
 
-/// Works out what the texts of the flags come to: sizes, the tile of the wall, kernels, buffers of the coupling. Error:
-/// names the flag that cannot be.
+/// Works out what the texts of the flags come to: sizes, the head's movement (its file is read), the tile of the wall,
+/// kernels, buffers of the coupling. Error: names the flag that cannot be.
 Status settle(ViewerOptions& options);
+
+/// What happens where the trajectory of a file ends before the viewer does, a line for the person; empty: it does not.
+/// For settled options.
+std::string end_of_trajectory(const ViewerOptions& options);
 
 }  // namespace telesplat::viewer

@@ -11,6 +11,7 @@
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/window_surface.h"
 #include "client/viewer/record/event_record.h"
+#include "client/viewer/record/slice_record.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/net/control.h"
@@ -19,12 +20,6 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kPicturesAfterSignal_s = 1.0, kMasterPatience_s = 2.0;
-
-Result<geometry::Trajectory> make_trajectory(const std::string& name) {
-  if (name == "orbit") return geometry::Trajectory::orbit();
-  if (name == "still") return geometry::Trajectory::still(geometry::default_pose());
-  return geometry::Trajectory::read_csv(name);
-}
 
 int refuse(const Error& error) {
   std::fprintf(stderr, "telesplat: %s\n", error.text.c_str());
@@ -44,11 +39,13 @@ void tell(const std::string& text) {
 
 // A window may be given another size than it asked for: the options follow.
 Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o) {
-  auto trajectory = make_trajectory(o.trajectory);
-  if (!trajectory) return trajectory.error();
-  if (!o.window) return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, std::move(*trajectory)));
-  WindowSurface::Options options{o.display, std::nullopt, o.fullscreen, o.out.empty() ? "." : o.out};
-  if (o.trajectory != "still") options.recorded = std::move(*trajectory);
+  if (!o.window) {
+    if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
+    return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, o.movement));
+  }
+  const std::string folder = o.out.empty() ? "." : o.out;
+  const WindowSurface::Options options{o.display, o.movement, o.fullscreen, o.out.empty() ? "." : o.out + "/images",
+                                       folder};
   auto opened = WindowSurface::open(options, tell);
   if (!opened) return opened.error();
   o.display.width = (*opened)->width();
@@ -63,10 +60,11 @@ Result<Renderers> open_renderers(ViewerOptions& o) {
   return renderers;
 }
 
-// What of the session is kept in the run folder; both null if nothing is.
+// What of the session is kept in the run folder; all null if nothing is.
 struct Record {
   std::unique_ptr<FrameSpool> spool;
   std::unique_ptr<EventRecorder> events;
+  std::unique_ptr<SliceRecorder> slices;
 };
 
 std::string spool_directory(const ViewerOptions& o) { return o.out + "/spool"; }
@@ -81,6 +79,7 @@ Result<Record> open_record(const ViewerOptions& o) {
   auto events = EventRecorder::open(o.out + "/points.events", o.record_points_mb << 20);
   if (!events) return events.error();
   record.events = std::move(*events);
+  record.slices = std::make_unique<SliceRecorder>(o.out + "/slices.events", o.record_points_mb << 20);
   return record;
 }
 
@@ -126,7 +125,7 @@ Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& rendere
                                       .requests = o.requests,
                                       .least_sampling = o.least_sampling,
                                       .facts = facts(o, renderers),
-                                      .received = {o.epoch_patience_s, record.events.get()},
+                                      .received = {o.epoch_patience_s, record.events.get(), record.slices.get()},
                                       .started_s = o.started_s};
   ViewerWorker worker(context, options, gate, frames, spans);
   const SourceMaker make_source = [&](Received& r) { return r.make_source(o.display, renderers); };
@@ -180,10 +179,12 @@ int run(ViewerOptions o) {
 
   const Served served = serve(o, **surface, *renderers, *record);
   if (!served.display.error.empty()) return fail({served.display.error});
+  const std::string lost = (*surface)->failure();
   surface->reset();  // the window goes at once, however much there is to write
   if (record->spool)
     if (const Status s = develop(o, *record->spool); !s) return fail(s.error());
-  return farewell(o, served);
+  const int code = farewell(o, served);
+  return lost.empty() ? code : fail({lost});
 }
 
 }  // namespace telesplat::viewer

@@ -69,7 +69,12 @@ void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochI
 
 ViewerWorker::Figures ViewerWorker::figures() const {
   const std::lock_guard lock(mutex_);
-  return {scene_, extent_m_, updates_, bytes_received_, latency_ms_, epochs_shown_};
+  return {scene_, updates_, bytes_received_, latency_ms_, epochs_shown_};
+}
+
+ShownScene ViewerWorker::shown_scene() const {
+  const std::lock_guard lock(mutex_);
+  return shown_scene_;
 }
 
 void ViewerWorker::loop() {
@@ -127,11 +132,10 @@ void ViewerWorker::follow_session() {
   if (const Status s = follow(*pipeline, session); !s)
     return log::error("the session as the master at {} tells of it cannot be shown: {}", options_.service.master,
                       s.error().text);
-  const glm::vec3 size = session.box_room.size();
   {
     const std::lock_guard lock(mutex_);
     scene_ = view.fact("scene");
-    extent_m_ = std::max({size.x, size.y, size.z});
+    shown_scene_ = {session.box_room, *pipeline};
   }
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
 }

@@ -49,13 +49,14 @@ class ViewerWorker {
 
   /// For people who watch.
   struct Figures {
-    std::string scene;    ///< name of the data set; empty until the master told it
-    double extent_m = 0;  ///< its largest extent in the room; 0 until then
+    std::string scene;  ///< name of the data set; empty until the master told it
     uint64_t updates = 0, bytes_received = 0;
     double latency_ms = 0;      ///< of the newest update; 0 before the first
     uint64_t epochs_shown = 0;  ///< times a new epoch took the place of one on display
   };
   Figures figures() const;
+  /// What there is to show; an empty box until that is known.
+  ShownScene shown_scene() const;
 
  private:
   void loop();
@@ -100,7 +101,8 @@ class ViewerWorker {
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
   std::vector<SeenPose> poses_;
   std::string scene_;
-  double extent_m_ = 0, latency_ms_ = 0;
+  ShownScene shown_scene_;
+  double latency_ms_ = 0;
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};

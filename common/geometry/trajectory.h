@@ -12,32 +12,46 @@ namespace telesplat::geometry {
 /// Poses over time, interpolated linearly (position) and spherically (orientation).
 class Trajectory {
  public:
-  /// Reads `t_s,px,py,pz,qw,qx,qy,qz` (header line required, times strictly increasing, at least one row, at most
-  /// 10^7). Errors name file and line.
-  static Result<Trajectory> read_csv(const std::string& path);
-  /// A circle around the origin: radius and height in metres, one turn in `period_s`.
-  static Trajectory orbit(double radius_m = 0.75, double height_m = 0.35, double period_s = 20.0);
-  /// One pose for ever: half way between front and above, looking at the origin.
-  static Trajectory still(const Pose& pose);
-
-  /// Pose at `t_s`; before the first and after the last sample those hold. An orbit goes on for ever.
-  Pose at(double t_s) const;
-  /// Seconds from first to last sample; 0 for still and orbit.
-  double duration_s() const;
-
- private:
   struct Sample {
     double t_s;
     Pose pose;
   };
+  /// Reads a CSV file whose header names t_s, px, py, pz, qw, qx, qy and qz, in any order; other columns are ignored,
+  /// and of a column "viewer" only the rows of the first one count (viewer-1 before viewer-2 before viewer-10). So the
+  /// frames.csv of a run is a trajectory. Times strictly increase; at least one row, at most 10^7. A byte-order mark
+  /// and blanks around values are skipped. Errors name file and line.
+  static Result<Trajectory> read_csv(const std::string& path);
+  /// A circle around a point, above it by `height_m`: one turn in `period_s`, beginning on its +z side.
+  static Trajectory orbit(double radius_m = 0.75, double height_m = 0.35, double period_s = 20.0,
+                          const glm::dvec3& centre = glm::dvec3(0));
+  /// One pose for ever.
+  static Trajectory still(const Pose& pose);
+  /// Precondition: at least one sample, times strictly increase.
+  static Trajectory of(std::vector<Sample> samples);
+
+  /// Pose at `t_s`; before the first and after the last sample those hold, unless it repeats. An orbit goes on for
+  /// ever.
+  Pose at(double t_s) const;
+  /// Seconds from first to last sample; 0 for still and orbit.
+  double duration_s() const;
+  /// From now on it begins again where it ends.
+  void repeat() { repeats_ = true; }
+
+ private:
   std::vector<Sample> samples_;
+  bool repeats_ = false;
   double orbit_radius_m_ = 0, orbit_height_m_ = 0, orbit_period_s_ = 0;
+  glm::dvec3 orbit_centre_{0.0};
 };
 
-/// Pose at `eye` looking at `target`, y up (another up is chosen when looking along y).
+/// The same as a CSV file that Trajectory::read_csv reads.
+Status write_trajectory(const std::string& path, const std::vector<Trajectory::Sample>& samples);
+
+/// Pose at `eye` looking at `target`, y up (another up is chosen when looking along y). From where the target is: along
+/// -z.
 Pose look_at(const glm::dvec3& eye, const glm::dvec3& target);
 
-/// The pose `still` uses when none is named.
+/// A pose that suits a data set of 0.8 m at the origin, for benchmarks; what people see first is fitted (fit.h).
 Pose default_pose();
 
 }  // namespace telesplat::geometry

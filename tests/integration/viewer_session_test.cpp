@@ -32,7 +32,8 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   display.target_fps = target_fps;
   display.duration_s = 120;  // a deadline
   display.frames = frames;
-  HeadlessSurface surface(display, geometry::Trajectory::orbit(1.2, 0.4, 20));
+  const auto orbit = std::make_shared<const geometry::Trajectory>(geometry::Trajectory::orbit(1.2, 0.4, 20));
+  HeadlessSurface surface(display, {.recorded = orbit});
   CouplingGate gate(buffers_of(mode, 3));
   auto renderers = Renderers::make(renderer, 1);
   metrics::TableRecorder table("frames", frame_columns());

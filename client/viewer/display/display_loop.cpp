@@ -36,7 +36,6 @@ LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn,
   const auto network = worker.figures();
   return {now_s,
           network.scene,
-          network.extent_m,
           frames,
           network.updates,
           network.latency_ms,
@@ -95,17 +94,25 @@ class Display {
   // The request of what is drawn next, where nothing is waited for.
   RequestId newest_drawn() const { return gate_.waits() ? RequestId{} : Succession::kNewest; }
 
+  // Of the frame that begins; the surface knows by then what there is to show.
+  geometry::Camera next_camera(double now_s, double t_s) {
+    const ShownScene scene = worker_.shown_scene();
+    if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
+    return surface_.begin_frame(now_s, t_s, look_);
+  }
+
   // Until it is known what there is to show.
   bool wait_for_scene() {
-    for (; !worker_.received_at({}); sleep_until(monotonic_s() + kRestPeriod_s)) {
+    for (; !worker_.received_at({}) || worker_.shown_scene().box_room.empty();
+         sleep_until(monotonic_s() + kRestPeriod_s)) {
       if (told_to_stop(worker_, surface_)) return false;
-      const geometry::Camera camera = surface_.begin_frame(monotonic_s(), -1, look_);
+      const geometry::Camera camera = next_camera(monotonic_s(), -1);
       if (!surface_.visible()) continue;
       fit(view_, camera, false);
       std::fill(view_.colour.begin(), view_.colour.end(), o_.shading.background);
       surface_.present(view_);
       const auto network = worker_.figures();
-      surface_.report({.now_s = monotonic_s(), .scene = network.scene, .extent_m = network.extent_m});
+      surface_.report({.now_s = monotonic_s(), .scene = network.scene});
     }
     return true;
   }
@@ -117,7 +124,7 @@ class Display {
       if (told_to_stop(worker_, surface_)) return false;
       if (!draw_from(newest_drawn())) return false;
       const double now_s = monotonic_s();
-      const geometry::Camera camera = surface_.begin_frame(now_s, -1, look_);
+      const geometry::Camera camera = next_camera(now_s, -1);
       worker_.on_pose(now_s, camera);
       fit(view_, camera, spool_ != nullptr);
       const DrawnFrame drawn = source_->draw({now_s, camera, look_, false, true, surface_.visible()}, view_);
@@ -146,7 +153,7 @@ class Display {
       }
       const double now_s = monotonic_s(), t_s = now_s - start_s_;
       if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s)) return now_s - begin_s;
-      worker_.on_pose(now_s, surface_.begin_frame(now_s, t_s, look_));
+      worker_.on_pose(now_s, next_camera(now_s, t_s));
       if (view_intact_ && surface_.visible()) surface_.present(view_);
     }
   }
@@ -172,10 +179,11 @@ class Display {
     const double t_s = m.begin_s - start_s_;
     see_whether_last(t_s);
     // The view of now, from what is cached now.
-    m.camera = surface_.begin_frame(m.begin_s, t_s, look_);
+    m.camera = next_camera(m.begin_s, t_s);
     const uint32_t use = use_of_frame(t_s);
     const bool with_depth = use & (kVerify | kExr);
     fit(view_, m.camera, spool_ != nullptr);
+    m.look = look_;
     m.drawn = source_->draw({m.begin_s, m.camera, look_, with_depth}, view_);
     m.end_s = monotonic_s();
     worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, gate_.waits() ? &m.drawn.update : nullptr);
@@ -224,6 +232,7 @@ class Display {
   FrameSpool* spool_;
   const SourceMaker& make_source_;
   Look look_;
+  ShownScene scene_;  // as the surface knows it
   std::shared_ptr<Received> received_;
   std::unique_ptr<ViewSource> source_;  // draws received_; null: it cannot be drawn
   image::View view_;

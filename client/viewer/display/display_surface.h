@@ -8,6 +8,7 @@
 #include "client/viewer/input/look.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/file.h"
+#include "common/scene/kind.h"
 
 namespace telesplat::viewer {
 
@@ -15,7 +16,6 @@ namespace telesplat::viewer {
 struct LiveFigures {
   double now_s = 0;                  ///< monotonic clock
   std::string scene;                 ///< name of the data set; empty until the master told it
-  double extent_m = 0;               ///< its largest extent in the room; 0 until then
   uint64_t frames = 0, updates = 0;  ///< displayed; completely received
   double latency_ms = 0;             ///< of the newest view update, request to complete; 0 before the first
   uint64_t points_drawn = 0, points_cached = 0, bytes_received = 0;
@@ -24,10 +24,19 @@ struct LiveFigures {
   const char* cached_name = "";       ///< and points_cached, with a space before it
 };
 
+/// What the session shows.
+struct ShownScene {
+  geometry::Box box_room;  ///< empty until the master told it
+  scene::Pipeline pipeline = scene::Pipeline::kPoints;
+  bool operator==(const ShownScene&) const = default;
+};
+
 /// Called by the display loop, in its thread, in this order for every frame.
 class DisplaySurface {
  public:
   virtual ~DisplaySurface() = default;
+  /// Before the next frame, when it is known what there is to show, and again when that changes.
+  virtual void on_scene(const ShownScene& scene) = 0;
   /// Takes in what happened since the last frame; returns the camera of the frame that begins, whose size is the
   /// frame's, and changes `look` to the person's wishes. t_s: seconds since the first displayed frame; negative before
   /// it, while the head rests.
@@ -42,6 +51,8 @@ class DisplaySurface {
   virtual Overlays* overlays() { return nullptr; }
   /// Whether the person is done.
   virtual bool wants_to_stop() const = 0;
+  /// Why it can show nothing any more; empty: it can. It wants to stop then.
+  virtual std::string failure() const { return {}; }
 };
 
 }  // namespace telesplat::viewer

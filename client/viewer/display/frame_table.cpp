@@ -51,6 +51,10 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"wait_ms", [](F f) { return f.wait_s * 1e3; }},
     {"request", [](F f) { return double(f.drawn.update.request.value); }},
     {"buffers_filled", [](F f) { return double(f.filled); }},
+    {"summaries", [](F f) { return double(f.drawn.summaries); }},
+    {"splat", [](F f) { return double(f.look.render.kernel); }},
+    {"finish", [](F f) { return double(splat::finish_bits(f.look.render.finish)); }},
+    {"lit", [](F f) { return f.look.lit ? 1.0 : 0.0; }},
 };
 
 }  // namespace

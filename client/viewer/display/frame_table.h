@@ -17,6 +17,7 @@ struct MeasuredFrame {
   double wait_s = 0;        ///< for the update, before begin_s
   double update_age_s = 0;  ///< since the update that it shows was requested
   geometry::Camera camera{};
+  Look look{};
   DrawnFrame drawn{};
   int filled = 0;  ///< complete updates that waited to be displayed
 };

@@ -23,6 +23,7 @@ struct DrawnFrame {
   double chosen_s = 0;  ///< monotonic clock: what to draw was chosen
   double project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0, antialias_cpu_ms = 0;
   uint64_t selected = 0, drawn = 0, items = 0, cached = 0, sequence = 0;
+  uint64_t summaries = 0;  ///< of bricks, that had been made by then
   double detail = 1, budget_ms = 0;
   EpochId epoch;
   ShownUpdate update;  ///< the newest view update that it shows

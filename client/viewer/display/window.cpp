@@ -4,9 +4,11 @@
 #include <epoxy/gl.h>
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <optional>
 #include <utility>
@@ -33,8 +35,35 @@ struct Library {
   }
 };
 
+std::atomic<bool> connection_lost{false};
+
+// What Xlib does when its connection breaks is to write a line and end the process. Instead the window is lost, and the
+// viewer ends in order. GLFW loads Xlib by itself; so its functions are looked up where they are loaded, and a window of
+// another system needs none. Functions that return pointers and take them have these types for any caller.
+void survive_broken_connection() {
+  connection_lost = false;
+  using Handler = int (*)(void* display);
+  using ExitHandler = void (*)(void* display, void* data);
+  void* const xlib = dlopen("libX11.so.6", RTLD_LAZY | RTLD_NOLOAD);
+  void* const glfw = dlsym(RTLD_DEFAULT, "glfwGetX11Display");
+  if (!xlib || !glfw) return;
+  void* const display = reinterpret_cast<void* (*)()>(glfw)();
+  const auto set_handler = reinterpret_cast<Handler (*)(Handler)>(dlsym(xlib, "XSetIOErrorHandler"));
+  const auto set_exit = reinterpret_cast<void (*)(void*, ExitHandler, void*)>(dlsym(xlib, "XSetIOErrorExitHandler"));
+  if (display && set_handler && set_exit) {
+    set_handler([](void*) {
+      connection_lost = true;
+      return 0;
+    });
+    set_exit(
+        display, [](void*, void*) {}, nullptr);
+  }
+  dlclose(xlib);
+}
+
 std::optional<Key> key_of(int glfw_key) {
   static constexpr std::pair<int, Key> kKeys[] = {{GLFW_KEY_A, Key::kA},
+                                                  {GLFW_KEY_C, Key::kC},
                                                   {GLFW_KEY_D, Key::kD},
                                                   {GLFW_KEY_E, Key::kE},
                                                   {GLFW_KEY_F, Key::kF},
@@ -145,6 +174,7 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
                          api == GLFW_EGL_CONTEXT_API ? "EGL" : "the window system", last_error());
   }
   if (!impl->window) return Error{"no window with OpenGL: " + tried};
+  survive_broken_connection();
   glfwSetWindowSizeLimits(impl->window, kSmallestSide, kSmallestSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
   impl->listen();
   std::unique_ptr<Window> out(new Window(std::move(impl)));
@@ -165,6 +195,10 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
 Window::Window(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) { read_size(); }
 
 Window::~Window() {
+  if (lost()) {
+    impl_.release();  // libraries would ask the server that is gone
+    return;
+  }
   const Current current(*this);
   impl_->presenter.reset();
 }
@@ -197,9 +231,11 @@ void Window::read_size() {
 }
 
 void Window::poll(Interaction& interaction) {
+  if (lost()) return;
   impl_->interaction = &interaction;
   glfwPollEvents();
   impl_->interaction = nullptr;
+  if (lost()) return;
   if (interaction.wants_pointer() != impl_->pointer_caught) {
     impl_->pointer_caught = interaction.wants_pointer();
     glfwSetInputMode(impl_->window, GLFW_CURSOR, impl_->pointer_caught ? GLFW_CURSOR_DISABLED : GLFW_CURSOR_NORMAL);
@@ -207,10 +243,15 @@ void Window::poll(Interaction& interaction) {
   read_size();
 }
 
-bool Window::closing() const { return glfwWindowShouldClose(impl_->window); }
-void Window::set_title(const std::string& title) { glfwSetWindowTitle(impl_->window, title.c_str()); }
+bool Window::lost() const { return connection_lost; }
+bool Window::closing() const { return lost() || glfwWindowShouldClose(impl_->window); }
+
+void Window::set_title(const std::string& title) {
+  if (!lost()) glfwSetWindowTitle(impl_->window, title.c_str());
+}
 
 void Window::present(const image::View& view, const Overlays& overlays) {
+  if (lost()) return;
   int width = 0, height = 0;
   glfwGetFramebufferSize(impl_->window, &width, &height);
   if (width <= 0 || height <= 0) return;

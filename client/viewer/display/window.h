@@ -43,8 +43,10 @@ class Window {
 
   /// Delivers keys, mouse and wheel since the last call; catches the pointer while the person flies.
   void poll(Interaction& interaction);
-  /// The person closed it.
+  /// The person closed it, or it is lost.
   bool closing() const;
+  /// The connection to the window system broke: nothing is shown any more, and nothing of it can be freed.
+  bool lost() const;
   /// Pixels of the content, which on fine screens are more than screen coordinates; the last ones while it is
   /// minimised.
   int width() const { return width_; }

@@ -1,6 +1,11 @@
 #include "client/viewer/display/window_surface.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+#include <ctime>
+#include <filesystem>
 #include <mutex>
 
 namespace telesplat::viewer {
@@ -12,6 +17,23 @@ std::function<void(const std::string&)> one_at_a_time(std::function<void(const s
     const std::lock_guard lock(*mutex);
     tell(text);
   };
+}
+
+// What plays from the beginning. An orbit is fitted once it is known around what.
+std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement) {
+  if (movement.recorded) return *movement.recorded;
+  return movement.orbits ? std::optional(geometry::Trajectory::orbit()) : std::nullopt;
+}
+
+// A name that no file has.
+std::string dated_path(const std::string& before, const std::string& after) {
+  char date[32];
+  const std::time_t now = std::time(nullptr);
+  std::strftime(date, sizeof date, "%Y%m%d-%H%M%S", std::localtime(&now));
+  std::string out = before + date + after;
+  std::error_code error;
+  for (int n = 2; std::filesystem::exists(out, error); ++n) out = fmt::format("{}{}-{}{}", before, date, n, after);
+  return out;
 }
 
 }  // namespace
@@ -33,24 +55,75 @@ Result<std::unique_ptr<WindowSurface>> WindowSurface::open(const Options& o,
 
 WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window,
                              std::function<void(const std::string&)> tell)
-    : options_(o.display),
+    : options_(o),
       window_(std::move(window)),
-      interaction_(o.recorded, {o.display.render, o.display.shading.lit}),
+      interaction_(first_movement(o.movement), {o.display.render, o.display.shading.lit}),
       tell_(tell),
-      screenshots_(o.screenshot_directory, tell) {}
+      screenshots_(o.screenshot_directory, tell) {
+  tell_(first_keys());
+}
+
+WindowSurface::~WindowSurface() {
+  interaction_.end_path();
+  keep_path();
+}
+
+// Of all tiles of a wall.
+geometry::Camera WindowSurface::whole(const geometry::Pose& pose) const {
+  const auto& o = options_.display;
+  return window_camera(pose, o.fov_deg, window_->width() * o.wall.columns, window_->height() * o.wall.rows, o.near_m);
+}
+
+void WindowSurface::on_scene(const ShownScene& scene) {
+  scene_ = scene;
+  fitted_width_ = 0;
+}
+
+// The first view suits the window as it is; the camera follows it until the person takes it.
+void WindowSurface::fit_views() {
+  if (scene_.box_room.empty() || (fitted_width_ == window_->width() && fitted_height_ == window_->height())) return;
+  fitted_width_ = window_->width();
+  fitted_height_ = window_->height();
+  const auto& movement = options_.movement;
+  interaction_.set_scene(scene_.pipeline, scene_.box_room, movement.first_view(scene_.box_room, whole({})));
+  if (movement.orbits) interaction_.set_recorded(movement.trajectory(scene_.box_room, whole({})));
+}
 
 geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look) {
   window_->poll(interaction_);
-  const auto& o = options_;
+  fit_views();
+  const auto& o = options_.display;
   const bool playback = t_s >= 0 && (o.duration_s <= 0 || t_s < o.duration_s - o.hold_s);
-  const geometry::Camera camera =
-      tile_of(window_camera(interaction_.advance(now_s, playback), o.fov_deg, window_->width() * o.wall.columns,
-                            window_->height() * o.wall.rows, o.near_m),
-              o.wall);
+  const geometry::Camera camera = tile_of(whole(interaction_.advance(now_s, playback)), o.wall);
   interaction_.set_height_tangent(camera.top - camera.bottom);
   look = interaction_.look();
-  for (const auto& note : interaction_.take_notes()) tell_(note);
+  show_help();
+  keep_path();
   return camera;
+}
+
+void WindowSurface::show_help() {
+  const int scale = interaction_.shows_help() ? std::clamp(window_->height() / 500, 1, 4) : 0;
+  if (scale == help_scale_) return;
+  help_scale_ = scale;
+  if (scale > 0)
+    overlays_.show("help", {text_panel(key_help(), scale), Overlay::Corner::kUpperLeft});
+  else
+    overlays_.hide("help");
+}
+
+// What keys led to: lines for the person, and a path that is complete.
+void WindowSurface::keep_path() {
+  for (const auto& note : interaction_.take_notes()) tell_(note);
+  const auto path = interaction_.take_path();
+  if (path.empty()) return;
+  const std::string name = dated_path(options_.path_directory + "/path-", ".csv");
+  std::error_code error;
+  std::filesystem::create_directories(options_.path_directory, error);
+  const Status written = geometry::write_trajectory(name, path);
+  tell_(written ? fmt::format("the camera's path of {:.1f} s: {} (T plays it, --trajectory takes it)", path.back().t_s,
+                              name)
+                : written.error().text);
 }
 
 void WindowSurface::present(const image::View& view) {
@@ -59,8 +132,11 @@ void WindowSurface::present(const image::View& view) {
 }
 
 void WindowSurface::report(const LiveFigures& figures) {
-  if (figures.extent_m > 0) interaction_.set_extent(figures.extent_m);
-  if (const auto title = title_.update(figures)) window_->set_title(*title);
+  if (const auto title = title_.update(figures)) title_text_ = *title;
+  const std::string title = interaction_.records_path() ? fmt::format("{} - recording the camera's path, {:.0f} s",
+                                                                      title_text_, interaction_.path_s())
+                                                        : title_text_;
+  if (title != title_shown_) window_->set_title(title_shown_ = title);
 }
 
 }  // namespace telesplat::viewer

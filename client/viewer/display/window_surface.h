@@ -7,6 +7,7 @@
 #include "client/viewer/display/display_surface.h"
 #include "client/viewer/display/title_line.h"
 #include "client/viewer/display/window.h"
+#include "client/viewer/input/head_movement.h"
 #include "client/viewer/record/screenshots.h"
 
 namespace telesplat::viewer {
@@ -15,32 +16,44 @@ class WindowSurface final : public DisplaySurface {
  public:
   struct Options {
     DisplayOptions display;
-    std::optional<geometry::Trajectory> recorded;  ///< a head movement that plays until the person takes the camera
+    HeadMovement movement;  ///< unless it stands still it plays until the person takes the camera
     bool fullscreen = false;
-    std::string screenshot_directory = ".";
+    std::string screenshot_directory = ".", path_directory = ".";
   };
   /// tell: lines for the person; may be called from another thread, never from two at once.
   static Result<std::unique_ptr<WindowSurface>> open(const Options& options,
                                                      std::function<void(const std::string&)> tell);
+  /// A path that is being recorded is written.
+  ~WindowSurface() override;
 
   int width() const { return window_->width(); }
   int height() const { return window_->height(); }
 
+  void on_scene(const ShownScene& scene) override;
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   bool visible() const override { return true; }
   void present(const image::View& view) override;
   void report(const LiveFigures& figures) override;
   Overlays* overlays() override { return &overlays_; }
   bool wants_to_stop() const override { return window_->closing() || interaction_.wants_to_quit(); }
+  std::string failure() const override { return window_->lost() ? "the display went away" : ""; }
 
  private:
   WindowSurface(const Options& options, std::unique_ptr<Window> window, std::function<void(const std::string&)> tell);
+  geometry::Camera whole(const geometry::Pose& pose) const;
+  void fit_views();
+  void show_help();
+  void keep_path();
 
-  DisplayOptions options_;
+  Options options_;
   std::unique_ptr<Window> window_;
   Interaction interaction_;
   TitleLine title_;
+  std::string title_text_, title_shown_;
   Overlays overlays_;
+  ShownScene scene_;
+  int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
+  int help_scale_ = 0;                        // of the overlay's letters; 0: it is not shown
   std::function<void(const std::string&)> tell_;
   Screenshots screenshots_;
 };

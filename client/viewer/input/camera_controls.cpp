@@ -48,16 +48,23 @@ CameraControls::State CameraControls::state_at(const geometry::Pose& pose, doubl
 }
 
 double CameraControls::distance_of_interest(const geometry::Pose& pose) const {
-  const double ahead = glm::dot(-pose.position_room, pose.orientation * glm::dvec3(0, 0, -1));
-  return std::clamp(ahead, 0.25 * extent_m_, Limits::kFarthest * extent_m_);
+  const double ahead = glm::dot(centre_ - pose.position_room, pose.orientation * glm::dvec3(0, 0, -1));
+  return std::clamp(ahead, 0.25 * extent_m_, farthest_m_);
 }
 
-void CameraControls::set_extent(double extent_m) {
-  if (!(extent_m > 0) || !std::isfinite(extent_m) || extent_m == extent_m_) return;
-  extent_m = std::clamp(extent_m, Limits::kSmallest_m, Limits::kLargest_m);
-  home_.position_room *= extent_m / extent_m_;
-  extent_m_ = extent_m;
-  if (!touched_) now_ = goal_ = state_at(home_, distance_of_interest(home_));
+void CameraControls::set_scene(const geometry::Box& box, const geometry::Pose& home) {
+  const glm::dvec3 size = glm::dvec3(box.hi) - glm::dvec3(box.lo), centre = glm::dvec3(box.lo) + size * 0.5;
+  const double extent_m = std::max({size.x, size.y, size.z});
+  if (!(extent_m > 0) || !(glm::length(centre) <= Limits::kLargest_m) || !std::isfinite(extent_m)) return;
+  centre_ = centre;
+  extent_m_ = std::clamp(extent_m, Limits::kSmallest_m, Limits::kLargest_m);
+  home_ = home;
+  const double home_m = glm::distance(home.position_room, centre);
+  farthest_m_ = std::max(Limits::kFarthest * extent_m_, 2 * home_m);
+  flight_m_ = std::max(Limits::kFlight * extent_m_, 2 * home_m);
+  const State home_state = state_at(home_, distance_of_interest(home_));
+  pivot_m_ = std::max(Limits::kPivot * extent_m_, glm::distance(home_state.anchor, centre_));
+  if (!touched_) now_ = goal_ = home_state;
   clamp_goal();
 }
 
@@ -120,10 +127,9 @@ void CameraControls::take_over(const geometry::Pose& pose) {
 
 void CameraControls::clamp_goal() {
   goal_.pitch = std::clamp(goal_.pitch, -Limits::kPitch_rad, Limits::kPitch_rad);
-  const double reach = (flying_ ? Limits::kFlight : Limits::kPivot) * extent_m_;
-  goal_.anchor = glm::clamp(goal_.anchor, glm::dvec3(-reach), glm::dvec3(reach));
-  if (!flying_)
-    goal_.distance = std::clamp(goal_.distance, Limits::kNearest * extent_m_, Limits::kFarthest * extent_m_);
+  const double reach = flying_ ? flight_m_ : pivot_m_;
+  goal_.anchor = glm::clamp(goal_.anchor, centre_ - reach, centre_ + reach);
+  if (!flying_) goal_.distance = std::clamp(goal_.distance, Limits::kNearest * extent_m_, farthest_m_);
 }
 
 glm::dvec3 CameraControls::flight_velocity() const {

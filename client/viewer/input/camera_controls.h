@@ -14,20 +14,18 @@ class CameraControls {
   /// (geometry::validate).
   struct Limits {
     static constexpr double kSmallest_m = 1e-4, kLargest_m = 1e4;
-    static constexpr double kNearest = 0.03, kFarthest = 10;           ///< eye to pivot
-    static constexpr double kPivot = 2;                                ///< pivot to centre, along each axis
-    static constexpr double kFlight = 10;                              ///< eye to centre in flight, along each axis
-    static constexpr double kSlowest = 0.02, kFastest = 5;             ///< flight, extents a second
+    static constexpr double kNearest = 0.03, kFarthest = 10;  ///< eye to pivot; twice home's distance if that is more
+    static constexpr double kPivot = 2;                       ///< pivot to centre, along each axis; or as far as home's
+    static constexpr double kFlight = 10;                     ///< eye to centre in flight, along each axis; or as above
+    static constexpr double kSlowest = 0.02, kFastest = 5;    ///< flight, extents a second
     static constexpr double kPitch_rad = 89 * 3.14159265358979 / 180;  ///< up and down
   };
-  /// What `home` is made for: 0.8 m, the default size of a data set in the room.
-  static constexpr double kHomeExtent_m = 0.8;
-
-  /// home: where reset() leads to, around a data set of kHomeExtent_m.
+  /// home: where reset() leads to, around a data set of 0.8 m at the origin, as long as nothing else is told.
   explicit CameraControls(const geometry::Pose& home = geometry::default_pose());
 
-  /// The data set's largest extent, metres: limits, speeds and home follow. The camera too, if nobody has moved it yet.
-  void set_extent(double extent_m);
+  /// The data set's box, which limits and speeds follow, and its home. The camera goes there if nobody has moved it yet.
+  /// A box that no camera can show changes nothing.
+  void set_scene(const geometry::Box& box_room, const geometry::Pose& home);
 
   /// Around the pivot (the data set's centre until panned), half a turn a window height. In flight: looks around.
   void orbit(double dx, double dy);
@@ -70,7 +68,11 @@ class CameraControls {
   void clamp_goal();
 
   geometry::Pose home_;
-  double extent_m_ = kHomeExtent_m, speed_ = 0.5;  // extents a second
+  glm::dvec3 centre_{0.0};               // of the data set
+  double extent_m_ = 0.8;                // its largest one
+  double farthest_m_ = 8;                // eye to pivot
+  double pivot_m_ = 1.6, flight_m_ = 8;  // pivot to centre, eye to centre in flight
+  double speed_ = 0.5;                   // extents a second
   State now_, goal_;
   Flight flight_;
   bool flying_ = false, touched_ = false;

@@ -4,6 +4,12 @@
 #include <utility>
 
 namespace telesplat::viewer {
+namespace {
+
+// Between the poses of a recorded path, so that their times differ in the file too.
+constexpr double kLeastStep_s = 1e-5;
+
+}  // namespace
 
 const std::vector<std::string>& key_help() {
   static const std::vector<std::string> lines{
@@ -12,16 +18,22 @@ const std::vector<std::string>& key_help() {
       "wheel                nearer, farther (in flight: faster, slower)",
       "F                    fly: W A S D, E up, Q down, the mouse looks around, shift is faster",
       "R                    back to the first view",
-      "T                    play the recorded head movement (--trajectory), or take the camera",
-      "1 2 3 4              splats: square, disc, ellipse, ewa",
-      "5 6 7                finish: fill pin-holes, smooth, antialias",
-      "8                    shading on, off",
-      "P, F12               screenshot, into the run folder or the current one",
-      "H                    these keys",
+      "T                    play the recorded head movement (--trajectory, or C), or take the camera",
+      "C                    begin, end recording the camera's path; it is written as path-DATE.csv",
+      "1 2 3 4              splats: square, disc, ellipse, ewa (not of volumes)",
+      "5 6 7                finish: fill pin-holes, smooth, antialias (not of volumes)",
+      "8                    shading on, off (not of volumes)",
+      "P, F12               screenshot, into images/ of the run folder or the current folder",
+      "H                    show, hide these keys",
       "Esc                  leave flight; quit",
       "Q                    quit (not in flight)",
   };
   return lines;
+}
+
+std::string first_keys() {
+  return "H shows all keys: left drag orbits, the wheel goes nearer, F flies, R goes back, P takes a screenshot, Q "
+         "quits";
 }
 
 Interaction::Interaction(std::optional<geometry::Trajectory> recorded, const Look& look)
@@ -44,7 +56,61 @@ void Interaction::take_camera() {
   controls_.take_over(recorded_->at(playback_s_));
 }
 
+void Interaction::play_or_take() {
+  if (!recorded_) {
+    notes_.push_back("no head movement to play: --trajectory names one, C records one");
+    return;
+  }
+  if (playing_) return take_camera();
+  controls_.set_flying(false);
+  if (recorded_->duration_s() > 0 && playback_s_ >= recorded_->duration_s()) playback_s_ = 0;
+  playing_ = true;
+}
+
+void Interaction::begin_path() {
+  records_path_ = true;
+  path_.clear();
+  notes_.push_back("recording the camera's path; C ends it");
+}
+
+void Interaction::end_path() {
+  if (!records_path_) return;
+  records_path_ = false;
+  if (path_.size() < 2) {
+    notes_.push_back("the camera's path is too short to keep");
+    return;
+  }
+  finished_path_ = std::move(path_);
+  path_.clear();
+  take_camera();
+  recorded_ = geometry::Trajectory::of(finished_path_);
+  has_own_path_ = true;
+  playback_s_ = 0;
+}
+
+// Whether the key is one that changes how points are drawn.
+bool Interaction::choose_look(Key key) {
+  if (key < Key::k1 || key > Key::k8) return false;
+  const int number = int(key) - int(Key::k1) + 1;
+  if (pipeline_ != scene::Pipeline::kPoints) {
+    notes_.push_back("key " + std::to_string(number) + " has no meaning for volumes");
+  } else if (key == Key::k5) {
+    toggle(look_.render.finish.fill, "fill");
+  } else if (key == Key::k6) {
+    toggle(look_.render.finish.smooth, "smooth");
+  } else if (key == Key::k7) {
+    toggle(look_.render.finish.antialias, "antialias");
+  } else if (key == Key::k8) {
+    toggle(look_.lit, "shading");
+  } else {
+    if (const auto kernel = splat::kernel_of_key(char('0' + number))) look_.render.kernel = *kernel;
+    notes_.push_back("splats: " + std::string(splat::kernel_name(look_.render.kernel)));
+  }
+  return true;
+}
+
 void Interaction::pressed(Key key) {
+  if (choose_look(key)) return;
   switch (key) {
     case Key::kF:
       take_camera();
@@ -55,37 +121,16 @@ void Interaction::pressed(Key key) {
       controls_.reset();
       return;
     case Key::kT:
-      if (!recorded_)
-        notes_.push_back("no head movement to play: --trajectory names one");
-      else if (playing_)
-        take_camera();
-      else {
-        controls_.set_flying(false);
-        if (recorded_->duration_s() > 0 && playback_s_ >= recorded_->duration_s()) playback_s_ = 0;
-        playing_ = true;
-      }
-      return;
-    case Key::k1:
-    case Key::k2:
-    case Key::k3:
-    case Key::k4:
-      if (const auto kernel = splat::kernel_of_key(char('1' + int(key) - int(Key::k1)))) look_.render.kernel = *kernel;
-      notes_.push_back("splats: " + std::string(splat::kernel_name(look_.render.kernel)));
-      return;
-    case Key::k5:
-      return toggle(look_.render.finish.fill, "fill");
-    case Key::k6:
-      return toggle(look_.render.finish.smooth, "smooth");
-    case Key::k7:
-      return toggle(look_.render.finish.antialias, "antialias");
-    case Key::k8:
-      return toggle(look_.lit, "shading");
+      return play_or_take();
+    case Key::kC:
+      return records_path_ ? end_path() : begin_path();
     case Key::kP:
     case Key::kF12:
       screenshot_ = true;
       return;
     case Key::kH:
-      notes_.insert(notes_.end(), key_help().begin(), key_help().end());
+      shows_help_ = !shows_help_;
+      if (shows_help_) notes_.insert(notes_.end(), key_help().begin(), key_help().end());
       return;
     case Key::kEscape:
       if (!controls_.flying()) quit_ = true;
@@ -124,9 +169,24 @@ void Interaction::focus_lost() {
   left_ = middle_ = false;
 }
 
+void Interaction::set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home) {
+  pipeline_ = pipeline;
+  controls_.set_scene(box_room, home);
+}
+
+void Interaction::set_recorded(geometry::Trajectory recorded) {
+  if (!has_own_path_) recorded_ = std::move(recorded);
+}
+
 geometry::Pose Interaction::advance(double now_s, bool playback) {
   const double dt_s = last_s_ ? std::max(0.0, now_s - *last_s_) : 0.0;
   last_s_ = now_s;
+  const geometry::Pose pose = next_pose(dt_s, playback);
+  if (records_path_) record_pose(now_s, pose);
+  return pose;
+}
+
+geometry::Pose Interaction::next_pose(double dt_s, bool playback) {
   if (playing_) {
     if (playback) playback_s_ += dt_s;
     return recorded_->at(playback_s_);
@@ -136,6 +196,13 @@ geometry::Pose Interaction::advance(double now_s, bool playback) {
   return controls_.advance(dt_s);
 }
 
+void Interaction::record_pose(double now_s, const geometry::Pose& pose) {
+  if (path_.empty()) path_from_s_ = now_s;
+  const double t_s = now_s - path_from_s_;
+  if (path_.empty() || t_s > path_.back().t_s + kLeastStep_s) path_.push_back({t_s, pose});
+}
+
+Interaction::Path Interaction::take_path() { return std::exchange(finished_path_, {}); }
 bool Interaction::take_screenshot_wish() { return std::exchange(screenshot_, false); }
 std::vector<std::string> Interaction::take_notes() { return std::exchange(notes_, {}); }
 

@@ -8,18 +8,47 @@
 
 #include "client/viewer/input/camera_controls.h"
 #include "client/viewer/input/look.h"
+#include "common/scene/kind.h"
 
 namespace telesplat::viewer {
 
 /// Keys that mean something here, by what is printed on a US keyboard.
-enum class Key { kA, kD, kE, kF, kH, kP, kQ, kR, kS, kT, kW, k1, k2, k3, k4, k5, k6, k7, k8, kF12, kEscape, kShift };
+enum class Key {
+  kA,
+  kC,
+  kD,
+  kE,
+  kF,
+  kH,
+  kP,
+  kQ,
+  kR,
+  kS,
+  kT,
+  kW,
+  k1,
+  k2,
+  k3,
+  k4,
+  k5,
+  k6,
+  k7,
+  k8,
+  kF12,
+  kEscape,
+  kShift
+};
 enum class MouseButton { kLeft, kMiddle };
 
 /// Keys and mouse, a line each: for H, for --help and for documentation.
 const std::vector<std::string>& key_help();
+/// The ones to begin with, in one line.
+std::string first_keys();
 
 class Interaction {
  public:
+  using Path = std::vector<geometry::Trajectory::Sample>;
+
   /// recorded: a head movement that T plays; without, T does nothing. It plays from the beginning if there is one.
   Interaction(std::optional<geometry::Trajectory> recorded, const Look& look);
 
@@ -32,8 +61,10 @@ class Interaction {
   void focus_lost();
 
   // ---- every frame ----
-  /// The data set's largest extent, metres.
-  void set_extent(double extent_m) { controls_.set_extent(extent_m); }
+  /// What there is to see, its box, and the view that R leads back to.
+  void set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home);
+  /// What T plays from now on, unless the person recorded a path.
+  void set_recorded(geometry::Trajectory recorded);
   /// What the window shows, top to bottom, at distance 1: pans follow the pointer.
   void set_height_tangent(double tangent) { height_tangent_ = tangent; }
   /// The camera at `now_s`. A recorded movement advances only while `playback` is true.
@@ -44,6 +75,14 @@ class Interaction {
   /// In flight the mouse turns the head: the pointer should be caught and hidden.
   bool wants_pointer() const { return controls_.flying(); }
   bool playing() const { return playing_; }
+  bool shows_help() const { return shows_help_; }
+  bool records_path() const { return records_path_; }
+  /// Seconds of the path that is being recorded.
+  double path_s() const { return path_.empty() ? 0 : path_.back().t_s; }
+  /// The camera's path that was recorded last, once; T plays it from now on. Empty: there is none.
+  Path take_path();
+  /// A path that is being recorded ends.
+  void end_path();
   /// True once after each press of the screenshot key.
   bool take_screenshot_wish();
   /// Lines to tell the person, since the last call.
@@ -51,13 +90,22 @@ class Interaction {
 
  private:
   void pressed(Key key);
+  void play_or_take();
+  bool choose_look(Key key);
   void take_camera();
+  void begin_path();
+  void record_pose(double now_s, const geometry::Pose& pose);
+  geometry::Pose next_pose(double dt_s, bool playback);
   void toggle(bool& flag, const char* name);
 
   std::optional<geometry::Trajectory> recorded_;
   Look look_;
   CameraControls controls_;
-  bool playing_ = false, quit_ = false, screenshot_ = false;
+  scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
+  bool playing_ = false, quit_ = false, screenshot_ = false, shows_help_ = false;
+  bool records_path_ = false, has_own_path_ = false;
+  double path_from_s_ = 0;
+  Path path_, finished_path_;
   double playback_s_ = 0, height_tangent_ = 1;
   std::optional<double> last_s_;
   std::optional<glm::dvec2> pointer_;

@@ -19,16 +19,17 @@ TEST(Wall, TilesSeeTogetherWhatTheWholeSees) {
   whole.width = 3 * 80;
   whole.height = 2 * 50;
   whole.duration_s = 10;
-  const auto trajectory = geometry::Trajectory::orbit();
+  const HeadMovement movement{.recorded =
+                                  std::make_shared<const geometry::Trajectory>(geometry::Trajectory::orbit())};
   Look look;
-  HeadlessSurface all(whole, trajectory);
+  HeadlessSurface all(whole, movement);
   const geometry::Camera reference = all.begin_frame(0, 3.5, look);
   for (int tile = 0; tile < 6; ++tile) {
     DisplayOptions part = whole;
     part.width = 80;
     part.height = 50;
     part.wall = {3, 2, tile};
-    HeadlessSurface surface(part, trajectory);
+    HeadlessSurface surface(part, movement);
     const geometry::Camera camera = surface.begin_frame(0, 3.5, look);
     ASSERT_TRUE(geometry::validate(camera).ok());
     EXPECT_EQ(camera.width, 80);

@@ -164,7 +164,7 @@ class VolumeStudy {
     v.buffers = options_.buffers;
     v.display.fov_deg = options_.fov_deg;
     v.display.target_fps = 0;
-    v.display.duration_s = options_.seconds + 2 * kSettle_s;
+    v.duration_s = options_.seconds + 2 * kSettle_s;
     v.display.picture_every = 0;
     v.record_points_mb = 0;
     v.started_s = monotonic_s();

@@ -12,6 +12,7 @@
 #include "client/viewer/record/frame_spool.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/net/master_address.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
@@ -64,6 +65,7 @@ class Run {
     auto pipeline = Pipeline::start(o_);
     if (!pipeline && o_.viewer.window && net::stop_requested()) return 0;
     if (!pipeline) return tools::complain(pipeline.error(), 1);
+    progress_.line(fmt::format("session at {}; telesplat ctl status asks it", pipeline->master_endpoint()));
     State state = watch(*pipeline);
     pipeline->finish();
     keep_record(*pipeline, state);
@@ -193,13 +195,25 @@ class Run {
   tools::ProgressLine progress_;
 };
 
+// Finds the session that --master auto means. Returns 0, or the exit code after saying why there is none.
+int find_session(RunOptions& o) {
+  if (o.join_master.empty()) return 0;
+  const auto search = net::find_master(o.join_master);
+  if (search.address.empty()) return tools::complain({search.problem}, search.exit_code());
+  o.join_master = search.address;
+  return 0;
+}
+
 int run(RunOptions o, const options::Given& given) {
   o.viewer.started_s = monotonic_s();
   if (o.out.empty() && !o.viewer.window) o.out = dated_folder();
   auto scene = settle(o, given);
   if (!scene) return tools::complain(scene.error());
+  if (const int code = find_session(o)) return code;
   if (o.viewer.window)
     if (const Status s = viewer::check_display(); !s) return tools::complain(s.error());
+  if (const std::string end = viewer::end_of_trajectory(o.viewer); !end.empty())
+    std::fprintf(stderr, "%s\n", end.c_str());
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
   return Run(std::move(o), std::move(*scene)).go();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <thread>
 
-#include "common/geometry/trajectory.h"
 #include "common/net/master_address.h"
 #include "services/data/kinds.h"
 #include "tools/telesplat/run/wall.h"
@@ -38,32 +37,34 @@ Table display_rows(RunOptions& o) {
 
 Table own_rows(RunOptions& o) {
   const auto points = scene::Kinds::of(scene::Pipeline::kPoints);
-  return {{.flag = "scene", .value = &o.data.scene, .help = data::scene_help() + ", or a scene file (TOML)"},
-          {.flag = "--samplers", .value = &o.samplers, .help = "sampler processes", .limits = Range{1, 64}},
-          {.flag = "--sampler-threads",
-           .value = &o.sampler.threads,
-           .help = "threads of each sampler; 0: the cores shared among them",
-           .limits = Range{0, 1024}},
-          {.flag = "--data-servers",
-           .value = &o.data_servers,
-           .help = "processes that each serve a part of a volume",
-           .limits = Range{1, 16},
-           .fits = {scene::Kind::kVolume}},
-          {.flag = "--master",
-           .value = &o.join_master,
-           .help = "join the running session at this address instead of starting one; default, where no scene is named: "
-                   "$TELESPLAT_MASTER"},
-          {.flag = "!--same-priority",
-           .value = &o.background_servers,
-           .help = "run samplers, packer and data at the viewer's priority"},
-          {.flag = "--record-depth",
-           .value = &o.record_depth,
-           .help = "keep the first 50 sampled depth images (telesplat inspect reads them)",
-           .fits = points},
-          {.flag = "--log-level",
-           .value = &o.log_level,
-           .help = "trace, debug, info, warn, error or off",
-           .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}}};
+  return {
+      {.flag = "scene", .value = &o.data.scene, .help = data::scene_help() + ", or a scene file (TOML)"},
+      {.flag = "--samplers", .value = &o.samplers, .help = "sampler processes", .limits = Range{1, 64}},
+      {.flag = "--sampler-threads",
+       .value = &o.sampler.threads,
+       .help = "threads of each sampler; 0: the cores shared among them",
+       .limits = Range{0, 1024}},
+      {.flag = "--data-servers",
+       .value = &o.data_servers,
+       .help = "processes that each serve a part of a volume",
+       .limits = Range{1, 16},
+       .fits = {scene::Kind::kVolume}},
+      {.flag = "--master",
+       .value = &o.join_master,
+       .help =
+           "join the running session at this address instead of starting one; auto: yours on this machine; default, "
+           "where no scene is named: $TELESPLAT_MASTER"},
+      {.flag = "!--same-priority",
+       .value = &o.background_servers,
+       .help = "run samplers, packer and data at the viewer's priority"},
+      {.flag = "--record-depth",
+       .value = &o.record_depth,
+       .help = "keep the first 50 sampled depth images (telesplat inspect reads them)",
+       .fits = points},
+      {.flag = "--log-level",
+       .value = &o.log_level,
+       .help = "trace, debug, info, warn, error or off",
+       .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}}};
 }
 
 // --sampler alone: threads and memory of samplers are the launcher's business.
@@ -112,13 +113,6 @@ Status refuse_records_without_folder(const RunOptions& o) {
   return ok_status();
 }
 
-Status check_viewer(viewer::ViewerOptions v) {
-  if (const Status s = viewer::settle(v); !s) return s;
-  if (v.trajectory == "orbit" || v.trajectory == "still") return ok_status();
-  const auto read = geometry::Trajectory::read_csv(v.trajectory);
-  return read ? ok_status() : Status(read.error());
-}
-
 // As a program of these options is to be told, where `defaults` is what it does anyway.
 template <class Options>
 std::vector<std::string> arguments(Options o) {
@@ -131,8 +125,6 @@ std::vector<std::string> arguments(Options o) {
 RunOptions view_defaults() {
   RunOptions o;
   o.viewer.window = true;
-  o.viewer.trajectory = "still";
-  o.viewer.display.duration_s = 0;
   return o;
 }
 
@@ -159,13 +151,13 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   }
   if (const Status s = settle_wall(o, given); !s) return s.error();
   if (const Status s = refuse_records_without_folder(o); !s) return s.error();
-  if (const Status s = check_viewer(o.viewer); !s) return s.error();
+  if (const Status s = viewer::settle(o.viewer); !s) return s.error();
   return out;
 }
 
 std::vector<std::string> master_arguments(const RunOptions& o) {
   auto out = arguments(o.master);
-  out.insert(out.end(), {"--bind", "tcp://127.0.0.1:*"});
+  out.insert(out.end(), {"--bind", "tcp://127.0.0.1:*", "--started-by", o.viewer.window ? "view" : "run"});
   if (!o.out.empty()) out.insert(out.end(), {"--out", o.out});
   return out;
 }

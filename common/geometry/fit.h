@@ -1,0 +1,21 @@
+// Where to stand so that a whole box is in the picture, with a small margin, whatever its shape.
+#pragma once
+
+#include "common/geometry/trajectory.h"
+
+namespace telesplat::geometry {
+
+/// How much of the picture's half width and half height stays free at least.
+inline constexpr double kFitMargin = 0.05;
+
+/// How steeply an orbit looks down on a box, in radians: 12 degrees on towers, 34 on what is flat.
+double suitable_tilt_rad(const Box& box_room);
+
+/// The pose in front of the box (on its +z side, tilted as above) that is as near as it can be. frustum: what the
+/// picture shows; its pose means nothing. Preconditions: the box is not empty, the frustum has its axis inside.
+Pose fitted_view(const Box& box_room, const Camera& frustum);
+
+/// The smallest circle around the box's vertical axis from which all poses show the whole box; begins in front of it.
+Trajectory fitted_orbit(const Box& box_room, const Camera& frustum, double period_s = 20.0);
+
+}  // namespace telesplat::geometry
