@@ -7,7 +7,7 @@ namespace telesplat::viewer {
 
 std::shared_ptr<Received> make_received(scene::Pipeline pipeline, const ReceivedOptions& options,
                                         const ReceivedLinks& links) {
-  if (pipeline == scene::Pipeline::kSlices) return std::make_shared<ReceivedSlices>(links);
+  if (pipeline == scene::Pipeline::kSlices) return std::make_shared<ReceivedSlices>(options, links);
   return std::make_shared<ReceivedPoints>(options, links);
 }
 

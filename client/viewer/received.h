@@ -69,11 +69,13 @@ struct ReceivedLinks {
 };
 
 class EventRecorder;
+class SliceRecorder;
 
 struct ReceivedOptions {
   double epoch_patience_s = 0.15;  ///< EpochSwitch
   EventRecorder* events =
       nullptr;  ///< keeps every applied event of points; null: nothing is kept. Outlives the Received
+  SliceRecorder* slices = nullptr;  ///< the same of frames of slice images
 };
 
 std::shared_ptr<Received> make_received(scene::Pipeline pipeline, const ReceivedOptions& options,

@@ -1,6 +1,7 @@
 #include "common/splat/render_options.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace telesplat::splat {
@@ -31,6 +32,25 @@ std::optional<Finish> finish_named(std::string_view name) {
       if (stage == text) known = out.*on = true;
     if (!known) return std::nullopt;
     begin = comma + 1;
+  }
+  return out;
+}
+
+unsigned finish_bits(const Finish& finish) {
+  unsigned out = 0, bit = 1;
+  for (const auto& [name, on] : kStages) {
+    if (finish.*on) out |= bit;
+    bit *= 2;
+  }
+  return out;
+}
+
+std::optional<Finish> finish_of_bits(uint64_t bits) {
+  if (bits >= 1u << std::size(kStages)) return std::nullopt;
+  Finish out;
+  for (const auto& [name, on] : kStages) {
+    out.*on = bits & 1;
+    bits /= 2;
   }
   return out;
 }

@@ -1,6 +1,7 @@
 // How splats are drawn and finished: the same for both renderers.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,6 +20,10 @@ struct Finish {
 /// "on", "off", or the stages that are on, as in "fill,antialias"; finish_named reads what finish_name makes.
 std::string finish_name(const Finish& finish);
 std::optional<Finish> finish_named(std::string_view name);
+/// As a number, for tables: 1 fill, 2 smooth, 4 antialias, added up. finish_of_bits reads what finish_bits makes; of
+/// other numbers nothing.
+unsigned finish_bits(const Finish& finish);
+std::optional<Finish> finish_of_bits(uint64_t bits);
 
 struct RenderOptions {
   Kernel kernel = Kernel::kDisc;

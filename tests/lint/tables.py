@@ -83,6 +83,7 @@ FLOORS = {
         ["tools/telesplat/command.h"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],
+        ["tools/telesplat/movie"],
         ["tools/telesplat/run"],
         ["tools/telesplat/compare", "tools/telesplat/bench"],
         ["tools/telesplat"],

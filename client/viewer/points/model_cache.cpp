@@ -74,8 +74,8 @@ void ModelCache::free_dropped() {
   std::swap(free, free_);
 }
 
-void ModelCache::summarise(size_t most) {
-  std::vector<points::ClusterKey> wanted;
+std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
+  std::vector<points::ClusterKey> wanted, made;
   {
     const std::lock_guard lock(mutex_);
     std::swap(wanted, wanted_);
@@ -98,7 +98,10 @@ void ModelCache::summarise(size_t most) {
     }
     place = std::move(summary);
     newest_.summary_bytes += place->bytes();
+    ++summaries_made_;
+    made.push_back(key);
   }
+  return made;
 }
 
 uint64_t ModelCache::digest() const {
@@ -117,6 +120,7 @@ void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOp
   out.applied = replica.applied;
   out.epoch = replica.epoch;
   out.replica = replica.number;
+  out.summaries = summaries_made_;
   drawn_ = replica.model.get();
 }
 

@@ -34,8 +34,10 @@ class ModelCache {
   /// milliseconds.
   void free_dropped();
   /// Makes up to `most` of the summaries that the display asked for (points/summary.h), while it draws. Only where no
-  /// other thread changes the cache.
-  void summarise(size_t most);
+  /// other thread changes the cache. Returns the bricks whose summaries were made, in order.
+  std::vector<points::ClusterKey> summarise(size_t most);
+  /// Summaries made so far.
+  uint64_t summaries_made() const { return summaries_made_; }
   /// Digest of the newest replica, for tests of replication.
   uint64_t digest() const;
 
@@ -77,7 +79,7 @@ class ModelCache {
   Replica newest_, older_;  // older_ only while it is on display in place of the newest
   const points::PointModel* drawn_ = nullptr;
   Dropped parked_, free_;
-  uint64_t replicas_ = 0, patches_ = 0;
+  uint64_t replicas_ = 0, patches_ = 0, summaries_made_ = 0;
   std::vector<points::ClusterKey> wanted_;  // summaries of the newest replica
 };
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "client/viewer/points/source.h"
+#include "client/viewer/record/event_record.h"
 #include "common/scene/session.h"
 
 namespace telesplat::viewer {
@@ -17,6 +18,7 @@ constexpr size_t kSummariesAtOnce = 8;
 ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLinks& links)
     : links_(links),
       waits_(links.gate.waits()),
+      events_(options.events),
       receiver_({links.viewer, options.epoch_patience_s, options.events, waits_},
                 {[this] { return config_; },
                  [this](InstanceId packer, Sequence after) {
@@ -45,8 +47,14 @@ void ReceivedPoints::receive(int most) {
 
 void ReceivedPoints::tick(double now_s) {
   receiver_.tick(now_s);
-  if (!waits_) cache_.summarise(kSummariesAtOnce);
+  if (!waits_) summarise();
   cache_.free_dropped();
+}
+
+void ReceivedPoints::summarise() {
+  uint64_t number = cache_.summaries_made();
+  for (const points::ClusterKey brick : cache_.summarise(kSummariesAtOnce))
+    if (++number; events_) events_->add_summary(number, brick);
 }
 
 void ReceivedPoints::on_update(const ShownUpdate& update) {

@@ -39,8 +39,11 @@ class ReceivedPoints final : public Received {
   bool keeps_redundant() const { return keeps_redundant_; }
 
  private:
+  void summarise();
+
   ReceivedLinks links_;
-  const bool waits_;  // the display, for whole updates
+  const bool waits_;             // the display, for whole updates
+  EventRecorder* const events_;  // null: nothing is kept
   ModelCache cache_;
   UpdateBatches batches_;
   PointReceiver receiver_;

@@ -1,64 +1,68 @@
 // The point-model events that a viewer applied, kept as they came. They are all that is needed to make any displayed
 // frame's model again: a replica is its packer's events in their order ("Replication" in docs/architecture.md).
 //
-// File: "TSEVENT2", then records  u32 type length, u64 body length, type, body  (little-endian). Types: "replica" (six
-// floats: the box in room space, lo then hi; u32: octree depth; u32: 1 if mosaics are merged) where a replica begins,
-// and the wire's "patch", "forget", "epoch_begin".
+// File (record_file.h): "TSEVENT3". Types: "replica" (six floats: the box in room space, lo then hi; u32: octree depth;
+// u32: 1 if mosaics are merged) where a replica begins, the wire's "patch", "forget", "epoch_begin", and "summary"
+// (u64: its number, u32: key of its brick) where the viewer made a summary of a brick (common/points/summary.h) from
+// the model as it was then. "TSEVENT2", of earlier versions, has no summaries.
 #pragma once
 
-#include <cstdio>
-#include <functional>
 #include <memory>
 #include <string>
 
 #include "client/viewer/points/event_sequencer.h"
-#include "common/points/point_model.h"
+#include "client/viewer/record/record_file.h"
+#include "common/points/summary.h"
 
 namespace telesplat::viewer {
 
 class EventRecorder {
  public:
-  /// Makes the file anew. At most max_bytes are written, then a warning is logged and the rest is left out.
+  /// As RecordWriter::open.
   static Result<std::unique_ptr<EventRecorder>> open(const std::string& path, uint64_t max_bytes);
 
   void begin_replica(const points::ModelConfig& config);
   void add(const ModelEvent& event);
+  /// number: of all summaries that the viewer made, this one included.
+  void add_summary(uint64_t number, points::ClusterKey brick);
   /// Everything so far is on disk.
-  void flush();
+  void flush() { file_.flush(); }
 
  private:
-  struct Close {
-    void operator()(FILE* f) const { std::fclose(f); }
-  };
-  void write(std::string_view type, std::string_view body);
-  std::unique_ptr<FILE, Close> file_;
-  std::string path_;
-  uint64_t bytes_ = 0, max_bytes_ = 0;
-  bool full_ = false;
+  explicit EventRecorder(RecordWriter file) : file_(std::move(file)) {}
+  RecordWriter file_;
 };
 
 /// Plays a record into a model, event by event.
 class EventReplay {
  public:
   /// Refuses files that are not a record. A record that ends in mid-event (a viewer that was killed) ends before that
-  /// event.
-  static Result<std::unique_ptr<EventReplay>> open(const std::string& path);
+  /// event. with_summaries: summaries are made again too, which takes time.
+  static Result<std::unique_ptr<EventReplay>> open(const std::string& path, bool with_summaries = false);
   ~EventReplay();
 
-  /// Applies events until the model holds everything up to and including `sequence`, or the
-  /// record ends. Goes forward only. Errors name the file and what is wrong with the event.
-  Status advance(Sequence sequence);
+  /// A displayed frame's state: its newest event, and how many summaries there were.
+  struct Moment {
+    Sequence sequence;
+    uint64_t summaries = ~uint64_t{0};
+  };
+  /// Applies events until the model holds everything up to and including the moment, or the record ends. Goes forward
+  /// only. Errors name the file and what is wrong with the event.
+  Status advance(const Moment& moment);
+  Status advance(Sequence sequence) { return advance(Moment{sequence}); }
   /// Goes on to where the viewer began its next replica, because another packer took over and numbers began again. A
   /// replica that holds no event does not count. Fails if there is none.
   Status next_replica();
   /// Null before the first event. Pointers into it hold until the next advance().
   const points::PointModel* model() const;
+  /// Of the model's bricks; empty unless they are made.
+  const points::Summaries& summaries() const;
   Sequence applied() const;
   bool at_end() const;
 
  private:
-  EventReplay();
   struct Impl;
+  explicit EventReplay(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -9,10 +9,10 @@ constexpr Feed kFeeds[] = {{net::Kind::kDealer, "state"}};
 
 }  // namespace
 
-ReceivedSlices::ReceivedSlices(const ReceivedLinks& links)
+ReceivedSlices::ReceivedSlices(const ReceivedOptions& options, const ReceivedLinks& links)
     : links_(links),
       cache_(links.gate.waits()),
-      receiver_({links.viewer, uint64_t(links.gate.buffers())},
+      receiver_({links.viewer, uint64_t(links.gate.buffers()), options.slices},
                 {links.requested_s,
                  [this](RequestId r) { return links_.gate.with([r](Coupling& c) { return c.is_open(r); }); },
                  [this](const ViewPart& part) {

@@ -9,7 +9,7 @@ namespace telesplat::viewer {
 
 class ReceivedSlices final : public Received {
  public:
-  explicit ReceivedSlices(const ReceivedLinks& links);
+  ReceivedSlices(const ReceivedOptions& options, const ReceivedLinks& links);
 
   Status follow(const wire::Welcome& session) override { return receiver_.set_session(session); }
   std::span<const Feed> feeds() const override;

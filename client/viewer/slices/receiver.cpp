@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "client/viewer/record/slice_record.h"
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/volume/session.h"
@@ -99,6 +100,7 @@ void SliceReceiver::on(const wire::SliceFrame& f, net::Socket& state) {
   pixels_received_ += pixels;
   spans_.add("decode", links_.to_master_s(begin_s), links_.to_master_s(monotonic_s()), 1);
   cache_.put(std::move(*frame));
+  if (options_.record) options_.record->add(*grid_, f);  // after it: it is shown first
   if (options_.buffers == 0) acknowledge(f.frame, state);
   links_.on_part({.viewer = f.viewer,
                   .request = f.request,

@@ -13,6 +13,8 @@
 
 namespace telesplat::viewer {
 
+class SliceRecorder;
+
 class SliceReceiver {
  public:
   /// Pixels of all images of a frame, those of its layers included, at most (1 GiB): a few bytes can claim many of
@@ -23,7 +25,8 @@ class SliceReceiver {
 
   struct Options {
     InstanceId viewer;
-    uint64_t buffers = 0;  ///< of the coupling; 0: asynchronous
+    uint64_t buffers = 0;             ///< of the coupling; 0: asynchronous
+    SliceRecorder* record = nullptr;  ///< keeps every frame that goes into the cache; null: nothing is kept
   };
   struct Links {
     std::function<std::optional<double>(RequestId)> requested_s;  ///< ViewRequester

@@ -63,6 +63,7 @@ struct DrawList {
   EpochId epoch;          ///< that model's; a list never has points of two epochs
   /// Together with it a DrawItem's cluster and sequence name the points: another packer's sequences begin again.
   uint64_t replica = 0;
+  uint64_t summaries = 0;  ///< how many summaries had been made by then, of any replica
 };
 
 /// Culls clusters by frustum, mosaics by normal cone; chooses how many of each mosaic's points are drawn

@@ -8,7 +8,9 @@
 #include <limits>
 #include <random>
 
+#include "client/viewer/points/model_cache.h"
 #include "client/viewer/record/event_record.h"
+#include "common/codec/depth_codec.h"
 #include "common/wire/serial.h"
 #include "tests/support/packer_scenes.h"
 
@@ -122,10 +124,16 @@ class EventRecord : public testing::Test {
     return std::visit([](const auto& m) { return part(std::decay_t<decltype(m)>::kName, wire::encode(m)); },
                       as_received(e).body);
   }
+  static std::string summary(uint64_t number, uint32_t brick) {
+    std::string body(16, '\0');
+    std::memcpy(body.data(), &number, 8);
+    std::memcpy(body.data() + 8, &brick, 4);
+    return part("summary", body);
+  }
   // The error of replaying it all; empty: none.
   std::string error_of(const std::string& content) const {
     write(content);
-    auto replay = EventReplay::open(path_);
+    auto replay = EventReplay::open(path_, true);
     if (!replay) return replay.error().text;
     const Status s = (*replay)->advance(kAll);
     return s ? "" : s.error().text;
@@ -244,6 +252,68 @@ TEST_F(EventRecord, CutAtEveryLengthItEndsBeforeTheCut) {
   }
 }
 
+// What a frame of three events and one summary displayed, as it was then: later summaries are not made yet.
+TEST_F(EventRecord, SummariesAreMadeAgainAtTheirPlace) {
+  const auto events = published(120, 60);
+  ASSERT_GT(events.size(), 8u);
+  ModelCache cache;
+  cache.begin_replica(test::scene_config());
+  struct Shown {
+    EventReplay::Moment moment;
+    size_t items;
+    uint64_t points;
+  };
+  std::vector<Shown> shown;
+  const auto far = test::scene_camera({0.4, 0.5, 2.5}, 160, 120);
+  splat::DrawList list;
+  {
+    auto recorder = EventRecorder::open(path_, 1u << 30);
+    (*recorder)->begin_replica(test::scene_config());
+    for (const auto& e : events) {
+      const ModelEvent event = as_received(e);
+      if (e.kind == packer::Event::Kind::kEpoch) break;
+      if (e.kind == packer::Event::Kind::kForget) {
+        cache.forget(e.sequence, e.clusters, e.frames);
+      } else {
+        auto tile = codec::decode(*e.blob);
+        ASSERT_TRUE(tile.ok());
+        cache.insert(points::prepare_patch(test::scene_config(), e.sequence, e.camera, e.rect, *tile, e.frame),
+                     e.epoch);
+      }
+      (*recorder)->add(event);
+      for (int frame = 0; frame < 2; ++frame) {
+        cache.select(far, {}, list);
+        cache.end_frame();
+        shown.push_back({{list.applied, list.summaries}, list.items.size(), list.points});
+        uint64_t number = cache.summaries_made();
+        for (const auto brick : cache.summarise(3)) (*recorder)->add_summary(++number, brick);
+      }
+    }
+  }
+  ASSERT_GT(shown.back().moment.summaries, 10u);
+  auto replay = EventReplay::open(path_, true);
+  ASSERT_TRUE(replay.ok()) << replay.error().text;
+  size_t with = 0;
+  for (const Shown& s : shown) {
+    const Status advanced = (*replay)->advance(s.moment);
+    ASSERT_TRUE(advanced.ok()) << advanced.error().text;
+    ASSERT_EQ((*replay)->applied(), s.moment.sequence);
+    splat::select_view(*(*replay)->model(), far, {}, list, &(*replay)->summaries());
+    ASSERT_EQ(list.items.size(), s.items) << "event " << s.moment.sequence.value << ", " << s.moment.summaries;
+    ASSERT_EQ(list.points, s.points);
+    with += !(*replay)->summaries().empty();
+  }
+  EXPECT_GT(with, shown.size() / 2);
+}
+
+TEST_F(EventRecord, ARecordOfAnEarlierVersionIsRead) {
+  const auto events = published(40, 40);
+  record(events);
+  std::string content = bytes();
+  content[7] = '2';
+  EXPECT_EQ(error_of(content), "");
+}
+
 TEST_F(EventRecord, WhatIsNoRecordIsRefusedByName) {
   for (const std::string& content :
        {std::string(), std::string("TSEVENT"), std::string("TSEVENT1 and more"), std::string(1000, '\xff')}) {
@@ -259,7 +329,7 @@ TEST_F(EventRecord, WhatIsNoRecordIsRefusedByName) {
 
 TEST_F(EventRecord, EventsThatCannotBeAreErrorsThatNameTheFile) {
   const auto events = published(40, 40);
-  const std::string magic = "TSEVENT2", good = replica(-0.4f, 0.4f, 6);
+  const std::string magic = "TSEVENT3", good = replica(-0.4f, 0.4f, 6);
   packer::Event outside = events[0];
   outside.rect.x += 7;
   packer::Event undecodable = events[0];
@@ -276,6 +346,9 @@ TEST_F(EventRecord, EventsThatCannotBeAreErrorsThatNameTheFile) {
       {magic + good + event(outside), "not inside"},
       {magic + good + event(undecodable), "patch"},
       {magic + good + event(unfit), "patch"},
+      {magic + part("summary", "short"), "5 bytes instead of 16"},
+      {magic + summary(1, 0), "before any replica"},
+      {magic + good + event(events[0]) + summary(1, 0xdeadbeef), "holds no points"},
       {magic + part("replica", "short"), "5 bytes instead of 32"},
       {magic + replica(0.4f, -0.4f, 6), "replica"},
       {magic + replica(std::numeric_limits<float>::quiet_NaN(), 1, 6), "replica"},
@@ -291,7 +364,7 @@ TEST_F(EventRecord, EventsThatCannotBeAreErrorsThatNameTheFile) {
 
 TEST_F(EventRecord, ClaimedLengthsAllocateNothing) {
   for (const uint64_t claimed : {uint64_t(1) << 40, ~uint64_t(0), ~uint64_t(0) - 11}) {
-    std::string content = "TSEVENT2" + replica(-1, 1, 6) + part("patch", "abc");
+    std::string content = "TSEVENT3" + replica(-1, 1, 6) + part("patch", "abc");
     std::memcpy(content.data() + content.size() - 16, &claimed, 8);
     EXPECT_EQ(error_of(content), "") << "it ends before that event";
   }

@@ -127,7 +127,11 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
                                     "epoch",
                                     "wait_ms",
                                     "request",
-                                    "buffers_filled"}));
+                                    "buffers_filled",
+                                    "summaries",
+                                    "splat",
+                                    "finish",
+                                    "lit"}));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;

@@ -1,0 +1,65 @@
+// The files of what a viewer received, as it came: records, one after the other, of which the last may be cut off.
+//
+// File: 8 letters that say what it is and its version, then records  u32 type length, u64 body length, type, body
+// (little-endian).
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/result.h"
+
+namespace telesplat::viewer {
+
+struct CloseFile {
+  void operator()(FILE* f) const { std::fclose(f); }
+};
+using RecordFile = std::unique_ptr<FILE, CloseFile>;
+
+class RecordWriter {
+ public:
+  /// Makes the file anew. magic: 8 letters. At most max_bytes are written, then a warning is logged and the rest is
+  /// left out. what: for that warning, "point-model events".
+  static Result<RecordWriter> open(const std::string& path, std::string_view magic, uint64_t max_bytes,
+                                   const char* what);
+  void write(std::string_view type, std::string_view body);
+  /// Nothing more is written: the limit was reached, or the disk is full.
+  bool full() const { return full_; }
+  /// Everything so far is on disk.
+  void flush() { std::fflush(file_.get()); }
+
+ private:
+  RecordFile file_;
+  std::string path_;
+  const char* what_ = "";
+  uint64_t bytes_ = 0, max_bytes_ = 0;
+  bool full_ = false;
+};
+
+class RecordReader {
+ public:
+  /// magics: what the file may begin with. what: for errors, "a record of point-model events". Error: the file is not
+  /// there, or is something else.
+  static Result<RecordReader> open(const std::string& path, const std::vector<std::string_view>& magics,
+                                   const char* what);
+
+  /// Reads the next record. False at the end, also if the last one is cut off. Nothing is allocated that the file does
+  /// not hold.
+  bool next();
+  const std::string& type() const { return type_; }
+  const std::string& body() const { return body_; }
+  const std::string& path() const { return path_; }
+  /// "PATH: TYPE: what"
+  Error wrong(const std::string& what) const;
+
+ private:
+  RecordFile file_;
+  std::string path_, type_, body_;
+  uint64_t left_ = 0;  // bytes of the file not read yet
+};
+
+}  // namespace telesplat::viewer
