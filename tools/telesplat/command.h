@@ -36,6 +36,7 @@ Command view_command();
 Command control_command();
 Command inspect_command();
 Command compare_command();
+Command movie_command();
 Command bench_command();
 Command presets_command();
 

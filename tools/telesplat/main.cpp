@@ -7,8 +7,8 @@ int main(int argc, char** argv) {
   return net::guarded_main([&] {
     const std::vector<launcher::Command> commands{launcher::run_command(),     launcher::view_command(),
                                                   launcher::control_command(), launcher::inspect_command(),
-                                                  launcher::compare_command(), launcher::bench_command(),
-                                                  launcher::presets_command()};
+                                                  launcher::compare_command(), launcher::movie_command(),
+                                                  launcher::bench_command(),   launcher::presets_command()};
     return launcher::run_commands("telesplat: explore data sets that are too large for this machine", commands,
                                   {argv + 1, argv + argc});
   });

@@ -103,18 +103,17 @@ Result<CompareSubject> find_subject(const CompareOptions& o) {
 Result<std::unique_ptr<PoseModels>> PoseModels::open(const CompareSubject& subject, int magnify, DirectScene& scene) {
   std::unique_ptr<PoseModels> out(new PoseModels(subject, magnify, scene));
   if (subject.events.empty()) return out;
-  auto events = viewer::EventReplay::open(subject.events);
+  auto events = ModelReplay::open(subject.events, false);
   if (!events) return events.error();
   out->events_ = std::move(*events);
   return out;
 }
 
 Result<const points::PointModel*> PoseModels::replay(const DisplayedFrame& frame) {
-  for (; replica_ < frame.replica; ++replica_)
-    if (const Status s = events_->next_replica(); !s) return s.error();
-  if (const Status s = events_->advance(frame.sequence); !s) return s.error();
+  const auto there = events_->advance(frame);
+  if (!there) return there.error();
   applied_ = events_->applied();
-  if (!events_->model() || applied_ != frame.sequence)
+  if (!*there)
     return Error{fmt::format(
         "{}: ends at event {}, frame {} displayed event {}; --frames chooses earlier frames, and telesplat run "
         "--record-points keeps more",

@@ -3,9 +3,8 @@
 
 #include <memory>
 
-#include "client/viewer/record/event_record.h"
 #include "tools/telesplat/compare/compare_options.h"
-#include "tools/telesplat/record/recorded_run.h"
+#include "tools/telesplat/record/frame_replay.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -45,9 +44,8 @@ class PoseModels {
   const CompareSubject& subject_;
   int magnify_;
   DirectScene& scene_;
-  std::unique_ptr<viewer::EventReplay> events_;
+  std::unique_ptr<ModelReplay> events_;
   std::unique_ptr<points::PointModel> sampled_;
-  uint32_t replica_ = 0;
   Sequence applied_;
 };
 

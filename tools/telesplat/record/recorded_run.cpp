@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <map>
 
+#include "common/image/background.h"
 #include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
@@ -39,12 +40,22 @@ double number(const toml::node_view<const toml::node>& node, double fallback) {
   return std::isfinite(out) ? out : fallback;
 }
 
-// The viewer whose frames the run's own record has.
-const toml::table* own_viewer(const toml::table& session) {
+std::string text_of(const toml::table& viewer, const char* key) { return viewer[key].value_or(std::string()); }
+
+std::vector<const toml::table*> viewers(const toml::table& session) {
+  std::vector<const toml::table*> out;
   if (const auto* processes = session["process"].as_array())
     for (const auto& p : *processes)
-      if (const auto* t = p.as_table(); t && (*t)["role"].value_or(std::string()) == "viewer") return t;
-  return nullptr;
+      if (const auto* t = p.as_table(); t && text_of(*t, "role") == "viewer") out.push_back(t);
+  return out;
+}
+
+// The viewer whose frames the run's own record has: the launcher's first, else the first that joined.
+const toml::table* own_viewer(const toml::table& session) {
+  const auto all = viewers(session);
+  const auto first =
+      std::find_if(all.begin(), all.end(), [](const toml::table* t) { return text_of(*t, "name") == "viewer-1"; });
+  return first != all.end() ? *first : all.empty() ? nullptr : all.front();
 }
 
 Status read_size(const std::string& path, const toml::table& viewer, RecordedRun& run) {
@@ -58,6 +69,37 @@ Status read_size(const std::string& path, const toml::table& viewer, RecordedRun
     return Error{fmt::format("{}: the viewer's display has {} x {} pixels, at most {} are compared", path, width,
                              height, kMaxPixels)};
   run.width = int(width), run.height = int(height);
+  return ok_status();
+}
+
+// Which part of a wall it was.
+Status read_wall(const std::string& path, const toml::table& viewer, RecordedRun& run) {
+  const std::string text = viewer["wall"].value_or(std::string());
+  if (text.empty()) return ok_status();
+  const auto layout = viewer::parse_wall(text);
+  if (!layout) return Error{fmt::format("{}: {}", path, layout.error().text)};
+  const double tile = number(toml::node_view<const toml::node>(viewer["wall_tile"]), 0);
+  if (!(tile >= 0 && tile < layout->tiles()) || tile != std::floor(tile))
+    return Error{
+        fmt::format("{}: wall_tile is {}, --wall {} has the tiles 0..{}", path, tile, text, layout->tiles() - 1)};
+  run.wall = {layout->columns, layout->rows, int(tile)};
+  return ok_status();
+}
+
+// How the display drew. Kernels are refused where they are drawn, if at all: volumes have none.
+Status read_look(const std::string& path, const toml::table& viewer, RecordedRun& run) {
+  if (const auto kernel = splat::kernel_named(run.kernel)) run.look.render.kernel = *kernel;
+  const std::string finish = viewer["finish"].value_or(std::string("on"));
+  const auto known = splat::finish_named(finish);
+  if (!known)
+    return Error{fmt::format("{}: finish is \"{}\", not on, off or some of fill,smooth,antialias", path, finish)};
+  run.look.render.finish = *known;
+  run.look.lit = run.shading.lit;
+  const float suits = splat::suitable_scale(run.look.render.kernel);
+  const auto scale = float(number(toml::node_view<const toml::node>(viewer["splat_scale"]), suits));
+  if (!(scale > 0 && scale <= 10))
+    return Error{fmt::format("{}: splat_scale is {}, limits are above 0 and 10", path, scale)};
+  run.splat_scale = scale == suits ? 0 : scale;
   return ok_status();
 }
 
@@ -77,43 +119,31 @@ Status read_display(const std::string& path, const toml::table& session, const t
   const auto known = image::shading_named(shading);
   if (!known) return Error{fmt::format("{}: shading is \"{}\", not lit, head or unlit", path, shading)};
   run.shading = *known;
-  return ok_status();
-}
-
-// Fills everything but the frames. Returns the name of the run's own viewer.
-Result<std::string> read_session(const std::string& path, RecordedRun& run) {
-  const auto session = read_toml(path);
-  if (!session) return session.error();
-  const toml::table* viewer = own_viewer(*session);
-  if (!viewer) return Error{fmt::format("{}: names no viewer, so no frame of that run was displayed", path)};
-  if (const Status s = read_display(path, *session, *viewer, run); !s) return s.error();
-  auto scene = recorded_scene(run.directory);
-  if (!scene) return scene.error();
-  run.scene = std::move(*scene);
-  return (*viewer)["name"].value_or(std::string());
+  const auto background = image::parse_background(session["display"]["background"].value_or(std::string("#141820")));
+  if (!background) return Error{fmt::format("{}: background of [display]: {}", path, background.error().text)};
+  run.shading.background = background->colour;
+  if (const Status s = read_wall(path, viewer, run); !s) return s;
+  return read_look(path, viewer, run);
 }
 
 // The columns of frames.csv that make a frame again.
 struct FrameColumns {
-  size_t viewer, frame, t_s, sequence, points_drawn;
-  std::array<size_t, 7> pose;           // px py pz qw qx qy qz
-  std::optional<size_t> detail, epoch;  // not there: 1, 0
+  size_t viewer, frame, t_s, construction_ms, sequence, points_drawn;
+  std::array<size_t, 7> pose;  // px py pz qw qx qy qz
+  // Earlier versions wrote none of them. Then: 1, 0, all, as the run began.
+  std::optional<size_t> detail, epoch, summaries, splat, finish, lit;
 };
 
 Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   FrameColumns out{};
-  const std::pair<const char*, size_t*> wanted[] = {{"viewer", &out.viewer},
-                                                    {"frame", &out.frame},
-                                                    {"t_s", &out.t_s},
-                                                    {"sequence", &out.sequence},
-                                                    {"points_drawn", &out.points_drawn},
-                                                    {"px", &out.pose[0]},
-                                                    {"py", &out.pose[1]},
-                                                    {"pz", &out.pose[2]},
-                                                    {"qw", &out.pose[3]},
-                                                    {"qx", &out.pose[4]},
-                                                    {"qy", &out.pose[5]},
-                                                    {"qz", &out.pose[6]}};
+  const std::pair<const char*, size_t*> wanted[] = {
+      {"viewer", &out.viewer},     {"frame", &out.frame},
+      {"t_s", &out.t_s},           {"construction_ms", &out.construction_ms},
+      {"sequence", &out.sequence}, {"points_drawn", &out.points_drawn},
+      {"px", &out.pose[0]},        {"py", &out.pose[1]},
+      {"pz", &out.pose[2]},        {"qw", &out.pose[3]},
+      {"qx", &out.pose[4]},        {"qy", &out.pose[5]},
+      {"qz", &out.pose[6]}};
   for (const auto& [name, column] : wanted) {
     const auto found = table.column(name);
     if (!found) return found.error();
@@ -121,7 +151,27 @@ Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   }
   out.detail = table.find("detail");
   out.epoch = table.find("epoch");
+  out.summaries = table.find("summaries");
+  out.splat = table.find("splat");
+  out.finish = table.find("finish");
+  out.lit = table.find("lit");
   return out;
+}
+
+// A whole number below `end`; `fallback` where the table has no such column.
+Result<uint64_t> optional_count(const tools::CsvTable& table, size_t row, const std::optional<size_t>& column,
+                                uint64_t fallback, double end) {
+  return column ? table.count(row, *column, end) : Result<uint64_t>(fallback);
+}
+
+Status read_look(const tools::CsvTable& table, size_t row, const FrameColumns& at, DisplayedFrame& f) {
+  const auto splat = optional_count(table, row, at.splat, uint64_t(f.look.render.kernel), splat::kKernels.size());
+  const auto finish = optional_count(table, row, at.finish, splat::finish_bits(f.look.render.finish), 8);
+  const auto lit = optional_count(table, row, at.lit, f.look.lit, 2);
+  for (const auto* value : {&splat, &finish, &lit})
+    if (!*value) return value->error();
+  f.look = {{splat::kKernels[*splat], *splat::finish_of_bits(*finish)}, *lit == 1};
+  return ok_status();
 }
 
 Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, const FrameColumns& at,
@@ -130,16 +180,26 @@ Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, cons
              drawn = table.count(row, at.points_drawn);
   for (const auto* count : {&number, &sequence, &drawn})
     if (!*count) return count->error();
-  double v[8] = {};
-  for (size_t i = 0; i < 8; ++i) {
-    const auto value = table.number(row, i < 7 ? at.pose[i] : at.t_s);
+  double v[9] = {};
+  for (size_t i = 0; i < 9; ++i) {
+    const auto value = table.number(row, i < 7 ? at.pose[i] : i < 8 ? at.t_s : at.construction_ms);
     if (!value) return value.error();
     v[i] = *value;
   }
   const geometry::Pose pose{{v[0], v[1], v[2]}, {v[3], v[4], v[5], v[6]}};
-  DisplayedFrame f{*number, v[7],   {*sequence},
-                   0,       *drawn, geometry::make_camera(pose, run.fov_deg, run.width, run.height, run.near_m)};
+  DisplayedFrame f;
+  f.number = *number;
+  f.t_s = v[7];
+  f.shown_s = v[7] + v[8] / 1e3;
+  f.sequence = {*sequence};
+  f.points_drawn = *drawn;
+  f.camera = run.camera_at(pose, run.width, run.height);
+  f.look = run.look;
   if (const Status s = geometry::validate(f.camera); !s) return table.wrong(row, s.error().text);
+  if (const Status s = read_look(table, row, at, f); !s) return s.error();
+  const auto summaries = optional_count(table, row, at.summaries, f.summaries, 9e15);
+  if (!summaries) return summaries.error();
+  f.summaries = *summaries;
   if (at.detail) {
     const auto detail = table.number(row, *at.detail);
     if (!detail) return detail.error();
@@ -176,15 +236,76 @@ Status read_frames(const std::string& path, const std::string& viewer, RecordedR
   return ok_status();
 }
 
-}  // namespace
-
-Result<RecordedRun> read_recorded_run(const std::string& directory) {
+// The frames that one viewer displayed.
+Result<RecordedRun> read_viewer(const std::string& directory, const toml::table& session, const toml::table& viewer) {
   RecordedRun run;
   run.directory = directory;
-  const auto viewer = read_session(directory + "/session.toml", run);
-  if (!viewer) return viewer.error();
-  if (const Status s = read_frames(directory + "/frames.csv", *viewer, run); !s) return s.error();
+  if (const Status s = read_display(directory + "/session.toml", session, viewer, run); !s) return s.error();
+  auto scene = recorded_scene(directory);
+  if (!scene) return scene.error();
+  run.scene = std::move(*scene);
+  if (const Status s = read_frames(directory + "/frames.csv", text_of(viewer, "name"), run); !s) return s.error();
   return run;
+}
+
+// The viewers of the wall's tiles, in their order.
+Result<std::vector<const toml::table*>> wall_viewers(const std::string& path, const toml::table& session,
+                                                     const std::string& wall) {
+  const auto layout = viewer::parse_wall(wall);
+  if (!layout) return Error{fmt::format("{}: {}", path, layout.error().text)};
+  std::vector<const toml::table*> out(size_t(layout->tiles()));
+  for (const toml::table* t : viewers(session)) {
+    const double tile = number(toml::node_view<const toml::node>((*t)["wall_tile"]), -1);
+    const std::string name = text_of(*t, "name");
+    if (text_of(*t, "wall") != wall || !(tile >= 0 && tile < layout->tiles())) continue;
+    if (name.empty() || name.front() == '.' || name.find('/') != name.npos)
+      return Error{fmt::format("{}: a viewer's name is {:?}, which names no folder", path, name)};
+    out[size_t(tile)] = t;
+  }
+  for (size_t i = 0; i < out.size(); ++i)
+    if (!out[i]) return Error{fmt::format("{}: names no viewer of the wall's tile {}", path, i)};
+  return out;
+}
+
+}  // namespace
+
+geometry::Camera RecordedRun::camera_at(const geometry::Pose& pose, int width_px, int height_px) const {
+  return viewer::tile_of(geometry::make_camera(pose, fov_deg, width_px * wall.columns, height_px * wall.rows, near_m),
+                         wall);
+}
+
+Result<RecordedRun> read_recorded_run(const std::string& directory) {
+  const std::string path = directory + "/session.toml";
+  const auto session = read_toml(path);
+  if (!session) return session.error();
+  const toml::table* viewer = own_viewer(*session);
+  if (!viewer) return Error{fmt::format("{}: names no viewer, so no frame of that run was displayed", path)};
+  return read_viewer(directory, *session, *viewer);
+}
+
+Result<std::vector<RecordedRun>> read_recorded_displays(const std::string& directory) {
+  const std::string path = directory + "/session.toml";
+  const auto session = read_toml(path);
+  if (!session) return session.error();
+  const toml::table* own = own_viewer(*session);
+  if (!own) return Error{fmt::format("{}: names no viewer, so no frame of that run was displayed", path)};
+  std::vector<const toml::table*> all{own};
+  if (const std::string wall = text_of(*own, "wall"); !wall.empty()) {
+    auto found = wall_viewers(path, *session, wall);
+    if (!found) return found.error();
+    all = std::move(*found);
+  }
+  std::vector<RecordedRun> out;
+  for (const toml::table* viewer : all) {
+    auto run = read_viewer(directory, *session, *viewer);
+    if (!run) return run.error();
+    if (!out.empty() && (run->width != out.front().width || run->height != out.front().height))
+      return Error{fmt::format("{}: the wall's tile {} has {}x{} pixels, its first {}x{}", path, out.size(), run->width,
+                               run->height, out.front().width, out.front().height)};
+    if (viewer != own) run->directory += "/" + text_of(*viewer, "name");
+    out.push_back(std::move(*run));
+  }
+  return out;
 }
 
 Result<std::vector<DisplayedFrame>> choose_frames(const RecordedRun& run, int count,

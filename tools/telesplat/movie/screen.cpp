@@ -1,0 +1,120 @@
+#include "tools/telesplat/movie/screen.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/image/canvas.h"
+
+namespace telesplat::launcher {
+namespace {
+
+constexpr int64_t kMaxPixels = 64 << 20;
+
+}  // namespace
+
+Result<Screen> Screen::open(const std::string& directory, int width, int height, const char* size_flag, int threads) {
+  auto runs = read_recorded_displays(directory);
+  if (!runs) return runs.error();
+  Screen out;
+  for (auto& run : *runs) {
+    Tile& tile = out.tiles_.emplace_back();
+    tile.run = std::make_unique<RecordedRun>(std::move(run));
+  }
+  if (const Status s = out.choose_size(width, height, size_flag); !s) return s.error();
+  if (const Status s = out.open_replays(threads); !s) return s.error();
+  out.find_times();
+  return out;
+}
+
+// All tiles of a wall have one size.
+Status Screen::choose_size(int width, int height, const char* size_flag) {
+  const RecordedRun& first = run();
+  const int columns = first.wall.columns, rows = first.wall.rows;
+  width_ = width ? width : first.width * columns;
+  height_ = height ? height : first.height * rows;
+  if (width_ % columns || height_ % rows)
+    return Error{fmt::format("{} {}x{}: the run has a wall of {}x{} displays, which share it evenly", size_flag, width_,
+                             height_, columns, rows)};
+  if (int64_t{width_} * height_ > kMaxPixels)
+    return Error{fmt::format("{} {}x{}: at most {} pixels", size_flag, width_, height_, kMaxPixels)};
+  return ok_status();
+}
+
+Status Screen::open_replays(int threads) {
+  for (Tile& tile : tiles_) {
+    auto replay = FrameReplay::open(*tile.run, tile.run->renderer, threads);
+    // A machine without a GPU draws frames of one that has.
+    if (!replay && tile.run->renderer == "gl") {
+      const std::string why = replay.error().text;
+      replay = FrameReplay::open(*tile.run, "cpu", threads);
+      if (replay && notes_.empty()) notes_.push_back("drawn by the cpu renderer instead of gl: " + why);
+    }
+    if (!replay) return replay.error();
+    tile.replay = std::move(*replay);
+  }
+  return ok_status();
+}
+
+// A wall's tiles have one clock.
+void Screen::find_times() {
+  double end_s = run().frames.back().shown_s;
+  begin_s_ = run().frames.front().shown_s;
+  for (const Tile& tile : tiles_) {
+    begin_s_ = std::max(begin_s_, tile.run->frames.front().shown_s);
+    end_s = std::min(end_s, tile.run->frames.back().shown_s);
+  }
+  duration_s_ = std::max(0.0, end_s - begin_s_);
+}
+
+Result<Screen::Shown> Screen::show(double t_s) {
+  bool changed = false;
+  for (Tile& tile : tiles_) {
+    const auto& frames = tile.run->frames;
+    while (tile.frame + 1 < frames.size() && frames[tile.frame + 1].shown_s - begin_s_ <= t_s) {
+      ++tile.frame;
+      tile.drawn = false;
+    }
+    if (tile.drawn) continue;
+    const auto there = draw(tile);
+    if (!there) return there.error();
+    if (!*there) return Shown::kRecordEnds;
+    changed = true;
+  }
+  if (!changed) return Shown::kSame;
+  ++drawn_;
+  compose();
+  return Shown::kNew;
+}
+
+Result<bool> Screen::draw(Tile& tile) {
+  const RecordedRun& run = *tile.run;
+  const DisplayedFrame& frame = run.frames[tile.frame];
+  const geometry::Camera camera = run.camera_at(frame.camera.pose, width_ / run.wall.columns, height_ / run.wall.rows);
+  if (const Status s = geometry::validate(camera); !s)
+    return Error{fmt::format("frame {}: {}", frame.number, s.error().text)};
+  const auto there = tile.replay->draw(frame, camera, tile.view);
+  if (there && *there) tile.drawn = true;
+  return there;
+}
+
+void Screen::compose() {
+  if (tiles_.size() == 1) {
+    view_ = tiles_.front().view;
+    return;
+  }
+  image::Canvas canvas(width_, height_, 0xff000000u);
+  for (const Tile& tile : tiles_) {
+    const auto& wall = tile.run->wall;
+    canvas.place(tile.view, wall.tile % wall.columns * (width_ / wall.columns),
+                 wall.tile / wall.columns * (height_ / wall.rows));
+  }
+  view_ = canvas.view();
+}
+
+const DisplayedFrame& Screen::frame() const { return run().frames[tiles_.front().frame]; }
+
+std::string Screen::record_file() const { return std::filesystem::path(record_path(run())).filename().string(); }
+
+}  // namespace telesplat::launcher

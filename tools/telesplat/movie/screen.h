@@ -1,0 +1,60 @@
+// What was on screen at a moment of a recorded run: the frame of its display, or those of a wall's tiles side by side.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tools/telesplat/record/frame_replay.h"
+
+namespace telesplat::launcher {
+
+class Screen {
+ public:
+  /// Of the run in this folder. width, height: pixels of the whole picture; 0: as it was displayed. Error: names the
+  /// file, or `size_flag` and what is wrong with the size.
+  static Result<Screen> open(const std::string& directory, int width, int height, const char* size_flag, int threads);
+
+  /// From the first frame on screen (of a wall: from when all tiles had one) to the last.
+  double duration_s() const { return duration_s_; }
+  /// Whether its record ends before the frame that was on screen at t_s.
+  enum class Shown { kNew, kSame, kRecordEnds };
+  /// Makes view() what was on screen t_s seconds after the first frame was. t_s never falls.
+  Result<Shown> show(double t_s);
+  const image::View& view() const { return view_; }
+
+  /// The run, and the frame that is shown, of the first tile.
+  const RecordedRun& run() const { return *tiles_.front().run; }
+  const DisplayedFrame& frame() const;
+  int width() const { return width_; }
+  int height() const { return height_; }
+  /// How many frames were drawn, of the first tile.
+  uint64_t drawn() const { return drawn_; }
+  /// "points.events"
+  std::string record_file() const;
+  /// What the person should know: lines.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  struct Tile {
+    std::unique_ptr<RecordedRun> run;  // its address stays: replay refers to it
+    std::unique_ptr<FrameReplay> replay;
+    size_t frame = 0;    // on screen
+    bool drawn = false;  // view shows it
+    image::View view;
+  };
+  Status choose_size(int width, int height, const char* size_flag);
+  Status open_replays(int threads);
+  void find_times();
+  Result<bool> draw(Tile& tile);
+  void compose();
+
+  std::vector<Tile> tiles_;
+  int width_ = 0, height_ = 0;  // of the whole
+  double begin_s_ = 0, duration_s_ = 0;
+  uint64_t drawn_ = 0;
+  image::View view_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace telesplat::launcher

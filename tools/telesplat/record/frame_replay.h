@@ -1,0 +1,51 @@
+// The displayed frames of a recorded run, made again from what its viewer received. No data set is needed.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "client/viewer/record/event_record.h"
+#include "common/image/file.h"
+#include "tools/telesplat/record/recorded_run.h"
+
+namespace telesplat::launcher {
+
+/// The point models of a run's displayed frames, one after the other, from its points.events.
+class ModelReplay {
+ public:
+  /// with_summaries: as EventReplay.
+  static Result<std::unique_ptr<ModelReplay>> open(const std::string& path, bool with_summaries);
+
+  /// Goes on to the model that the frame displayed. Frames come in order of display. False: the record ends before it.
+  Result<bool> advance(const DisplayedFrame& frame);
+  /// Null before the first. It holds until the next call.
+  const points::PointModel* model() const { return events_->model(); }
+  const points::Summaries& summaries() const { return events_->summaries(); }
+  /// Its newest event, and of which packer's model: the first, the second, ...
+  Sequence applied() const { return events_->applied(); }
+  uint32_t replica() const { return replica_; }
+
+ private:
+  explicit ModelReplay(std::unique_ptr<viewer::EventReplay> events) : events_(std::move(events)) {}
+
+  std::unique_ptr<viewer::EventReplay> events_;
+  uint32_t replica_ = 0;
+};
+
+/// Draws displayed frames as they were displayed: by the same renderer, kernel, detail, finish and shading.
+class FrameReplay {
+ public:
+  /// Opens the record of what the run's viewer received. renderer: "cpu" or "gl". threads: to draw with, 0: all cores.
+  /// `run` must outlive this. Error: there is no record, it is none, or no such renderer can be had.
+  static Result<std::unique_ptr<FrameReplay>> open(const RecordedRun& run, const std::string& renderer, int threads);
+  virtual ~FrameReplay() = default;
+
+  /// Draws what the frame showed, for this camera: the frame's own, or one of another size. Frames come in order of
+  /// display. False: the record ends before it. Errors name the file and what is wrong with it.
+  virtual Result<bool> draw(const DisplayedFrame& frame, const geometry::Camera& camera, image::View& view) = 0;
+};
+
+/// The file that frames are made again from.
+std::string record_path(const RecordedRun& run);
+
+}  // namespace telesplat::launcher
