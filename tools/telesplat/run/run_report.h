@@ -1,11 +1,25 @@
-// What a run tells the person when it is over.
+// What a run tells the person when it is over, and telesplat inspect of its folder.
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
+
+#include "common/core/result.h"
 
 namespace telesplat::launcher {
 
-/// Prints the main figures of DIR/summary.json; nothing if there is none.
+/// The main figures of a run.
+struct RunReport {
+  std::string head;                                        ///< what was shown, and how
+  std::vector<std::pair<std::string, std::string>> lines;  ///< what, figure
+  void line(const std::string& what, const std::string& value) { lines.emplace_back(what, value); }
+};
+
+/// Of DIR/summary.json; figures that were not measured say so. Error: there is none, or a figure is missing.
+Result<RunReport> read_report(const std::string& directory);
+
+/// Prints it; nothing if there is no summary.
 void print_report(const std::string& directory);
 
 }  // namespace telesplat::launcher
