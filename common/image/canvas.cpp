@@ -11,7 +11,9 @@
 namespace telesplat::image {
 
 int text_width(std::string_view text, int scale) {
-  return text.empty() ? 0 : (static_cast<int>(text.size()) * kGlyphAdvance - 1) * scale;
+  int characters = 0;
+  for (; !text.empty(); ++characters) take_character(text);
+  return characters == 0 ? 0 : (characters * kGlyphAdvance - 1) * scale;
 }
 
 Canvas::Canvas(int width, int height, uint32_t background)
@@ -30,8 +32,8 @@ void Canvas::place(const View& picture, int x, int y) {
 }
 
 void Canvas::text(int x, int y, std::string_view text, uint32_t colour, int scale) {
-  for (const char c : text) {
-    const Glyph& glyph = glyph_of(c);
+  while (!text.empty()) {
+    const Glyph& glyph = glyph_of(take_character(text));
     for (int row = 0; row < kGlyphHeight * scale; ++row)
       for (int column = 0; column < kGlyphWidth * scale; ++column)
         if (glyph[row / scale] >> (kGlyphWidth - 1 - column / scale) & 1) set(x + column, y + row, colour);
@@ -42,6 +44,21 @@ void Canvas::text(int x, int y, std::string_view text, uint32_t colour, int scal
 void Canvas::outline(const geometry::Rect& r, uint32_t colour) {
   for (int x = r.x; x < r.x + r.width; ++x) set(x, r.y, colour), set(x, r.y + r.height - 1, colour);
   for (int y = r.y; y < r.y + r.height; ++y) set(r.x, y, colour), set(r.x + r.width - 1, y, colour);
+}
+
+void blend(View& onto, const View& picture, int x, int y) {
+  const int x0 = std::max(0, -x), x1 = std::min(picture.width, onto.width - x);
+  for (int row = std::max(0, -y); row < std::min(picture.height, onto.height - y); ++row)
+    for (int column = x0; column < x1; ++column) {
+      const uint32_t over = picture.colour[size_t(row) * picture.width + column], alpha = over >> 24;
+      uint32_t& under = onto.colour[size_t(y + row) * onto.width + x + column];
+      uint32_t mixed = 0;
+      for (int shift = 16; shift >= 0; shift -= 8) {
+        const uint32_t a = over >> shift & 255, b = under >> shift & 255;
+        mixed = mixed << 8 | (a * alpha + b * (255 - alpha) + 127) / 255;
+      }
+      under = (under & 0xff000000) | mixed;
+    }
 }
 
 View shrink(const View& picture, int width, int height) {

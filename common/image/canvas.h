@@ -8,7 +8,8 @@
 
 namespace telesplat::image {
 
-/// Built-in letters: 5 x 7 pixels, one pixel between them; printable ASCII, anything else a hollow box.
+/// Built-in letters: 5 x 7 pixels, one pixel between them; printable ASCII and common signs of units in UTF-8, anything
+/// else a hollow box.
 inline constexpr int kGlyphWidth = 5, kGlyphHeight = 7, kGlyphAdvance = 6;
 
 /// Width of a line of text in pixels. scale: pixels a side of a letter's dot.
@@ -31,6 +32,10 @@ class Canvas {
   void set(int x, int y, uint32_t colour);
   View view_;
 };
+
+/// Lays a picture of 0xAARRGGBB (not premultiplied; alpha 255 is opaque) over another one, its upper left pixel at
+/// (x, y); what lies outside is cut off.
+void blend(View& onto, const View& picture, int x, int y);
 
 /// A smaller picture of `width` x `height` pixels: each the mean of the area that it covers, on sRGB codes. Without
 /// depth. Preconditions: 1 <= width <= picture.width, the same for the height.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,7 +11,8 @@
 
 namespace telesplat::image {
 
-/// A displayed frame. colour: 0x00RRGGBB row-major from the upper left; depth_m: metres along the view axis, +infinity
+/// A displayed frame. colour: 0x00RRGGBB row-major from the upper left, with anything in the upper byte unless somebody
+/// says that it has the coverage (background.h); depth_m: metres along the view axis, +infinity
 /// where nothing is, empty if the frame has no depth.
 struct View {
   int width = 0, height = 0;
@@ -18,10 +20,15 @@ struct View {
   std::vector<float> depth_m;
 };
 
-/// 8-bit RGB PNG. The file appears whole or not at all. Errors name the path.
-Status write_png(const std::string& path, const View& view);
-/// R, G, B as linearised half floats and Z as float (depth_m; +infinity = nothing). Precondition: view has depth.
-Status write_exr(const std::string& path, const View& view);
+enum class Alpha { kNone, kCoverage };  ///< coverage: in the upper byte of colours over black
+
+/// 8-bit RGB or RGBA PNG. The file appears whole or not at all. Errors name the path.
+Status write_png(const std::string& path, const View& view, Alpha alpha = Alpha::kNone);
+/// R, G, B (and A; then premultiplied) as linearised half floats and Z as float (depth_m; +infinity = nothing).
+/// Precondition: view has depth.
+Status write_exr(const std::string& path, const View& view, Alpha alpha = Alpha::kNone);
+/// The same without alpha, with the normals in N.X, N.Y, N.Z, half floats; one a pixel.
+Status write_exr(const std::string& path, const View& view, std::span<const glm::vec3> normals);
 /// Reads any picture OpenImageIO knows; channel Z becomes depth_m. At most 16384 pixels a side.
 Result<View> read_view(const std::string& path);
 

@@ -105,14 +105,54 @@ constexpr Glyph kGlyphs[] = {  // from '!' on
 // clang-format on
 static_assert(std::size(kGlyphs) == '~' - '!' + 1);
 
+struct Sign {
+  char32_t c;
+  Glyph glyph;
+};
+// clang-format off
+constexpr Sign kSigns[] = {  // of units
+    {U'\u00b0', {0b01100, 0b10010, 0b10010, 0b01100, 0b00000, 0b00000, 0b00000}},  // degree
+    {U'\u00b1', {0b00100, 0b00100, 0b11111, 0b00100, 0b00100, 0b00000, 0b11111}},  // plus-minus
+    {U'\u00b2', {0b01100, 0b10010, 0b00100, 0b11110, 0b00000, 0b00000, 0b00000}},  // squared
+    {U'\u00b3', {0b11100, 0b01100, 0b00010, 0b11100, 0b00000, 0b00000, 0b00000}},  // cubed
+    {U'\u00b5', {0b00000, 0b00000, 0b10001, 0b10001, 0b10011, 0b11101, 0b10000}},  // micro
+    {U'\u00b7', {0b00000, 0b00000, 0b00000, 0b00100, 0b00000, 0b00000, 0b00000}},  // middle dot
+    {U'\u00c5', {0b00100, 0b01010, 0b00100, 0b01010, 0b11111, 0b10001, 0b10001}},  // Angstrom
+    {U'\u00d7', {0b00000, 0b00000, 0b01010, 0b00100, 0b01010, 0b00000, 0b00000}},  // times
+    {U'\u03a9', {0b01110, 0b10001, 0b10001, 0b10001, 0b01010, 0b01010, 0b11011}},  // Ohm
+    {U'\u03bc', {0b00000, 0b00000, 0b10001, 0b10001, 0b10011, 0b11101, 0b10000}},  // mu
+    {U'\u2126', {0b01110, 0b10001, 0b10001, 0b10001, 0b01010, 0b01010, 0b11011}},  // Ohm sign
+    {U'\u212b', {0b00100, 0b01010, 0b00100, 0b01010, 0b11111, 0b10001, 0b10001}},  // Angstrom sign
+};
+// clang-format on
+
 constexpr Glyph kSpace{};
 constexpr Glyph kBox{0b11111, 0b10001, 0b10001, 0b10001, 0b10001, 0b10001, 0b11111};
 
 }  // namespace
 
-const Glyph& glyph_of(char c) {
+const Glyph& glyph_of(char32_t c) {
   if (c == ' ') return kSpace;
-  return c >= '!' && c <= '~' ? kGlyphs[c - '!'] : kBox;
+  if (c >= '!' && c <= '~') return kGlyphs[c - '!'];
+  for (const Sign& sign : kSigns)
+    if (sign.c == c) return sign.glyph;
+  return kBox;
+}
+
+char32_t take_character(std::string_view& text) {
+  const auto lead = static_cast<unsigned char>(text[0]);
+  size_t bytes = lead < 0xc2 ? 1 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : lead < 0xf5 ? 4 : 1;
+  char32_t out = bytes == 1 ? (lead < 0x80 ? lead : 0xfffd) : char32_t(lead & (0x7f >> bytes));
+  for (size_t n = 1; n < bytes; ++n) {
+    if (n == text.size() || (text[n] & 0xc0) != 0x80) {
+      bytes = n;
+      out = 0xfffd;
+    } else {
+      out = out << 6 | char32_t(text[n] & 0x3f);
+    }
+  }
+  text.remove_prefix(bytes);
+  return out;
 }
 
 }  // namespace telesplat::image

@@ -1,0 +1,51 @@
+// The legend of a picture: a bar of a colour map, with numbers beside it that people can read.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/colour/colour_map.h"
+#include "common/core/result.h"
+#include "common/image/canvas.h"
+
+namespace telesplat::image {
+
+struct Legend {
+  std::string title;      ///< UTF-8: the array and, in brackets, its unit
+  double lo = 0, hi = 1;  ///< what the map's ends stand for; lo <= hi, finite
+  colour::ColourMap map;
+  std::vector<float> opacity;  ///< 0 to 1, at equal distances from lo to hi; empty: the map has none
+  bool operator==(const Legend&) const = default;
+};
+
+inline constexpr size_t kMaxLegendText = 20000;  ///< bytes of the text form
+inline constexpr size_t kMaxLegendOpacities = 256;
+
+/// Lines of text; from_text of it gives the same legend again (control characters of the title become blanks).
+std::string to_text(const Legend& legend);
+Result<Legend> legend_from_text(std::string_view text);
+
+/// A round number on the bar.
+struct Tick {
+  double value = 0;
+  std::string label;
+};
+struct Ticks {
+  std::vector<Tick> all;  ///< ascending, within the range
+  int exponent = 0;       ///< labels are to be multiplied with 10 to the power of this; 0 unless numbers are very large
+                          ///< or small
+};
+/// Multiples of 1, 2, 2.5 or 5 times a power of ten within [lo, hi]: at most `most` of them and at least two (one if lo
+/// is hi). Labels have as many digits as tell them apart. Precondition: lo <= hi, both finite; most >= 2.
+Ticks nice_ticks(double lo, double hi, int most);
+
+/// The legend as a picture of 0xAARRGGBB, of a size that suits a display of so many pixels. Bar and letters have dark
+/// rims, so that they read on any ground.
+View legend_picture(const Legend& legend, int display_width, int display_height);
+/// Where such a picture lies on a display: in the lower right corner.
+geometry::Rect legend_place(const View& legend_picture, int display_width, int display_height);
+/// Draws it onto a finished picture, at its place.
+void draw_legend(View& picture, const Legend& legend);
+
+}  // namespace telesplat::image
