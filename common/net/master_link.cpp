@@ -4,7 +4,7 @@
 
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
-#include "common/net/service.h"
+#include "common/net/process_facts.h"
 
 namespace telesplat::net {
 namespace {
@@ -15,7 +15,7 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
     : hello_(std::move(hello)),
       socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes}) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
-  hello_.facts.emplace("host", host_name());
+  hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
   hello_.name = to_utf8(hello_.name);
   for (auto& [fact, value] : hello_.facts) value = to_utf8(value);

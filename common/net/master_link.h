@@ -15,7 +15,7 @@ class MasterLink {
  public:
   using Values = std::map<std::string, double>;
 
-  /// Connects to the master at `endpoint`; instance, pid and the fact "host" are filled in. Nothing is sent before the
+  /// Connects to the master at `endpoint`; instance, pid and process_facts() are filled in. Nothing is sent before the
   /// first tick().
   MasterLink(Context& context, const std::string& endpoint, wire::Hello hello);
 

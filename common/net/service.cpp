@@ -34,7 +34,7 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
   if (ends != Ends::kBinds)
     out.push_back({.flag = "--master",
                    .value = &o.master,
-                   .help = "address of the master",
+                   .help = "address of the master; auto: of the one session of yours that runs on this machine",
                    .reach = options::Reach::kHere,
                    .environment = kMasterVariable});
   out.push_back(
@@ -61,6 +61,17 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                  .help = "trace, debug, info, warn, error or off",
                  .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}});
   return out;
+}
+
+int settle_master(ServiceOptions& o) {
+  if (o.master != kTheOneMaster) return 0;
+  MasterSearch search = find_master(o.master);
+  if (search.address.empty()) {
+    std::fprintf(stderr, "telesplat: %s\n", search.problem.c_str());
+    return search.exit_code();
+  }
+  o.master = std::move(search.address);
+  return 0;
 }
 
 std::string host_name() {
@@ -92,6 +103,7 @@ std::string complain_about_host(const std::string& host) {
 void end_on_signals() { handle_signals(end_process); }
 void install_signal_handlers() { handle_signals(set_flag); }
 bool stop_requested() { return stop_flag; }
+void forget_stop() { stop_flag = false; }
 
 void lower_thread_priority(int levels) {
   const auto thread = static_cast<id_t>(syscall(SYS_gettid));

@@ -23,6 +23,10 @@ struct ServiceOptions {
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 
+/// Finds the session that --master auto means. Returns 0, or the exit code after a line on stderr that says why there is
+/// none.
+int settle_master(ServiceOptions& options);
+
 /// This machine's name; in a container that of the container.
 std::string host_name();
 /// ROLE-HOST-PID: process ids alone are no names, every container has a process 1.
@@ -41,6 +45,8 @@ void end_on_signals();
 /// From now on SIGINT and SIGTERM set a flag instead of ending the process.
 void install_signal_handlers();
 bool stop_requested();
+/// What was asked for has been done; another signal asks anew.
+void forget_stop();
 
 /// Lowers the calling thread's priority by `levels` of nice: for work that must not take the processor from a display.
 void lower_thread_priority(int levels);

@@ -1,6 +1,7 @@
 // The main() of every service program: parse the configuration, serve until told to stop.
 #pragma once
 
+#include "common/core/version.h"
 #include "common/net/service.h"
 #include "common/options/parser.h"
 
@@ -15,7 +16,9 @@ int service_main(int argc, char** argv, const char* about, Options options,
   return guarded_main([&] {
     telesplat::options::Parser parser{about};
     parser.add(table(options));
+    parser.version(version());
     parser.parse_or_exit(argv[0], {argv + 1, argv + argc});
+    if (const int code = settle_master(options.service)) return code;
     return run(options);
   });
 }

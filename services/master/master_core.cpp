@@ -11,6 +11,7 @@ namespace {
 
 constexpr size_t kMaxPeers = 4096;      // remembered processes, the departed included
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
+constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
 
 }  // namespace
 
@@ -79,6 +80,7 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
   p.process.facts = m.facts;
   const std::string at_once = scene::value_or(m.facts, "leases", std::string());
   if (!at_once.empty()) p.leases_at_once = std::clamp(std::atoi(at_once.c_str()), 0, kMaxWaitingLeases);
+  if (p.gone) p.reports.clear();
   p.seen_s = now_s;
   p.gone = p.refused = false;
   return p;
@@ -109,7 +111,11 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
 }
 
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
-  if (Peer* p = known(peer, now_s)) p->process.values = m.values;
+  Peer* p = known(peer, now_s);
+  if (!p) return;
+  p->process.values = m.values;
+  p->reports.push_back(m.values);
+  if (p->reports.size() > kReports) p->reports.pop_front();
 }
 
 void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_s) {

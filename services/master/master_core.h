@@ -2,6 +2,7 @@
 // which epoch it is and what each is told; what a scene is and how its views become leases is its plan's (plan.h).
 #pragma once
 
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "common/metrics/run_record.h"
+#include "common/net/session_file.h"
 #include "services/master/outbox.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
@@ -49,6 +51,13 @@ class MasterCore {
   /// True once everyone who was told to finish has said goodbye.
   bool everyone_left() const;
 
+  /// Who the session is, for status; the core adds scene and kind once they are known.
+  /// run_id: of the record's folder, by which viewers know it; empty: there is none.
+  void introduce(const net::RunningSession& session, const std::string& run_id = {}) {
+    session_ = session;
+    run_id_ = run_id;
+  }
+  const net::RunningSession& session() const { return session_; }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
   bool progressive() const { return plan_->progressive(); }
@@ -61,6 +70,7 @@ class MasterCore {
   struct Peer {
     wire::Hello hello;
     metrics::Process process;
+    std::deque<std::map<std::string, double>> reports;  ///< the newest few, for rates
     double seen_s = 0;
     bool gone = false;
     bool refused = false;    ///< a data server whose scene cannot be shown
@@ -96,6 +106,8 @@ class MasterCore {
   InstanceId instance_;
   metrics::RunRecord& record_;
   Outbox outbox_;
+  net::RunningSession session_;
+  std::string run_id_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
   Plan* plan_;                       // of these, the one that leads
   std::optional<scene::Kind> kind_;  // of its scene

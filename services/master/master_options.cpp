@@ -136,6 +136,15 @@ options::Table session_table(MasterServiceOptions& o) {
 options::Table table(MasterServiceOptions& o) {
   const options::Table own{
       {.flag = "--out", .value = &o.out, .help = "folder for the run's record", .reach = options::Reach::kHere},
+      {.flag = "--overwrite",
+       .value = &o.overwrite,
+       .help = "the folder of --out may hold a record already: its files are removed first, others stay",
+       .reach = options::Reach::kHere},
+      {.flag = "--started-by",
+       .value = &o.started_by,
+       .help = "what telesplat ctl list shows: hand, or the command of telesplat that started it",
+       .limits = options::Names{"hand", "run", "view", "bench"},
+       .reach = options::Reach::kHere},
       {.flag = "--animate",
        .value = &o.animate,
        .help = "change a Julia set's parameters with time: c.y=-0.4:0.4:10s, or c.y=@0s:-0.4@5s:0.4@10s:-0.4; several "

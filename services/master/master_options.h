@@ -12,8 +12,10 @@ namespace telesplat::master {
 struct MasterServiceOptions {
   net::ServiceOptions service;  ///< bind: the control socket's address
   MasterOptions master;
-  std::string out;      ///< run folder; empty: no record is written
-  std::string animate;  ///< as julia::parse_timeline takes it; empty: what the data server says
+  std::string out;                  ///< run folder; empty: no record is written
+  bool overwrite = false;           ///< it may hold a record already, which is replaced
+  std::string started_by = "hand";  ///< as net::RunningSession has it
+  std::string animate;              ///< as julia::parse_timeline takes it; empty: what the data server says
 };
 
 /// Flags that `telesplat run` has too: tiles, leases, packing. (There the data server is told of animations.) Rows

@@ -4,14 +4,22 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <optional>
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/core/version.h"
+#include "common/metrics/run_folder.h"
 #include "common/net/dispatch.h"
+#include "common/net/process_facts.h"
+#include "common/net/session_file.h"
 #include "services/master/guarded.h"
 #include "services/master/master_core.h"
+#include "services/master/master_record.h"
 
 namespace telesplat::master {
 namespace {
@@ -19,24 +27,6 @@ namespace {
 // How long others may take to say goodbye; less where someone waits for the master itself to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
 constexpr int kMessagesAtOnce = 1000;  // between two ticks
-
-// The effective configuration of everyone who took part.
-void write_session(const std::string& directory, const MasterServiceOptions& o, const MasterCore& core,
-                   const std::vector<metrics::Process>& processes) {
-  using options::quoted;
-  std::ofstream out(directory + "/session.toml");
-  out << "# The effective configuration of this run.\n[session]\ntile_size = " << o.master.schedule.tile_size
-      << "\nframes_in_flight = " << o.master.schedule.frames_in_flight
-      << "\nlease_timeout_s = " << o.master.schedule.lease_timeout_s
-      << "\nlease_target_s = " << o.master.schedule.lease_target_s << "\noctree_depth = " << core.octree_depth()
-      << "\nprogressive = " << quoted(core.progressive() ? "on" : "off") << "\nanimation = " << quoted(core.animation())
-      << "\n\n[settings]\n";
-  for (const auto& [key, value] : core.settings()) out << quoted(key) << " = " << fmt::format("{}", value) << "\n";
-  for (const auto& p : processes) {
-    out << "\n[[process]]\nrole = " << quoted(p.role) << "\nname = " << quoted(p.name) << "\n";
-    for (const auto& [key, value] : p.facts) out << quoted(key) << " = " << quoted(value) << "\n";
-  }
-}
 
 Result<MasterOptions> core_options(const MasterServiceOptions& o) {
   MasterOptions out = o.master;
@@ -47,18 +37,43 @@ Result<MasterOptions> core_options(const MasterServiceOptions& o) {
   return out;
 }
 
+net::RunningSession introduction(const MasterServiceOptions& o, const std::string& endpoint) {
+  return {.address = net::local_address(endpoint),
+          .pid = uint64_t(getpid()),
+          .scene = {},
+          .kind = {},
+          .run_folder = net::absolute_path(o.out),
+          .started_at_s =
+              std::floor(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()),
+          .started_by = o.started_by};
+}
+
 /// The control socket, and the core that answers what comes over it.
 class MasterService {
  public:
-  MasterService(const MasterServiceOptions& o, const MasterOptions& core, std::unique_ptr<metrics::RunRecord> record)
-      : options_(o), record_(std::move(record)), core_(core, net::make_instance_id(), *record_) {}
+  MasterService(const MasterServiceOptions& o, const MasterOptions& core, std::unique_ptr<metrics::RunRecord> record,
+                std::string run_id)
+      : options_(o),
+        record_(std::move(record)),
+        run_id_(std::move(run_id)),
+        core_(core, net::make_instance_id(), *record_) {}
 
-  /// Binds, and says so on stdout: whoever started this process waits for the line.
+  /// Binds, and says so on stdout: whoever started this process waits for the line. From then on it can be found.
   Status listen() {
     const auto endpoint = control_.bind(options_.service.bind, options_.service.insecure);
     if (!endpoint) return endpoint.error();
-    log::info("listening on {}", endpoint->c_str());
+    core_.introduce(introduction(options_, *endpoint), run_id_);
+    if (auto file = net::SessionFile::publish(core_.session()))
+      file_.emplace(std::move(*file));
+    else
+      log::warn("telesplat ctl will not find this session: {}", file.error().text);
+    told_ = core_.session();
     std::printf("listening on %s\n", endpoint->c_str());
+    if (options_.started_by == "hand")
+      std::printf("telesplat ctl status asks this session; others join it with --master %s\n",
+                  net::announced(*endpoint, {}).c_str());
+    else
+      log::info("listening on {}", *endpoint);  // stdout is read by who started it, and goes nowhere
     std::fflush(stdout);
     return ok_status();
   }
@@ -69,6 +84,7 @@ class MasterService {
 
   /// Tells everyone to finish, and listens to their last words.
   void say_goodbye() {
+    file_.reset();  // nobody shall find what ends
     core_.shut_down(net::stop_requested() ? "the master was told to stop" : "stop was commanded");
     const auto patience_s = [] { return net::stop_requested() ? kShortFarewell_s : kFarewell_s; };
     for (const double begin = monotonic_s(); !core_.everyone_left() && monotonic_s() - begin < patience_s();)
@@ -81,10 +97,16 @@ class MasterService {
         {"master",
          options_.service.name,
          uint64_t(getpid()),
-         {},
+         net::process_facts(),
          {{"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(control_.rejected())}}});
-    if (!options_.out.empty()) write_session(options_.out, options_, core_, processes);
-    return record_->finish(processes, core_.counters());
+    const metrics::About about{.id = run_id_,
+                               .version = version(),
+                               .begin = record_->begin(),
+                               .end_unix_ns = metrics::begin_now().unix_ns,
+                               .settings = core_.settings()};
+    if (!options_.out.empty())
+      std::ofstream(options_.out + "/session.toml") << session_text(options_, core_, about, processes);
+    return record_->finish(processes, core_.counters(), about);
   }
 
  private:
@@ -96,8 +118,16 @@ class MasterService {
       guarded(control_, *message, [&] { take(*message, monotonic_s()); });
     }
     core_.tick(monotonic_s());
+    tell_news();
     for (auto& out : core_.take_outgoing())
       if (!control_.send_frames(out.peer, out.type, std::move(out.body))) core_.undeliverable(out.peer);
+  }
+
+  // The session's file says what it shows as soon as that is known.
+  void tell_news() {
+    if (!file_ || core_.session() == told_) return;
+    told_ = core_.session();
+    if (const Status s = file_->update(told_); !s) log::warn("{}", s.error().text);
   }
 
   void take(const net::Message& message, double now_s) {
@@ -116,7 +146,10 @@ class MasterService {
   net::Socket control_{
       context_, net::Kind::kRouter, "master", {.high_water_mark = 10000, .max_message_bytes = 16u << 20}};
   std::unique_ptr<metrics::RunRecord> record_;
+  const std::string run_id_;  // empty: no record is written
   MasterCore core_;
+  net::RunningSession told_;  // in the file
+  std::optional<net::SessionFile> file_;
 };
 
 }  // namespace
@@ -128,11 +161,22 @@ int run(const MasterServiceOptions& o) {
     log::error("{}", e.text);
     return code;
   };
+  // Without the log's date: the launcher passes it on.
+  const auto refuse = [](const Error& e) {
+    std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
+    return 2;
+  };
   const auto options = core_options(o);
   if (!options) return fail(2, options.error());
-  auto record = metrics::RunRecord::open(o.out);
-  if (!record) return fail(2, record.error());
-  MasterService service(o, *options, *std::move(record));
+  std::string run_id;
+  if (!o.out.empty()) {
+    auto begun = metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
+    if (!begun) return refuse(begun.error());
+    run_id = *std::move(begun);
+  }
+  auto record = metrics::RunRecord::open(o.out, metrics::begin_now());
+  if (!record) return refuse(record.error());
+  MasterService service(o, *options, *std::move(record), std::move(run_id));
   if (const Status s = service.listen(); !s) return fail(2, s.error());
   service.serve();
   service.say_goodbye();

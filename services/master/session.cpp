@@ -29,7 +29,9 @@ Status MasterCore::adopt_scene(const wire::Hello& data, double now_s) {
     plan.views().take_views(plan_->views().release_views());
     plan_ = &plan;
   }
-  kind_ = scene::kind_named(scene::value_or(data.facts, "kind", std::string()));
+  session_.kind = scene::value_or(data.facts, "kind", std::string());
+  session_.scene = scene::value_or(data.facts, "scene", std::string());
+  kind_ = scene::kind_named(session_.kind);
   if (!std::exchange(scene_known_, true) && !adopted->in_parts)
     record_epoch(now_s);
   else if (other_plan || adopted->changed)
@@ -52,6 +54,11 @@ wire::Welcome MasterCore::welcome(double now_s) const {
   w.epoch = epoch_;
   for (const auto& [id, p] : peers_)
     if (!p.gone && !p.refused) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
+  w.facts.erase(metrics::kRecordFact);  // of the master alone
+  if (!run_id_.empty()) {
+    w.facts["run_folder"] = session_.run_folder;
+    w.facts["run_id"] = run_id_;
+  }
   w.endpoints.erase("voxels");  // each part of a volume has its own: samplers get them in their sheets
   return w;
 }

@@ -1,5 +1,9 @@
 // What the master says of a session: to `telesplat ctl status`, and to the run's record at the end.
+#include <fmt/chrono.h>
+
 #include <algorithm>
+#include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "services/master/master_core.h"
@@ -8,6 +12,41 @@ namespace telesplat::master {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// As a program wants it: what was counted as a whole number.
+Json number(double value) {
+  constexpr double kMostWhole = 9007199254740992.0;  // 2^53: above it a double does not know them all
+  if (value == std::floor(value) && std::abs(value) <= kMostWhole) return Json(int64_t(value));
+  return Json(value);
+}
+
+// What processes count on and on, so that it has a rate.
+constexpr const char* kCounters[] = {
+    "frames", "updates", "bytes_received", "points_received", "tiles_sampled",
+    "tiles",  "blocks",  "bytes_sent",     "requests",        "volume_frames_complete"};
+
+// A second, between the first and the last of a process' newest reports, by its own clock.
+Json rates(const std::deque<std::map<std::string, double>>& reports) {
+  Json out = Json::object();
+  if (reports.size() < 2) return out;
+  const auto &first = reports.front(), &last = reports.back();
+  const auto from = first.find("reported_s"), to = last.find("reported_s");
+  if (from == first.end() || to == last.end() || !(to->second > from->second)) return out;
+  for (const char* name : kCounters)
+    if (const auto a = first.find(name), b = last.find(name); a != first.end() && b != last.end())
+      out[name] = std::max(0.0, (b->second - a->second) / (to->second - from->second));
+  return out;
+}
+
+Json told(const net::RunningSession& s) {
+  return {{"address", s.address},
+          {"pid", s.pid},
+          {"scene", s.scene},
+          {"kind", s.kind},
+          {"started_at", fmt::format("{:%FT%TZ}", fmt::gmtime(std::time_t(s.started_at_s)))},
+          {"started_by", s.started_by},
+          {"run_folder", s.run_folder}};
+}
 
 Figures sum(const std::map<scene::Pipeline, std::unique_ptr<Plan>>& plans) {
   Figures out;
@@ -43,7 +82,8 @@ std::map<std::string, double> MasterCore::counters() const {
 
 std::string MasterCore::status_json(double now_s) const {
   const Figures f = sum(plans_);
-  Json out{{"epoch", epoch_.value},
+  Json out{{"session", told(session_)},
+           {"epoch", epoch_.value},
            {"frames_completed", f.frames_completed},
            {"frames_in_flight", f.frames_in_flight},
            {"leases_expired", leases_expired_},
@@ -51,7 +91,7 @@ std::string MasterCore::status_json(double now_s) const {
            {"leases_backup", f.backups},
            {"parameters", Json::object()},
            {"animation", animation()}};
-  for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = value;
+  for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
   plan_->add_status(out);
   out["processes"] = Json::array();
   for (const auto& [id, p] : peers_) {
@@ -63,8 +103,10 @@ std::string MasterCore::status_json(double now_s) const {
            {"silent_s", std::max(0.0, now_s - p.seen_s)}};
     if (p.hello.role == "sampler") e["leases"] = plan_->leases_of(id);
     for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
-    for (const auto& [key, value] : p.hello.facts) e["facts"][key] = value;
-    for (const auto& [key, value] : p.process.values) e["values"][key] = value;
+    for (const auto& [key, value] : p.hello.facts)
+      if (key != metrics::kRecordFact) e["facts"][key] = value;
+    for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
+    e["rates"] = rates(p.reports);
     out["processes"].push_back(e);
   }
   // Texts from peers may be any bytes: what is not UTF-8 is shown as U+FFFD.

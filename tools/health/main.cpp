@@ -2,7 +2,9 @@
 // 1 if not.
 #include <cstdio>
 
+#include "common/core/version.h"
 #include "common/net/control.h"
+#include "common/net/master_address.h"
 #include "common/net/service.h"
 #include "common/options/parser.h"
 #include "tools/common/complain.h"
@@ -21,7 +23,10 @@ struct Options {
 
 options::Table table(Options& o) {
   return {
-      {.flag = "--master", .value = &o.master, .help = "address of the master", .environment = "TELESPLAT_MASTER"},
+      {.flag = "--master",
+       .value = &o.master,
+       .help = "address of the master; auto: of the one session of yours that runs on this machine",
+       .environment = net::kMasterVariable},
       {.flag = "--role",
        .value = &o.subject.role,
        .help = "a process of this role must be well: data, sampler, packer or viewer",
@@ -38,7 +43,9 @@ options::Table table(Options& o) {
 int check(Options o) {
   log::initialise("health", "error");
   if (o.this_host) o.subject.host = net::host_name();
-  const auto status = net::ask_master(o.master, "status", o.timeout_s);
+  const auto master = net::find_master(o.master);
+  if (master.address.empty()) return tools::complain({master.problem}, master.exit_code(), "telesplat-health");
+  const auto status = net::ask_master(master.address, "status", o.timeout_s);
   const Status well = status ? health::check(*status, o.subject) : Status(status.error());
   if (status && o.show) std::printf("%s\n", status->c_str());
   return well.ok() ? 0 : tools::complain(well.error(), 1, "telesplat-health");
@@ -51,6 +58,7 @@ int main(int argc, char** argv) {
     Options o;
     options::Parser parser("telesplat-health: tells by its exit code whether a session and a process in it are well");
     parser.add(table(o));
+    parser.version(version());
     parser.parse_or_exit("telesplat-health", {argv + 1, argv + argc});
     return check(o);
   });

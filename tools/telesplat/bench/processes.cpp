@@ -35,7 +35,7 @@ Result<std::unique_ptr<BenchProcesses>> BenchProcesses::start(const std::vector<
                                                               const std::vector<std::string>& master_flags,
                                                               const std::string& directory, bool own_machines) {
   std::unique_ptr<BenchProcesses> p(new BenchProcesses(directory));
-  std::vector<std::string> master{"--bind", "tcp://127.0.0.1:*", "--out", directory};
+  std::vector<std::string> master{"--bind", "tcp://127.0.0.1:*", "--started-by", "bench", "--out", directory};
   master.insert(master.end(), master_flags.begin(), master_flags.end());
   if (const Status s = p->group_.start_master(master, kPatience_s); !s) return s.error();
   p->control_ = std::make_unique<ControlClient>(p->endpoint());

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <thread>
 
 #include "client/viewer/display/window.h"
@@ -17,6 +18,7 @@
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/control/client.h"
+#include "tools/telesplat/movie/movie.h"
 #include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/run/live_figures.h"
 #include "tools/telesplat/run/pipeline.h"
@@ -58,7 +60,9 @@ class PassingFolder {
 /// in any case.
 class Run {
  public:
-  Run(RunOptions options, std::shared_ptr<Scene> scene) : o_(std::move(options)), scene_(std::move(scene)) {}
+  /// movie: what is to be made of the record, if anything.
+  Run(RunOptions options, std::shared_ptr<Scene> scene, std::optional<MoviePlan> movie)
+      : o_(std::move(options)), scene_(std::move(scene)), movie_(std::move(movie)) {}
 
   int go() {
     if (const Status s = prepare(); !s) return tools::complain(s.error());
@@ -76,6 +80,7 @@ class Run {
     if (const Status s = verify(interrupted); !s) return tools::complain(s.error(), verify_code_);
     print_report(o_.out);
     if (const Status s = report_wall(); !s) return tools::complain(s.error(), 1);
+    if (const int code = make_the_movie(interrupted); code != 0) return code;
     return interrupted ? 1 : 0;
   }
 
@@ -169,7 +174,7 @@ class Run {
     if (!direct) return direct.error();
     verify_code_ = 1;
     const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("verifying view {} of {}", done, of)); };
-    const auto shading = *image::shading_named(o_.viewer.shading);
+    const auto& shading = o_.viewer.display.shading;
     const Status verified = verify_run(o_.out, **direct, shading, tell, net::stop_requested);
     progress_.close();
     return verified;
@@ -187,8 +192,28 @@ class Run {
     return ok_status();
   }
 
+  // Exit code. Whoever interrupts the run does not want to wait for a movie; Ctrl-C interrupts the movie, too.
+  int make_the_movie(bool interrupted) {
+    if (!movie_) return 0;
+    const std::string& file = movie_->options.file;
+    const std::string later =
+        fmt::format("telesplat movie {} {} makes it of the record", shell_quoted(o_.out), shell_quoted(file));
+    if (interrupted) {
+      progress_.line(fmt::format("{} was not made; {}", file, later));
+      return 0;
+    }
+    net::forget_stop();
+    const auto report = make_movie(o_.out, *movie_, progress_, net::stop_requested);
+    if (!report) return tools::complain(report.error(), 1);
+    if (!report->written) return tools::complain(report->written.error(), 1);
+    for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
+    if (report->interrupted) progress_.line(fmt::format("interrupted: {} was not made; {}", file, later));
+    return report->interrupted ? kInterrupted : 0;
+  }
+
   RunOptions o_;
   std::shared_ptr<Scene> scene_;
+  std::optional<MoviePlan> movie_;
   bool folder_existed_ = false;
   int verify_code_ = 1;
   PassingFolder logs_;
@@ -214,9 +239,15 @@ int run(RunOptions o, const options::Given& given) {
     if (const Status s = viewer::check_display(); !s) return tools::complain(s.error());
   if (const std::string end = viewer::end_of_trajectory(o.viewer); !end.empty())
     std::fprintf(stderr, "%s\n", end.c_str());
+  std::optional<MoviePlan> movie;
+  if (!o.movie.file.empty()) {
+    auto plan = plan_movie(o.movie, "--movie-size");
+    if (!plan) return tools::complain(plan.error());
+    movie = std::move(*plan);
+  }
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
-  return Run(std::move(o), std::move(*scene)).go();
+  return Run(std::move(o), std::move(*scene), std::move(movie)).go();
 }
 
 Command make(const char* name, const char* help, std::shared_ptr<RunOptions> defaults) {

@@ -107,9 +107,26 @@ Status refuse_records_without_folder(const RunOptions& o) {
   for (const auto& [asked, flag] : {std::pair{d.verify_every > 0, "--verify"},
                                     {d.picture_every > 0, "--record-every"},
                                     {d.exr, "--exr"},
-                                    {o.record_depth, "--record-depth"}})
+                                    {o.record_depth, "--record-depth"},
+                                    {!o.movie.file.empty(), "--movie"}})
     if (asked && o.out.empty())
       return Error{fmt::format("{} needs --out: nothing is recorded without a run folder", flag)};
+  return ok_status();
+}
+
+// A movie is made of the record.
+Status check_movie(const RunOptions& o, const options::Given& given) {
+  if (o.movie.file.empty()) {
+    for (const char* flag : {"--movie-fps", "--movie-size"})
+      if (std::find(given.begin(), given.end(), flag) != given.end())
+        return Error{fmt::format("{} is given, but no --movie", flag)};
+    return ok_status();
+  }
+  if (!o.join_master.empty())
+    return Error{
+        "--movie needs a session of its own: the record of a joined one is its master's; telesplat movie RUN "
+        "FILE makes a movie of it afterwards"};
+  if (o.viewer.record_points_mb == 0) return Error{"--movie needs the record that --record-points 0 leaves out"};
   return ok_status();
 }
 
@@ -129,7 +146,8 @@ RunOptions view_defaults() {
 }
 
 Table table(RunOptions& o) {
-  const Table launcher = joined(joined(own_rows(o), display_rows(o)), sampler_rows(o));
+  const Table own = joined(joined(own_rows(o), display_rows(o)), movie_rows(o.movie));
+  const Table launcher = joined(own, sampler_rows(o));
   const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
   return joined(joined(launcher, services), master::session_table(o.master));
 }
@@ -151,6 +169,7 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   }
   if (const Status s = settle_wall(o, given); !s) return s.error();
   if (const Status s = refuse_records_without_folder(o); !s) return s.error();
+  if (const Status s = check_movie(o, given); !s) return s.error();
   if (const Status s = viewer::settle(o.viewer); !s) return s.error();
   return out;
 }

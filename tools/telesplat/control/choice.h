@@ -1,0 +1,21 @@
+// Which session a command of `telesplat ctl` means.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "tools/telesplat/control/client.h"
+
+namespace telesplat::launcher {
+
+struct SessionChoice {
+  std::string master;   ///< --master, or TELESPLAT_MASTER in the environment; empty: the one that runs here
+  std::string session;  ///< --session: as net::find_master() takes it
+};
+
+options::Table session_rows(SessionChoice& choice);
+
+/// A connection to the session's master. Null: it is not known; why was said on stderr, and `exit_code` is set.
+std::unique_ptr<ControlClient> reach(const SessionChoice& choice, const options::Given& given, int& exit_code);
+
+}  // namespace telesplat::launcher
