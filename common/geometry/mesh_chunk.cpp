@@ -20,6 +20,7 @@ Result<MeshChunkView> MeshChunkView::validate(std::span<const std::byte> bytes) 
   if (bytes.size() != chunk_bytes(h.vertices, h.triangles))
     return Error{
         fmt::format("chunk has {} bytes, its header says {}", bytes.size(), chunk_bytes(h.vertices, h.triangles))};
+  if (h.scalars > 1) return Error{fmt::format("chunk has colours of the unknown kind {}", h.scalars)};
   const auto* words = reinterpret_cast<const uint32_t*>(bytes.data() + sizeof h);
   const size_t v = h.vertices;
   MeshChunkView out;
@@ -28,6 +29,7 @@ Result<MeshChunkView> MeshChunkView::validate(std::span<const std::byte> bytes) 
   out.normals = {words + 3 * v, v};
   out.colours = {words + 4 * v, v};
   out.indices = {words + 5 * v, 3 * size_t{h.triangles}};
+  out.scalars = h.scalars == 1;
   bool finite = true;
   for (float p : out.positions_room) finite &= std::isfinite(p);
   if (!finite) return Error{"chunk holds a position that is not finite"};
@@ -38,7 +40,7 @@ Result<MeshChunkView> MeshChunkView::validate(std::span<const std::byte> bytes) 
 }
 
 std::vector<std::byte> build_chunk(std::span<const float> positions_room, std::span<const uint32_t> normals,
-                                   std::span<const uint32_t> colours, std::span<const uint32_t> indices) {
+                                   std::span<const uint32_t> colours, std::span<const uint32_t> indices, bool scalars) {
   const size_t v = normals.size();
   CHECK(positions_room.size() == 3 * v && colours.size() == v && indices.size() % 3 == 0);
   CHECK(v >= 1 && v <= kMaxChunkVertices && indices.size() >= 3 && indices.size() / 3 <= kMaxChunkTriangles);
@@ -48,6 +50,7 @@ std::vector<std::byte> build_chunk(std::span<const float> positions_room, std::s
   ChunkHeader h;
   h.vertices = static_cast<uint32_t>(v);
   h.triangles = static_cast<uint32_t>(indices.size() / 3);
+  h.scalars = scalars;
   for (int a = 0; a < 3; ++a) h.lo[a] = box.lo[a], h.hi[a] = box.hi[a];
   std::vector<std::byte> out(chunk_bytes(v, h.triangles));
   std::byte* p = out.data();

@@ -8,7 +8,8 @@
 //   0                               ChunkHeader     64 bytes
 //   64                              float[3][V]     positions, metres
 //   64 + 12 V                       uint32[V]       normals, octahedral, 2 x 16 bits (image/normal.h: encode_normal32)
-//   64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo
+//   64 + 16 V                       uint32[V]       colours, 0x00RRGGBB, unlit albedo; or, where the header says so,
+//                                                   float[V] scalars (NaN: no value), which a colouring makes colours of
 //   64 + 20 V                       uint32[3][T]    vertex indices, each < V
 //   64 + 20 V + 12 T                zero bytes      to a multiple of 64, at least 16 (Embree reads beyond the end)
 #pragma once
@@ -34,7 +35,7 @@ struct ChunkHeader {
   uint32_t magic = kChunkMagic;
   uint32_t vertices = 0;
   uint32_t triangles = 0;
-  uint32_t reserved0 = 0;
+  uint32_t scalars = 0;  ///< 1: the colours are scalars, 0: colours
   float lo[3] = {}, hi[3] = {};
   uint32_t reserved1[6] = {};
 };
@@ -50,8 +51,9 @@ struct MeshChunkView {
   Box box_room;
   std::span<const float> positions_room;  ///< 3 V
   std::span<const uint32_t> normals;      ///< V
-  std::span<const uint32_t> colours;      ///< V
+  std::span<const uint32_t> colours;      ///< V; scalars: the bits of floats
   std::span<const uint32_t> indices;      ///< 3 T
+  bool scalars = false;
   size_t vertices() const { return normals.size(); }
   size_t triangles() const { return indices.size() / 3; }
 
@@ -69,10 +71,12 @@ struct ChunkInfo {
   bool operator==(const ChunkInfo&) const = default;
 };
 
-/// Lays out one chunk. normals and colours have one entry a vertex, as in the table above.
+/// Lays out one chunk. normals and colours have one entry a vertex, as in the table above; scalars: what the colours
+/// are.
 /// Preconditions: counts within the limits, indices < vertices.
 std::vector<std::byte> build_chunk(std::span<const float> positions_room, std::span<const uint32_t> normals,
-                                   std::span<const uint32_t> colours, std::span<const uint32_t> indices);
+                                   std::span<const uint32_t> colours, std::span<const uint32_t> indices,
+                                   bool scalars = false);
 
 /// Bytes of a chunk with whatever keeps them alive (a mapped file, a received message, a vector).
 struct ChunkBytes {

@@ -46,11 +46,10 @@ std::optional<Suffix> suffix_of(std::string_view text) {
 }
 
 // Cuts between characters.
-std::string shortened(std::string text, size_t bytes) {
+std::string shortened(const std::string& text, size_t bytes) {
   if (text.size() <= bytes) return text;
   while (bytes > 0 && (static_cast<unsigned char>(text[bytes]) & 0xc0) == 0x80) --bytes;
-  text.resize(bytes);
-  return text;
+  return text.substr(0, bytes);
 }
 
 Json span_json(const ValueSpan& span) { return span.empty() ? Json() : Json::array({span.lo, span.hi}); }

@@ -1,5 +1,8 @@
 #include "services/data/open_mesh.h"
 
+#include <fmt/format.h>
+
+#include "common/scene/colouring.h"
 #include "services/data/mesh/file_source.h"
 #include "services/data/surface/isosurface.h"
 
@@ -7,10 +10,20 @@ namespace telesplat::data {
 
 Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const MeshOptions& options,
                                              const Progress& user_progress) {
+  auto by = scene::parse_colour_by(options.colouring.by);
+  if (!by) return Error{fmt::format("--colour-by {}", by.error().text)};
+  return open_mesh_by(path, options, by->array, user_progress);
+}
+
+Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const MeshOptions& options,
+                                                const std::string& array, const Progress& user_progress) {
   const Progress progress = user_progress ? user_progress : [](const char*, double) {};
   if (const Status s = validate(options); !s) return s.error();
-  const auto source = options.iso ? surface_source(path, options.raw, *options.iso, progress)
-                                  : file_source(path, options.elevation, progress);
+  if (options.iso && !array.empty())
+    return Error{
+        fmt::format("--colour-by {}: {} is shown as a surface of a volume (--iso), which has no arrays", array, path)};
+  const auto source = options.iso ? surface_source(path, options.raw, options.series, *options.iso, progress)
+                                  : file_source(path, options.elevation, array, progress);
   if (!source) return source.error();
   return MeshStore::make(path, *source, options, progress);
 }

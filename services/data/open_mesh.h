@@ -13,5 +13,8 @@ namespace telesplat::data {
 /// first if the cache has none. progress may be empty. Errors (exit code 2 for a user) name the file.
 Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const MeshOptions& options,
                                              const Progress& progress);
+/// The same, but coloured by this array (empty: by none), whatever the options say.
+Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const MeshOptions& options,
+                                                const std::string& array, const Progress& progress);
 
 }  // namespace telesplat::data

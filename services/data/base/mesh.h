@@ -18,7 +18,7 @@ inline constexpr uint64_t kMaxVertices = (uint64_t{1} << 32) - 2;
 inline constexpr uint32_t kNeutralAlbedo = 0xc8c8c8;  ///< the colour of data without colours
 
 struct Mesh {
-  std::string format;                 ///< "ply", "obj", "stl", "off", "vtp", "vtk", "gltf"
+  std::string format;                 ///< "ply", "obj", "stl", "off", "vtp", "vtu", "vtk", "gltf"
   std::vector<glm::dvec3> positions;  ///< in the file's units
   std::vector<glm::vec3> normals;     ///< empty, or one a vertex; of any length; (0, 0, 0): to be computed
   std::vector<uint32_t> colours;      ///< empty, or one a vertex: 0x00RRGGBB

@@ -16,6 +16,7 @@ struct MeshSource {
   std::string variant;  ///< what else decides what the mesh is, as part of a file name; often empty
   /// Reads it; what comes passed validate_mesh.
   std::function<Result<Mesh>(const ReadProgress&)> read;
+  std::string array;  ///< what colours it, as scene::choose_array() takes it; part of the variant; empty: nothing
 };
 
 /// The hash of the files' contents, in this order. Files that cannot be read are left out: reading them says why. Calls

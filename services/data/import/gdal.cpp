@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "services/data/base/elevation.h"
+#include "services/data/import/raster_facts.h"
 
 namespace telesplat::data {
 namespace {
@@ -156,6 +157,42 @@ Result<ElevationRaster> read_elevation(const std::string& path, const std::strin
   out.y0 = t[3] * north;
   if (!texture.empty())
     if (const Status s = drape(texture, at, w, h, out); !s) return s.error();
+  return out;
+}
+
+Result<RasterFacts> read_raster_facts(const std::string& path) {
+  const auto raster = read_elevation(path, "");
+  if (!raster) return raster.error();
+  auto opened = open(path, "an elevation raster");
+  if (!opened) return opened.error();
+  const GDALDatasetH dataset = opened->get();
+  RasterFacts out;
+  out.format = GDALGetDriverLongName(GDALGetDatasetDriver(dataset));
+  out.type = GDALGetDataTypeName(GDALGetRasterDataType(GDALGetRasterBand(dataset, 1)));
+  out.width = GDALGetRasterXSize(dataset), out.height = GDALGetRasterYSize(dataset);
+  out.step = raster->step;
+  const Placement at = placement_of(dataset);
+  const double* t = at.transform;
+  if (const OGRSpatialReferenceH reference = GDALGetSpatialRef(dataset)) {
+    if (const char* name = OSRGetName(reference)) out.reference = name;
+    char* unit = nullptr;
+    OSRGetLinearUnits(reference, &unit);
+    out.unit = at.degrees ? "degrees" : at.metres == 1 || !unit ? "metres" : unit;
+  } else if (at.degrees) {
+    out.unit = "degrees";
+  }
+  const double x1 = t[0] + t[1] * out.width, y1 = t[3] + t[5] * out.height;
+  out.west = std::min(t[0], x1), out.east = std::max(t[0], x1);
+  out.south = std::min(t[3], y1), out.north = std::max(t[3], y1);
+  out.sample_x = std::abs(t[1]), out.sample_y = std::abs(t[5]);
+  out.sample_x_m = raster->dx / raster->step, out.sample_y_m = raster->dy / raster->step;
+  out.lo = HUGE_VAL, out.hi = -HUGE_VAL;
+  for (const float z : raster->heights)
+    if (std::isfinite(z))
+      out.lo = std::min(out.lo, double(z)), out.hi = std::max(out.hi, double(z));
+    else
+      ++out.without_data;
+  if (out.lo > out.hi) return Error{fmt::format("{}: none of its samples has data", path)};
   return out;
 }
 

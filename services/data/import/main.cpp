@@ -15,6 +15,7 @@
 
 #include "services/data/base/elevation.h"
 #include "services/data/import/iso.h"
+#include "services/data/import/raster_facts.h"
 #include "services/data/import/report.h"
 #include "services/data/import/vtk_import.h"
 #include "services/data/import/vtk_volume.h"
@@ -68,11 +69,12 @@ bool import_volume(int out, const std::string& path, uint64_t file_bytes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3 && argc != 5) {
+  if (argc < 3 || argc > 5) {
     std::fputs(
-        "usage: telesplat-import vtp|vtk|gltf FILE   (standard output: the mesh, for telesplat-data)\n"
+        "usage: telesplat-import vtp|vtu|vtk|gltf FILE [ARRAY]   (standard output: the mesh, for telesplat-data)\n"
         "       telesplat-import nifti|vti FILE      (standard output: import_stream.h)\n"
         "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
+        "       telesplat-import raster-facts FILE   (standard output: raster_facts.h)\n"
         "       telesplat-import iso NAME            (standard input: iso.h)\n",
         stderr);
     return 2;
@@ -93,9 +95,13 @@ int main(int argc, char** argv) {
     if (telesplat::data::reads_with_vtk(format)) return import_volume(out, path, file_bytes) ? 0 : 1;
     limit_time(file_bytes);
     limit_memory(100 * file_bytes);
+    if (format == "raster-facts") {
+      const auto facts = telesplat::data::read_raster_facts(path);
+      return telesplat::data::write_raster_facts(out, facts) ? 0 : 1;
+    }
     const auto mesh = argc == 5         ? import_elevation(path, std::atof(argv[3]), argv[4])
                       : format == "iso" ? telesplat::data::flying_edges(STDIN_FILENO, path)
-                                        : telesplat::data::import_with_vtk(path, format);
+                                        : telesplat::data::import_with_vtk(path, format, argc == 4 ? argv[3] : "");
     return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const telesplat::Error error{

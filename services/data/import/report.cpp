@@ -12,11 +12,14 @@
 namespace telesplat::data {
 namespace {
 
-// At the start of the file; then follow the error's text or the mesh's arrays.
+// At the start of the file; then follow the error's text or the mesh.
 struct Report {
   uint64_t text_bytes = 0;  // of an error; 0: a mesh follows
   uint64_t vertices = 0, triangles = 0, degenerate = 0;
   uint32_t normals = 0, colours = 0;
+  uint64_t scalars = 0;       // as many as there are
+  uint32_t of_faces = 0;      // scalars are one a triangle
+  uint32_t arrays_bytes = 0;  // scene::to_text() of the arrays
 };
 
 bool write_all(int descriptor, const void* data, size_t bytes) {
@@ -49,17 +52,21 @@ bool write_import_report(int descriptor, const Result<Mesh>& result) {
     return write_all(descriptor, &report, sizeof report) && write_all(descriptor, text.data(), text.size());
   }
   const Mesh& mesh = *result;
+  const std::string arrays = mesh.arrays.empty() ? "" : scene::to_text(mesh.arrays);
   report = {0,
             mesh.positions.size(),
             mesh.indices.size() / 3,
             mesh.degenerate_dropped,
             !mesh.normals.empty(),
-            !mesh.colours.empty()};
+            !mesh.colours.empty(),
+            mesh.scalars.size(),
+            mesh.scalars_of_faces,
+            static_cast<uint32_t>(arrays.size())};
   const auto put = [&](const auto& array) {
     return write_all(descriptor, array.data(), array.size() * sizeof(array[0]));
   };
   return write_all(descriptor, &report, sizeof report) && put(mesh.positions) && put(mesh.normals) &&
-         put(mesh.colours) && put(mesh.indices);
+         put(mesh.colours) && put(mesh.indices) && put(mesh.scalars) && put(arrays);
 }
 
 Result<Mesh> read_import_report(int descriptor, const std::string& path, const std::string& format) {
@@ -73,11 +80,19 @@ Result<Mesh> read_import_report(int descriptor, const std::string& path, const s
   Mesh mesh;
   mesh.format = format;
   mesh.degenerate_dropped = report.degenerate;
-  const bool whole = take(rest, report.vertices, mesh.positions) &&
-                     take(rest, report.normals ? report.vertices : 0, mesh.normals) &&
-                     take(rest, report.colours ? report.vertices : 0, mesh.colours) &&
-                     report.triangles <= kMaxTriangles && take(rest, 3 * report.triangles, mesh.indices);
-  if (!whole) return incomplete;
+  const bool whole =
+      take(rest, report.vertices, mesh.positions) && take(rest, report.normals ? report.vertices : 0, mesh.normals) &&
+      take(rest, report.colours ? report.vertices : 0, mesh.colours) && report.triangles <= kMaxTriangles &&
+      take(rest, 3 * report.triangles, mesh.indices) &&
+      (report.scalars == 0 || report.scalars == (report.of_faces ? report.triangles : report.vertices)) &&
+      take(rest, report.scalars, mesh.scalars);
+  mesh.scalars_of_faces = report.of_faces != 0;
+  std::vector<char> text;
+  if (!whole || report.arrays_bytes > scene::kMaxArraysText || !take(rest, report.arrays_bytes, text))
+    return incomplete;
+  auto arrays = scene::arrays_from_text({text.data(), text.size()});
+  if (!arrays) return Error{fmt::format("{}: {}", path, arrays.error().text)};
+  mesh.arrays = *std::move(arrays);
   return mesh;
 }
 

@@ -5,8 +5,10 @@
 #include <vtkCellArrayIterator.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkDataArray.h>
+#include <vtkDataReader.h>
 #include <vtkFieldData.h>
 #include <vtkGLTFReader.h>
+#include <vtkGeometryFilter.h>
 #include <vtkImageData.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
@@ -16,12 +18,16 @@
 #include <vtkSmartPointer.h>
 #include <vtkStringOutputWindow.h>
 #include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkUnstructuredGridReader.h>
 #include <vtkXMLPolyDataReader.h>
+#include <vtkXMLUnstructuredGridReader.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "services/data/import/vtk_arrays.h"
 #include "services/data/import/vtk_complaint.h"
 
 namespace telesplat::data {
@@ -98,7 +104,15 @@ struct Material {
 
 class Collector {
  public:
-  explicit Collector(const std::string& format) { mesh_.format = format; }
+  /// array: what the mesh is coloured by; empty: nothing.
+  Collector(const std::string& format, std::string array) : array_(std::move(array)) { mesh_.format = format; }
+
+  /// Of a format that holds one block: with its arrays. Error: array is not one of them.
+  Status add_alone(vtkPolyData* block, const std::string& path) {
+    add(block, nullptr);
+    if (mesh_.positions.empty()) return ok_status();
+    return take_arrays(*block, array_, cells_, path, mesh_);
+  }
 
   void add(vtkPolyData* block, const Material* material) {
     const auto base = static_cast<uint32_t>(mesh_.positions.size());
@@ -112,8 +126,9 @@ class Collector {
     }
     add_normals(block->GetPointData()->GetNormals(), points);
     add_colours(block, material);
-    add_cells(block->GetPolys(), base, points, false);
-    add_cells(block->GetStrips(), base, points, true);
+    const vtkIdType before_polys = block->GetNumberOfVerts() + block->GetNumberOfLines();
+    add_cells(block->GetPolys(), base, points, false, before_polys);
+    add_cells(block->GetStrips(), base, points, true, before_polys + block->GetNumberOfPolys());
   }
 
   Mesh finish() {
@@ -161,14 +176,15 @@ class Collector {
   }
 
   // Polygons as fans, strips with alternating orientation. An index that is out of range stays so, for validate_mesh to
-  // name.
-  void add_cells(vtkCellArray* cells, uint32_t base, vtkIdType points, bool strips) {
+  // name. first_cell: the number of the first of these cells in the block.
+  void add_cells(vtkCellArray* cells, uint32_t base, vtkIdType points, bool strips, vtkIdType first_cell) {
     if (!cells) return;
     const auto corner = [&](vtkIdType i) {
       return i >= 0 && i < points ? base + static_cast<uint32_t>(i) : ~uint32_t{0};
     };
     const auto iterator = vtk::TakeSmartPointer(cells->NewIterator());
-    for (iterator->GoToFirstCell(); !iterator->IsDoneWithTraversal(); iterator->GoToNextCell()) {
+    vtkIdType cell = first_cell;
+    for (iterator->GoToFirstCell(); !iterator->IsDoneWithTraversal(); iterator->GoToNextCell(), ++cell) {
       vtkIdType count = 0;
       const vtkIdType* ids = nullptr;
       iterator->GetCurrentCell(count, ids);
@@ -178,20 +194,54 @@ class Collector {
         const vtkIdType a = strips ? ids[k - 2] : ids[0];
         mesh_.indices.insert(mesh_.indices.end(),
                              {corner(a), corner(ids[odd ? k : k - 1]), corner(ids[odd ? k - 1 : k])});
+        if (!array_.empty()) cells_.push_back(uint32_t(cell));
       }
     }
   }
 
   Mesh mesh_;
+  const std::string array_;
+  std::vector<uint32_t> cells_;  // of each triangle, where array_ may be of cells
   bool any_normals_ = false, any_colours_ = false;
 };
 
+// Legacy files have several arrays of a kind; the readers take the first unless told otherwise.
+void read_all_arrays(vtkDataReader& reader) {
+  reader.ReadAllScalarsOn();
+  reader.ReadAllVectorsOn();
+  reader.ReadAllTensorsOn();
+  reader.ReadAllFieldsOn();
+  reader.ReadAllColorScalarsOn();
+}
+
 template <class Reader>
-void read_poly_data(const std::string& path, Collector& collector) {
+Status read_poly_data(const std::string& path, Collector& collector) {
   vtkNew<Reader> reader;
   reader->SetFileName(path.c_str());
+  if constexpr (requires { reader->ReadAllScalarsOn(); }) read_all_arrays(*reader);
   reader->Update();
-  if (reader->GetOutput()) collector.add(reader->GetOutput(), nullptr);
+  return reader->GetOutput() ? collector.add_alone(reader->GetOutput(), path) : ok_status();
+}
+
+// The outer faces of an unstructured grid's cells.
+template <class Reader>
+Status read_grid(const std::string& path, Collector& collector) {
+  vtkNew<Reader> reader;
+  reader->SetFileName(path.c_str());
+  if constexpr (requires { reader->ReadAllScalarsOn(); }) read_all_arrays(*reader);
+  vtkNew<vtkGeometryFilter> surface;
+  surface->SetInputConnection(reader->GetOutputPort());
+  surface->Update();
+  return surface->GetOutput() ? collector.add_alone(surface->GetOutput(), path) : ok_status();
+}
+
+Status read_vtk(const std::string& path, const std::string& format, Collector& collector) {
+  if (format == "vtp") return read_poly_data<vtkXMLPolyDataReader>(path, collector);
+  if (format == "vtu") return read_grid<vtkXMLUnstructuredGridReader>(path, collector);
+  vtkNew<vtkDataReader> legacy;
+  legacy->SetFileName(path.c_str());
+  if (legacy->IsFileUnstructuredGrid()) return read_grid<vtkUnstructuredGridReader>(path, collector);
+  return read_poly_data<vtkPolyDataReader>(path, collector);
 }
 
 void read_gltf(const std::string& path, Collector& collector) {
@@ -211,18 +261,18 @@ void read_gltf(const std::string& path, Collector& collector) {
 
 }  // namespace
 
-Result<Mesh> import_with_vtk(const std::string& path, const std::string& format) {
+Result<Mesh> import_with_vtk(const std::string& path, const std::string& format, const std::string& array) {
   vtkNew<vtkStringOutputWindow> output;
   vtkOutputWindow::SetInstance(output);
-  Collector collector(format);
+  Collector collector(format, array);
+  Status read = ok_status();
   if (format == "gltf")
     read_gltf(path, collector);
-  else if (format == "vtp")
-    read_poly_data<vtkXMLPolyDataReader>(path, collector);
   else
-    read_poly_data<vtkPolyDataReader>(path, collector);
+    read = read_vtk(path, format, collector);
   const std::string complaint = first_complaint(output->GetOutput());
   if (!complaint.empty()) return Error{fmt::format("{}: {}", path, complaint)};
+  if (!read) return read.error();
   return collector.finish();
 }
 

@@ -78,26 +78,34 @@ std::vector<uint32_t> morton_order(const PlacedMesh& mesh, std::span<const uint3
   return order;
 }
 
-// Gives each vertex of the whole mesh a number within the chunk, in the order of first use. An open hash table.
+// A vertex of the whole mesh in one of its colours: it has several where faces are coloured.
+struct Corner {
+  uint32_t vertex, colour;
+  bool operator==(const Corner&) const = default;
+};
+
+// Gives each corner of the whole mesh a number within the chunk, in the order of first use. An open hash table.
 class Renumbering {
  public:
   explicit Renumbering(size_t triangles) : table_(std::bit_ceil(std::max<size_t>(6 * triangles, 16)), kFree) {}
 
-  uint32_t operator()(uint32_t vertex) {
+  uint32_t operator()(const Corner& corner) {
     const size_t mask = table_.size() - 1;
-    for (size_t slot = (vertex * uint64_t{0x9e3779b97f4a7c15} >> 20) & mask;; slot = (slot + 1) & mask) {
+    const uint64_t hash = (corner.vertex + uint64_t{corner.colour} * 0xbf58476d) * 0x9e3779b97f4a7c15;
+    for (size_t slot = (hash >> 20) & mask;; slot = (slot + 1) & mask) {
       if (table_[slot] == kFree) {
         table_[slot] = static_cast<uint32_t>(used_.size());
-        used_.push_back(vertex);
+        used_.push_back(corner);
       }
-      if (used_[table_[slot]] == vertex) return table_[slot];
+      if (used_[table_[slot]] == corner) return table_[slot];
     }
   }
-  const std::vector<uint32_t>& used() const { return used_; }  ///< the vertex of the whole mesh behind each number
+  const std::vector<Corner>& used() const { return used_; }  ///< the corner of the whole mesh behind each number
 
  private:
   static constexpr uint32_t kFree = ~uint32_t{0};
-  std::vector<uint32_t> table_, used_;
+  std::vector<uint32_t> table_;
+  std::vector<Corner> used_;
 };
 
 }  // namespace
@@ -124,20 +132,23 @@ std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32
   std::vector<uint32_t> indices;
   indices.reserve(3 * triangles.size());
   for (uint32_t t : morton_order(mesh, triangles))
-    for (int k = 0; k < 3; ++k) indices.push_back(number(mesh.indices[3 * size_t{t} + k]));
-  const std::vector<uint32_t>& used = number.used();
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t vertex = mesh.indices[3 * size_t{t} + k];
+      indices.push_back(number({vertex, mesh.face_colours.empty() ? mesh.colours[vertex] : mesh.face_colours[t]}));
+    }
+  const std::vector<Corner>& used = number.used();
   std::vector<float> positions;
   positions.reserve(3 * used.size());
   std::vector<uint32_t> normals, colours;
   normals.reserve(used.size());
   colours.reserve(used.size());
-  for (uint32_t v : used) {
-    const glm::vec3& p = mesh.positions_room[v];
+  for (const Corner& corner : used) {
+    const glm::vec3& p = mesh.positions_room[corner.vertex];
     positions.insert(positions.end(), {p.x, p.y, p.z});
-    normals.push_back(mesh.normals[v]);
-    colours.push_back(mesh.colours[v]);
+    normals.push_back(mesh.normals[corner.vertex]);
+    colours.push_back(corner.colour);
   }
-  return geometry::build_chunk(positions, normals, colours, indices);
+  return geometry::build_chunk(positions, normals, colours, indices, mesh.scalars);
 }
 
 }  // namespace telesplat::data

@@ -1,13 +1,15 @@
 #include "services/data/mesh/file_source.h"
 
 #include <fmt/format.h>
+#include <xxhash.h>
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/mesh/reader.h"
 
 namespace telesplat::data {
 
-Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const Progress& progress) {
+Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
+                               const Progress& progress) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
   const DetectedFormat detected = detect_format((*file)->text(), path);
@@ -22,8 +24,11 @@ Result<MeshSource> file_source(const std::string& path, const ElevationOptions& 
     if (!texture) return texture.error();
     files.push_back(elevation.texture);
   }
-  return MeshSource{hash_files(files, progress), raster ? fmt::format("-z{}", elevation.z_scale) : "",
-                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation); }};
+  if (const Status s = check_array(array, detected.format, path); !s) return s.error();
+  std::string variant = raster ? fmt::format("-z{}", elevation.z_scale) : "";
+  if (!array.empty()) variant += fmt::format("-by{:016x}", XXH3_64bits(array.data(), array.size()));
+  return MeshSource{hash_files(files, progress), variant,
+                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation, array); }, array};
 }
 
 }  // namespace telesplat::data

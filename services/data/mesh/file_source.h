@@ -10,7 +10,8 @@ namespace telesplat::data {
 
 /// The mesh file or raster at `path`, with its companions (material libraries, buffers, the texture); hashes them.
 /// Error, naming the file: it cannot be opened, is of no known format; elevation options are given for what is no
-/// raster.
-Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const Progress& progress);
+/// raster, or an array where the format has none. array: what the mesh is coloured by; empty: nothing.
+Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
+                               const Progress& progress);
 
 }  // namespace telesplat::data

@@ -15,10 +15,17 @@ struct StoreOptions : PlacementOptions {
   bool use_cache = true;
 };
 
+/// What a mesh is coloured by, as people give it.
+struct ColouringOptions {
+  std::string by;               ///< scene::parse_colour_by(); empty: the file's own colours
+  std::string map = "viridis";  ///< colour::resolve_colour_map()
+};
+
 struct MeshOptions : StoreOptions {
   ElevationOptions elevation;  ///< of elevation rasters alone
-  std::optional<double> iso;   ///< of volumes alone: the surface where they have this value
-  std::string raw;             ///< with iso: VolumeSource::raw
+  ColouringOptions colouring;
+  std::optional<double> iso;  ///< of volumes alone: the surface where they have this value
+  std::string raw, series;    ///< with iso: those of VolumeSource
 };
 
 }  // namespace telesplat::data

@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -43,11 +44,13 @@ void drop_degenerate(PlacedMesh& mesh) {
   for (size_t t = 0; t < triangles; ++t) {
     const uint32_t a = mesh.indices[3 * t], b = mesh.indices[3 * t + 1], c = mesh.indices[3 * t + 2];
     if (area_vector(mesh, t) == glm::dvec3(0)) continue;
+    if (!mesh.face_colours.empty()) mesh.face_colours[kept] = mesh.face_colours[t];
     mesh.indices[3 * kept] = a, mesh.indices[3 * kept + 1] = b, mesh.indices[3 * kept + 2] = c;
     ++kept;
   }
   mesh.degenerate_dropped += triangles - kept;
   mesh.indices.resize(3 * kept);
+  if (!mesh.face_colours.empty()) mesh.face_colours.resize(kept);
 }
 
 // Area-weighted vertex normals, not normalised. Scaled up so that small triangles do not vanish in float.
@@ -83,6 +86,15 @@ void set_normals(PlacedMesh& placed, const std::vector<glm::vec3>& from_file, co
   });
 }
 
+// The array that colours the mesh, if any.
+void take_scalars(Mesh& mesh, PlacedMesh& placed) {
+  placed.scalars = !mesh.scalars.empty();
+  std::vector<uint32_t>& bits = mesh.scalars_of_faces ? placed.face_colours : placed.colours;
+  bits.resize(mesh.scalars.size());
+  parallel(bits.size(), [&](size_t i) { bits[i] = std::bit_cast<uint32_t>(mesh.scalars[i]); });
+  mesh.scalars = {};
+}
+
 }  // namespace
 
 Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string& up, const std::string& name) {
@@ -108,14 +120,16 @@ Result<PlacedMesh> place_mesh(Mesh&& mesh, double room_size_m, const std::string
   mesh.positions = {};
   placed.indices = std::move(mesh.indices);
   placed.degenerate_dropped = mesh.degenerate_dropped;
+  take_scalars(mesh, placed);
   drop_degenerate(placed);
   if (placed.indices.empty())
     return Error{fmt::format("{}: all its {} triangles are degenerate (no area)", name, placed.degenerate_dropped)};
   for (uint32_t i : placed.indices) placed.box_room.extend(placed.positions_room[i]);
 
   set_normals(placed, mesh.normals, glm::mat3(*rotation));
-  placed.colours = std::move(mesh.colours);
-  if (placed.colours.empty()) placed.colours.assign(placed.positions_room.size(), kNeutralAlbedo);
+  if (!placed.scalars) placed.colours = std::move(mesh.colours);
+  if (placed.colours.empty() && placed.face_colours.empty())
+    placed.colours.assign(placed.positions_room.size(), kNeutralAlbedo);
   return placed;
 }
 

@@ -13,7 +13,10 @@ namespace telesplat::data {
 struct PlacedMesh {
   std::vector<glm::vec3> positions_room;
   std::vector<uint32_t> normals;  ///< encode_normal32, one a vertex
-  std::vector<uint32_t> colours;  ///< 0x00RRGGBB, one a vertex
+  std::vector<uint32_t> colours;  ///< 0x00RRGGBB, one a vertex; scalars: the bits of floats
+  std::vector<uint32_t>
+      face_colours;  ///< if there are some, one a triangle in place of colours, of which there are none
+  bool scalars = false;
   std::vector<uint32_t> indices;  ///< three a triangle
   geometry::DBox box_data;        ///< of the vertices that triangles use
   geometry::Box box_room;

@@ -12,8 +12,9 @@ namespace telesplat::data {
 namespace {
 
 constexpr const char* kSupported =
-    "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTK (polygonal data), glTF and GLB, and elevation rasters "
-    "(GeoTIFF, HGT, 16-bit PNG)";
+    "supported are the mesh formats PLY, OBJ, STL, OFF, VTP, VTU, VTK (polygons and unstructured grids), glTF and GLB, "
+    "and elevation rasters "
+    "(GeoTIFF, HGT, 16-bit PNG, ASCII grid)";
 
 std::string extension_of(const std::string& path) {
   std::string out = std::filesystem::path(path).extension().string();
@@ -26,19 +27,28 @@ bool is_one_of(const std::string& word, std::initializer_list<const char*> words
   return std::any_of(words.begin(), words.end(), [&](const char* w) { return word == w; });
 }
 
-// Files that people may well take for meshes: what they are, in words.
+// Files that people may well take for meshes: what they are, in words, and what to do.
 std::string other_kind(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
-  if (content.starts_with("\xff\xd8\xff"sv)) return "a JPEG image";
-  if (content.starts_with("\x89PNG"sv)) return "a PNG image of 8-bit colours";
+  constexpr std::string_view kPicture =
+      "is {}: a picture, not elevation, which is one band of 16 bits or more (PNG, GeoTIFF); --texture FILE drapes "
+      "pictures over elevation rasters";
+  if (content.starts_with("\xff\xd8\xff"sv)) return fmt::format(kPicture, "a JPEG image");
+  if (content.starts_with("\x89PNG"sv)) {
+    // In its header chunk, which comes first: bit depth in byte 24, colour type (0: grey) in byte 25.
+    const bool known = content.size() > 26;
+    return fmt::format(kPicture, !known ? std::string("a PNG image")
+                                        : fmt::format("a PNG image of {}-bit {}", int(content[24]),
+                                                      content[25] == 0 || content[25] == 4 ? "grey" : "colours"));
+  }
   if (content.starts_with("NRRD") || content.starts_with("ObjectType = Image") ||
       is_one_of(extension, {".nii", ".nrrd", ".nhdr", ".mha", ".mhd", ".raw", ".dcm", ".vti"}) ||
       (content.size() > 132 && content.substr(128, 4) == "DICM"))
-    return "a volume";
+    return fmt::format("is a volume, not a mesh; {}", kSupported);
   if (content.starts_with("\x1f\x8b"sv) || content.starts_with("PK\3\4"sv) ||
       content.starts_with("\xfd"
                           "7zXZ"sv))
-    return "a compressed file (unpack it first)";
+    return fmt::format("is a compressed file (unpack it first), not a mesh; {}", kSupported);
   return "";
 }
 
@@ -46,7 +56,7 @@ std::string other_kind(std::string_view content, const std::string& extension) {
 bool looks_like_raster(std::string_view content, const std::string& extension) {
   using namespace std::string_view_literals;
   if (content.starts_with("II*\0"sv) || content.starts_with("MM\0*"sv) || content.starts_with("II+\0"sv)) return true;
-  // A PNG begins with its header chunk: bit depth in byte 24, colour type (0: grey) in byte 25.
+  // As in other_kind().
   if (content.starts_with("\x89PNG"sv)) return content.size() > 26 && content[24] == 16 && content[25] == 0;
   return is_one_of(extension, {".hgt", ".dem", ".asc", ".dt0", ".dt1", ".dt2"});
 }
@@ -84,38 +94,63 @@ DetectedFormat detect_format(std::string_view content, const std::string& path) 
   if (content.starts_with("# vtk DataFile")) return {"vtk", ""};
   if (const std::string_view start = content.substr(0, 1000); start.find("<VTKFile") != start.npos) {
     if (start.find("type=\"PolyData\"") != start.npos) return {"vtp", ""};
-    return {"", fmt::format("is a VTK file, but not of polygonal data (type=\"PolyData\"); {}", kSupported)};
+    if (start.find("type=\"UnstructuredGrid\"") != start.npos) return {"vtu", ""};
+    return {"", fmt::format("is a VTK file, but neither of polygons (type=\"PolyData\") nor an unstructured grid; {}",
+                            kSupported)};
   }
   if (looks_like_raster(content, extension)) return {"raster", ""};
-  if (const std::string kind = other_kind(content, extension); !kind.empty())
-    return {"", fmt::format("is {}, not a mesh; {}", kind, kSupported)};
+  if (std::string complaint = other_kind(content, extension); !complaint.empty()) return {"", std::move(complaint)};
   if (is_binary_stl(content)) return {"stl", ""};
   for (const char* start : {"OFF", "COFF", "NOFF", "CNOFF", "STOFF", "STCOFF", "STNOFF", "STCNOFF"})
     if (content.starts_with(start)) return {"off", ""};
   if (content.starts_with("solid") && (extension == ".stl" || content.substr(0, 4096).find("facet") != content.npos))
     return {"stl", ""};
   // By name, where the content says nothing (or is broken, which the reader will say better).
-  if (is_one_of(extension, {".ply", ".off", ".stl", ".obj", ".vtp", ".vtk"})) return {extension.substr(1), ""};
+  if (is_one_of(extension, {".ply", ".off", ".stl", ".obj", ".vtp", ".vtu", ".vtk"})) return {extension.substr(1), ""};
   if (is_one_of(extension, {".gltf", ".glb"})) return {"gltf", ""};
   const std::string_view start = content.substr(0, 4096);
   if (start.starts_with("{") && start.find("\"asset\"") != start.npos) return {"gltf", ""};
   if (looks_like_obj(content)) return {"obj", ""};
-  return {"", fmt::format("is of no known format; {}", kSupported)};
+  return {"", fmt::format("is of no known format; {}; raw voxels need --raw", kSupported)};
 }
 
-Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation) {
+bool has_arrays(std::string_view format) {
+  return format == "ply" || format == "vtp" || format == "vtu" || format == "vtk";
+}
+
+Status check_array(const std::string& array, const std::string& format, const std::string& path) {
+  if (array.empty() || has_arrays(format)) return ok_status();
+  if (format == "raster")
+    return Error{
+        fmt::format("--colour-by {}: {} is an elevation raster, which is coloured by its heights", array, path)};
+  return Error{fmt::format("--colour-by {}: {} is a file of format {}, which has no arrays; PLY, VTP, VTU and VTK have",
+                           array, path, format)};
+}
+
+Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const ReadProgress& progress) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  if (!has_arrays(detect_format((*file)->text(), path).format)) return std::vector<scene::ArrayInfo>{};
+  auto mesh = read_mesh(path, progress);
+  if (!mesh) return mesh.error();
+  return std::move(mesh->arrays);
+}
+
+Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation,
+                       const std::string& array) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
   const std::string_view content = (*file)->text();
   const DetectedFormat detected = detect_format(content, path);
   if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
+  if (const Status s = check_array(array, detected.format, path); !s) return s.error();
   try {
-    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress)
+    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress, array)
                 : detected.format == "off"    ? read_off(content, path, progress)
                 : detected.format == "stl"    ? read_stl(content, path, progress)
                 : detected.format == "obj"    ? read_obj(content, path, progress)
                 : detected.format == "raster" ? read_with_gdal(path, elevation, progress)
-                                              : read_with_vtk(content, detected.format, path, progress);
+                                              : read_with_vtk(content, detected.format, path, progress, array);
     if (!mesh) return mesh;
     if (auto status = validate_mesh(*mesh, path); !status) return status.error();
     return mesh;

@@ -10,7 +10,7 @@
 
 namespace telesplat::data {
 
-/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtk", "gltf",
+/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtu", "vtk", "gltf",
 /// "raster", or "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and what is
 /// supported.
 struct DetectedFormat {
@@ -21,15 +21,26 @@ DetectedFormat detect_format(std::string_view content, const std::string& path);
 
 /// Reads a mesh file of any supported format; what it returns passed validate_mesh. Errors name the file.
 /// Nothing is allocated by a count that the file merely claims.
-/// elevation: of rasters alone.
-Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {});
+/// elevation: of rasters alone. array: what the mesh is coloured by, as scene::choose_array() takes it; empty: nothing.
+Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {},
+                       const std::string& array = {});
+
+/// What arrays of numbers a mesh file holds, with the ranges of their values. It is read for that, but kept nowhere.
+/// Empty: of a format that has none, or a file without. Errors name the file.
+Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const ReadProgress& progress = {});
+/// Whether files of this format can hold arrays.
+bool has_arrays(std::string_view format);
+/// Error: an array is named, but files of this format have none.
+Status check_array(const std::string& array, const std::string& format, const std::string& path);
 
 // The readers of single formats. `content` is the whole file, `name` stands in error texts. They promise what
 // validate_mesh checks only as far as sizes go (arrays one a vertex, three indices a triangle); read_mesh checks the
 // rest. Faces of more than three corners become fans around their first corner, which is right for convex ones.
 
-/// PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also diffuse_*).
-Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress);
+/// PLY 1.0, ascii and both binary byte orders; polygons and triangle strips; nx ny nz; red green blue (also diffuse_*);
+/// other numbers of vertices and faces are arrays.
+Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
+                      const std::string& array = {});
 /// OFF in text, with the prefixes C (colours), N (normals), ST (texture coordinates, ignored); comments; CRLF.
 Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
 /// STL, binary or ascii. Corners at the same position become one vertex.
@@ -37,11 +48,11 @@ Result<Mesh> read_stl(std::string_view content, const std::string& name, const R
 /// Wavefront OBJ: v (with r g b too), vn, f (negative indices too), usemtl with the Kd colours of its material
 /// libraries, which are looked for beside `name`.
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// VTP, legacy VTK and glTF, through VTK, in the program telesplat-import, which must lie beside this process's own
+/// VTP, VTU, legacy VTK and glTF, through VTK (of grids the surface), in the program telesplat-import, which must lie beside this process's own
 /// program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us. Claimed counts are checked here
 /// before VTK sees the file.
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
-                           const ReadProgress& progress);
+                           const ReadProgress& progress, const std::string& array = {});
 
 /// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated:
 /// elevation.h.

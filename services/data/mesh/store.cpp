@@ -74,6 +74,8 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.had_normals = !mesh->normals.empty();
   info.had_colours = !mesh->colours.empty();
   info.content_hash = source.hash;
+  info.arrays = mesh->arrays;
+  info.array = source.array;
   progress("normals", 0.0);
   const auto placed = place_mesh(std::move(*mesh), options.room_size_m, options.up, path);
   if (!placed) return placed.error();

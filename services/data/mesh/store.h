@@ -20,7 +20,9 @@ struct MeshStoreInfo {
   uint64_t triangles = 0, vertices = 0;
   uint64_t degenerate_dropped = 0;
   bool had_normals = false, had_colours = false;
-  geometry::DBox box_data;  ///< in the file's own units
+  std::vector<scene::ArrayInfo> arrays;  ///< that the file holds
+  std::string array;                     ///< of which chunks have the values in place of colours; empty: none
+  geometry::DBox box_data;               ///< in the file's own units
   geometry::Box box_room;
   std::string up;         ///< the axis chosen
   std::string up_reason;  ///< why, in a few words

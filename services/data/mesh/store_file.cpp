@@ -26,6 +26,8 @@ struct StoreHeader {
   double data_lo[3] = {}, data_hi[3] = {};
   float room_lo[3] = {}, room_hi[3] = {};
   char format[16] = {}, up[8] = {}, up_reason[64] = {};
+  char array[512] = {};
+  uint64_t arrays_offset = 0, arrays_bytes = 0;
   uint64_t checksum = 0;  ///< of all the above and the table of contents
 };
 static_assert(sizeof(StoreHeader) <= kPage);
@@ -35,9 +37,10 @@ struct StoreEntry {
   float lo[3] = {}, hi[3] = {};
 };
 
-uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entries) {
+uint64_t checksum_of(const StoreHeader& header, std::span<const StoreEntry> entries, std::string_view arrays) {
   const uint64_t seed = XXH3_64bits(&header, offsetof(StoreHeader, checksum));
-  return XXH3_64bits_withSeed(entries.data(), entries.size_bytes(), seed);
+  return XXH3_64bits_withSeed(arrays.data(), arrays.size(),
+                              XXH3_64bits_withSeed(entries.data(), entries.size_bytes(), seed));
 }
 
 // Writes all of it; returns 0 or an errno.
@@ -67,6 +70,7 @@ StoreHeader make_header(const MeshStoreInfo& info) {
   std::strncpy(h.format, info.format.c_str(), sizeof h.format - 1);
   std::strncpy(h.up, info.up.c_str(), sizeof h.up - 1);
   std::strncpy(h.up_reason, info.up_reason.c_str(), sizeof h.up_reason - 1);
+  std::strncpy(h.array, info.array.c_str(), sizeof h.array - 1);
   return h;
 }
 
@@ -80,6 +84,7 @@ MeshStoreInfo info_of(const StoreHeader& h) {
   info.format = std::string(h.format, strnlen(h.format, sizeof h.format));
   info.up = std::string(h.up, strnlen(h.up, sizeof h.up));
   info.up_reason = std::string(h.up_reason, strnlen(h.up_reason, sizeof h.up_reason));
+  info.array = std::string(h.array, strnlen(h.array, sizeof h.array));
   return info;
 }
 
@@ -116,10 +121,13 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
 
   StoreHeader header = make_header(info);
   header.chunks = static_cast<uint32_t>(entries.size());
-  header.file_bytes = end;
-  header.checksum = checksum_of(header, entries);
+  const std::string arrays = scene::to_text(info.arrays);
+  header.arrays_offset = end, header.arrays_bytes = arrays.size();
+  header.file_bytes = end + round_up(arrays.size());
+  header.checksum = checksum_of(header, entries, arrays);
   if (failure == 0 && ftruncate(descriptor, static_cast<off_t>(header.file_bytes)) != 0) failure = errno;
   if (failure == 0) failure = write_at(descriptor, entries.data(), entries.size() * sizeof(StoreEntry), kPage);
+  if (failure == 0) failure = write_at(descriptor, arrays.data(), arrays.size(), header.arrays_offset);
   if (failure == 0) failure = write_at(descriptor, &header, sizeof header, 0);
   if (failure != 0)
     return Error{fmt::format("{}: chunk store of {} bytes cannot be written: {}", name, header.file_bytes,
@@ -144,10 +152,16 @@ Result<StoreContent> read_store(int descriptor, const std::string& name) {
       kPage + header.chunks * sizeof(StoreEntry) > bytes.size())
     return Error{fmt::format("{}: chunk store claims {} chunks in {} bytes", name, header.chunks, bytes.size())};
   const std::span entries(reinterpret_cast<const StoreEntry*>(bytes.data() + kPage), header.chunks);
-  if (checksum_of(header, entries) != header.checksum)
+  const bool inside =
+      header.arrays_offset <= bytes.size() && header.arrays_bytes <= bytes.size() - header.arrays_offset;
+  const std::string_view text = inside ? (*mapped)->text().substr(header.arrays_offset, header.arrays_bytes) : "";
+  if (!inside || checksum_of(header, entries, text) != header.checksum)
     return Error{fmt::format("{}: chunk store's table of contents is damaged", name)};
+  auto arrays = scene::arrays_from_text(text);
+  if (!arrays) return Error{fmt::format("{}: {}", name, arrays.error().text)};
 
   StoreContent out{*mapped, info_of(header), {}, {}};
+  out.info.arrays = *std::move(arrays);
   for (size_t i = 0; i < entries.size(); ++i) {
     const StoreEntry& e = entries[i];
     if (e.offset % kPage != 0 || e.offset > bytes.size() || e.bytes > bytes.size() - e.offset)

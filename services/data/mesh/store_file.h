@@ -3,6 +3,7 @@
 //   offset 0      StoreHeader, padded to 4096
 //   4096          StoreEntry[chunks], padded to a multiple of 4096
 //   then          the chunks (common/geometry/mesh_chunk.h), each at a multiple of 4096, in the order they were made
+//   then          what the file's arrays are: scene::to_text()
 //
 // Native byte order: the file is a cache and never travels.
 #pragma once
@@ -21,7 +22,7 @@ namespace telesplat::data {
 
 inline constexpr uint64_t kStoreMagic = 0x31455453'48534d54;  // "TMSHSTE1"
 /// Goes up whenever readers, placement or layout would make another file of the same mesh.
-inline constexpr uint32_t kStoreVersion = 3;
+inline constexpr uint32_t kStoreVersion = 4;
 
 /// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken
 /// from there. On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages

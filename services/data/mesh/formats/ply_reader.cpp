@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "services/data/base/text_scanner.h"
+#include "services/data/mesh/formats/ply_arrays.h"
 #include "services/data/mesh/formats/ply_header.h"
 #include "services/data/mesh/reader.h"
 
@@ -108,12 +109,16 @@ class PlyBody {
         name_(name),
         progress_(progress),
         content_bytes_(content.size()),
-        cursor_(content, header.bytes) {
+        cursor_(content, header.bytes),
+        arrays_(header, [](std::string_view property) { return target_of(property) != Target::kNone; }) {
     for (const PlyElement& e : header.elements) total_ += e.count;
   }
 
-  Result<Mesh> read() {
+  /// array: what the mesh is coloured by; empty: nothing.
+  Result<Mesh> read(const std::string& array) {
     mesh_.format = "ply";
+    if (!array.empty())
+      if (const Status s = arrays_.choose(array, name_); !s) return s.error();
     for (const PlyElement& element : header_.elements) {
       const Status status = element.name == "vertex"      ? read_vertices(element)
                             : element.name == "face"      ? read_faces(element, false)
@@ -121,6 +126,7 @@ class PlyBody {
                                                           : skip(element);
       if (!status.ok()) return status.error();
     }
+    arrays_.finish(mesh_);
     return std::move(mesh_);
   }
 
@@ -168,12 +174,14 @@ class PlyBody {
     mesh_.positions.reserve(element.count);
     if (normals) mesh_.normals.reserve(element.count);
     if (colours) mesh_.colours.reserve(element.count);
+    const std::vector<int>& arrays = arrays_.arrays_of(element);
     for (uint64_t v = 0; v < element.count; ++v, tick()) {
       double value[static_cast<int>(Target::kCount)] = {};
       for (size_t i = 0; i < targets.size(); ++i) {
         const PlyProperty& p = element.properties[i];
         if (p.is_list ? !read_list(p) : !cursor_.read(p.type, value[static_cast<int>(targets[i])]))
           return ended(element, v);
+        if (arrays[i] >= 0) arrays_.take_vertex(arrays[i], value[static_cast<int>(Target::kNone)]);
       }
       const auto at = [&](Target t) { return value[static_cast<int>(t)]; };
       mesh_.positions.emplace_back(at(Target::kX), at(Target::kY), at(Target::kZ));
@@ -205,14 +213,17 @@ class PlyBody {
       return Error{fmt::format("{}: element '{}' lacks the list vertex_indices", name_, element.name)};
     const size_t item_bytes = kPlyTypeBytes[static_cast<int>(element.properties[corners].type)];
     mesh_.indices.reserve(mesh_.indices.size() + std::min<uint64_t>(3 * element.count, content_bytes_ / item_bytes));
+    const std::vector<int>& arrays = arrays_.arrays_of(element);
     for (uint64_t f = 0; f < element.count; ++f, tick()) {
       for (size_t i = 0; i < element.properties.size(); ++i) {
         const PlyProperty& p = element.properties[i];
-        double ignored;
-        if (p.is_list ? !read_list(p) : !cursor_.read(p.type, ignored)) return ended(element, f);
+        double value;
+        if (p.is_list ? !read_list(p) : !cursor_.read(p.type, value)) return ended(element, f);
+        if (arrays[i] >= 0) arrays_.take_face(arrays[i], value);
         if (static_cast<int>(i) == corners)
           if (auto status = strips ? add_strip(element, f) : add_polygon(element, f); !status) return status;
       }
+      arrays_.end_face(mesh_.indices.size() / 3);
       if (mesh_.indices.size() > 3 * kMaxTriangles)
         return Error{fmt::format("{}: more than {} triangles", name_, kMaxTriangles)};
     }
@@ -256,6 +267,7 @@ class PlyBody {
   const ReadProgress& progress_;
   size_t content_bytes_;
   Cursor cursor_;
+  PlyArrays arrays_;
   Mesh mesh_;
   std::vector<double> list_;
   uint64_t done_ = 0, total_ = 0;
@@ -263,17 +275,18 @@ class PlyBody {
 
 }  // namespace
 
-Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress) {
+Result<Mesh> read_ply(std::string_view content, const std::string& name, const ReadProgress& progress,
+                      const std::string& array) {
   const auto header = parse_ply_header(content, name);
   if (!header) return header.error();
   constexpr bool kLittle = std::endian::native == std::endian::little;
   switch (header->encoding) {
     case PlyEncoding::kAscii:
-      return PlyBody<AsciiCursor>(*header, content, name, progress).read();
+      return PlyBody<AsciiCursor>(*header, content, name, progress).read(array);
     case PlyEncoding::kLittleEndian:
-      return PlyBody<BinaryCursor<!kLittle>>(*header, content, name, progress).read();
+      return PlyBody<BinaryCursor<!kLittle>>(*header, content, name, progress).read(array);
     case PlyEncoding::kBigEndian:
-      return PlyBody<BinaryCursor<kLittle>>(*header, content, name, progress).read();
+      return PlyBody<BinaryCursor<kLittle>>(*header, content, name, progress).read(array);
   }
   return Error{name + ": unknown PLY encoding"};
 }

@@ -45,12 +45,12 @@ Status check_before(std::string_view content, const std::string& format, const s
     }
     return check_gltf(content, bytes, path);
   }
-  if (format == "vtp") {
+  if (format == "vtp" || format == "vtu") {
     // zlib packs at most 1032 to 1.
-    return check_counts(
-        content, path,
-        {"NumberOfPoints=", "NumberOfPolys=", "NumberOfStrips=", "NumberOfVerts=", "NumberOfLines=", "NumberOfTuples="},
-        1032);
+    return check_counts(content, path,
+                        {"NumberOfPoints=", "NumberOfCells=", "NumberOfPolys=", "NumberOfStrips=", "NumberOfVerts=",
+                         "NumberOfLines=", "NumberOfTuples="},
+                        1032);
   }
   const size_t dataset = content.substr(0, 4096).find("DATASET");
   if (dataset == content.npos || !content.starts_with("# vtk DataFile"))
@@ -58,20 +58,21 @@ Status check_before(std::string_view content, const std::string& format, const s
   std::string_view kind = content.substr(dataset + 7, 40);
   while (!kind.empty() && kind.front() == ' ') kind.remove_prefix(1);
   kind = kind.substr(0, kind.find_first_of(" \r\n"));
-  if (kind != "POLYDATA" && kind != "polydata")
-    return Error{fmt::format(
-        "{}: is a VTK file of {} (a volume or grid), not of POLYDATA: only polygonal meshes are read", path, kind)};
+  if (kind != "POLYDATA" && kind != "polydata" && kind != "UNSTRUCTURED_GRID" && kind != "unstructured_grid")
+    return Error{fmt::format("{}: is a VTK file of {} (a volume or grid): only POLYDATA and UNSTRUCTURED_GRID are read",
+                             path, kind)};
   return check_counts(content, path,
-                      {"\nPOINTS ", "\nPOLYGONS ", "\nTRIANGLE_STRIPS ", "\nPOINT_DATA ", "\nCELL_DATA "}, 1);
+                      {"\nPOINTS ", "\nPOLYGONS ", "\nCELLS ", "\nTRIANGLE_STRIPS ", "\nPOINT_DATA ", "\nCELL_DATA "},
+                      1);
 }
 
 }  // namespace
 
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
-                           const ReadProgress& progress) {
+                           const ReadProgress& progress, const std::string& array) {
   if (auto status = check_before(content, format, path); !status) return status.error();
   if (progress) progress(0.0);
-  return import("VTK's " + format, {format, path});
+  return import("VTK's " + format, {format, path, array});
 }
 
 Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress) {

@@ -1,0 +1,32 @@
+// What the file of an elevation raster says, for people.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/core/result.h"
+
+namespace telesplat::data {
+
+struct RasterFacts {
+  std::string format;         ///< in GDAL's words: "GeoTIFF"
+  std::string type;           ///< of samples, in GDAL's words: "Int16"
+  int width = 0, height = 0;  ///< samples in the file
+  int step = 1;               ///< every step-th of them is read
+  std::string reference;      ///< name of the coordinates' reference system: "WGS 84 / UTM zone 10N"; empty: not said
+  std::string unit;           ///< "degrees", "metres" or another length; empty: nothing says where it lies
+  /// Edges and a sample's size, in that unit; without one in samples.
+  double west = 0, south = 0, east = 0, north = 0, sample_x = 1, sample_y = 1;
+  double sample_x_m = 1, sample_y_m = 1;  ///< in metres, as it is shown; without a unit 1
+  double lo = 0, hi = 0;                  ///< heights, of the samples that are read
+  uint64_t without_data = 0;              ///< of the samples that are read
+};
+
+/// Reads it with GDAL, in the program telesplat-import. Errors name the file.
+Result<RasterFacts> inspect_raster(const std::string& path);
+
+/// That program's part.
+Result<RasterFacts> read_raster_facts(const std::string& path);
+bool write_raster_facts(int descriptor, const Result<RasterFacts>& facts);
+
+}  // namespace telesplat::data
