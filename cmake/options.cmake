@@ -11,6 +11,7 @@ endif()
 option(TELESPLAT_TESTS "Build the tests and benchmarks" ON)
 option(TELESPLAT_PCH "Compile common headers once" ON)
 option(TELESPLAT_FUZZ "Build the libFuzzer targets (needs clang)" OFF)
+set(TELESPLAT_COMMIT "" CACHE STRING "HASH,DATE of the sources, where neither git nor an archive of git's tells them")
 set(TELESPLAT_SANITIZE "" CACHE STRING "Sanitizers, as in -fsanitize=")
 
 # -ffp-contract=off: packer and viewers must compute identical points, whatever instruction set they dispatch to.

@@ -4,21 +4,34 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <deque>
+#include <iostream>
+#include <span>
+
+#include "common/core/utf8.h"
+#include "common/options/suggest.h"
 
 namespace telesplat::options {
 
 struct Parser::Impl {
-  explicit Impl(CLI::App& a) : app(&a) {}
+  Impl(CLI::App& a, std::string n) : name(std::move(n)), app(&a) {}
   explicit Impl(const std::string& about) : own(std::make_unique<CLI::App>(about)), app(own.get()) {
     // The command line wins over a scene file, whose flags come first.
     app->option_defaults()->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   }
+  std::string name;  // of a command
   std::unique_ptr<CLI::App> own;
   CLI::App* app;
+  Table table;
+  std::string version;
   std::deque<Parser> commands;
   std::vector<std::pair<std::string, CLI::Option*>> options;  // by the row's name
+
+  Status refuse_unknown(const std::string& called, std::span<const std::string> arguments, std::string& command) const;
+  Status unknown_flag(const std::string& called, const std::string& flag) const;
+  Status unknown_command(const std::string& called, const std::string& name) const;
 };
 
 namespace {
@@ -37,8 +50,25 @@ std::string type_name(const Row& row) {
     type = "FLOAT";
   if (row.on_off) type = "{on,off}";
   if (const auto* range = std::get_if<Range>(&row.limits))
-    return fmt::format("{} in [{} - {}]", type, range->least, range->most);
+    return fmt::format("{} in [{} - {}]", type, number_text(range->least), number_text(range->most));
   return type;
+}
+
+bool takes_value(const Row& row) {
+  if (std::holds_alternative<Action>(row.value)) return false;
+  return !std::holds_alternative<bool*>(row.value) || row.on_off;
+}
+
+// A negative number is no flag.
+bool is_number(const std::string& word) {
+  return word.find_first_not_of("-+.,:0123456789eE%") == word.npos && word.find_first_of("0123456789") != word.npos;
+}
+
+std::string shown(const std::string& word) { return word.empty() ? "\"\"" : to_utf8(word.substr(0, 200)); }
+
+std::ostream& discarded() {
+  static std::ostream nowhere(nullptr);
+  return nowhere;
 }
 
 CLI::Option* add_row(CLI::App& app, const Row& row) {
@@ -77,25 +107,94 @@ void Parser::add(const Table& table) {
     if (row.required) option->required();
     if (!row.environment.empty()) option->envname(row.environment);
     impl_->options.emplace_back(name_of(row), option);
+    impl_->table.push_back(row);
   }
 }
 
 Parser& Parser::command(const std::string& name, const std::string& about) {
   impl_->app->require_subcommand(1);
-  impl_->commands.push_back(Parser(std::make_unique<Impl>(*impl_->app->add_subcommand(name, about))));
+  impl_->commands.push_back(Parser(std::make_unique<Impl>(*impl_->app->add_subcommand(name, about), name)));
   return impl_->commands.back();
 }
 
 void Parser::footer(const std::string& text) { impl_->app->footer(text); }
 
+void Parser::version(const std::string& text) { impl_->version = text; }
+
+Status Parser::Impl::unknown_flag(const std::string& called, const std::string& flag) const {
+  std::vector<std::string> known{"--help"};
+  if (!version.empty()) known.emplace_back("--version");
+  for (const Row& row : table)
+    for (auto& name : names_of(row))
+      if (name.starts_with("-")) known.push_back(std::move(name));
+  const std::string meant = did_you_mean(flag, known);
+  const char* otherwise = commands.empty() ? "" : "; flags follow the command";
+  return Error{fmt::format("{}: no such flag of {}{}", shown(flag), called, meant.empty() ? otherwise : meant)};
+}
+
+Status Parser::Impl::unknown_command(const std::string& called, const std::string& word) const {
+  std::vector<std::string> known;
+  for (const Parser& command : commands) known.push_back(command.impl_->name);
+  const std::string all = fmt::format("{}", fmt::join(known, ", "));
+  if (word.empty()) return Error{fmt::format("{} needs a command: {}", called, all)};
+  const std::string meant = did_you_mean(word, known);
+  return Error{fmt::format("{}: no such command of {}{}", shown(word), called,
+                           meant.empty() ? fmt::format(", which has {}", all) : meant)};
+}
+
+// CLI11 counts a misspelt flag's value among what is wrong, and does not name the flag. command: the one that was
+// chosen, with the program's name.
+Status Parser::Impl::refuse_unknown(const std::string& called, std::span<const std::string> arguments,
+                                    std::string& command) const {
+  command = called;
+  for (size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& word = arguments[i];
+    if (word == "--" || word == "-h" || word == "--help" || (word == "--version" && !version.empty()))
+      return ok_status();  // CLI11 has the rest
+    if (word.starts_with("-") && !is_number(word) && word != "-") {
+      const size_t equals = word.find('=');
+      const Row* row = find(table, word.substr(0, equals));
+      if (!row && word.size() > 2 && word[1] != '-') row = find(table, word.substr(0, 2));  // "-s4"
+      if (!row) return unknown_flag(called, word.substr(0, equals));
+      if (takes_value(*row) && equals == word.npos) ++i;
+    } else if (!commands.empty()) {
+      for (const Parser& p : commands)
+        if (p.impl_->name == word)
+          return p.impl_->refuse_unknown(fmt::format("{} {}", called, word), arguments.subspan(i + 1), command);
+      return unknown_command(called, word);
+    }
+  }
+  return commands.empty() ? ok_status() : unknown_command(called, {});
+}
+
 void Parser::parse_or_exit(const std::string& program, std::vector<std::string> arguments) {
-  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
   auto& app = *impl_->app;
-  if (app.get_name().empty()) app.name(program);
+  const std::string name = program.substr(program.rfind('/') + 1);
+  const auto refuse = [&](const std::string& why) {
+    std::fputs(fmt::format("{}: {}\n", name, why).c_str(), stderr);
+    std::exit(2);
+  };
+  if (app.get_name().empty()) app.name(name);
+  if (!impl_->version.empty()) {
+    const std::string told = fmt::format("{} {}", name, impl_->version);
+    app.set_version_flag("--version", told, "Print which version this is and exit");
+  }
+  std::string command;
+  if (const Status s = impl_->refuse_unknown(name, arguments, command); !s) refuse(s.error().text);
+  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
   try {
     app.parse(std::move(arguments));
+  } catch (const CLI::ExtrasError&) {
+    refuse(fmt::format("{} is one too many for {}", shown(app.remaining(true).front()), command));
+  } catch (const CLI::RequiredError& e) {
+    const std::string_view what = e.what();
+    refuse(fmt::format("{} needs {}; {} --help tells what that is", command, what.substr(0, what.find(' ')), command));
+  } catch (const CLI::ArgumentMismatch& e) {
+    const std::string_view what = e.what();
+    refuse(fmt::format("{}: its value is missing", what.substr(0, what.find(':'))));
   } catch (const CLI::ParseError& e) {
-    std::exit(app.exit(e) == 0 ? 0 : 2);
+    if (app.exit(e, std::cout, discarded()) == 0) std::exit(0);
+    refuse(e.what());
   }
 }
 

@@ -21,8 +21,11 @@ class Parser {
   Parser& command(const std::string& name, const std::string& about);
   /// Text at the end of --help.
   void footer(const std::string& text);
+  /// What --version tells behind the program's name; without it there is no such flag.
+  void version(const std::string& text);
 
-  /// --help prints and exits 0, bad usage prints what is wrong and exits 2. arguments: without the program's name.
+  /// --help prints and exits 0, bad usage prints "PROGRAM: what is wrong" in one line and exits 2. program: its name,
+  /// which may have a path in front. arguments: without it.
   void parse_or_exit(const std::string& program, std::vector<std::string> arguments);
 
   /// After parsing: whether this sub-command was chosen; the flags and arguments that were given here.

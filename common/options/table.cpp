@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
 
 #include "common/core/utf8.h"
+#include "common/options/suggest.h"
 
 namespace telesplat::options {
 namespace {
@@ -21,6 +23,7 @@ Result<T> read_number(const std::string& text, const char* what) {
   T value{};
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
+  if (stop == end && error == std::errc::result_out_of_range) return Error{"is too large or too small a number"};
   if (error != std::errc() || stop != end) return Error{fmt::format("is not {}", what)};
   return value;
 }
@@ -29,10 +32,10 @@ std::string complain(const Limits& limits, const std::string& text) {
   if (const auto* range = std::get_if<Range>(&limits)) {
     const auto value = read_number<double>(text, "a number");
     if (!value || !(*value >= range->least && *value <= range->most))
-      return fmt::format("is not in {}..{}", range->least, range->most);
+      return fmt::format("is not between {} and {}", number_text(range->least), number_text(range->most));
   } else if (const auto* names = std::get_if<Names>(&limits)) {
     if (std::find(names->begin(), names->end(), text) == names->end())
-      return fmt::format("is not one of {}", fmt::join(*names, ", "));
+      return fmt::format("is not one of {}{}", fmt::join(*names, ", "), did_you_mean(text, *names));
   } else if (const auto* check = std::get_if<Check>(&limits)) {
     return (*check)(text);
   }
@@ -43,6 +46,8 @@ template <class T>
 Status read_into(T& out, const std::string& text, const char* what) {
   const auto value = read_number<T>(text, what);
   if (!value) return value.error();
+  if constexpr (std::is_floating_point_v<T>)
+    if (!std::isfinite(*value)) return Error{"is not a finite number"};
   out = *value;
   return ok_status();
 }
@@ -102,10 +107,17 @@ std::string owners(const Row& row) {
   if (row.fits == scene::Kinds{scene::Kind::kVolume}) return "only volumes have";
   if (row.fits == scene::Kinds{scene::Kind::kJulia}) return "only Julia sets have";
   if (row.fits == scene::Kinds{scene::Kind::kMesh}) return "only meshes have";
+  if (row.fits == scene::Kinds{scene::Kind::kMesh, scene::Kind::kVolume}) return "only meshes and volumes have";
   return "others have";
 }
 
 }  // namespace
+
+std::string number_text(double number) {
+  std::array<char, 512> text;
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), number, std::chars_format::fixed).ptr;
+  return {text.data(), end};
+}
 
 Table joined(Table a, Table b) {
   a.insert(a.end(), std::make_move_iterator(b.begin()), std::make_move_iterator(b.end()));
@@ -121,6 +133,16 @@ Table without(Table table, const std::vector<std::string>& flags) {
 std::string name_of(const Row& row) {
   const std::string first = row.flag.substr(0, row.flag.find(','));
   return clears(row) ? first.substr(1) : first;
+}
+
+std::vector<std::string> names_of(const Row& row) {
+  std::vector<std::string> out;
+  for (size_t at = clears(row) ? 1 : 0; at <= row.flag.size();) {
+    const size_t comma = std::min(row.flag.find(',', at), row.flag.size());
+    out.push_back(row.flag.substr(at, comma - at));
+    at = comma + 1;
+  }
+  return out;
 }
 
 std::string key_of(const Row& row) {
@@ -153,6 +175,30 @@ Status set(const Row& row, const std::string& text) {
   }
   if (const Status s = std::visit(Reader{text, clears(row)}, row.value); !s) return wrong(s.error().text);
   return ok_status();
+}
+
+namespace {
+
+// A row of the same type, whose value goes nowhere.
+template <class T>
+Status check_as(Row row, const std::string& text) {
+  T scratch{};
+  row.value = &scratch;
+  return set(row, text);
+}
+
+}  // namespace
+
+Status check(const Row& row, const std::string& text) {
+  return std::visit(
+      [&](const auto& value) {
+        using T = std::decay_t<decltype(value)>;
+        if constexpr (std::is_pointer_v<T>)
+          return check_as<std::remove_pointer_t<T>>(row, text);
+        else
+          return set(row, text);
+      },
+      row.value);
 }
 
 std::vector<std::string> arguments(const Table& table, const Table& defaults) {

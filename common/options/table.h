@@ -73,6 +73,8 @@ Table without(Table table, const std::vector<std::string>& flags);
 
 /// "--z-scale" of "--z-scale,--height"; "--no-cache" of "!--no-cache".
 std::string name_of(const Row& row);
+/// All of them: {"--z-scale", "--height"}.
+std::vector<std::string> names_of(const Row& row);
 /// "z_scale": the key of a TOML file.
 std::string key_of(const Row& row);
 const Row* find(const Table& table, const std::string& flag);
@@ -81,6 +83,11 @@ const Row* find(const Table& table, const std::string& flag);
 std::string text_of(const Row& row);
 /// Gives the row's value. Error: "--flag TEXT: what is wrong", within the row's limits.
 Status set(const Row& row, const std::string& text);
+/// The same refusals; the value stays as it is, unless its type is Text.
+Status check(const Row& row, const std::string& text);
+
+/// A number as people write it, without exponent: "0.00001", "1000000". The shortest that reads back the same.
+std::string number_text(double number);
 
 /// What another process must be told so that its options equal `table`'s: rows that differ from the same rows of
 /// `defaults` (what that process takes without being told), of Reach::kChild or more: "--flag=value" or "--flag".

@@ -1,6 +1,7 @@
 // make-terrain: writes a coloured, made-up caldera landscape as PLY.
 #include <fmt/format.h>
 
+#include "common/core/version.h"
 #include "common/options/parser.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
@@ -44,6 +45,7 @@ int main(int argc, char** argv) {
   Options o;
   options::Parser parser(kAbout);
   parser.add(table(o));
+  parser.version(version());
   parser.parse_or_exit("make-terrain", {argv + 1, argv + argc});
   const Status made = make(o);
   return made.ok() ? 0 : tools::complain(made.error(), 1, "make-terrain");

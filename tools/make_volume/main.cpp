@@ -1,6 +1,7 @@
 // make-volume: writes a made-up CT scan of a Christmas tree.
 #include <fmt/format.h>
 
+#include "common/core/version.h"
 #include "common/options/parser.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
@@ -49,6 +50,7 @@ int main(int argc, char** argv) {
   Options o;
   options::Parser parser(kAbout);
   parser.add(table(o));
+  parser.version(version());
   parser.parse_or_exit("make-volume", {argv + 1, argv + argc});
   const Status made = make(o);
   return made.ok() ? 0 : tools::complain(made.error(), 1, "make-volume");

@@ -3,6 +3,7 @@
 #include <iterator>
 #include <utility>
 
+#include "common/core/version.h"
 #include "common/options/parser.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/scene/scene_file.h"
@@ -41,6 +42,7 @@ Status expand(const std::vector<Command>& commands, std::vector<std::string>& ar
 int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments) {
   if (const Status s = expand(commands, arguments); !s) return tools::complain(s.error());
   options::Parser parser(about);
+  parser.version(version());
   Parsers parsers;
   declare(parser, commands, parsers);
   parser.parse_or_exit("telesplat", std::move(arguments));

@@ -1,6 +1,7 @@
 #include "common/options/parser.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
 
@@ -61,10 +62,52 @@ TEST(Parser, LooksIntoTheEnvironment) {
 }
 
 TEST(ParserDeathTest, BadUsageEndsWithTwoAndSaysWhy) {
-  EXPECT_EXIT(parsed({"a", "--speed", "nan"}), testing::ExitedWithCode(2), "--speed nan: is not in 0..10");
+  EXPECT_EXIT(parsed({"a", "--speed", "nan"}), testing::ExitedWithCode(2),
+              "program: --speed nan: is not between 0 and 10");
   EXPECT_EXIT(parsed({"a", "--speed", "fast"}), testing::ExitedWithCode(2), "--speed fast: is not a number");
-  EXPECT_EXIT(parsed({"a", "--nothing"}), testing::ExitedWithCode(2), "--nothing");
-  EXPECT_EXIT(parsed({}), testing::ExitedWithCode(2), "scene");
+  EXPECT_EXIT(parsed({}), testing::ExitedWithCode(2), "^program: program needs scene; program --help tells");
+  EXPECT_EXIT(parsed({"a", "b"}), testing::ExitedWithCode(2), "^program: b is one too many for program\n$");
+  EXPECT_EXIT(parsed({"a", "--speed"}), testing::ExitedWithCode(2), "^program: --speed: its value is missing\n$");
+}
+
+TEST(ParserDeathTest, AWrongFlagIsNamedAloneAndTheNearestOneSuggested) {
+  const auto two = testing::ExitedWithCode(2);
+  EXPECT_EXIT(parsed({"--sped", "3"}), two, "^program: --sped: no such flag of program; did you mean --speed.\n$");
+  EXPECT_EXIT(parsed({"a", "--mastre=tcp://x:1"}), two, "^program: --mastre: no such flag of .*mean --master.\n$");
+  EXPECT_EXIT(parsed({"a", "--ligh"}), two, "did you mean --lighting") << "the beginning of a flag";
+  EXPECT_EXIT(parsed({"a", "--nothing", "--speed", "3"}), two, "^program: --nothing: no such flag of program\n$");
+  EXPECT_EXIT(parsed({"a", "--speed", "--sped", "3"}), two, "--speed --sped: is not a number") << "a value";
+  EXPECT_EXIT(parsed({"a", "-x"}), two, "^program: -x: no such flag of program\n$");
+}
+
+TEST(ParserDeathTest, AWrongCommandIsNamedAndTheNearestOneSuggested) {
+  const auto parse = [](std::vector<std::string> arguments) {
+    Settings s;
+    Parser parser("about");
+    parser.command("run", "runs").add(table(s));
+    parser.command("view", "shows").command("all", "of it");
+    parser.parse_or_exit("/usr/bin/program", std::move(arguments));
+  };
+  const auto two = testing::ExitedWithCode(2);
+  EXPECT_EXIT(parse({"rnu", "--speed", "3"}), two, "^program: rnu: no such command of program; did you mean run.\n$");
+  EXPECT_EXIT(parse({"a.ply"}), two, "^program: a.ply: no such command of program, which has run, view\n$");
+  EXPECT_EXIT(parse({}), two, "^program: program needs a command: run, view\n$");
+  EXPECT_EXIT(parse({"view"}), two, "^program: program view needs a command: all\n$");
+  EXPECT_EXIT(parse({"run", "a", "--sped", "3"}), two, "--sped: no such flag of program run; did you mean --speed");
+  EXPECT_EXIT(parse({"--speed", "3", "run"}), two, "--speed: no such flag of program; flags follow the command");
+  EXPECT_EXIT(parse({"run", "a", "b"}), two, "^program: b is one too many for program run\n$");
+}
+
+TEST(ParserDeathTest, TellsItsVersion) {
+  const auto parse = [](std::vector<std::string> arguments) {
+    Settings s;
+    Parser parser("about");
+    parser.add(table(s));
+    parser.version("1.2.3");
+    parser.parse_or_exit("path/program", std::move(arguments));
+  };
+  EXPECT_EXIT((dup2(2, 1), parse({"--version"})), testing::ExitedWithCode(0), "^program 1.2.3\n$");
+  EXPECT_EXIT(parse({"a", "--versoin"}), testing::ExitedWithCode(2), "did you mean --version");
 }
 
 TEST(ParserDeathTest, ListsAndHelpEndWithZero) {

@@ -84,18 +84,40 @@ TEST(OptionTable, RefusalsNameFlagValueAndLimit) {
     const Status status = set(*find(t, flag), text);
     return status ? std::string() : status.error().text;
   };
-  EXPECT_EQ(why("--threads", "-1"), "--threads -1: is not in 0..1024");
+  EXPECT_EQ(why("--threads", "-1"), "--threads -1: is not between 0 and 1024");
   EXPECT_EQ(why("--threads", "1e3"), "--threads 1e3: is not a whole number");
   EXPECT_EQ(why("--threads", "x"), "--threads x: is not a whole number");
   EXPECT_EQ(why("--frames", "-1"), "--frames -1: is not a whole number of 0 or more");
-  EXPECT_EQ(why("--z-scale", "nan"), "--z-scale nan: is not in -10..10");
-  EXPECT_EQ(why("--z-scale", "inf"), "--z-scale inf: is not in -10..10");
+  EXPECT_EQ(why("--z-scale", "nan"), "--z-scale nan: is not between -10 and 10");
+  EXPECT_EQ(why("--z-scale", "inf"), "--z-scale inf: is not between -10 and 10");
   EXPECT_EQ(why("--z-scale", ""), "--z-scale \"\": is not a number");
   EXPECT_EQ(why("--z-scale", "1x"), "--z-scale 1x: is not a number");
   EXPECT_EQ(why("--up", "y"), "--up y: is not one of auto, x, -z");
+  EXPECT_EQ(why("--up", "autu"), "--up autu: is not one of auto, x, -z; did you mean auto?");
+  EXPECT_EQ(why("--frames", "99999999999999999999"),
+            "--frames 99999999999999999999: is too large or too small a number");
+  EXPECT_EQ(why("--iso", "nan"), "--iso nan: is not a finite number");
+  EXPECT_EQ(why("--iso", "-inf"), "--iso -inf: is not a finite number");
   EXPECT_EQ(why("--lighting", "yes"), "--lighting yes: is neither on nor off");
   EXPECT_EQ(s.threads, 4);
   EXPECT_EQ(s.scale, 1.5);
+}
+
+TEST(OptionTable, ACheckLeavesTheValueAsItIs) {
+  Settings s;
+  const Table t = table(s);
+  EXPECT_TRUE(check(*find(t, "--threads"), "7"));
+  EXPECT_TRUE(check(*find(t, "--iso"), "7"));
+  EXPECT_EQ(check(*find(t, "--threads"), "-7").error().text, "--threads -7: is not between 0 and 1024");
+  EXPECT_EQ(s.threads, 4);
+  EXPECT_FALSE(s.iso);
+}
+
+TEST(OptionTable, NumbersAreWrittenAsPeopleDo) {
+  EXPECT_EQ(number_text(1e6), "1000000");
+  EXPECT_EQ(number_text(1e-5), "0.00001");
+  EXPECT_EQ(number_text(-0.5), "-0.5");
+  EXPECT_EQ(number_text(1e12), "1000000000000");
 }
 
 TEST(OptionTable, ValuesAreTakenAsWritten) {
