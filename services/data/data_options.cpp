@@ -7,6 +7,7 @@
 
 #include "common/volume/transfer/function.h"
 #include "services/data/kinds.h"
+#include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
 namespace {
@@ -19,7 +20,7 @@ using scene::Kind;
 using scene::Kinds;
 
 constexpr Kinds kMeshes{Kind::kMesh}, kVolumes{Kind::kVolume};
-constexpr Kinds kVolumesAndTheirSurfaces{Kind::kVolume, Kind::kMesh};
+constexpr Kinds kVolumesAndTheirSurfaces{Kind::kVolume, Kind::kMesh}, kFiles = kVolumesAndTheirSurfaces;
 
 // Absolute, because a run's session.toml names the folder.
 options::Text folder(std::string& path) {
@@ -59,6 +60,7 @@ Table placement_table(PlacementOptions& o) {
        .value = &o.up,
        .help = "data axis that points up",
        .limits = Names{"auto", "x", "y", "z", "-x", "-y", "-z"},
+       .fits = kFiles,
        .reach = Reach::kRecorded},
   };
 }
@@ -81,8 +83,13 @@ Table mesh_table(MeshOptions& o) {
       {.flag = "--cache",
        .value = folder(o.cache_dir),
        .help = "folder of the chunk store; default: telesplat in the user's cache folder",
+       .fits = kMeshes,
        .reach = Reach::kRecorded},
-      {.flag = "!--no-cache", .value = &o.use_cache, .help = "keep no chunk store", .reach = Reach::kRecorded},
+      {.flag = "!--no-cache",
+       .value = &o.use_cache,
+       .help = "keep no chunk store",
+       .fits = kMeshes,
+       .reach = Reach::kRecorded},
   };
 }
 
@@ -91,8 +98,15 @@ Table volume_table(DataOptions& o) {
       {
           {.flag = "--raw",
            .value = &o.volume.raw,
-           .help = "layout of a file that does not tell: SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING], TYPE one of "
-                   "u8, i8, u16, i16, f32",
+           .help = fmt::format("layout of a file that does not tell: SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING], "
+                               "TYPE one of {}",
+                               kRawTypes),
+           .fits = kVolumesAndTheirSurfaces,
+           .reach = Reach::kRecorded},
+          {.flag = "--series",
+           .value = &o.volume.series,
+           .help = "which series of a DICOM folder: its place in the list that telesplat inspect prints, or its UID; "
+                   "default: the one of most slices",
            .fits = kVolumesAndTheirSurfaces,
            .reach = Reach::kRecorded},
           {.flag = "--iso",

@@ -14,13 +14,13 @@ namespace telesplat::data {
 struct DataOptions {
   std::string scene;     ///< path of a mesh, raster or volume, or the word "julia"
   MeshOptions mesh;      ///< its placement counts for all kinds of scene
-  VolumeOptions volume;  ///< its `raw` counts for surfaces of volumes, too
+  VolumeOptions volume;  ///< its `raw` and `series` count for surfaces of volumes, too
   julia::SceneOptions julia;
 
   /// What open_mesh takes.
   MeshOptions mesh_options() const {
     MeshOptions out = mesh;
-    out.raw = volume.raw;
+    out.raw = volume.raw, out.series = volume.series;
     return out;
   }
 };

@@ -1,14 +1,99 @@
 #include "services/data/inspect.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cmath>
+#include <cstring>
 #include <filesystem>
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/mesh/store_file.h"
 #include "services/data/open_mesh.h"
 
 namespace telesplat::data {
+namespace {
+
+void sum_up(const std::vector<geometry::ChunkInfo>& chunks, MeshFileFacts& facts) {
+  facts.chunks = chunks.size();
+  for (const geometry::ChunkInfo& chunk : chunks) facts.chunk_bytes += chunk.bytes;
+}
+
+// In what units a file of this kind has its coordinates.
+const char* unit_of(const MeshFileFacts& facts) {
+  if (facts.raster)
+    return facts.raster->unit.empty()        ? "samples"
+           : facts.raster->unit == "degrees" ? "metres, made of the degrees"
+                                             : "metres";
+  return facts.info.format == "gltf" ? "metres" : "the file's own units";
+}
+
+const char* normals_of(const MeshFileFacts& facts) {
+  if (facts.iso) return "from the volume's gradients";
+  if (facts.raster) return "computed from the heights";
+  return facts.info.had_normals ? "in the file" : "none in the file: computed";
+}
+
+std::string colours_of(const MeshFileFacts& facts) {
+  if (!facts.texture.empty()) return "of the picture " + facts.texture;
+  if (facts.raster) return "none in the file: tinted by height";
+  return facts.info.had_colours ? "in the file" : "none in the file: neutral grey";
+}
+
+void describe_raster(const RasterFacts& r, const geometry::DBox& box, Description& out) {
+  out.row("samples", fmt::format("{} x {} of {}{}", r.width, r.height, r.type,
+                                 r.step > 1 ? fmt::format(", every {}th is read", r.step) : ""));
+  const std::string reference = r.reference.empty() ? "" : r.reference + ", ";
+  if (r.unit.empty())
+    out.row("lies at", "the file does not say; a sample counts as one unit");
+  else
+    out.row("lies at", fmt::format("{}{}: west {:.8g}, east {:.8g}, south {:.8g}, north {:.8g}", reference, r.unit,
+                                   r.west, r.east, r.south, r.north));
+  if (!r.unit.empty())
+    out.row(
+        "a sample",
+        fmt::format("{:.6g} x {:.6g} {}{}", r.sample_x, r.sample_y, r.unit,
+                    r.unit == "metres" ? "" : fmt::format(", {:.4g} x {:.4g} m as shown", r.sample_x_m, r.sample_y_m)));
+  const double scale = r.hi > r.lo ? (box.hi.z - box.lo.z) / (r.hi - r.lo) : 1;
+  out.row("heights",
+          fmt::format("{:.6g} .. {:.6g}{}, shown times {:.4g} (--z-scale){}", r.lo, r.hi, r.unit.empty() ? "" : " m",
+                      scale, r.without_data > 0 ? fmt::format("; {} samples have no data", r.without_data) : ""));
+  out.json["raster"] = {{"samples", {r.width, r.height}},
+                        {"type", r.type},
+                        {"step", r.step},
+                        {"reference", r.reference},
+                        {"unit", r.unit},
+                        {"west", r.west},
+                        {"east", r.east},
+                        {"south", r.south},
+                        {"north", r.north},
+                        {"sample", {r.sample_x, r.sample_y}},
+                        {"sample_m", {r.sample_x_m, r.sample_y_m}},
+                        {"heights", {r.lo, r.hi}},
+                        {"z_scale", scale},
+                        {"samples_without_data", r.without_data}};
+}
+
+void describe_shape(const MeshFileFacts& facts, Description& out) {
+  const MeshStoreInfo& i = facts.info;
+  out.row("triangles",
+          fmt::format(
+              "{}{}; {} vertices", i.triangles,
+              i.degenerate_dropped > 0 ? fmt::format(" ({} without an area are left out)", i.degenerate_dropped) : "",
+              i.vertices));
+  out.row("normals", normals_of(facts));
+  out.row("colours", colours_of(facts));
+  out.json["triangles"] = i.triangles;
+  out.json["degenerate"] = i.degenerate_dropped;
+  out.json["vertices"] = i.vertices;
+  out.json["normals"] = normals_of(facts);
+  out.json["colours"] = colours_of(facts);
+}
+
+}  // namespace
 
 Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& options, const Progress& progress) {
   const auto store = open_mesh(path, options, progress);
@@ -17,34 +102,68 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
   facts.info = (*store)->info();
   std::error_code error;
   facts.file_bytes = std::filesystem::file_size(path, error);
-  facts.chunks = (*store)->chunks().size();
-  for (const geometry::ChunkInfo& chunk : (*store)->chunks()) facts.chunk_bytes += chunk.bytes;
+  if (error) facts.file_bytes = 0;  // a folder of slices
+  sum_up((*store)->chunks(), facts);
+  facts.iso = options.iso;
+  if (facts.info.format == "raster") {
+    auto raster = inspect_raster(path);
+    if (!raster) return raster.error();
+    facts.raster = std::move(*raster);
+    facts.texture = options.elevation.texture;
+  }
   return facts;
 }
 
-std::string describe(const MeshFileFacts& facts) {
+Result<MeshFileFacts> inspect_store(const std::string& path) {
+  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return Error{fmt::format("{}: cannot be opened: {}", path, std::strerror(errno))};
+  const auto content = read_store(descriptor, path);
+  close(descriptor);
+  if (!content) return content.error();
+  MeshFileFacts facts;
+  facts.info = content->info;
+  facts.info.source = path;
+  facts.info.from_cache = true;
+  facts.file_bytes = content->file->bytes().size();
+  sum_up(content->chunks, facts);
+  return facts;
+}
+
+Description describe(const MeshFileFacts& facts) {
   const MeshStoreInfo& i = facts.info;
-  const auto size = i.box_data.size();
-  const auto room = i.box_room.size();
-  std::string out;
-  out += fmt::format("file        {}\n", i.source);
-  out += fmt::format("format      {}, {} bytes, content {:016x}\n", i.format, facts.file_bytes, i.content_hash);
-  out += fmt::format("triangles   {} ({} degenerate ones left out)\n", i.triangles, i.degenerate_dropped);
-  out += fmt::format("vertices    {}\n", i.vertices);
-  out += fmt::format("box         ({}, {}, {}) .. ({}, {}, {}), in the file's units\n", i.box_data.lo.x,
-                     i.box_data.lo.y, i.box_data.lo.z, i.box_data.hi.x, i.box_data.hi.y, i.box_data.hi.z);
-  out += fmt::format("size        {} x {} x {}\n", size.x, size.y, size.z);
-  out += fmt::format("in the room {:.3f} x {:.3f} x {:.3f} m, {} up\n", room.x, room.y, room.z, i.up);
-  out += fmt::format("normals     {}\n", i.had_normals ? "in the file" : "computed");
-  out += fmt::format("colours     {}\n", i.had_colours ? "in the file" : "none: neutral");
-  out += fmt::format("chunks      {}, {:.1f} MB{}\n", facts.chunks, static_cast<double>(facts.chunk_bytes) * 1e-6,
-                     i.from_cache ? ", from the cache" : "");
+  Description out(facts.raster ? "raster" : "mesh", fmt::format("{}: {}", i.source,
+                                                                facts.raster ? "an elevation raster"
+                                                                : facts.iso  ? "the surface of a volume"
+                                                                             : "a mesh"));
+  const std::string format = facts.raster ? facts.raster->format : facts.iso ? "volume" : i.format;
+  out.row("format", fmt::format("{}{}", format, facts.file_bytes ? ", " + bytes_text(facts.file_bytes) : ""));
+  out.json["path"] = i.source;
+  out.json["format"] = format;
+  out.json["bytes"] = facts.file_bytes;
+  out.json["content_hash"] = fmt::format("{:016x}", i.content_hash);
+  if (facts.iso) out.row("surface", fmt::format("where the value is {:g} (--iso)", *facts.iso));
+  if (facts.iso) out.json["iso"] = *facts.iso;
+  if (facts.raster) describe_raster(*facts.raster, i.box_data, out);
+  describe_shape(facts, out);
+  out.row("box", fmt::format("{} .. {}, {}", vector_text(i.box_data.lo), vector_text(i.box_data.hi), unit_of(facts)));
+  out.row("size", extent_text(i.box_data.size()));
+  out.json["box"] = box_json(i.box_data);
+  out.json["unit"] = unit_of(facts);
+  describe_room(out, i.box_room, i.up, i.up_reason);
+  out.row("chunks",
+          fmt::format("{}, {}{}", facts.chunks, bytes_text(facts.chunk_bytes), i.from_cache ? ", from the cache" : ""));
+  out.json["chunks"] = {{"count", facts.chunks}, {"bytes", facts.chunk_bytes}, {"from_cache", i.from_cache}};
   return out;
 }
 
 bool is_mesh_file(const std::string& path) {
   const auto file = MappedFile::open(path);
   return file.ok() && !detect_format((*file)->text(), path).format.empty();
+}
+
+std::string why_no_mesh(const std::string& path) {
+  const auto file = MappedFile::open(path);
+  return file ? detect_format((*file)->text(), path).complaint : "";
 }
 
 }  // namespace telesplat::data

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include "services/data/inspect.h"
+#include "services/data/volume/formats/dicom_series.h"
 
 namespace telesplat::data {
 namespace {
@@ -33,54 +34,143 @@ std::string bars(const std::array<uint64_t, 64>& counts) {
   return out;
 }
 
-std::string text(const glm::dvec3& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z); }
-
-}  // namespace
-
-Result<VolumeFileFacts> inspect_volume(const std::string& path, const std::string& raw, const ReadProgress& progress) {
-  VolumeFileFacts facts;
-  const auto source = find_volume(path, raw);
-  if (!source) return source.error();
-  facts.source = *source;
-  if (auto status = check_steps(facts.source); !status) return status.error();
-  auto volume = read_volume(facts.source, 0, progress);
-  if (!volume) return volume.error();
-  facts.volume = std::move(*volume);
-  facts.file_bytes = bytes_of(facts.source.steps[0]);
-  const Volume& v = facts.volume;
+// Of the first step, before a store takes its voxels.
+void take(const Volume& v, VolumeFileFacts& facts) {
+  facts.voxel_bytes = v.stored.size();
   const size_t count = v.stored.size() / voxel_bytes(v.type);
   const double scale = v.hi > v.lo ? double(facts.histogram.size()) / (v.hi - v.lo) : 0;
   for (size_t at = 0; at < count; ++at)
     ++facts.histogram[std::min(size_t(std::max(0.0, (v.value(at) - v.lo) * scale)), facts.histogram.size() - 1)];
-  return facts;
+  facts.volume = {v.size,   v.index_to_data, v.type, v.scale, v.offset,     {},
+                  v.format, v.hounsfield,    v.lo,   v.hi,    v.not_finite, v.remark};
 }
 
-std::string describe(const VolumeFileFacts& facts) {
+std::string unit_of(const VolumeFileFacts& facts) {
+  return facts.volume.format == "dicom" ? "mm" : "the file's own units";
+}
+
+void describe_grid(const VolumeFileFacts& facts, Description& out) {
   const Volume& v = facts.volume;
   const glm::dmat4& m = v.index_to_data;
   const glm::dvec3 i(m[0]), j(m[1]), k(m[2]);
   const glm::dvec3 spacing(glm::length(i), glm::length(j), glm::length(k));
-  std::string out;
-  out += fmt::format("file        {}\n", facts.source.name);
-  out += fmt::format("format      {}, {} bytes\n", v.format, facts.file_bytes);
-  out += fmt::format(
-      "voxels      {} x {} x {} of {}, {:.1f} MB{}\n", v.size[0], v.size[1], v.size[2], name_of(v.type),
-      double(v.stored.size()) * 1e-6,
-      v.scale == 1 && v.offset == 0 ? "" : fmt::format("; value = stored * {:.6g} + {:.6g}", v.scale, v.offset));
-  out += fmt::format("spacing     {:.6g} x {:.6g} x {:.6g}, in the file's units\n", spacing.x, spacing.y, spacing.z);
-  out += fmt::format("size        {:.6g} x {:.6g} x {:.6g}\n", spacing.x * v.size[0], spacing.y * v.size[1],
-                     spacing.z * v.size[2]);
-  out += fmt::format("axes        i {}, j {}, k {}: {}-handed\n", text(i / spacing.x), text(j / spacing.y),
-                     text(k / spacing.z), glm::determinant(glm::dmat3(m)) < 0 ? "left" : "right");
-  out += fmt::format("begins at   {}\n", text(glm::dvec3(m[3])));
-  out += fmt::format("values      {:.6g} .. {:.6g}{}{}\n", v.lo, v.hi, v.hounsfield ? ", Hounsfield units (a CT)" : "",
-                     v.not_finite > 0 ? fmt::format("; {} voxels are not finite", v.not_finite) : "");
-  out += fmt::format("histogram   |{}| (log)\n", bars(facts.histogram));
-  if (facts.source.steps.size() > 1)
-    out += fmt::format("steps       {}: {} .. {}\n", facts.source.steps.size(),
-                       fs::path(facts.source.steps.front()).filename().string(),
-                       fs::path(facts.source.steps.back()).filename().string());
-  if (!v.remark.empty()) out += fmt::format("remark      {}\n", v.remark);
+  const bool scaled = v.scale != 1 || v.offset != 0, left = glm::determinant(glm::dmat3(m)) < 0;
+  out.row("voxels", fmt::format("{} x {} x {} of {}, {}{}", v.size[0], v.size[1], v.size[2], name_of(v.type),
+                                bytes_text(facts.voxel_bytes),
+                                scaled ? fmt::format("; value = stored * {:.6g} + {:.6g}", v.scale, v.offset) : ""));
+  out.row("spacing", fmt::format("{}, {}", extent_text(spacing), unit_of(facts)));
+  out.row("axes", fmt::format("i {}, j {}, k {}: {}-handed", vector_text(i / spacing.x), vector_text(j / spacing.y),
+                              vector_text(k / spacing.z), left ? "left" : "right"));
+  const geometry::DBox box = v.box();
+  out.row("box", fmt::format("{} .. {}, {}", vector_text(box.lo), vector_text(box.hi), unit_of(facts)));
+  out.row("size", extent_text(box.size()));
+  out.json["voxels"] = {v.size[0], v.size[1], v.size[2]};
+  out.json["type"] = name_of(v.type);
+  out.json["voxel_bytes"] = facts.voxel_bytes;
+  out.json["scale"] = v.scale;
+  out.json["offset"] = v.offset;
+  out.json["spacing"] = vector_json(spacing);
+  out.json["unit"] = unit_of(facts);
+  for (int a = 0; a < 4; ++a) out.json["index_to_data"].push_back(vector_json(glm::dvec3(m[a])));
+  out.json["handed"] = left ? "left" : "right";
+  out.json["box"] = box_json(box);
+}
+
+void describe_values(const VolumeFileFacts& facts, Description& out) {
+  const Volume& v = facts.volume;
+  const volume::ValueRange& range = facts.session.range;
+  const size_t steps = facts.source.steps.size();
+  std::string of;
+  if (steps > 1 && facts.steps_read == steps) of = fmt::format(", of all {} steps", steps);
+  if (steps > 1 && facts.steps_read < steps)
+    of = fmt::format(", of the first step alone: the {} steps together are more than is kept in memory", steps);
+  out.row("values",
+          fmt::format("{:.6g} .. {:.6g}{}{}{}", range.lo, range.hi, range.hounsfield ? ", Hounsfield units (a CT)" : "",
+                      of, v.not_finite > 0 ? fmt::format("; {} voxels are not finite", v.not_finite) : ""));
+  out.row("", fmt::format("mostly {:.6g} .. {:.6g} where it is not background", range.typical_lo, range.typical_hi));
+  out.row("histogram", fmt::format("|{}| (log{})", bars(facts.histogram),
+                                   steps > 1 ? fmt::format("; first step, {:.6g} .. {:.6g}", v.lo, v.hi) : ""));
+  out.json["values"] = {{"lo", range.lo},
+                        {"hi", range.hi},
+                        {"typical_lo", range.typical_lo},
+                        {"typical_hi", range.typical_hi},
+                        {"hounsfield", range.hounsfield},
+                        {"not_finite", v.not_finite},
+                        {"steps_read", facts.steps_read}};
+  out.json["histogram"] = {{"lo", v.lo}, {"hi", v.hi}, {"counts", facts.histogram}};
+}
+
+void describe_choices(const VolumeFileFacts& facts, Description& out) {
+  const std::string transfer = volume::to_text(facts.session.transfer);
+  out.row("shown with", fmt::format("--tf {} ({})", facts.transfer, facts.transfer_reason));
+  out.json["transfer"] = {{"name", facts.transfer}, {"reason", facts.transfer_reason}, {"points", transfer}};
+  out.json["levels"] = facts.session.levels.count;
+  out.json["lighting"] = facts.session.lit;
+}
+
+void describe_steps(const VolumeFileFacts& facts, Description& out) {
+  const auto& steps = facts.source.steps;
+  const auto name = [](const std::string& path) { return fs::path(path).filename().string(); };
+  out.json["steps"] = steps;
+  out.json["steps_per_s"] = facts.session.steps_per_s;
+  if (steps.size() < 2) return;
+  const double rate = facts.session.steps_per_s;
+  out.row("steps", fmt::format("{}: {} .. {}, {}", steps.size(), name(steps.front()), name(steps.back()),
+                               rate > 0 ? fmt::format("{:.4g} a second (--series-rate)", rate) : "standing still"));
+}
+
+}  // namespace
+
+Result<VolumeFileFacts> inspect_volume(const std::string& path, const VolumeOptions& options,
+                                       const PlacementOptions& placement, const Progress& progress) {
+  VolumeFileFacts facts;
+  const auto source = find_volume(path, options.raw, options.series);
+  if (!source) return source.error();
+  facts.source = *source;
+  if (auto status = check_steps(facts.source); !status) return status.error();
+  facts.steps_read = 0;
+  const StepReader read = [&](size_t step, const ReadProgress& told) {
+    auto volume = read_volume(*source, step, told);
+    if (volume && step == 0) take(*volume, facts);
+    facts.steps_read += volume.ok();
+    return volume;
+  };
+  const Progress silent = [](const char*, double) {};
+  const auto store =
+      VolumeStore::make(read, source->steps.size(), path, options, placement, progress ? progress : silent);
+  if (!store) return store.error();
+  facts.session = (*store)->session();
+  for (const std::string& step : source->steps) facts.file_bytes += bytes_of(step);
+  facts.up = up_of_volume(placement);
+  facts.up_reason = placement.up == "auto" ? "volumes stand on z" : "--up";
+  facts.transfer =
+      options.transfer.empty() ? std::string(volume::fitting_preset(facts.session.range)) : options.transfer;
+  facts.transfer_reason = !options.transfer.empty()        ? "--tf"
+                          : facts.session.range.hounsfield ? "fits Hounsfield units"
+                                                           : "fits values of no known unit";
+  if (facts.volume.format == "dicom")
+    if (const auto series = find_dicom_series(source->steps[0], options.series))
+      for (size_t i = 0; i < series->all.size(); ++i) facts.series.push_back(text_of(series->all[i], i));
+  return facts;
+}
+
+Description describe(const VolumeFileFacts& facts) {
+  Description out("volume", fmt::format("{}: a volume{}", facts.source.name,
+                                        facts.source.steps.size() > 1 ? " that changes with time" : ""));
+  out.row("format", fmt::format("{}, {}", facts.volume.format, bytes_text(facts.file_bytes)));
+  out.json["name"] = facts.source.name;
+  out.json["format"] = facts.volume.format;
+  out.json["bytes"] = facts.file_bytes;
+  describe_grid(facts, out);
+  describe_values(facts, out);
+  describe_steps(facts, out);
+  describe_room(out, facts.session.grid.box_room(), facts.up, facts.up_reason);
+  describe_choices(facts, out);
+  for (size_t i = 0; i < facts.series.size() && facts.series.size() > 1; ++i)
+    out.row(i == 0 ? "series" : "", facts.series[i]);
+  if (!facts.series.empty()) out.json["series"] = facts.series;
+  if (!facts.volume.remark.empty()) out.row("remark", facts.volume.remark);
+  if (!facts.volume.remark.empty()) out.json["remark"] = facts.volume.remark;
   return out;
 }
 

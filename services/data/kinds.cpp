@@ -1,13 +1,18 @@
 #include "services/data/kinds.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 
+#include "services/data/base/mapped_file.h"
 #include "services/data/julia/served_julia.h"
+#include "services/data/mesh/reader.h"
 #include "services/data/mesh/served_mesh.h"
 #include "services/data/open_mesh.h"
+#include "services/data/volume/formats/header_text.h"
 #include "services/data/volume/served_volume.h"
 #include "services/data/volume/volume.h"
 
@@ -52,14 +57,34 @@ constexpr Row kRows[] = {
     {Kind::kVolume,
      "volume (NRRD, MetaImage, NIfTI, VTI, raw with --raw, a folder of DICOM slices or of a numbered series)",
      is_volume, open_as_volume},
-    {Kind::kMesh, "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB) or elevation raster (GeoTIFF, HGT, 16-bit PNG)",
+    {Kind::kMesh,
+     "mesh file (PLY, OBJ, STL, OFF, VTP, VTK, glTF, GLB) or elevation raster (GeoTIFF, HGT, 16-bit PNG, ASCII grid)",
      is_mesh, open_as_mesh},
 };
 static_assert(std::size(kRows) == std::size(scene::kKinds), "a row a kind");
 
+// What people name files of voxels that nothing describes.
+constexpr const char* kRawNames[] = {".raw", ".vol", ".img", ".bin", ".dat"};
+
+Status refuse_undescribed_voxels(const std::string& path) {
+  const std::string extension = lower(std::filesystem::path(path).extension().string());
+  if (std::find(std::begin(kRawNames), std::end(kRawNames), extension) == std::end(kRawNames)) return ok_status();
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  if (!detect_format((*file)->text(), path).format.empty()) return ok_status();
+  const uint64_t bytes = (*file)->bytes().size();
+  const auto guesses = raw_guesses(path, bytes);
+  return Error{fmt::format("{}: raw voxels need --raw SIZExSIZExSIZE:TYPE; {}", path,
+                           guesses.empty()
+                               ? fmt::format("it has {} bytes", bytes)
+                               : fmt::format("its {} bytes could be --raw {}", bytes, fmt::join(guesses, " or ")))};
+}
+
 Result<const Row*> row_of(const DataOptions& o) {
   std::error_code error;
   if (!is_julia(o) && !std::filesystem::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
+  if (!is_julia(o) && !holds_volume(o))
+    if (const Status s = refuse_undescribed_voxels(o.scene); !s) return s.error();
   for (const Row& row : kRows)
     if (row.claims(o)) return &row;
   if (o.mesh.iso) return Error{fmt::format("--iso: {} is no volume", o.scene)};

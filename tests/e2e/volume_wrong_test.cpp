@@ -37,11 +37,8 @@ TEST_P(VolumeWrong, ExitsWithTwoAndOneLine) {
   lying.replace(lying.find("16 16 16"), 8, "16 16 17");
   std::ofstream(folder / "lying.mha", std::ios::binary) << lying;
 
-  std::vector<std::string> arguments{"run",        w.scene == "julia" ? w.scene : folder / w.scene,
-                                     "--out",      out,
-                                     "--cache",    folder / "cache",
-                                     "--size",     "160x100",
-                                     "--duration", "1"};
+  std::vector<std::string> arguments{
+      "run", w.scene == "julia" ? w.scene : folder / w.scene, "--out", out, "--size", "160x100", "--duration", "1"};
   arguments.insert(arguments.end(), w.arguments.begin(), w.arguments.end());
   Program program("telesplat", arguments, folder / "telesplat");
   EXPECT_EQ(program.wait(60), 2) << program.err();

@@ -85,7 +85,7 @@ FLOORS = {
         ["tools/telesplat/record"],
         ["tools/telesplat/movie"],
         ["tools/telesplat/run"],
-        ["tools/telesplat/compare", "tools/telesplat/bench"],
+        ["tools/telesplat/compare", "tools/telesplat/bench", "tools/telesplat/inspect"],
         ["tools/telesplat"],
     ],
 }

@@ -159,9 +159,20 @@ PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::s
     : out_(folder_ / "run") {
   const std::string terrain = mesh.empty() ? folder_ / "terrain.ply" : mesh;
   if (mesh.empty()) write_terrain(terrain);
-  std::vector<std::string> a{
-      command,   terrain,           "--out",   out_,          "--cache", folder_ / "cache",   "--size",
-      "480x300", "--sampling-size", "320x200", "--tile-size", "64",      "--sampler-threads", "1"};
+  std::vector<std::string> a{command,
+                             terrain,
+                             "--out",
+                             out_,
+                             "--size",
+                             "480x300",
+                             "--sampling-size",
+                             "320x200",
+                             "--tile-size",
+                             "64",
+                             "--sampler-threads",
+                             "1"};
+  const bool surface = std::find(arguments.begin(), arguments.end(), "--iso") != arguments.end();
+  if (mesh.empty() || mesh.ends_with(".ply") || surface) a.insert(a.end(), {"--cache", folder_ / "cache"});
   // Half the usual rate shows as much, and leaves time to others that run beside it.
   if (command == "run") a.insert(a.end(), {"--target-fps", "30"});
   a.insert(a.end(), arguments.begin(), arguments.end());

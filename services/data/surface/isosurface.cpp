@@ -47,17 +47,17 @@ std::string hex(const std::string& text) { return fmt::format("{:016x}", XXH3_64
 
 }  // namespace
 
-Result<MeshSource> surface_source(const std::string& path, const std::string& raw, double iso,
-                                  const Progress& progress) {
-  auto found = find_volume(path, raw);
+Result<MeshSource> surface_source(const std::string& path, const std::string& raw, const std::string& series,
+                                  double iso, const Progress& progress) {
+  auto found = find_volume(path, raw, series);
   if (!found) return found.error();
   const auto read = [source = *found, iso](const ReadProgress& p) -> Result<Mesh> {
     const auto volume = read_volume(source, 0, p);
     if (!volume) return volume.error();
     return isosurface(*volume, iso, source.name);
   };
-  return MeshSource{hash_files(files_of(*found), progress),
-                    fmt::format("-iso{}{}", iso, raw.empty() ? "" : fmt::format("-{}", hex(raw))), read};
+  const std::string which = raw.empty() && series.empty() ? "" : "-" + hex(raw + series);
+  return MeshSource{hash_files(files_of(*found), progress), fmt::format("-iso{}{}", iso, which), read};
 }
 
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name) {

@@ -12,9 +12,9 @@ namespace telesplat::data {
 /// stays open. Error, starting with `name`: iso is not inside the values, no triangle, too many of them.
 Result<Mesh> isosurface(const Volume& volume, double iso, const std::string& name);
 
-/// That surface of the volume at `path` (its first step), for a store of chunks. raw: as find_volume takes it. Error:
-/// as find_volume.
-Result<MeshSource> surface_source(const std::string& path, const std::string& raw, double iso,
-                                  const Progress& progress);
+/// That surface of the volume at `path` (its first step), for a store of chunks. raw, series: as find_volume takes them.
+/// Error: as find_volume.
+Result<MeshSource> surface_source(const std::string& path, const std::string& raw, const std::string& series,
+                                  double iso, const Progress& progress);
 
 }  // namespace telesplat::data

@@ -92,12 +92,14 @@ bool looks_like_volume(const std::string& path) {
   return files && std::any_of(files->begin(), files->end(), [](auto& file) { return !format_of(file).empty(); });
 }
 
-Result<VolumeSource> find_volume(const std::string& path, const std::string& raw) {
+Result<VolumeSource> find_volume(const std::string& path, const std::string& raw, const std::string& series) {
   std::error_code error;
-  VolumeSource source{{}, raw, file_name(fs::path(path).lexically_normal().string())};
+  VolumeSource source{{}, raw, file_name(fs::path(path).lexically_normal().string()), series};
+  const Error no_folder{fmt::format("--series: {} is no folder of DICOM slices", path)};
   if (source.name.empty()) source.name = file_name(fs::path(path).lexically_normal().parent_path().string());
   if (!fs::exists(path, error)) return Error{path + ": no such file or folder"};
   if (!fs::is_directory(path, error)) {
+    if (!series.empty()) return no_folder;
     // Reading its header says best what is wrong with it.
     const auto header = read_volume_header(path, raw);
     if (!header) return header.error();
@@ -123,6 +125,7 @@ Result<VolumeSource> find_volume(const std::string& path, const std::string& raw
     return Error{
         fmt::format("{}: holds {} DICOM slices and {} other volumes; give the one or the other a folder of its own",
                     path, slices, volumes.size())};
+  if (!series.empty()) return no_folder;
   auto steps = series_of(volumes, path);
   if (!steps) return steps.error();
   source.steps = std::move(*steps);

@@ -8,6 +8,7 @@ namespace telesplat::data {
 
 struct VolumeOptions {
   std::string raw;       ///< VolumeSource::raw
+  std::string series;    ///< VolumeSource::series
   std::string transfer;  ///< as volume::resolve_transfer takes it; empty: what fits
   bool lit = true;
   /// Steps of a series a second; nothing: all of them in a second, at most 12.5; 0: it does not play.

@@ -216,7 +216,7 @@ std::string up_of_volume(const PlacementOptions& options) { return options.up ==
 
 Result<std::unique_ptr<VolumeStore>> VolumeStore::open(const std::string& path, const VolumeOptions& options,
                                                        const PlacementOptions& placement, const Progress& progress) {
-  const auto source = find_volume(path, options.raw);
+  const auto source = find_volume(path, options.raw, options.series);
   if (!source) return source.error();
   const StepReader read = [source = *source](size_t step, const ReadProgress& told) {
     return read_volume(source, step, told);

@@ -20,7 +20,7 @@ Result<VolumeFileHeader> read_step_header(const VolumeSource& source, size_t ste
   const auto header_of = [&](const std::string& path) -> Result<VolumeFileHeader> {
     std::error_code error;
     if (!std::filesystem::is_directory(path, error)) return read_volume_header(path, source.raw);
-    auto series = find_dicom_series(path);
+    auto series = find_dicom_series(path, source.series);
     if (!series) return series.error();
     return series->header;
   };
@@ -38,7 +38,7 @@ Result<VolumeFileHeader> read_step_header(const VolumeSource& source, size_t ste
 Result<Volume> read_step_here(const VolumeFileHeader& header, const VolumeSource& source, size_t step,
                               const ReadProgress& progress) {
   const std::string& path = source.steps[step];
-  if (header.format == "dicom") return read_dicom(path, progress);
+  if (header.format == "dicom") return read_dicom(path, source.series, progress);
   auto bytes = read_payload(header, path, progress);
   if (!bytes) return bytes.error();
   return make_volume(header, std::move(*bytes), path);

@@ -15,15 +15,16 @@ struct VolumeSource {
   std::vector<std::string> steps;  ///< a file each, or one DICOM folder
   std::string raw;                 ///< --raw: "256x256x256:u8[:sx,sy,sz]"; empty: files tell themselves
   std::string name;                ///< for people
+  std::string series;              ///< --series: which of a DICOM folder's; empty: the one of most slices
 };
 
 /// Whether a path is (by content, then by name) a volume: a volume file, a folder of DICOM slices, or a folder of
 /// numbered volume files.
 bool looks_like_volume(const std::string& path);
 /// A volume file, a DICOM folder, or a folder with a numbered series of volume files (phase00.nrrd, phase02.nrrd, ...),
-/// in order of their numbers. With `raw`, a raw file or a folder of numbered ones. Error: nothing of the kind; names
+/// in order of their numbers. With `raw`, a raw file or a folder of numbered ones. Error: nothing of the kind, a series of what is no DICOM folder; names
 /// path and what it is instead.
-Result<VolumeSource> find_volume(const std::string& path, const std::string& raw);
+Result<VolumeSource> find_volume(const std::string& path, const std::string& raw, const std::string& series = "");
 /// Reads one step. Formats that VTK reads are read in the program telesplat-import (vtk_reader.cpp), so that neither
 /// crashes nor claims of hostile files reach us. Error: truncated, lying and mismatched headers (sizes against file
 /// sizes), more than volume::kMaxSide on an axis, several components, types that are none of VoxelType's (wider ones

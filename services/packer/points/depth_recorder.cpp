@@ -11,12 +11,23 @@
 namespace telesplat::packer {
 namespace {
 constexpr size_t kMaxOpen = 4;  // frames being composed
+constexpr const char* kCameraColumns = "frame,width,height,px,py,pz,qw,qx,qy,qz,left,right,bottom,top,near_m";
+
+std::string row_of(FrameId id, const geometry::Camera& c) {
+  const auto& p = c.pose.position_room;
+  const auto& q = c.pose.orientation;
+  return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", id.value, c.width, c.height, p.x, p.y, p.z, q.w,
+                     q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m);
 }
+
+}  // namespace
 
 Result<DepthRecorder> DepthRecorder::open(const std::string& directory, int max_frames) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder for depth images: {}", directory, error.message())};
+  const std::string cameras = directory + "/cameras.csv";
+  if (!(std::ofstream(cameras) << kCameraColumns << '\n')) return Error{fmt::format("{}: cannot be written", cameras)};
   DepthRecorder out;
   out.directory_ = directory;
   out.left_ = max_frames;
@@ -44,7 +55,9 @@ Status DepthRecorder::add(FrameId id, const geometry::Camera& camera, const geom
   const std::string path = fmt::format("{}/frame-{:06d}.depth", directory_, id.value);
   std::ofstream out(path, std::ios::binary);
   out.write(reinterpret_cast<const char*>(stream.data()), std::streamsize(stream.size()));
-  if (!out) return Error{fmt::format("{}: cannot be written", path)};
+  std::ofstream cameras(directory_ + "/cameras.csv", std::ios::app);
+  cameras << row_of(id, camera) << std::flush;
+  if (!out || !cameras) return Error{fmt::format("{}: cannot be written", path)};
   return ok_status();
 }
 

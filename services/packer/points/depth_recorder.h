@@ -13,7 +13,8 @@ namespace telesplat::packer {
 
 class DepthRecorder {
  public:
-  /// Writes into `directory` (made if need be) as frame-NNNNNN.depth, at most `max_frames` of them.
+  /// Writes into `directory` (made if need be) as frame-NNNNNN.depth, at most `max_frames` of them, and into its
+  /// cameras.csv where each was seen from: without the near plane, codes are not metres.
   static Result<DepthRecorder> open(const std::string& directory, int max_frames);
 
   /// Adds a tile as sampled; the frame is written when its last tile is here. Frames never completed are dropped.

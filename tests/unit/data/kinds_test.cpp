@@ -41,7 +41,7 @@ TEST_F(Kinds, AreToldByContentAndByOptions) {
   EXPECT_EQ(*kind_of(of(mesh())), Kind::kMesh);
   EXPECT_EQ(*kind_of(of("julia")), Kind::kJulia);
   DataOptions volume = of(raw_volume());
-  EXPECT_EQ(*kind_of(volume), Kind::kMesh) << "nothing says that it is a volume: readers of meshes will complain";
+  EXPECT_EQ(refusal(volume), volume.scene + ": raw voxels need --raw SIZExSIZExSIZE:TYPE; it has 64 bytes");
   volume.volume.raw = "4x4x4:u8";
   EXPECT_EQ(*kind_of(volume), Kind::kVolume);
 }
@@ -98,6 +98,12 @@ TEST_F(Kinds, OptionsOfOthersAreRefused) {
   DataOptions julia = of("julia");
   julia.volume.raw = "4x4x4:u8";
   EXPECT_EQ(refusal(julia), "--raw: julia is a Julia set, which has no --raw");
+  DataOptions upright = of("julia");
+  upright.mesh.up = "z";
+  EXPECT_EQ(refusal(upright), "--up: julia is a Julia set, which has no --up");
+  DataOptions kept = of("julia");
+  kept.mesh.cache_dir = "somewhere", kept.mesh.use_cache = true;
+  EXPECT_EQ(refusal(kept), "--cache: julia is no mesh but a Julia set");
   DataOptions lit = of(raw_volume());
   lit.volume.raw = "4x4x4:u8", lit.mesh.iso = 100, lit.volume.lit = false;
   EXPECT_EQ(refusal(lit), "--lighting: " + lit.scene + " is shown as a surface (--iso), which has no --lighting");

@@ -300,8 +300,15 @@ TEST(BadRaw, SizesAndSpecsThatDoNotFit) {
   EXPECT_SAYS(refusal(path, "99999x1x1:u8"), "4096");
   for (const char* spec : {"5x4x3", "5x4:u8", "5x4x3:", "5x4x3:u9", "5x4x3:u8:", "5x4x3:u8:1,2", "5x4x3:u8:1,2,0",
                            "5x4x3:u8:1,-2,1", ":u8", "5x4x3x2:u8", "-5x4x3:u8", "5x4x3:u8:1,2,nan",
-                           "99999999999999999999x1x1:u8", "5X4X3:u8", "5x4x3:f64", "5x4x3:u8:1,1,1:2"})
+                           "99999999999999999999x1x1:u8", "5X4X3:u8", "5x4x3:f16", "5x4x3:u8:1,1,1:2"})
     EXPECT_SAYS(refusal(path, spec), "--raw");
+  // A wrong type is told which there are, all of them.
+  const std::string types = refusal(path, "5x4x3:uint16");
+  EXPECT_SAYS(types, "\"uint16\" is no type");
+  for (const char* type : {"u8", "i16", "u32", "f64", "u16be", "little-endian"}) EXPECT_SAYS(types, type);
+  const std::string nrrd =
+      folder.write("a.nrrd", nrrd_header({{2, 1, 1}, glm::dmat4(1.0), 0, 1}, "uint8", "\n") + "ab");
+  EXPECT_SAYS(refusal(nrrd, "5x4x3:u8"), "it is a nrrd file, which tells its layout itself: leave out --raw");
 }
 
 TEST(BadFolders, SayWhatTheyHoldInstead) {

@@ -236,6 +236,36 @@ TEST(Vti, ReadsExtentsThatBeginElsewhereAndCells) {
   expect_same(read_or_fail(folder.write("cells.vti", file("10 14 -1 2 0 2", "CellData"))), p);
 }
 
+// Plain types are little-endian; "be" turns them round.
+TEST(Raw, HasEveryTypeInEitherByteOrder) {
+  const auto check = [&]<class T>(T, const std::string& type) {
+    const TempFolder folder;
+    const Pattern p{{3, 2, 2}, glm::dmat4(1.0), 5, 3};
+    const std::string little = p.bytes<T>(), big = p.bytes<T>(true);
+    EXPECT_TRUE(sizeof(T) == 1 || little != big);
+    expect_same(read_or_fail(folder.write("little.raw", little), "3x2x2:" + type), p);
+    expect_same(read_or_fail(folder.write("big.raw", big), "3x2x2:" + type + "be"), p);
+  };
+  check(uint8_t{}, "u8"), check(int8_t{}, "i8"), check(uint16_t{}, "u16"), check(int16_t{}, "i16");
+  check(uint32_t{}, "u32"), check(int32_t{}, "i32"), check(uint64_t{}, "u64"), check(int64_t{}, "i64");
+  check(float{}, "f32"), check(double{}, "f64");
+}
+
+TEST(Raw, GuessesAreAsLargeAsTheFile) {
+  EXPECT_EQ(raw_guesses("/data/tooth_103x94x161_uint16.raw", 3117604), std::vector<std::string>{"103x94x161:u16"});
+  EXPECT_EQ(raw_guesses("a-2x3x4.raw", 24 * 4), std::vector<std::string>{"2x3x4:f32"});
+  EXPECT_EQ(raw_guesses("foot.raw", 256 * 256 * 256)[0], "256x256x256:u8");
+  EXPECT_TRUE(raw_guesses("tooth_103x94x161_uint16.raw", 3117605).empty()) << "not that many bytes";
+  EXPECT_TRUE(raw_guesses("99999x99999x99999x1_4096x4096x99999.raw", 7).empty());
+  const TempFolder folder;
+  for (const uint64_t bytes : {1ull << 24, 512ull * 512 * 300 * 2, 100ull * 100 * 100 * 4, 64ull * 64 * 64 * 2})
+    for (const std::string& guess : raw_guesses("a.raw", bytes)) {
+      const auto header = parse_raw_spec(guess, "a.raw");
+      ASSERT_TRUE(header.ok()) << guess;
+      EXPECT_EQ(header->voxel_bytes(), bytes) << guess;
+    }
+}
+
 TEST(Raw, ReadsWhatItIsTold) {
   const TempFolder folder;
   Pattern p{{5, 4, 3}, glm::dmat4(1.0), -20, 1};
@@ -280,7 +310,29 @@ TEST(DicomSeries, TakesTheLongestOfSeveralAndSaysSo) {
   folder.write("localizer.dcm", dicom_slice({{9, 9, 1}, turned(), 0, 1}, 0, {.series = "1.2.4"}));
   const Volume v = read_or_fail(folder / "");
   expect_same(v, p);
-  EXPECT_NE(v.remark.find("1 slices of 1 other series"), std::string::npos) << v.remark;
+  EXPECT_NE(v.remark.find("holds 2 series"), std::string::npos) << v.remark;
+}
+
+TEST(DicomSeries, TakesTheOneThatIsAskedFor) {
+  const TempFolder folder;
+  const Pattern p = turned_pattern(), other{{4, 3, 2}, turned(), 7, 1};
+  for (int k = 0; k < 3; ++k) folder.write(fmt::format("{}.dcm", k), dicom_slice(p, k, {}));
+  for (int k = 0; k < 2; ++k) folder.write(fmt::format("b{}.dcm", k), dicom_slice(other, k, {.series = "1.2.4"}));
+  for (const char* which : {"2", "1.2.4"}) {
+    const auto source = find_volume(folder / "", "", which);
+    ASSERT_TRUE(source.ok()) << source.error().text;
+    const auto volume = read_volume(*source, 0, nullptr);
+    ASSERT_TRUE(volume.ok()) << volume.error().text;
+    expect_same(*volume, other);
+    EXPECT_NE(volume->remark.find("1: MR, 3 slices of 5 x 4; 2: MR, 2 slices of 4 x 3"), std::string::npos)
+        << volume->remark;
+  }
+  const auto none = find_volume(folder / "", "", "3");
+  ASSERT_TRUE(none.ok());
+  const auto refused = read_volume(*none, 0, nullptr);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().text.find("--series \"3\": there is none"), std::string::npos) << refused.error().text;
+  EXPECT_FALSE(find_volume(folder / "0.dcm", "", "1").ok()) << "a series of a single file";
 }
 
 TEST(DicomSeries, GoesByNumberWithoutPositionsAndRescalesEachSlice) {
@@ -348,12 +400,12 @@ TEST(Inspect, SaysWhatTheVolumeIs) {
   const Pattern p = turned_pattern(true);
   const std::string path =
       folder.write("a.nrrd", nrrd_header(p, "int16", "endian: little\nencoding: raw\n\n") + p.bytes<int16_t>());
-  const auto facts = inspect_volume(path, "", nullptr);
+  const auto facts = inspect_volume(path, {}, {}, nullptr);
   ASSERT_TRUE(facts.ok()) << facts.error().text;
   uint64_t counted = 0;
   for (const uint64_t n : facts->histogram) counted += n;
   EXPECT_EQ(counted, p.voxels());
-  const std::string text = describe(*facts);
+  const std::string text = describe(*facts).table();
   for (const char* part : {"nrrd", "5 x 4 x 3 of i16", "0.5 x 0.75 x 2", "left-handed", "-20 .. 39"})
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
 }

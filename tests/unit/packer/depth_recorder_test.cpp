@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -38,6 +39,14 @@ TEST(DepthRecorder, ComposesTilesInAnyOrderAndKeepsAsManyFramesAsAsked) {
   const auto decoded = codec::decode(bytes);
   ASSERT_TRUE(decoded.ok()) << decoded.error().text;
   EXPECT_TRUE(*decoded == whole);
+  // Where it was seen from, with all digits.
+  std::ifstream cameras(directory + "/cameras.csv");
+  std::string columns, row, more;
+  std::getline(cameras, columns), std::getline(cameras, row);
+  EXPECT_EQ(columns, "frame,width,height,px,py,pz,qw,qx,qy,qz,left,right,bottom,top,near_m");
+  EXPECT_EQ(
+      row, fmt::format("5,48,32,0,0,0,1,0,0,0,{},{},{},{},0.02", camera.left, camera.right, camera.bottom, camera.top));
+  EXPECT_FALSE(std::getline(cameras, more)) << more;
   std::filesystem::remove_all(directory);
 }
 

@@ -58,6 +58,11 @@ Result<glm::vec3> corner(const std::string& path, toml::table& table, const char
   glm::vec3 out(NAN);
   if (array && array->size() == 3)
     for (int i = 0; i < 3; ++i) out[i] = float(array->get(size_t(i))->value<double>().value_or(NAN));
+  if (!array)
+    return Error{
+        fmt::format("{}: has no {} in [placement], so where the set stood is not known: earlier versions did not "
+                    "record it of runs that were started by hand",
+                    path, key)};
   if (!std::isfinite(out.x + out.y + out.z))
     return Error{fmt::format("{}: key {} of [placement] is not three numbers", path, key)};
   return out;
@@ -202,10 +207,23 @@ std::string JuliaScene::describe_record() const {
   return out;
 }
 
-Result<std::string> JuliaScene::describe_data() const {
+Result<data::Description> JuliaScene::describe_data(const data::Progress&) const {
   const auto scene = julia::read_scene(options_.julia);
   if (!scene) return scene.error();
-  return fmt::format("{}\n{}", scene->title, lines_of(scene->parameters));
+  const auto placement = julia::place(*scene, options_.mesh.room_size_m);
+  if (!placement) return placement.error();
+  data::Description out("julia", scene->title + ": a Julia set");
+  out.json["title"] = scene->title;
+  for (const auto& info : julia::parameter_infos()) {
+    const double value = julia::get(scene->parameters, info.name);
+    out.row(std::string(info.name), fmt::format("{:<12g} {}", value, info.text));
+    out.json["parameters"][std::string(info.name)] = value;
+  }
+  const std::string timeline = scene->timeline.text();
+  out.row("animation", timeline.empty() ? "none" : timeline);
+  out.json["animation"] = timeline;
+  data::describe_room(out, placement->box_room, "", "");
+  return out;
 }
 
 }  // namespace telesplat::launcher

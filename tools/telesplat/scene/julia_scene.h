@@ -21,7 +21,7 @@ class JuliaScene : public Scene {
   Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const override;
   std::string summary(uint64_t primitives) const override;
   std::string describe_record() const override;
-  Result<std::string> describe_data() const override;
+  Result<data::Description> describe_data(const data::Progress& progress) const override;
 
   struct Record {
     std::string directory, title;

@@ -47,8 +47,8 @@ Result<std::unique_ptr<DirectScene>> MeshScene::open_direct(int threads, const d
 
 std::string MeshScene::summary(uint64_t primitives) const { return fmt::format(": {} triangles", primitives); }
 
-Result<std::string> MeshScene::describe_data() const {
-  const auto facts = data::inspect_mesh(options_.scene, options_.mesh_options(), [](const char*, double) {});
+Result<data::Description> MeshScene::describe_data(const data::Progress& progress) const {
+  const auto facts = data::inspect_mesh(options_.scene, options_.mesh_options(), progress);
   if (!facts) return facts.error();
   return data::describe(*facts);
 }

@@ -11,7 +11,7 @@ class MeshScene : public Scene {
   scene::Kind kind() const override { return scene::Kind::kMesh; }
   Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const override;
   std::string summary(uint64_t primitives) const override;
-  Result<std::string> describe_data() const override;
+  Result<data::Description> describe_data(const data::Progress& progress) const override;
 };
 
 }  // namespace telesplat::launcher

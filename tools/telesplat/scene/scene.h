@@ -10,6 +10,7 @@
 #include "common/scene/kind.h"
 #include "services/data/base/progress.h"
 #include "services/data/data_options.h"
+#include "services/data/description.h"
 #include "tools/telesplat/scene/direct_scene.h"
 
 namespace telesplat::launcher {
@@ -47,8 +48,8 @@ class Scene {
   virtual std::string summary(uint64_t primitives) const = 0;
   /// What `telesplat inspect` tells of the scene of a run folder beside its summary: lines; may be empty.
   virtual std::string describe_record() const { return {}; }
-  /// What `telesplat inspect` tells of the data: lines.
-  virtual Result<std::string> describe_data() const = 0;
+  /// What `telesplat inspect` tells of the data.
+  virtual Result<data::Description> describe_data(const data::Progress& progress) const = 0;
 
  protected:
   data::DataOptions options_;

@@ -19,14 +19,12 @@ namespace {
 // Quotes double the text's length, numbers stand beside it.
 constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = volume::kMaxTransferText * 2 + (1 << 14)};
 
-// The picture with depth 1 where it differs visibly from the background, and none elsewhere.
-image::View with_outline(image::View view, uint32_t background) {
-  constexpr int kVisible = 3;  // steps of 255
+// The picture with depth 1 where the volume covers it visibly, and none elsewhere, whatever the background.
+image::View with_outline(image::View view) {
+  constexpr uint32_t kVisible = 3;  // steps of 255
   view.depth_m.assign(view.colour.size(), std::numeric_limits<float>::infinity());
   for (size_t i = 0; i < view.colour.size(); ++i)
-    for (const int shift : {0, 8, 16})
-      if (std::abs(int(view.colour[i] >> shift & 255) - int(background >> shift & 255)) >= kVisible)
-        view.depth_m[i] = 1;
+    if (view.colour[i] >> 24 >= kVisible) view.depth_m[i] = 1;
   return view;
 }
 
@@ -40,10 +38,10 @@ class DirectVolume : public DirectScene {
     if (const Status s = prepare(epoch); !s) return s.error();
     return raycaster_->draw(camera, shading.background);
   }
-  // A volume has no surface: it shows where the picture is not the background.
+  // A volume has no surface: it shows where it covers the picture.
   image::Quality compare(const image::View& reference, const image::View& view,
-                         const image::ShadingParameters& shading) const override {
-    return image::compare(with_outline(reference, shading.background), with_outline(view, shading.background));
+                         const image::ShadingParameters&) const override {
+    return image::compare(with_outline(reference), with_outline(view));
   }
   Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override {
     return Error{fmt::format("{}: is a volume, of which no depth images are sampled", file_)};
@@ -109,7 +107,7 @@ Result<VolumeScene::Epoch> VolumeScene::Epochs::at(EpochId epoch) const {
 }
 
 Status VolumeScene::check() const {
-  const auto found = data::find_volume(options_.scene, options_.volume.raw);
+  const auto found = data::find_volume(options_.scene, options_.volume.raw, options_.volume.series);
   return found ? ok_status() : Status(found.error());
 }
 
@@ -131,8 +129,8 @@ std::string VolumeScene::summary(uint64_t) const {
   return fmt::format(": {} epoch(s)", std::max<size_t>(1, epochs_.by_id.size()));
 }
 
-Result<std::string> VolumeScene::describe_data() const {
-  const auto facts = data::inspect_volume(options_.scene, options_.volume.raw, nullptr);
+Result<data::Description> VolumeScene::describe_data(const data::Progress& progress) const {
+  const auto facts = data::inspect_volume(options_.scene, options_.volume, options_.mesh, progress);
   if (!facts) return facts.error();
   return data::describe(*facts);
 }

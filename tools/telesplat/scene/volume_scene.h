@@ -16,7 +16,7 @@ class VolumeScene : public Scene {
   Status read_record(const std::string& run_directory) override;
   Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const override;
   std::string summary(uint64_t primitives) const override;
-  Result<std::string> describe_data() const override;
+  Result<data::Description> describe_data(const data::Progress& progress) const override;
 
   struct Epoch {
     std::string transfer;  ///< text form, absolute values; empty: as the data server begins

@@ -167,6 +167,12 @@ class Parser {
       case 0x00080060:
         out_.modality = std::string(text.substr(0, 16));
         break;
+      case 0x0008103e:
+        out_.series_text = std::string(text.substr(0, 64));
+        break;
+      case 0x00200011:
+        decimals(text, out_.series_number);
+        break;
       case 0x0020000e:
         out_.series = std::string(text.substr(0, 64));
         break;

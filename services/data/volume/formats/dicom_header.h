@@ -14,9 +14,11 @@ namespace telesplat::data {
 
 struct DicomSlice {
   std::string path;
-  std::string series;    ///< Series Instance UID
-  std::string modality;  ///< "CT", "MR", ...
-  double instance = 0;   ///< Instance Number
+  std::string series;        ///< Series Instance UID
+  std::string series_text;   ///< Series Description; often empty
+  double series_number = 0;  ///< Series Number
+  std::string modality;      ///< "CT", "MR", ...
+  double instance = 0;       ///< Instance Number
   int rows = 0, columns = 0, components = 1, frames = 1;
   int bits_allocated = 0, bits_stored = 0;
   bool is_signed = false, big_endian = false;

@@ -25,9 +25,11 @@ constexpr double kSamePlace = 1e-3;     // of a pixel
 
 std::string file_name(const std::string& path) { return fs::path(path).filename().string(); }
 
-// All slices with pixels, by series.
-Result<std::map<std::string, std::vector<DicomSlice>>> read_slices(const std::string& folder) {
-  std::map<std::string, std::vector<DicomSlice>> series;
+using Slices = std::vector<DicomSlice>;
+
+// All slices with pixels, a series each, by number and UID.
+Result<std::vector<Slices>> read_slices(const std::string& folder) {
+  std::map<std::string, Slices> series;
   std::error_code error;
   std::vector<std::string> paths;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
@@ -45,7 +47,39 @@ Result<std::map<std::string, std::vector<DicomSlice>>> read_slices(const std::st
     if (slice->data_bytes > 0) series[slice->series].push_back(std::move(*slice));
   }
   if (series.empty()) return Error{folder + ": holds no DICOM slices"};
-  return series;
+  std::vector<Slices> out;
+  for (auto& [uid, slices] : series) out.push_back(std::move(slices));
+  std::stable_sort(out.begin(), out.end(),
+                   [](auto& a, auto& b) { return a.front().series_number < b.front().series_number; });
+  return out;
+}
+
+std::vector<DicomSeriesName> names_of(const std::vector<Slices>& all) {
+  std::vector<DicomSeriesName> out;
+  for (const Slices& slices : all) {
+    const DicomSlice& any = slices.front();
+    out.push_back({any.series, any.series_text, any.modality, slices.size(), any.columns, any.rows});
+  }
+  return out;
+}
+
+std::string list_of(const std::vector<DicomSeriesName>& all) {
+  constexpr size_t kMostNamed = 12;
+  std::string out;
+  for (size_t i = 0; i < std::min(all.size(), kMostNamed); ++i)
+    out += fmt::format("{}{}", i > 0 ? "; " : "", text_of(all[i], i));
+  return all.size() > kMostNamed ? fmt::format("{}; and {} more", out, all.size() - kMostNamed) : out;
+}
+
+// The place of the series that was asked for.
+Result<size_t> choose(const std::vector<DicomSeriesName>& all, const std::string& which, const std::string& folder) {
+  if (which.empty())
+    return size_t(std::max_element(all.begin(), all.end(), [](auto& a, auto& b) { return a.slices < b.slices; }) -
+                  all.begin());
+  for (size_t i = 0; i < all.size(); ++i)
+    if (which == all[i].uid || which == std::to_string(i + 1)) return i;
+  return Error{fmt::format("{}: --series {}: there is none of that place or UID; there are {}", folder,
+                           in_quotes(which), list_of(all))};
 }
 
 Status check_slice(const DicomSlice& s, const DicomSlice& first) {
@@ -135,20 +169,29 @@ void unpack(const DicomSlice& s, const std::byte* from, size_t count, std::byte*
 
 }  // namespace
 
-Result<DicomSeries> find_dicom_series(const std::string& folder) {
+std::string text_of(const DicomSeriesName& series, size_t place) {
+  // What files say: cut, and without what a terminal might obey.
+  const auto plain = [](const std::string& said) {
+    const std::string quoted = in_quotes(said);
+    return said.empty() ? "" : quoted.substr(1, quoted.size() - 2) + ", ";
+  };
+  return fmt::format("{}: {}{}{} slices of {} x {}", place + 1, plain(series.text), plain(series.modality),
+                     series.slices, series.columns, series.rows);
+}
+
+Result<DicomSeries> find_dicom_series(const std::string& folder, const std::string& which) {
   auto all = read_slices(folder);
   if (!all) return all.error();
-  auto largest = all->begin();
-  size_t slices = 0;
-  for (auto at = all->begin(); at != all->end(); ++at) {
-    slices += at->second.size();
-    if (at->second.size() > largest->second.size()) largest = at;
-  }
   DicomSeries series;
-  series.slices = std::move(largest->second);
+  series.all = names_of(*all);
+  const auto taken = choose(series.all, which, folder);
+  if (!taken) return taken.error();
+  series.taken = *taken;
+  series.slices = std::move((*all)[*taken]);
   if (all->size() > 1)
-    series.remark = fmt::format("{} slices of {} other series in the folder were left out",
-                                slices - series.slices.size(), all->size() - 1);
+    series.remark =
+        fmt::format("the folder holds {} series ({}); series {} was taken{}", all->size(), list_of(series.all),
+                    *taken + 1, which.empty() ? ", which has the most slices; --series takes another" : "");
   for (const DicomSlice& s : series.slices)
     if (auto status = check_slice(s, series.slices.front()); !status) return status.error();
   const auto step = order(series, folder);
@@ -175,8 +218,8 @@ Result<DicomSeries> find_dicom_series(const std::string& folder) {
   return series;
 }
 
-Result<Volume> read_dicom(const std::string& folder, const ReadProgress& progress) {
-  const auto series = find_dicom_series(folder);
+Result<Volume> read_dicom(const std::string& folder, const std::string& which, const ReadProgress& progress) {
+  const auto series = find_dicom_series(folder, which);
   if (!series) return series.error();
   const VolumeFileHeader& h = series->header;
   if (auto status = check_memory(h.voxel_bytes(), folder); !status) return status.error();

@@ -7,7 +7,6 @@
 #include <zlib.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -177,50 +176,6 @@ Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& 
   return h;
 }
 
-Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path) {
-  VolumeFileHeader h;
-  h.format = "raw";
-  h.data_path = path;
-  const Error bad{
-      fmt::format("{}: --raw {} is not as 256x256x256:u8 or 512x512x100:i16be:0.5,0.5,2 (types: u8, i8, u16, "
-                  "i16, f32)",
-                  path, in_quotes(spec))};
-  const size_t colon = spec.find(':');
-  if (colon == spec.npos || spec.size() > 200) return bad;
-  std::string_view sizes = spec.substr(0, colon), type = spec.substr(colon + 1), spacing;
-  if (const size_t second = type.find(':'); second != type.npos)
-    spacing = type.substr(second + 1), type = type.substr(0, second);
-  const char* at = sizes.data();
-  const char* end = at + sizes.size();
-  for (size_t a = 0; a < 3; ++a) {
-    if (a > 0 && (at == end || *at++ != 'x')) return bad;
-    const auto parsed = std::from_chars(at, end, h.size[a]);
-    if (parsed.ec != std::errc() || h.size[a] < 0) return bad;
-    at = parsed.ptr;
-  }
-  if (at != end) return bad;
-  if (type.ends_with("be")) h.big_endian = true, type.remove_suffix(2);
-  if (type == "u8")
-    h.stored = StoredType::kU8;
-  else if (type == "i8")
-    h.stored = StoredType::kI8;
-  else if (type == "u16")
-    h.stored = StoredType::kU16;
-  else if (type == "i16")
-    h.stored = StoredType::kI16;
-  else if (type == "f32")
-    h.stored = StoredType::kF32;
-  else
-    return bad;
-  if (spec.back() == ':') return bad;
-  if (!spacing.empty()) {
-    const auto s = numbers(spacing, true);
-    if (!s || s->size() != 3 || !((*s)[0] > 0 && (*s)[1] > 0 && (*s)[2] > 0)) return bad;
-    h.index_to_data = placement({(*s)[0], 0, 0}, {0, (*s)[1], 0}, {0, 0, (*s)[2]}, glm::dvec3(0));
-  }
-  return h;
-}
-
 Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::string& raw) {
   const auto start = read_start(path);
   if (!start) return start.error();
@@ -251,7 +206,12 @@ Result<VolumeFileHeader> read_volume_header(const std::string& path, const std::
     h.skip_unpacked = h.data_at;
     h.data_at = 0;
   }
-  if (auto status = check_header(h, data_bytes, path); !status) return status.error();
+  if (auto status = check_header(h, data_bytes, path); !status) {
+    const std::string own = raw.empty() ? "" : volume_format(*start, path);
+    if (own.empty()) return status.error();
+    return Error{
+        fmt::format("{}; it is a {} file, which tells its layout itself: leave out --raw", status.error().text, own)};
+  }
   return h;
 }
 

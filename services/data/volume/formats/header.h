@@ -8,6 +8,7 @@
 #include <glm/mat4x4.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/core/result.h"
 
@@ -60,9 +61,16 @@ Result<VolumeFileHeader> parse_nifti(std::string_view content, const std::string
 /// VTK's XML images: size (of cells, if there are no point data) and the most bytes a voxel can take; type and
 /// placement are VTK's to say.
 Result<VolumeFileHeader> parse_vti(std::string_view content, const std::string& path);
-/// What --raw says, for the file at `path`: "WxHxD:TYPE[:SX,SY,SZ]" with TYPE u8, i8, u16, i16, f32 and "be" behind it
-/// for big-endian.
+
+/// For help texts and errors.
+inline constexpr const char* kRawTypes =
+    "u8, i8, u16, i16, u32, i32, u64, i64, f32, f64, little-endian, or big-endian with be behind them (u16be)";
+/// What --raw says, for the file at `path`: "WxHxD:TYPE[:SX,SY,SZ]", TYPE one of kRawTypes.
 Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path);
+/// What --raw could say of a file of so many bytes, likeliest first, at most three: what its name says
+/// (tooth_103x94x161_uint16.raw), else cubes and stacks of square slices that are nearly cubes. Each has exactly that
+/// many bytes.
+std::vector<std::string> raw_guesses(const std::string& path, uint64_t bytes);
 
 /// Refuses sizes outside [1, volume::kMaxSide] and beyond kMaxVoxels, placements that are no grid's, and claims that
 /// data of `data_bytes` cannot hold (compressed: at 1032 to 1, deflate's best). For raw files, also data that is longer

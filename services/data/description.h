@@ -1,0 +1,41 @@
+// What `telesplat inspect` tells of something: a table for people, and all of it for programs.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/geometry/box.h"
+
+namespace telesplat::data {
+
+class Description {
+ public:
+  /// what: for programs ("mesh"); title: the first line for people.
+  Description(const std::string& what, std::string title);
+
+  /// A row of the table. Without a label it goes on with the row above.
+  void row(std::string label, std::string text) { rows_.emplace_back(std::move(label), std::move(text)); }
+  /// The table, each line ended by a line feed; control characters of files' texts are replaced.
+  std::string table() const;
+  std::string to_json() const;  ///< indented; what is not UTF-8 is replaced
+
+  nlohmann::ordered_json json;  ///< begins with "what"
+
+ private:
+  std::string title_;
+  std::vector<std::pair<std::string, std::string>> rows_;
+};
+
+std::string bytes_text(uint64_t bytes);        ///< "812 bytes", "1.3 MB"
+std::string vector_text(const glm::dvec3& v);  ///< "(1, 2.5, -3)"
+std::string extent_text(const glm::dvec3& v);  ///< "1 x 2.5 x 3"
+nlohmann::ordered_json vector_json(const glm::dvec3& v);
+nlohmann::ordered_json box_json(const geometry::DBox& box);  ///< "lo", "hi"
+
+/// Where something stands in the room: a row each for its box and for the axis that points up, and the same as "room".
+void describe_room(Description& out, const geometry::Box& box_room, const std::string& up, const std::string& reason);
+
+}  // namespace telesplat::data

@@ -1,0 +1,143 @@
+// What --raw says of a file that does not tell its layout itself, and what it could say.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "common/volume/grid.h"
+#include "services/data/volume/formats/header_text.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr StoredType kTypes[] = {StoredType::kU8,  StoredType::kI8,  StoredType::kU16, StoredType::kI16,
+                                 StoredType::kU32, StoredType::kI32, StoredType::kU64, StoredType::kI64,
+                                 StoredType::kF32, StoredType::kF64};
+
+std::optional<StoredType> type_named(std::string_view name) {
+  for (const StoredType type : kTypes)
+    if (name == name_of(type)) return type;
+  return std::nullopt;
+}
+
+// "103x94x161" at the text's beginning; leaves what follows.
+std::optional<std::array<int64_t, 3>> take_size(std::string_view& text) {
+  std::array<int64_t, 3> size{};
+  const char *at = text.data(), *const end = at + text.size();
+  for (size_t a = 0; a < 3; ++a) {
+    if (a > 0 && (at == end || *at++ != 'x')) return std::nullopt;
+    const auto parsed = std::from_chars(at, end, size[a]);
+    if (parsed.ec != std::errc() || size[a] < 0) return std::nullopt;
+    at = parsed.ptr;
+  }
+  text.remove_prefix(size_t(at - text.data()));
+  return size;
+}
+
+// Words for types that file names have: "tooth_103x94x161_uint16.raw".
+std::optional<StoredType> type_in(std::string_view name) {
+  constexpr std::pair<std::string_view, StoredType> kWords[] = {
+      {"uint8", StoredType::kU8},    {"uint16", StoredType::kU16}, {"uint32", StoredType::kU32},
+      {"uchar", StoredType::kU8},    {"ushort", StoredType::kU16}, {"int8", StoredType::kI8},
+      {"int16", StoredType::kI16},   {"int32", StoredType::kI32},  {"short", StoredType::kI16},
+      {"float64", StoredType::kF64}, {"double", StoredType::kF64}, {"float", StoredType::kF32}};
+  for (const auto& [word, type] : kWords)
+    if (name.find(word) != name.npos) return type;
+  return std::nullopt;
+}
+
+StoredType usual_type(uint64_t bytes) {
+  return bytes == 1   ? StoredType::kU8
+         : bytes == 2 ? StoredType::kU16
+         : bytes == 4 ? StoredType::kF32
+                      : StoredType::kF64;
+}
+
+// What a name says, if the file is as large as that.
+std::string guess_by_name(std::string_view name, uint64_t bytes) {
+  for (size_t at = 0; at < name.size(); ++at) {
+    if (!std::isdigit(static_cast<unsigned char>(name[at])) ||
+        (at > 0 && std::isdigit(static_cast<unsigned char>(name[at - 1]))))
+      continue;
+    std::string_view rest = name.substr(at);
+    const auto size = take_size(rest);
+    if (!size) continue;
+    uint64_t voxels = 1;
+    for (const int64_t n : *size) voxels *= n >= 1 && n <= volume::kMaxSide ? uint64_t(n) : 0;
+    const auto named = type_in(name);
+    for (const uint64_t each : {1, 2, 4, 8})
+      if (voxels > 0 && voxels * each == bytes && (!named || stored_bytes(*named) == each))
+        return fmt::format("{}x{}x{}:{}", (*size)[0], (*size)[1], (*size)[2],
+                           name_of(named.value_or(usual_type(each))));
+  }
+  return "";
+}
+
+}  // namespace
+
+Result<VolumeFileHeader> parse_raw_spec(std::string_view spec, const std::string& path) {
+  VolumeFileHeader h;
+  h.format = "raw";
+  h.data_path = path;
+  const auto bad = [&](const std::string& what) {
+    return Error{fmt::format("{}: --raw {}: {}, as in 256x256x256:u8 or 512x512x100:i16be:0.5,0.5,2", path,
+                             in_quotes(spec), what)};
+  };
+  constexpr const char* kShape = "SIZExSIZExSIZE:TYPE[:SPACING,SPACING,SPACING] is needed";
+  std::string_view rest = spec;
+  const auto size = spec.size() <= 200 ? take_size(rest) : std::nullopt;
+  if (!size || !rest.starts_with(':')) return bad(kShape);
+  h.size = *size;
+  rest.remove_prefix(1);
+  const size_t colon = std::min(rest.find(':'), rest.size());
+  std::string_view type = rest.substr(0, colon);
+  const std::string_view whole = type;
+  if (type.ends_with("be")) h.big_endian = true, type.remove_suffix(2);
+  const auto stored = type_named(type);
+  if (!stored) return bad(fmt::format("{} is no type; types are {}", in_quotes(whole), kRawTypes));
+  h.stored = *stored;
+  if (colon == rest.size()) return h;
+  const auto s = numbers(rest.substr(colon + 1), true);
+  if (!s || s->size() != 3 || !((*s)[0] > 0 && (*s)[1] > 0 && (*s)[2] > 0))
+    return bad(fmt::format("{} is not three spacings above 0", in_quotes(rest.substr(colon + 1))));
+  h.index_to_data = placement({(*s)[0], 0, 0}, {0, (*s)[1], 0}, {0, 0, (*s)[2]}, glm::dvec3(0));
+  return h;
+}
+
+std::vector<std::string> raw_guesses(const std::string& path, uint64_t bytes) {
+  const std::string name = lower(std::filesystem::path(path).filename().string());
+  if (const std::string named = guess_by_name(name, bytes); !named.empty()) return {named};
+  struct Guess {
+    int64_t slices;  // against the side: how far from a cube
+    int64_t side;
+    uint64_t each;
+  };
+  constexpr size_t kMost = 3;
+  constexpr int64_t kFlattest = 4;
+  std::vector<Guess> found;
+  for (const uint64_t each : {1, 2, 4}) {
+    const auto cube = int64_t(std::llround(std::cbrt(double(bytes / each))));
+    if (cube >= 8 && cube <= volume::kMaxSide && uint64_t(cube) * uint64_t(cube) * uint64_t(cube) * each == bytes)
+      found.push_back({cube, cube, each});
+    for (const int64_t side : {64, 128, 256, 512, 1024, 2048}) {
+      const uint64_t slice = uint64_t(side) * uint64_t(side) * each;
+      const auto slices = int64_t(bytes / slice);
+      if (bytes % slice == 0 && slices != side && slices * kFlattest >= side && slices <= side * kFlattest)
+        found.push_back({slices, side, each});
+    }
+  }
+  const auto flatness = [](const Guess& g) {
+    return double(std::max(g.slices, g.side)) / double(std::min(g.slices, g.side));
+  };
+  std::stable_sort(found.begin(), found.end(), [&](auto& a, auto& b) { return flatness(a) < flatness(b); });
+  std::vector<std::string> out;
+  for (const Guess& g : found)
+    if (out.size() < kMost)
+      out.push_back(fmt::format("{}x{}x{}:{}", g.side, g.side, g.slices, name_of(usual_type(g.each))));
+  return out;
+}
+
+}  // namespace telesplat::data

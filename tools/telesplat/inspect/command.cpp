@@ -1,0 +1,145 @@
+// `telesplat inspect PATH`: what a data set, a run folder, a picture, a recorded frame, a depth image or a file of the
+// cache holds.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "services/data/inspect.h"
+#include "services/data/kinds.h"
+#include "services/data/volume/volume.h"
+#include "tools/common/complain.h"
+#include "tools/common/progress_line.h"
+#include "tools/telesplat/command.h"
+#include "tools/telesplat/inspect/pictures.h"
+#include "tools/telesplat/inspect/run_folder.h"
+#include "tools/telesplat/scene/scene.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct InspectOptions {
+  data::DataOptions data;  // its scene: the path
+  bool json = false;
+  std::string out;               // .npy or .exr file for depth; empty: none
+  std::optional<double> near_m;  // of a depth image of which nothing tells it
+};
+
+options::Table own_table(InspectOptions& o) {
+  return {
+      {.flag = "--json", .value = &o.json, .help = "print all that is known, as JSON"},
+      {.flag = "--out",
+       .value = &o.out,
+       .help = "of depth images and pictures with depth: write the depth in metres, rows from the top, infinity where "
+               "nothing is, into FILE.npy (float32) or FILE.exr (channel Z, with R, G, B and normals N)"},
+      {.flag = "--near",
+       .value = &o.near_m,
+       .help = "of depth images: near plane of the camera that saw them, metres; default: as cameras.csv beside them "
+               "says",
+       .limits = options::Range{1e-6, 1e6}},
+  };
+}
+
+options::Table table(InspectOptions& o) {
+  options::Table path{{.flag = "path",
+                       .value = &o.data.scene,
+                       .help = data::scene_help() +
+                               "; or a run folder, a picture, a recorded frame, a depth image (.depth), a chunk store "
+                               "of the cache (.mesh)",
+                       .required = true}};
+  return joined(joined(std::move(path), own_table(o)), data::scene_table(o.data));
+}
+
+// What lies at the path, as far as flags decide on it.
+enum class Subject { kData, kRun, kPicture, kDepthImage, kStore };
+
+std::string lower_extension(const std::string& path) {
+  std::string out = fs::path(path).extension().string();
+  std::transform(out.begin(), out.end(), out.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  return out;
+}
+
+Subject subject_of(const data::DataOptions& o) {
+  std::error_code error;
+  const std::string& path = o.scene;
+  if (path == julia::kSceneWord || !o.volume.raw.empty()) return Subject::kData;
+  // A folder is a run's, unless it holds a volume and no run.
+  if (fs::is_directory(path, error))
+    return fs::exists(path + "/summary.json", error) || !data::looks_like_volume(path) ? Subject::kRun : Subject::kData;
+  const std::string extension = lower_extension(path);
+  if (extension == ".depth") return Subject::kDepthImage;
+  if (extension == ".mesh") return Subject::kStore;
+  const bool picture = extension == ".exr" || extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+  if (extension == ".frame" || (picture && !data::is_mesh_file(path))) return Subject::kPicture;
+  return Subject::kData;
+}
+
+// Flags that say nothing of what lies there.
+Status refuse_misfits(const InspectOptions& o, const options::Given& given, Subject subject) {
+  constexpr const char* kWords[] = {"a data set", "a run folder", "a picture", "a depth image", "a chunk store"};
+  InspectOptions any;
+  const options::Table own = own_table(any), data = data::scene_table(any.data);
+  for (const std::string& flag : given) {
+    const bool deep = subject == Subject::kPicture || subject == Subject::kDepthImage;
+    const bool fits = options::find(data, flag) ? subject == Subject::kData
+                      : flag == "--out"         ? deep
+                      : flag == "--near"        ? subject == Subject::kDepthImage
+                                                : true;
+    if (!fits)
+      return Error{fmt::format("{}: {} is {}, which has no {}", flag, o.data.scene, kWords[size_t(subject)], flag)};
+  }
+  return ok_status();
+}
+
+Result<data::Description> inspect_data(const data::DataOptions& options) {
+  const auto scene = scene_of(options);
+  if (!scene) return scene.error();
+  tools::ProgressLine progress(1);
+  return (*scene)->describe_data([&](const char* what, double fraction) { progress.show(what, fraction); });
+}
+
+Result<data::Description> inspect_with_depth(const InspectOptions& o, Subject subject) {
+  const std::string& path = o.data.scene;
+  auto picture = subject == Subject::kPicture ? inspect_picture(path) : inspect_depth_image(path, o.near_m);
+  if (!picture) return picture.error();
+  if (o.out.empty()) return std::move(picture->description);
+  if (const Status s = write_depth(o.out, *picture, path); !s) return s.error();
+  picture->description.row("written", o.out);
+  picture->description.json["written"] = o.out;
+  return std::move(picture->description);
+}
+
+Result<data::Description> inspect_store(const std::string& path) {
+  const auto facts = data::inspect_store(path);
+  if (!facts) return facts.error();
+  return data::describe(*facts);
+}
+
+int inspect(InspectOptions o, const options::Given& given) {
+  const std::string& path = o.data.scene;
+  std::error_code error;
+  if (path != julia::kSceneWord && !fs::exists(path, error))
+    return tools::complain({fmt::format("{}: no such file", path)});
+  const Subject subject = subject_of(o.data);
+  if (const Status s = refuse_misfits(o, given, subject); !s) return tools::complain(s.error());
+  const auto told = subject == Subject::kData    ? inspect_data(o.data)
+                    : subject == Subject::kRun   ? inspect_run(path)
+                    : subject == Subject::kStore ? inspect_store(path)
+                                                 : inspect_with_depth(o, subject);
+  if (!told) return tools::complain(told.error());
+  std::printf("%s", (o.json ? told->to_json() + "\n" : told->table()).c_str());
+  return 0;
+}
+
+}  // namespace
+
+Command inspect_command() {
+  return make_command("inspect",
+                      "tell what a data set, a run folder, a picture or a depth image holds, and where it will stand",
+                      table, inspect);
+}
+
+}  // namespace telesplat::launcher
