@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "common/options/table.h"
 #include "tools/telesplat/control/client.h"
 
 namespace telesplat::launcher {

@@ -11,12 +11,17 @@ ControlClient::ControlClient(const std::string& master_endpoint)
 
 Result<std::string> ControlClient::ask(const std::string& command, double timeout_s,
                                        const std::map<std::string, std::string>& arguments) {
-  return net::ask_master(socket_, endpoint_, command, timeout_s, arguments);
+  auto reply = order(command, timeout_s, arguments);
+  if (!reply) return reply.error();
+  if (!reply->ok) return Error{std::move(reply->text)};
+  return std::move(reply->text);
 }
 
 Result<wire::ControlReply> ControlClient::order(const std::string& command, double timeout_s,
                                                 const std::map<std::string, std::string>& arguments) {
-  return net::reply_of_master(socket_, endpoint_, command, timeout_s, arguments);
+  auto reply = net::reply_of_master(socket_, endpoint_, command, timeout_s, arguments);
+  unanswered_ = !reply.ok();
+  return reply;
 }
 
 void ControlClient::request_status() { socket_.send(wire::Control{"status", {}}); }

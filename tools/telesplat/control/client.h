@@ -18,6 +18,8 @@ class ControlClient {
   /// The same, but a refusal is an answer.
   Result<wire::ControlReply> order(const std::string& command, double timeout_s,
                                    const std::map<std::string, std::string>& arguments = {});
+  /// Whether the last question had no answer, so that an error is not of what was asked.
+  bool unanswered() const { return unanswered_; }
   /// Sends "status" without waiting; poll_status() gives the answer once it is there.
   void request_status();
   std::optional<nlohmann::json> poll_status();
@@ -26,6 +28,7 @@ class ControlClient {
   std::string endpoint_;
   net::Context context_;
   net::Socket socket_;
+  bool unanswered_ = false;
 };
 
 }  // namespace telesplat::launcher

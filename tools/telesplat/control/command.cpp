@@ -1,57 +1,84 @@
 // `telesplat ctl ORDER ...`: asks or tells a running session's master.
-#include <cstdio>
-
 #include <fmt/format.h>
 
-#include "common/net/master_address.h"
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <thread>
+
+#include "common/net/service.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
-#include "tools/telesplat/control/client.h"
+#include "tools/telesplat/control/choice.h"
+#include "tools/telesplat/control/list.h"
 #include "tools/telesplat/control/orders.h"
+#include "tools/telesplat/control/status_text.h"
 
 namespace telesplat::launcher {
 namespace {
 
+constexpr std::chrono::milliseconds kLookAtSignals{50};
+constexpr int kLooksASecond = 20;
+
 struct StatusOptions {
-  std::string master = "tcp://127.0.0.1:7700";
+  SessionChoice session;
+  bool json = false, watch = false;
 };
 
 struct OrderOptions {
   Order order;
   std::vector<std::string> words;
-  std::string master = "tcp://127.0.0.1:7700";
+  SessionChoice session;
 };
 
 options::Table status_table(StatusOptions& o) {
-  return {
-      {.flag = "--master", .value = &o.master, .help = "address of the master", .environment = net::kMasterVariable}};
+  return joined({{.flag = "--json", .value = &o.json, .help = "print everything for programs"},
+                 {.flag = "--watch", .value = &o.watch, .help = "again every second, until Ctrl-C or the end"}},
+                session_rows(o.session));
 }
 
 options::Table order_table(OrderOptions& o) {
   options::Table out;
   if (!o.order.words.empty()) out.push_back({.flag = "values", .value = &o.words, .help = o.order.words});
-  out.push_back(
-      {.flag = "--master", .value = &o.master, .help = "address of the master", .environment = net::kMasterVariable});
-  return out;
+  return joined(std::move(out), session_rows(o.session));
 }
 
-int show_status(StatusOptions o, const options::Given&) {
-  log::initialise("ctl", "warn");
-  ControlClient client(o.master);
+// Error: no answer.
+Status print_status(ControlClient& client, const StatusOptions& o) {
   const auto answer = client.ask("status", kPatience_s);
-  if (!answer) return tools::complain(answer.error(), 1);
+  if (!answer) return answer.error();
   const auto json = nlohmann::ordered_json::parse(*answer, nullptr, false);
-  std::printf("%s\n", json.is_object() ? json.dump(2).c_str() : answer->c_str());
+  if (!json.is_object()) return Error{"the master's answer is not a status"};
+  if (o.watch && !o.json) std::printf("\033[H\033[2J");  // from the top of an empty screen
+  const std::string text = o.json ? json.dump(2) + "\n" : status_text(json, double(std::time(nullptr)));
+  std::fputs(text.c_str(), stdout);
+  std::fflush(stdout);
+  return ok_status();
+}
+
+int show_status(StatusOptions o, const options::Given& given) {
+  log::initialise("ctl", "warn");
+  int exit_code = 0;
+  const auto client = reach(o.session, given, exit_code);
+  if (!client) return exit_code;
+  if (o.watch) net::install_signal_handlers();
+  do {
+    if (const Status s = print_status(*client, o); !s) return tools::complain(s.error(), 1);
+    for (int i = 0; i < kLooksASecond && o.watch && !net::stop_requested(); ++i)
+      std::this_thread::sleep_for(kLookAtSignals);
+  } while (o.watch && !net::stop_requested());
   return 0;
 }
 
 // A master that refuses was asked for something wrong.
-int give_order(OrderOptions o, const options::Given&) {
+int give_order(OrderOptions o, const options::Given& given) {
   log::initialise("ctl", "warn");
-  ControlClient client(o.master);
-  auto arguments = o.order.read ? o.order.read(o.words, client) : Result<Order::Arguments>(Order::Arguments{});
-  if (!arguments) return tools::complain(arguments.error());
-  const auto reply = client.order(o.order.name, kPatience_s, *arguments);
+  int exit_code = 0;
+  const auto client = reach(o.session, given, exit_code);
+  if (!client) return exit_code;
+  auto arguments = o.order.read ? o.order.read(o.words, *client) : Result<Order::Arguments>(Order::Arguments{});
+  if (!arguments) return tools::complain(arguments.error(), client->unanswered() ? 1 : 2);
+  const auto reply = client->order(o.order.name, kPatience_s, *arguments);
   if (!reply) return tools::complain(reply.error(), 1);
   if (!reply->ok) return tools::complain({reply->text});
   std::printf("%s\n", reply->text.c_str());
@@ -70,6 +97,7 @@ Command control_command() {
   Command out{.name = "ctl", .help = "ask or tell a running session's master", .table = {}, .run = {}};
   out.commands.push_back(
       make_command("status", "who takes part in the session and what they count", status_table, show_status));
+  out.commands.push_back(list_command());
   for (const Order& order : orders()) out.commands.push_back(order_command(order));
   return out;
 }

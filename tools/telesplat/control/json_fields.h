@@ -1,0 +1,44 @@
+// Values of a JSON object that another program wrote: what is not there, or of another type, is empty.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+namespace telesplat::launcher {
+
+inline const nlohmann::ordered_json* field(const nlohmann::ordered_json& object, const char* key) {
+  if (!object.is_object()) return nullptr;
+  const auto it = object.find(key);
+  return it == object.end() ? nullptr : &*it;
+}
+
+inline std::string text(const nlohmann::ordered_json& object, const char* key) {
+  const auto* value = field(object, key);
+  return value && value->is_string() ? value->get<std::string>() : std::string();
+}
+
+inline std::optional<double> number(const nlohmann::ordered_json& object, const char* key) {
+  const auto* value = field(object, key);
+  return value && value->is_number() ? std::optional(value->get<double>()) : std::nullopt;
+}
+
+/// A whole number of 0 to 9e15.
+inline uint64_t count(const nlohmann::ordered_json& object, const char* key) {
+  return uint64_t(std::clamp(number(object, key).value_or(0), 0.0, 9e15));
+}
+
+inline bool flag(const nlohmann::ordered_json& object, const char* key) {
+  const auto* value = field(object, key);
+  return value && value->is_boolean() && value->get<bool>();
+}
+
+/// Its elements; none if it is no array.
+inline nlohmann::ordered_json array(const nlohmann::ordered_json& object, const char* key) {
+  const auto* value = field(object, key);
+  return value && value->is_array() ? *value : nlohmann::ordered_json::array();
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,158 @@
+#include "tools/telesplat/control/process_tables.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "tools/common/text_table.h"
+#include "tools/telesplat/control/json_fields.h"
+
+namespace telesplat::launcher {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kMostName = 26, kMostNamed = 8;
+constexpr double kSilent_s = 3;  // processes report every second
+
+std::string fact_of(const Json& process, const char* key) {
+  const auto* facts = field(process, "facts");
+  return facts ? text(*facts, key) : std::string();
+}
+
+/// A column: its title and what a process has there; empty: nothing.
+struct Field {
+  const char* title;
+  std::function<std::string(const Json&)> cell;
+  bool right = true;
+};
+
+// A number of `group`, in units of `unit`, with so many digits.
+Field value(const char* title, const char* group, const char* key, double unit, int digits) {
+  return {title, [=](const Json& p) {
+            const auto* values = field(p, group);
+            const auto v = values ? number(*values, key) : std::nullopt;
+            return v ? fmt::format("{:.{}f}", *v / unit, digits) : std::string();
+          }};
+}
+Field rate(const char* title, const char* key, double unit = 1) { return value(title, "rates", key, unit, 1); }
+Field counted(const char* title, const char* key) { return value(title, "values", key, 1, 0); }
+Field millions(const char* title, const char* key) { return value(title, "values", key, 1e6, 2); }
+// What is none of a process' business it tells as 0.
+Field unless_zero(Field shown) {
+  return {shown.title,
+          [cell = shown.cell](const Json& p) {
+            const std::string out = cell(p);
+            return out.find_first_not_of("0.") == std::string::npos ? std::string() : out;
+          },
+          shown.right};
+}
+Field fact(const char* title, const char* key) {
+  return {title, [=](const Json& p) { return tools::shortened(fact_of(p, key), 20); }};
+}
+Field leases() {
+  return {"leases", [](const Json& p) {
+            const auto n = number(p, "leases");
+            return n ? fmt::format("{:.0f}", *n) : std::string();
+          }};
+}
+
+Field size() {
+  return {"size", [](const Json& p) {
+            const std::string width = fact_of(p, "width"), height = fact_of(p, "height");
+            return width.empty() || height.empty() ? std::string() : width + "x" + height;
+          }};
+}
+
+std::string heard(const Json& p) {
+  const auto silent_s = number(p, "silent_s");
+  if (!silent_s) return {};
+  return *silent_s > kSilent_s ? fmt::format("silent for {:.1f} s", *silent_s) : fmt::format("{:.1f} s ago", *silent_s);
+}
+
+struct RoleTable {
+  const char* role;
+  const char* title;
+  std::vector<Field> fields;
+};
+
+const std::vector<RoleTable>& role_tables() {
+  static const std::vector<RoleTable> all{
+      {"viewer",
+       "viewer",
+       {size(), fact("renderer", "renderer"), rate("fps", "frames"), rate("updates/s", "updates"),
+        rate("MB/s", "bytes_received", 1e6), unless_zero(millions("M points", "points")),
+        unless_zero(millions("M pixels", "pixels")), counted("frames", "frames"), counted("epoch", "epoch")}},
+      {"packer",
+       "packer",
+       {rate("tiles/s", "tiles"), rate("blocks/s", "blocks"), rate("frames/s", "volume_frames_complete"),
+        rate("sent MB/s", "bytes_sent", 1e6), value("sent MB", "values", "bytes_sent", 1e6, 1),
+        millions("M points", "points"), counted("forgotten", "points_forgotten")}},
+      {"sampler",
+       "sampler",
+       {fact("kind", "sampler"), fact("threads", "threads"), leases(), rate("tiles/s", "tiles_sampled"),
+        counted("tiles", "tiles_sampled"), value("chunk MB", "values", "chunk_mb", 1, 0),
+        value("voxel MB", "values", "voxel_mb", 1, 0)}},
+      {"data",
+       "data server",
+       {fact("format", "format"), fact("primitives", "primitives"), counted("requests", "requests"),
+        rate("sent MB/s", "bytes_sent", 1e6), value("sent MB", "values", "bytes_sent", 1e6, 1)}}};
+  return all;
+}
+
+std::string table_of(const RoleTable& role, const std::vector<Json>& processes, bool hosts_differ) {
+  std::vector<Field> fields{
+      {role.title, [](const Json& p) { return tools::shortened(text(p, "name"), kMostName); }, false}};
+  if (hosts_differ)
+    fields.push_back({"host", [](const Json& p) { return tools::shortened(fact_of(p, "host"), 16); }, false});
+  fields.insert(fields.end(), role.fields.begin(), role.fields.end());
+  fields.push_back(value("MB", "values", "rss_mb", 1, 0));
+  fields.push_back(value("most MB", "values", "peak_rss_mb", 1, 0));
+  fields.push_back(unless_zero(counted("rejected", "messages_rejected")));
+  fields.push_back({"heard of", heard});
+  std::vector<tools::TextTable::Column> columns;
+  for (const Field& f : fields) columns.push_back({f.title, f.right});
+  tools::TextTable table(columns);
+  for (const Json& p : processes) {
+    std::vector<std::string> cells;
+    for (const Field& f : fields) cells.push_back(f.cell(p));
+    table.add(std::move(cells));
+  }
+  return table.empty() ? std::string() : "\n" + table.text();
+}
+
+}  // namespace
+
+std::string process_tables(const Json& processes) {
+  std::string out;
+  std::set<std::string> hosts;
+  std::vector<std::string> left;
+  std::vector<Json> here;
+  for (const auto& p : processes) {
+    if (!p.is_object()) continue;
+    if (!flag(p, "alive")) {
+      left.push_back(tools::shortened(text(p, "name"), kMostName));
+      continue;
+    }
+    hosts.insert(fact_of(p, "host"));
+    here.push_back(p);
+  }
+  std::sort(here.begin(), here.end(), [](const Json& a, const Json& b) { return text(a, "name") < text(b, "name"); });
+  for (const RoleTable& role : role_tables()) {
+    std::vector<Json> of_role;
+    std::copy_if(here.begin(), here.end(), std::back_inserter(of_role),
+                 [&](const Json& p) { return text(p, "role") == role.role; });
+    out += table_of(role, of_role, hosts.size() > 1);
+  }
+  if (left.empty()) return out;
+  const size_t more = left.size() - std::min(left.size(), kMostNamed);
+  left.resize(left.size() - more);
+  return out + fmt::format("\nleft: {}{}\n", fmt::join(left, ", "), more ? fmt::format(" and {} more", more) : "");
+}
+
+}  // namespace telesplat::launcher
