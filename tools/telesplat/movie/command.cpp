@@ -13,8 +13,6 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr int kInterrupted = 130;
-
 struct MovieCommandOptions {
   std::string run;
   MovieOptions movie;

@@ -11,6 +11,9 @@
 
 namespace telesplat::launcher {
 
+/// Exit code of a movie that Ctrl-C ended.
+inline constexpr int kInterrupted = 130;
+
 /// What is asked for, found possible.
 struct MoviePlan {
   MovieOptions options;

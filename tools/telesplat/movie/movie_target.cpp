@@ -44,7 +44,7 @@ Status try_to_make(const fs::path& above, const std::string& path) {
 // Whether a file can be made in this folder, which may have to be made first.
 Status check_folder(fs::path folder, const std::string& path) {
   std::error_code error;
-  folder = fs::absolute(folder, error);
+  folder = fs::absolute(folder.empty() ? "." : folder, error);
   if (fs::is_directory(folder, error)) return try_folder(folder, path);
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   if (!fs::is_directory(folder, error)) return Error{fmt::format("{}: {} is no folder", path, folder.string())};

@@ -8,6 +8,7 @@
 #include "services/master/master_options.h"
 #include "services/packer/packer_options.h"
 #include "services/sampler/sampler_options.h"
+#include "tools/telesplat/movie/movie_options.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -21,6 +22,7 @@ struct RunOptions {
   viewer::ViewerOptions viewer;     ///< wall "2x1": the viewers are its tiles; started_s: when the command began
   int samplers = 1, data_servers = 1, viewers = 1;
   std::string join_master;         ///< --master: join a running session instead of starting one
+  MovieOptions movie;              ///< made of the record after the run; no file: none
   std::string out;                 ///< run folder; empty: run makes one, view records nothing
   std::string log_directory;       ///< of the processes; empty: OUT/logs
   std::string log_level = "info";  ///< of the processes
