@@ -28,12 +28,12 @@ std::string_view trimmed(std::string_view text) {
 
 std::vector<std::string_view> split(std::string_view line) {
   std::vector<std::string_view> out;
-  for (size_t from = 0; from != line.npos + 1;) {
-    const size_t comma = std::min(line.find(',', from), line.size());
-    out.push_back(trimmed(line.substr(from, comma - from)));
-    from = comma == line.size() ? line.npos + 1 : comma + 1;
+  for (;;) {
+    const size_t comma = line.find(',');
+    out.push_back(trimmed(line.substr(0, comma)));
+    if (comma == line.npos) return out;
+    line.remove_prefix(comma + 1);
   }
-  return out;
 }
 
 // viewer-2 comes before viewer-10.

@@ -1,5 +1,6 @@
 #include "common/image/file.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
@@ -109,10 +110,11 @@ Status write_exr(const std::string& path, const View& view, std::span<const glm:
   return write_whole(path, "openexr", spec, OIIO::TypeDesc::FLOAT, values.data());
 }
 
-Result<View> read_view(const std::string& path) {
-  const auto input = OIIO::ImageInput::open(path);
-  if (!input) return Error{fmt::format("cannot read picture {}: {}", path, OIIO::geterror())};
-  const OIIO::ImageSpec spec = input->spec();
+namespace {
+
+// path: for error texts.
+Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint64_t most_pixels) {
+  const OIIO::ImageSpec spec = input.spec();
   if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.width > geometry::kMaxImageSide ||
       spec.height > geometry::kMaxImageSide)
     return Error{fmt::format("picture {} has {}x{}x{} pixels, limit is {} a side and one slice", path, spec.width,
@@ -129,11 +131,11 @@ Result<View> read_view(const std::string& path) {
   std::vector<float> rows(size_t(step) * spec.width * spec.nchannels);
   for (int y = 0; y < spec.height; y += step) {
     const int y0 = spec.y + y, y1 = spec.y + std::min(y + step, spec.height);
-    const bool good = spec.tile_width > 0 ? input->read_tiles(0, 0, spec.x, spec.x + spec.width, y0, y1, 0, 1, 0,
-                                                              spec.nchannels, OIIO::TypeDesc::FLOAT, rows.data())
-                                          : input->read_scanlines(0, 0, y0, y1, 0, 0, spec.nchannels,
-                                                                  OIIO::TypeDesc::FLOAT, rows.data());
-    if (!good) return Error{fmt::format("cannot read row {} of picture {}: {}", y, path, input->geterror())};
+    const bool good = spec.tile_width > 0 ? input.read_tiles(0, 0, spec.x, spec.x + spec.width, y0, y1, 0, 1, 0,
+                                                             spec.nchannels, OIIO::TypeDesc::FLOAT, rows.data())
+                                          : input.read_scanlines(0, 0, y0, y1, 0, 0, spec.nchannels,
+                                                                 OIIO::TypeDesc::FLOAT, rows.data());
+    if (!good) return Error{fmt::format("cannot read row {} of picture {}: {}", y, path, input.geterror())};
     const size_t pixels = size_t(y1 - y0) * spec.width;
     for (size_t i = 0; i < pixels; ++i) {
       const float* p = rows.data() + i * spec.nchannels;
@@ -144,6 +146,23 @@ Result<View> read_view(const std::string& path) {
   }
   view.height = spec.height;
   return view;
+}
+
+}  // namespace
+
+Result<View> read_view(const std::string& path) {
+  const auto input = OIIO::ImageInput::open(path);
+  if (!input) return Error{fmt::format("cannot read picture {}: {}", path, OIIO::geterror())};
+  return read_pixels(*input, path, ~uint64_t{0});
+}
+
+Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels) {
+  OIIO::ImageSpec wishes;
+  wishes.attribute("oiio:UnassociatedAlpha", 1);
+  OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes.data()), bytes.size());  // which only reads
+  const auto input = OIIO::ImageInput::open(name, &wishes, &memory);
+  if (!input) return Error{fmt::format("cannot read picture {}: {}", name, OIIO::geterror())};
+  return read_pixels(*input, name, most_pixels);
 }
 
 }  // namespace telesplat::image

@@ -1,6 +1,7 @@
 // Image files, through OpenImageIO.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
@@ -31,5 +32,8 @@ Status write_exr(const std::string& path, const View& view, Alpha alpha = Alpha:
 Status write_exr(const std::string& path, const View& view, std::span<const glm::vec3> normals);
 /// Reads any picture OpenImageIO knows; channel Z becomes depth_m. At most 16384 pixels a side.
 Result<View> read_view(const std::string& path);
+/// Reads a picture of at most `most_pixels` from memory: its colours without its alpha, which changes nothing of them.
+/// name: for error texts; its ending says what to try first.
+Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels);
 
 }  // namespace telesplat::image

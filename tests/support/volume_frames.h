@@ -92,12 +92,12 @@ inline int channel(uint32_t colour, int shift) { return static_cast<int>(colour 
 /// Largest difference of a colour's channels.
 inline int difference(uint32_t a, uint32_t b) {
   int most = 0;
-  for (const int shift : {0, 8, 16}) most = std::max(most, std::abs(channel(a, shift) - channel(b, shift)));
+  for (const int shift : {0, 8, 16, 24}) most = std::max(most, std::abs(channel(a, shift) - channel(b, shift)));
   return most;
 }
 
 /// The warp in double precision by its definition, with rays and planes in the room instead of matrices: colour
-/// 0xffRRGGBB, and depth.
+/// 0xCCRRGGBB, CC how much is covered, and depth.
 inline std::pair<uint32_t, double> warp_by_rays(const volume::VolumeFrame& frame, const geometry::Camera& camera,
                                                 uint32_t background, int x, int y) {
   const glm::dmat4 to_index = frame.grid.room_to_index();
@@ -132,9 +132,9 @@ inline std::pair<uint32_t, double> warp_by_rays(const volume::VolumeFrame& frame
     left = 1 - colour[3];
     if (left <= 1 - static_cast<double>(volume::kSolid) && depth == INFINITY) depth = at;
   }
-  uint32_t out = 0xff000000u;
-  for (int c = 0; c < 3; ++c) {
-    const double value = colour[c] * 255 + left * channel(background, 8 * c);
+  uint32_t out = 0;
+  for (int c = 0; c < 4; ++c) {
+    const double value = colour[c] * 255 + (c < 3 ? left * channel(background, 8 * c) : 0);
     out |= static_cast<uint32_t>(std::clamp(std::lround(value), 0l, 255l)) << 8 * c;
   }
   return {out, depth};

@@ -45,6 +45,10 @@ class DisplaySurface {
   virtual bool visible() const = 0;
   /// Shows a finished frame, drawn with the camera above.
   virtual void present(const image::View& view) = 0;
+  /// Whether somebody wants the frame that begins as a picture.
+  virtual bool wants_picture() const { return false; }
+  /// It is this one. alpha: what the upper byte of its colours is.
+  virtual void take_picture(const image::View&, image::Alpha) {}
   /// After the frame's bookkeeping.
   virtual void report(const LiveFigures& figures) = 0;
   /// What lies over the frames that it shows; null: nobody sees them.

@@ -12,7 +12,8 @@ struct FrameInput {
   double begin_s = 0;  ///< monotonic clock
   geometry::Camera camera;
   Look look;
-  bool with_depth = false;  ///< view.depth_m has room for it and is to be filled
+  bool with_depth = false;     ///< view.depth_m has room for it and is to be filled
+  bool with_coverage = false;  ///< colours over black get the coverage into their upper byte (image/background.h)
   bool resting = false;  ///< before the first view update is complete: nothing is measured for the sake of later frames
   bool even_empty = true;  ///< draw the background too if there is nothing else; else leave the view as it is
 };

@@ -126,9 +126,10 @@ void WindowSurface::keep_path() {
                 : written.error().text);
 }
 
-void WindowSurface::present(const image::View& view) {
-  window_->present(view, overlays_);
-  if (interaction_.take_screenshot_wish()) screenshots_.take(view);
+void WindowSurface::present(const image::View& view) { window_->present(view, overlays_); }
+
+void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
+  if (interaction_.take_screenshot_wish()) screenshots_.take(view, alpha);
 }
 
 void WindowSurface::report(const LiveFigures& figures) {

@@ -33,6 +33,8 @@ class WindowSurface final : public DisplaySurface {
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   bool visible() const override { return true; }
   void present(const image::View& view) override;
+  bool wants_picture() const override { return interaction_.wants_screenshot(); }
+  void take_picture(const image::View& view, image::Alpha alpha) override;
   void report(const LiveFigures& figures) override;
   Overlays* overlays() override { return &overlays_; }
   bool wants_to_stop() const override { return window_->closing() || interaction_.wants_to_quit(); }

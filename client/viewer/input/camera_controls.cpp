@@ -64,8 +64,10 @@ void CameraControls::set_scene(const geometry::Box& box, const geometry::Pose& h
   flight_m_ = std::max(Limits::kFlight * extent_m_, 2 * home_m);
   const State home_state = state_at(home_, distance_of_interest(home_));
   pivot_m_ = std::max(Limits::kPivot * extent_m_, glm::distance(home_state.anchor, centre_));
-  if (!touched_) now_ = goal_ = home_state;
-  clamp_goal();
+  if (touched_)
+    clamp_goal();
+  else
+    now_ = goal_ = home_state;  // as it is: it may look straight up
 }
 
 void CameraControls::orbit(double dx, double dy) {
@@ -147,7 +149,7 @@ geometry::Pose CameraControls::advance(double dt_s) {
   // First-order lag behind a goal that moves at a constant rate, solved exactly: the same path at any frame rate.
   const glm::dvec3 before = goal_.anchor;
   goal_.anchor += flight_velocity() * dt;
-  clamp_goal();
+  if (touched_) clamp_goal();
   const double keep = std::exp(-dt / kLag_s);
   const glm::dvec3 trail = (goal_.anchor - before) / dt * kLag_s;  // how far a camera trails a goal of this velocity
   const bool moving = flying_ && trail != glm::dvec3(0);

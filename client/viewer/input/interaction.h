@@ -83,6 +83,7 @@ class Interaction {
   Path take_path();
   /// A path that is being recorded ends.
   void end_path();
+  bool wants_screenshot() const { return screenshot_; }
   /// True once after each press of the screenshot key.
   bool take_screenshot_wish();
   /// Lines to tell the person, since the last call.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/core/clock.h"
+#include "common/image/background.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -18,6 +19,17 @@ PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer
       received_(received),
       budget_(options.detail_budget && options.target_fps > 0 ? kBudgetShare * 1e3 / options.target_fps : 0,
               options.least_detail) {}
+
+// Splats that soften their edges let the background through; which is known from drawing the same over another one.
+void PointSource::find_coverage(const FrameInput& input, image::View& view) {
+  auto shading = options_.shading;
+  shading.background = 0xffffff;
+  over_white_.width = view.width, over_white_.height = view.height;
+  over_white_.colour.resize(view.colour.size());
+  renderer_->render(list_, input.camera, input.look.render, image::Shading(shading, input.camera),
+                    {view.width, view.height, over_white_.colour.data(), nullptr});
+  image::find_coverage(over_white_, view);
+}
 
 DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   auto& o = options_;
@@ -38,9 +50,10 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
     stats = renderer_->render(
         list_, camera, input.look.render, image::Shading(o.shading, camera),
         {camera.width, camera.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr});
+  const double end_s = monotonic_s();
+  if (input.with_coverage) find_coverage(input, view);
   received_.cache().end_frame();
   if (!input.resting) {
-    const double end_s = monotonic_s();
     // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
     const double work_ms = stats.prepare_ms + (stats.project_ms + stats.resolve_ms + stats.fill_ms + stats.smooth_ms +
                                                stats.antialias_ms) /
@@ -59,6 +72,7 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   out.items = list_.items.size();
   out.cached = received_.cache().figures().points_displayed;
   out.sequence = list_.applied.value;
+  out.summaries = list_.summaries;
   out.detail = o.selection.detail;
   out.budget_ms = budget_.budget_ms();
   out.epoch = list_.epoch;

@@ -19,9 +19,12 @@ class PointSource final : public ViewSource {
   const char* cached_name() const override { return ""; }
 
  private:
+  void find_coverage(const FrameInput& input, image::View& view);
+
   DisplayOptions options_;
   std::unique_ptr<Renderer> renderer_;
   ReceivedPoints& received_;
+  image::View over_white_;
   splat::FrameBudget budget_;
   splat::SpeedDetail speed_;
   splat::DrawList list_;

@@ -171,11 +171,12 @@ Status develop_frames(const std::string& spool_directory, const std::string& pic
     if (go_on && !go_on()) break;
     auto frame = read_spooled_frame(paths[i]);
     if (!frame) return frame.error();
+    const auto alpha = frame->use & kTransparent ? image::Alpha::kCoverage : image::Alpha::kNone;
     const std::string base = fmt::format("{}/frame-{:06d}", picture_directory, frame->number);
     if (frame->use & kPicture)
-      if (const Status s = image::write_png(base + ".png", frame->view); !s) return s;
+      if (const Status s = image::write_png(base + ".png", frame->view, alpha); !s) return s;
     if ((frame->use & kExr) && !frame->view.depth_m.empty())
-      if (const Status s = image::write_exr(base + ".exr", frame->view); !s) return s;
+      if (const Status s = image::write_exr(base + ".exr", frame->view, alpha); !s) return s;
     if (!(frame->use & kVerify)) fs::remove(paths[i], error);
     if (progress) progress(i + 1, paths.size());
   }

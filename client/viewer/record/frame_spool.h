@@ -19,7 +19,12 @@
 namespace telesplat::viewer {
 
 /// Why a frame is kept: any combination.
-enum FrameUse : uint32_t { kPicture = 1, kVerify = 2, kExr = 4 };
+enum FrameUse : uint32_t {
+  kPicture = 1,
+  kVerify = 2,
+  kExr = 4,
+  kTransparent = 8  ///< its pictures have alpha: colours have the coverage in their upper byte
+};
 
 struct SpooledFrame {
   uint64_t number = 0;

@@ -28,13 +28,13 @@ std::string Screenshots::next_path() {
   return path;
 }
 
-void Screenshots::take(const image::View& view) {
-  writing_ = std::async(std::launch::async, [this, path = next_path(), before = std::move(writing_),
+void Screenshots::take(const image::View& view, image::Alpha alpha) {
+  writing_ = std::async(std::launch::async, [this, alpha, path = next_path(), before = std::move(writing_),
                                              copy = image::View{view.width, view.height, view.colour, {}}]() {
     if (before.valid()) before.wait();
     std::error_code error;
     fs::create_directories(directory_, error);
-    const Status written = image::write_png(path, copy);
+    const Status written = image::write_png(path, copy, alpha);
     tell_(written ? "screenshot: " + path : written.error().text);
   });
 }

@@ -19,7 +19,7 @@ class Screenshots {
   ~Screenshots();
 
   /// Copies the view and writes it as telesplat-YYYYMMDD-HHMMSS-NNN.png; no file is overwritten.
-  void take(const image::View& view);
+  void take(const image::View& view, image::Alpha alpha = image::Alpha::kNone);
 
  private:
   std::string next_path();

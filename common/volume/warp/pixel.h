@@ -57,8 +57,8 @@ inline WarpedPixel warp_pixel(const WarpTile& tile, uint64_t layers, int x, int 
       out.depth_m = inverse * layer.depth;
     if (transparency() < kWarpDone) break;
   }
-  out.colour = 0xff000000u;
-  for (int c = 0; c < 3; ++c) {
+  out.colour = 0;
+  for (int c = 0; c < 4; ++c) {
     const int32_t whole = add_behind(c, static_cast<int32_t>(tile.background >> 8 * c & 255) << 7);
     out.colour |= static_cast<uint32_t>((std::min(whole, kWarpOpaque) + 64) >> 7) << 8 * c;
   }

@@ -275,7 +275,7 @@ uint64_t WarpPart(const WarpTile& tile, uint64_t layers, int left, int top, Part
     const auto first = EightBits(Over(hn::Load(d, sums), hn::Load(d, factors), background));
     const auto second = EightBits(Over(hn::Load(d, sums + half), hn::Load(d, factors + half), background));
     const auto colour = hn::Or(Shuffled(first, kLowBytes), Shuffled(second, kHighBytes));
-    hn::Store(hn::Or(hn::BitCast(du, colour), hn::Set(du, 0xff000000u)), du, part.colour + i);
+    hn::Store(hn::BitCast(du, colour), du, part.colour + i);
   }
   return samples;
 }
@@ -301,7 +301,7 @@ HWY_INLINE uint64_t WarpPartsAs(const WarpTile& tile) {
         std::copy_n(pixels.colour + from, x1 - x0, colour);
         if (kDepth) std::copy_n(pixels.depth_m + from, x1 - x0, depth);
       } else {
-        std::fill_n(colour, x1 - x0, 0xff000000u | tile.background);
+        std::fill_n(colour, x1 - x0, tile.background);
         if (kDepth) std::fill_n(depth, x1 - x0, std::numeric_limits<float>::infinity());
       }
     }

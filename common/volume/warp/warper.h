@@ -65,7 +65,8 @@ class Warper {
  public:
   explicit Warper(int threads);  ///< 0: one a core
   ~Warper();
-  /// background: 0x00RRGGBB, under everything. frame may be null: background alone.
+  /// background: 0x00RRGGBB, under everything. The upper byte of a colour becomes how much of the pixel the volume
+  /// covers. frame may be null: background alone.
   /// Preconditions: camera valid, target as large as it says; frame valid (volume::validate).
   WarpStats render(const VolumeFrame* frame, const geometry::Camera& camera, uint32_t background,
                    const WarpTarget& target);

@@ -233,7 +233,8 @@ image::View VolumeRaycaster::draw(const geometry::Camera& camera, uint32_t backg
       return uint32_t(std::clamp(sum + 0.5, 0.0, 255.0)) << shift;
     };
     const size_t at = size_t(y) * size_t(camera.width) + size_t(x);
-    out.colour[at] = channel(16, colour.x) | channel(8, colour.y) | channel(0, colour.z);
+    const auto covered = uint32_t(std::clamp(255 * (1 - left) + 0.5, 0.0, 255.0));
+    out.colour[at] = covered << 24 | channel(16, colour.x) | channel(8, colour.y) | channel(0, colour.z);
     out.depth_m[at] = float(solid / per_depth);
   };
   impl.arena.execute([&] {

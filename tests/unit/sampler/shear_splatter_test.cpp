@@ -216,9 +216,10 @@ TEST(VolumeRaycaster, IntegratesAUniformBlock) {
     const auto camera = geometry::make_camera(geometry::look_at({0, 0, 1}, {0, 0, 0}), 5, 3, 3);
     const image::View view = VolumeRaycaster(grid, scene.voxels, colours, 1).draw(camera, 0x00000000, 0.05);
     const double alpha = 1 - std::exp(-17 * extinction);
-    EXPECT_NEAR(view.colour[4] >> 16, 255 * alpha, 1);
+    EXPECT_NEAR(view.colour[4] >> 16 & 255, 255 * alpha, 1);
     EXPECT_NEAR(view.colour[4] >> 8 & 255, 127.5 * alpha, 1);
     EXPECT_NEAR(view.colour[4] & 255, 63.75 * alpha, 1);
+    EXPECT_NEAR(view.colour[4] >> 24, 255 * alpha, 1);
     EXPECT_EQ(std::isinf(view.depth_m[4]), alpha < 0.25);
     // Opacity passes a quarter -log(0.75) / 0.1 voxels behind the plane half way up the ramp.
     if (extinction == 0.1) {

@@ -76,7 +76,7 @@ TEST(CameraControls, ThePointUnderThePointerFollowsAPan) {
 
 TEST(CameraControls, TheWheelDolliesWithinLimits) {
   CameraControls c;
-  const double distance = glm::length(c.pose().position_room), extent = CameraControls::kHomeExtent_m;
+  const double distance = glm::length(c.pose().position_room), extent = 0.8;
   c.wheel(1);
   EXPECT_NEAR(glm::length(settle(c).position_room), 0.9 * distance, 1e-6);
   for (int i = 0; i < 20; ++i) c.wheel(50);
@@ -184,15 +184,38 @@ TEST(CameraControls, TakesOverAnyPoseAndStraightensUp) {
   }
 }
 
-TEST(CameraControls, ALargerDataSetIsSeenFromFarther) {
+geometry::Box box_of(double half, const glm::vec3& centre = glm::vec3(0)) {
+  return {centre - float(half), centre + float(half)};
+}
+
+TEST(CameraControls, TheFirstViewFollowsTheSceneUntilThePersonMoves) {
   CameraControls c;
-  c.set_extent(8);
-  EXPECT_LT(glm::distance(c.pose().position_room, 10.0 * geometry::default_pose().position_room), 1e-9);
+  const Pose far = geometry::look_at({0, 4, 12}, {0, 0, 0}), aside = geometry::look_at({3, 1, 9}, {3, 0, 0});
+  c.set_scene(box_of(4), far);
+  expect_same_pose(c.pose(), far, 1e-9);
+  c.set_scene(box_of(2, {3, 0, 0}), aside);
+  expect_same_pose(settle(c), aside, 1e-9);
   c.orbit(0.1, 0);
   settle(c);
   const Pose moved = c.pose();
-  c.set_extent(4);  // who has moved stays
+  EXPECT_NEAR(glm::distance(moved.position_room, glm::dvec3(3, 0, 0)),
+              glm::distance(aside.position_room, glm::dvec3(3, 0, 0)), 1e-6);  // around the box's centre
+  c.set_scene(box_of(1), far);                                                 // who has moved stays
   expect_same_pose(c.pose(), moved, 1e-9);
+  c.reset();
+  expect_same_pose(settle(c), far, 1e-5);
+}
+
+TEST(CameraControls, AFirstViewFromFarAwayOrPastTheDataStays) {
+  // A field of view of 1 degree stands far off; an eye may look away from the data.
+  for (const Pose& home : {geometry::look_at({0, 20, 65}, {0, 0, 0}), geometry::look_at({10, 0, 0}, {30, 1, 0}),
+                           geometry::look_at({0, -2, 0}, {0, 5, 0})}) {
+    CameraControls c;
+    c.set_scene(box_of(0.4), home);
+    expect_same_pose(settle(c), home, 1e-5);
+    c.set_flying(true);
+    expect_same_pose(settle(c), home, 0.05);  // who looks straight up bends a degree
+  }
 }
 
 TEST(CameraControls, NoInputLeavesTheRoom) {
@@ -226,7 +249,7 @@ TEST(CameraControls, NoInputLeavesTheRoom) {
         c.fly({any(), any(), any(), random() % 2 == 0});
         break;
       case 5:
-        c.set_extent(random() % 2 ? 0.8 : any());
+        c.set_scene(box_of(random() % 2 ? 0.4 : any()), geometry::default_pose());
         break;
       case 6:
         if (random() % 16 == 0) c.reset();
@@ -309,6 +332,60 @@ TEST_F(InteractionTest, KernelFinishAndShadingKeys) {
   EXPECT_EQ(i.take_notes().back(), "shading on");
 }
 
+TEST_F(InteractionTest, KeysOfPointsHaveNoMeaningForVolumes) {
+  Interaction i(std::nullopt, look_);
+  i.set_scene(scene::Pipeline::kSlices, box_of(0.4), geometry::default_pose());
+  for (int k = 0; k < 8; ++k) {
+    tap(i, Key(int(Key::k1) + k));
+    EXPECT_EQ(i.take_notes(), std::vector<std::string>{"key " + std::to_string(k + 1) + " has no meaning for volumes"});
+  }
+  EXPECT_EQ(i.look().render.kernel, look_.render.kernel);
+  EXPECT_TRUE(i.look().render.finish.fill && i.look().render.finish.smooth && i.look().render.finish.antialias);
+  EXPECT_TRUE(i.look().lit);
+}
+
+TEST_F(InteractionTest, ARecordedPathIsWhatTPlays) {
+  Interaction i(std::nullopt, look_);
+  wait(i, 0.1);
+  tap(i, Key::kC);
+  EXPECT_TRUE(i.records_path());
+  i.move(0.5, 0.5);
+  i.button(MouseButton::kLeft, true);
+  i.move(0.7, 0.5);
+  i.button(MouseButton::kLeft, false);
+  wait(i, 1);
+  EXPECT_NEAR(i.path_s(), 1, 0.05);
+  const Pose end = i.advance(now_s_, true);
+  tap(i, Key::kC);
+  EXPECT_FALSE(i.records_path());
+  const auto path = i.take_path();
+  ASSERT_GE(path.size(), 60u);
+  EXPECT_TRUE(i.take_path().empty());
+  expect_same_pose(path.back().pose, end);
+  i.set_recorded(recorded());  // what the person recorded stays
+  tap(i, Key::kR);
+  wait(i);
+  tap(i, Key::kT);
+  EXPECT_TRUE(i.playing());
+  const double from_s = now_s_;
+  for (int n = 1; n < 50; n += 7) {
+    now_s_ = from_s + path[size_t(n)].t_s;
+    expect_same_pose(i.advance(now_s_, true), path[size_t(n)].pose, 1e-6);
+  }
+  expect_same_pose(wait(i, 3), end);
+}
+
+TEST_F(InteractionTest, APathThatIsTooShortIsSaidAndNotKept) {
+  Interaction i(std::nullopt, look_);
+  tap(i, Key::kC);
+  i.take_notes();
+  tap(i, Key::kC);
+  EXPECT_EQ(i.take_notes(), std::vector<std::string>{"the camera's path is too short to keep"});
+  EXPECT_TRUE(i.take_path().empty());
+  tap(i, Key::kT);
+  EXPECT_FALSE(i.playing());
+}
+
 TEST_F(InteractionTest, AHeldKeyCountsOnce) {
   Interaction i(std::nullopt, look_);
   i.key(Key::kP, true);
@@ -339,7 +416,11 @@ TEST_F(InteractionTest, FlightUsesTheKeysAndEscapeEndsItFirst) {
 TEST_F(InteractionTest, QQuitsAndHTellsEveryKey) {
   Interaction i(std::nullopt, look_);
   tap(i, Key::kH);
+  EXPECT_TRUE(i.shows_help());
   EXPECT_EQ(i.take_notes(), key_help());
+  tap(i, Key::kH);
+  EXPECT_FALSE(i.shows_help());
+  EXPECT_TRUE(i.take_notes().empty());
   tap(i, Key::kQ);
   EXPECT_TRUE(i.wants_to_quit());
 }
@@ -379,14 +460,14 @@ TEST(TitleLine, HasRatesSinceTheLastOne) {
   EXPECT_EQ(line.update(f), "crater.ply");
   f.now_s += 0.25;
   EXPECT_EQ(line.update(f), std::nullopt);
-  f = {50.5, "crater.ply", 0.8, 31, 2, 212.4, 410'000, 1'200'000, 1'155'000};
+  f = {50.5, "crater.ply", 31, 2, 212.4, 410'000, 1'200'000, 1'155'000};
   EXPECT_EQ(line.update(f),
             "crater.ply - 60.0 fps, 4.0 updates/s, 212 ms latency, 0.41 M points drawn, 1.20 M cached, 2.31 MB/s");
-  f = {51.0, "crater.ply", 0.8, 61, 4, 212.4, 410'000, 1'200'000, 2'310'000, 3};
+  f = {51.0, "crater.ply", 61, 4, 212.4, 410'000, 1'200'000, 2'310'000, 3};
   EXPECT_EQ(line.update(f),
             "crater.ply - 60.0 fps, 4.0 updates/s, 212 ms latency, 0.41 M points drawn, 1.20 M cached, 2.31 MB/s, 6.0 "
             "epochs/s");
-  f = {51.5, "crater.ply", 0.8, 91, 6, 212.4, 410'000, 1'200'000, 3'465'000, 3};
+  f = {51.5, "crater.ply", 91, 6, 212.4, 410'000, 1'200'000, 3'465'000, 3};
   EXPECT_EQ(line.update(f)->find("epochs"), std::string::npos) << "the scene rests";
 }
 

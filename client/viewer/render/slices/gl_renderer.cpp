@@ -217,7 +217,7 @@ volume::WarpStats VolumeGlRenderer::render(const volume::VolumeFrame* frame, con
   if (ready && frame) ready = parts_->upload(*frame);
   if (!ready) {
     if (refusals_.allow(start)) log::error("{}: {}", device(), ready.error().text);
-    std::fill_n(target.colour, pixels, 0xff000000u | background);
+    std::fill_n(target.colour, pixels, background & 0xffffffu);
     if (target.depth_m) std::fill_n(target.depth_m, pixels, std::numeric_limits<float>::infinity());
     return {};
   }

@@ -42,7 +42,7 @@ void main() {
       break;
     }
   }
-  colour = vec4(sum.rgb + (1 - sum.a) * background, 1);
+  colour = vec4(sum.rgb + (1 - sum.a) * background, sum.a);  // alpha: how much the volume covers
   depth_m = depth;
 }
 )";
