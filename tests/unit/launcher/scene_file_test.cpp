@@ -84,10 +84,33 @@ Result<julia::Scene> scene_of(const std::vector<std::string>& flags) {
 
 TEST_F(SceneFile, AKeyThatIsNoFlagIsNamedWithItsLine) {
   const std::vector<std::pair<std::string, const char*>> cases{
-      {"file = \"a.ply\"\n[view]\nduratoin = 3\n", ":3: key duratoin is none: there is no flag --duratoin"},
+      {"file = \"a.ply\"\n[view]\nduratoin = 3\n",
+       ":3: key duratoin is none: there is no flag --duratoin; did you mean duration?"},
+      {"file = \"a.ply\"\nsise = \"100x100\"\n", ":2: key sise is none: there is no flag --sise; did you mean size?"},
+      {"flie = \"a.ply\"\n", ":1: key flie is none: there is no flag --flie; did you mean file?"},
       {"file = \"a.ply\"\n[packing]\nmax_pionts = 3\n",
-       ":3: key max_pionts is none: there is no flag --packing.max_pionts"},
+       ":3: key max_pionts is none: there is no flag --packing.max_pionts; did you mean max_points?"},
       {"file = \"a.ply\"\nseed = 3\n", ":2: key seed"},
+  };
+  for (const auto& [text, part] : cases) {
+    const auto flags = read_scene_file(write(text));
+    ASSERT_FALSE(flags.ok()) << text;
+    EXPECT_TRUE(flags.error().text.starts_with(path_)) << flags.error().text;
+    EXPECT_NE(flags.error().text.find(part), std::string::npos) << flags.error().text;
+  }
+}
+
+TEST_F(SceneFile, AValueOutsideItsLimitsIsNamedWithItsLine) {
+  const std::vector<std::pair<std::string, const char*>> cases{
+      {"file = \"a.ply\"\n[view]\nduration = nan\n", ":3: --duration nan: is not between 0 and 1000000"},
+      {"file = \"a.ply\"\n[view]\nhold = inf\n", ":3: --hold inf: is not between 0 and 1000000"},
+      {"file = \"a.ply\"\n[view]\nfov = nan\n", ":3: --fov nan: is not between 1 and 170"},
+      {"file = \"a.ply\"\n[view]\nnear = -nan\n", ":3: --near"},
+      {"file = \"a.ply\"\n[view]\ntarget_fps = nan\n", ":3: --target-fps nan"},
+      {"file = \"a.ply\"\n[view]\nframes = -1\n", ":3: --frames -1: is not a whole number of 0 or more"},
+      {"file = \"a.ply\"\nsamplers = \"two\"\n", ":2: --samplers two: is not a whole number"},
+      {"file = \"a.ply\"\n[view]\nsplat = \"dsc\"\n", ":3: --splat dsc: is not one of"},
+      {"file = \"a.ply\"\n[packing]\nmax_points = nan\n", ":3: --packing.max_points nan"},
   };
   for (const auto& [text, part] : cases) {
     const auto flags = read_scene_file(write(text));

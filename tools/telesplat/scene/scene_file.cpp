@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "common/options/suggest.h"
 #include "tools/telesplat/scene/scene.h"
 #include "tools/telesplat/scene/scene_keys.h"
 
@@ -115,8 +116,22 @@ class SceneReader {
     const options::Row* row = options::find(table_, flag);
     const bool off = node.is_boolean() && !**node.as_boolean();
     if (!row && off) return ok_status();  // a flag of another command, and not wanted
-    if (!row) return wrong(node, fmt::format("key {} is none: there is no flag {}", name, flag));
+    if (!row) return wrong(node, fmt::format("key {} is none: there is no flag {}{}", name, flag, meant(group, name)));
     return read_flag(*row, flag, name, node);
+  }
+
+  std::string meant(const std::string& group, const std::string& name) const {
+    constexpr std::string_view kPacking = "packing.";
+    std::vector<std::string> known;
+    if (group != "packing") known.emplace_back("file");
+    for (const options::Row& row : table_) {
+      const std::string key = options::key_of(row);
+      if (group != "packing")
+        known.push_back(key);
+      else if (key.starts_with(kPacking))
+        known.push_back(key.substr(kPacking.size()));
+    }
+    return options::did_you_mean(name, known);
   }
 
   Status read_flag(const options::Row& row, const std::string& flag, const std::string& name, const toml::node& node) {
@@ -129,6 +144,7 @@ class SceneReader {
     std::string text = flag_text(node);
     if (text.empty() && !node.is_string())
       return wrong(node, fmt::format("key {} is neither text, number nor boolean", name));
+    if (const Status s = options::check(row, text); !s) return wrong(node, s.error().text);
     if (node.is_string() && names_file(row, text)) text = beside(text);
     flags_.push_back(fmt::format("{}={}", flag, text));
     return ok_status();
