@@ -64,7 +64,8 @@ class Movie {
     const double frames = std::floor(screen_.duration_s() * fps) + 1;
     if (!(frames <= kMostFrames))
       return Error{fmt::format("{}: a movie of {:.0f} frames; at most {:.0f}", plan_.target.path, frames, kMostFrames)};
-    auto sink = PictureSink::open(plan_.target, screen_.width(), screen_.height(), fps, should_stop_);
+    const auto alpha = screen_.run().transparent ? image::Alpha::kCoverage : image::Alpha::kNone;
+    auto sink = PictureSink::open(plan_.target, screen_.width(), screen_.height(), fps, alpha, should_stop_);
     if (!sink) return MovieReport{.written = sink.error()};
     const auto count = draw(**sink, uint64_t(frames), line);
     if (!count) return count.error();
@@ -103,6 +104,8 @@ class Movie {
                                         pictures ? target.pattern() : target.path, frames, screen_.width(),
                                         screen_.height(), with, plan_.options.fps, double(frames) / plan_.options.fps,
                                         screen_.drawn(), screen_.run().frames.size()));
+    if (screen_.run().transparent && !pictures)
+      report_.lines.push_back("a video has no transparency: the background is black; a folder of pictures has alpha");
     if (!target.wanted_video.empty()) report_.lines.push_back(advice(target, plan_.options.fps));
   }
 

@@ -22,7 +22,8 @@ class VideoSink final : public PictureSink {
 
 class FolderSink final : public PictureSink {
  public:
-  FolderSink(MovieTarget target, bool made) : target_(std::move(target)), made_(made) {}
+  FolderSink(MovieTarget target, image::Alpha alpha, bool made)
+      : target_(std::move(target)), alpha_(alpha), made_(made) {}
   ~FolderSink() override {
     if (done_) return;
     std::error_code error;
@@ -35,7 +36,7 @@ class FolderSink final : public PictureSink {
       std::error_code error;
       fs::copy_file(target_.picture(count_ - 1), path, fs::copy_options::overwrite_existing, error);
       if (error) return Error{fmt::format("{}: cannot be written: {}", path, error.message())};
-    } else if (const Status s = image::write_png(path, picture); !s) {
+    } else if (const Status s = image::write_png(path, picture, alpha_); !s) {
       return s;
     }
     ++count_;
@@ -49,6 +50,7 @@ class FolderSink final : public PictureSink {
 
  private:
   MovieTarget target_;
+  image::Alpha alpha_;
   bool made_, done_ = false;
   uint64_t count_ = 0;
 };
@@ -56,13 +58,13 @@ class FolderSink final : public PictureSink {
 }  // namespace
 
 Result<std::unique_ptr<PictureSink>> PictureSink::open(const MovieTarget& target, int width, int height, double fps,
-                                                       const ShouldStop& should_stop) {
+                                                       image::Alpha alpha, const ShouldStop& should_stop) {
   const bool video = target.kind == MovieTarget::Kind::kVideo;
   const fs::path folder = video ? fs::path(target.path).parent_path() : fs::path(target.path);
   std::error_code error;
   const bool made = !folder.empty() && fs::create_directories(folder, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder: {}", folder.string(), error.message())};
-  if (!video) return std::unique_ptr<PictureSink>(new FolderSink(target, made));
+  if (!video) return std::unique_ptr<PictureSink>(new FolderSink(target, alpha, made));
   auto encoder = Encoder::start(target.ffmpeg, target.path, width, height, fps, should_stop);
   if (!encoder) return encoder.error();
   return std::unique_ptr<PictureSink>(new VideoSink(std::move(*encoder)));

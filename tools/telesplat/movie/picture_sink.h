@@ -12,8 +12,9 @@ namespace telesplat::launcher {
 class PictureSink {
  public:
   /// Of a video or of pictures. What was not finished is removed in the end.
+  /// alpha: of pictures; videos have none.
   static Result<std::unique_ptr<PictureSink>> open(const MovieTarget& target, int width, int height, double fps,
-                                                   const ShouldStop& should_stop);
+                                                   image::Alpha alpha, const ShouldStop& should_stop);
   virtual ~PictureSink() = default;
   /// The next picture. again: it is the one before once more.
   virtual Status add(const image::View& picture, bool again) = 0;

@@ -7,6 +7,7 @@
 #include "client/viewer/record/slice_record.h"
 #include "client/viewer/render/renderer.h"
 #include "client/viewer/render/slices/renderer.h"
+#include "common/image/background.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -37,16 +38,27 @@ class PointReplay final : public FrameReplay {
     list_.epoch = frame.epoch;
     image::ShadingParameters shading = run_.shading;
     shading.lit = frame.look.lit;
-    renderer_->render(list_, camera, frame.look.render, image::Shading(shading, camera),
-                      {camera.width, camera.height, view.colour.data(), nullptr});
+    render(frame, camera, shading, view);
+    if (!run_.transparent) return true;
+    fit(over_white_, camera);
+    shading.background = 0xffffff;
+    render(frame, camera, shading, over_white_);
+    image::find_coverage(over_white_, view);
     return true;
   }
 
  private:
+  void render(const DisplayedFrame& frame, const geometry::Camera& camera, const image::ShadingParameters& shading,
+              image::View& view) {
+    renderer_->render(list_, camera, frame.look.render, image::Shading(shading, camera),
+                      {camera.width, camera.height, view.colour.data(), nullptr});
+  }
+
   const RecordedRun& run_;
   std::unique_ptr<ModelReplay> models_;
   std::unique_ptr<viewer::Renderer> renderer_;
   splat::DrawList list_;
+  image::View over_white_;
 };
 
 class SliceFrameReplay final : public FrameReplay {

@@ -122,6 +122,7 @@ Status read_display(const std::string& path, const toml::table& session, const t
   const auto background = image::parse_background(session["display"]["background"].value_or(std::string("#141820")));
   if (!background) return Error{fmt::format("{}: background of [display]: {}", path, background.error().text)};
   run.shading.background = background->colour;
+  run.transparent = background->transparent;
   if (const Status s = read_wall(path, viewer, run); !s) return s;
   return read_look(path, viewer, run);
 }
