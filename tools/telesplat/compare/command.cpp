@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "client/viewer/viewer_service.h"
+#include "common/geometry/fit.h"
 #include "common/core/log.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
@@ -40,7 +41,7 @@ Result<std::vector<std::string>> choose_renderers(const CompareOptions& o) {
 
 class Comparison {
  public:
-  Comparison(const CompareOptions& options, const CompareSubject& subject, const splat::Finish& finish,
+  Comparison(const CompareOptions& options, CompareSubject& subject, const splat::Finish& finish,
              const std::vector<std::string>& renderers)
       : options_(options), subject_(subject), finish_(finish), renderers_(renderers) {}
 
@@ -51,6 +52,10 @@ class Comparison {
     });
     if (!scene) return scene.error();
     scene_ = std::move(*scene);
+    if (subject_.first_view) {
+      auto& camera = subject_.frames.front().camera;
+      camera.pose = geometry::fitted_view(scene_->box_room(), camera);
+    }
     auto models = PoseModels::open(subject_, options_.magnify, *scene_);
     if (!models) return models.error();
     models_ = std::move(*models);
@@ -197,7 +202,7 @@ class Comparison {
   }
 
   const CompareOptions& options_;
-  const CompareSubject& subject_;
+  CompareSubject& subject_;
   splat::Finish finish_;
   const std::vector<std::string>& renderers_;
   tools::ProgressLine progress_;
@@ -213,7 +218,7 @@ int compare(CompareOptions o, const options::Given&) {
   const auto finish = splat::finish_named(o.finish);
   if (!finish)
     return tools::complain({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});
-  const auto subject = find_subject(o);
+  auto subject = find_subject(o);
   if (!subject) return tools::complain(subject.error());
   const auto renderers = choose_renderers(o);
   if (!renderers) return tools::complain(renderers.error());

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 constexpr int kPosesOfARun = 4;
 
-// A data file, seen from the default pose.
+// A data file, seen as a window shows it first.
 Result<CompareSubject> find_scene(const CompareOptions& o) {
   if (!o.frames.empty() || o.poses > 1)
     return Error{fmt::format("{}: is a data file, which has one pose; --poses and --frames need a run folder", o.path)};
@@ -30,8 +30,9 @@ Result<CompareSubject> find_scene(const CompareOptions& o) {
   s.octree_depth = o.octree_depth;
   s.out = o.out.empty() ? dated_folder("compare-") : o.out;
   DisplayedFrame frame;
-  frame.camera = geometry::make_camera(geometry::default_pose(), o.fov_deg, size->first, size->second, o.near_m);
+  frame.camera = geometry::make_camera({}, o.fov_deg, size->first, size->second, o.near_m);
   s.frames.push_back(frame);
+  s.first_view = true;
   return s;
 }
 

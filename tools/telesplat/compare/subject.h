@@ -19,6 +19,7 @@ struct CompareSubject {
   bool best_patch_only = false;      ///< the run's packing kept redundant patches
   int octree_depth = 6;
   std::vector<DisplayedFrame> frames;
+  bool first_view = false;  ///< the pose of the only frame is fitted to the data's box, once that is known
   std::string name() const { return scene->name(); }  ///< for captions
 };
 
