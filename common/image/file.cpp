@@ -112,6 +112,18 @@ Status write_exr(const std::string& path, const View& view, std::span<const glm:
 
 namespace {
 
+// OpenImageIO may tell of several errors, one a line.
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+// OpenImageIO chooses a reader by the ending of a name, but pictures in other files have none, and some a wrong one.
+std::string name_for_reader(std::span<const std::byte> bytes, const std::string& name) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (text.starts_with("\x89PNG")) return "picture.png";
+  if (text.starts_with("\xff\xd8\xff")) return "picture.jpg";
+  if (text.starts_with("RIFF") && text.substr(0, 12).ends_with("WEBP")) return "picture.webp";
+  return name;
+}
+
 // path: for error texts.
 Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint64_t most_pixels) {
   const OIIO::ImageSpec spec = input.spec();
@@ -119,6 +131,9 @@ Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint6
       spec.height > geometry::kMaxImageSide)
     return Error{fmt::format("picture {} has {}x{}x{} pixels, limit is {} a side and one slice", path, spec.width,
                              spec.height, spec.depth, geometry::kMaxImageSide)};
+  if (uint64_t(spec.width) * uint64_t(spec.height) > most_pixels)
+    return Error{
+        fmt::format("picture {} has {}x{} pixels, {} are left for it", path, spec.width, spec.height, most_pixels)};
   if (spec.nchannels < 1 || spec.nchannels > 64)
     return Error{fmt::format("picture {} has {} channels, limits are 1..64", path, spec.nchannels)};
 
@@ -135,7 +150,7 @@ Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint6
                                                              spec.nchannels, OIIO::TypeDesc::FLOAT, rows.data())
                                           : input.read_scanlines(0, 0, y0, y1, 0, 0, spec.nchannels,
                                                                  OIIO::TypeDesc::FLOAT, rows.data());
-    if (!good) return Error{fmt::format("cannot read row {} of picture {}: {}", y, path, input.geterror())};
+    if (!good) return Error{fmt::format("cannot read row {} of picture {}: {}", y, path, first_line(input.geterror()))};
     const size_t pixels = size_t(y1 - y0) * spec.width;
     for (size_t i = 0; i < pixels; ++i) {
       const float* p = rows.data() + i * spec.nchannels;
@@ -152,7 +167,7 @@ Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint6
 
 Result<View> read_view(const std::string& path) {
   const auto input = OIIO::ImageInput::open(path);
-  if (!input) return Error{fmt::format("cannot read picture {}: {}", path, OIIO::geterror())};
+  if (!input) return Error{fmt::format("cannot read picture {}: {}", path, first_line(OIIO::geterror()))};
   return read_pixels(*input, path, ~uint64_t{0});
 }
 
@@ -160,8 +175,10 @@ Result<View> read_picture(std::span<const std::byte> bytes, const std::string& n
   OIIO::ImageSpec wishes;
   wishes.attribute("oiio:UnassociatedAlpha", 1);
   OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes.data()), bytes.size());  // which only reads
-  const auto input = OIIO::ImageInput::open(name, &wishes, &memory);
-  if (!input) return Error{fmt::format("cannot read picture {}: {}", name, OIIO::geterror())};
+  OIIO::Filesystem::IOProxy* const proxy = &memory;
+  wishes.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);  // wishes take the place of what open() is given
+  const auto input = OIIO::ImageInput::open(name_for_reader(bytes, name), &wishes, &memory);
+  if (!input) return Error{fmt::format("cannot read picture {}: {}", name, first_line(OIIO::geterror()))};
   return read_pixels(*input, name, most_pixels);
 }
 

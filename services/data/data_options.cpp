@@ -1,10 +1,12 @@
 #include "services/data/data_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cstdio>
 #include <filesystem>
 
+#include "common/colour/colour_map.h"
 #include "common/volume/transfer/function.h"
 #include "services/data/kinds.h"
 #include "services/data/volume/formats/header.h"
@@ -77,6 +79,30 @@ Table mesh_table(MeshOptions& o) {
       {.flag = "--texture",
        .value = &o.elevation.texture,
        .help = "elevation rasters: an image draped over them",
+       .fits = kMeshes,
+       .reach = Reach::kRecorded,
+       .is_file = true},
+      {.flag = "--texture-detail",
+       .value = &o.texture_detail,
+       .help = "triangles, at most, that an OBJ or glTF is divided into so that its vertices carry its textures; 0: "
+               "vertices as they are",
+       .limits = Range{0, 1e8},
+       .fits = kMeshes,
+       .reach = Reach::kRecorded},
+      {.flag = "--colour-by",
+       .value = &o.colouring.by,
+       .help =
+           "colour a mesh by an array of its PLY, VTP, VTU or VTK file: ARRAY[:MIN:MAX], ARRAY a vector's length or "
+           "one of its components ARRAY.x .y .z ARRAY[0]; MIN and MAX: the ends of the colour map, default: those of "
+           "the array; none: the file's own colours",
+       .fits = kMeshes,
+       .reach = Reach::kRecorded},
+      {.flag = "--colour-map",
+       .value = &o.colouring.map,
+       .help =
+           fmt::format("colours of --colour-by: {}, each also turned round (NAME_r), or FILE.json[:NAME], a ParaView "
+                       "colour map",
+                       fmt::join(colour::colour_map_names(), ", ")),
        .fits = kMeshes,
        .reach = Reach::kRecorded,
        .is_file = true},

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "common/scene/colouring.h"
 #include "services/data/mesh/file_source.h"
 #include "services/data/surface/isosurface.h"
 
@@ -23,9 +22,26 @@ Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const M
     return Error{
         fmt::format("--colour-by {}: {} is shown as a surface of a volume (--iso), which has no arrays", array, path)};
   const auto source = options.iso ? surface_source(path, options.raw, options.series, *options.iso, progress)
-                                  : file_source(path, options.elevation, array, progress);
+                                  : file_source(path, options.elevation, array, options.texture_detail, progress);
   if (!source) return source.error();
   return MeshStore::make(path, *source, options, progress);
+}
+
+Result<colour::ColourMap> colour_map_of(const MeshOptions& options) {
+  auto map = colour::resolve_colour_map(options.colouring.map);
+  if (!map) return Error{fmt::format("--colour-map: {}", map.error().text)};
+  return map;
+}
+
+Result<std::optional<scene::Colouring>> colouring_of(const MeshOptions& options, const MeshStoreInfo& mesh) {
+  const auto by = scene::parse_colour_by(options.colouring.by);
+  if (!by) return Error{fmt::format("--colour-by {}", by.error().text)};
+  auto map = colour_map_of(options);
+  if (!map) return map.error();
+  if (by->array.empty()) return std::optional<scene::Colouring>();
+  auto colouring = scene::make_colouring(mesh.arrays, *by, *std::move(map));
+  if (!colouring) return Error{fmt::format("{}: {}", mesh.source, colouring.error().text)};
+  return std::optional(*std::move(colouring));
 }
 
 }  // namespace telesplat::data

@@ -35,8 +35,12 @@ class Served {
   virtual std::string title() const = 0;
   /// For the log: how large it is.
   virtual std::string summary() const = 0;
+  /// What people should know of how it was read: lines that name the file.
+  virtual std::vector<std::string> notes() const { return {}; }
   /// Adds what the session is told of it: facts, parameters, the box in the room.
   virtual void describe(wire::Hello& hello) const = 0;
+  /// Its tables of session.toml, "\n[scene]\nkind = ..."; empty: its file and the flags tell all (record.h).
+  virtual std::string record() const { return {}; }
   virtual Requests requests() const { return {}; }
 
   /// Called once, before what follows. self: this data server.
@@ -47,6 +51,8 @@ class Served {
   virtual void answer(const net::Message& /*request*/, const Outlets& /*outlets*/) {}
   /// Sends what has been worked off meanwhile, where that has a thread of its own.
   virtual void send_finished(const Outlets& /*outlets*/) {}
+  /// Facts of the hello that have changed since it was last asked: the master is told.
+  virtual std::map<std::string, std::string> news() { return {}; }
   /// True: something is worked on or waits to be sent, though no message comes.
   virtual bool busy() const { return false; }
   virtual void add_status(std::map<std::string, double>& /*values*/) const {}

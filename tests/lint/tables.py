@@ -37,6 +37,7 @@ FLOORS = {
     ],
     "services/data": [
         ["services/data/base"],
+        ["services/data/texture"],
         ["services/data/volume/formats"],
         ["services/data/import"],
         ["services/data/served.h"],
@@ -85,7 +86,7 @@ FLOORS = {
         ["tools/telesplat/record"],
         ["tools/telesplat/movie"],
         ["tools/telesplat/run"],
-        ["tools/telesplat/compare", "tools/telesplat/bench", "tools/telesplat/inspect"],
+        ["tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare", "tools/telesplat/inspect"],
         ["tools/telesplat"],
     ],
 }

@@ -29,7 +29,8 @@ struct Mesh {
   bool scalars_of_faces = false;
   std::vector<scene::ArrayInfo> arrays;  ///< all that the file holds, asked for or not; make_tellable() was called
   uint64_t degenerate_dropped = 0;       ///< faces with fewer than three corners
-  /// What is placed in the room in place of the mesh's own box: of a surface, the grid of its volume, so that both stand
+  std::vector<std::string> notes;        ///< what people should know of how it was read: lines that name the file
+  /// What is placed in the room instead of the mesh's own box: of a surface, the grid of its volume, so that both stand
   /// at one place and are equally large.
   std::optional<geometry::DBox> frame;
 };

@@ -71,7 +71,8 @@ bool import_volume(int out, const std::string& path, uint64_t file_bytes) {
 int main(int argc, char** argv) {
   if (argc < 3 || argc > 5) {
     std::fputs(
-        "usage: telesplat-import vtp|vtu|vtk|gltf FILE [ARRAY]   (standard output: the mesh, for telesplat-data)\n"
+        "usage: telesplat-import vtp|vtu|vtk FILE [ARRAY]   (standard output: the mesh, for telesplat-data)\n"
+        "       telesplat-import gltf FILE TEXTURE_DETAIL\n"
         "       telesplat-import nifti|vti FILE      (standard output: import_stream.h)\n"
         "       telesplat-import raster FILE Z_SCALE TEXTURE|''\n"
         "       telesplat-import raster-facts FILE   (standard output: raster_facts.h)\n"
@@ -94,14 +95,18 @@ int main(int argc, char** argv) {
   try {
     if (telesplat::data::reads_with_vtk(format)) return import_volume(out, path, file_bytes) ? 0 : 1;
     limit_time(file_bytes);
-    limit_memory(100 * file_bytes);
+    const bool gltf = format == "gltf" && argc == 4;
+    const uint64_t texture_detail = gltf ? std::strtoull(argv[3], nullptr, 10) : 0;
+    // Pictures hold many texels a byte; baked triangles are divided into a copy.
+    limit_memory(100 * file_bytes + (gltf ? (uint64_t{3} << 30) + 300 * texture_detail : 0));
     if (format == "raster-facts") {
       const auto facts = telesplat::data::read_raster_facts(path);
       return telesplat::data::write_raster_facts(out, facts) ? 0 : 1;
     }
     const auto mesh = argc == 5         ? import_elevation(path, std::atof(argv[3]), argv[4])
                       : format == "iso" ? telesplat::data::flying_edges(STDIN_FILENO, path)
-                                        : telesplat::data::import_with_vtk(path, format, argc == 4 ? argv[3] : "");
+                                        : telesplat::data::import_with_vtk(
+                                              path, format, argc == 4 && !gltf ? argv[3] : "", texture_detail);
     return telesplat::data::write_import_report(out, mesh) ? 0 : 1;
   } catch (const std::bad_alloc&) {
     const telesplat::Error error{

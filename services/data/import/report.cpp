@@ -20,6 +20,7 @@ struct Report {
   uint64_t scalars = 0;       // as many as there are
   uint32_t of_faces = 0;      // scalars are one a triangle
   uint32_t arrays_bytes = 0;  // scene::to_text() of the arrays
+  uint64_t notes_bytes = 0;   // each ends with a line's end
 };
 
 bool write_all(int descriptor, const void* data, size_t bytes) {
@@ -53,6 +54,8 @@ bool write_import_report(int descriptor, const Result<Mesh>& result) {
   }
   const Mesh& mesh = *result;
   const std::string arrays = mesh.arrays.empty() ? "" : scene::to_text(mesh.arrays);
+  std::string notes;
+  for (const auto& note : mesh.notes) notes += note + "\n";
   report = {0,
             mesh.positions.size(),
             mesh.indices.size() / 3,
@@ -61,12 +64,13 @@ bool write_import_report(int descriptor, const Result<Mesh>& result) {
             !mesh.colours.empty(),
             mesh.scalars.size(),
             mesh.scalars_of_faces,
-            static_cast<uint32_t>(arrays.size())};
+            static_cast<uint32_t>(arrays.size()),
+            notes.size()};
   const auto put = [&](const auto& array) {
     return write_all(descriptor, array.data(), array.size() * sizeof(array[0]));
   };
   return write_all(descriptor, &report, sizeof report) && put(mesh.positions) && put(mesh.normals) &&
-         put(mesh.colours) && put(mesh.indices) && put(mesh.scalars) && put(arrays);
+         put(mesh.colours) && put(mesh.indices) && put(mesh.scalars) && put(arrays) && put(notes);
 }
 
 Result<Mesh> read_import_report(int descriptor, const std::string& path, const std::string& format) {
@@ -93,6 +97,13 @@ Result<Mesh> read_import_report(int descriptor, const std::string& path, const s
   auto arrays = scene::arrays_from_text({text.data(), text.size()});
   if (!arrays) return Error{fmt::format("{}: {}", path, arrays.error().text)};
   mesh.arrays = *std::move(arrays);
+  std::vector<char> notes;
+  if (!take(rest, report.notes_bytes, notes)) return incomplete;
+  for (auto begin = notes.begin(); begin != notes.end();) {
+    const auto end = std::find(begin, notes.end(), '\n');
+    mesh.notes.emplace_back(begin, end);
+    begin = end == notes.end() ? end : end + 1;
+  }
   return mesh;
 }
 

@@ -7,11 +7,12 @@
 #include <vtkDataArray.h>
 #include <vtkDataReader.h>
 #include <vtkFieldData.h>
+#include <vtkGLTFDocumentLoader.h>
 #include <vtkGLTFReader.h>
 #include <vtkGeometryFilter.h>
-#include <vtkImageData.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
+#include <vtkObjectFactory.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataReader.h>
@@ -27,8 +28,11 @@
 #include <array>
 #include <cmath>
 
+#include "services/data/base/mapped_file.h"
 #include "services/data/import/vtk_arrays.h"
 #include "services/data/import/vtk_complaint.h"
+#include "services/data/texture/bake.h"
+#include "services/data/texture/gltf_textures.h"
 
 namespace telesplat::data {
 namespace {
@@ -72,33 +76,17 @@ double channel_scale(vtkDataArray* colours) {
 // The glTF material of a block, from the field data that vtkGLTFReader leaves.
 struct Material {
   Linear factor{1, 1, 1};
-  vtkImageData* texture = nullptr;
+  uint32_t texture = kNoTexture;
 
-  Material(vtkPolyData* block, vtkGLTFReader& reader) {
+  Material(vtkPolyData* block, const GltfTextures& textures) {
     vtkFieldData* fields = block->GetFieldData();
     if (vtkDataArray* a = fields->GetArray("BaseColorMultiplier");
         a && a->GetNumberOfComponents() >= 3 && a->GetNumberOfTuples() > 0)
       for (int k = 0; k < 3; ++k) factor[k] = a->GetComponent(0, k);
     vtkDataArray* index = fields->GetArray("BaseColorTextureIndex");
     if (!index || index->GetNumberOfTuples() == 0) return;
-    const auto i = static_cast<vtkIdType>(index->GetTuple1(0));
-    if (i < 0 || i >= reader.GetNumberOfTextures()) return;
-    const auto found = reader.GetGLTFTexture(i);
-    if (found.Image && found.Image->GetScalarType() == VTK_UNSIGNED_CHAR &&
-        found.Image->GetNumberOfScalarComponents() >= 3)
-      texture = found.Image;
-  }
-
-  // Repeats in both directions, as glTF does unless told otherwise; nearest texel.
-  Linear sample(double u, double v) const {
-    if (!texture || !std::isfinite(u) || !std::isfinite(v)) return {1, 1, 1};
-    int size[3];
-    texture->GetDimensions(size);
-    const auto texel = [](double t, int n) { return std::min(static_cast<int>((t - std::floor(t)) * n), n - 1); };
-    const auto* p =
-        static_cast<const unsigned char*>(texture->GetScalarPointer(texel(u, size[0]), texel(v, size[1]), 0));
-    if (!p) return {1, 1, 1};
-    return {to_linear(p[0] / 255.0), to_linear(p[1] / 255.0), to_linear(p[2] / 255.0)};
+    const double i = index->GetTuple1(0);
+    if (i >= 0 && i < double(textures.all.size()) && textures.all[size_t(i)]) texture = uint32_t(i);
   }
 };
 
@@ -131,6 +119,19 @@ class Collector {
     add_cells(block->GetStrips(), base, points, true, before_polys + block->GetNumberOfPolys());
   }
 
+  /// Of all blocks added so far, which have these textures.
+  void bake(GltfTextures textures, uint64_t most_triangles, const std::string& path) {
+    mesh_.notes = std::move(textures.notes);
+    use_.textures = std::move(textures.all);
+    const bool any = std::any_of(use_.texture.begin(), use_.texture.end(), [](uint32_t t) { return t != kNoTexture; });
+    const bool sound =
+        std::all_of(mesh_.indices.begin(), mesh_.indices.end(), [&](uint32_t i) { return i < mesh_.positions.size(); });
+    if (!any || !sound) return;
+    any_normals_ = true;
+    if (std::string note = bake_textures(mesh_, std::move(use_), most_triangles); !note.empty())
+      mesh_.notes.push_back(path + ": " + note);
+  }
+
   Mesh finish() {
     if (!any_normals_) mesh_.normals = {};
     if (!any_colours_) mesh_.colours = {};
@@ -154,10 +155,14 @@ class Collector {
     if (colours && colours->GetNumberOfTuples() != points) colours = nullptr;
     vtkDataArray* uv = block->GetPointData()->GetTCoords();
     if (uv && (uv->GetNumberOfTuples() != points || uv->GetNumberOfComponents() < 2)) uv = nullptr;
-    const bool tinted = material && (material->texture || material->factor != Linear{1, 1, 1});
+    const uint32_t texture = material && uv ? material->texture : kNoTexture;
+    const bool tinted = material && (texture != kNoTexture || material->factor != Linear{1, 1, 1});
     any_colours_ |= colours || tinted;
     const double scale = colours ? channel_scale(colours) : 0;
     for (vtkIdType i = 0; i < points; ++i) {
+      use_.texture.push_back(texture);
+      use_.uv.push_back(texture == kNoTexture ? glm::vec2(0)
+                                              : glm::vec2(uv->GetComponent(i, 0), uv->GetComponent(i, 1)));
       if (!colours && !tinted) {
         mesh_.colours.push_back(kNeutralAlbedo);
         continue;
@@ -167,10 +172,8 @@ class Collector {
       if (colours)
         for (int k = 0; k < 3; ++k)
           c[k] = colours->GetComponent(i, k) * scale, c[k] = material ? c[k] : to_linear(c[k]);
-      if (material) {
-        const Linear texel = uv ? material->sample(uv->GetComponent(i, 0), uv->GetComponent(i, 1)) : Linear{1, 1, 1};
-        for (int k = 0; k < 3; ++k) c[k] *= material->factor[k] * texel[k];
-      }
+      if (material)
+        for (int k = 0; k < 3; ++k) c[k] *= material->factor[k];
       mesh_.colours.push_back(to_rgb(c));
     }
   }
@@ -200,6 +203,7 @@ class Collector {
   }
 
   Mesh mesh_;
+  TextureUse use_;
   const std::string array_;
   std::vector<uint32_t> cells_;  // of each triangle, where array_ may be of cells
   bool any_normals_ = false, any_colours_ = false;
@@ -244,30 +248,56 @@ Status read_vtk(const std::string& path, const std::string& format, Collector& c
   return read_poly_data<vtkPolyDataReader>(path, collector);
 }
 
-void read_gltf(const std::string& path, Collector& collector) {
-  vtkNew<vtkGLTFReader> reader;
+// Reads the geometry alone. Pictures are read elsewhere: with their samplers, and without an end if one is missing.
+class GltfReader : public vtkGLTFReader {
+ public:
+  static GltfReader* New() { VTK_STANDARD_NEW_BODY(GltfReader); }
+
+  void read() {
+    UpdateInformation();
+    if (const auto model = Loader ? Loader->GetInternalModel() : nullptr)
+      for (auto& image : model->Images) {
+        image.BufferView = -1;
+        image.MimeType = "image/png";
+        image.Uri =  // one grey pixel
+            "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGM4"
+            "AQAAygDJmcpdfgAAAABJRU5ErkJggg==";
+      }
+    Update();
+  }
+};
+
+Status read_gltf(const std::string& path, uint64_t texture_detail, Collector& collector) {
+  const auto file = MappedFile::open(path);
+  if (!file) return file.error();
+  auto textures = read_gltf_textures((*file)->text(), path);
+  if (!textures) return textures.error();
+  vtkNew<GltfReader> reader;
   reader->SetFileName(path.c_str());
   reader->ApplyDeformationsToGeometryOn();
-  reader->Update();
+  reader->read();
   auto* blocks = vtkMultiBlockDataSet::SafeDownCast(reader->GetOutputDataObject(0));
-  if (!blocks) return;
+  if (!blocks) return ok_status();
   const auto iterator = vtk::TakeSmartPointer(blocks->NewIterator());
   for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem())
     if (auto* block = vtkPolyData::SafeDownCast(iterator->GetCurrentDataObject())) {
-      const Material material(block, *reader.GetPointer());
+      const Material material(block, *textures);
       collector.add(block, &material);
     }
+  collector.bake(std::move(*textures), texture_detail, path);
+  return ok_status();
 }
 
 }  // namespace
 
-Result<Mesh> import_with_vtk(const std::string& path, const std::string& format, const std::string& array) {
+Result<Mesh> import_with_vtk(const std::string& path, const std::string& format, const std::string& array,
+                             uint64_t texture_detail) {
   vtkNew<vtkStringOutputWindow> output;
   vtkOutputWindow::SetInstance(output);
   Collector collector(format, array);
   Status read = ok_status();
   if (format == "gltf")
-    read_gltf(path, collector);
+    read = read_gltf(path, texture_detail, collector);
   else
     read = read_vtk(path, format, collector);
   const std::string complaint = first_complaint(output->GetOutput());

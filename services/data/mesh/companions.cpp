@@ -1,33 +1,18 @@
-// Which other files a mesh file pulls in: material libraries of an OBJ, buffers and images of a glTF.
+// Which other files a mesh file pulls in: material libraries of an OBJ and their textures, buffers and images of a
+// glTF.
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "services/data/mesh/formats/gltf_header.h"
+#include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/texture/gltf_textures.h"
 
 namespace telesplat::data {
 namespace {
 
-constexpr size_t kMaxCompanions = 64;
-
-// The names after "mtllib" at lines' starts.
-std::vector<std::string> material_libraries(std::string_view content) {
-  std::vector<std::string> names;
-  constexpr std::string_view kWord = "mtllib";
-  for (size_t at = content.find(kWord); at != content.npos && names.size() < kMaxCompanions;
-       at = content.find(kWord, at)) {
-    const bool starts_line = at == 0 || content[at - 1] == '\n';
-    at += kWord.size();
-    if (!starts_line) continue;
-    std::string_view name = content.substr(at, std::min(content.find('\n', at), content.size()) - at);
-    while (!name.empty() && static_cast<unsigned char>(name.front()) <= ' ') name.remove_prefix(1);
-    while (!name.empty() && static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
-    if (!name.empty()) names.emplace_back(name);
-  }
-  return names;
-}
+constexpr size_t kMaxCompanions = 1024;
 
 // The uris of buffers and images, as VTK looks for them: without undoing %20 and its like.
 std::vector<std::string> gltf_uris(std::string_view content) {
@@ -50,7 +35,15 @@ std::vector<std::string> gltf_uris(std::string_view content) {
 
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path) {
   std::vector<std::string> names;
-  if (format == "obj") names = material_libraries(content);
+  if (format == "obj") {
+    std::vector<std::string> files = obj_material_libraries(content, path);
+    const auto materials = read_obj_materials(files);
+    for (const auto& [name, material] : materials)
+      if (!material.texture.empty() && std::find(files.begin(), files.end(), material.texture) == files.end() &&
+          files.size() < kMaxCompanions)
+        files.push_back(material.texture);
+    return files;
+  }
   if (format == "gltf") names = gltf_uris(content);
   for (std::string& name : names) name = (std::filesystem::path(path).parent_path() / name).string();
   return names;

@@ -9,7 +9,7 @@
 namespace telesplat::data {
 
 Result<MeshSource> file_source(const std::string& path, const ElevationOptions& elevation, const std::string& array,
-                               const Progress& progress) {
+                               uint64_t texture_detail, const Progress& progress) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
   const DetectedFormat detected = detect_format((*file)->text(), path);
@@ -27,8 +27,10 @@ Result<MeshSource> file_source(const std::string& path, const ElevationOptions& 
   if (const Status s = check_array(array, detected.format, path); !s) return s.error();
   std::string variant = raster ? fmt::format("-z{}", elevation.z_scale) : "";
   if (!array.empty()) variant += fmt::format("-by{:016x}", XXH3_64bits(array.data(), array.size()));
+  const bool textured = detected.format == "obj" || detected.format == "gltf";
+  if (textured && texture_detail != kDefaultTextureDetail) variant += fmt::format("-t{}", texture_detail);
   return MeshSource{hash_files(files, progress), variant,
-                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation, array); }, array};
+                    [=](const ReadProgress& p) { return read_mesh(path, p, elevation, array, texture_detail); }, array};
 }
 
 }  // namespace telesplat::data

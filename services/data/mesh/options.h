@@ -6,6 +6,7 @@
 
 #include "services/data/base/elevation_options.h"
 #include "services/data/base/placement_options.h"
+#include "services/data/texture/bake.h"
 
 namespace telesplat::data {
 
@@ -22,7 +23,8 @@ struct ColouringOptions {
 };
 
 struct MeshOptions : StoreOptions {
-  ElevationOptions elevation;  ///< of elevation rasters alone
+  ElevationOptions elevation;                       ///< of elevation rasters alone
+  uint64_t texture_detail = kDefaultTextureDetail;  ///< triangles, at most, of a mesh whose textures are baked
   ColouringOptions colouring;
   std::optional<double> iso;  ///< of volumes alone: the surface where they have this value
   std::string raw, series;    ///< with iso: those of VolumeSource

@@ -137,7 +137,7 @@ Result<std::vector<scene::ArrayInfo>> mesh_arrays(const std::string& path, const
 }
 
 Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation,
-                       const std::string& array) {
+                       const std::string& array, uint64_t texture_detail) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
   const std::string_view content = (*file)->text();
@@ -145,12 +145,13 @@ Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, co
   if (detected.format.empty()) return Error{fmt::format("{}: {}", path, detected.complaint)};
   if (const Status s = check_array(array, detected.format, path); !s) return s.error();
   try {
-    auto mesh = detected.format == "ply"      ? read_ply(content, path, progress, array)
-                : detected.format == "off"    ? read_off(content, path, progress)
-                : detected.format == "stl"    ? read_stl(content, path, progress)
-                : detected.format == "obj"    ? read_obj(content, path, progress)
-                : detected.format == "raster" ? read_with_gdal(path, elevation, progress)
-                                              : read_with_vtk(content, detected.format, path, progress, array);
+    auto mesh = detected.format == "ply"   ? read_ply(content, path, progress, array)
+                : detected.format == "off" ? read_off(content, path, progress)
+                : detected.format == "stl" ? read_stl(content, path, progress)
+                : detected.format == "obj" ? read_obj(content, path, progress, texture_detail)
+                : detected.format == "raster"
+                    ? read_with_gdal(path, elevation, progress)
+                    : read_with_vtk(content, detected.format, path, progress, array, texture_detail);
     if (!mesh) return mesh;
     if (auto status = validate_mesh(*mesh, path); !status) return status.error();
     return mesh;

@@ -7,6 +7,7 @@
 #include "services/data/base/elevation.h"
 #include "services/data/base/mesh.h"
 #include "services/data/base/progress.h"
+#include "services/data/texture/bake.h"
 
 namespace telesplat::data {
 
@@ -22,8 +23,9 @@ DetectedFormat detect_format(std::string_view content, const std::string& path);
 /// Reads a mesh file of any supported format; what it returns passed validate_mesh. Errors name the file.
 /// Nothing is allocated by a count that the file merely claims.
 /// elevation: of rasters alone. array: what the mesh is coloured by, as scene::choose_array() takes it; empty: nothing.
+/// texture_detail: of OBJ and glTF, whose textures are baked: bake_textures().
 Result<Mesh> read_mesh(const std::string& path, const ReadProgress& progress, const ElevationOptions& elevation = {},
-                       const std::string& array = {});
+                       const std::string& array = {}, uint64_t texture_detail = kDefaultTextureDetail);
 
 /// What arrays of numbers a mesh file holds, with the ranges of their values. It is read for that, but kept nowhere.
 /// Empty: of a format that has none, or a file without. Errors name the file.
@@ -45,21 +47,24 @@ Result<Mesh> read_ply(std::string_view content, const std::string& name, const R
 Result<Mesh> read_off(std::string_view content, const std::string& name, const ReadProgress& progress);
 /// STL, binary or ascii. Corners at the same position become one vertex.
 Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress);
-/// Wavefront OBJ: v (with r g b too), vn, f (negative indices too), usemtl with the Kd colours of its material
-/// libraries, which are looked for beside `name`.
-Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress);
+/// Wavefront OBJ: v (with r g b too), vn, vt, f (negative indices too), usemtl with Kd and map_Kd of its material
+/// libraries, which are looked for beside `name`; textures are baked. Error: also a texture that is damaged; without one
+/// that is missing the mesh has a note.
+Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
+                      uint64_t texture_detail = kDefaultTextureDetail);
 /// VTP, VTU, legacy VTK and glTF, through VTK (of grids the surface), in the program telesplat-import, which must lie beside this process's own
 /// program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us. Claimed counts are checked here
 /// before VTK sees the file.
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
-                           const ReadProgress& progress, const std::string& array = {});
+                           const ReadProgress& progress, const std::string& array = {},
+                           uint64_t texture_detail = kDefaultTextureDetail);
 
 /// An elevation raster, through GDAL, in the program telesplat-import like the above; coloured and triangulated:
 /// elevation.h.
 Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress);
 
-/// Other files that `path` pulls in (material libraries of an OBJ, buffers and images of a glTF), as paths; existing or
-/// not.
+/// Other files that `path` pulls in (material libraries of an OBJ and their textures, buffers and images of a glTF), as
+/// paths; existing or not.
 std::vector<std::string> companion_files(std::string_view content, const std::string& format, const std::string& path);
 
 }  // namespace telesplat::data

@@ -1,9 +1,7 @@
 #include "services/data/mesh/store.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -12,6 +10,8 @@
 #include <filesystem>
 
 #include "common/core/log.h"
+#include "services/data/base/file_lock.h"
+#include "services/data/mesh/cache.h"
 #include "services/data/mesh/placement.h"
 #include "services/data/mesh/store_file.h"
 
@@ -20,25 +20,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// An open file descriptor.
-class Descriptor {
- public:
-  explicit Descriptor(int value = -1) : value_(value) {}
-  ~Descriptor() {
-    if (value_ >= 0) close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return value_; }
-  bool valid() const { return value_ >= 0; }
-
- private:
-  int value_;
-};
-
 class Store : public MeshStore {
  public:
-  explicit Store(StoreContent content) : content_(std::move(content)) {}
+  /// use: a lock that says so, of a store in the cache.
+  explicit Store(StoreContent content, Descriptor use) : content_(std::move(content)), use_(std::move(use)) {}
   const MeshStoreInfo& info() const override { return content_.info; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return content_.chunks; }
   geometry::ChunkBytes chunk(ChunkId id) const override {
@@ -48,26 +33,23 @@ class Store : public MeshStore {
 
  private:
   StoreContent content_;
+  Descriptor use_;
 };
 
-std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& path, bool from_cache) {
+std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& path, bool from_cache,
+                                      Descriptor use = Descriptor()) {
   content.info.source = path;
   content.info.from_cache = from_cache;
-  return std::make_shared<Store>(std::move(content));
-}
-
-fs::path default_cache_dir() {
-  if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg && *xdg) return fs::path(xdg) / "telesplat";
-  if (const char* home = std::getenv("HOME"); home && *home) return fs::path(home) / ".cache" / "telesplat";
-  return fs::temp_directory_path() / fmt::format("telesplat-{}", getuid());
+  return std::make_shared<Store>(std::move(content), std::move(use));
 }
 
 // Reads the mesh file and writes its store into the descriptor.
 Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
-                   const Progress& progress) {
+                   const Progress& progress, std::vector<std::string>& notes) {
   auto mesh = source.read([&](double fraction) { progress("read", fraction); });
   if (!mesh) return mesh.error();
   progress("read", 1.0);
+  notes = mesh->notes;
   MeshStoreInfo info;
   info.format = mesh->format;
   info.vertices = mesh->positions.size();
@@ -98,30 +80,43 @@ Result<std::shared_ptr<MeshStore>> open_unnamed(const std::string& path, const S
   if (!file.valid())
     return Error{fmt::format("{}: no temporary file {} for its chunks: {}", path, name, std::strerror(errno))};
   unlink(name.c_str());
-  if (auto status = build_store(file.get(), path, options, source, progress); !status) return status.error();
+  std::vector<std::string> notes;
+  if (auto status = build_store(file.get(), path, options, source, progress, notes); !status) return status.error();
   auto content = read_store(file.get(), name);
   if (!content) return content.error();
+  content->info.notes = std::move(notes);
   return make_store(std::move(*content), path, false);
 }
 
-Result<StoreContent> open_existing(const std::string& name) {
-  const Descriptor file(open(name.c_str(), O_RDONLY | O_CLOEXEC));
+// The store of a stem, which is locked as in use; null: there is none. news: for the person.
+Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const std::string& path, bool from_cache,
+                                                 std::vector<std::string> news = {}) {
+  const std::string name = stem + ".mesh";
+  auto file = Descriptor::open_file(name, O_RDONLY);
+  if (!file.valid() && errno == ENOENT) return std::shared_ptr<MeshStore>();
   if (!file.valid()) return Error{fmt::format("{}: {}", name, std::strerror(errno))};
-  return read_store(file.get(), name);
+  file.lock(LOCK_SH);
+  auto content = read_store(file.get(), name);
+  if (!content) return content.error();
+  note_use(stem, path, fmt::format("{}, {} triangles", content->info.format, content->info.triangles));
+  content->info.notes = std::move(news);
+  return make_store(std::move(*content), path, from_cache, std::move(file));
 }
 
-// Makes a store in the cache. It gets its name once it is whole.
+// Makes a store in the cache. It gets its name once it is whole. Where the cache has a limit, others make room: this one
+// is locked.
 Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const std::string& path,
                                                const StoreOptions& options, const MeshSource& source,
                                                const Progress& progress) {
   const std::string name = stem + ".mesh", part = stem + ".part";
+  std::vector<std::string> notes;
   {
-    const Descriptor out(::open(part.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    const auto out = Descriptor::open_file(part, O_RDWR | O_CREAT | O_TRUNC);
     if (!out.valid()) {
       log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
       return open_unnamed(path, options, source, progress);
     }
-    const Status built = build_store(out.get(), path, options, source, progress);
+    const Status built = build_store(out.get(), path, options, source, progress, notes);
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
       const std::string reason =
           built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
@@ -130,9 +125,24 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
       return Error{reason};
     }
   }
-  auto content = open_existing(name);
-  if (!content) return content.error();
-  return make_store(std::move(*content), path, false);
+  if (std::string told = after_growth(fs::path(stem).parent_path().string()); !told.empty())
+    notes.push_back(std::move(told));
+  auto store = open_existing(stem, path, false, std::move(notes));
+  if (!store.ok() || *store) return store;
+  return Error{fmt::format("{}: was removed as soon as it was made", name)};
+}
+
+// One process at a time makes a store; others wait for it here and then find it. The lock ends with its holder. Whoever
+// clears the cache removes locks that nobody holds, so the one that was waited for may be gone: then once more.
+Descriptor lock_making(const std::string& stem) {
+  const std::string name = stem + ".lock";
+  while (true) {
+    auto lock = Descriptor::open_file(name, O_RDWR | O_CREAT);
+    if (!lock.lock(LOCK_EX)) return Descriptor();
+    struct stat held {
+    }, there{};
+    if (fstat(lock.get(), &held) == 0 && stat(name.c_str(), &there) == 0 && held.st_ino == there.st_ino) return lock;
+  }
 }
 
 }  // namespace
@@ -148,25 +158,23 @@ Status validate(const StoreOptions& options) {
 Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, const MeshSource& source,
                                                    const StoreOptions& options, const Progress& progress) {
   if (!options.use_cache) return open_unnamed(path, options, source, progress);
-  const fs::path folder = options.cache_dir.empty() ? default_cache_dir() : fs::path(options.cache_dir);
+  const fs::path folder = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
   const std::string stem =
       (folder / fmt::format("{:016x}-{}-{}{}", source.hash, options.up, options.room_size_m, source.variant)).string();
-  const std::string name = stem + ".mesh";
-  if (auto content = open_existing(name)) return make_store(std::move(*content), path, true);
+  if (auto store = open_existing(stem, path, true); store && *store) return store;
 
   std::error_code error;
   fs::create_directories(folder, error);
-  // One process at a time makes this store; others wait for it here and then find it. The lock ends with its holder.
-  const Descriptor lock(::open((stem + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-  if (!lock.valid() || flock(lock.get(), LOCK_EX) != 0) {
+  const Descriptor lock = lock_making(stem);
+  if (!lock.valid()) {
     log::warn("cache folder {} cannot be written ({}); going on without", folder.string(), std::strerror(errno));
     return open_unnamed(path, options, source, progress);
   }
-  auto content = open_existing(name);
-  if (content) return make_store(std::move(*content), path, true);
-  if (fs::exists(name, error)) {
-    log::warn("{}; making it anew", content.error().text);
-    fs::remove(name, error);
+  auto store = open_existing(stem, path, true);
+  if (store && *store) return store;
+  if (!store) {
+    log::warn("{}; making it anew", store.error().text);
+    fs::remove(stem + ".mesh", error);
   }
   return make_cached(stem, path, options, source, progress);
 }

@@ -28,6 +28,7 @@ struct MeshStoreInfo {
   std::string up_reason;  ///< why, in a few words
   bool from_cache = false;
   uint64_t content_hash = 0;
+  std::vector<std::string> notes;  ///< Mesh::notes, where it was made just now
 };
 
 /// An open chunk store: immutable, safe to read from any thread.

@@ -71,6 +71,7 @@ class Baker {
   }
 
   std::string bake() {
+    complete_normals();
     settled_.assign(mesh_.indices.size() / 3, false);
     while (pass()) {
     }
@@ -83,6 +84,22 @@ class Baker {
   }
 
  private:
+  // Normals that are to be computed are so here, because texture's seams double vertices: smooth across them.
+  void complete_normals() {
+    mesh_.normals.resize(mesh_.positions.size(), glm::vec3(0));
+    const auto absent = [&](size_t v) { return mesh_.normals[v] == glm::vec3(0); };
+    std::vector<glm::dvec3> sums(mesh_.positions.size(), glm::dvec3(0));  // by numbers of positions
+    for (size_t t = 0; t < mesh_.indices.size() / 3; ++t) {
+      const auto& p = mesh_.positions;
+      const glm::dvec3 n = glm::cross(p[corner(t, 1)] - p[corner(t, 0)], p[corner(t, 2)] - p[corner(t, 0)]);
+      for (int k = 0; k < 3; ++k) sums[place_[corner(t, k)]] += n;
+    }
+    for (size_t v = 0; v < mesh_.positions.size(); ++v) {
+      const glm::dvec3 n = sums[place_[v]];
+      if (absent(v) && glm::dot(n, n) > 0) mesh_.normals[v] = glm::vec3(glm::normalize(n));
+    }
+  }
+
   uint32_t corner(size_t t, int k) const { return mesh_.indices[3 * t + size_t(k)]; }
   // Null: it has none, or corners of different ones.
   const Texture* texture_of(size_t t) const {
@@ -192,10 +209,8 @@ class Baker {
     const uint32_t v = middles_.insert(a, b, next);
     if (v != next) return v;
     mesh_.positions.push_back((mesh_.positions[a] + mesh_.positions[b]) * 0.5);
-    if (!mesh_.normals.empty()) {
-      const auto unit = [](glm::vec3 n) { return glm::dot(n, n) > 0 ? glm::normalize(n) : n; };
-      mesh_.normals.push_back(unit(unit(mesh_.normals[a]) + unit(mesh_.normals[b])));
-    }
+    const auto unit = [](glm::vec3 n) { return glm::dot(n, n) > 0 ? glm::normalize(n) : n; };
+    mesh_.normals.push_back(unit(unit(mesh_.normals[a]) + unit(mesh_.normals[b])));
     mesh_.colours.push_back(mean_colour(mesh_.colours[a], mesh_.colours[b]));
     use_.uv.push_back((use_.uv[a] + use_.uv[b]) * 0.5f);
     use_.texture.push_back(use_.texture[a] == use_.texture[b] ? use_.texture[a] : kNoTexture);

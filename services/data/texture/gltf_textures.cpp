@@ -104,7 +104,10 @@ Result<Picture> from_view(const Json& document, std::string_view content, size_t
   }
   if (length == 0 || offset > data.size() || length > data.size() - offset)
     return Error{fmt::format("{} claims {} bytes from {} on, there are {}", picture.name, length, offset, data.size())};
-  picture.bytes = data.substr(offset, length);
+  if (picture.file || picture.own.empty())
+    picture.bytes = data.substr(offset, length);
+  else
+    picture.own = picture.own.substr(offset, length);
   return picture;
 }
 

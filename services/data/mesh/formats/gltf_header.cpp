@@ -5,6 +5,8 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "services/data/texture/gltf_textures.h"
+
 namespace telesplat::data {
 namespace {
 
@@ -17,14 +19,6 @@ uint32_t word_at(std::string_view content, size_t offset) {
 }
 
 }  // namespace
-
-std::string_view gltf_json(std::string_view content) {
-  if (!content.starts_with("glTF")) return content;
-  if (content.size() < kGlbHeader + kChunkHeader) return {};
-  const uint32_t bytes = word_at(content, kGlbHeader);
-  if (bytes > content.size() - kGlbHeader - kChunkHeader) return {};
-  return content.substr(kGlbHeader + kChunkHeader, bytes);
-}
 
 Status check_gltf(std::string_view content, uint64_t data_bytes, const std::string& name) {
   if (content.starts_with("glTF")) {

@@ -1,4 +1,4 @@
-// The JSON of a glTF file, and checks on what it claims. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4.4.
+// Checks on what a glTF file claims. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4.4.
 #pragma once
 
 #include <string>
@@ -7,10 +7,6 @@
 #include "common/core/result.h"
 
 namespace telesplat::data {
-
-/// The JSON text of a .gltf file (all of it) or a .glb file (its first chunk); empty if a .glb is too short for what it
-/// claims.
-std::string_view gltf_json(std::string_view content);
 
 /// Checks before VTK sees the file: version 2, well-formed JSON, no accessor of more elements than `data_bytes` (the
 /// file and its companions), a GLB no longer than it is. Errors start with `name`.

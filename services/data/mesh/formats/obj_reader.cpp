@@ -2,12 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
+#include <map>
 #include <unordered_map>
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/base/text_scanner.h"
+#include "services/data/mesh/formats/obj_materials.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/texture/bake.h"
 
 namespace telesplat::data {
 namespace {
@@ -17,36 +19,28 @@ uint32_t colour_of(const double (&c)[3]) {
   return pack_rgb(channel(c[0]), channel(c[1]), channel(c[2]));
 }
 
-// The diffuse colours of a material library; a library that cannot be read has none.
-void read_materials(const std::string& path, std::unordered_map<std::string, uint32_t>& colours) {
-  const auto file = MappedFile::open(path);
-  if (!file) return;
-  TextScanner scan((*file)->text());
-  std::string material;
-  for (; scan.skip_space('#'); scan.next_line()) {
-    const std::string_view word = scan.word();
-    if (word == "newmtl" && scan.skip_blanks()) material = scan.word();
-    double c[3];
-    if (word == "Kd" && scan.skip_blanks() && scan.number(c[0]) && scan.skip_blanks() && scan.number(c[1]) &&
-        scan.skip_blanks() && scan.number(c[2]))
-      colours[material] = colour_of(c);
-  }
-}
-
 constexpr uint32_t kNone = ~uint32_t{0};
 
 class ObjReader {
  public:
-  ObjReader(std::string_view content, const std::string& name, const ReadProgress& progress)
-      : content_(content), name_(name), progress_(progress), scan_(content) {}
+  ObjReader(std::string_view content, const std::string& name, const ReadProgress& progress, uint64_t texture_detail)
+      : content_(content), name_(name), progress_(progress), texture_detail_(texture_detail), scan_(content) {}
 
   Result<Mesh> read() {
-    for (const std::string& library : companion_files(content_, "obj", name_)) read_materials(library, materials_);
+    for (auto& [name, material] : read_obj_materials(obj_material_libraries(content_, name_))) {
+      // Those that look the same are one: fewer vertices are doubled.
+      const auto same = std::find_if(materials_.begin(), materials_.end(), [&](const ObjMaterial& m) {
+        return m.texture.empty() && material.texture.empty() && m.colour == material.colour;
+      });
+      material_numbers_.emplace(name, uint32_t(same - materials_.begin()));
+      if (same == materials_.end()) materials_.push_back(std::move(material));
+    }
     mesh_.format = "obj";
     for (size_t lines = 0; scan_.skip_space('#'); scan_.next_line(), ++lines) {
       const std::string_view word = scan_.word();
       const Status status = word == "v"    ? read_vertex()
                             : word == "vn" ? read_normal()
+                            : word == "vt" ? read_texture_coordinate()
                             : word == "f"  ? read_face()
                                            : ok_status();
       if (!status.ok()) return status.error();
@@ -54,14 +48,14 @@ class ObjReader {
       if ((lines & 0xffff) == 0 && progress_)
         progress_(static_cast<double>(scan_.offset()) / static_cast<double>(content_.size()));
     }
-    finish();
-    return std::move(mesh_);
+    return finish();
   }
 
  private:
-  // A corner of the output mesh: a position with one normal and one material. Those of one position form a list.
+  // A corner of the output mesh: a position with one normal, one material and, where that has a texture, one place in
+  // it. Those of one position form a list.
   struct Variant {
-    uint32_t normal, colour, vertex, next;
+    uint32_t normal, material, place, vertex, next;
   };
 
   Error bad(const std::string& what) const { return Error{fmt::format("{}:{}: {}", name_, scan_.line_number(), what)}; }
@@ -88,10 +82,18 @@ class ObjReader {
     return ok_status();
   }
 
+  // u [v [w]]; v goes up from the picture's lower rim.
+  Status read_texture_coordinate() {
+    double u = 0, v = 0;
+    if (!scan_.skip_blanks('#') || !scan_.number(u)) return bad("a texture coordinate is no number");
+    if (scan_.skip_blanks('#')) scan_.number(v);
+    places_.emplace_back(u, v);
+    return ok_status();
+  }
+
   void use_material() {
-    scan_.skip_blanks();
-    const auto found = materials_.find(std::string(scan_.word()));
-    material_colour_ = found == materials_.end() ? kNone : found->second;
+    const auto found = material_numbers_.find(rest_of_line(content_, scan_.offset()));
+    material_ = found == material_numbers_.end() ? kNone : found->second;
   }
 
   // 1-based, or negative: counted back from the last one so far.
@@ -104,26 +106,28 @@ class ObjReader {
 
   // position[/[texture][/normal]]
   Status read_corner(uint32_t& out) {
-    int64_t index = 0, ignored = 0;
-    uint32_t position = 0, normal = kNone;
+    int64_t index = 0;
+    uint32_t position = 0, normal = kNone, place = kNone;
     if (!scan_.integer(index)) return bad("a face's corner is no number");
     if (!resolve(index, positions_.size(), position))
       return bad(fmt::format("a face names vertex {}, there are {} so far", index, positions_.size()));
     if (scan_.skip_char('/')) {
-      scan_.integer(ignored);
+      if (scan_.integer(index) && !resolve(index, places_.size(), place))
+        return bad(fmt::format("a face names texture coordinate {}, there are {} so far", index, places_.size()));
       if (scan_.skip_char('/') && scan_.integer(index) && !resolve(index, normals_.size(), normal))
         return bad(fmt::format("a face names normal {}, there are {} so far", index, normals_.size()));
     }
-    out = variant_of(position, normal);
+    const bool textured = material_ != kNone && !materials_[material_].texture.empty();
+    out = variant_of(position, normal, textured ? place : kNone);
     return ok_status();
   }
 
-  uint32_t variant_of(uint32_t position, uint32_t normal) {
+  uint32_t variant_of(uint32_t position, uint32_t normal, uint32_t place) {
     if (first_variant_.size() < positions_.size()) first_variant_.resize(positions_.size(), kNone);
     for (uint32_t v = first_variant_[position]; v != kNone; v = variants_[v].next)
-      if (variants_[v].normal == normal && variants_[v].colour == material_colour_) return v;
+      if (variants_[v].normal == normal && variants_[v].material == material_ && variants_[v].place == place) return v;
     const auto id = static_cast<uint32_t>(variants_.size());
-    variants_.push_back({normal, material_colour_, position, first_variant_[position]});
+    variants_.push_back({normal, material_, place, position, first_variant_[position]});
     return first_variant_[position] = id;
   }
 
@@ -146,37 +150,101 @@ class ObjReader {
     return ok_status();
   }
 
-  void finish() {
+  uint32_t colour_of_variant(const Variant& v, bool own_colours, bool textured) const {
+    const auto kd = v.material == kNone ? std::nullopt : materials_[v.material].colour;
+    // A texture is tinted by its material; many programs write black beside a texture and mean none.
+    if (textured) return kd && *kd != 0 ? *kd : 0xffffff;
+    return !own_colours && kd ? *kd : vertex_colours_[v.vertex];
+  }
+
+  Result<Mesh> finish() {
+    auto use = read_textures();
+    if (!use) return use.error();
     const bool own_colours = !vertex_colours_.empty();  // they win over materials
-    bool any_colour = own_colours, any_normal = false;
-    for (const Variant& v : variants_) any_colour |= v.colour != kNone, any_normal |= v.normal != kNone;
+    bool any_colour = own_colours || !use->textures.empty(), any_normal = false;
+    for (const Variant& v : variants_)
+      any_colour |= v.material != kNone && materials_[v.material].colour, any_normal |= v.normal != kNone;
     vertex_colours_.resize(positions_.size(), kNeutralAlbedo);
     mesh_.positions.reserve(variants_.size());
     for (const Variant& v : variants_) {
       mesh_.positions.push_back(positions_[v.vertex]);
-      if (any_colour) mesh_.colours.push_back(!own_colours && v.colour != kNone ? v.colour : vertex_colours_[v.vertex]);
+      const uint32_t texture = v.material == kNone || v.place == kNone ? kNoTexture : textures_of_[v.material];
+      if (any_colour) mesh_.colours.push_back(colour_of_variant(v, own_colours, texture != kNoTexture));
       if (any_normal)
         mesh_.normals.push_back(v.normal != kNone ? normals_[v.normal] : glm::vec3(0));  // without one: computed later
+      if (use->textures.empty()) continue;
+      use->texture.push_back(texture);
+      use->uv.push_back(texture == kNoTexture ? glm::vec2(0) : place_in_picture(v));
     }
+    // A mesh that validate_mesh refuses is left to it.
+    const bool sound =
+        std::all_of(mesh_.indices.begin(), mesh_.indices.end(), [&](uint32_t i) { return i < mesh_.positions.size(); });
+    if (!use->textures.empty() && sound)
+      if (std::string note = bake_textures(mesh_, std::move(*use), texture_detail_); !note.empty())
+        mesh_.notes.push_back(name_ + ": " + note);
+    return std::move(mesh_);
+  }
+
+  glm::vec2 place_in_picture(const Variant& v) const {
+    const ObjMaterial& m = materials_[v.material];
+    const glm::vec2 uv = places_[v.place] * m.scale + m.offset;
+    return {uv.x, 1 - uv.y};
+  }
+
+  // Those that faces use. One file is read once for each way to wrap it.
+  Result<TextureUse> read_textures() {
+    TextureUse use;
+    textures_of_.assign(materials_.size(), kNoTexture);
+    std::vector<bool> used(materials_.size(), false);
+    for (const Variant& v : variants_)
+      if (v.material != kNone && v.place != kNone) used[v.material] = true;
+    std::map<std::pair<std::string, bool>, uint32_t> read;
+    uint64_t room = kMaxTexels;
+    for (size_t m = 0; m < materials_.size(); ++m) {
+      const ObjMaterial& material = materials_[m];
+      if (!used[m] || material.texture.empty()) continue;
+      const auto [entry, is_new] = read.try_emplace({material.texture, material.clamp}, uint32_t(use.textures.size()));
+      if (is_new) {
+        const auto file = MappedFile::open(material.texture);
+        if (!file) {
+          mesh_.notes.push_back(
+              fmt::format("{}: the texture {} is not there; its material's colour is shown", name_, material.texture));
+          entry->second = kNoTexture;
+        } else {
+          auto picture = image::read_picture((*file)->bytes(), material.texture, room);
+          if (!picture) return Error{fmt::format("{}: {}", name_, picture.error().text)};
+          room -= picture->colour.size();
+          const Wrap wrap = material.clamp ? Wrap::kClamp : Wrap::kRepeat;
+          use.textures.push_back(std::make_shared<Texture>(std::move(*picture), wrap, wrap));
+        }
+      }
+      textures_of_[m] = entry->second;
+    }
+    return use;
   }
 
   std::string_view content_;
   const std::string& name_;
   const ReadProgress& progress_;
+  const uint64_t texture_detail_;
   TextScanner scan_;
   Mesh mesh_;
   std::vector<glm::dvec3> positions_;
   std::vector<glm::vec3> normals_;
   std::vector<uint32_t> vertex_colours_, first_variant_;
   std::vector<Variant> variants_;
-  std::unordered_map<std::string, uint32_t> materials_;
-  uint32_t material_colour_ = kNone;
+  std::vector<glm::vec2> places_;  // in textures
+  std::unordered_map<std::string, uint32_t> material_numbers_;
+  std::vector<ObjMaterial> materials_;
+  std::vector<uint32_t> textures_of_;  // of each material: its number in TextureUse::textures, or kNoTexture
+  uint32_t material_ = kNone;
 };
 
 }  // namespace
 
-Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress) {
-  return ObjReader(content, name, progress).read();
+Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
+                      uint64_t texture_detail) {
+  return ObjReader(content, name, progress, texture_detail).read();
 }
 
 }  // namespace telesplat::data

@@ -1,12 +1,14 @@
 // Meshes of the formats that VTK reads: claims are checked here, the rest is read in the program telesplat-import.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "services/data/base/mapped_file.h"
 #include "services/data/import/process.h"
 #include "services/data/mesh/formats/gltf_header.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/texture/gltf_textures.h"
 
 namespace telesplat::data {
 namespace {
@@ -38,8 +40,10 @@ Status check_counts(std::string_view content, const std::string& name, std::init
 Status check_before(std::string_view content, const std::string& format, const std::string& path) {
   if (format == "gltf") {
     uint64_t bytes = content.size();
+    const auto pictures = gltf_picture_files(content, path);
     for (const std::string& companion : companion_files(content, format, path)) {
       const auto file = MappedFile::open(companion);
+      if (!file && std::find(pictures.begin(), pictures.end(), companion) != pictures.end()) continue;  // goes without
       if (!file) return Error{fmt::format("{}: needs a file that is missing: {}", path, file.error().text)};
       bytes += (*file)->bytes().size();
     }
@@ -69,10 +73,10 @@ Status check_before(std::string_view content, const std::string& format, const s
 }  // namespace
 
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
-                           const ReadProgress& progress, const std::string& array) {
+                           const ReadProgress& progress, const std::string& array, uint64_t texture_detail) {
   if (auto status = check_before(content, format, path); !status) return status.error();
   if (progress) progress(0.0);
-  return import("VTK's " + format, {format, path, array});
+  return import("VTK's " + format, {format, path, format == "gltf" ? std::to_string(texture_detail) : array});
 }
 
 Result<Mesh> read_with_gdal(const std::string& path, const ElevationOptions& options, const ReadProgress& progress) {

@@ -1,0 +1,108 @@
+#include "services/data/mesh/formats/obj_materials.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+
+#include "services/data/base/mapped_file.h"
+#include "services/data/base/mesh.h"
+#include "services/data/base/text_scanner.h"
+
+namespace telesplat::data {
+namespace {
+
+constexpr size_t kMaxLibraries = 64, kMaxMaterials = 100'000;
+
+std::string trimmed(std::string_view name) {
+  while (!name.empty() && static_cast<unsigned char>(name.front()) <= ' ') name.remove_prefix(1);
+  while (!name.empty() && static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
+  return std::string(name);
+}
+
+std::string beside(const std::string& path, std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');  // as programs on Windows write them
+  return (std::filesystem::path(path).parent_path() / name).string();
+}
+
+uint32_t colour_of(const std::array<double, 3>& c) {
+  const auto channel = [](double v) { return v > 0 ? static_cast<uint32_t>(std::min(v * 255 + 0.5, 255.0)) : 0; };
+  return pack_rgb(channel(c[0]), channel(c[1]), channel(c[2]));
+}
+
+// As many numbers as there are, at most three.
+int take_numbers(TextScanner& scan, double (&out)[3]) {
+  int n = 0;
+  while (n < 3 && scan.skip_blanks() && scan.number(out[n])) ++n;
+  return n;
+}
+
+// -s u v w, -o u v w, -clamp on and those that say nothing of the colours; then the file's name, which may have blanks.
+void read_map(TextScanner& scan, std::string_view content, const std::string& library, ObjMaterial& material) {
+  while (scan.skip_blanks()) {
+    const size_t begin = scan.offset();
+    const std::string_view word = scan.word();
+    double numbers[3] = {};
+    if (word == "-s" || word == "-o" || word == "-t") {
+      const int n = take_numbers(scan, numbers);
+      glm::vec2& to = word == "-s" ? material.scale : material.offset;
+      if (n > 0 && word != "-t") to = {float(numbers[0]), float(n > 1 ? numbers[1] : (word == "-s" ? 1.0 : 0.0))};
+    } else if (word == "-mm" || word == "-bm" || word == "-boost" || word == "-texres") {
+      take_numbers(scan, numbers);
+    } else if (word == "-clamp" || word == "-blendu" || word == "-blendv" || word == "-cc" || word == "-imfchan" ||
+               word == "-type") {
+      scan.skip_blanks();
+      const std::string_view value = scan.word();
+      if (word == "-clamp") material.clamp = value == "on";
+    } else {
+      if (const std::string name = rest_of_line(content, begin); !name.empty())
+        material.texture = beside(library, name);
+      return;
+    }
+  }
+}
+
+void read_library(const std::string& path, std::map<std::string, ObjMaterial>& materials) {
+  const auto file = MappedFile::open(path);
+  if (!file) return;
+  const std::string_view content = (*file)->text();
+  TextScanner scan(content);
+  ObjMaterial* material = nullptr;
+  for (; scan.skip_space('#') && materials.size() < kMaxMaterials; scan.next_line()) {
+    const std::string_view word = scan.word();
+    double c[3];
+    if (word == "newmtl") {
+      material = &(materials[rest_of_line(content, scan.offset())] = {});
+    } else if (material && word == "Kd") {
+      if (take_numbers(scan, c) == 3) material->colour = colour_of({c[0], c[1], c[2]});
+    } else if (material && word == "map_Kd") {
+      read_map(scan, content, path, *material);
+    }
+  }
+}
+
+}  // namespace
+
+std::string rest_of_line(std::string_view content, size_t offset) {
+  return trimmed(content.substr(offset, std::min(content.find('\n', offset), content.size()) - offset));
+}
+
+std::vector<std::string> obj_material_libraries(std::string_view content, const std::string& path) {
+  std::vector<std::string> out;
+  constexpr std::string_view kWord = "mtllib";
+  for (size_t at = content.find(kWord); at != content.npos && out.size() < kMaxLibraries;
+       at = content.find(kWord, at)) {
+    const bool starts_line = at == 0 || content[at - 1] == '\n';
+    at += kWord.size();
+    if (!starts_line) continue;
+    if (const std::string name = rest_of_line(content, at); !name.empty()) out.push_back(beside(path, name));
+  }
+  return out;
+}
+
+std::map<std::string, ObjMaterial> read_obj_materials(const std::vector<std::string>& libraries) {
+  std::map<std::string, ObjMaterial> out;
+  for (const auto& library : libraries) read_library(library, out);
+  return out;
+}
+
+}  // namespace telesplat::data
