@@ -22,8 +22,8 @@ struct VolumeSource {
 /// numbered volume files.
 bool looks_like_volume(const std::string& path);
 /// A volume file, a DICOM folder, or a folder with a numbered series of volume files (phase00.nrrd, phase02.nrrd, ...),
-/// in order of their numbers. With `raw`, a raw file or a folder of numbered ones. Error: nothing of the kind, a series of what is no DICOM folder; names
-/// path and what it is instead.
+/// in order of their numbers. With `raw`, a raw file or a folder of numbered ones. series: of a DICOM folder alone.
+/// Error: nothing of the kind; names path and what it is instead.
 Result<VolumeSource> find_volume(const std::string& path, const std::string& raw, const std::string& series = "");
 /// Reads one step. Formats that VTK reads are read in the program telesplat-import (vtk_reader.cpp), so that neither
 /// crashes nor claims of hostile files reach us. Error: truncated, lying and mismatched headers (sizes against file

@@ -196,8 +196,8 @@ TEST(Truncation, AtEveryLengthOfEachTextFormat) {
       refused += !reader(std::string_view(exact.data(), length), "cut", nullptr).ok();
     }
   };
-  try_all(ply_of(grid), read_ply);
-  try_all(obj, read_obj);
+  try_all(ply_of(grid), [](auto... given) { return read_ply(given...); });
+  try_all(obj, [](auto... given) { return read_obj(given...); });
   try_all(off, read_off);
   try_all(stl, read_stl);
   EXPECT_GT(refused, 300u);

@@ -2,6 +2,7 @@
 #include "tests/support/volume_files.h"
 
 #include "services/data/inspect.h"
+#include "services/data/volume/formats/header.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -1,4 +1,4 @@
-// What `telesplat inspect` tells of pictures, recorded frames and sampled depth images, and the depth it writes of them.
+// What `telesplat inspect` tells of pictures, recorded frames and sampled depth images, and the depth it writes.
 #pragma once
 
 #include <optional>

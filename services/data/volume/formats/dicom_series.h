@@ -31,9 +31,9 @@ struct DicomSeries {
 std::string text_of(const DicomSeriesName& series, size_t place);
 
 /// A series among the DICOM files of a folder (not of its subfolders): `which` is its place in the list, from 1, or its
-/// UID; empty: the one of most slices. Slices go by position, or by instance number if they have none. Error: no slices,
-/// no such series; a damaged file among them; compressed, coloured and multi-frame
-/// ones; slices of different sizes; two at the same position; gaps.
+/// UID; empty: the one of most slices. Slices go by position, or by instance number if they have none. Error: no
+/// slices, no such series; a damaged file among them; compressed, coloured and multi-frame ones; slices of different
+/// sizes; two at the same position; gaps.
 Result<DicomSeries> find_dicom_series(const std::string& folder, const std::string& which = "");
 
 /// Reads its voxels: bits above those stored are cleared (or carry the sign); slices with different rescaling become

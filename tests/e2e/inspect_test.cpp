@@ -1,0 +1,156 @@
+// `telesplat inspect` as a person types it: what run takes is told as run takes it, what run refuses is refused alike.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string big_endian(uint32_t value) { return {char(value >> 24), char(value >> 16), char(value >> 8), char(value)}; }
+
+std::string png_chunk(const std::string& type, const std::string& data) {
+  const std::string checked = type + data;
+  const auto sum = crc32(0, reinterpret_cast<const Bytef*>(checked.data()), uInt(checked.size()));
+  return big_endian(uint32_t(data.size())) + checked + big_endian(uint32_t(sum));
+}
+
+// A ramp of grey, `bits` a sample.
+void write_png(const std::string& path, int bits, int width = 24, int height = 16) {
+  std::string rows;
+  for (int y = 0; y < height; ++y) {
+    rows += '\0';
+    for (int x = 0; x < width; ++x) {
+      if (bits == 16) rows += char(x * y >> 8);
+      rows += char(x * y);
+    }
+  }
+  uLongf bytes = compressBound(uLong(rows.size()));
+  std::string packed(bytes, '\0');
+  compress(reinterpret_cast<Bytef*>(packed.data()), &bytes, reinterpret_cast<const Bytef*>(rows.data()),
+           uLong(rows.size()));
+  packed.resize(bytes);
+  std::ofstream(path, std::ios::binary) << "\x89PNG\r\n\x1a\n"
+                                        << png_chunk("IHDR", big_endian(uint32_t(width)) +
+                                                                 big_endian(uint32_t(height)) + char(bits) +
+                                                                 std::string(4, '\0'))
+                                        << png_chunk("IDAT", packed) << png_chunk("IEND", "");
+}
+
+class Inspect : public testing::Test {
+ protected:
+  // Exit code; what it said is in out_ and err_.
+  int inspect(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "inspect");
+    Program program("telesplat", arguments, folder_ / "telesplat");
+    const int code = program.wait(60);
+    out_ = program.out(), err_ = program.err();
+    return code;
+  }
+  bool tells(const std::string& part) const { return out_.find(part) != std::string::npos; }
+  // Code 2, one line that names it.
+  void expect_refused(const std::vector<std::string>& arguments, const std::string& named) {
+    EXPECT_EQ(inspect(arguments), 2) << named;
+    EXPECT_EQ(std::count(err_.begin(), err_.end(), '\n'), 1) << err_;
+    EXPECT_NE(err_.find(named), std::string::npos) << err_;
+  }
+  TemporaryFolder folder_;
+  std::string out_, err_;
+};
+
+TEST_F(Inspect, ARasterThatRunTakesIsNoPicture) {
+  write_png(folder_ / "dem.png", 16), write_png(folder_ / "photo.png", 8);
+  ASSERT_EQ(inspect({folder_ / "dem.png", "--no-cache"}), 0) << err_;
+  for (const char* part : {"dem.png: an elevation raster", "24 x 16 of UInt16", "tinted by height", "z (an elevation"})
+    EXPECT_TRUE(tells(part)) << part << " is not in\n" << out_;
+  ASSERT_EQ(inspect({folder_ / "photo.png"}), 0) << err_;
+  EXPECT_TRUE(tells("photo.png: a picture") && tells("8-bit grey: a picture, not elevation")) << out_;
+  ASSERT_EQ(inspect({folder_ / "dem.png", "--no-cache", "--json", "--z-scale", "2", "--up", "-y"}), 0) << err_;
+  const auto json = nlohmann::json::parse(out_, nullptr, false);
+  ASSERT_TRUE(json.is_object()) << out_;
+  EXPECT_EQ(json["what"], "raster");
+  EXPECT_NEAR(double(json["raster"]["z_scale"]), 2, 1e-6);
+  EXPECT_EQ(json["room"]["up"], "-y");
+}
+
+TEST_F(Inspect, WhatRunRefusesIsRefusedAlike) {
+  write_png(folder_ / "dem.png", 16);
+  std::ofstream(folder_ / "cube.raw", std::ios::binary) << std::string(64 * 64 * 64, 'x');
+  fs::create_directory(folder_ / "empty");
+  expect_refused({folder_ / "dem.png", "--tf", "bone"}, "--tf: ");
+  expect_refused({folder_ / "cube.raw"}, "raw voxels need --raw");
+  expect_refused({folder_ / "cube.raw"}, "--raw 64x64x64:u8");
+  expect_refused({folder_ / "cube.raw", "--raw", "64x64x64:u9"}, "\"u9\" is no type");
+  expect_refused({"julia", "--up", "z"}, "--up: julia is a Julia set");
+  expect_refused({"julia", "--cache", folder_ / "cache"}, "--cache: julia is no mesh");
+  expect_refused({folder_ / "empty"}, "summary.json");
+  expect_refused({folder_ / "none.ply"}, "none.ply: no such file");
+  expect_refused({folder_ / "dem.png", "--out", "a.npy"}, "--out: ");
+  expect_refused({folder_ / "dem.png", "--near", "nan"}, "--near");
+  write_png(folder_ / "photo.png", 8);
+  expect_refused({folder_ / "photo.png", "--tf", "bone"}, "is a picture, which has no --tf");
+  expect_refused({folder_ / "photo.png", "--out", folder_ / "a.npy"}, "has no depth");
+}
+
+TEST_F(Inspect, AVolumeAndItsSurfaceStandAtOnePlace) {
+  write_volume(folder_ / "balls.mha");
+  ASSERT_EQ(inspect({folder_ / "balls.mha", "--json", "--room-size", "2"}), 0) << err_;
+  const auto volume = nlohmann::json::parse(out_, nullptr, false);
+  ASSERT_EQ(inspect({folder_ / "balls.mha", "--json", "--room-size", "2", "--iso", "100", "--no-cache"}), 0) << err_;
+  const auto surface = nlohmann::json::parse(out_, nullptr, false);
+  ASSERT_TRUE(volume.is_object() && surface.is_object());
+  EXPECT_EQ(volume["what"], "volume");
+  EXPECT_EQ(surface["what"], "mesh");
+  EXPECT_EQ(volume["room"]["up"], surface["room"]["up"]);
+  // Metres a unit of the file are the same, and so is where they begin.
+  for (size_t a = 0; a < 3; ++a) {
+    const size_t in_room = a == 0 ? 0 : a == 1 ? 2 : 1;  // z is up, y goes away
+    const double units = double(surface["box"]["hi"][a]) - double(surface["box"]["lo"][a]);
+    const double metres = double(surface["room"]["hi"][in_room]) - double(surface["room"]["lo"][in_room]);
+    EXPECT_NEAR(metres / units, 2.0 / 40, 1e-5) << a;
+  }
+  EXPECT_EQ(volume["voxels"], (nlohmann::json{40, 40, 40}));
+}
+
+TEST_F(Inspect, ARunItsLatestLinkAndItsDepthAreTold) {
+  PipelineRun run({"--duration", "1", "--record-depth"});
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  fs::create_directory_symlink(run.out(), folder_ / "latest");
+  ASSERT_EQ(inspect({folder_ / "latest"}), 0) << err_;
+  for (const char* part : {": a run", "20000 triangles", "inter-frame delay", "frames.csv", "bytes"})
+    EXPECT_TRUE(tells(part)) << part << " is not in\n" << out_;
+  ASSERT_EQ(inspect({folder_ / "latest", "--json"}), 0) << err_;
+  const auto json = nlohmann::json::parse(out_, nullptr, false);
+  ASSERT_TRUE(json.is_object());
+  EXPECT_EQ(json["summary"]["kind"], "mesh");
+  EXPECT_TRUE(json["files"].is_array());
+  expect_refused({folder_ / "latest", "--tf", "bone"}, "is a run folder, which has no --tf");
+
+  std::string depth;
+  for (const auto& entry : fs::directory_iterator(run.out() + "/depth"))
+    if (entry.path().extension() == ".depth") depth = std::max(depth, entry.path().string());
+  ASSERT_FALSE(depth.empty());
+  ASSERT_EQ(inspect({depth, "--json", "--out", folder_ / "a.npy"}), 0) << err_;
+  const auto image = nlohmann::json::parse(out_, nullptr, false);
+  ASSERT_TRUE(image.is_object()) << out_;
+  // The head is some tens of centimetres from a terrain of 0.8 m.
+  EXPECT_GT(image["coverage"], 0.05);
+  EXPECT_GT(image["depth_m"]["min"], 0.1);
+  EXPECT_LT(image["depth_m"]["max"], 3);
+  EXPECT_LE(image["depth_m"]["min"], image["depth_m"]["median"]);
+  const uint64_t pixels = uint64_t(image["size"][0]) * uint64_t(image["size"][1]);
+  EXPECT_EQ(fs::file_size(folder_ / "a.npy"), 128 + 4 * pixels);
+  ASSERT_EQ(inspect({depth, "--out", folder_ / "a.exr"}), 0) << err_;
+  EXPECT_TRUE(tells("a sampled depth image") && tells("camera") && tells("near plane")) << out_;
+  ASSERT_EQ(inspect({folder_ / "a.exr"}), 0) << err_;
+  EXPECT_TRUE(tells("a picture with depth")) << out_;
+}
+
+}  // namespace
+}  // namespace telesplat::test
