@@ -108,7 +108,8 @@ struct Control {
   static constexpr std::string_view kName = "control";
   /// "status", "stop", "epoch", "set" (arguments: parameter -> value), "animate" (argument "timeline": as
   /// julia::parse_timeline takes it, or "off"), "tf" (argument "transfer": a preset's name or points, as
-  /// volume::parse_transfer takes them).
+  /// volume::parse_transfer takes them), "colour" (arguments "array": as scene::parse_colour_by takes it, "map": as
+  /// colour::from_text takes it).
   std::string command;
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) {

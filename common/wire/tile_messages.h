@@ -1,6 +1,7 @@
 // Messages about tiles of depth images (surfaces, Julia sets): their leases, what samplers fetch for them and send.
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -79,10 +80,13 @@ struct TileDone {
 
 // ---- blocks of a mesh: sampler (DEALER) <-> data (ROUTER) ----------------------------------------------------------
 
+/// array: what the mesh is coloured by in this epoch (scene::Colouring::array): its chunks hold that array's values in
+/// place of colours; empty: the file's own colours. A data server that does not have it does not answer.
 struct ChunkListRequest {
   static constexpr std::string_view kName = "chunk_list_request";
   EpochId epoch;
-  template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); }
+  std::string array;
+  template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); f("array", m.array); }
 };
 struct ChunkList {
   static constexpr std::string_view kName = "chunk_list";
@@ -95,7 +99,10 @@ struct ChunkRequest {
   static constexpr std::string_view kName = "chunk_request";
   EpochId epoch;
   ChunkId chunk;
-  template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); f("chunk", m.chunk); }
+  std::string array;
+  template <class F> static void fields(F& f, auto& m) {
+    f("epoch", m.epoch); f("chunk", m.chunk); f("array", m.array);
+  }
 };
 struct Chunk {
   static constexpr std::string_view kName = "chunk";

@@ -32,9 +32,19 @@ bool is_mesh(const DataOptions& o) {
 }
 
 OpenServed open_as_mesh(const DataOptions& o, const Progress& progress) {
-  auto store = open_mesh(o.scene, o.mesh_options(), progress);
+  const MeshOptions options = o.mesh_options();
+  auto map = colour_map_of(options);  // before the mesh is read, which takes longer
+  if (!map) return map.error();
+  auto store = open_mesh(o.scene, options, progress);
   if (!store) return store.error();
-  return serve_mesh(std::move(*store), o.scene);
+  auto colouring = colouring_of(options, (*store)->info());
+  if (!colouring) return colouring.error();
+  return serve_mesh(std::move(*store), o.scene,
+                    {.as_begun = *std::move(colouring),
+                     .map = *std::move(map),
+                     .open = [path = o.scene, options](const std::string& array, const Progress& working) {
+                       return open_mesh_by(path, options, array, working);
+                     }});
 }
 OpenServed open_as_volume(const DataOptions& o, const Progress& progress) {
   auto store = VolumeStore::open(o.scene, o.volume, o.mesh, progress);
@@ -66,12 +76,15 @@ static_assert(std::size(kRows) == std::size(scene::kKinds), "a row a kind");
 // What people name files of voxels that nothing describes.
 constexpr const char* kRawNames[] = {".raw", ".vol", ".img", ".bin", ".dat"};
 
-Status refuse_undescribed_voxels(const std::string& path) {
-  const std::string extension = lower(std::filesystem::path(path).extension().string());
-  if (std::find(std::begin(kRawNames), std::end(kRawNames), extension) == std::end(kRawNames)) return ok_status();
+// A file that is of no format. Nobody needs to start anything to tell.
+Status refuse_unknown_format(const std::string& path) {
   const auto file = MappedFile::open(path);
   if (!file) return file.error();
-  if (!detect_format((*file)->text(), path).format.empty()) return ok_status();
+  const DetectedFormat detected = detect_format((*file)->text(), path);
+  if (!detected.format.empty()) return ok_status();
+  const std::string extension = lower(std::filesystem::path(path).extension().string());
+  if (std::find(std::begin(kRawNames), std::end(kRawNames), extension) == std::end(kRawNames))
+    return Error{fmt::format("{}: {}", path, detected.complaint)};
   const uint64_t bytes = (*file)->bytes().size();
   const auto guesses = raw_guesses(path, bytes);
   return Error{fmt::format("{}: raw voxels need --raw SIZExSIZExSIZE:TYPE; {}", path,
@@ -83,10 +96,15 @@ Status refuse_undescribed_voxels(const std::string& path) {
 Result<const Row*> row_of(const DataOptions& o) {
   std::error_code error;
   if (!is_julia(o) && !std::filesystem::exists(o.scene, error)) return Error{fmt::format("{}: no such file", o.scene)};
-  if (!is_julia(o) && !holds_volume(o))
-    if (const Status s = refuse_undescribed_voxels(o.scene); !s) return s.error();
-  for (const Row& row : kRows)
-    if (row.claims(o)) return &row;
+  const bool other_file = !holds_volume(o) && !std::filesystem::is_directory(o.scene, error);
+  for (const Row& row : kRows) {
+    if (!row.claims(o)) continue;
+    if (row.kind == Kind::kMesh && other_file)
+      if (const Status s = refuse_unknown_format(o.scene); !s) return s.error();
+    return &row;
+  }
+  if (o.mesh.iso && other_file)
+    if (const Status s = refuse_unknown_format(o.scene); !s) return s.error();
   if (o.mesh.iso) return Error{fmt::format("--iso: {} is no volume", o.scene)};
   return Error{fmt::format(
       "{}: is a folder, and not one of DICOM slices or of a numbered series of volume files; a data file is needed, "

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "common/scene/colouring.h"
 #include "services/data/mesh/options.h"
 #include "services/data/mesh/store.h"
 
@@ -16,5 +17,10 @@ Result<std::shared_ptr<MeshStore>> open_mesh(const std::string& path, const Mesh
 /// The same, but coloured by this array (empty: by none), whatever the options say.
 Result<std::shared_ptr<MeshStore>> open_mesh_by(const std::string& path, const MeshOptions& options,
                                                 const std::string& array, const Progress& progress);
+
+/// How options colour a mesh with these arrays; nothing: by the file's own colours. Errors name flag or file.
+Result<std::optional<scene::Colouring>> colouring_of(const MeshOptions& options, const MeshStoreInfo& mesh);
+/// --colour-map as it was read. Error: names the flag.
+Result<colour::ColourMap> colour_map_of(const MeshOptions& options);
 
 }  // namespace telesplat::data

@@ -10,7 +10,8 @@ namespace telesplat::master {
 /// What a scene did with a command.
 struct Obeyed {
   bool begins_epoch = false;
-  std::string answer;  ///< for the person; unused where an epoch begins: its number is the answer
+  std::string answer;      ///< for the person; unused where an epoch begins: its number is the answer
+  bool tells_all = false;  ///< the session is told to everyone anew, though no epoch begins
 };
 
 /// Reads the value that someone wants a parameter to have. Error: no finite number; names it.

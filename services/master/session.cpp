@@ -107,14 +107,15 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
 
 Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
   Obeyed obeyed{.begins_epoch = true, .answer = {}};  // "epoch"
-  if (m.command == "set" || m.command == "animate" || m.command == "tf") {
+  if (m.command == "set" || m.command == "animate" || m.command == "tf" || m.command == "colour") {
     auto by_scene = plan_->obey(m);
     if (!by_scene) return by_scene.error();
     obeyed = *std::move(by_scene);
   } else if (m.command != "epoch") {
     return Error{
-        fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf", m.command.substr(0, 64))};
+        fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf, colour", m.command.substr(0, 64))};
   }
+  if (obeyed.tells_all) announce(now_s);
   if (!obeyed.begins_epoch) return obeyed.answer;
   next_epoch(now_s);
   return fmt::format("epoch {}", epoch_.value);

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
+#include <limits>
 #include <random>
+#include <set>
 
 #include "common/geometry/trajectory.h"
 #include "services/sampler/mesh/sampler.h"
@@ -119,6 +122,46 @@ TEST_F(RaysAndRaster, AgreeOnRandomTriangles) {
 TEST_F(RaysAndRaster, AgreeOnATerrainOfSmallTriangles) {
   load(test::terrain(200, 60));
   expect_agreement(cameras(9, 8), 1e-3);
+}
+
+// A scalar at each vertex, one in a hundred missing.
+test::ChunkList with_scalars(const test::ChunkList& chunks) {
+  test::ChunkList out;
+  for (const auto& [id, chunk] : chunks) {
+    const auto view = geometry::MeshChunkView::validate(chunk.bytes);
+    std::vector<uint32_t> scalars;
+    for (size_t v = 0; v < view->vertices(); ++v) {
+      const float value = 100 * view->positions_room[3 * v] + 40 * view->positions_room[3 * v + 2];
+      scalars.push_back(std::bit_cast<uint32_t>(v % 100 == 7 ? std::numeric_limits<float>::quiet_NaN() : value));
+    }
+    const auto bytes = std::make_shared<std::vector<std::byte>>(
+        geometry::build_chunk(view->positions_room, view->normals, scalars, view->indices, true));
+    out.emplace_back(id, geometry::ChunkBytes{*bytes, bytes});
+  }
+  return out;
+}
+
+TEST_F(RaysAndRaster, AgreeOnScalarsAndTheirMissingValues) {
+  const scene::Colouring colouring{"heat", "", -30, 35, 0, *colour::find_colour_map("viridis")};
+  const auto table = std::make_shared<const scene::ColourTable>(scene::make_table(colouring));
+  load(with_scalars(test::terrain(200, 60)));
+  const Camera c = cameras(9, 1)[0];
+  const geometry::Rect whole{0, 0, c.width, c.height};
+  for (Sampler* sampler : {ray_.get(), raster_.get()}) {
+    for (const uint32_t colour : sampler->sample(c, whole).colour)  // nobody told the colours yet
+      ASSERT_TRUE(colour == 0 || colour == 0xc8c8c8);
+    sampler->set_colours(table);
+  }
+  expect_agreement(cameras(9, 8), 1e-3);
+  const DepthImage image = ray_->sample(c, whole);
+  size_t missing = 0, covered = 0;
+  for (size_t i = 0; i < image.pixels(); ++i) {
+    missing += image.colour[i] == colouring.map.missing;
+    covered += image.depth[i] != 0;
+  }
+  EXPECT_GT(missing, covered / 100);
+  EXPECT_LT(missing, covered / 4);
+  EXPECT_GT(std::set<uint32_t>(image.colour.begin(), image.colour.end()).size(), 200u);
 }
 
 TEST_F(RaysAndRaster, AgreeInsideTheSceneWhereTheNearPlaneCuts) {

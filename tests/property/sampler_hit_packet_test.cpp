@@ -3,9 +3,12 @@
 
 #include <hwy/targets.h>
 
+#include <bit>
+#include <limits>
 #include <random>
 
 #include "services/sampler/mesh/hit_packet.h"
+#include "services/sampler/mesh/sampler.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat::sampler {
@@ -59,13 +62,53 @@ TEST(HitPacket, SimdEqualsScalarOnEveryTarget) {
       alignas(32) uint32_t colour[kPacket], normal[kPacket];
       shade_hits(hits, colour, normal);
       for (int k = 0; k < kPacket; ++k) {
-        const SurfacePoint expected = surface_point(*view, first + k, hits.u[k], hits.v[k], g[k], d[k]);
+        const SurfacePoint expected =
+            surface_point(*view, first + k, hits.u[k], hits.v[k], g[k], d[k], *neutral_colours());
         EXPECT_NEAR(colour[k] >> 16, expected.colour.x, 0.501);
         EXPECT_NEAR(colour[k] >> 8 & 255, expected.colour.y, 0.501);
         EXPECT_NEAR(colour[k] & 255, expected.colour.z, 0.501);
         ASSERT_LT(normal[k], 65536u);
         const glm::vec3 n = image::decode_normal16(static_cast<uint16_t>(normal[k]));
         EXPECT_GT(glm::dot(n, expected.normal), std::cos(0.018f)) << "triangle " << first + k;  // one degree
+      }
+    }
+  });
+}
+
+TEST(HitPacket, ScalarsAreLookedUpOnEveryTarget) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> value(-2, 12), weight(0, 1);
+  const scene::ColourTable table = scene::make_table({"heat", "", 0, 10, 0, *colour::find_colour_map("viridis")});
+  std::vector<test::Vertex> vertices;
+  std::vector<uint32_t> indices;
+  for (uint32_t i = 0; i < 600; ++i) {
+    const float scalar = i % 50 == 3 ? std::numeric_limits<float>::quiet_NaN() : value(random);
+    vertices.push_back({{float(i), float(i % 7), float(i % 3)}, {0, 0, 1}, std::bit_cast<uint32_t>(scalar)});
+    indices.push_back(i);
+  }
+  const auto chunk = test::chunk_of(vertices, indices, true);
+  const auto view = geometry::MeshChunkView::validate(chunk.bytes);
+  ASSERT_TRUE(view.ok());
+  ASSERT_TRUE(view->scalars);
+  for_each_target([&] {
+    for (uint32_t first = 0; first < 200; first += kPacket) {
+      HitPacket hits{};
+      for (int k = 0; k < kPacket; ++k) {
+        hits.u[k] = weight(random);
+        hits.v[k] = (1 - hits.u[k]) * weight(random);
+        hits.geometric_normal[2][k] = 1, hits.direction[2][k] = -1;
+        for (int c = 0; c < 3; ++c) {
+          hits.corner_normal[c][k] = view->normals[3 * (first + k) + c];
+          hits.corner_colour[c][k] = view->colours[3 * (first + k) + c];
+        }
+      }
+      alignas(32) uint32_t colour[kPacket], normal[kPacket];
+      shade_hits(hits, colour, normal, &table);
+      for (int k = 0; k < kPacket; ++k) {
+        const SurfacePoint expected =
+            surface_point(*view, first + k, hits.u[k], hits.v[k], {0, 0, 1}, {0, 0, -1}, table);
+        for (int channel = 0; channel < 3; ++channel)  // neighbours in the table differ by one
+          EXPECT_NEAR(colour[k] >> (16 - 8 * channel) & 255, expected.colour[channel], 1.01);
       }
     }
   });

@@ -19,7 +19,9 @@ struct Vertex {
   uint32_t colour = 0x808080;
 };
 
-inline geometry::ChunkBytes chunk_of(const std::vector<Vertex>& vertices, const std::vector<uint32_t>& indices) {
+/// scalars: colours are the bits of floats.
+inline geometry::ChunkBytes chunk_of(const std::vector<Vertex>& vertices, const std::vector<uint32_t>& indices,
+                                     bool scalars = false) {
   std::vector<float> positions;
   std::vector<uint32_t> normals, colours;
   for (const Vertex& v : vertices) {
@@ -28,7 +30,7 @@ inline geometry::ChunkBytes chunk_of(const std::vector<Vertex>& vertices, const 
     colours.push_back(v.colour);
   }
   const auto bytes =
-      std::make_shared<std::vector<std::byte>>(geometry::build_chunk(positions, normals, colours, indices));
+      std::make_shared<std::vector<std::byte>>(geometry::build_chunk(positions, normals, colours, indices, scalars));
   return {*bytes, bytes};
 }
 

@@ -5,24 +5,32 @@
 #include <filesystem>
 
 #include "common/net/dispatch.h"
+#include "common/scene/session.h"
+#include "services/data/mesh/array_stores.h"
 
 namespace telesplat::data {
 namespace {
 
 class ServedMesh final : public Served {
  public:
-  ServedMesh(std::shared_ptr<const MeshStore> store, std::string title)
-      : store_(std::move(store)), title_(std::move(title)) {}
+  ServedMesh(std::shared_ptr<const MeshStore> store, std::string title, ServedColours colours)
+      : store_(std::move(store)),
+        title_(std::move(title)),
+        as_begun_(std::move(colours.as_begun)),
+        map_(std::move(colours.map)),
+        stores_(store_, as_begun_ ? as_begun_->array : "", std::move(colours.open)) {}
 
   scene::Kind kind() const override { return scene::Kind::kMesh; }
   std::string title() const override { return title_; }
   std::string summary() const override {
     const MeshStoreInfo& info = store_->info();
     return fmt::format(
-        "{} triangles in {} chunks{}{}", info.triangles, store_->chunks().size(),
-        info.degenerate_dropped ? fmt::format(", {} degenerate ones dropped", info.degenerate_dropped) : "",
-        info.from_cache ? " (from the chunk store)" : "");
+               "{} triangles in {} chunks{}{}", info.triangles, store_->chunks().size(),
+               info.degenerate_dropped ? fmt::format(", {} degenerate ones dropped", info.degenerate_dropped) : "",
+               info.from_cache ? " (from the chunk store)" : "") +
+           (as_begun_ ? ", coloured by " + as_begun_->array : "");
   }
+  std::vector<std::string> notes() const override { return store_->info().notes; }
   void describe(wire::Hello& hello) const override {
     const MeshStoreInfo& info = store_->info();
     hello.facts.insert({{"format", info.format},
@@ -33,31 +41,82 @@ class ServedMesh final : public Served {
                         {"up", info.up},
                         {"from_cache", info.from_cache ? "true" : "false"},
                         {"content_hash", fmt::format("{:016x}", info.content_hash)}});
+    if (!info.arrays.empty()) hello.facts[scene::kArraysFact] = scene::to_text(info.arrays);
+    if (as_begun_) hello.facts[scene::kColouringFact] = scene::to_text(*as_begun_);
+    hello.facts[scene::kColourMapFact] = colour::to_text(map_);
     hello.box_room = info.box_room;
   }
   Requests requests() const override { return {"chunks", 4096}; }
 
+  // The session may want other colours than it began with: by order of the master, or because another data server that
+  // was here before had them.
+  Status follow(const wire::Welcome& session) override {
+    const scene::SessionView view(session);
+    const std::string order = view.fact(scene::kArrayOrderFact);
+    if (!order.empty() && order != order_) {
+      order_ = order;
+      stores_.want(ordered_array());
+      if (stores_.find(ordered_array())) answer_ = order_number();
+    } else if (const std::string text = view.fact(scene::kColouringFact); text != shown_) {
+      shown_ = text;
+      const auto colouring =
+          text.empty() ? Result<scene::Colouring>(scene::Colouring{}) : scene::colouring_from_text(text);
+      if (!colouring) return colouring.error();
+      stores_.want(colouring->array);
+    }
+    return ok_status();
+  }
+
+  // Who asks for an array that is not there yet asks again.
   void answer(const net::Message& message, const Outlets& outlets) override {
-    net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(
-        outlets.requests, message, [&](const auto& request) { outlets.requests.send(reply(request), message.peer); });
+    net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(outlets.requests, message, [&](const auto& request) {
+      const MeshStore* store = stores_.find(request.array);
+      if (store) outlets.requests.send(reply(request, *store), message.peer);
+    });
+  }
+  void send_finished(const Outlets&) override {
+    const auto opened = stores_.take_opened();
+    if (!opened) return;
+    if (!opened->status) log::error("{}", opened->status.error().text);
+    if (order_.empty() || opened->array != ordered_array()) return;
+    answer_ = order_number();
+    if (!opened->status) answer_ += " " + opened->status.error().text;
+  }
+  std::map<std::string, std::string> news() override {
+    if (answer_.empty()) return {};
+    return {{scene::kArrayAnswerFact, std::exchange(answer_, std::string())}};
   }
 
  private:
-  wire::ChunkList reply(const wire::ChunkListRequest& request) const { return {request.epoch, store_->chunks()}; }
+  static wire::ChunkList reply(const wire::ChunkListRequest& request, const MeshStore& store) {
+    return {request.epoch, store.chunks()};
+  }
   // Without bytes: there is no such chunk.
-  wire::Chunk reply(const wire::ChunkRequest& request) const {
-    const bool exists = request.chunk.value < store_->chunks().size();
-    return {request.epoch, request.chunk, exists ? store_->chunk(request.chunk).bytes : wire::Bytes{}};
+  static wire::Chunk reply(const wire::ChunkRequest& request, const MeshStore& store) {
+    const bool exists = request.chunk.value < store.chunks().size();
+    return {request.epoch, request.chunk, exists ? store.chunk(request.chunk).bytes : wire::Bytes{}};
+  }
+  // Of the order "N ARRAY".
+  std::string order_number() const { return order_.substr(0, order_.find(' ')); }
+  std::string ordered_array() const {
+    const size_t blank = order_.find(' ');
+    return blank == order_.npos ? "" : order_.substr(blank + 1);
   }
 
   const std::shared_ptr<const MeshStore> store_;
   const std::string title_;
+  const std::optional<scene::Colouring> as_begun_;
+  const colour::ColourMap map_;
+  ArrayStores stores_;
+  std::string order_, shown_, answer_;
 };
 
 }  // namespace
 
-std::unique_ptr<Served> serve_mesh(std::shared_ptr<const MeshStore> store, const std::string& path) {
-  return std::make_unique<ServedMesh>(std::move(store), std::filesystem::path(path).filename().string());
+std::unique_ptr<Served> serve_mesh(std::shared_ptr<const MeshStore> store, const std::string& path,
+                                   ServedColours colours) {
+  return std::make_unique<ServedMesh>(std::move(store), std::filesystem::path(path).filename().string(),
+                                      std::move(colours));
 }
 
 }  // namespace telesplat::data

@@ -72,6 +72,7 @@ Status SlabPlan::weigh(const wire::SliceWeights& m) {
 }
 
 Result<Obeyed> SlabPlan::obey(const wire::Control& m) {
+  if (m.command == "colour") return Error{"colour: the scene is a volume; ctl tf sets its transfer function"};
   if (!whole_)
     return Error{fmt::format("{}: the volume is not known yet: data servers of parts are missing", m.command)};
   if (m.command == "animate") {

@@ -15,6 +15,7 @@ Result<Adopted> TilePlan::adopt(const wire::Hello& data, double /*now_s*/) {
   facts_ = data.facts;
   std::string problem;
   Adopted out{.changed = scene_.adopt(data, problem)};
+  out.changed |= colours_.adopt(data, problem);
   if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
   const Cut cut{scene_.is_julia(), master::progressive(options_, scene::kind_named(scene_.kind()))};
   out.changed |= cut != schedule_.cut();
@@ -26,12 +27,19 @@ void TilePlan::describe(wire::Welcome& welcome) const {
   welcome.box_room = box_room_;
   welcome.facts = facts_;
   welcome.parameters = scene_.values();
+  colours_.describe(welcome);
+}
+
+std::map<std::string, std::string> TilePlan::epoch_texts() const {
+  if (scene_.is_julia()) return {};
+  return {{scene::kColouringFact, colours_.text()}};
 }
 
 Result<Obeyed> TilePlan::obey(const wire::Control& m) {
   if (m.command == "tf")
     return Error{facts_.empty() ? std::string("tf: there is no data server yet")
                                 : fmt::format("tf: a scene of kind \"{}\" has no transfer function", scene_.kind())};
+  if (m.command == "colour") return colours_.obey(m);
   if (m.command == "set") {
     if (const Status s = scene_.set(m.arguments); !s) return s.error();
     return Obeyed{.begins_epoch = true, .answer = {}};

@@ -5,6 +5,7 @@
 #include "services/master/settings.h"
 #include "services/master/tiles/frame_schedule.h"
 #include "services/master/tiles/julia_parameters.h"
+#include "services/master/tiles/mesh_colours.h"
 
 namespace telesplat::master {
 
@@ -14,6 +15,7 @@ class TilePlan final : public Plan {
 
   Result<Adopted> adopt(const wire::Hello& data, double now_s) override;
   void describe(wire::Welcome& welcome) const override;
+  std::map<std::string, std::string> epoch_texts() const override;
   Result<Obeyed> obey(const wire::Control& command) override;
   std::string animation() const override { return scene_.animation(); }
   bool playing() const override { return scene_.animated(); }
@@ -44,6 +46,7 @@ class TilePlan final : public Plan {
   PlanLinks links_;
   FrameSchedule schedule_;
   JuliaParameters scene_;
+  MeshColours colours_;
   geometry::Box box_room_;  // of the last data server
   std::map<std::string, std::string> facts_;
 };

@@ -18,7 +18,7 @@ image::View render_directly(Sampler& ray_sampler, const geometry::Camera& camera
       const SurfacePoint point =
           surface_point(scene.chunk(packet.hit.instID[0][k]), packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k],
                         {packet.hit.Ng_x[k], packet.hit.Ng_y[k], packet.hit.Ng_z[k]},
-                        {packet.ray.dir_x[k], packet.ray.dir_y[k], packet.ray.dir_z[k]});
+                        {packet.ray.dir_x[k], packet.ray.dir_y[k], packet.ray.dir_z[k]}, sampler->colours());
       const glm::uvec3 lit(point.colour * shading.intensity(point.normal) + 0.5f);
       const size_t at = size_t(py) * camera.width + px;
       view.colour[at] = lit.x << 16 | lit.y << 8 | lit.z;

@@ -5,6 +5,7 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
+#include <bit>
 #include <glm/geometric.hpp>
 
 #include "common/image/normal.h"
@@ -59,7 +60,18 @@ HWY_INLINE VU encode16(const V3& n) {
   return hn::Or(quantise(hn::IfThenElse(below, fx, x)), hn::ShiftLeft<8>(quantise(hn::IfThenElse(below, fy, y))));
 }
 
-void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* HWY_RESTRICT normal) {
+// The scalars' colours; scalars that are not a number have the last one.
+HWY_INLINE VU look_up(VF scalar, const scene::ColourTable& table) {
+  const VF entry = hn::MulAdd(hn::Sub(scalar, hn::Set(f, table.lo)), hn::Set(f, table.scale), hn::Set(f, table.offset));
+  const VF last = hn::Set(f, float(scene::ColourTable::kEntries - 1));
+  const VF within = hn::Min(hn::Max(entry, hn::Zero(f)), last);
+  const VF none = hn::Set(f, float(scene::ColourTable::kEntries));
+  const auto index = hn::ConvertTo(si, hn::IfThenElse(hn::IsNaN(scalar), none, within));
+  return hn::GatherIndex(un, table.colours.data(), index);
+}
+
+void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* HWY_RESTRICT normal,
+               const scene::ColourTable* scalars) {
   for (size_t lane = 0; lane < kPacket; lane += hn::Lanes(f)) {
     const VF w1 = hn::Load(f, hits.u + lane), w2 = hn::Load(f, hits.v + lane);
     const VF w0 = hn::Sub(hn::Sub(hn::Set(f, 1.0f), w1), w2);
@@ -84,9 +96,14 @@ void ShadeHits(const HitPacket& hits, uint32_t* HWY_RESTRICT colour, uint32_t* H
     n = {hn::Xor(n.x, sign), hn::Xor(n.y, sign), hn::Xor(n.z, sign)};
     hn::Store(encode16(n), un, normal + lane);
 
-    // Colour: per channel, rounded.
+    // Colour: looked up for a scalar, or per channel, rounded.
     const VU c0 = hn::Load(un, hits.corner_colour[0] + lane), c1 = hn::Load(un, hits.corner_colour[1] + lane),
              c2 = hn::Load(un, hits.corner_colour[2] + lane);
+    if (scalars) {
+      const VF scalar = blend(hn::BitCast(f, c0), hn::BitCast(f, c1), hn::BitCast(f, c2));
+      hn::Store(look_up(scalar, *scalars), un, colour + lane);
+      continue;
+    }
     const VU mask = hn::Set(un, 255);
     const auto channel = [&](VU a, VU b, VU c) {
       const VF v = hn::Add(blend(to_float(hn::And(a, mask)), to_float(hn::And(b, mask)), to_float(hn::And(c, mask))),
@@ -108,20 +125,26 @@ namespace telesplat::sampler {
 
 HWY_EXPORT(ShadeHits);
 
-void shade_hits(const HitPacket& hits, uint32_t* colour, uint32_t* normal) {
-  HWY_DYNAMIC_DISPATCH(ShadeHits)(hits, colour, normal);
+void shade_hits(const HitPacket& hits, uint32_t* colour, uint32_t* normal, const scene::ColourTable* scalars) {
+  HWY_DYNAMIC_DISPATCH(ShadeHits)(hits, colour, normal, scalars);
 }
 
+namespace {
+glm::vec3 rgb(uint32_t c) { return {c >> 16 & 255, c >> 8 & 255, c & 255}; }
+}  // namespace
+
 SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, float u, float v,
-                           const glm::vec3& g, const glm::vec3& direction) {
+                           const glm::vec3& g, const glm::vec3& direction, const scene::ColourTable& colours) {
   const float weight[3] = {1 - u - v, u, v};
   SurfacePoint out{glm::vec3(0), glm::vec3(0)};
+  float scalar = 0;
   for (int corner = 0; corner < 3; ++corner) {
     const uint32_t vertex = chunk.indices[3 * size_t{triangle} + corner], c = chunk.colours[vertex];
-    out.colour += weight[corner] * glm::vec3(c >> 16 & 255, c >> 8 & 255, c & 255);
+    out.colour += weight[corner] * rgb(c);
+    if (chunk.scalars) scalar += weight[corner] * std::bit_cast<float>(c);
     out.normal += weight[corner] * image::decode_normal32(chunk.normals[vertex]);
   }
-  out.colour = glm::clamp(out.colour, 0.0f, 255.0f);
+  out.colour = chunk.scalars ? rgb(colours.at(scalar)) : glm::clamp(out.colour, 0.0f, 255.0f);
   if (glm::dot(out.normal, out.normal) < 1e-6f) out.normal = g;
   if (glm::dot(out.normal, g) * glm::dot(direction, g) > 0) out.normal = -out.normal;
   out.normal = glm::normalize(out.normal);

@@ -1,6 +1,6 @@
 // From ray hits to what a depth image stores, eight at a time: colours and normals interpolated over the triangle.
 //
-//   n = (1-u-v) n0 + u n1 + v n2          colour likewise, per channel
+//   n = (1-u-v) n0 + u n1 + v n2          colour likewise, per channel; of scalars: the colour of the one interpolated
 //   n is negated where it points away from the side of the triangle that the ray sees: sign(n . g) == sign(d . g)
 // with g either normal of the triangle's plane and d the ray's direction, whatever the winding.
 #pragma once
@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include "common/geometry/mesh_chunk.h"
+#include "common/scene/colouring.h"
 
 namespace telesplat::sampler {
 
@@ -19,12 +20,13 @@ struct HitPacket {
   alignas(32) float u[kPacket], v[kPacket];  ///< barycentric weights of corners 1 and 2
   alignas(32) float geometric_normal[3][kPacket], direction[3][kPacket];
   alignas(32) uint32_t corner_normal[3][kPacket];  ///< [corner], image/normal.h: encode_normal32
-  alignas(32) uint32_t corner_colour[3][kPacket];  ///< [corner], 0x00RRGGBB
+  alignas(32) uint32_t corner_colour[3][kPacket];  ///< [corner], 0x00RRGGBB; of scalars the bits of floats
 };
 
 /// Interpolated attributes in every lane. SIMD, chosen for the processor at run time.
-/// colour: 0x00RRGGBB. normal: image/normal.h: encode_normal16, in 32 bits. Both 32-byte aligned.
-void shade_hits(const HitPacket& hits, uint32_t* colour, uint32_t* normal);
+/// colour: 0x00RRGGBB. normal: image/normal.h: encode_normal16, in 32 bits. Both 32-byte aligned. scalars: the colours of
+/// scalars, which all corners have then; null: they have colours.
+void shade_hits(const HitPacket& hits, uint32_t* colour, uint32_t* normal, const scene::ColourTable* scalars = nullptr);
 
 /// One hit, unquantised: what direct rendering uses, and the oracle of shade_hits.
 struct SurfacePoint {
@@ -32,6 +34,7 @@ struct SurfacePoint {
   glm::vec3 normal;  ///< unit length, facing the viewer
 };
 SurfacePoint surface_point(const geometry::MeshChunkView& chunk, uint32_t triangle, float u, float v,
-                           const glm::vec3& geometric_normal, const glm::vec3& direction);
+                           const glm::vec3& geometric_normal, const glm::vec3& direction,
+                           const scene::ColourTable& colours);
 
 }  // namespace telesplat::sampler

@@ -26,6 +26,7 @@ class RasterSampler final : public Sampler {
   Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) override;
   Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override;
   void remove_chunk(ChunkId id) override;
+  void set_colours(std::shared_ptr<const scene::ColourTable> colours) override;
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) override;
 
  private:
@@ -34,6 +35,7 @@ class RasterSampler final : public Sampler {
     GLuint buffer = 0, vertex_array = 0;
     GLuint vertices = 0;
     GLsizei indices = 0;
+    bool scalars = false;
     geometry::Box box_room;
   };
 
@@ -50,6 +52,8 @@ class RasterSampler final : public Sampler {
   GLuint targets_[4] = {};  // depth in metres, colour, normal, the rasteriser's depth buffer
   int target_width_ = 0, target_height_ = 0, largest_part_ = kLargestPart;
   GLint64 largest_chunk_bytes_ = 0;
+  GLuint colour_buffer_ = 0;                           // of colours_
+  std::shared_ptr<const scene::ColourTable> colours_;  // null: none was told yet
   std::unordered_map<ChunkId, Drawable> chunks_;
 };
 
@@ -80,6 +84,8 @@ Result<std::unique_ptr<Sampler>> RasterSampler::make() {
   glGetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &side);
   sampler->largest_part_ = std::min(kLargestPart, side);
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &sampler->largest_chunk_bytes_);
+  glGenBuffers(1, &sampler->colour_buffer_);
+  sampler->set_colours(nullptr);
   log::info("raster sampler on {}", sampler->context_->renderer());
   return std::unique_ptr<Sampler>(std::move(sampler));
 }
@@ -106,6 +112,7 @@ RasterSampler::~RasterSampler() {
   const gl::EglContext::Current current(*context_);
   if (!current.ok()) return;
   for (auto& [id, drawable] : chunks_) release(drawable);
+  glDeleteBuffers(1, &colour_buffer_);
   glDeleteRenderbuffers(4, targets_);
   glDeleteFramebuffers(1, &framebuffer_);
   glDeleteProgram(program_);
@@ -125,7 +132,8 @@ Status RasterSampler::upload(ChunkId id, geometry::ChunkBytes chunk) {
     return Error{fmt::format("chunk {} of {} bytes refused: the graphics card's limit is {}", id.value, bytes,
                              largest_chunk_bytes_)};
 
-  Drawable made{0, 0, static_cast<GLuint>(view.vertices()), static_cast<GLsizei>(view.indices.size()), {}};
+  Drawable made{0, 0, static_cast<GLuint>(view.vertices()), static_cast<GLsizei>(view.indices.size()), view.scalars,
+                {}};
   for (size_t i = 0; i < view.positions_room.size(); i += 3)
     made.box_room.extend(glm::vec3(view.positions_room[i], view.positions_room[i + 1], view.positions_room[i + 2]));
   while (glGetError() != GL_NO_ERROR) continue;
@@ -171,6 +179,17 @@ void RasterSampler::remove_chunk(ChunkId id) {
   chunks_.erase(found);
 }
 
+void RasterSampler::set_colours(std::shared_ptr<const scene::ColourTable> colours) {
+  if (!colours) colours = neutral_colours();
+  if (colours == colours_) return;
+  const gl::EglContext::Current current(*context_);
+  if (!current.ok()) return;
+  colours_ = std::move(colours);
+  glBindBuffer(GL_SHADER_STORAGE_BUFFER, colour_buffer_);
+  glBufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(colours_->colours.size() * sizeof(uint32_t)),
+               colours_->colours.data(), GL_STATIC_DRAW);
+}
+
 void RasterSampler::reserve_targets(int width, int height) {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
   if (width <= target_width_ && height <= target_height_) return;
@@ -207,7 +226,10 @@ void RasterSampler::draw(const geometry::Camera& camera) {
   glUniform4f(uniform("frustum"), float(camera.left), float(camera.right), float(camera.bottom), float(camera.top));
   glUniform1f(uniform("near_m"), float(camera.near_m));
   glUniform2f(uniform("size_pixels"), float(camera.width), float(camera.height));
-  const GLint vertices = uniform("vertices");
+  glUniform3f(uniform("range"), colours_->lo, colours_->scale, colours_->offset);
+  glUniform1ui(uniform("entries"), GLuint{scene::ColourTable::kEntries});
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, colour_buffer_);
+  const GLint vertices = uniform("vertices"), scalars = uniform("scalars");
 
   // Visible chunks, nearest first, so that the depth test spares hidden fragments.
   const geometry::Frustum frustum(camera);
@@ -220,6 +242,7 @@ void RasterSampler::draw(const geometry::Camera& camera) {
     glBindVertexArray(drawable->vertex_array);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, drawable->buffer);
     glUniform1ui(vertices, drawable->vertices);
+    glUniform1i(scalars, drawable->scalars);
     const size_t first_index = sizeof(geometry::ChunkHeader) + 20 * size_t{drawable->vertices};
     glDrawElements(GL_TRIANGLES, drawable->indices, GL_UNSIGNED_INT, reinterpret_cast<const void*>(first_index));
   }

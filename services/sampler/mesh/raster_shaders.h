@@ -28,6 +28,11 @@ uniform vec3 eye_room;
 uniform mat3 to_camera;
 uniform vec4 frustum;
 uniform vec2 size_pixels;
+// Chunks with scalars: colours of the range, and last the one of scalars that are not a number.
+layout(std430, binding = 1) readonly buffer Colours { uint table[]; };
+uniform bool scalars;
+uniform vec3 range;  // first scalar of the range, entries a unit, entry of the first
+uniform uint entries;
 layout(location = 0) out float depth_m;
 layout(location = 1) out uint colour;
 layout(location = 2) out uint normal;
@@ -50,6 +55,15 @@ uint encode_normal16(vec3 n) {
 vec3 albedo(uint v) {
   uint c = words[16u + 4u * vertices + v];
   return vec3(c >> 16 & 255u, c >> 8 & 255u, c & 255u);
+}
+bool missing(uint bits) { return (bits & 0x7fffffffu) > 0x7f800000u; }
+// The corners' scalars, interpolated.
+uint scalar_colour(uvec3 corner, vec3 weight) {
+  uint first = 16u + 4u * vertices;
+  uvec3 bits = uvec3(words[first + corner.x], words[first + corner.y], words[first + corner.z]);
+  if (missing(bits.x) || missing(bits.y) || missing(bits.z)) return table[entries];
+  float entry = (dot(weight, uintBitsToFloat(bits)) - range.x) * range.y + range.z;
+  return table[uint(clamp(entry, 0.0, float(entries - 1u)))];
 }
 
 void main() {
@@ -75,6 +89,10 @@ void main() {
            weight.z * decode_normal32(words[16u + 3u * vertices + corner.z]);
   if (dot(n, n) < 1e-6) n = g;
   normal = encode_normal16(dot(n, g) * sign(total) > 0 ? -n : n);  // towards the side that is seen
+  if (scalars) {
+    colour = scalar_colour(corner, weight);
+    return;
+  }
   uvec3 rgb = uvec3(weight.x * albedo(corner.x) + weight.y * albedo(corner.y) + weight.z * albedo(corner.z) + 0.5);
   colour = rgb.r << 16 | rgb.g << 8 | rgb.b;
 }

@@ -10,8 +10,8 @@ namespace {
 // prefetched step by step, and eight at a time are shaded when it has arrived.
 class PendingHits {
  public:
-  PendingHits(const RayScene& scene, double near_m, image::DepthImage& out)
-      : scene_(scene), near_m_(near_m), out_(out) {}
+  PendingHits(const RayScene& scene, const scene::ColourTable& colours, double near_m, image::DepthImage& out)
+      : scene_(scene), colours_(colours), near_m_(near_m), out_(out) {}
 
   /// Keeps the hits of a packet that lie in the tile.
   void add(const RTCRayHit8& packet, int x, int y, const geometry::Rect& tile) {
@@ -49,14 +49,17 @@ class PendingHits {
     for (int first = 0; first < count_; first += kPacket) {
       HitPacket& hits = hits_[first / kPacket];
       const int lanes = std::min(kPacket, count_ - first);
+      const bool scalars = chunks_[first]->scalars;
       for (int k = 0; k < lanes; ++k)
         for (int c = 0; c < 3; ++c) {
           const uint32_t vertex = corners_[first + k][c];
           hits.corner_normal[c][k] = chunks_[first + k]->normals[vertex];
-          hits.corner_colour[c][k] = chunks_[first + k]->colours[vertex];
+          // Chunks of both kinds meet only while they change: then those of the other are neutral.
+          const bool fits = chunks_[first + k]->scalars == scalars;
+          hits.corner_colour[c][k] = fits ? chunks_[first + k]->colours[vertex] : scalars ? kNotANumber : kNeutral;
         }
       alignas(32) uint32_t colour[kPacket], normal[kPacket];
-      shade_hits(hits, colour, normal);
+      shade_hits(hits, colour, normal, scalars ? &colours_ : nullptr);
       for (int k = 0; k < lanes; ++k) {
         const size_t at = pixels_[first + k];
         out_.depth[at] = image::encode_depth(depths_m_[first + k], near_m_);
@@ -71,7 +74,10 @@ class PendingHits {
   static constexpr int kCapacity =
       64;  // eight packets: SamplerRay/40 takes 110 ms with it, 117 ms shading packet by packet
 
+  static constexpr uint32_t kNotANumber = 0x7fc00000, kNeutral = 0xc8c8c8;
+
   const RayScene& scene_;
+  const scene::ColourTable& colours_;
   double near_m_;
   image::DepthImage& out_;
   int count_ = 0;
@@ -93,10 +99,19 @@ Status RaySampler::add_chunk(ChunkId id, geometry::ChunkBytes chunk) {
 image::DepthImage RaySampler::sample(const geometry::Camera& camera, const geometry::Rect& tile) {
   image::DepthImage out(tile.width, tile.height);
   trace_tile(
-      scene_, camera, tile, [&] { return PendingHits(scene_, camera.near_m, out); },
+      scene_, camera, tile, [&] { return PendingHits(scene_, *colours_, camera.near_m, out); },
       [&tile](PendingHits& pending, const RTCRayHit8& packet, int x, int y) { pending.add(packet, x, y, tile); },
       [](PendingHits& pending) { pending.flush(); });
   return out;
+}
+
+std::shared_ptr<const scene::ColourTable> neutral_colours() {
+  static const auto table = [] {
+    scene::ColourTable out;
+    out.colours.assign(scene::ColourTable::kEntries + 1, 0xc8c8c8);
+    return std::make_shared<const scene::ColourTable>(std::move(out));
+  }();
+  return table;
 }
 
 std::unique_ptr<Sampler> make_ray_sampler(int threads) { return std::make_unique<RaySampler>(threads); }

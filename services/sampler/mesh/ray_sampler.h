@@ -16,12 +16,17 @@ class RaySampler final : public Sampler {
     return scene_.add(std::move(chunks));
   }
   void remove_chunk(ChunkId id) override { scene_.remove(id); }
+  void set_colours(std::shared_ptr<const scene::ColourTable> colours) override {
+    colours_ = colours ? std::move(colours) : neutral_colours();
+  }
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) override;
 
   RayScene& scene() { return scene_; }
+  const scene::ColourTable& colours() const { return *colours_; }
 
  private:
   RayScene scene_;
+  std::shared_ptr<const scene::ColourTable> colours_ = neutral_colours();
 };
 
 }  // namespace telesplat::sampler

@@ -10,6 +10,7 @@
 #include "common/image/depth_image.h"
 #include "common/image/file.h"
 #include "common/image/shading.h"
+#include "common/scene/colouring.h"
 
 namespace telesplat::sampler {
 
@@ -29,11 +30,17 @@ class Sampler {
   virtual Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) = 0;
   virtual void remove_chunk(ChunkId id) = 0;
 
+  /// What chunks that hold scalars are coloured with from now on; null: neutral. Others keep their colours.
+  virtual void set_colours(std::shared_ptr<const scene::ColourTable> colours) = 0;
+
   /// Samples the pixels `tile` of the frame `camera` at their centres. Colours are unlit albedo interpolated over the
-  /// triangle; normals are interpolated, in room space, flipped to the side on which the camera sees the triangle.
+  /// triangle, or looked up for scalars that are interpolated over it; normals are interpolated, in room space, flipped to the side on which the camera sees the triangle.
   /// Returns a canonical image of tile.width x tile.height. Precondition: tile lies in the camera's image.
   virtual image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) = 0;
 };
+
+/// Of scalars that nobody told the colours of.
+std::shared_ptr<const scene::ColourTable> neutral_colours();
 
 /// Embree 3 ray packets on `threads` oneTBB threads (0 = all cores).
 std::unique_ptr<Sampler> make_ray_sampler(int threads);

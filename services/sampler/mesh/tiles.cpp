@@ -30,7 +30,26 @@ MeshTiles::MeshTiles(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, con
       link_(link),
       spans_(spans) {}
 
+void MeshTiles::learn_look(const wire::Welcome& session) {
+  looks_.follow(session.master);
+  Look look{scene::SessionView(session).fact(scene::kColouringFact), {}, nullptr, true};
+  const Look* before = looks_.find(session.epoch);
+  if (before && before->text == look.text) return;
+  if (!look.text.empty()) {
+    const auto colouring = scene::colouring_from_text(look.text);
+    look.known = colouring.ok();
+    if (colouring) {
+      look.array = colouring->array;
+      look.colours = std::make_shared<const scene::ColourTable>(scene::make_table(*colouring));
+    } else {
+      log::error("epoch {} cannot be sampled: {}", session.epoch.value, colouring.error().text);
+    }
+  }
+  looks_.put(session.epoch, std::move(look));
+}
+
 void MeshTiles::on_welcome(const wire::Welcome& session) {
+  learn_look(session);
   const scene::SessionView view(session);
   const std::string chunks = view.endpoint("chunks");
   if (chunks.empty() || (chunks == endpoint_ && session.epoch == epoch_)) return;
@@ -43,7 +62,9 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
   }
   // A restarted data server with the same data has the same chunks: keep what we hold.
   const std::string hash = view.fact("content_hash");
-  if (hash.empty() || hash != content_hash_) {
+  const Look* look = looks_.find(session.epoch);
+  if (hash.empty() || hash != content_hash_ || (look && look->array != array_)) {
+    if (look) array_ = look->array;
     for (const auto& c : cache_.chunks()) sampler_->remove_chunk(c.id);
     cache_.reset({});
     content_hash_ = hash;
@@ -53,12 +74,16 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
   last_request_s_ = -1e9;
 }
 
-Readiness MeshTiles::readiness(const HeldLease& held, double) {
+Readiness MeshTiles::readiness(const HeldLease& held, double now_s) {
+  const Look* look = looks_.find(held.lease.epoch);
+  if (!look) return looks_.wait_for_welcome(held.lease.epoch, held.received_s, now_s);
+  if (!look->known || look->array != array_) return {Readiness::State::kHopeless};
   const bool ready = cache_.known() && cache_.missing(part(held.lease)).empty();
   return {ready ? Readiness::State::kReady : Readiness::State::kWaits};
 }
 
 Sampled MeshTiles::sample(const HeldLease& held) {
+  sampler_->set_colours(looks_.find(held.lease.epoch)->colours);
   return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect); });
 }
 
@@ -67,7 +92,7 @@ void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
   if (!cache_.known()) {
     if (now_s - last_request_s_ > kRetry_s) {
-      blocks_->send(wire::ChunkListRequest{epoch_});
+      blocks_->send(wire::ChunkListRequest{epoch_, array_});
       last_request_s_ = now_s;
     }
     return;
@@ -92,7 +117,7 @@ void MeshTiles::fetch(const HeldLease* next, double now_s) {
   for (const ChunkId id : wanted) {
     if (cache_.waiting_count() >= kChunksInFlight) break;
     if (cache_.waiting(id)) continue;
-    blocks_->send(wire::ChunkRequest{epoch_, id});
+    blocks_->send(wire::ChunkRequest{epoch_, id, array_});
     cache_.mark_waiting(id);
     last_request_s_ = now_s;
   }

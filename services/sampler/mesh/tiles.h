@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/metrics/recorder.h"
+#include "services/sampler/epoch_book.h"
 #include "services/sampler/mesh/chunk_cache.h"
 #include "services/sampler/mesh/sampler.h"
 #include "services/sampler/tiles/tile_source.h"
@@ -30,6 +31,14 @@ class MeshTiles final : public TileSource {
   void add_status(net::MasterLink::Values& values) const override;
 
  private:
+  // How an epoch looks.
+  struct Look {
+    std::string text;   // the fact "colouring"
+    std::string array;  // that chunks hold; empty: colours
+    std::shared_ptr<const scene::ColourTable> colours;
+    bool known = true;  // the text could be read
+  };
+  void learn_look(const wire::Welcome& session);
   size_t missing_count() const;
 
   std::unique_ptr<Sampler> sampler_;
@@ -40,7 +49,9 @@ class MeshTiles final : public TileSource {
   metrics::SpanRecorder& spans_;
   std::optional<net::Socket> blocks_;
   std::string endpoint_, content_hash_;
-  EpochId epoch_;
+  std::string array_;  // that the chunks held have
+  EpochId epoch_;      // the newest
+  EpochBook<Look> looks_;
   bool prefetched_ = false;
   double last_request_s_ = -1e9, last_extend_s_ = -1e9;
 };

@@ -85,12 +85,12 @@ TEST(PlyArray, OfAFaceIsThatOfAllItsTriangles) {
   EXPECT_EQ(mesh->scalars, (std::vector<float>{7, 7, 9}));  // the face of two corners is left out
 }
 
-// A tetrahedron's shape as VTK's formats have it, and arrays: t of points, v a vector of points, c of cells.
+// A tetrahedron's shape as VTK's formats have it, and arrays: t of points (1 2 3 and not a number), v a vector of points, c of cells.
 constexpr const char* kVtp = R"(<?xml version="1.0"?>
 <VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"><PolyData>
 <Piece NumberOfPoints="4" NumberOfVerts="1" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="2">
 <PointData>
-<DataArray type="Float32" Name="t" format="ascii">1 2 3 nan</DataArray>
+<DataArray type="Float32" Name="t" format="binary">EAAAAAAAgD8AAABAAABAQAAAwH8=</DataArray>
 <DataArray type="Float64" Name="v" NumberOfComponents="3" format="ascii">3 4 0 0 0 1 0 0 2 0 0 -7</DataArray>
 </PointData>
 <CellData><DataArray type="Int32" Name="c" format="ascii">100 5 6</DataArray>

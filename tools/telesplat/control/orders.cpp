@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "common/julia/flags.h"
+#include "common/scene/colouring.h"
 #include "common/volume/session.h"
 
 namespace telesplat::launcher {
@@ -101,6 +102,26 @@ Result<Arguments> transfer_arguments(const Words& words, ControlClient& client) 
   return Arguments{{"transfer", text}};
 }
 
+// ARRAY[:MIN:MAX], none, map NAME, or ARRAY map NAME. Maps are read here: their files lie on this machine.
+Result<Arguments> colour_arguments(const Words& words, ControlClient&) {
+  const bool maps = words.size() >= 2 && words[words.size() - 2] == "map";
+  const size_t arrays = words.size() - (maps ? 2 : 0);
+  if (words.empty() || arrays > 1)
+    return Error{
+        "ctl colour: needs an array such as temperature or temperature:0:100, none, or map NAME, or both: "
+        "temperature map plasma"};
+  Arguments out;
+  if (arrays == 1) {
+    if (const auto by = scene::parse_colour_by(words.front()); !by) return Error{"ctl colour: " + by.error().text};
+    out["array"] = words.front();
+  }
+  if (!maps) return out;
+  const auto map = colour::resolve_colour_map(words.back());
+  if (!map) return Error{"ctl colour: " + map.error().text};
+  out["map"] = colour::to_text(*map);
+  return out;
+}
+
 }  // namespace
 
 const std::vector<Order>& orders() {
@@ -119,7 +140,12 @@ const std::vector<Order>& orders() {
        .help = "change a volume's transfer function",
        .words = "as --tf of run: a preset (" + preset_names() +
                 "), a ParaView JSON file, or points VALUE:COLOUR:OPACITY,...",
-       .read = transfer_arguments}};
+       .read = transfer_arguments},
+      {.name = "colour",
+       .help = "colour a mesh by another array, range or colour map",
+       .words = "ARRAY[:MIN:MAX] as --colour-by of run, or none; map NAME, NAME as --colour-map of run; or both: ARRAY "
+                "map NAME",
+       .read = colour_arguments}};
   return all;
 }
 

@@ -1,0 +1,48 @@
+// What a mesh is coloured by in the current epoch, what may change it, and what the data server was asked for so that it
+// can. No clocks.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/scene/colouring.h"
+#include "common/wire/messages.h"
+#include "services/master/control.h"
+
+namespace telesplat::master {
+
+class MeshColours {
+ public:
+  /// A data server said hello. One that says the same as the one before (it was restarted) changes nothing: what was
+  /// chosen since then stays. True: the mesh looks otherwise. problem: what is wrong with what it says; then it is
+  /// taken for a mesh without arrays, or what was asked of it did not come.
+  bool adopt(const wire::Hello& data, std::string& problem);
+  /// Fills in what everyone is told, and what the data server shall have ready.
+  void describe(wire::Welcome& welcome) const;
+  /// For the run's record; empty: the file's own colours.
+  std::string text() const { return now_ ? scene::to_text(*now_) : std::string(); }
+
+  /// "colour": arguments "array" (as scene::parse_colour_by() takes it) and "map" (as colour::from_text() takes it), one
+  /// of them at least. Another map or range begins an epoch; another array is asked for first, and its epoch begins when
+  /// the data server has it. Error: no such array, no range, nothing to colour; then nothing changed.
+  Result<Obeyed> obey(const wire::Control& command);
+
+ private:
+  struct Order {
+    uint64_t number = 0;
+    std::optional<scene::Colouring> colouring;
+  };
+  bool hear_answer(const std::string& answer, std::string& problem);
+  Result<std::optional<scene::Colouring>> wanted(const wire::Control& command) const;
+
+  bool is_mesh_ = false;
+  std::string content_hash_, told_;  // by the data server
+  std::vector<scene::ArrayInfo> arrays_;
+  colour::ColourMap map_;  // of an array, unless another one is chosen with it
+  std::optional<scene::Colouring> now_;
+  std::optional<Order> order_;  // that waits for its answer
+  uint64_t orders_ = 0;
+};
+
+}  // namespace telesplat::master
