@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <thread>
 
+#include "common/geometry/trajectory.h"
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
 
@@ -130,8 +133,8 @@ TEST_F(WindowTest, ShowsTheObjectObeysTheHandAndEndsWhenClosed) {
 
   // The screenshot is what the window shows.
   display_->tap("p");
-  ASSERT_TRUE(wait_until([&] { return screenshots(run.out()).size() == 1; })) << run.program().err();
-  const auto picture = image::read_view(screenshots(run.out())[0]);
+  ASSERT_TRUE(wait_until([&] { return screenshots(run.out() + "/images").size() == 1; })) << run.program().err();
+  const auto picture = image::read_view(screenshots(run.out() + "/images")[0]);
   ASSERT_TRUE(picture) << picture.error().text;
   EXPECT_EQ(picture->width, 480);
   EXPECT_EQ(picture->height, 300);
@@ -156,8 +159,8 @@ TEST_F(WindowTest, ShowsTheObjectObeysTheHandAndEndsWhenClosed) {
     return shown && shown->width == 200 && shown->height == 320 && covered(*shown) > 0.05 && covered(*shown) < 0.95;
   }));
   display_->tap("F12");
-  ASSERT_TRUE(wait_until([&] { return screenshots(run.out()).size() == 2; })) << run.program().err();
-  const auto tall = image::read_view(screenshots(run.out())[1]);
+  ASSERT_TRUE(wait_until([&] { return screenshots(run.out() + "/images").size() == 2; })) << run.program().err();
+  const auto tall = image::read_view(screenshots(run.out() + "/images")[1]);
   ASSERT_TRUE(tall) << tall.error().text;
   EXPECT_EQ(tall->width, 200);
   EXPECT_EQ(tall->height, 320);
@@ -168,6 +171,123 @@ TEST_F(WindowTest, ShowsTheObjectObeysTheHandAndEndsWhenClosed) {
   EXPECT_TRUE(run.all_gone());
   EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
   EXPECT_GT(run.summary()["frames"], 0);
+}
+
+TEST_F(WindowTest, TellsItsKeysOnTheTerminalAndInTheWindow) {
+  PipelineRun run({}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  EXPECT_NE(run.program().err().find("H shows all keys: left drag orbits"), std::string::npos) << run.program().err();
+  // The keys lie in the upper left corner, where nothing else was; they are in no screenshot.
+  const auto ink = [](const image::View& v) {
+    int out = 0;
+    for (int y = 0; y < v.height / 3; ++y)
+      for (int x = 0; x < v.width / 3; ++x) out += (v.colour[size_t(y * v.width + x)] & 0xff) > 0xb0;
+    return out;
+  };
+  const auto shows = [&](bool wanted) {
+    return wait_until([&] {
+      const auto shown = display_->content(window);
+      return shown && (ink(*shown) > 200) == wanted;
+    });
+  };
+  EXPECT_TRUE(shows(false));
+  display_->tap("h");
+  EXPECT_TRUE(shows(true));
+  EXPECT_TRUE(wait_until([&] { return run.program().err().find("left drag   ") != std::string::npos; }));
+  display_->tap("p");
+  ASSERT_TRUE(wait_until([&] { return screenshots(run.out() + "/images").size() == 1; })) << run.program().err();
+  const auto picture = image::read_view(screenshots(run.out() + "/images")[0]);
+  ASSERT_TRUE(picture);
+  EXPECT_LE(ink(*picture), 200);
+  display_->tap("h");
+  EXPECT_TRUE(shows(false));
+  display_->tap("q");
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
+TEST_F(WindowTest, APathIsRecordedPlayedAgainAndATrajectory) {
+  PipelineRun run({}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  display_->tap("c");
+  EXPECT_TRUE(wait_until([&] {
+    return display_->title(window).find("recording the camera's path") != std::string::npos;
+  })) << display_->title(window);
+  display_->move_pointer(window, 200, 150);
+  display_->button(1, true);
+  display_->move_pointer(window, 290, 150);
+  display_->button(1, false);
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  display_->tap("c");
+  std::string path;
+  EXPECT_TRUE(wait_until([&] {
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(run.out(), error))
+      if (entry.path().filename().string().starts_with("path-")) path = entry.path();
+    return !path.empty() && run.program().err().find(path) != std::string::npos;
+  })) << run.program().err();
+  const auto recorded = geometry::Trajectory::read_csv(path);
+  ASSERT_TRUE(recorded) << recorded.error().text;
+  EXPECT_GT(recorded->duration_s(), 0.5);
+  const auto from = recorded->at(0).position_room, to = recorded->at(1e9).position_room;
+  EXPECT_GT(glm::distance(from, to), 0.2);
+
+  // Back home, then once more along the path: the head ends where it ended.
+  display_->tap("r");
+  std::vector<double> x, z;
+  const auto stands_at = [&](const glm::dvec3& p) {
+    z = run.column("frames.csv", "pz"), x = run.column("frames.csv", "px");
+    const size_t rows = std::min(x.size(), z.size());
+    return rows > 0 && std::hypot(x[rows - 1] - p.x, z[rows - 1] - p.z) < 1e-3;
+  };
+  EXPECT_TRUE(wait_until([&] { return stands_at(from); }));
+  display_->tap("t");
+  EXPECT_TRUE(wait_until([&] { return stands_at(to); }));
+  display_->close(window);
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+
+  // What the window wrote, and what the run recorded, move a head without a window, for as long as they last.
+  for (const std::string& file : {path, run.out() + "/frames.csv"}) {
+    const auto trajectory = geometry::Trajectory::read_csv(file);
+    ASSERT_TRUE(trajectory) << trajectory.error().text;
+    std::vector<std::string> arguments{"--trajectory", file};
+    if (file != path) arguments.insert(arguments.end(), {"--duration", "0.5"});
+    PipelineRun again(arguments);
+    EXPECT_EQ(again.program().wait(60), 0) << again.program().err();
+    const double lasted_s = again.column("frames.csv", "t_s").back();
+    EXPECT_NEAR(lasted_s, file == path ? trajectory->duration_s() : 0.5, 0.2);
+  }
+}
+
+TEST_F(WindowTest, KeysOfPointsDoNothingToAVolume) {
+  TemporaryFolder folder;
+  write_volume(folder / "ball.mha");
+  PipelineRun run({}, folder / "ball.mha", "view");
+  ASSERT_NE(live_window(run.program()), 0u);
+  for (const char* key : {"1", "5", "8"}) {
+    display_->tap(key);
+    const std::string line = "key " + std::string(key) + " has no meaning for volumes";
+    EXPECT_TRUE(wait_until([&] { return run.program().err().find(line) != std::string::npos; })) << run.program().err();
+  }
+  EXPECT_EQ(run.program().err().find("splats:"), std::string::npos);
+  display_->tap("q");
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
+TEST_F(WindowTest, EndsInOrderWhenTheDisplayGoesAway) {
+  PipelineRun run({}, "", "view");
+  ASSERT_NE(live_window(run.program()), 0u);
+  run.master();
+  const auto pids = family(run.program().pid());
+  display_->go_away();
+  EXPECT_EQ(run.program().wait(60), 1);
+  const std::string err = run.program().err();
+  EXPECT_NE(err.find("the display went away"), std::string::npos) << err;
+  EXPECT_EQ(err.find("serial number"), std::string::npos) << err;
+  EXPECT_TRUE(none_runs(pids));
+  EXPECT_TRUE(run.all_gone());
+  EXPECT_GT(run.summary()["frames"], 0) << "the record is complete";
 }
 
 TEST_F(WindowTest, LeavesNothingBehindUnlessTold) {

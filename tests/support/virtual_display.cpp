@@ -80,12 +80,17 @@ VirtualDisplay::VirtualDisplay() : display_before_(variable("DISPLAY")), wayland
   connection_ = XOpenDisplay(nullptr);
 }
 
-VirtualDisplay::~VirtualDisplay() {
+void VirtualDisplay::go_away() {
   if (connection_) XCloseDisplay(display_of(connection_));
-  if (server_ > 0) {
-    kill(server_, SIGTERM);
-    waitpid(server_, nullptr, 0);
-  }
+  connection_ = nullptr;
+  if (server_ <= 0) return;
+  kill(server_, SIGTERM);
+  waitpid(server_, nullptr, 0);
+  server_ = -1;
+}
+
+VirtualDisplay::~VirtualDisplay() {
+  go_away();
   restore("DISPLAY", display_before_);
   restore("WAYLAND_DISPLAY", wayland_before_);
 }

@@ -40,6 +40,9 @@ class VirtualDisplay {
   /// What a window manager sends when the person closes a window.
   void close(WindowId window);
 
+  /// The server ends, as when the person's session or a forwarded connection does. Nothing else can be asked then.
+  void go_away();
+
  private:
   pid_t server_ = -1;
   void* connection_ = nullptr;
