@@ -11,6 +11,7 @@
 #include <span>
 
 #include "common/core/utf8.h"
+#include "common/options/manual.h"
 #include "common/options/suggest.h"
 
 namespace telesplat::options {
@@ -29,6 +30,7 @@ struct Parser::Impl {
   std::deque<Parser> commands;
   std::vector<std::pair<std::string, CLI::Option*>> options;  // by the row's name
 
+  Manual manual(const std::string& called) const;
   Status refuse_unknown(const std::string& called, std::span<const std::string> arguments, std::string& command) const;
   Status unknown_flag(const std::string& called, const std::string& flag) const;
   Status unknown_command(const std::string& called, const std::string& name) const;
@@ -52,11 +54,6 @@ std::string type_name(const Row& row) {
   if (const auto* range = std::get_if<Range>(&row.limits))
     return fmt::format("{} in [{} - {}]", type, number_text(range->least), number_text(range->most));
   return type;
-}
-
-bool takes_value(const Row& row) {
-  if (std::holds_alternative<Action>(row.value)) return false;
-  return !std::holds_alternative<bool*>(row.value) || row.on_off;
 }
 
 // A negative number is no flag.
@@ -121,6 +118,12 @@ void Parser::footer(const std::string& text) { impl_->app->footer(text); }
 
 void Parser::version(const std::string& text) { impl_->version = text; }
 
+Manual Parser::Impl::manual(const std::string& called) const {
+  Manual out{called, app->get_description(), table, app->get_footer(), {}};
+  for (const Parser& p : commands) out.commands.push_back(p.impl_->manual(called + " " + p.impl_->name));
+  return out;
+}
+
 Status Parser::Impl::unknown_flag(const std::string& called, const std::string& flag) const {
   std::vector<std::string> known{"--help"};
   if (!version.empty()) known.emplace_back("--version");
@@ -178,6 +181,10 @@ void Parser::parse_or_exit(const std::string& program, std::vector<std::string> 
   if (!impl_->version.empty()) {
     const std::string told = fmt::format("{} {}", name, impl_->version);
     app.set_version_flag("--version", told, "Print which version this is and exit");
+  }
+  if (!impl_->version.empty() && arguments == std::vector<std::string>{"--man"}) {
+    std::fputs(man_page(impl_->manual(name), impl_->version, true).c_str(), stdout);
+    std::exit(0);
   }
   std::string command;
   if (const Status s = impl_->refuse_unknown(name, arguments, command); !s) refuse(s.error().text);

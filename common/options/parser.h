@@ -21,7 +21,8 @@ class Parser {
   Parser& command(const std::string& name, const std::string& about);
   /// Text at the end of --help.
   void footer(const std::string& text);
-  /// What --version tells behind the program's name; without it there is no such flag.
+  /// What --version tells behind the program's name, and --man, alone, in the foot of the manual page that it prints.
+  /// Without it there are no such flags.
   void version(const std::string& text);
 
   /// --help prints and exits 0, bad usage prints "PROGRAM: what is wrong" in one line and exits 2. program: its name,

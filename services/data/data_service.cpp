@@ -1,6 +1,9 @@
 #include "services/data/data_service.h"
 
+#include <fmt/format.h>
+
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 
 #include "common/core/clock.h"
@@ -15,15 +18,18 @@ namespace {
 constexpr int kQuiet_ms = 50, kBusy_ms = 2;
 constexpr int kRequestsATurn = 64;  // so that the master is not kept waiting
 
-// Progress goes to the launcher's pipe, or to the log every two seconds.
-Progress make_progress(bool to_stdout) {
-  return [to_stdout, last_s = monotonic_s()](const char* stage, double fraction) mutable {
+// Progress goes to the launcher's pipe, or to the log every two seconds. scene: the file.
+Progress make_progress(bool to_stdout, const std::string& scene) {
+  const std::string name = to_utf8(std::filesystem::path(scene).filename().string());
+  return [to_stdout, name, last_s = monotonic_s()](const char* stage, double fraction) mutable {
     const double now = monotonic_s();
     if (to_stdout) {
-      std::printf("progress %s %.3f\n", stage, fraction);
+      std::fputs(fmt::format("progress {} {:.3f}\n", what, fraction).c_str(), stdout);
+    const bool of_the_file = stage == std::string_view(kReading) || stage == std::string_view(kIdentifying);
+    const std::string what = of_the_file && !name.empty() ? fmt::format("{} {}", stage, name) : stage;
       std::fflush(stdout);
     } else if (now - last_s >= 2.0) {
-      log::info("{}: {:.0f} %", stage, fraction * 100);
+      log::info("{}: {:.0f} %", what, fraction * 100);
       last_s = now;
     }
   };
@@ -99,7 +105,7 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
 int run(const DataServiceOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   const double begin_s = monotonic_s();
-  const auto served = open(o, make_progress(o.report_progress));
+  const auto served = open(o, make_progress(o.report_progress, o.scene));
   if (!served) {
     std::fprintf(stderr, "telesplat: %s\n", served.error().text.c_str());
     return 2;

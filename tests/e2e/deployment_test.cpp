@@ -174,7 +174,7 @@ TEST(Deployment, ADataServerEndsOnASignalWhileItReads) {
   Deployment d;
   write_terrain(d.folder() / "mountains.ply", 1500);
   Program& data = d.start("data", {d.folder() / "mountains.ply", "--cache", d.folder() / "cache", "--report-progress"});
-  ASSERT_TRUE(wait_until([&] { return data.out().find("progress read") != std::string::npos; }));
+  ASSERT_TRUE(wait_until([&] { return data.out().find("progress reading") != std::string::npos; }));
   data.signal(SIGTERM);
   EXPECT_EQ(data.wait(), 0);
   for (const auto& entry : fs::directory_iterator(d.folder() / "cache")) EXPECT_NE(entry.path().extension(), ".mesh");

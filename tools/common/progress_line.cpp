@@ -29,9 +29,12 @@ void ProgressLine::show(const std::string& text) {
 }
 
 void ProgressLine::show(const char* what, double fraction) {
-  char text[200];
-  std::snprintf(text, sizeof text, "%s %.0f %%", what, 100 * fraction);
-  show(std::string(text));
+  std::string text;
+  {
+    const std::lock_guard lock(mutex_);
+    text = time_left_.text(what, fraction, monotonic_s());
+  }
+  show(text);
 }
 
 void ProgressLine::line(const std::string& text) {

@@ -4,6 +4,8 @@
 #include <mutex>
 #include <string>
 
+#include "tools/common/time_left.h"
+
 namespace telesplat::tools {
 
 /// On a terminal one line that rewrites itself, at most 10 times a second; elsewhere one line every 5 seconds. Any
@@ -15,7 +17,7 @@ class ProgressLine {
   ~ProgressLine() { close(); }
 
   void show(const std::string& text);
-  /// "WHAT 43 %"
+  /// "WHAT 43 %, 12 s left"
   void show(const char* what, double fraction);
   /// A line that stays.
   void line(const std::string& text);
@@ -24,6 +26,7 @@ class ProgressLine {
 
  private:
   std::mutex mutex_;
+  TimeLeft time_left_;
   bool terminal_, open_ = false;
   double begin_s_, last_s_;
 };

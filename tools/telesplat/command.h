@@ -38,7 +38,11 @@ Command inspect_command();
 Command compare_command();
 Command movie_command();
 Command bench_command();
+Command cache_command();
 Command presets_command();
+
+/// `commands`, and two more that tell of all of them: completion and man.
+std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands);
 
 /// Runs the command that the arguments name; --help prints and ends the program, bad usage too, with code 2.
 int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments);

@@ -18,13 +18,13 @@ uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progr
     const auto bytes = (*file)->bytes();
     for (size_t at = 0; at < bytes.size(); at += kStep) {
       const double of_file = static_cast<double>(at) / static_cast<double>(bytes.size());
-      progress("hash", (static_cast<double>(n) + of_file) / static_cast<double>(paths.size()));
+      progress(kIdentifying, (static_cast<double>(n) + of_file) / static_cast<double>(paths.size()));
       XXH3_64bits_update(state, bytes.data() + at, std::min(kStep, bytes.size() - at));
     }
   }
   const uint64_t hash = XXH3_64bits_digest(state);
   XXH3_freeState(state);
-  progress("hash", 1.0);
+  progress(kIdentifying, 1.0);
   return hash;
 }
 

@@ -20,7 +20,7 @@ struct MeshSource {
 };
 
 /// The hash of the files' contents, in this order. Files that cannot be read are left out: reading them says why. Calls
-/// progress with stage "hash".
+/// progress with stage kIdentifying.
 uint64_t hash_files(const std::vector<std::string>& paths, const Progress& progress);
 
 }  // namespace telesplat::data

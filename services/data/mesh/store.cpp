@@ -46,9 +46,9 @@ std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& p
 // Reads the mesh file and writes its store into the descriptor.
 Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
                    const Progress& progress, std::vector<std::string>& notes) {
-  auto mesh = source.read([&](double fraction) { progress("read", fraction); });
+  auto mesh = source.read([&](double fraction) { progress(kReading, fraction); });
   if (!mesh) return mesh.error();
-  progress("read", 1.0);
+  progress(kReading, 1.0);
   notes = mesh->notes;
   MeshStoreInfo info;
   info.format = mesh->format;
@@ -58,10 +58,10 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.content_hash = source.hash;
   info.arrays = mesh->arrays;
   info.array = source.array;
-  progress("normals", 0.0);
+  progress(kPlacing, 0.0);
   const auto placed = place_mesh(std::move(*mesh), options.room_size_m, options.up, path);
   if (!placed) return placed.error();
-  progress("normals", 1.0);
+  progress(kPlacing, 1.0);
   info.triangles = placed->indices.size() / 3;
   info.degenerate_dropped = placed->degenerate_dropped;
   info.box_data = placed->box_data;

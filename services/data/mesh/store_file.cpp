@@ -92,12 +92,12 @@ MeshStoreInfo info_of(const StoreHeader& h) {
 
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
                    const Progress& progress) {
-  progress("chunk", 0.0);
+  progress(kSortingIntoChunks, 0.0);
   const ChunkPlan plan = plan_chunks(mesh);
   if (plan.chunks() > geometry::kMaxChunks)
     return Error{
         fmt::format("{}: would be split into {} chunks, the limit is {}", name, plan.chunks(), geometry::kMaxChunks)};
-  progress("chunk", 1.0);
+  progress(kSortingIntoChunks, 1.0);
   std::vector<StoreEntry> entries(plan.chunks());
   std::atomic<size_t> end = kPage + round_up(entries.size() * sizeof(StoreEntry));
   std::atomic<int> failure = 0;
@@ -105,7 +105,7 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   // Batches, so that progress is told from this thread; a chunk takes its place in the file when its size is known.
   constexpr size_t kBatch = 16;
   for (size_t first = 0; first < plan.chunks() && failure == 0; first += kBatch) {
-    progress("write", static_cast<double>(first) / static_cast<double>(plan.chunks()));
+    progress(kWritingTheStore, static_cast<double>(first) / static_cast<double>(plan.chunks()));
     tbb::parallel_for(first, std::min(first + kBatch, plan.chunks()), [&](size_t i) {
       const auto triangles = std::span(plan.order).subspan(plan.begin[i], plan.begin[i + 1] - plan.begin[i]);
       const std::vector<std::byte> bytes = make_chunk(mesh, triangles);
@@ -132,7 +132,7 @@ Status write_store(int descriptor, const std::string& name, const PlacedMesh& me
   if (failure != 0)
     return Error{fmt::format("{}: chunk store of {} bytes cannot be written: {}", name, header.file_bytes,
                              std::strerror(failure))};
-  progress("write", 1.0);
+  progress(kWritingTheStore, 1.0);
   return ok_status();
 }
 

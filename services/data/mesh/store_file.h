@@ -26,7 +26,7 @@ inline constexpr uint32_t kStoreVersion = 5;
 
 /// Makes the store of a placed mesh in an open, empty, writable file. `info` describes it; boxes and counts are taken
 /// from there. On failure (disk full) the file's content is worthless. Errors start with `name`. `progress` (stages
-/// "chunk" and "write") is called on this thread.
+/// kSortingIntoChunks and kWritingTheStore) is called on this thread.
 Status write_store(int descriptor, const std::string& name, const PlacedMesh& mesh, const MeshStoreInfo& info,
                    const Progress& progress);
 

@@ -68,7 +68,7 @@ class Store final : public VolumeStore {
   }
 
   Status initialise(const VolumeOptions& options, const PlacementOptions& placement, const Progress& progress) {
-    auto first = read_(0, [&](double f) { progress("read", f / session_.steps); });
+    auto first = read_(0, [&](double f) { progress(kReading, f / session_.steps); });
     if (!first) return first.error();
     const auto refuse = [&](const Error& e) { return Error{name_ + ": " + e.text}; };
     const auto index_to_room = place_volume(*first, placement);
@@ -87,7 +87,7 @@ class Store final : public VolumeStore {
     double lo = all[0].lo, hi = all[0].hi;
     if (double(all[0].stored.size()) * session_.steps <= double(cache_bytes_))
       for (int step = 1; step < session_.steps; ++step) {
-        auto v = read_step(step, [&](double f) { progress("read", (step + f) / session_.steps); });
+        auto v = read_step(step, [&](double f) { progress(kReading, (step + f) / session_.steps); });
         if (!v) return v.error();
         lo = std::min(lo, v->lo), hi = std::max(hi, v->hi);
         all.push_back(std::move(*v));
@@ -100,7 +100,7 @@ class Store final : public VolumeStore {
       content_hash_ = XXH3_64bits_withSeed(all[step].stored.data(), all[step].stored.size(), content_hash_);
       keep(int(step), std::make_shared<VolumeSlices>(all[step], session_, begin_, end_));
       all[step].stored = {};
-      progress("classify", double(step + 1) / double(all.size()));
+      progress(kSortingVoxels, double(step + 1) / double(all.size()));
     }
     const std::string transfer =
         options.transfer.empty() ? std::string(volume::fitting_preset(session_.range)) : options.transfer;

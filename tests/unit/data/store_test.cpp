@@ -69,7 +69,7 @@ TEST_F(StoreTest, SecondOpenIsFromTheCacheAndTheSame) {
   });
   ASSERT_TRUE(first && again.ok());
   EXPECT_TRUE((*again)->info().from_cache);
-  EXPECT_EQ(std::count(stages.begin(), stages.end(), "read"), 0);
+  EXPECT_EQ(std::count(stages.begin(), stages.end(), kReading), 0);
   EXPECT_EQ(first->chunks(), (*again)->chunks());
   EXPECT_EQ(first->info().box_data, (*again)->info().box_data);
   EXPECT_EQ(first->info().content_hash, (*again)->info().content_hash);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+
 #include "common/core/clock.h"
 #include "tools/telesplat/run/wall.h"
 
@@ -115,7 +117,14 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
 
 void Pipeline::read(Member& m) {
   for (const auto& line : m.process->read_lines()) {
-    if (line.starts_with("progress ")) progress_ = line.substr(9);
+    if (line.starts_with("progress ")) read_progress(m.name, line.substr(9));
+// "STAGE 0.430"
+void Pipeline::read_progress(const std::string& member, const std::string& told) {
+  const size_t space = told.rfind(' ');
+  if (space == told.npos) return;
+  progress_ = time_left_[member].text(told.substr(0, space), std::atof(told.c_str() + space), monotonic_s());
+}
+
     if (line.starts_with("note ")) notes_.push_back(line.substr(5));
   }
 }

@@ -1,12 +1,14 @@
 // The processes of one session on this machine: started in any order, supervised, ended together.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "tools/common/time_left.h"
 #include "tools/telesplat/control/client.h"
 #include "tools/telesplat/run/process_group.h"
 #include "tools/telesplat/run/run_options.h"
@@ -26,7 +28,7 @@ class Pipeline {
   /// the master's or a viewer's death ends the run, which is finished when all viewers are. `news` gets lines for the
   /// person.
   State supervise(std::vector<std::string>& news);
-  /// "reading 43 %" and the like, from the children's progress lines; empty if there is nothing to tell.
+  /// "reading a.ply 43 %, 12 s left" and the like, from the children's progress lines; empty: nothing to tell.
   const std::string& progress() const { return progress_; }
   /// Lines that viewers told the person, since the last call.
   std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
@@ -39,12 +41,14 @@ class Pipeline {
   Status start_viewers(double clock_from_s);
   Status start_wall();
   void read(Member& member);
+  void read_progress(const std::string& member, const std::string& told);
   /// What the end of a process means for the run.
   State ended(Member& member, std::vector<std::string>& news);
 
   RunOptions options_;
   ProcessGroup group_;
   std::string progress_;
+  std::map<std::string, tools::TimeLeft> time_left_;  // by member
   std::vector<std::string> notes_;
   bool has_viewers_ = false;
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait

@@ -1,0 +1,37 @@
+// Open files and locks on them (flock). A lock ends with its descriptor, so with its process too.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <string>
+#include <utility>
+
+namespace telesplat::data {
+
+class Descriptor {
+ public:
+  explicit Descriptor(int value = -1) : value_(value) {}
+  ~Descriptor() {
+    if (value_ >= 0) close(value_);
+  }
+  Descriptor(Descriptor&& other) noexcept : value_(std::exchange(other.value_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(value_, other.value_);
+    return *this;
+  }
+  static Descriptor open_file(const std::string& path, int flags) {
+    return Descriptor(::open(path.c_str(), flags | O_CLOEXEC, 0644));
+  }
+
+  int get() const { return value_; }
+  bool valid() const { return value_ >= 0; }
+  /// how: LOCK_SH or LOCK_EX, and LOCK_NB. False: somebody else holds it, or it cannot be locked.
+  bool lock(int how) const { return valid() && flock(value_, how) == 0; }
+
+ private:
+  int value_;
+};
+
+}  // namespace telesplat::data

@@ -1,0 +1,139 @@
+// Wrong usage is refused by the program that was called, before it starts another: exit code 2, one line that names
+// flag, value and limit.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Case {
+  std::string name;
+  std::vector<std::string> arguments;  // the program first
+  std::string line;                    // all of what it says
+};
+
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+
+class Usage : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Usage, IsRefusedWithOneLine) {
+  const Case& c = GetParam();
+  TemporaryFolder folder;
+  write_terrain(folder / "terrain.ply", 4);
+  std::vector<std::string> arguments(c.arguments.begin() + 1, c.arguments.end());
+  std::replace(arguments.begin(), arguments.end(), std::string("MESH"), folder / "terrain.ply");
+  if (arguments.size() > 1 && arguments[0] == "run" && arguments[1].ends_with("terrain.ply")) {
+    arguments.insert(arguments.begin() + 2, {"--out", folder / "out", "--no-cache"});
+    if (std::find(arguments.begin(), arguments.end(), "--duration") == arguments.end())
+      arguments.insert(arguments.begin() + 2, {"--duration", "1"});
+  }
+  Program program(c.arguments.front(), arguments, folder / "program");
+  EXPECT_EQ(program.wait(30), 2) << program.err();
+  EXPECT_EQ(program.err(), c.line + "\n");
+  EXPECT_FALSE(fs::exists(folder / "out")) << "something was started";
+}
+
+const Case kCases[] = {
+    {"WrongFlag",
+     {"telesplat", "run", "MESH", "--durationn", "3"},
+     "telesplat: --durationn: no such flag of telesplat run; did you mean --duration?"},
+    {"WrongFlagWithValue",
+     {"telesplat", "run", "MESH", "--samplrs=2"},
+     "telesplat: --samplrs: no such flag of telesplat run; did you mean --samplers?"},
+    {"WrongFlagLikeNone",
+     {"telesplat", "run", "MESH", "--elephant"},
+     "telesplat: --elephant: no such flag of telesplat run"},
+    {"WrongFlagOfAService",
+     {"telesplat-viewer", "--sise", "3x3"},
+     "telesplat-viewer: --sise: no such flag of telesplat-viewer; did you mean --size?"},
+    {"WrongCommand", {"telesplat", "rnu", "MESH"}, "telesplat: rnu: no such command of telesplat; did you mean run?"},
+    {"WrongOrder",
+     {"telesplat", "ctl", "stauts"},
+     "telesplat: stauts: no such command of telesplat ctl; did you mean status?"},
+    {"NotANumber",
+     {"telesplat", "run", "MESH", "--samplers", "two"},
+     "telesplat: --samplers two: is not a whole number"},
+    {"TooMany", {"telesplat", "run", "MESH", "--samplers", "99"}, "telesplat: --samplers 99: is not between 1 and 64"},
+    {"WrongName",
+     {"telesplat", "run", "MESH", "--splat", "dsc"},
+     "telesplat: --splat dsc: is not one of square, disc, ellipse, ewa; did you mean disc?"},
+    {"NegativeFrames",
+     {"telesplat", "run", "MESH", "--frames", "-1"},
+     "telesplat: --frames -1: is not a whole number of 0 or more"},
+    {"NegativePictures",
+     {"telesplat", "run", "MESH", "--record-every", "-1"},
+     "telesplat: --record-every -1: is not a whole number of 0 or more"},
+    {"NegativeVerify",
+     {"telesplat", "run", "MESH", "--verify", "-1"},
+     "telesplat: --verify -1: is not a whole number of 0 or more"},
+    {"NegativePoints",
+     {"telesplat", "run", "MESH", "--record-points", "-1"},
+     "telesplat: --record-points -1: is not between 0 and 1048576"},
+    {"HugeFrames",
+     {"telesplat", "run", "MESH", "--frames", "99999999999999999999"},
+     "telesplat: --frames 99999999999999999999: is too large or too small a number"},
+    {"DurationIsNoNumber",
+     {"telesplat", "run", "MESH", "--duration", "nan"},
+     "telesplat: --duration nan: is not between 0 and 1000000"},
+    {"DurationIsInfinite",
+     {"telesplat", "run", "MESH", "--duration", "inf"},
+     "telesplat: --duration inf: is not between 0 and 1000000"},
+    {"FovIsNoNumber", {"telesplat", "run", "MESH", "--fov", "nan"}, "telesplat: --fov nan: is not between 1 and 170"},
+    {"HoldIsNoNumber",
+     {"telesplat", "run", "MESH", "--hold", "nan"},
+     "telesplat: --hold nan: is not between 0 and 1000000"},
+    {"NearIsNoNumber",
+     {"telesplat", "run", "MESH", "--near", "nan"},
+     "telesplat: --near nan: is not between 0.00001 and 1000"},
+    {"RateIsNoNumber",
+     {"telesplat", "run", "MESH", "--target-fps", "nan"},
+     "telesplat: --target-fps nan: is not between 0 and 1000"},
+    {"IsoIsNoNumber", {"telesplat", "run", "MESH", "--iso", "nan"}, "telesplat: --iso nan: is not a finite number"},
+    {"ViewersFov", {"telesplat-viewer", "--fov", "nan"}, "telesplat-viewer: --fov nan: is not between 1 and 170"},
+    {"ViewersClock",
+     {"telesplat-viewer", "--clock-from", "nan"},
+     "telesplat-viewer: --clock-from nan: is not a finite number"},
+    {"MastersTimeout",
+     {"telesplat-master", "--lease-timeout", "nan"},
+     "telesplat-master: --lease-timeout nan: is not between 0.05 and 3600"},
+    {"MastersLimit",
+     {"telesplat-master", "--packing.max_points", "nan"},
+     "telesplat-master: --packing.max_points nan: is not between 0 and 1000000000000"},
+    {"SamplersCost",
+     {"telesplat-sampler", "--cost-scale", "inf"},
+     "telesplat-sampler: --cost-scale inf: is not between 0 and 1000000"},
+    {"DatasRoom",
+     {"telesplat-data", "MESH", "--room-size", "nan"},
+     "telesplat-data: --room-size nan: is not between 0.001 and 1000"},
+};
+
+INSTANTIATE_TEST_SUITE_P(All, Usage, ::testing::ValuesIn(kCases), [](const auto& info) { return info.param.name; });
+
+// What a scene file says is refused with its line.
+TEST(UsageOfSceneFiles, NamesFileAndLine) {
+  TemporaryFolder folder;
+  write_terrain(folder / "terrain.ply", 4);
+  const std::string scene = folder / "scene.toml";
+  const auto said = [&](const std::string& line) {
+    std::ofstream(scene) << "[scene]\nfile = \"terrain.ply\"\n" << line << "\n";
+    Program program("telesplat", {"run", scene, "--out", folder / "out", "--no-cache"}, folder / "program");
+    EXPECT_EQ(program.wait(30), 2) << line;
+    return program.err();
+  };
+  EXPECT_EQ(said("sise = \"100x100\""),
+            "telesplat: " + scene + ":3: key sise is none: there is no flag --sise; did you mean size?\n");
+  EXPECT_EQ(said("duration = nan"), "telesplat: " + scene + ":3: --duration nan: is not between 0 and 1000000\n");
+  EXPECT_EQ(said("frames = -1"), "telesplat: " + scene + ":3: --frames -1: is not a whole number of 0 or more\n");
+  EXPECT_EQ(said("fov = inf"), "telesplat: " + scene + ":3: --fov inf: is not between 1 and 170\n");
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+}  // namespace
+}  // namespace telesplat::test

@@ -1,0 +1,164 @@
+// `telesplat completion SHELL` and `telesplat man`: what shells and man(1) are told, from the tables of --help.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include "common/core/version.h"
+#include "common/options/manual.h"
+#include "common/options/suggest.h"
+#include "tools/common/complain.h"
+#include "tools/telesplat/command.h"
+#include "tools/telesplat/run/process_group.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kServices{"master", "data", "sampler", "packer", "viewer", "health"};
+
+struct CompletionOptions {
+  std::string shell;
+};
+struct ManOptions {
+  std::vector<std::string> words;
+  std::string out;
+};
+
+options::Table completion_table(CompletionOptions& o) {
+  return {{.flag = "shell",
+           .value = &o.shell,
+           .help = "prints a script for this shell; of bash: source <(telesplat completion bash)",
+           .limits = options::Names{"bash", "zsh", "fish"},
+           .required = true}};
+}
+
+options::Table man_table(ManOptions& o) {
+  return {{.flag = "command",
+           .value = &o.words,
+           .help = "a command of telesplat, or a service: master, data, sampler, packer, viewer, health; default: "
+                   "telesplat itself"},
+          {.flag = "--out", .value = &o.out, .help = "folder to write all pages to instead: telesplat.1, ..."}};
+}
+
+options::Manual manual_of(const std::string& name, const Command& command) {
+  options::Manual out{name, command.help, command.table, command.footer, {}};
+  for (const Command& c : command.commands) out.commands.push_back(manual_of(name + " " + c.name, c));
+  return out;
+}
+
+// What a program prints; empty: it is not there, or prints nothing.
+std::string output_of(const std::string& program, const std::string& flag) {
+  const std::string path = program_directory() + "/" + program;
+  if (access(path.c_str(), X_OK) != 0) return {};
+  std::string quoted;
+  for (const char c : path) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(fmt::format("'{}' {}", quoted, flag).c_str(), "r"), pclose);
+  std::string out;
+  std::array<char, 4096> part;
+  while (pipe)
+    if (const size_t n = fread(part.data(), 1, part.size(), pipe.get()); n > 0)
+      out.append(part.data(), n);
+    else
+      break;
+  return out;
+}
+
+// The page of telesplat, of one of its commands, or of a service.
+Result<std::string> page_of(const options::Manual& all, const std::string& word) {
+  if (word.empty() || word == "telesplat") return options::man_page(all, version(), true);
+  std::vector<std::string> known;
+  for (const auto& m : all.commands) {
+    known.push_back(m.name.substr(m.name.rfind(' ') + 1));
+    if (known.back() == word) return options::man_page(m, version(), false);
+  }
+  const std::string service = word.starts_with("telesplat-") ? word.substr(10) : word;
+  for (const char* name : kServices) {
+    known.emplace_back(name);
+    if (service != name) continue;
+    std::string page = output_of("telesplat-" + service, "--man");
+    if (page.empty()) return Error{fmt::format("telesplat-{} is not beside telesplat", service)};
+    return page;
+  }
+  return Error{
+      fmt::format("man {}: no such command or service{}", word.substr(0, 80), options::did_you_mean(word, known))};
+}
+
+Status write_pages(const options::Manual& all, const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  std::vector<std::pair<std::string, std::string>> pages{{"telesplat", ""}};
+  for (const auto& m : all.commands) {
+    const std::string word = m.name.substr(m.name.rfind(' ') + 1);
+    pages.emplace_back("telesplat-" + word, word);
+  }
+  for (const char* name : kServices) pages.emplace_back(fmt::format("telesplat-{}", name), name);
+  for (const auto& [file, word] : pages) {
+    const auto text = page_of(all, word);
+    if (!text) return text.error();
+    const std::string path = fs::path(folder) / (file + ".1");
+    if (!(std::ofstream(path) << *text).flush()) return Error{fmt::format("{}: cannot be written", path)};
+  }
+  return ok_status();
+}
+
+// A person at a terminal reads it with man(1), where there is one.
+void show(const std::string& page) {
+  if (isatty(STDOUT_FILENO))
+    if (const std::unique_ptr<FILE, int (*)(FILE*)> reader(
+            popen("command -v man > /dev/null && exec man -l - || exec cat", "w"), pclose);
+        reader) {
+      std::fputs(page.c_str(), reader.get());
+      return;
+    }
+  std::fputs(page.c_str(), stdout);
+}
+
+int man(const options::Manual& all, const ManOptions& o) {
+  if (!o.out.empty()) {
+    const Status s = write_pages(all, o.out);
+    return s ? 0 : tools::complain(s.error());
+  }
+  if (o.words.size() > 1)
+    return tools::complain({fmt::format("man: one command, not {} and {}", o.words[0], o.words[1])});
+  const auto page = page_of(all, o.words.empty() ? "" : o.words.front());
+  if (!page) return tools::complain(page.error());
+  show(*page);
+  return 0;
+}
+
+int complete(const options::Manual& all, const std::string& shell) {
+  using options::Shell;
+  const Shell of = shell == "bash" ? Shell::kBash : shell == "zsh" ? Shell::kZsh : Shell::kFish;
+  std::fputs(options::completion(all, of).c_str(), stdout);
+  return 0;
+}
+
+}  // namespace
+
+std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands) {
+  const auto completion_options = std::make_shared<CompletionOptions>();
+  const auto man_options = std::make_shared<ManOptions>();
+  commands.push_back({.name = "completion",
+                      .help = "print a script that completes telesplat's commands and flags in a shell",
+                      .table = completion_table(*completion_options),
+                      .run = {}});
+  commands.push_back(
+      {.name = "man", .help = "show or write manual pages", .table = man_table(*man_options), .run = {}});
+  options::Manual all{"telesplat", about, {}, {}, {}};
+  for (const Command& c : commands) all.commands.push_back(manual_of("telesplat " + c.name, c));
+  // What the tables point to lives as long as what `commands` runs.
+  const auto owned = std::make_shared<std::vector<Command>>(commands);
+  commands[commands.size() - 2].run = [all, owned, o = completion_options](const options::Given&) {
+    return complete(all, o->shell);
+  };
+  commands.back().run = [all, owned, o = man_options](const options::Given&) { return man(all, *o); };
+  return commands;
+}
+
+}  // namespace telesplat::launcher
