@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "client/viewer/coupling/coupling.h"
+#include "common/image/background.h"
 #include "common/splat/kernel_traits.h"
 #include "common/wire/messages.h"
 
@@ -22,6 +23,11 @@ const scene::Kinds kPoints = scene::Kinds::of(scene::Pipeline::kPoints);
 
 std::string complain_about_finish(const std::string& text) {
   return splat::finish_named(text) ? "" : "not on, off or some of fill,smooth,antialias";
+}
+
+std::string complain_about_background(const std::string& text) {
+  const auto background = image::parse_background(text);
+  return background ? "" : background.error().text;
 }
 
 std::string complain_about_point(const std::string& text) {
@@ -134,11 +140,22 @@ Table drawing_table(ViewerOptions& o) {
        .help = "work per pixel after splatting: on, off, or some of fill,smooth,antialias",
        .limits = options::Check(complain_about_finish),
        .fits = kPoints},
+      {.flag = "--background",
+       .value = &o.background,
+       .help = "behind the data: #rrggbb, a name (white, black, grey, ...), or transparent (pictures have alpha; a "
+               "window shows black)",
+       .limits = options::Check(complain_about_background),
+       .reach = Reach::kRecorded},
       {.flag = "--shading",
        .value = &o.shading,
        .help = "lit: head light, directional light, ambient; head: head light; unlit: colours as they are",
        .limits = Names(image::kShadingNames.begin(), image::kShadingNames.end()),
        .reach = Reach::kRecorded},
+      {.flag = "--legend",
+       .value = &d.legend,
+       .help = "on: pictures and the window show what colours mean: the array that colours a mesh, a volume's transfer "
+               "function",
+       .on_off = true},
   };
 }
 
@@ -202,7 +219,10 @@ Table process_table(ViewerOptions& o) {
        .help =
            "monotonic clock when the head's movement and --duration begin, for several viewers that follow one head; "
            "0: with the first displayed frame"},
-      {.flag = "--out", .value = &o.out, .help = "run folder for pictures and frames to verify"},
+      {.flag = "--out",
+       .value = &o.out,
+       .help = "run folder for pictures and what is received; default: the master's, if it is on this machine"},
+      {.flag = "!--no-record", .value = &o.join_record, .help = "keep nothing in the master's run folder"},
       {.flag = "--end-session",
        .value = &o.end_session,
        .help = "when this viewer is done, the session is over for everyone"},
@@ -260,6 +280,15 @@ Status settle_wall(ViewerOptions& o) {
   return ok_status();
 }
 
+Status settle_shading(ViewerOptions& o) {
+  const auto background = image::parse_background(o.background);
+  if (!background) return Error{fmt::format("--background {}: {}", o.background, background.error().text)};
+  o.display.shading = *image::shading_named(o.shading);
+  o.display.shading.background = background->colour;
+  o.display.transparent = background->transparent;
+  return ok_status();
+}
+
 Status settle_coupling(ViewerOptions& o) {
   const auto coupling = coupling_named(o.coupling);
   if (!coupling) return Error{fmt::format("--coupling {}: not async, sync or loose", o.coupling)};
@@ -296,7 +325,7 @@ Status settle(ViewerOptions& o) {
   if (const Status s = settle_coupling(o); !s) return s;
   o.display.render.kernel = *splat::kernel_named(o.splat);
   o.display.splat_scale = float(o.splat_scale);
-  o.display.shading = *image::shading_named(o.shading);
+  if (const Status s = settle_shading(o); !s) return s;
   o.display.render.finish = *splat::finish_named(o.finish);
   o.requests.adaptive = o.sampling_size == "auto";
   o.requests.follow_display = o.window;

@@ -30,6 +30,7 @@ struct ViewerOptions {
   /// Seconds from the first displayed frame, 0: until stopped; not given: as long as the trajectory of a file (and
   /// display.hold_s) takes, else 10, in a window until it is closed.
   std::optional<double> duration_s;
+  std::string background = "#141820";  ///< "#rrggbb", a name, or "transparent"
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
   int buffers = 3;                 ///< of loose coupling
   std::string wall;                ///< "CxR": this display is a tile of a wall; empty: it is none
@@ -42,7 +43,8 @@ struct ViewerOptions {
   bool fullscreen = false;           ///< the window fills the screen
   double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
   bool end_session = false;          ///< tell the master to end the session once this viewer's run is over and recorded
-  std::string out;                   ///< run folder; empty: nothing is recorded
+  std::string out;                   ///< run folder; empty: the session's, if it is here
+  bool join_record = true;           ///< without `out`: keep a record in the session's folder
 };
 
 /// Flags that `telesplat run` and `view` have too: size, trajectory, renderer and the like.

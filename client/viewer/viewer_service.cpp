@@ -10,10 +10,11 @@
 #include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/window_surface.h"
-#include "client/viewer/record/event_record.h"
-#include "client/viewer/record/slice_record.h"
+#include "client/viewer/session_record.h"
 #include "common/core/clock.h"
+#include "common/core/file_hash.h"
 #include "common/core/log.h"
+#include "common/metrics/about.h"
 #include "common/net/control.h"
 
 namespace telesplat::viewer {
@@ -60,27 +61,18 @@ Result<Renderers> open_renderers(ViewerOptions& o) {
   return renderers;
 }
 
-// What of the session is kept in the run folder; all null if nothing is.
-struct Record {
-  std::unique_ptr<FrameSpool> spool;
-  std::unique_ptr<EventRecorder> events;
-  std::unique_ptr<SliceRecorder> slices;
-};
+Result<std::unique_ptr<SessionRecord>> open_record(const ViewerOptions& o) {
+  return SessionRecord::open(
+      {.out = o.out, .join = o.join_record, .name = o.service.name, .received_mb = o.record_points_mb});
+}
 
-std::string spool_directory(const ViewerOptions& o) { return o.out + "/spool"; }
-
-Result<Record> open_record(const ViewerOptions& o) {
-  Record record;
-  if (o.out.empty()) return record;
-  auto spool = FrameSpool::open(spool_directory(o));
-  if (!spool) return spool.error();
-  record.spool = std::move(*spool);
-  if (o.record_points_mb == 0) return record;
-  auto events = EventRecorder::open(o.out + "/points.events", o.record_points_mb << 20);
-  if (!events) return events.error();
-  record.events = std::move(*events);
-  record.slices = std::make_unique<SliceRecorder>(o.out + "/slices.events", o.record_points_mb << 20);
-  return record;
+// The file that the head follows.
+void add_trajectory(std::map<std::string, std::string>& facts, const ViewerOptions& o) {
+  facts["trajectory"] = o.trajectory;
+  if (!o.movement.recorded) return;
+  std::error_code error;
+  facts["trajectory_file"] = std::filesystem::absolute(o.trajectory, error).lexically_normal().string();
+  if (const auto hash = hash_of_files({o.trajectory})) facts["trajectory_hash"] = hash_text(hash->hash);
 }
 
 // What the master is told of this viewer.
@@ -99,11 +91,18 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
                                          {"sampling_width", std::to_string(r.adaptive ? d.width : r.sampling_width)},
                                          {"sampling_height", std::to_string(r.adaptive ? d.height : r.sampling_height)},
                                          {"sampling", r.adaptive ? "adaptive" : "fixed"},
-                                         {"trajectory", o.trajectory},
+                                         {"duration_s", fmt::format("{}", d.duration_s)},
+                                         {"frames", std::to_string(d.frames)},
+                                         {"hold_s", fmt::format("{}", d.hold_s)},
+                                         {"verify_every", std::to_string(d.verify_every)},
                                          {"fov_deg", fmt::format("{}", d.fov_deg)},
                                          {"target_fps", fmt::format("{}", d.target_fps)},
                                          {"update_rate", fmt::format("{}", r.max_rate_hz)},
                                          {"splat_scale", fmt::format("{}", scale)}};
+  add_trajectory(out, o);
+  if (const std::string device = renderers.device(); !device.empty()) out["gpu"] = device;
+  ViewerOptions shown = o;
+  out[metrics::kRecordFact] = "\n[display]\n" + options::recorded(view_table(shown), {});
   if (o.wall.empty()) return out;
   out["wall"] = o.wall;
   out["wall_tile"] = std::to_string(o.wall_tile);
@@ -116,7 +115,7 @@ struct Served {
 };
 
 // Shows the session until it, the person or the clock ends it.
-Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& renderers, const Record& record) {
+Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& renderers, SessionRecord& record) {
   net::Context context;
   CouplingGate gate(int(o.requests.buffers));
   metrics::TableRecorder frames("frames", frame_columns());
@@ -125,18 +124,20 @@ Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& rendere
                                       .requests = o.requests,
                                       .least_sampling = o.least_sampling,
                                       .facts = facts(o, renderers),
-                                      .received = {o.epoch_patience_s, record.events.get(), record.slices.get()},
+                                      .received = {.epoch_patience_s = o.epoch_patience_s},
+                                      .record = &record,
                                       .started_s = o.started_s};
   ViewerWorker worker(context, options, gate, frames, spans);
   const SourceMaker make_source = [&](Received& r) { return r.make_source(o.display, renderers); };
   Served served;
-  served.display = run_display(o.display, surface, make_source, gate, worker, frames, spans, record.spool.get());
+  served.display =
+      run_display(o.display, surface, make_source, gate, worker, frames, spans, [&] { return record.spool(); });
   served.session_ended = worker.shutdown_requested();
   return served;
 }
 
 // Recorded frames become pictures. After a signal there is a second for it; the rest stays where it is.
-Status develop(const ViewerOptions& o, FrameSpool& spool) {
+Status develop(const std::string& directory, FrameSpool& spool) {
   spool.flush();
   if (spool.dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool.dropped());
   const auto progress = [](size_t done, size_t of) {
@@ -148,9 +149,9 @@ Status develop(const ViewerOptions& o, FrameSpool& spool) {
     if (signalled_s == 0) signalled_s = monotonic_s();
     return monotonic_s() - signalled_s < kPicturesAfterSignal_s;
   };
-  if (const Status s = develop_frames(spool_directory(o), o.out + "/images", progress, in_time); !s) return s;
+  if (const Status s = develop_frames(directory + "/spool", directory + "/images", progress, in_time); !s) return s;
   std::error_code error;
-  if (std::filesystem::is_empty(spool_directory(o), error)) std::filesystem::remove(spool_directory(o), error);
+  if (std::filesystem::is_empty(directory + "/spool", error)) std::filesystem::remove(directory + "/spool", error);
   return ok_status();
 }
 
@@ -177,12 +178,12 @@ int run(ViewerOptions o) {
   auto record = open_record(o);
   if (!record) return refuse(record.error());
 
-  const Served served = serve(o, **surface, *renderers, *record);
+  const Served served = serve(o, **surface, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
   const std::string lost = (*surface)->failure();
   surface->reset();  // the window goes at once, however much there is to write
-  if (record->spool)
-    if (const Status s = develop(o, *record->spool); !s) return fail(s.error());
+  if (FrameSpool* spool = (*record)->spool())
+    if (const Status s = develop((*record)->directory(), *spool); !s) return fail(s.error());
   const int code = farewell(o, served);
   return lost.empty() ? code : fail({lost});
 }

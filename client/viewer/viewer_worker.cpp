@@ -118,6 +118,8 @@ void ViewerWorker::follow_session() {
   seen_version_ = link_.version();
   const wire::Welcome& session = *link_.session();
   const scene::SessionView view(session);
+  follow_record(session);
+  legends_.follow(session);
   offset_s_ = link_.to_master_s(0);
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
   requester_.set_min_scale(options_.least_sampling.value_or(told));
@@ -138,6 +140,16 @@ void ViewerWorker::follow_session() {
     shown_scene_ = {session.box_room, *pipeline};
   }
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
+}
+
+// Where the record lies is known before anything is received.
+void ViewerWorker::follow_record(const wire::Welcome& session) {
+  if (!options_.record) return;
+  const std::string before = options_.record->records_in();
+  options_.record->follow(session);
+  options_.received.events = options_.record->events();
+  options_.received.slices = options_.record->slices();
+  if (const std::string& now = options_.record->records_in(); now != before) link_.tell("records_in", now);
 }
 
 Status ViewerWorker::follow(scene::Pipeline pipeline, const wire::Welcome& session) {

@@ -8,7 +8,9 @@
 #include <mutex>
 #include <thread>
 
+#include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
+#include "client/viewer/session_record.h"
 #include "client/viewer/succession.h"
 #include "common/net/service.h"
 
@@ -23,8 +25,9 @@ class ViewerWorker {
     /// requests.min_scale.
     std::optional<double> least_sampling;
     std::map<std::string, std::string> facts;  ///< for the hello
-    ReceivedOptions received;
-    double started_s = 0;  ///< when the session was started, on the monotonic clock; 0: now
+    ReceivedOptions received;                  ///< its recorders are the record's
+    SessionRecord* record = nullptr;           ///< null: nothing is kept. Outlives the worker
+    double started_s = 0;                      ///< when the session was started, on the monotonic clock; 0: now
   };
 
   /// Starts the thread.
@@ -57,11 +60,14 @@ class ViewerWorker {
   Figures figures() const;
   /// What there is to show; an empty box until that is known.
   ShownScene shown_scene() const;
+  /// Of the frames of this epoch; null: there is nothing to tell.
+  std::shared_ptr<const image::Legend> legend_at(EpochId epoch) const { return legends_.at(epoch); }
 
  private:
   void loop();
   void receive();
   void follow_session();
+  void follow_record(const wire::Welcome& session);
   Status follow(scene::Pipeline pipeline, const wire::Welcome& session);
   void retire();
   void receive_control();
@@ -98,6 +104,7 @@ class ViewerWorker {
     /// Master's clock: when the update was requested that the frame waited for; 0: it did not.
     double waited_since_s = 0;
   };
+  LegendBook legends_;
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
   std::vector<SeenPose> poses_;
   std::string scene_;

@@ -11,19 +11,23 @@
 
 #include "common/core/utf8.h"
 #include "common/metrics/columns.h"
+#include "common/metrics/run_folder.h"
 #include "common/metrics/summary.h"
 
 namespace telesplat::metrics {
 namespace {
 
 std::string whole(uint64_t v) { return std::to_string(v); }
-std::string seconds(double v) { return fmt::format("{:.6f}", v); }
-std::string shortest(double v) { return fmt::format("{:.9g}", v); }
+std::string seconds(double v) { return fmt::format("{:.9f}", v); }
+// With as many digits as it has: displayed frames are made again from poses and times.
 std::string exact(double v) { return fmt::format("{}", v); }
 
 struct TileRow {
   const std::string& sampler;
   const wire::TileDone& tile;
+  double begin_s;  // of the run
+
+  std::string moment(double master_s) const { return seconds(master_s - begin_s); }
 };
 constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"frame", [](const TileRow& r) { return whole(r.tile.frame.value); }},
@@ -34,18 +38,28 @@ constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"kept", [](const TileRow& r) { return whole(r.tile.kept); }},
     {"bytes_sampled", [](const TileRow& r) { return whole(r.tile.bytes_sampled); }},
     {"bytes_sent", [](const TileRow& r) { return whole(r.tile.bytes_sent); }},
-    {"leased_s", [](const TileRow& r) { return seconds(r.tile.leased_s); }},
-    {"sample_begin_s", [](const TileRow& r) { return seconds(r.tile.sample_begin_s); }},
-    {"sample_end_s", [](const TileRow& r) { return seconds(r.tile.sample_end_s); }},
-    {"encode_end_s", [](const TileRow& r) { return seconds(r.tile.encode_end_s); }},
-    {"receive_s", [](const TileRow& r) { return seconds(r.tile.receive_s); }},
-    {"packed_s", [](const TileRow& r) { return seconds(r.tile.packed_s); }},
+    {"leased_s", [](const TileRow& r) { return r.moment(r.tile.leased_s); }},
+    {"sample_begin_s", [](const TileRow& r) { return r.moment(r.tile.sample_begin_s); }},
+    {"sample_end_s", [](const TileRow& r) { return r.moment(r.tile.sample_end_s); }},
+    {"encode_end_s", [](const TileRow& r) { return r.moment(r.tile.encode_end_s); }},
+    {"receive_s", [](const TileRow& r) { return r.moment(r.tile.receive_s); }},
+    {"packed_s", [](const TileRow& r) { return r.moment(r.tile.packed_s); }},
+    {"published_s", [](const TileRow& r) { return r.tile.published_s > 0 ? r.moment(r.tile.published_s) : ""; }},
     {"x", [](const TileRow& r) { return std::to_string(r.tile.rect.x); }},
     {"y", [](const TileRow& r) { return std::to_string(r.tile.rect.y); }},
     {"width", [](const TileRow& r) { return std::to_string(r.tile.rect.width); }},
     {"height", [](const TileRow& r) { return std::to_string(r.tile.rect.height); }},
     {"step", [](const TileRow& r) { return whole(r.tile.step); }},
 };
+
+bool is_time(const std::string& column) { return column.ends_with("_s"); }
+bool is_moment(const std::string& column) { return is_time(column) && column != "t_s"; }
+
+// Of a viewer's table. Moments count from the run's beginning.
+std::string cell_of(const std::string& column, double value, double begin_s) {
+  if (is_moment(column)) return seconds(value - begin_s);
+  return is_time(column) ? seconds(value) : exact(value);
+}
 
 // The scene's parameters and texts follow.
 struct EpochRow {
@@ -80,9 +94,10 @@ void append(std::vector<std::string>& cells, const std::vector<std::string>& mor
 
 }  // namespace
 
-Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory) {
+Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory, const Beginning& begin) {
   std::unique_ptr<RunRecord> out(new RunRecord);
   out->directory_ = directory;
+  out->begin_ = begin;
   if (directory.empty()) return out;
   std::error_code error;
   std::filesystem::create_directories(directory, error);
@@ -94,7 +109,7 @@ Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory)
 Status RunRecord::open_files() {
   if (!frames_file_.open(directory_ + "/frames.csv") || !updates_file_.open(directory_ + "/updates.csv") ||
       !tiles_file_.open(directory_ + "/tiles.csv") || !epochs_file_.open(directory_ + "/epochs.csv") ||
-      !trace_.open(directory_ + "/trace.json"))
+      !trace_.open(directory_ + "/trace.json", begin_.monotonic_s))
     return Error{fmt::format("{}: cannot write into it: {}", directory_, std::strerror(errno))};
   tiles_file_.write(csv_line(names(kTileColumns)));
   return ok_status();
@@ -120,7 +135,8 @@ Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows)
   }
   for (size_t i = 0; i < rows.values.size(); i += rows.columns.size()) {
     std::vector<std::string> cells{process.name};
-    for (size_t c = 0; c < rows.columns.size(); ++c) cells.push_back(shortest(rows.values[i + c]));
+    for (size_t c = 0; c < rows.columns.size(); ++c)
+      cells.push_back(cell_of(rows.columns[c], rows.values[i + c], begin_.monotonic_s));
     file.write(csv_line(cells));
   }
   file.flush();
@@ -130,7 +146,8 @@ Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows)
 void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& tile) {
   measured_.tiles.push_back(tile);
   measured_.busy_s[sampler] += std::max(0.0, tile.encode_end_s - tile.sample_begin_s);
-  if (tiles_file_.is_open()) tiles_file_.write(csv_line(values(kTileColumns, TileRow{sampler, tile})));
+  if (tiles_file_.is_open())
+    tiles_file_.write(csv_line(values(kTileColumns, TileRow{sampler, tile, begin_.monotonic_s})));
 }
 
 void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters,
@@ -143,7 +160,7 @@ void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string,
     append(header, epoch_texts_);
     epochs_file_.write(csv_line(header));
   }
-  std::vector<std::string> cells = values(kEpochColumns, EpochRow{epoch, t_s});
+  std::vector<std::string> cells = values(kEpochColumns, EpochRow{epoch, t_s - begin_.monotonic_s});
   for (const std::string& name : epoch_columns_) {
     const auto found = parameters.find(name);
     cells.push_back(found == parameters.end() ? "" : exact(found->second));  // the frame can be made again from it
@@ -165,20 +182,24 @@ void RunRecord::add_assignment(const std::vector<Assignment>& transfers) {
 }
 
 nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
-                                          const std::map<std::string, double>& counters) const {
-  return summarise(measured_, processes, counters);
+                                          const std::map<std::string, double>& counters, About about) const {
+  about.begin = begin_;
+  return summarise(measured_, processes, counters, about);
 }
 
-Status RunRecord::finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters) {
+Status RunRecord::finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
+                         const About& about) {
   if (directory_.empty()) return ok_status();
   tiles_file_.flush();
   const std::string path = directory_ + "/summary.json";
   std::ofstream out(path + ".part");
-  out << summary(processes, counters).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+  out << summary(processes, counters, about).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
+      << "\n";
   out.close();
   std::error_code error;
   if (out) std::filesystem::rename(path + ".part", path, error);
   if (!out || error) return Error{fmt::format("{}: cannot be written", path)};
+  if (!measured_.frames.values.empty()) point_latest(directory_);
   return ok_status();
 }
 

@@ -11,6 +11,7 @@
 
 #include "common/core/ids.h"
 #include "common/core/result.h"
+#include "common/metrics/about.h"
 #include "common/metrics/measured.h"
 #include "common/metrics/process.h"
 #include "common/metrics/text_file.h"
@@ -29,10 +30,11 @@ struct Assignment {
 class RunRecord {
  public:
   /// Opens a folder for writing, and makes it if need be. `directory` may be empty: nothing is written, summaries still
-  /// work.
-  static Result<std::unique_ptr<RunRecord>> open(const std::string& directory);
+  /// work. begin: from here on count the times of all files, which come on the master's clock.
+  static Result<std::unique_ptr<RunRecord>> open(const std::string& directory, const Beginning& begin = {});
 
-  /// Rows of "frames", "updates" or "spans" from `process`. Refuses unknown tables and shapes that do not fit.
+  /// Rows of "frames", "updates" or "spans" from `process`. Refuses unknown tables and shapes that do not fit. Columns
+  /// whose names end in _s are moments of the master's clock; but for t_s, which each viewer counts from its own.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
   void add_tile(const std::string& sampler, const wire::TileDone& tile);
   /// The scene's parameters and texts (quoted in the file) from t_s on. epochs.csv has the names of the first epoch.
@@ -41,12 +43,14 @@ class RunRecord {
   void add_assignment(const std::vector<Assignment>& transfers);
 
   /// The figures of docs/metrics.md, "summary.json", from everything so far. processes: all that took part; counters:
-  /// the master's ("leases_expired", "tiles_released", ...).
-  nlohmann::ordered_json summary(const std::vector<Process>& processes,
-                                 const std::map<std::string, double>& counters) const;
+  /// the master's ("leases_expired", "tiles_released", ...); about: what was done, its beginning left out.
+  nlohmann::ordered_json summary(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
+                                 About about = {}) const;
 
-  /// Writes summary.json.
-  Status finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters);
+  /// Writes summary.json. If something was displayed, runs/latest is this run from now on.
+  Status finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
+                const About& about = {});
+  const Beginning& begin() const { return begin_; }
 
  private:
   RunRecord() = default;
@@ -54,6 +58,7 @@ class RunRecord {
   TextFile& file_of(const std::string& table) { return table == "frames" ? frames_file_ : updates_file_; }
 
   std::string directory_;
+  Beginning begin_;
   Measured measured_;
   std::vector<std::string> epoch_columns_, epoch_texts_;
   TextFile frames_file_, updates_file_, tiles_file_, epochs_file_;

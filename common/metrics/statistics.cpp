@@ -30,4 +30,9 @@ nlohmann::ordered_json to_json(const Distribution& d) {
           {"max", rounded(d.max)}};
 }
 
+nlohmann::ordered_json distribution_json(const std::vector<double>& values) {
+  const bool any = std::any_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  return any ? to_json(distribution(values)) : nlohmann::ordered_json();
+}
+
 }  // namespace telesplat::metrics

@@ -15,5 +15,7 @@ struct Distribution {
 Distribution distribution(std::vector<double> values);
 
 nlohmann::ordered_json to_json(const Distribution& d);
+/// The distribution of these values; null if there are none: nothing was measured.
+nlohmann::ordered_json distribution_json(const std::vector<double>& values);
 
 }  // namespace telesplat::metrics

@@ -20,6 +20,13 @@ double hundredths(double v) { return std::round(v * 100) / 100; }
 double thousandths(double v) { return std::round(v * 1000) / 1000; }
 uint64_t whole(double v) { return uint64_t(v); }
 
+ordered_json or_null(const std::string& text) { return text.empty() ? ordered_json() : ordered_json(text); }
+/// A figure that means something only if `measured` is so.
+template <class V>
+ordered_json if_measured(bool measured, V value) {
+  return measured ? ordered_json(value) : ordered_json();
+}
+
 /// What one viewer did.
 struct ViewerFigures {
   size_t frames = 0, updates = 0;
@@ -27,6 +34,8 @@ struct ViewerFigures {
   std::vector<double> inter_frame_ms, latency_ms;
 
   double per_second(size_t count) const { return duration_s > 0 ? double(count) / std::max(duration_s, 1e-9) : 0; }
+  /// Rates need two frames.
+  ordered_json rate(size_t count) const { return if_measured(duration_s > 0, hundredths(per_second(count))); }
 };
 
 /// Each viewer by itself: they need not have begun, nor ended, together.
@@ -83,7 +92,9 @@ FrameDurations frame_durations(const std::vector<wire::TileDone>& tiles) {
 /// What samplers made, what was sent of it, what viewers took.
 struct Traffic {
   double bytes_raw = 0, bytes_sent = 0, bytes_consumed = 0;
-  double redundancy = 0;  ///< share of the samples that elimination left out
+  double redundancy = 0;   ///< share of the samples that elimination left out
+  bool sampled = false;    ///< something was
+  bool eliminates = true;  ///< points: of slice images nothing is eliminated
 };
 
 Traffic traffic(const Measured& m, const Roster& roster) {
@@ -94,10 +105,12 @@ Traffic traffic(const Measured& m, const Roster& roster) {
     samples += double(t.samples);
     kept += double(t.kept);
   }
+  out.sampled = samples > 0;
   const auto kind = scene::kind_named(roster.fact("data", "kind"));
   out.bytes_consumed = roster.counted("viewer", "points_received") * kRawBytesPerPoint;
   if (kind && scene::pipeline_of(*kind) == scene::Pipeline::kSlices) {
     // Samples are voxels, and kept are pixels that they made.
+    out.eliminates = false;
     out.bytes_raw = kept * kRawBytesPerSlicePixel;
     for (const double pixels : m.updates.column("points")) out.bytes_consumed += pixels * kRawBytesPerSlicePixel;
   } else {
@@ -118,7 +131,7 @@ ordered_json busy_spread(const std::map<std::string, double>& busy_s) {
     by_name[name] = std::round(s * 1e6) / 1e6;
   }
   const double spread = sum > 0 ? (most - least) * double(busy_s.size()) / sum : 0;
-  return {{"spread", std::round(spread * 1e4) / 1e4}, {"busy_s", by_name}};
+  return {{"spread", if_measured(sum > 0, std::round(spread * 1e4) / 1e4)}, {"busy_s", by_name}};
 }
 
 /// One number where there is one process of a role, a list where there may be several.
@@ -137,25 +150,28 @@ ordered_json peak_rss(const Roster& roster) {
 // ---- the sections of the summary, in its order ---------------------------------------------------------------------
 
 ordered_json what_was_shown(const Roster& roster) {
-  const auto pixels = [&](const char* key) { return whole(roster.number("viewer", key)); };
+  const auto viewer = [&](const char* key) { return or_null(roster.fact("viewer", key)); };
+  const auto size = [&](const char* width, const char* height) -> ordered_json {
+    if (roster.number("viewer", width) <= 0) return nullptr;
+    return {whole(roster.number("viewer", width)), whole(roster.number("viewer", height))};
+  };
   // Data servers of earlier versions told one of the other two.
   double primitives = roster.number("data", "primitives");
   if (primitives == 0) primitives = roster.number("data", "triangles") + roster.number("data", "voxels");
-  return {{"schema", 1},
-          {"scene", roster.fact("data", "scene")},
-          {"kind", roster.fact("data", "kind")},
-          {"primitives", whole(primitives)},
+  return {{"scene", or_null(roster.fact("data", "scene"))},
+          {"kind", or_null(roster.fact("data", "kind"))},
+          {"primitives", if_measured(primitives > 0, whole(primitives))},
           {"samplers", roster.count("sampler")},
           {"viewers", roster.count("viewer")},
-          {"coupling", roster.fact("viewer", "coupling")},
-          {"buffers", whole(roster.number("viewer", "buffers"))},
-          {"renderer", roster.fact("viewer", "renderer")},
-          {"splat", roster.fact("viewer", "splat")},
-          {"finish", roster.fact("viewer", "finish")},
-          {"shading", roster.fact("viewer", "shading")},
-          {"size", {pixels("width"), pixels("height")}},
-          {"sampling_size", {pixels("sampling_width"), pixels("sampling_height")}},
-          {"sampling", roster.fact("viewer", "sampling")}};
+          {"coupling", viewer("coupling")},
+          {"buffers", if_measured(!viewer("buffers").is_null(), whole(roster.number("viewer", "buffers")))},
+          {"renderer", viewer("renderer")},
+          {"splat", viewer("splat")},
+          {"finish", viewer("finish")},
+          {"shading", viewer("shading")},
+          {"size", size("width", "height")},
+          {"sampling_size", size("sampling_width", "sampling_height")},
+          {"sampling", viewer("sampling")}};
 }
 
 double longest_s(const std::map<std::string, ViewerFigures>& viewers) {
@@ -174,17 +190,17 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
     each[name] = {{"frames", v.frames},
                   {"updates", v.updates},
                   {"duration_s", thousandths(v.duration_s)},
-                  {"fps", hundredths(v.per_second(v.frames))},
-                  {"updates_per_s", hundredths(v.per_second(v.updates))},
-                  {"inter_frame_delay_ms", to_json(distribution(v.inter_frame_ms))},
-                  {"view_update_latency_ms", to_json(distribution(v.latency_ms))}};
+                  {"fps", v.rate(v.frames)},
+                  {"updates_per_s", v.rate(v.updates)},
+                  {"inter_frame_delay_ms", distribution_json(v.inter_frame_ms)},
+                  {"view_update_latency_ms", distribution_json(v.latency_ms)}};
   }
   return {{"epochs", m.epochs},
           {"frames", m.frames.column("t_s").size()},
           {"updates", m.updates.column("latency_ms").size()},
-          {"duration_s", thousandths(longest_s(viewers))},
-          {"fps", hundredths(fps)},
-          {"updates_per_s", hundredths(updates_per_s)},
+          {"duration_s", if_measured(longest_s(viewers) > 0, thousandths(longest_s(viewers)))},
+          {"fps", if_measured(longest_s(viewers) > 0, hundredths(fps))},
+          {"updates_per_s", if_measured(longest_s(viewers) > 0, hundredths(updates_per_s))},
           {"by_viewer", each},
           {"frames_sampled", whole(frames_completed)}};
 }
@@ -193,48 +209,52 @@ ordered_json how_long(const Measured& m) {
   auto delays = m.frames.column("inter_frame_ms");
   std::erase_if(delays, [](double d) { return d <= 0; });  // the first frame of a viewer has none
   const FrameDurations durations = frame_durations(m.tiles);
-  return {{"inter_frame_delay_ms", to_json(distribution(delays))},
-          {"view_construction_ms", to_json(distribution(m.frames.column("construction_ms")))},
-          {"view_update_latency_ms", to_json(distribution(m.updates.column("latency_ms")))},
-          {"start_up_latency_ms", to_json(distribution(m.updates.column("start_up_ms")))},
-          {"sampling_ms", to_json(distribution(durations.sampling_ms))},
-          {"lease_to_sampled_ms", to_json(distribution(durations.leased_ms))},
-          {"packing_ms", to_json(distribution(durations.packing_ms))},
+  return {{"inter_frame_delay_ms", distribution_json(delays)},
+          {"view_construction_ms", distribution_json(m.frames.column("construction_ms"))},
+          {"view_update_latency_ms", distribution_json(m.updates.column("latency_ms"))},
+          {"start_up_latency_ms", distribution_json(m.updates.column("start_up_ms"))},
+          {"sampling_ms", distribution_json(durations.sampling_ms)},
+          {"lease_to_sampled_ms", distribution_json(durations.leased_ms)},
+          {"packing_ms", distribution_json(durations.packing_ms)},
           {"samplers_busy", busy_spread(m.busy_s)}};
 }
 
 ordered_json how_much(const Traffic& t, double run_s, double viewers) {
-  return {{"data_generating_rate_mb_s", t.bytes_raw / 1e6 / run_s},
-          {"data_transfer_rate_mb_s", t.bytes_sent / 1e6 / run_s},
-          {"data_consuming_rate_mb_s", t.bytes_consumed / 1e6 / viewers / run_s},
-          {"bytes_raw", whole(t.bytes_raw)},
-          {"bytes_sent", whole(t.bytes_sent)},
-          {"compression_ratio", t.bytes_sent > 0 ? t.bytes_raw / t.bytes_sent : 0.0},
-          {"redundancy_eliminated", t.redundancy}};
+  const bool lasted = t.sampled && run_s > 0;
+  return {{"data_generating_rate_mb_s", if_measured(lasted, t.bytes_raw / 1e6 / run_s)},
+          {"data_transfer_rate_mb_s", if_measured(lasted, t.bytes_sent / 1e6 / run_s)},
+          {"data_consuming_rate_mb_s", if_measured(lasted, t.bytes_consumed / 1e6 / viewers / run_s)},
+          {"bytes_raw", if_measured(t.sampled, whole(t.bytes_raw))},
+          {"bytes_sent", if_measured(t.sampled, whole(t.bytes_sent))},
+          {"compression_ratio", if_measured(t.bytes_sent > 0, t.bytes_raw / t.bytes_sent)},
+          {"redundancy_eliminated", if_measured(t.sampled && t.eliminates, t.redundancy)}};
 }
 
 ordered_json what_was_held(const Measured& m, const Roster& roster, double partitions, double viewers) {
-  const double points = roster.present("packer", "points"), voxels = roster.counted("data", "voxels_sent");
-  return {{"points_cached", whole(points)},
-          {"bytes_per_cached_point", points > 0 ? roster.present("packer", "model_bytes") / points : 0.0},
-          {"points_drawn", to_json(distribution(m.frames.column("points_drawn")))},
-          {"update_age_ms", to_json(distribution(m.frames.column("update_age_ms")))},
-          {"voxels_fetched", whole(voxels)},
-          {"bytes_per_voxel", voxels > 0 ? roster.counted("data", "bytes_sent") / voxels : 0.0},
-          {"partitions", whole(partitions)},
-          {"first_points_s", roster.present("viewer", "first_points_s") / viewers}};
+  const double points = roster.present("packer", "points"), voxels = roster.counted("data", "voxels_sent"),
+               first_points_s = roster.present("viewer", "first_points_s");
+  return {{"points_cached", if_measured(!roster.each("packer", "points").empty(), whole(points))},
+          {"bytes_per_cached_point", if_measured(points > 0, roster.present("packer", "model_bytes") / points)},
+          {"points_drawn", distribution_json(m.frames.column("points_drawn"))},
+          {"update_age_ms", distribution_json(m.frames.column("update_age_ms"))},
+          {"voxels_fetched", if_measured(!roster.each("data", "voxels_sent").empty(), whole(voxels))},
+          {"bytes_per_voxel", if_measured(voxels > 0, roster.counted("data", "bytes_sent") / voxels)},
+          {"partitions", if_measured(partitions > 0, whole(partitions))},
+          {"first_points_s", if_measured(first_points_s > 0, first_points_s / viewers)}};
 }
 
 }  // namespace
 
 ordered_json summarise(const Measured& measured, const std::vector<Process>& processes,
-                       const std::map<std::string, double>& counters) {
+                       const std::map<std::string, double>& counters, const About& about) {
   const Roster roster(processes);
   const auto counter = [&](const char* key) { return scene::value_or(counters, key, 0.0); };
   const auto figures = by_viewer(measured);
   const double viewers = std::max<double>(1, double(roster.count("viewer")));
-  const double run_s = std::max(longest_s(figures), 1e-9);
-  ordered_json out = what_was_shown(roster);
+  const double run_s = longest_s(figures);
+  ordered_json out{{"schema", 2}};
+  out.update(what_was_done(about, processes));
+  out.update(what_was_shown(roster));
   out.update(how_often(measured, figures, counter("frames_completed")));
   out.update(how_long(measured));
   out.update(how_much(traffic(measured, roster), run_s, viewers));

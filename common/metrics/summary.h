@@ -6,13 +6,15 @@
 #include <string>
 #include <vector>
 
+#include "common/metrics/about.h"
 #include "common/metrics/measured.h"
 #include "common/metrics/process.h"
 
 namespace telesplat::metrics {
 
-/// processes: all that took part; counters: the master's ("leases_expired", "tiles_released", ...).
+/// processes: all that took part; counters: the master's ("leases_expired", "tiles_released", ...). Where nothing was
+/// measured, and where a figure has no meaning for the scene, it is null.
 nlohmann::ordered_json summarise(const Measured& measured, const std::vector<Process>& processes,
-                                 const std::map<std::string, double>& counters);
+                                 const std::map<std::string, double>& counters, const About& about);
 
 }  // namespace telesplat::metrics

@@ -8,13 +8,17 @@ namespace {
 
 constexpr size_t kWidth = 4;
 
+// To the nanosecond.
+double microseconds(double s) { return std::round(s * 1e9) / 1e3; }
+
 std::string text_of(const nlohmann::json& event) {
   return event.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace
 
-bool TraceFile::open(const std::string& path) {
+bool TraceFile::open(const std::string& path, double begin_s) {
+  begin_s_ = begin_s;
   if (!file_.open(path)) return false;
   file_.write("[\n");
   return true;
@@ -38,8 +42,8 @@ void TraceFile::add(const Process& process, const wire::MetricRows& rows) {
                    {"name", rows.columns[size_t(name)]},
                    {"pid", process.pid},
                    {"tid", int(rows.values[i + 3])},
-                   {"ts", std::round(begin_s * 1e6)},
-                   {"dur", std::round((end_s - begin_s) * 1e6)}}));
+                   {"ts", microseconds(begin_s - begin_s_)},
+                   {"dur", microseconds(end_s - begin_s)}}));
   }
 }
 

@@ -14,7 +14,8 @@ namespace telesplat::metrics {
 class TraceFile {
  public:
   ~TraceFile();
-  bool open(const std::string& path);
+  /// begin_s: on the master's clock; times in the file count from there.
+  bool open(const std::string& path, double begin_s);
   /// Rows of "spans": name (its number among the columns), begin, end (seconds of the master's clock), lane. Rows whose
   /// name is not among the columns are left out. Precondition: 4 values a row.
   void add(const Process& process, const wire::MetricRows& rows);
@@ -23,6 +24,7 @@ class TraceFile {
   void event(const std::string& json);
 
   TextFile file_;
+  double begin_s_ = 0;
   bool has_events_ = false;
   std::set<std::string> named_;  // processes whose names the file has
 };

@@ -8,8 +8,10 @@
 
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
+#include "common/metrics/about.h"
 #include "common/net/master_link.h"
 #include "services/data/kinds.h"
+#include "services/data/record.h"
 
 namespace telesplat::data {
 namespace {
@@ -23,10 +25,10 @@ Progress make_progress(bool to_stdout, const std::string& scene) {
   const std::string name = to_utf8(std::filesystem::path(scene).filename().string());
   return [to_stdout, name, last_s = monotonic_s()](const char* stage, double fraction) mutable {
     const double now = monotonic_s();
-    if (to_stdout) {
-      std::fputs(fmt::format("progress {} {:.3f}\n", what, fraction).c_str(), stdout);
     const bool of_the_file = stage == std::string_view(kReading) || stage == std::string_view(kIdentifying);
     const std::string what = of_the_file && !name.empty() ? fmt::format("{} {}", stage, name) : stage;
+    if (to_stdout) {
+      std::fputs(fmt::format("progress {} {:.3f}\n", what, fraction).c_str(), stdout);
       std::fflush(stdout);
     } else if (now - last_s >= 2.0) {
       log::info("{}: {:.0f} %", what, fraction * 100);
@@ -53,6 +55,24 @@ net::MasterLink::Values status_of(const Served& served, const std::optional<net:
   return values;
 }
 
+// What the record of a run is told of the data set.
+Recorded recorded(const DataServiceOptions& o, const Served& served) {
+  Recorded out{.facts = {{metrics::kRecordFact, record_of(o, served)}}, .files = files_of(o, served.kind())};
+  std::error_code error;
+  if (!out.files.empty())
+    out.facts["data_file"] = std::filesystem::absolute(o.scene, error).lexically_normal().string();
+  return out;
+}
+
+// The launcher passes notes on to people.
+void tell_notes(const Served& served, bool to_stdout) {
+  for (const auto& note : served.notes()) {
+    log::warn("{}", note);
+    if (to_stdout) std::printf("note telesplat: %s\n", note.c_str());
+  }
+  std::fflush(stdout);
+}
+
 void answer_some(Served& served, const Outlets& outlets) {
   for (int n = 0; n < kRequestsATurn; ++n) {
     const auto message = outlets.requests.receive();
@@ -74,14 +94,18 @@ wire::Hello make_hello(const Served& served, const std::string& name, const std:
   return hello;
 }
 
-int serve(net::Context& context, Served& served, const net::ServiceOptions& o, const std::function<bool()>& stop) {
+int serve(net::Context& context, Served& served, const net::ServiceOptions& o, const std::function<bool()>& stop,
+          const Recorded& recorded) {
   std::optional<net::Socket> requests;
   const auto endpoint = bind_requests(requests, context, served.requests(), o);
   if (!endpoint) {
     log::error("{}", endpoint.error().text);
     return 2;
   }
-  net::MasterLink link(context, o.master, make_hello(served, o.name, *endpoint));
+  wire::Hello hello = make_hello(served, o.name, *endpoint);
+  for (const auto& [fact, value] : recorded.facts) hello.facts[fact] = value;
+  net::MasterLink link(context, o.master, std::move(hello));
+  BackgroundHash hash(recorded.files);
   served.begin(link.instance());
   const auto status = [&] { return status_of(served, requests); };
   std::vector<net::Socket*> sockets{&link.socket()};
@@ -97,6 +121,11 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
       if (const Status s = served.follow(*link.session()); !s) log::warn("{}", s.error().text);
     }
     if (requests) answer_some(served, {*requests, link.socket()});
+    for (const auto& [fact, value] : served.news()) link.tell(fact, value);
+    if (const auto known = hash.take()) {
+      link.tell("data_bytes", std::to_string(known->bytes));
+      link.tell("data_hash", hash_text(known->hash));
+    }
   }
   link.leave(status);
   return 0;
@@ -112,8 +141,10 @@ int run(const DataServiceOptions& o) {
   }
   net::install_signal_handlers();  // until here a signal ended the process: what was being read is read again next time
   log::info("{}: {}; ready in {:.0f} ms", o.scene, (*served)->summary(), 1e3 * (monotonic_s() - begin_s));
+  tell_notes(**served, o.report_progress);
   net::Context context;
-  return serve(context, **served, o.service, [] { return false; });
+  return serve(
+      context, **served, o.service, [] { return false; }, recorded(o, **served));
 }
 
 }  // namespace telesplat::data

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <functional>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "common/net/socket.h"
 #include "services/data/data_options.h"
@@ -13,8 +16,15 @@ namespace telesplat::data {
 /// requests go to; empty: nowhere.
 wire::Hello make_hello(const Served& served, const std::string& name, const std::string& endpoint);
 
+/// What the record of a run is told beside: facts, and files whose size and hash follow when they are known.
+struct Recorded {
+  std::map<std::string, std::string> facts;
+  std::vector<std::string> files;
+};
+
 /// Binds, says hello, answers until told to stop; `stop` ends it, too. Exit code: 0, or 2 if nothing can be bound.
-int serve(net::Context& context, Served& served, const net::ServiceOptions& options, const std::function<bool()>& stop);
+int serve(net::Context& context, Served& served, const net::ServiceOptions& options, const std::function<bool()>& stop,
+          const Recorded& recorded = {});
 
 /// Opens the data set and serves it until told to stop. Exit code: 0, or 2 if the data cannot be read (one line on
 /// stderr says why).

@@ -113,26 +113,6 @@ TEST(Faults, TheRunEndsWithItsViewer) {
   EXPECT_TRUE(run.all_gone());
 }
 
-TEST(Faults, CtrlCEndsTheRunProperly) {
-  PipelineRun run({"--duration", "0"});
-  ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  run.program().signal(SIGINT);
-  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
-  EXPECT_TRUE(run.all_gone());
-  const auto s = run.summary();
-  ASSERT_TRUE(s.is_object());
-  EXPECT_GT(s["frames"], 0);
-  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
-}
-
-TEST(Faults, CtrlCWhileStartingLeavesNothingRunning) {
-  PipelineRun run({"--duration", "0"});
-  ASSERT_FALSE(run.master().empty());
-  run.program().signal(SIGINT);
-  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
-  EXPECT_TRUE(run.all_gone());
-}
-
 TEST(Faults, ALauncherKilledTakesItsChildrenAlong) {
   PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();

@@ -50,7 +50,7 @@ LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn,
 class Display {
  public:
   Display(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ViewerWorker& worker,
-          metrics::TableRecorder& frames, metrics::SpanRecorder& spans, FrameSpool* spool,
+          metrics::TableRecorder& frames, metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool,
           const SourceMaker& make_source)
       : o_(o),
         surface_(surface),
@@ -58,12 +58,14 @@ class Display {
         worker_(worker),
         frames_(frames),
         spans_(spans),
-        spool_(spool),
+        find_spool_(spool),
         make_source_(make_source),
         look_{o.render, o.shading.lit} {}
 
   DisplayResult run() {
-    if (!wait_for_scene() || !draw_from(newest_drawn()) || !rest()) return stopped_early();
+    if (!wait_for_scene()) return stopped_early();
+    spool_ = find_spool_ ? find_spool_() : nullptr;
+    if (!draw_from(newest_drawn()) || !rest()) return stopped_early();
     worker_.on_first_points(monotonic_s());
     start_s_ = o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s();
     while (!last_) frame();
@@ -127,7 +129,9 @@ class Display {
       const geometry::Camera camera = next_camera(now_s, -1);
       worker_.on_pose(now_s, camera);
       fit(view_, camera, spool_ != nullptr);
-      const DrawnFrame drawn = source_->draw({now_s, camera, look_, false, true, surface_.visible()}, view_);
+      const DrawnFrame drawn = source_->draw(
+          {.begin_s = now_s, .camera = camera, .look = look_, .resting = true, .even_empty = surface_.visible()},
+          view_);
       if (drawn.empty && !surface_.visible()) continue;
       surface_.present(view_);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
@@ -163,6 +167,7 @@ class Display {
     uint32_t use = 0;
     if (o_.picture_every ? result_.frames % o_.picture_every == 0 : t_s >= next_picture_s_ || last_)
       use |= o_.exr ? kPicture | kExr : kPicture;
+    if (o_.transparent && (use & kPicture)) use |= kTransparent;
     if (o_.verify_every && (result_.frames % o_.verify_every == 0 || last_)) use |= kVerify;
     return use;
   }
@@ -184,22 +189,28 @@ class Display {
     const bool with_depth = use & (kVerify | kExr);
     fit(view_, m.camera, spool_ != nullptr);
     m.look = look_;
-    m.drawn = source_->draw({m.begin_s, m.camera, look_, with_depth}, view_);
+    const bool wished = surface_.wants_picture();
+    const bool coverage = o_.transparent && ((use & kPicture) || wished);
+    m.drawn = source_->draw({m.begin_s, m.camera, look_, with_depth, coverage}, view_);
     m.end_s = monotonic_s();
     worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, gate_.waits() ? &m.drawn.update : nullptr);
+    const auto legend = o_.legend ? worker_.legend_at(m.drawn.epoch) : nullptr;
+    surface_.on_legend(legend);
     surface_.present(view_);
+    if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
     m.presented_s = monotonic_s();
     m.filled = gate_.filled();
     source_->displayed();
     gate_.displayed();
     record(m);
-    keep(use, t_s, m);
+    keep(use, t_s, m, legend);
     ++result_.frames;
     surface_.report(live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_));
     if (o_.target_fps > 0) sleep_until(next_frame_s(m.begin_s));
   }
 
   void record(MeasuredFrame& m) {
+    m.begin_master_s = worker_.to_master_s(m.begin_s);
     m.update_age_s = worker_.to_master_s(m.end_s) - m.drawn.update.requested_s;
     frames_.add(frame_row(m));
     if (m.wait_s > 0)
@@ -209,11 +220,13 @@ class Display {
   }
 
   // Hands the picture to the spool, if it is to be kept.
-  void keep(uint32_t use, double t_s, const MeasuredFrame& m) {
+  void keep(uint32_t use, double t_s, const MeasuredFrame& m, const std::shared_ptr<const image::Legend>& legend) {
     view_intact_ = use == 0;
     if (!use) return;
     if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
-    view_ = spool_->exchange({m.number, t_s, use, m.camera, std::move(view_), m.drawn.epoch});
+    const auto& camera = m.camera;
+    view_ = spool_->exchange({m.number, t_s, use, camera, std::move(view_), m.drawn.epoch, legend,
+                              part_of_wall(camera.width, camera.height, o_.wall)});
   }
 
   // Frames are due at equal distances: one that began late, because sleep ended late, does not delay those after it.
@@ -229,7 +242,8 @@ class Display {
   ViewerWorker& worker_;
   metrics::TableRecorder& frames_;
   metrics::SpanRecorder& spans_;
-  FrameSpool* spool_;
+  const std::function<FrameSpool*()>& find_spool_;
+  FrameSpool* spool_ = nullptr;
   const SourceMaker& make_source_;
   Look look_;
   ShownScene scene_;  // as the surface knows it
@@ -247,7 +261,7 @@ class Display {
 
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
                           CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
-                          metrics::SpanRecorder& spans, FrameSpool* spool) {
+                          metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool) {
   return Display(options, surface, gate, worker, frames, spans, spool, make_source).run();
 }
 

@@ -55,6 +55,7 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"splat", [](F f) { return double(f.look.render.kernel); }},
     {"finish", [](F f) { return double(splat::finish_bits(f.look.render.finish)); }},
     {"lit", [](F f) { return f.look.lit ? 1.0 : 0.0; }},
+    {"begin_s", [](F f) { return f.begin_master_s; }},
 };
 
 }  // namespace

@@ -14,8 +14,9 @@ struct MeasuredFrame {
   double start_s = 0;     ///< the display began
   double previous_s = 0;  ///< the frame before was finished; 0: there was none
   double begin_s = 0, end_s = 0, presented_s = 0;
-  double wait_s = 0;        ///< for the update, before begin_s
-  double update_age_s = 0;  ///< since the update that it shows was requested
+  double begin_master_s = 0;  ///< begin_s on the master's clock
+  double wait_s = 0;          ///< for the update, before begin_s
+  double update_age_s = 0;    ///< since the update that it shows was requested
   geometry::Camera camera{};
   Look look{};
   DrawnFrame drawn{};

@@ -3,7 +3,11 @@
 namespace telesplat::viewer {
 
 Renderers::Renderers(std::string kind, int threads, std::unique_ptr<Renderer> first)
-    : kind_(std::move(kind)), threads_(threads), name_(first->name()), first_(std::move(first)) {}
+    : kind_(std::move(kind)),
+      threads_(threads),
+      name_(first->name()),
+      device_(first->device()),
+      first_(std::move(first)) {}
 
 Result<Renderers> Renderers::make(const std::string& kind, int threads) {
   auto first = make_renderer(kind, threads);

@@ -19,6 +19,8 @@ class Renderers {
 
   /// What draws points: "cpu" or "gl".
   const char* name() const { return name_; }
+  /// What OpenGL calls the device that draws; empty: the processor does.
+  const std::string& device() const { return device_; }
   Result<std::unique_ptr<Renderer>> for_points();
   Result<std::unique_ptr<VolumeRenderer>> for_slices();
 
@@ -28,6 +30,7 @@ class Renderers {
   std::string kind_;
   int threads_;
   const char* name_;
+  std::string device_;
   std::unique_ptr<Renderer> first_;  // until somebody needs one
 };
 

@@ -14,6 +14,11 @@ class Renderer {
   virtual ~Renderer() = default;
   /// "cpu" or "gl".
   virtual const char* name() const = 0;
+  /// What OpenGL calls the device that draws; empty: none does.
+  virtual const std::string& device() const {
+    static const std::string none;
+    return none;
+  }
   /// Draws one frame into target (host memory). Called from one thread, the one that made the renderer.
   virtual splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                                    const splat::RenderOptions& options, const image::Shading& shading,

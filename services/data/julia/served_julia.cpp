@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/core/clock.h"
+#include "common/options/table.h"
 
 namespace telesplat::data {
 namespace {
@@ -11,8 +12,8 @@ constexpr double kQuiet_s = 2;  // what takes longer tells how far it is
 
 class ServedJulia final : public Served {
  public:
-  ServedJulia(julia::Scene scene, const julia::Placement& placement)
-      : scene_(std::move(scene)), placement_(placement) {}
+  ServedJulia(julia::Scene scene, const julia::Placement& placement, double room_size_m)
+      : scene_(std::move(scene)), placement_(placement), room_size_m_(room_size_m) {}
 
   scene::Kind kind() const override { return scene::Kind::kJulia; }
   std::string title() const override { return scene_.title; }
@@ -27,10 +28,22 @@ class ServedJulia final : public Served {
     hello.parameters.merge(julia::to_map(placement_));
     hello.box_room = placement_.box_room;
   }
+  std::string record() const override {
+    std::string out = fmt::format("\n[scene]\nkind = \"{}\"\ntitle = {}\nroom_size = {}\n", scene::name_of(kind()),
+                                  options::quoted(scene_.title), room_size_m_);
+    if (!scene_.timeline.empty()) out += fmt::format("animate = {}\n", options::quoted(scene_.timeline.text()));
+    out += "\n[julia]\n";
+    for (const auto& [name, value] : julia::to_map(scene_.parameters)) out += fmt::format("\"{}\" = {}\n", name, value);
+    out += "\n[placement]\n";
+    for (const auto& [name, value] : julia::to_map(placement_)) out += fmt::format("\"{}\" = {}\n", name, value);
+    const auto& [lo, hi] = placement_.box_room;
+    return out + fmt::format("lo = [{}, {}, {}]\nhi = [{}, {}, {}]\n", lo.x, lo.y, lo.z, hi.x, hi.y, hi.z);
+  }
 
  private:
   const julia::Scene scene_;
   const julia::Placement placement_;
+  const double room_size_m_;
 };
 
 }  // namespace
@@ -44,7 +57,7 @@ Result<std::unique_ptr<Served>> serve_julia(const julia::SceneOptions& options, 
     if (monotonic_s() - begin_s >= kQuiet_s) progress("looking for the set", double(done) / double(of));
   });
   if (!placement) return placement.error();
-  return std::unique_ptr<Served>(std::make_unique<ServedJulia>(std::move(*scene), *placement));
+  return std::unique_ptr<Served>(std::make_unique<ServedJulia>(std::move(*scene), *placement, room_size_m));
 }
 
 }  // namespace telesplat::data

@@ -7,6 +7,8 @@
 
 #include "common/net/master_address.h"
 #include "common/options/parser.h"
+#include "services/data/kinds.h"
+#include "services/data/record.h"
 #include "tools/telesplat/run/run_options.h"
 
 namespace telesplat::launcher {
@@ -69,7 +71,7 @@ TEST_F(Scenes, WhatSessionTomlKeepsMakesTheSameSceneAgain) {
   RunOptions o;
   const auto scene = settled(o, {file("cube.raw"), "--raw=16x16x16:u8", "--iso=90.5", "--up=-y", "--no-cache"});
   ASSERT_TRUE(scene.ok()) << scene.error().text;
-  std::ofstream(file("session.toml")) << *(*scene)->session_tables() << display_table(o);
+  std::ofstream(file("session.toml")) << data::scene_lines(o.data, (*scene)->kind());
   const auto again = recorded_scene(folder_);
   ASSERT_TRUE(again.ok()) << again.error().text;
   EXPECT_EQ((*again)->kind(), scene::Kind::kMesh);
@@ -85,12 +87,13 @@ TEST_F(Scenes, AJuliaSetIsRecordedWithItsParameters) {
   RunOptions o;
   const auto scene = settled(o, {"julia", "--preset=wings", "--iterations=33", "--room-size=0.5"});
   ASSERT_TRUE(scene.ok()) << scene.error().text;
-  std::ofstream(file("session.toml")) << *(*scene)->session_tables();
+  const auto served = data::open(o.data, [](const char*, double) {});
+  ASSERT_TRUE(served.ok()) << served.error().text;
+  std::ofstream(file("session.toml")) << data::record_of(o.data, **served);
   const auto again = recorded_scene(folder_);
   ASSERT_TRUE(again.ok()) << again.error().text;
   EXPECT_EQ((*again)->kind(), scene::Kind::kJulia);
   EXPECT_EQ((*again)->name(), (*scene)->name());
-  EXPECT_EQ((*again)->session_tables().ok(), true);
   EXPECT_NE((*again)->describe_record().find("33"), std::string::npos);
   EXPECT_FALSE((*again)->move_to("elsewhere.ply").ok());
 }

@@ -12,10 +12,13 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST_F(Record, TablesBecomeCsv) {
-  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s"}, {0, 0.25, 1, 1e-7}}));
+  // Times have the digits of nanoseconds, everything else those that it has.
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s", "px"}, {0, 0.25, 0, 1, 1e-7, 1e-7}}));
   viewer.name = "viewer-2";
-  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s"}, {0, 123456.789}}));
-  EXPECT_EQ(text("frames.csv"), "viewer,frame,t_s\nviewer-1,0,0.25\nviewer-1,1,1e-07\nviewer-2,0,123456.789\n");
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"frame", "t_s", "px"}, {0, 123456.789, 1.0 / 3}}));
+  EXPECT_EQ(text("frames.csv"),
+            "viewer,frame,t_s,px\nviewer-1,0,0.250000000,0\nviewer-1,1,0.000000100,1e-07\n"
+            "viewer-2,0,123456.789000000,0.3333333333333333\n");
 }
 
 TEST_F(Record, BadTablesAreRefusedAndLeaveNothing) {
@@ -47,6 +50,32 @@ TEST_F(Record, TheTraceIsValidWhateverSpansCome) {
   EXPECT_EQ(trace[2]["tid"], 3);
 }
 
+// However long the machine runs: twelve days of uptime are 10^6 seconds.
+TEST_F(Record, TimesCountFromTheRunsBeginning) {
+  record = std::move(RunRecord::open(folder + "/run", {1'000'000, 1})).value();
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s", "begin_s"}, {0.5, 1'000'002.000000001}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"requested_s", "latency_ms"}, {1'000'001.25, 200}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"sample"}, {0, 1'000'001, 1'000'001.000000123, 0}}));
+  wire::TileDone done = tile(1, 0, 1'000'003);
+  done.leased_s = 1'000'002;
+  record->add_tile("sampler-1", done);
+  done.published_s = 1'000'003.5;
+  record->add_tile("sampler-1", done);
+  record->add_epoch({1}, 1'000'000.5, {});
+  ASSERT_TRUE(record->finish({}, {}));
+  record.reset();
+  EXPECT_EQ(text("frames.csv"), "viewer,t_s,begin_s\nviewer-1,0.500000000,2.000000001\n");
+  EXPECT_EQ(text("updates.csv"), "viewer,requested_s,latency_ms\nviewer-1,1.250000000,200\n");
+  EXPECT_EQ(text("epochs.csv"), "epoch,t_s\n1,0.500000000\n");
+  EXPECT_NE(text("tiles.csv").find(",2.000000000,3.000000000,3.010000000,3.012000000,3.013000000,3.018000000,,0,"),
+            std::string::npos)
+      << "not published with this tile: " << text("tiles.csv");
+  EXPECT_NE(text("tiles.csv").find(",3.018000000,3.500000000,0,"), std::string::npos);
+  const auto trace = nlohmann::json::parse(text("trace.json"));
+  EXPECT_EQ(trace[1]["ts"], 1e6);
+  EXPECT_NEAR(double(trace[1]["dur"]), 0.123, 1e-9) << "microseconds, to the nanosecond";
+}
+
 TEST_F(Record, ATraceWithoutSpansIsValidToo) {
   record.reset();
   EXPECT_EQ(nlohmann::json::parse(text("trace.json"), nullptr, false), nlohmann::json::array());
@@ -58,8 +87,9 @@ TEST_F(Record, EpochsCanBeMadeAgain) {
   record->add_epoch({2}, 1.25, {{"c.x", -1e-9}, {"iterations", 65}, {"new", 1}});
   record->add_epoch({4}, 2, {{"iterations", 66}});
   const std::string epochs = text("epochs.csv");
-  EXPECT_EQ(epochs,
-            "epoch,t_s,c.x,iterations\n1,0.500000,0.3333333333333333,64\n2,1.250000,-1e-09,65\n4,2.000000,,66\n");
+  EXPECT_EQ(
+      epochs,
+      "epoch,t_s,c.x,iterations\n1,0.500000000,0.3333333333333333,64\n2,1.250000000,-1e-09,65\n4,2.000000000,,66\n");
   EXPECT_EQ(std::strtod(epochs.c_str() + epochs.find("0.333"), nullptr), third);
   EXPECT_EQ(record->summary({}, {})["epochs"], 3);
 }
@@ -69,8 +99,8 @@ TEST_F(Record, EpochsHaveTextsInQuotes) {
   record->add_epoch({2}, 1, {{"volume.step", 1}}, {{"transfer", "a \"b\"\nc"}});
   record->add_epoch({3}, 2, {{"volume.step", 2}});
   EXPECT_EQ(text("epochs.csv"),
-            "epoch,t_s,volume.step,transfer\n1,0.000000,0,\"0:#000000:0, 1:#ffffff:1\"\n"
-            "2,1.000000,1,\"a \"\"b\"\" c\"\n3,2.000000,2,\n");
+            "epoch,t_s,volume.step,transfer\n1,0.000000000,0,\"0:#000000:0, 1:#ffffff:1\"\n"
+            "2,1.000000000,1,\"a \"\"b\"\" c\"\n3,2.000000000,2,\n");
 }
 
 TEST_F(Record, AssignmentSheetsAreKept) {
@@ -102,7 +132,7 @@ TEST_F(Record, FilesAreUtf8WhateverNamesAre) {
   for (const auto& file : fs::directory_iterator(folder + "/run"))
     EXPECT_TRUE(valid_utf8(text(file.path().filename()))) << file.path();
   EXPECT_EQ(nlohmann::json::parse(text("trace.json"))[1]["name"], "caf\xef\xbf\xbd");
-  EXPECT_EQ(text("frames.csv"), "viewer,t_s,caf\xef\xbf\xbd\nviewer \xef\xbf\xbd,0,1\n");
+  EXPECT_EQ(text("frames.csv"), "viewer,t_s,caf\xef\xbf\xbd\nviewer \xef\xbf\xbd,0.000000000,1\n");
 }
 
 TEST_F(Record, RefusalsAreUtf8) {

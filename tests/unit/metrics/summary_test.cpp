@@ -103,7 +103,7 @@ TEST_F(Record, TilesTellWhereTheyLieAndCoarseFramesAreNotTimed) {
   ASSERT_TRUE(record->finish({}, {}));
   const std::string tiles = text("tiles.csv");
   EXPECT_TRUE(tiles.starts_with("frame,tile,lease,sampler,samples,")) << tiles;
-  EXPECT_NE(tiles.find("packed_s,x,y,width,height,step\n"), std::string::npos);
+  EXPECT_NE(tiles.find("packed_s,published_s,x,y,width,height,step\n"), std::string::npos);
   EXPECT_NE(tiles.find(",0,128,640,3,1\n"), std::string::npos) << tiles;
   EXPECT_NE(tiles.find(",0,0,0,0,4\n"), std::string::npos) << tiles;
 }
@@ -168,7 +168,8 @@ TEST_F(Record, OfAVolumeCountsVoxelsAndPixels) {
   EXPECT_EQ(s["buffers"], 3);
   EXPECT_EQ(s["bytes_raw"], 1'000'000) << "four bytes a pixel";
   EXPECT_EQ(s["compression_ratio"], 10);
-  EXPECT_EQ(s["redundancy_eliminated"], 0);
+  EXPECT_EQ(s["redundancy_eliminated"], nullptr) << "of slices nothing is eliminated";
+  EXPECT_EQ(s["points_cached"], nullptr);
   EXPECT_EQ(s["data_generating_rate_mb_s"], 0.5);
   EXPECT_EQ(s["data_transfer_rate_mb_s"], 0.05);
   EXPECT_EQ(s["data_consuming_rate_mb_s"], 1);
@@ -177,12 +178,116 @@ TEST_F(Record, OfAVolumeCountsVoxelsAndPixels) {
   EXPECT_EQ(s["partitions"], 2);
 }
 
-TEST_F(Record, OfARunWithoutAnythingHoldsZeros) {
+TEST_F(Record, OfARunWithoutAnythingHoldsNoResults) {
   const auto s = record->summary({}, {});
-  EXPECT_EQ(s["frames"], 0);
-  EXPECT_EQ(s["fps"], 0);
-  EXPECT_EQ(s["redundancy_eliminated"], 0);
-  EXPECT_EQ(s.dump().find("null,\"peak"), s.dump().find("null")) << "only quality is null: " << s.dump();
+  for (const char* count : {"frames", "updates", "samplers", "viewers", "epochs"}) EXPECT_EQ(s[count], 0) << count;
+  for (const char* key : {"id",
+                          "version",
+                          "begin",
+                          "begin_monotonic_s",
+                          "end",
+                          "command",
+                          "data",
+                          "trajectory",
+                          "scene",
+                          "kind",
+                          "primitives",
+                          "coupling",
+                          "buffers",
+                          "renderer",
+                          "splat",
+                          "finish",
+                          "shading",
+                          "size",
+                          "sampling_size",
+                          "sampling",
+                          "duration_s",
+                          "fps",
+                          "updates_per_s",
+                          "inter_frame_delay_ms",
+                          "view_construction_ms",
+                          "view_update_latency_ms",
+                          "start_up_latency_ms",
+                          "sampling_ms",
+                          "lease_to_sampled_ms",
+                          "packing_ms",
+                          "data_generating_rate_mb_s",
+                          "data_transfer_rate_mb_s",
+                          "data_consuming_rate_mb_s",
+                          "bytes_raw",
+                          "bytes_sent",
+                          "compression_ratio",
+                          "redundancy_eliminated",
+                          "points_cached",
+                          "bytes_per_cached_point",
+                          "points_drawn",
+                          "update_age_ms",
+                          "voxels_fetched",
+                          "bytes_per_voxel",
+                          "partitions",
+                          "first_points_s",
+                          "quality"}) {
+    ASSERT_TRUE(s.contains(key)) << key;
+    EXPECT_TRUE(s[key].is_null()) << key << ": " << s[key];
+  }
+  EXPECT_TRUE(s["samplers_busy"]["spread"].is_null());
+}
+
+TEST_F(Record, TheSummarySaysWhatWasDone) {
+  const Process master{"master",
+                       "master",
+                       1,
+                       {{"host", "north"},
+                        {"processor", "Some CPU"},
+                        {"cores", "2"},
+                        {"memory_mb", "8000"},
+                        {"launched_by", "telesplat run 'a b.ply'"},
+                        {"command", "telesplat-master"}},
+                       {}};
+  const Process data{"data",
+                     "data",
+                     2,
+                     {{"host", "north"}, {"data_file", "/x/a b.ply"}, {"data_bytes", "123"}, {"data_hash", "xxh3:0f"}},
+                     {}};
+  const Process sampler{
+      "sampler", "sampler-1", 3, {{"host", "south"}, {"gpu", "Some GPU"}, {"command", "s 'x y'"}}, {}};
+  viewer.facts.insert({{"trajectory", "walk.csv"},
+                       {"trajectory_file", "/x/walk.csv"},
+                       {"trajectory_hash", "xxh3:1"},
+                       {"duration_s", "2.5"},
+                       {"frames", "0"},
+                       {"hold_s", "1"},
+                       {"verify_every", "30"}});
+  const About about{"abc", "1.2.3", {}, 0, {{"packing.epsilon", 0.004}}};
+  record = std::move(RunRecord::open(folder + "/run", {12.5, 1'700'000'000'123'456'789})).value();
+  const auto s = record->summary({data, master, sampler, viewer}, {}, about);
+  EXPECT_EQ(s["schema"], 2);
+  EXPECT_EQ(s["id"], "abc");
+  EXPECT_EQ(s["version"], "1.2.3");
+  EXPECT_EQ(s["begin_monotonic_s"], 12.5);
+  EXPECT_EQ(s["begin"], iso_time(1'700'000'000'123'456'789));
+  EXPECT_NE(s["begin"].get<std::string>().find(":20.123456789"), std::string::npos) << s["begin"];
+  EXPECT_EQ(s["command"], "telesplat run 'a b.ply'");
+  ASSERT_EQ(s["machines"].size(), 2u);
+  EXPECT_EQ(s["machines"][0]["host"], "north");
+  EXPECT_EQ(s["machines"][0]["processor"], "Some CPU") << "whoever tells it: " << s["machines"];
+  EXPECT_EQ(s["machines"][1]["gpu"], "Some GPU");
+  EXPECT_EQ(s["data"]["file"], "/x/a b.ply");
+  EXPECT_EQ(s["data"]["bytes"], 123);
+  EXPECT_EQ(s["data"]["hash"], "xxh3:0f");
+  EXPECT_EQ(s["trajectory"]["hash"], "xxh3:1");
+  EXPECT_EQ(s["asked"]["duration_s"], 2.5);
+  EXPECT_EQ(s["asked"]["verify_every"], 30);
+  EXPECT_EQ(s["settings"]["packing.epsilon"], 0.004);
+  // Started by hand: everyone's own command line.
+  EXPECT_EQ(record->summary({sampler}, {})["command"], nlohmann::json({{"sampler-1", "s 'x y'"}}));
+}
+
+TEST(RecordText, IsLinesOfSessionToml) {
+  EXPECT_TRUE(is_record_text("\n[scene]\nkind = \"mesh\"\n\n[display]\nfov = 90.0\n"));
+  EXPECT_TRUE(is_record_text(""));
+  EXPECT_FALSE(is_record_text("no table"));
+  EXPECT_FALSE(is_record_text("a = 1\r\nb = \x1b[2J"));
 }
 
 TEST_F(Record, TheSummaryIsUtf8WhateverNamesAre) {

@@ -53,8 +53,12 @@ std::vector<const toml::table*> viewers(const toml::table& session) {
 // The viewer whose frames the run's own record has: the launcher's first, else the first that joined.
 const toml::table* own_viewer(const toml::table& session) {
   const auto all = viewers(session);
-  const auto first =
-      std::find_if(all.begin(), all.end(), [](const toml::table* t) { return text_of(*t, "name") == "viewer-1"; });
+  // Of those before records told who kept one where, the launcher's first.
+  auto first =
+      std::find_if(all.begin(), all.end(), [](const toml::table* t) { return text_of(*t, "records_in") == "."; });
+  if (first == all.end())
+    first =
+        std::find_if(all.begin(), all.end(), [](const toml::table* t) { return text_of(*t, "name") == "viewer-1"; });
   return first != all.end() ? *first : all.empty() ? nullptr : all.front();
 }
 

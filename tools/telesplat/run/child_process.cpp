@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/net/service.h"
 
 namespace telesplat::launcher {
 
@@ -109,7 +110,9 @@ void ChildProcess::signal(int number) {
 
 void ChildProcess::finish(double patience_s) {
   for (const int next : {SIGTERM, SIGKILL, 0}) {
-    for (const double until = monotonic_s() + patience_s; !ended() && monotonic_s() < until;) {
+    // Who interrupts again does not want to wait; but nobody is left behind.
+    const auto waits = [&] { return next == 0 || !net::stop_requested(); };
+    for (const double until = monotonic_s() + patience_s; !ended() && monotonic_s() < until && waits();) {
       read_lines();  // a full pipe must not keep it from ending
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }

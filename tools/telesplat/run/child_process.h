@@ -31,7 +31,8 @@ class ChildProcess {
   /// Exit code, or 128 + signal. Precondition: ended().
   int exit_code() const { return *exit_code_; }
   void signal(int number);
-  /// Waits for it to end by itself, then SIGTERM, then SIGKILL, each after `patience_s` more.
+  /// Waits for it to end by itself, then SIGTERM, then SIGKILL, each after `patience_s` more; at once if this process
+  /// is told to stop.
   void finish(double patience_s);
 
  private:

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "common/core/clock.h"
+#include "common/net/service.h"
 #include "tools/telesplat/run/wall.h"
 
 namespace telesplat::launcher {
@@ -54,7 +55,9 @@ Status Pipeline::start_servers() {
 Status Pipeline::start_viewers(double clock_from_s) {
   has_viewers_ = true;
   for (int i = 1; i <= options_.viewers; ++i) {
-    Member viewer{.role = "viewer", .name = viewer_name(i), .arguments = viewer_arguments(options_, i, clock_from_s)};
+    // A session that is joined has a viewer-1 already.
+    const std::string name = options_.join_master.empty() ? viewer_name(i) : net::unique_name(viewer_name(i));
+    Member viewer{.role = "viewer", .name = name, .arguments = viewer_arguments(options_, i, clock_from_s)};
     if (const Status s = group_.start(std::move(viewer)); !s) return s;
   }
   return ok_status();
@@ -115,9 +118,6 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   return State::kRunning;
 }
 
-void Pipeline::read(Member& m) {
-  for (const auto& line : m.process->read_lines()) {
-    if (line.starts_with("progress ")) read_progress(m.name, line.substr(9));
 // "STAGE 0.430"
 void Pipeline::read_progress(const std::string& member, const std::string& told) {
   const size_t space = told.rfind(' ');
@@ -125,6 +125,9 @@ void Pipeline::read_progress(const std::string& member, const std::string& told)
   progress_ = time_left_[member].text(told.substr(0, space), std::atof(told.c_str() + space), monotonic_s());
 }
 
+void Pipeline::read(Member& m) {
+  for (const auto& line : m.process->read_lines()) {
+    if (line.starts_with("progress ")) read_progress(m.name, line.substr(9));
     if (line.starts_with("note ")) notes_.push_back(line.substr(5));
   }
 }

@@ -92,7 +92,7 @@ void ProcessGroup::finish() {
   Member* master = find("master");
   if (master && master->process && !master->process->ended() && !endpoint_.empty()) {
     ControlClient control(endpoint_);
-    if (!control.ask("stop", 2)) master->process->signal(SIGTERM);
+    if (net::stop_requested() || !control.ask("stop", 2)) master->process->signal(SIGTERM);
     for (const double until = monotonic_s() + kSoon_s; !master->process->ended() && monotonic_s() < until;)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     // Who said hello while the session ended has not heard of it, and the master waits for them.

@@ -52,7 +52,7 @@ class ProcessGroup {
   const std::string& log_directory() const { return log_directory_; }
 
   /// Ends everything: viewers first, so that their last measurements arrive, then a "stop" to the group's own master,
-  /// then all others.
+  /// then all others. If this process is told to stop meanwhile, at once.
   void finish();
 
  private:

@@ -4,27 +4,25 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <thread>
 
 #include "client/viewer/display/window.h"
-#include "client/viewer/record/frame_spool.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/core/machine.h"
+#include "common/metrics/run_folder.h"
 #include "common/net/master_address.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/control/client.h"
-#include "tools/telesplat/movie/movie.h"
 #include "tools/telesplat/record/dated_folder.h"
+#include "tools/telesplat/run/after_run.h"
 #include "tools/telesplat/run/live_figures.h"
 #include "tools/telesplat/run/pipeline.h"
-#include "tools/telesplat/run/run_report.h"
-#include "tools/telesplat/run/verify.h"
-#include "tools/telesplat/run/wall.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -56,8 +54,8 @@ class PassingFolder {
   std::string path_;
 };
 
-/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input. No process is left behind
-/// in any case.
+/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input, 130 interrupted. No process
+/// is left behind in any case.
 class Run {
  public:
   /// movie: what is to be made of the record, if anything.
@@ -67,31 +65,34 @@ class Run {
   int go() {
     if (const Status s = prepare(); !s) return tools::complain(s.error());
     auto pipeline = Pipeline::start(o_);
-    if (!pipeline && o_.viewer.window && net::stop_requested()) return 0;
-    if (!pipeline) return tools::complain(pipeline.error(), 1);
+    if (!pipeline) return not_started(pipeline.error());
     progress_.line(fmt::format("session at {}; telesplat ctl status asks it", pipeline->master_endpoint()));
-    State state = watch(*pipeline);
+    const State state = watch(*pipeline);
+    // From here on a signal is another one: what is at hand is left out.
+    const bool stopped = state == State::kRunning;
+    if (stopped) net::forget_stop();
     pipeline->finish();
-    keep_record(*pipeline, state);
+    if (state != State::kBadInput && !o_.out.empty()) after_.develop_pictures();
+    for (const auto& n : pipeline->take_notes()) progress_.line(n);
     if (state == State::kBadInput || state == State::kFailed) return clear_up(state);
     if (o_.out.empty()) return 0;
-    // A window that is closed, or Ctrl-C there, is an end like any other.
-    const bool interrupted = state == State::kRunning && !o_.viewer.window;
-    if (const Status s = verify(interrupted); !s) return tools::complain(s.error(), verify_code_);
-    print_report(o_.out);
-    if (const Status s = report_wall(); !s) return tools::complain(s.error(), 1);
-    if (const int code = make_the_movie(interrupted); code != 0) return code;
-    return interrupted ? 1 : 0;
+    if (stopped && net::stop_requested()) return end_at_once();
+    if (!after_.displayed()) return nothing_displayed(stopped);
+    return complete(stopped);
   }
 
  private:
+  // The folder is ours from here on.
   Status prepare() {
     std::error_code error;
-    folder_existed_ = o_.out.empty() || fs::exists(o_.out, error);
-    if (!o_.out.empty()) return ok_status();
-    const Status made = logs_.make();
-    if (made) o_.log_directory = logs_.path();
-    return made;
+    if (o_.out.empty()) {
+      const Status made = logs_.make();
+      if (made) o_.log_directory = logs_.path();
+      return made;
+    }
+    folder_existed_ = fs::exists(o_.out, error);
+    const auto begun = metrics::begin_folder(o_.out, o_.overwrite, metrics::Logs::kOurs);
+    return begun ? ok_status() : Status(begun.error());
   }
 
   // Shows what goes on until the pipeline ends or somebody wants it to; kRunning: the latter.
@@ -110,7 +111,11 @@ class Run {
         control.request_status();
         asked_s = monotonic_s();
       }
-      if (const auto status = control.poll_status()) live = figures.update(*status, monotonic_s());
+      if (const auto status = control.poll_status()) {
+        live = figures.update(*status, monotonic_s());
+        if (const auto session = status->find("session"); session != status->end())
+          master_folder_ = session->value("run_folder", std::string());
+      }
       if (o_.viewer.window && !live.empty())
         progress_.close();  // the window's title has the figures
       else if (!live.empty() || !pipeline.progress().empty())
@@ -121,43 +126,19 @@ class Run {
     return state;
   }
 
-  // What processes left half done: a viewer that is told to stop does so, whatever pictures are left to make.
-  void keep_record(Pipeline& pipeline, State state) {
-    if (state != State::kBadInput && !o_.out.empty()) develop_pictures();
-    for (const auto& n : pipeline.take_notes()) progress_.line(n);
-    if (!o_.join_master.empty() || o_.out.empty()) return;
-    complete_session();
+  void remove_record() const {
+    if (!o_.out.empty()) metrics::remove_record(o_.out, !folder_existed_);
   }
 
-  // Recorded frames become pictures, whatever made their viewer stop before they were.
-  void develop_pictures() {
-    std::error_code error;
-    for (int i = 1; i <= o_.viewers; ++i) {
-      const std::string folder = viewer_directory(o_.out, i), spool = folder + "/spool";
-      if (!fs::is_directory(spool, error)) continue;
-      const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("picture {} of {}", done, of)); };
-      if (const Status s = viewer::develop_frames(spool, folder + "/images", tell); !s)
-        progress_.line("telesplat: " + s.error().text);
-      if (fs::is_empty(spool, error)) fs::remove(spool, error);
-      progress_.close();
-    }
-  }
-
-  // Adds to the master's session.toml what only the launcher knows: the scene, and the display's camera. `telesplat
-  // compare` renders a run's frames again with it.
-  void complete_session() const {
-    std::error_code error;
-    const std::string path = o_.out + "/session.toml";
-    if (!fs::exists(path, error)) return;
-    const auto tables = scene_->session_tables();
-    // If they cannot be made, its data server has said why.
-    if (tables) std::ofstream(path, std::ios::app) << *tables << display_table(o_);
+  int not_started(const Error& error) {
+    if (net::stop_requested()) return nothing_displayed(true);
+    remove_record();
+    return tools::complain(error, 1);
   }
 
   int clear_up(State state) {
-    std::error_code error;
     if (state == State::kBadInput) {
-      if (!folder_existed_) fs::remove_all(o_.out, error);
+      remove_record();
       return 2;
     }
     if (!logs_.path().empty()) tools::complain({"the logs are in " + logs_.path()});
@@ -165,59 +146,50 @@ class Run {
     return 1;
   }
 
-  Status verify(bool interrupted) {
-    if (o_.viewer.display.verify_every == 0 || interrupted || !o_.join_master.empty()) return ok_status();
-    verify_code_ = 2;
-    // The scene as it was opened, with what the record tells of its epochs: session.toml cannot tell every file's name.
-    if (const Status s = scene_->read_record(o_.out); !s) return s;
-    auto direct = scene_->open_direct(0, [](const char*, double) {});
-    if (!direct) return direct.error();
-    verify_code_ = 1;
-    const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("verifying view {} of {}", done, of)); };
-    const auto& shading = o_.viewer.display.shading;
-    const Status verified = verify_run(o_.out, **direct, shading, tell, net::stop_requested);
-    progress_.close();
-    return verified;
+  // A window that is closed, or Ctrl-C there, is an end like any other.
+  int nothing_displayed(bool stopped) {
+    remove_record();
+    if (o_.viewer.window) return 0;
+    tools::complain({stopped ? "interrupted before the first frame; nothing is recorded"
+                             : "the session ended before the first frame; nothing is recorded"});
+    return stopped ? kInterrupted : 1;
   }
 
-  // The wall's picture, and the moments its tiles are of.
-  Status report_wall() const {
-    if (o_.viewer.wall.empty()) return ok_status();
-    const auto tiles = stitch_wall(o_.out, *viewer::parse_wall(o_.viewer.wall));
-    if (!tiles) return tiles.error();
-    std::string moments;
-    for (const auto& t : *tiles)
-      moments += fmt::format("{}{} frame {} at {:.2f} s", moments.empty() ? "" : ", ", t.viewer, t.frame, t.t_s);
-    std::printf("The wall's picture is images/wall.png, of %s\n", moments.c_str());
-    return ok_status();
+  int end_at_once() {
+    after_.drop_spools();
+    std::error_code error;
+    const bool complete = !o_.join_master.empty() || fs::exists(o_.out + "/summary.json", error);
+    tools::complain({fmt::format("interrupted; the record in {} {}", o_.out,
+                                 complete ? "lacks what is made after the run" : "is not complete")});
+    return o_.viewer.window ? 0 : kInterrupted;
   }
 
-  // Exit code. Whoever interrupts the run does not want to wait for a movie; Ctrl-C interrupts the movie, too.
-  int make_the_movie(bool interrupted) {
-    if (!movie_) return 0;
-    const std::string& file = movie_->options.file;
-    const std::string later =
-        fmt::format("telesplat movie {} {} makes it of the record", shell_quoted(o_.out), shell_quoted(file));
-    if (interrupted) {
-      progress_.line(fmt::format("{} was not made; {}", file, later));
-      return 0;
-    }
-    net::forget_stop();
-    const auto report = make_movie(o_.out, *movie_, progress_, net::stop_requested);
-    if (!report) return tools::complain(report.error(), 1);
-    if (!report->written) return tools::complain(report->written.error(), 1);
-    for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
-    if (report->interrupted) progress_.line(fmt::format("interrupted: {} was not made; {}", file, later));
-    return report->interrupted ? kInterrupted : 0;
+  // Whether the run would have ended by itself.
+  bool has_end() const {
+    const auto& d = o_.viewer.display;
+    return !o_.viewer.window && (d.duration_s > 0 || d.frames > 0);
+  }
+
+  int complete(bool stopped) {
+    const int code = after_.run(stopped, master_folder_);
+    if (!net::stop_requested() || code == 0) after_.drop_spools();
+    if (code != 0) return code;
+    const bool again = net::stop_requested();
+    if (again)
+      progress_.line("telesplat: interrupted; the record lacks what is made after the run");
+    else if (stopped && !o_.viewer.window)
+      progress_.line(fmt::format("telesplat: {}; the record is complete", has_end() ? "interrupted" : "stopped"));
+    return (again || stopped) && has_end() ? kInterrupted : 0;
   }
 
   RunOptions o_;
   std::shared_ptr<Scene> scene_;
   std::optional<MoviePlan> movie_;
   bool folder_existed_ = false;
-  int verify_code_ = 1;
+  std::string master_folder_;  // where the session's record is; empty: not known, or nowhere
   PassingFolder logs_;
   tools::ProgressLine progress_;
+  AfterRun after_{o_, scene_.get(), movie_, progress_};  // last: it uses the others
 };
 
 // Finds the session that --master auto means. Returns 0, or the exit code after saying why there is none.
@@ -231,6 +203,7 @@ int find_session(RunOptions& o) {
 
 int run(RunOptions o, const options::Given& given) {
   o.viewer.started_s = monotonic_s();
+  setenv(kLaunchedByVariable, command_line().c_str(), 1);
   if (o.out.empty() && !o.viewer.window) o.out = dated_folder();
   auto scene = settle(o, given);
   if (!scene) return tools::complain(scene.error());

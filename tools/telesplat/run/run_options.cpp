@@ -54,6 +54,9 @@ Table own_rows(RunOptions& o) {
        .help =
            "join the running session at this address instead of starting one; auto: yours on this machine; default, "
            "where no scene is named: $TELESPLAT_MASTER"},
+      {.flag = "--overwrite",
+       .value = &o.overwrite,
+       .help = "the folder of --out may hold a record already: its files are removed first, others stay"},
       {.flag = "!--same-priority",
        .value = &o.background_servers,
        .help = "run samplers, packer and data at the viewer's priority"},
@@ -205,15 +208,13 @@ std::vector<std::string> sampler_arguments(const RunOptions& o) {
 std::vector<std::string> viewer_arguments(const RunOptions& o, int number, double clock_from_s) {
   viewer::ViewerOptions v = o.viewer;
   if (number != 1) v.display.verify_every = 0;
-  if (!o.out.empty()) v.out = viewer_directory(o.out, number);
+  if (o.out.empty())
+    v.join_record = false;  // a guest without a folder leaves nothing in that of others
+  else
+    v.out = viewer_directory(o.out, number);
   if (!v.wall.empty()) v.wall_tile = number - 1;
   v.display.clock_from_s = clock_from_s;
   return arguments(v);
-}
-
-std::string display_table(const RunOptions& o) {
-  viewer::ViewerOptions v = o.viewer;
-  return "\n[display]\n" + options::recorded(viewer::view_table(v), {});
 }
 
 }  // namespace telesplat::launcher

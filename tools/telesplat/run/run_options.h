@@ -24,6 +24,7 @@ struct RunOptions {
   std::string join_master;         ///< --master: join a running session instead of starting one
   MovieOptions movie;              ///< made of the record after the run; no file: none
   std::string out;                 ///< run folder; empty: run makes one, view records nothing
+  bool overwrite = false;          ///< `out` may hold a record already, which is replaced
   std::string log_directory;       ///< of the processes; empty: OUT/logs
   std::string log_level = "info";  ///< of the processes
   bool record_depth = false;       ///< keep sampled depth images in OUT/depth
@@ -53,8 +54,5 @@ std::vector<std::string> sampler_arguments(const RunOptions& options);
 /// number: 1 to options.viewers. Only the first one's frames are verified. clock_from_s: when the trajectory of a wall
 /// begins, on the monotonic clock; 0: each viewer's begins with its first frame.
 std::vector<std::string> viewer_arguments(const RunOptions& options, int number, double clock_from_s);
-
-/// The table [display] of session.toml.
-std::string display_table(const RunOptions& options);
 
 }  // namespace telesplat::launcher

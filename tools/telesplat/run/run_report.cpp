@@ -3,101 +3,127 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "tools/telesplat/movie/movie_target.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr const char* kNotMeasured = "not measured";
+constexpr const char* kNothing = "-";  // in place of what was not measured
 
 std::string plural(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-// Throws as json::at does where a figure is not there at all; null: it was not measured.
-std::string number(const json& value, const char* format, double factor = 1) {
-  return value.is_null() ? "?" : fmt::format(fmt::runtime(format), value.get<double>() * factor);
+// What a summary has under this key; null if it has nothing.
+json at(const json& s, const char* key) {
+  const auto found = s.find(key);
+  return found == s.end() ? json() : *found;
+}
+
+std::string text(const json& s, const char* key) {
+  const json v = at(s, key);
+  return v.is_string() ? v.get<std::string>() : kNothing;
+}
+
+// As `format` has it, times `scale`.
+std::string number(const json& value, const char* format, double scale = 1) {
+  return value.is_number() ? fmt::format(fmt::runtime(format), value.get<double>() * scale) : kNothing;
+}
+
+std::string size(const json& s, const char* key) {
+  const json v = at(s, key);
+  if (!v.is_array() || v.size() != 2) return kNothing;
+  return fmt::format("{}x{}", v[0].get<int>(), v[1].get<int>());
 }
 
 std::string distribution(const json& s, const char* key, const char* unit) {
-  const json& d = s.at(key);
-  if (d.is_null() || d.at("median").is_null()) return kNotMeasured;
-  return fmt::format("median {}  p95 {}  max {} {}", number(d.at("median"), "{:.1f}"), number(d.at("p95"), "{:.1f}"),
-                     number(d.at("max"), "{:.1f}"), unit);
-}
-
-// The median of a distribution that may not be there.
-std::string median(const json& s, const char* key, const char* format, double factor = 1) {
-  const json& d = s.at(key);
-  return d.is_null() ? "?" : number(d.at("median"), format, factor);
+  const json d = at(s, key);
+  if (!d.is_object()) return kNothing;
+  return fmt::format("median {}  p95 {}  max {} {}", number(at(d, "median"), "{:.1f}"), number(at(d, "p95"), "{:.1f}"),
+                     number(at(d, "max"), "{:.1f}"), unit);
 }
 
 std::string subject_of(const std::string& directory, const json& s) {
-  const std::string name = s.at("scene").get<std::string>();
   const auto scene = recorded_scene(directory);
-  return scene ? name + (*scene)->summary(s.at("primitives").get<uint64_t>()) : name;
+  if (!scene) return text(s, "scene");
+  const json primitives = at(s, "primitives");
+  return text(s, "scene") + (*scene)->summary(primitives.is_number() ? primitives.get<uint64_t>() : 0);
 }
 
 // Whether the run was drawn from points, so that there are splats and points cached.
 bool has_points(const json& s) {
-  const auto kind = scene::kind_named(s.at("kind").get<std::string>());
+  const auto kind = scene::kind_named(text(s, "kind"));
   return !kind || scene::pipeline_of(*kind) == scene::Pipeline::kPoints;
 }
 
 std::string head_of(const std::string& directory, const json& s) {
-  const json &size = s.at("size"), &sampling = s.at("sampling_size");
   std::string head =
-      fmt::format("{}, display {}x{}, sampling {}x{}, {}, {} renderer", subject_of(directory, s), size.at(0).get<int>(),
-                  size.at(1).get<int>(), sampling.at(0).get<int>(), sampling.at(1).get<int>(),
-                  plural(s.at("samplers").get<int>(), "sampler"), s.at("renderer").get<std::string>());
-  if (has_points(s)) head += ", " + s.at("splat").get<std::string>() + " splats";
+      fmt::format("{}, display {}, sampling {}, {}, {} renderer", subject_of(directory, s), size(s, "size"),
+                  size(s, "sampling_size"), plural(s.at("samplers").get<int>(), "sampler"), text(s, "renderer"));
+  if (has_points(s)) head += ", " + text(s, "splat") + " splats";
   if (const int viewers = s.at("viewers").get<int>(); viewers > 1)
     head += fmt::format(", {} (figures of all)", plural(viewers, "viewer"));
   return head;
 }
 
 void add_display(const json& s, RunReport& out) {
-  const std::string coupling = s.at("coupling").get<std::string>();
-  out.line(
-      "display",
-      fmt::format("{} fps over {} frames, {} coupling{}", number(s.at("fps"), "{:.1f}"), s.at("frames").get<uint64_t>(),
-                  coupling, coupling == "loose" ? fmt::format(" of {} buffers", s.at("buffers").get<int>()) : ""));
+  const std::string coupling = text(s, "coupling");
+  out.line("display",
+           fmt::format("{} fps over {} frames, {} coupling{}", number(at(s, "fps"), "{:.1f}"),
+                       s.at("frames").get<uint64_t>(), coupling,
+                       coupling == "loose" ? fmt::format(" of {} buffers", number(at(s, "buffers"), "{:.0f}")) : ""));
   out.line("inter-frame delay", distribution(s, "inter_frame_delay_ms", "ms"));
   out.line("view construction", distribution(s, "view_construction_ms", "ms"));
 }
 
+std::string sent(const json& s) {
+  if (at(s, "bytes_raw").is_null()) return kNothing;
+  return fmt::format("{} MB of {} MB sampled ({} : 1), {} MB/s", number(at(s, "bytes_sent"), "{:.2f}", 1e-6),
+                     number(at(s, "bytes_raw"), "{:.0f}", 1e-6), number(at(s, "compression_ratio"), "{:.0f}"),
+                     number(at(s, "data_transfer_rate_mb_s"), "{:.2f}"));
+}
+
 void add_updates(const json& s, RunReport& out) {
-  out.line("view updates", fmt::format("{} per second, {} in all", number(s.at("updates_per_s"), "{:.2f}"),
+  out.line("view updates", fmt::format("{} per second, {} in all", number(at(s, "updates_per_s"), "{:.2f}"),
                                        s.at("updates").get<uint64_t>()));
   out.line("view update latency", distribution(s, "view_update_latency_ms", "ms"));
+  const auto median = [&](const char* key) {
+    const json d = at(s, key);
+    return number(d.is_object() ? at(d, "median") : json(), "{:.1f}");
+  };
   out.line("sampling / packing of a frame",
-           fmt::format("median {} / {} ms", median(s, "sampling_ms", "{:.1f}"), median(s, "packing_ms", "{:.1f}")));
+           fmt::format("median {} / {} ms", median("sampling_ms"), median("packing_ms")));
   if (has_points(s)) {
-    out.line("points cached", fmt::format("{} M, {} bytes each", number(s.at("points_cached"), "{:.2f}", 1e-6),
-                                          number(s.at("bytes_per_cached_point"), "{:.1f}")));
-    out.line("redundancy eliminated", number(s.at("redundancy_eliminated"), "{:.2f} %", 100));
+    out.line("points cached", fmt::format("{} M, {} bytes each", number(at(s, "points_cached"), "{:.2f}", 1e-6),
+                                          number(at(s, "bytes_per_cached_point"), "{:.1f}")));
+    out.line("redundancy eliminated", number(at(s, "redundancy_eliminated"), "{:.2f} %", 100));
   }
-  out.line("sent to viewers",
-           fmt::format("{} MB of {} MB sampled ({} : 1), {} MB/s", number(s.at("bytes_sent"), "{:.2f}", 1e-6),
-                       number(s.at("bytes_raw"), "{:.0f}", 1e-6), number(s.at("compression_ratio"), "{:.0f}"),
-                       number(s.at("data_transfer_rate_mb_s"), "{:.2f}")));
+  out.line("sent to viewers", sent(s));
 }
 
 void add_quality(const json& s, RunReport& out) {
-  const json& q = s.at("quality");
+  const json q = at(s, "quality");
   if (!q.is_object()) return;
+  const auto figure = [&](const char* key, const char* which) {
+    const json d = at(q, key);
+    return d.is_object() ? at(d, which) : json();
+  };
   out.line("PSNR against direct rendering",
-           fmt::format("median {} dB over {} views", median(q, "psnr_db", "{:.2f}"), q.at("views").get<int>()));
-  out.line("SSIM", fmt::format("median {}", median(q, "ssim", "{:.4f}")));
-  const json& holes = q.at("hole_fraction");
-  out.line("hole fraction", fmt::format("median {} %  p95 {} %", median(q, "hole_fraction", "{:.3f}", 100),
-                                        holes.is_null() ? "?" : number(holes.at("p95"), "{:.3f}", 100)));
+           fmt::format("median {} dB over {} views", number(figure("psnr_db", "median"), "{:.2f}"),
+                       q.at("views").get<int>()));
+  out.line("SSIM", fmt::format("median {}", number(figure("ssim", "median"), "{:.4f}")));
+  out.line("hole fraction",
+           fmt::format("median {} %  p95 {} %", number(figure("hole_fraction", "median"), "{:.3f}", 100),
+                       number(figure("hole_fraction", "p95"), "{:.3f}", 100)));
   if (q.contains("last_view"))
-    out.line("last view", fmt::format("PSNR {} dB, holes {} %", number(q.at("last_view").at("psnr_db"), "{:.2f}"),
-                                      number(q.at("last_view").at("hole_fraction"), "{:.3f}", 100)));
+    out.line("last view", fmt::format("PSNR {} dB, holes {} %", number(figure("last_view", "psnr_db"), "{:.2f}"),
+                                      number(figure("last_view", "hole_fraction"), "{:.3f}", 100)));
 }
 
 void add_errors(const json& s, RunReport& out) {
@@ -107,25 +133,44 @@ void add_errors(const json& s, RunReport& out) {
                                  e.at("leases_expired").get<uint64_t>()));
 }
 
+// How a person names the folder next: runs/latest, where that is this run.
+std::string name_of(const std::string& directory) {
+  std::error_code error;
+  const fs::path latest = fs::path(directory).lexically_normal().parent_path() / "latest";
+  const bool is_it = fs::is_symlink(latest, error) && fs::equivalent(latest, directory, error) && !error;
+  return shell_quoted(is_it ? latest.string() : directory);
+}
+
+// What to do with the record. Nothing is replayed of volumes, and without what the viewer received.
+void print_next(const std::string& directory) {
+  std::error_code error;
+  std::printf("\nEverything lies in %s (summary.json, frames.csv, updates.csv, tiles.csv, trace.json, images/)\n",
+              directory.c_str());
+  const std::string name = name_of(directory);
+  const auto scene = recorded_scene(directory);
+  if (scene && (*scene)->pipeline() == scene::Pipeline::kPoints && fs::exists(directory + "/points.events", error))
+    std::printf("telesplat compare %s draws its frames with every kernel, beside direct rendering\n", name.c_str());
+  else
+    std::printf("telesplat inspect %s tells more\n", name.c_str());
+}
+
 }  // namespace
 
 Result<RunReport> read_report(const std::string& directory) {
   const std::string path = directory + "/summary.json";
   std::ifstream in(path);
-  if (!in) return Error{fmt::format("{}: is not there, so {} is no finished run", path, directory)};
   const auto s = json::parse(in, nullptr, false);
-  if (!s.is_object()) return Error{fmt::format("{}: is no JSON object", path)};
-  RunReport out;
+  if (!s.is_object()) return Error{path + ": is not there, or no summary"};
   try {
-    out.head = head_of(directory, s);
+    RunReport out{head_of(directory, s), {}};
     add_display(s, out);
     add_updates(s, out);
     add_quality(s, out);
     add_errors(s, out);
-  } catch (const json::exception& e) {
-    return Error{fmt::format("{}: {}", path, e.what())};
+    return out;
+  } catch (const json::exception&) {  // a file that somebody else wrote
+    return Error{path + ": lacks a figure, or has another thing in its place"};
   }
-  return out;
 }
 
 void print_report(const std::string& directory) {
@@ -133,8 +178,15 @@ void print_report(const std::string& directory) {
   if (!report) return;
   std::printf("\n%s\n", report->head.c_str());
   for (const auto& [what, value] : report->lines) std::printf("  %-34s %s\n", what.c_str(), value.c_str());
-  std::printf("\nEverything lies in %s (summary.json, frames.csv, updates.csv, tiles.csv, trace.json, images/)\n",
-              directory.c_str());
+  print_next(directory);
+}
+
+void print_joined(const std::string& directory, const std::string& master_folder) {
+  std::printf(
+      "\nPictures and what was received lie in %s (images/, points.events or slices.events, logs/); the figures %s\n",
+      directory.c_str(),
+      master_folder.empty() ? "are its master's, which keeps no record"
+                            : ("will be in the session's record, " + master_folder + ", when it ends").c_str());
 }
 
 }  // namespace telesplat::launcher

@@ -21,5 +21,7 @@ Result<RunReport> read_report(const std::string& directory);
 
 /// Prints it; nothing if there is no summary.
 void print_report(const std::string& directory);
+/// The same of a viewer that joined a session. master_folder: of the session's record; empty: it is not known.
+void print_joined(const std::string& directory, const std::string& master_folder);
 
 }  // namespace telesplat::launcher

@@ -112,8 +112,6 @@ Status read_epochs(const std::string& path, JuliaScene::Record& out) {
   return ok_status();
 }
 
-std::string list_of(const glm::vec3& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
-
 std::string lines_of(const julia::Parameters& parameters) {
   std::string out;
   for (const auto& info : julia::parameter_infos())
@@ -152,21 +150,6 @@ Status JuliaScene::check() const {
   return scene ? ok_status() : Status(scene.error());
 }
 
-Result<std::string> JuliaScene::session_tables() const {
-  const auto scene = julia::read_scene(options_.julia);
-  if (!scene) return scene.error();
-  const auto placement = julia::place(*scene, options_.mesh.room_size_m);
-  if (!placement) return placement.error();
-  std::string out = fmt::format("\n[scene]\nkind = \"{}\"\ntitle = {}\nroom_size = {}\n", scene::name_of(kind()),
-                                options::quoted(scene->title), options_.mesh.room_size_m);
-  if (!scene->timeline.empty()) out += fmt::format("animate = {}\n", options::quoted(scene->timeline.text()));
-  out += "\n[julia]\n";
-  for (const auto& [name, value] : julia::to_map(scene->parameters)) out += fmt::format("\"{}\" = {}\n", name, value);
-  out += "\n[placement]\n";
-  for (const auto& [name, value] : julia::to_map(*placement)) out += fmt::format("\"{}\" = {}\n", name, value);
-  return out + fmt::format("lo = {}\nhi = {}\n", list_of(placement->box_room.lo), list_of(placement->box_room.hi));
-}
-
 Status JuliaScene::read_record(const std::string& run_directory) {
   Record out;
   out.directory = run_directory;
@@ -192,8 +175,8 @@ std::string JuliaScene::summary(uint64_t) const {
   const auto julia = record();
   if (!julia) return {};
   const auto& c = julia->begin.c;
-  return fmt::format(": c = ({:.4g}, {:.4g}, {:.4g}, {:.4g}), {} epoch(s)", c.x, c.y, c.z, c.w,
-                     std::max<size_t>(1, julia->epochs.size()));
+  return fmt::format(": c = ({:.4g}, {:.4g}, {:.4g}, {:.4g}){}", c.x, c.y, c.z, c.w,
+                     julia->epochs.size() > 1 ? fmt::format(", {} epochs", julia->epochs.size()) : "");
 }
 
 std::string JuliaScene::describe_record() const {

@@ -14,8 +14,7 @@ class JuliaScene : public Scene {
   std::string name() const override;
   Status check() const override;
   /// [scene], [julia] with the parameters it begins with, [placement].
-  Result<std::string> session_tables() const override;
-  /// Reads what session_tables() wrote, and epochs.csv (epoch, t_s, a column for each parameter) if there is one.
+  /// Reads what its data server told of it, and epochs.csv (epoch, t_s, a column for each parameter) if there is one.
   Status read_record(const std::string& run_directory) override;
   Status move_to(const std::string& file) override;
   Result<std::unique_ptr<DirectScene>> open_direct(int threads, const data::Progress& progress) const override;

@@ -66,16 +66,6 @@ Status Scene::check() const {
   return ok_status();
 }
 
-Result<std::string> Scene::session_tables() const {
-  data::DataOptions given = options_, usual;
-  std::error_code error;
-  const std::string file = fs::absolute(given.scene, error).string();
-  // Where it stood is told even if it stood as usual: what is usual may change.
-  const auto defaults = options::without(data::scene_table(usual), {"--room-size", "--up"});
-  return fmt::format("\n[scene]\nkind = {}\nfile = {}\n{}", options::quoted(std::string(scene::name_of(kind()))),
-                     options::quoted(file), options::recorded(data::scene_table(given), defaults));
-}
-
 Status Scene::read_record(const std::string&) { return ok_status(); }
 
 Status Scene::move_to(const std::string& file) {

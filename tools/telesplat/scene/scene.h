@@ -29,8 +29,6 @@ class Scene {
   /// Whether it is there and can be shown, as far as that is known without reading all of it. The error names file or
   /// parameter.
   virtual Status check() const;
-  /// The tables [scene] and so on of a run's session.toml, from which recorded_scene() makes the same scene again.
-  virtual Result<std::string> session_tables() const;
 
   /// From here on of a recorded run. Takes in what else the run folder tells: the scene of each epoch. Errors name
   /// file, line, value, limit.

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <set>
 
 #include "common/volume/session.h"
 #include "services/data/inspect.h"
@@ -125,8 +126,14 @@ Result<std::unique_ptr<DirectScene>> VolumeScene::open_direct(int threads, const
       std::make_unique<DirectVolume>(options_.scene, epochs_, std::move(*store), threads));
 }
 
-std::string VolumeScene::summary(uint64_t) const {
-  return fmt::format(": {} epoch(s)", std::max<size_t>(1, epochs_.by_id.size()));
+std::string VolumeScene::summary(uint64_t primitives) const {
+  constexpr size_t kShort = 40;  // a transfer function of many points is long
+  std::string transfer = options_.volume.transfer.empty() ? "that fits" : options_.volume.transfer;
+  if (transfer.size() > kShort) transfer = transfer.substr(0, kShort) + "...";
+  std::set<int> steps;
+  for (const auto& [id, epoch] : epochs_.by_id) steps.insert(epoch.step);
+  return fmt::format(": {} voxels, transfer function {}{}", primitives, transfer,
+                     steps.size() > 1 ? fmt::format(", {} steps shown", steps.size()) : "");
 }
 
 Result<data::Description> VolumeScene::describe_data(const data::Progress& progress) const {

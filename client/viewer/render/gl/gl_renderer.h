@@ -45,7 +45,7 @@ class GlRenderer final : public Renderer {
   /// The frame that render() or render_on_gpu() made last; empty (width 0) before the first.
   const GlFrame& last_frame() const { return frame_; }
 
-  const std::string& device() const { return device_; }
+  const std::string& device() const override { return device_; }
   bool is_software() const { return gl::is_software(device_); }
 
  private:

@@ -1,0 +1,94 @@
+#include "client/viewer/session_record.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/core/log.h"
+#include "common/metrics/run_folder.h"
+#include "common/scene/session.h"
+
+namespace telesplat::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMostViewers = 100;  // of one name in a folder
+
+// Whether this process made it: of several only one did.
+bool made(const std::string& folder) {
+  std::error_code error;
+  return fs::create_directory(folder, error) && !error;
+}
+
+// A viewer's name as a folder's.
+std::string folder_name(const std::string& name) {
+  std::string out;
+  for (const char c : name) out += std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' ? c : '-';
+  return out.starts_with("viewer-") ? out : "viewer-" + out;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SessionRecord>> SessionRecord::open(const Options& options) {
+  std::unique_ptr<SessionRecord> out(new SessionRecord(options));
+  if (!options.out.empty())
+    if (const Status s = out->open_in(options.out); !s) return s.error();
+  return out;
+}
+
+Status SessionRecord::open_in(const std::string& directory) {
+  auto spool = FrameSpool::open(directory + "/spool");
+  if (!spool) return spool.error();
+  if (options_.received_mb > 0) {
+    auto events = EventRecorder::open(directory + "/points.events", options_.received_mb << 20);
+    if (!events) return events.error();
+    events_ = std::move(*events);
+    slices_ = std::make_unique<SliceRecorder>(directory + "/slices.events", options_.received_mb << 20);
+  }
+  spool_ = std::move(*spool);
+  directory_ = directory;
+  spool_ready_ = spool_.get();
+  return ok_status();
+}
+
+void SessionRecord::follow(const wire::Welcome& session) {
+  if (std::exchange(known_, true)) return;
+  const std::string folder = scene::value_or(session.facts, "run_folder", std::string()),
+                    id = scene::value_or(session.facts, "run_id", std::string());
+  if (folder.empty() || id.empty()) return;  // the session keeps no record
+  std::error_code error;
+  if (!options_.out.empty()) {
+    const fs::path own = fs::absolute(options_.out, error).lexically_normal();
+    const fs::path named = own.has_filename() ? own : own.parent_path();
+    if (metrics::folder_id(named) == id)
+      records_in_ = ".";
+    else if (metrics::folder_id(named.parent_path()) == id)
+      records_in_ = named.filename().string();
+    return;
+  }
+  if (!options_.join) return;
+  if (metrics::folder_id(folder) != id)
+    return log::info("the run's folder {} is not on this machine: --out is needed to keep pictures", folder);
+  if (const Status s = join(folder, id); !s) log::warn("no pictures are kept: {}", s.error().text);
+}
+
+// The first viewer records into the folder itself, others into one of their own in it. Whoever makes images/ is first.
+Status SessionRecord::join(const std::string& folder, const std::string& id) {
+  if (made(folder + "/images")) {
+    records_in_ = ".";
+    return open_in(folder);
+  }
+  const std::string name = folder_name(options_.name);
+  for (int n = 1; n <= kMostViewers; ++n) {
+    const std::string own = n == 1 ? name : fmt::format("{}-{}", name, n);
+    if (!made(folder + "/" + own)) continue;
+    records_in_ = own;
+    log::info("pictures go to {}/{}", folder, own);
+    return open_in(folder + "/" + own);
+  }
+  return Error{fmt::format("{}: no folder {} can be made in it for run {}", folder, name, id)};
+}
+
+}  // namespace telesplat::viewer

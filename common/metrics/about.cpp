@@ -1,0 +1,115 @@
+#include "common/metrics/about.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "common/metrics/roster.h"
+#include "common/scene/session.h"
+
+namespace telesplat::metrics {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json text_or_null(const std::string& text) { return text.empty() ? ordered_json() : ordered_json(text); }
+
+// A fact that is a number. Whole numbers stay whole.
+ordered_json number_or_null(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0') return {};
+  if (value == double(int64_t(value))) return int64_t(value);
+  return value;
+}
+
+std::string fact(const Process& p, const char* key) { return scene::value_or(p.facts, key, std::string()); }
+
+// Each machine that took part, and who ran on it.
+ordered_json machines(const std::vector<Process>& processes) {
+  ordered_json out = ordered_json::array();
+  for (const Process& p : processes) {
+    const std::string host = fact(p, "host");
+    if (host.empty() || p.replaced) continue;
+    auto known = std::find_if(out.begin(), out.end(), [&](const auto& m) { return m["host"] == host; });
+    if (known == out.end()) {
+      out.push_back({{"host", host},
+                     {"processor", nullptr},
+                     {"cores", nullptr},
+                     {"memory_mb", nullptr},
+                     {"gpu", nullptr},
+                     {"processes", ordered_json::array()}});
+      known = out.end() - 1;
+    }
+    for (const char* key : {"processor", "gpu"})
+      if (const std::string text = fact(p, key); !text.empty()) (*known)[key] = text;
+    for (const char* key : {"cores", "memory_mb"})
+      if (const auto value = number_or_null(fact(p, key)); !value.is_null()) (*known)[key] = value;
+    (*known)["processes"].push_back(p.name);
+  }
+  return out;
+}
+
+// The launcher's command line; of a session that was started by hand everyone's own.
+ordered_json commands(const std::vector<Process>& processes) {
+  auto by_hand = ordered_json::object();
+  for (const Process& p : processes) {
+    if (const std::string launched_by = fact(p, "launched_by"); p.role == "master" && !launched_by.empty())
+      return launched_by;
+    if (const std::string command = fact(p, "command"); !command.empty()) by_hand[p.name] = command;
+  }
+  return by_hand.empty() ? ordered_json() : by_hand;
+}
+
+ordered_json data_of(const Roster& roster) {
+  const std::string file = roster.fact("data", "data_file");
+  if (file.empty()) return {};
+  return {{"file", file},
+          {"bytes", number_or_null(roster.fact("data", "data_bytes"))},
+          {"hash", text_or_null(roster.fact("data", "data_hash"))}};
+}
+
+ordered_json trajectory_of(const Roster& roster) {
+  const std::string name = roster.fact("viewer", "trajectory");
+  if (name.empty()) return {};
+  return {{"name", name},
+          {"file", text_or_null(roster.fact("viewer", "trajectory_file"))},
+          {"hash", text_or_null(roster.fact("viewer", "trajectory_hash"))}};
+}
+
+// What the first viewer was asked to do.
+ordered_json asked_of(const Roster& roster) {
+  ordered_json out;
+  for (const char* key : {"duration_s", "frames", "hold_s", "verify_every", "target_fps", "update_rate", "fov_deg"})
+    out[key] = number_or_null(roster.fact("viewer", key));
+  return out;
+}
+
+}  // namespace
+
+bool is_record_text(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const auto control = [](unsigned char c) { return c < 0x20 && c != '\t'; };
+    if (std::any_of(line.begin(), line.end(), control)) return false;
+    const bool heading = line.starts_with('[') && line.ends_with(']');
+    if (!line.empty() && !heading && line.find(" = ") == line.npos) return false;
+  }
+  return true;
+}
+
+ordered_json what_was_done(const About& about, const std::vector<Process>& processes) {
+  const Roster roster(processes);
+  const auto date = [](int64_t ns) { return ns ? ordered_json(iso_time(ns)) : ordered_json(); };
+  ordered_json out{{"id", text_or_null(about.id)},        {"version", text_or_null(about.version)},
+                   {"begin", date(about.begin.unix_ns)},  {"begin_monotonic_s", nullptr},
+                   {"end", date(about.end_unix_ns)},      {"command", commands(processes)},
+                   {"machines", machines(processes)},     {"data", data_of(roster)},
+                   {"trajectory", trajectory_of(roster)}, {"asked", asked_of(roster)},
+                   {"settings", about.settings}};
+  if (about.begin.unix_ns) out["begin_monotonic_s"] = about.begin.monotonic_s;
+  return out;
+}
+
+}  // namespace telesplat::metrics

@@ -1,0 +1,33 @@
+// What was run, where and when: the part of a record that is not measured.
+#pragma once
+
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "common/metrics/beginning.h"
+#include "common/metrics/process.h"
+
+namespace telesplat::metrics {
+
+struct About {
+  std::string id;       ///< the run's own, as in its folder's run.id; empty: none
+  std::string version;  ///< of the master's program; empty: unknown
+  Beginning begin;
+  int64_t end_unix_ns = 0;                 ///< 0: it goes on
+  std::map<std::string, double> settings;  ///< of the session, as everyone was told them
+};
+
+/// Facts by which processes tell the record what the figures do not: lines of session.toml, "\n[table]\nkey = value\n".
+inline constexpr const char* kRecordFact = "record";
+
+/// Whether `text` is lines of session.toml, as far as can be told without a parser: headings and key = value, no
+/// control characters. It comes from other processes, and stands in the file as it is.
+bool is_record_text(const std::string& text);
+
+/// The keys of summary.json that say what was done: version, begin, machines, command, data, trajectory, ... Nothing is
+/// measured; what nobody told is null.
+nlohmann::ordered_json what_was_done(const About& about, const std::vector<Process>& processes);
+
+}  // namespace telesplat::metrics

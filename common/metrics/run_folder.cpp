@@ -1,0 +1,194 @@
+#include "common/metrics/run_folder.h"
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+namespace telesplat::metrics {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kIdFile = "run.id";
+constexpr std::string_view kIdWord = "telesplat-run ";
+constexpr const char* kLatest = "latest";
+
+/// Files that we write, a pattern of names in a folder of a record. What a person may have put there (screenshots,
+/// notes) is not ours.
+struct Ours {
+  const char* folder;
+  std::vector<const char*> names;
+};
+const std::vector<Ours>& ours() {
+  static const std::vector<Ours> table{
+      {"",
+       {"summary.json", "summary.json.part", "frames.csv", "updates.csv", "tiles.csv", "epochs.csv", "assignment.csv",
+        "quality.csv", "trace.json", "session.toml", "points.events", "slices.events"}},
+      {"images", {"frame-*.png", "frame-*.exr", "verify-*.png", "wall.png", "contact-sheet.png"}},
+      {"depth", {"frame-*.depth"}},
+      {"spool", {"*.frame", "*.frame.part"}},
+      {"compare", {"contact-sheet.png", "pose-*.png", "compare.csv", "compare.json"}},
+      {"compare-still", {"contact-sheet.png", "pose-*.png", "compare.csv", "compare.json"}},
+  };
+  return table;
+}
+const Ours kLogFiles{"logs", {"*.log"}};
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::symlink_status(path, error).type() == fs::file_type::directory;
+}
+
+bool is_ours(const Ours& of, const std::string& name) {
+  return std::any_of(of.names.begin(), of.names.end(),
+                     [&](const char* pattern) { return fnmatch(pattern, name.c_str(), FNM_PERIOD) == 0; });
+}
+
+/// What lies in a record's folder under names of ours.
+struct Found {
+  std::vector<std::string> files, folders, links;  ///< relative to the folder; folders: inner ones first
+};
+
+// prefix: of what is found, "" or "viewer-2/".
+void look(const fs::path& directory, const std::string& prefix, const Ours& of, Found& out) {
+  const std::string inner = *of.folder ? prefix + of.folder + "/" : prefix;
+  const fs::path folder = directory / inner;
+  std::error_code error;
+  if (fs::is_symlink(fs::symlink_status(directory / (prefix + of.folder), error))) {
+    out.links.push_back(prefix + of.folder);
+    return;
+  }
+  if (!is_folder(folder)) return;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!is_ours(of, name)) continue;
+    const auto type = entry->symlink_status(error).type();
+    if (type == fs::file_type::symlink) out.links.push_back(inner + name);
+    if (type == fs::file_type::regular) out.files.push_back(inner + name);
+  }
+  if (*of.folder) out.folders.push_back(prefix + of.folder);
+}
+
+void look_everywhere(const fs::path& directory, const std::string& prefix, Logs logs, Found& out) {
+  for (const Ours& of : ours()) look(directory, prefix, of, out);
+  if (logs == Logs::kOurs) look(directory, prefix, kLogFiles, out);
+}
+
+// Further viewers have a folder of their own in it: the launcher's are viewer-N, others bear the run's id.
+Found look_into(const std::string& directory, Logs logs) {
+  Found out;
+  look_everywhere(directory, "", logs, out);
+  std::error_code error;
+  for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!is_folder(entry->path()) || (!name.starts_with("viewer-") && folder_id(entry->path()).empty())) continue;
+    Found inner;
+    look_everywhere(directory, name + "/", logs, inner);
+    for (auto [from, to] :
+         {std::pair{&inner.files, &out.files}, {&inner.folders, &out.folders}, {&inner.links, &out.links}})
+      to->insert(to->end(), from->begin(), from->end());
+    if (fs::exists(fs::symlink_status(directory + "/" + name + "/" + kIdFile, error)))
+      out.files.push_back(name + "/" + kIdFile);
+    if (!inner.folders.empty()) out.folders.push_back(name);
+  }
+  std::sort(out.files.begin(), out.files.end());
+  return out;
+}
+
+// "summary.json, frames.csv and 12 more"
+std::string list_of(const std::vector<std::string>& files) {
+  constexpr size_t kNamed = 3;
+  std::string out;
+  for (size_t i = 0; i < std::min(files.size(), kNamed); ++i) out += (i ? ", " : "") + files[i];
+  return files.size() > kNamed ? out + fmt::format(" and {} more", files.size() - kNamed) : out;
+}
+
+// A folder that earlier versions left has no id, but what a master begins with.
+bool is_record(const std::string& directory, const Found& found) {
+  const auto has = [&](const char* name) {
+    return std::find(found.files.begin(), found.files.end(), name) != found.files.end();
+  };
+  return !folder_id(directory).empty() || (has("frames.csv") && has("tiles.csv") && has("trace.json"));
+}
+
+void remove_found(const std::string& directory, const Found& found) {
+  std::error_code error;
+  for (const auto& file : found.files) fs::remove(directory + "/" + file, error);
+  for (const auto& folder : found.folders) fs::remove(directory + "/" + folder, error);  // empty ones only
+}
+
+std::string new_id() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
+}
+
+}  // namespace
+
+std::vector<std::string> recorded_files(const std::string& directory, Logs logs) {
+  return look_into(directory, logs).files;
+}
+
+std::string folder_id(const std::string& directory) {
+  const std::string path = directory + "/" + kIdFile;
+  std::error_code error;
+  if (fs::symlink_status(path, error).type() != fs::file_type::regular) return {};
+  std::ifstream in(path);
+  std::string line;
+  std::getline(in, line);
+  return line.starts_with(kIdWord) ? line.substr(kIdWord.size(), 64) : std::string();
+}
+
+Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) return Error{fmt::format("{}: cannot be made a run folder: {}", directory, error.message())};
+  const Found found = look_into(directory, logs);
+  if (!found.links.empty())
+    return Error{
+        fmt::format("{}/{}: is a symbolic link, which a run would write through; remove it, or give another "
+                    "--out",
+                    directory, found.links.front())};
+  if (!found.files.empty() && !overwrite)
+    return Error{fmt::format("{}: holds a record already ({}); give another --out, or --overwrite to replace it",
+                             directory, list_of(found.files))};
+  if (!found.files.empty() && !is_record(directory, found))
+    return Error{fmt::format("{}: holds {}, but is no run's record, so nothing of it is removed; give another --out",
+                             directory, list_of(found.files))};
+  remove_found(directory, found);
+  const std::string path = directory + "/" + kIdFile, id = new_id();
+  if (fs::is_symlink(fs::symlink_status(path, error))) return Error{path + ": is a symbolic link; remove it"};
+  std::ofstream out(path);
+  out << kIdWord << id << "\n";
+  out.close();
+  if (!out) return Error{fmt::format("{}: cannot be written to", directory)};
+  return id;
+}
+
+void remove_record(const std::string& directory, bool folder_too) {
+  std::error_code error;
+  if (folder_id(directory).empty()) return;
+  remove_found(directory, look_into(directory, Logs::kOurs));
+  fs::remove(directory + "/" + kIdFile, error);
+  if (folder_too) fs::remove(directory, error);
+}
+
+void point_latest(const std::string& directory) {
+  std::error_code error;
+  const fs::path folder = fs::canonical(directory, error);
+  if (error || folder.parent_path().filename() != "runs" || folder.filename() == kLatest) return;
+  const fs::path link = folder.parent_path() / kLatest;
+  const auto before = fs::symlink_status(link, error).type();
+  if (before != fs::file_type::not_found && before != fs::file_type::symlink) return;
+  const fs::path part = folder.parent_path() / fmt::format(".latest-{}", getpid());
+  fs::remove(part, error);
+  fs::create_directory_symlink(folder.filename(), part, error);
+  if (!error) fs::rename(part, link, error);
+  if (error) fs::remove(part, error);
+}
+
+}  // namespace telesplat::metrics

@@ -1,0 +1,34 @@
+// The folder of a run's record: what is ours in it, whose it is, and how it is begun, given up and found again.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/core/result.h"
+
+namespace telesplat::metrics {
+
+/// Who looks: a launcher writes logs too; a master that is started by hand finds those of others there.
+enum class Logs { kOurs, kOthers };
+
+/// The files of a record that lie in `directory`, relative to it, sorted: those that runs and `telesplat compare` write,
+/// by their names. Whatever else lies there is not among them, and no symbolic link is followed. run.id is left out.
+std::vector<std::string> recorded_files(const std::string& directory, Logs logs = Logs::kOurs);
+
+/// Makes `directory` the folder of a new record: makes it if need be, and writes run.id into it. Returns the new id.
+/// Error, naming the folder: it cannot be written to; it holds a record already and overwrite is not set; it is to be
+/// overwritten, but is no record; a name of ours is a symbolic link. With overwrite the files of the record before are
+/// removed, and folders of ours that are empty then; nothing else.
+Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs);
+/// The id in the folder's run.id; empty: there is none.
+std::string folder_id(const std::string& directory);
+
+/// Removes what begin_folder() and the run after it left: a record that shall not be. folder_too: the folder itself, if
+/// it is empty then.
+void remove_record(const std::string& directory, bool folder_too);
+
+/// If the folder lies in one that is called "runs": makes "latest" there a symbolic link to it, in one step. Something
+/// else of that name stays.
+void point_latest(const std::string& directory);
+
+}  // namespace telesplat::metrics

@@ -1,0 +1,80 @@
+#include "services/data/record.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "services/data/volume/volume.h"
+
+namespace telesplat::data {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPolite = 15;  // levels of nice
+
+std::vector<std::string> files_in(const std::string& folder) {
+  std::vector<std::string> out;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (entry->is_regular_file(error) && !name.starts_with('.')) out.push_back(entry->path().string());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+}  // namespace
+
+std::string scene_lines(const DataOptions& o, scene::Kind kind) {
+  DataOptions given = o, usual;
+  std::error_code error;
+  const std::string file = fs::absolute(given.scene, error).string();
+  // Where it stood is told even if it stood as usual: what is usual may change.
+  const auto defaults = options::without(scene_table(usual), {"--room-size", "--up"});
+  return fmt::format("\n[scene]\nkind = {}\nfile = {}\n{}", options::quoted(std::string(scene::name_of(kind))),
+                     options::quoted(file), options::recorded(scene_table(given), defaults));
+}
+
+std::string record_of(const DataOptions& o, const Served& served) {
+  std::string own = served.record();
+  return own.empty() ? scene_lines(o, served.kind()) : own;
+}
+
+std::vector<std::string> files_of(const DataOptions& o, scene::Kind kind) {
+  if (kind == scene::Kind::kJulia) return {};
+  std::vector<std::string> paths{o.scene};
+  if (kind == scene::Kind::kVolume)
+    if (const auto volume = find_volume(o.scene, o.volume.raw)) paths = volume->steps;
+  std::vector<std::string> out;
+  std::error_code error;
+  for (const std::string& path : paths) {
+    if (!fs::is_directory(path, error)) {
+      out.push_back(path);
+      continue;
+    }
+    const auto inside = files_in(path);
+    out.insert(out.end(), inside.begin(), inside.end());
+  }
+  return out;
+}
+
+BackgroundHash::BackgroundHash(std::vector<std::string> files)
+    : thread_([this, files = std::move(files)] {
+        net::lower_thread_priority(kPolite);
+        if (files.empty()) return;
+        if (const auto hash = hash_of_files(files, [this] { return !stop_; })) hash_ = *hash;
+        done_ = true;
+      }) {}
+
+BackgroundHash::~BackgroundHash() {
+  stop_ = true;
+  thread_.join();
+}
+
+std::optional<FileHash> BackgroundHash::take() {
+  return done_.exchange(false) ? std::exchange(hash_, std::nullopt) : std::nullopt;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,121 @@
+#include "tools/telesplat/run/after_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "client/viewer/record/frame_spool.h"
+#include "common/metrics/run_folder.h"
+#include "common/net/service.h"
+#include "tools/common/complain.h"
+#include "tools/telesplat/run/run_report.h"
+#include "tools/telesplat/run/verify.h"
+#include "tools/telesplat/run/wall.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+}  // namespace
+
+void AfterRun::develop_pictures() {
+  std::error_code error;
+  for (int i = 1; i <= o_.viewers; ++i) {
+    const std::string folder = viewer_directory(o_.out, i), spool = folder + "/spool";
+    if (!fs::is_directory(spool, error)) continue;
+    const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("picture {} of {}", done, of)); };
+    const auto go_on = [] { return !net::stop_requested(); };
+    if (const Status s = viewer::develop_frames(spool, folder + "/images", tell, go_on); !s) {
+      progress_.line("telesplat: " + s.error().text);
+      developed_ = false;
+    }
+    if (fs::is_empty(spool, error)) fs::remove(spool, error);
+    progress_.close();
+  }
+}
+
+// The first displayed frame becomes a picture, where the figures are another's.
+bool AfterRun::displayed() const {
+  if (!o_.join_master.empty()) {
+    const auto files = metrics::recorded_files(o_.out);
+    return std::any_of(files.begin(), files.end(), [](const auto& f) { return f.find("frame") != f.npos; });
+  }
+  std::ifstream in(o_.out + "/summary.json");
+  const auto summary = nlohmann::json::parse(in, nullptr, false);
+  return summary.is_object() && summary.value("frames", uint64_t{0}) > 0;
+}
+
+int AfterRun::run(bool stopped, const std::string& master_folder) {
+  if (const int code = verify(stopped)) return code;
+  if (o_.join_master.empty())
+    print_report(o_.out);
+  else
+    print_joined(o_.out, master_folder);
+  if (const int code = stitch(stopped)) return code;
+  return make_the_movie(stopped);
+}
+
+int AfterRun::verify(bool stopped) {
+  if (o_.viewer.display.verify_every == 0) return 0;
+  if (!o_.join_master.empty()) {
+    progress_.line("frames of a joined session are not verified: its data are with its data server");
+    drop_spools();
+    return 0;
+  }
+  if (stopped) progress_.line("what was displayed is verified; Ctrl-C leaves that out");
+  // The scene as it was opened, with what the record tells of its epochs: session.toml cannot tell every file's name.
+  if (const Status s = scene_->read_record(o_.out); !s) return tools::complain(s.error());
+  auto direct = scene_->open_direct(0, [](const char*, double) {});
+  if (!direct) return tools::complain(direct.error());
+  const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("verifying view {} of {}", done, of)); };
+  const Status verified = verify_run(o_.out, **direct, o_.viewer.display.shading, tell, net::stop_requested);
+  progress_.close();
+  return verified ? 0 : tools::complain(verified.error(), 1);
+}
+
+// The wall's picture, and the moments its tiles are of. A run that was stopped need not have one of each tile.
+int AfterRun::stitch(bool stopped) const {
+  if (o_.viewer.wall.empty()) return 0;
+  const auto tiles = stitch_wall(o_.out, *viewer::parse_wall(o_.viewer.wall));
+  if (!tiles) return tools::complain(tiles.error(), stopped ? 0 : 1);
+  std::string moments;
+  for (const auto& t : *tiles)
+    moments += fmt::format("{}{} frame {} at {:.2f} s", moments.empty() ? "" : ", ", t.viewer, t.frame, t.t_s);
+  std::printf("The wall's picture is images/wall.png, of %s\n", moments.c_str());
+  return 0;
+}
+
+// Whoever stops the run does not want to wait for a movie; Ctrl-C interrupts the movie, too.
+int AfterRun::make_the_movie(bool stopped) {
+  if (!movie_) return 0;
+  const std::string& file = movie_->options.file;
+  const std::string later =
+      fmt::format("telesplat movie {} {} makes it of the record", shell_quoted(o_.out), shell_quoted(file));
+  if (stopped || net::stop_requested()) {
+    progress_.line(fmt::format("{} was not made; {}", file, later));
+    return 0;
+  }
+  const auto report = make_movie(o_.out, *movie_, progress_, net::stop_requested);
+  if (!report) return tools::complain(report.error(), 1);
+  if (!report->written) return tools::complain(report->written.error(), 1);
+  for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
+  if (report->interrupted) progress_.line(fmt::format("interrupted: {} was not made; {}", file, later));
+  return report->interrupted ? kInterrupted : 0;
+}
+
+void AfterRun::drop_spools() const {
+  if (!developed_) return;  // whoever finds out why may need them
+  std::error_code error;
+  for (int i = 1; i <= o_.viewers; ++i) {
+    const std::string spool = viewer_directory(o_.out, i) + "/spool";
+    for (const auto& frame : viewer::spooled_frames(spool)) fs::remove(frame, error);
+    fs::remove(spool, error);
+  }
+}
+
+}  // namespace telesplat::launcher
