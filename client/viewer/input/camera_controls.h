@@ -23,8 +23,8 @@ class CameraControls {
   /// home: where reset() leads to, around a data set of 0.8 m at the origin, as long as nothing else is told.
   explicit CameraControls(const geometry::Pose& home = geometry::default_pose());
 
-  /// The data set's box, which limits and speeds follow, and its home. The camera goes there if nobody has moved it yet.
-  /// A box that no camera can show changes nothing.
+  /// The data set's box, which limits and speeds follow, and its home. The camera goes there if nobody has moved it
+  /// yet. A box that no camera can show changes nothing.
   void set_scene(const geometry::Box& box_room, const geometry::Pose& home);
 
   /// Around the pivot (the data set's centre until panned), half a turn a window height. In flight: looks around.

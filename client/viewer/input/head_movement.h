@@ -1,5 +1,5 @@
-// What moves the head, as --trajectory, --eye, --look-at and --loop say it. What depends on the data set's box is worked
-// out once that is known.
+// What moves the head, as --trajectory, --eye, --look-at and --loop say it. What depends on the data set's box is
+// worked out once that is known.
 #pragma once
 
 #include <memory>
@@ -22,7 +22,8 @@ struct HeadMovement {
   geometry::Trajectory trajectory(const geometry::Box& box_room, const geometry::Camera& frustum) const;
 };
 
-/// name: "orbit", "still", or a CSV file, which is read. Error: names the file and what is wrong, or says what there is.
+/// name: "orbit", "still", or a CSV file, which is read. Error: names the file and what is wrong, or says what there
+/// is.
 Result<HeadMovement> head_movement(const std::string& name, bool loop);
 
 /// "x,y,z" in metres. Error: what is wrong with it, without the flag's name.

@@ -21,7 +21,8 @@ class VolumeRaycaster {
   VolumeRaycaster(const volume::Grid& grid, const volume::Voxels& voxels, std::vector<volume::LevelColour> colours,
                   int threads);
   ~VolumeRaycaster();
-  /// Colours over background, in the upper byte how much of the pixel the volume covers; depth as volume::WarpTarget has it.
+  /// Colours over background, in the upper byte how much of the pixel the volume covers; depth as volume::WarpTarget
+  /// has it.
   image::View draw(const geometry::Camera& camera, uint32_t background, double step = 0.25) const;
 
  private:

@@ -19,8 +19,7 @@ TEST(Wall, TilesSeeTogetherWhatTheWholeSees) {
   whole.width = 3 * 80;
   whole.height = 2 * 50;
   whole.duration_s = 10;
-  const HeadMovement movement{.recorded =
-                                  std::make_shared<const geometry::Trajectory>(geometry::Trajectory::orbit())};
+  const HeadMovement movement{.recorded = std::make_shared<const geometry::Trajectory>(geometry::Trajectory::orbit())};
   Look look;
   HeadlessSurface all(whole, movement);
   const geometry::Camera reference = all.begin_frame(0, 3.5, look);
