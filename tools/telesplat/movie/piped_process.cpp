@@ -109,6 +109,7 @@ bool PipedProcess::write(std::span<const std::byte> bytes, const ShouldStop& sho
 
 int PipedProcess::finish(const ShouldStop& should_stop) {
   close_input();
+  if (pid_ < 0) return -1;  // it was waited for already
   int status = 0;
   while (waitpid(pid_, &status, WNOHANG) == 0) {
     if (should_stop()) return -1;

@@ -253,6 +253,12 @@ Result<RecordedRun> read_viewer(const std::string& directory, const toml::table&
   return run;
 }
 
+// Where in the run's folder it recorded.
+std::string folder_of(const toml::table& viewer) {
+  const std::string told = text_of(viewer, "records_in");
+  return told.empty() ? text_of(viewer, "name") : told;
+}
+
 // The viewers of the wall's tiles, in their order.
 Result<std::vector<const toml::table*>> wall_viewers(const std::string& path, const toml::table& session,
                                                      const std::string& wall) {
@@ -261,10 +267,10 @@ Result<std::vector<const toml::table*>> wall_viewers(const std::string& path, co
   std::vector<const toml::table*> out(size_t(layout->tiles()));
   for (const toml::table* t : viewers(session)) {
     const double tile = number(toml::node_view<const toml::node>((*t)["wall_tile"]), -1);
-    const std::string name = text_of(*t, "name");
+    const std::string name = folder_of(*t);
     if (text_of(*t, "wall") != wall || !(tile >= 0 && tile < layout->tiles())) continue;
-    if (name.empty() || name.front() == '.' || name.find('/') != name.npos)
-      return Error{fmt::format("{}: a viewer's name is {:?}, which names no folder", path, name)};
+    const bool folder = name == "." || (!name.empty() && name.front() != '.' && name.find('/') == name.npos);
+    if (!folder) return Error{fmt::format("{}: a viewer recorded in {:?}, which is no folder in it", path, name)};
     out[size_t(tile)] = t;
   }
   for (size_t i = 0; i < out.size(); ++i)
@@ -307,7 +313,7 @@ Result<std::vector<RecordedRun>> read_recorded_displays(const std::string& direc
     if (!out.empty() && (run->width != out.front().width || run->height != out.front().height))
       return Error{fmt::format("{}: the wall's tile {} has {}x{} pixels, its first {}x{}", path, out.size(), run->width,
                                run->height, out.front().width, out.front().height)};
-    if (viewer != own) run->directory += "/" + text_of(*viewer, "name");
+    if (viewer != own) run->directory += "/" + folder_of(*viewer);
     out.push_back(std::move(*run));
   }
   return out;

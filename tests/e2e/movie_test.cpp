@@ -1,0 +1,303 @@
+// Movies of recorded runs: their frames are those that were displayed, to the last bit; what goes wrong is said.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "common/image/file.h"
+#include "tests/support/pipeline_run.h"
+#include "tools/common/csv_table.h"
+#include "tools/telesplat/movie/movie_target.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int code = 0;
+  std::string out, err;
+};
+
+Outcome telesplat(const TemporaryFolder& folder, const std::vector<std::string>& arguments) {
+  Program program("telesplat", arguments, folder / "telesplat");
+  Outcome o;
+  o.code = program.wait(100);
+  o.out = program.out();
+  o.err = program.err();
+  return o;
+}
+
+Outcome movie(const PipelineRun& run, const std::string& file, std::vector<std::string> more = {}) {
+  more.insert(more.begin(), {"movie", run.out(), file});
+  return telesplat(run.folder(), more);
+}
+
+size_t lines(const std::string& text) { return size_t(std::count(text.begin(), text.end(), '\n')); }
+
+// Where the program is not, what needs it is skipped.
+std::string need(const char* program) { return launcher::find_program(program); }
+
+// What a movie of `fps` frames a second must show: the number of the displayed frame for each of its frames.
+std::vector<uint64_t> on_screen(const std::string& run, double fps) {
+  const auto table = tools::CsvTable::read(run + "/frames.csv", {});
+  EXPECT_TRUE(table.ok()) << table.error().text;
+  const auto t = table->numbers(*table->column("t_s")), took = table->numbers(*table->column("construction_ms")),
+             number = table->numbers(*table->column("frame"));
+  const auto shown_s = [&](size_t i) { return t[i] + took[i] / 1e3 - (t[0] + took[0] / 1e3); };
+  std::vector<uint64_t> out;
+  size_t i = 0;
+  for (size_t k = 0; double(k) / fps <= shown_s(t.size() - 1); ++k) {
+    while (i + 1 < t.size() && shown_s(i + 1) <= double(k) / fps) ++i;
+    out.push_back(uint64_t(number[i]));
+  }
+  return out;
+}
+
+// The movie's pictures beside those that the run recorded of the same frames. Returns how many were compared.
+size_t expect_as_displayed(const PipelineRun& run, double fps) {
+  const std::string folder = run.folder() / "frames";
+  const Outcome made = movie(run, folder + "/", {"--fps", fmt::format("{}", fps)});
+  EXPECT_EQ(made.code, 0) << made.err;
+  const auto wanted = on_screen(run.out(), fps);
+  size_t compared = 0;
+  for (size_t k = 0; k < wanted.size(); ++k) {
+    const std::string mine = fmt::format("{}/{:06}.png", folder, k);
+    const std::string recorded = fmt::format("{}/images/frame-{:06}.png", run.out(), wanted[k]);
+    EXPECT_TRUE(fs::exists(mine)) << mine;
+    if (!fs::exists(recorded) || !fs::exists(mine)) continue;  // the disk did not keep up
+    const auto a = image::read_view(mine), b = image::read_view(recorded);
+    EXPECT_TRUE(a.ok() && b.ok());
+    if (!a || !b) continue;
+    EXPECT_EQ(a->width, b->width);
+    EXPECT_TRUE(a->colour == b->colour) << "movie frame " << k << " is not displayed frame " << wanted[k];
+    ++compared;
+  }
+  EXPECT_FALSE(fs::exists(fmt::format("{}/{:06}.png", folder, wanted.size()))) << "there is one too many";
+  EXPECT_GT(compared, wanted.size() / 2);
+  return compared;
+}
+
+const std::vector<std::string> kEveryFrame{"--record-every", "1", "--duration", "2", "--size", "160x120"};
+
+std::vector<std::string> with(std::vector<std::string> a, const std::vector<std::string>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+TEST(Movie, OfAMeshShowsWhatWasDisplayedToTheLastBit) {
+  PipelineRun run(kEveryFrame);
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  EXPECT_GT(expect_as_displayed(run, 25), 20u);
+  const auto made = run.column("frames.csv", "summaries");
+  EXPECT_GT(made.back(), 0) << "nothing was drawn from summaries: the test shows less than it should";
+}
+
+TEST(Movie, OfAMeshDrawnByOpenGlShowsWhatWasDisplayedToTheLastBit) {
+  PipelineRun run(with(kEveryFrame, {"--renderer", "gl", "--splat", "ellipse", "--shading", "head"}));
+  const int code = run.program().wait();
+  if (code != 0) GTEST_SKIP() << "no OpenGL: " << run.program().err();
+  EXPECT_GT(expect_as_displayed(run, 10), 5u);
+}
+
+TEST(Movie, OfAJuliaSetWhoseParametersChangeShowsWhatWasDisplayedToTheLastBit) {
+  PipelineRun run(with(kEveryFrame, {"--animate", "c.y=-0.5:-0.3:2s", "--background", "#ffffff"}), "julia");
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  EXPECT_GT(expect_as_displayed(run, 30), 20u);
+  EXPECT_GT(run.column("frames.csv", "epoch").back(), 2);
+}
+
+TEST(Movie, OfAVolumeShowsWhatWasDisplayedToTheLastBit) {
+  TemporaryFolder data;
+  write_volume(data / "balls.mha");
+  PipelineRun run(with(kEveryFrame, {"--samplers", "2"}), data / "balls.mha");
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  EXPECT_TRUE(fs::exists(run.out() + "/slices.events"));
+  EXPECT_GT(expect_as_displayed(run, 30), 20u);
+}
+
+TEST(Movie, OfFramesThatWaitedForUpdatesShowsWhatWasDisplayedToTheLastBit) {
+  PipelineRun run(with(kEveryFrame, {"--coupling", "loose", "--splat", "ewa"}));
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  EXPECT_GT(expect_as_displayed(run, 20), 10u);
+}
+
+TEST(Movie, OfATransparentRunHasPicturesWithItsAlpha) {
+  for (const char* scene : {"", "volume"}) {
+    TemporaryFolder data;
+    write_volume(data / "balls.mha");
+    PipelineRun run(with(kEveryFrame, {"--background", "transparent"}), *scene ? data / "balls.mha" : "");
+    ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+    ASSERT_EQ(movie(run, run.folder() / "frames/", {"--fps", "10"}).code, 0);
+    const auto wanted = on_screen(run.out(), 10);
+    // The same bytes: read_view() knows no alpha.
+    size_t compared = 0;
+    for (size_t k = 0; k < wanted.size(); ++k) {
+      const std::string recorded = read_text(fmt::format("{}/images/frame-{:06}.png", run.out(), wanted[k]));
+      if (recorded.empty()) continue;
+      ASSERT_GT(recorded.size(), 26u);
+      EXPECT_EQ(recorded[25], 6) << "not RGBA";
+      EXPECT_TRUE(read_text(run.folder() / fmt::format("frames/{:06}.png", k)) == recorded) << k;
+      ++compared;
+    }
+    EXPECT_GT(compared, 5u);
+  }
+}
+
+TEST(Movie, OfAWallIsThePictureOfAllItsTiles) {
+  PipelineRun run({"--wall", "2x1", "--size", "96x80", "--duration", "2"});
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  const Outcome made = movie(run, run.folder() / "wall/", {"--fps", "10"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  const auto picture = image::read_view(run.folder() / "wall/000005.png");
+  ASSERT_TRUE(picture.ok());
+  EXPECT_EQ(picture->width, 192);
+  EXPECT_EQ(picture->height, 80);
+  const auto shows = [&](int from) {
+    size_t different = 0;
+    for (int y = 0; y < 80; ++y)
+      for (int x = from; x < from + 96; ++x)
+        different += picture->colour[size_t(y) * 192 + size_t(x)] != picture->colour[0];
+    return different;
+  };
+  EXPECT_GT(shows(0), 500u);
+  EXPECT_GT(shows(96), 500u);
+  EXPECT_EQ(movie(run, run.folder() / "odd/", {"--size", "191x80"}).code, 2);
+}
+
+TEST(Movie, AsAVideoHasTheRateTheSizeAndTheNumberOfFrames) {
+  if (need("ffmpeg").empty() || need("ffprobe").empty()) GTEST_SKIP() << "ffmpeg is not installed";
+  TemporaryFolder target;
+  const std::string file = target / "a flight.mp4";
+  PipelineRun run({"--duration", "2", "--size", "161x121", "--movie", file, "--movie-fps", "25"});
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_NE(run.program().out().find(file), std::string::npos) << run.program().out();
+  ASSERT_TRUE(fs::exists(file));
+  EXPECT_FALSE(fs::exists(file + ".part"));
+  const std::string command = fmt::format(
+      "ffprobe -v error -count_frames -select_streams v -show_entries "
+      "stream=codec_name,width,height,pix_fmt,r_frame_rate,nb_read_frames -of csv=p=0 '{}' > '{}'",
+      file, target / "probed");
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const std::string probed = read_text(target / "probed");
+  EXPECT_NE(probed.find(fmt::format(",160,120,yuv420p,25/1,{}", on_screen(run.out(), 25).size())), std::string::npos)
+      << probed;
+  for (const char* name : {"b.gif", "b.webm", "b.mkv"}) {
+    const Outcome other = movie(run, target / name, {"--fps", "5"});
+    EXPECT_EQ(other.code, 0) << name << ": " << other.err;
+    EXPECT_GT(fs::file_size(target / name), 500u) << name;
+  }
+}
+
+TEST(Movie, WithoutFfmpegIsASequenceOfPicturesAndTellsHowToGoOn) {
+  PipelineRun run({"--duration", "1", "--size", "96x64"});
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", "/nowhere", 1);
+  const Outcome made = movie(run, run.folder() / "flight.mp4", {"--fps", "10"});
+  const Outcome again = movie(run, run.folder() / "flight.mp4", {"--fps", "10"});
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(fs::exists(run.folder() / "flight-frames/000000.png"));
+  EXPECT_TRUE(fs::exists(run.folder() / "flight-frames/000009.png"));
+  EXPECT_FALSE(fs::exists(run.folder() / "flight.mp4"));
+  EXPECT_NE(made.out.find("ffmpeg -framerate 10 -i"), std::string::npos) << made.out;
+  EXPECT_EQ(again.code, 2) << "pictures of two movies would mix";
+}
+
+TEST(Movie, IsRefusedBeforeTheRunBegins) {
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"--movie", "/proc/nowhere/a.mp4"}, "/proc/nowhere/a.mp4: cannot be written"},
+      {{"--movie", "a.xyz"}, "a.xyz: ends in none of"},
+      {{"--movie", "a.mp4", "--movie-size", "13x13"}, "--movie-size 13x13"},
+      {{"--movie", "a.mp4", "--movie-fps", "nan"}, "--movie-fps"},
+      {{"--movie", "a.mp4", "--movie-fps", "0"}, "--movie-fps"},
+      {{"--movie", "a.mp4", "--record-points", "0"}, "--record-points 0"},
+      {{"--movie-fps", "10"}, "no --movie"}};
+  for (const auto& [arguments, reason] : cases) {
+    PipelineRun run(arguments);
+    EXPECT_EQ(run.program().wait(20), 2) << reason;
+    EXPECT_NE(run.program().err().find(reason), std::string::npos) << reason << ": " << run.program().err();
+    EXPECT_EQ(lines(run.program().err()), 1u) << run.program().err();
+    EXPECT_FALSE(fs::exists(run.out())) << reason;
+  }
+}
+
+TEST(Movie, EndsWhereTheRecordWasCutShortAndSaysSo) {
+  TemporaryFolder data;
+  write_volume(data / "balls.mha", 64);
+  for (const std::string& scene : {std::string(), data / "balls.mha"}) {
+    PipelineRun run({"--duration", "3", "--size", "320x240"}, scene);
+    ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+    const std::string record = run.out() + (scene.empty() ? "/points.events" : "/slices.events");
+    fs::resize_file(record, fs::file_size(record) / 2);
+    const Outcome made = movie(run, run.folder() / "frames/", {"--fps", "20"});
+    EXPECT_EQ(made.code, 0) << made.err;
+    EXPECT_NE(made.out.find("the record was cut short"), std::string::npos) << made.out;
+    const size_t all = on_screen(run.out(), 20).size(),
+                 count = size_t(std::distance(fs::directory_iterator(run.folder() / "frames"), {}));
+    EXPECT_GT(count, 0u);
+    EXPECT_LT(count, all);
+  }
+}
+
+TEST(Movie, OfRecordsThatAreNoneIsRefusedInOneLine) {
+  TemporaryFolder data;
+  write_volume(data / "balls.mha", 24);
+  PipelineRun run({"--duration", "1", "--size", "96x64"}, data / "balls.mha");
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  const std::string record = run.out() + "/slices.events", good = read_text(record);
+  const std::pair<std::string, std::string> cases[] = {
+      {"", "is not a record"},
+      {"TSSLICE", "is not a record"},
+      {std::string(5000, '\xff'), "is not a record"},
+      {good.substr(0, 30), "ends before frame"},
+      {good.substr(0, 8) + std::string(300, '\x7f'), "ends before frame"},
+      {good.substr(0, 400) + std::string(good.size() - 400, '\0'), "slices.events"}};
+  for (const auto& [content, reason] : cases) {
+    std::ofstream(record, std::ios::binary | std::ios::trunc) << content;
+    const Outcome made = movie(run, run.folder() / "frames/");
+    EXPECT_EQ(made.code, 2) << reason;
+    EXPECT_NE(made.err.find(reason), std::string::npos) << reason << ": " << made.err;
+    EXPECT_EQ(lines(made.err), 1u) << made.err;
+    EXPECT_FALSE(fs::exists(run.folder() / "frames")) << "nothing is left behind";
+  }
+  fs::remove(record);
+  const Outcome none = movie(run, run.folder() / "frames/");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.err.find("slices.events: is not there"), std::string::npos) << none.err;
+  EXPECT_EQ(telesplat(run.folder(), {"movie", run.folder() / "no-run", "a.mp4"}).code, 2);
+}
+
+TEST(Movie, ThatIsInterruptedLeavesNoFileAndNoProcess) {
+  if (need("ffmpeg").empty()) GTEST_SKIP() << "ffmpeg is not installed";
+  PipelineRun run({"--duration", "3", "--size", "640x480"});
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  const std::string file = run.folder() / "long.mp4";
+  Program program("telesplat", {"movie", run.out(), file, "--fps", "1000"}, run.folder() / "long");
+  ASSERT_TRUE(wait_until([&] { return fs::exists(file + ".part"); }));
+  program.signal(SIGINT);
+  EXPECT_EQ(program.wait(20), 130) << program.err();
+  EXPECT_NE(program.err().find("interrupted"), std::string::npos) << program.err();
+  EXPECT_FALSE(fs::exists(file));
+  EXPECT_FALSE(fs::exists(file + ".part"));
+  EXPECT_TRUE(run.all_gone()) << "an ffmpeg is left";
+}
+
+TEST(Movie, AContactSheetHasThePicturesThatWereAskedFor) {
+  PipelineRun run({"--duration", "1", "--size", "96x64", "--animate", "c.y=-0.5:-0.3:1s"}, "julia");
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  const Outcome made = movie(run, run.folder() / "sheet.png", {"--pictures", "6"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(made.out.find("6 frames of the run"), std::string::npos) << made.out;
+  const auto sheet = image::read_view(run.folder() / "sheet.png");
+  ASSERT_TRUE(sheet.ok());
+  EXPECT_GT(sheet->width, 2 * 96);
+  EXPECT_GT(sheet->height, 2 * 64);
+}
+
+}  // namespace
+}  // namespace telesplat::test
