@@ -155,6 +155,7 @@ Table drawing_table(ViewerOptions& o) {
        .value = &d.legend,
        .help = "on: pictures and the window show what colours mean: the array that colours a mesh, a volume's transfer "
                "function",
+       .reach = Reach::kRecorded,
        .on_off = true},
   };
 }

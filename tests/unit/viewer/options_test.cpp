@@ -30,7 +30,7 @@ TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {
   ViewerOptions o;
   const auto recorded =
       names_of(view_table(o), [](const options::Row& r) { return r.reach == options::Reach::kRecorded; });
-  EXPECT_EQ(recorded, (Texts{"--size", "--fov", "--near", "--background", "--shading"}));
+  EXPECT_EQ(recorded, (Texts{"--size", "--fov", "--near", "--background", "--shading", "--legend"}));
 }
 
 TEST(ViewerFlags, SayWhatDiffersAndReadItBack) {

@@ -44,7 +44,9 @@ EpochCaptions::EpochCaptions(const std::string& run_directory) {
   if (!epoch) return;
   std::vector<size_t> differing;
   for (size_t c = 0; c < table->header().size(); ++c) {
-    if (c == *epoch || table->header()[c] == "t_s") continue;
+    const std::string& name = table->header()[c];
+    if (c == *epoch || name == "t_s" || name.starts_with("room.")) continue;
+    if (table->rows() == 0 || !table->number(0, c)) continue;  // transfer functions and the like are no caption
     for (size_t row = 1; row < table->rows(); ++row)
       if (table->text(row, c) != table->text(0, c)) {
         differing.push_back(c);

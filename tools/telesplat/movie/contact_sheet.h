@@ -11,8 +11,8 @@
 
 namespace telesplat::launcher {
 
-/// What an epoch's row of epochs.csv tells that differs between epochs: "c.y -0.41  slice.offset 0.2". Nothing where
-/// there is one epoch only, or no such file. Values are shortened to `digits`.
+/// Which numbers of an epoch's row of epochs.csv differ between epochs: "c.y -0.41  slice.offset 0.2". Nothing where
+/// there is one epoch only, or no such file. Values have four digits.
 class EpochCaptions {
  public:
   explicit EpochCaptions(const std::string& run_directory);

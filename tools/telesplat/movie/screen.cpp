@@ -24,6 +24,11 @@ Result<Screen> Screen::open(const std::string& directory, int width, int height,
   }
   if (const Status s = out.choose_size(width, height, size_flag); !s) return s.error();
   if (const Status s = out.open_replays(threads); !s) return s.error();
+  if (out.run().legend) {
+    auto legends = EpochLegends::read(directory);
+    if (!legends) return legends.error();
+    out.legends_ = std::move(*legends);
+  }
   out.find_times();
   return out;
 }
@@ -85,6 +90,7 @@ Result<Screen::Shown> Screen::show(double t_s) {
   if (!changed) return Shown::kSame;
   ++drawn_;
   compose();
+  if (const image::Legend* legend = legends_.at(frame().epoch)) image::draw_legend(view_, *legend);
   return Shown::kNew;
 }
 

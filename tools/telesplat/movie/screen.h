@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/telesplat/record/epoch_legends.h"
 #include "tools/telesplat/record/frame_replay.h"
 
 namespace telesplat::launcher {
@@ -50,6 +51,7 @@ class Screen {
   void compose();
 
   std::vector<Tile> tiles_;
+  EpochLegends legends_;
   int width_ = 0, height_ = 0;  // of the whole
   double begin_s_ = 0, duration_s_ = 0;
   uint64_t drawn_ = 0;

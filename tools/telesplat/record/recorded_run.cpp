@@ -127,6 +127,7 @@ Status read_display(const std::string& path, const toml::table& session, const t
   if (!background) return Error{fmt::format("{}: background of [display]: {}", path, background.error().text)};
   run.shading.background = background->colour;
   run.transparent = background->transparent;
+  run.legend = session["display"]["legend"].value_or(std::string("on")) != "off";
   if (const Status s = read_wall(path, viewer, run); !s) return s;
   return read_look(path, viewer, run);
 }

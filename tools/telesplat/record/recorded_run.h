@@ -36,6 +36,7 @@ struct RecordedRun {
   double fov_deg = 0, near_m = 0;
   std::string sampling_size, renderer, kernel;  ///< as they were, for captions
   image::ShadingParameters shading;
+  bool legend = true;            ///< pictures told what colours mean, where there was something to tell
   bool transparent = false;      ///< pictures have alpha: nothing lies behind the data
   viewer::Look look;             ///< as the run began
   float splat_scale = 0;         ///< of splat sizes, whatever the kernel; 0: what suits it
