@@ -76,9 +76,9 @@ Status check_pictures(const MovieTarget& target) {
   return check_folder(target.path, target.path);
 }
 
-// Reads "NAME%06d.png". Error: another pattern.
-Status read_pattern(const std::string& name, MovieTarget& out) {
-  const Error wrong{fmt::format("{}: pictures are numbered by one %d, %06d or the like before .png", name)};
+// Reads "NAME%06d.png". Error: another pattern. path: for error texts.
+Status read_pattern(const std::string& name, const std::string& path, MovieTarget& out) {
+  const Error wrong{fmt::format("{}: pictures are numbered by one %d, %06d or the like before .png", path)};
   const size_t percent = name.find('%'), d = name.find('d', percent);
   if (d == name.npos || name.find('%', d) != name.npos) return wrong;
   const std::string width = name.substr(percent + 1, d - percent - 1);
@@ -97,7 +97,7 @@ Result<MovieTarget> pictures(const std::string& name) {
   const fs::path path(name);
   const bool numbered = path.filename().string().find('%') != std::string::npos;
   if (numbered)
-    if (const Status s = read_pattern(path.filename().string(), out); !s) return s.error();
+    if (const Status s = read_pattern(path.filename().string(), name, out); !s) return s.error();
   out.path = (numbered ? path.parent_path() : path).string();
   if (out.path.empty()) out.path = ".";
   if (const Status s = check_pictures(out); !s) return s.error();

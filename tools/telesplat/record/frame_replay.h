@@ -41,7 +41,8 @@ class FrameReplay {
   virtual ~FrameReplay() = default;
 
   /// Draws what the frame showed, for this camera: the frame's own, or one of another size. Where the run's background
-  /// is transparent, colours have the coverage in their upper byte (image/background.h). Frames come in order of display. False: the record ends before it. Errors name the file and what is wrong with it.
+  /// is transparent, colours have the coverage in their upper byte (image/background.h). Frames come in order of
+  /// display. False: the record ends before it. Errors name the file and what is wrong with it.
   virtual Result<bool> draw(const DisplayedFrame& frame, const geometry::Camera& camera, image::View& view) = 0;
 };
 
