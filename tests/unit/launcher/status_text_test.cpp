@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tools/telesplat/control/process_tables.h"
+#include "tools/telesplat/run/live_figures.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -38,13 +39,13 @@ TEST(StatusText, HasEveryFigureInItsPlace) {
   EXPECT_EQ(status_text(volume_status(), begin + 75),
             "head.mha (volume), started by telesplat view at " + local_time(begin, begin + 75) +
                 ", 75 s ago\n"
-                "  address    tcp://127.0.0.1:4711, process 77\n"
-                "  record     none\n"
-                "  views      36 complete, 2 in flight; epoch 3\n"
-                "  leases     1 expired, 5 given to a second sampler; 4 tiles taken back\n"
-                "  animation  on\n"
-                "  volume     step 2 of 12 (0 to 11), 16 layers, 2 partitions made\n"
-                "  transfer   0:#000000:0,255:#ffffff:1\n"
+                "  address     tcp://127.0.0.1:4711, process 77\n"
+                "  record      none\n"
+                "  views       36 complete, 2 in flight; epoch 3\n"
+                "  leases      1 expired, 5 given to a second sampler; 4 tiles taken back\n"
+                "  animation   on\n"
+                "  volume      step 2 of 12 (0 to 11), 16 layers, 2 partitions made\n"
+                "  transfer    0:#000000:0,255:#ffffff:1\n"
                 "\n"
                 "slab of      slices  visible M  voxels M  MB received\n"
                 "sampler-1   0 to 39       1.50      1.50          2.0  ready\n"
@@ -79,6 +80,26 @@ TEST(StatusText, ManyThatLeftAreNotAllNamed) {
   EXPECT_EQ(process_tables(processes),
             "\nleft: sampler-0, sampler-1, sampler-2, sampler-3, sampler-4, sampler-5, sampler-6, sampler-7 and 92 "
             "more\n");
+}
+
+TEST(StatusText, AKindThatTheSceneNamesIsNotSaidTwice) {
+  Json status = volume_status();
+  status["session"]["scene"] = "julia (coral)";
+  status["session"]["kind"] = "julia";
+  EXPECT_TRUE(status_text(status, 0).starts_with("julia (coral), started")) << status_text(status, 0);
+  status["session"]["scene"] = status["session"]["kind"] = "";
+  EXPECT_TRUE(status_text(status, 0).starts_with("no data server yet, started")) << status_text(status, 0);
+}
+
+TEST(ViewerResults, AreOfTheNamedViewersThoughTheyLeft) {
+  const auto status = nlohmann::json::parse(R"({"processes": [
+    {"role": "viewer", "name": "viewer-1", "alive": true, "values": {"frames": 7}},
+    {"role": "viewer", "name": "viewer-1-a-5", "alive": false, "rates": {"frames": 58.71}, "values": {"frames": 285,
+     "updates": 34, "points": 90000, "bytes_received": 1234567}}]})");
+  EXPECT_EQ(viewer_results(status, {"viewer-1-a-5", "viewer-2-a-6"}),
+            std::vector<std::string>{"viewer-1-a-5: 285 frames, 58.7 fps, 34 view updates, 0.09 M points at the end, "
+                                     "1.2 MB received"});
+  EXPECT_TRUE(viewer_results(nlohmann::json::object(), {"viewer-1"}).empty());
 }
 
 // A master of another version, or something that only looks like one.

@@ -17,9 +17,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kColumns = 110, kIndent = 13;  // of a line, and of what a line of the head says
+constexpr size_t kColumns = 110, kIndent = 14;  // of a line, and of what a line of the head says
 
-std::string line(const std::string& what, const std::string& value) { return fmt::format("  {:<11}{}\n", what, value); }
+std::string line(const std::string& what, const std::string& value) { return fmt::format("  {:<12}{}\n", what, value); }
 
 // Words in as many lines as they need.
 std::string wrapped(const std::string& what, const std::vector<std::string>& words) {
@@ -46,7 +46,8 @@ std::string started_by(const std::string& who) { return who == "hand" ? "by hand
 
 std::string title(const Json& session, double now_s) {
   const std::string scene = text(session, "scene"), kind = text(session, "kind");
-  std::string out = scene.empty() ? "no data server yet" : fmt::format("{} ({})", scene, kind);
+  std::string out = scene.empty() ? "no data server yet" : scene;
+  if (!kind.empty() && !scene.starts_with(kind)) out += " (" + kind + ")";
   const double at_s = read_utc(text(session, "started_at"));
   if (at_s > 0)
     out += fmt::format(", started {} at {}, {} ago", started_by(text(session, "started_by")), local_time(at_s, now_s),

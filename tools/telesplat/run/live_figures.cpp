@@ -61,4 +61,21 @@ std::string SessionFigures::update(const nlohmann::json& status, double now_s) {
   return text;
 }
 
+std::vector<std::string> viewer_results(const nlohmann::json& status, const std::vector<std::string>& names) {
+  std::vector<std::string> out;
+  const auto empty = nlohmann::json::object();
+  for (const auto& p : status.value("processes", nlohmann::json::array())) {
+    const std::string name = p.value("name", "");
+    if (std::find(names.begin(), names.end(), name) == names.end() || !p.contains("values")) continue;
+    const auto values = p["values"], rates = p.value("rates", empty);
+    std::string line = fmt::format("{}: {:.0f} frames", name, values.value("frames", 0.0));
+    if (rates.contains("frames")) line += fmt::format(", {:.1f} fps", rates.value("frames", 0.0));
+    line += fmt::format(", {:.0f} view updates", values.value("updates", 0.0));
+    if (const double points = values.value("points", 0.0); points > 0)
+      line += fmt::format(", {:.2f} M points at the end", points / 1e6);
+    out.push_back(line + fmt::format(", {:.1f} MB received", values.value("bytes_received", 0.0) / 1e6));
+  }
+  return out;
+}
+
 }  // namespace telesplat::launcher

@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 namespace telesplat::launcher {
 
@@ -33,5 +34,9 @@ class SessionFigures {
 
   std::map<std::string, Viewer> viewers_;  // by name and process id
 };
+
+/// What viewers did in all, a line each, from a status answer: for a session whose record is another's. names: of the
+/// viewers.
+std::vector<std::string> viewer_results(const nlohmann::json& status, const std::vector<std::string>& names);
 
 }  // namespace telesplat::launcher

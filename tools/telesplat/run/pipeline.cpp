@@ -81,6 +81,13 @@ Status Pipeline::start_wall() {
   return start_viewers(now + kWallLead_s);
 }
 
+std::vector<std::string> Pipeline::viewers() {
+  std::vector<std::string> out;
+  for (const Member& m : group_.members())
+    if (m.role == "viewer") out.push_back(m.name);
+  return out;
+}
+
 Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
   if (!has_viewers_)
     if (const Status s = start_wall(); !s) {

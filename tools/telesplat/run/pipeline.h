@@ -22,6 +22,8 @@ class Pipeline {
   static Result<Pipeline> start(const RunOptions& options);
 
   const std::string& master_endpoint() const { return group_.endpoint(); }
+  /// Names of the viewers that were started.
+  std::vector<std::string> viewers();
 
   enum class State { kRunning, kFinished, kFailed, kBadInput };
   /// Looks after the children; does not wait. Samplers, packer and data that die are restarted (5 times each at most);

@@ -32,6 +32,7 @@ namespace fs = std::filesystem;
 using State = Pipeline::State;
 
 constexpr double kAskEvery_s = 0.5;  // the master for its status
+constexpr double kResultPatience_s = 2;
 
 /// A folder for the logs of a session that leaves nothing behind; kept if something went wrong.
 class PassingFolder {
@@ -72,6 +73,7 @@ class Run {
     const bool stopped = state == State::kRunning;
     if (stopped) net::forget_stop();
     pipeline->finish();
+    if (!o_.join_master.empty()) ask_for_results(*pipeline);
     if (state != State::kBadInput && !o_.out.empty()) after_.develop_pictures();
     for (const auto& n : pipeline->take_notes()) progress_.line(n);
     if (state == State::kBadInput || state == State::kFailed) return clear_up(state);
@@ -126,6 +128,13 @@ class Run {
     return state;
   }
 
+  // The record of a joined session is its master's; so what its viewers did is asked for, once they have left.
+  void ask_for_results(Pipeline& pipeline) {
+    const auto answer = ControlClient(pipeline.master_endpoint()).ask("status", kResultPatience_s);
+    const auto status = answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
+    if (status.is_object()) results_ = viewer_results(status, pipeline.viewers());
+  }
+
   void remove_record() const {
     if (!o_.out.empty()) metrics::remove_record(o_.out, !folder_existed_);
   }
@@ -171,6 +180,7 @@ class Run {
   }
 
   int complete(bool stopped) {
+    for (const auto& line : results_) std::printf("%s\n", line.c_str());
     const int code = after_.run(stopped, master_folder_);
     if (!net::stop_requested() || code == 0) after_.drop_spools();
     if (code != 0) return code;
@@ -186,7 +196,8 @@ class Run {
   std::shared_ptr<Scene> scene_;
   std::optional<MoviePlan> movie_;
   bool folder_existed_ = false;
-  std::string master_folder_;  // where the session's record is; empty: not known, or nowhere
+  std::string master_folder_;         // where the session's record is; empty: not known, or nowhere
+  std::vector<std::string> results_;  // of the viewers of a joined session
   PassingFolder logs_;
   tools::ProgressLine progress_;
   AfterRun after_{o_, scene_.get(), movie_, progress_};  // last: it uses the others
