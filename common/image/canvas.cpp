@@ -57,7 +57,7 @@ void blend(View& onto, const View& picture, int x, int y) {
         const uint32_t a = over >> shift & 255, b = under >> shift & 255;
         mixed = mixed << 8 | (a * alpha + b * (255 - alpha) + 127) / 255;
       }
-      under = (under & 0xff000000) | mixed;
+      under = (alpha + ((under >> 24) * (255 - alpha) + 127) / 255) << 24 | mixed;
     }
 }
 

@@ -34,7 +34,7 @@ class Canvas {
 };
 
 /// Lays a picture of 0xAARRGGBB (not premultiplied; alpha 255 is opaque) over another one, its upper left pixel at
-/// (x, y); what lies outside is cut off.
+/// (x, y); what lies outside is cut off. The upper byte gets the coverage of both.
 void blend(View& onto, const View& picture, int x, int y);
 
 /// A smaller picture of `width` x `height` pixels: each the mean of the area that it covers, on sRGB codes. Without

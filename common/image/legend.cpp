@@ -247,9 +247,13 @@ geometry::Rect legend_place(const View& picture, int display_width, int display_
 }
 
 void draw_legend(View& picture, const Legend& legend) {
-  const View over = legend_picture(legend, picture.width, picture.height);
-  const auto place = legend_place(over, picture.width, picture.height);
-  blend(picture, over, place.x, place.y);
+  draw_legend(picture, legend, {picture.width, picture.height, 0, 0});
+}
+
+void draw_legend(View& picture, const Legend& legend, const DisplayPart& part) {
+  const View over = legend_picture(legend, part.width, part.height);
+  const auto place = legend_place(over, part.width, part.height);
+  blend(picture, over, place.x - part.x, place.y - part.y);
 }
 
 }  // namespace telesplat::image

@@ -45,7 +45,14 @@ Ticks nice_ticks(double lo, double hi, int most);
 View legend_picture(const Legend& legend, int display_width, int display_height);
 /// Where such a picture lies on a display: in the lower right corner.
 geometry::Rect legend_place(const View& legend_picture, int display_width, int display_height);
+/// What part of a display a picture is: a tile of a wall, or all of it.
+struct DisplayPart {
+  int width = 0, height = 0;  ///< of the whole display
+  int x = 0, y = 0;           ///< where the picture begins
+};
 /// Draws it onto a finished picture, at its place.
 void draw_legend(View& picture, const Legend& legend);
+/// The same of a picture that is a part of a display: as much of the legend as lies in it.
+void draw_legend(View& picture, const Legend& legend, const DisplayPart& part);
 
 }  // namespace telesplat::image

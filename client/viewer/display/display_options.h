@@ -32,6 +32,7 @@ struct DisplayOptions {
   splat::SelectionOptions selection;
   float splat_scale = 0;  ///< selection.scale; 0: what suits the kernel
   image::ShadingParameters shading;
+  bool legend = true;          ///< pictures and the window show what colours mean, where there is something to tell
   bool transparent = false;    ///< pictures have the coverage as alpha; shading.background is black then
   uint64_t picture_every = 0;  ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one
   uint64_t verify_every = 0;   ///< keep every N-th frame for verification; 0: none

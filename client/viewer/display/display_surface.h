@@ -2,12 +2,14 @@
 // a window.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "client/viewer/display/overlay.h"
 #include "client/viewer/input/look.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/file.h"
+#include "common/image/legend.h"
 #include "common/scene/kind.h"
 
 namespace telesplat::viewer {
@@ -43,6 +45,8 @@ class DisplaySurface {
   virtual geometry::Camera begin_frame(double now_s, double t_s, Look& look) = 0;
   /// Whether frames without points are worth drawing, because somebody sees them.
   virtual bool visible() const = 0;
+  /// The legend of the frame that is shown next; null: it has none.
+  virtual void on_legend(const std::shared_ptr<const image::Legend>&) {}
   /// Shows a finished frame, drawn with the camera above.
   virtual void present(const image::View& view) = 0;
   /// Whether somebody wants the frame that begins as a picture.

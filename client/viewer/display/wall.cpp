@@ -26,4 +26,9 @@ geometry::Camera tile_of(const geometry::Camera& whole, const WallTile& wall) {
   return geometry::crop(whole, {wall.tile % wall.columns * width, wall.tile / wall.columns * height, width, height});
 }
 
+image::DisplayPart part_of_wall(int width, int height, const WallTile& wall) {
+  return {width * wall.columns, height * wall.rows, wall.tile % wall.columns * width,
+          wall.tile / wall.columns * height};
+}
+
 }  // namespace telesplat::viewer

@@ -5,6 +5,7 @@
 
 #include "common/core/result.h"
 #include "common/geometry/camera.h"
+#include "common/image/legend.h"
 
 namespace telesplat::viewer {
 
@@ -24,5 +25,8 @@ struct WallTile {
 
 /// The camera of this display, one of a wall's tiles: its part of the off-axis frustum of the whole.
 geometry::Camera tile_of(const geometry::Camera& whole, const WallTile& wall);
+
+/// The same in pixels, of a display of width x height.
+image::DisplayPart part_of_wall(int width, int height, const WallTile& wall);
 
 }  // namespace telesplat::viewer

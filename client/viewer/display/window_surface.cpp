@@ -25,6 +25,12 @@ std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement)
   return movement.orbits ? std::optional(geometry::Trajectory::orbit()) : std::nullopt;
 }
 
+// As large as the keys fit into the window.
+int help_scale(int width, int height) {
+  const image::View smallest = text_panel(key_help(), 1);
+  return std::clamp(std::min(width / (smallest.width + 12), height / (2 * smallest.height)), 1, 4);
+}
+
 // A name that no file has.
 std::string dated_path(const std::string& before, const std::string& after) {
   char date[32];
@@ -103,7 +109,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
 }
 
 void WindowSurface::show_help() {
-  const int scale = interaction_.shows_help() ? std::clamp(window_->height() / 500, 1, 4) : 0;
+  const int scale = interaction_.shows_help() ? help_scale(window_->width(), window_->height()) : 0;
   if (scale == help_scale_) return;
   help_scale_ = scale;
   if (scale > 0)
@@ -128,8 +134,28 @@ void WindowSurface::keep_path() {
 
 void WindowSurface::present(const image::View& view) { window_->present(view, overlays_); }
 
+void WindowSurface::on_legend(const std::shared_ptr<const image::Legend>& legend) {
+  if (legend_ == legend && legend_width_ == window_->width() && legend_height_ == window_->height()) return;
+  legend_ = legend;
+  legend_width_ = window_->width();
+  legend_height_ = window_->height();
+  show_legend();
+}
+
+// On a wall the tile in the lower right corner has it.
+void WindowSurface::show_legend() {
+  const WallTile& wall = options_.display.wall;
+  if (!legend_ || wall.tile != wall.columns * wall.rows - 1) return overlays_.hide("legend");
+  overlays_.show("legend",
+                 {image::legend_picture(*legend_, legend_width_, legend_height_), Overlay::Corner::kLowerRight});
+}
+
 void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
-  if (interaction_.take_screenshot_wish()) screenshots_.take(view, alpha);
+  if (!interaction_.take_screenshot_wish()) return;
+  if (!legend_) return screenshots_.take(view, alpha);
+  image::View copy{view.width, view.height, view.colour, {}};
+  image::draw_legend(copy, *legend_, part_of_wall(view.width, view.height, options_.display.wall));
+  screenshots_.take(copy, alpha);
 }
 
 void WindowSurface::report(const LiveFigures& figures) {

@@ -33,6 +33,7 @@ class WindowSurface final : public DisplaySurface {
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   bool visible() const override { return true; }
   void present(const image::View& view) override;
+  void on_legend(const std::shared_ptr<const image::Legend>& legend) override;
   bool wants_picture() const override { return interaction_.wants_screenshot(); }
   void take_picture(const image::View& view, image::Alpha alpha) override;
   void report(const LiveFigures& figures) override;
@@ -45,6 +46,7 @@ class WindowSurface final : public DisplaySurface {
   geometry::Camera whole(const geometry::Pose& pose) const;
   void fit_views();
   void show_help();
+  void show_legend();
   void keep_path();
 
   Options options_;
@@ -55,6 +57,8 @@ class WindowSurface final : public DisplaySurface {
   Overlays overlays_;
   ShownScene scene_;
   int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
+  std::shared_ptr<const image::Legend> legend_;
+  int legend_width_ = 0, legend_height_ = 0;  // of the window that the legend on display suits
   int help_scale_ = 0;                        // of the overlay's letters; 0: it is not shown
   std::function<void(const std::string&)> tell_;
   Screenshots screenshots_;

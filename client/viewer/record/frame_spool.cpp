@@ -14,14 +14,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A spool file: this header, then colour (u32) and depth (f32) of width x height pixels.
+// A spool file: this header, then colour (u32) and depth (f32) of width x height pixels, then the legend's text.
 struct FileHeader {
-  char magic[8] = {'T', 'S', 'F', 'R', 'A', 'M', 'E', '2'};
+  char magic[8] = {'T', 'S', 'F', 'R', 'A', 'M', 'E', '3'};
   uint64_t number = 0, epoch = 0;
   double t_s = 0;
   double camera[12] = {};
   int32_t width = 0, height = 0;
   uint32_t use = 0, has_depth = 0;
+  int32_t part[4] = {};
+  uint64_t legend_bytes = 0;
 };
 
 using FilePtr = std::unique_ptr<FILE, int (*)(FILE*)>;
@@ -41,12 +43,17 @@ bool write_frame(const std::string& directory, const SpooledFrame& f) {
   h.height = c.height;
   h.use = f.use;
   h.has_depth = !f.view.depth_m.empty();
+  const int32_t part[4] = {f.part.width, f.part.height, f.part.x, f.part.y};
+  std::copy(part, part + 4, h.part);
+  const std::string legend = f.legend ? image::to_text(*f.legend) : "";
+  h.legend_bytes = legend.size();
   const std::string path = fmt::format("{}/{:08d}.frame", directory, f.number);
   const FilePtr out = open_file(path + ".part", "wb");
   if (!out) return false;
   bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
   ok = ok && std::fwrite(f.view.colour.data(), 4, f.view.colour.size(), out.get()) == f.view.colour.size();
   ok = ok && std::fwrite(f.view.depth_m.data(), 4, f.view.depth_m.size(), out.get()) == f.view.depth_m.size();
+  ok = ok && std::fwrite(legend.data(), 1, legend.size(), out.get()) == legend.size();
   ok = ok && std::fflush(out.get()) == 0;
   std::error_code error;
   if (ok)
@@ -54,6 +61,19 @@ bool write_frame(const std::string& directory, const SpooledFrame& f) {
   else
     fs::remove(path + ".part", error);
   return ok && !error;
+}
+
+Status read_legend(FILE* in, const FileHeader& h, SpooledFrame& f) {
+  if (h.legend_bytes == 0) return ok_status();
+  std::string text(h.legend_bytes, '\0');
+  if (std::fread(text.data(), 1, text.size(), in) != text.size()) return Error{"its legend cannot be read"};
+  auto legend = image::legend_from_text(text);
+  if (!legend) return legend.error();
+  f.legend = std::make_shared<image::Legend>(std::move(*legend));
+  f.part = {h.part[0], h.part[1], h.part[2], h.part[3]};
+  for (const int side : {f.part.width, f.part.height})
+    if (side < 1 || side > 64 * geometry::kMaxImageSide) return Error{fmt::format("a display of {} pixels", side)};
+  return ok_status();
 }
 
 }  // namespace
@@ -146,19 +166,21 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
   if (h.magic[7] != FileHeader{}.magic[7])
     return Error{fmt::format("{}: is a recorded frame of version {:?} instead of {:?}", path, h.magic[7],
                              FileHeader{}.magic[7])};
-  SpooledFrame f{h.number, h.t_s, h.use, {}, {}, {h.epoch}};
+  SpooledFrame f{h.number, h.t_s, h.use, {}, {}, {h.epoch}, {}, {}};
   const double* c = h.camera;
   f.camera = {
       {{c[0], c[1], c[2]}, glm::dquat(c[3], c[4], c[5], c[6])}, c[7], c[8], c[9], c[10], c[11], h.width, h.height};
   if (const Status s = geometry::validate(f.camera); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
   const size_t pixels = size_t(h.width) * size_t(h.height);
   std::error_code error;
-  if (fs::file_size(path, error) != sizeof h + pixels * (h.has_depth ? 8 : 4))
+  if (h.legend_bytes > image::kMaxLegendText ||
+      fs::file_size(path, error) != sizeof h + pixels * (h.has_depth ? 8 : 4) + h.legend_bytes)
     return Error{fmt::format("{}: its size does not fit {}x{} pixels", path, h.width, h.height)};
   f.view = {h.width, h.height, std::vector<uint32_t>(pixels), std::vector<float>(h.has_depth ? pixels : 0)};
   if (std::fread(f.view.colour.data(), 4, pixels, in.get()) != pixels ||
       std::fread(f.view.depth_m.data(), 4, f.view.depth_m.size(), in.get()) != f.view.depth_m.size())
     return Error{fmt::format("{}: cannot be read", path)};
+  if (const Status s = read_legend(in.get(), h, f); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
   return f;
 }
 
@@ -173,10 +195,11 @@ Status develop_frames(const std::string& spool_directory, const std::string& pic
     if (!frame) return frame.error();
     const auto alpha = frame->use & kTransparent ? image::Alpha::kCoverage : image::Alpha::kNone;
     const std::string base = fmt::format("{}/frame-{:06d}", picture_directory, frame->number);
-    if (frame->use & kPicture)
-      if (const Status s = image::write_png(base + ".png", frame->view, alpha); !s) return s;
     if ((frame->use & kExr) && !frame->view.depth_m.empty())
       if (const Status s = image::write_exr(base + ".exr", frame->view, alpha); !s) return s;
+    if (frame->legend) image::draw_legend(frame->view, *frame->legend, frame->part);
+    if (frame->use & kPicture)
+      if (const Status s = image::write_png(base + ".png", frame->view, alpha); !s) return s;
     if (!(frame->use & kVerify)) fs::remove(paths[i], error);
     if (progress) progress(i + 1, paths.size());
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -15,6 +16,7 @@
 #include "common/core/result.h"
 #include "common/geometry/camera.h"
 #include "common/image/file.h"
+#include "common/image/legend.h"
 
 namespace telesplat::viewer {
 
@@ -33,6 +35,9 @@ struct SpooledFrame {
   geometry::Camera camera;
   image::View view;
   EpochId epoch;  ///< of all points in it
+  /// Drawn onto the pictures alone: what is verified stays as it was displayed. Null: none.
+  std::shared_ptr<const image::Legend> legend;
+  image::DisplayPart part;  ///< of a legend: what the frame is of the display
 };
 
 class FrameSpool {
@@ -67,9 +72,9 @@ class FrameSpool {
 std::vector<std::string> spooled_frames(const std::string& directory);
 /// Reads one spooled frame; refuses files that are not one, or were written by an earlier version.
 Result<SpooledFrame> read_spooled_frame(const std::string& path);
-/// Turns frames marked kPicture into directory/frame-NNNNNN.png (kExr: .exr too) and deletes spooled frames that are
-/// not also marked kVerify. progress: done, of. go_on: asked before each frame; once it says no, the remaining ones are
-/// left as they are.
+/// Turns frames marked kPicture into directory/frame-NNNNNN.png with their legends (kExr: .exr too, without) and
+/// deletes spooled frames that are not also marked kVerify. progress: done, of. go_on: asked before each frame; once it
+/// says no, the remaining ones are left as they are.
 Status develop_frames(const std::string& spool_directory, const std::string& picture_directory,
                       const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& go_on = {});
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -70,6 +71,48 @@ TEST_F(Spool, PicturesAreDevelopedAndOnlyFramesToVerifyStay) {
   EXPECT_EQ(spooled_frames(directory_).size(), 2u);
 }
 
+// Frames are compared with references, and people look at pictures.
+TEST_F(Spool, LegendsAreDrawnOntoPicturesAndLeaveFramesToVerifyAlone) {
+  const auto large = [](uint64_t number, uint32_t use) {
+    SpooledFrame f = frame(number, use);
+    f.camera = geometry::make_camera({}, 90, 640, 400);
+    f.view = {640, 400, std::vector<uint32_t>(640 * 400, 0x203040), {}};
+    return f;
+  };
+  const auto legend =
+      std::make_shared<const image::Legend>(image::Legend{"depth [m]", 0, 10, *colour::find_colour_map("viridis"), {}});
+  {
+    auto spool = FrameSpool::open(directory_);
+    SpooledFrame with = large(1, kPicture | kVerify), left = large(3, kPicture);
+    with.legend = left.legend = legend;
+    with.part = {640, 400, 0, 0};
+    left.part = {1280, 400, 0, 0};  // the left half of a wall
+    for (auto* f : {&with, &left}) {
+      (*spool)->exchange(std::move(*f));
+      (*spool)->flush();
+    }
+    (*spool)->exchange(large(2, kPicture));
+    (*spool)->flush();
+  }
+  const auto kept = read_spooled_frame(spooled_frames(directory_).at(0));
+  ASSERT_TRUE(kept) << kept.error().text;
+  ASSERT_TRUE(kept->legend);
+  EXPECT_EQ(*kept->legend, *legend);
+  ASSERT_TRUE(develop_frames(directory_, directory_ + "/images", nullptr).ok());
+  const auto with = image::read_view(directory_ + "/images/frame-000001.png");
+  const auto without = image::read_view(directory_ + "/images/frame-000002.png");
+  const auto left = image::read_view(directory_ + "/images/frame-000003.png");
+  ASSERT_TRUE(with && without && left);
+  const auto has = [](const image::View& view, uint32_t c) {
+    return std::find(view.colour.begin(), view.colour.end(), c) != view.colour.end();
+  };
+  EXPECT_TRUE(has(*with, legend->map.at(1)));
+  EXPECT_EQ(without->colour, std::vector<uint32_t>(640 * 400, 0x203040));
+  EXPECT_EQ(left->colour, without->colour) << "the legend lies in the wall's lower right corner";
+  const auto again = read_spooled_frame(spooled_frames(directory_).at(0));
+  EXPECT_EQ(again->view.colour, std::vector<uint32_t>(640 * 400, 0x203040));
+}
+
 TEST_F(Spool, FilesThatAreNoFramesAreRefused) {
   {
     auto spool = FrameSpool::open(directory_);
@@ -99,7 +142,7 @@ TEST_F(Spool, FramesOfAnEarlierVersionAreNamed) {
   const auto back = read_spooled_frame(path);
   ASSERT_FALSE(back.ok());
   EXPECT_NE(back.error().text.find(path), std::string::npos);
-  EXPECT_NE(back.error().text.find("version '1' instead of '2'"), std::string::npos) << back.error().text;
+  EXPECT_NE(back.error().text.find("version '1' instead of '3'"), std::string::npos) << back.error().text;
 }
 
 TEST(ParseSize, TakesWidthAndHeightWithinLimits) {
