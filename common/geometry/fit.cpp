@@ -23,14 +23,40 @@ glm::dvec2 half_tangents(const Camera& c) {
   return glm::max(glm::dvec2(std::min(-c.left, c.right), std::min(-c.bottom, c.top)), 1e-4) * (1 - kFitMargin);
 }
 
-double sane(double distance_m) { return std::clamp(distance_m, 1e-5, kFarthest_m); }
+// What the corners ask of an eye that looks along a given direction: `distance` from the centre against that direction,
+// and `aside`, upwards in the picture. A corner p (right, up, towards the eye) is in the picture if
+//   |p.x| <= tangent.x (distance - p.z)  and  |p.y - aside| <= tangent.y (distance - p.z).
+class Demands {
+ public:
+  Demands(const glm::dvec2& tangents, double near_m) : tangents_(tangents), near_m_(near_m) {}
 
-glm::dvec3 direction(double tilt_rad) { return {0, std::sin(tilt_rad), std::cos(tilt_rad)}; }
+  void add(const glm::dvec3& p) {
+    above_ = std::max(above_, p.z + p.y / tangents_.y);
+    below_ = std::max(below_, p.z - p.y / tangents_.y);
+    at_least(p.z + std::abs(p.x) / tangents_.x);
+    at_least(p.z + near_m_ * 1.01);
+  }
+  void at_least(double distance) { least_ = std::max(least_, distance); }
 
-// Distance of an eye from the centre so that a point of these coordinates in the camera (right, up, towards the eye)
-// is in the picture: |right| <= tangent * (distance - towards), and so on.
-double distance_for(const glm::dvec3& p, const glm::dvec2& tangents, double near_m) {
-  return p.z + std::max({std::abs(p.x) / tangents.x, std::abs(p.y) / tangents.y, near_m * 1.01});
+  // As much room above as below.
+  double aside() const { return tangents_.y * (above_ - below_) / 2; }
+  double distance() const { return std::max(least_, (above_ + below_) / 2); }
+
+ private:
+  glm::dvec2 tangents_;
+  double near_m_, above_ = 0, below_ = 0, least_ = 0;
+};
+
+// The eye that fulfils them, as a point to look at, on the box's vertical axis, and the distance from there.
+struct Stand {
+  glm::dvec3 target;
+  double distance;
+};
+
+Stand stand_at(const Shape& s, const Demands& demands, double tilt_rad) {
+  const double aside = std::clamp(demands.aside(), -kFarthest_m, kFarthest_m);
+  const double distance = demands.distance() - aside * std::tan(tilt_rad);
+  return {s.centre + glm::dvec3(0, aside / std::cos(tilt_rad), 0), std::clamp(distance, 1e-5, kFarthest_m)};
 }
 
 }  // namespace
@@ -43,31 +69,31 @@ double suitable_tilt_rad(const Box& box) {
 
 Pose fitted_view(const Box& box, const Camera& frustum) {
   const Shape s = shape_of(box);
-  const glm::dvec3 back = direction(suitable_tilt_rad(box)), right(1, 0, 0), up = glm::cross(back, right);
-  const glm::dvec2 tangents = half_tangents(frustum);
-  double distance = 0;
+  const double tilt = suitable_tilt_rad(box);
+  const glm::dvec3 back(0, std::sin(tilt), std::cos(tilt)), right(1, 0, 0), up = glm::cross(back, right);
+  Demands demands(half_tangents(frustum), frustum.near_m);
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec3 p = s.half * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
-    distance = std::max(
-        distance, distance_for({glm::dot(p, right), glm::dot(p, up), glm::dot(p, back)}, tangents, frustum.near_m));
+    demands.add({glm::dot(p, right), glm::dot(p, up), glm::dot(p, back)});
   }
-  return look_at(s.centre + back * sane(distance), s.centre);
+  const Stand stand = stand_at(s, demands, tilt);
+  return look_at(stand.target + back * stand.distance, stand.target);
 }
 
 Trajectory fitted_orbit(const Box& box, const Camera& frustum, double period_s) {
   const Shape s = shape_of(box);
   const double tilt = suitable_tilt_rad(box), sine = std::sin(tilt), cosine = std::cos(tilt);
   const glm::dvec2 tangents = half_tangents(frustum);
-  // Of all points of the cylinder's two rims, which all corners pass along: those at the side need
-  //   y sin + r (cos a cos + |sin a| / tangent),  largest over a:  y sin + r sqrt(cos^2 + 1 / tangent^2);
-  // upwards it is linear in cos a, so the nearest and the farthest point of a rim decide.
-  double distance = s.half.y * sine + s.radius * std::hypot(cosine, 1 / tangents.x);
+  // All corners pass along the two rims of the upright cylinder around the box. Upwards a rim's demand is linear in
+  // cos a, so its nearest and its farthest point decide; sideways the largest over a of
+  //   y sin + r (cos a cos + |sin a| / tangent)  is  y sin + r sqrt(cos^2 + 1 / tangent^2).
+  Demands demands(tangents, frustum.near_m);
   for (const double y : {-s.half.y, s.half.y})
     for (const double along : {-s.radius, s.radius})
-      distance = std::max(
-          distance, distance_for({0, y * cosine - along * sine, y * sine + along * cosine}, tangents, frustum.near_m));
-  distance = sane(distance);
-  return Trajectory::orbit(distance * cosine, distance * sine, period_s, s.centre);
+      demands.add({0, y * cosine - along * sine, y * sine + along * cosine});
+  demands.at_least(s.half.y * sine + s.radius * std::hypot(cosine, 1 / tangents.x));
+  const Stand stand = stand_at(s, demands, tilt);
+  return Trajectory::orbit(stand.distance * cosine, stand.distance * sine, period_s, stand.target);
 }
 
 }  // namespace telesplat::geometry

@@ -11,7 +11,8 @@ inline constexpr double kFitMargin = 0.05;
 /// How steeply an orbit looks down on a box, in radians: 12 degrees on towers, 34 on what is flat.
 double suitable_tilt_rad(const Box& box_room);
 
-/// The pose in front of the box (on its +z side, tilted as above) that is as near as it can be. frustum: what the
+/// The pose in front of the box (on its +z side, tilted as above) that is as near as it can be, with as much room above
+/// as below; it looks at a point of the box's vertical axis. frustum: what the
 /// picture shows; its pose means nothing. Preconditions: the box is not empty, the frustum has its axis inside.
 Pose fitted_view(const Box& box_room, const Camera& frustum);
 

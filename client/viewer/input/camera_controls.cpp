@@ -48,7 +48,16 @@ CameraControls::State CameraControls::state_at(const geometry::Pose& pose, doubl
 }
 
 double CameraControls::distance_of_interest(const geometry::Pose& pose) const {
-  const double ahead = glm::dot(centre_ - pose.position_room, pose.orientation * glm::dvec3(0, 0, -1));
+  const glm::dvec3 forward = pose.orientation * glm::dvec3(0, 0, -1), to_centre = centre_ - pose.position_room;
+  double ahead = glm::dot(to_centre, forward);
+  // Who looks at the data set's vertical axis turns about that.
+  const double level = forward.x * forward.x + forward.z * forward.z;
+  if (level > 1e-6) {
+    const double at_axis = (to_centre.x * forward.x + to_centre.z * forward.z) / level;
+    const glm::dvec3 miss = forward * at_axis - to_centre;
+    if (at_axis > 0 && std::hypot(miss.x, miss.z) < 1e-3 * extent_m_ && std::abs(miss.y) < 0.5 * extent_m_)
+      ahead = at_axis;
+  }
   return std::clamp(ahead, 0.25 * extent_m_, farthest_m_);
 }
 

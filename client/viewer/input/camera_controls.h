@@ -34,8 +34,8 @@ class CameraControls {
   /// To (> 0) or from the pivot, a tenth a step. In flight: faster or slower.
   void wheel(double steps);
 
-  /// In flight the camera turns about itself; leaving it, about the point ahead that is as far as the data set's
-  /// centre. The view does not change with either.
+  /// In flight the camera turns about itself; leaving it, about the point ahead that lies on the data set's vertical
+  /// axis, or that is as far as its centre. The view does not change with either.
   void set_flying(bool flying);
   bool flying() const { return flying_; }
   /// Where to fly while the keys are held, -1 to 1 each: right and forward of the camera, up of the room.
