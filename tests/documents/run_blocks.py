@@ -87,7 +87,7 @@ class Page:
 
     def _make_environment(self):
         out = {k: v for k, v in os.environ.items() if not k.startswith("TELESPLAT_")}
-        for name in ("HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR"):
+        for name in ("HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR", "TELESPLAT_RUNTIME"):
             out[name] = os.path.join(self._folder, "." + name.lower())
             os.mkdir(out[name], 0o700)
         out["PATH"] = self._programs + os.pathsep + out["PATH"]
