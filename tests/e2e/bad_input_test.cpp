@@ -50,7 +50,7 @@ TEST_P(BadInput, ExitsWithTwoAndOneLine) {
   for (std::string a : c.arguments) arguments.push_back(a == "TRAJECTORY" ? folder / "trajectory.csv" : a);
   Program program("telesplat", arguments, folder / "telesplat");
   EXPECT_EQ(program.wait(60), 2) << program.err();
-  const std::string err = program.err();
+  const std::string err = program.complaint();
   EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
   EXPECT_TRUE(err.starts_with("telesplat: ")) << err;
   EXPECT_NE(err.find(c.named), std::string::npos) << err;

@@ -42,7 +42,7 @@ TEST_P(VolumeWrong, ExitsWithTwoAndOneLine) {
   arguments.insert(arguments.end(), w.arguments.begin(), w.arguments.end());
   Program program("telesplat", arguments, folder / "telesplat");
   EXPECT_EQ(program.wait(60), 2) << program.err();
-  const std::string err = program.err();
+  const std::string err = program.complaint();
   EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
   EXPECT_TRUE(err.starts_with("telesplat: ")) << err;
   EXPECT_NE(err.find(w.named), std::string::npos) << err;

@@ -151,6 +151,11 @@ int Program::wait(double deadline_s) {
   return exit_code_;
 }
 
+std::string Program::complaint() const {
+  const std::string all = err();
+  return all.starts_with("session at ") ? all.substr(std::min(all.find('\n'), all.size() - 1) + 1) : all;
+}
+
 void Program::signal(int number) {
   if (exit_code_ < 0) ::kill(pid_, number);
 }

@@ -56,6 +56,8 @@ class Program {
   void signal(int number);
   std::string out() const { return read_text(prefix_ + ".out"); }
   std::string err() const { return read_text(prefix_ + ".err"); }
+  /// err() without the line that tells a session's address, which a run begins with.
+  std::string complaint() const;
 
  private:
   std::string prefix_;

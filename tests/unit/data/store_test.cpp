@@ -176,7 +176,7 @@ TEST_F(StoreTest, InspectSumsUp) {
   EXPECT_EQ(facts->chunks, 1u);
   EXPECT_GT(facts->chunk_bytes, 3200u * 12);
   const std::string text = describe(*facts).table();
-  for (const char* part : {"grid.ply: a mesh", "triangles    3200", "1681", "z (--up)", "computed"})
+  for (const char* part : {"grid.ply: a mesh", "triangles    3200", "1681", "z (shaped like a terrain)", "computed"})
     EXPECT_NE(text.find(part), std::string::npos) << text;
   EXPECT_TRUE(is_mesh_file(path_));
 }

@@ -105,7 +105,7 @@ TEST_F(InspectFiles, DepthIsWrittenAsNpy) {
   const std::string bytes = read(file("a.npy"));
   ASSERT_EQ(bytes.size(), 128u + 4 * kWidth * kHeight);
   EXPECT_EQ(bytes.substr(0, 8), std::string("\x93NUMPY\1\0", 8));
-  EXPECT_EQ(bytes.substr(10, 60), "{'descr': '<f4', 'fortran_order': False, 'shape': (5, 8), }");
+  EXPECT_EQ(bytes.substr(10, 59), "{'descr': '<f4', 'fortran_order': False, 'shape': (5, 8), }");
   EXPECT_EQ(uint8_t(bytes[8]) + 256 * uint8_t(bytes[9]), 128 - 10);
   EXPECT_EQ(bytes[127], '\n');
   std::vector<float> values(kWidth * kHeight);
