@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace telesplat::geometry {
 namespace {
@@ -31,6 +32,7 @@ class Demands {
   Demands(const glm::dvec2& tangents, double near_m) : tangents_(tangents), near_m_(near_m) {}
 
   void add(const glm::dvec3& p) {
+    corners_.push_back(p);
     above_ = std::max(above_, p.z + p.y / tangents_.y);
     below_ = std::max(below_, p.z - p.y / tangents_.y);
     at_least(p.z + std::abs(p.x) / tangents_.x);
@@ -38,12 +40,25 @@ class Demands {
   }
   void at_least(double distance) { least_ = std::max(least_, distance); }
 
-  // As much room above as below.
-  double aside() const { return tangents_.y * (above_ - below_) / 2; }
+  // As much room above as below, from the distance below. The higher the eye, the lower lies all in the picture.
+  double aside() const {
+    double low = tangents_.y * (above_ - distance()), high = tangents_.y * (distance() - below_);
+    for (int i = 0; i < 60; ++i) {
+      const double middle = (low + high) / 2;
+      double upper = -1e300, lower = 1e300;
+      for (const glm::dvec3& p : corners_) {
+        const double v = (p.y - middle) / std::max(distance() - p.z, 1e-12);
+        upper = std::max(upper, v), lower = std::min(lower, v);
+      }
+      (upper + lower > 0 ? low : high) = middle;
+    }
+    return (low + high) / 2;
+  }
   double distance() const { return std::max(least_, (above_ + below_) / 2); }
 
  private:
   glm::dvec2 tangents_;
+  std::vector<glm::dvec3> corners_;
   double near_m_, above_ = 0, below_ = 0, least_ = 0;
 };
 

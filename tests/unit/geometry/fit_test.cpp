@@ -35,6 +35,19 @@ double nearest_depth(const Box& box, const Pose& pose) {
   return out;
 }
 
+// The lowest and the highest of the corners in the picture, whose edges are at -1 and 1.
+std::pair<double, double> heights(const Box& box, const Pose& pose, Camera camera) {
+  camera.pose = pose;
+  const auto t = camera.room_to_pixel();
+  std::pair out{1e300, -1e300};
+  for (int c = 0; c < 8; ++c) {
+    const glm::dvec4 p(c & 1 ? box.hi.x : box.lo.x, c & 2 ? box.hi.y : box.lo.y, c & 4 ? box.hi.z : box.lo.z, 1);
+    const double y = 1 - 2 * glm::dot(t.y, p) / glm::dot(t.w, p) / camera.height;
+    out = {std::min(out.first, y), std::max(out.second, y)};
+  }
+  return out;
+}
+
 struct Case {
   Box box;
   Camera camera;
@@ -68,6 +81,8 @@ TEST(Fit, TheFirstViewShowsTheWholeBoxAndFillsThePicture) {
     // As near as can be, unless the near plane would cut the box.
     if (nearest_depth(box, pose) > 1.1 * camera.near_m && r < 1 - 1.1 * kFitMargin)
       ADD_FAILURE() << "fills " << r << " only";
+    const auto [low, high] = heights(box, pose, camera);
+    ASSERT_NEAR(low, -high, 1e-3) << "as much room above as below";
   }
 }
 
@@ -77,6 +92,12 @@ TEST(Fit, EveryPoseOfTheOrbitShowsTheWholeBox) {
     double most = 0;
     for (double t = 0; t < 20; t += 20.0 / 360 * 5) most = std::max(most, reach(box, orbit.at(t), camera));
     ASSERT_LE(most, 1 - 0.9 * kFitMargin) << box.size().x << " " << box.size().y << " " << box.size().z;
+    double low = 1, high = -1;
+    for (double t = 0; t < 20; t += 20.0 / 360 * 5) {
+      const auto [l, h] = heights(box, orbit.at(t), camera);
+      low = std::min(low, l), high = std::max(high, h);
+    }
+    ASSERT_LT(std::abs(low + high), 0.35 * (high - low)) << "about as much room above as below";
     // As near as can be: the extreme points of its upright cylinder touch the margin somewhere, corners nearly.
     const double distance = glm::distance(orbit.at(0).position_room, glm::dvec3(box.centre()));
     if (distance > 20 * camera.near_m) {
