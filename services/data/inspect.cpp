@@ -93,6 +93,35 @@ void describe_shape(const MeshFileFacts& facts, Description& out) {
   out.json["colours"] = colours_of(facts);
 }
 
+std::string span_text(const scene::ValueSpan& span) {
+  return span.empty() ? "no finite values" : fmt::format("{:.6g} .. {:.6g}", span.lo, span.hi);
+}
+
+nlohmann::ordered_json span_json(const scene::ValueSpan& span) {
+  return span.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json{span.lo, span.hi};
+}
+
+// What --colour-by takes.
+void describe_arrays(const std::vector<scene::ArrayInfo>& arrays, Description& out) {
+  constexpr size_t kMostTold = 20;
+  out.json["arrays"] = nlohmann::ordered_json::array();
+  for (size_t i = 0; i < arrays.size(); ++i) {
+    const scene::ArrayInfo& a = arrays[i];
+    nlohmann::ordered_json json = {
+        {"name", a.name}, {"unit", a.unit}, {"of", a.of_cells ? "faces" : "points"}, {"components", a.components}};
+    for (const scene::ValueSpan& span : a.spans) json["spans"].push_back(span_json(span));
+    out.json["arrays"].push_back(std::move(json));
+    if (i == kMostTold) out.row("", fmt::format("and {} more", arrays.size() - kMostTold));
+    if (i >= kMostTold) continue;
+    const std::string unit = a.unit.empty() ? "" : " " + a.unit;
+    out.row(i == 0 ? "arrays" : "",
+            fmt::format("{}, of {}: {}{}", a.name, a.of_cells ? "faces" : "points",
+                        a.components > 1 ? fmt::format("{} components, lengths ", a.components) : "",
+                        a.spans.empty() ? "" : span_text(a.spans[0]) + unit));
+  }
+  if (!arrays.empty()) out.row("", "(--colour-by NAME[:MIN:MAX] colours by one)");
+}
+
 }  // namespace
 
 Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& options, const Progress& progress) {
@@ -145,6 +174,9 @@ Description describe(const MeshFileFacts& facts) {
   if (facts.iso) out.json["iso"] = *facts.iso;
   if (facts.raster) describe_raster(*facts.raster, i.box_data, out);
   describe_shape(facts, out);
+  describe_arrays(i.arrays, out);
+  for (const std::string& note : i.notes) out.row("remark", note);
+  if (!i.notes.empty()) out.json["remarks"] = i.notes;
   out.row("box", fmt::format("{} .. {}, {}", vector_text(i.box_data.lo), vector_text(i.box_data.hi), unit_of(facts)));
   out.row("size", extent_text(i.box_data.size()));
   out.json["box"] = box_json(i.box_data);

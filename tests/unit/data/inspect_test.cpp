@@ -116,6 +116,21 @@ TEST(Inspect, AVolumeTellsWhatARunWouldChoose) {
   EXPECT_FALSE(inspect_volume(path, options, {}, nullptr).ok()) << "as run refuses it";
 }
 
+TEST(Inspect, ArraysAreListedWithTheirRanges) {
+  const TempFolder folder;
+  const std::string path = folder.write(
+      "warm.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float "
+      "warmth\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 -2.5\n1 0 0 7\n0 1 0 3\n3 0 1 "
+      "2\n");
+  const auto facts = inspect_mesh(path, no_cache(), nullptr);
+  ASSERT_TRUE(facts.ok()) << facts.error().text;
+  const Description told = describe(*facts);
+  expect_rows(told, {"arrays", "warmth, of points: -2.5 .. 7", "--colour-by"});
+  ASSERT_EQ(told.json["arrays"].size(), 1u);
+  EXPECT_EQ(told.json["arrays"][0]["spans"][0], (nlohmann::ordered_json{-2.5, 7.0}));
+}
+
 TEST(Inspect, AStoreOfTheCacheTellsWhatItHolds) {
   const TempFolder folder;
   MeshOptions options;
