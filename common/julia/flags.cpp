@@ -40,6 +40,22 @@ Status read_constant(const std::string& text, Parameters& p) {
   return ok_status();
 }
 
+// Which parameter is to blame for an empty slice: one without which there would be points, else the constant. at: when.
+std::string why_empty(const Parameters& p, const std::string& at) {
+  Parameters other = p;
+  other.bound = 0;
+  if (p.bound > 0 && !bounds(other).empty())
+    return fmt::format("bound is {}: the cube of that size{} holds no point of the set", p.bound, at);
+  other.slice_offset = 0;
+  if (p.slice_offset != 0 && !bounds(other).empty())
+    return fmt::format("slice.offset is {}: the slice{} holds no point of the set", p.slice_offset, at);
+  return fmt::format(
+      "c is {},{},{},{}: the slice{} holds no point of the set, which is dust where |c| is much above 1, and here it "
+      "is "
+      "{:.3g}",
+      p.c.x, p.c.y, p.c.z, p.c.w, at, glm::length(p.c));
+}
+
 // What a parameter is, its limits, and its value in the first preset.
 std::string help_of(const ParameterInfo& info) {
   const Parameters& defaults = presets().front().parameters;
@@ -146,11 +162,8 @@ Result<Placement> place(const Scene& scene, double room_size_m, const std::funct
   const AnimatedBounds found = animated_bounds(scene.parameters, scene.timeline, progress);
   if (!found.box.empty()) return place(found.box, room_size_m);
   const Parameters p = *parameters_at(scene.parameters, scene.timeline, found.empty_at_s);
-  std::string what = fmt::format("slice.offset is {}: the slice", p.slice_offset);
-  if (p.bound > 0)
-    what = fmt::format("slice.offset is {} and bound {}: the slice in that cube", p.slice_offset, p.bound);
-  if (!scene.timeline.empty()) what += fmt::format(", at {:.4g} s of the animation,", found.empty_at_s);
-  return Error{what + " holds no point of the set"};
+  const std::string at = scene.timeline.empty() ? "" : fmt::format(", at {:.4g} s of the animation,", found.empty_at_s);
+  return Error{why_empty(p, at)};
 }
 
 }  // namespace telesplat::julia

@@ -126,7 +126,7 @@ std::string bash(const Manual& program) {
 // In single quotes, beside a colon that ends the word.
 std::string zsh_entry(const std::string& word, const std::string& about) {
   std::string out = "'" + word + ":";
-  for (const char c : about) out += c == '\'' ? "'\\''" : c == ':' ? "\\:" : std::string(1, c);
+  for (const char c : about) out += c == '\'' ? "'\\''" : c == ':' ? "\\:" : std::string(1, c == '\n' ? ' ' : c);
   return out + "'";
 }
 
@@ -173,7 +173,7 @@ std::string zsh(const Manual& program) {
 
 std::string fish_quoted(const std::string& text) {
   std::string out = "'";
-  for (const char c : text) out += c == '\'' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+  for (const char c : text) out += c == '\'' || c == '\\' ? std::string("\\") + c : std::string(1, c == '\n' ? ' ' : c);
   return out + "'";
 }
 

@@ -171,6 +171,7 @@ const Wrong kWrong[] = {
     {"NoIterations", {"--iterations", "0"}, "iterations is 0, limits are 1..4096"},
     {"TooManyIterations", {"--iterations", "1000000000"}, "iterations is 1000000000, limits are 1..4096"},
     {"SliceBeyondTheSet", {"--slice.offset", "3"}, "the slice is empty"},
+    {"ConstantOfDust", {"--c", "3,3,3,3"}, "c is 3,3,3,3: the slice holds no point of the set"},
     {"SliceBesideTheSet", {"--c", "0,0,0,1.5", "--slice.offset", "1.75"}, "holds no point of the set"},
     {"UnknownPreset", {"--preset", "nonesuch"}, "nonesuch"},
     {"UnknownPalette", {"--palette", "mud"}, "mud"},
