@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "common/core/file_hash.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -63,7 +64,19 @@ TEST(Record, EveryFileIsThereAndTrue) {
     expect_distribution(s[key], key);
     EXPECT_GT(s[key]["max"], 0) << key;
   }
-  EXPECT_EQ(s["schema"], 1);
+  EXPECT_EQ(s["schema"], 2);
+  for (const char* key : {"id", "version", "begin", "begin_monotonic_s", "end", "command", "trajectory"})
+    EXPECT_FALSE(s[key].is_null()) << key;
+  EXPECT_NE(s["command"].get<std::string>().find("--verify 15"), std::string::npos) << s["command"];
+  ASSERT_EQ(s["machines"].size(), 1u);
+  EXPECT_GT(s["machines"][0]["cores"], 0);
+  EXPECT_EQ(s["machines"][0]["processes"].size(), 5u);
+  EXPECT_EQ(s["data"]["file"], run.folder() / "terrain.ply");
+  EXPECT_EQ(s["data"]["bytes"], fs::file_size(run.folder() / "terrain.ply"));
+  EXPECT_EQ(s["data"]["hash"], hash_text(hash_of_files({run.folder() / "terrain.ply"})->hash));
+  EXPECT_EQ(s["asked"]["duration_s"], 2);
+  EXPECT_EQ(s["asked"]["hold_s"], 1);
+  EXPECT_EQ(s["asked"]["verify_every"], 15);
   EXPECT_EQ(s["kind"], "mesh");
   EXPECT_EQ(s["scene"], "terrain.ply");
   EXPECT_EQ(s["primitives"], 20000);
@@ -118,6 +131,58 @@ TEST(Record, EveryFileIsThereAndTrue) {
   Program inspect("telesplat", {"inspect", run.out()}, run.folder() / "inspect");
   EXPECT_EQ(inspect.wait(), 0) << inspect.err();
   EXPECT_NE(inspect.out().find("summary.json"), std::string::npos);
+}
+
+// Where the time of each view update went: the stages of its last published tile, which add up to its latency.
+void expect_stages(PipelineRun& run) {
+  const char* moments[] = {"leased_s",  "sample_begin_s", "sample_end_s", "encode_end_s",
+                           "receive_s", "packed_s",       "published_s"};
+  std::map<std::string, std::vector<double>> tiles;
+  for (const char* column : moments) tiles[column] = run.column("tiles.csv", column);
+  const auto frame_of_tile = run.column("tiles.csv", "frame");
+  const auto frames = run.column("updates.csv", "frame"), requested = run.column("updates.csv", "requested_s"),
+             complete = run.column("updates.csv", "complete_s"), latency = run.column("updates.csv", "latency_ms");
+  ASSERT_FALSE(frames.empty());
+  for (size_t u = 0; u < frames.size(); ++u) {
+    size_t last = frame_of_tile.size();
+    for (size_t t = 0; t < frame_of_tile.size(); ++t)
+      if (frame_of_tile[t] == frames[u] && tiles["published_s"][t] > 0 &&
+          (last == frame_of_tile.size() || tiles["published_s"][t] > tiles["published_s"][last]))
+        last = t;
+    ASSERT_LT(last, frame_of_tile.size()) << "no tile of frame " << frames[u] << " was published";
+    double before = requested[u], sum_ms = 0;
+    for (const char* moment : moments) {
+      const double stage_ms = (tiles[moment][last] - before) * 1e3;
+      EXPECT_GE(stage_ms, 0) << moment << " of frame " << frames[u];
+      sum_ms += stage_ms;
+      before = tiles[moment][last];
+    }
+    EXPECT_GE(complete[u], before) << "displayed before it was published: frame " << frames[u];
+    sum_ms += (complete[u] - before) * 1e3;
+    EXPECT_NEAR(sum_ms, latency[u], 1e-5) << "frame " << frames[u];
+  }
+}
+
+TEST(Record, TheStagesOfAnUpdateAddUpAndNoneIsNegative) {
+  for (const char* coupling : {"sync", "async"}) {
+    PipelineRun run({"--duration", "3", "--coupling", coupling});
+    ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
+    expect_stages(run);
+    // A frame and the update that it shows, on one clock.
+    const auto begin = run.column("frames.csv", "begin_s"), construction = run.column("frames.csv", "construction_ms"),
+               age = run.column("frames.csv", "update_age_ms"), shown = run.column("frames.csv", "request"),
+               t = run.column("frames.csv", "t_s");
+    const auto request = run.column("updates.csv", "request"), requested = run.column("updates.csv", "requested_s");
+    size_t joined = 0;
+    for (size_t f = 0; f < begin.size(); ++f)
+      for (size_t u = 0; u < request.size(); ++u) {
+        if (shown[f] != request[u]) continue;
+        EXPECT_NEAR((begin[f] - requested[u]) * 1e3 + construction[f], age[f], 1e-5) << "frame " << f;
+        ++joined;
+      }
+    EXPECT_GT(joined, begin.size() / 2);
+    for (size_t f = 1; f < begin.size(); ++f) EXPECT_NEAR(begin[f] - begin[0], t[f] - t[0], 1e-8);
+  }
 }
 
 TEST(Record, ARealMesh) {

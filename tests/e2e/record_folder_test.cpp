@@ -1,0 +1,153 @@
+// Whose the folder of a record is, and what is left of a run that ends before its time.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string small(const TemporaryFolder& folder) {
+  write_terrain(folder / "terrain.ply", 20);
+  return folder / "terrain.ply";
+}
+
+// A run of some frames into DIR/OUT.
+std::vector<std::string> short_run(const TemporaryFolder& folder, const std::string& out,
+                                   std::vector<std::string> more = {}) {
+  std::vector<std::string> a{"run", folder / "terrain.ply", "--cache", folder / "cache", "--size", "160x100", "--out",
+                             out,   "--sampler-threads",    "1",       "--frames",       "5"};
+  a.insert(a.end(), more.begin(), more.end());
+  return a;
+}
+
+bool has(const std::string& path) { return fs::exists(fs::symlink_status(path)); }
+
+TEST(RecordFolder, ASecondRunIntoItIsRefusedUnlessItMayOverwrite) {
+  const TemporaryFolder folder;
+  small(folder);
+  const std::string out = folder / "runs/one";
+  Program first("telesplat", short_run(folder, out, {"--verify", "1", "--viewers", "2"}), folder / "first");
+  ASSERT_EQ(first.wait(90), 0) << first.err();
+  EXPECT_TRUE(has(out + "/quality.csv") && has(out + "/viewer-2/images") && has(out + "/images/frame-000000.png"));
+  EXPECT_EQ(fs::read_symlink(folder / "runs/latest"), "one") << "relative, so that the folder can be moved";
+  std::ofstream(out + "/notes.txt") << "mine";
+  std::ofstream(out + "/images/drawing.png") << "mine";
+  fs::create_symlink("/etc", out + "/elsewhere");
+  const std::string summary = read_text(out + "/summary.json");
+
+  Program refused("telesplat", short_run(folder, out), folder / "refused");
+  EXPECT_EQ(refused.wait(30), 2);
+  EXPECT_NE(refused.err().find(out + ": holds a record already"), std::string::npos) << refused.err();
+  EXPECT_NE(refused.err().find("--overwrite"), std::string::npos) << refused.err();
+  Program by_hand("telesplat-master", {"--bind", "tcp://127.0.0.1:*", "--out", out}, folder / "by-hand");
+  EXPECT_EQ(by_hand.wait(30), 2) << by_hand.err();
+  EXPECT_NE(by_hand.err().find(out + ": holds a record already"), std::string::npos) << by_hand.err();
+  EXPECT_EQ(read_text(out + "/summary.json"), summary) << "a run that was refused changed nothing";
+
+  Program again("telesplat", short_run(folder, out, {"--overwrite"}), folder / "again");
+  ASSERT_EQ(again.wait(90), 0) << again.err();
+  EXPECT_FALSE(has(out + "/quality.csv") || has(out + "/viewer-2")) << "of the run before";
+  EXPECT_EQ(read_text(out + "/notes.txt"), "mine");
+  EXPECT_EQ(read_text(out + "/images/drawing.png"), "mine");
+  EXPECT_TRUE(has(out + "/elsewhere") && has("/etc/passwd"));
+  EXPECT_NE(read_text(out + "/summary.json"), summary);
+}
+
+TEST(RecordFolder, WhatIsNoRecordIsNeverRemoved) {
+  const TemporaryFolder folder;
+  small(folder);
+  fs::create_directories(folder / "mine/images");
+  std::ofstream(folder / "mine/images/frame-000001.png") << "mine";
+  Program run("telesplat", short_run(folder, folder / "mine", {"--overwrite"}), folder / "run");
+  EXPECT_EQ(run.wait(30), 2);
+  EXPECT_NE(run.err().find("is no run's record"), std::string::npos) << run.err();
+  EXPECT_EQ(read_text(folder / "mine/images/frame-000001.png"), "mine");
+  // Nothing is written through a link either.
+  fs::create_directories(folder / "linked");
+  std::ofstream(folder / "precious") << "mine";
+  fs::create_symlink(folder / "precious", folder / "linked/frames.csv");
+  Program linked("telesplat", short_run(folder, folder / "linked", {"--overwrite"}), folder / "linked-run");
+  EXPECT_EQ(linked.wait(30), 2);
+  EXPECT_NE(linked.err().find("linked/frames.csv: is a symbolic link"), std::string::npos) << linked.err();
+  EXPECT_EQ(read_text(folder / "precious"), "mine");
+}
+
+TEST(RecordFolder, OneThatCannotBeWrittenToIsNamed) {
+  const TemporaryFolder folder;
+  small(folder);
+  for (const char* program : {"telesplat", "telesplat-master"}) {
+    const bool launcher = program == std::string("telesplat");
+    Program run(program,
+                launcher ? short_run(folder, "/proc/no/such")
+                         : std::vector<std::string>{"--bind", "tcp://127.0.0.1:*", "--out", "/proc/no/such"},
+                folder / "run");
+    EXPECT_EQ(run.wait(30), 2) << program;
+    EXPECT_NE(run.err().find("/proc/no/such: cannot be made a run folder"), std::string::npos) << run.err();
+  }
+}
+
+TEST(Interrupted, ARunWithAnEndSaysSoAndIsComplete) {
+  PipelineRun run({"--duration", "120", "--verify", "20"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  run.program().signal(SIGINT);
+  EXPECT_EQ(run.program().wait(90), 130) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  EXPECT_NE(run.program().err().find("interrupted; the record is complete"), std::string::npos) << run.program().err();
+  const auto s = run.summary();
+  ASSERT_TRUE(s.is_object());
+  EXPECT_GT(s["frames"], 0);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  EXPECT_TRUE(s["quality"].is_object()) << "what was displayed is verified";
+  EXPECT_FALSE(has(run.out() + "/spool"));
+  EXPECT_TRUE(has(run.out() + "/images/frame-000000.png"));
+}
+
+TEST(Interrupted, ARunWithoutAnEndIsDone) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  run.program().signal(SIGINT);
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  EXPECT_EQ(run.program().err().find("interrupted"), std::string::npos) << run.program().err();
+  EXPECT_GT(run.summary()["frames"], 0);
+}
+
+TEST(Interrupted, BeforeTheFirstFrameThereAreNoResults) {
+  // The first view takes long.
+  PipelineRun run({"--duration", "60", "--size", "4096x4096", "--sampling-size", "4096x4096"});
+  ASSERT_FALSE(run.master().empty());
+  run.program().signal(SIGINT);
+  EXPECT_EQ(run.program().wait(60), 130) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  if (run.program().err().find("the record is complete") != std::string::npos) GTEST_SKIP() << "it was too quick";
+  EXPECT_NE(run.program().err().find("interrupted before the first frame"), std::string::npos) << run.program().err();
+  EXPECT_EQ(run.program().out().find("fps over"), std::string::npos) << "a table of nothing: " << run.program().out();
+  EXPECT_FALSE(has(run.out())) << "an empty record";
+}
+
+TEST(Interrupted, AgainEndsAtOnce) {
+  PipelineRun run({"--duration", "120", "--verify", "1", "--record-every", "1"});
+  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 60; }));
+  run.program().signal(SIGINT);
+  run.program().signal(SIGINT);
+  ASSERT_TRUE(wait_until(
+      [&] {
+        return run.program().err().find("picture ") != std::string::npos || run.program().wait(0) >= 0 ||
+               run.program().err().find("verified") != std::string::npos;
+      },
+      10));
+  run.program().signal(SIGINT);
+  EXPECT_EQ(run.program().wait(20), 130) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  EXPECT_NE(run.program().err().find("interrupted"), std::string::npos) << run.program().err();
+  EXPECT_FALSE(has(run.out() + "/spool"));
+}
+
+}  // namespace
+}  // namespace telesplat::test
