@@ -23,6 +23,9 @@ class MeshColours {
   /// For the run's record; empty: the file's own colours.
   std::string text() const { return now_ ? scene::to_text(*now_) : std::string(); }
 
+  /// nullopt: by nothing, in the file's own colours.
+  const std::optional<scene::Colouring>& now() const { return now_; }
+
   /// "colour": arguments "array" (as scene::parse_colour_by() takes it) and "map" (as colour::from_text() takes it), one
   /// of them at least. Another map or range begins an epoch; another array is asked for first, and its epoch begins when
   /// the data server has it. Error: no such array, no range, nothing to colour; then nothing changed.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "common/core/log.h"
 #include "services/master/outbox.h"
 
@@ -49,6 +51,11 @@ Result<Obeyed> TilePlan::obey(const wire::Control& m) {
     return Error{"animate: the argument timeline is missing, such as c.y=-0.4:0.4:10s, or off"};
   if (const Status s = scene_.animate(timeline->second); !s) return s.error();
   return Obeyed{.begins_epoch = false, .answer = "animation " + scene_.animation()};
+}
+
+void TilePlan::add_status(nlohmann::ordered_json& status) const {
+  if (const auto& c = colours_.now())
+    status["colouring"] = {{"array", c->array}, {"unit", c->unit}, {"lo", c->lo}, {"hi", c->hi}, {"map", c->map.name}};
 }
 
 void TilePlan::give_leases(Idle& idle, double now_s) {

@@ -38,6 +38,7 @@ class TilePlan final : public Plan {
   int release_sampler(const std::string& sampler) override { return schedule_.release_sampler(sampler); }
   size_t leases_of(const std::string& sampler) const override { return schedule_.leases_of(sampler); }
   Figures figures() const override;
+  void add_status(nlohmann::ordered_json& status) const override;
 
  private:
   bool give_one(Idle& idle, double now_s);

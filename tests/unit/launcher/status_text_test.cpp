@@ -91,6 +91,13 @@ TEST(StatusText, AKindThatTheSceneNamesIsNotSaidTwice) {
   EXPECT_TRUE(status_text(status, 0).starts_with("no data server yet, started")) << status_text(status, 0);
 }
 
+TEST(StatusText, WhatAMeshIsColouredByIsTold) {
+  const Json status{
+      {"colouring", {{"array", "temperature"}, {"unit", "K"}, {"lo", 273.15}, {"hi", 1e5}, {"map", "viridis"}}}};
+  EXPECT_NE(status_text(status, 0).find("  coloured by temperature, 273.15 to 100000 K, viridis\n"), std::string::npos)
+      << status_text(status, 0);
+}
+
 TEST(ViewerResults, AreOfTheNamedViewersThoughTheyLeft) {
   const auto status = nlohmann::json::parse(R"({"processes": [
     {"role": "viewer", "name": "viewer-1", "alive": true, "values": {"frames": 7}},

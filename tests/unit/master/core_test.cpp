@@ -230,7 +230,8 @@ TEST_F(Master, ASilentSamplerIsTakenForDead) {
   core.on("p", wire::StatusReport{}, 5.9);
   core.tick(6.1);
   EXPECT_GE(core.counters().at("leases_expired"), 1);
-  for (const auto& p : status()["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << p["name"];
+  const auto now = status();
+  for (const auto& p : now["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << p["name"];
 }
 
 TEST_F(Master, ANewPackerStartsWithNewFrames) {
@@ -334,6 +335,55 @@ TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
   for (uint64_t i = 0; i < 6000; ++i)
     core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 1000 + i), 1);
   EXPECT_LE(core.processes().size(), 4096u);
+}
+
+TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {
+  core.introduce({.address = "tcp://127.0.0.1:4711",
+                  .pid = 77,
+                  .scene = {},
+                  .kind = {},
+                  .run_folder = "/data/run",
+                  .started_at_s = 1795377266,
+                  .started_by = "view"});
+  EXPECT_EQ(core.session().scene, "");
+  const auto before = status()["session"];
+  EXPECT_EQ(before, (nlohmann::json{{"address", "tcp://127.0.0.1:4711"},
+                                    {"pid", 77},
+                                    {"scene", ""},
+                                    {"kind", ""},
+                                    {"started_at", "2026-11-22T19:54:26Z"},
+                                    {"started_by", "view"},
+                                    {"run_folder", "/data/run"}}));
+  auto data = hello("data", "data", 1);
+  data.facts["kind"] = "mesh";
+  core.on("d", data, 0);
+  EXPECT_EQ(core.session().scene, "hill");
+  EXPECT_EQ(core.session().kind, "mesh");
+  EXPECT_EQ(status()["session"]["scene"], "hill");
+}
+
+TEST_F(Master, StatusCountsInWholeNumbersAndTellsRates) {
+  join_all();
+  const auto report = [&](double at_s, double frames) {
+    core.on("v", wire::StatusReport{{5}, {{"reported_s", at_s}, {"frames", frames}, {"rss_mb", 12.5}}}, at_s);
+  };
+  const auto viewer = [&] {
+    const auto now = status();
+    for (const auto& p : now["processes"])
+      if (p["name"] == "viewer-1") return p;
+    return nlohmann::json();
+  };
+  report(10, 300);
+  EXPECT_TRUE(viewer()["rates"].empty()) << "of one report nothing follows";
+  EXPECT_EQ(viewer()["values"]["frames"].dump(), "300");
+  EXPECT_EQ(viewer()["values"]["rss_mb"].dump(), "12.5");
+  report(12, 420);
+  EXPECT_EQ(viewer()["rates"], (nlohmann::json{{"frames", 60.0}}));
+  // Of the last five reports.
+  for (int i = 1; i <= 4; ++i) report(12 + i, 420 + 10 * i);
+  EXPECT_EQ(viewer()["rates"]["frames"], 10.0);
+  report(17, 0);  // it began to count anew
+  EXPECT_EQ(viewer()["rates"]["frames"], 0.0);
 }
 
 }  // namespace

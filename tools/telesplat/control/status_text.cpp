@@ -83,6 +83,17 @@ std::string parameters(const Json& status) {
   return wrapped("parameters", words);
 }
 
+std::string colouring(const Json& status) {
+  const auto* c = field(status, "colouring");
+  if (!c || text(*c, "array").empty()) return {};
+  std::string told = fmt::format("{}, {:g} to {:g}", tools::shortened(text(*c, "array"), 40),
+                                 number(*c, "lo").value_or(0), number(*c, "hi").value_or(0));
+  for (const char* key : {"unit", "map"})
+    if (const std::string word = text(*c, key); !word.empty())
+      told += (*key == 'u' ? " " : ", ") + tools::shortened(word, 24);
+  return line("coloured by", told);
+}
+
 std::string slabs(const Json& partition) {
   tools::TextTable table({{"slab of", false}, {"slices"}, {"visible M"}, {"voxels M"}, {"MB received"}, {"", false}});
   for (const auto& s : array(partition, "slabs"))
@@ -114,7 +125,8 @@ std::string volume(const Json& status) {
 
 std::string status_text(const Json& status, double now_s) {
   if (!status.is_object()) return {};
-  return head(status, now_s) + parameters(status) + volume(status) + process_tables(array(status, "processes"));
+  return head(status, now_s) + colouring(status) + parameters(status) + volume(status) +
+         process_tables(array(status, "processes"));
 }
 
 double read_utc(const std::string& text) {
