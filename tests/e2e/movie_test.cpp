@@ -8,8 +8,8 @@
 #include <fstream>
 
 #include "common/image/file.h"
+#include "tests/support/movie_frames.h"
 #include "tests/support/pipeline_run.h"
-#include "tools/common/csv_table.h"
 #include "tools/telesplat/movie/movie_target.h"
 
 namespace telesplat::test {
@@ -40,46 +40,6 @@ size_t lines(const std::string& text) { return size_t(std::count(text.begin(), t
 
 // Where the program is not, what needs it is skipped.
 std::string need(const char* program) { return launcher::find_program(program); }
-
-// What a movie of `fps` frames a second must show: the number of the displayed frame for each of its frames.
-std::vector<uint64_t> on_screen(const std::string& run, double fps) {
-  const auto table = tools::CsvTable::read(run + "/frames.csv", {});
-  EXPECT_TRUE(table.ok()) << table.error().text;
-  const auto t = table->numbers(*table->column("t_s")), took = table->numbers(*table->column("construction_ms")),
-             number = table->numbers(*table->column("frame"));
-  const auto shown_s = [&](size_t i) { return t[i] + took[i] / 1e3 - (t[0] + took[0] / 1e3); };
-  std::vector<uint64_t> out;
-  size_t i = 0;
-  for (size_t k = 0; double(k) / fps <= shown_s(t.size() - 1); ++k) {
-    while (i + 1 < t.size() && shown_s(i + 1) <= double(k) / fps) ++i;
-    out.push_back(uint64_t(number[i]));
-  }
-  return out;
-}
-
-// The movie's pictures beside those that the run recorded of the same frames. Returns how many were compared.
-size_t expect_as_displayed(const PipelineRun& run, double fps) {
-  const std::string folder = run.folder() / "frames";
-  const Outcome made = movie(run, folder + "/", {"--fps", fmt::format("{}", fps)});
-  EXPECT_EQ(made.code, 0) << made.err;
-  const auto wanted = on_screen(run.out(), fps);
-  size_t compared = 0;
-  for (size_t k = 0; k < wanted.size(); ++k) {
-    const std::string mine = fmt::format("{}/{:06}.png", folder, k);
-    const std::string recorded = fmt::format("{}/images/frame-{:06}.png", run.out(), wanted[k]);
-    EXPECT_TRUE(fs::exists(mine)) << mine;
-    if (!fs::exists(recorded) || !fs::exists(mine)) continue;  // the disk did not keep up
-    const auto a = image::read_view(mine), b = image::read_view(recorded);
-    EXPECT_TRUE(a.ok() && b.ok());
-    if (!a || !b) continue;
-    EXPECT_EQ(a->width, b->width);
-    EXPECT_TRUE(a->colour == b->colour) << "movie frame " << k << " is not displayed frame " << wanted[k];
-    ++compared;
-  }
-  EXPECT_FALSE(fs::exists(fmt::format("{}/{:06}.png", folder, wanted.size()))) << "there is one too many";
-  EXPECT_GT(compared, wanted.size() / 2);
-  return compared;
-}
 
 const std::vector<std::string> kEveryFrame{"--record-every", "1", "--duration", "2", "--size", "160x120"};
 

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "common/geometry/trajectory.h"
+#include "tests/support/movie_frames.h"
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
 
@@ -258,6 +259,23 @@ TEST_F(WindowTest, APathIsRecordedPlayedAgainAndATrajectory) {
     const double lasted_s = again.column("frames.csv", "t_s").back();
     EXPECT_NEAR(lasted_s, file == path ? trajectory->duration_s() : 0.5, 0.2);
   }
+}
+
+TEST_F(WindowTest, AMovieShowsWhatKeysHadChanged) {
+  PipelineRun run({"--trajectory", "orbit", "--record-every", "1", "--size", "200x150"}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  for (const char* key : {"3", "5", "8"}) {  // ellipse, fill off, unlit
+    display_->tap(key);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  display_->tap("q");
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  for (const char* column : {"splat", "finish", "lit"}) {
+    const auto values = run.column("frames.csv", column);
+    EXPECT_NE(values.front(), values.back()) << column;
+  }
+  EXPECT_GT(expect_as_displayed(run, 15), 10u);
 }
 
 TEST_F(WindowTest, KeysOfPointsDoNothingToAVolume) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/core/clock.h"
+#include "tools/common/time_left.h"
 #include "tools/telesplat/movie/contact_sheet.h"
 #include "tools/telesplat/movie/picture_sink.h"
 #include "tools/telesplat/movie/screen.h"
@@ -13,28 +14,19 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr double kMostFrames = 1e7;
-constexpr double kTellLeftAfter_s = 2;
 
-/// "movie frame 12 of 300, 0:34 left"
+/// "making the movie 43 %, 12 s left"
 class Progress {
  public:
   Progress(tools::ProgressLine& line, const char* what, uint64_t of) : line_(line), what_(what), of_(of) {}
 
-  void show(uint64_t done) {
-    const double passed_s = monotonic_s() - begin_s_;
-    std::string text = fmt::format("{} {} of {}", what_, done, of_);
-    if (done > 0 && passed_s > kTellLeftAfter_s) {
-      const auto left_s = int64_t(passed_s / double(done) * double(of_ - done) + 0.5);
-      text += fmt::format(", {}:{:02} left", left_s / 60, left_s % 60);
-    }
-    line_.show(text);
-  }
+  void show(uint64_t done) { line_.show(left_.text(what_, double(done) / double(of_), monotonic_s())); }
 
  private:
   tools::ProgressLine& line_;
+  tools::TimeLeft left_;
   const char* what_;
   uint64_t of_;
-  double begin_s_ = monotonic_s();
 };
 
 std::string cut_short(const Screen& screen, double t_s) {
@@ -79,7 +71,8 @@ class Movie {
  private:
   // How many frames the movie has. What cannot be written stands in the report.
   Result<uint64_t> draw(PictureSink& sink, uint64_t frames, tools::ProgressLine& line) {
-    Progress progress(line, "movie frame", frames);
+    Progress progress(line, "making the movie", frames);
+    progress.show(0);
     for (uint64_t k = 0; k < frames; ++k) {
       if (should_stop_()) return k;
       const double t_s = double(k) / plan_.options.fps;
@@ -118,7 +111,7 @@ class Movie {
 Result<MovieReport> make_sheet(Screen& screen, const MoviePlan& plan, tools::ProgressLine& line,
                                const ShouldStop& should_stop) {
   const int count = plan.options.pictures;
-  Progress progress(line, "picture", uint64_t(count));
+  Progress progress(line, "making the contact sheet", uint64_t(count));
   ContactSheet sheet(screen.run().directory);
   MovieReport report;
   for (int i = 0; i < count; ++i) {
