@@ -20,7 +20,7 @@ class Files:
             "scans/abdomen": self._dicom,
             "phases": self._series,
             "map.json": _colour_map,
-            "heated.vtp": _scalars,
+            "plate.vtp": _scalars,
         }
 
     def names(self):
@@ -113,7 +113,7 @@ def _colour_map(path):
 
 
 def _scalars(path):
-    """A wavy square with the point arrays temperature and velocity and the cell array part."""
+    """A wavy square with the point arrays temperature and wind and the cell array part."""
     side = 24
     grid = [(x, y) for y in range(side) for x in range(side)]
     points = " ".join(f"{x} {y} {((x * 7 + y * 3) % 11) / 5}" for x, y in grid)
@@ -125,8 +125,8 @@ def _scalars(path):
         file.write('<VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"><PolyData>')
         file.write(f'<Piece NumberOfPoints="{len(grid)}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0"')
         file.write(f' NumberOfPolys="{len(triangles)}"><PointData>')
-        file.write(array.format("temperature", 1, " ".join(str(273 + x * y / 4) for x, y in grid)))
-        file.write(array.format("velocity", 3, " ".join(f"{x} {y} 1" for x, y in grid)))
+        file.write(array.format("temperature", 1, " ".join(str(20 + x * y / 9) for x, y in grid)))
+        file.write(array.format("wind", 3, " ".join(f"{x} {y} 1" for x, y in grid)))
         file.write("</PointData><CellData>")
         file.write(array.format("part", 1, " ".join(str(t // 200) for t in range(len(triangles)))))
         file.write("</CellData><Points>" + array.format("Points", 3, points) + "</Points><Polys>")

@@ -56,7 +56,7 @@ class Screen:
         if not shutil.which("Xvfb"):
             return
         ours, theirs = os.pipe()
-        command = ["Xvfb", "-displayfd", str(theirs), "-screen", "0", "1280x1024x24"]
+        command = ["Xvfb", "-displayfd", str(theirs), "-noreset", "-screen", "0", "1280x1024x24"]
         self._server = subprocess.Popen(command, pass_fds=[theirs], stderr=subprocess.DEVNULL)
         os.close(theirs)
         with os.fdopen(ours) as said:
