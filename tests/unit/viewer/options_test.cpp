@@ -131,16 +131,18 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
                                     "summaries",
                                     "splat",
                                     "finish",
-                                    "lit"}));
+                                    "lit",
+                                    "begin_s"}));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;
+  f.begin_master_s = 4;
   f.drawn.summaries = 9;
   f.look = {{splat::Kernel::kEwa, {.fill = true, .smooth = false, .antialias = true}}, false};
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 5, row.end())), (std::vector<double>{2, 9, 3, 5, 0}));
+  EXPECT_EQ((std::vector<double>(row.end() - 6, row.end())), (std::vector<double>{2, 9, 3, 5, 0, 4}));
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
