@@ -168,7 +168,10 @@ std::string zsh(const Manual& program) {
     }
     out += fmt::format("        {}\n      fi\n      ;;\n", takes_files(*m) ? "_files" : ":");
   }
-  return out + fmt::format("  esac\n}}\ncompdef _{0} {0}\n", program.name);
+  // Of a folder of functions the file itself is the function, when it is first called.
+  return out +
+         fmt::format("  esac\n}}\nif [[ $funcstack[1] == _{0} ]]; then\n  _{0} \"$@\"\nelse\n  compdef _{0} {0}\nfi\n",
+                     program.name);
 }
 
 std::string fish_quoted(const std::string& text) {
