@@ -207,6 +207,33 @@ TEST_F(WindowTest, TellsItsKeysOnTheTerminalAndInTheWindow) {
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
+TEST_F(WindowTest, TheLegendLiesInTheWindowAndInScreenshots) {
+  TemporaryFolder folder;
+  write_volume(folder / "balls.mha");
+  PipelineRun run({"--tf", "grey"}, folder / "balls.mha", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  // The bar's rim and the letters, in the lower right quarter.
+  const auto ink = [](const image::View& v) {
+    int out = 0;
+    for (int y = v.height / 2; y < v.height; ++y)
+      for (int x = v.width / 2; x < v.width; ++x)
+        out += (v.colour[size_t(y * v.width + x)] & 0xffffff) == 0xf4f4f4;
+    return out;
+  };
+  EXPECT_TRUE(wait_until([&] {
+    const auto shown = display_->content(window);
+    return shown && ink(*shown) > 200;
+  }));
+  display_->tap("p");
+  ASSERT_TRUE(wait_until([&] { return screenshots(run.out() + "/images").size() == 1; })) << run.program().err();
+  const auto picture = image::read_view(screenshots(run.out() + "/images")[0]);
+  ASSERT_TRUE(picture);
+  EXPECT_GT(ink(*picture), 200);
+  display_->tap("q");
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
 TEST_F(WindowTest, APathIsRecordedPlayedAgainAndATrajectory) {
   PipelineRun run({}, "", "view");
   const auto window = live_window(run.program());
