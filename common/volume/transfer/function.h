@@ -59,8 +59,8 @@ Result<TransferFunction> parse_transfer(std::string_view text, const ValueRange&
 /// The text form, absolute values; parse_transfer of it gives the same function again, to the last bit.
 std::string to_text(const TransferFunction& transfer);
 /// A ParaView colour-map JSON file's content: RGBPoints with Points (opacity), or without (opacity rises over the
-/// range). name: for error texts. Of several maps the one that is called `wanted`, or the first. A map from 0 (or -1) to 1 is stretched over [lo,
-/// hi] if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
+/// range). name: for errors. The map called `wanted`, or the first. One from 0 (or -1) to 1 is stretched over [lo, hi]
+/// if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
 Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name, const ValueRange& range,
                                              std::string_view wanted = {});
 /// What people give: FILE.json or FILE.json:NAME, points (they have a ':'), or a preset's name.

@@ -112,7 +112,7 @@ class Baker {
   }
   static float shortest(const Texture& texture) { return texture.nearest() ? kShortestNearestEdge : kShortestEdge; }
 
-  // Whether colours in the triangle differ visibly from what its corners' colours give. `longest`: of its edges, texels.
+  // Whether colours in the triangle differ visibly from what its corners give. `longest`: of its edges, in texels.
   bool differs(const Texture& texture, size_t t, float longest) const {
     glm::vec2 uv[3];
     glm::vec3 at[3];
