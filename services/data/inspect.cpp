@@ -175,8 +175,6 @@ Description describe(const MeshFileFacts& facts) {
   if (facts.raster) describe_raster(*facts.raster, i.box_data, out);
   describe_shape(facts, out);
   describe_arrays(i.arrays, out);
-  for (const std::string& note : i.notes) out.row("remark", note);
-  if (!i.notes.empty()) out.json["remarks"] = i.notes;
   out.row("box", fmt::format("{} .. {}, {}", vector_text(i.box_data.lo), vector_text(i.box_data.hi), unit_of(facts)));
   out.row("size", extent_text(i.box_data.size()));
   out.json["box"] = box_json(i.box_data);
@@ -185,6 +183,8 @@ Description describe(const MeshFileFacts& facts) {
   out.row("chunks",
           fmt::format("{}, {}{}", facts.chunks, bytes_text(facts.chunk_bytes), i.from_cache ? ", from the cache" : ""));
   out.json["chunks"] = {{"count", facts.chunks}, {"bytes", facts.chunk_bytes}, {"from_cache", i.from_cache}};
+  for (const std::string& note : i.notes) out.row("remark", note);
+  if (!i.notes.empty()) out.json["remarks"] = i.notes;
   return out;
 }
 

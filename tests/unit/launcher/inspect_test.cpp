@@ -160,6 +160,7 @@ TEST_F(InspectFiles, ARunFolderIsATableItsFilesSortedWhateverItsSummarySays) {
     for (const auto& f : told->json["files"]) files.push_back(f["name"]);
     EXPECT_EQ(files, (std::vector<std::string>{"frames.csv", "summary.json", "images/a.png", "images/b.png"}));
     EXPECT_NE(told->table().find("figures"), std::string::npos) << told->table();
+    EXPECT_NE(told->table().find("3 bytes in 2 files"), std::string::npos) << told->table();
   }
   for (const char* text : {"", "[]", "{", "null"}) {
     write("bad/summary.json", text);

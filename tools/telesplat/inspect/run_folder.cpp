@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 
 #include "tools/telesplat/run/run_report.h"
@@ -14,8 +15,6 @@ namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr size_t kMostFilesTold = 40;
 
 struct File {
   std::string name;  // from the run folder on
@@ -49,17 +48,27 @@ void describe_scene(const std::string& directory, data::Description& out) {
   for (bool first = true; std::getline(lines, line); first = false) out.row(first ? "scene" : "", line);
 }
 
+// A row for each of its own files, one for all of a subfolder.
 void describe_files(const std::string& directory, data::Description& out) {
   const std::vector<File> files = files_below(directory);
+  std::map<std::string, std::pair<size_t, uint64_t>> folders;  // files, bytes
   uint64_t all = 0;
   for (const File& f : files) {
     all += f.bytes;
     out.json["files"].push_back({{"name", f.name}, {"bytes", f.bytes}});
   }
   out.row("files", fmt::format("{}, {}", files.size(), data::bytes_text(all)));
-  for (size_t i = 0; i < std::min(files.size(), kMostFilesTold); ++i)
-    out.row("", fmt::format("{:<34} {:>14} bytes", files[i].name, files[i].bytes));
-  if (files.size() > kMostFilesTold) out.row("", fmt::format("and {} more", files.size() - kMostFilesTold));
+  for (const File& f : files) {
+    const size_t slash = f.name.find('/');
+    if (slash == f.name.npos) {
+      out.row("", fmt::format("{:<18} {:>12} bytes", f.name, f.bytes));
+      continue;
+    }
+    auto& [count, bytes] = folders[f.name.substr(0, slash + 1)];
+    ++count, bytes += f.bytes;
+  }
+  for (const auto& [name, sum] : folders)
+    out.row("", fmt::format("{:<18} {:>12} bytes in {} files", name, sum.second, sum.first));
 }
 
 }  // namespace
