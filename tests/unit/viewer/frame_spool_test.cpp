@@ -71,6 +71,23 @@ TEST_F(Spool, PicturesAreDevelopedAndOnlyFramesToVerifyStay) {
   EXPECT_EQ(spooled_frames(directory_).size(), 2u);
 }
 
+TEST_F(Spool, TransparentPicturesHaveAlpha) {
+  {
+    auto spool = FrameSpool::open(directory_);
+    for (const auto& [number, use] : {std::pair{1, uint32_t(kPicture)}, {2, uint32_t(kPicture | kTransparent)}}) {
+      (*spool)->exchange(frame(uint64_t(number), use));
+      (*spool)->flush();
+    }
+  }
+  ASSERT_TRUE(develop_frames(directory_, directory_ + "/images", nullptr).ok());
+  for (const int number : {1, 2}) {
+    std::ifstream in(directory_ + "/images/frame-00000" + std::to_string(number) + ".png", std::ios::binary);
+    char header[26] = {};
+    ASSERT_TRUE(in.read(header, sizeof header));
+    EXPECT_EQ(int(header[25]), number == 1 ? 2 : 6) << "RGB, RGBA";
+  }
+}
+
 // Frames are compared with references, and people look at pictures.
 TEST_F(Spool, LegendsAreDrawnOntoPicturesAndLeaveFramesToVerifyAlone) {
   const auto large = [](uint64_t number, uint32_t use) {
