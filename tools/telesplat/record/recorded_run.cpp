@@ -134,27 +134,32 @@ Status read_display(const std::string& path, const toml::table& session, const t
 
 // The columns of frames.csv that make a frame again.
 struct FrameColumns {
-  size_t viewer, frame, t_s, construction_ms, sequence, points_drawn;
+  size_t viewer, frame, t_s, sequence, points_drawn;
   std::array<size_t, 7> pose;  // px py pz qw qx qy qz
-  // Earlier versions wrote none of them. Then: 1, 0, all, as the run began.
-  std::optional<size_t> detail, epoch, summaries, splat, finish, lit;
+  // Of files that lack them: 0, 1, 0, all, as the run began.
+  std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit;
 };
 
 Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   FrameColumns out{};
-  const std::pair<const char*, size_t*> wanted[] = {
-      {"viewer", &out.viewer},     {"frame", &out.frame},
-      {"t_s", &out.t_s},           {"construction_ms", &out.construction_ms},
-      {"sequence", &out.sequence}, {"points_drawn", &out.points_drawn},
-      {"px", &out.pose[0]},        {"py", &out.pose[1]},
-      {"pz", &out.pose[2]},        {"qw", &out.pose[3]},
-      {"qx", &out.pose[4]},        {"qy", &out.pose[5]},
-      {"qz", &out.pose[6]}};
+  const std::pair<const char*, size_t*> wanted[] = {{"viewer", &out.viewer},
+                                                    {"frame", &out.frame},
+                                                    {"t_s", &out.t_s},
+                                                    {"sequence", &out.sequence},
+                                                    {"points_drawn", &out.points_drawn},
+                                                    {"px", &out.pose[0]},
+                                                    {"py", &out.pose[1]},
+                                                    {"pz", &out.pose[2]},
+                                                    {"qw", &out.pose[3]},
+                                                    {"qx", &out.pose[4]},
+                                                    {"qy", &out.pose[5]},
+                                                    {"qz", &out.pose[6]}};
   for (const auto& [name, column] : wanted) {
     const auto found = table.column(name);
     if (!found) return found.error();
     *column = *found;
   }
+  out.construction_ms = table.find("construction_ms");
   out.detail = table.find("detail");
   out.epoch = table.find("epoch");
   out.summaries = table.find("summaries");
@@ -187,8 +192,8 @@ Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, cons
   for (const auto* count : {&number, &sequence, &drawn})
     if (!*count) return count->error();
   double v[9] = {};
-  for (size_t i = 0; i < 9; ++i) {
-    const auto value = table.number(row, i < 7 ? at.pose[i] : i < 8 ? at.t_s : at.construction_ms);
+  for (size_t i = 0; i < (at.construction_ms ? 9 : 8); ++i) {
+    const auto value = table.number(row, i < 7 ? at.pose[i] : i < 8 ? at.t_s : *at.construction_ms);
     if (!value) return value.error();
     v[i] = *value;
   }
