@@ -53,7 +53,8 @@ ValueSpan span_of(std::span<const ArrayInfo> arrays, const ArrayChoice& choice);
 /// kMaxArraysText. The others are left out.
 void make_tellable(std::vector<ArrayInfo>& arrays);
 
-/// JSON: [{"name", "unit", "cells", "components", "spans": [[lo, hi] or null, ...]}, ...]. Precondition: make_tellable().
+/// JSON: [{"name", "unit", "cells", "components", "spans": [[lo, hi] or null, ...]}, ...]. Precondition:
+/// make_tellable().
 std::string to_text(std::span<const ArrayInfo> arrays);
 /// Empty text: none. Error: no such text, a limit.
 Result<std::vector<ArrayInfo>> arrays_from_text(std::string_view text);

@@ -54,8 +54,8 @@ Result<ColourBy> parse_colour_by(std::string_view text);
 /// The colouring that this comes to. Error: no such array, it has no finite values.
 Result<Colouring> make_colouring(std::span<const ArrayInfo> arrays, const ColourBy& by, colour::ColourMap map);
 
-/// Chunks hold arrays as 32-bit floats minus this: 0, or the smallest value where the values lie far from 0 and close to
-/// each other (dates), so that floats tell them apart.
+/// Chunks hold arrays as 32-bit floats minus this: 0, or the smallest value where the values lie far from 0 and close
+/// to each other (dates), so that floats tell them apart.
 double scalar_origin(const ValueSpan& span);
 /// As chunks hold it; NaN where the value is not finite.
 float stored_scalar(double value, double origin);

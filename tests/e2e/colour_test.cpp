@@ -106,8 +106,8 @@ TEST_F(ColouredRun, WhatIsDisplayedIsWhatRaysSee) {
     EXPECT_EQ(told[0].map.name, "plasma");
     EXPECT_EQ(told[0].hi, by == "temperature" ? told[0].hi : 20);
     const std::string session = read_text(run.out() + "/session.toml");
-    EXPECT_NE(session.find(fmt::format("colour-by = \"{}\"", by)), std::string::npos) << session;
-    EXPECT_NE(session.find("colour-map = \"plasma\""), std::string::npos) << session;
+    EXPECT_NE(session.find(fmt::format("colour_by = \"{}\"", by)), std::string::npos) << session;
+    EXPECT_NE(session.find("colour_map = \"plasma\""), std::string::npos) << session;
   }
 }
 

@@ -25,7 +25,8 @@ struct ChunkPlan {
 ChunkPlan plan_chunks(const PlacedMesh& mesh, size_t most = kTrianglesPerChunk);
 
 /// Lays out one chunk (geometry::build_chunk) of these triangles: vertices are renumbered in the order of their first
-/// use, and doubled where faces of other colours meet, triangles follow a Morton curve through their centroids, so that neighbours in memory are neighbours in space.
+/// use, and doubled where faces of other colours meet, triangles follow a Morton curve through their centroids, so that
+/// neighbours in memory are neighbours in space.
 std::vector<std::byte> make_chunk(const PlacedMesh& mesh, std::span<const uint32_t> triangles);
 
 }  // namespace telesplat::data

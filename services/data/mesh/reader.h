@@ -11,9 +11,9 @@
 
 namespace telesplat::data {
 
-/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtu", "vtk", "gltf",
-/// "raster", or "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and what is
-/// supported.
+/// What a file is, by its content first and its extension second: "ply", "obj", "stl", "off", "vtp", "vtu", "vtk",
+/// "gltf", "raster", or "" with a sentence on what it seems to be instead (an image, a volume, an elevation raster) and
+/// what is supported.
 struct DetectedFormat {
   std::string format;
   std::string complaint;
@@ -48,13 +48,13 @@ Result<Mesh> read_off(std::string_view content, const std::string& name, const R
 /// STL, binary or ascii. Corners at the same position become one vertex.
 Result<Mesh> read_stl(std::string_view content, const std::string& name, const ReadProgress& progress);
 /// Wavefront OBJ: v (with r g b too), vn, vt, f (negative indices too), usemtl with Kd and map_Kd of its material
-/// libraries, which are looked for beside `name`; textures are baked. Error: also a texture that is damaged; without one
-/// that is missing the mesh has a note.
+/// libraries, which are looked for beside `name`; textures are baked. Error: also a texture that is damaged; without
+/// one that is missing the mesh has a note.
 Result<Mesh> read_obj(std::string_view content, const std::string& name, const ReadProgress& progress,
                       uint64_t texture_detail = kDefaultTextureDetail);
-/// VTP, VTU, legacy VTK and glTF, through VTK (of grids the surface), in the program telesplat-import, which must lie beside this process's own
-/// program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us. Claimed counts are checked here
-/// before VTK sees the file.
+/// VTP, VTU, legacy VTK and glTF, through VTK (of grids the surface), in the program telesplat-import, which must lie
+/// beside this process's own program or in $PATH: neither VTK's messages nor a crash on a hostile file reach us.
+/// Claimed counts are checked here before VTK sees the file.
 Result<Mesh> read_with_vtk(std::string_view content, const std::string& format, const std::string& path,
                            const ReadProgress& progress, const std::string& array = {},
                            uint64_t texture_detail = kDefaultTextureDetail);

@@ -1,5 +1,5 @@
-// What a mesh is coloured by in the current epoch, what may change it, and what the data server was asked for so that it
-// can. No clocks.
+// What a mesh is coloured by in the current epoch, what may change it, and what the data server was asked for so that
+// it can. No clocks.
 #pragma once
 
 #include <optional>
@@ -26,9 +26,9 @@ class MeshColours {
   /// nullopt: by nothing, in the file's own colours.
   const std::optional<scene::Colouring>& now() const { return now_; }
 
-  /// "colour": arguments "array" (as scene::parse_colour_by() takes it) and "map" (as colour::from_text() takes it), one
-  /// of them at least. Another map or range begins an epoch; another array is asked for first, and its epoch begins when
-  /// the data server has it. Error: no such array, no range, nothing to colour; then nothing changed.
+  /// "colour": arguments "array" (as scene::parse_colour_by() takes it) and "map" (as colour::from_text() takes it),
+  /// one of them at least. Another map or range begins an epoch; another array is asked for first, and its epoch begins
+  /// when the data server has it. Error: no such array, no range, nothing to colour; then nothing changed.
   Result<Obeyed> obey(const wire::Control& command);
 
  private:

@@ -23,9 +23,9 @@ struct HitPacket {
   alignas(32) uint32_t corner_colour[3][kPacket];  ///< [corner], 0x00RRGGBB; of scalars the bits of floats
 };
 
-/// Interpolated attributes in every lane. SIMD, chosen for the processor at run time.
-/// colour: 0x00RRGGBB. normal: image/normal.h: encode_normal16, in 32 bits. Both 32-byte aligned. scalars: the colours of
-/// scalars, which all corners have then; null: they have colours.
+/// Interpolated attributes in every lane. SIMD, chosen for the processor at run time. colour: 0x00RRGGBB. normal:
+/// image/normal.h: encode_normal16, in 32 bits. Both 32-byte aligned. scalars: the colours of scalars, which all
+/// corners have then; null: they have colours.
 void shade_hits(const HitPacket& hits, uint32_t* colour, uint32_t* normal, const scene::ColourTable* scalars = nullptr);
 
 /// One hit, unquantised: what direct rendering uses, and the oracle of shade_hits.

@@ -34,8 +34,9 @@ class Sampler {
   virtual void set_colours(std::shared_ptr<const scene::ColourTable> colours) = 0;
 
   /// Samples the pixels `tile` of the frame `camera` at their centres. Colours are unlit albedo interpolated over the
-  /// triangle, or looked up for scalars that are interpolated over it; normals are interpolated, in room space, flipped to the side on which the camera sees the triangle.
-  /// Returns a canonical image of tile.width x tile.height. Precondition: tile lies in the camera's image.
+  /// triangle, or looked up for scalars that are interpolated over it; normals are interpolated, in room space, flipped
+  /// to the side on which the camera sees the triangle. Returns a canonical image of tile.width x tile.height.
+  /// Precondition: tile lies in the camera's image.
   virtual image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) = 0;
 };
 

@@ -85,7 +85,8 @@ TEST(PlyArray, OfAFaceIsThatOfAllItsTriangles) {
   EXPECT_EQ(mesh->scalars, (std::vector<float>{7, 7, 9}));  // the face of two corners is left out
 }
 
-// A tetrahedron's shape as VTK's formats have it, and arrays: t of points (1 2 3 and not a number), v a vector of points, c of cells.
+// A tetrahedron's shape as VTK's formats have it, and arrays: t of points (1 2 3 and not a number), v a vector of
+// points, c of cells.
 constexpr const char* kVtp = R"(<?xml version="1.0"?>
 <VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"><PolyData>
 <Piece NumberOfPoints="4" NumberOfVerts="1" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="2">
@@ -253,12 +254,9 @@ TEST(ArrayStore, FacesHaveOneValueAndSmoothNormals) {
   const Mesh grid = wavy_grid(8);
   std::string file = ply_of(grid);
   file.replace(file.find("end_header"), 10, "property int number\nend_header");
-  size_t at = file.find("end_header\n") + 11;
-  for (size_t line = 0, face = 0; at < file.size(); ++line) {
-    at = file.find('\n', at);
-    if (line >= grid.positions.size()) file.insert(at, fmt::format(" {}", face++));
-    ++at;
-  }
+  file.resize(file.find("\n3 ") + 1);  // the faces, again, with a number each
+  for (size_t f = 0; f < grid.indices.size() / 3; ++f)
+    file += fmt::format("3 {} {} {} {}\n", grid.indices[3 * f], grid.indices[3 * f + 1], grid.indices[3 * f + 2], f);
   const auto path = folder.write("grid.ply", file);
   const auto store = open_or_fail(path, coloured("number")), plain = open_or_fail(path, plain_options());
   ASSERT_NE(store, nullptr);

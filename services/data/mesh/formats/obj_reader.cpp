@@ -27,13 +27,14 @@ class ObjReader {
       : content_(content), name_(name), progress_(progress), texture_detail_(texture_detail), scan_(content) {}
 
   Result<Mesh> read() {
+    std::map<int64_t, uint32_t> looks;
     for (auto& [name, material] : read_obj_materials(obj_material_libraries(content_, name_))) {
-      // Those that look the same are one: fewer vertices are doubled.
-      const auto same = std::find_if(materials_.begin(), materials_.end(), [&](const ObjMaterial& m) {
-        return m.texture.empty() && material.texture.empty() && m.colour == material.colour;
-      });
-      material_numbers_.emplace(name, uint32_t(same - materials_.begin()));
-      if (same == materials_.end()) materials_.push_back(std::move(material));
+      // Those without a texture that have one colour are one: fewer vertices are doubled.
+      const auto next = uint32_t(materials_.size());
+      const int64_t look = material.colour ? int64_t(*material.colour) : -1;
+      const uint32_t number = material.texture.empty() ? looks.emplace(look, next).first->second : next;
+      material_numbers_.emplace(name, number);
+      if (number == next) materials_.push_back(std::move(material));
     }
     mesh_.format = "obj";
     for (size_t lines = 0; scan_.skip_space('#'); scan_.next_line(), ++lines) {
