@@ -8,7 +8,6 @@
 #include <fstream>
 
 #include "common/image/file.h"
-#include "tests/support/movie_frames.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/telesplat/movie/movie_target.h"
 

@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "common/geometry/trajectory.h"
-#include "tests/support/movie_frames.h"
 #include "tests/support/pipeline_run.h"
 #include "tests/support/virtual_display.h"
 
@@ -217,8 +216,7 @@ TEST_F(WindowTest, TheLegendLiesInTheWindowAndInScreenshots) {
   const auto ink = [](const image::View& v) {
     int out = 0;
     for (int y = v.height / 2; y < v.height; ++y)
-      for (int x = v.width / 2; x < v.width; ++x)
-        out += (v.colour[size_t(y * v.width + x)] & 0xffffff) == 0xf4f4f4;
+      for (int x = v.width / 2; x < v.width; ++x) out += (v.colour[size_t(y * v.width + x)] & 0xffffff) == 0xf4f4f4;
     return out;
   };
   EXPECT_TRUE(wait_until([&] {
