@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
@@ -12,6 +13,19 @@ namespace telesplat::net {
 namespace {
 
 namespace fs = std::filesystem;
+
+// What a socket can connect to: tcp://HOST:PORT or ipc://PATH.
+bool is_address(const std::string& text) {
+  constexpr std::string_view kTcp = "tcp://", kIpc = "ipc://";
+  if (text.find_first_of(" \t\n") != text.npos) return false;
+  if (text.starts_with(kIpc)) return text.size() > kIpc.size();
+  const size_t colon = text.rfind(':');
+  if (!text.starts_with(kTcp) || colon <= kTcp.size()) return false;
+  int port = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, port);
+  return error == std::errc() && stop == end && port >= 1 && port <= 65535;
+}
 
 // As a person may name it.
 bool is_called(const RunningSession& session, const std::string& name) {
@@ -35,7 +49,14 @@ std::string master_from_environment() {
 }
 
 MasterSearch find_master(const std::string& master, const std::string& session) {
-  if (!master.empty() && master != kTheOneMaster) return {.address = master, .problem = {}};
+  if (!master.empty() && master != kTheOneMaster) {
+    if (is_address(master)) return {.address = master, .problem = {}};
+    return {.address = {},
+            .problem =
+                fmt::format("{} {}: is no address such as tcp://127.0.0.1:7700",
+                            master == master_from_environment() ? kMasterVariable : "--master", master.substr(0, 200)),
+            .several = true};
+  }
   const auto running = running_sessions();
   auto fitting = running;
   if (!session.empty()) std::erase_if(fitting, [&](const auto& s) { return !is_called(s, session); });

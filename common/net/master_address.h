@@ -19,7 +19,7 @@ std::string master_from_environment();
 struct MasterSearch {
   std::string address;   ///< empty: there is none
   std::string problem;   ///< then; sessions among which to choose are told in lines of their own
-  bool several = false;  ///< the person must choose: bad usage
+  bool several = false;  ///< the person must choose, or gave what is no address: bad usage
   int exit_code() const { return several ? 2 : 1; }
 };
 

@@ -64,7 +64,6 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
 }
 
 int settle_master(ServiceOptions& o) {
-  if (o.master != kTheOneMaster) return 0;
   MasterSearch search = find_master(o.master);
   if (search.address.empty()) {
     std::fprintf(stderr, "telesplat: %s\n", search.problem.c_str());

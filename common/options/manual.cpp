@@ -135,7 +135,7 @@ std::string man_page(const Manual& m, const std::string& version, bool separate)
   }
   out += paragraphs(roff(m.footer));
   if (!separate) out += sections(m);
-  out += ".SH EXIT STATUS\n0: done. 1: failed while running. 2: bad usage or bad input.\n";
+  out += ".SH EXIT STATUS\n0: done. 1: failed while running. 2: bad usage or bad input. 130: interrupted.\n";
   if (m.name != "telesplat") out += ".SH SEE ALSO\n\\fBtelesplat\\fR(1)\n";
   return out;
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "common/net/master_address.h"
 #include "common/net/service.h"
 #include "common/options/parser.h"
 
@@ -36,6 +37,21 @@ TEST(Service, RefusesHostsThatNobodyCanConnectTo) {
   for (const std::string& host : {std::string("0.0.0.0"), std::string("*"), std::string("::"), std::string("[::]"),
                                   std::string(""), std::string("tcp://lab"), std::string("a b"), std::string(254, 'a')})
     EXPECT_NE(complain_about_host(host), "") << host;
+}
+
+TEST(Service, AMasterThatIsNoAddressIsRefused) {
+  for (const char* text : {"foo", "tcp://", "tcp://x", "tcp://:7700", "tcp://x:0", "tcp://x:70000", "tcp://x:77y",
+                           "tcp://a b:7700", "ipc://", "http://x:1"}) {
+    const auto search = find_master(text);
+    EXPECT_EQ(search.address, "") << text;
+    EXPECT_EQ(search.problem, std::string("--master ") + text + ": is no address such as tcp://127.0.0.1:7700");
+    EXPECT_EQ(search.exit_code(), 2);
+  }
+  for (const char* text : {"tcp://127.0.0.1:7700", "tcp://[::1]:7700", "tcp://lab:1", "ipc:///tmp/x"})
+    EXPECT_EQ(find_master(text).address, text);
+  setenv(kMasterVariable, "foo", 1);
+  EXPECT_EQ(find_master("foo").problem, "TELESPLAT_MASTER foo: is no address such as tcp://127.0.0.1:7700");
+  unsetenv(kMasterVariable);
 }
 
 TEST(Service, FlagsTakeTheMasterFromTheEnvironment) {
