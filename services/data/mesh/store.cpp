@@ -103,8 +103,8 @@ Result<std::shared_ptr<MeshStore>> open_existing(const std::string& stem, const 
   return make_store(std::move(*content), path, from_cache, std::move(file));
 }
 
-// Makes a store in the cache. It gets its name once it is whole. Where the cache has a limit, others make room: this one
-// is locked.
+// Makes a store in the cache. It gets its name once it is whole. Where the cache has a limit, others make room: this
+// one is locked.
 Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const std::string& path,
                                                const StoreOptions& options, const MeshSource& source,
                                                const Progress& progress) {
