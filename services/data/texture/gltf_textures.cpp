@@ -141,7 +141,8 @@ std::vector<size_t> base_colours(const Json& document) {
   const Json& materials = member(document, "materials");
   for (size_t m = 0; materials.is_array() && m < materials.size(); ++m) {
     const auto texture = index(member(member(materials[m], "pbrMetallicRoughness"), "baseColorTexture"), "index");
-    if (texture && std::find(out.begin(), out.end(), *texture) == out.end()) out.push_back(*texture);
+    if (texture && *texture < kMaxPictures && std::find(out.begin(), out.end(), *texture) == out.end())
+      out.push_back(*texture);
   }
   return out;
 }
@@ -173,7 +174,7 @@ Result<GltfTextures> read_gltf_textures(std::string_view content, const std::str
   for (const size_t t : base_colours(document)) {
     const Json& texture = element(document, "textures", t);
     const auto source = index(texture, "source");
-    if (!source || t >= kMaxPictures) continue;
+    if (!source) continue;
     const auto picture = find_picture(document, content, *source, path);
     if (!picture) return picture.error();
     if (picture->missing) {
