@@ -30,7 +30,7 @@ const std::vector<Ours>& ours() {
        {"summary.json", "summary.json.part", "frames.csv", "updates.csv", "tiles.csv", "epochs.csv", "assignment.csv",
         "quality.csv", "trace.json", "session.toml", "points.events", "slices.events"}},
       {"images", {"frame-*.png", "frame-*.exr", "verify-*.png", "wall.png", "contact-sheet.png"}},
-      {"depth", {"frame-*.depth"}},
+      {"depth", {"frame-*.depth", "cameras.csv"}},
       {"spool", {"*.frame", "*.frame.part"}},
       {"compare", {"contact-sheet.png", "pose-*.png", "compare.csv", "compare.json"}},
       {"compare-still", {"contact-sheet.png", "pose-*.png", "compare.csv", "compare.json"}},

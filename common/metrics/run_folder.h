@@ -11,8 +11,9 @@ namespace telesplat::metrics {
 /// Who looks: a launcher writes logs too; a master that is started by hand finds those of others there.
 enum class Logs { kOurs, kOthers };
 
-/// The files of a record that lie in `directory`, relative to it, sorted: those that runs and `telesplat compare` write,
-/// by their names. Whatever else lies there is not among them, and no symbolic link is followed. run.id is left out.
+/// The files of a record that lie in `directory`, relative to it, sorted: those that runs and `telesplat compare`
+/// write, by their names. Whatever else lies there is not among them, and no symbolic link is followed. run.id is left
+/// out.
 std::vector<std::string> recorded_files(const std::string& directory, Logs logs = Logs::kOurs);
 
 /// Makes `directory` the folder of a new record: makes it if need be, and writes run.id into it. Returns the new id.

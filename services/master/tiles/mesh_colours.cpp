@@ -50,7 +50,8 @@ bool MeshColours::hear_answer(const std::string& answer, std::string& problem) {
   order_.reset();
   const size_t blank = answer.find(' ');
   if (blank != answer.npos) {
-    problem = fmt::format("the array \"{}\" cannot be shown: {}", array_of(colouring), answer.substr(blank + 1));
+    failure_ = problem =
+        fmt::format("the array \"{}\" cannot be shown: {}", array_of(colouring), answer.substr(blank + 1));
     return false;
   }
   now_ = colouring;
@@ -63,6 +64,12 @@ void MeshColours::describe(wire::Welcome& welcome) const {
   welcome.facts.erase(scene::kColouringFact);
   if (now_) welcome.facts[scene::kColouringFact] = text();
   if (order_) welcome.facts[scene::kArrayOrderFact] = fmt::format("{} {}", order_->number, array_of(order_->colouring));
+}
+
+std::string MeshColours::waits_for() const {
+  if (!order_) return failure_;
+  return fmt::format("{} {} being fetched", order_->colouring ? order_->colouring->array : "the file's own colours",
+                     order_->colouring ? "is" : "are");
 }
 
 // What the command comes to, seen from what is shown or was ordered last.
@@ -97,6 +104,7 @@ Result<Obeyed> MeshColours::obey(const wire::Control& command) {
                                                         : "colour: the scene is no mesh and has no arrays"};
   auto colouring = wanted(command);
   if (!colouring) return colouring.error();
+  failure_.clear();
   if (array_of(*colouring) == array_of(now_)) {
     order_.reset();
     now_ = *std::move(colouring);

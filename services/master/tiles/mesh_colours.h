@@ -26,6 +26,9 @@ class MeshColours {
   /// nullopt: by nothing, in the file's own colours.
   const std::optional<scene::Colouring>& now() const { return now_; }
 
+  /// For people: what is on its way, or why the last array that was asked for did not come; empty: neither.
+  std::string waits_for() const;
+
   /// "colour": arguments "array" (as scene::parse_colour_by() takes it) and "map" (as colour::from_text() takes it),
   /// one of them at least. Another map or range begins an epoch; another array is asked for first, and its epoch begins
   /// when the data server has it. Error: no such array, no range, nothing to colour; then nothing changed.
@@ -46,6 +49,7 @@ class MeshColours {
   std::optional<scene::Colouring> now_;
   std::optional<Order> order_;  // that waits for its answer
   uint64_t orders_ = 0;
+  std::string failure_;  // of the last order
 };
 
 }  // namespace telesplat::master

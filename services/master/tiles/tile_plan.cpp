@@ -56,6 +56,7 @@ Result<Obeyed> TilePlan::obey(const wire::Control& m) {
 void TilePlan::add_status(nlohmann::ordered_json& status) const {
   if (const auto& c = colours_.now())
     status["colouring"] = {{"array", c->array}, {"unit", c->unit}, {"lo", c->lo}, {"hi", c->hi}, {"map", c->map.name}};
+  if (const std::string waits = colours_.waits_for(); !waits.empty()) status["colouring_order"] = waits;
 }
 
 void TilePlan::give_leases(Idle& idle, double now_s) {

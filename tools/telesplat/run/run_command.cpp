@@ -55,8 +55,8 @@ class PassingFolder {
   std::string path_;
 };
 
-/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input, 130 interrupted. No process
-/// is left behind in any case.
+/// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input, 130 interrupted. No
+/// process is left behind in any case.
 class Run {
  public:
   /// movie: what is to be made of the record, if anything.
