@@ -270,10 +270,16 @@ TEST_F(Sessions, ATransferFunctionIsChangedWhileAVolumeRuns) {
     EXPECT_EQ(refused.code, 2) << wrong[0] << ": " << refused.out << refused.err;
     EXPECT_TRUE(refused.err.starts_with("telesplat: ")) << refused.err;
   }
+  // What ctl found wrong by itself was not the master's business.
+  const auto counted = nlohmann::json::parse(ctl({"status", "--json"}).out, nullptr, false);
+  ASSERT_TRUE(counted.is_object());
+  EXPECT_EQ(counted["epoch"], 3);
   const auto status = ctl({"status"});
-  for (const char* told : {"balls.mha (volume)", "transfer", "slab of", "voxels M", "ready"})
+  for (const char* told : {"balls.mha (volume)", "transfer", "slab of", "voxels held", "ready"})
     EXPECT_TRUE(holds(status.out, told)) << told << " in\n" << status.out;
   EXPECT_LE(widest_line(status.out), 120u) << status.out;
+  EXPECT_EQ(run.stop(), 0);
+  EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
 }
 
 TEST_F(Sessions, WordsThatAreNoOrderAreBadUsage) {

@@ -1,12 +1,18 @@
 #include "tools/telesplat/control/client.h"
 
+#include <utility>
+
 #include "common/net/control.h"
 
 namespace telesplat::launcher {
 
 ControlClient::ControlClient(const std::string& master_endpoint)
-    : endpoint_(master_endpoint), socket_(context_, net::Kind::kDealer, "ctl", net::kControlSocket) {
-  if (const Status s = socket_.connect(master_endpoint); !s) log::error("{}", s.error().text);
+    : endpoint_(master_endpoint), socket_(context_, net::Kind::kDealer, "ctl", net::kControlSocket) {}
+
+// A connection over which nothing is said counts at the master as a message that it rejected.
+void ControlClient::connect() {
+  if (std::exchange(connected_, true)) return;
+  if (const Status s = socket_.connect(endpoint_); !s) log::error("{}", s.error().text);
 }
 
 Result<std::string> ControlClient::ask(const std::string& command, double timeout_s,
@@ -19,12 +25,16 @@ Result<std::string> ControlClient::ask(const std::string& command, double timeou
 
 Result<wire::ControlReply> ControlClient::order(const std::string& command, double timeout_s,
                                                 const std::map<std::string, std::string>& arguments) {
+  connect();
   auto reply = net::reply_of_master(socket_, endpoint_, command, timeout_s, arguments);
   unanswered_ = !reply.ok();
   return reply;
 }
 
-void ControlClient::request_status() { socket_.send(wire::Control{"status", {}}); }
+void ControlClient::request_status() {
+  connect();
+  socket_.send(wire::Control{"status", {}});
+}
 
 std::optional<nlohmann::json> ControlClient::poll_status() {
   std::optional<nlohmann::json> out;

@@ -10,6 +10,7 @@ namespace telesplat::launcher {
 
 class ControlClient {
  public:
+  /// Connects when the first question is asked.
   explicit ControlClient(const std::string& master_endpoint);
 
   /// Sends a command and waits for its answer. Error: the master refused, or there is no answer.
@@ -25,10 +26,12 @@ class ControlClient {
   std::optional<nlohmann::json> poll_status();
 
  private:
+  void connect();
+
   std::string endpoint_;
   net::Context context_;
   net::Socket socket_;
-  bool unanswered_ = false;
+  bool connected_ = false, unanswered_ = false;
 };
 
 }  // namespace telesplat::launcher

@@ -84,24 +84,26 @@ std::string parameters(const Json& status) {
 }
 
 std::string colouring(const Json& status) {
+  const std::string order = text(status, "colouring_order");
+  const std::string waits = order.empty() ? "" : line("colours", tools::shortened(order, kColumns - kIndent));
   const auto* c = field(status, "colouring");
-  if (!c || text(*c, "array").empty()) return {};
+  if (!c || text(*c, "array").empty()) return waits;
   std::string told = fmt::format("{}, {:g} to {:g}", tools::shortened(text(*c, "array"), 40),
                                  number(*c, "lo").value_or(0), number(*c, "hi").value_or(0));
   for (const char* key : {"unit", "map"})
     if (const std::string word = text(*c, key); !word.empty())
       told += (*key == 'u' ? " " : ", ") + tools::shortened(word, 24);
-  return line("coloured by", told);
+  return line("coloured by", told) + waits;
 }
 
 std::string slabs(const Json& partition) {
-  tools::TextTable table({{"slab of", false}, {"slices"}, {"visible M"}, {"voxels M"}, {"MB received"}, {"", false}});
+  tools::TextTable table(
+      {{"slab of", false}, {"slices"}, {"visible voxels"}, {"voxels held"}, {"MB received"}, {"", false}});
   for (const auto& s : array(partition, "slabs"))
     if (s.is_object())
       table.add({tools::shortened(text(s, "sampler"), 30),
                  fmt::format("{} to {}", count(s, "begin"), count(s, "end") - std::min<uint64_t>(1, count(s, "end"))),
-                 fmt::format("{:.2f}", double(count(s, "weight")) / 1e6),
-                 fmt::format("{:.2f}", double(count(s, "voxels")) / 1e6),
+                 std::to_string(count(s, "weight")), std::to_string(count(s, "voxels")),
                  fmt::format("{:.1f}", double(count(s, "bytes")) / 1e6), flag(s, "ready") ? "ready" : "being filled"});
   for (const auto& s : array(partition, "spare"))
     if (s.is_string()) table.add({tools::shortened(s.get<std::string>(), 30), "", "", "", "", "spare"});
@@ -112,7 +114,7 @@ std::string volume(const Json& status) {
   const auto* found = field(status, "volume");
   if (!found || !found->is_object()) return {};
   const Json& v = *found;
-  std::string told = fmt::format("{} layers, {} partitions made", count(v, "layers"), count(v, "partitions"));
+  std::string told = fmt::format("{} layers; cut into slabs {} times", count(v, "layers"), count(v, "partitions"));
   if (const uint64_t steps = count(v, "steps"); steps > 1)
     told = fmt::format("step {} of {} (0 to {}), ", count(v, "step"), steps, steps - 1) + told;
   std::string out = line("volume", told);
