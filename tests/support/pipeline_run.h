@@ -105,8 +105,8 @@ nlohmann::json process(const nlohmann::json& status, const std::string& name);
 /// Its value, 0 if it has none.
 double value(const nlohmann::json& status, const std::string& name, const std::string& key);
 
-/// What a movie of `fps` frames a second of the run in this folder must show: the number of the displayed frame for each
-/// of its frames.
+/// What a movie of `fps` frames a second of the run in this folder must show: for each of its frames the number of the
+/// displayed one.
 std::vector<uint64_t> on_screen(const std::string& run, double fps);
 /// Makes a folder of pictures of the run, which recorded every frame, and expects each to be the recorded one. Returns
 /// how many were compared: the disk may not have kept up.
