@@ -19,6 +19,7 @@ const char* name_of(VoxelType type);  ///< "u8", "i8", "u16", "i16", "f32"
 struct Volume {
   std::array<int, 3> size{};
   glm::dmat4 index_to_data{1.0};  ///< spacing, orientation and origin, in the file's own units and axes; affine
+  std::string unit;               ///< of these: "mm", "m", ...; empty: the file does not say
   VoxelType type = VoxelType::kU8;
   double scale = 1, offset = 0;  ///< value = stored * scale + offset (a CT's rescale, NIfTI's scl_slope)
   /// i fastest, then j, k; native byte order; size[0] * size[1] * size[2] * voxel_bytes(type) bytes.

@@ -94,6 +94,28 @@ TEST(Inspect, ASeriesValuesAreThoseOfAllStepsOrOfTheFirstAndItIsSaid) {
   expect_rows(describe(*first), {"0 .. 0, of the first step alone"});
 }
 
+TEST(Inspect, AVolumesUnitIsTheOneItsFileSays) {
+  const TempFolder folder;
+  const Pattern p{{5, 4, 3}, glm::dmat4(1.0), 0, 1};
+  const auto unit_of = [&](const std::string& path) -> std::string {
+    const auto facts = inspect_volume(path, {}, {}, nullptr);
+    EXPECT_TRUE(facts.ok()) << path << (facts ? "" : facts.error().text);
+    return facts ? std::string(describe(*facts).json["unit"]) : "";
+  };
+  std::string nifti = nifti_header(p, {}) + p.bytes<int16_t>();
+  EXPECT_EQ(unit_of(folder.write("none.nii", nifti)), "the file's own units");
+  nifti[123] = 2 | 8;  // millimetres, seconds
+  EXPECT_EQ(unit_of(folder.write("mm.nii", nifti)), "mm");
+  const auto nrrd = [&](const std::string& units) {
+    return nrrd_header(p, "uint8", "space units: " + units + "\nencoding: raw\n\n") + p.bytes<uint8_t>();
+  };
+  EXPECT_EQ(unit_of(folder.write("um.nrrd", nrrd("\"um\" \"um\" \"um\""))), "um");
+  EXPECT_EQ(unit_of(folder.write("cut.nrrd", nrrd("\"" + std::string(100, 'u')))), std::string(16, 'u'));
+  std::filesystem::create_directory(folder / "scan");
+  for (int k = 0; k < 3; ++k) folder.write(fmt::format("scan/{}.dcm", k), dicom_slice(p, k, {}));
+  EXPECT_EQ(unit_of(folder / "scan"), "mm");
+}
+
 TEST(Inspect, AVolumeTellsWhatARunWouldChoose) {
   const TempFolder folder;
   std::string stored;

@@ -228,6 +228,9 @@ Result<VolumeFileHeader> parse_nrrd(std::string_view content, const std::string&
   const auto m = placement_of(fields, *axes, sizes->size(), path);
   if (!m) return m.error();
   h.index_to_data = *m;
+  // "mm" "mm" "mm": the first counts, as scanners' axes have one unit.
+  if (const auto units = field(fields, {"spaceunits"}); units.starts_with('"'))
+    h.unit = units.substr(1, std::min(units.find('"', 1) - 1, size_t{16}));
 
   if (const Status s = read_encoding(fields, path, h); !s) return s.error();
   if (const Status s = find_data(lines, path, h); !s) return s.error();
