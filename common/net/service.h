@@ -23,8 +23,8 @@ struct ServiceOptions {
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 
-/// Finds the session that --master auto means. Returns 0, or the exit code after a line on stderr that says why there is
-/// none.
+/// Finds the session that --master auto means. Returns 0, or the exit code after a line on stderr that says why there
+/// is none.
 int settle_master(ServiceOptions& options);
 
 /// This machine's name; in a container that of the container.
