@@ -128,10 +128,16 @@ class Baker {
     return false;
   }
 
+  // Poles of spheres have such triangles; nothing of them is seen.
+  bool is_a_line(size_t t) const {
+    const uint32_t a = place_[corner(t, 0)], b = place_[corner(t, 1)], c = place_[corner(t, 2)];
+    return a == b || b == c || c == a;
+  }
+
   // Which edges of a triangle are to be halved for its own sake: bits of its corners 0, 1, 2, behind which they lie.
   uint8_t wishes(size_t t) const {
     const Texture* texture = texture_of(t);
-    if (!texture) return 0;
+    if (!texture || is_a_line(t)) return 0;
     uint8_t bits = 0;
     float longest = 0;
     for (int k = 0; k < 3; ++k) {
