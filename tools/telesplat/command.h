@@ -12,11 +12,12 @@ namespace telesplat::launcher {
 
 struct Command {
   std::string name, help;
-  options::Table table;                           ///< its flags
-  std::function<int(const options::Given&)> run;  ///< exit code: 0 done, 1 failed or interrupted, 2 bad usage or input
-  bool takes_scene_file = false;                  ///< an argument that ends in .toml stands for the flags in that file
-  std::string footer;                             ///< at the end of --help
-  std::vector<Command> commands;                  ///< its sub-commands, instead of flags
+  options::Table table;  ///< its flags
+  /// Exit code: 0 done, 1 failed, 2 bad usage or input, 130 interrupted.
+  std::function<int(const options::Given&)> run;
+  bool takes_scene_file = false;  ///< an argument that ends in .toml stands for the flags in that file
+  std::string footer;             ///< at the end of --help
+  std::vector<Command> commands;  ///< its sub-commands, instead of flags
 };
 
 /// A command whose flags fill `o`, an options struct of its own. table: as tables of options are; it points into the
