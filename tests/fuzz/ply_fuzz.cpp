@@ -1,5 +1,11 @@
 #include "tests/fuzz/mesh_reader_fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  return telesplat::data::use(telesplat::data::read_ply({reinterpret_cast<const char*>(data), size}, "fuzz", nullptr));
+  using namespace telesplat::data;
+  const std::string_view content(reinterpret_cast<const char*>(data), size);
+  auto mesh = read_ply(content, "fuzz", nullptr);
+  const std::string array = mesh.ok() && !mesh->arrays.empty() ? mesh->arrays.back().name : "";
+  use(std::move(mesh));
+  if (!array.empty()) use(read_ply(content, "fuzz", nullptr, array));
+  return 0;
 }

@@ -70,6 +70,7 @@ TEST_F(MeshColoursTest, AnotherArrayIsFetchedFirst) {
   EXPECT_FALSE(done->begins_epoch);
   EXPECT_TRUE(done->tells_all);
   EXPECT_EQ(told().at(scene::kArrayOrderFact), "1 area");
+  EXPECT_EQ(colours.waits_for(), "area is being fetched");
   EXPECT_EQ(now().array, "heat");
   EXPECT_FALSE(adopt(data(heat(), "7")));  // the answer to another order
   EXPECT_TRUE(adopt(data(heat(), "1")));
@@ -90,6 +91,7 @@ TEST_F(MeshColoursTest, AnArrayThatCannotBeHadChangesNothing) {
   ASSERT_TRUE(colours.obey(colour({{"array", "area"}})).ok());
   EXPECT_FALSE(adopt(data("", "1 disk full")));
   EXPECT_NE(problem.find("disk full"), std::string::npos);
+  EXPECT_NE(colours.waits_for().find("disk full"), std::string::npos);
   EXPECT_EQ(colours.text(), "");
   EXPECT_FALSE(told().contains(scene::kArrayOrderFact));
 }
