@@ -13,6 +13,7 @@
 #include "services/data/mesh/reader.h"
 #include "services/data/mesh/store_file.h"
 #include "services/data/open_mesh.h"
+#include "services/data/volume/formats/header.h"
 
 namespace telesplat::data {
 namespace {
@@ -28,7 +29,17 @@ const char* unit_of(const MeshFileFacts& facts) {
     return facts.raster->unit.empty()        ? "samples"
            : facts.raster->unit == "degrees" ? "metres, made of the degrees"
                                              : "metres";
-  return facts.info.format == "gltf" ? "metres" : "the file's own units";
+  return facts.unit.empty() ? "the file's own units" : facts.unit.c_str();
+}
+
+// As inspect_volume() tells it, but read from the header alone.
+std::string unit_of_volume(const std::string& path, const MeshOptions& options) {
+  const auto source = find_volume(path, options.raw, options.series);
+  if (!source) return "";
+  std::error_code error;
+  if (std::filesystem::is_directory(source->steps[0], error)) return "mm";  // DICOM's
+  const auto header = read_volume_header(source->steps[0], options.raw);
+  return header ? header->unit : "";
 }
 
 const char* normals_of(const MeshFileFacts& facts) {
@@ -134,6 +145,7 @@ Result<MeshFileFacts> inspect_mesh(const std::string& path, const MeshOptions& o
   if (error) facts.file_bytes = 0;  // a folder of slices
   sum_up((*store)->chunks(), facts);
   facts.iso = options.iso;
+  facts.unit = options.iso ? unit_of_volume(path, options) : facts.info.format == "gltf" ? "metres" : "";
   if (facts.info.format == "raster") {
     auto raster = inspect_raster(path);
     if (!raster) return raster.error();

@@ -21,6 +21,7 @@ struct MeshFileFacts {
   std::optional<RasterFacts> raster;  ///< of elevation rasters
   std::string texture;                ///< draped over a raster; empty: none
   std::optional<double> iso;          ///< of surfaces of volumes
+  std::string unit;                   ///< of lengths in the file: "mm", ...; empty: it does not say
 };
 
 /// Opens the file's store (making it if need be: a file whose chunks cannot be made is no good file) and sums it up.

@@ -79,6 +79,17 @@ TEST_F(Inspect, ARasterThatRunTakesIsNoPicture) {
   EXPECT_EQ(json["room"]["up"], "-y");
 }
 
+TEST_F(Inspect, WarningsDoNotGetIntoTheJson) {
+  write_terrain(folder_ / "hill.ply", 4);
+  const std::vector<std::string> arguments{folder_ / "hill.ply", "--cache", folder_ / "cache", "--json"};
+  ASSERT_EQ(inspect(arguments), 0) << err_;
+  for (const auto& entry : fs::directory_iterator(folder_ / "cache"))
+    if (entry.path().extension() == ".mesh") std::ofstream(entry.path()) << "an older version's";
+  ASSERT_EQ(inspect(arguments), 0) << err_;
+  EXPECT_NE(err_.find("making it anew"), std::string::npos) << err_;
+  EXPECT_TRUE(nlohmann::json::parse(out_, nullptr, false).is_object()) << out_;
+}
+
 TEST_F(Inspect, WhatRunRefusesIsRefusedAlike) {
   write_png(folder_ / "dem.png", 16);
   std::ofstream(folder_ / "cube.raw", std::ios::binary) << std::string(64 * 64 * 64, 'x');

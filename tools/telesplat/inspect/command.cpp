@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "common/core/log.h"
 #include "services/data/inspect.h"
 #include "services/data/kinds.h"
 #include "services/data/volume/volume.h"
@@ -119,6 +120,7 @@ Result<data::Description> inspect_store(const std::string& path) {
 }
 
 int inspect(InspectOptions o, const options::Given& given) {
+  log::initialise("telesplat", "warn");  // to stderr: stdout may be JSON
   const std::string& path = o.data.scene;
   std::error_code error;
   if (path != julia::kSceneWord && !fs::exists(path, error))
