@@ -129,7 +129,9 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
 void Pipeline::read_progress(const std::string& member, const std::string& told) {
   const size_t space = told.rfind(' ');
   if (space == told.npos) return;
-  progress_ = time_left_[member].text(told.substr(0, space), std::atof(told.c_str() + space), monotonic_s());
+  const double fraction = std::atof(told.c_str() + space);
+  progress_ = time_left_[member].text(told.substr(0, space), fraction, monotonic_s());
+  if (fraction >= 1) progress_.clear();  // what follows tells of itself
 }
 
 void Pipeline::read(Member& m) {
