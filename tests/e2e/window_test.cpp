@@ -370,6 +370,27 @@ TEST_F(WindowTest, JoinsARunningSessionAndLeavesIt) {
   EXPECT_TRUE(run.all_gone());
 }
 
+// It leaves nothing on disk that would tell its address, but says it, and telesplat ctl finds it.
+TEST_F(WindowTest, AViewThatRecordsNothingIsFound) {
+  TemporaryFolder folder;
+  const Environment runtime("TELESPLAT_RUNTIME", (folder / "runtime").c_str());
+  Program view("telesplat", {"view", "julia", "--size", "200x150", "--sampler-threads", "1"}, folder / "view");
+  const auto window = live_window(view);
+  ASSERT_NE(window, 0u);
+  const std::string words = "session at tcp://127.0.0.1:", said = view.err();
+  EXPECT_NE(said.find(words), std::string::npos) << said;
+  Program list("telesplat", {"ctl", "list"}, folder / "list");
+  EXPECT_EQ(list.wait(), 0);
+  for (const char* told : {"tcp://127.0.0.1:", "julia (coral)", "view"})
+    EXPECT_NE(list.out().find(told), std::string::npos) << told << " in\n" << list.out();
+  Program set("telesplat", {"ctl", "set", "c.y=-0.3"}, folder / "set");
+  EXPECT_EQ(set.wait(), 0) << set.err();
+  EXPECT_EQ(set.out(), "epoch 2\n");
+  Program stop("telesplat", {"ctl", "stop"}, folder / "stop");
+  EXPECT_EQ(stop.wait(), 0) << stop.err();
+  EXPECT_EQ(view.wait(), 0) << view.err();
+}
+
 TEST(NoDisplay, IsOneLineAndExitCodeTwo) {
   TemporaryFolder folder;
   write_terrain(folder / "terrain.ply", 4);

@@ -130,6 +130,8 @@ Program::Program(const std::string& name, std::vector<std::string> arguments, co
   if (pid_ != 0) return;
   dup2(::open((prefix + ".out").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), 1);
   dup2(::open((prefix + ".err").c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), 2);
+  // Sessions of tests and those of the person at this machine do not find each other.
+  setenv("TELESPLAT_RUNTIME", (prefix + ".runtime").c_str(), 0);
   execv(argv[0], argv.data());
   _exit(127);
 }

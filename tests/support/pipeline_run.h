@@ -47,7 +47,8 @@ bool is_running(pid_t pid);
 /// A program of the build's bin folder.
 class Program {
  public:
-  /// stdout and stderr go to `prefix`.out and `prefix`.err.
+  /// stdout and stderr go to `prefix`.out and `prefix`.err. Its sessions are found by those alone who have the same
+  /// TELESPLAT_RUNTIME in their environment; where that is not set, it gets one of its own.
   Program(const std::string& name, std::vector<std::string> arguments, const std::string& prefix);
   ~Program();  ///< kills it if it still runs
   pid_t pid() const { return pid_; }
