@@ -72,22 +72,22 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
                       .receive_s = receive_s};
   // What a frame gives is counted to the slab that completed it. A slab that is here already is done: the master may
   // not know.
-  done.packed_s = outlets_.master_now();
   if (added->frame_complete) {
-    // Taken before it is sent: a viewer may have it before the send returns.
-    done.published_s = outlets_.master_now();
-    done.bytes_sent = send_out(now_s);
+    done.bytes_sent = send_out(now_s, &done.published_s);
     spans_.add("pack", receive_s, outlets_.master_now());
   }
+  done.packed_s = done.published_s > 0 ? done.published_s : outlets_.master_now();
   outlets_.tell(done);
   return ok_status();
 }
 
-uint64_t SlicePacking::send_out(double now_s) {
+uint64_t SlicePacking::send_out(double now_s, double* first_s) {
   uint64_t bytes = 0;
   while (auto out = gatherer_.take_outgoing(now_s)) {
     out->frame.packer = instance_;
     out->frame.packed_s = outlets_.master_now();
+    // Taken before it is sent: a viewer may have it before the send returns.
+    if (first_s && *first_s == 0) *first_s = out->frame.packed_s;
     if (!outlets_.send(out->frame, out->peer)) {
       gatherer_.unreachable(out->peer);
       continue;

@@ -34,7 +34,8 @@ class SlicePacking final : public Packing {
   bool is_ahead(const wire::SliceImages& images) const {
     return !gatherer_.ready() || images.lease.epoch > gatherer_.epoch();
   }
-  uint64_t send_out(double now_s);
+  /// Bytes. first_s: when the first was sent, on the master's clock; stays as it is if nobody takes one now.
+  uint64_t send_out(double now_s, double* first_s = nullptr);
 
   Outlets outlets_;
   metrics::SpanRecorder& spans_;
