@@ -16,8 +16,9 @@ constexpr double kLeastSeen_s = 1, kLeastSeen = 0.02;
 
 std::string TimeLeft::text(const std::string& stage, double fraction, double now_s) {
   fraction = std::isfinite(fraction) ? std::clamp(fraction, 0.0, 1.0) : 0;
-  const auto [begin, is_new] = begins_.try_emplace(stage, Begin{now_s, fraction});
-  if (fraction < begin->second.fraction) begin->second = {now_s, fraction};  // it began again
+  const auto [begin, is_new] = begins_.try_emplace(stage, Begin{now_s, fraction, fraction});
+  if (fraction < begin->second.last) begin->second = {now_s, fraction, fraction};  // it began again
+  begin->second.last = fraction;
   std::string out = fmt::format("{} {:.0f} %", stage, std::floor(100 * fraction));
   const double seen_s = now_s - begin->second.at_s, seen = fraction - begin->second.fraction;
   if (seen_s < kLeastSeen_s || seen < kLeastSeen) return out;

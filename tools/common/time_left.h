@@ -14,7 +14,7 @@ class TimeLeft {
 
  private:
   struct Begin {
-    double at_s, fraction;
+    double at_s, fraction, last;  ///< last: the fraction that was told last
   };
   std::map<std::string, Begin> begins_;
 };
