@@ -164,6 +164,7 @@ TEST_F(Sessions, OfSeveralOneIsChosen) {
   EXPECT_TRUE(holds(ctl({"status"}).out, address(*first)));
   EXPECT_TRUE(holds(ctl({"status", "--session", std::to_string(second->pid())}).out, address(*second)));
   EXPECT_TRUE(holds(ctl({"status", "--master", address(*second)}).out, address(*second)));
+  EXPECT_TRUE(holds(ctl({"--master", address(*second), "status"}).out, address(*second))) << "in front, too";
   setenv("TELESPLAT_MASTER", "auto", 1);
   EXPECT_EQ(ctl({"status"}).code, 2);
   unsetenv("TELESPLAT_MASTER");

@@ -1,5 +1,6 @@
 #include "tools/telesplat/command.h"
 
+#include <algorithm>
 #include <iterator>
 #include <utility>
 
@@ -37,10 +38,25 @@ Status expand(const std::vector<Command>& commands, std::vector<std::string>& ar
   return ok_status();
 }
 
+// `ctl --master ADDRESS status` means `ctl status --master ADDRESS`: flags in front of a sub-command are its own.
+void put_flags_behind(const std::vector<Command>& commands, std::vector<std::string>& arguments) {
+  for (const Command& command : commands) {
+    if (command.commands.empty() || arguments.size() < 3 || arguments.front() != command.name) continue;
+    if (!arguments[1].starts_with("--") || arguments[1] == "--help") continue;
+    const auto is_command = [&](const std::string& word) {
+      return std::any_of(command.commands.begin(), command.commands.end(),
+                         [&](const Command& c) { return c.name == word; });
+    };
+    const auto begin = arguments.begin() + 1, named = std::find_if(begin, arguments.end(), is_command);
+    if (named != arguments.end()) std::rotate(begin, named, named + 1);
+  }
+}
+
 }  // namespace
 
 int run_commands(const std::string& about, const std::vector<Command>& commands, std::vector<std::string> arguments) {
   if (const Status s = expand(commands, arguments); !s) return tools::complain(s.error());
+  put_flags_behind(commands, arguments);
   options::Parser parser(about);
   parser.version(version());
   Parsers parsers;
