@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <fstream>
 #include <thread>
 
 #include "common/core/clock.h"
@@ -156,11 +157,13 @@ TEST(DataServer, RefusesAVolumesFlagsWhereThereIsNoVolume) {
     EXPECT_EQ(run(o), 2);
     return testing::internal::GetCapturedStderr();
   };
+  const std::string mesh = testing::TempDir() + "triangle.off";
+  std::ofstream(mesh) << "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
   DataServiceOptions julia, file, surface;
   julia.scene = "julia", julia.volume.transfer = "bone";
-  file.scene = "CMakeLists.txt", file.volume.part = "0/2";
-  surface.scene = "CMakeLists.txt", surface.mesh.iso = 5, surface.volume.lit = false;
-  for (const auto& [text, scene] : {std::pair{refusal(julia), "julia"}, {refusal(file), "CMakeLists.txt"}}) {
+  file.scene = mesh, file.volume.part = "0/2";
+  surface.scene = mesh, surface.mesh.iso = 5, surface.volume.lit = false;
+  for (const auto& [text, scene] : {std::pair{refusal(julia), std::string("julia")}, {refusal(file), mesh}}) {
     EXPECT_NE(text.find(scene), std::string::npos) << text;
     EXPECT_NE(text.find("is no volume"), std::string::npos) << text;
   }

@@ -72,7 +72,7 @@ TEST(LegendPicture, TheBarHasTheMapsColoursLowBelow) {
   int low = -1, high = -1;
   for (int y = 0; y < 800; ++y)
     for (int x = 640; x < 1280; ++x) {
-      const uint32_t c = picture.colour[size_t(y) * 1280 + x];
+      const uint32_t c = picture.colour[size_t(y) * 1280 + x] & 0xffffff;  // above it stands the coverage
       if (c == legend.map.at(0)) low = y;
       if (c == legend.map.at(1) && high < 0) high = y;
     }
