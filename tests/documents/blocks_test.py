@@ -70,7 +70,12 @@ class Pages(unittest.TestCase):
     def test_what_needs_a_network_is_left_out_and_unknown_languages_are_not(self):
         self.assertEqual(self.run_page("```\ndocker compose up\napt-get install x\n```\n"), (0, 0))
         self.assertEqual(self.run_page("```text\nfalse\n```\n"), (0, 0))
-        self.assertEqual(self.run_page("```python\nfalse\n```\n"), (0, 1))
+        self.assertEqual(self.run_page("```yaml\nfalse\n```\n"), (0, 1))
+
+    def test_python_runs_beside_a_record(self):
+        record = "```\nmkdir -p runs/latest\n```\n"
+        self.assertEqual(self.run_page(record + "```python\nopen('runs/latest/a', 'w')\n```\n"), (2, 0))
+        self.assertEqual(self.run_page(record + "```python\nopen('runs/none/a')\n```\n"), (2, 1))
 
 
 if __name__ == "__main__":

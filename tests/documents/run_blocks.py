@@ -8,7 +8,8 @@ with exit code 0. These things differ from what a person does:
 - the addresses of other machines are this machine's;
 - `telesplat ctl` talks to what the last `run` or `view` of its block started, or the command of a comment above the
   block, <!-- beside: COMMAND -->; a service goes to the background until `telesplat ctl stop`, or the page's end.
-Scene files (toml) and head movements (csv) run, too; blocks of the language text are looked at by nobody.
+Scene files (toml) and head movements (csv) run, too, and Python beside a run's record; blocks of the language text are
+looked at by nobody.
 Commands that need a network, root or a long time are told and left out (SKIPPED).
 """
 
@@ -104,6 +105,8 @@ class Page:
                 self._run_block_as("telesplat run {}", block, ".toml")
             elif block.language == "csv":
                 self._run_block_as("telesplat run MY.ply --trajectory {}", block, ".csv")
+            elif block.language == "python":
+                self._run_python(block)
             elif block.language != "text":
                 self._fail(f"line {block.line}: nobody knows how to try a block of the language {block.language}", "")
 
@@ -129,6 +132,15 @@ class Page:
         with open(os.path.join(self._folder, path), "w") as file:
             file.write(block.text)
         self._foreground(f"line {block.line}", shortened(command.format(path)))
+
+    def _run_python(self, block):
+        where, path = f"line {block.line}", f"block-{block.line}.py"
+        if not os.path.exists(os.path.join(self._folder, "runs/latest")):
+            self._files.make_those_in("MY.ply")
+            self._foreground(where, shortened("telesplat run MY.ply"))
+        with open(os.path.join(self._folder, path), "w") as file:
+            file.write(block.text)
+        self._foreground(where, f"{sys.executable} {path}")
 
     def _reason_to_skip(self, text, words):
         for pattern, reason in SKIPPED.items():

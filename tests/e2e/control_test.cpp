@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
+#include <thread>
 
 #include "common/core/clock.h"
 #include "tests/support/pipeline_run.h"
@@ -116,6 +117,15 @@ TEST_F(Sessions, CtlFindsWhatRunStarted) {
       << after.err;
   EXPECT_EQ(ctl({"list"}).out, "no session of yours runs on this machine\n");
   EXPECT_EQ(telesplat({"run", "--master", "auto", "--out", folder_ / "none"}).code, 1);
+}
+
+TEST_F(Sessions, ARunThatJoinsNobodySaysSo) {
+  Program run("telesplat", {"run", "--master", "tcp://127.0.0.1:9", "--out", folder_ / "none"}, folder_ / "joining");
+  const std::string told = "telesplat: no master answers at tcp://127.0.0.1:9 yet; waiting for one\n";
+  for (int i = 0; i < 200 && !holds(run.err(), told); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_TRUE(holds(run.err(), told)) << run.err();
+  run.signal(SIGINT);
+  EXPECT_EQ(run.wait(), 130) << run.err();
 }
 
 TEST_F(Sessions, StatusIsForProgramsToo) {

@@ -160,10 +160,12 @@ TEST_F(VolumeRun, ANewTransferFunctionIsANewEpoch) {
   // A colour-map file's points lie between 0 and 1 and are spread over the volume's range.
   std::ofstream(run.folder() / "map.json")
       << R"([{"Name": "two", "RGBPoints": [0, 0, 0, 1, 1, 1, 1, 0], "Points": [0, 0, 0.5, 0, 1, 0.8, 0.5, 0]}])";
-  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json"}, &err), 0) << err;
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json:two"}, &err), 0) << err;
   EXPECT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "epoch") == 4; }));
   const double updates = value(run.status(), "viewer-1", "updates");
   EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "updates") > updates + 1; }));
+  EXPECT_EQ(ctl(run, {"tf", run.folder() / "map.json:three"}, &err), 2);
+  EXPECT_NE(err.find("\"three\""), std::string::npos) << err;
 
   EXPECT_NE(ctl(run, {"tf", "nonesuch"}, &err), 0);
   EXPECT_NE(err.find("nonesuch"), std::string::npos) << err;

@@ -113,8 +113,8 @@ Result<Obeyed> MeshColours::obey(const wire::Control& command) {
   order_ = Order{++orders_, *std::move(colouring)};
   const std::string name = array_of(order_->colouring);
   return Obeyed{.begins_epoch = false,
-                .answer = fmt::format("{} is being fetched; its epoch begins when it is there",
-                                      name.empty() ? "the file's own colours" : name),
+                .answer = fmt::format("{} being fetched; their epoch begins when they are there",
+                                      name.empty() ? "the file's own colours are" : "the values of " + name + " are"),
                 .tells_all = true};
 }
 

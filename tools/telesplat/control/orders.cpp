@@ -46,8 +46,11 @@ Result<Arguments> animate_arguments(const Words& words, ControlClient&) {
   return Arguments{{"timeline", words.front()}};
 }
 
-// A colour-map file's values may lie in any range; the session's is asked for.
-Result<std::string> read_map(const std::string& path, ControlClient& client) {
+// FILE.json or FILE.json:NAME. A colour-map file's values may lie in any range; the session's is asked for.
+Result<std::string> read_map(const std::string& word, ControlClient& client) {
+  const size_t named = word.find(".json:");
+  const std::string path = word.substr(0, named == std::string::npos ? named : named + 5);
+  const std::string name = path.size() < word.size() ? word.substr(path.size() + 1) : "";
   std::error_code error;
   const uintmax_t bytes = fs::file_size(path, error);
   if (error) return Error{fmt::format("{}: {}", path, error.message())};
@@ -64,7 +67,7 @@ Result<std::string> read_map(const std::string& path, ControlClient& client) {
   const volume::TransferFunction any{{{}}};
   const auto session = volume::read_session(parameters, {{"transfer", volume::to_text(any)}});
   if (!session) return Error{fmt::format("ctl tf {}: the session shows no volume: {}", path, session.error().text)};
-  const auto transfer = volume::parse_paraview_json(content, path, session->range);
+  const auto transfer = volume::parse_paraview_json(content, path, session->range, name);
   if (!transfer) return transfer.error();
   return volume::to_text(*transfer);
 }
@@ -84,7 +87,7 @@ Result<Arguments> transfer_arguments(const Words& words, ControlClient& client) 
                     preset_names())};
   std::string text = words.front();
   std::error_code error;
-  if (text.ends_with(".json") || fs::is_regular_file(text, error)) {
+  if (text.ends_with(".json") || text.find(".json:") != std::string::npos || fs::is_regular_file(text, error)) {
     auto map = read_map(text, client);
     if (!map) return map.error();
     text = *std::move(map);

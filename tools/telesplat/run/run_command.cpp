@@ -32,6 +32,7 @@ namespace fs = std::filesystem;
 using State = Pipeline::State;
 
 constexpr double kAskEvery_s = 0.5;  // the master for its status
+constexpr double kSilence_s = 3;     // of a master that is joined, before the person is told
 constexpr double kResultPatience_s = 2;
 
 /// A folder for the logs of a session that leaves nothing behind; kept if something went wrong.
@@ -102,6 +103,8 @@ class Run {
     ControlClient control(pipeline.master_endpoint());
     SessionFigures figures;
     double asked_s = 0;
+    const double begin_s = monotonic_s();
+    bool heard = o_.join_master.empty();  // or told that nothing is
     std::string live;
     auto state = State::kRunning;
     while (state == State::kRunning && !net::stop_requested()) {
@@ -114,9 +117,14 @@ class Run {
         asked_s = monotonic_s();
       }
       if (const auto status = control.poll_status()) {
+        heard = true;
         live = figures.update(*status, monotonic_s());
         if (const auto session = status->find("session"); session != status->end())
           master_folder_ = session->value("run_folder", std::string());
+      }
+      if (!heard && monotonic_s() - begin_s > kSilence_s) {
+        heard = true;
+        progress_.line(fmt::format("telesplat: no master answers at {} yet; waiting for one", o_.join_master));
       }
       if (o_.viewer.window && !live.empty())
         progress_.close();  // the window's title has the figures
