@@ -16,7 +16,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kNamesTold = 20;  // in an error
+constexpr size_t kNamesTold = 20;     // in an error
+constexpr size_t kMostSpanText = 52;  // bytes: two numbers of all digits
 
 std::string names_of(std::span<const ArrayInfo> arrays) {
   std::string out;
@@ -43,6 +44,17 @@ std::optional<Suffix> suffix_of(std::string_view text) {
   const auto parsed = std::from_chars(text.data() + open + 1, end, component);
   if (parsed.ec != std::errc() || parsed.ptr != end || component < 0) return std::nullopt;
   return Suffix{component, text.size() - open};
+}
+
+// UTF-8 without characters that would steer a terminal.
+std::string plain(const std::string& text) {
+  std::string out = to_utf8(text);
+  for (size_t i = 0; i < out.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(out[i]);
+    if (byte < 0x20 || byte == 0x7f) out[i] = '?';
+    if (byte == 0xc2 && static_cast<unsigned char>(out[i + 1]) < 0xa0) out.replace(i, 2, "?");  // U+0080 to U+009F
+  }
+  return out;
 }
 
 // Cuts between characters.
@@ -135,15 +147,17 @@ void make_tellable(std::vector<ArrayInfo>& arrays) {
   std::set<std::string> taken;
   for (size_t i = 0; i < arrays.size(); ++i) {
     ArrayInfo& a = arrays[i];
-    a.unit = shortened(to_utf8(a.unit), kMaxArrayName);
-    const std::string name = a.name.empty() ? fmt::format("array {}", i + 1) : shortened(to_utf8(a.name), 200);
+    a.unit = shortened(plain(a.unit), kMaxArrayName);
+    const std::string name = a.name.empty() ? fmt::format("array {}", i + 1) : shortened(plain(a.name), 200);
     a.name = name;
     if (taken.contains(a.name) && a.of_cells) a.name = name + " (cell)";
     for (int n = 2; taken.contains(a.name); ++n) a.name = fmt::format("{} ({})", name, n);
     taken.insert(a.name);
   }
+  // Spans may be found later: there is room for them.
+  const auto most_bytes = [](const ArrayInfo& a) { return text_of(a).size() + 1 + a.spans.size() * kMostSpanText; };
   size_t bytes = 2, told = 0;
-  while (told < arrays.size() && (bytes += text_of(arrays[told]).size() + 1) <= kMaxArraysText) ++told;
+  while (told < arrays.size() && (bytes += most_bytes(arrays[told])) <= kMaxArraysText) ++told;
   arrays.resize(told);
 }
 

@@ -86,6 +86,22 @@ TEST(Arrays, AListThatIsTooLongLosesItsEnd) {
   EXPECT_EQ(*read, arrays);
 }
 
+TEST(Arrays, SpansThatAreFoundLaterHaveRoom) {
+  std::vector<ArrayInfo> arrays(kMaxArrays, {std::string(150, 'x'), "", false, 1, {ValueSpan{}}});
+  make_tellable(arrays);
+  for (ArrayInfo& a : arrays) a.spans[0] = {-1.2345678901234567e-300, 1.2345678901234567e+300};
+  const auto read = arrays_from_text(to_text(arrays));
+  ASSERT_TRUE(read.ok()) << read.error().text;
+  EXPECT_EQ(*read, arrays);
+}
+
+TEST(Arrays, NamesDoNotSteerATerminal) {
+  std::vector<ArrayInfo> arrays{{"\x1b[2Jheat\n", "K\x7f\xc2\x9b\xc3\xa9", false, 1, {{0, 1}}}};
+  make_tellable(arrays);
+  EXPECT_EQ(arrays[0].name, "?[2Jheat?");
+  EXPECT_EQ(arrays[0].unit, "K??\xc3\xa9");
+}
+
 TEST(Arrays, HostileListsAreRefused) {
   EXPECT_TRUE(arrays_from_text("").ok());
   for (const std::string text :
