@@ -22,6 +22,15 @@ bool made(const std::string& folder) {
   return fs::create_directory(folder, error) && !error;
 }
 
+// The folder's name came over the network: what stands there must not lead elsewhere.
+Status refuse_links(const std::string& folder) {
+  std::error_code error;
+  for (const char* name : {"/images", "/spool", "/points.events", "/slices.events"})
+    if (fs::is_symlink(fs::symlink_status(folder + name, error)))
+      return Error{fmt::format("{}{}: is a symbolic link", folder, name)};
+  return ok_status();
+}
+
 // A viewer's name as a folder's.
 std::string folder_name(const std::string& name) {
   std::string out;
@@ -76,6 +85,7 @@ void SessionRecord::follow(const wire::Welcome& session) {
 
 // The first viewer records into the folder itself, others into one of their own in it. Whoever makes images/ is first.
 Status SessionRecord::join(const std::string& folder, const std::string& id) {
+  if (const Status s = refuse_links(folder); !s) return s;
   if (made(folder + "/images")) {
     records_in_ = ".";
     return open_in(folder);

@@ -79,21 +79,19 @@ void look_everywhere(const fs::path& directory, const std::string& prefix, Logs 
   if (logs == Logs::kOurs) look(directory, prefix, kLogFiles, out);
 }
 
-// Further viewers have a folder of their own in it: the launcher's are viewer-N, others bear the run's id.
+// Further viewers have a folder of their own in it, viewer-NAME. One with an id is another run's record.
 Found look_into(const std::string& directory, Logs logs) {
   Found out;
   look_everywhere(directory, "", logs, out);
   std::error_code error;
   for (fs::directory_iterator entry(directory, error), end; !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (!is_folder(entry->path()) || (!name.starts_with("viewer-") && folder_id(entry->path()).empty())) continue;
+    if (!is_folder(entry->path()) || !name.starts_with("viewer-") || !folder_id(entry->path()).empty()) continue;
     Found inner;
     look_everywhere(directory, name + "/", logs, inner);
     for (auto [from, to] :
          {std::pair{&inner.files, &out.files}, {&inner.folders, &out.folders}, {&inner.links, &out.links}})
       to->insert(to->end(), from->begin(), from->end());
-    if (fs::exists(fs::symlink_status(directory + "/" + name + "/" + kIdFile, error)))
-      out.files.push_back(name + "/" + kIdFile);
     if (!inner.folders.empty()) out.folders.push_back(name);
   }
   std::sort(out.files.begin(), out.files.end());

@@ -12,8 +12,8 @@ namespace telesplat::metrics {
 enum class Logs { kOurs, kOthers };
 
 /// The files of a record that lie in `directory`, relative to it, sorted: those that runs and `telesplat compare`
-/// write, by their names. Whatever else lies there is not among them, and no symbolic link is followed. run.id is left
-/// out.
+/// write, by their names. Whatever else lies there is not among them, nor are records of other runs, and no symbolic
+/// link is followed. run.id is left out.
 std::vector<std::string> recorded_files(const std::string& directory, Logs logs = Logs::kOurs);
 
 /// Makes `directory` the folder of a new record: makes it if need be, and writes run.id into it. Returns the new id.

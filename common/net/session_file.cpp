@@ -169,6 +169,15 @@ std::vector<RunningSession> running_sessions() {
   return out;
 }
 
+Status refuse_folder_in_use(const std::string& folder) {
+  const std::string path = absolute_path(folder);
+  for (const RunningSession& s : running_sessions())
+    if (s.run_folder == path)
+      return Error{fmt::format("{}: the session at {} (pid {}) records into it; end that first, or give another --out",
+                               folder, s.address, s.pid)};
+  return ok_status();
+}
+
 std::string local_address(const std::string& endpoint) {
   for (const auto& [everywhere, here] :
        {std::pair<std::string_view, std::string_view>{"tcp://0.0.0.0:", "tcp://127.0.0.1:"},

@@ -46,6 +46,9 @@ class SessionFile {
 /// of other machines and containers, and what is no session's file, are passed over.
 std::vector<RunningSession> running_sessions();
 
+/// Error, naming it: one of them records into this folder.
+Status refuse_folder_in_use(const std::string& folder);
+
 /// The address under which processes of this machine reach what is bound to `endpoint`: 127.0.0.1 for every IPv4
 /// address of this machine, [::1] for every one, an absolute path for ipc.
 std::string local_address(const std::string& endpoint);

@@ -170,6 +170,7 @@ int run(const MasterServiceOptions& o) {
   if (!options) return fail(2, options.error());
   std::string run_id;
   if (!o.out.empty()) {
+    if (const Status s = net::refuse_folder_in_use(o.out); !s) return refuse(s.error());
     auto begun = metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
     if (!begun) return refuse(begun.error());
     run_id = *std::move(begun);

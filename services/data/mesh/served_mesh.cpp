@@ -53,6 +53,7 @@ class ServedMesh final : public Served {
   Status follow(const wire::Welcome& session) override {
     const scene::SessionView view(session);
     const std::string order = view.fact(scene::kArrayOrderFact);
+    if (std::exchange(master_, session.master) != session.master) order_.clear();  // another one counts from 1 again
     if (!order.empty() && order != order_) {
       order_ = order;
       stores_.want(ordered_array());
@@ -108,6 +109,7 @@ class ServedMesh final : public Served {
   const std::optional<scene::Colouring> as_begun_;
   const colour::ColourMap map_;
   ArrayStores stores_;
+  InstanceId master_;
   std::string order_, shown_, answer_;
 };
 

@@ -22,6 +22,7 @@
 #include "tools/telesplat/record/dated_folder.h"
 #include "tools/telesplat/run/after_run.h"
 #include "tools/telesplat/run/live_figures.h"
+#include "tools/telesplat/run/overwrite.h"
 #include "tools/telesplat/run/pipeline.h"
 
 namespace telesplat::launcher {
@@ -94,6 +95,8 @@ class Run {
       return made;
     }
     folder_existed_ = fs::exists(o_.out, error);
+    if (o_.overwrite)
+      if (const Status s = check_overwrite(o_); !s) return s;
     const auto begun = metrics::begin_folder(o_.out, o_.overwrite, metrics::Logs::kOurs);
     return begun ? ok_status() : Status(begun.error());
   }

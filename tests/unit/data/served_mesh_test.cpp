@@ -1,0 +1,61 @@
+// A mesh's data server between its sockets: orders of arrays are answered, whoever gives them.
+#include "services/data/mesh/served_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+namespace telesplat::data {
+namespace {
+
+class NoChunks final : public MeshStore {
+ public:
+  const MeshStoreInfo& info() const override { return info_; }
+  const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
+  geometry::ChunkBytes chunk(ChunkId) const override { return {}; }
+
+ private:
+  MeshStoreInfo info_;
+  std::vector<geometry::ChunkInfo> chunks_;
+};
+
+class ServedMeshTest : public testing::Test {
+ protected:
+  // What the master is told after this order of this master.
+  std::string answer(uint64_t master, const std::string& order) {
+    wire::Welcome session;
+    session.master = InstanceId{master};
+    session.facts[scene::kArrayOrderFact] = order;
+    EXPECT_TRUE(served->follow(session).ok());
+    net::Context context;
+    net::Socket nobody(context, net::Kind::kRouter, "nobody", {});
+    for (int i = 0; i < 500; ++i) {
+      served->send_finished({nobody, nobody});
+      if (const auto news = served->news(); !news.empty()) return news.at(scene::kArrayAnswerFact);
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return "";
+  }
+
+  std::unique_ptr<Served> served =
+      serve_mesh(std::make_shared<NoChunks>(), "hill.ply",
+                 {.as_begun = std::nullopt, .map = {}, .open = [](const std::string& array, const Progress&) {
+                    using Made = Result<std::shared_ptr<MeshStore>>;
+                    return array == "heat" ? Made(std::make_shared<NoChunks>()) : Made(Error{"there is none"});
+                  }});
+};
+
+TEST_F(ServedMeshTest, OrdersAreAnswered) {
+  EXPECT_EQ(answer(1, "1 heat"), "1");
+  EXPECT_EQ(answer(1, "2 cold"), "2 there is none");
+  EXPECT_EQ(answer(1, "3 heat"), "3") << "it is there already";
+}
+
+TEST_F(ServedMeshTest, AnotherMastersOrderOfTheSameWordsIsAnsweredToo) {
+  EXPECT_EQ(answer(1, "1 heat"), "1");
+  EXPECT_EQ(answer(2, "1 heat"), "1");
+}
+
+}  // namespace
+}  // namespace telesplat::data

@@ -1,0 +1,44 @@
+// Whose files a run folder holds: those of the record in it may be removed, those of others may not.
+#include "common/metrics/run_folder.h"
+
+#include "tests/unit/metrics/record_fixture.h"
+
+namespace telesplat::metrics {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RunFolder : public testing::Test {
+ protected:
+  RunFolder() {
+    std::string pattern = (fs::temp_directory_path() / "telesplat-folder-XXXXXX").string();
+    folder = mkdtemp(pattern.data());
+  }
+  ~RunFolder() override { fs::remove_all(folder); }
+  void put(const std::string& name) const {
+    fs::create_directories(fs::path(folder + "/" + name).parent_path());
+    std::ofstream(folder + "/" + name) << name;
+  }
+  bool has(const std::string& name) const { return fs::exists(folder + "/" + name); }
+
+  std::string folder;
+};
+
+TEST_F(RunFolder, ARecordWithinItIsAnotherRuns) {
+  ASSERT_TRUE(begin_folder(folder, false, Logs::kOurs).ok());
+  put("frames.csv");
+  put("viewer-2/images/frame-000000.png");
+  for (const char* other : {"/second", "/viewer-third"}) {
+    ASSERT_TRUE(begin_folder(folder + other, false, Logs::kOurs).ok());
+    put(other + std::string("/frames.csv"));
+  }
+  EXPECT_EQ(recorded_files(folder), (std::vector<std::string>{"frames.csv", "viewer-2/images/frame-000000.png"}));
+  ASSERT_TRUE(begin_folder(folder, true, Logs::kOurs).ok());
+  EXPECT_FALSE(has("frames.csv") || has("viewer-2"));
+  remove_record(folder, true);
+  for (const char* other : {"second", "viewer-third"})
+    EXPECT_TRUE(has(other + std::string("/frames.csv")) && has(other + std::string("/run.id"))) << other;
+}
+
+}  // namespace
+}  // namespace telesplat::metrics

@@ -1,0 +1,59 @@
+// Where a viewer records is what a master tells: it is believed only as far as the folder on this machine bears it out.
+#include "client/viewer/session_record.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/metrics/run_folder.h"
+
+namespace telesplat::viewer {
+namespace {
+
+namespace fs = std::filesystem;
+
+class JoinedRecord : public testing::Test {
+ protected:
+  JoinedRecord() {
+    std::string pattern = (fs::temp_directory_path() / "telesplat-joined-XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+    session_.facts = {{"run_folder", folder_ + "/run"},
+                      {"run_id", *metrics::begin_folder(folder_ + "/run", false, metrics::Logs::kOthers)}};
+  }
+  ~JoinedRecord() override { fs::remove_all(folder_); }
+  // Where in the session's folder a viewer records.
+  std::string joined() const {
+    const auto record = SessionRecord::open({.out = {}, .join = true, .name = "guest", .received_mb = 1});
+    (*record)->follow(session_);
+    return (*record)->records_in();
+  }
+
+  std::string folder_;
+  wire::Welcome session_;
+};
+
+TEST_F(JoinedRecord, TheFirstViewerTakesTheFolderOthersOneInIt) {
+  EXPECT_EQ(joined(), ".");
+  EXPECT_EQ(joined(), "viewer-guest");
+}
+
+TEST_F(JoinedRecord, NothingIsWrittenThroughLinks) {
+  std::ofstream(folder_ + "/precious") << "mine";
+  for (const char* name : {"images", "spool", "points.events", "slices.events"}) {
+    fs::create_symlink(folder_ + "/precious", folder_ + "/run/" + name);
+    EXPECT_EQ(joined(), "") << name;
+    fs::remove(folder_ + "/run/" + name);
+  }
+  EXPECT_EQ(fs::file_size(folder_ + "/precious"), 4u);
+  EXPECT_FALSE(fs::exists(folder_ + "/run/viewer-guest"));
+}
+
+TEST_F(JoinedRecord, AnotherRunsFolderIsLeftAlone) {
+  session_.facts["run_id"] = "0123";
+  EXPECT_EQ(joined(), "");
+  EXPECT_FALSE(fs::exists(folder_ + "/run/images"));
+}
+
+}  // namespace
+}  // namespace telesplat::viewer
