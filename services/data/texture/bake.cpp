@@ -137,7 +137,7 @@ class Baker {
   // Which edges of a triangle are to be halved for its own sake: bits of its corners 0, 1, 2, behind which they lie.
   uint8_t wishes(size_t t) const {
     const Texture* texture = texture_of(t);
-    if (!texture || is_a_line(t)) return 0;
+    if (!texture || texture->plain() || is_a_line(t)) return 0;
     uint8_t bits = 0;
     float longest = 0;
     for (int k = 0; k < 3; ++k) {

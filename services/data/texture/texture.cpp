@@ -26,6 +26,8 @@ Texture::Texture(image::View picture, Wrap wrap_u, Wrap wrap_v, bool nearest)
     : wrap_{wrap_u, wrap_v}, nearest_(nearest) {
   CHECK(picture.width > 0 && picture.height > 0);
   levels_.push_back({picture.width, picture.height, std::move(picture.colour)});
+  const auto& texels = levels_[0].texels;
+  plain_ = std::all_of(texels.begin(), texels.end(), [&](uint32_t t) { return ((t ^ texels[0]) & 0xffffff) == 0; });
   while (levels_.back().width > 1 || levels_.back().height > 1) {
     const Level& from = levels_.back();
     Level to{std::max(1, from.width / 2), std::max(1, from.height / 2), {}};

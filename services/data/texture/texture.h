@@ -27,6 +27,8 @@ class Texture {
   int width() const { return levels_[0].width; }
   int height() const { return levels_[0].height; }
   bool nearest() const { return nearest_; }
+  /// All texels have one colour.
+  bool plain() const { return plain_; }
 
   /// Linear light, 0 to 1. (0, 0) is the upper left corner of the picture, v goes down. level: of halvings of the
   /// picture, for colours that stand for many texels.
@@ -43,7 +45,7 @@ class Texture {
 
   std::vector<Level> levels_;
   std::array<Wrap, 2> wrap_;
-  bool nearest_;
+  bool nearest_, plain_;
 };
 
 }  // namespace telesplat::data

@@ -409,5 +409,25 @@ TEST(Textures, RealGlbHasItsTexture) {
   EXPECT_GT(colours.size(), 8u) << "its picture is a palette";
 }
 
+TEST(Bake, TexturesOfOneColourAreNotSearched) {
+  Mesh mesh;
+  TextureUse use;
+  const auto grey = std::make_shared<Texture>(image::View{1024, 1, std::vector<uint32_t>(1024, 0x808080), {}},
+                                              Wrap::kRepeat, Wrap::kRepeat);
+  EXPECT_TRUE(grey->plain());
+  EXPECT_FALSE(Texture(four_colours(2), Wrap::kRepeat, Wrap::kRepeat).plain());
+  use.textures = {grey};
+  // Each of them repeats it 100 times and more: seconds, if every texel were looked at.
+  for (uint32_t v = 0; v < 30'000; ++v) {
+    mesh.positions.emplace_back(v % 3 == 1, v % 3 == 2, v / 3);
+    mesh.indices.push_back(v);
+    use.texture.push_back(0);
+    use.uv.emplace_back(v % 3 == 1 ? 100 : 0, v % 3 == 2 ? 100 : 0);
+  }
+  EXPECT_EQ(bake_textures(mesh, std::move(use), 1'000'000), "");
+  EXPECT_EQ(mesh.indices.size(), 30'000u);
+  EXPECT_EQ(mesh.colours[29'999], 0x808080u);
+}
+
 }  // namespace
 }  // namespace telesplat::data::test
