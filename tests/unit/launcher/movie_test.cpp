@@ -172,6 +172,18 @@ TEST_F(Movies, AnEncoderGetsEveryPictureAndTheFileItsNameAtTheEnd) {
   EXPECT_FALSE(fs::exists("oops"));
 }
 
+TEST_F(Movies, AnEncoderDoesNotWriteThroughALinkThatLiesThere) {
+  only_ffmpeg(std::string(kKnowsX264) + "\nfor a; do out=\"$a\"; done\n/bin/cat > \"${out#file:}\"");
+  std::ofstream(folder / "precious") << "mine";
+  fs::create_symlink(folder / "precious", folder / "a.mp4.part");
+  auto encoder = Encoder::start(folder / "bin/ffmpeg", folder / "a.mp4", 4, 2, 30, never);
+  ASSERT_TRUE(encoder.ok()) << encoder.error().text;
+  ASSERT_TRUE((*encoder)->add(grey(4, 2, 1)).ok());
+  ASSERT_TRUE((*encoder)->finish().ok());
+  EXPECT_EQ(read_text(folder / "precious"), "mine");
+  EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(folder / "a.mp4")));
+}
+
 TEST_F(Movies, WhatAnEncoderComplainsOfIsToldByItsLastLine) {
   only_ffmpeg(std::string(kKnowsX264) + "\necho first >&2; echo 'no space left' >&2; exit 3");
   auto encoder = Encoder::start(folder / "bin/ffmpeg", folder / "a.mp4", 640, 480, 30, never);

@@ -117,6 +117,7 @@ Result<std::unique_ptr<Encoder>> Encoder::start(const std::string& ffmpeg, const
   arguments = joined(std::move(arguments), (*encoder)->arguments);
   // "file:" keeps names from being taken for options or protocols.
   arguments = joined(std::move(arguments), {"-f", container->format, "file:" + part_of(path)});
+  std::remove(part_of(path).c_str());  // ffmpeg would write through a link
   auto process = PipedProcess::start(ffmpeg, arguments);
   if (!process) return process.error();
   return std::unique_ptr<Encoder>(new Encoder(std::move(*process), path, (*encoder)->name, width, height, should_stop));
