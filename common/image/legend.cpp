@@ -13,6 +13,8 @@ namespace telesplat::image {
 namespace {
 
 constexpr uint32_t kInk = 0xfff4f4f4, kRim = 0xd0101418, kEmpty = 0x90101418;
+// Behind all of it: small white letters do not read on a white ground by their rims alone.
+constexpr uint32_t kPlate = 0xa0101418;
 constexpr int kLeastTicks = 2, kMostTicks = 7;
 constexpr size_t kMostTitleLines = 4;
 
@@ -220,7 +222,7 @@ Ticks nice_ticks(double lo, double hi, int most) {
 
 View legend_picture(const Legend& legend, int display_width, int display_height) {
   const Layout l = layout_of(legend, display_width, display_height);
-  Canvas canvas(l.width, l.height, 0);
+  Canvas canvas(l.width, l.height, kPlate);
   int y = 2 * l.dot;
   for (const auto& line : l.title) {
     write(canvas, 2 * l.dot, y, line, l.dot);

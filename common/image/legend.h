@@ -41,7 +41,7 @@ struct Ticks {
 Ticks nice_ticks(double lo, double hi, int most);
 
 /// The legend as a picture of 0xAARRGGBB, of a size that suits a display of so many pixels. Bar and letters have dark
-/// rims, so that they read on any ground.
+/// rims and stand on a dark plate that lets some of the ground through, so that they read on any.
 View legend_picture(const Legend& legend, int display_width, int display_height);
 /// Where such a picture lies on a display: in the lower right corner.
 geometry::Rect legend_place(const View& legend_picture, int display_width, int display_height);

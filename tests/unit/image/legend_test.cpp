@@ -90,6 +90,9 @@ TEST(LegendPicture, ReadsOnAnyGround) {
     for (const uint32_t c : picture.colour) light += (c >> 8 & 255) > 230, dark += (c >> 8 & 255) < 70;
     EXPECT_GT(light, 300) << "letters on " << ground;
     EXPECT_GT(dark, 300) << "their rims on " << ground;
+    const View legend = legend_picture(some_legend(), 640, 400);
+    const auto place = legend_place(legend, 640, 400);
+    EXPECT_LT(picture.colour[size_t(place.y) * 640 + place.x] >> 8 & 255, 120u) << "the plate on " << ground;
   }
 }
 
