@@ -12,9 +12,14 @@ size_t Roster::count(const std::string& role) const {
 }
 
 std::string Roster::fact(const std::string& role, const std::string& key) const {
-  for (const Process& p : processes_)
-    if (const auto it = p.facts.find(key); p.role == role && !p.replaced && it != p.facts.end()) return it->second;
-  return "";
+  const std::string* found = nullptr;
+  for (const Process& p : processes_) {
+    const auto it = p.facts.find(key);
+    if (p.role != role || p.replaced || it == p.facts.end()) continue;
+    if (scene::value_or(p.facts, "records_in", std::string()) == ".") return it->second;
+    if (!found) found = &it->second;
+  }
+  return found ? *found : "";
 }
 
 double Roster::number(const std::string& role, const std::string& key) const {

@@ -147,6 +147,15 @@ TEST_F(Record, ViewersAreCountedEachByItself) {
   EXPECT_EQ(s["frames_sampled"], 3);
 }
 
+TEST_F(Record, TheViewerThatRecordsIntoTheFolderSaysWhatWasAsked) {
+  Process guest = viewer, owner = viewer;
+  guest.name = "a guest", guest.facts["records_in"] = "/elsewhere", guest.facts["width"] = "320";
+  owner.name = "viewer", owner.facts["records_in"] = ".", owner.facts["width"] = "640";
+  EXPECT_EQ(record->summary({guest, owner}, {})["size"][0], 640);
+  EXPECT_EQ(record->summary({owner, guest}, {})["size"][0], 640);
+  EXPECT_EQ(record->summary({guest}, {})["size"][0], 320);
+}
+
 TEST_F(Record, OfAVolumeCountsVoxelsAndPixels) {
   Process data{
       "data", "data-1", 1, {{"kind", "volume"}, {"voxels", "16777216"}}, {{"bytes_sent", 3000}, {"voxels_sent", 1000}}};

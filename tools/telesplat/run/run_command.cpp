@@ -69,7 +69,8 @@ class Run {
     if (const Status s = prepare(); !s) return tools::complain(s.error());
     auto pipeline = Pipeline::start(o_);
     if (!pipeline) return not_started(pipeline.error());
-    progress_.line(fmt::format("session at {}; telesplat ctl status asks it", pipeline->master_endpoint()));
+    if (o_.join_master.empty())
+      progress_.line(fmt::format("session at {}; telesplat ctl status asks it", pipeline->master_endpoint()));
     const State state = watch(*pipeline);
     // From here on a signal is another one: what is at hand is left out.
     const bool stopped = state == State::kRunning;
@@ -121,9 +122,7 @@ class Run {
       }
       if (const auto status = control.poll_status()) {
         heard = true;
-        live = figures.update(*status, monotonic_s());
-        if (const auto session = status->find("session"); session != status->end())
-          master_folder_ = session->value("run_folder", std::string());
+        read_status(*status, figures, live);
       }
       if (!heard && monotonic_s() - begin_s > kSilence_s) {
         heard = true;
@@ -140,10 +139,21 @@ class Run {
   }
 
   // The record of a joined session is its master's; so what its viewers did is asked for, once they have left.
-  void ask_for_results(Pipeline& pipeline) {
+  // A master that others started may speak another dialect: what it says in one is not shown.
+  void read_status(const nlohmann::json& status, SessionFigures& figures, std::string& live) try {
+    live = figures.update(status, monotonic_s());
+    if (const auto session = status.find("session"); session != status.end())
+      master_folder_ = session->value("run_folder", std::string());
+  } catch (const nlohmann::json::exception&) {
+    live.clear();
+  }
+
+  void ask_for_results(Pipeline& pipeline) try {
     const auto answer = ControlClient(pipeline.master_endpoint()).ask("status", kResultPatience_s);
     const auto status = answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
     if (status.is_object()) results_ = viewer_results(status, pipeline.viewers());
+  } catch (const nlohmann::json::exception&) {
+    results_.clear();
   }
 
   void remove_record() const {
