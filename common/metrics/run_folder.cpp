@@ -9,6 +9,8 @@
 #include <fstream>
 #include <random>
 
+#include "common/core/log.h"
+
 namespace telesplat::metrics {
 namespace {
 
@@ -17,6 +19,7 @@ namespace fs = std::filesystem;
 constexpr const char* kIdFile = "run.id";
 constexpr std::string_view kIdWord = "telesplat-run ";
 constexpr const char* kLatest = "latest";
+constexpr const char* kReplaced = ".replaced";
 
 /// Files that we write, a pattern of names in a folder of a record. What a person may have put there (screenshots,
 /// notes) is not ours.
@@ -120,6 +123,35 @@ void remove_found(const std::string& directory, const Found& found) {
   for (const auto& folder : found.folders) fs::remove(directory + "/" + folder, error);  // empty ones only
 }
 
+// Moves the files, and run.id, from one folder into another of the same file system.
+Status move_record(const std::string& from, const std::string& to, const Found& found) {
+  std::error_code error;
+  auto files = found.files;
+  files.emplace_back(kIdFile);
+  for (const auto& file : files) {
+    const fs::path source = fs::path(from) / file, target = fs::path(to) / file;
+    if (!fs::exists(fs::symlink_status(source, error))) continue;  // records of earlier versions have no id
+    fs::create_directories(target.parent_path(), error);
+    if (!error) fs::rename(source, target, error);
+    if (error) return Error{fmt::format("{}: cannot be moved to {}: {}", source.string(), to, error.message())};
+  }
+  for (const auto& folder : found.folders) fs::remove(from + "/" + folder, error);  // empty ones only
+  return ok_status();
+}
+
+// Sets the record aside, in place of what a run that was killed may have left there.
+Status set_aside(const std::string& directory, const Found& found) {
+  const std::string aside = directory + "/" + kReplaced;
+  std::error_code error;
+  if (fs::is_symlink(fs::symlink_status(aside, error))) return Error{aside + ": is a symbolic link; remove it"};
+  forget_replaced(directory);
+  if (const Status s = move_record(directory, aside, found); !s) {
+    move_record(aside, directory, look_into(aside, Logs::kOurs));
+    return s;
+  }
+  return ok_status();
+}
+
 std::string new_id() {
   std::random_device random;
   return fmt::format("{:08x}{:08x}", random(), random());
@@ -157,7 +189,8 @@ Result<std::string> begin_folder(const std::string& directory, bool overwrite, L
   if (!found.files.empty() && !is_record(directory, found))
     return Error{fmt::format("{}: holds {}, but is no run's record, so nothing of it is removed; give another --out",
                              directory, list_of(found.files))};
-  remove_found(directory, found);
+  if (!found.files.empty())
+    if (const Status s = set_aside(directory, found); !s) return s.error();
   const std::string path = directory + "/" + kIdFile, id = new_id();
   if (fs::is_symlink(fs::symlink_status(path, error))) return Error{path + ": is a symbolic link; remove it"};
   std::ofstream out(path);
@@ -167,11 +200,26 @@ Result<std::string> begin_folder(const std::string& directory, bool overwrite, L
   return id;
 }
 
+void forget_replaced(const std::string& directory) {
+  const std::string aside = directory + "/" + kReplaced;
+  std::error_code error;
+  if (!is_folder(aside)) return;
+  remove_found(aside, look_into(aside, Logs::kOurs));
+  fs::remove(aside + "/" + kIdFile, error);
+  fs::remove(aside, error);
+}
+
 void remove_record(const std::string& directory, bool folder_too) {
   std::error_code error;
   if (folder_id(directory).empty()) return;
   remove_found(directory, look_into(directory, Logs::kOurs));
   fs::remove(directory + "/" + kIdFile, error);
+  const std::string aside = directory + "/" + kReplaced;
+  if (is_folder(aside)) {
+    if (const Status s = move_record(aside, directory, look_into(aside, Logs::kOurs)); !s)
+      log::warn("{}", s.error().text);
+    fs::remove(aside, error);
+  }
   if (folder_too) fs::remove(directory, error);
 }
 

@@ -18,14 +18,18 @@ std::vector<std::string> recorded_files(const std::string& directory, Logs logs 
 
 /// Makes `directory` the folder of a new record: makes it if need be, and writes run.id into it. Returns the new id.
 /// Error, naming the folder: it cannot be written to; it holds a record already and overwrite is not set; it is to be
-/// overwritten, but is no record; a name of ours is a symbolic link. With overwrite the files of the record before are
-/// removed, and folders of ours that are empty then; nothing else.
+/// overwritten, but is no record; a name of ours is a symbolic link. With overwrite the files of the record before, and
+/// nothing else, are set aside in ".replaced" in the folder: the new record may come to nothing. Folders of ours that
+/// are empty then are removed.
 Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs);
 /// The id in the folder's run.id; empty: there is none.
 std::string folder_id(const std::string& directory);
 
-/// Removes what begin_folder() and the run after it left: a record that shall not be. folder_too: the folder itself, if
-/// it is empty then.
+/// Removes for good what begin_folder() set aside: the new record has something to show.
+void forget_replaced(const std::string& directory);
+
+/// Removes what begin_folder() and the run after it left: a record that shall not be. The record that it was to replace
+/// is put back. folder_too: the folder itself, if it is empty then.
 void remove_record(const std::string& directory, bool folder_too);
 
 /// If the folder lies in one that is called "runs": makes "latest" there a symbolic link to it, in one step. Something

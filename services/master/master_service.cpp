@@ -173,6 +173,7 @@ int run(const MasterServiceOptions& o) {
     if (const Status s = net::refuse_folder_in_use(o.out); !s) return refuse(s.error());
     auto begun = metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
     if (!begun) return refuse(begun.error());
+    if (o.overwrite) metrics::forget_replaced(o.out);
     run_id = *std::move(begun);
   }
   auto record = metrics::RunRecord::open(o.out, metrics::begin_now());

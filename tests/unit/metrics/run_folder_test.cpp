@@ -40,5 +40,31 @@ TEST_F(RunFolder, ARecordWithinItIsAnotherRuns) {
     EXPECT_TRUE(has(other + std::string("/frames.csv")) && has(other + std::string("/run.id"))) << other;
 }
 
+TEST_F(RunFolder, AReplacedRecordComesBackIfTheNewOneComesToNothing) {
+  const auto first = begin_folder(folder, false, Logs::kOurs);
+  ASSERT_TRUE(first.ok());
+  for (const char* name : {"frames.csv", "images/frame-000000.png", "viewer-2/images/wall.png", "mine.txt"}) put(name);
+  const auto replace = [&] {
+    const auto begun = begin_folder(folder, true, Logs::kOurs);
+    EXPECT_TRUE(begun.ok() && *begun != *first);
+    EXPECT_FALSE(has("frames.csv") || has("images") || has("viewer-2"));
+    put("frames.csv");
+    put("tiles.csv");
+  };
+  replace();
+  remove_record(folder, false);
+  EXPECT_EQ(folder_id(folder), *first);
+  for (const char* name : {"frames.csv", "images/frame-000000.png", "viewer-2/images/wall.png", "mine.txt"})
+    EXPECT_TRUE(has(name)) << name;
+  EXPECT_FALSE(has("tiles.csv") || has(".replaced"));
+
+  replace();
+  forget_replaced(folder);
+  EXPECT_TRUE(has("tiles.csv") && has("mine.txt") && !has(".replaced"));
+  remove_record(folder, false);
+  EXPECT_FALSE(has("frames.csv") || has("tiles.csv") || has("run.id")) << "nothing is left to come back";
+  EXPECT_TRUE(has("mine.txt"));
+}
+
 }  // namespace
 }  // namespace telesplat::metrics

@@ -81,6 +81,7 @@ class Run {
     for (const auto& n : pipeline->take_notes()) progress_.line(n);
     if (state == State::kBadInput || state == State::kFailed) return clear_up(state);
     if (o_.out.empty()) return 0;
+    if (after_.displayed()) settle_replaced();
     if (stopped && net::stop_requested()) return end_at_once();
     if (!after_.displayed()) return nothing_displayed(stopped);
     return complete(stopped);
@@ -160,6 +161,15 @@ class Run {
     if (!o_.out.empty()) metrics::remove_record(o_.out, !folder_existed_);
   }
 
+  // What --overwrite was to replace is gone once there is something in its place.
+  void settle_replaced() const {
+    if (!o_.overwrite || o_.out.empty()) return;
+    if (after_.displayed())
+      metrics::forget_replaced(o_.out);
+    else
+      remove_record();
+  }
+
   int not_started(const Error& error) {
     if (net::stop_requested()) return nothing_displayed(true);
     remove_record();
@@ -171,6 +181,7 @@ class Run {
       remove_record();
       return 2;
     }
+    settle_replaced();
     if (!logs_.path().empty()) tools::complain({"the logs are in " + logs_.path()});
     logs_.keep();
     return 1;
