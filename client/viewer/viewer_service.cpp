@@ -140,8 +140,12 @@ Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& rendere
 Status develop(const std::string& directory, FrameSpool& spool) {
   spool.flush();
   if (spool.dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool.dropped());
-  const auto progress = [](size_t done, size_t of) {
-    std::printf("progress pictures %.3f\n", double(done) / double(of));
+  // The launcher reads lines, a person one that is rewritten.
+  const auto progress = [person = isatty(STDOUT_FILENO) != 0](size_t done, size_t of) {
+    if (person)
+      std::printf("\rpictures %.0f %%%s", 100.0 * double(done) / double(of), done == of ? "\n" : "");
+    else
+      std::printf("progress pictures %.3f\n", double(done) / double(of));
     std::fflush(stdout);
   };
   const auto in_time = [signalled_s = 0.0]() mutable {
