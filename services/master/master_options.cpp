@@ -138,7 +138,7 @@ options::Table table(MasterServiceOptions& o) {
       {.flag = "--out", .value = &o.out, .help = "folder for the run's record", .reach = options::Reach::kHere},
       {.flag = "--overwrite",
        .value = &o.overwrite,
-       .help = "the folder of --out may hold a record already: its files are removed first, others stay",
+       .help = "the folder of --out may hold a record already: its files are replaced, others stay",
        .reach = options::Reach::kHere},
       {.flag = "--started-by",
        .value = &o.started_by,

@@ -56,7 +56,7 @@ Table own_rows(RunOptions& o) {
            "where no scene is named: $TELESPLAT_MASTER"},
       {.flag = "--overwrite",
        .value = &o.overwrite,
-       .help = "the folder of --out may hold a record already: its files are removed first, others stay"},
+       .help = "the folder of --out may hold a record already: its files are replaced, others stay"},
       {.flag = "!--same-priority",
        .value = &o.background_servers,
        .help = "run samplers, packer and data at the viewer's priority"},
