@@ -161,13 +161,16 @@ class Run {
     if (!o_.out.empty()) metrics::remove_record(o_.out, !folder_existed_);
   }
 
-  // What --overwrite was to replace is gone once there is something in its place.
+  // What --overwrite was to replace is gone once there is something in its place. What a run that failed has measured
+  // stays, and so does the record before.
   void settle_replaced() const {
     if (!o_.overwrite || o_.out.empty()) return;
+    std::error_code error;
+    const std::string before = o_.out + "/.replaced";
     if (after_.displayed())
       metrics::forget_replaced(o_.out);
-    else
-      remove_record();
+    else if (fs::exists(before, error))
+      tools::complain({"the record that was to be replaced is in " + before});
   }
 
   int not_started(const Error& error) {
