@@ -25,6 +25,10 @@ std::string complain_about_finish(const std::string& text) {
   return splat::finish_named(text) ? "" : "not on, off or some of fill,smooth,antialias";
 }
 
+std::string complain_about_still_samples(const std::string& text) {
+  return text == "1" || text == "4" || text == "16" ? "" : "not 1, 4 or 16";
+}
+
 std::string complain_about_background(const std::string& text) {
   const auto background = image::parse_background(text);
   return background ? "" : background.error().text;
@@ -41,8 +45,7 @@ Table sampling_table(ViewerOptions& o) {
       {.flag = "--sampling-size",
        .value = &o.sampling_size,
        .help = "sampling size in pixels, WxH; auto: from --least-sampling of the display's to all of it, as fine as "
-               "updates "
-               "of --target-latency allow"},
+               "updates of --target-latency allow (of half of it where sampling is steered)"},
       {.flag = "--least-sampling",
        .value = &o.least_sampling,
        .help = "--sampling-size auto: sampled pixels a displayed pixel, on each axis, at least",
@@ -50,7 +53,8 @@ Table sampling_table(ViewerOptions& o) {
        .default_text = "what the session tells: 0.4 of Julia sets, else 0.5"},
       {.flag = "--target-latency",
        .value = &o.requests.target_latency_s,
-       .help = "seconds from request to complete view update that --sampling-size auto aims at",
+       .help = "seconds from request to complete view update that --sampling-size auto aims at; where sampling is "
+               "steered it aims at half of it",
        .limits = Range{0.01, 10}},
   };
 }
@@ -140,6 +144,12 @@ Table drawing_table(ViewerOptions& o) {
        .help = "work per pixel after splatting: on, off, or some of fill,smooth,antialias",
        .limits = options::Check(complain_about_finish),
        .fits = kPoints},
+      {.flag = "--still-samples",
+       .value = &o.still_samples,
+       .help = "a head that stands still sees pictures of so many sub-pixels a pixel, 1, 4 or 16, wherever there are "
+               "points that fine; not with --finish off, nor with --background transparent",
+       .limits = options::Check(complain_about_still_samples),
+       .fits = kPoints},
       {.flag = "--background",
        .value = &o.background,
        .help = "behind the data: #rrggbb, a name (white, black, grey, ...), or transparent (pictures have alpha; a "
@@ -199,6 +209,11 @@ Table record_table(ViewerOptions& o) {
       {.flag = "--verify",
        .value = &d.verify_every,
        .help = "compare every N-th frame with direct rendering after the run; 0: none"},
+      {.flag = "--verify-consecutive",
+       .value = &d.verify_row,
+       .help = "compare so many frames in a row each time: flicker, popping and how long holes last are measured from "
+               "one frame to the next",
+       .limits = Range{1, 1000}},
   };
 }
 
@@ -328,6 +343,7 @@ Status settle(ViewerOptions& o) {
   o.display.splat_scale = float(o.splat_scale);
   if (const Status s = settle_shading(o); !s) return s;
   o.display.render.finish = *splat::finish_named(o.finish);
+  o.display.still_samples = o.still_samples == "1" ? 1 : o.still_samples == "4" ? 4 : 16;
   o.requests.adaptive = o.sampling_size == "auto";
   o.requests.follow_display = o.window;
   return ok_status();

@@ -32,6 +32,7 @@ struct ViewerOptions {
   std::optional<double> duration_s;
   std::string background = "#141820";  ///< "#rrggbb", a name, or "transparent"
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
+  std::string still_samples = "16";
   int buffers = 3;                 ///< of loose coupling
   std::string wall;                ///< "CxR": this display is a tile of a wall; empty: it is none
   int wall_tile = 0;               ///< which one, by rows from the upper left

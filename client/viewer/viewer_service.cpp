@@ -174,6 +174,7 @@ int farewell(const ViewerOptions& o, const Served& served) {
 int run(ViewerOptions o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
+  net::keep_freed_memory();
   if (const Status s = settle(o); !s) return refuse(s.error());
   auto surface = open_surface(o);  // before the renderers, whose contexts may depend on the window's
   if (!surface) return refuse(surface.error());

@@ -89,7 +89,7 @@ void ViewerWorker::loop() {
       report(now, false);
       std::vector<net::Socket*> sockets{&link_.socket()};
       feeds_.add_to(sockets);
-      net::wait_readable_s(sockets, poll_s);
+      net::wait_readable_s(sockets, std::min(poll_s, requester_.due_in_s(to_master_s(monotonic_s())).value_or(poll_s)));
       receive_control();
       receive();
     }
@@ -123,6 +123,7 @@ void ViewerWorker::follow_session() {
   offset_s_ = link_.to_master_s(0);
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
   requester_.set_min_scale(options_.least_sampling.value_or(told));
+  requester_.set_steered(view.setting("sampling.steering", 0) != 0);
   if (std::exchange(master_, session.master) != session.master) {
     all_again_ = true;  // it knows nothing of what was asked for
     if (received_) received_->on_new_master();

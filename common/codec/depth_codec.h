@@ -35,6 +35,7 @@ struct StreamInfo {
   int width = 0, height = 0;
   size_t covered_pixels = 0;
   size_t mask_bytes = 0, depth_bytes = 0, colour_bytes = 0, normal_bytes = 0;
+  size_t sparse_bytes = 0;  ///< of sparse tiles: depth, colour and normal in one
 };
 Result<StreamInfo> inspect(std::span<const uint8_t> bytes);
 

@@ -16,6 +16,7 @@ enum BlockKind : uint32_t { kConstant = 0, kStored = 1, kZstd = 2 };
 // Level 1 looks for strings; a very negative level finds next to none, which is faster, and mostly shorter, too: short
 // strings in noise cost more than their Huffman codes (figures in depth_codec.cpp).
 constexpr int kStringsLevel = 1, kHuffmanOnlyLevel = -1000;
+constexpr size_t kTooShort = 32;  // bytes: a Huffman table takes about what it saves, and 10 us
 
 using Compressor = std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)>;
 Compressor make_compressor(int level) {
@@ -107,6 +108,7 @@ void put_varint(std::vector<uint8_t>& out, uint32_t value) {
 void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
   if (raw.size() < 2) return append(out, kStored, raw);
   if (std::memcmp(raw.data(), raw.data() + 1, raw.size() - 1) == 0) return append(out, kConstant, raw.first(1));
+  if (raw.size() < kTooShort) return append(out, kStored, raw);
   static thread_local std::vector<uint8_t> packed;
   packed.resize(std::max(packed.size(), ZSTD_compressBound(raw.size())));
   const size_t size =

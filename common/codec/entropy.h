@@ -16,7 +16,8 @@ class Reader {
  public:
   explicit Reader(std::span<const uint8_t> bytes) : rest_(bytes) {}
   std::optional<uint8_t> u8();
-  std::optional<uint32_t> varint();  ///< LEB128 of at most 32 bits
+  int peek() const { return rest_.empty() ? -1 : rest_[0]; }  ///< the next byte; -1: there is none
+  std::optional<uint32_t> varint();                           ///< LEB128 of at most 32 bits
   std::optional<std::span<const uint8_t>> bytes(size_t count);
   size_t left() const { return rest_.size(); }
 
@@ -88,6 +89,12 @@ struct BitSource {
     word >>= position & 7;
     position += count;
     return static_cast<uint32_t>(word & ((uint64_t{1} << count) - 1));
+  }
+  /// How many of the next bits are ones, up to 57; takes none.
+  unsigned ones() const {
+    uint64_t word;
+    std::memcpy(&word, data + (position >> 3), 8);
+    return static_cast<unsigned>(std::countr_one(word >> (position & 7)));
   }
 };
 

@@ -41,7 +41,10 @@ namespace {
 
 // kRuns: lengths of the alternating runs of empty and covered pixels, rows joined: few pixels, or long runs.
 // kBytes: eight pixels a byte. kBytesAbove: the same, exclusive or with the row above, for outlines that run downwards.
-enum Coding : uint8_t { kRuns = 0, kBytes = 1, kBytesAbove = 2 };
+// kPeriodic: a pattern of 64 x 64 pixels that repeats, which of its pixels are covered where, and the other covered
+// pixels: three masks of the other codings. Validation rays are picked by such a pattern (blue noise).
+enum Coding : uint8_t { kRuns = 0, kBytes = 1, kBytesAbove = 2, kPeriodic = 3 };
+constexpr int kPeriod = 64;
 
 size_t bytes_per_row(const Mask& mask) { return (static_cast<size_t>(mask.width()) + 7) / 8; }
 
@@ -81,6 +84,8 @@ struct Scratch {
   std::vector<uint8_t> tokens[2], bytes, packed;
   BitWriter writer;
   BitReader reader;
+  Mask pattern, repeats, others;
+  std::vector<uint8_t> periodic;
 };
 Scratch& scratch() {
   static thread_local Scratch s;
@@ -149,28 +154,14 @@ bool get_bytes(Reader& in, Mask& mask, bool above, Scratch& s) {
 
 }  // namespace
 
-size_t Mask::count() const {
-  size_t n = 0;
-  for (const uint64_t word : words_) n += static_cast<size_t>(std::popcount(word));
-  return n;
-}
-
-size_t Mask::runs() const {
-  size_t n = 0;
-  for (int y = 0; y < height_; ++y)
-    for (size_t w = 0; w < words_per_row_; ++w) {
-      const uint64_t word = row(y)[w], last = w == 0 ? 0 : row(y)[w - 1] >> 63;
-      n += static_cast<size_t>(std::popcount(word & ~(word << 1 | last)));
-    }
-  return n;
-}
-
 HWY_EXPORT(CoveredBits);
 void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) {
   HWY_DYNAMIC_DISPATCH(CoveredBits)(depth, count, words);
 }
 
-void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
+namespace {
+
+void put_plain(std::vector<uint8_t>& out, const Mask& mask) {
   // A run takes a byte or so, a byte of pixels at least a bit and few more where it is the usual one. Bench
   // codec/patch*.
   Scratch& s = scratch();
@@ -196,7 +187,7 @@ void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
   out.insert(out.end(), s.packed.begin(), s.packed.end());
 }
 
-bool get_mask(Reader& in, Mask& mask) {
+bool get_plain(Reader& in, Mask& mask) {
   const auto coding = in.u8();
   if (!coding) return false;
   switch (*coding) {
@@ -208,6 +199,96 @@ bool get_mask(Reader& in, Mask& mask) {
     default:
       return false;
   }
+}
+
+// Calls f(y, word index, pattern's bits inside of the mask) for all words of the mask that the pattern has bits in.
+template <class F>
+void for_each_repeat(const Mask& mask, const Mask& pattern, F f) {
+  const size_t words = mask.words_per_row(), last = static_cast<size_t>(mask.width()) % 64;
+  for (int y = 0; y < mask.height(); ++y)
+    for (size_t w = 0; w < words; ++w) {
+      uint64_t bits = *pattern.row(y % kPeriod);
+      if (w + 1 == words && last != 0) bits &= (uint64_t{1} << last) - 1;
+      if (bits != 0) f(y, w, bits);
+    }
+}
+
+// What is covered in two periods or more, where few pixels are. Returns how many covered pixels it explains.
+size_t find_pattern(const Mask& mask, Mask& pattern) {
+  constexpr int kFew = 12;  // of 64: more are no pattern, but a place where all pixels are covered
+  pattern.reset(kPeriod, kPeriod);
+  uint64_t once[kPeriod] = {};
+  for (int y = 0; y < mask.height(); ++y)
+    for (size_t w = 0; w < mask.words_per_row(); ++w) {
+      const uint64_t word = mask.row(y)[w];
+      if (std::popcount(word) > kFew) continue;
+      *pattern.row(y % kPeriod) |= once[y % kPeriod] & word;
+      once[y % kPeriod] |= word;
+    }
+  size_t explained = 0;
+  for_each_repeat(mask, pattern, [&](int y, size_t w, uint64_t bits) {
+    explained += static_cast<size_t>(std::popcount(mask.row(y)[w] & bits));
+  });
+  return explained;
+}
+
+void put_periodic(std::vector<uint8_t>& out, const Mask& mask, Scratch& s) {
+  size_t places = 0;
+  for_each_repeat(mask, s.pattern,
+                  [&](int, size_t, uint64_t bits) { places += static_cast<size_t>(std::popcount(bits)); });
+  s.repeats.reset(static_cast<int>(places), 1);
+  s.others = mask;
+  int at = 0;
+  for_each_repeat(mask, s.pattern, [&](int y, size_t w, uint64_t bits) {
+    s.others.row(y)[w] &= ~bits;
+    for (; bits != 0; bits &= bits - 1, ++at)
+      if (mask.row(y)[w] & bits & -bits) s.repeats.set(at, 0);
+  });
+  out.push_back(kPeriodic);
+  for (const Mask* part : {&s.pattern, &s.repeats, &s.others}) put_plain(out, *part);
+}
+
+bool get_periodic(Reader& in, Mask& mask, Scratch& s) {
+  s.pattern.reset(kPeriod, kPeriod);
+  if (!get_plain(in, s.pattern)) return false;
+  size_t places = 0;
+  for_each_repeat(mask, s.pattern,
+                  [&](int, size_t, uint64_t bits) { places += static_cast<size_t>(std::popcount(bits)); });
+  if (places == 0) return false;
+  s.repeats.reset(static_cast<int>(places), 1);
+  if (!get_plain(in, s.repeats) || !get_plain(in, mask)) return false;
+  int at = 0;
+  for_each_repeat(mask, s.pattern, [&](int y, size_t w, uint64_t bits) {
+    for (; bits != 0; bits &= bits - 1, ++at)
+      if (s.repeats.at(at, 0)) mask.row(y)[w] |= bits & -bits;
+  });
+  return true;
+}
+
+}  // namespace
+
+void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
+  Scratch& s = scratch();
+  const size_t covered = mask.count();
+  const bool repeats = covered >= 64 && (mask.width() > kPeriod || mask.height() > kPeriod);
+  const size_t explained = repeats ? find_pattern(mask, s.pattern) : 0;
+  constexpr size_t kMostOfPattern = kPeriod * kPeriod / 6;  // what is denser repeats by chance
+  if (explained * 3 < covered || explained == 0 || s.pattern.count() > kMostOfPattern) return put_plain(out, mask);
+  s.periodic.clear();
+  put_periodic(s.periodic, mask, s);
+  const size_t begin = out.size();
+  if (explained * 10 < covered * 8) {  // not clear: the shorter one
+    put_plain(out, mask);
+    if (out.size() - begin <= s.periodic.size()) return;
+    out.resize(begin);
+  }
+  out.insert(out.end(), s.periodic.begin(), s.periodic.end());
+}
+
+bool get_mask(Reader& in, Mask& mask) {
+  if (in.peek() != kPeriodic) return get_plain(in, mask);
+  (void)in.u8();
+  return get_periodic(in, mask, scratch());
 }
 
 }  // namespace telesplat::codec::detail

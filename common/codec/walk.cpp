@@ -43,16 +43,6 @@ void load_row(FilledRow& row, const image::DepthImage& image, size_t first, size
 
 Pixel at(const image::DepthImage& image, size_t i) { return {image.depth[i], image.colour[i], image.normal[i]}; }
 
-// Pixel i = (x, y) of a sparse tile: as in a filled row where the three neighbours are covered, else the nearest pixel.
-Pixel predict_sparse(const TileScratch& s, const image::DepthImage& image, size_t x, int y, size_t i, size_t stride) {
-  const auto covered = [&](size_t column, int row) { return (s.mask.row(row)[column / 64] >> column % 64 & 1) != 0; };
-  if (x == 0 || y == 0 || !covered(x - 1, y) || !covered(x, y - 1) || !covered(x - 1, y - 1))
-    return s.neighbours.predict(static_cast<int>(x), y);
-  const Pixel left = at(image, i - 1), up = at(image, i - stride), up_left = at(image, i - stride - 1);
-  return {predict_depth(left.depth, up.depth, up_left.depth), predict_bytes(left.colour, up.colour, up_left.colour),
-          static_cast<uint16_t>(predict_bytes(left.normal, up.normal, up_left.normal))};
-}
-
 }  // namespace
 
 void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full) {
@@ -136,43 +126,26 @@ bool decode_masked(TileScratch& s, image::DepthImage& image, const TileRect& rec
 }
 
 void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base) {
-  s.neighbours.reset(rect.width, rect.height, base);
-  for (int y = 0; y < rect.height; ++y) {
-    size_t n = 0;
-    for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
-      const size_t i = rect.first + rect.stride * static_cast<size_t>(y) + x;
-      const Pixel pixel = at(image, i), guess = predict_sparse(s, image, x, y, i, rect.stride);
-      s.packed.depth[n] = fold_depth(pixel.depth - guess.depth);
-      s.packed.colour[n] = fold_bytes(pixel.colour, guess.colour);
-      s.packed.normal[n++] = static_cast<uint16_t>(fold_bytes(pixel.normal, guess.normal));
-      s.neighbours.add(static_cast<int>(x), y, pixel);
-    });
-    if (n != 0) s.writer.add(s.packed, n);
-  }
+  s.predictor.start(base);
+  s.scatter_walk(s.mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
+    const Pixel pixel = at(image, rect.index(x, y));
+    const Magnitudes size = s.scatter_encoder.put(pixel, s.predictor.predict(x, y, neighbours));
+    s.predictor.add(x, y, pixel, size);
+    return true;
+  });
 }
 
 bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
-  s.neighbours.reset(rect.width, rect.height, base);
-  JoinedRow& packed = s.decoded_packed;
-  bool good = true;
-  for (int y = 0; y < rect.height; ++y) {
-    size_t n = count_bits(s.mask.row(y), s.mask.words_per_row());
-    if (n == 0) continue;
-    if (!s.reader.take(packed, n)) return false;
-    n = 0;
-    for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) {
-      const size_t i = rect.first + rect.stride * static_cast<size_t>(y) + x;
-      const Pixel guess = predict_sparse(s, image, x, y, i, rect.stride);
-      const Pixel pixel{(guess.depth + unfold_depth(packed.depth[n])) & image::kMaxDepthCode,
-                        add_bytes(guess.colour, colour_of(packed.attributes[n])),
-                        static_cast<uint16_t>(add_bytes(guess.normal, normal_of(packed.attributes[n])))};
-      ++n;
-      image.depth[i] = pixel.depth, image.colour[i] = pixel.colour, image.normal[i] = pixel.normal;
-      good &= pixel.depth != 0;
-      s.neighbours.add(static_cast<int>(x), y, pixel);
-    });
-  }
-  return good;
+  s.predictor.start(base);
+  return s.scatter_walk(s.mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
+    Magnitudes size;
+    const auto pixel = s.scatter_decoder.get(s.predictor.predict(x, y, neighbours), size);
+    if (!pixel) return false;
+    const size_t i = rect.index(x, y);
+    image.depth[i] = pixel->depth, image.colour[i] = pixel->colour, image.normal[i] = pixel->normal;
+    s.predictor.add(x, y, *pixel, size);
+    return true;
+  });
 }
 
 }  // namespace telesplat::codec::detail

@@ -1,12 +1,13 @@
-// From a tile's pixels to token streams and back, in scan order: dense tiles by rows (predict.h), sparse ones by
-// neighbours.
+// From a tile's pixels to bytes and back: dense tiles in rows (predict.h), by token streams; sparse ones from coarse to
+// fine (scatter.h).
 #pragma once
 
 #include <cstddef>
 
 #include "common/codec/mask.h"
 #include "common/codec/predict.h"
-#include "common/codec/sparse.h"
+#include "common/codec/scatter.h"
+#include "common/codec/scatter_coder.h"
 #include "common/codec/streams.h"
 #include "common/image/depth_image.h"
 
@@ -16,6 +17,7 @@ namespace telesplat::codec::detail {
 struct TileRect {
   size_t first, stride;
   int width, height;
+  size_t index(int x, int y) const { return first + stride * static_cast<size_t>(y) + static_cast<size_t>(x); }
 };
 
 /// Buffers that one thread keeps: a tile is too small to allocate them anew.
@@ -30,18 +32,21 @@ struct TileScratch {
   FilledRow rows[2];
   Residuals residuals, packed;  ///< of a row; of its covered pixels alone
   JoinedRow decoded[2], decoded_residuals, decoded_packed;
-  Neighbours neighbours;
+  ScatterWalk scatter_walk;
+  ScatterPredictor predictor;
+  ScatterEncoder scatter_encoder;
+  ScatterDecoder scatter_decoder;
   TokenWriter writer;
   TokenReader reader;
 };
 
-/// Pixels covered by s.mask -> s.writer, which was started. `base`: what predicts the first pixel. `full`: the mask is
-/// all ones.
+/// Pixels covered by s.mask -> s.writer, or of sparse tiles s.scatter_encoder, which was started. `base`: what predicts
+/// the first pixel. `full`: the mask is all ones.
 void encode_dense(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, bool full);
 void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base);
 
-/// s.reader, which was started -> pixels covered by s.mask; others are left alone (they are zero). False where the
-/// stream is damaged.
+/// s.reader, of sparse tiles s.scatter_decoder, which was started -> pixels covered by s.mask; others are left alone
+/// (they are zero). False where the stream is damaged.
 [[nodiscard]] bool decode_full(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
 [[nodiscard]] bool decode_masked(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
 [[nodiscard]] bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/core/result.h"
+#include "common/metrics/plans/plan_row.h"
 #include "common/wire/session_messages.h"
 #include "common/wire/tile_messages.h"
 
@@ -26,6 +27,7 @@ struct Measured {
   Rows frames, updates;
   std::vector<std::string> viewers;  ///< names of those that sent rows
   std::vector<wire::TileDone> tiles;
+  std::vector<PlanRow> plans;
   std::map<std::string, double> busy_s;  ///< sample begin to encode end, by sampler
   size_t epochs = 0;
 

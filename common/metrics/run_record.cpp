@@ -50,6 +50,8 @@ constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"width", [](const TileRow& r) { return std::to_string(r.tile.rect.width); }},
     {"height", [](const TileRow& r) { return std::to_string(r.tile.rect.height); }},
     {"step", [](const TileRow& r) { return whole(r.tile.step); }},
+    {"rays", [](const TileRow& r) { return whole(r.tile.rays); }},
+    {"extra", [](const TileRow& r) { return whole(r.tile.extra); }},
 };
 
 bool is_time(const std::string& column) { return column.ends_with("_s"); }
@@ -181,6 +183,16 @@ void RunRecord::add_assignment(const std::vector<Assignment>& transfers) {
   assignment_file_.flush();
 }
 
+void RunRecord::add_plan(const std::string& viewer, const PlanRow& plan) {
+  // The summary needs no more of it, and a session may last for hours.
+  PlanRow& kept = measured_.plans.emplace_back(plan);
+  std::erase_if(kept.figures, [](const auto& figure) { return figure.first != "plan_ms"; });
+  if (directory_.empty()) return;
+  if (!plans_file_.is_open() && plans_file_.open(directory_ + "/plans.csv"))
+    plans_file_.write(csv_line(plan_columns()));
+  plans_file_.write(csv_line(plan_cells(viewer, plan, begin_.monotonic_s)));
+}
+
 nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
                                           const std::map<std::string, double>& counters, About about) const {
   about.begin = begin_;
@@ -191,6 +203,7 @@ Status RunRecord::finish(const std::vector<Process>& processes, const std::map<s
                          const About& about) {
   if (directory_.empty()) return ok_status();
   tiles_file_.flush();
+  plans_file_.flush();
   const std::string path = directory_ + "/summary.json";
   std::ofstream out(path + ".part");
   out << summary(processes, counters, about).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)

@@ -1,6 +1,6 @@
-// The record of a run: frames.csv, updates.csv, tiles.csv, epochs.csv, assignment.csv, trace.json and summary.json in
-// one folder (docs/metrics.md tells every column and figure). The master writes it as rows arrive: what was measured
-// survives, however the run ends.
+// The record of a run: frames.csv, updates.csv, tiles.csv, plans.csv, epochs.csv, assignment.csv, trace.json and
+// summary.json in one folder (docs/metrics.md tells every column and figure). The master writes it as rows arrive: what
+// was measured survives, however the run ends.
 #pragma once
 
 #include <map>
@@ -41,6 +41,8 @@ class RunRecord {
   void add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters,
                  const std::map<std::string, std::string>& texts = {});
   void add_assignment(const std::vector<Assignment>& transfers);
+  /// viewer: name of the one that asked for the view.
+  void add_plan(const std::string& viewer, const PlanRow& plan);
 
   /// The figures of docs/metrics.md, "summary.json", from everything so far. processes: all that took part; counters:
   /// the master's ("leases_expired", "tiles_released", ...); about: what was done, its beginning left out.
@@ -62,7 +64,7 @@ class RunRecord {
   Measured measured_;
   std::vector<std::string> epoch_columns_, epoch_texts_;
   TextFile frames_file_, updates_file_, tiles_file_, epochs_file_;
-  TextFile assignment_file_;  // opened when there is something to write: meshes have none
+  TextFile assignment_file_, plans_file_;  // opened when there is something to write: the first of volumes alone
   TraceFile trace_;
 };
 

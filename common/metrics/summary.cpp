@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "common/image/depth_image.h"
 #include "common/metrics/roster.h"
@@ -62,7 +63,8 @@ std::map<std::string, ViewerFigures> by_viewer(const Measured& m) {
   return out;
 }
 
-/// How long each frame took. Coarse frames are a part of their view only: they would flatter these figures.
+/// How long each frame took. Coarse frames are a part of their view only, and extra ones come after it: they would
+/// flatter these figures.
 struct FrameDurations {
   std::vector<double> leased_ms, sampling_ms, packing_ms;
 };
@@ -73,7 +75,7 @@ FrameDurations frame_durations(const std::vector<wire::TileDone>& tiles) {
   };
   std::map<uint64_t, Times> frames;
   for (const wire::TileDone& t : tiles) {
-    if (t.step != 1) continue;
+    if (t.step != 1 || t.extra) continue;
     Times& f = frames[t.frame.value];
     f.leased = std::min(f.leased, t.leased_s);
     f.begin = std::min(f.begin, t.sample_begin_s);
@@ -230,6 +232,47 @@ ordered_json how_much(const Traffic& t, double run_s, double viewers) {
           {"redundancy_eliminated", if_measured(t.sampled && t.eliminates, t.redundancy)}};
 }
 
+/// What steering spared: rays of all tiles, against those of whole views.
+struct Rays {
+  double cast = 0, full = 0;
+};
+
+Rays rays(const Measured& m) {
+  Rays out;
+  std::set<uint64_t> planned;  // frames that have the rays of a plan
+  for (const PlanRow& p : m.plans) {
+    if (p.outcome != PlanRow::Outcome::kTiles && p.outcome != PlanRow::Outcome::kEmpty) continue;
+    planned.insert(p.asked.frame.value);
+    out.full += double(p.rays_full());
+  }
+  for (const wire::TileDone& t : m.tiles) {
+    out.cast += double(t.rays);
+    if (!planned.contains(t.frame.value)) out.full += double(t.rays);
+  }
+  return out;
+}
+
+ordered_json what_was_steered(const Measured& m) {
+  std::vector<double> plan_ms, answer_ms;
+  double late = 0;
+  for (const PlanRow& p : m.plans) {
+    if (p.outcome == PlanRow::Outcome::kLate)
+      ++late;
+    else if (!p.asked.extra)
+      answer_ms.push_back((p.planned_s - p.asked_s) * 1e3);
+    if (const auto ms = p.figures.find("plan_ms"); ms != p.figures.end() && !p.asked.extra)
+      plan_ms.push_back(ms->second);
+  }
+  const Rays r = rays(m);
+  return {{"rays_cast", if_measured(r.full > 0, whole(r.cast))},
+          {"rays_full", if_measured(r.full > 0, whole(r.full))},
+          {"rays_saved", if_measured(r.full > 0, 1 - r.cast / r.full)},
+          {"plans", if_measured(!m.plans.empty(), m.plans.size())},
+          {"plans_late", if_measured(!m.plans.empty(), whole(late))},
+          {"plan_ms", distribution_json(plan_ms)},
+          {"plan_answer_ms", distribution_json(answer_ms)}};
+}
+
 ordered_json what_was_held(const Measured& m, const Roster& roster, double partitions, double viewers) {
   const double points = roster.present("packer", "points"), voxels = roster.counted("data", "voxels_sent"),
                first_points_s = roster.present("viewer", "first_points_s");
@@ -258,6 +301,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(how_often(measured, figures, counter("frames_completed")));
   out.update(how_long(measured));
   out.update(how_much(traffic(measured, roster), run_s, viewers));
+  out.update(what_was_steered(measured));
   out.update(what_was_held(measured, roster, counter("partitions"), viewers));
   out.update(ordered_json{{"tiles_released", whole(counter("tiles_released"))},
                           {"leases_backup", whole(counter("leases_backup"))},

@@ -1,6 +1,7 @@
 #include "common/net/service.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -103,6 +104,13 @@ void end_on_signals() { handle_signals(end_process); }
 void install_signal_handlers() { handle_signals(set_flag); }
 bool stop_requested() { return stop_flag; }
 void forget_stop() { stop_flag = false; }
+
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 128 << 20);
+#endif
+}
 
 void lower_thread_priority(int levels) {
   const auto thread = static_cast<id_t>(syscall(SYS_gettid));

@@ -51,6 +51,10 @@ void forget_stop();
 /// Lowers the calling thread's priority by `levels` of nice: for work that must not take the processor from a display.
 void lower_thread_priority(int levels);
 
+/// Keeps up to 128 MB of freed memory for the next images of tiles, which are as large: to get them anew from the
+/// system, page by page, costs as much as to fill them.
+void keep_freed_memory();
+
 /// Resident memory of this process now / at most so far, MB.
 double resident_mb();
 double peak_resident_mb();

@@ -219,13 +219,15 @@ Mosaic build(const PointSet& p, Sequence sequence, FrameId frame) {
 }
 
 // Whether finer points surround those of a coarser mosaic: for each cell of one of its sample distances, how many there
-// are.
+// are, and in which of its eight octants.
 class FinerPoints {
  public:
   FinerPoints(const Mosaic& coarse, int finest_class)
       : grid_{cells_a_side(coarse.pixel_range(), 1)},
-        // Density goes with the square: an octave is four times as many. Half of what covers a cell must be there.
-        enough_(1u << std::clamp(2 * (finest_class - density_class(coarse.pixel_range())) - 1, 0, 12)) {}
+        halves_{2 * grid_.side},
+        // Density goes with the square: an octave is four times as many. Three quarters of what covers a cell must be
+        // there: half of it may be the neighbours of a sample around which nothing finer was sampled.
+        enough_(3u << 2 * std::clamp(finest_class - density_class(coarse.pixel_range()) - 1, 0, 6)) {}
 
   void begin(size_t most) {
     scratch.table.begin(most);
@@ -235,23 +237,31 @@ class FinerPoints {
     for (uint32_t i = 0; i < n; ++i) {
       const uint32_t c = scratch.table.number(grid_.key(x[i], y[i], z[i], face_of(normal[i])));
       if (c == scratch.counts.size()) scratch.counts.push_back(0);
-      ++scratch.counts[c];
+      uint32_t& count = scratch.counts[c];
+      count |=
+          1u << (kOctants + (halves_.along(x[i]) & 1) + 2 * (halves_.along(y[i]) & 1) + 4 * (halves_.along(z[i]) & 1));
+      if ((count & kMostCounted) < kMostCounted) ++count;
     }
   }
   bool surround(const Mosaic::Level& l, uint32_t i) const {
     const uint32_t c = scratch.table.find(grid_.key(l.x[i], l.y[i], l.z[i], face_of(l.normal[i])));
-    return c != CellTable::kNone && scratch.counts[c] >= enough_;
+    if (c == CellTable::kNone) return false;
+    const uint32_t count = scratch.counts[c];
+    return (count & kMostCounted) >= enough_ && std::popcount(count >> kOctants) >= kLeastOctants;
   }
 
  private:
-  Grid grid_;
+  static constexpr uint32_t kOctants = 24, kMostCounted = (1u << kOctants) - 1;  // a word: octants above, count below
+  // A surface crosses four octants at least. Fewer are a clump of many samples, beside which there is nothing.
+  static constexpr int kLeastOctants = 3;
+  Grid grid_, halves_;
   uint32_t enough_;
 };
 
-// Whether a mosaic is merged with `total` others: those of one class, or both small and of much the same density.
-bool may_merge(const Mosaic& m, int fresh_class, uint32_t total) {
-  const int apart = std::abs(density_class(m.pixel_range()) - fresh_class);
-  return apart == 0 || (apart <= kSmallApart && total < kSmallMosaic && m.count(0) < kSmallMosaic);
+// Whether a mosaic is merged with others: those of one class. Samples an octave coarser, among finer ones of which
+// there are few yet, would be drawn by the mean as splats with gaps between them.
+bool may_merge(const Mosaic& m, int fresh_class) {
+  return !m.provisional() && density_class(m.pixel_range()) == fresh_class;
 }
 
 bool contains(const std::vector<uint32_t>& list, uint32_t i) {
@@ -266,7 +276,7 @@ std::vector<uint32_t> mergeable(const std::vector<Mosaic>& mosaics, const Mosaic
   while (true) {
     const Mosaic* smallest = nullptr;
     for (const Mosaic& m : mosaics)
-      if (may_merge(m, fresh_class, total) && !contains(out, static_cast<uint32_t>(&m - mosaics.data())) &&
+      if (may_merge(m, fresh_class) && !contains(out, static_cast<uint32_t>(&m - mosaics.data())) &&
           (!smallest || m.count(0) < smallest->count(0)))
         smallest = &m;
     if (!smallest) break;
@@ -286,7 +296,8 @@ uint32_t find_surrounded(const std::vector<Mosaic>& mosaics, const std::vector<u
   FinerPoints finer(coarse, merged_class);
   const auto for_finer = [&](const auto& visit) {
     for (uint32_t j = 0; j < mosaics.size(); ++j)
-      if (density_class(mosaics[j].pixel_range()) > density_class(coarse.pixel_range()) && !contains(replaced, j))
+      if (density_class(mosaics[j].pixel_range()) > density_class(coarse.pixel_range()) && !mosaics[j].provisional() &&
+          !contains(replaced, j))
         visit(mosaics[j].level(0));
   };
   size_t most = own;
@@ -354,6 +365,11 @@ Mosaic representatives(const std::vector<PlacedLevel>& parts, int shift, float p
 }
 
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
+  if (fresh.provisional()) {
+    Merge alone;
+    alone.added.push_back(std::move(fresh));
+    return alone;
+  }
   Merge out{mergeable(mosaics, fresh), {}};
   PointSet& p = scratch.points;
   p.clear();
@@ -362,10 +378,11 @@ Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh) {
 
   const uint32_t own = p.size();
   const float range = p.pixel_range();
-  const int merged_class = density_class(range);  // not fresh's, where small ones of another class were merged
+  const int merged_class = density_class(range);
   for (uint32_t i = 0; own >= kSmallMosaic && i < mosaics.size(); ++i) {
     const Mosaic& coarse = mosaics[i];
-    if (density_class(coarse.pixel_range()) >= merged_class || contains(out.replaced, i)) continue;
+    if (density_class(coarse.pixel_range()) >= merged_class || coarse.provisional() || contains(out.replaced, i))
+      continue;
     const uint32_t surrounded = find_surrounded(mosaics, out.replaced, coarse, merged_class, p, own);
     if (surrounded == 0 || surrounded * kLeastTaken < coarse.count(0)) continue;
     PointSet& rest = scratch.rest;

@@ -22,8 +22,6 @@ namespace telesplat::points {
 /// Mosaics of fewer points are merged whatever the other's size, and without levels of detail: to copy them costs
 /// little. Set by bench cache: with 64 the bonsai had 10,500 items after a minute's orbit, with 128 it has 9,100.
 inline constexpr uint32_t kSmallMosaic = 128;
-/// Small mosaics are merged also if their density classes differ, by this at most.
-inline constexpr int kSmallApart = 1;
 /// Sizes of the mosaics of one density class in a cluster differ by more than this factor.
 inline constexpr uint32_t kGrowth = 4;
 
@@ -42,6 +40,7 @@ struct Merge {
 /// what is merged so far. If the result is not small, it also takes in the points of coarser mosaics that finer points
 /// surround: such a point is as exact as they are, so it needs no larger splat than they do. What of a coarser mosaic
 /// is not surrounded stays a mosaic.
+///   Provisional mosaics stay as they came.
 ///   A merged mosaic has the mean pixel range of its parts, by their points, their mean direction if they are alike,
 ///   and fresh's sequence and frame.
 Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh);

@@ -78,16 +78,32 @@ class Decimator {
   }
 
   DecimatedTile run(const geometry::Rect& tile) {
-    for (int y = -(tile.y & 3); y < height_; y += 4) {
-      for (int x = -(tile.x & 3); x < width_; x += 4) {
-        const bool whole = x >= 0 && y >= 0 && x + 4 <= width_ && y + 4 <= height_;
-        if (!(whole && take_whole(x, y))) take_parts(x, y);
-      }
-    }
+    for (int y = -(tile.y & 3); y < height_; y += 4)
+      for (int x0 = -(tile.x & 3); x0 < width_; x0 += kStretch)
+        if (any_covered(x0, y)) take_stretch(x0, y);
     return std::move(out_);
   }
 
  private:
+  static constexpr int kStretch = 64;  // pixels of four rows: most of a tile with few rays is passed over by them
+
+  bool any_covered(int x0, int y0) const {
+    const int begin = std::max(x0, 0), end = std::min(x0 + kStretch, width_);
+    uint32_t any = 0;
+    for (int y = std::max(y0, 0); y < std::min(y0 + 4, height_); ++y) {
+      const uint32_t* row = depth_ + static_cast<size_t>(y) * width_;
+      for (int x = begin; x < end; ++x) any |= row[x];
+    }
+    return any != 0;
+  }
+
+  void take_stretch(int x0, int y) {
+    for (int x = x0; x < std::min(x0 + kStretch, width_); x += 4) {
+      const bool whole = x >= 0 && y >= 0 && x + 4 <= width_ && y + 4 <= height_;
+      if (!(whole && take_whole(x, y))) take_parts(x, y);
+    }
+  }
+
   // One of up to 16 samples of a block.
   struct Candidate {
     SampleEntry entry;

@@ -116,7 +116,8 @@ Mosaic MosaicBuilder::finish(float pixel_range, const glm::vec3& direction_to_ey
   const uint32_t n = mosaic_.counts_[0];
   const Cone cone = normal_cone(normal, n);
   mosaic_.pixel_range_ = pixel_range;
-  mosaic_.direction_to_eye_ = direction_to_eye == glm::vec3(0) ? Mosaic::kNoDirection : image::encode_normal16(direction_to_eye);
+  mosaic_.direction_to_eye_ =
+      direction_to_eye == glm::vec3(0) ? Mosaic::kNoDirection : image::encode_normal16(direction_to_eye);
   mosaic_.cone_axis_ = cone.axis;
   mosaic_.cone_cosine_ = cone.cosine;
   mosaic_.centroid_ = {mean_position(x, n), mean_position(y, n), mean_position(z, n)};

@@ -28,6 +28,12 @@ inline constexpr int kMaxOctreeDepth = 10;  ///< 1024 leaves a side at most
 
 /// A frame tag is what of a frame's number these bits hold.
 inline constexpr uint32_t kFrameTagMask = (1u << 24) - 1;
+/// The bit of a frame tag that coarse passes have.
+inline constexpr uint32_t kProvisionalTag = 1u << 23;
+/// What prepare_patch() is told of a frame: its number without that bit, or, of a coarse pass (step > 1), with it.
+constexpr FrameId tagged(FrameId frame, uint64_t step) {
+  return {(frame.value & (kProvisionalTag - 1)) | (step > 1 ? kProvisionalTag : 0)};
+}
 
 /// Where a cluster's leaf lies: its integer coordinates, `depth` bits each, in the octree's cube; x in the low bits
 /// (x | y << 10 | z << 20).
@@ -76,6 +82,9 @@ class Mosaic {
   /// The sampling frame's number modulo 2^24: equal for all tiles of one frame, that is, for the mosaics of one patch
   /// (T4.3.2).
   uint32_t frame_tag() const { return static_cast<uint32_t>(sequence_and_frame_ >> kSequenceBits); }
+  /// Of a coarse pass: its points stand in for the complete frame that is on its way. They are merged with none, show
+  /// nothing to redundancy elimination, and are forgotten by their tag when that frame is there.
+  bool provisional() const { return (frame_tag() & kProvisionalTag) != 0; }
   /// Projected pixels across the cluster's cube in the sampling view: leaf size * focal / depth of the leaf's centre
   /// (the linear "pixel range" of T4.3.2). Level l has pixel_range() / 2^l. Of merged mosaics the mean.
   float pixel_range() const { return pixel_range_; }
@@ -139,7 +148,7 @@ struct PreparedPatch {
 
 /// Unprojects the covered pixels of a depth-image tile, sorts them into leaves, decimates (T4.3.2, T7.2) and computes
 /// each mosaic's attributes.
-///   frame: the sampling frame that the tile is of, so that its mosaics know each other.
+///   frame: the sampling frame that the tile is of (tagged()), so that its mosaics know each other.
 ///   camera: the frame's camera; tile: where `image` lies in it (image is tile.width x tile.height).
 ///   Level l+1 makes one point of covered pixels in each block of 2x2 pixels of level l (blocks are aligned to the
 ///   frame's pixel grid): of those that fall in the same leaf and lie within 2 % of the first one's depth. The point is

@@ -9,7 +9,8 @@
 namespace telesplat::points {
 namespace {
 
-// Where each pixel of the tile lies; no value is written twice, so nothing is cleared first.
+// Where each pixel of the tile lies; no value is written twice, so nothing is cleared first. Rows without a sample are
+// no leaf's.
 struct UnprojectedTile {
   std::unique_ptr<ClusterKey[]> keys;
   std::unique_ptr<uint16_t[]> x, y, z;
@@ -23,6 +24,14 @@ UnprojectedTile unproject(const OctreeGrid& grid, const geometry::Camera& camera
       std::make_unique_for_overwrite<uint16_t[]>(pixels), std::make_unique_for_overwrite<uint16_t[]>(pixels)};
   for (int row = 0; row < tile.height; ++row) {
     const size_t first = static_cast<size_t>(row) * tile.width;
+    const uint32_t* depth = image.depth.data() + first;
+    uint32_t any = 0;
+    for (int x = 0; x < tile.width; ++x) any |= depth[x];
+    // Decimation looks at four rows at once where one of them has a sample.
+    if (any == 0) {
+      std::fill_n(out.keys.get() + first, tile.width, kNoCluster);
+      continue;
+    }
     unproject_row(row_rays(grid, camera, tile.x, tile.y + row), image.depth.data() + first, tile.width,
                   out.keys.get() + first, out.x.get() + first, out.y.get() + first, out.z.get() + first);
   }

@@ -195,7 +195,7 @@ void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspa
   // Each stage leaves as much around the tile as those after it read.
   const int left_after_fill = finish_reach({false, finish.smooth, finish.antialias});
   const int left_after_smooth = finish_reach({false, false, finish.antialias});
-  if (finish.fill) fill_holes(content, left_after_fill, workspace.finish), lap(stats.fill_ms);
+  if (finish.fill) fill_holes(content, left_after_fill, gaps_to_fill(finish), workspace.finish), lap(stats.fill_ms);
   if (finish.smooth) smooth(content, left_after_smooth, workspace.finish), lap(stats.smooth_ms);
   if (finish.antialias) antialias(content, workspace.finish), lap(stats.antialias_ms);
 }

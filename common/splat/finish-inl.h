@@ -53,34 +53,65 @@ ResolvedTile FindContent(const ResolvedTile& tile, int reach) {
 
 // ---- fill ----
 
+// Calls visit(x offset, y offset, whether at a side) for the eight neighbours.
+template <class Visit>
+HWY_INLINE void ForNeighbours(const Visit& visit) {
+  for (int j = -1; j <= 1; ++j)
+    for (int i = -1; i <= 1; ++i)
+      if (i != 0 || j != 0) visit(i, j, i == 0 || j == 0);
+}
+
+// Which of the holes have enough supports, and the info within kEdge of which they lie.
+struct Closing {
+  hn::Mask<U32> holes;
+  hn::Vec<U32> target;
+};
+HWY_INLINE Closing FindSupports(const ResolvedTile& tile, int x, int y, hn::Vec<U32> closed, hn::Mask<U32> holes,
+                                Gaps gaps) {
+  const U32 d;
+  const auto edge = hn::Set(d, kEdgeInfo), one = hn::Set(d, 1u), own = hn::LoadU(d, tile.info(y) + x);
+  auto count = hn::Zero(d), weights = count, between = count, most = count, farthest = count,
+       least = hn::Set(d, kEmptyInfo);
+  ForNeighbours([&](int i, int j, bool side) HWY_ATTR {
+    const auto info = hn::LoadU(d, tile.info(y + j) + x + i), weight = side ? hn::Add(one, one) : one;
+    const auto apart = hn::Gt(Difference(info, closed), edge);
+    count = hn::Add(count, hn::IfThenZeroElse(apart, one));
+    weights = hn::Add(weights, hn::IfThenZeroElse(apart, weight));
+    least = hn::Min(least, hn::IfThenElse(apart, least, info));
+    most = hn::Max(most, hn::IfThenZeroElse(apart, info));
+    const auto nearer = hn::Gt(hn::Sub(hn::Max(own, info), info), edge);
+    between = hn::Add(between, hn::IfThenElseZero(nearer, weight));
+    farthest = hn::Max(farthest, hn::IfThenElseZero(nearer, info));
+  });
+  if (gaps == Gaps::kAll) return {hn::AndNot(hn::Gt(hn::Set(d, kFillSupports), count), holes), closed};
+  const auto uneven = hn::Gt(hn::Sub(hn::Max(most, least), least), hn::Set(d, kFlat << 8));
+  const auto needed = hn::IfThenElse(uneven, hn::Set(d, kPinHoleSupports), hn::Set(d, kFlatSupports));
+  const auto few = hn::Gt(needed, weights), some = hn::Gt(hn::Set(d, kBetweenSupports), between);
+  return {hn::AndNot(hn::And(few, some), holes), hn::IfThenElse(few, farthest, closed)};
+}
+
 // Closes the holes of one vector of pixels.
-HWY_INLINE void CloseHoles(const ResolvedTile& tile, int x, int y, hn::Vec<U32> closed, hn::Mask<U32> holes, int end,
+HWY_INLINE void CloseHoles(const ResolvedTile& tile, int x, int y, const Closing& closing, int end,
                            FinishScratch& scratch) {
   const U32 d;
   const hn::RebindToFloat<U32> df;
   const hn::RebindToSigned<U32> di;
   const auto edge = hn::Set(d, kEdgeInfo);
   const auto even = hn::Set(d, 0x00ff00ffu), low = hn::Set(d, 255u);
-  auto red_blue = hn::Zero(d), green = hn::Zero(d), depth = hn::Zero(d), weights = hn::Zero(d), count = hn::Zero(d);
-  for (int j = -1; j <= 1; ++j)
-    for (int i = -1; i <= 1; ++i) {
-      if (i == 0 && j == 0) continue;
-      const auto info = hn::LoadU(d, tile.info(y + j) + x + i), colour = hn::LoadU(d, tile.colour(y + j) + x + i);
-      const auto apart = hn::Gt(Difference(info, closed), edge);
-      // Counted once at a corner, twice at a side.
-      const auto rb = hn::IfThenZeroElse(apart, hn::And(colour, even));
-      const auto g = hn::IfThenZeroElse(apart, hn::And(hn::ShiftRight<8>(colour), low));
-      const auto z = hn::IfThenZeroElse(apart, hn::ShiftRight<8>(info));
-      const auto one = hn::IfThenZeroElse(apart, hn::Set(d, 1u));
-      const bool side = i == 0 || j == 0;
-      red_blue = hn::Add(red_blue, side ? hn::Add(rb, rb) : rb);
-      green = hn::Add(green, side ? hn::Add(g, g) : g);
-      depth = hn::Add(depth, side ? hn::Add(z, z) : z);
-      weights = hn::Add(weights, side ? hn::Add(one, one) : one);
-      count = hn::Add(count, one);
-    }
-  const auto enough = hn::And(holes, hn::Gt(count, hn::Set(d, static_cast<uint32_t>(kFillSupports - 1))));
-  if (hn::AllFalse(d, enough)) return;
+  auto red_blue = hn::Zero(d), green = hn::Zero(d), depth = hn::Zero(d), weights = hn::Zero(d);
+  ForNeighbours([&](int i, int j, bool side) HWY_ATTR {
+    const auto info = hn::LoadU(d, tile.info(y + j) + x + i), colour = hn::LoadU(d, tile.colour(y + j) + x + i);
+    const auto apart = hn::Gt(Difference(info, closing.target), edge);
+    // Counted once at a corner, twice at a side.
+    const auto rb = hn::IfThenZeroElse(apart, hn::And(colour, even));
+    const auto g = hn::IfThenZeroElse(apart, hn::And(hn::ShiftRight<8>(colour), low));
+    const auto z = hn::IfThenZeroElse(apart, hn::ShiftRight<8>(info));
+    const auto one = hn::IfThenZeroElse(apart, hn::Set(d, 1u));
+    red_blue = hn::Add(red_blue, side ? hn::Add(rb, rb) : rb);
+    green = hn::Add(green, side ? hn::Add(g, g) : g);
+    depth = hn::Add(depth, side ? hn::Add(z, z) : z);
+    weights = hn::Add(weights, side ? hn::Add(one, one) : one);
+  });
   // Quotients of integers below 2^24: exact, since no quotient that is not whole is nearer to one than 1 / 12.
   const auto divisor = hn::ConvertTo(df, hn::BitCast(di, hn::Max(weights, hn::Set(d, 1u))));
   const auto over = [&](hn::Vec<U32> v) HWY_ATTR {
@@ -94,13 +125,13 @@ HWY_INLINE void CloseHoles(const ResolvedTile& tile, int x, int y, hn::Vec<U32> 
       wanted[hwy::HWY_NAMESPACE::MaxLanes(U32())];
   hn::Store(colour, d, colours);
   hn::Store(hn::ShiftLeft<8>(over(depth)), d, infos);
-  hn::Store(hn::VecFromMask(d, enough), d, wanted);
+  hn::Store(hn::VecFromMask(d, closing.holes), d, wanted);
   const int lanes = std::min(static_cast<int>(hn::Lanes(d)), end - x);
   for (int i = 0; i < lanes; ++i)
     if (wanted[i]) scratch.pixels.push_back({x + i, y, colours[i], infos[i]});
 }
 
-int FillHoles(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
+int FillHoles(const ResolvedTile& tile, int grow, Gaps gaps, FinishScratch& scratch) {
   const U32 d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const auto edge = hn::Set(d, kEdgeInfo);
@@ -135,7 +166,9 @@ int FillHoles(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
       const auto closed = hn::Max(hn::Max(hn::LoadU(d, above + at), hn::LoadU(d, here + at)), hn::LoadU(d, below + at));
       const auto own = hn::LoadU(d, info + x);
       const auto holes = hn::Gt(hn::Sub(hn::Max(own, closed), closed), edge);
-      if (!hn::AllFalse(d, holes)) CloseHoles(tile, x, y, closed, holes, end, scratch);
+      if (hn::AllFalse(d, holes)) continue;
+      const Closing closing = FindSupports(tile, x, y, closed, holes, gaps);
+      if (!hn::AllFalse(d, closing.holes)) CloseHoles(tile, x, y, closing, end, scratch);
     }
   }
   for (const auto& p : scratch.pixels) tile.colour(p.y)[p.x] = p.colour, tile.info(p.y)[p.x] = p.info;
@@ -224,13 +257,56 @@ void Smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
 
 // ---- antialias ----
 
+// Sums with weights, of the near pixels and of all: of red and blue, and of green, above which weights are counted.
+struct Sums {
+  Channels near, all;
+};
+// Of three neighbours in a row, weights [1 2 1]. colour, info: of the left one.
+HWY_INLINE Sums SumRow(const uint32_t* colour, const uint32_t* info, hn::Vec<U32> least) {
+  const U32 d;
+  const auto edge = hn::Set(d, kEdgeInfo), one = hn::Set(d, 1u << 16);
+  const auto at = [&](int i) HWY_ATTR {
+    const auto far = hn::VecFromMask(d, hn::Gt(hn::Sub(hn::LoadU(d, info + i), least), edge));
+    Channels c = Split(hn::LoadU(d, colour + i));
+    c.green = hn::Or(c.green, one);
+    return Sums{{hn::AndNot(far, c.red_blue), hn::AndNot(far, c.green)}, c};
+  };
+  const Sums left = at(0), middle = at(1), right = at(2);
+  return {Add(Add(left.near, right.near), Times<1>(middle.near)), Add(Add(left.all, right.all), Times<1>(middle.all))};
+}
+
+// A vector of pixels, blended from the 3x3 around each by how much what is near covers them.
+//   colours, infos: of the pixels to the left of theirs in the rows above, of them and below.
+HWY_INLINE hn::Vec<U32> Blend(const uint32_t* const colours[3], const uint32_t* const infos[3], hn::Vec<U32> least) {
+  const U32 d;
+  const Sums above = SumRow(colours[0], infos[0], least), here = SumRow(colours[1], infos[1], least),
+             below = SumRow(colours[2], infos[2], least);
+  const Channels near = Add(Add(above.near, below.near), Times<1>(here.near)),
+                 all = Add(Add(above.all, below.all), Times<1>(here.all));
+  const Channels far{hn::Sub(all.red_blue, near.red_blue), hn::Sub(all.green, near.green)};
+  const auto is_far = hn::Gt(hn::Sub(hn::LoadU(d, infos[1] + 1), least), hn::Set(d, kEdgeInfo));
+  const auto row = hn::IfThenZeroElse(is_far, hn::Set(d, 17u));
+  const auto index = hn::BitCast(hn::RebindToSigned<U32>(), hn::Add(hn::ShiftRight<16>(near.green), row));
+  const auto of_near = hn::GatherIndex(d, kCoverageWeights.near.data(), index),
+             of_far = hn::GatherIndex(d, kCoverageWeights.far.data(), index);
+  const auto mean = [&](hn::Vec<U32> n, hn::Vec<U32> f) HWY_ATTR {
+    return hn::ShiftRight<16>(hn::Add(hn::Add(hn::Mul(n, of_near), hn::Mul(f, of_far)), hn::Set(d, 0x8000u)));
+  };
+  const auto low = hn::Set(d, 0xffffu);
+  const auto red = mean(hn::ShiftRight<16>(near.red_blue), hn::ShiftRight<16>(far.red_blue)),
+             green = mean(hn::And(near.green, low), hn::And(far.green, low)),
+             blue = mean(hn::And(near.red_blue, low), hn::And(far.red_blue, low));
+  return hn::Or(hn::Or(hn::ShiftLeft<16>(red), hn::ShiftLeft<8>(green)), blue);
+}
+
 void Antialias(const ResolvedTile& tile, FinishScratch& scratch) {
   const U32 d;
   const auto lanes = static_cast<int>(hn::Lanes(d));
   const auto edge = hn::Set(d, 2 * kEdgeInfo);
-  HWY_ALIGN uint32_t blended[hwy::HWY_NAMESPACE::MaxLanes(U32())];
-  HWY_ALIGN uint32_t range[hwy::HWY_NAMESPACE::MaxLanes(U32())];
-  scratch.pixels.clear();
+  // Vectors with silhouettes, written once all have been read.
+  scratch.places.clear();
+  scratch.rows.resize(std::max(scratch.rows.size(), static_cast<size_t>(tile.height) * (tile.width + lanes)));
+  uint32_t* blended = scratch.rows.data();
   for (int y = 0; y < tile.height; ++y) {
     const uint32_t *above = tile.info(y - 1), *here = tile.info(y), *below = tile.info(y + 1);
     for (int x = 0; x < tile.width; x += lanes) {
@@ -240,22 +316,22 @@ void Antialias(const ResolvedTile& tile, FinishScratch& scratch) {
           const auto info = hn::LoadU(d, p + x + i);
           least = hn::Min(least, info), most = hn::Max(most, info);
         }
-      const auto gap = hn::Sub(most, least);
-      if (hn::AllFalse(d, hn::Gt(gap, edge))) continue;
-      Channels sum{hn::Zero(d), hn::Zero(d)};
-      for (int j = -1; j <= 1; ++j) {
-        const uint32_t* c = tile.colour(y + j) + x;
-        const Channels line =
-            Add(Add(Split(hn::LoadU(d, c - 1)), Split(hn::LoadU(d, c + 1))), Times<1>(Split(hn::LoadU(d, c))));
-        sum = Add(sum, j == 0 ? Times<1>(line) : line);
-      }
-      hn::Store(Join<4>(sum), d, blended);
-      hn::Store(gap, d, range);
-      for (int i = 0; i < std::min(lanes, tile.width - x); ++i)
-        if (range[i] > 2 * kEdgeInfo) scratch.pixels.push_back({x + i, y, blended[i], 0});
+      const auto silhouette = hn::Gt(hn::Sub(most, least), edge);
+      if (hn::AllFalse(d, silhouette)) continue;
+      const uint32_t* const colours[3] = {tile.colour(y - 1) + x - 1, tile.colour(y) + x - 1,
+                                          tile.colour(y + 1) + x - 1};
+      const uint32_t* const infos[3] = {above + x - 1, here + x - 1, below + x - 1};
+      const auto mask = hn::And(silhouette, hn::FirstN(d, static_cast<size_t>(tile.width - x)));
+      hn::StoreU(hn::IfThenElse(mask, Blend(colours, infos, least), hn::LoadU(d, colours[1] + 1)), d, blended);
+      blended += lanes;
+      scratch.places.push_back(tile.colour(y) + x);
     }
   }
-  for (const auto& p : scratch.pixels) tile.colour(p.y)[p.x] = p.colour;
+  blended = scratch.rows.data();
+  for (uint32_t* place : scratch.places) {
+    hn::StoreU(hn::LoadU(d, blended), d, place);
+    blended += lanes;
+  }
 }
 
 }  // namespace telesplat::splat::HWY_NAMESPACE

@@ -19,8 +19,8 @@ HWY_EXPORT(Antialias);
 ResolvedTile crop_to_content(const ResolvedTile& tile, int reach) {
   return HWY_DYNAMIC_DISPATCH(FindContent)(tile, reach);
 }
-int fill_holes(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
-  return HWY_DYNAMIC_DISPATCH(FillHoles)(tile, grow, scratch);
+int fill_holes(const ResolvedTile& tile, int grow, Gaps gaps, FinishScratch& scratch) {
+  return HWY_DYNAMIC_DISPATCH(FillHoles)(tile, grow, gaps, scratch);
 }
 void smooth(const ResolvedTile& tile, int grow, FinishScratch& scratch) {
   HWY_DYNAMIC_DISPATCH(Smooth)(tile, grow, scratch);

@@ -1,10 +1,12 @@
 // The reference depth map of a sampling view and redundancy elimination (T4.3.1).
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "common/geometry/camera.h"
 #include "common/image/depth_image.h"
+#include "common/image/pixel_mask.h"
 #include "common/points/point_model.h"
 
 namespace telesplat::splat {
@@ -15,6 +17,11 @@ namespace telesplat::splat {
 /// (0 = all).
 void render_reference_depth(const points::PointModel& model, const geometry::Camera& camera, int threads,
                             std::vector<float>& depth_m);
+
+/// The same as if the points of a patch were in the model too: of a model that holds none of them yet. depth_m: of the
+/// model without them.
+void add_to_reference_depth(const points::PreparedPatch& patch, const points::ModelConfig& model,
+                            const geometry::Camera& camera, std::vector<float>& depth_m);
 
 struct Elimination {
   uint64_t samples = 0, kept = 0;
@@ -34,5 +41,11 @@ inline constexpr float kNearestSample = 0.6f;
 Elimination eliminate_redundancy(const geometry::Camera& camera, const geometry::Rect& tile,
                                  const std::vector<float>& reference_depth_m, float relative_epsilon,
                                  image::DepthImage& image, float nearest = kNearestSample);
+
+/// The same where few pixels were sampled: those of `cast`, which is of the tile's size. All other pixels of the image
+/// are empty. reference_depth_m: of the whole frame.
+Elimination eliminate_where_cast(const geometry::Camera& camera, const geometry::Rect& tile,
+                                 const image::PixelMask& cast, std::span<const float> reference_depth_m,
+                                 float relative_epsilon, image::DepthImage& image, float nearest = kNearestSample);
 
 }  // namespace telesplat::splat

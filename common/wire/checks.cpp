@@ -21,6 +21,11 @@ std::optional<Error> check_step(uint64_t step) {
   return std::nullopt;
 }
 
+std::optional<Error> check_footprint(double footprint) {
+  if (footprint >= 0) return std::nullopt;
+  return Error{fmt::format("footprint {}, at least 0", footprint)};
+}
+
 std::optional<Error> check_frames(const std::vector<uint32_t>& clusters, const std::vector<uint32_t>& frames) {
   if (frames.empty() || frames.size() == clusters.size()) return std::nullopt;
   return Error{fmt::format("{} frames for {} clusters: neither none nor one each", frames.size(), clusters.size())};
@@ -53,7 +58,38 @@ std::optional<Error> check(const Lease& m) {
   if (r.x < b.x || r.y < b.y || r.x + r.width > b.x + b.width || r.y + r.height > b.y + b.height)
     return Error{fmt::format("tile {}x{}+{}+{} is not inside its block {}x{}+{}+{}", r.width, r.height, r.x, r.y,
                              b.width, b.height, b.x, b.y)};
+  if (m.rays > uint64_t(m.rect.width) * uint64_t(m.rect.height))
+    return Error{fmt::format("{} rays of {}x{} pixels", m.rays, m.rect.width, m.rect.height)};
+  if (auto bad = check_footprint(m.footprint)) return bad;
   return check_step(m.step);
+}
+
+std::optional<Error> check(const PlanRequest& m) {
+  if (m.tile_size >= 32 && m.tile_size <= 4096) return std::nullopt;
+  return Error{fmt::format("tiles of {} pixels, limits 32 and 4096", m.tile_size)};
+}
+
+// Each tile lies in the frame, has rays, and its mask is there. All together have no more pixels than the frame: a plan
+// is no more work than the frame is.
+std::optional<Error> check(const Plan& m) {
+  if (m.tiles.size() % kPlanNumbers != 0) return Error{fmt::format("{} numbers of tiles", m.tiles.size())};
+  uint64_t words = 0, pixels = 0;
+  for (size_t i = 0; i < m.tiles.size(); i += kPlanNumbers) {
+    const uint64_t x = m.tiles[i], y = m.tiles[i + 1], width = m.tiles[i + 2], height = m.tiles[i + 3];
+    const uint64_t rays = m.tiles[i + 4], mask = m.tiles[i + 5];
+    if (width < 1 || height < 1 || x + width > uint64_t(m.camera.width) || y + height > uint64_t(m.camera.height) ||
+        width * height > uint64_t(kMaxTilePixels))
+      return Error{fmt::format("tile {}x{}+{}+{} is not inside its {}x{} frame", width, height, x, y, m.camera.width,
+                               m.camera.height)};
+    if (rays < 1 || rays > width * height || mask > kMaxMaskWords || (mask == 0 && rays != width * height))
+      return Error{fmt::format("{} rays and {} words of mask in a tile of {}x{} pixels", rays, mask, width, height)};
+    words += mask;
+    pixels += width * height;
+  }
+  if (const uint64_t most = uint64_t(m.camera.width) * uint64_t(m.camera.height); pixels > most)
+    return Error{fmt::format("its tiles have {} pixels, the frame {}", pixels, most)};
+  if (words == m.masks.size()) return std::nullopt;
+  return Error{fmt::format("{} words of masks, its tiles have {}", m.masks.size(), words)};
 }
 
 std::optional<Error> check(const DepthTile& m) { return check(m.lease); }
@@ -67,7 +103,10 @@ std::optional<Error> check(const Forget& m) { return check_frames(m.clusters, m.
 
 std::optional<Error> check(const AccessReport& m) { return check_frames(m.clusters, m.frames); }
 
-std::optional<Error> check(const ViewRequest& m) { return check_buffers(m.buffers); }
+std::optional<Error> check(const ViewRequest& m) {
+  if (auto bad = check_footprint(m.footprint)) return bad;
+  return check_buffers(m.buffers);
+}
 
 std::optional<Error> check(const SliceAck& m) {
   if (m.buffers < 1) return Error{"0 buffers, at least 1"};

@@ -15,6 +15,8 @@ std::optional<Error> check(const M&) {
 }
 
 std::optional<Error> check(const Lease& m);
+std::optional<Error> check(const PlanRequest& m);
+std::optional<Error> check(const Plan& m);
 std::optional<Error> check(const DepthTile& m);
 std::optional<Error> check(const Patch& m);
 std::optional<Error> check(const Forget& m);

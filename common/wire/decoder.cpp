@@ -139,7 +139,9 @@ void Decoder::get_bin(const msgpack::object& o, std::vector<T>& v, size_t max_en
   v.resize(o.via.bin.size / sizeof(T));
   if (!v.empty()) std::memcpy(v.data(), o.via.bin.ptr, o.via.bin.size);
 }
-void Decoder::get(const msgpack::object& o, std::vector<uint32_t>& v) { get_bin(o, v, kMaxKeys); }
+void Decoder::get(const msgpack::object& o, std::vector<uint32_t>& v) {
+  get_bin(o, v, limit_ > 0 ? limit_ : kMaxKeys);
+}
 void Decoder::get(const msgpack::object& o, std::vector<double>& v) { get_bin(o, v, kMaxBulkBytes / sizeof(double)); }
 
 void Decoder::get(const msgpack::object& o, std::vector<std::string>& v) {

@@ -7,7 +7,7 @@
 
 namespace telesplat::wire {
 
-inline constexpr uint64_t kProtocolVersion = 4;
+inline constexpr uint64_t kProtocolVersion = 5;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
 inline constexpr size_t kMaxFact = 64u << 10;         ///< bytes of a text in facts and arguments: transfer functions
@@ -16,6 +16,9 @@ inline constexpr size_t kMaxBulkBytes = 256u << 20;   ///< all bulk fields of a 
 inline constexpr size_t kMaxKeys = 1u << 21;          ///< cluster keys in one message
 inline constexpr size_t kMaxEntries = 4096;           ///< entries of a map or list
 inline constexpr uint64_t kMaxTiles = 1u << 16;       ///< tiles of a frame, and blocks
+inline constexpr size_t kMaxMaskWords = 1u << 17;     ///< of a tile: 512 KiB
+inline constexpr size_t kPlanNumbers = 6;             ///< of each tile of a plan
+inline constexpr size_t kMaxPlanWords = 1u << 21;     ///< of the masks of a plan: 8 MiB
 inline constexpr uint64_t kMaxStep = 16;              ///< of a coarse frame
 inline constexpr int64_t kMaxTilePixels = 1 << 24;    ///< of a tile: what the codec takes
 inline constexpr uint64_t kMaxSlabs = 1024;           ///< of a volume, and samplers that share it

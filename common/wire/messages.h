@@ -17,10 +17,10 @@ namespace telesplat::wire {
 
 /// All of them. A message that is not in this list cannot be encoded or decoded: the compiler says so. Tests and the
 /// fuzz target go through it too.
-using Messages =
-    std::tuple<Hello, Welcome, WhoAreYou, ViewRequest, LeaseRequest, Lease, LeaseExtend, TileDone, StatusReport,
-               MetricRows, Control, ControlReply, Shutdown, Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk,
-               DepthTile, Patch, Forget, EpochBegin, StateMark, StateRequest, AccessReport, SliceWeights,
-               SlabAssignment, SlabReady, SliceLease, VoxelRequest, VoxelData, SliceImages, SliceFrame, SliceAck>;
+using Messages = std::tuple<Hello, Welcome, WhoAreYou, ViewRequest, LeaseRequest, Lease, LeaseExtend, TileDone,
+                            PlanRequest, Plan, StatusReport, MetricRows, Control, ControlReply, Shutdown, Goodbye,
+                            ChunkListRequest, ChunkList, ChunkRequest, Chunk, DepthTile, Patch, Forget, EpochBegin,
+                            StateMark, StateRequest, AccessReport, SliceWeights, SlabAssignment, SlabReady, SliceLease,
+                            VoxelRequest, VoxelData, SliceImages, SliceFrame, SliceAck>;
 
 }  // namespace telesplat::wire

@@ -27,6 +27,7 @@ struct Patch {
   RequestId request;
   uint64_t tile = 0, tiles_in_frame = 0;  ///< of what is published of a frame at once: the leases' blocks
   uint64_t step = 1;                      ///< Lease::step
+  bool extra = false;                     ///< Lease::extra
   bool frame_complete = false;            ///< the last tile of its frame to be packed
   uint64_t samples = 0, kept = 0;
   geometry::Camera camera;  ///< of the whole frame
@@ -35,8 +36,8 @@ struct Patch {
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
     f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
-    f("frame_complete", m.frame_complete); f("samples", m.samples); f("kept", m.kept); f("camera", m.camera);
-    f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
+    f("extra", m.extra); f("frame_complete", m.frame_complete); f("samples", m.samples); f("kept", m.kept);
+    f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
   }
 };
 struct Forget {

@@ -76,9 +76,11 @@ struct ViewRequest {
   geometry::Camera camera;  ///< predicted pose; width x height is the sampling size
   double sent_s = 0;
   uint64_t buffers = 0;     ///< at most kMaxBuffers
+  double footprint = 0;     ///< width of a displayed pixel at unit depth, for scenes whose detail depends on it; 0: of
+                            ///< one of camera's pixels
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("sent_s", m.sent_s);
-    f("buffers", m.buffers);
+    f("buffers", m.buffers); f("footprint", m.footprint);
   }
 };
 

@@ -1,6 +1,7 @@
 // Messages about tiles of depth images (surfaces, Julia sets): their leases, what samplers fetch for them and send.
 #pragma once
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,11 +40,16 @@ struct Lease {
   geometry::Camera camera;    ///< of the whole frame
   geometry::Rect rect;        ///< the tile in it
   geometry::Rect block_rect;  ///< the block in it; the tile lies in the block
+  bool extra = false;         ///< of rays beyond what the view asked for: it completes no update
+  uint64_t rays = 0;          ///< to be cast: those of the mask; without one all of the rectangle
+  std::vector<uint32_t> mask; ///< codec::encode_mask, of rect's size; empty: all pixels. Samplers do not send it back
+  double footprint = 0;       ///< as ViewRequest::footprint; 0: of one of camera's pixels, over step
   double leased_s = 0;
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request);
     f("tile", m.tile); f("step", m.step); f("block", m.block); f("blocks_in_frame", m.blocks_in_frame);
-    f("camera", m.camera); f("rect", m.rect); f("block_rect", m.block_rect); f("leased_s", m.leased_s);
+    f("camera", m.camera); f("rect", m.rect); f("block_rect", m.block_rect); f("extra", m.extra); f("rays", m.rays);
+    f("mask", m.mask, kMaxMaskWords); f("footprint", m.footprint); f("leased_s", m.leased_s);
   }
 };
 
@@ -63,6 +69,8 @@ struct TileDone {
   LeaseId lease;
   InstanceId sampler;
   uint64_t step = 1;                           ///< Lease::step
+  bool extra = false;                          ///< Lease::extra
+  uint64_t rays = 0;                           ///< Lease::rays
   geometry::Rect rect;                         ///< Lease::rect
   uint64_t samples = 0, kept = 0;              ///< covered pixels before and after redundancy elimination
   uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< encoded tile as received, as published
@@ -71,10 +79,55 @@ struct TileDone {
   double published_s = 0;                      ///< handed to viewers with its block or frame; 0: another tile's was
   template <class F> static void fields(F& f, auto& m) {
     f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler); f("step", m.step);
-    f("rect", m.rect); f("samples", m.samples); f("kept", m.kept); f("bytes_sampled", m.bytes_sampled);
-    f("bytes_sent", m.bytes_sent); f("leased_s", m.leased_s); f("sample_begin_s", m.sample_begin_s);
-    f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s); f("receive_s", m.receive_s);
-    f("packed_s", m.packed_s); f("published_s", m.published_s);
+    f("extra", m.extra); f("rays", m.rays); f("rect", m.rect); f("samples", m.samples); f("kept", m.kept);
+    f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent); f("leased_s", m.leased_s);
+    f("sample_begin_s", m.sample_begin_s); f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s);
+    f("receive_s", m.receive_s); f("packed_s", m.packed_s); f("published_s", m.published_s);
+  }
+};
+
+// ---- plans: master (ROUTER) <-> packer (DEALER) --------------------------------------------------------------------
+
+/// Master -> packer: which rays of this view does the model lack?
+struct PlanRequest {
+  static constexpr std::string_view kName = "plan_request";
+  FrameId frame;            ///< that its tiles will be of
+  EpochId epoch;
+  InstanceId viewer;        ///< who asked,
+  RequestId request;        ///< and with which request
+  geometry::Camera camera;  ///< of the view
+  bool extra = false;       ///< the view has been planned: which rays beyond it are worth casting, from where?
+  uint64_t round = 0;       ///< extra: how many such questions there were before about this viewer's views
+  bool still = false;       ///< the viewer's view before was seen by the same camera
+  uint64_t tile_size = 256; ///< no tile has longer sides
+  uint64_t tile_rays = 0;   ///< a tile that is longer than 32 pixels has no more rays; 0: no limit
+  /// extra: all tiles together have about as many at most. Else: as many rays, about, may refine surfaces that the
+  /// model shows too coarsely; others wait for later views. 0: no limit.
+  uint64_t most_rays = 0;
+  template <class F> static void fields(F& f, auto& m) {
+    f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request); f("camera", m.camera);
+    f("extra", m.extra); f("round", m.round); f("still", m.still); f("tile_size", m.tile_size);
+    f("tile_rays", m.tile_rays); f("most_rays", m.most_rays);
+  }
+};
+
+/// Packer -> master: the tiles of that frame. Without any the frame is over; of a view the packer has published that
+/// its update is complete.
+struct Plan {
+  static constexpr std::string_view kName = "plan";
+  static constexpr bool kBulk = true;
+  FrameId frame;
+  EpochId epoch;
+  geometry::Camera camera;       ///< of the tiles: the request's; of extra rays another one, finer or from beside
+  bool full = false;             ///< too little is known: all pixels are to be sampled, as if nobody had planned
+  std::vector<uint32_t> tiles;   ///< kPlanNumbers a tile: x, y, width, height, rays, words of its mask; most
+                                 ///< urgent first; no two overlap
+  std::vector<uint32_t> masks;   ///< of all tiles, one behind the other (codec::encode_mask); 0 words: all pixels
+  std::map<std::string, double> figures;  ///< for the record: rays.nothing, rays.sparse, rays.edge, rays.stale,
+                                          ///< rays.validation, rays.refinement, rays.cell, pixels.*, plan_ms
+  template <class F> static void fields(F& f, auto& m) {
+    f("frame", m.frame); f("epoch", m.epoch); f("camera", m.camera); f("full", m.full);
+    f("tiles", m.tiles, kPlanNumbers * kMaxTiles); f("masks", m.masks, kMaxPlanWords); f("figures", m.figures);
   }
 };
 

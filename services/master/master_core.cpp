@@ -1,5 +1,7 @@
 #include "services/master/master_core.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdlib>
 
@@ -17,10 +19,18 @@ constexpr size_t kReports = 5;          // of a process, one a second: rates are
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
     : options_(options), instance_(instance), record_(record) {
-  const PlanLinks links{.outbox = outbox_, .record = record_, .name_of = [this](const std::string& id) {
-                          const auto p = peers_.find(id);
-                          return p == peers_.end() ? std::string("?") : p->second.hello.name;
-                        }};
+  const auto name_of = [this](const std::string& id) {
+    const auto p = peers_.find(id);
+    return p == peers_.end() ? std::string("?") : p->second.hello.name;
+  };
+  const auto name_of_instance = [this, name_of](InstanceId instance) {
+    const auto id = instances_.find(instance);
+    return id == instances_.end() ? std::string("?") : name_of(id->second);
+  };
+  const PlanLinks links{
+      .outbox = outbox_, .record = record_, .name_of = name_of, .name_of_instance = name_of_instance, .packer = [this] {
+        return packer();
+      }};
   for (const auto kind : scene::kKinds)
     if (auto& plan = plans_[scene::pipeline_of(kind)]; !plan)
       plan = make_plan(scene::pipeline_of(kind), options_, links);
@@ -44,9 +54,15 @@ MasterCore::Peer* MasterCore::known_sampler(const std::string& peer, double now_
   return p && p->hello.role == "sampler" ? p : nullptr;
 }
 
-bool MasterCore::packer_here() const {
+std::string MasterCore::packer() const {
+  const auto packer = std::find_if(peers_.begin(), peers_.end(),
+                                   [](const auto& p) { return !p.second.gone && p.second.hello.role == "packer"; });
+  return packer == peers_.end() ? std::string() : packer->first;
+}
+
+bool MasterCore::samplers_here() const {
   return std::any_of(peers_.begin(), peers_.end(),
-                     [](const auto& p) { return !p.second.gone && p.second.hello.role == "packer"; });
+                     [](const auto& p) { return !p.second.gone && p.second.hello.role == "sampler"; });
 }
 
 // Forgets someone who left if there are too many. False: all are here.
@@ -71,6 +87,7 @@ void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m
 
 MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& m, double now_s) {
   Peer& p = peers_[peer];
+  if (p.hello.instance != m.instance || p.hello.role != m.role) forget_viewer(p.hello);
   instances_.erase(p.hello.instance);
   instances_[m.instance] = peer;
   p.hello = m;
@@ -92,7 +109,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   const auto before = peers_.find(peer);
   const bool changed = before == peers_.end() || before->second.hello.instance != m.instance || before->second.gone ||
                        before->second.hello.endpoints != m.endpoints;
-  if (changed && m.role == "packer") plan_->drop_frames();  // a new packer has none of the tiles that the old one had
+  if (changed && m.role == "packer") plan_->new_packer();
   if (changed && m.role == "sampler")
     for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new one holds nothing yet
   Peer& p = enter(peer, m, now_s);
@@ -134,6 +151,12 @@ void MasterCore::undeliverable(const std::string& peer) {
   if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "cannot be reached");
 }
 
+// Also of plans that led when it was here.
+void MasterCore::forget_viewer(const wire::Hello& hello) {
+  if (hello.role != "viewer") return;
+  for (auto& [pipeline, plan] : plans_) plan->views().forget_viewer(hello.instance);
+}
+
 void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
   p.gone = true;
   idle_.remove(routing_id);
@@ -143,7 +166,7 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
     if (p.hello.role == "data") plan->leave_data(p.hello.instance);
   }
   if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
-  if (p.hello.role == "viewer") plan_->views().forget_viewer(p.hello.instance);
+  forget_viewer(p.hello);
   if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
 }
 
@@ -200,6 +223,16 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   dispatch(now_s);
 }
 
+Status MasterCore::on(const std::string& peer, const wire::Plan& m, double now_s) {
+  const Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "packer") return ok_status();
+  const std::string name = p->hello.name;
+  const Status taken = plan_->planned(m, now_s);
+  dispatch(now_s);
+  if (taken) return taken;
+  return Error{fmt::format("{}: {}", name, taken.error().text)};
+}
+
 void MasterCore::tick(double now_s) {
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
@@ -216,7 +249,7 @@ void MasterCore::tick(double now_s) {
 
 bool MasterCore::begin_view(double now_s) {
   if (!plan_->may_begin(idle_)) return false;
-  if (!plan_->playing()) return plan_->begin(epoch_, false);
+  if (!plan_->playing()) return plan_->begin(epoch_, false, now_s);
   // One view at a time, so that each epoch has a complete one; all who wait when an epoch begins are served from it, in
   // turn.
   if (plan_->views().views_in_flight() > 0) return false;
@@ -224,14 +257,16 @@ bool MasterCore::begin_view(double now_s) {
     if (plan_->step(now_s)) next_epoch(now_s);
     plan_->views().begin_turns();
   }
-  return plan_->begin(epoch_, true);
+  return plan_->begin(epoch_, true, now_s);
 }
 
 void MasterCore::dispatch(double now_s) {
   plan_->prepare(now_s);
-  if (stop_ || idle_.empty() || !packer_here()) return;
+  const bool early = plan_->begins_early(now_s) && samplers_here();
+  if (stop_ || (idle_.empty() && !early) || packer().empty()) return;
   do plan_->give_leases(idle_, now_s);
-  while (!idle_.empty() && begin_view(now_s));
+  while ((!idle_.empty() || early) && begin_view(now_s));
+  if (early) plan_->begin_extra(epoch_, now_s);
 }
 
 void MasterCore::shut_down(const std::string& reason) {

@@ -36,6 +36,7 @@ class MasterCore {
   /// Errors are the sender's fault: the caller counts them.
   Status on(const std::string& peer, const wire::MetricRows& m, double now_s);
   Status on(const std::string& peer, const wire::SliceWeights& m, double now_s);
+  Status on(const std::string& peer, const wire::Plan& m, double now_s);
 
   /// A message to this peer could not be delivered: it is gone.
   void undeliverable(const std::string& peer);
@@ -60,6 +61,7 @@ class MasterCore {
   const net::RunningSession& session() const { return session_; }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
+  Figures figures() const;  ///< of all plans together
   bool progressive() const { return plan_->progressive(); }
   std::string animation() const { return plan_->animation(); }
   /// As everyone is told them: what was left to the kind of scene is decided.
@@ -80,10 +82,12 @@ class MasterCore {
   // Who takes part.
   Peer* known(const std::string& peer, double now_s);
   Peer* known_sampler(const std::string& peer, double now_s);
-  bool packer_here() const;
+  std::string packer() const;
+  bool samplers_here() const;
   bool make_room(const std::string& peer);
   void replace_namesakes(const std::string& peer, const wire::Hello& m);
   Peer& enter(const std::string& peer, const wire::Hello& m, double now_s);
+  void forget_viewer(const wire::Hello& hello);
   void lose(Peer& peer, const std::string& routing_id, const char* why, bool said_goodbye = false);
 
   // The scene and its epochs.

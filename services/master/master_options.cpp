@@ -64,6 +64,48 @@ options::Row setting_by_kind(MasterOptions& o, const std::string& name, const ch
   return row;
 }
 
+// A setting of the session that is one of a few whole numbers.
+options::Row setting_of_few(MasterOptions& o, const char* flag, const std::string& name, double usual,
+                            const options::Names& values, const char* help) {
+  double& value = o.settings.try_emplace(name, usual).first->second;
+  options::Row row{.flag = flag, .value = {}, .help = help, .limits = values};
+  row.value = options::Text{.read =
+                                [&value, values](const std::string& text) {
+                                  if (std::find(values.begin(), values.end(), text) == values.end())
+                                    return Status(Error{fmt::format("is not one of {}", fmt::join(values, ", "))});
+                                  value = std::stod(text);
+                                  return ok_status();
+                                },
+                            .write = [&value] { return fmt::format("{}", value); }};
+  row.fits = Kinds::of(Pipeline::kPoints);
+  return row;
+}
+
+options::Table steering_table(MasterOptions& o) {
+  const auto points = Kinds::of(Pipeline::kPoints);
+  const options::Names rays{"1", "4", "16"};
+  return {named({.flag = "--steering",
+                 .value = {},
+                 .help = "on: before a view is sampled, the packer says which of its rays the model lacks, and only "
+                         "these are cast; auto: where redundancy is eliminated",
+                 .fits = points},
+                o.steering, {Steering::kAuto, Steering::kOn, Steering::kOff}),
+          {.flag = "--view-cell,--sampling.view_cell_m",
+           .value = &o.settings.try_emplace("sampling.view_cell_m", 0.2).first->second,
+           .help = "metres of a head movement for which is sampled ahead what it would uncover; 0: nothing",
+           .limits = options::Range{0.0, 10.0},
+           .fits = points},
+          {.flag = "--validation,--sampling.validation",
+           .value = &o.settings.try_emplace("sampling.validation", 32).first->second,
+           .help = "each pixel that the model shows well is sampled again once in so many updates; 0: never",
+           .limits = options::Range{0.0, 4096.0},
+           .fits = points},
+          setting_of_few(o, "--edge-rays,--sampling.edge_rays", "sampling.edge_rays", 1, rays,
+                         "rays a pixel at edges while the head moves"),
+          setting_of_few(o, "--still-rays,--sampling.still_rays", "sampling.still_rays", 16, rays,
+                         "rays a pixel everywhere while the head stands still, when it has stood long enough")};
+}
+
 options::Table lease_table(MasterOptions& o) {
   return {{.flag = "--tile-size",
            .value = &o.schedule.tile_size,
@@ -104,7 +146,7 @@ options::Row redundancy_row(MasterOptions& o) {
       {.flag = "--packing.redundancy,--packing.keep_redundant",
        .value = {},
        .help = "eliminate: pack what the model does not show yet; keep: everything, viewers draw the best patches; "
-               "auto: keep of Julia sets",
+               "auto: eliminate",
        .fits = Kinds::of(Pipeline::kPoints)},
       o.redundancy, {Redundancy::kAuto, Redundancy::kEliminate, Redundancy::kKeep});
   auto& value = std::get<options::Text>(row.value);
@@ -116,7 +158,7 @@ options::Row redundancy_row(MasterOptions& o) {
 }
 
 options::Table packing_table(MasterOptions& o) {
-  return {setting_by_kind(o, "packing.max_points", "points the model holds at most", "20e6; of Julia sets 8e6"),
+  return {setting_by_kind(o, "packing.max_points", "points the model holds at most", "20e6"),
           setting(o, "packing.obsolete_after_s", 0, "forget clusters not seen for so long; 0: never"),
           setting(o, "packing.epsilon", 0.004, "redundancy threshold, relative to depth"),
           setting(o, "packing.age_weight", 1,
@@ -130,7 +172,7 @@ options::Table packing_table(MasterOptions& o) {
 }  // namespace
 
 options::Table session_table(MasterServiceOptions& o) {
-  return options::joined(lease_table(o.master), packing_table(o.master));
+  return options::joined(options::joined(lease_table(o.master), steering_table(o.master)), packing_table(o.master));
 }
 
 options::Table table(MasterServiceOptions& o) {

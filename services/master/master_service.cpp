@@ -132,13 +132,13 @@ class MasterService {
 
   void take(const net::Message& message, double now_s) {
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
-                  wire::TileDone, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::Goodbye, wire::Control>(
-        control_, message, [&](const auto& m) {
-          if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
-            core_.on(message.peer, m, now_s);
-          else if (const Status s = core_.on(message.peer, m, now_s); !s)
-            control_.reject(message, s.error().text);
-        });
+                  wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::Goodbye,
+                  wire::Control>(control_, message, [&](const auto& m) {
+      if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
+        core_.on(message.peer, m, now_s);
+      else if (const Status s = core_.on(message.peer, m, now_s); !s)
+        control_.reject(message, s.error().text);
+    });
   }
 
   const MasterServiceOptions& options_;

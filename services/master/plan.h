@@ -74,6 +74,7 @@ struct Figures {
   uint64_t frames_completed = 0, frames_in_flight = 0;
   uint64_t released = 0;  ///< leases that were taken back
   uint64_t backups = 0;   ///< leases of what another sampler was slow with
+  uint64_t viewers = 0;   ///< of whom anything is remembered
 };
 
 /// How views become frames and leases. Samplers are named by their routing ids.
@@ -83,6 +84,8 @@ class Schedule {
   virtual Views& views() = 0;
   /// New epoch, new packer: the frames' views wait again.
   virtual void drop_frames() = 0;
+  /// The packer is another than before: it has none of the tiles that the old one had.
+  virtual void new_packer() { drop_frames(); }
   /// Another plan leads the session from now on: drops the frames.
   virtual void put_aside() { drop_frames(); }
 
@@ -90,9 +93,15 @@ class Schedule {
   virtual void prepare(double /*now_s*/) {}
   /// A view waits, and of the idle samplers there is one that would go on with it at once.
   virtual bool may_begin(const Idle& idle) = 0;
+  /// Views may begin though no sampler is idle: they may need none.
+  virtual bool begins_early(double /*now_s*/) const { return false; }
   /// Begins the frame or frames of the next view. turns_only: of one whose viewer has a turn. False: none, or enough
   /// are in flight.
-  virtual bool begin(EpochId epoch, bool turns_only) = 0;
+  virtual bool begin(EpochId epoch, bool turns_only, double now_s) = 0;
+  /// To be called when no view is left to begin.
+  virtual void begin_extra(EpochId /*epoch*/, double /*now_s*/) {}
+  /// The packer's plan of a frame. Error: the packer's fault.
+  virtual Status planned(const wire::Plan& /*plan*/, double /*now_s*/) { return ok_status(); }
   /// Gives out all leases that idle samplers can have of the frames in flight.
   virtual void give_leases(Idle& idle, double now_s) = 0;
   /// Gives a lease its full time again. Unknown leases are ignored.
@@ -130,6 +139,9 @@ struct PlanLinks {
   metrics::RunRecord& record;
   /// For people; "?": it is not known.
   std::function<std::string(const std::string& sampler)> name_of;
+  std::function<std::string(InstanceId)> name_of_instance;  ///< likewise
+  /// Routing id of the packer; empty: there is none.
+  std::function<std::string()> packer;
 };
 
 /// The one place that knows which plan is for which pipeline.

@@ -112,8 +112,8 @@ Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
     if (!by_scene) return by_scene.error();
     obeyed = *std::move(by_scene);
   } else if (m.command != "epoch") {
-    return Error{
-        fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf, colour", m.command.substr(0, 64))};
+    return Error{fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf, colour",
+                             m.command.substr(0, 64))};
   }
   if (obeyed.tells_all) announce(now_s);
   if (!obeyed.begins_epoch) return obeyed.answer;

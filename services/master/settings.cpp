@@ -17,6 +17,10 @@ const char* name_of(Redundancy redundancy) {
   return redundancy == Redundancy::kAuto ? "auto" : redundancy == Redundancy::kKeep ? "keep" : "eliminate";
 }
 
+const char* name_of(Steering steering) {
+  return steering == Steering::kAuto ? "auto" : steering == Steering::kOn ? "on" : "off";
+}
+
 uint64_t octree_depth(const MasterOptions& options, std::optional<scene::Kind> kind) {
   return options.octree_depth > 0 ? options.octree_depth : uint64_t(policy(kind).octree_depth);
 }
@@ -25,11 +29,21 @@ bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind) 
   return options.progressive == Progressive::kAuto ? policy(kind).progressive : options.progressive == Progressive::kOn;
 }
 
+bool keeps_redundant(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  return options.redundancy == Redundancy::kAuto ? policy(kind).keep_redundant
+                                                 : options.redundancy == Redundancy::kKeep;
+}
+
+bool steers(const MasterOptions& options, std::optional<scene::Kind> kind) {
+  if (scene::pipeline_of(kind.value_or(scene::Kind::kMesh)) != scene::Pipeline::kPoints) return false;
+  return options.steering == Steering::kAuto ? !keeps_redundant(options, kind) : options.steering == Steering::kOn;
+}
+
 std::map<std::string, double> settings(const MasterOptions& options, std::optional<scene::Kind> kind) {
   auto out = options.settings;
   out.try_emplace("packing.max_points", policy(kind).max_points);
-  out["packing.keep_redundant"] =
-      options.redundancy == Redundancy::kAuto ? policy(kind).keep_redundant : options.redundancy == Redundancy::kKeep;
+  out["packing.keep_redundant"] = keeps_redundant(options, kind);
+  out["sampling.steering"] = steers(options, kind);
   out["viewer.least_sampling"] = policy(kind).least_sampling;
   return out;
 }

@@ -26,17 +26,26 @@ enum class Redundancy {
   kKeep        ///< packs everything; viewers draw the best patches
 };
 
-/// As --progressive and --packing.redundancy take them.
+/// Whether the packer is asked which rays of a view its model lacks, before they are cast.
+enum class Steering {
+  kAuto,  ///< where the packer eliminates redundancy
+  kOn,
+  kOff
+};
+
+/// As --progressive, --packing.redundancy and --steering take them.
 const char* name_of(Progressive progressive);
 const char* name_of(Redundancy redundancy);
+const char* name_of(Steering steering);
 
 struct MasterOptions {
   ScheduleOptions schedule;
   Progressive progressive = Progressive::kAuto;
   Redundancy redundancy = Redundancy::kAuto;
+  Steering steering = Steering::kAuto;
   julia::Timeline animation;  ///< of the scene's parameters, from the first view on; empty: what the data server says
   uint64_t octree_depth = 0;  ///< 0: as the kind of scene has it
-  /// packing.* values for the packer, volume.layers of a volume's frames; passed on in every welcome.
+  /// packing.* and sampling.* values for the packer, volume.layers of a volume's frames; passed on in every welcome.
   /// packing.max_points that is not there is as the kind of scene has it.
   std::map<std::string, double> settings;
   double silent_after_s = 5.0;  ///< a process that reports nothing for so long is taken for dead
@@ -46,8 +55,10 @@ struct MasterOptions {
 /// mesh.
 uint64_t octree_depth(const MasterOptions& options, std::optional<scene::Kind> kind);
 bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind);
-/// As everyone is told them (docs/protocol.md): the given ones, packing.keep_redundant, packing.max_points and
-/// viewer.least_sampling.
+bool keeps_redundant(const MasterOptions& options, std::optional<scene::Kind> kind);
+bool steers(const MasterOptions& options, std::optional<scene::Kind> kind);
+/// As everyone is told them (docs/protocol.md): the given ones, packing.keep_redundant, packing.max_points,
+/// sampling.steering and viewer.least_sampling.
 std::map<std::string, double> settings(const MasterOptions& options, std::optional<scene::Kind> kind);
 
 }  // namespace telesplat::master

@@ -48,19 +48,20 @@ Json told(const net::RunningSession& s) {
           {"run_folder", s.run_folder}};
 }
 
-Figures sum(const std::map<scene::Pipeline, std::unique_ptr<Plan>>& plans) {
+}  // namespace
+
+Figures MasterCore::figures() const {
   Figures out;
-  for (const auto& [pipeline, plan] : plans) {
+  for (const auto& [pipeline, plan] : plans_) {
     const Figures f = plan->figures();
     out.frames_completed += f.frames_completed;
     out.frames_in_flight += f.frames_in_flight;
     out.released += f.released;
     out.backups += f.backups;
+    out.viewers += f.viewers;
   }
   return out;
 }
-
-}  // namespace
 
 std::vector<metrics::Process> MasterCore::processes() const {
   std::vector<metrics::Process> out;
@@ -71,7 +72,7 @@ std::vector<metrics::Process> MasterCore::processes() const {
 }
 
 std::map<std::string, double> MasterCore::counters() const {
-  const Figures f = sum(plans_);
+  const Figures f = figures();
   std::map<std::string, double> out{{"leases_expired", double(leases_expired_)},
                                     {"tiles_released", double(f.released)},
                                     {"leases_backup", double(f.backups)},
@@ -81,7 +82,7 @@ std::map<std::string, double> MasterCore::counters() const {
 }
 
 std::string MasterCore::status_json(double now_s) const {
-  const Figures f = sum(plans_);
+  const Figures f = figures();
   Json out{{"session", told(session_)},
            {"epoch", epoch_.value},
            {"frames_completed", f.frames_completed},

@@ -41,8 +41,8 @@ bool ViewQueue::turn_waiting() const {
   return std::any_of(viewers_.begin(), viewers_.end(), [](const auto& v) { return v.second.turn; });
 }
 
-const wire::ViewRequest* ViewQueue::next(bool turns_only) const {
-  const auto wanted = [&](const auto& v) { return !turns_only || v.second.turn; };
+const wire::ViewRequest* ViewQueue::next(bool turns_only, const std::function<bool(InstanceId)>& served) const {
+  const auto wanted = [&](const auto& v) { return (!turns_only || v.second.turn) && served(v.first); };
   auto next = std::find_if(viewers_.upper_bound(last_), viewers_.end(), wanted);
   if (next == viewers_.end()) next = std::find_if(viewers_.begin(), viewers_.end(), wanted);
   return next == viewers_.end() ? nullptr : &next->second.requests.front();

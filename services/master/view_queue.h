@@ -35,8 +35,10 @@ class ViewQueue {
   void begin_turns();
   bool turn_waiting() const;
 
-  /// Whose turn it is: its first request. turns_only: only of viewers that have a turn. nullptr: none.
-  const wire::ViewRequest* next(bool turns_only = false) const;
+  /// Whose turn it is: its first request. turns_only: only of viewers that have a turn; served: only of those for which
+  /// it is true. nullptr: none.
+  const wire::ViewRequest* next(
+      bool turns_only = false, const std::function<bool(InstanceId)>& served = [](InstanceId) { return true; }) const;
   /// Takes the first request of a viewer; the turn goes to the next viewer. Precondition: it has one.
   wire::ViewRequest take(InstanceId viewer);
   /// Takes the first requests of all viewers where they are wanted, `most` at most; nobody's turn changes.

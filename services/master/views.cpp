@@ -11,7 +11,7 @@ void Views::request_view(const wire::ViewRequest& request) {
   const auto same = [&](const wire::ViewRequest& r) {
     return r.viewer == request.viewer && r.request == request.request;
   };
-  if (request.buffers > 0 && std::any_of(in_flight_.begin(), in_flight_.end(), [&](const InFlight& f) {
+  if (request.buffers > 0 && std::any_of(in_flight_.begin(), in_flight_.end(), [&](const Begun& f) {
         return std::any_of(f.views.begin(), f.views.end(), same);
       }))
     return;
@@ -20,7 +20,9 @@ void Views::request_view(const wire::ViewRequest& request) {
 
 void Views::forget_viewer(InstanceId viewer) {
   waiting_.forget(viewer);
-  for (InFlight& f : in_flight_) f.left.push_back(viewer);
+  for (Begun& f : in_flight_)
+    if (std::any_of(f.views.begin(), f.views.end(), [&](const auto& v) { return v.viewer == viewer; }))
+      f.left.push_back(viewer);
 }
 
 ViewQueue Views::release_views() {
@@ -31,8 +33,12 @@ ViewQueue Views::release_views() {
 FrameId Views::next_frame() { return std::exchange(next_frame_, next_frame_.next()); }
 LeaseId Views::next_lease() { return std::exchange(next_lease_, next_lease_.next()); }
 
-std::optional<wire::ViewRequest> Views::take_view(bool turns_only) {
-  const wire::ViewRequest* next = waiting_.next(turns_only);
+std::optional<wire::ViewRequest> Views::take_view(bool turns_only, InFlight allowed) {
+  const wire::ViewRequest* next = waiting_.next(turns_only, [&](InstanceId viewer) {
+    return allowed == InFlight::kAny || std::none_of(in_flight_.begin(), in_flight_.end(), [&](const Begun& f) {
+             return std::any_of(f.views.begin(), f.views.end(), [&](const auto& v) { return v.viewer == viewer; });
+           });
+  });
   if (!next || views_in_flight() >= views_at_once(options_.frames_in_flight, next->buffers)) return std::nullopt;
   return waiting_.take(next->viewer);
 }
@@ -41,9 +47,9 @@ void Views::begin(FrameId frame, const std::vector<wire::ViewRequest>& views) {
   in_flight_.push_back({frame, views, {}});
 }
 
-std::vector<Views::InFlight>::iterator Views::find(FrameId frame) {
+std::vector<Views::Begun>::iterator Views::find(FrameId frame) {
   const auto found =
-      std::find_if(in_flight_.begin(), in_flight_.end(), [&](const InFlight& f) { return f.frame == frame; });
+      std::find_if(in_flight_.begin(), in_flight_.end(), [&](const Begun& f) { return f.frame == frame; });
   CHECK(found != in_flight_.end());
   return found;
 }
@@ -55,7 +61,7 @@ void Views::complete(FrameId frame) {
 
 void Views::put_back(FrameId frame) {
   const auto found = find(frame);
-  const InFlight dropped = std::move(*found);
+  const Begun dropped = std::move(*found);
   in_flight_.erase(found);
   for (const auto& view : dropped.views)
     if (std::find(dropped.left.begin(), dropped.left.end(), view.viewer) == dropped.left.end()) waiting_.put_back(view);

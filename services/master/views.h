@@ -36,7 +36,7 @@ class Views {
  public:
   /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
   void request_view(const wire::ViewRequest& request);
-  void forget_viewer(InstanceId viewer);
+  virtual void forget_viewer(InstanceId viewer);
   bool view_waiting() const { return !waiting_.empty(); }
   /// See ViewQueue.
   void begin_turns() { waiting_.begin_turns(); }
@@ -57,9 +57,10 @@ class Views {
   FrameId next_frame();
   LeaseId next_lease();
 
-  /// The view to begin; viewers take turns. turns_only: only those that have a turn. nullopt: none waits, or as many
-  /// are in flight as may be (views_at_once()).
-  std::optional<wire::ViewRequest> take_view(bool turns_only);
+  enum class InFlight { kAny, kOneAViewer };
+  /// The view to begin; viewers take turns. turns_only: only those that have a turn. kOneAViewer: only those that have
+  /// no view in flight. nullopt: none waits, or as many are in flight as may be (views_at_once()).
+  std::optional<wire::ViewRequest> take_view(bool turns_only, InFlight allowed = InFlight::kAny);
   /// More views for the same frame, as ViewQueue::take_all().
   std::vector<wire::ViewRequest> take_more(const std::function<bool(const wire::ViewRequest&)>& wanted, size_t most) {
     return waiting_.take_all(wanted, most);
@@ -72,16 +73,16 @@ class Views {
   void put_back(FrameId frame);
 
  private:
-  struct InFlight {
+  struct Begun {
     FrameId frame;
     std::vector<wire::ViewRequest> views;
     std::vector<InstanceId> left;  // viewers that are gone
   };
-  std::vector<InFlight>::iterator find(FrameId frame);
+  std::vector<Begun>::iterator find(FrameId frame);
 
   ScheduleOptions options_;
   ViewQueue waiting_;
-  std::vector<InFlight> in_flight_;  // few
+  std::vector<Begun> in_flight_;  // few
   FrameId next_frame_{1};
   LeaseId next_lease_{1};
   uint64_t completed_ = 0;

@@ -4,10 +4,12 @@
 
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
+#include "common/net/dispatch.h"
 #include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/points/point_packing.h"
 #include "services/packer/slices/slice_packing.h"
+#include "services/packer/spare_time.h"
 
 namespace telesplat::packer {
 namespace {
@@ -41,6 +43,11 @@ class PackerService {
       if (!recorder) return recorder.error();
       recorder_ = std::move(*recorder);
     }
+    if (!options_.record_plan.empty()) {
+      auto recorder = PlanRecorder::open(options_.record_plan, options_.record_plan_frames);
+      if (!recorder) return recorder.error();
+      plan_recorder_ = std::move(*recorder);
+    }
     link_.emplace(context, options_.service.master, hello);
     return ok_status();
   }
@@ -52,7 +59,8 @@ class PackerService {
       early_.expire(now);
       if (packing_) packing_->tick(now);
       flush_spans(now);
-      net::wait_readable({&link_->socket(), &tiles_, &state_}, 50);
+      const std::vector<net::Socket*> sockets{&link_->socket(), &tiles_, &state_};
+      if (!net::wait_readable(sockets, 0) && !use_spare_time(now)) net::wait_readable(sockets, 50);
       receive_control();
       receive(state_, kStateAtOnce, &Packing::take_state);
       receive(tiles_, kSampledAtOnce, &Packing::take_sampled);
@@ -71,11 +79,43 @@ class PackerService {
   };
 
   void receive_control() {
-    link_->receive(monotonic_s());
+    while (const auto message = link_->socket().receive()) {
+      const double now_s = monotonic_s();
+      if (!link_->handle(*message, now_s))
+        net::dispatch<wire::PlanRequest>(link_->socket(), *message,
+                                         [&](const wire::PlanRequest& request) { plan(request, now_s); });
+      follow_news();
+    }
+  }
+
+  void follow_news() {
     if (link_->session() && link_->version() != seen_version_) {
       seen_version_ = link_->version();
       follow(*link_->session(), monotonic_s());
     }
+  }
+
+  // Rays beyond a view wait for spare time: to plan them takes as long as to plan a view.
+  void plan(const wire::PlanRequest& request, double now_s) {
+    if (request.extra && packing_) return spare_.keep(request);
+    if (!request.extra) spare_.follow(request);
+    link_->socket().send(packing_ ? packing_->plan(request, now_s) : all_rays(request));
+  }
+
+  // One piece of what can wait. False: there is none, or it waits.
+  bool use_spare_time(double now_s) {
+    const bool hurried = packing_ && packing_->hurried(now_s);
+    if (!packing_ || !spare_.begins(now_s, hurried)) return false;
+    const wire::PlanRequest* question = spare_.question(now_s);
+    // Where some view is always under way there always is something to learn, too.
+    const bool questions_turn = question && hurried && settled_;
+    if (settled_ = !questions_turn && packing_->idle(now_s); settled_) return true;
+    if (!question) return false;
+    const double begin_s = monotonic_s();
+    const auto plan = packing_->plan_piece(*question, now_s);
+    if (plan) link_->socket().send(*plan);
+    spare_.worked(begin_s, monotonic_s(), plan.has_value());
+    return true;
   }
 
   // A session may change from one kind of scene to another, and with it how the data travel.
@@ -100,7 +140,8 @@ class PackerService {
     if (pipeline == scene::Pipeline::kSlices) return std::make_unique<SlicePacking>(std::move(outlets), spans_);
     const PointPacking::Options options{.threads = options_.threads,
                                         .max_log_bytes = uint64_t(options_.log_limit_mb * 1e6),
-                                        .recorder = recorder_ ? &*recorder_ : nullptr};
+                                        .recorder = recorder_ ? &*recorder_ : nullptr,
+                                        .plans = plan_recorder_ ? &*plan_recorder_ : nullptr};
     return std::make_unique<PointPacking>(options, std::move(outlets), spans_);
   }
 
@@ -136,9 +177,12 @@ class PackerService {
   net::Socket tiles_, patches_, state_;
   std::optional<net::MasterLink> link_;
   std::optional<DepthRecorder> recorder_;
+  std::optional<PlanRecorder> plan_recorder_;
   metrics::SpanRecorder spans_;
   std::unique_ptr<Packing> packing_;  // none before the session's kind is known
   EpochHold<Early> early_;            // what came before
+  SpareTime spare_;
+  bool settled_ = false;  // what the last piece of spare time was for
   int seen_version_ = 0;
   double last_flush_s_ = 0;
 };
@@ -148,6 +192,7 @@ class PackerService {
 int run(const PackerOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
+  net::keep_freed_memory();
   net::Context context;
   PackerService service(o, context);
   if (const Status s = service.open(context); !s) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -30,6 +31,11 @@ struct Outlets {
   }
 };
 
+/// The answer of those who cannot plan: a view needs all of its rays, and none beyond.
+inline wire::Plan all_rays(const wire::PlanRequest& request) {
+  return {.frame = request.frame, .epoch = request.epoch, .camera = request.camera, .full = !request.extra};
+}
+
 class Packing {
  public:
   virtual ~Packing() = default;
@@ -43,6 +49,19 @@ class Packing {
   virtual void take_sampled(net::Socket& from, const net::Message& message, double now_s) = 0;
   /// A message of a viewer: likewise.
   virtual void take_state(net::Socket& from, const net::Message& message, double now_s) = 0;
+
+  /// The master asks which rays of a view are needed.
+  virtual wire::Plan plan(const wire::PlanRequest& request, double /*now_s*/) { return all_rays(request); }
+  /// The same for rays beyond a view, by a piece of work of some tens of milliseconds. nullopt: there is no answer yet,
+  /// the next call with this request goes on.
+  virtual std::optional<wire::Plan> plan_piece(const wire::PlanRequest& request, double now_s) {
+    return plan(request, now_s);
+  }
+
+  /// Somebody waits for a view that is being sampled: its parts will come soon, and should find the packer free.
+  virtual bool hurried(double /*now_s*/) const { return false; }
+  /// Nothing has come: does a piece of work that can wait, of some milliseconds. False: there is none.
+  virtual bool idle(double /*now_s*/) { return false; }
 
   /// To be called at least every 100 ms: what happens by time.
   virtual void tick(double now_s) = 0;

@@ -220,6 +220,7 @@ class SamplerService {
 int run(const SamplerOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
+  net::keep_freed_memory();
   std::unique_ptr<Sampler> sampler;
   std::unique_ptr<TileSource> replay;
   if (!o.replay.empty()) {

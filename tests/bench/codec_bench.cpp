@@ -13,6 +13,7 @@
 
 #include "common/codec/depth_codec.h"
 #include "tests/support/depth_images.h"
+#include "tests/support/masks.h"
 
 namespace telesplat::codec {
 namespace {
@@ -28,6 +29,9 @@ const DepthImage& test_image(const std::string& name) {
   DepthImage image =
       test::render({.rough = has("rough"), .constant_albedo = has("albedo"), .covers_all = !has("object")});
   if (has("outlines")) test::keep_outlines(image);
+  if (has("spread")) image = test::masked(image, test::spread_mask(image.width, image.height, 32, 7));
+  if (has("bands")) image = test::masked(image, test::band_mask(image.width, image.height, 3));
+  if (has("lines")) image = test::masked(image, test::band_mask(image.width, image.height, 1));
   if (const size_t at = name.find("random_"); at != std::string::npos)
     test::keep_random(image, std::atof(name.c_str() + at + 7), 1);
   return cache.emplace(name, std::move(image)).first->second;
@@ -48,6 +52,9 @@ void report(benchmark::State& state, const DepthImage& image, size_t bytes) {
   state.counters["covered"] = static_cast<double>(covered) / pixels;
   state.counters["Mpx/s"] =
       benchmark::Counter(pixels * 1e-6 * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["s/covered"] =
+      benchmark::Counter(static_cast<double>(covered) * static_cast<double>(state.iterations()),
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void encode_tiles(benchmark::State& state, const std::string& name) {
@@ -153,7 +160,10 @@ const bool registered = [] {
       add(name + "zstd_" + std::to_string(level),
           [image, level](benchmark::State& s) { zstd_planes(s, image, level); });
   }
-  for (const std::string image : {"patch_outlines", "patch_random_0.3", "patch_random_0.03", "patch_random_0.001"}) {
+  // Beside full_smooth and full_rough: what a pixel costs in a masked tile.
+  for (const std::string image :
+       {"patch_outlines", "patch_random_0.3", "patch_random_0.03", "patch_random_0.001", "sparse_spread_smooth",
+        "sparse_spread_rough", "sparse_bands_rough", "sparse_lines_rough", "sparse_random_0.1_rough"}) {
     const std::string name = "codec/" + image + "/";
     add(name + "encode", [image](benchmark::State& s) { encode_tiles(s, image); });
     add(name + "decode", [image](benchmark::State& s) { decode_tiles(s, image); });

@@ -5,6 +5,7 @@
 
 #include "common/geometry/trajectory.h"
 #include "services/sampler/julia/sampler.h"
+#include "tests/support/masks.h"
 #include "tests/support/simd_targets.h"
 
 namespace telesplat::sampler {
@@ -44,6 +45,20 @@ void frame(benchmark::State& state, const julia::Preset& preset, double distance
   state.counters["thesis/this"] = benchmark::Counter(kThesis_s * frames, benchmark::Counter::kIsRate);
 }
 
+// Masked tiles of 128 x 128, as plans lease them; us/ray says what a mask costs beside all rays.
+void masked(benchmark::State& state, double share) {
+  JuliaSampler sampler(1);
+  const JuliaScene scene = scene_of(julia::presets()[0]);
+  const geometry::Camera camera = from(0.7377);
+  const image::PixelMask mask = test::random_mask(128, 128, share, 1);
+  for (auto _ : state)
+    for (int y = 0; y < kFrame.height; y += 128)
+      for (int x = 0; x < kFrame.width; x += 128)
+        benchmark::DoNotOptimize(sampler.sample(scene, camera, {x, y, 128, 128}, 1, &mask).depth.data());
+  const double rays = double(mask.count()) * 40 * double(state.iterations());
+  state.counters["us/ray"] = benchmark::Counter(rays / 1e6, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
 // Presets go by their number: while benchmarks register themselves, what they hold is not there yet.
 void add(int preset, double distance_m, int64_t target, int rows, const std::string& what) {
   const std::string name = "JuliaFrame/preset:" + std::to_string(preset) + "/" + what;
@@ -61,6 +76,10 @@ const bool registered = [] {
     for (const int64_t target : testing::simd_targets())
       add(0, distance_m, target, kFrame.height, std::string(name) + hwy::TargetName(target));
   }
+  for (const double share : {1.0, 0.5, 0.1, 1.0 / 32, 0.01})
+    benchmark::RegisterBenchmark(("JuliaMasked/" + std::to_string(share)).c_str(), [=](benchmark::State& state) {
+      masked(state, share);
+    })->Unit(benchmark::kMillisecond);
   for (const int rows : {1, 4, 16})
     add(0, 1, best, rows, "1m/" + std::string(hwy::TargetName(best)) + "/rows:" + std::to_string(rows));
   for (int preset = 1; preset < static_cast<int>(julia::presets().size()); ++preset) {

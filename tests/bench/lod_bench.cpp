@@ -12,7 +12,7 @@
 #include <numeric>
 
 #include "common/geometry/trajectory.h"
-#include "common/image/quality.h"
+#include "common/image/measures/quality.h"
 #include "common/splat/cpu_splatter.h"
 #include "common/splat/select/frame_budget.h"
 #include "services/packer/points/packer_core.h"

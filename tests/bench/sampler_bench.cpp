@@ -2,9 +2,12 @@
 // same rays through Embree without attributes, and the OpenGL rasteriser.
 #include <benchmark/benchmark.h>
 
+#include <array>
+
 #include "common/geometry/trajectory.h"
 #include "services/sampler/mesh/ray_packets.h"
 #include "services/sampler/mesh/ray_sampler.h"
+#include "tests/support/masks.h"
 #include "tests/support/mesh_chunks.h"
 
 namespace telesplat::sampler {
@@ -77,6 +80,45 @@ void SamplerBuild(benchmark::State& state) {
       benchmark::Counter(2 * 724 * 724 / 1e6 * double(state.iterations()), benchmark::Counter::kIsRate);
 }
 
+// Frames in masked tiles of 256 x 200, as plans lease them. us/ray beside that of SamplerRay says what a mask costs.
+enum class Rays { kAll, kHalf, kTenth, kBands, kSpread };
+void sample_masked(benchmark::State& state, Sampler& sampler) {
+  if (!sampler.add_chunks(terrain()).ok()) return state.SkipWithError("chunks refused");
+  const geometry::Camera camera = view(40);
+  const auto mask = [&] {
+    switch (static_cast<Rays>(state.range(0))) {
+      case Rays::kAll:
+        return test::full_mask(256, 200);
+      case Rays::kHalf:
+        return test::random_mask(256, 200, 0.5, 1);
+      case Rays::kTenth:
+        return test::random_mask(256, 200, 0.1, 1);
+      case Rays::kBands:
+        return test::band_mask(256, 200, 3);
+      default:
+        return test::spread_mask(256, 200, 32, 1);
+    }
+  }();
+  state.SetLabel(std::array{"all", "half", "tenth", "bands", "one in 32"}.at(static_cast<size_t>(state.range(0))));
+  for (auto _ : state)
+    for (int y = 0; y < kFrame.height; y += 200)
+      for (int x = 0; x < kFrame.width; x += 256)
+        benchmark::DoNotOptimize(sampler.sample(camera, {x, y, 256, 200}, &mask).depth.data());
+  const double rays = 20 * double(mask.count());
+  count(state, rays);
+  state.counters["us/ray"] = benchmark::Counter(rays / 1e6 * double(state.iterations()),
+                                                benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
+void SamplerRayMasked(benchmark::State& state) { sample_masked(state, *make_ray_sampler(1)); }
+void SamplerRasterMasked(benchmark::State& state) {
+  auto sampler = make_raster_sampler();
+  if (!sampler) return state.SkipWithError(sampler.error().text.c_str());
+  sample_masked(state, **sampler);
+}
+
+BENCHMARK(SamplerRayMasked)->DenseRange(0, 4)->Unit(benchmark::kMillisecond);
+BENCHMARK(SamplerRasterMasked)->DenseRange(0, 4)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(SamplerRay)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(SamplerRayWithoutAttributes)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(SamplerRaster)->Arg(90)->Arg(40)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -11,7 +11,7 @@
 
 #include "client/viewer/render/slices/renderer.h"
 #include "common/core/clock.h"
-#include "tests/support/volume_frames.h"
+#include "tests/support/volume/frames.h"
 
 namespace telesplat {
 namespace {

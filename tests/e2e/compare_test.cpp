@@ -105,6 +105,7 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   ASSERT_TRUE(json.is_object());
   ASSERT_EQ(json["poses"].size(), 2u);
   EXPECT_EQ(json["medians"].size(), rows.size() / 2);
+  EXPECT_EQ(json["samples"], 16);
   EXPECT_EQ(json["size"], nlohmann::json({480, 300}));
   EXPECT_NEAR(json["poses"][0]["cells"][0]["psnr_db"].get<double>(), number(rows[0], "psnr_db"), 1e-3);
   EXPECT_GT(json["poses"][1]["points_cached"], 1000);
@@ -118,7 +119,7 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
     EXPECT_GT(std::set<uint32_t>(sheet->colour.begin(), sheet->colour.end()).size(), 500u) << name;
   }
 
-  // What is replayed is what was displayed: the run's last picture, drawn again, is the same.
+  // What is replayed is what was displayed: the run's last picture, drawn again, is the same or nearly so.
   std::string last;
   for (const auto& entry : fs::directory_iterator(run.out() + "/images"))
     last = std::max(last, entry.path().filename().string());
@@ -132,7 +133,8 @@ TEST(Compare, DrawsARunsPosesWithEveryKernelAndRenderer) {
   const auto drawn = image::read_view(run.folder() / ("again/pose-" + digits + "-disc-cpu.png"));
   ASSERT_TRUE(displayed.ok() && drawn.ok());
   ASSERT_EQ(displayed->colour.size(), drawn->colour.size());
-  EXPECT_GT(psnr(*displayed, *drawn), 40);
+  // Tiles of a still picture that waited for their turn when points had just come are replayed with these.
+  EXPECT_GT(psnr(*displayed, *drawn), 34);
   EXPECT_TRUE(fs::exists(run.folder() / ("again/pose-" + digits + "-disc-cpu-flip.png")));
   EXPECT_TRUE(fs::exists(run.folder() / ("again/pose-" + digits + "-reference.png")));
 
@@ -273,6 +275,7 @@ const Refusal kRefusals[] = {
     {"SceneEmpty", "terrain.ply", "", {}, "terrain.ply"},
     {"UnknownKernel", "", "", {"--kernels", "square,star"}, "star"},
     {"UnknownFinish", "", "", {"--finish", "fill,polish"}, "polish"},
+    {"BadSamples", "", "", {"--samples", "10"}, "--samples: 10 rays a pixel"},
     {"MagnifyARun", "", "", {"--magnify", "2"}, "--still"},
     {"NoPoses", "", "", {"--poses", "0"}, "--poses"},
     {"FramesOfAScene", "", "", {"terrain.ply", "--still", "--frames", "3"}, "--frames"},

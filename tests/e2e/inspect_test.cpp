@@ -143,9 +143,10 @@ TEST_F(Inspect, ARunItsLatestLinkAndItsDepthAreTold) {
   EXPECT_TRUE(json["files"].is_array());
   expect_refused({folder_ / "latest", "--tf", "bone"}, "is a run folder, which has no --tf");
 
-  std::string depth;
+  std::string depth;  // the first frame's: later ones hold what was lacking
   for (const auto& entry : fs::directory_iterator(run.out() + "/depth"))
-    if (entry.path().extension() == ".depth") depth = std::max(depth, entry.path().string());
+    if (const std::string path = entry.path().string(); entry.path().extension() == ".depth")
+      depth = depth.empty() ? path : std::min(depth, path);
   ASSERT_FALSE(depth.empty());
   ASSERT_EQ(inspect({depth, "--json", "--out", folder_ / "a.npy"}), 0) << err_;
   const auto image = nlohmann::json::parse(out_, nullptr, false);

@@ -22,7 +22,7 @@ bool frames_go_on(PipelineRun& run, int more = 3) {
   return run.wait_status([&](const auto& s) { return frames_completed(s) >= before + more; });
 }
 
-// Whether each completed frame of the record has all rows of its picture, each once.
+// Whether each completed frame of the record has all rows of its picture, each once: without steering it shall.
 void expect_whole_frames(PipelineRun& run) {
   const auto frame = run.column("tiles.csv", "frame"), y = run.column("tiles.csv", "y"),
              height = run.column("tiles.csv", "height"), step = run.column("tiles.csv", "step");
@@ -43,7 +43,7 @@ void expect_whole_frames(PipelineRun& run) {
 }
 
 TEST(JuliaFaults, ASamplerKilledInMidFrameLosesNothing) {
-  PipelineRun run({"--duration", "0", "--samplers", "2"}, "julia");
+  PipelineRun run({"--duration", "0", "--steering", "off", "--samplers", "2"}, "julia");
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   // Stopped while it holds a lease, so that it dies in the middle of it.
   pid_t victim = 0;
@@ -62,7 +62,7 @@ TEST(JuliaFaults, ASamplerKilledInMidFrameLosesNothing) {
 }
 
 TEST(JuliaFaults, ASamplerToldToStopFinishesWhatItHolds) {
-  PipelineRun run({"--duration", "0", "--samplers", "1"}, "julia");
+  PipelineRun run({"--duration", "0", "--steering", "off", "--samplers", "1"}, "julia");
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
   Program guest("telesplat-sampler", {"--master", run.master(), "--name", "guest", "--threads", "1"},
                 run.folder() / "guest");

@@ -110,7 +110,10 @@ TEST(Record, EveryFileIsThereAndTrue) {
   const auto& q = s["quality"];
   ASSERT_TRUE(q.is_object());
   EXPECT_GE(q["views"], 2);
-  for (const char* key : {"psnr_db", "ssim", "hole_fraction"}) expect_distribution(q[key], key);
+  for (const char* key : {"psnr_db", "ssim", "flip", "hole_fraction", "flicker", "popping"})
+    expect_distribution(q[key], key);
+  EXPECT_EQ(q["samples"], 16);
+  EXPECT_GT(q["flicker"]["median"], 0) << "every verified frame is compared with the next one";
   EXPECT_GT(q["psnr_db"]["median"], 20);
   EXPECT_LT(q["last_view"]["hole_fraction"], 0.02);
   EXPECT_GT(q["last_view"]["psnr_db"], 22);

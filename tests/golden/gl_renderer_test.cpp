@@ -283,7 +283,7 @@ std::vector<uint32_t> finish_plainly(const Scene& scene, const splat::Finish& fi
   const splat::ResolvedTile tile{rows.data(), stride, kMargin, width, height};
   splat::FinishScratch scratch;
   int grow = splat::finish_reach(finish);
-  if (finish.fill) splat::fill_holes(tile, grow -= splat::kFillReach, scratch);
+  if (finish.fill) splat::fill_holes(tile, grow -= splat::kFillReach, splat::gaps_to_fill(finish), scratch);
   if (finish.smooth) splat::smooth(tile, grow -= 1, scratch);
   if (finish.antialias) splat::antialias(tile, scratch);
   std::vector<uint32_t> out;

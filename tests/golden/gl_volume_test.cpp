@@ -6,7 +6,7 @@
 #include "client/viewer/render/slices/renderer.h"
 #include "common/gl/egl_context.h"
 #include "common/image/file.h"
-#include "tests/support/volume_frames.h"
+#include "tests/support/volume/frames.h"
 
 namespace telesplat {
 namespace {

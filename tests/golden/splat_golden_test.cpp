@@ -10,7 +10,7 @@
 
 #include "client/viewer/render/gl/gl_renderer.h"
 #include "common/geometry/trajectory.h"
-#include "common/image/quality.h"
+#include "common/image/measures/quality.h"
 #include "tests/support/splat_scene.h"
 
 namespace telesplat {

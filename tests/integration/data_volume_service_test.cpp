@@ -11,7 +11,7 @@
 #include "services/data/kinds.h"
 #include "services/data/volume/served_volume.h"
 #include "tests/support/data_files.h"
-#include "tests/support/volume_samples.h"
+#include "tests/support/volume/samples.h"
 
 namespace telesplat::data {
 namespace {

@@ -7,11 +7,13 @@
 
 #include "common/codec/depth_codec.h"
 #include "tests/support/depth_images.h"
+#include "tests/support/masks.h"
 
 namespace telesplat::codec {
 namespace {
 
 using image::DepthImage;
+using image::PixelMask;
 
 // One image of each kind there is, small enough to try many.
 std::vector<DepthImage> images(uint32_t seed) {
@@ -35,6 +37,12 @@ std::vector<DepthImage> images(uint32_t seed) {
   }
   all.push_back(test::render({.width = side(), .height = side(), .seed = seed, .covers_all = false}));
   test::keep_outlines(all.back());
+  all.push_back(test::render({.width = side(), .height = side(), .seed = seed, .rough = true}));
+  all.back() = test::masked(all.back(), test::band_mask(all.back().width, all.back().height, 1 + int(seed % 3)));
+  all.push_back(test::render({.width = side() + 64, .height = side() + 64, .seed = seed}));
+  PixelMask picks = test::spread_mask(all.back().width, all.back().height, 32, seed);
+  for (int y = 64; y < picks.height(); ++y) *picks.row(y) = *picks.row(y - 64);  // a pattern that repeats
+  all.back() = test::masked(all.back(), picks);
   return all;
 }
 
@@ -50,7 +58,8 @@ TEST(CodecProperties, RoundTrip) {
 
 TEST(CodecProperties, RoundTripOfSeveralTiles) {
   for (const double density : {0.001, 0.02, 0.15, 0.7, 1.0}) {
-    for (const auto& [width, height] : {std::pair{700, 300}, {513, 257}, {20, 9000}, {9000, 20}}) {
+    for (const auto& [width, height] :
+         {std::pair{700, 300}, {513, 257}, {20, 9000}, {9000, 20}, {65536, 1}, {1, 65536}}) {
       DepthImage image = test::plane(width, height, 40, 90);
       test::keep_random(image, density, 3);
       const auto back = decode(encode(image));
@@ -96,7 +105,7 @@ TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
 TEST(CodecProperties, RandomBytesAfterAGoodHeader) {
   std::mt19937 random(12);
   for (int trial = 0; trial < 20000; ++trial) {
-    std::vector<uint8_t> bytes{0xD7, 2, static_cast<uint8_t>(1 + random() % 100),
+    std::vector<uint8_t> bytes{0xD7, 3, static_cast<uint8_t>(1 + random() % 100),
                                static_cast<uint8_t>(1 + random() % 100)};
     for (uint32_t n = random() % 80; n > 0; --n)
       bytes.push_back(static_cast<uint8_t>(random() % (random() % 2 != 0 ? 256 : 16)));

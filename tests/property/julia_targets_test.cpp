@@ -31,12 +31,12 @@ TEST(JuliaTargets, EveryTargetEqualsTheOracle) {
       const geometry::Camera camera = geometry::make_camera(pose, 90, 101 + round, 53);
       const geometry::Rect rect{round % 3, round % 7, 101, 40};
       const int step = round % 2 ? 1 : 4;
-      const image::DepthImage expected = JuliaSampler(1, julia_trace_plainly).sample(scene, camera, rect, step);
+      const image::DepthImage expected = JuliaSampler(1, julia_trace_plainly).sample(scene, camera, rect, 1.0 / step);
       covered += static_cast<size_t>(
           std::count_if(expected.depth.begin(), expected.depth.end(), [](uint32_t d) { return d != 0; }));
       for (const int64_t target : testing::simd_targets()) {
         const testing::OnTarget on(target);
-        const image::DepthImage image = JuliaSampler(1 + round % 2).sample(scene, camera, rect, step);
+        const image::DepthImage image = JuliaSampler(1 + round % 2).sample(scene, camera, rect, 1.0 / step);
         ASSERT_TRUE(image == expected) << preset.name << " on " << hwy::TargetName(target) << ", round " << round;
       }
       ++round;

@@ -96,10 +96,11 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
     } else {
       if (waiting.empty()) {
         // Some are coarse; those are forgotten first, perhaps before they are complete.
-        const int width = keep && chance(0.3) ? 40 : 160;
+        const int width = chance(0.3) ? 40 : 160;
         waiting =
             test::sampled_frame({next_frame++}, test::scene_camera(test::random_eye(random), width, width * 5 / 8),
                                 width == 40 ? 16 : 64, core.epoch());
+        for (auto& t : waiting) t.step = width == 40 ? 4 : 1;
         std::shuffle(waiting.begin(), waiting.end(), random);
         if (chance(0.3)) waiting.push_back(waiting.front());  // a duplicate
       }
@@ -107,6 +108,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
       waiting.pop_back();
       ASSERT_TRUE(event.ok()) << event.error().text;
       if (event->has_value()) publish(**event);
+      for (const auto& forget : core.forget_superseded()) publish(forget);
     }
     if (HasFatalFailure()) return;
     if (step % 100 == 0) {
@@ -116,7 +118,10 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
     }
   }
   EXPECT_GT(patches, 100);
-  EXPECT_EQ(patch_forgets, keep ? forgets : 0);
+  EXPECT_GT(patch_forgets, 10);
+  if (keep) {
+    EXPECT_EQ(patch_forgets, forgets);
+  }
 
   gappy.catch_up(core);
   test::Replica late(config.model);

@@ -12,6 +12,7 @@ namespace telesplat {
 namespace {
 
 using splat::FinishScratch;
+using splat::Gaps;
 using testing::OwnTile;
 
 constexpr uint32_t kNear = 90000, kFar = 100000;  // depth codes
@@ -43,19 +44,22 @@ void expect_same(const OwnTile& expected, const OwnTile& actual, int grow, const
 TEST(Finish, EveryStageOnEveryTargetAndWidthEqualsThePlainLoops) {
   for (int width = 1; width <= 40; ++width) {
     const OwnTile tile = random_tile(static_cast<uint32_t>(width), width, 7 + width % 5);
-    OwnTile filled = tile, smoothed = tile, antialiased = tile;
-    testing::fill_plainly(filled, 2);
+    OwnTile filled = tile, all_filled = tile, smoothed = tile, antialiased = tile;
+    testing::fill_plainly(filled, 2, Gaps::kPinHoles);
+    testing::fill_plainly(all_filled, 2, Gaps::kAll);
     testing::smooth_plainly(smoothed, 1);
     testing::antialias_plainly(antialiased);
     for (const int64_t target : testing::simd_targets()) {
       const testing::OnTarget on(target);
       const std::string what = std::string(hwy::TargetName(target)) + ", width " + std::to_string(width);
       FinishScratch scratch;
-      OwnTile a = tile, b = tile, c = tile;
-      EXPECT_GT(splat::fill_holes(a.tile, 2, scratch), 0);
+      OwnTile a = tile, all = tile, b = tile, c = tile;
+      EXPECT_GT(splat::fill_holes(a.tile, 2, Gaps::kPinHoles, scratch), 0);
+      EXPECT_GT(splat::fill_holes(all.tile, 2, Gaps::kAll, scratch), 0);
       splat::smooth(b.tile, 1, scratch);
       splat::antialias(c.tile, scratch);
       expect_same(filled, a, 2, "fill on " + what);
+      expect_same(all_filled, all, 2, "fill all on " + what);
       expect_same(smoothed, b, 1, "smooth on " + what);
       expect_same(antialiased, c, 0, "antialias on " + what);
     }
@@ -76,7 +80,7 @@ TEST(Finish, CroppingToContentLosesNothingThatAStageChanges) {
     OwnTile whole = tile, part = tile;
     FinishScratch scratch;
     const auto finish = [&](const splat::ResolvedTile& t) {
-      splat::fill_holes(t, 2, scratch);
+      splat::fill_holes(t, 2, Gaps::kPinHoles, scratch);
       splat::smooth(t, 1, scratch);
       splat::antialias(t, scratch);
     };
@@ -112,7 +116,7 @@ TEST(Finish, FillClosesPinHolesAndNothingElse) {
   for (int y = 18; y < 26; ++y)
     for (int x = 26; x < 34; ++x) t.tile.info(y)[x] = splat::kEmptyInfo;
   FinishScratch scratch;
-  splat::fill_holes(t.tile, 2, scratch);
+  splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch);
   int closed_in_gap = 0;
   for (int y = 0; y < 64; ++y)
     for (int x = 0; x < 64; ++x) {
@@ -134,7 +138,7 @@ TEST(Finish, FillClosesHolesThroughWhichAFartherSurfaceShows) {
     for (int x = -5; x < 37; ++x) t.set(x, y, 0x2040f0, kNear);
   t.set(10, 10, 0xff0000, kFar), t.set(20, 12, 0xff0000, kFar), t.set(21, 12, 0xff0000, kFar);
   FinishScratch scratch;
-  EXPECT_EQ(splat::fill_holes(t.tile, 2, scratch), 3);
+  EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 3);
   EXPECT_EQ(t.colour(10, 10), 0x2040f0u);
   EXPECT_EQ(t.info(21, 12) >> 8, kNear);
 }
@@ -146,7 +150,38 @@ TEST(Finish, FillNeverReachesAcrossDepthEdges) {
     for (int x = -5; x < 37; ++x)
       if (x != 16) t.set(x, y, 0x404040, x < 16 ? kNear : kFar);
   FinishScratch scratch;
-  EXPECT_EQ(splat::fill_holes(t.tile, 2, scratch), 0);
+  EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 0);
+}
+
+// Ribs two pixels wide, a pixel apart, each at a depth of its own.
+TEST(Finish, FillLeavesGapsBetweenRibsOpen) {
+  OwnTile t(32, 32);
+  for (int y = -5; y < 37; ++y)
+    for (int x = -5; x < 37; ++x)
+      if ((x + 6) % 3 != 0) t.set(x, y, 0x404040, kNear + ((x + 6) / 3 % 2 ? 300 : 0));
+  const OwnTile before = t;
+  FinishScratch scratch;
+  EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 0);
+  expect_same(before, t, 0, "ribs");
+  // A hole in a rib is closed all the same, and a picture of sub-pixels closes everything.
+  t.tile.info(16)[13] = splat::kEmptyInfo;
+  OwnTile all = t;
+  EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 1);
+  EXPECT_GT(splat::fill_holes(all.tile, 2, Gaps::kAll, scratch), 300);
+}
+
+// What a nearer surface hid until now: a row of empty pixels along its silhouette.
+TEST(Finish, FillShowsTheFartherSurfaceBesideASilhouette) {
+  OwnTile t(32, 32);
+  for (int y = -5; y < 37; ++y)
+    for (int x = -5; x < 37; ++x) t.set(x, y, x < 16 ? 0x404040 : 0xff0000, x < 16 ? kNear : kFar);
+  t.tile.info(10)[16] = t.tile.info(20)[16] = splat::kEmptyInfo;
+  FinishScratch scratch;
+  EXPECT_EQ(splat::fill_holes(t.tile, 2, Gaps::kPinHoles, scratch), 2);
+  for (const int y : {10, 20}) {
+    EXPECT_EQ(t.colour(16, y), 0xff0000u);
+    EXPECT_EQ(t.info(16, y) >> 8, kFar);
+  }
 }
 
 TEST(Finish, SmoothingSamplesTwoPixelsApartIsBilinearInterpolation) {
@@ -182,6 +217,34 @@ TEST(Finish, SamplesAPixelApartStayAsTheyAre) {
       if (!t.empty(x, y)) {
         EXPECT_EQ(t.colour(x, y), before.colour(x, y)) << x << ", " << y;
       }
+}
+
+TEST(Finish, CoverageWeightsAreMeans) {
+  for (uint32_t near_there = 0; near_there < 2; ++near_there)
+    for (uint32_t weight = 1; weight < 16; ++weight) {
+      const size_t i = 17 * near_there + weight;
+      const uint32_t near = splat::kCoverageWeights.near[i] * weight,
+                     far = splat::kCoverageWeights.far[i] * (16 - weight);
+      EXPECT_NEAR(near, 1024.0 * splat::kCoverage[near_there][weight], 8);
+      // One colour stays as it is, rounded.
+      EXPECT_LT(std::abs(int(near + far) - 65536) * 255, 32768) << i;
+    }
+}
+
+// Splats reach beyond silhouettes: a straight edge is drawn where its outermost samples are, not half a pixel outside.
+TEST(Finish, AntialiasDrawsSilhouettesThinner) {
+  OwnTile t(32, 32);
+  for (int y = -5; y < 37; ++y)
+    for (int x = -5; x < 16; ++x) t.set(x, y, 0xc0c0c0, kNear);
+  for (int y = -5; y < 37; ++y)
+    for (int x = 16; x < 37; ++x) t.set(x, y, 0x000000, kFar);
+  FinishScratch scratch;
+  splat::antialias(t.tile, scratch);
+  double covered = 0;
+  for (int x = 10; x < 22; ++x) covered += (t.colour(x, 16) & 255) / 192.0;
+  EXPECT_NEAR(covered, 5.64, 0.05);  // of 6 pixels
+  EXPECT_EQ(t.colour(14, 16), 0xc0c0c0u);
+  EXPECT_LT(t.colour(16, 16) & 255, 6u);
 }
 
 TEST(Finish, AntialiasBlendsSilhouettesAndLeavesSurfacesAlone) {

@@ -253,5 +253,61 @@ TEST(Elimination, KeepsWhatIsNearerByMoreThanEpsilonInCanonicalForm) {
   EXPECT_LT(kept, samples);
 }
 
+TEST(ReferenceDepth, WithAPatchIsThatOfTheModelThatTookIt) {
+  points::PointModel model = bumpy_model();
+  const geometry::Camera camera = camera_at(0.4, 301, 260), from = camera_at(0.9);
+  std::vector<float> with, before;
+  splat::render_reference_depth(model, camera, 1, with);
+  before = with;
+  for (uint32_t i = 6; i < 9; ++i) {
+    auto patch = points::prepare_patch(model.config(), Sequence{i}, from, {10 * int(i), 20, 200, 150}, [&] {
+      const image::DepthImage all = bumpy_image(from, i);
+      image::DepthImage part(200, 150);
+      for (int y = 0; y < 150; ++y)
+        for (int x = 0; x < 200; ++x) {
+          const size_t to = size_t(y) * 200 + x, at = size_t(20 + y) * from.width + 10 * i + x;
+          part.depth[to] = all.depth[at], part.colour[to] = all.colour[at], part.normal[to] = all.normal[at];
+        }
+      return part;
+    }());
+    splat::add_to_reference_depth(patch, model.config(), camera, with);
+    model.insert(std::move(patch));
+  }
+  std::vector<float> expected;
+  splat::render_reference_depth(model, camera, 1, expected);
+  EXPECT_TRUE(with == expected);
+  EXPECT_FALSE(before == expected);
+}
+
+TEST(EliminateRedundancy, WhereFewWereCastLeavesTheSame) {
+  const points::PointModel model = bumpy_model();
+  const geometry::Camera camera = camera_at(0.4, 301, 260);
+  std::vector<float> reference_m;
+  splat::render_reference_depth(model, camera, 1, reference_m);
+  std::mt19937 rng(3);
+  uint64_t kept = 0, samples = 0;
+  for (const geometry::Rect& tile : {geometry::Rect{0, 0, 128, 100}, {173, 100, 128, 160}}) {
+    const image::DepthImage all = bumpy_image(camera, 8);
+    image::DepthImage came(tile.width, tile.height);
+    image::PixelMask cast(tile.width, tile.height);
+    for (int y = 0; y < tile.height; ++y)
+      for (int x = 0; x < tile.width; ++x) {
+        if (rng() % 9 != 0) continue;
+        cast.set(x, y);
+        const size_t to = size_t(y) * tile.width + x, at = size_t(tile.y + y) * camera.width + tile.x + x;
+        came.depth[to] = all.depth[at], came.colour[to] = all.colour[at], came.normal[to] = all.normal[at];
+      }
+    image::DepthImage expected = came;
+    const auto whole = splat::eliminate_redundancy(camera, tile, reference_m, 0.005f, expected);
+    const auto some = splat::eliminate_where_cast(camera, tile, cast, reference_m, 0.005f, came);
+    EXPECT_TRUE(came == expected);
+    EXPECT_EQ(some.samples, whole.samples);
+    EXPECT_EQ(some.kept, whole.kept);
+    kept += some.kept, samples += some.samples;
+  }
+  EXPECT_GT(kept, 100u);
+  EXPECT_LT(kept, samples - 100);
+}
+
 }  // namespace
 }  // namespace telesplat

@@ -5,7 +5,7 @@
 
 #include "services/sampler/volume/shear/splatter.h"
 #include "tests/support/simd_targets.h"
-#include "tests/support/volume_scenes.h"
+#include "tests/support/volume/scenes.h"
 
 namespace telesplat::sampler {
 namespace {

@@ -5,7 +5,7 @@
 #include "common/volume/warp/pixel.h"
 #include "common/volume/warp/plan.h"
 #include "tests/support/simd_targets.h"
-#include "tests/support/volume_frames.h"
+#include "tests/support/volume/frames.h"
 
 namespace telesplat::volume {
 namespace {

@@ -7,7 +7,7 @@
 #include "common/net/dispatch.h"
 #include "common/volume/session.h"
 #include "tests/support/points_scenes.h"
-#include "tests/support/volume_frames.h"
+#include "tests/support/volume/frames.h"
 
 namespace telesplat::test {
 namespace {

@@ -34,7 +34,7 @@ struct OwnTile {
 
 inline int channel(uint32_t colour, int c) { return static_cast<int>(colour >> 8 * c & 255); }
 
-inline void fill_plainly(OwnTile& t, int grow) {
+inline void fill_plainly(OwnTile& t, int grow, splat::Gaps gaps) {
   const OwnTile before = t;
   // In whole infos, like everything that the definition calls a code: what lies below the code's bits counts too.
   const int64_t edge = int64_t{splat::kEdge} * 256;
@@ -51,18 +51,34 @@ inline void fill_plainly(OwnTile& t, int grow) {
       for (int j = -1; j <= 1; ++j)
         for (int i = -1; i <= 1; ++i) closed = std::max(closed, least(x + i, y + j));
       if (code(x, y) - closed <= edge) continue;
-      int supports = 0, weights = 0, sums[3] = {};
+      const auto neighbours = [&](const auto& visit) {
+        for (int j = -1; j <= 1; ++j)
+          for (int i = -1; i <= 1; ++i)
+            if (i != 0 || j != 0) visit(x + i, y + j, i == 0 || j == 0 ? 2 : 1);
+      };
+      int count = 0, weights = 0, between = 0;
+      int64_t nearest = INT64_MAX, farthest = 0, behind = 0;
+      neighbours([&](int i, int j, int w) {
+        if (code(x, y) - code(i, j) > edge) between += w, behind = std::max(behind, code(i, j));
+        if (std::abs(code(i, j) - closed) > edge) return;
+        ++count, weights += w;
+        nearest = std::min(nearest, code(i, j)), farthest = std::max(farthest, code(i, j));
+      });
+      const bool flat = farthest - nearest <= int64_t{splat::kFlat} * 256;
+      const int needed = static_cast<int>(flat ? splat::kFlatSupports : splat::kPinHoleSupports);
+      const bool all = gaps == splat::Gaps::kAll;
+      const bool enough = all ? count >= static_cast<int>(splat::kFillSupports) : weights >= needed;
+      if (!enough && (all || between < static_cast<int>(splat::kBetweenSupports))) continue;
+      const int64_t target = enough ? closed : behind;
+      int sums[3] = {};
       int64_t depth = 0;
-      for (int j = -1; j <= 1; ++j)
-        for (int i = -1; i <= 1; ++i) {
-          if ((i == 0 && j == 0) || std::abs(code(x + i, y + j) - closed) > edge) continue;
-          const int w = i == 0 || j == 0 ? 2 : 1;
-          ++supports;
-          weights += w;
-          for (int c = 0; c < 3; ++c) sums[c] += w * channel(before.colour(x + i, y + j), c);
-          depth += w * (code(x + i, y + j) >> 8);
-        }
-      if (supports < splat::kFillSupports) continue;
+      weights = 0;
+      neighbours([&](int i, int j, int w) {
+        if (std::abs(code(i, j) - target) > edge) return;
+        weights += w;
+        for (int c = 0; c < 3; ++c) sums[c] += w * channel(before.colour(i, j), c);
+        depth += w * (code(i, j) >> 8);
+      });
       uint32_t colour = 0;
       for (int c = 0; c < 3; ++c) colour |= static_cast<uint32_t>((sums[c] + weights / 2) / weights) << 8 * c;
       t.set(x, y, colour, static_cast<uint32_t>(depth / weights));
@@ -100,19 +116,29 @@ inline void smooth_plainly(OwnTile& t, int grow) {
 
 inline void antialias_plainly(OwnTile& t) {
   const OwnTile before = t;
+  const int64_t edge = int64_t{splat::kEdge} * 256;
   for (int y = 0; y < t.tile.height; ++y)
     for (int x = 0; x < t.tile.width; ++x) {
       int64_t least = INT64_MAX, most = 0;
-      int sums[3] = {};
-      for (int j = -1; j <= 1; ++j)
-        for (int i = -1; i <= 1; ++i) {
-          const int64_t info = before.info(x + i, y + j);
-          least = std::min(least, info), most = std::max(most, info);
-          for (int c = 0; c < 3; ++c) sums[c] += (i ? 1 : 2) * (j ? 1 : 2) * channel(before.colour(x + i, y + j), c);
-        }
-      if (most - least <= int64_t{2} * splat::kEdge * 256) continue;
+      const auto each = [&](const auto& visit) {
+        for (int j = -1; j <= 1; ++j)
+          for (int i = -1; i <= 1; ++i) visit(int64_t{before.info(x + i, y + j)}, i, j);
+      };
+      each([&](int64_t info, int, int) { least = std::min(least, info), most = std::max(most, info); });
+      if (most - least <= 2 * edge) continue;
+      uint32_t near[3] = {}, far[3] = {}, weight = 0;
+      each([&](int64_t info, int i, int j) {
+        const uint32_t w = (i ? 1 : 2) * (j ? 1 : 2);
+        const bool is_near = info - least <= edge;
+        if (is_near) weight += w;
+        for (int c = 0; c < 3; ++c) (is_near ? near : far)[c] += w * (before.colour(x + i, y + j) >> 8 * c & 255);
+      });
+      const uint32_t kind = weight + (before.info(x, y) - least <= edge ? 17 : 0);
       uint32_t colour = 0;
-      for (int c = 0; c < 3; ++c) colour |= static_cast<uint32_t>((sums[c] + 8) / 16) << 8 * c;
+      for (int c = 0; c < 3; ++c)
+        colour |=
+            (near[c] * splat::kCoverageWeights.near[kind] + far[c] * splat::kCoverageWeights.far[kind] + 0x8000) >>
+            16 << 8 * c;
       t.tile.colour(y)[x] = colour;
     }
 }

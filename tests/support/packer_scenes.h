@@ -52,8 +52,8 @@ class Replica {
     if (event.kind == packer::Event::Kind::kPatch) {
       const auto image = codec::decode(*event.blob, event.rect.width, event.rect.height);
       CHECK(image.ok());
-      model_.insert(
-          points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image, event.frame));
+      model_.insert(points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image,
+                                          points::tagged(event.frame, event.step)));
     }
   }
   /// Closes a gap.

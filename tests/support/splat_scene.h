@@ -153,7 +153,7 @@ inline Frame splat_plainly(const splat::DrawList& list, const geometry::Camera& 
     tile.tile.colour(y)[x] =
         image::Shading::apply(splat::key_albedo(keys[i]), shading.table()[splat::key_normal(keys[i])]);
   }
-  if (finish.fill) fill_plainly(tile, 2);
+  if (finish.fill) fill_plainly(tile, 2, splat::gaps_to_fill(finish));
   if (finish.smooth) smooth_plainly(tile, 1);
   if (finish.antialias) antialias_plainly(tile);
   for (size_t i = 0; i < keys.size(); ++i) {

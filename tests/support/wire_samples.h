@@ -79,7 +79,10 @@ struct Filler {
                   })
       m.begin = 3, m.end = 12;
     if constexpr (std::is_same_v<M, wire::SliceWeights>) m.begin = 3;
+    if constexpr (std::is_same_v<M, wire::Plan>)
+      m.tiles = {64, 32, 100, 50, 700, 2, 0, 0, 64, 32, 2048, 0, 200, 100, 1, 1, 1, 1};
     if constexpr (requires { m.buffers; }) m.buffers = 3;
+    if constexpr (requires { m.footprint; }) m.footprint = 0.00078125;
   }
 
  private:

@@ -47,6 +47,7 @@ struct ViewPart {
   EpochId epoch;
   FrameId frame;
   bool complete = false;  ///< the last part of the frame of full resolution
+  bool extra = false;     ///< of rays beyond what the view asked for: it belongs to no update
   uint64_t tiles = 1, points = 0, samples = 0, bytes = 0;
   geometry::Camera camera;  ///< that was sampled
   uint64_t eliminated = 0;  ///< samples of which no points came, because the model has them already
@@ -55,17 +56,34 @@ ViewPart part_of(const wire::Patch& patch);
 
 class ViewRequester {
  public:
+  static constexpr double kDeadBand_px = 0.25;  ///< of anything that is kNearest_m away or farther
+  static constexpr double kNearest_m = 0.3;
+  static constexpr double kQuietPeriod_s = 1.0;  ///< what has changed without a word is found by asking again
+  static constexpr double kPatience_s = 0.5;     ///< with a view on its way
+
   ViewRequester(const RequestOptions& options, InstanceId viewer) : options_(options), viewer_(viewer) {}
 
   /// A displayed pose; display: the camera it was shown with.
   void on_pose(double t_s, const geometry::Camera& display);
   /// RequestOptions::min_scale, as the session sets it; within 0.1 to 1.
   void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
+  /// Whether samplers cast only the rays that the model lacks: then a view that was seen already costs next to nothing,
+  /// and its size is no measure of its time.
+  void set_steered(bool steered) { steered_ = steered; }
   /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full
   /// resolution.
-  void on_epoch(double now_s) { epoch_began_s_ = now_s; }
-  /// The next request; asynchronously, if one is due.
+  void on_epoch(double now_s);
+  /// The next request; asynchronously, if one is due. A head that rests asks for exactly the same view again while it
+  /// moves by less than kDeadBand_px. Where sampling is steered, it asks only every kQuietPeriod_s while its view is on
+  /// its way, and after an update of it that brought no points.
+  ///   Requests keep to their rate: one that is late does not make the following ones late. Where sampling is steered,
+  ///   a viewer's views are sampled one after the other, so the next one is asked for when the last one is complete, or
+  ///   has been on its way for kPatience_s: then the head is known best.
   std::optional<wire::ViewRequest> next(double now_s);
+  /// Asynchronously: when the next request may go out, if that is not yet.
+  std::optional<double> due_in_s(double now_s) const {
+    return due_s_ > now_s ? std::optional(due_s_ - now_s) : std::nullopt;
+  }
   /// These requests once more, for the view that is wanted now.
   std::vector<wire::ViewRequest> again(std::span<const RequestId> requests, double now_s);
   /// A frame that waited for its update was displayed so long after the update had been requested: predictions reach to
@@ -83,6 +101,7 @@ class ViewRequester {
     bool still = false;  ///< asked for at full resolution, while the head rested
     /// The coarse pass included.
     uint64_t points = 0, samples = 0, bytes = 0, tiles = 0, eliminated = 0;
+    uint64_t extra_points = 0, extra_bytes = 0;  ///< of extra rays that came since the update before
   };
   /// Part of a frame was applied. Returns the finished update when it was the last part of the frame of full resolution
   /// and asked for by us; a coarse pass may come before it, with the same request.
@@ -102,9 +121,20 @@ class ViewRequester {
   }
 
   geometry::Camera wanted(double now_s, bool& still);
+  bool rests_at(const geometry::Pose& pose) const;
+  bool quiet(const geometry::Camera& camera) const;
+  bool waits_for_answer(double now_s) const;
+  void follow_latency(const Update& update, double latency_s);
+  void step_scale(double own_s);
 
-  bool changing_ = false;  // the scene; as of the last request
-  double last_sent_s_ = -1e9, latency_s_ = 0, displayed_latency_s_ = 0, epoch_began_s_ = -1e9, last_update_s_ = -1e9;
+  bool steered_ = false;
+  std::optional<geometry::Camera> sent_, quiet_;  // of the last request; of the last update, if it brought no points
+  RequestId sent_id_;
+  uint64_t extra_points_ = 0, extra_bytes_ = 0;  // since the last update
+  int slow_ = 0, fast_ = 0;                      // updates in a row that took too long, that left time
+  bool changing_ = false;                        // the scene; as of the last request
+  double last_sent_s_ = -1e9, due_s_ = -1e9, latency_s_ = 0, displayed_latency_s_ = 0, epoch_began_s_ = -1e9,
+         last_update_s_ = -1e9;
   std::map<RequestId, Update> open_;
 };
 

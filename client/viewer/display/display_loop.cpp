@@ -5,6 +5,7 @@
 #include <cmath>
 #include <thread>
 
+#include "client/viewer/render/fit_view.h"
 #include "common/core/clock.h"
 
 namespace telesplat::viewer {
@@ -19,16 +20,6 @@ bool told_to_stop(const ViewerWorker& worker, const DisplaySurface& surface) {
 void sleep_until(double t_s) {
   const double wait_s = t_s - monotonic_s();
   if (wait_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(wait_s));
-}
-
-// Room for a frame of this camera. A view that may be recorded has room for depth all the time: growing it costs
-// milliseconds.
-void fit(image::View& view, const geometry::Camera& camera, bool with_depth) {
-  const size_t pixels = size_t(camera.width) * size_t(camera.height);
-  view.width = camera.width;
-  view.height = camera.height;
-  view.colour.resize(pixels);
-  view.depth_m.resize(with_depth ? pixels : 0);
 }
 
 LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn, const ViewSource& source,
@@ -112,7 +103,7 @@ class Display {
       if (!surface_.visible()) continue;
       fit(view_, camera, false);
       std::fill(view_.colour.begin(), view_.colour.end(), o_.shading.background);
-      surface_.present(view_);
+      surface_.present(view_, true);
       const auto network = worker_.figures();
       surface_.report({.now_s = monotonic_s(), .scene = network.scene});
     }
@@ -128,12 +119,13 @@ class Display {
       const double now_s = monotonic_s();
       const geometry::Camera camera = next_camera(now_s, -1);
       worker_.on_pose(now_s, camera);
+      // A view that may be recorded has room for depth all the time: growing it costs milliseconds.
       fit(view_, camera, spool_ != nullptr);
       const DrawnFrame drawn = source_->draw(
           {.begin_s = now_s, .camera = camera, .look = look_, .resting = true, .even_empty = surface_.visible()},
           view_);
       if (drawn.empty && !surface_.visible()) continue;
-      surface_.present(view_);
+      surface_.present(view_, true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
       surface_.report(live_figures(monotonic_s(), 0, drawn, *source_, worker_));
     }
@@ -158,7 +150,7 @@ class Display {
       const double now_s = monotonic_s(), t_s = now_s - start_s_;
       if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s)) return now_s - begin_s;
       worker_.on_pose(now_s, next_camera(now_s, t_s));
-      if (view_intact_ && surface_.visible()) surface_.present(view_);
+      if (view_intact_ && surface_.visible()) surface_.present(view_, true);
     }
   }
 
@@ -168,7 +160,7 @@ class Display {
     if (o_.picture_every ? result_.frames % o_.picture_every == 0 : t_s >= next_picture_s_ || last_)
       use |= o_.exr ? kPicture | kExr : kPicture;
     if (o_.transparent && (use & kPicture)) use |= kTransparent;
-    if (o_.verify_every && (result_.frames % o_.verify_every == 0 || last_)) use |= kVerify;
+    if (o_.verify_every && (result_.frames % o_.verify_every < o_.verify_row || last_)) use |= kVerify;
     return use;
   }
 
@@ -187,16 +179,23 @@ class Display {
     m.camera = next_camera(m.begin_s, t_s);
     const uint32_t use = use_of_frame(t_s);
     const bool with_depth = use & (kVerify | kExr);
+    const bool intact = view_intact_ && view_.width == m.camera.width && view_.height == m.camera.height;
     fit(view_, m.camera, spool_ != nullptr);
     m.look = look_;
     const bool wished = surface_.wants_picture();
     const bool coverage = o_.transparent && ((use & kPicture) || wished);
-    m.drawn = source_->draw({m.begin_s, m.camera, look_, with_depth, coverage}, view_);
+    m.drawn = source_->draw({.begin_s = m.begin_s,
+                             .camera = m.camera,
+                             .look = look_,
+                             .with_depth = with_depth,
+                             .with_coverage = coverage,
+                             .intact = intact},
+                            view_);
     m.end_s = monotonic_s();
     worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, gate_.waits() ? &m.drawn.update : nullptr);
     const auto legend = o_.legend ? worker_.legend_at(m.drawn.epoch) : nullptr;
     surface_.on_legend(legend);
-    surface_.present(view_);
+    surface_.present(view_, m.drawn.changed);
     if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
     m.presented_s = monotonic_s();
     m.filled = gate_.filled();
@@ -206,7 +205,10 @@ class Display {
     keep(use, t_s, m, legend);
     ++result_.frames;
     surface_.report(live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_));
-    if (o_.target_fps > 0) sleep_until(next_frame_s(m.begin_s));
+    if (o_.target_fps > 0)
+      sleep_until(next_frame_s(m.begin_s));
+    else if (!m.drawn.changed)
+      sleep_until(m.begin_s + kRestPeriod_s / 2);
   }
 
   void record(MeasuredFrame& m) {

@@ -28,6 +28,9 @@ struct DisplayOptions {
   double duration_s = 10;  ///< seconds from the first displayed frame; 0: until told to stop
   uint64_t frames = 0;     ///< frames to display; 0: no limit
   double hold_s = 0;       ///< the head stands still for so long at the end of duration_s
+  /// Samples a pixel of a still picture: 4 or 16; 1: it is drawn as all others are. Only where pictures are antialiased
+  /// and not transparent.
+  int still_samples = 16;
   splat::RenderOptions render;
   splat::SelectionOptions selection;
   float splat_scale = 0;  ///< selection.scale; 0: what suits the kernel
@@ -36,6 +39,7 @@ struct DisplayOptions {
   bool transparent = false;    ///< pictures have the coverage as alpha; shading.background is black then
   uint64_t picture_every = 0;  ///< record every N-th frame as a picture; 0: one every 2.5 s and the last one
   uint64_t verify_every = 0;   ///< keep every N-th frame for verification; 0: none
+  uint64_t verify_row = 2;     ///< so many frames in a row each time
   bool exr = false;            ///< pictures as EXR with depth too
 };
 

@@ -47,8 +47,8 @@ class DisplaySurface {
   virtual bool visible() const = 0;
   /// The legend of the frame that is shown next; null: it has none.
   virtual void on_legend(const std::shared_ptr<const image::Legend>&) {}
-  /// Shows a finished frame, drawn with the camera above.
-  virtual void present(const image::View& view) = 0;
+  /// Shows a finished frame, drawn with the camera above. changed: it is not the one that was shown last.
+  virtual void present(const image::View& view, bool changed) = 0;
   /// Whether somebody wants the frame that begins as a picture.
   virtual bool wants_picture() const { return false; }
   /// It is this one. alpha: what the upper byte of its colours is.

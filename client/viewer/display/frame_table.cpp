@@ -56,6 +56,9 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"finish", [](F f) { return double(splat::finish_bits(f.look.render.finish)); }},
     {"lit", [](F f) { return f.look.lit ? 1.0 : 0.0; }},
     {"begin_s", [](F f) { return f.begin_master_s; }},
+    {"refined", [](F f) { return f.drawn.refined; }},
+    {"refine_ms", [](F f) { return f.drawn.refine_ms; }},
+    {"sub_pixels", [](F f) { return double(f.drawn.sub_pixels); }},
 };
 
 }  // namespace

@@ -29,7 +29,7 @@ class HeadlessSurface final : public DisplaySurface {
     return tile_of(whole(trajectory_.at(moving_s)), o.wall);
   }
   bool visible() const override { return false; }
-  void present(const image::View&) override {}
+  void present(const image::View&, bool) override {}
   void report(const LiveFigures&) override {}
   bool wants_to_stop() const override { return false; }
 

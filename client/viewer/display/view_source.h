@@ -16,16 +16,20 @@ struct FrameInput {
   bool with_coverage = false;  ///< colours over black get the coverage into their upper byte (image/background.h)
   bool resting = false;  ///< before the first view update is complete: nothing is measured for the sake of later frames
   bool even_empty = true;  ///< draw the background too if there is nothing else; else leave the view as it is
+  bool intact = false;     ///< the view holds what the call before this one left in it
 };
 
 /// The columns of frames.csv that depend on what is drawn (docs/metrics.md).
 struct DrawnFrame {
   bool empty = true;    ///< there was nothing of the scene to draw
+  bool changed = true;  ///< false: the view is as FrameInput::intact found it
   double chosen_s = 0;  ///< monotonic clock: what to draw was chosen
-  double project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0, antialias_cpu_ms = 0;
+  double prepare_ms = 0, project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0, antialias_cpu_ms = 0;
   uint64_t selected = 0, drawn = 0, items = 0, cached = 0, sequence = 0;
   uint64_t summaries = 0;  ///< of bricks, that had been made by then
   double detail = 1, budget_ms = 0;
+  double refined = 0, refine_ms = 0;  ///< of a still picture: share of pixels drawn with sub-pixels; time for that
+  int sub_pixels = 1;                 ///< of such a pixel, on each axis
   EpochId epoch;
   ShownUpdate update;  ///< the newest view update that it shows
 };

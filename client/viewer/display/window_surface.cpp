@@ -8,8 +8,12 @@
 #include <filesystem>
 #include <mutex>
 
+#include "common/core/clock.h"
+
 namespace telesplat::viewer {
 namespace {
+
+constexpr double kShowAgain_s = 0.1;
 
 // Screenshots tell from a thread of theirs.
 std::function<void(const std::string&)> one_at_a_time(std::function<void(const std::string&)> tell) {
@@ -132,7 +136,14 @@ void WindowSurface::keep_path() {
                 : written.error().text);
 }
 
-void WindowSurface::present(const image::View& view) { window_->present(view, overlays_); }
+// A window system may want it again at any time, without telling.
+void WindowSurface::present(const image::View& view, bool changed) {
+  const Shown now{monotonic_s(), window_->width(), window_->height(), overlays_.version()};
+  const bool same = now.width == shown_.width && now.height == shown_.height && now.overlays == shown_.overlays;
+  if (!changed && same && now.at_s - shown_.at_s < kShowAgain_s) return;
+  shown_ = now;
+  window_->present(view, overlays_);
+}
 
 void WindowSurface::on_legend(const std::shared_ptr<const image::Legend>& legend) {
   if (legend_ == legend && legend_width_ == window_->width() && legend_height_ == window_->height()) return;

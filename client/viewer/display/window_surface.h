@@ -32,7 +32,7 @@ class WindowSurface final : public DisplaySurface {
   void on_scene(const ShownScene& scene) override;
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   bool visible() const override { return true; }
-  void present(const image::View& view) override;
+  void present(const image::View& view, bool changed) override;
   void on_legend(const std::shared_ptr<const image::Legend>& legend) override;
   bool wants_picture() const override { return interaction_.wants_screenshot(); }
   void take_picture(const image::View& view, image::Alpha alpha) override;
@@ -59,7 +59,13 @@ class WindowSurface final : public DisplaySurface {
   int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
   std::shared_ptr<const image::Legend> legend_;
   int legend_width_ = 0, legend_height_ = 0;  // of the window that the legend on display suits
-  int help_scale_ = 0;                        // of the overlay's letters; 0: it is not shown
+  struct Shown {
+    double at_s = -1e9;
+    int width = 0, height = 0;  // of the window
+    uint64_t overlays = 0;      // their version
+  };
+  Shown shown_;         // what is in the window
+  int help_scale_ = 0;  // of the overlay's letters; 0: it is not shown
   std::function<void(const std::string&)> tell_;
   Screenshots screenshots_;
 };

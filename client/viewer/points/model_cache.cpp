@@ -7,6 +7,9 @@
 namespace telesplat::viewer {
 namespace {
 
+// More changes than this between two frames are told as a change of everything: 1.5 MB.
+constexpr size_t kMostChanges = 1u << 16;
+
 template <class T>
 void move_to_end(std::vector<T>& from, std::vector<T>& to) {
   to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
@@ -22,6 +25,22 @@ void ModelCache::drop(Replica& replica) {
   dropped.models.push_back(std::move(replica.model));
 }
 
+void ModelCache::note_change(const geometry::Box& box) {
+  changes_.any = true;
+  if (changes_.everywhere) return;
+  if (changes_.boxes.size() < kMostChanges) return changes_.boxes.push_back(box);
+  note_replica();
+}
+
+void ModelCache::note_change(points::ClusterKey key) {
+  if (!changes_.everywhere) note_change(points::leaf_box(newest_.model->config(), key));
+}
+
+void ModelCache::note_replica() {
+  changes_.any = changes_.everywhere = true;
+  changes_.boxes.clear();
+}
+
 bool ModelCache::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence applied) {
   auto fresh = std::make_unique<points::PointModel>(config);
   const std::lock_guard lock(mutex_);
@@ -33,6 +52,7 @@ bool ModelCache::begin_replica(const points::ModelConfig& config, EpochId epoch,
   }
   newest_ = {std::move(fresh), epoch, applied, ++replicas_, {}, 0};
   wanted_.clear();
+  if (!older_.model) note_replica();
   return older_.model != nullptr;
 }
 
@@ -42,6 +62,8 @@ void ModelCache::insert(points::PreparedPatch patch, EpochId epoch) {
   CHECK(newest_.epoch == epoch || newest_.epoch.value == 0);
   newest_.epoch = epoch;
   newest_.applied = insertion.sequence;
+  changes_.any = true;
+  for (const auto& change : insertion.changes) note_change(change.key);
   auto replaced = newest_.model->commit(std::move(insertion));
   move_to_end(replaced, dropped_of(newest_.model.get()).mosaics);
   ++patches_;
@@ -51,6 +73,8 @@ void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> k
   const std::lock_guard lock(mutex_);
   auto dropped = frames.empty() ? newest_.model->take_out(keys) : newest_.model->take_out(keys, frames);
   newest_.applied = sequence;
+  changes_.any = true;
+  for (const points::ClusterKey key : keys) note_change(key);
   Dropped& place = dropped_of(newest_.model.get());
   move_to_end(dropped, place.clusters);
   for (const points::ClusterKey key : keys) {
@@ -65,7 +89,9 @@ void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> k
 
 void ModelCache::show_newest() {
   const std::lock_guard lock(mutex_);
-  if (older_.model) drop(older_);
+  if (!older_.model) return;
+  drop(older_);
+  note_replica();
 }
 
 void ModelCache::free_dropped() {
@@ -98,6 +124,7 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
     }
     place = std::move(summary);
     newest_.summary_bytes += place->bytes();
+    note_change(brick->second->box_room);
     ++summaries_made_;
     made.push_back(key);
   }
@@ -109,19 +136,37 @@ uint64_t ModelCache::digest() const {
   return newest_.model ? newest_.model->digest() : 0;
 }
 
-void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {
-  const std::lock_guard lock(mutex_);
+void ModelCache::select_displayed(const geometry::Camera& camera, const splat::SelectionOptions& options,
+                                  splat::DrawList& out) {
   const Replica& replica = displayed();
   if (replica.model)
     splat::select_view(*replica.model, camera, options, out, &replica.summaries);
   else
     out = {};
-  if (&replica == &newest_) wanted_ = out.summaries_wanted;
   out.applied = replica.applied;
   out.epoch = replica.epoch;
   out.replica = replica.number;
   out.summaries = summaries_made_;
   drawn_ = replica.model.get();
+}
+
+void ModelCache::select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out) {
+  const std::lock_guard lock(mutex_);
+  select_displayed(camera, options, out);
+  if (&displayed() == &newest_) wanted_ = out.summaries_wanted;
+}
+
+void ModelCache::select_part(const geometry::Camera& camera, const splat::SelectionOptions& options,
+                             splat::DrawList& out) {
+  const std::lock_guard lock(mutex_);
+  select_displayed(camera, options, out);
+}
+
+void ModelCache::take_changes(Changes& out) {
+  out.boxes.clear();
+  const std::lock_guard lock(mutex_);
+  std::swap(out, changes_);
+  changes_.any = changes_.everywhere = false;
 }
 
 void ModelCache::end_frame() {

@@ -42,9 +42,21 @@ class ModelCache {
   uint64_t digest() const;
 
   // ---- display thread ----
-  /// Selects what to draw of the replica on display. The list stays drawable until end_frame().
+  /// Selects what to draw of the replica on display. The list stays drawable until end_frame(), also if more is
+  /// selected before that.
   void select(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out);
+  /// The same for a part of the picture that is drawn more finely: what summaries it would like makes none.
+  void select_part(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out);
   void end_frame();
+
+  /// Where points came or went.
+  struct Changes {
+    bool any = false;                  ///< something happened, if only an event without points
+    bool everywhere = false;           ///< another replica is on display, or too much changed to tell
+    std::vector<geometry::Box> boxes;  ///< room space: clusters and bricks whose points changed; may repeat themselves
+  };
+  /// What happened since the last call. What is selected later may have more changes: the next call tells them.
+  void take_changes(Changes& out);
 
   // ---- any thread ----
   struct Figures {
@@ -74,6 +86,10 @@ class ModelCache {
   // Where to put what was part of a model: it waits for the end of the frame if that frame draws the model.
   Dropped& dropped_of(const points::PointModel* model) { return model == drawn_ ? parked_ : free_; }
   void drop(Replica& replica);
+  void select_displayed(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out);
+  void note_change(points::ClusterKey key);
+  void note_change(const geometry::Box& box);
+  void note_replica();
 
   mutable std::mutex mutex_;
   Replica newest_, older_;  // older_ only while it is on display in place of the newest
@@ -81,6 +97,7 @@ class ModelCache {
   Dropped parked_, free_;
   uint64_t replicas_ = 0, patches_ = 0, summaries_made_ = 0;
   std::vector<points::ClusterKey> wanted_;  // summaries of the newest replica
+  Changes changes_;
 };
 
 }  // namespace telesplat::viewer

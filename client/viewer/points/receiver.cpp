@@ -115,7 +115,8 @@ bool PointReceiver::apply_patch(const wire::Patch& patch) {
   }
   const double decoded = monotonic_s();
   epoch_ = patch.epoch;
-  auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_, patch.frame);
+  auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_,
+                                        points::tagged(patch.frame, patch.step));
   if (options_.hold)
     batches_.add(UpdateBatches::Insert{std::move(prepared), patch.epoch}, cache_);
   else
@@ -125,7 +126,8 @@ bool PointReceiver::apply_patch(const wire::Patch& patch) {
   spans_.add("insert", links_.to_master_s(decoded), links_.to_master_s(inserted), 1);
   points_received_ += patch.kept;
   if (!options_.hold) {
-    switch_.on_part({patch.epoch, patch.step, patch.frame_complete, patch.viewer == options_.viewer}, inserted);
+    const bool complete = patch.frame_complete && !patch.extra;
+    switch_.on_part({patch.epoch, patch.step, complete, patch.viewer == options_.viewer}, inserted);
     tick(inserted);
   }
   links_.on_part(part_of(patch));

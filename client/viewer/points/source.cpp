@@ -10,6 +10,24 @@ namespace {
 
 // What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
 constexpr double kBudgetShare = 0.85;
+// Of a frame's time, for sub-pixels. The samplers of a small machine need the rest: a head that has just come to rest
+// is when they have the most to do.
+constexpr double kStillShare = 0.5;
+// A camera that is the same for so many frames stands still.
+constexpr int kStillFrames = 4;
+// Where frames are not paced.
+constexpr double kStillPeriod_s = 1.0 / 60;
+// A frame whose time is over all the same saves so much for the next tile.
+constexpr double kLeastRefining_s = 0.5e-3;
+// What is on display but is not drawn again is told so often as seen: packers forget what nobody sees.
+constexpr double kSeenPeriod_s = 0.5;
+
+int still_side(const DisplayOptions& o) { return o.still_samples >= 16 ? 4 : 2; }
+
+bool same_look(const Look& a, const Look& b) {
+  return a.render.kernel == b.render.kernel && a.lit == b.lit &&
+         splat::finish_bits(a.render.finish) == splat::finish_bits(b.render.finish);
+}
 
 }  // namespace
 
@@ -18,7 +36,8 @@ PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer
       renderer_(std::move(renderer)),
       received_(received),
       budget_(options.detail_budget && options.target_fps > 0 ? kBudgetShare * 1e3 / options.target_fps : 0,
-              options.least_detail) {}
+              options.least_detail),
+      supersampler_(*renderer_, still_side(options)) {}
 
 // Splats that soften their edges let the background through; which is known from drawing the same over another one.
 void PointSource::find_coverage(const FrameInput& input, image::View& view) {
@@ -31,52 +50,140 @@ void PointSource::find_coverage(const FrameInput& input, image::View& view) {
   image::find_coverage(over_white_, view);
 }
 
-DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
-  auto& o = options_;
-  const geometry::Camera& camera = input.camera;
-  o.shading.lit = input.look.lit;
-  o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(input.look.render.kernel);
-  o.selection.best_patch_only = received_.keeps_redundant();
-  if (!input.resting) {
-    if (o.speed_detail) speed_.frame(input.begin_s, camera, list_.distance_m > 0 ? list_.distance_m : 1);
-    o.selection.detail = float(std::min(budget_.detail(), speed_.detail()));
+bool PointSource::stands_still(const FrameInput& input) {
+  const bool same = !input.resting && input.camera == camera_ && same_look(input.look, look_);
+  same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
+  camera_ = input.camera;
+  look_ = input.look;
+  const bool refines = options_.still_samples > 1 && input.look.render.finish.antialias && !options_.transparent;
+  if (!refines || same_frames_ < kStillFrames) {
+    still_shading_.reset();
+    return false;
   }
-  received_.cache().select(camera, o.selection, list_);
-  DrawnFrame out;
-  out.empty = list_.points == 0;
-  out.chosen_s = monotonic_s();
-  splat::SplatStats stats;
-  if (!out.empty || input.even_empty)
-    stats = renderer_->render(
-        list_, camera, input.look.render, image::Shading(o.shading, camera),
-        {camera.width, camera.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr});
-  const double end_s = monotonic_s();
-  if (input.with_coverage) find_coverage(input, view);
-  received_.cache().end_frame();
-  if (!input.resting) {
-    // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
-    const double work_ms = stats.prepare_ms + (stats.project_ms + stats.resolve_ms + stats.fill_ms + stats.smooth_ms +
-                                               stats.antialias_ms) /
-                                                  std::max(o.threads, 1);
-    budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, std::min((end_s - out.chosen_s) * 1e3, work_ms),
-                       double(list_.points), o.selection.detail);
-    received_.on_seen(list_.clusters_seen, list_.frames_seen);
+  if (!still_shading_) {
+    still_shading_.emplace(options_.shading, input.camera);
+    still_.begin(input.camera);
+    changes_.any = true;
+  } else {
+    still_.on_changes(changes_);
   }
+  return true;
+}
+
+void PointSource::select(const FrameInput& input, double detail, DrawnFrame& out) {
+  options_.selection.detail = float(detail);
+  received_.cache().select(input.camera, options_.selection, list_);
+  out.chosen_s = seen_s_ = monotonic_s();
+  if (!input.resting) received_.on_seen(list_.clusters_seen, list_.frames_seen);
+}
+
+void PointSource::draw_list(const FrameInput& input, const image::Shading& shading, image::View& view,
+                            DrawnFrame& out) {
+  const splat::SplatStats stats = renderer_->render(
+      list_, input.camera, input.look.render, shading,
+      {view.width, view.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr});
+  out.prepare_ms = stats.prepare_ms;
   out.project_cpu_ms = stats.project_ms;
   out.resolve_cpu_ms = stats.resolve_ms;
   out.fill_cpu_ms = stats.fill_ms;
   out.smooth_cpu_ms = stats.smooth_ms;
   out.antialias_cpu_ms = stats.antialias_ms;
+  drawn_ = stats.points_drawn;
+}
+
+void PointSource::draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out) {
+  if (!input.resting && options_.speed_detail)
+    speed_.frame(input.begin_s, input.camera, list_.distance_m > 0 ? list_.distance_m : 1);
+  const double detail = std::min(budget_.detail(), speed_.detail());
+  select(input, input.resting ? 1.0 : detail, out);
+  if (list_.points > 0 || input.even_empty) draw_list(input, image::Shading(options_.shading, input.camera), view, out);
+  if (input.resting) return;
+  // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
+  const double end_s = monotonic_s();
+  const double threads_ms =
+      out.project_cpu_ms + out.resolve_cpu_ms + out.fill_cpu_ms + out.smooth_cpu_ms + out.antialias_cpu_ms;
+  const double work_ms = out.prepare_ms + threads_ms / std::max(options_.threads, 1);
+  budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, std::min((end_s - out.chosen_s) * 1e3, work_ms),
+                     double(list_.points), detail);
+}
+
+void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFrame& out) {
+  out.chosen_s = input.begin_s;
+  base_stale_ |= changes_.any;
+  const bool base = input.with_depth || (!still_.covers_all() && (base_stale_ || !input.intact));
+  if (base || changes_.any) select(input, 1, out);
+  if (base) {
+    draw_list(input, *still_shading_, view, out);
+    base_stale_ = false;
+  }
+  out.changed = base || !input.intact;
+  if (out.changed) still_.put_over(view);
+  refine(input, view, out);
+  if (input.begin_s - seen_s_ < kSeenPeriod_s) return;
+  seen_s_ = input.begin_s;
+  received_.on_seen(list_.clusters_seen, list_.frames_seen);
+}
+
+void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame& out) {
+  const double period_s = options_.target_fps > 0 ? 1 / options_.target_fps : kStillPeriod_s;
+  const double begin_s = monotonic_s(), until_s = input.begin_s + kStillShare * period_s;
+  // Tiles that take longer than there is time in a frame are drawn in every second frame, or more seldom.
+  saved_s_ = std::min(saved_s_ + std::max(until_s - begin_s, kLeastRefining_s), tile_s_);
+  const Supersampler::Scene scene{
+      [this](const geometry::Camera& camera, const splat::SelectionOptions& selection, splat::DrawList& list) {
+        received_.cache().select_part(camera, selection, list);
+      },
+      options_.selection, input.look.render, *still_shading_};
+  for (double now_s = begin_s;;) {
+    const auto tile = still_.next(now_s);
+    if (!tile || (now_s + tile_s_ > until_s && (now_s > begin_s || saved_s_ < tile_s_))) break;
+    saved_s_ = 0;
+    const double share = still_.share();
+    const bool drawn =
+        supersampler_.draw(scene, input.camera, still_.rect(*tile), still_.pixels(*tile), size_t(input.camera.width));
+    const double end_s = monotonic_s();
+    still_.done(*tile, drawn, end_s);
+    if (drawn) {
+      still_.put_over(view, *tile);
+      out.changed = true;
+      tile_s_ = tile_s_ == 0 ? end_s - now_s : 0.8 * tile_s_ + 0.2 * (end_s - now_s);
+    }
+    base_stale_ |= still_.share() < share;  // it has lost its pixels: the picture below is to be seen again
+    now_s = end_s;
+    out.refine_ms = (end_s - begin_s) * 1e3;
+  }
+  out.refined = still_.share();
+  out.sub_pixels = supersampler_.side();
+}
+
+void PointSource::add_figures(DrawnFrame& out) const {
+  out.empty = list_.points == 0;
   out.selected = list_.points;
-  out.drawn = stats.points_drawn;
+  out.drawn = out.empty ? 0 : drawn_;
   out.items = list_.items.size();
   out.cached = received_.cache().figures().points_displayed;
   out.sequence = list_.applied.value;
   out.summaries = list_.summaries;
-  out.detail = o.selection.detail;
+  out.detail = options_.selection.detail;
   out.budget_ms = budget_.budget_ms();
   out.epoch = list_.epoch;
   out.update = received_.shown();
+}
+
+DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
+  auto& o = options_;
+  o.shading.lit = input.look.lit;
+  o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(input.look.render.kernel);
+  o.selection.best_patch_only = received_.keeps_redundant();
+  DrawnFrame out;
+  received_.cache().take_changes(changes_);
+  if (stands_still(input))
+    draw_still(input, view, out);
+  else
+    draw_moving(input, view, out);
+  if (input.with_coverage) find_coverage(input, view);
+  received_.cache().end_frame();
+  add_figures(out);
   return out;
 }
 

@@ -4,11 +4,14 @@
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/view_source.h"
 #include "client/viewer/points/received_points.h"
-#include "client/viewer/render/renderer.h"
+#include "client/viewer/points/still_picture.h"
+#include "client/viewer/render/supersampler.h"
 #include "common/splat/select/frame_budget.h"
 
 namespace telesplat::viewer {
 
+/// While the camera and the look stay the same, the picture is refined with sub-pixels, tile by tile, within a share of
+/// each frame's time, and nothing is drawn that is in the view already.
 class PointSource final : public ViewSource {
  public:
   PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ReceivedPoints& received);
@@ -19,7 +22,14 @@ class PointSource final : public ViewSource {
   const char* cached_name() const override { return ""; }
 
  private:
+  bool stands_still(const FrameInput& input);
+  void select(const FrameInput& input, double detail, DrawnFrame& out);
+  void draw_list(const FrameInput& input, const image::Shading& shading, image::View& view, DrawnFrame& out);
+  void draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out);
+  void draw_still(const FrameInput& input, image::View& view, DrawnFrame& out);
+  void refine(const FrameInput& input, image::View& view, DrawnFrame& out);
   void find_coverage(const FrameInput& input, image::View& view);
+  void add_figures(DrawnFrame& out) const;
 
   DisplayOptions options_;
   std::unique_ptr<Renderer> renderer_;
@@ -28,6 +38,18 @@ class PointSource final : public ViewSource {
   splat::FrameBudget budget_;
   splat::SpeedDetail speed_;
   splat::DrawList list_;
+  uint64_t drawn_ = 0;  // points of it
+
+  // Since when the camera stands still, and what was drawn since then.
+  geometry::Camera camera_;
+  Look look_;
+  int same_frames_ = 0;
+  ModelCache::Changes changes_;
+  StillPicture still_;
+  Supersampler supersampler_;
+  std::optional<image::Shading> still_shading_;  // none: no still picture has begun
+  bool base_stale_ = true;  // the picture without sub-pixels, wherever the view shows it, is not of the model as it is
+  double tile_s_ = 0, saved_s_ = 0, seen_s_ = 0;
 };
 
 }  // namespace telesplat::viewer

@@ -99,7 +99,8 @@ struct EventReplay::Impl {
   Status apply(const wire::Patch& p) {
     const std::span bytes(reinterpret_cast<const uint8_t*>(p.image.data()), p.image.size());
     if (const Status s = codec::decode_into(tile, bytes, p.rect.width, p.rect.height); !s) return wrong(s.error().text);
-    model->insert(points::prepare_patch(model->config(), p.sequence, p.camera, p.rect, tile, p.frame));
+    model->insert(
+        points::prepare_patch(model->config(), p.sequence, p.camera, p.rect, tile, points::tagged(p.frame, p.step)));
     return ok_status();
   }
   Status apply(const wire::Forget& f) {

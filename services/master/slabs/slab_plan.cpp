@@ -150,7 +150,7 @@ bool SlabPlan::may_begin(const Idle& idle) {
   return wanted && schedule_.view_waiting();
 }
 
-bool SlabPlan::begin(EpochId epoch, bool turns_only) {
+bool SlabPlan::begin(EpochId epoch, bool turns_only, double /*now_s*/) {
   return schedule_.begin_frame(epoch, partitions_.in_use(), turns_only);
 }
 

@@ -30,7 +30,7 @@ class SlabPlan final : public Plan {
   void put_aside() override;
   void prepare(double now_s) override;
   bool may_begin(const Idle& idle) override;
-  bool begin(EpochId epoch, bool turns_only) override;
+  bool begin(EpochId epoch, bool turns_only, double now_s) override;
   void give_leases(Idle& idle, double now_s) override;
   void extend(LeaseId lease, double now_s) override { schedule_.extend(lease, now_s); }
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override;

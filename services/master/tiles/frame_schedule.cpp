@@ -6,20 +6,41 @@
 
 namespace telesplat::master {
 
-bool FrameSchedule::begin_view(EpochId epoch, bool turns_only) {
-  const auto request = take_view(turns_only);
+bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
+  const bool steered = plans_.on(now_s);
+  // The plan of a viewer's next view must know the samples of the one before.
+  const auto request = take_view(turns_only, steered ? InFlight::kOneAViewer : InFlight::kAny);
   if (!request) return false;
-  if (cut_.coarse) begin_frame(epoch, *request, kCoarseStep);
-  begin(begin_frame(epoch, *request, 1), {*request});
+  close_extras(now_s);
+  PlannedView view{.epoch = epoch, .view = *request};
+  if (cut_.coarse) view.coarse = next_frame();
+  view.frame = next_frame();
+  begin(view.frame, {*request});
+  if (steered) {
+    questions_.push_back(plans_.ask(view, limits(), now_s));
+  } else {
+    plans_.begin_unplanned(view);
+    begin_whole(view);
+  }
   return true;
 }
 
-FrameId FrameSchedule::begin_frame(EpochId epoch, const wire::ViewRequest& request, int step) {
-  const geometry::Camera camera = step == 1 ? request.camera : geometry::subsample(request.camera, step);
+void FrameSchedule::begin_whole(const PlannedView& view) {
+  if (view.coarse.value != 0) begin_frame(view, view.coarse, kCoarseStep);
+  begin_frame(view, view.frame, 1);
+}
+
+void FrameSchedule::begin_frame(const PlannedView& view, FrameId id, int step) {
+  const geometry::Camera camera = step == 1 ? view.view.camera : geometry::subsample(view.view.camera, step);
   auto tiles = cut_.rows ? FrameTiles::of_rows(camera.width, camera.height)
                          : FrameTiles::of_squares(camera.width, camera.height, options().tile_size);
-  frames_.push_back({next_frame(), epoch, request, step, camera, std::move(tiles)});
-  return frames_.back().id;
+  insert({id, view.epoch, view.view, step, camera, std::move(tiles)});
+}
+
+void FrameSchedule::insert(Frame frame) {
+  const auto place = frame.extra ? frames_.end()
+                                 : std::find_if(frames_.begin(), frames_.end(), [](const Frame& f) { return f.extra; });
+  frames_.insert(place, std::move(frame));
 }
 
 bool FrameSchedule::tile_open() const {
@@ -27,26 +48,31 @@ bool FrameSchedule::tile_open() const {
 }
 
 bool FrameSchedule::backup_due(double now_s) const {
-  const double before_s = now_s - backup_after_s();
-  return std::any_of(frames_.begin(), frames_.end(),
-                     [&](const Frame& f) { return !f.tiles.open() && f.tiles.overdue(before_s, nullptr); });
+  return std::any_of(frames_.begin(), frames_.end(), [&](const Frame& f) {
+    return !f.extra && !f.tiles.open() && f.tiles.overdue(now_s - backup_after_s(f.planned), nullptr);
+  });
+}
+
+double FrameSchedule::target_s() const {
+  return std::max(options().lease_target_s, kTargetPerSampler_s * double(costs_.samplers()));
 }
 
 std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, double now_s, bool even_own, bool idle) {
   costs_.join(sampler);
   const double pixel_s = costs_.pixel_s(sampler);
-  const double target_s = std::max(options().lease_target_s, kTargetPerSampler_s * double(costs_.samplers()));
+  const auto extras = std::find_if(frames_.rbegin(), frames_.rend(), [](const Frame& f) { return !f.extra; });
+  const Frame* newest = extras == frames_.rend() ? nullptr : &*extras;  // of views
   for (Frame& f : frames_) {
     const double row_s = pixel_s * f.camera.width;
     // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would
     // keep all waiting.
-    const bool last = &f == &frames_.back() && f.tiles.rows_left() > 0 && f.tiles.rows_left() <= int(costs_.samplers());
+    const bool last = &f == newest && f.tiles.rows_left() > 0 && f.tiles.rows_left() <= int(costs_.samplers());
     if (last && !idle && (row_s == 0 || row_s > kDearRow_s) && leases_of(sampler) > 0) continue;
-    const int rows = band_rows(target_s, row_s, f.tiles.rows_left(), costs_.samplers());
+    const int rows = band_rows(target_s(), row_s, f.tiles.rows_left(), costs_.samplers());
     if (const auto tile = f.tiles.take(sampler, rows, even_own)) return lease_tile(f, *tile, sampler, now_s);
-    if (f.tiles.open()) continue;
+    if (f.tiles.open() || f.extra) continue;
     // A frame is finished before the next is fed: what is out too long gets a second sampler.
-    if (const auto tile = f.tiles.overdue(now_s - backup_after_s(), &sampler)) {
+    if (const auto tile = f.tiles.overdue(now_s - backup_after_s(f.planned), &sampler)) {
       ++backups_;
       return lease_tile(f, *tile, sampler, now_s);
     }
@@ -56,8 +82,9 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
 
 wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& sampler, double now_s) {
   const LeaseId id = next_lease();
-  f.tiles.lease(tile, id, sampler, now_s, now_s + lease_time_s());
+  f.tiles.lease(tile, id, sampler, now_s, now_s + lease_time_s(f.planned));
   const auto& t = f.tiles.tile(tile);
+  const auto mask = f.tiles.mask(t);
   return {.lease = id,
           .frame = f.id,
           .epoch = f.epoch,
@@ -70,6 +97,10 @@ wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& 
           .camera = f.camera,
           .rect = t.rect,
           .block_rect = f.tiles.blocks()[t.block],
+          .extra = f.extra,
+          .rays = t.rays,
+          .mask = {mask.begin(), mask.end()},
+          .footprint = f.request.footprint > 0 ? f.request.footprint : 1 / f.request.camera.focal_x(),
           .leased_s = now_s};
 }
 
@@ -89,34 +120,40 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   for (const LeaseId id : f->tiles.tile(m.tile).leases)
     if (const auto* out = f->tiles.out(id); out && id != m.lease) overtaken_[id] = {out->sampler, out->expires_s};
   if (!f->tiles.done(m.tile)) return false;
-  if (took_s) tile_time_s_.add(*took_s);
-  const auto& rect = f->tiles.tile(m.tile).rect;
-  costs_.learn(sampler, m.encode_end_s - m.sample_begin_s, double(rect.width) * rect.height);
-  if (f->tiles.complete()) end_frame(f);
+  if (took_s) (f->planned ? planned_time_s_ : tile_time_s_).add(*took_s);
+  // A sampler that cannot read a mask casts all.
+  const auto& tile = f->tiles.tile(m.tile);
+  const uint64_t all = uint64_t(tile.rect.width) * uint64_t(tile.rect.height);
+  costs_.learn(sampler, m.encode_end_s - m.sample_begin_s, double(std::clamp(m.rays, tile.rays, all)));
+  if (!f->tiles.complete()) return true;
+  if (f->planned && !f->extra)
+    refining_.learn(now_s - f->begun_s, f->refining, f->put_off, std::max<size_t>(costs_.samplers(), 1));
+  end_frame(f);
   return true;
 }
 
-void FrameSchedule::end_frame(std::deque<Frame>::iterator frame) {
-  const bool whole = frame->step == 1;
-  const auto viewer = frame->request.viewer;
-  const auto request = frame->request.request;
-  if (whole) complete(frame->id);
+std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<Frame>::iterator frame) {
+  const bool view = frame->step == 1 && !frame->extra;
+  const PlannedView ended{.frame = frame->id, .epoch = frame->epoch, .view = frame->request};
+  if (!view) return frames_.erase(frame);
   frames_.erase(frame);
-  if (!whole) return;
+  view_complete(ended);
   // A coarse frame that is not there yet shows nothing any more.
   std::erase_if(frames_, [&](const Frame& f) {
-    return f.step != 1 && f.request.viewer == viewer && f.request.request == request;
+    return f.step != 1 && f.request.viewer == ended.view.viewer && f.request.request == ended.view.request;
   });
+  return frames_.end();
 }
 
-double FrameSchedule::lease_time_s() const {
+double FrameSchedule::lease_time_s(bool planned) const {
   const double longest_s = options().lease_timeout_s;
-  return tile_time_s_.known() ? std::clamp(25 * tile_time_s_.value(), std::min(0.3, longest_s), longest_s) : longest_s;
+  const RunningMean& typical = planned ? planned_time_s_ : tile_time_s_;
+  return typical.known() ? std::clamp(25 * typical.value(), std::min(0.3, longest_s), longest_s) : longest_s;
 }
 
-double FrameSchedule::backup_after_s() const {
-  return tile_time_s_.known() ? std::max(3 * tile_time_s_.value(), kLeastOverdue_s)
-                              : std::numeric_limits<double>::infinity();
+double FrameSchedule::backup_after_s(bool planned) const {
+  const RunningMean& typical = planned ? planned_time_s_ : tile_time_s_;
+  return typical.known() ? std::max(3 * typical.value(), kLeastOverdue_s) : std::numeric_limits<double>::infinity();
 }
 
 void FrameSchedule::heard_of(const std::string& sampler) {
@@ -132,6 +169,7 @@ int FrameSchedule::expire(double now_s, const std::function<void(const std::stri
     return true;
   }));
   released_ += uint64_t(count);
+  end_closed();
   return count;
 }
 
@@ -141,6 +179,7 @@ int FrameSchedule::release_sampler(const std::string& sampler) {
   for (Frame& f : frames_) count += f.tiles.release(sampler);
   count += int(std::erase_if(overtaken_, [&](const auto& o) { return o.second.sampler == sampler; }));
   released_ += uint64_t(count);
+  end_closed();
   return count;
 }
 
@@ -153,10 +192,15 @@ size_t FrameSchedule::leases_of(const std::string& sampler) const {
 
 void FrameSchedule::drop_frames() {
   // Newest first, each view once.
+  const auto& open = plans_.open();
+  for (auto asked = open.rbegin(); asked != open.rend(); ++asked)
+    if (!asked->request.extra) put_back(asked->view.frame);
   for (auto f = frames_.rbegin(); f != frames_.rend(); ++f)
-    if (f->step == 1) put_back(f->id);
+    if (f->step == 1 && !f->extra) put_back(f->id);
   frames_.clear();
   overtaken_.clear();
+  plans_.clear();
+  questions_.clear();
 }
 
 }  // namespace telesplat::master

@@ -10,6 +10,8 @@
 
 #include "common/wire/messages.h"
 #include "services/master/tiles/frame_tiles.h"
+#include "services/master/tiles/plan_questions.h"
+#include "services/master/tiles/refining_rays.h"
 #include "services/master/tiles/sampling_costs.h"
 #include "services/master/views.h"
 
@@ -27,10 +29,16 @@ inline constexpr double kTargetPerSampler_s = 0.25e-3;
 /// scaling`).
 inline constexpr double kDearRow_s = 0.01;
 
+/// What all samplers together should take for the tiles of an extra frame: a view that comes waits for what is out.
+inline constexpr double kExtraFrame_s = 0.05;
+/// When a view begins, open tiles of an extra frame that is older are dropped.
+inline constexpr double kExtraPatience_s = 0.25;
+
 /// How the frames of a scene are leased.
 struct Cut {
-  bool rows = false;    ///< bands of rows of blocks instead of square tiles
-  bool coarse = false;  ///< a view is two frames: one of step kCoarseStep, then one of step 1
+  bool rows = false;     ///< bands of rows of blocks instead of square tiles
+  bool coarse = false;   ///< a view is two frames: one of step kCoarseStep, then one of step 1
+  bool steered = false;  ///< the packer is asked first which rays are needed; rows and coarse are for what it leaves
   bool operator==(const Cut&) const = default;
 };
 
@@ -39,11 +47,32 @@ class FrameSchedule : public Views {
   explicit FrameSchedule(const ScheduleOptions& options) : Views(options) {}
 
   /// For frames that begin from now on.
-  void set_cut(Cut cut) { cut_ = cut; }
+  void set_cut(Cut cut) {
+    cut_ = cut;
+    plans_.set_on(cut.steered);
+  }
   Cut cut() const { return cut_; }
 
-  /// Begins the frame or frames of the next view that waits; see Views::take_view(). False: there is none.
-  bool begin_view(EpochId epoch, bool turns_only = false);
+  /// Begins the next view that waits; see Views::take_view(). Its frame or frames follow at once, or with its plan.
+  /// False: there is none.
+  bool begin_view(EpochId epoch, bool turns_only = false, double now_s = 0);
+
+  /// Asks what is worth casting beyond the views: when there is nothing else to do, and for every second view of a
+  /// viewer that always has another one waiting.
+  void begin_extra(EpochId epoch, double now_s);
+  /// Questions for the packer, in order, each once.
+  std::vector<wire::PlanRequest> take_questions() { return std::exchange(questions_, {}); }
+  /// The packer's answer. What nobody waits for is dropped. Error: it does not fit what was asked (check_answer()), and
+  /// counts as full.
+  Status take_plan(const wire::Plan& plan, double now_s);
+  /// Samples whole what waited too long for its plan.
+  void give_up_plans(double now_s);
+  /// What came of plans since the last call.
+  std::vector<metrics::PlanRow> take_plan_rows() { return std::exchange(plan_rows_, {}); }
+  bool steered(double now_s) const { return plans_.on(now_s); }
+  /// There is another packer.
+  void trust_packer() { plans_.trust(); }
+  void forget_viewer(InstanceId viewer) override;
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been
   /// out for long in a frame that has none (see backup_after_s()). The newest frame's last rows, one a sampler, go only
@@ -64,7 +93,8 @@ class FrameSchedule : public Views {
   /// Takes back all leases of a sampler that left. Returns how many.
   int release_sampler(const std::string& sampler);
   size_t leases_of(const std::string& sampler) const;
-  /// Drops all frames (new epoch, new packer). Their views wait again, unless a newer request of the viewer does.
+  /// Drops all frames and plans (new epoch, new packer). Their views wait again, unless a newer request of the viewer
+  /// does.
   void drop_frames();
 
   bool tile_open() const;
@@ -73,12 +103,14 @@ class FrameSchedule : public Views {
   size_t frames_in_flight() const { return frames_.size(); }
   uint64_t tiles_released() const { return released_; }
   uint64_t backups() const { return backups_; }
+  size_t viewers_remembered() const { return plans_.viewers(); }
   const SamplingCosts& costs() const { return costs_; }
-  /// Seconds after which a lease expires now: 25 typical tile times, within [0.3, lease_timeout_s].
-  double lease_time_s() const;
+  /// Seconds after which a lease expires now: 25 typical tile times, within [0.3, lease_timeout_s]. planned: of a tile
+  /// of a plan.
+  double lease_time_s(bool planned = false) const;
   /// Seconds after which a tile that is out may be leased to another sampler too: 3 typical tile times, at least
   /// kLeastOverdue_s; never while nothing is known.
-  double backup_after_s() const;
+  double backup_after_s(bool planned = false) const;
 
  private:
   struct Frame {
@@ -88,21 +120,41 @@ class FrameSchedule : public Views {
     int step = 1;
     geometry::Camera camera;
     FrameTiles tiles;
+    bool planned = false;              // the tiles are a plan's
+    bool extra = false;                // of rays beyond a view
+    double begun_s = 0;                // its plan came
+    double refining = 0, put_off = 0;  // RefiningRays::learn()
   };
   // A lease whose tile another sampler delivered first; its own may be dead or slow.
   struct Overtaken {
     std::string sampler;
     double expires_s;
   };
-  FrameId begin_frame(EpochId epoch, const wire::ViewRequest& request, int step);
-  void end_frame(std::deque<Frame>::iterator frame);
+  void begin_frame(const PlannedView& view, FrameId id, int step);
+  void begin_whole(const PlannedView& view);
+  void take_answer(const wire::Plan& plan, double now_s);
+  void begin_planned(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
+  /// Views stand before extra frames.
+  void insert(Frame frame);
+  void close_extras(double now_s);
+  void view_complete(const PlannedView& view);
+  void note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
+  PlanLimits limits() const;
+  double target_s() const;
+  std::deque<Frame>::iterator end_frame(std::deque<Frame>::iterator frame);
+  void end_closed();
   wire::Lease lease_tile(Frame& frame, size_t tile, const std::string& sampler, double now_s);
 
   Cut cut_;
-  std::deque<Frame> frames_;
+  PlanQuestions plans_;
+  std::vector<wire::PlanRequest> questions_;
+  std::vector<metrics::PlanRow> plan_rows_;
+  std::deque<Frame> frames_;  // extra ones last
   std::map<LeaseId, Overtaken> overtaken_;
   SamplingCosts costs_;
-  RunningMean tile_time_s_{0.05};  // lease -> done
+  RefiningRays refining_;
+  RunningMean tile_time_s_{0.05};     // lease -> done
+  RunningMean planned_time_s_{0.05};  // the same of tiles of plans, which have few rays
   uint64_t released_ = 0, backups_ = 0;
 };
 

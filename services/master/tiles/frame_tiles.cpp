@@ -19,6 +19,12 @@ std::vector<geometry::Rect> cut_tiles(int width, int height, int tile_size) {
   return out;
 }
 
+namespace {
+
+uint64_t pixels(const geometry::Rect& rect) { return uint64_t(rect.width) * uint64_t(rect.height); }
+
+}  // namespace
+
 FrameTiles FrameTiles::of_squares(int width, int height, int tile_size) {
   // A hostile viewer could ask for a frame of very many tiles; larger tiles keep the count bounded.
   while (uint64_t((width + tile_size - 1) / tile_size) * uint64_t((height + tile_size - 1) / tile_size) > 1024)
@@ -26,7 +32,10 @@ FrameTiles FrameTiles::of_squares(int width, int height, int tile_size) {
   FrameTiles out;
   out.blocks_ = cut_tiles(width, height, tile_size);
   out.tiles_.resize(out.blocks_.size());
-  for (size_t i = 0; i < out.tiles_.size(); ++i) out.tiles_[i].rect = out.blocks_[i], out.tiles_[i].block = i;
+  for (size_t i = 0; i < out.tiles_.size(); ++i) {
+    Tile& t = out.tiles_[i];
+    t.rect = out.blocks_[i], t.block = i, t.rays = pixels(t.rect);
+  }
   return out;
 }
 
@@ -37,13 +46,35 @@ FrameTiles FrameTiles::of_rows(int width, int height) {
   return out;
 }
 
+FrameTiles FrameTiles::of_plan(const wire::Plan& plan) {
+  FrameTiles out;
+  size_t words = 0;
+  for (size_t i = 0; i < plan.tiles.size(); i += wire::kPlanNumbers) {
+    const uint32_t* n = &plan.tiles[i];
+    Tile t;
+    t.rect = {int(n[0]), int(n[1]), int(n[2]), int(n[3])};
+    t.block = out.blocks_.size();
+    t.rays = n[4];
+    t.mask_begin = words, t.mask_words = n[5];
+    words += n[5];
+    out.blocks_.push_back(t.rect);
+    out.tiles_.push_back(std::move(t));
+  }
+  CHECK(words == plan.masks.size());
+  out.masks_ = plan.masks;
+  return out;
+}
+
 std::optional<size_t> FrameTiles::take(const std::string& sampler, int rows, bool even_own) {
+  if (closed_) return std::nullopt;
   for (const size_t i : reopened_)
     if (tiles_[i].given_up_by != sampler) return i;
   if (unleased_ < tiles_.size()) return unleased_;
   if (rows_.rows_left() > 0) {
     const auto band = rows_.carve(rows);
-    tiles_.push_back({band.rect, band.block, Tile::State::kOpen, {}, {}});
+    Tile t;
+    t.rect = band.rect, t.block = band.block, t.rays = pixels(band.rect);
+    tiles_.push_back(std::move(t));
     return tiles_.size() - 1;
   }
   if (even_own && !reopened_.empty()) return *reopened_.begin();

@@ -7,11 +7,13 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "common/core/ids.h"
+#include "common/wire/tile_messages.h"
 #include "services/master/tiles/row_bands.h"
 
 namespace telesplat::master {
@@ -25,13 +27,17 @@ class FrameTiles {
   static FrameTiles of_squares(int width, int height, int tile_size);
   /// Bands of rows, carved when they are taken.
   static FrameTiles of_rows(int width, int height);
+  /// The tiles of a plan, in its order, each a block of its own. Precondition: wire::check(plan).
+  static FrameTiles of_plan(const wire::Plan& plan);
 
   struct Tile {
     geometry::Rect rect;
     size_t block = 0;
     enum class State { kOpen, kLeased, kDone } state = State::kOpen;
-    std::array<LeaseId, 2> leases;  ///< that are out; 0: none. The second is a backup
-    std::string given_up_by;        ///< whose lease ran out
+    std::array<LeaseId, 2> leases;          ///< that are out; 0: none. The second is a backup
+    std::string given_up_by;                ///< whose lease ran out
+    uint64_t rays = 0;                      ///< to be cast
+    size_t mask_begin = 0, mask_words = 0;  ///< in masks_; none: all pixels
   };
   /// A lease that is out.
   struct Out {
@@ -42,12 +48,18 @@ class FrameTiles {
     double expires_s;
   };
 
-  bool open() const { return !reopened_.empty() || unleased_ < tiles_.size() || rows_.rows_left() > 0; }
-  bool complete() const { return done_ == tiles_.size() && rows_.rows_left() == 0; }
+  bool open() const { return !closed_ && (!reopened_.empty() || unleased_ < tiles_.size() || rows_.rows_left() > 0); }
+  bool complete() const { return closed_ ? out_.empty() : done_ == tiles_.size() && rows_.rows_left() == 0; }
+  /// Open tiles are not wanted any more; what is out may still come.
+  void close() { closed_ = true; }
   int rows_left() const { return rows_.rows_left(); }
   const Tile& tile(size_t i) const { return tiles_[i]; }
   size_t tiles() const { return tiles_.size(); }
   const std::vector<geometry::Rect>& blocks() const { return blocks_; }
+  /// See wire::Lease::mask.
+  std::span<const uint32_t> mask(const Tile& tile) const {
+    return std::span(masks_).subspan(tile.mask_begin, tile.mask_words);
+  }
 
   /// A tile to lease to `sampler`: first those taken back, then those never leased, carved with `rows` rows. Tiles
   /// whose lease ran out at this very sampler only if even_own. The tile counts as leased from lease() on, which must
@@ -77,7 +89,9 @@ class FrameTiles {
 
   std::vector<geometry::Rect> blocks_;
   std::vector<Tile> tiles_;
+  std::vector<uint32_t> masks_;
   RowBands rows_;
+  bool closed_ = false;
   size_t unleased_ = 0;                           // tiles before it were leased at least once
   std::set<size_t> reopened_;                     // of these, the open ones
   std::map<LeaseId, Out> out_;                    // oldest first

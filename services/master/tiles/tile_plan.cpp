@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/core/log.h"
+#include "common/metrics/run_record.h"
 #include "services/master/outbox.h"
 
 namespace telesplat::master {
@@ -19,7 +20,10 @@ Result<Adopted> TilePlan::adopt(const wire::Hello& data, double /*now_s*/) {
   Adopted out{.changed = scene_.adopt(data, problem)};
   out.changed |= colours_.adopt(data, problem);
   if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
-  const Cut cut{scene_.is_julia(), master::progressive(options_, scene::kind_named(scene_.kind()))};
+  const auto kind = scene::kind_named(scene_.kind());
+  const Cut cut{.rows = scene_.is_julia(),
+                .coarse = master::progressive(options_, kind),
+                .steered = master::steers(options_, kind)};
   out.changed |= cut != schedule_.cut();
   schedule_.set_cut(cut);
   return out;
@@ -59,6 +63,48 @@ void TilePlan::add_status(nlohmann::ordered_json& status) const {
   if (const std::string waits = colours_.waits_for(); !waits.empty()) status["colouring_order"] = waits;
 }
 
+void TilePlan::new_packer() {
+  schedule_.trust_packer();
+  schedule_.drop_frames();
+}
+
+void TilePlan::prepare(double now_s) {
+  schedule_.give_up_plans(now_s);
+  record_plans();
+}
+
+bool TilePlan::begin(EpochId epoch, bool turns_only, double now_s) {
+  const bool begun = schedule_.begin_view(epoch, turns_only, now_s);
+  ask_packer();
+  return begun;
+}
+
+// What is only beyond views is not for animations: their next epoch has no use for it.
+void TilePlan::begin_extra(EpochId epoch, double now_s) {
+  if (playing()) return;
+  schedule_.begin_extra(epoch, now_s);
+  ask_packer();
+}
+
+void TilePlan::ask_packer() {
+  const auto questions = schedule_.take_questions();
+  if (questions.empty()) return;
+  const std::string packer = links_.packer();
+  if (packer.empty()) return;  // it is gone: a new one drops the frames
+  for (const auto& question : questions) links_.outbox.send(packer, question);
+}
+
+Status TilePlan::planned(const wire::Plan& plan, double now_s) {
+  const Status taken = schedule_.take_plan(plan, now_s);
+  record_plans();
+  return taken;
+}
+
+void TilePlan::record_plans() {
+  for (const auto& row : schedule_.take_plan_rows())
+    links_.record.add_plan(links_.name_of_instance(row.asked.viewer), row);
+}
+
 void TilePlan::give_leases(Idle& idle, double now_s) {
   while (!idle.empty() && (schedule_.tile_open() || schedule_.backup_due(now_s)) && give_one(idle, now_s)) {
   }
@@ -87,7 +133,8 @@ Figures TilePlan::figures() const {
   return {.frames_completed = schedule_.frames_completed(),
           .frames_in_flight = schedule_.frames_in_flight(),
           .released = schedule_.tiles_released(),
-          .backups = schedule_.backups()};
+          .backups = schedule_.backups(),
+          .viewers = schedule_.viewers_remembered()};
 }
 
 }  // namespace telesplat::master

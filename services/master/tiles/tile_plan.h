@@ -24,8 +24,14 @@ class TilePlan final : public Plan {
 
   Views& views() override { return schedule_; }
   void drop_frames() override { schedule_.drop_frames(); }
+  void new_packer() override;
+  /// Views whose plans are late are sampled without.
+  void prepare(double now_s) override;
   bool may_begin(const Idle&) override { return schedule_.view_waiting(); }
-  bool begin(EpochId epoch, bool turns_only) override { return schedule_.begin_view(epoch, turns_only); }
+  bool begins_early(double now_s) const override { return schedule_.steered(now_s); }
+  bool begin(EpochId epoch, bool turns_only, double now_s) override;
+  void begin_extra(EpochId epoch, double now_s) override;
+  Status planned(const wire::Plan& plan, double now_s) override;
   void give_leases(Idle& idle, double now_s) override;
   void extend(LeaseId lease, double now_s) override { schedule_.extend(lease, now_s); }
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override {
@@ -42,6 +48,8 @@ class TilePlan final : public Plan {
 
  private:
   bool give_one(Idle& idle, double now_s);
+  void ask_packer();
+  void record_plans();
 
   MasterOptions options_;
   PlanLinks links_;

@@ -147,7 +147,8 @@ std::vector<Event> EventLog::patch_forgets(Sequence after, bool from_nothing) co
   std::vector<std::tuple<Sequence, points::ClusterKey, uint32_t>> keys;
   for (const auto& [sequence, patch] : patches_)
     for (const auto& [forgotten, key] : patch.patch_forgotten)
-      keys.emplace_back(forgotten, key, static_cast<uint32_t>(patch.event.frame.value & points::kFrameTagMask));
+      keys.emplace_back(forgotten, key,
+                        static_cast<uint32_t>(points::tagged(patch.event.frame, patch.event.step).value));
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   for (const auto& [sequence, key, frame] : keys) {

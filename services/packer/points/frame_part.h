@@ -23,6 +23,7 @@ struct FramePart {
   uint32_t step = 1;        ///< the frame has every step-th pixel of every step-th row of the view
   geometry::Camera camera;  ///< of the whole frame
   geometry::Rect rect;      ///< the tile in it
+  bool extra = false;       ///< of rays beyond what the view asked for: it completes no update
 };
 
 /// "tile 3 of frame 17". noun: what the part is called in messages.

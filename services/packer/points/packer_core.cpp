@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <iterator>
 #include <utility>
 
 #include "common/codec/depth_codec.h"
@@ -28,6 +29,37 @@ Status check_tile(const SampledTile& t) {
   return ok_status();
 }
 
+// The smallest rectangle of the tile that holds all of its samples; of none a pixel.
+geometry::Rect kept_in(const image::DepthImage& image) {
+  int left = image.width, right = 0, top = image.height, bottom = 0;
+  for (int y = 0; y < image.height; ++y) {
+    const uint32_t* row = &image.depth[static_cast<size_t>(y) * image.width];
+    const auto is_sample = [](uint32_t code) { return code != 0; };
+    const auto first = static_cast<int>(std::find_if(row, row + image.width, is_sample) - row);
+    if (first == image.width) continue;
+    const auto behind = std::find_if(std::reverse_iterator(row + image.width), std::reverse_iterator(row), is_sample);
+    left = std::min(left, first), right = std::max(right, static_cast<int>(behind.base() - row));
+    top = std::min(top, y), bottom = y + 1;
+  }
+  return bottom == 0 ? geometry::Rect{0, 0, 1, 1} : geometry::Rect{left, top, right - left, bottom - top};
+}
+
+// What was eliminated need not be coded, decoded and looked through: most of a planned tile's rays only check.
+void crop_to_kept(SampledTile& tile) {
+  const geometry::Rect kept = kept_in(tile.image);
+  if (kept.width == tile.rect.width && kept.height == tile.rect.height) return;
+  image::DepthImage part(kept.width, kept.height);
+  for (int y = 0; y < kept.height; ++y) {
+    const size_t from = static_cast<size_t>(kept.y + y) * tile.rect.width + kept.x;
+    const size_t to = static_cast<size_t>(y) * kept.width;
+    std::copy_n(&tile.image.depth[from], kept.width, &part.depth[to]);
+    std::copy_n(&tile.image.colour[from], kept.width, &part.colour[to]);
+    std::copy_n(&tile.image.normal[from], kept.width, &part.normal[to]);
+  }
+  tile.image = std::move(part);
+  tile.rect = {tile.rect.x + kept.x, tile.rect.y + kept.y, kept.width, kept.height};
+}
+
 }  // namespace
 
 struct PackerCore::Impl {
@@ -41,6 +73,7 @@ struct PackerCore::Impl {
   Obsolescence obsolescence;             // of clusters, kEliminate
   PatchObsolescence patch_obsolescence;  // kKeep
   Statistics statistics;
+  ModelWatcher* watcher = nullptr;
   std::vector<float> reference_depth_m;               // kept for its memory
   std::vector<points::ClusterKey> clusters_of_patch;  // likewise
   struct CoarsePass {
@@ -49,7 +82,7 @@ struct PackerCore::Impl {
     RequestId request;
     std::vector<PatchKey> patches;
   };
-  std::deque<CoarsePass> coarse;     // kKeep: coarse frames whose complete ones are not there yet, oldest first
+  std::deque<CoarsePass> coarse;     // coarse frames whose complete ones are not there yet, oldest first
   std::vector<PatchKey> superseded;  // what complete frames made superfluous
 
   Event next_event(Event::Kind kind) {
@@ -62,11 +95,14 @@ struct PackerCore::Impl {
 
   bool keeps() const { return config.redundancy == Redundancy::kKeep; }
 
-  splat::Elimination eliminate(SampledTile& tile) {
+  splat::Elimination eliminate(SampledTile& tile, const std::optional<KnownReference>& known) {
     if (keeps()) {
       const auto nothing = static_cast<uint64_t>(std::count(tile.image.depth.begin(), tile.image.depth.end(), 0u));
       return {tile.image.pixels() - nothing, tile.image.pixels() - nothing};
     }
+    if (known)
+      return splat::eliminate_where_cast(tile.camera, tile.rect, known->cast, known->nearest_m, config.relative_epsilon,
+                                         tile.image, config.nearest_sample);
     // The reference of this tile alone, as of now: what other frames added or forgot meanwhile counts, and clusters
     // outside the tile's frustum cost next to nothing. It has a pixel more on each side, inside the frame, for the
     // tile's border.
@@ -83,27 +119,36 @@ struct PackerCore::Impl {
 
   using Stream = std::shared_ptr<const std::vector<uint8_t>>;
 
+  void supersede(const CoarsePass& pass) {
+    superseded.insert(superseded.end(), pass.patches.begin(), pass.patches.end());
+  }
+
   // A coarse frame is over when a complete one answers the same request of its viewer, or a later one.
   void note_pass(const Event& event, const points::PreparedPatch& patch) {
     if (event.step > 1) {
       if (coarse.empty() || coarse.back().frame != event.frame)
         coarse.push_back({event.frame, event.viewer, event.request, {}});
-      if (coarse.size() > kMaxOpenFrames) coarse.pop_front();
+      if (coarse.size() > kMaxOpenFrames) {
+        if (!keeps()) supersede(coarse.front());  // provisional points are not kept for good
+        coarse.pop_front();
+      }
       auto& patches = coarse.back().patches;
       for (const auto& [key, mosaic] : patch.mosaics) patches.push_back({key, mosaic.frame_tag()});
-    } else if (event.frame_complete) {
+    } else if (event.frame_complete && !event.extra) {
       std::erase_if(coarse, [&](const CoarsePass& pass) {
         const bool over = pass.viewer == event.viewer && pass.request <= event.request;
-        if (over) superseded.insert(superseded.end(), pass.patches.begin(), pass.patches.end());
+        if (over) supersede(pass);
         return over;
       });
     }
   }
 
-  Event pack(SampledTile& tile, double now_s, Stream stream, const std::function<void(const Event&)>& publish) {
-    const splat::Elimination elimination = eliminate(tile);
+  Event pack(SampledTile& tile, double now_s, Stream stream, const std::function<void(const Event&)>& publish,
+             const std::optional<KnownReference>& known) {
+    const splat::Elimination elimination = eliminate(tile, known);
     Event event = next_event(Event::Kind::kPatch);
     const FrameBook::Frame frame = frames.add(tile, elimination);
+    if (!keeps()) crop_to_kept(tile);
     static_cast<FramePart&>(event) = tile;
     event.frame_complete = frame.tiles_left == 0;
     event.samples = elimination.samples, event.kept = elimination.kept;
@@ -113,8 +158,8 @@ struct PackerCore::Impl {
         as_it_came ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
     if (publish) publish(event);
 
-    points::PreparedPatch patch =
-        points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect, tile.image, tile.frame);
+    points::PreparedPatch patch = points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect,
+                                                        tile.image, points::tagged(tile.frame, tile.step));
     clusters_of_patch.clear();
     for (const auto& [key, mosaic] : patch.mosaics) {
       clusters_of_patch.push_back(key);
@@ -123,9 +168,10 @@ struct PackerCore::Impl {
       else
         obsolescence.accessed(key, now_s);
     }
-    if (keeps()) note_pass(event, patch);
+    note_pass(event, patch);
     log.add_patch(event, clusters_of_patch);
     statistics.points_outside += patch.outside;
+    if (watcher) watcher->inserted(patch);
     model.insert(std::move(patch));
 
     ++statistics.tiles;
@@ -145,11 +191,22 @@ struct PackerCore::Impl {
       std::vector<points::ClusterKey> dropped;
       for (const points::Cluster& cluster : model.forget(some)) dropped.push_back(cluster.key);
       log.add_forget(event.sequence, dropped);
+      if (watcher) watcher->forgotten(dropped);
       for (const points::ClusterKey key : some) obsolescence.forgotten(key);
       statistics.clusters_forgotten += dropped.size();
       statistics.points_forgotten += points - model.points();
       out.push_back(std::move(event));
     }
+  }
+
+  // Of these clusters single patches were forgotten: some have none left.
+  void forget_emptied(std::span<const points::ClusterKey> keys) {
+    if (keeps()) return;
+    std::vector<points::ClusterKey> emptied;
+    std::copy_if(keys.begin(), keys.end(), std::back_inserter(emptied),
+                 [&](points::ClusterKey k) { return !model.find(k); });
+    for (const points::ClusterKey key : emptied) obsolescence.forgotten(key);
+    if (watcher) watcher->forgotten(emptied);
   }
 
   void forget_patches(std::span<const PatchKey> keys, std::vector<Event>& out) {
@@ -165,6 +222,7 @@ struct PackerCore::Impl {
       const uint64_t points = model.points(), clusters = model.clusters().size();
       const std::vector<points::Cluster> dropped = model.forget(event.clusters, event.frames);
       log.add_patch_forget(event, dropped);
+      forget_emptied(event.clusters);
       statistics.clusters_forgotten += clusters - model.clusters().size();
       statistics.patches_forgotten += dropped.size();
       statistics.points_forgotten += points - model.points();
@@ -182,7 +240,8 @@ PackerCore::PackerCore(const Config& config, EpochId epoch, Hooks hooks)
 PackerCore::~PackerCore() = default;
 
 Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, Impl::Stream stream,
-                                                const std::function<void(const Event&)>& publish) {
+                                                const std::function<void(const Event&)>& publish,
+                                                const std::optional<KnownReference>& reference) {
   Impl& i = *impl_;
   if (tile.epoch != i.epoch) {
     ++i.statistics.tiles_other_epoch;
@@ -198,7 +257,21 @@ Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, 
     ++i.statistics.tiles_refused;
     return good.error();
   }
-  return std::optional<Event>(i.pack(tile, now_s, std::move(stream), publish));
+  return std::optional<Event>(i.pack(tile, now_s, std::move(stream), publish, reference));
+}
+
+Result<std::optional<Event>> PackerCore::complete_empty(FramePart frame, double now_s) {
+  frame.tile = 0, frame.tiles_in_frame = 1;
+  frame.rect = {0, 0, 1, 1};
+  return submit({frame, image::DepthImage(1, 1)}, now_s);
+}
+
+void PackerCore::watch(ModelWatcher* watcher) { impl_->watcher = watcher; }
+
+std::vector<Event> PackerCore::forget(std::span<const points::ClusterKey> clusters) {
+  std::vector<Event> out;
+  impl_->forget(clusters, out);
+  return out;
 }
 
 bool PackerCore::has(FrameId frame, uint32_t tile) const { return impl_->frames.has(frame, tile); }
@@ -244,6 +317,8 @@ std::vector<Event> PackerCore::forget_superseded() {
 
 void PackerCore::forget_frames() {
   impl_->frames.clear();
+  if (!impl_->keeps())
+    for (const auto& pass : impl_->coarse) impl_->supersede(pass);
   impl_->coarse.clear();
 }
 
@@ -259,6 +334,7 @@ std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
   i.coarse.clear();
   i.superseded.clear();
   i.log.add_epoch(event);
+  if (i.watcher) i.watcher->cleared();
   return event;
 }
 

@@ -12,6 +12,8 @@
 #include "common/points/point_model.h"
 #include "common/splat/reference_depth.h"
 #include "services/packer/points/event.h"
+#include "services/packer/points/known_reference.h"
+#include "services/packer/points/model_watcher.h"
 #include "services/packer/points/sampled_tile.h"
 
 namespace telesplat::packer {
@@ -77,9 +79,11 @@ class PackerCore {
   ///   or if it is null, the tile is encoded.
   ///   publish: called with the event as soon as it is known, while the model has yet to take the points over, so that
   ///   those who wait for them need not wait for that too; or null.
+  ///   reference: what the model shows at the tile, or nothing: then it is rendered.
   Result<std::optional<Event>> submit(SampledTile tile, double now_s,
                                       std::shared_ptr<const std::vector<uint8_t>> stream = {},
-                                      const std::function<void(const Event&)>& publish = {});
+                                      const std::function<void(const Event&)>& publish = {},
+                                      const std::optional<KnownReference>& reference = {});
 
   /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.
   bool has(FrameId frame, uint32_t tile) const;
@@ -88,10 +92,20 @@ class PackerCore {
   /// empty. Unknown keys are ignored. Precondition: no frames, or as many as clusters.
   void accessed(std::span<const points::ClusterKey> clusters, double now_s, std::span<const uint32_t> frames = {});
 
+  /// A frame of which nothing is sampled is complete: the event of no points that says so to viewers. frame: its label;
+  /// it stands for one tile. Else as submit().
+  Result<std::optional<Event>> complete_empty(FramePart frame, double now_s);
+
+  /// Tells everything that happens to the model from now on. watcher: null: nobody; it must outlive its use here.
+  void watch(ModelWatcher* watcher);
+
+  /// Drops clusters, for whatever reason. Returns the events to publish.
+  std::vector<Event> forget(std::span<const points::ClusterKey> clusters);
+
   /// Decides what is obsolete (T4.3.3) or too much. Returns the forget events to publish, most often none.
   std::vector<Event> tick(double now_s);
 
-  /// kKeep: the forget events for the coarse passes of frames that were completed since the last call: a complete frame
+  /// The forget events for the coarse passes of frames that were completed since the last call: a complete frame
   /// has every sample of its coarse pass, whose patches would only be in the way of choosing the best ones.
   std::vector<Event> forget_superseded();
 

@@ -1,9 +1,12 @@
 #include "services/packer/points/point_packing.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/net/dispatch.h"
+#include "services/packer/points/plan/blue_noise.h"
 
 namespace telesplat::packer {
 namespace {
@@ -26,6 +29,24 @@ Config config_of(const wire::Welcome& session, const PointPacking::Options& opti
   return c;
 }
 
+PlanConfig plan_config_of(const wire::Welcome& session, const Config& packing) {
+  const scene::SessionView view(session);
+  const auto whole = [&](const std::string& name, int fallback, double most) {
+    return static_cast<int>(std::clamp(view.setting(name, fallback), 0.0, most));
+  };
+  PlanConfig c;
+  c.model = packing.model;
+  c.relative_epsilon = packing.relative_epsilon;
+  c.nearest_sample = packing.nearest_sample;
+  c.view_cell_m = std::clamp(view.setting("sampling.view_cell_m", c.view_cell_m), 0.0, 1e3);
+  c.validation = whole("sampling.validation", c.validation, BlueNoise::kMaxShare);
+  c.edge_rays = whole("sampling.edge_rays", c.edge_rays, 16);
+  c.still_rays = whole("sampling.still_rays", c.still_rays, 16);
+  c.max_points = packing.max_points;
+  c.threads = packing.threads;
+  return c;
+}
+
 // The block that a leased tile belongs to.
 FramePart block_of(const wire::Lease& l) {
   return {.frame = l.frame,
@@ -36,7 +57,8 @@ FramePart block_of(const wire::Lease& l) {
           .tiles_in_frame = uint32_t(l.blocks_in_frame),
           .step = uint32_t(l.step),
           .camera = l.camera,
-          .rect = l.block_rect};
+          .rect = l.block_rect,
+          .extra = l.extra};
 }
 
 wire::TileDone done_of(const wire::DepthTile& m, double receive_s) {
@@ -45,6 +67,8 @@ wire::TileDone done_of(const wire::DepthTile& m, double receive_s) {
           .lease = m.lease.lease,
           .sampler = m.sampler,
           .step = m.lease.step,
+          .extra = m.lease.extra,
+          .rays = m.lease.rays,
           .rect = m.lease.rect,
           .bytes_sampled = m.image.size(),
           .leased_s = m.lease.leased_s,
@@ -67,6 +91,7 @@ void with_message(InstanceId packer, const Event& e, auto&& send) {
                               .tile = e.tile,
                               .tiles_in_frame = e.tiles_in_frame,
                               .step = e.step,
+                              .extra = e.extra,
                               .frame_complete = e.frame_complete,
                               .samples = e.samples,
                               .kept = e.kept,
@@ -103,17 +128,32 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   master_ = session.master;
   if (another_master) {
     core_->forget_frames();
+    if (planner_) planner_->forget_frames();
     gatherer_.clear();
   }
   if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
     if (core_) instance_ = net::make_instance_id();  // viewers start anew
     model_ = config.model;
+    planner_.reset();
     core_.emplace(config, session.epoch);
     gatherer_.clear();
   } else if (const auto event = core_->begin_epoch(session.epoch)) {
     publish(*event);
     gatherer_.clear();
   }
+  PlanConfig plan_config = plan_config_of(session, config);
+  plan_config.pictures = options_.plans != nullptr;
+  begin_planner(plan_config);
+}
+
+// Another configuration means another planner, which knows what the model knows.
+void PointPacking::begin_planner(const PlanConfig& config) {
+  if (core_->redundancy() == Redundancy::kKeep) return core_->watch(nullptr), planner_.reset();
+  if (planner_ && plan_config_ == config) return;
+  plan_config_ = config;
+  planner_.emplace(config);
+  planner_->learn(core_->model());
+  core_->watch(&*planner_);
 }
 
 void PointPacking::take_sampled(net::Socket& from, const net::Message& message, double now_s) {
@@ -148,14 +188,17 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   spans_.add("decode", begin_s, outlets_.master_now());
   std::shared_ptr<const std::vector<uint8_t>> ready;
   if (got.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
-  if (const Status s = pack_block(std::move(*got.block), std::move(ready), done, now_s); !s)
+  const bool whole = lease.rays == 0 || lease.rays == uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
+  if (const Status s = pack_block(std::move(*got.block), whole, std::move(ready), done, now_s); !s)
     from->reject(message, s.error().text);
 }
 
-Status PointPacking::pack_block(SampledTile block, std::shared_ptr<const std::vector<uint8_t>> stream,
+Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<const std::vector<uint8_t>> stream,
                                 wire::TileDone& done, double now_s) {
   const double begin_s = outlets_.master_now();
   record(block);
+  if (planner_) planner_->take(block, whole, now_s);
+  const auto reference = planner_ ? planner_->reference(block) : std::nullopt;
   // What a block gives is counted to the tile that completed it.
   const auto announce = [&](const Event& event) {
     // Taken before it is sent: a viewer may have it in its replica before the send returns.
@@ -166,12 +209,58 @@ Status PointPacking::pack_block(SampledTile block, std::shared_ptr<const std::ve
     bytes_sent_ += done.bytes_sent;
     outlets_.tell(done);
   };
-  const auto event = core_->submit(std::move(block), now_s, std::move(stream), announce);
+  const auto event = core_->submit(std::move(block), now_s, std::move(stream), announce, reference);
   if (!event) return event.error();
   if (*event && (*event)->frame_complete)
     for (const auto& forget : core_->forget_superseded()) publish(forget);
+  if (planner_)
+    for (const auto& forget : core_->forget(planner_->disproved())) publish(forget);
   spans_.add("pack", begin_s, outlets_.master_now());
   return ok_status();
+}
+
+void PointPacking::record_plan() {
+  if (!options_.plans) return;
+  const Status s = options_.plans->add(planner_->picture());
+  if (s) return;
+  log::error("{}", s.error().text);
+  options_.plans = nullptr;
+}
+
+wire::Plan PointPacking::plan(const wire::PlanRequest& request, double now_s) {
+  for (;;)
+    if (auto plan = plan_piece(request, now_s)) return *std::move(plan);
+}
+
+std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& request, double now_s) {
+  if (!core_ || !planner_ || request.epoch != core_->epoch()) return all_rays(request);
+  const double begin_s = monotonic_s(), begin_master_s = outlets_.master_now();
+  auto piece = planner_->plan_piece(core_->model(), core_->sequence(), request, now_s);
+  spans_.add("plan", begin_master_s, outlets_.master_now());
+  double took_s = monotonic_s() - begin_s;
+  if (request.extra) {
+    if (std::exchange(planning_, request.frame) == request.frame) took_s += planning_s_;
+    planning_s_ = took_s;
+  }
+  if (!piece) return std::nullopt;
+  wire::Plan plan = *std::move(piece);
+  plan.figures["plan_ms"] = took_s * 1e3;
+  ++plans_;
+  const uint64_t pixels = uint64_t(request.camera.width) * uint64_t(request.camera.height);
+  if (pixels > Planner::kMaxPixels && !std::exchange(told_of_size_, true))
+    log::warn("views of {}x{} pixels are sampled whole: up to {} pixels are planned", request.camera.width,
+              request.camera.height, Planner::kMaxPixels);
+  if (!request.extra && !plan.full) record_plan();
+  if (request.extra || plan.full || !plan.tiles.empty()) return plan;
+  const FramePart frame{.frame = request.frame,
+                        .epoch = request.epoch,
+                        .viewer = request.viewer,
+                        .request = request.request,
+                        .camera = request.camera};
+  const auto event = core_->complete_empty(frame, now_s);
+  if (event && *event) publish(**event);
+  for (const auto& forget : core_->forget_superseded()) publish(forget);
+  return plan;
 }
 
 void PointPacking::tell_taken(wire::TileDone& done) {
@@ -219,6 +308,17 @@ wire::StateMark PointPacking::mark(bool answer) const {
   return {instance_, core_->sequence(), core_->epoch(), answer, core_->model().points()};
 }
 
+// Messages wait meanwhile, so it may take a quarter of the time at most, unless it saves more than it takes.
+bool PointPacking::idle(double now_s) {
+  constexpr double kPause = 3;
+  if (!planner_ || (now_s < next_settle_s_ && !planner_->settles_soon())) return false;
+  const double begin_s = outlets_.master_now(), started_s = monotonic_s();
+  if (!planner_->settle()) return false;
+  next_settle_s_ = now_s + (1 + kPause) * (monotonic_s() - started_s);
+  spans_.add("settle", begin_s, outlets_.master_now());
+  return true;
+}
+
 void PointPacking::tick(double now_s) {
   ahead_.expire(now_s);
   if (!core_) return;
@@ -249,7 +349,8 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"frames_complete", double(s.frames_complete)},
                  {"patches_forgotten", double(s.patches_forgotten)},
                  {"points_forgotten", double(s.points_forgotten)},
-                 {"points_outside", double(s.points_outside)}});
+                 {"points_outside", double(s.points_outside)},
+                 {"plans", double(plans_)}});
 }
 
 }  // namespace telesplat::packer

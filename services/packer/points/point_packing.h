@@ -10,6 +10,7 @@
 #include "services/packer/points/block_gatherer.h"
 #include "services/packer/points/depth_recorder.h"
 #include "services/packer/points/packer_core.h"
+#include "services/packer/points/plan/planner.h"
 
 namespace telesplat::packer {
 
@@ -22,14 +23,19 @@ class PointPacking final : public Packing {
     int threads = 1;                    ///< for reference depth maps; 0: all cores
     uint64_t max_log_bytes = 0;         ///< Config::max_log_bytes
     DepthRecorder* recorder = nullptr;  ///< of sampled depth images; null: none are kept
+    PlanRecorder* plans = nullptr;      ///< of plans; null: none are kept
   };
-  /// Keeps a reference to the spans, and the recorder's address.
+  /// Keeps a reference to the spans, and the recorders' addresses.
   PointPacking(const Options& options, Outlets outlets, metrics::SpanRecorder& spans)
       : options_(options), outlets_(std::move(outlets)), spans_(spans) {}
 
   bool follow(const wire::Welcome& session, double now_s) override;
   void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
   void take_state(net::Socket& from, const net::Message& message, double now_s) override;
+  wire::Plan plan(const wire::PlanRequest& request, double now_s) override;
+  std::optional<wire::Plan> plan_piece(const wire::PlanRequest& request, double now_s) override;
+  bool hurried(double now_s) const override { return planner_ && planner_->view_under_way(now_s); }
+  bool idle(double now_s) override;
   void tick(double now_s) override;
   void add_status(net::MasterLink::Values& values) const override;
 
@@ -40,10 +46,13 @@ class PointPacking final : public Packing {
     wire::DepthTile tile;  // its image lies in the message
   };
   void begin(const Config& config, const wire::Welcome& session);
+  void begin_planner(const PlanConfig& config);
+  void record_plan();
   void pack(const Received& received, double since_s, double now_s);
   /// A block whose every row is here. stream: of the whole block, if it came as one tile; else null.
-  Status pack_block(SampledTile block, std::shared_ptr<const std::vector<uint8_t>> stream, wire::TileDone& done,
-                    double now_s);
+  ///   whole: every pixel of it was cast.
+  Status pack_block(SampledTile block, bool whole, std::shared_ptr<const std::vector<uint8_t>> stream,
+                    wire::TileDone& done, double now_s);
   /// To the master: taken in, but not published with this tile.
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
@@ -56,10 +65,17 @@ class PointPacking final : public Packing {
   metrics::SpanRecorder& spans_;
   InstanceId instance_ = net::make_instance_id(), master_;
   std::optional<PackerCore> core_;  // none before the data set's box is known
+  std::optional<Planner> planner_;  // of its model; none where redundant points are kept
+  PlanConfig plan_config_;          // that it was made with
   points::ModelConfig model_;
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
+  uint64_t plans_ = 0;
+  FrameId planning_;           // whose extra rays were planned last,
+  double planning_s_ = 0;      // and for how long so far
+  bool told_of_size_ = false;  // that views are too large for plans
+  double next_settle_s_ = 0;
   double last_mark_s_ = -1e9, last_forget_s_ = -1e9;
 };
 

@@ -34,13 +34,16 @@ void KeepHits(Queue& queue) {
     for (int i = 0; i < kMarchWays * static_cast<int>(kMaxLanes); ++i) copy(0, kept + i);
 }
 
-void TracePart(const Constants& k, const JuliaRays& rays, const JuliaPart& part, JuliaPoints& out) {
+// The rays of all parts stand in one queue: lanes that are done find others even where parts have few rays.
+void TraceParts(const Constants& k, const JuliaRays& rays, std::span<const JuliaPart> parts, JuliaPoints& out) {
   static_assert(JuliaPoints::kPadded - JuliaPoints::kMost >= kMarchWays * static_cast<int>(kMaxLanes));
   float start[JuliaPart::kBlocks + kMaxLanes];
-  MarchCones(k, rays, part, start);
   thread_local const std::unique_ptr<Queue> queue = std::make_unique<Queue>();
   queue->count = 0;
-  ClipRays(k, rays, part, start, *queue);
+  for (const JuliaPart& part : parts) {
+    MarchCones(k, rays, part, start);
+    ClipRays(k, rays, part, start, *queue);
+  }
   March(k, rays, *queue);
   KeepHits(*queue);
   Refine(k, rays, *queue);
@@ -53,11 +56,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace telesplat::sampler {
 
-HWY_EXPORT(TracePart);
+HWY_EXPORT(TraceParts);
 
-void julia_trace(const JuliaScene::Constants& scene, const JuliaRays& rays, const JuliaPart& part,
+void julia_trace(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
                  JuliaPoints& points) {
-  HWY_DYNAMIC_DISPATCH(TracePart)(scene, rays, part, points);
+  HWY_DYNAMIC_DISPATCH(TraceParts)(scene, rays, parts, points);
 }
 
 }  // namespace telesplat::sampler

@@ -49,19 +49,26 @@ HWY_INLINE Interval Clip(const Constants& k, const JuliaRays& rays, const VF* d,
   return out;
 }
 
-// Depths up to which the blocks' rays are free, for whole vectors of blocks.
+// Depths up to which the blocks' rays are free, for whole vectors of blocks; those without rays are free all the way.
 HWY_NOINLINE void MarchCones(const Constants& k, const JuliaRays& rays, const JuliaPart& part,
                              float* HWY_RESTRICT start) {
   const VF growth = set(rays.spread + kConeMargin * k.lod * rays.footprint);
-  for (int block = part.block_begin; block < part.block_end; block += static_cast<int>(hn::Lanes(f))) {
+  const int lanes = static_cast<int>(hn::Lanes(f));
+  for (int block = part.block_begin; block < part.block_end; block += lanes) {
+    HWY_ALIGN float wanted[kMaxLanes];
+    for (int i = 0; i < lanes; ++i) wanted[i] = block + i < part.block_end && part.any(block + i) ? 1 : 0;
+    MF live = hn::Gt(hn::Load(f, wanted), hn::Zero(f));
+    if (hn::AllFalse(f, live)) {
+      hn::StoreU(set(kNothing), f, start + (block - part.block_begin));
+      continue;
+    }
     VF d[7];
     for (int i = 0; i < 7; ++i)
       d[i] = hn::Add(hn::LoadU(f, rays.block_column[i].data() + block), set(rays.block_row[i][part.block_row]));
     const Vec4 direction{{d[0], d[1], d[2], d[3]}};
     const Interval range = Clip(k, rays, d, rays.block_ball, rays.block_margin);
     const VF scale = hn::Div(set(1), hn::Add(speed_of(direction), growth));
-    VF t = range.t0;
-    MF live = hn::Eq(t, t);
+    VF t = hn::IfThenElse(live, range.t0, set(kNothing));
     for (int i = 0; i < kMaxConeSteps; ++i) {
       const MF over = hn::And(live, hn::Gt(t, range.t1));
       t = hn::IfThenElse(over, set(kNothing), t);
@@ -81,21 +88,23 @@ HWY_NOINLINE void ClipRays(const Constants& k, const JuliaRays& rays, const Juli
                            const float* HWY_RESTRICT start, Queue& queue) {
   HWY_ALIGN float d_of[4][kMaxLanes], inverse[kMaxLanes], t0[kMaxLanes], t1[kMaxLanes];
   const int lanes = static_cast<int>(hn::Lanes(f));
-  const int first = part.block_begin * kJuliaBlock;
+  const int first = part.block_begin * kJuliaBlock, count = (part.block_end - part.block_begin) * kJuliaBlock;
   // Blocks in order, rows in a block, so that neighbours in the queue do alike.
-  for (int x8 = part.x_begin / kJuliaBlock * kJuliaBlock; x8 < part.x_end; x8 += std::max(lanes, kJuliaBlock))
-    for (int y = part.y_begin; y < part.y_end; ++y)
-      for (int x0 = x8; x0 < std::min(x8 + kJuliaBlock, part.x_end); x0 += lanes) {
+  for (int x8 = 0; x8 < count; x8 += std::max(lanes, kJuliaBlock))
+    for (int row = 0; row < kJuliaBlock; ++row)
+      for (int x0 = x8; x0 < x8 + kJuliaBlock; x0 += lanes) {
         HWY_ALIGN float free[kMaxLanes];
         float least = kNothing;
         for (int i = 0; i < lanes; ++i) {
-          const int x = x0 + i;
-          free[i] = x >= part.x_begin && x < part.x_end ? start[(x - first) / kJuliaBlock] : kNothing;
+          const int x = x0 + i, block = x / kJuliaBlock;
+          free[i] = part.wanted[row][block] >> x % kJuliaBlock & 1 ? start[block] : kNothing;
           least = std::min(least, free[i]);
         }
         if (least == kNothing) continue;
+        const int y = part.block_row * kJuliaBlock + row;
         VF d[7];
-        for (int i = 0; i < 7; ++i) d[i] = hn::Add(hn::LoadU(f, rays.column[i].data() + x0), set(rays.row[i][y]));
+        for (int i = 0; i < 7; ++i)
+          d[i] = hn::Add(hn::LoadU(f, rays.column[i].data() + first + x0), set(rays.row[i][y]));
         Interval range = Clip(k, rays, d, rays.ball, 0);
         range.t0 = hn::Max(range.t0, hn::Load(f, free));
         const MF live = hn::Le(range.t0, range.t1);
@@ -111,7 +120,7 @@ HWY_NOINLINE void ClipRays(const Constants& k, const JuliaRays& rays, const Juli
           for (int a = 0; a < 4; ++a) queue.d[a][at] = d_of[a][i];
           queue.inverse[at] = inverse[i];
           queue.t0[at] = t0[i], queue.t1[at] = t1[i];
-          queue.x[at] = x0 + i, queue.y[at] = y;
+          queue.x[at] = first + x0 + i, queue.y[at] = y;
         }
       }
 }

@@ -190,6 +190,31 @@ bool normalise(float* n) {
   return true;
 }
 
+// A rim is where a surface turns away within a pixel: the surface is rounded by its threshold, which is less than a
+// pixel. One ray meets it anywhere between facing and edge-on, so rims would be dotted with dark pixels. A steep normal
+// becomes the mean of itself and the one half a pixel further in, away from the rim. Where nothing is there, as of a
+// thread thinner than a pixel, the direction towards the viewer stands for it. Flat surfaces keep their normals,
+// however steep. back: towards the viewer, unit length; reach: a pixel there, in set units.
+void widen(const Constants& k, const Vec4& q, float reach, const float* back, float* n) {
+  const float lean = dot(n, back), in = kInward * reach;
+  if (!(lean < kSteep)) return;
+  float side[3];
+  for (int i = 0; i < 3; ++i) side[i] = n[i] - back[i] * lean;
+  normalise(side);
+  // From before the surface on, as far as a flat one rises on the way in, and as much more.
+  const float slope = std::sqrt(std::max(1.0f - lean * lean, 0.0f)) / std::max(lean, kLeastLean);
+  const Vec4 towards = orbit_vector(k, back), base = along(q.v, orbit_vector(k, side), -in);
+  float ahead = in * (std::min(slope, kInwardSlope) + 1.0f), off = 0;
+  for (int i = 0; i < kInwardSteps; ++i) {
+    off = estimate(k, along(base.v, towards, ahead)) - k.lod * reach;
+    ahead = ahead - off;
+  }
+  Orbit second = follow(k, along(base.v, towards, ahead));
+  const bool found = normalise(second.gradient) && dot(second.gradient, back) > 0 && std::abs(off) < kInwardOff * reach;
+  for (int i = 0; i < 3; ++i) n[i] = n[i] + (found ? second.gradient[i] : back[i]);
+  normalise(n);
+}
+
 // The gradient where it is good; else the estimate's differences over a footprint; else the direction towards the
 // viewer. What still faces away, at a silhouette, is turned until it just does not.
 void normal_at(const Constants& k, const Vec4& q, const float* gradient, float reach, const float* ray, float* n) {
@@ -209,6 +234,7 @@ void normal_at(const Constants& k, const Vec4& q, const float* gradient, float r
     for (int i = 0; i < 3; ++i) n[i] = n[i] + back[i] * (kLeast - lean);
     normalise(n);
   }
+  widen(k, q, reach, back, n);
 }
 
 float occlusion_at(const Constants& k, const Vec4& q, const float* n) {
@@ -255,6 +281,22 @@ void add_point(const Constants& k, const JuliaRays& rays, int x, int y, const fl
   out.light[i] = light;
 }
 
+void trace_block(const Constants& k, const JuliaRays& rays, const JuliaPart& part, int block, JuliaPoints& out) {
+  const float start = cone_start(k, rays, block, part.block_row);
+  for (int row = 0; row < kJuliaBlock; ++row)
+    for (int column = 0; column < kJuliaBlock; ++column) {
+      if (!(part.wanted[row][block - part.block_begin] >> column & 1)) continue;
+      const int x = block * kJuliaBlock + column, y = part.block_row * kJuliaBlock + row;
+      float d[7];
+      for (int i = 0; i < 7; ++i) d[i] = rays.column[i][x] + rays.row[i][y];
+      Interval range = clip(k, rays, d, rays.ball, 0);
+      range.t0 = std::max(range.t0, start);
+      Bracket bracket;
+      if (range.t0 <= range.t1 && march(k, rays, {d[0], d[1], d[2], d[3]}, range, bracket))
+        add_point(k, rays, x, y, d, bracket, out);
+    }
+}
+
 }  // namespace
 
 bool face_normal(const Constants& k, const JuliaRays& rays, const float* direction, float t, float* normal) {
@@ -269,20 +311,11 @@ bool face_normal(const Constants& k, const JuliaRays& rays, const float* directi
   return false;
 }
 
-void julia_trace_plainly(const Constants& k, const JuliaRays& rays, const JuliaPart& part, JuliaPoints& out) {
-  float start[JuliaPart::kBlocks];
-  for (int block = part.block_begin; block < part.block_end; ++block)
-    start[block - part.block_begin] = cone_start(k, rays, block, part.block_row);
-  for (int y = part.y_begin; y < part.y_end; ++y)
-    for (int x = part.x_begin; x < part.x_end; ++x) {
-      float d[7];
-      for (int i = 0; i < 7; ++i) d[i] = rays.column[i][x] + rays.row[i][y];
-      Interval range = clip(k, rays, d, rays.ball, 0);
-      range.t0 = std::max(range.t0, start[x / kJuliaBlock - part.block_begin]);
-      Bracket bracket;
-      if (range.t0 <= range.t1 && march(k, rays, {d[0], d[1], d[2], d[3]}, range, bracket))
-        add_point(k, rays, x, y, d, bracket, out);
-    }
+void julia_trace_plainly(const Constants& k, const JuliaRays& rays, std::span<const JuliaPart> parts,
+                         JuliaPoints& out) {
+  for (const JuliaPart& part : parts)
+    for (int block = part.block_begin; block < part.block_end; ++block)
+      if (part.any(block)) trace_block(k, rays, part, block, out);
 }
 
 }  // namespace telesplat::sampler

@@ -1,11 +1,13 @@
 #include "services/sampler/julia/sampler.h"
 
-#include <tbb/blocked_range2d.h>
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "common/image/normal.h"
 #include "services/sampler/julia/palette.h"
@@ -14,38 +16,85 @@ namespace telesplat::sampler {
 
 namespace {
 
-// Calls consume(rays, points) for every part of the rectangle, on several threads at once.
+// Bits x .. x + 7 of a row of bits, of which those outside of it are 0. x: more than -8.
+uint8_t eight_bits(const uint64_t* words, size_t count, int x) {
+  if (x < 0) return static_cast<uint8_t>(words[0] << -x);
+  const size_t word = static_cast<size_t>(x) / 64, shift = static_cast<size_t>(x) % 64;
+  if (word >= count) return 0;
+  const uint64_t rest = shift > 56 && word + 1 < count ? words[word + 1] << (64 - shift) : 0;
+  return static_cast<uint8_t>(words[word] >> shift | rest);
+}
+// Those of x .. x + 7 that lie in [0, width).
+uint8_t eight_inside(int x, int width) {
+  const int left = std::max(-x, 0), right = std::min(width - x, 8);
+  return left >= right ? 0 : static_cast<uint8_t>((255u << left) & (255u >> (8 - right)));
+}
+
+// The rays wanted of blocks [block_begin, block_end) of a row of blocks.
+JuliaPart make_part(const JuliaRays& rays, const geometry::Rect& rect, const image::PixelMask* mask, int block_row,
+                    int block_begin, int block_end) {
+  static_assert(kJuliaBlock == 8);
+  JuliaPart part{block_row, block_begin, block_end};
+  for (int row = 0; row < kJuliaBlock; ++row) {
+    const int y = rays.y0 + block_row * kJuliaBlock + row - rect.y;
+    if (y < 0 || y >= rect.height) continue;
+    for (int block = block_begin; block < block_end; ++block) {
+      const int x = rays.x0 + block * kJuliaBlock - rect.x;
+      part.wanted[row][block - block_begin] =
+          mask ? eight_bits(mask->row(y), mask->words_per_row(), x) : eight_inside(x, rect.width);
+    }
+  }
+  return part;
+}
+
+// Parts of a rectangle that are traced together, one behind the other in a list.
+struct Batches {
+  std::vector<JuliaPart> parts;
+  std::vector<size_t> begin{0};  // of each batch, and the end of the last
+};
+
+// A row of blocks is one part or several, so that even a single row of pixels keeps all threads busy. With a mask,
+// parts have few rays or none; then some of them make a batch.
+Batches make_batches(const JuliaRays& rays, const geometry::Rect& rect, const image::PixelMask* mask) {
+  constexpr int kMaskedBatch = 256;  // rays: enough for lanes to be full most of the time
+  Batches out;
+  int waiting = 0;
+  const auto close = [&] {
+    if (out.begin.back() < out.parts.size()) out.begin.push_back(out.parts.size());
+    waiting = 0;
+  };
+  for (int row = 0; row < rays.rows_of_blocks; ++row)
+    for (int block = 0; block < rays.columns_of_blocks; block += JuliaPart::kBlocks) {
+      const int end = std::min(block + JuliaPart::kBlocks, rays.columns_of_blocks);
+      const JuliaPart part = make_part(rays, rect, mask, row, block, end);
+      const int count = part.rays();
+      if (count == 0) continue;
+      if (!mask || waiting + count > JuliaPoints::kMost) close();
+      out.parts.push_back(part);
+      waiting += count;
+      if (waiting >= kMaskedBatch) close();
+    }
+  close();
+  return out;
+}
+
+// Calls consume(rays, points) for every batch of the rectangle, on several threads at once.
 template <class Consume>
 void trace_rect(tbb::task_arena& arena, JuliaTrace trace, const JuliaScene& scene, const geometry::Camera& camera,
-                const geometry::Rect& rect, int step, const Consume& consume) {
+                const geometry::Rect& rect, double footprint_px, const image::PixelMask* mask, const Consume& consume) {
   if (rect.width <= 0 || rect.height <= 0) return;
-  const JuliaRays rays(scene, camera, rect, step);
-  const int dx = rect.x - rays.x0, dy = rect.y - rays.y0;
-  // A row of blocks is one task or several, so that even a single row of pixels keeps all threads busy.
-  constexpr int kPartBlocks = JuliaPart::kBlocks;
-  const int parts = (rays.columns_of_blocks + kPartBlocks - 1) / kPartBlocks;
-  const auto trace_part = [&](int block_row, int part, JuliaPoints& points) {
-    JuliaPart p;
-    p.block_row = block_row;
-    p.block_begin = part * kPartBlocks;
-    p.block_end = std::min(p.block_begin + kPartBlocks, rays.columns_of_blocks);
-    p.x_begin = std::max(p.block_begin * kJuliaBlock, dx);
-    p.x_end = std::min(p.block_end * kJuliaBlock, dx + rect.width);
-    p.y_begin = std::max(block_row * kJuliaBlock, dy);
-    p.y_end = std::min((block_row + 1) * kJuliaBlock, dy + rect.height);
-    points.count = 0;
-    trace(scene.constants(), rays, p, points);
-    consume(rays, points);
+  const JuliaRays rays(scene, camera, rect, footprint_px);
+  const Batches batches = make_batches(rays, rect, mask);
+  const std::span<const JuliaPart> parts = batches.parts;
+  const auto trace_range = [&](const tbb::blocked_range<size_t>& range) {
+    const auto points = std::make_unique_for_overwrite<JuliaPoints>();
+    for (size_t i = range.begin(); i < range.end(); ++i) {
+      points->count = 0;
+      trace(scene.constants(), rays, parts.subspan(batches.begin[i], batches.begin[i + 1] - batches.begin[i]), *points);
+      consume(rays, *points);
+    }
   };
-  arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range2d<int>(0, rays.rows_of_blocks, 1, 0, parts, 1),
-                      [&](const tbb::blocked_range2d<int>& range) {
-                        const auto points = std::make_unique_for_overwrite<JuliaPoints>();
-                        for (int row = range.rows().begin(); row < range.rows().end(); ++row)
-                          for (int part = range.cols().begin(); part < range.cols().end(); ++part)
-                            trace_part(row, part, *points);
-                      });
-  });
+  arena.execute([&] { tbb::parallel_for(tbb::blocked_range<size_t>(0, batches.begin.size() - 1), trace_range); });
 }
 
 }  // namespace
@@ -54,29 +103,30 @@ JuliaSampler::JuliaSampler(int threads, JuliaTrace trace)
     : arena_(threads > 0 ? threads : tbb::task_arena::automatic), trace_(trace) {}
 
 image::DepthImage JuliaSampler::sample(const JuliaScene& scene, const geometry::Camera& camera,
-                                       const geometry::Rect& rect, int step) {
+                                       const geometry::Rect& rect, double footprint_px, const image::PixelMask* mask) {
   image::DepthImage out(rect.width, rect.height);
   const JuliaPalette& palette = julia_palette(scene.palette());
-  trace_rect(arena_, trace_, scene, camera, rect, step, [&](const JuliaRays& rays, const JuliaPoints& points) {
-    for (int i = 0; i < points.count; ++i) {
-      const size_t at = size_t(points.y[i] + rays.y0 - rect.y) * rect.width + (points.x[i] + rays.x0 - rect.x);
-      out.depth[at] = image::encode_depth(points.depth_m[i], camera.near_m);
-      out.colour[at] = palette.rounded(points.tone[i], points.light[i]);
-      out.normal[at] = image::encode_normal16({points.normal[0][i], points.normal[1][i], points.normal[2][i]});
-    }
-  });
+  trace_rect(
+      arena_, trace_, scene, camera, rect, footprint_px, mask, [&](const JuliaRays& rays, const JuliaPoints& points) {
+        for (int i = 0; i < points.count; ++i) {
+          const size_t at = size_t(points.y[i] + rays.y0 - rect.y) * rect.width + (points.x[i] + rays.x0 - rect.x);
+          out.depth[at] = image::encode_depth(points.depth_m[i], camera.near_m);
+          out.colour[at] = palette.rounded(points.tone[i], points.light[i]);
+          out.normal[at] = image::encode_normal16({points.normal[0][i], points.normal[1][i], points.normal[2][i]});
+        }
+      });
   return out;
 }
 
 image::View render_julia_directly(const JuliaScene& scene, const geometry::Camera& camera,
-                                  const image::Shading& shading, int threads) {
+                                  const image::Shading& shading, int threads, double footprint_px) {
   const size_t pixels = size_t(camera.width) * camera.height;
   image::View view{camera.width, camera.height, std::vector<uint32_t>(pixels, shading.background()),
                    std::vector<float>(pixels, std::numeric_limits<float>::infinity())};
   const JuliaPalette& palette = julia_palette(scene.palette());
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
   trace_rect(
-      arena, julia_trace, scene, camera, {0, 0, camera.width, camera.height}, 1,
+      arena, julia_trace, scene, camera, {0, 0, camera.width, camera.height}, footprint_px, nullptr,
       [&](const JuliaRays& rays, const JuliaPoints& points) {
         for (int i = 0; i < points.count; ++i) {
           const size_t at = size_t(points.y[i] + rays.y0) * camera.width + (points.x[i] + rays.x0);

@@ -6,6 +6,7 @@
 #include "common/geometry/camera.h"
 #include "common/image/depth_image.h"
 #include "common/image/file.h"
+#include "common/image/pixel_mask.h"
 #include "common/image/shading.h"
 #include "services/sampler/julia/scene.h"
 #include "services/sampler/julia/trace.h"
@@ -18,13 +19,16 @@ class JuliaSampler {
   explicit JuliaSampler(int threads, JuliaTrace trace = julia_trace);
 
   /// Samples the pixels `rect` of the frame `camera` at their centres: the first point of a ray, inside the box and
-  /// beyond the near plane, whose distance estimate is lod footprints or less. step: the footprint is that of a pixel
-  /// of camera / step (4 for a camera that takes every fourth pixel of every fourth row), at least 1. Colours are unlit
-  /// albedo, darkened by occlusion and shadow; normals face the camera. Returns a canonical image of rect.width x
-  /// rect.height. A pixel does not depend on the rectangle it was asked for with. Precondition: rect lies in the
-  /// camera's image. Any number of threads may call it.
+  /// beyond the near plane, whose distance estimate is lod footprints or less. footprint_px: pixels of
+  /// this camera that a footprint is, above 0. It is that of the view that the samples are for, so that all of them are
+  /// of one surface: 1/4 for a camera that takes every fourth pixel of every fourth row, 4 for one that has 4 x 4 rays
+  /// for each of the view's pixels. Colours are unlit
+  /// albedo, darkened by occlusion and shadow; normals face the camera. mask, of the rectangle's size: only its pixels
+  /// are sampled, the others are empty; null: all. Returns a canonical image of rect.width x rect.height. A pixel does
+  /// not depend on the rectangle and the mask it was asked for with. Precondition: rect lies in the camera's image. Any
+  /// number of threads may call it.
   image::DepthImage sample(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect,
-                           int step);
+                           double footprint_px, const image::PixelMask* mask = nullptr);
 
  private:
   tbb::task_arena arena_;
@@ -32,8 +36,8 @@ class JuliaSampler {
 };
 
 /// Direct rendering for verification: every pixel of `camera` traced, shaded with unquantised normals. Depth in metres,
-/// +infinity where nothing is. threads: 0 = all cores.
+/// +infinity where nothing is. threads: 0 = all cores. footprint_px: as in JuliaSampler::sample().
 image::View render_julia_directly(const JuliaScene& scene, const geometry::Camera& camera,
-                                  const image::Shading& shading, int threads);
+                                  const image::Shading& shading, int threads, double footprint_px = 1);
 
 }  // namespace telesplat::sampler

@@ -63,7 +63,8 @@ glm::dvec4 JuliaScene::orbit_point(const glm::dvec3& room) const {
   return origin_ + orbit_direction(room + centre_ / units_per_metre_);
 }
 
-JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect, int step)
+JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect,
+                     double footprint_px)
     : x0(rect.x / kJuliaBlock * kJuliaBlock),
       y0(rect.y / kJuliaBlock * kJuliaBlock),
       columns_of_blocks((rect.x + rect.width - x0 + kJuliaBlock - 1) / kJuliaBlock),
@@ -102,7 +103,7 @@ JuliaRays::JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, co
   const glm::dvec4 orbit = scene.orbit_point(camera.pose.position_room);
   for (int i = 0; i < 4; ++i) origin[i] = static_cast<float>(orbit[i]);
   for (int i = 0; i < 3; ++i) origin[4 + i] = static_cast<float>(camera.pose.position_room[i]);
-  footprint = static_cast<float>(pixel_x / step * scene.units_per_metre());
+  footprint = static_cast<float>(pixel_x * footprint_px * scene.units_per_metre());
 
   // The farthest pixel centre of a block from its middle; a little more, for rounding. What is in the ball lies no
   // deeper than `deepest`.

@@ -67,17 +67,17 @@ class JuliaScene {
 /// so that a pixel's result does not depend on the rectangle it was asked for with.
 inline constexpr int kJuliaBlock = 8;
 
-/// The rays of a camera through a scene. A ray's parameter t is depth in metres; the direction of pixel (x, y) is
-/// column[x] + row[y], in orbit coordinates (index 0 to 3) and in room space (4 to 6). Only what `rect` needs is
-/// filled, in whole blocks.
+/// The rays of a camera through a scene. footprint_px: pixels of this camera that a footprint is. A ray's parameter t
+/// is depth in metres; the direction of pixel (x, y) is column[x] + row[y], in orbit coordinates (index 0 to 3) and in
+/// room space (4 to 6). Only what `rect` needs is filled, in whole blocks.
 struct JuliaRays {
-  JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect, int step);
+  JuliaRays(const JuliaScene& scene, const geometry::Camera& camera, const geometry::Rect& rect, double footprint_px);
 
   int x0, y0;  ///< upper left pixel of the blocks that hold the rectangle
   int columns_of_blocks, rows_of_blocks;
   float origin[7];  ///< of all rays: orbit coordinates, room space
   float near_m;
-  float footprint;     ///< of a pixel, in set units a metre of depth
+  float footprint;     ///< footprint_px pixels, in set units a metre of depth
   float ball;          ///< radius in orbit coordinates of the ball about 0 that rays are clipped to
   float spread;        ///< of a block: distance of its farthest ray from the middle one, in set units a metre of depth
   float block_ball;    ///< as `ball`, for a block's middle ray to stand for all its rays

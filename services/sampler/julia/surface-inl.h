@@ -128,6 +128,32 @@ HWY_INLINE Orbit Follow(const Constants& k, const Vec4& q) {
   return out;
 }
 
+// Steep normals, widened.
+HWY_INLINE Vec3 Widen(const Constants& k, const Vec4& q, VF reach, const Vec3& back, const Vec3& n) {
+  const VF lean = dot(n, back), in = hn::Mul(set(kInward), reach);
+  const MF steep = hn::Lt(lean, set(kSteep));
+  if (hn::AllFalse(f, steep)) return n;
+  Vec3 side;
+  for (int i = 0; i < 3; ++i) side.v[i] = hn::Sub(n.v[i], hn::Mul(back.v[i], lean));
+  normalise(side);
+  const VF rest = hn::Max(hn::Sub(set(1), hn::Mul(lean, lean)), hn::Zero(f));
+  const VF slope = hn::Div(hn::Sqrt(rest), hn::Max(lean, set(kLeastLean)));
+  const Vec4 towards = orbit_vector(k, back), base = along(q, orbit_vector(k, side), hn::Neg(in));
+  VF ahead = hn::Mul(in, hn::Add(hn::Min(slope, set(kInwardSlope)), set(1))), off = hn::Zero(f);
+  for (int i = 0; i < kInwardSteps; ++i) {
+    off = hn::Sub(Estimate(k, along(base, towards, ahead)), hn::Mul(set(k.lod), reach));
+    ahead = hn::Sub(ahead, off);
+  }
+  Vec3 second = Follow(k, along(base, towards, ahead)).gradient;
+  const MF good = hn::And(normalise(second), hn::Lt(hn::Abs(off), hn::Mul(set(kInwardOff), reach)));
+  const MF found = hn::And(good, hn::Gt(dot(second, back), hn::Zero(f)));
+  const Vec3 other = choose(found, second, back);
+  Vec3 mean;
+  for (int i = 0; i < 3; ++i) mean.v[i] = hn::Add(n.v[i], other.v[i]);
+  normalise(mean);
+  return choose(steep, mean, n);
+}
+
 HWY_INLINE Vec3 NormalAt(const Constants& k, const Vec4& q, const Vec3& gradient, VF reach, const Vec3& ray) {
   Vec3 back{{hn::Neg(ray.v[0]), hn::Neg(ray.v[1]), hn::Neg(ray.v[2])}}, n = gradient;
   normalise(back);
@@ -151,7 +177,7 @@ HWY_INLINE Vec3 NormalAt(const Constants& k, const Vec4& q, const Vec3& gradient
     normalise(turned);
     n = choose(away, turned, n);
   }
-  return n;
+  return Widen(k, q, reach, back, n);
 }
 
 HWY_INLINE VF OcclusionAt(const Constants& k, const Vec4& q, const Vec3& n) {

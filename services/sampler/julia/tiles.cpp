@@ -1,5 +1,7 @@
 #include "services/sampler/julia/tiles.h"
 
+#include <algorithm>
+
 #include "common/core/log.h"
 
 namespace telesplat::sampler {
@@ -12,6 +14,12 @@ Result<JuliaScene> make_scene(const wire::Welcome& session) {
   const auto placement = julia::placement_from_map(session.parameters, session.box_room);
   if (!placement) return placement.error();
   return JuliaScene(*parameters, *placement);
+}
+
+// Pixels of the lease's camera that are one of the view's; within limits, whatever a lease says.
+double footprint_px(const wire::Lease& lease) {
+  if (lease.footprint <= 0) return 1.0 / double(lease.step);
+  return std::clamp(lease.footprint * lease.camera.focal_x(), 1.0 / 64, 64.0);
 }
 
 }  // namespace
@@ -37,8 +45,10 @@ Readiness JuliaTiles::readiness(const HeldLease& held, double now_s) {
 
 Sampled JuliaTiles::sample(const HeldLease& held) {
   const wire::Lease& lease = held.lease;
-  return timed(
-      [&] { return sampler_.sample(*epochs_.find(lease.epoch)->scene, lease.camera, lease.rect, int(lease.step)); });
+  return timed([&] {
+    return sampler_.sample(*epochs_.find(lease.epoch)->scene, lease.camera, lease.rect, footprint_px(lease),
+                           held.pixels());
+  });
 }
 
 }  // namespace telesplat::sampler

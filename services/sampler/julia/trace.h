@@ -8,17 +8,32 @@
 //   surface  the depth refined within its bracket; normal, colour, occlusion, shadow
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <span>
 
 #include "services/sampler/julia/scene.h"
 
 namespace telesplat::sampler {
 
-/// Pixels [x_begin, x_end) x [y_begin, y_end) of a row of blocks, counted from rays.x0, rays.y0.
+/// Some of the pixels of a row of blocks, counted from rays.x0, rays.y0.
 struct JuliaPart {
-  static constexpr int kBlocks = 16;  ///< at most
+  static constexpr int kBlocks = 16;   ///< at most
+  static constexpr int kPadding = 16;  ///< blocks: kernels read whole vectors
   int block_row, block_begin, block_end;
-  int x_begin, x_end, y_begin, y_end;
+  /// The pixels to be traced: bit i of wanted[y][b] is pixel i of row y of block block_begin + b.
+  uint8_t wanted[kJuliaBlock][kBlocks + kPadding] = {};
+
+  bool any(int block) const {
+    return std::any_of(wanted, wanted + kJuliaBlock, [&](const auto& row) { return row[block - block_begin] != 0; });
+  }
+  int rays() const {
+    int n = 0;
+    for (const auto& row : wanted)
+      for (const uint8_t bits : row) n += std::popcount(bits);
+    return n;
+  }
 };
 
 /// Surface points, in no particular order.
@@ -33,8 +48,9 @@ struct JuliaPoints {
   float light[kPadded];      ///< 0..1, multiplies the colour
 };
 
-/// Adds the surface points of a part to `points`, which has room for them.
-using JuliaTrace = void (*)(const JuliaScene::Constants& scene, const JuliaRays& rays, const JuliaPart& part,
+/// Adds the surface points of the parts, of at most JuliaPoints::kMost rays in all, to `points`, which has room for
+/// them.
+using JuliaTrace = void (*)(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
                             JuliaPoints& points);
 
 /// For a ray that meets the surface where it begins, at depth t: the normal of the face through which it enters the box
@@ -43,9 +59,10 @@ bool face_normal(const JuliaScene::Constants& scene, const JuliaRays& rays, cons
                  float* normal);
 
 /// SIMD.
-void julia_trace(const JuliaScene::Constants& scene, const JuliaRays& rays, const JuliaPart& part, JuliaPoints& points);
+void julia_trace(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
+                 JuliaPoints& points);
 /// The oracle.
-void julia_trace_plainly(const JuliaScene::Constants& scene, const JuliaRays& rays, const JuliaPart& part,
+void julia_trace_plainly(const JuliaScene::Constants& scene, const JuliaRays& rays, std::span<const JuliaPart> parts,
                          JuliaPoints& points);
 
 }  // namespace telesplat::sampler

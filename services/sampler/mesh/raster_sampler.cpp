@@ -11,6 +11,7 @@
 #include "services/sampler/mesh/chunk_input.h"
 #include "services/sampler/mesh/raster_shaders.h"
 #include "services/sampler/mesh/sampler.h"
+#include "services/sampler/tiles/masked_image.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -27,7 +28,8 @@ class RasterSampler final : public Sampler {
   Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override;
   void remove_chunk(ChunkId id) override;
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override;
-  image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) override;
+  image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
+                           const image::PixelMask* mask = nullptr) override;
 
  private:
   // What OpenGL holds of a chunk: its bytes as they are, in one buffer. The caller's bytes are not needed any more.
@@ -44,7 +46,8 @@ class RasterSampler final : public Sampler {
   void reserve_targets(int width, int height);
   Status upload(ChunkId id, geometry::ChunkBytes chunk);
   static void release(Drawable& drawable);
-  void draw(const geometry::Camera& camera);
+  void draw(const geometry::Camera& camera, const geometry::Rect& part);
+  void read(const geometry::Rect& from, size_t to, std::vector<float>& depth_m, image::DepthImage& out) const;
   GLint uniform(const char* name) const { return glGetUniformLocation(program_, name); }
 
   std::unique_ptr<gl::EglContext> context_;
@@ -204,10 +207,11 @@ void RasterSampler::reserve_targets(int width, int height) {
   glDrawBuffers(3, kPlaces);
 }
 
-void RasterSampler::draw(const geometry::Camera& camera) {
+// Draws `part` of the camera's image; the rest of it is left as it was.
+void RasterSampler::draw(const geometry::Camera& camera, const geometry::Rect& part) {
   glViewport(0, 0, camera.width, camera.height);
   glEnable(GL_SCISSOR_TEST);
-  glScissor(0, 0, camera.width, camera.height);
+  glScissor(part.x, part.y, part.width, part.height);
   glEnable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
   glDisable(GL_DITHER);
@@ -232,7 +236,7 @@ void RasterSampler::draw(const geometry::Camera& camera) {
   const GLint vertices = uniform("vertices"), scalars = uniform("scalars");
 
   // Visible chunks, nearest first, so that the depth test spares hidden fragments.
-  const geometry::Frustum frustum(camera);
+  const geometry::Frustum frustum(geometry::crop(camera, part));
   std::vector<std::pair<float, const Drawable*>> visible;
   for (const auto& [id, drawable] : chunks_)
     if (frustum.may_contain(drawable.box_room))
@@ -249,26 +253,39 @@ void RasterSampler::draw(const geometry::Camera& camera) {
   glBindVertexArray(0);
 }
 
-image::DepthImage RasterSampler::sample(const geometry::Camera& camera, const geometry::Rect& tile) {
-  image::DepthImage out(tile.width, tile.height);
-  const gl::EglContext::Current current(*context_);
-  if (!current.ok()) return out;
-  std::vector<float> depth_m(out.pixels());
+// Copies `from` of what was drawn to the pixels of the image that begin at `to`.
+void RasterSampler::read(const geometry::Rect& from, size_t to, std::vector<float>& depth_m,
+                         image::DepthImage& out) const {
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glPixelStorei(GL_PACK_ROW_LENGTH, tile.width);
+  glPixelStorei(GL_PACK_ROW_LENGTH, out.width);
+  const auto read_plane = [&](GLenum source, GLenum format, GLenum type, void* pixels) {
+    glReadBuffer(source);
+    glReadPixels(from.x, from.y, from.width, from.height, format, type, pixels);
+  };
+  read_plane(GL_COLOR_ATTACHMENT0, GL_RED, GL_FLOAT, depth_m.data() + to);
+  read_plane(GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_INT, out.colour.data() + to);
+  read_plane(GL_COLOR_ATTACHMENT2, GL_RED_INTEGER, GL_UNSIGNED_SHORT, out.normal.data() + to);
+}
+
+// A mask spares what lies outside of the smallest rectangle that holds it: fragments are shaded many at a time, so that
+// to discard single ones would save little.
+image::DepthImage RasterSampler::sample(const geometry::Camera& camera, const geometry::Rect& tile,
+                                        const image::PixelMask* mask) {
+  image::DepthImage out(tile.width, tile.height);
+  const geometry::Rect wanted = mask ? bounds(*mask) : geometry::Rect{0, 0, tile.width, tile.height};
+  const gl::EglContext::Current current(*context_);
+  if (!current.ok() || wanted.width == 0) return out;
+  std::vector<float> depth_m(out.pixels());
   for (int y = 0; y < tile.height; y += largest_part_)
     for (int x = 0; x < tile.width; x += largest_part_) {
       const int width = std::min(largest_part_, tile.width - x), height = std::min(largest_part_, tile.height - y);
+      const int left = std::max(x, wanted.x), right = std::min(x + width, wanted.x + wanted.width);
+      const int top = std::max(y, wanted.y), bottom = std::min(y + height, wanted.y + wanted.height);
+      if (left >= right || top >= bottom) continue;
+      const geometry::Rect part{left - x, top - y, right - left, bottom - top};
       reserve_targets(width, height);
-      draw(geometry::crop(camera, {tile.x + x, tile.y + y, width, height}));
-      const size_t at = size_t(y) * tile.width + x;
-      const auto read = [&](GLenum source, GLenum format, GLenum type, void* to) {
-        glReadBuffer(source);
-        glReadPixels(0, 0, width, height, format, type, to);
-      };
-      read(GL_COLOR_ATTACHMENT0, GL_RED, GL_FLOAT, depth_m.data() + at);
-      read(GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_INT, out.colour.data() + at);
-      read(GL_COLOR_ATTACHMENT2, GL_RED_INTEGER, GL_UNSIGNED_SHORT, out.normal.data() + at);
+      draw(geometry::crop(camera, {tile.x + x, tile.y + y, width, height}), part);
+      read(part, size_t(top) * tile.width + left, depth_m, out);
     }
   for (size_t i = 0; i < depth_m.size(); ++i) {
     if (depth_m[i] > 0)
@@ -276,6 +293,7 @@ image::DepthImage RasterSampler::sample(const geometry::Camera& camera, const ge
     else
       out.colour[i] = 0, out.normal[i] = 0;  // nothing there; or a driver's NaN
   }
+  if (mask) keep_only(*mask, out);
   return out;
 }
 

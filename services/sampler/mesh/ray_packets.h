@@ -2,15 +2,18 @@
 #pragma once
 
 #include <embree3/rtcore.h>
+#include <tbb/blocked_range.h>
 #include <tbb/blocked_range2d.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "common/geometry/camera.h"
 #include "services/sampler/mesh/hit_packet.h"
+#include "services/sampler/mesh/masked_pixels.h"
 #include "services/sampler/mesh/ray_scene.h"
 
 namespace telesplat::sampler {
@@ -44,23 +47,39 @@ class PixelRays {
 
   /// Rays of the packet whose upper left pixel is (x, y).
   void aim(int x, int y, RTCRayHit8& packet) const {
-    for (int k = 0; k < kPacket; ++k) {
-      const glm::dvec3 d = columns_[x - x0_ + k % kPacketWidth] + rows_[y - y0_ + k / kPacketWidth];
-      packet.ray.dir_x[k] = static_cast<float>(d.x);
-      packet.ray.dir_y[k] = static_cast<float>(d.y);
-      packet.ray.dir_z[k] = static_cast<float>(d.z);
-      packet.ray.tfar[k] = std::numeric_limits<float>::infinity();
-      packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
-      packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
-    }
+    for (int k = 0; k < kPacket; ++k)
+      aim(k, columns_[x - x0_ + k % kPacketWidth] + rows_[y - y0_ + k / kPacketWidth], packet);
+  }
+
+  /// Rays of up to kPacket pixels, counted from (x, y); other lanes keep what they have, but hit nothing.
+  void aim(std::span<const MaskedPixel> pixels, int x, int y, RTCRayHit8& packet) const {
+    for (size_t k = 0; k < pixels.size(); ++k)
+      aim(static_cast<int>(k), columns_[x - x0_ + pixels[k].x] + rows_[y - y0_ + pixels[k].y], packet);
+    for (size_t k = pixels.size(); k < kPacket; ++k) packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
   }
 
  private:
+  static void aim(int k, const glm::dvec3& d, RTCRayHit8& packet) {
+    packet.ray.dir_x[k] = static_cast<float>(d.x);
+    packet.ray.dir_y[k] = static_cast<float>(d.y);
+    packet.ray.dir_z[k] = static_cast<float>(d.z);
+    packet.ray.tfar[k] = std::numeric_limits<float>::infinity();
+    packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+  }
+
   int x0_, y0_;
   glm::vec3 origin_;
   float near_;
   std::vector<glm::dvec3> columns_, rows_;
 };
+
+/// Whether a traced packet hit anything.
+inline bool any_hit(const RTCRayHit8& packet) {
+  bool any = false;
+  for (int k = 0; k < kPacket; ++k) any |= packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
+  return any;
+}
 
 /// Traces every packet that touches `tile`. Each task (several run at once) starts with task = begin(), calls
 /// consume(task, packet, x, y) for the packets in which something was hit, and ends with end(task); (x, y) is the
@@ -92,9 +111,7 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
                           for (int column = part.cols().begin(); column < part.cols().end(); ++column) {
                             rays.aim(column * kPacketWidth, row * kPacketHeight, packet);
                             rtcIntersect8(kAll, scene.scene(), &context, &packet);
-                            bool any = false;
-                            for (int k = 0; k < kPacket; ++k) any |= packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
-                            if (any) consume(task, packet, column * kPacketWidth, row * kPacketHeight);
+                            if (any_hit(packet)) consume(task, packet, column * kPacketWidth, row * kPacketHeight);
                           }
                         end(task);
                       });
@@ -107,6 +124,38 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
   trace_tile(
       scene, camera, tile, [] { return 0; },
       [&](int, const RTCRayHit8& packet, int x, int y) { consume(packet, x, y); }, [](int) {});
+}
+
+/// Traces the pixels of `tile` that `mask`, of its size, covers; consume(task, packet, pixels) as in trace_tile(), the
+/// packet's pixels being counted from the tile's corner. Packets hold what of the mask lies close together.
+template <class Begin, class Consume, class End>
+void trace_pixels(RayScene& scene, const geometry::Camera& camera, const geometry::Rect& tile,
+                  const image::PixelMask& mask, const Begin& begin, const Consume& consume, const End& end) {
+  const std::vector<MaskedPixel> pixels = gather(mask);
+  if (pixels.empty()) return;
+  const PixelRays rays(camera, tile.x, tile.y, tile.x + tile.width, tile.y + tile.height);
+  scene.commit();
+  constexpr size_t kTask = 16 * kPacket;  // pixels: fewer are not worth a thread
+  const auto trace = [&](const tbb::blocked_range<size_t>& part) {
+    auto task = begin();
+    RTCRayHit8 packet;
+    rays.begin(packet);
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    for (size_t i = part.begin() * kPacket; i < std::min(part.end() * kPacket, pixels.size()); i += kPacket) {
+      const size_t count = std::min<size_t>(kPacket, pixels.size() - i);
+      const std::span<const MaskedPixel> group(pixels.data() + i, count);
+      alignas(32) int valid[kPacket];
+      for (int k = 0; k < kPacket; ++k) valid[k] = static_cast<size_t>(k) < count ? -1 : 0;
+      rays.aim(group, tile.x, tile.y, packet);
+      rtcIntersect8(valid, scene.scene(), &context, &packet);
+      if (any_hit(packet)) consume(task, packet, group);
+    }
+    end(task);
+  };
+  const size_t packets = (pixels.size() + kPacket - 1) / kPacket;
+  scene.arena().execute([&] { tbb::parallel_for(tbb::blocked_range<size_t>(0, packets, kTask / kPacket), trace); });
 }
 
 }  // namespace telesplat::sampler

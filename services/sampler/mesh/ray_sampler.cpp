@@ -13,18 +13,19 @@ class PendingHits {
   PendingHits(const RayScene& scene, const scene::ColourTable& colours, double near_m, image::DepthImage& out)
       : scene_(scene), colours_(colours), near_m_(near_m), out_(out) {}
 
-  /// Keeps the hits of a packet that lie in the tile.
-  void add(const RTCRayHit8& packet, int x, int y, const geometry::Rect& tile) {
+  /// Keeps the hits of a packet that lie in the image; pixel_of(k) is the pixel of lane k.
+  template <class PixelOf>
+  void add(const RTCRayHit8& packet, const PixelOf& pixel_of) {
     if (count_ + kPacket > kCapacity) flush();
     for (int k = 0; k < kPacket; ++k) {
-      const int px = x + k % kPacketWidth - tile.x, py = y + k / kPacketWidth - tile.y;
-      if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID || px < 0 || py < 0 || px >= tile.width || py >= tile.height)
-        continue;
+      if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) continue;
+      const auto [px, py] = pixel_of(k);
+      if (px < 0 || py < 0 || px >= out_.width || py >= out_.height) continue;
       const geometry::MeshChunkView& chunk = scene_.chunk(packet.hit.instID[0][k]);
       const int i = count_++, group = i / kPacket, lane = i % kPacket;
       corners_[i] = chunk.indices.data() + 3 * size_t{packet.hit.primID[k]};
       chunks_[i] = &chunk;
-      pixels_[i] = size_t(py) * tile.width + px;
+      pixels_[i] = size_t(py) * out_.width + px;
       depths_m_[i] = packet.ray.tfar[k];
       __builtin_prefetch(corners_[i]);
       HitPacket& hits = hits_[group];
@@ -96,12 +97,27 @@ Status RaySampler::add_chunk(ChunkId id, geometry::ChunkBytes chunk) {
   return scene_.add(std::move(one));
 }
 
-image::DepthImage RaySampler::sample(const geometry::Camera& camera, const geometry::Rect& tile) {
+image::DepthImage RaySampler::sample(const geometry::Camera& camera, const geometry::Rect& tile,
+                                     const image::PixelMask* mask) {
   image::DepthImage out(tile.width, tile.height);
+  const auto begin = [&] { return PendingHits(scene_, *colours_, camera.near_m, out); };
+  const auto end = [](PendingHits& pending) { pending.flush(); };
+  if (mask && mask->count() < out.pixels()) {
+    trace_pixels(
+        scene_, camera, tile, *mask, begin,
+        [](PendingHits& pending, const RTCRayHit8& packet, std::span<const MaskedPixel> pixels) {
+          pending.add(packet, [&](int k) { return std::pair<int, int>(pixels[k].x, pixels[k].y); });
+        },
+        end);
+    return out;
+  }
   trace_tile(
-      scene_, camera, tile, [&] { return PendingHits(scene_, *colours_, camera.near_m, out); },
-      [&tile](PendingHits& pending, const RTCRayHit8& packet, int x, int y) { pending.add(packet, x, y, tile); },
-      [](PendingHits& pending) { pending.flush(); });
+      scene_, camera, tile, begin,
+      [&tile](PendingHits& pending, const RTCRayHit8& packet, int x, int y) {
+        pending.add(packet,
+                    [&](int k) { return std::pair(x + k % kPacketWidth - tile.x, y + k / kPacketWidth - tile.y); });
+      },
+      end);
   return out;
 }
 

@@ -19,7 +19,8 @@ class RaySampler final : public Sampler {
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override {
     colours_ = colours ? std::move(colours) : neutral_colours();
   }
-  image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) override;
+  image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
+                           const image::PixelMask* mask = nullptr) override;
 
   RayScene& scene() { return scene_; }
   const scene::ColourTable& colours() const { return *colours_; }

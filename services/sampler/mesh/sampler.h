@@ -9,6 +9,7 @@
 #include "common/geometry/mesh_chunk.h"
 #include "common/image/depth_image.h"
 #include "common/image/file.h"
+#include "common/image/pixel_mask.h"
 #include "common/image/shading.h"
 #include "common/scene/colouring.h"
 
@@ -36,8 +37,11 @@ class Sampler {
   /// Samples the pixels `tile` of the frame `camera` at their centres. Colours are unlit albedo interpolated over the
   /// triangle, or looked up for scalars that are interpolated over it; normals are interpolated, in room space, flipped
   /// to the side on which the camera sees the triangle. Returns a canonical image of tile.width x tile.height.
+  /// mask, of the tile's size: only its pixels are sampled, and are what they are without a mask (where two triangles
+  /// are equally near, the other one may be seen); the others are empty. null: all.
   /// Precondition: tile lies in the camera's image.
-  virtual image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile) = 0;
+  virtual image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
+                                   const image::PixelMask* mask = nullptr) = 0;
 };
 
 /// Of scalars that nobody told the colours of.

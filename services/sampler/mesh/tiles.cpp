@@ -84,7 +84,7 @@ Readiness MeshTiles::readiness(const HeldLease& held, double now_s) {
 
 Sampled MeshTiles::sample(const HeldLease& held) {
   sampler_->set_colours(looks_.find(held.lease.epoch)->colours);
-  return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect); });
+  return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect, held.pixels()); });
 }
 
 // Asks for the list of chunks, then for what the next tile needs, then for the rest as far as the budget goes.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/core/log.h"
+#include "services/sampler/tiles/masked_image.h"
 
 namespace telesplat::sampler {
 
@@ -22,7 +23,9 @@ Readiness ReplayTiles::readiness(const HeldLease& held, double now_s) {
     lease_ = lease.lease;
     begin_s_ = std::max(end_s_, held.received_s);
     const double whole_rows_s = cost_before_s_[lease.rect.y + lease.rect.height] - cost_before_s_[lease.rect.y];
-    end_s_ = begin_s_ + whole_rows_s * lease.rect.width / lease.camera.width;
+    const double pixels = double(lease.rect.width) * lease.rect.height;
+    const double part = held.mask ? double(held.mask->count()) / pixels : 1.0;
+    end_s_ = begin_s_ + whole_rows_s * part * lease.rect.width / lease.camera.width;
   }
   if (now_s >= end_s_) return {};
   return {State::kWaits, end_s_};
@@ -39,6 +42,7 @@ Sampled ReplayTiles::sample(const HeldLease& held) {
   copy(replay_.frame.depth, out.image.depth);
   copy(replay_.frame.colour, out.image.colour);
   copy(replay_.frame.normal, out.image.normal);
+  if (held.mask) keep_only(*held.mask, out.image);
   return out;
 }
 

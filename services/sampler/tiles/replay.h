@@ -15,8 +15,9 @@ class ReplayTiles final : public TileSource {
 
   const char* name() const override { return "replay"; }
   void on_welcome(const wire::Welcome&) override {}
-  /// A lease begins when the one before has ended, or when it came. Both are the instants that were due, not those at
-  /// which this process woke up: late awakenings do not add up. Hopeless: a frame of another size, or a coarse one.
+  /// A lease begins when the one before has ended, or when it came, and costs its part of the pixels. Both are the
+  /// instants that were due, not those at which this process woke up: late awakenings do not add up. Hopeless: a frame
+  /// of another size, or a coarse one.
   Readiness readiness(const HeldLease& lease, double now_s) override;
   Sampled sample(const HeldLease& lease) override;
 

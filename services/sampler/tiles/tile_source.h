@@ -4,10 +4,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/core/clock.h"
 #include "common/image/depth_image.h"
+#include "common/image/pixel_mask.h"
 #include "common/net/master_link.h"
 #include "services/sampler/work.h"
 
@@ -15,13 +17,16 @@ namespace telesplat::sampler {
 
 /// A lease and when it came, on this machine's clock.
 struct HeldLease {
-  wire::Lease lease;
+  wire::Lease lease;  ///< without its mask
   double received_s = 0;
+  std::optional<image::PixelMask> mask;  ///< what lease.mask says: the pixels to be sampled, counted from its rectangle
+
+  const image::PixelMask* pixels() const { return mask ? &*mask : nullptr; }
 };
 
 /// A sampled tile and when its sampling began and ended, on this machine's clock.
 struct Sampled {
-  image::DepthImage image;  ///< canonical, of the lease's rectangle
+  image::DepthImage image;  ///< canonical, of the lease's rectangle, empty where its mask is
   double begin_s = 0, end_s = 0;
 };
 

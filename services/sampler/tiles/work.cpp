@@ -1,14 +1,32 @@
 #include "services/sampler/tiles/work.h"
 
 #include "common/codec/depth_codec.h"
+#include "common/codec/mask_stream.h"
+#include "common/core/log.h"
 #include "common/net/dispatch.h"
 
 namespace telesplat::sampler {
 
 void TileWork::take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) {
   net::dispatch<wire::Lease>(from, message, [&](const wire::Lease& lease) {
-    if (takes_leases && leases_.size() < kMaxHeld) leases_.push_back({lease, now_s});
+    if (takes_leases && leases_.size() < kMaxHeld) hold(lease, now_s);
   });
+}
+
+// The mask is decoded once, and does not go on to the packer.
+void TileWork::hold(const wire::Lease& lease, double now_s) {
+  HeldLease held{lease, now_s, std::nullopt};
+  if (!lease.mask.empty()) {
+    held.lease.mask.clear();
+    auto mask = codec::decode_mask(lease.mask, lease.rect.width, lease.rect.height);
+    if (mask) {
+      held.mask = std::move(*mask);
+    } else {
+      held.lease.rays = uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
+      log::warn("lease {}: {}; all pixels are sampled", lease.lease.value, mask.error().text);
+    }
+  }
+  leases_.push_back(std::move(held));
 }
 
 Readiness TileWork::look_at_next(double now_s) {

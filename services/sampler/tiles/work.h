@@ -16,6 +16,8 @@ class TileWork final : public Work {
   const char* name() const override { return source_->name(); }
   void on_welcome(const wire::Welcome& session) override { source_->on_welcome(session); }
   bool takes_leases() const override { return source_->takes_leases(); }
+  /// All pixels of a lease whose mask is none are sampled, with a line: dropped, it would come again when it has run
+  /// out, as would the view that waits for it.
   void take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) override;
   size_t leases() const override { return leases_.size(); }
   void drop_leases() override { leases_.clear(); }
@@ -27,6 +29,8 @@ class TileWork final : public Work {
   void add_status(net::MasterLink::Values& values) const override { source_->add_status(values); }
 
  private:
+  void hold(const wire::Lease& lease, double now_s);
+
   std::unique_ptr<TileSource> source_;
   net::MasterLink& link_;
   std::deque<HeldLease> leases_;

@@ -107,6 +107,18 @@ TEST(CodecRoundTrip, PlanesLeaveOnlyRounding) {
   EXPECT_LT(inspect(encode(image)).value().depth_bytes, image.pixels() * 5 / 16) << "2.5 bits a pixel";
 }
 
+// Depths of scattered pixels of a plane are found by its neighbours all around, whatever their distance.
+TEST(CodecRoundTrip, ScatteredPixelsOfAPlaneLeaveOnlyRounding) {
+  for (const double density : {0.003, 0.03, 0.1}) {
+    DepthImage image = test::plane(256, 256, 301.7, -129.3);
+    std::fill(image.colour.begin(), image.colour.end(), 0x808080);
+    test::keep_random(image, density, 3);
+    expect_round_trip(image);
+    const StreamInfo info = inspect(encode(image)).value();
+    EXPECT_LT(info.sparse_bytes, 40 + info.covered_pixels * 9 / 8) << "9 bits a pixel of depth and normal, " << density;
+  }
+}
+
 TEST(CodecRoundTrip, DecodesIntoUsedMemory) {
   DepthImage image = test::random_pixels(300, 200, 1, 1);
   for (const double density : {0.0, 0.02, 0.5, 1.0}) {
@@ -127,7 +139,7 @@ TEST(CodecRoundTrip, InspectAddsUp) {
   EXPECT_EQ(info.height, 300);
   EXPECT_EQ(info.covered_pixels, static_cast<size_t>(std::count_if(image.depth.begin(), image.depth.end(),
                                                                    [](uint32_t d) { return d != 0; })));
-  const size_t parts = info.mask_bytes + info.depth_bytes + info.colour_bytes + info.normal_bytes;
+  const size_t parts = info.mask_bytes + info.depth_bytes + info.colour_bytes + info.normal_bytes + info.sparse_bytes;
   EXPECT_LE(parts, bytes.size());
   EXPECT_GE(parts + 9 * 6 + 8, bytes.size()) << "six tiles of a kind and a base, and a header";
 }
@@ -142,9 +154,28 @@ TEST(CodecFormat, GoldenBytes) {
       image.colour[i] = 0x102030 + static_cast<uint32_t>(i % 4) * 0x010203;
       image.normal[i] = static_cast<uint16_t>(0x8040 + i);
     }
-  const std::vector<uint8_t> golden{215, 2,  4,  3, 5, 232, 3, 0,   48,  32, 16, 64, 128, 2, 13, 7,   0, 8,  41, 0,
+  const std::vector<uint8_t> golden{215, 3,  4,  3, 5, 232, 3, 0,   48,  32, 16, 64, 128, 2, 13, 7,   0, 8,  41, 0,
                                     14,  14, 37, 0, 9, 37,  0, 8,   15,  9,  0,  8,  41,  0, 2,  2,   8, 2,  2,  8,
                                     2,   2,  2,  5, 0, 41,  0, 100, 100, 0,  0,  0,  0,   0, 0,  100, 9, 34, 2};
+  EXPECT_EQ(encode(image), golden);
+  const auto back = decode(golden);
+  ASSERT_TRUE(back.ok()) << back.error().text;
+  EXPECT_TRUE(*back == image);
+}
+
+// Sparse tiles are predicted in floating point, which must be the same everywhere: these bytes, too.
+TEST(CodecFormat, GoldenBytesOfASparseTile) {
+  DepthImage image(9, 8);
+  for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {8, 1}, {1, 3}, {5, 3}, {7, 4}, {2, 6}, {3, 7}, {8, 7}}) {
+    const size_t i = static_cast<size_t>(y * 9 + x);
+    image.depth[i] = static_cast<uint32_t>(500000 + 1234 * x - 777 * y + x * x * y);
+    image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
+    image.normal[i] = static_cast<uint16_t>((250 + 2 * x) % 256 | (100 - y) << 8);
+  }
+  const std::vector<uint8_t> golden{215, 3,   9,   8,   6,  32,  161, 7,   96,  80,  64,  250, 100, 1,   65,
+                                    17,  0,   0,   1,   0,  0,   34,  0,   128, 0,   0,   0,   4,   0,   8,
+                                    1,   9,   245, 1,   93, 248, 255, 215, 120, 252, 190, 223, 251, 225, 179,
+                                    136, 170, 3,   129, 94, 51,  136, 130, 11,  134, 128, 1,   0};
   EXPECT_EQ(encode(image), golden);
   const auto back = decode(golden);
   ASSERT_TRUE(back.ok()) << back.error().text;

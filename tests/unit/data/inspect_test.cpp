@@ -1,7 +1,7 @@
 // What `telesplat inspect` finds out of data sets: true units, what a run would choose, values of all steps.
 #include "services/data/inspect.h"
 
-#include "tests/support/volume_files.h"
+#include "tests/support/volume/files.h"
 
 namespace telesplat::data::test {
 namespace {

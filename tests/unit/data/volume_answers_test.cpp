@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/wire/serial.h"
-#include "tests/support/volume_samples.h"
+#include "tests/support/volume/samples.h"
 
 namespace telesplat::data {
 namespace {

@@ -3,7 +3,7 @@
 #include <sys/resource.h>
 
 #include "services/data/volume/formats/import_stream.h"
-#include "tests/support/volume_files.h"
+#include "tests/support/volume/files.h"
 
 #include <unistd.h>
 

@@ -1,5 +1,5 @@
 // Every volume format, type, byte order and placement: read voxel by voxel as written.
-#include "tests/support/volume_files.h"
+#include "tests/support/volume/files.h"
 
 #include "services/data/inspect.h"
 #include "services/data/volume/formats/header.h"

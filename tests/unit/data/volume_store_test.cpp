@@ -10,7 +10,7 @@
 
 #include "common/image/normal.h"
 #include "services/data/volume/slices.h"
-#include "tests/support/volume_samples.h"
+#include "tests/support/volume/samples.h"
 
 namespace telesplat::data {
 namespace {

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <random>
 
-#include "common/image/flip.h"
+#include "common/image/measures/flip.h"
 
 namespace telesplat::image {
 namespace {

@@ -1,5 +1,5 @@
 // PSNR, SSIM and hole fraction against their formulae, computed here the slow way.
-#include "common/image/quality.h"
+#include "common/image/measures/quality.h"
 
 #include <gtest/gtest.h>
 

@@ -109,6 +109,7 @@ TEST_F(Scenes, FlagsThatDoNotFitAreRefused) {
       {{"--master=tcp://127.0.0.1:1", "--tf=bone"}, "no scene"},
       {{"--master=tcp://127.0.0.1:1", "--c=0,0,0,0"}, "ctl set"},
       {{file("mesh.ply"), "--wall=2x1", "--viewers=3"}, "--viewers 3"},
+      {{file("mesh.ply"), "--verify-samples=12"}, "--verify-samples: 12 rays"},
       {{}, "a scene is needed"},
   };
   for (const auto& [arguments, part] : cases) {

@@ -11,7 +11,9 @@ namespace {
 
 class Animation : public ::testing::Test {
  protected:
-  explicit Animation(MasterOptions o = {.schedule = {.frames_in_flight = 2}, .progressive = Progressive::kOff})
+  explicit Animation(MasterOptions o = {.schedule = {.frames_in_flight = 2},
+                                        .progressive = Progressive::kOff,
+                                        .steering = Steering::kOff})
       : options(std::move(o)), core(options, {42}, *record) {}
 
   static wire::Hello hello(const std::string& role, uint64_t instance) {
@@ -298,7 +300,7 @@ TEST_F(Animation, TheDataServersTimelineRuns) {
 
 class BadTimeline : public Animation {
  protected:
-  BadTimeline() : Animation({.animation = *julia::parse_timeline("c.y=0:99:1s")}) {}
+  BadTimeline() : Animation({.steering = Steering::kOff, .animation = *julia::parse_timeline("c.y=0:99:1s")}) {}
 };
 TEST_F(BadTimeline, OfTheCommandLineIsNotBegun) {
   join();
@@ -309,7 +311,7 @@ TEST_F(BadTimeline, OfTheCommandLineIsNotBegun) {
 
 class ProgressiveAnimation : public Animation {
  protected:
-  ProgressiveAnimation() : Animation({}) {}
+  ProgressiveAnimation() : Animation({.steering = Steering::kOff}) {}
 };
 TEST_F(ProgressiveAnimation, CoarseAndFineShareAnEpoch) {
   join();
@@ -324,13 +326,16 @@ TEST_F(ProgressiveAnimation, CoarseAndFineShareAnEpoch) {
   }
 }
 
-TEST_F(ProgressiveAnimation, PackingKeepsEverythingByDefault) {
+TEST_F(ProgressiveAnimation, PackingEliminatesUnlessToldOtherwise) {
   MasterOptions o;
   o.redundancy = Redundancy::kAuto;
   MasterCore other(o, {1}, *record);
-  EXPECT_EQ(other.settings().at("packing.keep_redundant"), 0);
   other.on("d", hello("data", 1), 0);
-  EXPECT_EQ(other.settings().at("packing.keep_redundant"), 1);
+  EXPECT_EQ(other.settings().at("packing.keep_redundant"), 0);
+  o.redundancy = Redundancy::kKeep;
+  MasterCore keeping(o, {1}, *record);
+  keeping.on("d", hello("data", 1), 0);
+  EXPECT_EQ(keeping.settings().at("packing.keep_redundant"), 1);
 }
 
 }  // namespace

@@ -75,6 +75,7 @@ class Master : public ::testing::Test {
 
   std::unique_ptr<metrics::RunRecord> record = std::move(metrics::RunRecord::open("")).value();
   MasterCore core{MasterOptions{.schedule = {.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2},
+                                .steering = Steering::kOff,
                                 .settings = {{"packing.max_points", 5}}},
                   {42},
                   *record};

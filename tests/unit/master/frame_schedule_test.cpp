@@ -83,6 +83,22 @@ TEST(FrameSchedule, LeasesEveryTileOnceThenCompletes) {
   EXPECT_FALSE(done(s, frame, 1000, 0.2));
 }
 
+TEST(FrameSchedule, LeasesTellThePixelOfTheViewOrOfTheDisplay) {
+  FrameSchedule s({.tile_size = 256});
+  s.set_cut({.coarse = true});
+  wire::ViewRequest of_camera = request(1, 1), of_display = request(2, 1);
+  of_camera.camera.left = -1, of_camera.camera.right = 1;
+  of_display.footprint = 0.001;
+  s.request_view(of_camera);
+  s.request_view(of_display);
+  std::set<uint64_t> steps;
+  while (const auto l = next(s, "a", 0)) {
+    steps.insert(l->step);
+    EXPECT_DOUBLE_EQ(l->footprint, l->viewer == of_camera.viewer ? 2.0 / 256 : 0.001) << "step " << l->step;
+  }
+  EXPECT_EQ(steps.size(), 2u) << "coarse and complete frames";
+}
+
 TEST(FrameSchedule, ALeaseThatRunsOutGoesToAnother) {
   FrameSchedule s({.tile_size = 256, .lease_timeout_s = 2});
   s.request_view(request(1, 1));

@@ -101,7 +101,7 @@ class KindsOfScenes : public ::testing::Test {
 
   double now = 0;
   std::unique_ptr<metrics::RunRecord> record = std::move(metrics::RunRecord::open("")).value();
-  MasterCore core{{}, {42}, *record};
+  MasterCore core{{.steering = Steering::kOff}, {42}, *record};
   std::vector<Outgoing> outbox;
   std::map<std::string, wire::Welcome> last;
 };
@@ -289,7 +289,7 @@ TEST_F(KindsOfScenes, WhatWasNotGivenIsAsTheKindHasIt) {
   };
   expect(20e6, 0, 0.5, false);  // nothing is known yet
   hello(data(1, "julia"));
-  expect(8e6, 1, 0.4, true);
+  expect(20e6, 0, 0.4, true);
   hello(data(2, "mesh"));
   expect(20e6, 0, 0.5, false);
   hello(volume_part(3, 12, 0, 1));

@@ -61,6 +61,13 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
                           "bytes_sent",
                           "compression_ratio",
                           "redundancy_eliminated",
+                          "rays_cast",
+                          "rays_full",
+                          "rays_saved",
+                          "plans",
+                          "plans_late",
+                          "plan_ms",
+                          "plan_answer_ms",
                           "points_cached",
                           "points_drawn",
                           "tiles_released",
@@ -93,6 +100,7 @@ TEST_F(Record, TilesTellWhereTheyLieAndCoarseFramesAreNotTimed) {
   coarse.step = 4;
   fine.rect = {0, 128, 640, 3};
   fine.leased_s = 0.99;
+  fine.rays = 700;
   record->add_tile("a", coarse);
   record->add_tile("a", fine);
   const auto s = record->summary({}, {});
@@ -103,9 +111,54 @@ TEST_F(Record, TilesTellWhereTheyLieAndCoarseFramesAreNotTimed) {
   ASSERT_TRUE(record->finish({}, {}));
   const std::string tiles = text("tiles.csv");
   EXPECT_TRUE(tiles.starts_with("frame,tile,lease,sampler,samples,")) << tiles;
-  EXPECT_NE(tiles.find("packed_s,published_s,x,y,width,height,step\n"), std::string::npos);
-  EXPECT_NE(tiles.find(",0,128,640,3,1\n"), std::string::npos) << tiles;
-  EXPECT_NE(tiles.find(",0,0,0,0,4\n"), std::string::npos) << tiles;
+  EXPECT_NE(tiles.find("packed_s,published_s,x,y,width,height,step,rays,extra\n"), std::string::npos);
+  EXPECT_NE(tiles.find(",0,128,640,3,1,700,0\n"), std::string::npos) << tiles;
+  EXPECT_NE(tiles.find(",0,0,0,0,4,0,0\n"), std::string::npos) << tiles;
+}
+
+TEST_F(Record, PlansSpareRays) {
+  wire::PlanRequest asked{.frame = {1}, .epoch = {1}, .viewer = {5}, .request = {7}};
+  asked.camera.width = 100, asked.camera.height = 50;
+  wire::Plan plan{.frame = {1}, .epoch = {1}, .camera = asked.camera, .figures = {{"plan_ms", 8}, {"rays.edge", 40}}};
+  const auto add = [&](double asked_s, double planned_s) {
+    record->add_plan("v", metrics::row_of(asked, asked_s, plan, planned_s));
+  };
+  plan.tiles = {0, 0, 64, 32, 40, 1, 64, 0, 32, 32, 60, 2};
+  plan.masks = {1, 2, 3};
+  add(1, 1.010);  // frame 1: 100 rays
+  asked.frame = {2}, plan.tiles = {}, plan.masks = {};
+  add(2, 2.012);  // frame 2: none
+  asked.frame = {3}, plan.full = true;
+  add(3, 3.014);  // frame 3: all
+  asked.frame = {4};
+  record->add_plan("v", {.asked = asked, .asked_s = 4, .planned_s = 4.3});  // frame 4: all
+  asked.frame = {5}, asked.extra = true, plan.full = false, plan.tiles = {0, 0, 64, 32, 700, 1}, plan.masks = {4};
+  add(5, 5.1);  // 700 beyond
+  const auto cast = [&](uint64_t frame, uint64_t rays, bool extra = false) {
+    auto t = tile(frame, 0, 1.0);
+    t.rays = rays, t.extra = extra;
+    record->add_tile("a", t);
+  };
+  cast(1, 40), cast(1, 60), cast(3, 5000), cast(4, 5000), cast(5, 700, true);
+  const auto s = record->summary({}, {});
+  EXPECT_EQ(s["rays_cast"], 10800);
+  EXPECT_EQ(s["rays_full"], 20000);
+  EXPECT_DOUBLE_EQ(s["rays_saved"], 0.46);
+  EXPECT_EQ(s["plans"], 5);
+  EXPECT_EQ(s["plans_late"], 1);
+  EXPECT_DOUBLE_EQ(s["plan_ms"]["median"], 8);
+  EXPECT_NEAR(double(s["plan_answer_ms"]["median"]), 12, 1e-9) << "of views that were answered";
+  ASSERT_TRUE(record->finish({}, {}));
+  const std::string plans = text("plans.csv");
+  EXPECT_TRUE(plans.starts_with("viewer,request,frame,epoch,extra,round,still,outcome,asked_s,planned_s,plan_ms,"))
+      << plans;
+  EXPECT_NE(plans.find("\"v\",7,1,1,0,0,0,tiles,1.000000000,1.010000000,8,2.000000,2,12,100,5000,,,40,"),
+            std::string::npos)
+      << plans;
+  EXPECT_NE(plans.find(",2,1,0,0,0,empty,"), std::string::npos) << plans;
+  EXPECT_NE(plans.find(",3,1,0,0,0,full,"), std::string::npos) << plans;
+  EXPECT_NE(plans.find(",4,1,0,0,0,late,4.000000000,4.300000000,,,0,0,5000,5000,"), std::string::npos) << plans;
+  EXPECT_NE(plans.find(",5,1,1,0,0,tiles,"), std::string::npos) << plans;
 }
 
 TEST_F(Record, SaysHowEvenlySamplersWereBusy) {
@@ -227,6 +280,10 @@ TEST_F(Record, OfARunWithoutAnythingHoldsNoResults) {
                           "bytes_sent",
                           "compression_ratio",
                           "redundancy_eliminated",
+                          "rays_cast",
+                          "rays_saved",
+                          "plans",
+                          "plan_ms",
                           "points_cached",
                           "bytes_per_cached_point",
                           "points_drawn",

@@ -140,7 +140,8 @@ TEST(KeepMode, StreamsArePublishedAsTheyCame) {
     const auto event = core.submit(tile, 0, stream);
     ASSERT_TRUE(event.ok() && event->has_value());
     EXPECT_EQ((*event)->blob == stream, keep);
-    EXPECT_EQ(*(*event)->blob, *stream) << "nothing is redundant yet";
+    if (keep) EXPECT_EQ(*(*event)->blob, *stream);
+    EXPECT_EQ((*event)->kept, (*event)->samples) << "nothing is redundant yet";
   }
 }
 
@@ -157,7 +158,7 @@ TEST(KeepMode, CoarsePatchesGoFirst) {
   const auto events = core.tick(1);
   ASSERT_EQ(events.size(), 1u);
   ASSERT_EQ(events[0].frames.size(), events[0].clusters.size());
-  for (const uint32_t frame : events[0].frames) EXPECT_EQ(frame, 1u);
+  for (const uint32_t frame : events[0].frames) EXPECT_EQ(frame, 1u | points::kProvisionalTag);
   EXPECT_GT(core.statistics().patches_forgotten, 10u);
   EXPECT_EQ(core.statistics().patches_forgotten, events[0].clusters.size());
   for (const auto& [key, cluster] : core.model().clusters()) {
@@ -166,6 +167,34 @@ TEST(KeepMode, CoarsePatchesGoFirst) {
     std::sort(frames.begin(), frames.end());
     EXPECT_LE(std::unique(frames.begin(), frames.end()) - frames.begin(), 2);
   }
+}
+
+TEST(EliminateMode, ACoarsePassLeavesNoTraceBehindItsCompleteFrame) {
+  Config config = test::packer_config();
+  config.model.compact = true;
+  PackerCore core(config, test::kEpoch), plain(config, test::kEpoch);
+  test::Replica replica(config.model);
+  const auto apply = [&](const std::vector<Event>& events) {
+    for (const Event& e : events) replica.apply(e);
+  };
+  auto coarse = test::sampled_frame({1}, geometry::subsample(camera(0), 4), 16);
+  auto fine = test::sampled_frame({2}, camera(0), 48);
+  for (auto& t : coarse) t.step = 4, t.request = {1};
+  for (auto& t : fine) t.request = {1};
+  apply(submit_all(core, std::move(coarse), 0));
+  const uint64_t coarse_points = core.model().points();
+  submit_all(plain, fine, 0);
+  apply(submit_all(core, std::move(fine), 0));
+  EXPECT_EQ(core.model().points(), plain.model().points() + coarse_points) << "all of the complete frame is packed";
+  apply(core.forget_superseded());
+  EXPECT_GT(coarse_points, 50u);
+  EXPECT_EQ(core.model().points(), plain.model().points());
+  for (const auto& [key, cluster] : core.model().clusters())
+    for (const points::Mosaic& m : cluster->mosaics) EXPECT_FALSE(m.provisional());
+  EXPECT_EQ(replica.model().digest(), core.model().digest());
+  test::Replica late(config.model);
+  late.catch_up(core);
+  EXPECT_EQ(late.model().digest(), core.model().digest());
 }
 
 TEST(KeepMode, ACompleteFrameSupersedesItsCoarsePass) {
@@ -197,7 +226,8 @@ TEST(KeepMode, ACompleteFrameSupersedesItsCoarsePass) {
   std::set<uint32_t> left;
   for (const auto& [key, cluster] : core.model().clusters())
     for (const auto& m : cluster->mosaics) left.insert(m.frame_tag());
-  EXPECT_EQ(left, (std::set<uint32_t>{2, 3})) << "the other request's coarse pass is all there is of it";
+  EXPECT_EQ(left, (std::set<uint32_t>{2, 3 | points::kProvisionalTag}))
+      << "the other request's coarse pass is all there is of it";
   EXPECT_EQ(replica.model().digest(), core.model().digest());
   test::Replica late(keep_config().model);
   late.catch_up(core);

@@ -22,13 +22,13 @@ ModelConfig compact_config() {
 }
 
 // A view of the scene of which a share of the pixels is left, as elimination leaves them.
-PreparedPatch view(uint64_t sequence, double fraction, int width = 320, double distance = 1) {
+PreparedPatch view(uint64_t sequence, double fraction, int width = 320, double distance = 1, FrameId frame = {}) {
   std::mt19937_64 random(sequence);
   const geometry::Rect tile{0, 0, width, width * 5 / 8};
   const geometry::Camera camera = test::scene_camera(test::random_eye(random) * distance, tile.width, tile.height);
   image::DepthImage image = test::sample_scene(camera, tile);
   test::mask_randomly(image, fraction, sequence);
-  return prepare_patch(compact_config(), {sequence}, camera, tile, image, FrameId{sequence});
+  return prepare_patch(compact_config(), {sequence}, camera, tile, image, frame.value ? frame : FrameId{sequence});
 }
 
 struct Point {
@@ -54,6 +54,32 @@ TEST(Compaction, KeepsEveryPointAsItWas) {
     for (const Mosaic& m : cluster->mosaics) gather(key, m, got);
   EXPECT_EQ(got.size(), model.points());
   EXPECT_TRUE(got == expected);
+}
+
+TEST(Compaction, ProvisionalMosaicsStayAsTheyCame) {
+  PointModel model(compact_config()), without(compact_config());
+  std::multiset<Point> expected, got;
+  uint64_t provisional = 0;
+  for (uint64_t s = 1; s <= 12; ++s) {
+    const uint64_t step = s % 3 == 1 ? 4 : 1;
+    PreparedPatch patch = view(s, 0.4, 320, step > 1 ? 4 : 1, tagged({s}, step));
+    for (const auto& [key, mosaic] : patch.mosaics) {
+      EXPECT_EQ(mosaic.provisional(), step > 1);
+      EXPECT_EQ(mosaic.frame_tag(), step > 1 ? s | kProvisionalTag : s);
+      if (step > 1) gather(key, mosaic, expected), ++provisional;
+    }
+    if (step == 1) without.insert(view(s, 0.4, 320, 1, tagged({s}, step)));
+    model.insert(std::move(patch));
+  }
+  std::vector<ClusterKey> keys;
+  std::vector<uint32_t> frames;
+  for (const auto& [key, cluster] : model.clusters())
+    for (const Mosaic& m : cluster->mosaics)
+      if (m.provisional()) gather(key, m, got), keys.push_back(key), frames.push_back(m.frame_tag());
+  EXPECT_EQ(keys.size(), provisional);
+  EXPECT_TRUE(got == expected);
+  model.forget(keys, frames);
+  EXPECT_EQ(model.digest(), without.digest()) << "as if they had never been there";
 }
 
 TEST(Compaction, MosaicsGrowWithTheLogarithmOfPoints) {
@@ -170,6 +196,61 @@ TEST(Compaction, FinerPointsTakeInTheCoarseOnesTheySurround) {
   // Of another side of the surface: they surround nothing.
   Merge apart = plan_merge(cluster, plane(800, 20, 3, image::encode_normal16({0, 0, -1})));
   EXPECT_TRUE(apart.replaced.empty());
+}
+
+// Clumps of finer samples, as refinement adds them: where there are none, samples stay as far apart as they are, and
+// so are drawn as large.
+TEST(Compaction, SamplesBesideFinerOnesKeepTheirSize) {
+  const ModelConfig config = compact_config();
+  PointModel model(config);
+  const int width = 256, height = 160, clump = 4;
+  const geometry::Camera camera = test::scene_camera({0.35, 0.3, 0.5}, width, height);
+  std::mt19937 random(5);
+  std::vector<bool> refined(size_t(width / clump) * (height / clump));
+  for (size_t i = 0; i < refined.size(); ++i) refined[i] = random() % 100 < 30;
+  const auto is_refined = [&](int x, int y) {
+    if (x < 0 || y < 0 || x >= width || y >= height) return false;
+    return bool(refined[size_t(y / clump * (width / clump) + x / clump)]);
+  };
+  const auto patch = [&](uint64_t sequence, int by, const auto& wanted) {
+    geometry::Camera fine = camera;
+    fine.width *= by, fine.height *= by;
+    const geometry::Rect all{0, 0, fine.width, fine.height};
+    image::DepthImage image = test::sample_scene(fine, all);
+    for (int y = 0; y < fine.height; ++y)
+      for (int x = 0; x < fine.width; ++x)
+        if (const size_t i = size_t(y) * fine.width + x; !wanted(x / by, y / by))
+          image.depth[i] = image.colour[i] = image.normal[i] = 0;
+    return prepare_patch(config, {sequence}, fine, all, image, FrameId{sequence});
+  };
+  // Samples with nothing finer beside them, and the range at which they were sampled.
+  std::map<Point, float> alone;
+  const auto apart = patch(1, 1, [&](int x, int y) {
+    for (int j = -1; j <= 1; ++j)
+      for (int i = -1; i <= 1; ++i)
+        if (is_refined(x + i, y + j)) return false;
+    return true;
+  });
+  for (const auto& [key, mosaic] : apart.mosaics) {
+    std::multiset<Point> points;
+    gather(key, mosaic, points);
+    for (const Point& p : points) alone[p] = mosaic.pixel_range();
+  }
+  ASSERT_GT(alone.size(), 500u);
+  model.insert(patch(1, 1, [](int, int) { return true; }));
+  for (uint64_t s = 2; s <= 9; ++s)
+    model.insert(patch(s, s % 2 ? 4 : 2,
+                       [&](int x, int y) { return is_refined(x, y) && (x / 8 + y / 8) % 4 == int(s / 2 - 1); }));
+  size_t found = 0, shrunk = 0;
+  for (const auto& [key, cluster] : model.clusters())
+    for (const Mosaic& m : cluster->mosaics) {
+      std::multiset<Point> points;
+      gather(key, m, points);
+      for (const Point& p : points)
+        if (const auto at = alone.find(p); at != alone.end()) ++found, shrunk += m.pixel_range() > 1.01f * at->second;
+    }
+  EXPECT_EQ(found, alone.size());
+  EXPECT_LT(double(shrunk), 0.02 * double(found));
 }
 
 TEST(Summary, HasAPointForEachCellOfTheBlock) {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/geometry/trajectory.h"
+#include "common/image/measures/reference.h"
 #include "common/image/normal.h"
 #include "services/sampler/julia/palette.h"
 #include "services/sampler/julia/sampler.h"
@@ -139,7 +140,7 @@ TEST(JuliaSampler, StepKeepsTheFootprintOfTheFullCamera) {
   const double dx = 1.5 / full.focal_x(), dy = 1.5 / full.focal_y();  // pixel (x, y) becomes (4 x, 4 y)
   coarse.left -= dx, coarse.right -= dx, coarse.top += dy, coarse.bottom += dy;
   const image::DepthImage fine = whole(s.scene, full);
-  const image::DepthImage sparse = JuliaSampler(1).sample(s.scene, coarse, {0, 0, coarse.width, coarse.height}, 4);
+  const image::DepthImage sparse = JuliaSampler(1).sample(s.scene, coarse, {0, 0, coarse.width, coarse.height}, 0.25);
   size_t both = 0, alike = 0, one = 0;
   for (int y = 0; y < coarse.height; ++y)
     for (int x = 0; x < coarse.width; ++x) {
@@ -153,6 +154,57 @@ TEST(JuliaSampler, StepKeepsTheFootprintOfTheFullCamera) {
   ASSERT_GT(both, 500u);
   EXPECT_GE(alike + 3, both);
   EXPECT_LE(one, 3u);
+}
+
+// Four by four rays for each pixel of `c`, of the pixel's own surface.
+image::Reference sixteen_rays(const JuliaScene& scene, const geometry::Camera& c, const image::Shading& shading) {
+  return *image::supersample(c, 16, [&](const geometry::Camera& part) {
+    return Result<image::View>(render_julia_directly(scene, part, shading, 1, 4));
+  });
+}
+
+TEST(JuliaSampler, FinerCamerasSeeTheSurfaceOfTheView) {
+  // Rays at the middles of a view's pixels, cast by a camera of 3 x 3 rays a pixel.
+  const Scene s(julia::presets()[0].parameters);
+  const geometry::Camera view = camera(320, 200);
+  geometry::Camera fine = view;
+  fine.width *= 3, fine.height *= 3;
+  const geometry::Rect all{0, 0, fine.width, fine.height};
+  const image::DepthImage own = whole(s.scene, view);
+  const auto differ = [&](double footprint_px) {
+    const image::DepthImage image = JuliaSampler(1).sample(s.scene, fine, all, footprint_px);
+    size_t out = 0;
+    for (int y = 0; y < view.height; ++y)
+      for (int x = 0; x < view.width; ++x) {
+        const uint32_t a = own.depth[size_t(y) * view.width + x],
+                       b = image.depth[size_t(3 * y + 1) * fine.width + 3 * x + 1];
+        out += (a == 0) != (b == 0) ||
+               (a && std::abs(image::decode_depth(a, view.near_m) / image::decode_depth(b, view.near_m) - 1) *
+                             view.focal_x() >
+                         0.5);
+      }
+    return out;
+  };
+  EXPECT_LT(differ(3), covered(own) / 500);  // single rays that graze the surface
+  EXPECT_GT(differ(1), covered(own) / 20);   // a pixel of its own is a third as large, so its surface lies deeper
+}
+
+TEST(JuliaSampler, RimsAreNotDottedWithDarkPixels) {
+  // Folds seen from the side end in rims that turn away within a pixel.
+  const Scene s(julia::presets()[0].parameters);
+  const geometry::Camera c = camera(800, 500);
+  const image::Shading shading({}, c);
+  const image::View one = render_julia_directly(s.scene, c, shading, 1);
+  const image::Reference truth = sixteen_rays(s.scene, c, shading);
+  size_t shown = 0, dark = 0;
+  for (size_t i = 0; i < one.colour.size(); ++i) {
+    if (!std::isfinite(one.depth_m[i]) || !std::isfinite(truth.view.depth_m[i])) continue;
+    ++shown;
+    const auto red = [](uint32_t colour) { return int(colour >> 16 & 255); };
+    dark += red(one.colour[i]) + 30 < red(truth.view.colour[i]);
+  }
+  ASSERT_GT(shown, 50000u);
+  EXPECT_LT(dark, 55u);  // 29; 102 if each normal is that of its point
 }
 
 TEST(JuliaSampler, BoxThatCutsTheSetShowsItsFaces) {

@@ -6,8 +6,8 @@
 #include "services/sampler/volume/raycaster.h"
 #include "services/sampler/volume/shear/rows.h"
 #include "services/sampler/volume/shear/splatter.h"
-#include "tests/support/volume_oracle.h"
-#include "tests/support/volume_scenes.h"
+#include "tests/support/volume/oracle.h"
+#include "tests/support/volume/scenes.h"
 
 namespace telesplat::sampler {
 namespace {

@@ -1,4 +1,4 @@
-// What samplers do for their leases without sockets: Julia sets by epoch, and replays.
+// What samplers do for their leases: Julia sets by epoch, replays, masks.
 #include <gtest/gtest.h>
 
 #include <unistd.h>
@@ -6,10 +6,15 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/codec/depth_codec.h"
+#include "common/codec/mask_stream.h"
 #include "common/geometry/trajectory.h"
 #include "common/julia/parameters.h"
+#include "common/net/dispatch.h"
 #include "services/sampler/julia/tiles.h"
 #include "services/sampler/tiles/replay.h"
+#include "services/sampler/tiles/work.h"
+#include "tests/support/masks.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -50,6 +55,20 @@ TEST(JuliaTiles, SamplesEachLeaseWithItsEpochsParameters) {
   EXPECT_GE(a.end_s, a.begin_s);
   EXPECT_NE(a.image, b.image);
   EXPECT_EQ(work.sample(first).image, a.image);
+}
+
+TEST(JuliaTiles, TheSurfaceIsThatOfTheLeasesFootprint) {
+  JuliaTiles work(1);
+  work.on_welcome(welcome({1}, 0.3));
+  HeldLease own = lease(1, {1}, {0, 0, 48, 32}, 0), stepped = own, fine = own;
+  fine.lease.footprint = 1 / fine.lease.camera.focal_x() / 4;  // as a lease of every fourth pixel
+  stepped.lease.step = 4;
+  EXPECT_EQ(work.sample(fine).image, work.sample(stepped).image);
+  EXPECT_NE(work.sample(fine).image, work.sample(own).image);
+  for (const double odd : {1e-300, 1e300}) {
+    fine.lease.footprint = odd;
+    EXPECT_EQ(work.sample(fine).image.width, 48) << odd;
+  }
 }
 
 TEST(JuliaTiles, RemembersTheLastEpochsOnly) {
@@ -119,6 +138,95 @@ TEST(ReplayTiles, DropsLeasesOfOtherFrames) {
   other.lease.step = 1;
   other.lease.camera.width = 24;
   EXPECT_EQ(work.readiness(other, 0).state, State::kHopeless);
+}
+
+TEST(ReplayTiles, AMaskedLeaseCostsItsPartAndHasItsPixelsOnly) {
+  ReplayTiles work(replay(), 1);
+  auto held = lease(1, {1}, {0, 0, 48, 4}, 100);
+  held.mask = test::band_mask(48, 4, 20);
+  const size_t count = held.mask->count();
+  ASSERT_GT(count, 10u);
+  ASSERT_LT(count, 48u * 4);
+  EXPECT_NEAR(work.readiness(held, 100).again_s, 100 + 0.5 * 4 * double(count) / (48 * 4), 1e-9);
+  ASSERT_EQ(work.readiness(held, 103).state, State::kReady);
+  const auto masked = work.sample(held).image;
+  held.mask.reset();
+  EXPECT_EQ(masked, test::masked(work.sample(held).image, test::band_mask(48, 4, 20)));
+}
+
+class Masks : public testing::Test {
+ protected:
+  Masks() : link_(context_, "tcp://127.0.0.1:9", {}), control_(context_, net::Kind::kDealer, "master") {
+    work_.on_welcome(welcome({1}, 0));
+  }
+  void take(const wire::Lease& lease) {
+    const auto body = std::make_shared<std::string>(wire::encode(lease));
+    work_.take(control_, {"", "lease", std::as_bytes(std::span(*body)), body}, true, 0);
+  }
+  // What comes of the first lease.
+  std::pair<wire::Lease, image::DepthImage> deliver() {
+    EXPECT_EQ(work_.look_at_next(0).state, State::kReady);
+    const Delivery made = work_.sample_next();
+    std::pair<wire::Lease, image::DepthImage> out;
+    net::dispatch<wire::DepthTile>(control_, {"", std::string(made.type), std::as_bytes(std::span(made.body)), nullptr},
+                                   [&](const wire::DepthTile& tile) {
+                                     const auto* bytes = reinterpret_cast<const uint8_t*>(tile.image.data());
+                                     auto image = codec::decode({bytes, tile.image.size()});
+                                     ASSERT_TRUE(image.ok());
+                                     out = {tile.lease, *std::move(image)};
+                                   });
+    return out;
+  }
+  static wire::Lease plain() {
+    wire::Lease out = lease(1, {1}, {4, 4, 40, 24}, 0).lease;
+    out.block_rect = out.rect;
+    out.blocks_in_frame = 1;
+    return out;
+  }
+
+  net::Context context_;
+  net::MasterLink link_;
+  net::Socket control_;
+  TileWork work_{std::make_unique<JuliaTiles>(1), link_};
+};
+
+TEST_F(Masks, OfALeaseSaysWhatIsSampledAndStaysWithTheSampler) {
+  const auto mask = test::spread_mask(40, 24, 8, 1);
+  wire::Lease lease = plain();
+  take(lease);
+  const auto all = deliver().second;
+  lease.mask = codec::encode_mask(mask);
+  lease.rays = mask.count();
+  take(lease);
+  const auto [back, image] = deliver();
+  EXPECT_TRUE(back.mask.empty());
+  EXPECT_EQ(back.rays, mask.count());
+  EXPECT_EQ(image, test::masked(all, mask));
+  EXPECT_NE(image, image::DepthImage(40, 24));
+}
+
+// Dropped, the lease would come again and again.
+TEST_F(Masks, WhereTheyAreNoneAllPixelsAreSampled) {
+  wire::Lease lease = plain();
+  take(lease);
+  const auto all = deliver().second;
+  const auto good = codec::encode_mask(test::spread_mask(40, 24, 8, 1));
+  for (const std::vector<uint32_t>& bad : {std::vector<uint32_t>{0xffffffff},
+                                           std::vector<uint32_t>(1000, 0x01010101),
+                                           {good.begin(), good.end() - 1},
+                                           codec::encode_mask(test::spread_mask(200, 300, 8, 1))}) {
+    lease.mask = bad;
+    lease.rays = 120;
+    take(lease);
+    ASSERT_EQ(work_.leases(), 1u) << bad.size() << " words";
+    const auto [back, image] = deliver();
+    EXPECT_EQ(image, all);
+    EXPECT_EQ(back.rays, 40u * 24u);
+    EXPECT_TRUE(back.mask.empty());
+  }
+  lease.mask = good;
+  take(lease);
+  EXPECT_EQ(work_.leases(), 1u);
 }
 
 class ReplayFile : public testing::Test {

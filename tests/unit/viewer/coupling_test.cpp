@@ -1,6 +1,7 @@
 // Pose prediction and view requests.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "client/viewer/coupling/view_requester.h"
@@ -70,6 +71,14 @@ TEST_F(Requester, AStillHeadGetsExactlyWhatItLooksAt) {
   EXPECT_TRUE(requester.next(0.21).has_value());
 }
 
+TEST_F(Requester, RequestsTellThePixelOfTheDisplay) {
+  requester.on_pose(0, display);
+  const auto r = requester.next(0);
+  ASSERT_TRUE(r);
+  ASSERT_EQ(r->camera.width, 640);
+  EXPECT_DOUBLE_EQ(r->footprint, 2.0 / 1280);
+}
+
 TEST_F(Requester, AMovingHeadGetsAWiderViewWithinTheLimit) {
   for (int i = 0; i < 10; ++i) {
     display.pose = turned(2.0 * i * 0.02, {0, 0, 0});
@@ -124,6 +133,160 @@ TEST_F(Requester, ACoarsePartThatComesLastIsNoNewUpdate) {
   auto coarse = part(id, 0, 1);
   coarse.step = 4;
   EXPECT_FALSE(requester.on_part(part_of(coarse), 0.4).has_value());
+}
+
+TEST_F(Requester, AHeadThatTremblesAsksForTheSameViewAgain) {
+  requester.on_pose(0, display);
+  const geometry::Camera first = requester.next(0)->camera;
+  const double quarter_rad = ViewRequester::kDeadBand_px / display.focal_x();
+  // Slow, so that it counts as resting; half of the dead band to one side, then to the other.
+  double now_s = 0;
+  for (const double turn : {0.5, -0.5, 0.9, 0.0}) {
+    display.pose = turned(turn * quarter_rad, {0, 0, 0});
+    for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
+    EXPECT_TRUE(requester.next(now_s)->camera == first) << turn;
+  }
+  display.pose = turned(1.2 * quarter_rad, {0, 0, 0});
+  for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
+  const geometry::Camera next = requester.next(now_s)->camera;
+  EXPECT_TRUE(next.pose == display.pose) << "what is displayed, to the last bit";
+  // It drifts, in steps that are small each: the dead band is about what was asked for, not about the step before.
+  display.pose = turned(1.9 * quarter_rad, {0, 0, 0});
+  for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
+  EXPECT_TRUE(requester.next(now_s)->camera == next);
+  display.pose = turned(2.6 * quarter_rad, {0, 0, 0});
+  for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
+  EXPECT_FALSE(requester.next(now_s)->camera == next);
+  // Metres count as well.
+  display.pose.position_room.x += ViewRequester::kNearest_m * 1.1 * quarter_rad;
+  for (int i = 0; i < 20; ++i) requester.on_pose(now_s += 0.02, display);
+  EXPECT_TRUE(requester.next(now_s)->camera.pose == display.pose);
+}
+
+TEST_F(Requester, KeepsItsRateWhoeverLooksLate) {
+  int count = 0;
+  // 10 a second, looked at every 0.013 s: a period that began with the last request would lose 4 % of them.
+  for (int i = 0; i < 1540; ++i) {
+    const double now_s = 100 + 0.013 * i;
+    requester.on_pose(now_s, display);
+    count += requester.next(now_s).has_value();
+    if (const auto due_s = requester.due_in_s(now_s)) EXPECT_LE(*due_s, 0.1);
+  }
+  EXPECT_GE(count, 200);
+  EXPECT_LE(count, 202);
+  // After a pause there are no more at once than one.
+  requester.on_pose(200, display);
+  EXPECT_TRUE(requester.next(200).has_value());
+  EXPECT_FALSE(requester.next(200.05).has_value());
+}
+
+class SteeredRequester : public Requester {
+ protected:
+  SteeredRequester() { requester.set_steered(true); }
+  // Requests within `for_s` of a head that moves by so many metres a second; each is answered after 50 ms.
+  int requests(double for_s, uint64_t kept, double speed_m_s = 0) {
+    int count = 0;
+    for (const double end_s = now_s + for_s; now_s < end_s; now_s += 0.01) {
+      display.pose.position_room.x += speed_m_s * 0.01;
+      requester.on_pose(now_s, display);
+      if (const auto request = requester.next(now_s)) {
+        ++count;
+        open = request->request, answer_s = now_s + 0.05;
+      }
+      if (open.value == 0 || now_s < answer_s) continue;
+      auto p = part(open, 0, 1);
+      p.kept = kept, p.samples = kept + 300;  // the others were cast to see whether they agree
+      EXPECT_TRUE(requester.on_part(part_of(p), now_s).has_value());
+      open = {};
+    }
+    return count;
+  }
+  double now_s = 100, answer_s = 0;
+  RequestId open;
+};
+
+TEST_F(SteeredRequester, AViewThatLacksNothingIsAskedForOnceASecond) {
+  EXPECT_GE(requests(2, 10), 17) << "it brings points: ten a second, and two for the first one's epoch";
+  const int quiet = requests(5, 0);
+  EXPECT_GE(quiet, 5);
+  EXPECT_LE(quiet, 7);
+  EXPECT_GE(requests(2, 0, 0.5), 18) << "the head moves";
+  EXPECT_LE(requests(3, 0), 6);
+  EXPECT_GE(requests(2, 5), 12) << "something has changed: within a second it is asked for at the full rate again";
+}
+
+TEST_F(SteeredRequester, TheNextViewIsAskedForWhenTheLastOneIsComplete) {
+  // Each is answered after 0.25 s, when two more are due.
+  std::vector<double> asked_s, answered_s;
+  for (const double end_s = now_s + 3; now_s < end_s; now_s += 0.01) {
+    display.pose.position_room.x += 0.005;
+    requester.on_pose(now_s, display);
+    if (open.value != 0 && now_s >= answer_s) {
+      EXPECT_TRUE(requester.on_part(part_of(part(open, 0, 1)), now_s).has_value());
+      answered_s.push_back(now_s);
+      open = {};
+    }
+    const auto request = requester.next(now_s);
+    if (!request) continue;
+    EXPECT_EQ(open.value, 0u) << "one at a time";
+    open = request->request, answer_s = now_s + 0.25;
+    asked_s.push_back(now_s);
+  }
+  ASSERT_GT(asked_s.size(), 9u);
+  for (size_t i = 1; i < asked_s.size(); ++i) EXPECT_EQ(asked_s[i], answered_s[i - 1]);
+  // One that is lost does not stop it for good.
+  int count = 0;
+  for (const double end_s = now_s + 2; now_s < end_s; now_s += 0.01) {
+    display.pose.position_room.x += 0.005;
+    requester.on_pose(now_s, display);
+    count += requester.next(now_s).has_value();
+  }
+  EXPECT_GE(count, 3);
+}
+
+TEST_F(SteeredRequester, ANewEpochIsAskedForAtOnce) {
+  requests(3, 0);
+  requests(0.3, 0);
+  requester.on_epoch(now_s);
+  EXPECT_GE(requests(0.5, 0), 4);
+}
+
+TEST_F(SteeredRequester, AViewOnItsWayIsNotAskedForAgainUntilItSeemsLost) {
+  requests(2, 0);
+  display.pose.position_room.x += 0.1;
+  int count = 0;
+  for (const double end_s = now_s + 3.5; now_s < end_s; now_s += 0.01) {
+    requester.on_pose(now_s, display);
+    count += requester.next(now_s).has_value();
+  }
+  EXPECT_GE(count, 4) << "nobody answers: once a second";
+  EXPECT_LE(count, 8) << "while the step was still seen as a movement the view was another one";
+}
+
+TEST_F(SteeredRequester, WithoutSteeringARestingHeadAsksAtTheFullRate) {
+  requester.set_steered(false);
+  EXPECT_GE(requests(2, 0), 18);
+}
+
+TEST_F(Requester, ExtraPatchesCompleteNothingAndCountApart) {
+  requester.on_pose(0, display);
+  const RequestId first = requester.next(0)->request;
+  auto extra = part(first, 0, 1);
+  extra.extra = true, extra.kept = 7;
+  const std::array<std::byte, 5> bytes{};
+  extra.image = bytes;
+  ASSERT_TRUE(extra.frame_complete);
+  EXPECT_FALSE(requester.on_part(part_of(extra), 0.1).has_value());
+  const auto update = requester.on_part(part_of(part(first, 0, 1)), 0.2);
+  ASSERT_TRUE(update.has_value());
+  EXPECT_EQ(update->points, 10u);
+  EXPECT_EQ(update->tiles, 1u);
+  EXPECT_DOUBLE_EQ(update->first_s, 0.2);
+  EXPECT_EQ(update->extra_points, 7u);
+  EXPECT_EQ(update->extra_bytes, 5u);
+  EXPECT_FALSE(requester.on_part(part_of(extra), 0.3).has_value()) << "of an update that is over";
+  const RequestId second = requester.next(1)->request;
+  EXPECT_EQ(requester.on_part(part_of(part(second, 0, 1)), 1.1)->extra_points, 7u);
 }
 
 class AdaptiveRequester : public testing::Test {
@@ -203,6 +366,22 @@ TEST_F(AdaptiveRequester, SamplesAsFinelyAsTheLatencyAllows) {
   EXPECT_NEAR(density(c), 1.0, 0.01);  // no finer than the display
   for (int i = 0; i < 30; ++i) c = cycle(1e5, true);
   EXPECT_NEAR(density(c), 0.5, 0.01);  // no coarser than half of it
+}
+
+TEST_F(AdaptiveRequester, SteeredSamplingGoesByOctavesAndOnlyWhereUpdatesAgree) {
+  requester.set_steered(true);
+  cycle(1e8, true);
+  cycle(1e8, true);
+  EXPECT_NEAR(density(cycle(1e8, true)), 0.707, 0.01) << "two fast updates";
+  for (int i = 0; i < 3; ++i) cycle(1e8, true);
+  EXPECT_NEAR(density(cycle(1e8, true)), 1, 0.01);
+  cycle(1e6, true);
+  cycle(1e6, true);
+  EXPECT_NEAR(density(cycle(1e8, true)), 1, 0.01) << "two slow ones are chance";
+  for (int i = 0; i < 3; ++i) cycle(1e6, true);
+  EXPECT_NEAR(density(cycle(1e8, true)), 0.707, 0.01);
+  for (int i = 0; i < 20; ++i) cycle(1e6, true);
+  EXPECT_NEAR(density(cycle(1e8, true)), 0.5, 0.01) << "no coarser than half of the display";
 }
 
 }  // namespace

@@ -39,6 +39,7 @@ ModelEvent as_received(const packer::Event& e) {
                       e.tile,
                       e.tiles_in_frame,
                       e.step,
+                      e.extra,
                       e.frame_complete,
                       e.samples,
                       e.kept,

@@ -23,7 +23,7 @@ TEST(ViewerFlags, ThoseOfPointsFitMeshesAndJuliaSetsAlone) {
   ViewerOptions o;
   const auto points = names_of(table(o), [](const options::Row& r) { return !r.fits.has(scene::Kind::kVolume); });
   EXPECT_EQ(points, (Texts{"--detail-budget", "--least-detail", "--speed-detail", "--splat", "--splat-scale",
-                           "--finish", "--epoch-patience"}));
+                           "--finish", "--still-samples", "--epoch-patience"}));
 }
 
 TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {
@@ -31,6 +31,15 @@ TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {
   const auto recorded =
       names_of(view_table(o), [](const options::Row& r) { return r.reach == options::Reach::kRecorded; });
   EXPECT_EQ(recorded, (Texts{"--size", "--fov", "--near", "--background", "--shading", "--legend"}));
+}
+
+TEST(ViewerFlags, StillPicturesHaveOneFourOrSixteenSamples) {
+  for (const auto& [text, samples] : {std::pair{"1", 1}, {"4", 4}, {"16", 16}}) {
+    ViewerOptions o;
+    o.still_samples = text;
+    ASSERT_TRUE(settle(o).ok());
+    EXPECT_EQ(o.display.still_samples, samples);
+  }
 }
 
 TEST(ViewerFlags, SayWhatDiffersAndReadItBack) {
@@ -132,30 +141,39 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
                                     "splat",
                                     "finish",
                                     "lit",
-                                    "begin_s"}));
+                                    "begin_s",
+                                    "refined",
+                                    "refine_ms",
+                                    "sub_pixels"}));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;
   f.begin_master_s = 4;
   f.drawn.summaries = 9;
+  f.drawn.refined = 0.5;
+  f.drawn.refine_ms = 6;
+  f.drawn.sub_pixels = 4;
   f.look = {{splat::Kernel::kEwa, {.fill = true, .smooth = false, .antialias = true}}, false};
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 6, row.end())), (std::vector<double>{2, 9, 3, 5, 0, 4}));
+  EXPECT_EQ((std::vector<double>(row.end() - 9, row.end())), (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4}));
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
   EXPECT_EQ(update_columns(),
             (Texts{"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
-                   "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch"}));
+                   "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch",
+                   "extra_points", "extra_bytes"}));
   ViewRequester::Update u;
   u.requested_s = 1, u.first_s = 1.25, u.complete_s = 1.5;
   u.samples = 100, u.points = 25, u.eliminated = 75;
+  u.extra_points = 8, u.extra_bytes = 16;
   const auto row = update_row({u, {}});
   EXPECT_EQ(row[5], 500);
   EXPECT_EQ(row[6], 250);
   EXPECT_EQ(row[11], 0.75);
+  EXPECT_EQ((std::vector<double>(row.end() - 2, row.end())), (std::vector<double>{8, 16}));
 }
 
 TEST(LeastSampling, IsWhatTheSessionTellsWithinItsLimits) {

@@ -10,7 +10,7 @@
 #include "client/viewer/record/slice_record.h"
 #include "client/viewer/slices/receiver.h"
 #include "common/wire/serial.h"
-#include "tests/support/volume_frames.h"
+#include "tests/support/volume/frames.h"
 
 namespace telesplat::viewer {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tests/support/volume_frames.h"
+#include "tests/support/volume/frames.h"
 
 namespace telesplat::volume {
 namespace {

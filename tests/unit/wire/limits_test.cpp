@@ -122,6 +122,21 @@ TEST(Limits, OfCameras) {
   EXPECT_TRUE(refused_camera([](C& c) { c.top = std::numeric_limits<double>::infinity(); }, "finite"));
 }
 
+TEST(Limits, OfFootprints) {
+  Lease lease = sample_message<Lease>();
+  ViewRequest request = sample_message<ViewRequest>();
+  for (const double good : {0.0, 1e-9, 1e9}) {
+    lease.footprint = request.footprint = good;
+    EXPECT_TRUE(decode<Lease>(bytes_of(encode(lease))));
+    EXPECT_TRUE(decode<ViewRequest>(bytes_of(encode(request))));
+  }
+  for (const double bad : {-1e-9, double(std::numeric_limits<double>::quiet_NaN()), HUGE_VAL}) {
+    lease.footprint = request.footprint = bad;
+    EXPECT_TRUE(refused<Lease>(encode(lease), "footprint"));
+    EXPECT_TRUE(refused<ViewRequest>(encode(request), "footprint"));
+  }
+}
+
 // What tells which part of a frame it is: a lease's block, a patch's tile.
 uint64_t& part(Lease& m) { return m.block; }
 uint64_t& part(Patch& m) { return m.tile; }
@@ -168,6 +183,51 @@ TEST(Limits, OfTiles) {
   lease = sample_message<Lease>();
   lease.block_rect = {64, 32, 100, 49};
   EXPECT_TRUE(refused<Lease>(encode(lease), "not inside its block"));
+}
+
+TEST(Limits, OfMasks) {
+  Lease lease = sample_message<Lease>();
+  lease.rays = 5000;  // of 100 x 50 pixels
+  EXPECT_TRUE(decode<Lease>(bytes_of(encode(lease))));
+  lease.rays = 5001;
+  EXPECT_TRUE(refused<Lease>(encode(lease), "5001 rays of 100x50 pixels"));
+  lease = sample_message<Lease>();
+  lease.mask.assign(kMaxMaskWords, 1);
+  EXPECT_TRUE(decode<Lease>(bytes_of(encode(lease))));
+  lease.mask.push_back(1);
+  EXPECT_TRUE(refused<Lease>(encode(lease), "mask"));
+  PlanRequest request = sample_message<PlanRequest>();
+  for (const auto& [size, good] : {std::pair{32, true}, {4096, true}, {31, false}, {4097, false}, {0, false}}) {
+    request.tile_size = uint64_t(size);
+    EXPECT_EQ(bool(decode<PlanRequest>(bytes_of(encode(request)))), good) << size;
+  }
+}
+
+TEST(Limits, OfPlans) {
+  const auto plan = [](std::vector<uint32_t> tiles, size_t words) {
+    Plan m = sample_message<Plan>();  // 320 x 200 pixels
+    m.tiles = std::move(tiles);
+    m.masks.assign(words, 7);
+    return encode(m);
+  };
+  EXPECT_TRUE(decode<Plan>(bytes_of(plan({}, 0))));
+  EXPECT_TRUE(decode<Plan>(bytes_of(plan({0, 0, 320, 200, 64000, 0}, 0))));
+  EXPECT_TRUE(decode<Plan>(bytes_of(plan({0, 0, 320, 100, 3, 2, 0, 100, 320, 100, 32000, 1}, 3))));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 320, 200, 64000}, 0), "5 numbers"));
+  EXPECT_TRUE(refused<Plan>(plan({1, 0, 320, 200, 64000, 0}, 0), "tile 320x200+1+0 is not inside its 320x200 frame"));
+  EXPECT_TRUE(refused<Plan>(plan({0xffffffff, 0, 2, 1, 2, 0}, 0), "not inside"));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0xffffffff, 1, 0xffffffff, 2, 1}, 1), "not inside"));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 0, 8, 0, 1}, 1), "not inside"));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 0, 1}, 1), "0 rays"));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 65, 1}, 1), "65 rays"));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 63, 0}, 0), "63 rays and 0 words"));  // which of the 64 pixels?
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 3, 2}, 1), "1 words of masks, its tiles have 2"));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 3, 2}, 3), "3 words of masks, its tiles have 2"));
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 8, 8, 3, kMaxMaskWords + 1}, kMaxMaskWords + 1), "words of mask"));
+  // The same pixels again and again would be more work than the frame.
+  EXPECT_TRUE(refused<Plan>(plan({0, 0, 320, 200, 64000, 0, 0, 0, 1, 1, 1, 0}, 0), "64001 pixels, the frame 64000"));
+  EXPECT_TRUE(refused<Plan>(plan({}, kMaxPlanWords + 1), "masks"));
+  EXPECT_TRUE(refused<Plan>(plan(std::vector<uint32_t>(kPlanNumbers * kMaxTiles + 1), 0), "tiles"));
 }
 
 template <class M>

@@ -16,9 +16,9 @@ namespace {
 using namespace telesplat::test;
 
 // Those that may be larger than kMaxControlBytes.
-constexpr std::string_view kBulkMessages[] = {"metric_rows",  "chunk_list", "chunk",         "depth_tile",
-                                              "patch",        "forget",     "access_report", "voxel_data",
-                                              "slice_images", "slice_frame"};
+constexpr std::string_view kBulkMessages[] = {"metric_rows",  "chunk_list",  "chunk",         "depth_tile",
+                                              "patch",        "forget",      "access_report", "voxel_data",
+                                              "slice_images", "slice_frame", "plan"};
 
 size_t body_limit(const MessageSample& sample) {
   const bool bulk = std::ranges::find(kBulkMessages, sample.name) != std::end(kBulkMessages);
@@ -172,16 +172,17 @@ std::string hex(const std::string& bytes) {
 }
 TEST(GoldenBytes, OfAMark) {
   EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000})),
-            "86a17604a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
+            "86a17605a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
             "73ce00011170");
 }
 TEST(GoldenBytes, OfALease) {
   EXPECT_EQ(hex(encode(sample_message<Lease>())),
-            "8ea17604a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a67669"
-            "65776572cf0000010000000004a772657175657374cf0000010000000005a474696c6505a47374657004a5626c6f636b03af626c"
-            "6f636b735f696e5f6672616d6508a663616d6572619ecb3fb999999999999acb3fc999999999999acb3fd3333333333333cb3fe3"
-            "33333333333300cb3fe999999999999a00ff01cbbfe0000000000000cb3fe8000000000000cb3f847ae147ae147bcd0140ccc8a4"
-            "726563749440206432aa626c6f636b5f726563749440206432a86c65617365645f73cb4024800000000000");
+            "de0012a17605a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6"
+            "766965776572cf0000010000000004a772657175657374cf0000010000000005a474696c6505a47374657004a5626c6f636b03af"
+            "626c6f636b735f696e5f6672616d6508a663616d6572619ecb3fb999999999999acb3fc999999999999acb3fd3333333333333cb"
+            "3fe333333333333300cb3fe999999999999a00ff01cbbfe0000000000000cb3fe8000000000000cb3f847ae147ae147bcd0140cc"
+            "c8a4726563749440206432aa626c6f636b5f726563749440206432a56578747261c3a472617973cd03f2a46d61736bc40c010000"
+            "0002000000ffffffffa9666f6f747072696e74cb3f4999999999999aa86c65617365645f73cb4028800000000000");
 }
 
 TEST(Bulk, PointsIntoTheBody) {

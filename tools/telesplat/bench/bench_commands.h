@@ -8,5 +8,6 @@ namespace telesplat::launcher {
 Command bench_scaling_command();
 Command bench_volume_command();
 Command bench_cache_command();
+Command bench_steering_command();
 
 }  // namespace telesplat::launcher

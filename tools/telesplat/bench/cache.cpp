@@ -6,18 +6,15 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <optional>
-#include <sstream>
 
 #include "client/viewer/points/model_cache.h"
 #include "client/viewer/viewer_service.h"
 #include "common/codec/depth_codec.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
-#include "common/geometry/trajectory.h"
-#include "common/image/quality.h"
+#include "common/image/measures/quality.h"
 #include "common/metrics/statistics.h"
 #include "common/net/service.h"
 #include "common/points/compaction.h"
@@ -27,6 +24,7 @@
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/bench/bench_commands.h"
 #include "tools/telesplat/bench/surfel_grid.h"
+#include "tools/telesplat/bench/walk.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -53,51 +51,6 @@ struct CacheBenchOptions {
   double nearest = -1;     ///< packer::Config::nearest_sample; below 0: as sessions have it
   std::string out;         ///< folder for cache.csv and pictures; empty: none
 };
-
-// Several recorded walks, one after the other, or an orbit.
-class Walk {
- public:
-  static Result<Walk> open(const std::string& names) {
-    Walk walk;
-    std::istringstream list(names);
-    for (std::string name; std::getline(list, name, ',');) {
-      if (name == "orbit") {
-        walk.parts_.push_back(geometry::Trajectory::orbit());
-        walk.ends_s_.push_back(walk.length_s() + 20);
-        continue;
-      }
-      auto read = geometry::Trajectory::read_csv(name);
-      if (!read) return read.error();
-      if (!(read->duration_s() > 0)) return Error{fmt::format("{}: takes no time, so nothing is walked", name)};
-      walk.parts_.push_back(std::move(*read));
-      walk.ends_s_.push_back(walk.length_s() + walk.parts_.back().duration_s());
-    }
-    return walk;
-  }
-
-  geometry::Pose at(double t_s) const {
-    t_s = std::fmod(t_s, length_s());
-    size_t i = 0;
-    while (i + 1 < parts_.size() && t_s >= ends_s_[i]) ++i;
-    return parts_[i].at(i == 0 ? t_s : t_s - ends_s_[i - 1]);
-  }
-
- private:
-  double length_s() const { return ends_s_.empty() ? 0 : ends_s_.back(); }
-  std::vector<geometry::Trajectory> parts_;
-  std::vector<double> ends_s_;
-};
-
-image::DepthImage cut(const image::DepthImage& whole, const geometry::Rect& r) {
-  image::DepthImage out(r.width, r.height);
-  for (int y = 0; y < r.height; ++y) {
-    const size_t from = size_t(r.y + y) * whole.width + r.x, to = size_t(y) * r.width;
-    std::copy_n(whole.depth.data() + from, r.width, out.depth.data() + to);
-    std::copy_n(whole.colour.data() + from, r.width, out.colour.data() + to);
-    std::copy_n(whole.normal.data() + from, r.width, out.normal.data() + to);
-  }
-  return out;
-}
 
 // The same points in a model of one mosaic a cluster, as if they had all come at once.
 points::PointModel made_at_once(const points::PointModel& model) {

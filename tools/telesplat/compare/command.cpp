@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "client/viewer/viewer_service.h"
-#include "common/geometry/fit.h"
 #include "common/core/log.h"
+#include "common/geometry/fit.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/command.h"
@@ -113,6 +113,7 @@ class Comparison {
             {"sampling", subject_.sampling},
             {"magnify", options_.magnify},
             {"finish", splat::finish_name(finish_)},
+            {"samples", options_.samples},
             {"pixels_per_degree", options_.pixels_per_degree},
             {"repeat", options_.repeat}};
   }
@@ -122,23 +123,23 @@ class Comparison {
     progress_.show(where + ": direct rendering");
     const auto model = models_->of(frame);
     if (!model) return model.error();
-    const auto drawn = scene_->draw(frame.camera, subject_.shading, frame.epoch);
+    const auto drawn = scene_->draw_reference(frame.camera, subject_.shading, frame.epoch, options_.samples);
     if (!drawn) return drawn.error();
-    const image::View& reference = *drawn;
-    const bool shows = std::any_of(reference.depth_m.begin(), reference.depth_m.end(),
-                                   [](float d) { return d < std::numeric_limits<float>::infinity(); });
-    if (!shows) return Error{fmt::format("frame {} of {}: does not show the data", frame.number, subject_.name())};
-    const image::Flip flip(reference, options_.pixels_per_degree);
+    const image::Reference& reference = *drawn;
+    const auto& depth = reference.view.depth_m;
+    if (std::none_of(depth.begin(), depth.end(), [](float d) { return d < std::numeric_limits<float>::infinity(); }))
+      return Error{fmt::format("frame {} of {}: does not show the data", frame.number, subject_.name())};
+    const image::Flip flip(reference.view, options_.pixels_per_degree);
 
     ComparedPose pose{frame, (*model)->points(), {}};
     const auto complete = measure_cells(**model, reference, flip, where, pose);
     if (!complete) return complete.error();
-    return *complete ? keep(reference, std::move(pose)) : ok_status();
+    return *complete ? keep(reference.view, std::move(pose)) : ok_status();
   }
 
   // One cell a kernel and renderer. False: told to stop in between.
-  Result<bool> measure_cells(const points::PointModel& model, const image::View& reference, const image::Flip& flip,
-                             const std::string& where, ComparedPose& pose) {
+  Result<bool> measure_cells(const points::PointModel& model, const image::Reference& reference,
+                             const image::Flip& flip, const std::string& where, ComparedPose& pose) {
     // Renderers of its own: they keep copies of points by event number, and a pose may have another model of the same
     // numbers.
     std::vector<std::unique_ptr<viewer::Renderer>> renderers;
@@ -174,7 +175,8 @@ class Comparison {
     const auto& f = pose.frame;
     const std::vector<std::string> captions{
         subject_.name(),
-        scene_->size() + ", drawn directly: one ray a pixel",
+        fmt::format("{}, drawn directly: {} a pixel", scene_->size(),
+                    options_.samples == 1 ? "one ray" : fmt::format("{} rays", options_.samples)),
         subject_.events.empty() ? std::string("still camera")
                                 : fmt::format("frame {} at {:.2f} s, event {}", f.number, f.t_s, f.sequence.value),
         fmt::format("display {}x{}", f.camera.width, f.camera.height),
@@ -215,6 +217,7 @@ class Comparison {
 int compare(CompareOptions o, const options::Given&) {
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
+  if (const Status s = image::validate_samples(o.samples); !s) return tools::complain({"--samples: " + s.error().text});
   const auto finish = splat::finish_named(o.finish);
   if (!finish)
     return tools::complain({fmt::format("--finish {}: not on, off or some of fill,smooth,antialias", o.finish)});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "common/image/measures/reference.h"
 #include "common/splat/render_options.h"
 
 namespace telesplat::launcher {
@@ -82,6 +83,10 @@ options::Table drawing_table(CompareOptions& o) {
        .value = &o.splat_scale,
        .help = "scale factor of splat sizes; 0: what suits the kernel",
        .limits = Range{0, 10}},
+      {.flag = "--samples",
+       .value = &o.samples,
+       .help = "rays a pixel of the direct rendering that all pictures are compared with, a square number",
+       .limits = Range{1, image::kMostSamples}},
       {.flag = "--repeat",
        .value = &o.repeat,
        .help = "frames timed for each picture; the median counts",

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "common/image/flip.h"
+#include "common/image/measures/flip.h"
 #include "common/points/point_model.h"
 #include "common/splat/kernel_traits.h"
 #include "services/data/data_options.h"
@@ -21,6 +21,7 @@ struct CompareOptions {
   std::vector<std::string> renderers;  ///< empty: cpu, and gl where there is OpenGL
   std::string finish = "on";
   double splat_scale = 0;  ///< 0: what suits the kernel
+  int samples = 16;        ///< rays a pixel of direct rendering
   int repeat = 5;
   double pixels_per_degree = image::kFlipPixelsPerDegree;
   int threads = 0;

@@ -22,17 +22,19 @@ int squared_error(uint32_t a, uint32_t b) {
 
 }  // namespace
 
-ErrorShares error_shares(const image::View& reference, const image::View& reconstruction) {
-  const size_t pixels = reference.colour.size();
-  CHECK(reconstruction.colour.size() == pixels && reference.depth_m.size() == pixels);
+ErrorShares error_shares(const image::Reference& reference, const image::View& reconstruction) {
+  const image::View& direct = reference.view;
+  const size_t pixels = direct.colour.size();
+  CHECK(reconstruction.colour.size() == pixels && direct.depth_m.size() == pixels);
   CHECK(reconstruction.depth_m.size() == pixels);
   enum { kSilhouette, kDepthEdge, kInterior };
   double error[3] = {}, count[3] = {};
   for (size_t i = 0; i < pixels; ++i) {
-    const float a = reference.depth_m[i], b = reconstruction.depth_m[i];
-    if (!shows(a) && !shows(b)) continue;
-    const int where = shows(a) != shows(b) ? kSilhouette : std::abs(a - b) > 0.02f * a ? kDepthEdge : kInterior;
-    error[where] += squared_error(reference.colour[i], reconstruction.colour[i]);
+    const float a = direct.depth_m[i], b = reconstruction.depth_m[i];
+    if (!image::counts(reference, reconstruction, i)) continue;
+    const bool whole = shows(a) && shows(b);
+    const int where = !whole ? kSilhouette : std::abs(a - b) > 0.02f * a ? kDepthEdge : kInterior;
+    error[where] += squared_error(direct.colour[i], reconstruction.colour[i]);
     count[where] += 1;
   }
   const double total = error[0] + error[1] + error[2], all = count[0] + count[1] + count[2];
@@ -53,16 +55,8 @@ ErrorShares error_shares(const image::View& reference, const image::View& recons
   return out;
 }
 
-double mean_over_object(const std::vector<float>& map, const image::View& reference) {
-  CHECK(map.size() == reference.depth_m.size());
-  double sum = 0, count = 0;
-  for (size_t i = 0; i < map.size(); ++i)
-    if (shows(reference.depth_m[i])) sum += map[i], count += 1;
-  return count > 0 ? sum / count : 0;
-}
-
 Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, Sequence applied,
-                  const geometry::Camera& camera, const CellOptions& o, const image::View& reference,
+                  const geometry::Camera& camera, const CellOptions& o, const image::Reference& reference,
                   const image::Flip& flip) {
   const size_t pixels = size_t(camera.width) * camera.height;
   Cell cell;
@@ -111,7 +105,7 @@ Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, S
   cell.quality = image::compare(reference, cell.view);
   cell.shares = error_shares(reference, cell.view);
   cell.flip_map = flip.error_map(cell.view);
-  cell.flip = mean_over_object(cell.flip_map, reference);
+  cell.flip = image::mean_error(cell.flip_map, reference, cell.view);
   return cell;
 }
 

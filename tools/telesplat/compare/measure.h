@@ -6,16 +6,15 @@
 #include <vector>
 
 #include "client/viewer/render/renderer.h"
-#include "common/image/flip.h"
-#include "common/image/quality.h"
+#include "common/image/measures/flip.h"
+#include "common/image/measures/quality.h"
 
 namespace telesplat::launcher {
 
 /// Where the squared error lies, as shares of its sum over pixels where reference or reconstruction shows the data set
 /// (1 in all, 0 where the pictures are identical):
-///   silhouette: only one of the two shows it;  depth_edge: both do, but their depths differ by more than 2 % of the
-/// reference's;
-///   interior: the rest.
+///   silhouette: only one of the two shows it, or not all of the reference's rays do;  depth_edge: both do, but their
+///   depths differ by more than 2 % of the reference's;  interior: the rest.
 struct ErrorShares {
   double silhouette = 0, depth_edge = 0, interior = 0;
   double silhouette_pixels = 0, depth_edge_pixels = 0;  ///< their shares of the pixels
@@ -23,10 +22,7 @@ struct ErrorShares {
 };
 
 /// Preconditions: equal sizes, both with depth.
-ErrorShares error_shares(const image::View& reference, const image::View& reconstruction);
-
-/// Mean of an error map over the pixels where the reference shows the data set; 0 if it does nowhere.
-double mean_over_object(const std::vector<float>& map, const image::View& reference);
+ErrorShares error_shares(const image::Reference& reference, const image::View& reconstruction);
 
 struct FrameTimes {
   double frame_ms =
@@ -41,7 +37,7 @@ struct Cell {
   float splat_scale = 0;
   image::Quality quality;
   ErrorShares shares;
-  double flip = 0;  ///< mean over object pixels
+  double flip = 0;  ///< mean over the pixels that count (quality.h)
   FrameTimes times;
   uint64_t items = 0;
   image::View view;             ///< with depth
@@ -60,7 +56,7 @@ struct CellOptions {
 /// Draws `model` for `camera` and compares it with `reference`, whose FLIP comparer is `flip`.
 /// applied: the newest event of the model (renderers keep copies of points by it).
 Cell measure_cell(viewer::Renderer& renderer, const points::PointModel& model, Sequence applied,
-                  const geometry::Camera& camera, const CellOptions& options, const image::View& reference,
+                  const geometry::Camera& camera, const CellOptions& options, const image::Reference& reference,
                   const image::Flip& flip);
 
 }  // namespace telesplat::launcher

@@ -200,14 +200,12 @@ Result<Picture> inspect_depth_image(const std::string& path, std::optional<doubl
   if (out.camera) describe_camera(*out.camera, out.description);
   const size_t covered = info->covered_pixels;
   out.description.row(
-      "bytes", fmt::format("{} ({:.2f} a covered pixel): mask {}, depth {}, colour {}, normals {}", bytes->size(),
-                           covered ? double(bytes->size()) / double(covered) : 0.0, info->mask_bytes, info->depth_bytes,
-                           info->colour_bytes, info->normal_bytes));
-  out.description.json["bytes"] = {{"all", bytes->size()},
-                                   {"mask", info->mask_bytes},
-                                   {"depth", info->depth_bytes},
-                                   {"colour", info->colour_bytes},
-                                   {"normals", info->normal_bytes}};
+      "bytes", fmt::format("{} ({:.2f} a covered pixel): mask {}, depth {}, colour {}, normals {}, sparse tiles {}",
+                           bytes->size(), covered ? double(bytes->size()) / double(covered) : 0.0, info->mask_bytes,
+                           info->depth_bytes, info->colour_bytes, info->normal_bytes, info->sparse_bytes));
+  out.description.json["bytes"] = {{"all", bytes->size()},          {"mask", info->mask_bytes},
+                                   {"depth", info->depth_bytes},    {"colour", info->colour_bytes},
+                                   {"normals", info->normal_bytes}, {"sparse_tiles", info->sparse_bytes}};
   return out;
 }
 

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <tuple>
 
+#include "client/viewer/points/still_picture.h"
 #include "client/viewer/record/slice_record.h"
 #include "client/viewer/render/renderer.h"
 #include "client/viewer/render/slices/renderer.h"
+#include "client/viewer/render/supersampler.h"
 #include "common/image/background.h"
 
 namespace telesplat::launcher {
@@ -28,6 +31,10 @@ class PointReplay final : public FrameReplay {
     const auto there = models_->advance(frame);
     if (!there || !*there) return there;
     fit(view, camera);
+    if (same_as_last(frame, camera)) {
+      view.colour = last_.colour;
+      return true;
+    }
     splat::SelectionOptions selection;
     selection.scale = run_.splat_scale_of(frame.look.render.kernel);
     selection.detail = float(frame.detail);
@@ -39,6 +46,8 @@ class PointReplay final : public FrameReplay {
     image::ShadingParameters shading = run_.shading;
     shading.lit = frame.look.lit;
     render(frame, camera, shading, view);
+    if (frame.refined > 0 && camera == frame.camera) refine(frame, selection, shading, view);
+    keep(frame, camera, view);
     if (!run_.transparent) return true;
     fit(over_white_, camera);
     shading.background = 0xffffff;
@@ -48,6 +57,49 @@ class PointReplay final : public FrameReplay {
   }
 
  private:
+  // Frames of a head that stands still take a second to draw and are often alike.
+  bool same_as_last(const DisplayedFrame& frame, const geometry::Camera& camera) const {
+    const DisplayedFrame& last = last_frame_;
+    const auto look = [](const viewer::Look& l) {
+      return std::tuple(l.render.kernel, splat::finish_bits(l.render.finish), l.lit);
+    };
+    return frame.refined > 0 && last.refined == frame.refined && last.sequence == frame.sequence &&
+           last.replica == frame.replica && last.summaries == frame.summaries && last.epoch == frame.epoch &&
+           last.sub_pixels == frame.sub_pixels && camera == last_camera_ && look(last.look) == look(frame.look);
+  }
+  void keep(const DisplayedFrame& frame, const geometry::Camera& camera, const image::View& view) {
+    last_frame_ = frame;
+    last_camera_ = camera;
+    if (frame.refined > 0) last_.colour = view.colour;
+  }
+
+  // As many tiles as the display had, in its order. Those that waited there because points had just come have them here
+  // already.
+  void refine(const DisplayedFrame& frame, const splat::SelectionOptions& selection,
+              const image::ShadingParameters& parameters, image::View& view) {
+    constexpr double kRounding = 1e-4;
+    const image::Shading shading(parameters, frame.camera);
+    viewer::Supersampler supersampler(*renderer_, frame.sub_pixels);
+    const viewer::Supersampler::Scene scene{
+        [&](const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& list) {
+          splat::select_view(*models_->model(), camera, options, list, &models_->summaries());
+          list.applied = list_.applied;
+          list.replica = list_.replica;
+          list.epoch = list_.epoch;
+        },
+        selection, frame.look.render, shading};
+    still_.begin(frame.camera);
+    while (still_.share() < frame.refined - kRounding) {
+      const auto tile = still_.next(0);
+      if (!tile) break;
+      still_.done(
+          *tile,
+          supersampler.draw(scene, frame.camera, still_.rect(*tile), still_.pixels(*tile), size_t(frame.camera.width)),
+          0);
+    }
+    still_.put_over(view);
+  }
+
   void render(const DisplayedFrame& frame, const geometry::Camera& camera, const image::ShadingParameters& shading,
               image::View& view) {
     renderer_->render(list_, camera, frame.look.render, image::Shading(shading, camera),
@@ -59,6 +111,10 @@ class PointReplay final : public FrameReplay {
   std::unique_ptr<viewer::Renderer> renderer_;
   splat::DrawList list_;
   image::View over_white_;
+  viewer::StillPicture still_;
+  DisplayedFrame last_frame_;
+  geometry::Camera last_camera_;
+  image::View last_;
 };
 
 class SliceFrameReplay final : public FrameReplay {

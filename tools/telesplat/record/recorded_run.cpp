@@ -136,8 +136,8 @@ Status read_display(const std::string& path, const toml::table& session, const t
 struct FrameColumns {
   size_t viewer, frame, t_s, sequence, points_drawn;
   std::array<size_t, 7> pose;  // px py pz qw qx qy qz
-  // Of files that lack them: 0, 1, 0, all, as the run began.
-  std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit;
+  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1.
+  std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, refined, sub_pixels;
 };
 
 Result<FrameColumns> find_columns(const tools::CsvTable& table) {
@@ -166,6 +166,8 @@ Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   out.splat = table.find("splat");
   out.finish = table.find("finish");
   out.lit = table.find("lit");
+  out.refined = table.find("refined");
+  out.sub_pixels = table.find("sub_pixels");
   return out;
 }
 
@@ -182,6 +184,21 @@ Status read_look(const tools::CsvTable& table, size_t row, const FrameColumns& a
   for (const auto* value : {&splat, &finish, &lit})
     if (!*value) return value->error();
   f.look = {{splat::kKernels[*splat], *splat::finish_of_bits(*finish)}, *lit == 1};
+  return ok_status();
+}
+
+Status read_refinement(const tools::CsvTable& table, size_t row, const FrameColumns& at, DisplayedFrame& f) {
+  if (!at.refined || !at.sub_pixels) return ok_status();
+  const auto refined = table.number(row, *at.refined);
+  if (!refined) return refined.error();
+  if (!(*refined >= 0 && *refined <= 1))
+    return table.wrong(row, fmt::format("refined is {}, limits are 0 and 1", *refined));
+  const auto side = table.count(row, *at.sub_pixels, 5);
+  if (!side) return side.error();
+  if (*refined > 0 && *side != 2 && *side != 4)
+    return table.wrong(row, fmt::format("sub_pixels is {}, limits are 2 and 4", *side));
+  f.refined = *refined;
+  f.sub_pixels = int(*side);
   return ok_status();
 }
 
@@ -208,6 +225,7 @@ Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, cons
   f.look = run.look;
   if (const Status s = geometry::validate(f.camera); !s) return table.wrong(row, s.error().text);
   if (const Status s = read_look(table, row, at, f); !s) return s.error();
+  if (const Status s = read_refinement(table, row, at, f); !s) return s.error();
   const auto summaries = optional_count(table, row, at.summaries, f.summaries, 9e15);
   if (!summaries) return summaries.error();
   f.summaries = *summaries;

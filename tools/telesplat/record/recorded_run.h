@@ -27,6 +27,8 @@ struct DisplayedFrame {
   viewer::Look look;                  ///< how it was drawn; a person may have changed it in the window
   uint64_t summaries = ~uint64_t{0};  ///< of bricks, that its viewer had made by then; else all that there are
   EpochId epoch;                      ///< of all points in it
+  double refined = 0;                 ///< share of its pixels that were drawn with sub-pixels,
+  int sub_pixels = 1;                 ///< so many on each axis
 };
 
 struct RecordedRun {

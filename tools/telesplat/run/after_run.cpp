@@ -73,7 +73,8 @@ int AfterRun::verify(bool stopped) {
   auto direct = scene_->open_direct(0, [](const char*, double) {});
   if (!direct) return tools::complain(direct.error());
   const auto tell = [&](size_t done, size_t of) { progress_.show(fmt::format("verifying view {} of {}", done, of)); };
-  const Status verified = verify_run(o_.out, **direct, o_.viewer.display.shading, tell, net::stop_requested);
+  const VerifyOptions options{o_.viewer.display.shading, o_.verify_samples};
+  const Status verified = verify_run(o_.out, **direct, options, tell, net::stop_requested);
   progress_.close();
   return verified ? 0 : tools::complain(verified.error(), 1);
 }

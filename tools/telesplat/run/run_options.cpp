@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "common/image/measures/reference.h"
 #include "common/net/master_address.h"
 #include "services/data/kinds.h"
 #include "tools/telesplat/run/wall.h"
@@ -64,6 +65,15 @@ Table own_rows(RunOptions& o) {
        .value = &o.record_depth,
        .help = "keep the first 50 sampled depth images (telesplat inspect reads them)",
        .fits = points},
+      {.flag = "--record-plan",
+       .value = &o.record_plan,
+       .help = "keep pictures of the first 50 plans: which rays of a view are cast, and why",
+       .fits = points},
+      {.flag = "--verify-samples",
+       .value = &o.verify_samples,
+       .help = "rays a pixel of the direct rendering that --verify compares with, a square number; volumes have 1",
+       .limits = Range{1, image::kMostSamples},
+       .fits = points},
       {.flag = "--log-level",
        .value = &o.log_level,
        .help = "trace, debug, info, warn, error or off",
@@ -111,6 +121,7 @@ Status refuse_records_without_folder(const RunOptions& o) {
                                     {d.picture_every > 0, "--record-every"},
                                     {d.exr, "--exr"},
                                     {o.record_depth, "--record-depth"},
+                                    {o.record_plan, "--record-plan"},
                                     {!o.movie.file.empty(), "--movie"}})
     if (asked && o.out.empty())
       return Error{fmt::format("{} needs --out: nothing is recorded without a run folder", flag)};
@@ -173,6 +184,8 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   if (const Status s = settle_wall(o, given); !s) return s.error();
   if (const Status s = refuse_records_without_folder(o); !s) return s.error();
   if (const Status s = check_movie(o, given); !s) return s.error();
+  if (const Status s = image::validate_samples(o.verify_samples); !s)
+    return Error{"--verify-samples: " + s.error().text};
   if (const Status s = viewer::settle(o.viewer); !s) return s.error();
   return out;
 }
@@ -195,6 +208,7 @@ std::vector<std::string> data_arguments(const RunOptions& o, int part) {
 std::vector<std::string> packer_arguments(const RunOptions& o) {
   packer::PackerOptions p = o.packer;
   if (o.record_depth) p.record_depth = o.out + "/depth";
+  if (o.record_plan) p.record_plan = o.out + "/plans";
   return arguments(p);
 }
 

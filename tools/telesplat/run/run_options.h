@@ -27,6 +27,8 @@ struct RunOptions {
   bool overwrite = false;          ///< `out` may hold a record already, which is replaced
   std::string log_directory;       ///< of the processes; empty: OUT/logs
   std::string log_level = "info";  ///< of the processes
+  int verify_samples = 16;         ///< rays a pixel of the pictures that displayed frames are verified against
+  bool record_plan = false;        ///< keep pictures of plans in OUT/plans
   bool record_depth = false;       ///< keep sampled depth images in OUT/depth
   bool background_servers = true;  ///< samplers, packer and data run at lower priority than the viewer
 };

@@ -104,7 +104,21 @@ void add_updates(const json& s, RunReport& out) {
                                           number(at(s, "bytes_per_cached_point"), "{:.1f}")));
     out.line("redundancy eliminated", number(at(s, "redundancy_eliminated"), "{:.2f} %", 100));
   }
+  if (at(s, "plans").is_number())
+    out.line("rays cast",
+             fmt::format("{} M of {} M ({} % saved), planned in median {} ms",
+                         number(at(s, "rays_cast"), "{:.2f}", 1e-6), number(at(s, "rays_full"), "{:.2f}", 1e-6),
+                         number(at(s, "rays_saved"), "{:.1f}", 100), median("plan_answer_ms")));
   out.line("sent to viewers", sent(s));
+}
+
+// From one frame to the next; nothing where no two frames were compared in a row.
+void add_steadiness(const json& q, RunReport& out) {
+  const json flicker = at(q, "flicker"), popping = at(q, "popping");
+  if (!flicker.is_object() || !popping.is_object()) return;
+  out.line("flicker / popping", fmt::format("median {} / {} of 255", number(at(flicker, "median"), "{:.2f}"),
+                                            number(at(popping, "median"), "{:.1f}")));
+  out.line("holes last", fmt::format("{} ms on average", number(at(q, "hole_lifetime_ms"), "{:.0f}")));
 }
 
 void add_quality(const json& s, RunReport& out) {
@@ -115,12 +129,14 @@ void add_quality(const json& s, RunReport& out) {
     return d.is_object() ? at(d, which) : json();
   };
   out.line("PSNR against direct rendering",
-           fmt::format("median {} dB over {} views", number(figure("psnr_db", "median"), "{:.2f}"),
-                       q.at("views").get<int>()));
-  out.line("SSIM", fmt::format("median {}", number(figure("ssim", "median"), "{:.4f}")));
+           fmt::format("median {} dB over {} views, {} rays a pixel", number(figure("psnr_db", "median"), "{:.2f}"),
+                       q.at("views").get<int>(), number(at(q, "samples"), "{:.0f}")));
+  out.line("SSIM / FLIP", fmt::format("median {} / {}", number(figure("ssim", "median"), "{:.4f}"),
+                                      number(figure("flip", "median"), "{:.4f}")));
   out.line("hole fraction",
            fmt::format("median {} %  p95 {} %", number(figure("hole_fraction", "median"), "{:.3f}", 100),
                        number(figure("hole_fraction", "p95"), "{:.3f}", 100)));
+  add_steadiness(q, out);
   if (q.contains("last_view"))
     out.line("last view", fmt::format("PSNR {} dB, holes {} %", number(figure("last_view", "psnr_db"), "{:.2f}"),
                                       number(figure("last_view", "hole_fraction"), "{:.3f}", 100)));

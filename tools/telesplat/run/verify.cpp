@@ -6,22 +6,15 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "client/viewer/record/frame_spool.h"
-#include "common/image/quality.h"
-#include "common/metrics/statistics.h"
+#include "tools/telesplat/run/quality_record.h"
 
 namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Verified {
-  std::string path;
-  uint64_t frame = 0;
-  double t_s = 0;
-  image::Quality quality;
-};
 
 // reference | displayed | absolute difference x 4.
 image::View side_by_side(const image::View& a, const image::View& b) {
@@ -42,31 +35,13 @@ image::View side_by_side(const image::View& a, const image::View& b) {
   return out;
 }
 
-Status write_summary(const std::string& directory, const std::vector<Verified>& views) {
+// Changes summary.json.
+Status write_summary(const std::string& directory, const std::vector<VerifiedView>& views) {
   const std::string path = directory + "/summary.json";
   std::ifstream in(path);
   auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
   if (!summary.is_object()) return Error{fmt::format("{}: cannot be read as JSON", path)};
-  std::vector<double> psnr, ssim, holes;
-  for (const auto& v : views) {
-    if (v.quality.object_pixels == 0) continue;  // looking away from the data set: there is nothing to compare
-    psnr.push_back(v.quality.psnr_db);
-    ssim.push_back(v.quality.ssim);
-    holes.push_back(v.quality.hole_fraction);
-  }
-  const auto precise = [](const metrics::Distribution& d) {
-    return nlohmann::ordered_json{
-        {"mean", d.mean}, {"median", d.median}, {"p95", d.p95}, {"p99", d.p99}, {"max", d.max}};
-  };
-  summary["quality"] = {{"views", psnr.size()},
-                        {"views_without_object", views.size() - psnr.size()},
-                        {"psnr_db", metrics::to_json(metrics::distribution(psnr))},
-                        {"ssim", precise(metrics::distribution(ssim))},
-                        {"hole_fraction", precise(metrics::distribution(holes))}};
-  if (!views.empty())
-    summary["quality"]["last_view"] = {{"psnr_db", views.back().quality.psnr_db},
-                                       {"ssim", views.back().quality.ssim},
-                                       {"hole_fraction", views.back().quality.hole_fraction}};
+  summary["quality"] = quality_json(views);
   std::ofstream out(path + ".part");
   out << summary.dump(2) << "\n";
   out.close();
@@ -76,51 +51,96 @@ Status write_summary(const std::string& directory, const std::vector<Verified>& 
   return ok_status();
 }
 
+class Verification {
+ public:
+  Verification(DirectScene& scene, const VerifyOptions& options) : scene_(scene), options_(options) {}
+
+  /// Frames come in the order of their numbers.
+  Status compare(const std::string& path) {
+    auto read = viewer::read_spooled_frame(path);
+    if (!read) return read.error();
+    if (!(read->use & viewer::kVerify) || read->view.depth_m.empty()) return ok_status();
+    auto reference = scene_.draw_reference(read->camera, options_.shading, read->epoch, options_.samples);
+    if (!reference) return reference.error();
+    Frame now{*std::move(read), *std::move(reference)};
+    scene_.mark_shown(now.frame.view);
+    VerifiedView v{.frame = now.frame.number, .t_s = now.frame.t_s, .samples = now.reference.samples};
+    v.quality = image::compare(now.reference, now.frame.view);
+    v.flip = image::flip(now.reference, now.frame.view);
+    if (before_ && before_->frame.number + 1 == now.frame.number && alike(before_->frame.camera, now.frame.camera))
+      v.change = change_to(now);
+    views_.push_back(v);
+    paths_.push_back(path);
+    before_ = std::move(now);
+    return ok_status();
+  }
+
+  const std::vector<VerifiedView>& views() const { return views_; }
+
+  /// Of the worst, the median and the last view that shows the data set.
+  Status write_pictures(const std::string& directory) const {
+    std::vector<size_t> seen;
+    for (size_t i = 0; i < views_.size(); ++i)
+      if (views_[i].quality.object_pixels > 0) seen.push_back(i);
+    if (seen.empty()) return ok_status();
+    const size_t last = seen.back();
+    std::stable_sort(seen.begin(), seen.end(),
+                     [&](size_t a, size_t b) { return views_[a].quality.psnr_db < views_[b].quality.psnr_db; });
+    for (const auto& [name, i] : {std::pair{"worst", seen.front()}, {"median", seen[seen.size() / 2]}, {"last", last}})
+      if (const Status s = write_picture(directory, name, i); !s) return s;
+    return ok_status();
+  }
+
+ private:
+  struct Frame {
+    viewer::SpooledFrame frame;
+    image::Reference reference;
+  };
+
+  static bool alike(const geometry::Camera& a, const geometry::Camera& b) {
+    return a.width == b.width && a.height == b.height;
+  }
+
+  VerifiedView::Change change_to(const Frame& now) const {
+    const image::VerifiedFrame a{before_->frame.camera, before_->reference, before_->frame.view};
+    const image::VerifiedFrame b{now.frame.camera, now.reference, now.frame.view};
+    VerifiedView::Change out{now.frame.t_s - before_->frame.t_s, image::unsteadiness(a, b), {}};
+    if (scene_.has_surface() && before_->frame.epoch == now.frame.epoch) out.holes = image::follow_holes(a, b);
+    return out;
+  }
+
+  Status write_picture(const std::string& directory, const char* name, size_t i) const {
+    const auto frame = viewer::read_spooled_frame(paths_[i]);
+    if (!frame) return frame.error();
+    const auto reference = scene_.draw_reference(frame->camera, options_.shading, frame->epoch, options_.samples);
+    if (!reference) return reference.error();
+    return image::write_png(fmt::format("{}/images/verify-{}-{:06d}.png", directory, name, frame->number),
+                            side_by_side(reference->view, frame->view));
+  }
+
+  DirectScene& scene_;
+  const VerifyOptions& options_;
+  std::vector<VerifiedView> views_;
+  std::vector<std::string> paths_;  // of views_
+  std::optional<Frame> before_;
+};
+
 }  // namespace
 
-Status verify_run(const std::string& directory, DirectScene& scene, const image::ShadingParameters& shading,
+Status verify_run(const std::string& directory, DirectScene& scene, const VerifyOptions& options,
                   const std::function<void(size_t, size_t)>& progress, const std::function<bool()>& should_stop) {
   const std::string spool = directory + "/spool";
   const auto paths = viewer::spooled_frames(spool);
-  std::vector<Verified> views;
+  Verification verification(scene, options);
   for (size_t i = 0; i < paths.size() && !should_stop(); ++i) {
-    const auto frame = viewer::read_spooled_frame(paths[i]);
-    if (!frame) return frame.error();
-    if (!(frame->use & viewer::kVerify) || frame->view.depth_m.empty()) continue;
-    const auto reference = scene.draw(frame->camera, shading, frame->epoch);
-    if (!reference) return reference.error();
-    views.push_back({paths[i], frame->number, frame->t_s, scene.compare(*reference, frame->view, shading)});
+    if (const Status s = verification.compare(paths[i]); !s) return s;
     progress(i + 1, paths.size());
   }
-
-  std::ofstream csv(directory + "/quality.csv");
-  csv << "frame,t_s,psnr_db,ssim,hole_fraction,object_pixels\n";
-  for (const auto& v : views)
-    csv << fmt::format("{},{:.4f},{:.3f},{:.5f},{:.6f},{}\n", v.frame, v.t_s, v.quality.psnr_db, v.quality.ssim,
-                       v.quality.hole_fraction, v.quality.object_pixels);
-
-  std::vector<Verified> seen;
-  std::copy_if(views.begin(), views.end(), std::back_inserter(seen),
-               [](const Verified& v) { return v.quality.object_pixels > 0; });
-  if (!seen.empty()) {
-    const Verified last = seen.back();
-    std::sort(seen.begin(), seen.end(),
-              [](const auto& a, const auto& b) { return a.quality.psnr_db < b.quality.psnr_db; });
-    for (const auto& [name, v] :
-         {std::pair{"worst", seen.front()}, {"median", seen[seen.size() / 2]}, {"last", last}}) {
-      const auto frame = viewer::read_spooled_frame(v.path);
-      if (!frame) return frame.error();
-      const auto reference = scene.draw(frame->camera, shading, frame->epoch);
-      if (!reference) return reference.error();
-      if (const Status s = image::write_png(fmt::format("{}/images/verify-{}-{:06d}.png", directory, name, v.frame),
-                                            side_by_side(*reference, frame->view));
-          !s)
-        return s;
-    }
-  }
+  std::ofstream(directory + "/quality.csv") << quality_csv(verification.views());
+  if (const Status s = verification.write_pictures(directory); !s) return s;
   std::error_code error;
   fs::remove_all(spool, error);
-  return write_summary(directory, views);
+  return write_summary(directory, verification.views());
 }
 
 }  // namespace telesplat::launcher

@@ -2,6 +2,7 @@
 // anew.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -11,7 +12,8 @@
 #include "common/geometry/camera.h"
 #include "common/image/depth_image.h"
 #include "common/image/file.h"
-#include "common/image/quality.h"
+#include "common/image/measures/reference.h"
+#include "common/image/pixel_mask.h"
 #include "common/image/shading.h"
 
 namespace telesplat::launcher {
@@ -22,17 +24,42 @@ class DirectScene {
 
   /// The scene of `epoch`: every pixel of `camera` traced and shaded with unquantised normals. Depth in metres,
   /// +infinity where nothing is. Error: the scene of that epoch is not known.
+  /// footprint_px: pixels of `camera` that are one of the view it is drawn for: what a pixel shows may depend on how
+  /// large it is (sampler::JuliaSampler).
   virtual Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading,
-                                   EpochId epoch) = 0;
-  /// One sampling frame, as a sampler takes it. Error: as draw(), or the scene has no surface.
-  virtual Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) = 0;
-
-  /// How good `view` is. The pixels that count are those where either shows the data set. Surfaces show by their depth.
-  virtual image::Quality compare(const image::View& reference, const image::View& view,
-                                 const image::ShadingParameters& shading) const {
-    (void)shading;
-    return image::compare(reference, view);
+                                   EpochId epoch, double footprint_px) = 0;
+  Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading, EpochId epoch) {
+    return draw(camera, shading, epoch, 1);
   }
+  /// The same with `samples` rays a pixel (image::validate_samples), or one of what has no surface. It is marked
+  /// (mark_shown).
+  Result<image::Reference> draw_reference(const geometry::Camera& camera, const image::ShadingParameters& shading,
+                                          EpochId epoch, int samples) {
+    const int rays = has_surface() ? samples : 1;
+    return image::supersample(camera, rays, [&](const geometry::Camera& piece) {
+      auto drawn = draw(piece, shading, epoch, std::sqrt(rays));
+      if (drawn) mark_shown(*drawn);
+      return drawn;
+    });
+  }
+  /// The pixels `tile` of a sampling frame, of them those of `mask` (null: all), as a sampler takes them. Error: as
+  /// draw(), or the scene has no surface. Preconditions: the tile lies in the camera's image, and has the mask's size.
+  virtual Result<image::DepthImage> sample_tile(const geometry::Camera& camera, const geometry::Rect& tile,
+                                                const image::PixelMask* mask, EpochId epoch, double footprint_px) = 0;
+  Result<image::DepthImage> sample_tile(const geometry::Camera& camera, const geometry::Rect& tile,
+                                        const image::PixelMask* mask, EpochId epoch) {
+    return sample_tile(camera, tile, mask, epoch, 1);
+  }
+  /// All of a sampling frame.
+  Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) {
+    return sample_tile(camera, {0, 0, camera.width, camera.height}, nullptr, epoch);
+  }
+
+  /// Whether pictures have the depth of a surface.
+  virtual bool has_surface() const { return true; }
+  /// Gives a picture, drawn directly or displayed, the depth by which measures find what shows the data set: surfaces
+  /// have it.
+  virtual void mark_shown(image::View& view) const { (void)view; }
 
   virtual geometry::Box box_room() const = 0;
   virtual uint64_t primitives() const { return 0; }  ///< triangles; 0: it has none

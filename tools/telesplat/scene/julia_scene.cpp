@@ -19,16 +19,17 @@ class DirectJulia : public DirectScene {
  public:
   DirectJulia(JuliaScene::Record julia, int threads) : julia_(std::move(julia)), threads_(threads), sampler_(threads) {}
 
-  Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading,
-                           EpochId epoch) override {
+  Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading, EpochId epoch,
+                           double footprint_px) override {
     const auto scene = at(epoch);
     if (!scene) return scene.error();
-    return sampler::render_julia_directly(*scene, camera, image::Shading(shading, camera), threads_);
+    return sampler::render_julia_directly(*scene, camera, image::Shading(shading, camera), threads_, footprint_px);
   }
-  Result<image::DepthImage> sample(const geometry::Camera& camera, EpochId epoch) override {
+  Result<image::DepthImage> sample_tile(const geometry::Camera& camera, const geometry::Rect& tile,
+                                        const image::PixelMask* mask, EpochId epoch, double footprint_px) override {
     const auto scene = at(epoch);
     if (!scene) return scene.error();
-    return sampler_.sample(*scene, camera, {0, 0, camera.width, camera.height}, 1);
+    return sampler_.sample(*scene, camera, tile, footprint_px, mask);
   }
   geometry::Box box_room() const override { return julia_.placement.box_room; }
   std::string size() const override { return fmt::format("{} iterations", julia_.begin.iterations); }

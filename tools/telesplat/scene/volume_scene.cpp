@@ -20,31 +20,26 @@ namespace {
 // Quotes double the text's length, numbers stand beside it.
 constexpr tools::CsvTable::Limits kEpochs{.rows = 1'000'000, .line_bytes = volume::kMaxTransferText * 2 + (1 << 14)};
 
-// The picture with depth 1 where the volume covers it visibly, and none elsewhere, whatever the background.
-image::View with_outline(image::View view) {
-  constexpr uint32_t kVisible = 3;  // steps of 255
-  view.depth_m.assign(view.colour.size(), std::numeric_limits<float>::infinity());
-  for (size_t i = 0; i < view.colour.size(); ++i)
-    if (view.colour[i] >> 24 >= kVisible) view.depth_m[i] = 1;
-  return view;
-}
-
 class DirectVolume : public DirectScene {
  public:
   DirectVolume(std::string file, VolumeScene::Epochs epochs, std::unique_ptr<data::VolumeStore> store, int threads)
       : file_(std::move(file)), epochs_(std::move(epochs)), store_(std::move(store)), threads_(threads) {}
 
-  Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading,
-                           EpochId epoch) override {
+  Result<image::View> draw(const geometry::Camera& camera, const image::ShadingParameters& shading, EpochId epoch,
+                           double) override {
     if (const Status s = prepare(epoch); !s) return s.error();
     return raycaster_->draw(camera, shading.background);
   }
-  // A volume has no surface: it shows where it covers the picture.
-  image::Quality compare(const image::View& reference, const image::View& view,
-                         const image::ShadingParameters&) const override {
-    return image::compare(with_outline(reference), with_outline(view));
+  bool has_surface() const override { return false; }
+  // Depth 1 where the volume covers the picture visibly, and none elsewhere, whatever the background.
+  void mark_shown(image::View& view) const override {
+    constexpr uint32_t kVisible = 3;  // steps of 255
+    view.depth_m.assign(view.colour.size(), std::numeric_limits<float>::infinity());
+    for (size_t i = 0; i < view.colour.size(); ++i)
+      if (view.colour[i] >> 24 >= kVisible) view.depth_m[i] = 1;
   }
-  Result<image::DepthImage> sample(const geometry::Camera&, EpochId) override {
+  Result<image::DepthImage> sample_tile(const geometry::Camera&, const geometry::Rect&, const image::PixelMask*,
+                                        EpochId, double) override {
     return Error{fmt::format("{}: is a volume, of which no depth images are sampled", file_)};
   }
   geometry::Box box_room() const override { return store_->session().grid.box_room(); }

@@ -19,6 +19,10 @@
 namespace telesplat::viewer {
 namespace {
 
+// Pictures of no more pixels may be parts of a still picture: 128 x 96 pixels, one more on each
+// side, of 4 x 4 sub-pixels.
+constexpr int64_t kPartPixels = 130 * 98 * 16;
+
 Status check_limits() {
   if (epoxy_gl_version() < 43)
     return Error{fmt::format("OpenGL {}.{} instead of 4.3 or later", epoxy_gl_version() / 10, epoxy_gl_version() % 10)};
@@ -47,7 +51,9 @@ struct GlRenderer::Parts {
   ~Parts() { glDeleteVertexArrays(1, &no_vertices); }
 
   Programs programs;
-  FrameTargets targets;
+  // Frames, and parts of still pictures, which come between them: neither makes the other's anew.
+  FrameTargets frame_targets, part_targets;
+  FrameTargets* targets = &frame_targets;  // of the frame at hand
   SplatPasses splatting;
   ReadBack read_back;
   gl::StageTimer timer;
@@ -99,7 +105,7 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
   const bool sums = splat::traits_of(options.kernel).passes == splat::Passes::kSums;
   const Programs& programs = parts_->programs;
   std::vector<Step> steps{{sums ? &programs.of(options.kernel).resolve : &programs.keys, kResolving, 0}};
-  if (options.finish.fill) steps.push_back({&programs.fill, kFilling, splat::kFillReach});
+  if (options.finish.fill) steps.push_back({&programs.fill(gaps_to_fill(options.finish)), kFilling, splat::kFillReach});
   if (options.finish.smooth) steps.push_back({&programs.smooth, kSmoothing, 1});
   if (options.finish.antialias) steps.push_back({&programs.antialias, kAntialiasing, 1});
 
@@ -108,10 +114,10 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
     glBindTexture(GL_TEXTURE_2D, texture);
   };
   if (sums) {
-    bind(1, parts_->targets.sums(1));
-    bind(0, parts_->targets.sums(0));
+    bind(1, parts_->targets->sums(1));
+    bind(0, parts_->targets->sums(0));
   } else {
-    bind(0, parts_->targets.keys());
+    bind(0, parts_->targets->keys());
   }
   glBindVertexArray(parts_->no_vertices);
   glEnable(GL_SCISSOR_TEST);
@@ -120,18 +126,18 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
     const bool last = i + 1 == steps.size();
     reach -= steps[i].reach;
     if (last) {
-      parts_->targets.draw_to(with_depth ? FrameTargets::kOutput : FrameTargets::kOutputColour);
-      glScissor(0, 0, parts_->targets.width(), parts_->targets.height());
+      parts_->targets->draw_to(with_depth ? FrameTargets::kOutput : FrameTargets::kOutputColour);
+      glScissor(0, 0, parts_->targets->width(), parts_->targets->height());
       steps[i].pass->to_output.use();
     } else {
-      parts_->targets.draw_to(i % 2 ? FrameTargets::kPair1 : FrameTargets::kPair0);
+      parts_->targets->draw_to(i % 2 ? FrameTargets::kPair1 : FrameTargets::kPair0);
       const int margin = FrameTargets::kMargin - reach;
-      glScissor(margin, margin, parts_->targets.width() + 2 * reach, parts_->targets.height() + 2 * reach);
+      glScissor(margin, margin, parts_->targets->width() + 2 * reach, parts_->targets->height() + 2 * reach);
       steps[i].pass->to_pairs.use();
     }
     glDrawArrays(GL_TRIANGLES, 0, 3);
     parts_->timer.end_stage(steps[i].stage);
-    if (!last) bind(0, parts_->targets.pairs(i % 2));
+    if (!last) bind(0, parts_->targets->pairs(i % 2));
   }
   glDisable(GL_SCISSOR_TEST);
 }
@@ -139,9 +145,11 @@ void GlRenderer::shade_and_finish(const splat::RenderOptions& options, bool with
 Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& camera,
                         const splat::RenderOptions& options, const image::Shading& shading, bool with_depth) {
   frame_ = {};
-  if (const Status resized = parts_->targets.resize(camera.width, camera.height); !resized) return resized;
+  const bool part = int64_t{camera.width} * camera.height <= kPartPixels;
+  parts_->targets = part ? &parts_->part_targets : &parts_->frame_targets;
+  if (const Status resized = parts_->targets->resize(camera.width, camera.height); !resized) return resized;
   if (splat::traits_of(options.kernel).passes == splat::Passes::kSums)
-    if (const Status made = parts_->targets.make_sums(); !made) return made;
+    if (const Status made = parts_->targets->make_sums(); !made) return made;
   // Others may have left these on in a shared context.
   for (const GLenum off : {GL_BLEND, GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_CULL_FACE,
                            GL_RASTERIZER_DISCARD, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_FRAMEBUFFER_SRGB, GL_DITHER})
@@ -155,11 +163,11 @@ Status GlRenderer::draw(const splat::DrawList& list, const geometry::Camera& cam
   parts_->splatting.prepare(list, camera, options.kernel, shading);
   prepare_ms_ = (monotonic_s() - start) * 1e3;
   parts_->timer.begin_frame();
-  parts_->splatting.splat(parts_->targets, parts_->programs, options.kernel);
+  parts_->splatting.splat(*parts_->targets, parts_->programs, options.kernel);
   parts_->timer.end_stage(kSplatting);
   shade_and_finish(options, with_depth);
   parts_->splatting.end_frame();
-  frame_ = parts_->targets.output(with_depth);
+  frame_ = parts_->targets->output(with_depth);
   return ok_status();
 }
 
@@ -210,7 +218,7 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
   }
   if (!parts_->timer.available()) glFinish();
   const double drawn = monotonic_s();
-  parts_->read_back.read(parts_->targets.framebuffer(FrameTargets::kOutput), target);
+  parts_->read_back.read(parts_->targets->framebuffer(FrameTargets::kOutput), target);
   release_state();
   const double end = monotonic_s();
   splat::SplatStats out = stats(list, true);

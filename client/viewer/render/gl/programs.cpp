@@ -2,6 +2,7 @@
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "client/viewer/render/gl/shaders/common.h"
 #include "client/viewer/render/gl/shaders/contour.h"
@@ -29,7 +30,13 @@ std::string constants() {
   // All digits, and a decimal point always: the shader's constant has the same bits.
   const auto add_float = [&](std::string_view name, float value) { add(name, fmt::format("{:.9e}", value)); };
   add("DEPTH_SHIFT", std::to_string(splat::kDepthCodeShift));
-  add("FILL_SUPPORTS", std::to_string(splat::kFillSupports));
+  add_uint("FILL_SUPPORTS", splat::kFillSupports);
+  add_uint("PIN_HOLE_SUPPORTS", splat::kPinHoleSupports);
+  add_uint("BETWEEN_SUPPORTS", splat::kBetweenSupports);
+  add_uint("FLAT_SUPPORTS", splat::kFlatSupports);
+  add_uint("FLAT", splat::kFlat);
+  add("COVERAGE_NEAR", fmt::format("{}u", fmt::join(splat::kCoverageWeights.near, "u, ")));
+  add("COVERAGE_FAR", fmt::format("{}u", fmt::join(splat::kCoverageWeights.far, "u, ")));
   add_uint("EDGE", splat::kEdge);
   add("MAX_SPLAT_SIDE", std::to_string(splat::kMaxSplatSide));
   add_uint("MAX_CENTRE_CODE", splat::kMaxCentreCode);
@@ -134,7 +141,8 @@ Result<Programs> Programs::make() {
   for (const KernelShaders& shaders : kernel_shaders())
     p.kernels[static_cast<size_t>(shaders.kernel)] = linker.kernel(shaders);
   p.keys = linker.pass("keys", {kResolve});
-  p.fill = linker.pass("fill", {kFinish, kFill});
+  p.fill_pin_holes = linker.pass("fill", {kFinish, kPinHoles, kFill});
+  p.fill_all = linker.pass("fill all", {kFinish, kAllGaps, kFill});
   p.smooth = linker.pass("smooth", {kFinish, kSmooth});
   p.antialias = linker.pass("antialias", {kFinish, kAntialias});
   if (!linker.failed().empty()) return Error{linker.failed()};

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "common/gl/program.h"
+#include "common/splat/finish.h"
 #include "common/splat/kernel_traits.h"
 
 namespace telesplat::viewer {
@@ -23,8 +24,9 @@ struct KernelPrograms {
 struct Programs {
   std::array<KernelPrograms, splat::kKernels.size()> kernels;  ///< by splat::Kernel
   FramePass keys;                                              ///< shades keys
-  FramePass fill, smooth, antialias;                           ///< the finish
+  FramePass fill_pin_holes, fill_all, smooth, antialias;       ///< the finish; splat::Gaps
 
+  const FramePass& fill(splat::Gaps gaps) const { return gaps == splat::Gaps::kAll ? fill_all : fill_pin_holes; }
   const KernelPrograms& of(splat::Kernel kernel) const { return kernels[static_cast<size_t>(kernel)]; }
 
   /// Fails with the compiler's words.

@@ -15,6 +15,16 @@ uvec3 split(uint colour) { return uvec3(colour >> 16, colour >> 8, colour) & 255
 uint join(uvec3 rgb) { return rgb.r << 16 | rgb.g << 8 | rgb.b; }
 )";
 
+/// ENOUGH: whether supports suffice (common/splat/finish.h, Gaps), by their `count`, their `weights`, and whether they
+/// are `even`. BETWEEN: whether nearer neighbours of these `weights` do.
+inline constexpr std::string_view kPinHoles = R"(
+#define ENOUGH(count, weights, even) (weights >= ((even) ? FLAT_SUPPORTS : PIN_HOLE_SUPPORTS))
+#define BETWEEN(weights) (weights >= BETWEEN_SUPPORTS)
+)";
+inline constexpr std::string_view kAllGaps = R"(
+#define ENOUGH(count, weights, even) (count >= FILL_SUPPORTS)
+#define BETWEEN(weights) false
+)";
 inline constexpr std::string_view kFill = R"(
 uint gap(uint a, uint b) { return max(a, b) - min(a, b); }
 
@@ -33,20 +43,32 @@ uvec2 resolve(ivec2 at) {
   uvec2 here = pair_at(at);
   if (here.y <= closed || here.y - closed <= kEdgeInfo) return here;
 
-  uint weights = 0u, depth = 0u;
-  uvec3 rgb = uvec3(0u);
-  int supports = 0;
-  for (int j = -1; j <= 1; ++j)
-    for (int i = -1; i <= 1; ++i) {
-      uvec2 pair = pair_at(at + ivec2(i, j));
-      if ((i == 0 && j == 0) || gap(pair.y, closed) > kEdgeInfo) continue;
-      uint w = i == 0 || j == 0 ? 2u : 1u;
-      ++supports;
-      weights += w;
-      rgb += w * split(pair.x);
-      depth += w * (pair.y >> 8);
+  uint count = 0u, weights = 0u, nearest = kEmptyInfo, farthest = 0u, between = 0u, behind = 0u;
+  for (int i = 0; i < 9; ++i) {
+    if (i == 4) continue;
+    uint info = infos[6 + 5 * (i / 3) + i % 3], w = i % 2 == 1 ? 2u : 1u;
+    if (gap(info, closed) <= kEdgeInfo) {
+      ++count, weights += w;
+      nearest = min(nearest, info), farthest = max(farthest, info);
     }
-  if (supports < FILL_SUPPORTS) return here;
+    if (info < here.y && here.y - info > kEdgeInfo) between += w, behind = max(behind, info);
+  }
+  uint target = closed;
+  if (!ENOUGH(count, weights, max(farthest, nearest) - nearest <= FLAT << 8)) {
+    if (!BETWEEN(between)) return here;
+    target = behind;
+  }
+  uint depth = 0u;
+  uvec3 rgb = uvec3(0u);
+  weights = 0u;
+  for (int i = 0; i < 9; ++i) {
+    uvec2 pair = pair_at(at + ivec2(i % 3 - 1, i / 3 - 1));
+    if (i == 4 || gap(pair.y, target) > kEdgeInfo) continue;
+    uint w = i % 2 == 1 ? 2u : 1u;
+    weights += w;
+    rgb += w * split(pair.x);
+    depth += w * (pair.y >> 8);
+  }
   return uvec2(join((rgb + weights / 2u) / weights), depth / weights << 8);
 }
 )";
@@ -80,18 +102,29 @@ uvec2 resolve(ivec2 at) {
 )";
 
 inline constexpr std::string_view kAntialias = R"(
+const uint kOfNear[34] = uint[34](COVERAGE_NEAR), kOfFar[34] = uint[34](COVERAGE_FAR);
+
 uvec2 resolve(ivec2 at) {
+  uvec2 pairs_there[9];
   uvec2 here = pair_at(at);
   uint least = here.y, most = here.y;
-  uvec3 sum = uvec3(0u);
-  for (int j = -1; j <= 1; ++j)
-    for (int i = -1; i <= 1; ++i) {
-      uvec2 pair = pair_at(at + ivec2(i, j));
-      least = min(least, pair.y), most = max(most, pair.y);
-      sum += split(pair.x) << uint((i == 0 ? 1 : 0) + (j == 0 ? 1 : 0));
-    }
+  for (int i = 0; i < 9; ++i) {
+    pairs_there[i] = pair_at(at + ivec2(i % 3 - 1, i / 3 - 1));
+    least = min(least, pairs_there[i].y), most = max(most, pairs_there[i].y);
+  }
   if (most - least <= 2u * kEdgeInfo) return here;
-  return uvec2(join((sum + 8u) >> 4), here.y);
+  uvec3 near = uvec3(0u), far = uvec3(0u);
+  uint weight = 0u;
+  for (int i = 0; i < 9; ++i) {
+    uint w = (i % 3 == 1 ? 2u : 1u) * (i / 3 == 1 ? 2u : 1u);
+    uvec3 c = w * split(pairs_there[i].x);
+    if (pairs_there[i].y - least <= kEdgeInfo)
+      near += c, weight += w;
+    else
+      far += c;
+  }
+  uint i = weight + (here.y - least <= kEdgeInfo ? 17u : 0u);
+  return uvec2(join((near * kOfNear[i] + far * kOfFar[i] + 32768u) >> 16), here.y);
 }
 )";
 

@@ -1,4 +1,4 @@
-#include "common/image/quality.h"
+#include "common/image/measures/quality.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -37,9 +37,8 @@ struct Sums {
       squared += e * e;
     }
     squared_error += squared;
-    if (!shows(reference.depth_m[at])) return;
-    ++object;
-    if (!(reconstruction.depth_m[at] <= 1.01f * reference.depth_m[at])) ++holes;
+    object += shows(reference.depth_m[at]);
+    holes += is_hole(reference, reconstruction, at);
   }
 };
 
@@ -66,7 +65,6 @@ float luma(uint32_t c) {
   return 0.299f * static_cast<float>(c >> 16 & 255) + 0.587f * static_cast<float>(c >> 8 & 255) +
          0.114f * static_cast<float>(c & 255) - kLumaOffset;
 }
-
 
 // Window moments of one row: means of x, of y, of x^2 + y^2 and of x y. Lines are padded by the radius on either side.
 class RowMoments {
@@ -119,9 +117,8 @@ class RowMoments {
   std::array<std::vector<float>, 4> vertical_, means_;
 };
 
-}  // namespace
-
-Quality compare(const View& reference, const View& reconstruction) {
+// hits: how many rays of each pixel of the reference met the data; null: its depth tells.
+Quality compare_counted(const View& reference, const uint16_t* hits, const View& reconstruction) {
   const int width = reference.width, height = reference.height;
   const size_t pixels = size_t(width) * height;
   CHECK(reconstruction.width == width && reconstruction.height == height);
@@ -140,7 +137,7 @@ Quality compare(const View& reference, const View& reconstruction) {
     for (int row = range.begin(); row < range.end(); ++row) {
       const size_t at = size_t(row) * width;
       const auto in_union = [&](int i) {
-        return shows(reference.depth_m[at + i]) || shows(reconstruction.depth_m[at + i]);
+        return (hits ? hits[at + i] > 0 : shows(reference.depth_m[at + i])) || shows(reconstruction.depth_m[at + i]);
       };
       int first = 0;
       while (first < width && !in_union(first)) ++first;
@@ -165,12 +162,52 @@ Quality compare(const View& reference, const View& reconstruction) {
 
   Quality q;
   q.object_pixels = sums.object;
+  q.hole_pixels = sums.holes;
   if (sums.pixels == 0) return q;
   const double mean_squared = sums.squared_error / (3.0 * static_cast<double>(sums.pixels));
   q.psnr_db = mean_squared > 0 ? std::min(99.0, 10 * std::log10(255.0 * 255.0 / mean_squared)) : 99.0;
   q.ssim = sums.ssim / static_cast<double>(sums.pixels);
   if (sums.object > 0) q.hole_fraction = static_cast<double>(sums.holes) / static_cast<double>(sums.object);
   return q;
+}
+
+const uint16_t* hits_of(const Reference& r) {
+  CHECK(r.hits.empty() || r.hits.size() == r.view.colour.size());
+  return r.hits.empty() ? nullptr : r.hits.data();
+}
+
+}  // namespace
+
+Quality compare(const Reference& reference, const View& reconstruction) {
+  return compare_counted(reference.view, hits_of(reference), reconstruction);
+}
+
+Quality compare(const View& reference, const View& reconstruction) {
+  return compare_counted(reference, nullptr, reconstruction);
+}
+
+bool counts(const Reference& r, const View& reconstruction, size_t at) {
+  return (r.hits.empty() ? shows(r.view.depth_m[at]) : r.hits[at] > 0) || shows(reconstruction.depth_m[at]);
+}
+
+bool is_hole(const View& reference, const View& reconstruction, size_t at) {
+  return shows(reference.depth_m[at]) && !(reconstruction.depth_m[at] <= 1.01f * reference.depth_m[at]);
+}
+
+double mean_error(const std::vector<float>& map, const Reference& reference, const View& reconstruction) {
+  CHECK(map.size() == reference.view.colour.size() && map.size() == reconstruction.depth_m.size());
+  double sum = 0;
+  size_t count = 0;
+  for (size_t i = 0; i < map.size(); ++i) {
+    if (!counts(reference, reconstruction, i)) continue;
+    sum += map[i];
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+double flip(const Reference& reference, const View& reconstruction, double pixels_per_degree) {
+  return mean_error(Flip(reference.view, pixels_per_degree).error_map(reconstruction), reference, reconstruction);
 }
 
 }  // namespace telesplat::image

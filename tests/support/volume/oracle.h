@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/volume/lighting.h"
-#include "tests/support/volume_scenes.h"
+#include "tests/support/volume/scenes.h"
 
 namespace telesplat::test {
 

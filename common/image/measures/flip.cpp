@@ -1,4 +1,4 @@
-#include "common/image/flip.h"
+#include "common/image/measures/flip.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

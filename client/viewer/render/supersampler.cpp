@@ -1,0 +1,221 @@
+#include "client/viewer/render/supersampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "client/viewer/render/fit_view.h"
+#include "common/core/check.h"
+#include "common/splat/flat/splat_table.h"
+
+namespace telesplat::viewer {
+namespace {
+
+// Splats hang over into a rectangle from as far outside of it, in sub-pixels.
+constexpr int kOverhang = splat::kMaxSplatSide;
+// Samples closer than this, in pixels, count as finer than pixels: those of twice the resolution are 0.5 apart.
+constexpr float kFiner = 0.75f;
+// So many of them, a pixel of the rectangle, are worth sub-pixels: an edge across a rectangle of 128 x 96 pixels, four
+// samples a pixel, has 0.03.
+constexpr double kWorthwhile = 0.01;
+// Splats that are cut may stand for as much surface as the others, which may hide them all, and a little more.
+constexpr double kMostCut = 1.2;
+// Samples closer than this, in sub-pixels, are as fine as sub-pixels.
+constexpr float kFinest = 1.5f;
+// Sub-pixels of a pixel that closer samples cover at least where it was sampled more than once. Fewer may be samples of
+// another view.
+constexpr int kLeastCovered = 3;
+// Farther than what the view shows by this factor: about splat::kEdge steps of a depth code.
+constexpr float kBehind = 1.03f;
+
+geometry::Rect grown(const geometry::Rect& r, int by) {
+  return {r.x - by, r.y - by, r.width + 2 * by, r.height + 2 * by};
+}
+
+geometry::Rect scaled(const geometry::Rect& r, int by) { return {r.x * by, r.y * by, r.width * by, r.height * by}; }
+
+geometry::Camera finer(geometry::Camera camera, int by) {
+  camera.width *= by;
+  camera.height *= by;
+  return camera;
+}
+
+}  // namespace
+
+void box_filter(const uint32_t* from, size_t from_pitch, int side, int width, int height, uint32_t* to, size_t pitch) {
+  const auto samples = uint32_t(side * side), half = samples / 2;
+  for (int y = 0; y < height; ++y, from += from_pitch * size_t(side), to += pitch)
+    for (int x = 0; x < width; ++x) {
+      // Sums of 16 channels of 8 bits stay within 12.
+      uint32_t red_blue = 0, green = 0;
+      for (int j = 0; j < side; ++j)
+        for (int i = 0; i < side; ++i) {
+          const uint32_t c = from[size_t(j) * from_pitch + size_t(x * side + i)];
+          red_blue += c & 0xff00ff;
+          green += c >> 8 & 0xff;
+        }
+      const uint32_t red = ((red_blue >> 16) + half) / samples, blue = ((red_blue & 0xffff) + half) / samples;
+      to[x] = 0xff000000u | red << 16 | (green + half) / samples << 8 | blue;
+    }
+}
+
+Supersampler::Fineness Supersampler::fineness(const geometry::Rect& rect) const {
+  uint64_t finer = 0;
+  double cut = 0, whole = 0;  // surface, pixels
+  for (const splat::DrawItem& item : list_.items) {
+    const double spacing = double(item.splat_px) / list_.scale / side_, area = spacing * spacing * item.level.count;
+    if (spacing < kFiner) finer += item.level.count;
+    (item.splat_px > float(splat::kMaxSplatSide) ? cut : whole) += area;
+  }
+  return {double(finer) > kWorthwhile * rect.width * rect.height && cut <= kMostCut * whole, cut > 0};
+}
+
+void Supersampler::render(const Scene& scene, const splat::DrawList& list, const geometry::Camera& camera,
+                          image::View& view, bool antialias) {
+  fit(view, camera, true);
+  splat::RenderOptions options = scene.render;
+  options.finish.antialias = antialias;
+  renderer_.render(list, camera, options, scene.shading,
+                   {view.width, view.height, view.colour.data(), view.depth_m.data()});
+}
+
+bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect, uint32_t* to,
+                        size_t pitch) {
+  CHECK(side_ == 2 || side_ == 4);
+  const geometry::Camera fine = finer(camera, side_);
+  const geometry::Rect sub = scaled(grown(rect, 1), side_);
+  splat::SelectionOptions selection = scene.selection;
+  selection.detail = 1;
+  // Finer samples cover parts of a cluster only, as often as not edges that were sampled twice: coarser splats beside
+  // them must not shrink. Over them the nearest centre wins a sub-pixel anyway.
+  selection.hide_ratio = std::numeric_limits<float>::infinity();
+  selection.max_splat_px = float(splat::kMaxSplatSide * side_);  // so that those that are cut are known
+  scene.select(crop(fine, grown(sub, kOverhang)), selection, list_);
+  const Fineness fineness = this->fineness(rect);
+  if (!fineness.worthwhile) return false;
+  const geometry::Camera around = crop(fine, sub);
+  render(scene, list_, around, fine_);
+  const bool open = count_covered(rect, fine_, covered_);
+  if (open || fineness.gaps) render_coarse(scene, camera, rect);
+  if (open) find_silhouettes(rect), sharpen(scene, around, rect);
+  if (open || fineness.gaps) close_gaps(rect, fineness.gaps);
+  const auto row = size_t(fine_.width), inset = size_t(side_);
+  box_filter(fine_.colour.data() + inset * row + inset, row, side_, rect.width, rect.height, to, pitch);
+  if (open) show_antialiased(scene, camera, rect, to, pitch);
+  return true;
+}
+
+// With two pixels around.
+void Supersampler::render_coarse(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect) {
+  const geometry::Rect around = grown(rect, 2);
+  splat::SelectionOptions selection = scene.selection;
+  selection.detail = 1;
+  scene.select(crop(camera, grown(around, kOverhang)), selection, coarse_list_);
+  render(scene, coarse_list_, crop(camera, around), coarse_);
+}
+
+// Whether some sub-pixels show something and others nothing.
+bool Supersampler::count_covered(const geometry::Rect& rect, const image::View& view,
+                                 std::vector<uint8_t>& covered) const {
+  const size_t width = size_t(rect.width) + 2, height = size_t(rect.height) + 2;
+  covered.assign(width * height, 0);
+  size_t all = 0;
+  for (int y = 0; y < view.height; ++y) {
+    const float* depth_m = view.depth_m.data() + size_t(y) * size_t(view.width);
+    uint8_t* row = covered.data() + size_t(y / side_) * width;
+    for (int x = 0; x < view.width; ++x)
+      if (!std::isinf(depth_m[x])) ++row[x / side_], ++all;
+  }
+  return all > 0 && all < view.depth_m.size();
+}
+
+// By what stands in covered_.
+void Supersampler::find_silhouettes(const geometry::Rect& rect) {
+  const size_t row = size_t(rect.width) + 2;
+  const int whole = side_ * side_;
+  silhouette_.assign(covered_.size(), 0);
+  for (size_t y = 1; y <= size_t(rect.height); ++y)
+    for (size_t x = 1; x <= size_t(rect.width); ++x) {
+      int nothing = 0;
+      for (size_t j = y - 1; j <= y + 1; ++j)
+        for (size_t i = x - 1; i <= x + 1; ++i) nothing += whole - covered_[j * row + i];
+      silhouette_[y * row + x] = nothing >= whole;
+    }
+}
+
+// A pixel of a silhouette, by what stands in covered_ and sampled_, rows `row` apart.
+bool Supersampler::was_sampled(size_t pixel, size_t row) const {
+  if (2 * covered_[pixel] >= side_ * side_) return sampled_[pixel] >= kLeastCovered;
+  bool beside = false;
+  for (const size_t at : {pixel - row, pixel - 1, pixel + 1, pixel + row}) beside |= sampled_[at] >= kLeastCovered;
+  return sampled_[pixel] > 0 || beside;
+}
+
+// Of list_, which keeps these points alone.
+void Supersampler::render_closer(const Scene& scene, const geometry::Camera& around, float spacing, image::View& view) {
+  std::erase_if(list_.items, [&](const splat::DrawItem& item) { return item.splat_px / list_.scale >= spacing; });
+  render(scene, list_, around, view);
+}
+
+void Supersampler::sharpen(const Scene& scene, const geometry::Camera& around, const geometry::Rect& rect) {
+  render_closer(scene, around, kFiner * float(side_), closer_);
+  sampled_.assign(covered_.size(), 0);
+  if (list_.items.empty()) return;
+  count_covered(rect, closer_, sampled_);
+  render_closer(scene, around, kFinest, finest_);
+  const auto width = size_t(rect.width) + 2, row = size_t(fine_.width), side = size_t(side_);
+  for (size_t y = 1; y <= size_t(rect.height); ++y)
+    for (size_t x = 1; x <= size_t(rect.width); ++x) {
+      const size_t pixel = y * width + x;
+      if (!silhouette_[pixel] || !was_sampled(pixel, width)) continue;
+      for (size_t j = 0; j < side; j += 2)
+        for (size_t i = 0; i < side; i += 2) show_samples((y * side + j) * row + x * side + i);
+    }
+}
+
+// Of a quarter of a pixel, by its upper left sub-pixel. A single sample a sub-pixel apart, in a quarter that closer
+// ones fill, is one of another view.
+void Supersampler::show_samples(size_t first) {
+  const auto row = size_t(fine_.width);
+  const size_t quarter[] = {first, first + 1, first + row, first + row + 1};
+  int closer = 0, finest = 0;
+  for (const size_t i : quarter) closer += !std::isinf(closer_.depth_m[i]), finest += !std::isinf(finest_.depth_m[i]);
+  const image::View& from = finest > 1 || (finest == 1 && closer < 4) ? finest_ : closer_;
+  for (const size_t i : quarter) fine_.colour[i] = from.colour[i];
+}
+
+void Supersampler::show_antialiased(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect,
+                                    uint32_t* to, size_t pitch) {
+  render(scene, coarse_list_, crop(camera, grown(rect, 2)), antialiased_, true);
+  const size_t width = size_t(rect.width) + 2, antialiased_width = width + 2;
+  for (size_t y = 0; y < size_t(rect.height); ++y)
+    for (size_t x = 0; x < size_t(rect.width); ++x) {
+      const size_t pixel = (y + 1) * width + x + 1;
+      if (silhouette_[pixel] && !was_sampled(pixel, width))
+        to[y * pitch + x] = antialiased_.colour[(y + 2) * antialiased_width + x + 2];
+    }
+}
+
+void Supersampler::close_gaps(const geometry::Rect& rect, bool with_depths) {
+  const size_t w = size_t(rect.width) + 4;
+  farthest_.resize(size_t(rect.width));
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t first = (size_t(y) + 1) * w + 1;  // upper left of the 3x3 around the row's first pixel
+    for (int x = 0; x < rect.width; ++x) {
+      float far = 0;
+      for (size_t j = 0; j < 3; ++j)
+        for (size_t i = 0; i < 3; ++i) far = std::max(far, coarse_.depth_m[first + j * w + size_t(x) + i]);
+      farthest_[size_t(x)] = kBehind * far;
+    }
+    const uint32_t* pixels = coarse_.colour.data() + first + w + 1;
+    for (int j = 0; j < side_; ++j) {
+      const size_t row = size_t((y + 1) * side_ + j) * size_t(fine_.width) + size_t(side_);
+      for (int x = 0; x < rect.width * side_; ++x)
+        if (const float depth_m = fine_.depth_m[row + size_t(x)];
+            depth_m > farthest_[size_t(x / side_)] && (with_depths || std::isinf(depth_m)))
+          fine_.colour[row + size_t(x)] = pixels[x / side_];
+    }
+  }
+}
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,48 @@
+// Some of the pixels of a rectangle: which are covered, which rays are to be cast.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace telesplat::image {
+
+/// One bit a pixel, rows padded to whole 64-bit words with zeros, pixel x of a row at bit x % 64 of word x / 64.
+class PixelMask {
+ public:
+  PixelMask() = default;
+  PixelMask(int width, int height) { reset(width, height); }
+  /// All zero.
+  void reset(int width, int height) {
+    width_ = width, height_ = height, words_per_row_ = (static_cast<size_t>(width) + 63) / 64;
+    words_.assign(words_per_row_ * static_cast<size_t>(height), 0);
+  }
+  int width() const { return width_; }
+  int height() const { return height_; }
+  size_t words_per_row() const { return words_per_row_; }
+  uint64_t* row(int y) { return words_.data() + words_per_row_ * static_cast<size_t>(y); }
+  const uint64_t* row(int y) const { return words_.data() + words_per_row_ * static_cast<size_t>(y); }
+  bool at(int x, int y) const { return (row(y)[x >> 6] >> (x & 63) & 1) != 0; }
+  void set(int x, int y) { row(y)[x >> 6] |= uint64_t{1} << (x & 63); }
+  void clear(int x, int y) { row(y)[x >> 6] &= ~(uint64_t{1} << (x & 63)); }
+  size_t count() const;
+  /// Number of maximal runs of covered pixels within rows.
+  size_t runs() const;
+
+  bool operator==(const PixelMask&) const = default;
+
+ private:
+  int width_ = 0, height_ = 0;
+  size_t words_per_row_ = 0;
+  std::vector<uint64_t> words_;
+};
+
+/// Calls f(x) for every set bit of one row, in order.
+template <class F>
+void for_each_set(const uint64_t* words, size_t word_count, F f) {
+  for (size_t w = 0; w < word_count; ++w)
+    for (uint64_t rest = words[w]; rest != 0; rest &= rest - 1) f(w * 64 + static_cast<size_t>(std::countr_zero(rest)));
+}
+
+}  // namespace telesplat::image

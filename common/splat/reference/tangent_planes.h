@@ -1,0 +1,37 @@
+// How the depth of a sample's tangent plane goes on from its pixel to the pixels around it.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/splat/surfel/contour.h"
+
+namespace telesplat::splat {
+
+/// Depth (1 + x dx + y dy) at an offset in pixels.
+struct PlaneSlope {
+  float x, y;
+};
+
+/// Slopes are limited to those that splats follow (surfel/contour.h): normals are too coarse for more.
+class TangentPlanes {
+ public:
+  explicit TangentPlanes(const geometry::Camera& camera) : c_(surfel_camera(camera)) {}
+  /// normal: of 16 bits, of a sample at the centre of pixel (x, y).
+  PlaneSlope at(uint16_t normal, int x, int y) const {
+    const auto [nx, ny, nz] = surfel_normal(normal);
+    const float mx = dot(c_.right, nx, ny, nz), my = dot(c_.down, nx, ny, nz), mz = dot(c_.forward, nx, ny, nz);
+    const float u = (static_cast<float>(x) + 0.5f - c_.centre_x) * c_.step_x,
+                v = (static_cast<float>(y) + 0.5f - c_.centre_y) * c_.step_y;
+    const float along = (mx * u + my * v) + mz;
+    const float inverse = 1.0f / std::copysign(std::max(std::abs(along), 1e-3f), along);
+    const float limit_x = kSteepest * c_.step_x, limit_y = kSteepest * c_.step_y;
+    return {-std::clamp(mx * inverse * c_.step_x, -limit_x, limit_x),
+            -std::clamp(my * inverse * c_.step_y, -limit_y, limit_y)};
+  }
+
+ private:
+  SurfelCamera c_;
+};
+
+}  // namespace telesplat::splat

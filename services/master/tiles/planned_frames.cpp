@@ -1,0 +1,125 @@
+// The part of the schedule that is steered: plans are asked for, and become frames.
+#include <algorithm>
+
+#include "common/core/check.h"
+#include "services/master/tiles/frame_schedule.h"
+#include "services/master/tiles/plan_check.h"
+
+namespace telesplat::master {
+namespace {
+
+// Before anything is known of what rays cost.
+constexpr uint64_t kFirstTileRays = 8192, kFirstExtraRays = 65536;
+// Of fewer rays the lease costs more than the rays.
+constexpr double kLeastTileRays = 1024, kMostRays = 1 << 24;
+// Tiles of plans have longer sides, for the same reason: with 256 pixels a view of 1280x800 had 24 tiles of 260 rays,
+// and two thirds of the time samplers waited for leases. Where few samplers share them they are longer still: packer
+// and viewers pay for each tile, too, in every cluster that it adds points to.
+constexpr int kPlannedSide = 2, kPlannedSideOfFew = 4;
+constexpr double kTargetsOfFew = 3;  // of lease_target_s
+constexpr size_t kFewSamplers = 2;
+
+}  // namespace
+
+PlanLimits FrameSchedule::limits() const {
+  const double ray_s = costs_.pixel_s({});
+  const bool few = costs_.samplers() <= kFewSamplers;
+  const int side = few ? kPlannedSideOfFew : kPlannedSide;
+  PlanLimits out{.tile_size = side * options().tile_size, .tile_rays = kFirstTileRays, .most_rays = kFirstExtraRays};
+  const size_t samplers = std::max<size_t>(costs_.samplers(), 1);
+  out.refining_rays = refining_.most(samplers);
+  if (!(ray_s > 0)) return out;
+  out.tile_rays = uint64_t(std::clamp((few ? kTargetsOfFew : 1) * target_s() / ray_s, kLeastTileRays, kMostRays));
+  out.most_rays = uint64_t(std::clamp(kExtraFrame_s * double(samplers) / ray_s, kLeastTileRays, kMostRays));
+  return out;
+}
+
+void FrameSchedule::note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s) {
+  plan_rows_.push_back(metrics::row_of(asked.request, asked.asked_s, plan, now_s));
+}
+
+Status FrameSchedule::take_plan(const wire::Plan& plan, double now_s) {
+  const auto asked = plans_.waiting_for(plan);
+  if (!asked) return ok_status();
+  Status fits = check_answer(*asked, plan);
+  if (fits)
+    take_answer(plan, now_s);
+  else  // extra rays are not asked for again until there is another view
+    take_answer({.frame = plan.frame, .epoch = plan.epoch, .camera = asked->camera, .full = true}, now_s);
+  return fits;
+}
+
+void FrameSchedule::take_answer(const wire::Plan& plan, double now_s) {
+  const auto asked = plans_.answered(plan, now_s);
+  CHECK(asked);
+  note(*asked, plan, now_s);
+  if (asked->request.extra) {
+    if (!plan.full && !plan.tiles.empty()) begin_planned(*asked, plan, now_s);
+    return;
+  }
+  if (plan.full) return begin_whole(asked->view);
+  plans_.known(asked->view);
+  if (plan.tiles.empty())
+    view_complete(asked->view);
+  else
+    begin_planned(*asked, plan, now_s);
+}
+
+void FrameSchedule::begin_planned(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s) {
+  const auto figure = [&](const char* name) {
+    const auto found = plan.figures.find(name);
+    return found == plan.figures.end() ? 0.0 : found->second;
+  };
+  const bool learns = !asked.request.still;
+  insert({.id = plan.frame,
+          .epoch = plan.epoch,
+          .request = asked.view.view,
+          .camera = plan.camera,
+          .tiles = FrameTiles::of_plan(plan),
+          .planned = true,
+          .extra = asked.request.extra,
+          .begun_s = now_s,
+          .refining = learns ? std::max(figure("rays.sparse"), figure("rays.edge") / RefiningRays::kEdges) : 0,
+          .put_off = learns ? figure("rays.put_off") : 0});
+}
+
+void FrameSchedule::give_up_plans(double now_s) {
+  for (const PlanQuestions::Asked& asked : plans_.give_up(now_s)) {
+    plan_rows_.push_back({.asked = asked.request, .asked_s = asked.asked_s, .planned_s = now_s});
+    if (!asked.request.extra) begin_whole(asked.view);
+  }
+}
+
+void FrameSchedule::view_complete(const PlannedView& view) {
+  complete(view.frame);
+  plans_.known(view);
+}
+
+// One extra frame at a time, so that the packer has seen what came of it. While views wait for each other the samplers
+// do its tiles in between; it is planned while they are busy with a view, as the packer is not.
+void FrameSchedule::begin_extra(EpochId epoch, double now_s) {
+  const bool extra_out = std::any_of(frames_.begin(), frames_.end(), [](const Frame& f) { return f.extra; });
+  if (!plans_.on(now_s) || plans_.extra_open() || extra_out) return;
+  const bool nothing_else = !view_waiting() && views_in_flight() == 0;
+  const auto which = nothing_else ? PlanQuestions::Extra::kAny : PlanQuestions::Extra::kDue;
+  if (!plans_.extra_wanted(epoch, which)) return;
+  questions_.push_back(plans_.ask_extra(next_frame(), epoch, which, limits(), now_s));
+}
+
+// A view makes what is beyond others old.
+void FrameSchedule::close_extras(double now_s) {
+  for (Frame& f : frames_)
+    if (f.extra && now_s - f.begun_s > kExtraPatience_s) f.tiles.close();
+  end_closed();
+}
+
+void FrameSchedule::end_closed() {
+  std::erase_if(frames_, [](const Frame& f) { return f.extra && f.tiles.complete(); });
+}
+
+void FrameSchedule::forget_viewer(InstanceId viewer) {
+  Views::forget_viewer(viewer);
+  plans_.forget_viewer(viewer);
+}
+
+}  // namespace telesplat::master

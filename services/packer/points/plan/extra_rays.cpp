@@ -1,0 +1,329 @@
+// Rays beyond what a view asks for: from beside it, so that a movement of the head uncovers nothing unknown, and finer
+// ones.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <mutex>
+
+#include "services/packer/points/plan/planner_impl.h"
+
+namespace telesplat::packer {
+namespace {
+
+constexpr double kMostFull = 0.85;  // of the points that the model may hold
+constexpr unsigned kDirections = 8;
+// Rays beyond a view while the head moves, as shares of its pixels: the next view has edges of its own.
+constexpr double kMovingCells = 0.05, kMovingFine = 0.04;
+// Tiles that have not come for so long were given up.
+constexpr double kLost_s = 0.5;
+// Of a view from beside: as much more on each side, and what is so near to a sample is good enough.
+constexpr double kWider = 0.04;
+constexpr float kNearestFromBeside = 1.5f;
+// What is shown there is cast if the view sees its place no more than so many times as coarsely.
+constexpr double kCloser = 1.5;
+constexpr int kNearEdge = 32;  // pixels; a word of a mask is twice as wide
+// The surfaces of a view that stands still are judged again when all of its finer rays are cast, so many times: what
+// these rays found has edges of its own.
+constexpr int kMostLooks = 3;
+// Tiles of a finer view that are looked at before rays are counted again.
+constexpr size_t kTilesAtOnce = 8;
+
+// In the camera's plane, to the sides first.
+glm::dvec3 direction(unsigned i) {
+  constexpr double kDiagonal = 0.70710678;
+  constexpr glm::dvec3 kTable[kDirections] = {{1, 0, 0},
+                                              {-1, 0, 0},
+                                              {0, 1, 0},
+                                              {0, -1, 0},
+                                              {kDiagonal, kDiagonal, 0},
+                                              {-kDiagonal, -kDiagonal, 0},
+                                              {-kDiagonal, kDiagonal, 0},
+                                              {kDiagonal, -kDiagonal, 0}};
+  return kTable[i % kDirections];
+}
+
+geometry::Camera widened(const geometry::Camera& camera) {
+  const auto room = [](int side) {
+    return std::min(static_cast<int>(kWider * side), (geometry::kMaxImageSide - side) / 2);
+  };
+  const int x = room(camera.width), y = room(camera.height);
+  return geometry::crop(camera, {-x, -y, camera.width + 2 * x, camera.height + 2 * y});
+}
+
+// The same frustum with `times` as many pixels a side.
+geometry::Camera finer_camera(const geometry::Camera& camera, int times) {
+  geometry::Camera out = camera;
+  out.width *= times, out.height *= times;
+  return out;
+}
+
+// What a movement uncovers lies beside an edge. Elsewhere there is but space that no view has looked into so far,
+// between the eye and surfaces that are known: the next view that looks there will tell.
+void drop_far_from_edges(const ViewMap& map, image::PixelMask& cast) {
+  const auto word_of = [&](const image::PixelMask& mask, int y, size_t w) {
+    return y < mask.height() ? mask.row(y)[w] : 0;
+  };
+  for (int y0 = 0; y0 < cast.height(); y0 += kNearEdge)
+    for (size_t w = 0; w < cast.words_per_row(); ++w) {
+      uint64_t edges = 0;
+      for (int y = y0; y < y0 + kNearEdge; ++y) edges |= word_of(map.edge, y, w);
+      if (edges != 0) continue;
+      for (int y = y0; y < std::min(y0 + kNearEdge, cast.height()); ++y) cast.row(y)[w] &= ~map.covered.row(y)[w];
+    }
+}
+
+// Of a view from beside, what is shown is cast if its place lies in the view's own frustum, hidden there or not, and at
+// a like distance. The rest is known, only not as finely as from where nobody stands. Each place beside a walk is
+// another one and much nearer to something: of the bones, walked around again and again, nine tenths of the new points
+// came from there.
+void drop_beyond_view(const ViewMap& map, const geometry::Camera& view, image::PixelMask& cast) {
+  const auto t = view.room_to_pixel();
+  for (int y = 0; y < cast.height(); ++y)
+    for (size_t w = 0; w < cast.words_per_row(); ++w)
+      for (uint64_t rest = cast.row(y)[w] & map.covered.row(y)[w]; rest != 0; rest &= rest - 1) {
+        const int x = static_cast<int>(w) * 64 + std::countr_zero(rest);
+        const double depth_m = map.depth_m[static_cast<size_t>(y) * static_cast<size_t>(cast.width()) + x];
+        const glm::dvec4 place(map.camera.unproject(x + 0.5, y + 0.5, depth_m), 1);
+        const double view_m = glm::dot(t.w, place), left = glm::dot(t.x, place), top = glm::dot(t.y, place);
+        const bool inside = left >= 0 && top >= 0 && left < view_m * view.width && top < view_m * view.height;
+        if (!(view_m >= view.near_m && inside && view_m <= kCloser * depth_m)) cast.row(y)[w] &= ~(rest & -rest);
+      }
+}
+
+bool any(const image::PixelMask& mask, const geometry::Rect& r) {
+  for (int y = r.y; y < r.y + r.height; ++y)
+    for (int w = r.x >> 6; w <= (r.x + r.width - 1) >> 6; ++w)
+      if (mask.row(y)[w] != 0) return true;
+  return false;
+}
+
+}  // namespace
+
+void Planner::Impl::plan_extra(Question& q, ViewerView& view) {
+  // A view that this planner has not planned, as after a restart.
+  if (!view.known || !(view.camera == q.request.camera)) {
+    follow(q.request.camera, view);
+    view.still = q.request.still;
+  }
+  if (q.model.points() == 0) return;
+  // Near its limit the model would forget for them what the view needs.
+  if (config.max_points > 0 &&
+      static_cast<double>(q.model.points()) > kMostFull * static_cast<double>(config.max_points))
+    return;
+  view.still = view.still || q.request.still;
+  if (plan_lost(q, view)) return;
+  const bool cells_first = q.request.round % 2 == 0;
+  if (cells_first && plan_cells(q, view)) return;
+  if (plan_fine(q, view)) return;
+  if (!cells_first) plan_cells(q, view);
+}
+
+// False: there were enough such rays for this view.
+bool Planner::Impl::limit(Question& q, const ViewerView& view, uint64_t cast, double share) const {
+  q.most_rays = q.request.most_rays > 0 ? q.request.most_rays : ~uint64_t{0};
+  if (view.still) return true;
+  const auto most = static_cast<uint64_t>(share * view.camera.width * view.camera.height);
+  if (cast >= most) return false;
+  q.most_rays = std::min(q.most_rays, most - cast);
+  return true;
+}
+
+// Tiles of extra frames that were given up for the view's are asked for again: each was planned once and is not found
+// again.
+bool Planner::Impl::plan_lost(Question& q, ViewerView& view) {
+  for (PlannedFrame& frame : shelf.frames()) {
+    if (frame.viewer != view.viewer || frame.kind == PlannedFrame::Kind::kView || frame.complete()) continue;
+    if (q.now_s - frame.planned_s < kLost_s) continue;
+    LostTiles lost{frame.camera, frame.kind, {}};
+    for (size_t i = 0; i < frame.tiles.size(); ++i)
+      if (!frame.returned[i]) lost.tiles.push_back(std::move(frame.tiles[i]));
+    frame.returned.assign(frame.tiles.size(), true);  // what comes late has no mask any more
+    frame.left = 0;
+    frame.came_m.clear();  // settled with nothing to tell
+    if (frame.kind == PlannedFrame::Kind::kFine && frame.base == view.camera) view.lost.push_back(std::move(lost));
+  }
+  if (view.lost.empty()) return false;
+  LostTiles lost = std::move(view.lost.front());
+  view.lost.pop_front();
+  double rays = 0;
+  for (const RayTile& tile : lost.tiles) rays += static_cast<double>(tile.rays);
+  q.plan.figures["rays.refinement"] = rays;
+  return issue(q, std::move(lost.tiles), {.kind = lost.kind, .camera = lost.camera, .base = view.camera}) > 0;
+}
+
+bool Planner::Impl::plan_cells(Question& q, ViewerView& view) {
+  if (!(config.view_cell_m > 0) || !limit(q, view, view.cell_rays, kMovingCells)) return false;
+  // A moving head has moved on before all directions had their turn.
+  const unsigned tries = view.still ? kDirections : 1;
+  for (unsigned i = 0; i < tries; ++i) {
+    const unsigned turn = view.cell_turn % kDirections;
+    if (!(view.cells_done >> turn & 1) && q.breaks_off()) return true;
+    ++view.cell_turn;
+    if (view.cells_done >> turn & 1) continue;
+    view.cells_done |= 1u << turn;
+    if (plan_cell(q, view, turn)) return true;
+  }
+  return false;
+}
+
+bool Planner::Impl::plan_cell(Question& q, ViewerView& view, unsigned turn) {
+  // As many rays a side as the view has: with half of them points beyond silhouettes are larger there than what they
+  // belong to, which took 1.1 dB from a moving head.
+  geometry::Camera camera = widened(view.camera);
+  const double moved = glm::length(view.movement_m);
+  // Every other time towards where the head goes.
+  const bool ahead = !view.still && moved > 1e-4 && turn % 2 == 0;
+  camera.pose.position_room +=
+      config.view_cell_m * (ahead ? view.movement_m / moved : camera.pose.orientation * direction(turn));
+  if (!geometry::validate(camera)) return false;
+  q.look_at(camera);
+  const std::shared_ptr<ViewMap> map = new_map();
+  render_view_map(q.model, camera, {test.relative_epsilon, kNearestFromBeside}, true, keys, *map);
+  image::PixelMask cast;
+  known_empty.project(camera, map->depth_m, config.threads, cast);
+  drop_far_from_edges(*map, cast);
+  PlannedFrame frame{.kind = PlannedFrame::Kind::kCell, .camera = camera, .base = view.camera, .map = map};
+  frame.firm.reset(camera.width, camera.height);
+  for (int y = 0; y < camera.height; ++y)
+    for (size_t w = 0; w < cast.words_per_row(); ++w) {
+      frame.firm.row(y)[w] = map->covered.row(y)[w] & ~cast.row(y)[w];  // no unseen space before it
+      cast.row(y)[w] |= map->lacking.row(y)[w];
+    }
+  drop_beyond_view(*map, view.camera, cast);
+  for (int y = 0; y < camera.height; ++y)
+    for (size_t w = 0; w < cast.words_per_row(); ++w) frame.firm.row(y)[w] &= ~cast.row(y)[w];
+  std::vector<RayTile> tiles = cut_tiles(cast, {0, 0, camera.width, camera.height}, q.limits());
+  sort_by_distance_to_centre(tiles, camera.width, camera.height);
+  uint64_t rays = 0;
+  size_t count = 0;
+  while (count < tiles.size() && !q.enough(rays)) rays += tiles[count++].rays;
+  // The rest is found again when it is this direction's turn.
+  if (count < tiles.size()) view.cells_done &= ~(1u << turn);
+  tiles.resize(count);
+  view.cell_rays += rays;
+  q.plan.figures["rays.cell"] = static_cast<double>(rays);
+  return issue(q, std::move(tiles), std::move(frame)) > 0;
+}
+
+bool Planner::Impl::plan_fine(Question& q, ViewerView& view) {
+  if (!view.still && config.edge_rays <= 1) return false;
+  if (!limit(q, view, view.fine_rays, kMovingFine)) return false;
+  if (q.breaks_off()) return true;
+  if (!view.fine_map) look_closer(q, view);
+  if (plan_stages(q, view)) return true;
+  if (!view.still || view.fine_sequence == q.sequence || view.looks >= kMostLooks) return false;
+  if (q.breaks_off()) return true;
+  look_closer(q, view);
+  return plan_stages(q, view);
+}
+
+void Planner::Impl::look_closer(Question& q, ViewerView& view) {
+  if (view.still || !view.map) map_view(q, view);
+  view.fine_map = view.map;
+  view.fine_sequence = view.map_sequence;
+  ++view.looks;
+}
+
+bool Planner::Impl::plan_stages(Question& q, ViewerView& view) {
+  const std::shared_ptr<const ViewMap> map = view.fine_map;
+  struct Stage {
+    const image::PixelMask* wanted;
+    int finer;
+    bool edge;
+  };
+  const Stage stages[] = {{&map->edge, 1, true},    {&map->edge, 2, true},  {&map->strong, 1, false},
+                          {&map->strong, 2, false}, {&map->weak, 1, false}, {&map->weak, 2, false}};
+  const int while_still = view.still ? config.still_rays : 1;
+  for (const Stage& stage : stages) {
+    const int most = stage.edge ? std::max(config.edge_rays, while_still) : while_still;
+    if (most >= 1 << 2 * stage.finer && plan_fine(q, view, *stage.wanted, stage.finer)) return true;
+  }
+  return false;
+}
+
+namespace {
+
+// Part of a view, looked at with more rays.
+struct Part {
+  geometry::Rect rect;  // in the view
+  int tile;             // of the finer view
+  double distance2;     // from its middle
+};
+
+// The pixels that have not had these rays, part by part, from the middle outwards.
+std::vector<Part> parts_of(const image::PixelMask& open, const splat::TileGrid& fine, int times) {
+  std::vector<Part> parts;
+  for (int i = 0; i < fine.count(); ++i) {
+    const geometry::Rect r = fine.rect(i);
+    const geometry::Rect in_view{r.x / times, r.y / times, r.width / times, r.height / times};
+    if (!any(open, in_view)) continue;
+    const double dx = r.x + 0.5 * r.width - 0.5 * fine.width, dy = r.y + 0.5 * r.height - 0.5 * fine.height;
+    parts.push_back({in_view, i, dx * dx + dy * dy});
+  }
+  std::stable_sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.distance2 < b.distance2; });
+  return parts;
+}
+
+// Rays of a finer tile in the pixels `wanted` of the view (of the part's size) where the model has no sample.
+std::vector<RayTile> fine_tiles(const splat::ViewKeys::Tile& tile, const PixelJudge& judge,
+                                const image::PixelMask& wanted, int times, const TileLimits& limits) {
+  ViewMap local;
+  reset_masks(tile.rect.width, tile.rect.height, local);
+  judge.judge(tile, 0, 0, local);
+  image::PixelMask rays(tile.rect.width, tile.rect.height);
+  for (int y = 0; y < wanted.height(); ++y) {
+    image::for_each_set(wanted.row(y), wanted.words_per_row(), [&](size_t x) {
+      for (int dy = 0; dy < times; ++dy)
+        for (int dx = 0; dx < times; ++dx) rays.set(static_cast<int>(x) * times + dx, y * times + dy);
+    });
+    for (int row = y * times; row < (y + 1) * times; ++row)
+      for (size_t w = 0; w < rays.words_per_row(); ++w)
+        rays.row(row)[w] &= ~local.covered.row(row)[w] | local.lacking.row(row)[w];
+  }
+  std::vector<RayTile> tiles = cut_tiles(rays, {0, 0, tile.rect.width, tile.rect.height}, limits);
+  for (RayTile& t : tiles) t.rect.x += tile.rect.x, t.rect.y += tile.rect.y;
+  return tiles;
+}
+
+}  // namespace
+
+bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const image::PixelMask& wanted, int finer) {
+  const int times = 1 << finer;
+  const geometry::Camera camera = finer_camera(view.camera, times);
+  if (!geometry::validate(camera)) return false;
+  image::PixelMask& refined = view.refined[static_cast<size_t>(finer)];
+  image::PixelMask open = wanted;
+  for (int y = 0; y < open.height(); ++y)
+    for (size_t w = 0; w < open.words_per_row(); ++w) open.row(y)[w] &= ~refined.row(y)[w];
+  const std::vector<Part> parts = parts_of(open, {camera.width, camera.height, kPlanTileWidth, kPlanTileHeight}, times);
+  if (parts.empty()) return false;
+  if (q.breaks_off()) return true;
+
+  keys.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight);
+  const PixelJudge judge(camera, test, keys.rim());
+  std::vector<RayTile> tiles;
+  uint64_t rays = 0;
+  std::mutex mutex;
+  for (size_t first = 0; first < parts.size() && !q.enough(rays); first += kTilesAtOnce) {
+    if (first > 0 && q.breaks_off()) break;
+    const std::span<const Part> some(parts.data() + first, std::min(kTilesAtOnce, parts.size() - first));
+    std::vector<int> indices;
+    for (const Part& part : some) indices.push_back(part.tile);
+    keys.draw(indices, [&](const splat::ViewKeys::Tile& tile) {
+      const geometry::Rect& part =
+          std::find_if(some.begin(), some.end(), [&](const Part& p) { return p.tile == tile.index; })->rect;
+      std::vector<RayTile> found = fine_tiles(tile, judge, cropped(open, part), times, q.limits());
+      const std::lock_guard lock(mutex);
+      for (RayTile& t : found) rays += t.rays, tiles.push_back(std::move(t));
+    });
+    for (const Part& part : some) merge(cropped(open, part.rect), part.rect.x, part.rect.y, refined);
+    q.looked_at += some.size() * uint64_t{kPlanTileWidth} * uint64_t{kPlanTileHeight};
+  }
+  sort_by_distance_to_centre(tiles, camera.width, camera.height);
+  view.fine_rays += rays;
+  q.plan.figures["rays.refinement"] = static_cast<double>(rays);
+  return issue(q, std::move(tiles), {.kind = PlannedFrame::Kind::kFine, .camera = camera, .base = view.camera}) > 0 ||
+         q.unfinished;
+}
+
+}  // namespace telesplat::packer

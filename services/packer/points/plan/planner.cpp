@@ -1,0 +1,260 @@
+#include "services/packer/points/plan/planner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "services/packer/points/plan/planner_impl.h"
+
+namespace telesplat::packer {
+namespace {
+
+// The pixels of a view are checked in turn, 1 / (validation * kSets) of them at a time: up to kSets such sets in a
+// plan, fewer where plans follow each other in less than kTurn_s, and where the head stands still.
+constexpr int kSets = 8, kStillSets = 4;
+constexpr double kTurn_s = 0.25;
+// Where nothing is known to be, so many times fewer rays look whether something came.
+constexpr int kEmptyShare = 4;
+
+bool never_cast(RayClass c) { return c == RayClass::kGood || c == RayClass::kKnownEmpty; }
+
+uint64_t last_word_mask(int width) { return (width & 63) == 0 ? ~uint64_t{0} : (uint64_t{1} << (width & 63)) - 1; }
+
+}  // namespace
+
+// Which pixels of a view are cast, and why: each for one reason.
+struct Planner::Impl::ViewClasses {
+  image::PixelMask cast, firm;
+  // What of `cast` only refines surfaces that are shown, with nothing unseen before them; and what of that is put off.
+  image::PixelMask sparse, edge, put_off;
+  std::map<std::string, double> figures;
+  uint64_t needed = 0;  // rays that are no validation
+};
+
+Planner::Impl::Impl(const PlanConfig& c)
+    : config(c),
+      test{c.relative_epsilon, c.nearest_sample},
+      keys(c.threads),
+      known_empty(c.model),
+      blue_noise(std::max(c.validation, 1) * kSets),
+      validation(c.model) {}
+
+size_t Planner::Impl::issue(Question& q, std::vector<RayTile> tiles, PlannedFrame frame) {
+  tiles.resize(add_tiles(tiles, config.threads, q.plan));
+  frame.id = q.request.frame;
+  frame.viewer = q.request.viewer;
+  frame.planned_s = q.now_s;
+  frame.left = tiles.size();
+  frame.returned.assign(tiles.size(), false);
+  frame.tiles = std::move(tiles);
+  if (frame.kind != PlannedFrame::Kind::kFine) frame.came_m.resize(frame.tiles.size());
+  q.plan.camera = frame.camera;
+  q.plan.figures["mask_bytes"] = 4.0 * static_cast<double>(q.plan.masks.size());
+  const size_t count = frame.tiles.size();
+  if (count > 0) shelf.add(std::move(frame));
+  return count;
+}
+
+// Memory of maps that nobody looks at any more is used again: to get it anew costs as much as to fill it.
+std::shared_ptr<ViewMap> Planner::Impl::new_map() {
+  size_t pixels = 0;
+  std::erase_if(maps, [&](const auto& map) {
+    pixels += map->depth_m.capacity();
+    return map.use_count() == 1 && pixels > ViewerViews::kMaxMapPixels;
+  });
+  for (const auto& map : maps)
+    if (map.use_count() == 1) return map;
+  if (maps.size() < ViewerViews::kMaxMaps) return maps.emplace_back(std::make_shared<ViewMap>());
+  return std::make_shared<ViewMap>();
+}
+
+// The same view of the same model looks as it did.
+void Planner::Impl::map_view(Question& q, ViewerView& view) {
+  if (view.map && view.map_sequence == q.sequence) return;
+  view.map = new_map();
+  render_view_map(q.model, view.camera, test, true, keys, *view.map);
+  view.map_sequence = q.sequence;
+}
+
+uint64_t Planner::Impl::validation_sets(const Question& q, ViewerView& view) const {
+  if (config.validation == 0) return 0;
+  const double most = view.still ? kStillSets : kSets;
+  const double since_s = q.now_s - view.validated_s;
+  view.sets_due = std::clamp(view.sets_due + kSets * since_s / kTurn_s, 0.0, most);
+  view.validated_s = q.now_s;
+  const double sets = std::floor(view.sets_due);
+  view.sets_due -= sets;
+  return static_cast<uint64_t>(sets);
+}
+
+Planner::Impl::ViewClasses Planner::Impl::classify(Question& q, ViewerView& view) {
+  const ViewMap& map = *view.map;
+  const int width = map.camera.width, height = map.camera.height;
+  ViewClasses out;
+  for (image::PixelMask* mask : {&out.cast, &out.firm, &out.sparse, &out.edge}) mask->reset(width, height);
+  image::PixelMask may_hold, stale(width, height);
+  known_empty.project(map.camera, map.depth_m, config.threads, may_hold);
+  validation.mark_stale(map.camera, q.now_s, stale);
+  std::array<uint64_t, kRayClasses> pixels{}, rays{};
+  if (config.pictures) picture.reset(q.request.frame, width, height), picture.ground = map.colour;
+  const uint64_t picks = validation_sets(q, view);
+  for (int y = 0; y < height; ++y) {
+    uint64_t picked = 0, picked_empty = 0;
+    for (uint64_t i = 0; i < picks; ++i) picked |= blue_noise.row(y, view.round + i);
+    for (uint64_t i = 0; i < picks; i += kEmptyShare) picked_empty |= blue_noise.row(y, view.round + i);
+    for (size_t w = 0; w < map.covered.words_per_row(); ++w) {
+      const uint64_t inside = w + 1 == map.covered.words_per_row() ? last_word_mask(width) : ~uint64_t{0};
+      const uint64_t covered = map.covered.row(y)[w], lacking = map.lacking.row(y)[w], edge = map.edge.row(y)[w];
+      const uint64_t holds = may_hold.row(y)[w], old = stale.row(y)[w], done = view.done.row(y)[w];
+      uint64_t left = inside, cast = 0;
+      const auto take = [&](RayClass reason, uint64_t members, uint64_t chosen) {
+        const auto c = static_cast<size_t>(reason);
+        members &= left;
+        left &= ~members;
+        if (config.pictures)
+          picture.set(static_cast<int>(w) * 64, y, never_cast(reason) ? members : members & chosen, reason);
+        pixels[c] += static_cast<uint64_t>(std::popcount(members));
+        rays[c] += static_cast<uint64_t>(std::popcount(members & chosen));
+        cast |= members & chosen;
+      };
+      // Also where it is doubted: rays there are evidence.
+      const uint64_t good = covered & ~lacking & ~holds, empty = ~covered & ~holds & inside;
+      take(RayClass::kStale, old, ~uint64_t{0});
+      take(RayClass::kNothing, ~covered & holds, ~done);
+      const uint64_t before = cast;
+      take(RayClass::kEdge, lacking & edge, ~done);
+      const uint64_t edge_cast = cast & ~before;
+      take(RayClass::kSparse, lacking, ~done);
+      out.edge.row(y)[w] = edge_cast & ~holds;
+      out.sparse.row(y)[w] = cast & ~before & ~edge_cast & ~holds;
+      take(RayClass::kUnproven, holds, ~done);
+      out.firm.row(y)[w] = (good & ~edge) | empty;
+      out.needed += static_cast<uint64_t>(std::popcount(cast));
+      const uint64_t checked = left & ((covered & picked) | (~covered & picked_empty));
+      rays[static_cast<size_t>(RayClass::kValidation)] += static_cast<uint64_t>(std::popcount(checked));
+      cast |= checked;
+      take(RayClass::kKnownEmpty, ~covered, 0);
+      take(RayClass::kGood, ~uint64_t{0}, 0);
+      if (config.pictures) picture.set(static_cast<int>(w) * 64, y, checked, RayClass::kValidation);
+      out.cast.row(y)[w] = cast;
+    }
+  }
+  view.round += picks;
+  for (size_t i = 0; i < kRayClasses; ++i) {
+    const auto c = static_cast<RayClass>(i);
+    if (c != RayClass::kValidation) out.figures[fmt::format("pixels.{}", name_of(c))] = static_cast<double>(pixels[i]);
+    if (!never_cast(c)) out.figures[fmt::format("rays.{}", name_of(c))] = static_cast<double>(rays[i]);
+  }
+  return out;
+}
+
+// The master samples all of it. What its tiles tell is learned as they come.
+void Planner::Impl::plan_full(Question& q, const ViewerView& view) {
+  q.plan.full = true;
+  q.plan.camera = view.camera;
+}
+
+// What is shown already, though coarsely, can wait; edges less than what lies between them.
+void Planner::Impl::put_off(uint64_t most_rays, ViewClasses& classes) {
+  constexpr uint64_t kEdges = 4;  // times as many (PlanRequest::most_rays)
+  const uint64_t sparse = put_off_rays(classes.sparse, most_rays, classes.cast);
+  const uint64_t edge = put_off_rays(
+      classes.edge, kEdges * std::min(most_rays, ~uint64_t{0} / kEdges), classes.cast);
+  if (sparse + edge == 0) return;
+  classes.put_off.reset(classes.cast.width(), classes.cast.height());
+  for (int y = 0; y < classes.cast.height(); ++y)
+    for (size_t w = 0; w < classes.cast.words_per_row(); ++w) {
+      const uint64_t left = (classes.sparse.row(y)[w] | classes.edge.row(y)[w]) & ~classes.cast.row(y)[w];
+      classes.put_off.row(y)[w] = left;
+      if (config.pictures) picture.set(static_cast<int>(w) * 64, y, left, RayClass::kGood);
+    }
+  classes.needed -= sparse + edge;
+  classes.figures["rays.sparse"] -= static_cast<double>(sparse);
+  classes.figures["rays.edge"] -= static_cast<double>(edge);
+  classes.figures["rays.put_off"] = static_cast<double>(sparse + edge);
+}
+
+void Planner::Impl::plan_view(Question& q, ViewerView& view) {
+  follow(q.request.camera, view);
+  if (q.model.points() == 0) return plan_full(q, view);
+  map_view(q, view);
+  ViewClasses classes = classify(q, view);
+  if (q.request.most_rays > 0) put_off(q.request.most_rays, classes);
+  q.plan.figures = std::move(classes.figures);
+  const auto all = static_cast<uint64_t>(view.camera.width) * static_cast<uint64_t>(view.camera.height);
+  if (classes.needed > all / 2) return plan_full(q, view);
+
+  std::vector<RayTile> tiles = cut_tiles(classes.cast, {0, 0, view.camera.width, view.camera.height}, q.limits());
+  sort_by_distance_to_centre(tiles, view.camera.width, view.camera.height);
+  PlannedFrame frame{
+      .camera = view.camera, .map = view.map, .firm = std::move(classes.firm), .put_off = std::move(classes.put_off)};
+  issue(q, std::move(tiles), std::move(frame));
+}
+
+Planner::Planner(const PlanConfig& config) : impl_(std::make_unique<Impl>(config)) {}
+Planner::~Planner() = default;
+
+wire::Plan Planner::plan(const points::PointModel& model, Sequence sequence, const wire::PlanRequest& request,
+                         double now_s) {
+  for (;;)
+    if (auto plan = plan_piece(model, sequence, request, now_s)) return *std::move(plan);
+}
+
+std::optional<wire::Plan> Planner::plan_piece(const points::PointModel& model, Sequence sequence,
+                                              const wire::PlanRequest& request, double now_s) {
+  Impl& m = *impl_;
+  m.settle_old(now_s);
+  Impl::Question q{model, sequence, request, now_s};
+  q.plan.frame = request.frame;
+  q.plan.epoch = request.epoch;
+  q.plan.camera = request.camera;
+  if (!geometry::validate(request.camera)) return std::move(q.plan);
+  if (uint64_t(request.camera.width) * uint64_t(request.camera.height) > kMaxPixels) {
+    q.plan.full = !request.extra;
+    return std::move(q.plan);
+  }
+  ViewerView& view = m.viewers.use(request.viewer);
+  if (request.extra)
+    m.plan_extra(q, view);
+  else
+    m.plan_view(q, view);
+  if (q.plan.tiles.empty() && q.unfinished) return std::nullopt;
+  return std::move(q.plan);
+}
+
+void Planner::take(const SampledTile& tile, bool whole, double now_s) { impl_->take(tile, whole, now_s); }
+std::optional<KnownReference> Planner::reference(const SampledTile& tile) const { return impl_->reference(tile); }
+void Planner::learn(const points::PointModel& model) { impl_->known_empty.add(model); }
+bool Planner::settle() { return impl_->settle(); }
+bool Planner::settles_soon() const { return tells_much(impl_->shelf); }
+bool Planner::view_under_way(double now_s) const { return packer::view_under_way(impl_->shelf, now_s); }
+
+const PlanPicture& Planner::picture() const { return impl_->picture; }
+
+std::vector<points::ClusterKey> Planner::disproved() { return impl_->validation.disproved(); }
+
+void Planner::inserted(const points::PreparedPatch& patch) {
+  impl_->known_empty.add(patch);
+  note_inserted(patch, impl_->config.model, impl_->shelf);
+}
+
+void Planner::forgotten(std::span<const points::ClusterKey> clusters) {
+  if (clusters.empty()) return;
+  impl_->known_empty.forget(clusters);
+  impl_->validation.forgotten(clusters);
+  for (PlannedFrame& frame : impl_->shelf.frames()) frame.nearest_known = false;
+  impl_->viewers.forgotten(impl_->config.model, impl_->config.view_cell_m, clusters);
+}
+
+void Planner::cleared() {
+  impl_->known_empty.clear();
+  impl_->validation.clear();
+  impl_->viewers.clear();
+  impl_->shelf.clear();
+}
+
+void Planner::forget_frames() { impl_->shelf.clear(); }
+
+}  // namespace telesplat::packer

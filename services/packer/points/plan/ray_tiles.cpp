@@ -1,0 +1,168 @@
+#include "services/packer/points/plan/ray_tiles.h"
+
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "common/codec/mask_stream.h"
+
+namespace telesplat::packer {
+namespace {
+
+// 64 pixels of a row from x on; those beyond the row's words are zero.
+uint64_t bits_at(const uint64_t* row, size_t words, int x) {
+  const auto word = static_cast<size_t>(x) >> 6;
+  const int shift = x & 63;
+  const uint64_t low = word < words ? row[word] >> shift : 0;
+  return shift == 0 || word + 1 >= words ? low : low | row[word + 1] << (64 - shift);
+}
+
+uint64_t first_bits(int n) { return n >= 64 ? ~uint64_t{0} : (uint64_t{1} << n) - 1; }
+
+// How many rays a rectangle has, and their box.
+struct Content {
+  uint64_t rays = 0;
+  geometry::Rect box;
+};
+Content content_of(const image::PixelMask& mask, const geometry::Rect& r) {
+  Content out;
+  int x0 = r.x + r.width, x1 = r.x, y0 = -1, y1 = 0;
+  for (int y = r.y; y < r.y + r.height; ++y) {
+    const uint64_t rays = out.rays;
+    for (int x = r.x; x < r.x + r.width; x += 64) {
+      const uint64_t bits = bits_at(mask.row(y), mask.words_per_row(), x) & first_bits(r.x + r.width - x);
+      if (bits == 0) continue;
+      out.rays += static_cast<uint64_t>(std::popcount(bits));
+      x0 = std::min(x0, x + std::countr_zero(bits));
+      x1 = std::max(x1, x + 64 - std::countl_zero(bits));
+    }
+    if (out.rays == rays) continue;
+    if (y0 < 0) y0 = y;
+    y1 = y + 1;
+  }
+  if (out.rays > 0) out.box = {x0, y0, x1 - x0, y1 - y0};
+  return out;
+}
+
+void cut(const image::PixelMask& mask, const geometry::Rect& r, const TileLimits& limits, int size,
+         std::vector<RayTile>& tiles) {
+  const Content content = content_of(mask, r);
+  if (content.rays == 0) return;
+  const bool small = std::max(content.box.width, content.box.height) <= kLeastTile;
+  if (limits.rays == 0 || content.rays <= limits.rays || small || size <= kLeastTile) {
+    tiles.push_back({content.box, cropped(mask, content.box), content.rays});
+    return;
+  }
+  const int half = std::max(size / 2, kLeastTile);
+  for (int y = r.y; y < r.y + r.height; y += half)
+    for (int x = r.x; x < r.x + r.width; x += half)
+      cut(mask, {x, y, std::min(half, r.x + r.width - x), std::min(half, r.y + r.height - y)}, limits, half, tiles);
+}
+
+}  // namespace
+
+image::PixelMask cropped(const image::PixelMask& mask, const geometry::Rect& r) {
+  image::PixelMask out(r.width, r.height);
+  for (int y = 0; y < r.height; ++y) {
+    uint64_t* row = out.row(y);
+    for (int x = 0; x < r.width; x += 64)
+      row[x >> 6] = bits_at(mask.row(r.y + y), mask.words_per_row(), r.x + x) & first_bits(r.width - x);
+  }
+  return out;
+}
+
+void merge(const image::PixelMask& part, int x, int y, image::PixelMask& mask) {
+  const int shift = x & 63;
+  for (int row = 0; row < part.height(); ++row) {
+    const uint64_t* from = part.row(row);
+    uint64_t* to = mask.row(y + row) + (x >> 6);
+    for (size_t w = 0; w < part.words_per_row(); ++w) {
+      if (from[w] == 0) continue;
+      to[w] |= from[w] << shift;
+      if (shift != 0 && from[w] >> (64 - shift) != 0) to[w + 1] |= from[w] >> (64 - shift);
+    }
+  }
+}
+
+std::vector<RayTile> cut_tiles(const image::PixelMask& mask, const geometry::Rect& area, const TileLimits& limits) {
+  std::vector<RayTile> tiles;
+  const int size = std::max(limits.size, kLeastTile);
+  for (int y = area.y - area.y % size; y < area.y + area.height; y += size)
+    for (int x = area.x - area.x % size; x < area.x + area.width; x += size) {
+      const int x0 = std::max(x, area.x), y0 = std::max(y, area.y);
+      const int x1 = std::min(x + size, area.x + area.width), y1 = std::min(y + size, area.y + area.height);
+      cut(mask, {x0, y0, x1 - x0, y1 - y0}, limits, size, tiles);
+    }
+  return tiles;
+}
+
+uint64_t put_off_rays(const image::PixelMask& some, uint64_t most, image::PixelMask& cast) {
+  constexpr int kWidth = 64, kHeight = 16;  // a word of a mask
+  struct Piece {
+    size_t word;
+    int y;
+    uint64_t rays;
+    double distance2;
+  };
+  std::vector<Piece> pieces;
+  uint64_t left = 0;
+  for (int y = 0; y < some.height(); y += kHeight)
+    for (size_t word = 0; word < some.words_per_row(); ++word) {
+      uint64_t rays = 0;
+      for (int row = y; row < std::min(y + kHeight, some.height()); ++row)
+        rays += static_cast<uint64_t>(std::popcount(some.row(row)[word]));
+      if (rays == 0) continue;
+      const double dx = (static_cast<double>(word) + 0.5) * kWidth - 0.5 * some.width();
+      const double dy = y + 0.5 * kHeight - 0.5 * some.height();
+      pieces.push_back({word, y, rays, dx * dx + dy * dy});
+      left += rays;
+    }
+  if (left <= most) return 0;
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const Piece& a, const Piece& b) { return a.distance2 > b.distance2; });
+  uint64_t taken = 0;
+  for (const Piece& piece : pieces) {
+    if (left <= most) break;
+    for (int row = piece.y; row < std::min(piece.y + kHeight, some.height()); ++row)
+      cast.row(row)[piece.word] &= ~some.row(row)[piece.word];
+    left -= piece.rays, taken += piece.rays;
+  }
+  return taken;
+}
+
+void sort_by_distance_to_centre(std::vector<RayTile>& tiles, int width, int height) {
+  const auto distance2 = [&](const RayTile& t) {
+    const double dx = t.rect.x + 0.5 * t.rect.width - 0.5 * width, dy = t.rect.y + 0.5 * t.rect.height - 0.5 * height;
+    return dx * dx + dy * dy;
+  };
+  std::stable_sort(tiles.begin(), tiles.end(),
+                   [&](const RayTile& a, const RayTile& b) { return distance2(a) < distance2(b); });
+}
+
+size_t add_tiles(const std::vector<RayTile>& tiles, int threads, wire::Plan& plan) {
+  std::vector<std::vector<uint32_t>> masks(tiles.size());
+  tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
+      const RayTile& t = tiles[i];
+      if (t.rays < static_cast<uint64_t>(t.rect.width) * static_cast<uint64_t>(t.rect.height))
+        masks[i] = codec::encode_mask(t.mask);
+    });
+  });
+  for (size_t i = 0; i < tiles.size(); ++i) {
+    const RayTile& t = tiles[i];
+    if (plan.tiles.size() / wire::kPlanNumbers >= wire::kMaxTiles || masks[i].size() > wire::kMaxMaskWords ||
+        plan.masks.size() + masks[i].size() > wire::kMaxPlanWords)
+      return i;
+    for (const int n : {t.rect.x, t.rect.y, t.rect.width, t.rect.height}) plan.tiles.push_back(uint32_t(n));
+    plan.tiles.push_back(uint32_t(t.rays));
+    plan.tiles.push_back(uint32_t(masks[i].size()));
+    plan.masks.insert(plan.masks.end(), masks[i].begin(), masks[i].end());
+  }
+  return tiles.size();
+}
+
+}  // namespace telesplat::packer

@@ -1,0 +1,212 @@
+#include "services/packer/points/plan/validation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+
+#include "common/core/check.h"
+#include "common/image/normal.h"
+
+namespace telesplat::packer {
+namespace {
+
+// A cluster is disproved by so many contradictions, twice as many after each time that this did not help, if they are
+// such a part of all rays at it of about the last second.
+constexpr float kProof = 16, kProofShare = 0.5f;
+constexpr int kMostStrikes = 6;
+constexpr double kHalfLifeSeconds = 0.5, kStrikeSeconds = 10;
+constexpr size_t kMostEvidence = size_t{1} << 17;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+struct Around {
+  float nearest_m = kInfinity, farthest_m = 0;
+  std::array<int, 3> low{255, 255, 255}, high{0, 0, 0};
+  float cosine = -1;  // of the normal most like the sample's
+};
+
+int channel(uint32_t colour, int c) { return static_cast<int>(colour >> (8 * c) & 255); }
+
+// What is shown within `reach` pixels. The sample lies between what is shown where its surface was sampled at other
+// places.
+Around look_around(const ShownView& shown, int x, int y, int reach, const glm::vec3& normal) {
+  Around out;
+  for (int py = std::max(y - reach, 0); py <= std::min(y + reach, shown.camera.height - 1); ++py)
+    for (int px = std::max(x - reach, 0); px <= std::min(x + reach, shown.camera.width - 1); ++px) {
+      const size_t i = static_cast<size_t>(py) * shown.camera.width + px;
+      out.nearest_m = std::min(out.nearest_m, shown.depth_m[i]);
+      out.farthest_m = std::max(out.farthest_m, shown.depth_m[i]);
+      if (!(shown.depth_m[i] < kInfinity)) continue;
+      for (int c = 0; c < 3; ++c) {
+        auto& low = out.low[static_cast<size_t>(c)];
+        auto& high = out.high[static_cast<size_t>(c)];
+        low = std::min(low, channel(shown.colour[i], c));
+        high = std::max(high, channel(shown.colour[i], c));
+      }
+      out.cosine = std::max(out.cosine, glm::dot(image::decode_normal16(shown.normal[i]), normal));
+    }
+  return out;
+}
+
+std::optional<points::ClusterKey> leaf_at(const points::OctreeGrid& grid, const glm::dvec3& position_room) {
+  const glm::dvec3 at = glm::floor((position_room - grid.lo) / grid.leaf_size);
+  const double side = 1 << grid.depth;
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(at[axis] >= 0 && at[axis] < side)) return std::nullopt;
+  return static_cast<points::ClusterKey>(at.x) | static_cast<points::ClusterKey>(at.y) << 10 |
+         static_cast<points::ClusterKey>(at.z) << 20;
+}
+
+}  // namespace
+
+Validation::Validation(const points::ModelConfig& model, const Tolerance& tolerance)
+    : grid_(points::octree_grid(model)), tolerance_(tolerance) {}
+
+Validation::Verdict Validation::judge(const ShownView& shown, int shown_x, int shown_y, const image::DepthImage& came,
+                                      size_t pixel) const {
+  const size_t i = static_cast<size_t>(shown_y) * shown.camera.width + static_cast<size_t>(shown_x);
+  const bool hit = came.depth[pixel] != 0;
+  if (!(shown.depth_m[i] < kInfinity)) return hit ? Verdict::kNearer : Verdict::kAgrees;
+  const glm::vec3 normal = image::decode_normal16(came.normal[pixel]);
+  const Around around = look_around(shown, shown_x, shown_y, tolerance_.reach, normal);
+  // What lies beside a silhouette may be either.
+  if (!hit) return around.farthest_m < kInfinity ? Verdict::kMissed : Verdict::kNone;
+  const auto depth_m = static_cast<float>(image::decode_depth(came.depth[pixel], shown.camera.near_m));
+  if (depth_m < around.nearest_m * (1 - tolerance_.relative_depth)) return Verdict::kNearer;
+  if (depth_m > around.farthest_m * (1 + tolerance_.relative_depth)) return Verdict::kFarther;
+  for (int c = 0; c < 3; ++c) {
+    const auto v = static_cast<float>(channel(came.colour[pixel], c));
+    const auto at = static_cast<size_t>(c);
+    if (v < static_cast<float>(around.low[at]) - tolerance_.colour ||
+        v > static_cast<float>(around.high[at]) + tolerance_.colour)
+      return Verdict::kColour;
+  }
+  return around.cosine < tolerance_.normal_cosine ? Verdict::kNormal : Verdict::kAgrees;
+}
+
+void Validation::check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
+                       const image::DepthImage& came, double now_s, image::PixelMask& contradicted) {
+  const size_t pixels = static_cast<size_t>(shown.camera.width) * shown.camera.height;
+  CHECK(shown.depth_m.size() == pixels && shown.colour.size() == pixels && shown.normal.size() == pixels);
+  CHECK(shown.firm.width() == shown.camera.width && shown.firm.height() == shown.camera.height);
+  CHECK(geometry::contains({0, 0, shown.camera.width, shown.camera.height}, rect));
+  CHECK(cast.width() == rect.width && cast.height() == rect.height);
+  CHECK(came.width == rect.width && came.height == rect.height);
+  contradicted.reset(rect.width, rect.height);
+  marked_.reset((rect.width + kMarkPixels - 1) / kMarkPixels, (rect.height + kMarkPixels - 1) / kMarkPixels);
+  for (int y = 0; y < rect.height; ++y)
+    image::for_each_set(cast.row(y), cast.words_per_row(), [&](size_t x) {
+      const int column = static_cast<int>(x);
+      if (!shown.firm.at(rect.x + column, rect.y + y)) return;
+      if (take(shown, rect, column, y, came, now_s)) contradicted.set(column, y);
+    });
+}
+
+// One ray at a firm pixel. True: it contradicts.
+bool Validation::take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
+                      double now_s) {
+  const int px = rect.x + x, py = rect.y + y;
+  const size_t at = static_cast<size_t>(y) * rect.width + x;
+  const float shown_m = shown.depth_m[static_cast<size_t>(py) * shown.camera.width + px];
+  const bool empty = !(shown_m < kInfinity);
+  const Verdict verdict = judge(shown, px, py, came, at);
+  count(verdict, empty);
+  if (verdict == Verdict::kNone) return false;
+  const auto room = [&](double depth_m) { return shown.camera.unproject(px + 0.5, py + 0.5, depth_m); };
+  // What is before the shown surface says nothing about that.
+  if (!empty && verdict != Verdict::kNearer)
+    if (const auto key = leaf_at(grid_, room(shown_m))) note(*key, verdict == Verdict::kAgrees, now_s);
+  if (verdict == Verdict::kAgrees) return false;
+  const int square_x = x / kMarkPixels, square_y = y / kMarkPixels;
+  if (!marked_.at(square_x, square_y)) {
+    marked_.set(square_x, square_y);
+    const bool gone = verdict == Verdict::kFarther || verdict == Verdict::kMissed;
+    mark(room(gone ? shown_m : image::decode_depth(came.depth[at], shown.camera.near_m)), now_s);
+  }
+  return true;
+}
+
+void Validation::count(Verdict verdict, bool empty) {
+  if (verdict == Verdict::kNone) return;
+  if (empty) {
+    ++statistics_.empty_rays;
+    statistics_.empty_hits += verdict != Verdict::kAgrees;
+    return;
+  }
+  ++statistics_.rays;
+  statistics_.nearer += verdict == Verdict::kNearer;
+  statistics_.farther += verdict == Verdict::kFarther;
+  statistics_.missed += verdict == Verdict::kMissed;
+  statistics_.colour += verdict == Verdict::kColour;
+  statistics_.normal += verdict == Verdict::kNormal;
+}
+
+void Validation::note(points::ClusterKey key, bool agrees, double now_s) {
+  if (evidence_.size() >= kMostEvidence && !evidence_.contains(key)) evidence_.clear();
+  Evidence& e = evidence_[key];
+  if (now_s > e.s) {
+    const auto fade = static_cast<float>(std::exp2(-(now_s - e.s) / kHalfLifeSeconds));
+    e.agree *= fade, e.contradict *= fade;
+    e.s = now_s;
+  }
+  (agrees ? e.agree : e.contradict) += 1;
+  if (agrees) return;
+  if (e.strikes > 0 && now_s - e.strike_s > kStrikeSeconds * (1 << e.strikes)) e.strikes = 0;
+  const float proof = kProof * static_cast<float>(1 << e.strikes);
+  if (e.contradict < proof || e.contradict < kProofShare * (e.agree + e.contradict)) return;
+  disproved_.push_back(key);
+  e = {0, 0, now_s, now_s, static_cast<uint8_t>(std::min(e.strikes + 1, kMostStrikes))};
+}
+
+void Validation::mark(const glm::dvec3& position_room, double now_s) {
+  if (marks_.size() >= kMaxMarks) marks_.erase(marks_.begin(), marks_.begin() + kMaxMarks / 8);
+  marks_.push_back({position_room, now_s, -1});
+}
+
+void Validation::mark_stale(const geometry::Camera& camera, double now_s, image::PixelMask& mask) {
+  CHECK(mask.width() == camera.width && mask.height() == camera.height);
+  std::erase_if(marks_, [&](const Mark& m) { return !(now_s - m.made_s <= kMarkSeconds); });
+  const geometry::Camera::PixelTransform t = camera.room_to_pixel();
+  for (Mark& m : marks_) {
+    const glm::dvec4 p(m.position_room, 1);
+    const double w = glm::dot(t.w, p);
+    if (!(w > camera.near_m)) continue;
+    const double x = std::floor(glm::dot(t.x, p) / w), y = std::floor(glm::dot(t.y, p) / w);
+    if (!(x >= 0 && x < camera.width && y >= 0 && y < camera.height)) continue;
+    constexpr int kHalf = kMarkPixels / 2;
+    const int x0 = std::max(static_cast<int>(x) - kHalf, 0), y0 = std::max(static_cast<int>(y) - kHalf, 0);
+    const int x1 = std::min(static_cast<int>(x) + kHalf, camera.width),
+              y1 = std::min(static_cast<int>(y) + kHalf, camera.height);
+    for (int py = y0; py < y1; ++py)
+      for (int px = x0; px < x1; ++px) mask.set(px, py);
+    m.planned_s = now_s;
+  }
+}
+
+void Validation::resampled(double planned_s) {
+  std::erase_if(marks_, [&](const Mark& m) { return m.planned_s == planned_s; });
+}
+
+std::vector<points::ClusterKey> Validation::disproved() {
+  std::vector<points::ClusterKey> out;
+  out.swap(disproved_);
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+void Validation::forgotten(std::span<const points::ClusterKey> clusters) {
+  for (const points::ClusterKey key : clusters)
+    if (const auto found = evidence_.find(key); found != evidence_.end())
+      found->second.agree = found->second.contradict = 0;
+}
+
+void Validation::clear() {
+  marks_.clear();
+  evidence_.clear();
+  disproved_.clear();
+}
+
+}  // namespace telesplat::packer

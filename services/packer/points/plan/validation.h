@@ -1,0 +1,103 @@
+// Whether the model still shows what is there: rays that were cast at pixels which need none are compared with what the
+// model shows. No clocks; one thread at a time.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "common/geometry/camera.h"
+#include "common/image/depth_image.h"
+#include "common/image/pixel_mask.h"
+#include "common/points/point_model.h"
+
+namespace telesplat::packer {
+
+/// What the model shows in a view: planes of camera.width x camera.height pixels, row by row.
+struct ShownView {
+  const geometry::Camera& camera;
+  std::span<const float> depth_m;    ///< +infinity: nothing
+  std::span<const uint32_t> colour;  ///< 0x00RRGGBB albedo
+  std::span<const uint16_t> normal;  ///< encode_normal16
+  const image::PixelMask& firm;      ///< pixels of which this is believed: good ones and known empty ones
+};
+
+/// How far a ray may be off what is shown. A sample agrees if it lies between what the pixels around show, and these
+/// tolerances beyond.
+struct Tolerance {
+  float relative_depth = 0.01f;  ///< of the depth
+  int reach = 2;                 ///< pixels around that are looked at
+  float colour = 32;             ///< largest difference of a channel, of 255
+  float normal_cosine = 0.5f;    ///< at least, between normals
+};
+
+class Validation {
+ public:
+  static constexpr int kMarkPixels = 16;     ///< side of the square that one contradiction makes stale
+  static constexpr double kMarkSeconds = 1;  ///< a mark that no plan takes up is dropped after that
+  static constexpr size_t kMaxMarks = 4096;  ///< oldest go first
+
+  /// kNone: beside a silhouette nothing can be said. kNearer also: something where nothing is shown.
+  enum class Verdict : uint8_t { kNone, kAgrees, kNearer, kFarther, kMissed, kColour, kNormal };
+
+  struct Statistics {
+    uint64_t rays = 0;                                                     ///< compared
+    uint64_t nearer = 0, farther = 0, missed = 0, colour = 0, normal = 0;  ///< contradictions
+    uint64_t empty_rays = 0, empty_hits = 0;  ///< at known empty pixels; not in the figures above
+  };
+
+  explicit Validation(const points::ModelConfig& model, const Tolerance& tolerance = {});
+
+  /// Compares a tile's rays at firm pixels with what was shown when its frame was planned.
+  ///   cast: of rect's size; came: likewise, as sampled. shown.camera's image holds rect.
+  ///   contradicted: becomes a mask of rect's size: the rays that saw something else than what is shown; their hits are
+  ///   new points.
+  void check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
+             const image::DepthImage& came, double now_s, image::PixelMask& contradicted);
+
+  /// Sets a square of kMarkPixels pixels around each mark in sight: stale. mask: of the camera's size.
+  void mark_stale(const geometry::Camera& camera, double now_s, image::PixelMask& mask);
+  /// The frame of the plan that called mark_stale at planned_s is complete: its marks are settled.
+  void resampled(double planned_s);
+
+  /// Clusters that rays have disproved since the last call, ascending.
+  std::vector<points::ClusterKey> disproved();
+  /// Clusters are gone, for whatever reason: evidence about their old points is void.
+  void forgotten(std::span<const points::ClusterKey> clusters);
+
+  void clear();  ///< a new epoch
+  const Statistics& statistics() const { return statistics_; }
+  size_t marks() const { return marks_.size(); }
+
+  /// One ray. shown_x, shown_y: its pixel in the view.
+  Verdict judge(const ShownView& shown, int shown_x, int shown_y, const image::DepthImage& came, size_t pixel) const;
+
+ private:
+  struct Mark {
+    glm::dvec3 position_room;
+    double made_s = 0, planned_s = -1;  // planned_s: when a plan last had it in sight
+  };
+  // Of a cluster: rays since it last changed, old ones count less and less.
+  struct Evidence {
+    float agree = 0, contradict = 0;
+    double s = 0, strike_s = 0;
+    uint8_t strikes = 0;  // how often it was forgotten for contradictions: each asks for twice the proof of the last
+  };
+  bool take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
+            double now_s);
+  void count(Verdict verdict, bool empty);
+  void note(points::ClusterKey key, bool agrees, double now_s);
+  void mark(const glm::dvec3& position_room, double now_s);
+
+  points::OctreeGrid grid_;
+  Tolerance tolerance_;
+  std::vector<Mark> marks_;
+  image::PixelMask marked_;  // squares of the tile at hand that have a mark
+  std::unordered_map<points::ClusterKey, Evidence> evidence_;
+  std::vector<points::ClusterKey> disproved_;
+  Statistics statistics_;
+};
+
+}  // namespace telesplat::packer

@@ -1,0 +1,74 @@
+// What the model shows in a view, pixel by pixel, and what it lacks there.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/geometry/camera.h"
+#include "common/image/pixel_mask.h"
+#include "common/points/point_model.h"
+#include "common/splat/reference/tangent_planes.h"
+#include "common/splat/reference/view_keys.h"
+#include "services/packer/points/plan/view/judge_rows.h"
+
+namespace telesplat::packer {
+
+/// What is looked at at once: keys and points of so many pixels lie in the second-level cache.
+inline constexpr int kPlanTileWidth = 256, kPlanTileHeight = 128;
+
+/// When a pixel counts as shown.
+struct PixelTest {
+  float relative_epsilon = 0.005f;  ///< points this close to the surface, as a fraction of depth, are of it
+  /// A covered pixel lacks a sample if no point of its surface lies in it or within so many pixels of its centre (up to
+  /// 1.5).
+  float nearest = 0.6f;
+};
+
+/// Planes and masks of camera.width x camera.height pixels, row by row.
+struct ViewMap {
+  geometry::Camera camera;
+  std::vector<float> depth_m;    ///< +infinity: nothing
+  std::vector<uint32_t> colour;  ///< 0x00RRGGBB albedo; 0 where nothing is
+  std::vector<uint16_t> normal;  ///< encode_normal16; 0 where nothing is
+  /// What render_reference_depth() gives: the nearest sample in each pixel, and in the last bits where it lies there.
+  std::vector<float> nearest_m;
+  image::PixelMask covered;  ///< some splat covers it
+  /// Covered, but no sample of that surface is near (PixelTest), or a pin-hole: what is shown lies behind a surface
+  /// all around.
+  image::PixelMask lacking;
+  image::PixelMask edge;    ///< beside a step of depth or of the normal
+  image::PixelMask strong;  ///< no edge, but colour or normal differ much from a neighbour's
+  image::PixelMask weak;    ///< the same, less
+};
+
+/// Renders the model and judges its pixels. with_planes: depth_m, colour, normal and nearest_m are filled; else they
+/// are empty.
+///   threads: those of `keys`.
+void render_view_map(const points::PointModel& model, const geometry::Camera& camera, const PixelTest& test,
+                     bool with_planes, splat::ViewKeys& keys, ViewMap& map);
+
+/// The same tile by tile, for views that are looked at in parts.
+class PixelJudge {
+ public:
+  /// rim: of the ViewKeys whose tiles come.
+  PixelJudge(const geometry::Camera& camera, const PixelTest& test, const splat::RimBias& rim);
+  /// Fills the part of `map` in which the tile lies: its first pixel is (x, y) there, x a multiple of 64. Masks must
+  /// be zero there. Planes may have no pixels: they are left out then. Several tiles may be judged at a time if their
+  /// words of masks are different ones.
+  void judge(const splat::ViewKeys::Tile& tile, int x, int y, ViewMap& map) const;
+
+ private:
+  struct Rows;
+  void judge_64(const splat::ViewKeys::Tile& tile, Rows& rows, int x0, int y, size_t word, int map_y,
+                ViewMap& map) const;
+  bool has_sample_near(const splat::ViewKeys::Tile& tile, int x, int y, float depth_m, uint16_t normal) const;
+  float near_m_;
+  splat::TangentPlanes planes_;
+  PixelTest test_;
+  BiasTable bias_;
+};
+
+/// Makes all masks zero, of this size.
+void reset_masks(int width, int height, ViewMap& map);
+
+}  // namespace telesplat::packer

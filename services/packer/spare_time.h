@@ -1,0 +1,46 @@
+// What the packer does when nobody waits for it: the question about rays beyond views. No sockets, no clocks.
+#pragma once
+
+#include <optional>
+
+#include "common/wire/tile_messages.h"
+
+namespace telesplat::packer {
+
+class SpareTime {
+ public:
+  /// What can wait does so while a view is under way, but no longer than this: where many viewers look, one always is.
+  static constexpr double kLongestHurry_s = 0.25;
+  /// Where views come as fast as they are answered, questions beyond them take a quarter of the time at most.
+  static constexpr double kPause = 3;
+
+  /// Whether a piece of work that can wait may begin. hurried: a view is under way.
+  bool begins(double now_s, bool hurried) {
+    if (hurried && now_s - rested_s_ < kLongestHurry_s) return false;
+    rested_s_ = now_s;
+    return true;
+  }
+
+  /// A question about rays beyond a view. The master waits for one at a time: an older one is no longer waited for.
+  void keep(const wire::PlanRequest& extra) { question_ = extra; }
+  /// A viewer's next view is planned: the question about its views is about this one from now on.
+  void follow(const wire::PlanRequest& view) {
+    if (question_ && question_->viewer == view.viewer && question_->epoch == view.epoch)
+      question_->camera = view.camera, question_->still = view.still;
+  }
+  /// Null: there is none, or it waits. A head that rests does not wait for views.
+  const wire::PlanRequest* question(double now_s) const {
+    return question_ && (question_->still || now_s >= next_s_) ? &*question_ : nullptr;
+  }
+  /// A piece of the work for question() was done. done: it has its answer.
+  void worked(double from_s, double until_s, bool done) {
+    next_s_ = from_s + (1 + kPause) * (until_s - from_s);
+    if (done) question_.reset();
+  }
+
+ private:
+  std::optional<wire::PlanRequest> question_;
+  double rested_s_ = 0, next_s_ = 0;  // when there last was time; when the next piece for the question may begin
+};
+
+}  // namespace telesplat::packer

@@ -1,0 +1,53 @@
+// A view of the test scene with any number of rays a pixel: for tests of pictures of a camera that rests.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "client/viewer/render/supersampler.h"
+#include "tests/support/points_scenes.h"
+
+namespace telesplat::test {
+
+/// The camera's view with `by` times as many pixels on each axis.
+inline geometry::Camera finer(geometry::Camera camera, int by) {
+  camera.width *= by, camera.height *= by;
+  return camera;
+}
+
+/// The scene with side x side rays a pixel, at even distances: mean of their displayed colours.
+inline image::View traced(const geometry::Camera& camera, int side, const image::Shading& shading) {
+  const geometry::Camera fine = finer(camera, side);
+  const image::DepthImage rays = sample_scene(fine, {0, 0, fine.width, fine.height});
+  std::vector<uint32_t> colour(rays.pixels());
+  for (size_t i = 0; i < colour.size(); ++i)
+    colour[i] =
+        rays.depth[i] ? image::Shading::apply(rays.colour[i], shading.table()[rays.normal[i]]) : shading.background();
+  const auto pixels = size_t(camera.width) * size_t(camera.height);
+  image::View out{camera.width, camera.height, std::vector<uint32_t>(pixels), {}};
+  viewer::box_filter(colour.data(), size_t(fine.width), side, camera.width, camera.height, out.colour.data(),
+                     size_t(camera.width));
+  return out;
+}
+
+/// A patch of all pixels of the camera's view with `by` times as many pixels on each axis.
+inline points::PreparedPatch whole_patch(const points::ModelConfig& config, uint64_t sequence,
+                                         const geometry::Camera& camera, int by) {
+  const geometry::Camera fine = finer(camera, by);
+  const geometry::Rect all{0, 0, fine.width, fine.height};
+  return points::prepare_patch(config, Sequence{sequence}, fine, all, sample_scene(fine, all), FrameId{sequence});
+}
+
+/// PSNR of the colours, dB; infinity where they are equal.
+inline double psnr_db(const image::View& a, const image::View& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.colour.size(); ++i)
+    for (const int shift : {16, 8, 0}) {
+      const double d = double(a.colour[i] >> shift & 255) - double(b.colour[i] >> shift & 255);
+      sum += d * d;
+    }
+  return 10 * std::log10(255.0 * 255.0 * 3.0 * double(a.colour.size()) / sum);
+}
+
+}  // namespace telesplat::test

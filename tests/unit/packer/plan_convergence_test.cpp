@@ -1,0 +1,308 @@
+// Plans, and what they lead to: an analytic scene is sampled by what is planned alone.
+#include <gtest/gtest.h>
+
+#include "services/packer/points/plan/planner.h"
+#include "services/packer/points/plan/view/view_map.h"
+#include "tests/support/packer_scenes.h"
+#include "tests/support/planned_tiles.h"
+
+namespace telesplat::packer {
+namespace {
+
+PlanConfig plan_config() {
+  PlanConfig c;
+  c.model = test::packer_config().model;
+  return c;
+}
+
+// A packer with its planner, and a sampler that casts what is planned.
+struct Session {
+  explicit Session(const PlanConfig& config = plan_config()) : planner(config) { core.watch(&planner); }
+
+  wire::PlanRequest request(const geometry::Camera& camera, bool extra = false, uint64_t round = 0) {
+    return {.frame = {++frame},
+            .epoch = test::kEpoch,
+            .viewer = {77},
+            .request = {frame},
+            .camera = camera,
+            .extra = extra,
+            .round = round,
+            .tile_size = 64};
+  }
+
+  wire::Plan ask(const wire::PlanRequest& r) { return planner.plan(core.model(), core.sequence(), r, now_s += 0.1); }
+
+  // Casts the rays of a plan. Returns their number.
+  uint64_t cast(const wire::PlanRequest& r, const wire::Plan& plan) {
+    uint64_t rays = 0;
+    if (plan.full) {
+      for (SampledTile& tile : test::sampled_frame(r.frame, r.camera, 64)) {
+        rays += tile.image.pixels();
+        tile.viewer = r.viewer, tile.request = r.request;
+        submit(std::move(tile), true);
+      }
+      return rays;
+    }
+    for (test::PlannedTile& planned : test::planned_tiles(r, plan)) {
+      rays += planned.rays;
+      submit(std::move(planned.tile), planned.whole);
+    }
+    return rays;
+  }
+  void submit(SampledTile tile, bool whole) {
+    planner.take(tile, whole, now_s);
+    EXPECT_TRUE(core.submit(std::move(tile), now_s).ok());
+    planner.settle();
+    for (const Event& forget : core.forget(planner.disproved())) (void)forget, ++forgets;
+  }
+  uint64_t view(const geometry::Camera& camera) {
+    const wire::PlanRequest r = request(camera);
+    last = ask(r);
+    return cast(r, last);
+  }
+
+  PackerCore core{test::packer_config(), test::kEpoch};
+  Planner planner;
+  wire::Plan last;
+  uint64_t frame = 0, forgets = 0;
+  double now_s = 0;
+};
+
+TEST(Plan, AStillViewNeedsNothingAfterAFewRounds) {
+  std::mt19937_64 random(5);
+  for (int trial = 0; trial < 3; ++trial) {
+    PlanConfig config = plan_config();
+    config.validation = 0;
+    Session s(config);
+    const geometry::Camera camera = test::scene_camera(test::random_eye(random), 320, 240);
+    EXPECT_EQ(s.view(camera), 320u * 240u) << "the first view is sampled whole";
+    EXPECT_TRUE(s.last.full);
+    uint64_t rays = 0, rounds = 0;
+    for (; rounds < 4 && (rounds == 0 || rays > 0); ++rounds) rays = s.view(camera);
+    EXPECT_EQ(rays, 0u);
+    uint64_t extra = 0;
+    for (uint64_t round = 0;; ++round) {
+      ASSERT_LT(round, 100u) << "extra rays do not come to an end";
+      const wire::PlanRequest r = [&] {
+        auto q = s.request(camera, true, round);
+        q.still = true;
+        return q;
+      }();
+      const wire::Plan plan = s.ask(r);
+      const uint64_t cast = s.cast(r, plan);
+      extra += cast;
+      if (cast == 0) break;
+    }
+    EXPECT_GT(extra, 0u);
+  }
+}
+
+// What a view shows once its rays are in, sampled whole or by plans.
+ViewMap shown(const PackerCore& core, const geometry::Camera& camera) {
+  splat::ViewKeys keys(1);
+  ViewMap map;
+  render_view_map(core.model(), camera, {}, true, keys, map);
+  return map;
+}
+
+TEST(Plan, ShowsWhatFullSamplingShows) {
+  PlanConfig config = plan_config();
+  Session steered(config), whole(config);
+  for (int i = 0; i < 8; ++i) {
+    const geometry::Camera camera =
+        test::scene_camera({0.7 * std::cos(0.05 * i), 0.3, 0.7 * std::sin(0.05 * i)}, 240, 180);
+    steered.view(camera);
+    wire::Plan all;
+    all.full = true;
+    const wire::PlanRequest r = whole.request(camera);
+    whole.cast(r, all);
+    const ViewMap a = shown(steered.core, camera), b = shown(whole.core, camera);
+    size_t holes = 0, off = 0;
+    for (size_t p = 0; p < a.depth_m.size(); ++p) {
+      holes += std::isinf(a.depth_m[p]) != std::isinf(b.depth_m[p]);
+      off += std::abs(a.depth_m[p] - b.depth_m[p]) > 0.02f * b.depth_m[p];
+    }
+    EXPECT_LT(double(holes), 0.002 * double(a.depth_m.size())) << i;
+    EXPECT_LT(double(off), 0.004 * double(a.depth_m.size())) << i;
+  }
+}
+
+TEST(Plan, AViewThatNeedsNothingIsCompleteAtOnce) {
+  PlanConfig config = plan_config();
+  config.validation = 0;
+  Session s(config);
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 160, 120);
+  s.view(camera);
+  EXPECT_EQ(s.view(camera), 0u);
+  EXPECT_TRUE(s.last.tiles.empty());
+  EXPECT_FALSE(s.last.full);
+  const auto event =
+      s.core.complete_empty({.frame = {1000}, .epoch = test::kEpoch, .viewer = {77}, .camera = camera}, 1);
+  ASSERT_TRUE(event.ok() && *event);
+  EXPECT_TRUE((*event)->frame_complete);
+  EXPECT_EQ((*event)->kept, 0u);
+}
+
+TEST(Plan, StrangeRequestsAreAnswered) {
+  Session s;
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 160, 120);
+  s.view(camera);
+  auto ask = [&](auto change) {
+    wire::PlanRequest r = s.request(camera);
+    change(r);
+    return s.ask(r);
+  };
+  EXPECT_TRUE(ask([](auto& r) { r.camera.width = 0; }).tiles.empty());
+  EXPECT_TRUE(ask([](auto& r) { r.camera.left = NAN; }).tiles.empty());
+  EXPECT_TRUE(ask([](auto& r) { r.camera.pose.position_room.x = INFINITY; }).tiles.empty());
+  for (const uint64_t number : {uint64_t{0}, uint64_t{1}, uint64_t{31}, ~uint64_t{0}}) {
+    for (const bool extra : {false, true}) {
+      const wire::Plan plan = ask([&](auto& r) {
+        r.extra = extra, r.still = number == 1;
+        r.tile_size = number, r.tile_rays = number, r.most_rays = number, r.round = number;
+      });
+      for (size_t i = 0; i < plan.tiles.size(); i += wire::kPlanNumbers) EXPECT_GE(plan.tiles[i + 4], 1u);
+    }
+  }
+  // Away from everything; inside of it; very large and very small.
+  ask([](auto& r) { r.camera.pose.position_room = {1e6, 0, 0}; });
+  ask([](auto& r) { r.camera.pose.position_room = {0, 0, 0}; });
+  ask([](auto& r) { r.camera.width = r.camera.height = 1; });
+  ask([](auto& r) { r.camera.width = geometry::kMaxImageSide, r.camera.height = 1, r.extra = true; });
+}
+
+// Where nothing is left to be found the packer is not away for long: views are planned in between.
+TEST(Plan, WhatIsBeyondAViewIsLookedForInPieces) {
+  PlanConfig config = plan_config();
+  config.validation = 0;
+  Session s(config);
+  s.view(test::scene_camera({0.6, 0.3, 0.2}, 160, 120));
+  // Past the scene, where nothing can be.
+  const geometry::Camera away = geometry::make_camera(geometry::look_at({1, 0.3, 0.2}, {3, 0.3, 0.2}), 60, 1280, 960);
+  EXPECT_EQ(s.view(away), 0u);
+  EXPECT_EQ(s.view(away), 0u);
+  wire::PlanRequest r = s.request(away, true, 0);
+  r.still = true;
+  const auto piece = [&] { return s.planner.plan_piece(s.core.model(), s.core.sequence(), r, s.now_s += 0.1); };
+  int pieces = 0;
+  std::optional<wire::Plan> plan;
+  for (; pieces < 100 && !(plan = piece()); ++pieces) EXPECT_EQ(s.view(away), 0u);
+  EXPECT_EQ(pieces, 8) << "one for each view from beside, before finer rays are looked for";
+  ASSERT_TRUE(plan);
+  EXPECT_TRUE(plan->tiles.empty());
+  EXPECT_TRUE(piece()) << "nothing is looked at twice";
+  r.viewer = {78};
+  EXPECT_TRUE(s.ask(r).tiles.empty()) << "at once";
+}
+
+TEST(Plan, LargeViewsAreNotPlanned) {
+  Session s;
+  s.view(test::scene_camera({0.6, 0.3, 0.2}, 160, 120));
+  for (const auto& [width, height] : {std::pair{4096, 2049}, {8192, 8192}, {16384, 16384}}) {
+    const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, width, height);
+    EXPECT_TRUE(s.ask(s.request(camera)).full);
+    const wire::Plan extra = s.ask(s.request(camera, true));
+    EXPECT_TRUE(extra.tiles.empty() && !extra.full);
+  }
+}
+
+TEST(Plan, TilesOfUnknownFramesAndWrongRectanglesChangeNothing) {
+  Session s;
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 160, 120);
+  s.view(camera);
+  const wire::PlanRequest r = s.request(camera);
+  const wire::Plan plan = s.ask(r);
+  SampledTile tile;
+  tile.frame = {r.frame.value}, tile.camera = camera, tile.rect = {1, 1, 5, 5}, tile.image = image::DepthImage(5, 5);
+  s.planner.take(tile, false, 1);  // of the frame, but no tile of its plan
+  tile.camera.width = 80;
+  s.planner.take(tile, false, 1);
+  tile.frame = {12345};
+  s.planner.take(tile, false, 1);
+  s.planner.take(tile, true, 1);
+  while (s.planner.settle()) {
+  }
+  EXPECT_GT(s.cast(r, plan), 0u) << "its tiles are taken still";
+}
+
+// A sampler could not read their masks.
+TEST(Plan, TilesThatCameWholeAreThoseOfThePlan) {
+  PlanConfig config = plan_config();
+  config.validation = 0;
+  Session s(config);
+  s.view(test::scene_camera({0.6, 0.3, 0.2}, 320, 240));
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.25}, 320, 240);
+  const wire::PlanRequest r = s.request(camera);
+  const wire::Plan plan = s.ask(r);
+  ASSERT_FALSE(plan.tiles.empty() || plan.full);
+  const size_t count = plan.tiles.size() / wire::kPlanNumbers;
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t* n = &plan.tiles[i * wire::kPlanNumbers];
+    SampledTile tile;
+    tile.frame = r.frame, tile.epoch = r.epoch, tile.viewer = r.viewer, tile.request = r.request;
+    tile.tile = uint32_t(i), tile.tiles_in_frame = uint32_t(count);
+    tile.camera = camera, tile.rect = {int(n[0]), int(n[1]), int(n[2]), int(n[3])};
+    tile.image = test::sample_scene(camera, tile.rect);
+    s.submit(std::move(tile), true);
+  }
+  EXPECT_LT(s.view(camera), 50u) << "all that was planned has come";
+  EXPECT_EQ(s.forgets, 0u);
+}
+
+// The master gave them up for a newer view; a sampler had begun them.
+TEST(Plan, TilesOfAnExtraFrameThatComeLateAreTakenAllTheSame) {
+  Session s;
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 320, 240);
+  s.view(camera);
+  s.view(camera);
+  wire::PlanRequest given_up = s.request(camera);
+  given_up.extra = true;
+  const wire::Plan plan = s.ask(given_up);
+  ASSERT_FALSE(plan.tiles.empty());
+  s.now_s += 0.6;
+  wire::PlanRequest next = s.request(camera);
+  next.extra = true, next.round = 1;
+  s.ask(next);
+  EXPECT_GT(s.cast(given_up, plan), 0u);
+  s.view(camera);
+  EXPECT_FALSE(s.last.full);
+}
+
+TEST(Plan, ANewEpochIsSampledWholeAndFollowedByPlans) {
+  Session s;
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 160, 120);
+  s.view(camera);
+  s.view(camera);
+  EXPECT_FALSE(s.last.full);
+  ASSERT_TRUE(s.core.begin_epoch({test::kEpoch.value + 1}));
+  const wire::Plan plan = s.ask(s.request(camera));
+  EXPECT_TRUE(plan.full);
+}
+
+TEST(Plan, AnotherPlannerGoesOnWithTheModelThatIsThere) {
+  Session s;
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 160, 120);
+  s.view(camera);
+  Planner another(plan_config());
+  another.learn(s.core.model());
+  const wire::Plan plan = another.plan(s.core.model(), s.core.sequence(), s.request(camera), 1);
+  EXPECT_FALSE(plan.frame == FrameId{});
+  const wire::Plan extra = another.plan(s.core.model(), s.core.sequence(), s.request(camera, true), 1);
+  EXPECT_FALSE(extra.full);
+}
+
+TEST(Plan, AWalkNeedsFewRays) {
+  Session s;
+  uint64_t rays = 0, full = 0;
+  for (int i = 0; i < 30; ++i) {
+    const double turn = 0.01 * i;
+    const geometry::Camera camera = test::scene_camera({0.7 * std::cos(turn), 0.3, 0.7 * std::sin(turn)}, 320, 240);
+    const uint64_t cast = s.view(camera);
+    if (i > 0) rays += cast, full += 320 * 240;
+  }
+  EXPECT_LT(double(rays), 0.08 * double(full));
+  EXPECT_EQ(s.forgets, 0u);
+}
+
+}  // namespace
+}  // namespace telesplat::packer
