@@ -15,6 +15,11 @@ std::optional<Error> check_tile(const geometry::Camera& c, const geometry::Rect&
   return std::nullopt;
 }
 
+std::optional<Error> check_pixels(const geometry::Rect& r) {
+  if (int64_t{r.width} * r.height <= kMaxTilePixels) return std::nullopt;
+  return Error{fmt::format("tile of {}x{} pixels, limit {}", r.width, r.height, kMaxTilePixels)};
+}
+
 std::optional<Error> check_step(uint64_t step) {
   if (step < 1 || step > kMaxStep)
     return Error{fmt::format("step {} is out of range, limits 1 and {}", step, kMaxStep)};
@@ -51,8 +56,7 @@ std::optional<Error> check_slab(uint64_t slab, uint64_t slabs, uint64_t begin, u
 
 std::optional<Error> check(const Lease& m) {
   if (auto bad = check_tile(m.camera, m.rect, m.tile, kMaxTiles)) return bad;
-  if (int64_t{m.rect.width} * m.rect.height > kMaxTilePixels)
-    return Error{fmt::format("tile of {}x{} pixels, limit {}", m.rect.width, m.rect.height, kMaxTilePixels)};
+  if (auto bad = check_pixels(m.rect)) return bad;
   if (auto bad = check_tile(m.camera, m.block_rect, m.block, m.blocks_in_frame)) return bad;
   const geometry::Rect &r = m.rect, &b = m.block_rect;
   if (r.x < b.x || r.y < b.y || r.x + r.width > b.x + b.width || r.y + r.height > b.y + b.height)
@@ -96,6 +100,8 @@ std::optional<Error> check(const DepthTile& m) { return check(m.lease); }
 
 std::optional<Error> check(const Patch& m) {
   if (auto bad = check_tile(m.camera, m.rect, m.tile, m.tiles_in_frame)) return bad;
+  if (auto bad = check_tile(m.camera, m.missed_rect, m.tile, m.tiles_in_frame)) return bad;
+  if (auto bad = check_pixels(m.missed_rect)) return bad;
   return check_step(m.step);
 }
 

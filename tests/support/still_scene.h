@@ -39,6 +39,35 @@ inline points::PreparedPatch whole_patch(const points::ModelConfig& config, uint
   return points::prepare_patch(config, Sequence{sequence}, fine, all, sample_scene(fine, all), FrameId{sequence});
 }
 
+/// Rays of such a view, of which only some are cast: where they lie, what they met, and which met nothing.
+struct CastRays {
+  geometry::Camera camera;
+  geometry::Rect rect;
+  image::DepthImage image;
+  image::PixelMask missed;
+  points::PreparedPatch patch(const points::ModelConfig& config, uint64_t sequence) const {
+    return points::prepare_patch(config, Sequence{sequence}, camera, rect, image, FrameId{sequence});
+  }
+  viewer::FineRays::Tile tile(EpochId epoch) const { return {epoch, camera, rect, &missed, rect, &image}; }
+};
+
+template <class Cast>
+CastRays cast_rays(const geometry::Camera& camera, int by, const Cast& cast) {
+  CastRays out{finer(camera, by), {}, {}, {}};
+  out.rect = {0, 0, out.camera.width, out.camera.height};
+  out.image = sample_scene(out.camera, out.rect);
+  out.missed.reset(out.rect.width, out.rect.height);
+  for (int y = 0; y < out.rect.height; ++y)
+    for (int x = 0; x < out.rect.width; ++x) {
+      const size_t i = size_t(y) * size_t(out.rect.width) + size_t(x);
+      if (!cast(x, y))
+        out.image.depth[i] = out.image.colour[i] = out.image.normal[i] = 0;
+      else if (out.image.depth[i] == 0)
+        out.missed.set(x, y);
+    }
+  return out;
+}
+
 /// PSNR of the colours, dB; infinity where they are equal.
 inline double psnr_db(const image::View& a, const image::View& b) {
   double sum = 0;

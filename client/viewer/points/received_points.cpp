@@ -26,7 +26,7 @@ ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLin
                      state->send(wire::StateRequest{links_.viewer, packer, after});
                  },
                  links.on_part, links.on_epoch, links.to_master_s},
-                cache_, batches_, links.spans) {}
+                cache_, fine_rays_, batches_, links.spans) {}
 
 Status ReceivedPoints::follow(const wire::Welcome& session) {
   const bool keep = scene::SessionView(session).setting("packing.keep_redundant", 0) != 0;

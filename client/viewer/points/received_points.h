@@ -29,6 +29,7 @@ class ReceivedPoints final : public Received {
 
   // ---- for its source, in the display's thread ----
   ModelCache& cache() { return cache_; }
+  FineRays& fine_rays() { return fine_rays_; }
   /// Where the display waits: shows this update, which is complete.
   void advance(RequestId request);
   /// The newest update that what is on display contains.
@@ -45,6 +46,7 @@ class ReceivedPoints final : public Received {
   const bool waits_;             // the display, for whole updates
   EventRecorder* const events_;  // null: nothing is kept
   ModelCache cache_;
+  FineRays fine_rays_;
   UpdateBatches batches_;
   PointReceiver receiver_;
   points::ModelConfig config_;  // valid once the feeds are connected

@@ -1,5 +1,6 @@
 #include "client/viewer/points/receiver.h"
 
+#include "client/viewer/points/patch_rays.h"
 #include "common/codec/depth_codec.h"
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
@@ -11,11 +12,12 @@ constexpr double kAnswerPatience_s = 2.0;
 
 }  // namespace
 
-PointReceiver::PointReceiver(const Options& options, Links links, ModelCache& cache, UpdateBatches& batches,
-                             metrics::SpanRecorder& spans)
+PointReceiver::PointReceiver(const Options& options, Links links, ModelCache& cache, FineRays& rays,
+                             UpdateBatches& batches, metrics::SpanRecorder& spans)
     : options_(options),
       links_(std::move(links)),
       cache_(cache),
+      rays_(rays),
       batches_(batches),
       spans_(spans),
       sequencer_({[this](const ModelEvent& e) { apply(e); },
@@ -86,12 +88,22 @@ void PointReceiver::apply(const ModelEvent& event) {
       },
       event.body);
   // After it: points are shown first. What could not be applied could not be replayed either.
-  if (applied && options_.events) options_.events->add(event);
+  if (applied && options_.events) record(event);
+}
+
+// Rays of others' views are not shown here.
+void PointReceiver::record(const ModelEvent& event) {
+  const auto* patch = std::get_if<wire::Patch>(&event.body);
+  if (!patch || patch->missed.empty() || patch->viewer == options_.viewer) return options_.events->add(event);
+  ModelEvent without = event;
+  std::get<wire::Patch>(without.body).missed.clear();
+  options_.events->add(without);
 }
 
 void PointReceiver::begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence) {
   config_ = config;
   epoch_ = epoch;
+  rays_.clear();
   if (options_.hold)
     batches_.add(UpdateBatches::Begin{config, epoch, sequence}, cache_);
   else
@@ -113,6 +125,12 @@ bool PointReceiver::apply_patch(const wire::Patch& patch) {
     log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
     return false;
   }
+  if (patch.viewer == options_.viewer)
+    if (const Status rays = add_rays(patch, tile_, rays_); !rays) {
+      ++decode_errors_;
+      log::warn("patch {}: {}", patch.sequence.value, rays.error().text);
+      return false;
+    }
   const double decoded = monotonic_s();
   epoch_ = patch.epoch;
   auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_,

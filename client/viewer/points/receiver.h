@@ -10,6 +10,7 @@
 #include "client/viewer/points/model_cache.h"
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/record/event_record.h"
+#include "client/viewer/render/fine_rays.h"
 #include "common/image/depth_image.h"
 #include "common/metrics/recorder.h"
 #include "common/net/socket.h"
@@ -31,7 +32,7 @@ class PointReceiver {
     std::function<void()> on_epoch;                           ///< a new epoch began
     std::function<double(double)> to_master_s;
   };
-  PointReceiver(const Options& options, Links links, ModelCache& cache, UpdateBatches& batches,
+  PointReceiver(const Options& options, Links links, ModelCache& cache, FineRays& rays, UpdateBatches& batches,
                 metrics::SpanRecorder& spans);
 
   /// A packer at another address.
@@ -50,6 +51,7 @@ class PointReceiver {
 
  private:
   void apply(const ModelEvent& event);
+  void record(const ModelEvent& event);
   /// False if it cannot be decoded.
   bool apply_patch(const wire::Patch& patch);
   void begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence);
@@ -57,6 +59,7 @@ class PointReceiver {
   Options options_;
   Links links_;
   ModelCache& cache_;
+  FineRays& rays_;  // of the viewer's own views
   UpdateBatches& batches_;
   metrics::SpanRecorder& spans_;
   EventSequencer sequencer_;

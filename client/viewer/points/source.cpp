@@ -66,6 +66,7 @@ bool PointSource::stands_still(const FrameInput& input) {
     changes_.any = true;
   } else {
     still_.on_changes(changes_);
+    still_.on_changes(ray_changes_);
   }
   return true;
 }
@@ -133,7 +134,7 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
       [this](const geometry::Camera& camera, const splat::SelectionOptions& selection, splat::DrawList& list) {
         received_.cache().select_part(camera, selection, list);
       },
-      options_.selection, input.look.render, *still_shading_};
+      options_.selection, input.look.render, *still_shading_, &received_.fine_rays()};
   for (double now_s = begin_s;;) {
     const auto tile = still_.next(now_s);
     if (!tile || (now_s + tile_s_ > until_s && (now_s > begin_s || saved_s_ < tile_s_))) break;
@@ -177,6 +178,8 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   o.selection.best_patch_only = received_.keeps_redundant();
   DrawnFrame out;
   received_.cache().take_changes(changes_);
+  ray_changes_.clear();
+  received_.fine_rays().take_changes(input.camera, ray_changes_);
   if (stands_still(input))
     draw_still(input, view, out);
   else

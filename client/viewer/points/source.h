@@ -45,6 +45,7 @@ class PointSource final : public ViewSource {
   Look look_;
   int same_frames_ = 0;
   ModelCache::Changes changes_;
+  std::vector<geometry::Rect> ray_changes_;  // of the picture
   StillPicture still_;
   Supersampler supersampler_;
   std::optional<image::Shading> still_shading_;  // none: no still picture has begun

@@ -33,6 +33,12 @@ void StillPicture::on_changes(const ModelCache::Changes& changes) {
   for (const geometry::Box& box : changes.boxes) want(to_pixel, box);
 }
 
+void StillPicture::on_changes(std::span<const geometry::Rect> rects) {
+  for (const geometry::Rect& r : rects)
+    want(std::max(r.x - 1, 0), std::max(r.y - 1, 0), std::min(r.x + r.width, camera_.width - 1),
+         std::min(r.y + r.height, camera_.height - 1));
+}
+
 // The tiles that the box's eight corners span.
 void StillPicture::want(const geometry::Camera::PixelTransform& to_pixel, const geometry::Box& box) {
   double x0 = 1e9, y0 = 1e9, x1 = -1e9, y1 = -1e9;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "client/viewer/points/model_cache.h"
@@ -22,6 +23,8 @@ class StillPicture {
   void begin(const geometry::Camera& camera);
   /// Tiles in which points came or went are to be drawn (again). Another replica may be another scene: all begins anew.
   void on_changes(const ModelCache::Changes& changes);
+  /// So are those that these rectangles of the picture touch.
+  void on_changes(std::span<const geometry::Rect> rects);
 
   /// The next one: those without pixels come first, from the centre outwards; then those that waited longest.
   std::optional<size_t> next(double now_s) const;

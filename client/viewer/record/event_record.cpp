@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "client/viewer/points/patch_rays.h"
 #include "common/codec/depth_codec.h"
 #include "common/wire/serial.h"
 
@@ -64,6 +65,7 @@ struct EventReplay::Impl {
   const bool makes_summaries;
   std::unique_ptr<points::PointModel> model;
   points::Summaries summaries;
+  FineRays rays;
   Sequence applied;
   bool at_end = false;
   bool pending = false;     // the file's record was read but not applied
@@ -91,6 +93,7 @@ struct EventReplay::Impl {
     if (const Status s = points::validate(config); !s) return wrong(s.error().text);
     model = std::make_unique<points::PointModel>(config);
     summaries.clear();
+    rays.clear();
     applied = {};
     has_events = false;
     return ok_status();
@@ -99,6 +102,7 @@ struct EventReplay::Impl {
   Status apply(const wire::Patch& p) {
     const std::span bytes(reinterpret_cast<const uint8_t*>(p.image.data()), p.image.size());
     if (const Status s = codec::decode_into(tile, bytes, p.rect.width, p.rect.height); !s) return wrong(s.error().text);
+    if (const Status s = add_rays(p, tile, rays); !s) return wrong(s.error().text);
     model->insert(
         points::prepare_patch(model->config(), p.sequence, p.camera, p.rect, tile, points::tagged(p.frame, p.step)));
     return ok_status();
@@ -115,6 +119,7 @@ struct EventReplay::Impl {
   Status apply(const wire::EpochBegin&) {
     model->clear();
     summaries.clear();
+    rays.clear();
     return ok_status();
   }
 
@@ -201,6 +206,7 @@ Status EventReplay::next_replica() {
 const points::PointModel* EventReplay::model() const { return impl_->model.get(); }
 const points::Summaries& EventReplay::summaries() const { return impl_->summaries; }
 Sequence EventReplay::applied() const { return impl_->applied; }
+const FineRays& EventReplay::fine_rays() const { return impl_->rays; }
 bool EventReplay::at_end() const { return impl_->at_end; }
 
 }  // namespace telesplat::viewer

@@ -12,6 +12,7 @@
 
 #include "client/viewer/points/event_sequencer.h"
 #include "client/viewer/record/record_file.h"
+#include "client/viewer/render/fine_rays.h"
 #include "common/points/summary.h"
 
 namespace telesplat::viewer {
@@ -58,6 +59,8 @@ class EventReplay {
   /// Of the model's bricks; empty unless they are made.
   const points::Summaries& summaries() const;
   Sequence applied() const;
+  /// What rays finer than the viewer's views met.
+  const FineRays& fine_rays() const;
   bool at_end() const;
 
  private:

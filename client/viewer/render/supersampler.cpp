@@ -1,6 +1,7 @@
 #include "client/viewer/render/supersampler.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -22,9 +23,6 @@ constexpr double kWorthwhile = 0.01;
 constexpr double kMostCut = 1.2;
 // Samples closer than this, in sub-pixels, are as fine as sub-pixels.
 constexpr float kFinest = 1.5f;
-// Sub-pixels of a pixel that closer samples cover at least where it was sampled more than once. Fewer may be samples of
-// another view.
-constexpr int kLeastCovered = 3;
 // Farther than what the view shows by this factor: about splat::kEdge steps of a depth code.
 constexpr float kBehind = 1.03f;
 
@@ -92,16 +90,16 @@ bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, cons
   selection.max_splat_px = float(splat::kMaxSplatSide * side_);  // so that those that are cut are known
   scene.select(crop(fine, grown(sub, kOverhang)), selection, list_);
   const Fineness fineness = this->fineness(rect);
-  if (!fineness.worthwhile) return false;
   const geometry::Camera around = crop(fine, sub);
+  if (!scene.rays || !scene.rays->look_up(around, list_.epoch, met_m_)) met_m_.clear();
+  if (!fineness.worthwhile && met_m_.empty()) return false;
   render(scene, list_, around, fine_);
-  const bool open = count_covered(rect, fine_, covered_);
-  if (open || fineness.gaps) render_coarse(scene, camera, rect);
-  if (open) find_silhouettes(rect), sharpen(scene, around, rect);
-  if (open || fineness.gaps) close_gaps(rect, fineness.gaps);
+  if (!met_m_.empty()) show_met(scene, around);
+  const bool open = count_covered(rect), gaps = open || fineness.gaps;
+  if (gaps) render_coarse(scene, camera, rect), close_gaps(rect, fineness.gaps);
   const auto row = size_t(fine_.width), inset = size_t(side_);
   box_filter(fine_.colour.data() + inset * row + inset, row, side_, rect.width, rect.height, to, pitch);
-  if (open) show_antialiased(scene, camera, rect, to, pitch);
+  if (open && find_silhouettes(rect)) show_antialiased(scene, camera, rect, to, pitch);
   return true;
 }
 
@@ -115,73 +113,42 @@ void Supersampler::render_coarse(const Scene& scene, const geometry::Camera& cam
 }
 
 // Whether some sub-pixels show something and others nothing.
-bool Supersampler::count_covered(const geometry::Rect& rect, const image::View& view,
-                                 std::vector<uint8_t>& covered) const {
+bool Supersampler::count_covered(const geometry::Rect& rect) {
   const size_t width = size_t(rect.width) + 2, height = size_t(rect.height) + 2;
-  covered.assign(width * height, 0);
-  size_t all = 0;
-  for (int y = 0; y < view.height; ++y) {
-    const float* depth_m = view.depth_m.data() + size_t(y) * size_t(view.width);
-    uint8_t* row = covered.data() + size_t(y / side_) * width;
-    for (int x = 0; x < view.width; ++x)
-      if (!std::isinf(depth_m[x])) ++row[x / side_], ++all;
-  }
-  return all > 0 && all < view.depth_m.size();
+  covered_.assign(width * height, 0), known_.assign(width * height, 0);
+  const int shift = std::countr_zero(unsigned(side_));
+  size_t all = 0, i = 0;
+  for (int y = 0; y < fine_.height; ++y)
+    for (int x = 0; x < fine_.width; ++x, ++i) {
+      const size_t pixel = size_t(y >> shift) * width + size_t(x >> shift);
+      const bool covered = !std::isinf(fine_.depth_m[i]);
+      covered_[pixel] += covered, all += covered;
+      if (!met_m_.empty()) known_[pixel] += met_m_[i] != 0;
+    }
+  return all > 0 && all < fine_.depth_m.size();
 }
 
-// By what stands in covered_.
-void Supersampler::find_silhouettes(const geometry::Rect& rect) {
+// By what stands in covered_ and known_. Whether there are any.
+bool Supersampler::find_silhouettes(const geometry::Rect& rect) {
   const size_t row = size_t(rect.width) + 2;
   const int whole = side_ * side_;
+  bool any = false;
   silhouette_.assign(covered_.size(), 0);
   for (size_t y = 1; y <= size_t(rect.height); ++y)
     for (size_t x = 1; x <= size_t(rect.width); ++x) {
+      if (known_[y * row + x] >= side_) continue;
       int nothing = 0;
       for (size_t j = y - 1; j <= y + 1; ++j)
         for (size_t i = x - 1; i <= x + 1; ++i) nothing += whole - covered_[j * row + i];
-      silhouette_[y * row + x] = nothing >= whole;
+      any |= silhouette_[y * row + x] = nothing >= whole;
     }
-}
-
-// A pixel of a silhouette, by what stands in covered_ and sampled_, rows `row` apart.
-bool Supersampler::was_sampled(size_t pixel, size_t row) const {
-  if (2 * covered_[pixel] >= side_ * side_) return sampled_[pixel] >= kLeastCovered;
-  bool beside = false;
-  for (const size_t at : {pixel - row, pixel - 1, pixel + 1, pixel + row}) beside |= sampled_[at] >= kLeastCovered;
-  return sampled_[pixel] > 0 || beside;
+  return any;
 }
 
 // Of list_, which keeps these points alone.
 void Supersampler::render_closer(const Scene& scene, const geometry::Camera& around, float spacing, image::View& view) {
   std::erase_if(list_.items, [&](const splat::DrawItem& item) { return item.splat_px / list_.scale >= spacing; });
   render(scene, list_, around, view);
-}
-
-void Supersampler::sharpen(const Scene& scene, const geometry::Camera& around, const geometry::Rect& rect) {
-  render_closer(scene, around, kFiner * float(side_), closer_);
-  sampled_.assign(covered_.size(), 0);
-  if (list_.items.empty()) return;
-  count_covered(rect, closer_, sampled_);
-  render_closer(scene, around, kFinest, finest_);
-  const auto width = size_t(rect.width) + 2, row = size_t(fine_.width), side = size_t(side_);
-  for (size_t y = 1; y <= size_t(rect.height); ++y)
-    for (size_t x = 1; x <= size_t(rect.width); ++x) {
-      const size_t pixel = y * width + x;
-      if (!silhouette_[pixel] || !was_sampled(pixel, width)) continue;
-      for (size_t j = 0; j < side; j += 2)
-        for (size_t i = 0; i < side; i += 2) show_samples((y * side + j) * row + x * side + i);
-    }
-}
-
-// Of a quarter of a pixel, by its upper left sub-pixel. A single sample a sub-pixel apart, in a quarter that closer
-// ones fill, is one of another view.
-void Supersampler::show_samples(size_t first) {
-  const auto row = size_t(fine_.width);
-  const size_t quarter[] = {first, first + 1, first + row, first + row + 1};
-  int closer = 0, finest = 0;
-  for (const size_t i : quarter) closer += !std::isinf(closer_.depth_m[i]), finest += !std::isinf(finest_.depth_m[i]);
-  const image::View& from = finest > 1 || (finest == 1 && closer < 4) ? finest_ : closer_;
-  for (const size_t i : quarter) fine_.colour[i] = from.colour[i];
 }
 
 void Supersampler::show_antialiased(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect,
@@ -191,9 +158,40 @@ void Supersampler::show_antialiased(const Scene& scene, const geometry::Camera& 
   for (size_t y = 0; y < size_t(rect.height); ++y)
     for (size_t x = 0; x < size_t(rect.width); ++x) {
       const size_t pixel = (y + 1) * width + x + 1;
-      if (silhouette_[pixel] && !was_sampled(pixel, width))
-        to[y * pitch + x] = antialiased_.colour[(y + 2) * antialiased_width + x + 2];
+      if (silhouette_[pixel]) to[y * pitch + x] = antialiased_.colour[(y + 2) * antialiased_width + x + 2];
     }
+}
+
+// Where rays are known, what they met. Splats before it are of coarser samples, or of those beside it; and coarser ones
+// at the same depth hide what the finest say of it.
+void Supersampler::show_met(const Scene& scene, const geometry::Camera& around) {
+  const auto behind = [&](const image::View& view, size_t i) {
+    return kBehind * view.depth_m[i] >= std::abs(met_m_[i]);
+  };
+  const auto show = [&](const image::View& from, size_t i) {
+    fine_.depth_m[i] = from.depth_m[i], fine_.colour[i] = from.colour[i];
+  };
+  const splat::DrawList all = list_;
+  render_closer(scene, around, kFinest, closer_);
+  bool wrong = false;
+  for (size_t i = 0; i < met_m_.size(); ++i) {
+    if (met_m_[i] == 0) continue;
+    const bool finest = !std::isinf(closer_.depth_m[i]);
+    if (finest && (met_m_[i] < 0 || behind(closer_, i)))
+      show(closer_, i), met_m_[i] = closer_.depth_m[i];
+    else
+      wrong |= !behind(fine_, i);
+  }
+  if (!wrong) return;
+  list_ = all;
+  render_closer(scene, around, kFiner * float(side_), closer_);
+  for (size_t i = 0; i < met_m_.size(); ++i) {
+    if (met_m_[i] == 0 || behind(fine_, i)) continue;
+    if (!std::isinf(closer_.depth_m[i]) && behind(closer_, i))
+      show(closer_, i);
+    else if (std::isinf(met_m_[i]))
+      fine_.depth_m[i] = std::abs(met_m_[i]), fine_.colour[i] = scene.shading.background();
+  }
 }
 
 void Supersampler::close_gaps(const geometry::Rect& rect, bool with_depths) {
@@ -211,8 +209,9 @@ void Supersampler::close_gaps(const geometry::Rect& rect, bool with_depths) {
     for (int j = 0; j < side_; ++j) {
       const size_t row = size_t((y + 1) * side_ + j) * size_t(fine_.width) + size_t(side_);
       for (int x = 0; x < rect.width * side_; ++x)
-        if (const float depth_m = fine_.depth_m[row + size_t(x)];
-            depth_m > farthest_[size_t(x / side_)] && (with_depths || std::isinf(depth_m)))
+        if (const float depth_m = fine_.depth_m[row + size_t(x)]; depth_m > farthest_[size_t(x / side_)] &&
+                                                                  (with_depths || std::isinf(depth_m)) &&
+                                                                  (met_m_.empty() || met_m_[row + size_t(x)] == 0))
           fine_.colour[row + size_t(x)] = pixels[x / side_];
     }
   }

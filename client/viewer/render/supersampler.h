@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "client/viewer/render/fine_rays.h"
 #include "client/viewer/render/renderer.h"
 #include "common/image/file.h"
 
@@ -25,11 +26,10 @@ void box_filter(const uint32_t* from, size_t from_pitch, int side, int width, in
 /// shows in the 3x3 pixels around it is such a gap; it gets its pixel's colour. Where no splat is cut, one that shows
 /// nothing is a gap still: between a coarse sample and fine ones.
 ///
-/// Splats reach beyond silhouettes by half of their samples' distance. A pixel at one that was sampled more finely than
-/// once shows these samples alone, and its quarters those a sub-pixel apart alone if they have any: where finer rays
-/// hit nothing there is nothing. That it was sampled so is seen by such samples in it; or, where splats cover less than
-/// half of it, beside it. Where it was not, it shows what a picture without sub-pixels does, whose antialias knows how
-/// far splats reach.
+/// Splats reach beyond silhouettes by half of their samples' distance. Where it is known what finer rays met
+/// (Scene::rays), a sub-pixel shows nothing that lies before that: where a ray met nothing there is nothing. Where it
+/// is not known, a pixel of a silhouette shows what a picture without sub-pixels does, whose antialias knows how far
+/// splats reach.
 /// A pixel lies at a silhouette if in the 3x3 pixels around it sub-pixels show nothing that together make a pixel or
 /// more. Fewer are a gap between fine samples.
 class Supersampler {
@@ -41,6 +41,7 @@ class Supersampler {
     splat::SelectionOptions selection;  ///< its detail is not used: all points are drawn
     splat::RenderOptions render;        ///< without its antialiasing
     const image::Shading& shading;      ///< of the view
+    const FineRays* rays = nullptr;     ///< of where the camera is; null: not known
   };
 
   /// The renderer is used by draw() alone. side: 2 or 4.
@@ -60,28 +61,26 @@ class Supersampler {
   void render(const Scene& scene, const splat::DrawList& list, const geometry::Camera& camera, image::View& view,
               bool antialias = false);
   void render_coarse(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect);
-  void find_silhouettes(const geometry::Rect& rect);
+  void render_closer(const Scene& scene, const geometry::Camera& around, float spacing, image::View& view);
+  void show_met(const Scene& scene, const geometry::Camera& around);
+  bool count_covered(const geometry::Rect& rect);
+  void close_gaps(const geometry::Rect& rect, bool with_depths);
+  bool find_silhouettes(const geometry::Rect& rect);
   void show_antialiased(const Scene& scene, const geometry::Camera& camera, const geometry::Rect& rect, uint32_t* to,
                         size_t pitch);
-  void close_gaps(const geometry::Rect& rect, bool with_depths);
-  void sharpen(const Scene& scene, const geometry::Camera& around, const geometry::Rect& rect);
-  bool count_covered(const geometry::Rect& rect, const image::View& view, std::vector<uint8_t>& covered) const;
-  bool was_sampled(size_t pixel, size_t row) const;
-  void render_closer(const Scene& scene, const geometry::Camera& around, float spacing, image::View& view);
-  void show_samples(size_t first);
 
   Renderer& renderer_;
   const int side_;
   splat::DrawList list_, coarse_list_;
-  // Of the rectangle and a pixel more on each side, with sub-pixels: all, by samples closer than pixels, by those a
-  // sub-pixel apart.
-  image::View fine_, closer_, finest_;
+  // Of the rectangle and a pixel more on each side, with sub-pixels: all, and by closer samples alone.
+  image::View fine_, closer_;
   // Without sub-pixels, of the rectangle and two pixels more on each side; and the same antialiased.
   image::View coarse_, antialiased_;
+  std::vector<float> met_m_;     // FineRays::look_up(), of fine_'s pixels; empty: no rays are known
   std::vector<float> farthest_;  // of the 3x3 pixels around each of a row
-  // Of each pixel of the rectangle and one more on each side, how many sub-pixels show something: by all splats, by
-  // samples closer than pixels; and whether it lies at a silhouette (not of those around the rectangle).
-  std::vector<uint8_t> covered_, sampled_, silhouette_;
+  // Of each pixel of the rectangle and one more on each side: how many sub-pixels show something, of how many it is
+  // known what rays met, and whether the pixel shows the antialiased picture instead.
+  std::vector<uint8_t> covered_, known_, silhouette_;
 };
 
 }  // namespace telesplat::viewer

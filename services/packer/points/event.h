@@ -23,6 +23,9 @@ struct Event : FramePart {
   bool frame_complete = false;  ///< the last tile of its frame to be packed
   /// Codec stream of the tile; eliminated pixels are not covered.
   std::shared_ptr<const std::vector<uint8_t>> blob;
+  /// Of rays finer than a view's: those that met nothing (codec::encode_mask), and where they lie; else none.
+  std::vector<uint32_t> missed;
+  geometry::Rect missed_rect{0, 0, 1, 1};
   /// Covered pixels of this tile, before and after elimination.
   uint64_t samples = 0, kept = 0;
   /// The sums over the frame's tiles so far: elimination = 1 - kept / samples.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/codec/depth_codec.h"
+#include "common/codec/mask_stream.h"
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/frame_book.h"
 #include "services/packer/points/obsolescence.h"
@@ -26,6 +27,9 @@ Status check_tile(const SampledTile& t) {
       t.image.colour.size() != pixels || t.image.normal.size() != pixels)
     return Error{fmt::format("{}: its image has {}x{} pixels, its rectangle {}x{}", name_of(t, "tile"), t.image.width,
                              t.image.height, t.rect.width, t.rect.height)};
+  if (t.missed.width() > 0 && (t.missed.width() != t.rect.width || t.missed.height() != t.rect.height))
+    return Error{fmt::format("{}: its mask has {}x{} pixels, its rectangle {}x{}", name_of(t, "tile"), t.missed.width(),
+                             t.missed.height(), t.rect.width, t.rect.height)};
   return ok_status();
 }
 
@@ -148,6 +152,7 @@ struct PackerCore::Impl {
     const splat::Elimination elimination = eliminate(tile, known);
     Event event = next_event(Event::Kind::kPatch);
     const FrameBook::Frame frame = frames.add(tile, elimination);
+    if (tile.missed.width() > 0) event.missed = codec::encode_mask(tile.missed), event.missed_rect = tile.rect;
     if (!keeps()) crop_to_kept(tile);
     static_cast<FramePart&>(event) = tile;
     event.frame_complete = frame.tiles_left == 0;

@@ -97,7 +97,9 @@ void with_message(InstanceId packer, const Event& e, auto&& send) {
                               .kept = e.kept,
                               .camera = e.camera,
                               .rect = e.rect,
-                              .image = std::as_bytes(std::span(*e.blob))});
+                              .image = std::as_bytes(std::span(*e.blob)),
+                              .missed = e.missed,
+                              .missed_rect = e.missed_rect});
     case Event::Kind::kForget:
       return send(wire::Forget{packer, e.sequence, e.epoch, e.clusters, e.frames});
     case Event::Kind::kEpoch:
@@ -197,7 +199,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
                                 wire::TileDone& done, double now_s) {
   const double begin_s = outlets_.master_now();
   record(block);
-  if (planner_) planner_->take(block, whole, now_s);
+  if (planner_) planner_->take(block, whole, now_s), block.missed = planner_->missed(block);
   const auto reference = planner_ ? planner_->reference(block) : std::nullopt;
   // What a block gives is counted to the tile that completed it.
   const auto announce = [&](const Event& event) {
@@ -205,7 +207,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
     done.packed_s = done.published_s = outlets_.master_now();
     publish(event);
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
-    done.bytes_sent = event.blob->size();
+    done.bytes_sent = event.blob->size() + event.missed.size() * sizeof event.missed[0];
     bytes_sent_ += done.bytes_sent;
     outlets_.tell(done);
   };

@@ -97,6 +97,52 @@ TEST(Plan, AStillViewNeedsNothingAfterAFewRounds) {
   }
 }
 
+// Where finer rays met nothing no point says so; their patches do.
+TEST(Plan, PatchesOfFinerRaysTellWhichOfThemMetNothing) {
+  PlanConfig config = plan_config();
+  config.validation = 0, config.view_cell_m = 0;
+  Session s(config);
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 160, 120);
+  s.view(camera);
+  s.view(camera);
+  uint64_t frames = 0, missed = 0;
+  for (uint64_t round = 0;; ++round, ++frames) {
+    wire::PlanRequest r = s.request(camera, true, round);
+    r.still = true;
+    const wire::Plan plan = s.ask(r);
+    if (plan.tiles.empty()) break;
+    for (test::PlannedTile& planned : test::planned_tiles(r, plan)) {
+      SampledTile& tile = planned.tile;
+      s.planner.take(tile, planned.whole, s.now_s);
+      tile.missed = s.planner.missed(tile);
+      ASSERT_EQ(tile.missed.width(), tile.rect.width);
+      const auto hits = std::count_if(tile.image.depth.begin(), tile.image.depth.end(), [](uint32_t d) { return d; });
+      EXPECT_EQ(tile.missed.count() + uint64_t(hits), planned.rays);
+      const geometry::Rect rect = tile.rect;
+      const image::PixelMask mask = tile.missed;
+      const auto event = s.core.submit(std::move(tile), s.now_s);
+      ASSERT_TRUE(event.ok() && *event);
+      EXPECT_EQ((*event)->missed_rect, rect);
+      const auto told = codec::decode_mask((*event)->missed, rect.width, rect.height);
+      ASSERT_TRUE(told.ok());
+      EXPECT_EQ(*told, mask);
+      missed += mask.count();
+    }
+  }
+  EXPECT_GT(frames, 1u);
+  EXPECT_GT(missed, 100u) << "beside the ball";
+
+  // Rays of a view, and of no plan, tell nothing.
+  const wire::PlanRequest r = s.request(test::scene_camera({0.6, 0.3, 0.25}, 160, 120));
+  for (test::PlannedTile& planned : test::planned_tiles(r, s.ask(r)))
+    EXPECT_EQ(s.planner.missed(planned.tile).width(), 0);
+  SampledTile wrong;
+  wrong.frame = {12345}, wrong.camera = camera, wrong.rect = {0, 0, 4, 4}, wrong.image = image::DepthImage(4, 4);
+  EXPECT_EQ(s.planner.missed(wrong).width(), 0);
+  wrong.epoch = test::kEpoch, wrong.tiles_in_frame = 1, wrong.missed = image::PixelMask(3, 4);
+  EXPECT_FALSE(s.core.submit(std::move(wrong), 1).ok());
+}
+
 // What a view shows once its rays are in, sampled whole or by plans.
 ViewMap shown(const PackerCore& core, const geometry::Camera& camera) {
   splat::ViewKeys keys(1);

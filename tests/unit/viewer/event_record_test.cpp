@@ -45,7 +45,9 @@ ModelEvent as_received(const packer::Event& e) {
                       e.kept,
                       e.camera,
                       e.rect,
-                      std::as_bytes(std::span(*e.blob))},
+                      std::as_bytes(std::span(*e.blob)),
+                      e.missed,
+                      e.missed_rect},
           e.blob};
 }
 
@@ -74,6 +76,19 @@ std::vector<packer::Event> published(int width, int tile) {
   out.push_back(*core.begin_epoch({test::kEpoch.value + 1}));
   sample(4, {0.1, 0.4, 0.7}, {test::kEpoch.value + 1});
   return out;
+}
+
+// Finer rays of a view, all of them cast.
+packer::SampledTile finer_rays() {
+  packer::SampledTile tile;
+  tile.frame = {9}, tile.epoch = test::kEpoch, tile.tiles_in_frame = 1, tile.extra = true;
+  tile.camera = test::scene_camera({0, 0.3, 0.8}, 160, 120);
+  tile.rect = {0, 0, 160, 120};
+  tile.image = test::sample_scene(tile.camera, tile.rect);
+  tile.missed.reset(160, 120);
+  for (size_t i = 0; i < tile.image.depth.size(); ++i)
+    if (tile.image.depth[i] == 0) tile.missed.set(int(i % 160), int(i / 160));
+  return tile;
 }
 
 // Digests of a replica after each event.
@@ -140,6 +155,36 @@ class EventRecord : public testing::Test {
     return s ? "" : s.error().text;
   }
 };
+
+TEST_F(EventRecord, FinerRaysComeBack) {
+  packer::PackerCore core(test::packer_config(), test::kEpoch);
+  packer::SampledTile plain = finer_rays();
+  plain.missed = {};
+  ASSERT_TRUE(core.submit(std::move(plain), 0).ok());
+  const uint64_t bytes_before = core.log_bytes();
+  packer::SampledTile tile = finer_rays();
+  tile.frame = {10}, tile.camera.pose.position_room.x += 0.01;
+  const geometry::Camera camera = tile.camera;
+  const image::PixelMask missed = tile.missed;
+  ASSERT_TRUE(core.submit(std::move(tile), 0).ok());
+  const auto events = core.events_since({});
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_FALSE(events[1].missed.empty());
+  EXPECT_GE(core.log_bytes() - bytes_before, 4 * events[1].missed.size());
+  record(events);
+  auto replay = EventReplay::open(path_);
+  ASSERT_TRUE(replay.ok());
+  std::vector<float> met_m;
+  ASSERT_TRUE((*replay)->advance(events[0].sequence).ok());
+  EXPECT_FALSE((*replay)->fine_rays().look_up(camera, test::kEpoch, met_m));
+  ASSERT_TRUE((*replay)->advance(events[1].sequence).ok());
+  ASSERT_TRUE((*replay)->fine_rays().look_up(camera, test::kEpoch, met_m));
+  for (size_t i = 0; i < met_m.size(); ++i)
+    ASSERT_EQ(std::isinf(met_m[i]), missed.at(int(i % 160), int(i / 160))) << "ray " << i;
+  packer::Event wrong = events[1];
+  wrong.missed.assign(3, 0xffffffff);
+  EXPECT_NE(error_of(bytes().substr(0, 8) + replica(-1, 1, 5) + event(wrong)).find("mask"), std::string::npos);
+}
 
 TEST_F(EventRecord, EverySequenceGivesTheModelThatWasShown) {
   const auto events = published(160, 40);

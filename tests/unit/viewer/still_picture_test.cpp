@@ -84,6 +84,23 @@ TEST(StillPicture, DrawsAgainWherePointsCameAndKeepsThePixelsUntilThen) {
   EXPECT_FALSE(still.next(100));
 }
 
+TEST(StillPicture, DrawsAgainWhereRaysAreKnown) {
+  StillPicture still;
+  const geometry::Camera camera = grid_camera(3, 2);
+  still.begin(camera);
+  while (const auto tile = still.next(1)) still.done(*tile, true, 1);
+  const geometry::Rect rects[] = {{kW + 5, kH + 5, 10, 10}, {2 * kW, 3, 4, 4}, {0, 0, 0, 0}};
+  still.on_changes(std::span(rects).first(1));
+  EXPECT_EQ(still.next(2), std::optional<size_t>(4));
+  still.done(4, true, 2);
+  EXPECT_FALSE(still.next(3));
+  still.on_changes(std::span(rects).subspan(1, 1));
+  std::vector<size_t> drawn;
+  while (const auto tile = still.next(4)) drawn.push_back(*tile), still.done(*tile, true, 4);
+  std::sort(drawn.begin(), drawn.end());
+  EXPECT_EQ(drawn, (std::vector<size_t>{1, 2})) << "what lies at a tile's rim is seen in the next one, too";
+}
+
 TEST(StillPicture, ChangesBesideTheViewAreNone) {
   const geometry::Camera camera = grid_camera(2, 2);
   StillPicture still;
@@ -208,7 +225,11 @@ class StillSource : public testing::Test {
             .requested_s = [](RequestId) { return std::nullopt; },
             .to_master_s = [](double s) { return s; }};
   }
-  void insert(int by) { received_.cache().insert(test::whole_patch(config_, ++sequence_, camera_, by), EpochId{1}); }
+  void insert(int by) {
+    const test::CastRays rays = test::cast_rays(camera_, by, [](int, int) { return true; });
+    received_.fine_rays().add(rays.tile(EpochId{1}));
+    received_.cache().insert(rays.patch(config_, ++sequence_), EpochId{1});
+  }
   DrawnFrame frame(bool intact = true) {
     view_.width = camera_.width, view_.height = camera_.height;
     view_.colour.resize(size_t(camera_.width) * size_t(camera_.height));

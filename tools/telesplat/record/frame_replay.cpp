@@ -87,7 +87,7 @@ class PointReplay final : public FrameReplay {
           list.replica = list_.replica;
           list.epoch = list_.epoch;
         },
-        selection, frame.look.render, shading};
+        selection, frame.look.render, shading, &models_->fine_rays()};
     still_.begin(frame.camera);
     while (still_.share() < frame.refined - kRounding) {
       const auto tile = still_.next(0);

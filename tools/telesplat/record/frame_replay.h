@@ -24,6 +24,7 @@ class ModelReplay {
   /// Its newest event, and of which packer's model: the first, the second, ...
   Sequence applied() const { return events_->applied(); }
   uint32_t replica() const { return replica_; }
+  const viewer::FineRays& fine_rays() const { return events_->fine_rays(); }
 
  private:
   explicit ModelReplay(std::unique_ptr<viewer::EventReplay> events) : events_(std::move(events)) {}

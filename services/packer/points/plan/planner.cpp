@@ -160,8 +160,7 @@ void Planner::Impl::plan_full(Question& q, const ViewerView& view) {
 void Planner::Impl::put_off(uint64_t most_rays, ViewClasses& classes) {
   constexpr uint64_t kEdges = 4;  // times as many (PlanRequest::most_rays)
   const uint64_t sparse = put_off_rays(classes.sparse, most_rays, classes.cast);
-  const uint64_t edge = put_off_rays(
-      classes.edge, kEdges * std::min(most_rays, ~uint64_t{0} / kEdges), classes.cast);
+  const uint64_t edge = put_off_rays(classes.edge, kEdges * std::min(most_rays, ~uint64_t{0} / kEdges), classes.cast);
   if (sparse + edge == 0) return;
   classes.put_off.reset(classes.cast.width(), classes.cast.height());
   for (int y = 0; y < classes.cast.height(); ++y)
@@ -226,6 +225,7 @@ std::optional<wire::Plan> Planner::plan_piece(const points::PointModel& model, S
 
 void Planner::take(const SampledTile& tile, bool whole, double now_s) { impl_->take(tile, whole, now_s); }
 std::optional<KnownReference> Planner::reference(const SampledTile& tile) const { return impl_->reference(tile); }
+image::PixelMask Planner::missed(const SampledTile& tile) const { return impl_->missed(tile); }
 void Planner::learn(const points::PointModel& model) { impl_->known_empty.add(model); }
 bool Planner::settle() { return impl_->settle(); }
 bool Planner::settles_soon() const { return tells_much(impl_->shelf); }

@@ -62,6 +62,9 @@ class Planner final : public ModelWatcher {
   /// What the model shows where the tile of a planned frame was cast, as of now: PackerCore::submit() takes it in place
   /// of rendering the model. nullopt: it is not known. Valid until the planner or the model changes.
   std::optional<KnownReference> reference(const SampledTile& tile) const;
+  /// Of a tile of rays finer than a view's: those that met nothing, of its size. Empty: it is no such tile, or that is
+  /// not known any more.
+  image::PixelMask missed(const SampledTile& tile) const;
   /// Learns from a frame that is complete: where nothing is. To be called when there is time, after its points are
   /// inserted, until nothing is left to do (false). plan() does it where it has waited for long.
   bool settle();

@@ -64,6 +64,7 @@ struct Planner::Impl {
   // planned tiles come back: take_tile.cpp
   void take(const SampledTile& tile, bool whole, double now_s);
   std::optional<KnownReference> reference(const SampledTile& tile);
+  image::PixelMask missed(const SampledTile& tile);
   void take_whole(const SampledTile& tile, double now_s);
   void take_planned(PlannedFrame& frame, const SampledTile& tile, double now_s);
   void note_done(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask* cast);

@@ -46,6 +46,20 @@ std::optional<KnownReference> Planner::Impl::reference(const SampledTile& tile) 
   return KnownReference{frame->tiles[at].mask, frame->map->nearest_m};
 }
 
+image::PixelMask Planner::Impl::missed(const SampledTile& tile) {
+  const PlannedFrame* frame = shelf.find(tile.frame);
+  if (!frame || frame->kind != PlannedFrame::Kind::kFine || !(frame->camera == tile.camera)) return {};
+  const size_t at = frame->find(tile.rect);
+  if (at == frame->tiles.size() || !only_cast(tile, frame->tiles[at].mask)) return {};
+  image::PixelMask out = frame->tiles[at].mask;
+  for (int y = 0; y < out.height(); ++y) {
+    const uint32_t* depth = &tile.image.depth[static_cast<size_t>(y) * tile.rect.width];
+    for (int x = 0; x < out.width(); ++x)
+      if (depth[x] != 0) out.clear(x, y);
+  }
+  return out;
+}
+
 // A frame that nobody planned, or that was to be sampled whole.
 void Planner::Impl::take_whole(const SampledTile& tile, double now_s) {
   const auto pixels = static_cast<uint64_t>(tile.camera.width) * static_cast<uint64_t>(tile.camera.height);

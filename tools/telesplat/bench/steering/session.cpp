@@ -179,6 +179,7 @@ Status SteeredSession::sample_tile(packer::SampledTile tile, const image::PixelM
   auto event = timed(cost.pack_cpu_ms, [&] {
     if (!config_.steering) return packer_.submit(std::move(tile), now_s);
     planner_.take(tile, mask == nullptr, now_s);
+    tile.missed = planner_.missed(tile);
     const auto reference = planner_.reference(tile);
     return packer_.submit(std::move(tile), now_s, {}, {}, reference);
   });
@@ -207,10 +208,16 @@ void SteeredSession::note_cast(const geometry::Rect& rect, const image::PixelMas
 }
 
 Status SteeredSession::insert(const packer::Event& event, ViewCost& cost) {
-  cost.samples += event.samples, cost.kept += event.kept, cost.sent_bytes += event.blob->size();
+  cost.samples += event.samples, cost.kept += event.kept,
+      cost.sent_bytes += event.blob->size() + 4 * event.missed.size();
   return timed(cost.insert_cpu_ms, [&]() -> Status {
     auto decoded = codec::decode(*event.blob);
     if (!decoded) return decoded.error();
+    if (!event.missed.empty()) {
+      const auto missed = codec::decode_mask(event.missed, event.missed_rect.width, event.missed_rect.height);
+      if (!missed) return missed.error();
+      fine_rays_.add({kEpoch, event.camera, event.missed_rect, &*missed, event.rect, &*decoded});
+    }
     cache_.insert(
         points::prepare_patch(cache_.config(), event.sequence, event.camera, event.rect, *decoded, event.frame),
         kEpoch);
@@ -271,8 +278,8 @@ void SteeredSession::refine(const geometry::Camera& camera, const splat::Selecti
   viewer::StillPicture picture;
   picture.begin(camera);
   while (const auto tile = picture.next(0)) {
-    const bool drawn = supersampler.draw({select, selection, config_.render, shading}, camera, picture.rect(*tile),
-                                         picture.pixels(*tile), size_t(camera.width));
+    const bool drawn = supersampler.draw({select, selection, config_.render, shading, &fine_rays_}, camera,
+                                         picture.rect(*tile), picture.pixels(*tile), size_t(camera.width));
     cache_.end_frame();
     picture.done(*tile, drawn, 0);
   }

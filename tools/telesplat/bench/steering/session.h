@@ -7,6 +7,7 @@
 #include <string>
 
 #include "client/viewer/points/model_cache.h"
+#include "client/viewer/render/fine_rays.h"
 #include "client/viewer/render/renderer.h"
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
@@ -71,6 +72,7 @@ class SteeredSession {
   packer::PackerCore packer_;
   packer::Planner planner_;
   viewer::ModelCache cache_;
+  viewer::FineRays fine_rays_;
   std::unique_ptr<viewer::Renderer> renderer_;
   splat::DrawList list_;
   image::View frame_;
