@@ -11,7 +11,7 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   // The plan of a viewer's next view must know the samples of the one before.
   const auto request = take_view(turns_only, steered ? InFlight::kOneAViewer : InFlight::kAny);
   if (!request) return false;
-  close_extras(now_s);
+  close_extras(*request, now_s);
   PlannedView view{.epoch = epoch, .view = *request};
   if (cut_.coarse) view.coarse = next_frame();
   view.frame = next_frame();

@@ -31,7 +31,7 @@ inline constexpr double kDearRow_s = 0.01;
 
 /// What all samplers together should take for the tiles of an extra frame: a view that comes waits for what is out.
 inline constexpr double kExtraFrame_s = 0.05;
-/// When a view begins, open tiles of an extra frame that is older are dropped.
+/// When another view begins, open tiles of an extra frame that is older are dropped.
 inline constexpr double kExtraPatience_s = 0.25;
 
 /// How the frames of a scene are leased.
@@ -136,7 +136,7 @@ class FrameSchedule : public Views {
   void begin_planned(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
   /// Views stand before extra frames.
   void insert(Frame frame);
-  void close_extras(double now_s);
+  void close_extras(const wire::ViewRequest& view, double now_s);
   void view_complete(const PlannedView& view);
   void note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
   PlanLimits limits() const;

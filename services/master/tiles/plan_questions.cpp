@@ -68,7 +68,7 @@ wire::PlanRequest PlanQuestions::ask_extra(FrameId frame, EpochId epoch, Extra w
   request.extra = true;
   request.round = seen.round++;
   request.still = seen.still;
-  request.most_rays = limits.most_rays;
+  request.most_rays = limits.most_rays * (seen.still ? kStillExtras : 1);
   open_.push_back({view, request, now_s});
   return request;
 }

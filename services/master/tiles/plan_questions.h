@@ -21,6 +21,8 @@ inline constexpr double kExtraAnswer_s = 10;
 inline constexpr int kViewsPerExtra = 2;
 /// A head that rests gets so many times as many refining rays in a view: it waits for them, and nothing else.
 inline constexpr uint64_t kStillViews = 16;
+/// Its extra frames have so many times as many rays: each of them waits for a question, an answer and its last tile.
+inline constexpr uint64_t kStillExtras = 8;
 /// A packer that let two views on end wait in vain is not asked for so long; twice as long each further time, up to the
 /// second.
 inline constexpr double kFirstRest_s = 1, kLongestRest_s = 30;

@@ -106,10 +106,12 @@ void FrameSchedule::begin_extra(EpochId epoch, double now_s) {
   questions_.push_back(plans_.ask_extra(next_frame(), epoch, which, limits(), now_s));
 }
 
-// A view makes what is beyond others old.
-void FrameSchedule::close_extras(double now_s) {
-  for (Frame& f : frames_)
-    if (f.extra && now_s - f.begun_s > kExtraPatience_s) f.tiles.close();
+// A view makes what is beyond others old, but not what is beyond itself: a head that rests asks for it every second.
+void FrameSchedule::close_extras(const wire::ViewRequest& view, double now_s) {
+  for (Frame& f : frames_) {
+    const bool same = f.request.viewer == view.viewer && f.request.camera == view.camera;
+    if (f.extra && !same && now_s - f.begun_s > kExtraPatience_s) f.tiles.close();
+  }
   end_closed();
 }
 

@@ -337,16 +337,43 @@ TEST_F(Steered, ViewsComeBeforeExtraTiles) {
   EXPECT_EQ(schedule.frames_completed(), 2u);
 }
 
-TEST_F(Steered, OldExtraTilesAreDroppedWhenAViewBegins) {
+TEST_F(Steered, OldExtraTilesAreDroppedWhenAnotherViewBegins) {
+  look(5, 1);
+  answer(ask_extra(), kTwoTiles);
+  const auto extra = schedule.lease("a", now);
+  ASSERT_TRUE(extra);
+  now += kExtraPatience_s + 0.01;
+  look(5, 2, 0.1);
+  EXPECT_TRUE(leases().empty()) << "the other tile is dropped";
+  EXPECT_TRUE(done(*extra)) << "what was out is welcome";
+  EXPECT_EQ(schedule.frames_in_flight(), 0u);
+}
+
+// A view that stays is asked for every second, and more is cast for it in between.
+TEST_F(Steered, ExtraTilesOfAViewThatStaysAreKept) {
   look(5, 1);
   answer(ask_extra(), kTwoTiles);
   const auto extra = schedule.lease("a", now);
   ASSERT_TRUE(extra);
   now += kExtraPatience_s + 0.01;
   look(5, 2);
-  EXPECT_TRUE(leases().empty()) << "the other tile is dropped";
-  EXPECT_TRUE(done(*extra)) << "what was out is welcome";
+  const auto left = leases();
+  ASSERT_EQ(left.size(), 1u);
+  EXPECT_TRUE(left[0].extra);
+  look(6, 1);
+  EXPECT_TRUE(done(*extra));
+  EXPECT_TRUE(done(left[0]));
   EXPECT_EQ(schedule.frames_in_flight(), 0u);
+}
+
+TEST_F(Steered, AHeadThatRestsGetsMoreRaysInAnExtraFrame) {
+  look(5, 1);
+  const auto moving = ask_extra();
+  answer(moving, {});
+  look(5, 2);
+  const auto still = ask_extra();
+  EXPECT_TRUE(still.still);
+  EXPECT_EQ(still.most_rays, kStillExtras * moving.most_rays);
 }
 
 TEST_F(Steered, LostLeasesOfADroppedExtraFrameEndIt) {
@@ -354,7 +381,7 @@ TEST_F(Steered, LostLeasesOfADroppedExtraFrameEndIt) {
   answer(ask_extra(), kTwoTiles);
   ASSERT_TRUE(schedule.lease("a", now));
   now += kExtraPatience_s + 0.01;
-  look(5, 2);
+  look(5, 2, 0.1);
   EXPECT_EQ(schedule.leases_of("a"), 1u);
   EXPECT_EQ(schedule.release_sampler("a"), 1);
   EXPECT_EQ(schedule.frames_in_flight(), 0u);

@@ -241,6 +241,65 @@ TEST(Plan, WhatIsBeyondAViewIsLookedForInPieces) {
   EXPECT_TRUE(s.ask(r).tiles.empty()) << "at once";
 }
 
+// Packer and viewers pay for each tile, and a head that rests waits for each question.
+TEST(Plan, FinerRaysOfAStillViewComeInFewPlansOfFewTiles) {
+  PlanConfig config = plan_config();
+  config.validation = 0;
+  config.view_cell_m = 0;
+  Session s(config);
+  const geometry::Camera camera = test::scene_camera({0.5, 0.2, 0.2}, 960, 720);
+  while (s.view(camera) > 0) {
+  }
+  for (const int times : {2, 4}) {
+    wire::PlanRequest r = s.request(camera, true);
+    r.still = true;
+    r.tile_size = 1024;
+    const wire::Plan plan = s.ask(r);
+    EXPECT_EQ(plan.camera.width, times * camera.width) << "all of the edges in one plan, however many pieces it took";
+    const uint64_t squares = uint64_t(times) * uint64_t(times);
+    EXPECT_GT(plan.tiles.size(), 0u);
+    EXPECT_LE(plan.tiles.size() / wire::kPlanNumbers, 2 * squares);
+    s.cast(r, plan);
+  }
+}
+
+// Splats cannot show everything: one ray that always sees something else must not make a still view cast the pixels
+// around it again and again.
+TEST(Plan, AStillViewGetsOverARayThatAlwaysContradicts) {
+  PlanConfig config = plan_config();
+  config.validation = 1;
+  Session s(config);
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 320, 240);
+  s.view(camera);
+  const ViewMap map = shown(s.core, camera);
+  int at_x = 0, at_y = 0;
+  for (int y = 8; y < 232 && at_x == 0; ++y)
+    for (int x = 8; x < 312 && at_x == 0; ++x) {
+      bool inside = true;
+      for (int dy = -8; dy <= 8; ++dy)
+        for (int dx = -8; dx <= 8; ++dx) inside &= map.covered.at(x + dx, y + dy) && !map.edge.at(x + dx, y + dy);
+      if (inside) at_x = x, at_y = y;
+    }
+  ASSERT_GT(at_x, 0);
+  int stale = 0;
+  for (int i = 0; i < 40; ++i) {
+    const wire::PlanRequest r = s.request(camera);
+    const wire::Plan plan = s.ask(r);
+    ASSERT_FALSE(plan.full);
+    stale += plan.figures.at("rays.stale") > 0;
+    for (test::PlannedTile& planned : test::planned_tiles(r, plan)) {
+      const geometry::Rect& rect = planned.tile.rect;
+      if (at_x >= rect.x && at_x < rect.x + rect.width && at_y >= rect.y && at_y < rect.y + rect.height) {
+        const size_t pixel = static_cast<size_t>(at_y - rect.y) * rect.width + static_cast<size_t>(at_x - rect.x);
+        planned.tile.image.depth[pixel] = 0, planned.tile.image.colour[pixel] = 0, planned.tile.image.normal[pixel] = 0;
+      }
+      s.submit(std::move(planned.tile), planned.whole);
+    }
+  }
+  EXPECT_EQ(stale, 1);
+  EXPECT_EQ(s.forgets, 0u);
+}
+
 TEST(Plan, LargeViewsAreNotPlanned) {
   Session s;
   s.view(test::scene_camera({0.6, 0.3, 0.2}, 160, 120));

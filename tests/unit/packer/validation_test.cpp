@@ -110,6 +110,23 @@ TEST(Validation, OnlyFirmPixelsThatWereCastAreJudged) {
   EXPECT_EQ(v.statistics().nearer, 1u);
 }
 
+TEST(Validation, WhereRaysHaveContradictedBeforeNothingBecomesStaleAgain) {
+  Wall wall;
+  Validation v(wall.model);
+  for (int x = 60; x < 70; ++x) wall.put(x, 40, 0, 0);
+  image::PixelMask doubted = wall.check(v, 10);
+  EXPECT_EQ(doubted.count(), 10u);
+  const size_t marks = v.marks();
+  image::PixelMask contradicted;
+  v.check(wall.shown(), wall.all, wall.cast, wall.came, 10.1, contradicted, &doubted);
+  EXPECT_EQ(v.marks(), marks);
+  EXPECT_EQ(contradicted.count(), 10u);
+  EXPECT_EQ(v.statistics().missed, 20u) << "it is evidence all the same";
+  wall.put(100, 80, 0, 0);
+  v.check(wall.shown(), wall.all, wall.cast, wall.came, 10.2, contradicted, &doubted);
+  EXPECT_EQ(v.marks(), marks + 1) << "news";
+}
+
 TEST(Validation, AContradictionMakesItsSurroundingsStaleUntilTheyAreSampled) {
   Wall wall;
   Validation v(wall.model);

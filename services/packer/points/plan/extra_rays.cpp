@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <mutex>
+#include <utility>
 
 #include "services/packer/points/plan/planner_impl.h"
 
@@ -27,6 +28,9 @@ constexpr int kNearEdge = 32;  // pixels; a word of a mask is twice as wide
 constexpr int kMostLooks = 3;
 // Tiles of a finer view that are looked at before rays are counted again.
 constexpr size_t kTilesAtOnce = 8;
+// Sides of the parts of a finer view whose points are chosen and binned at once: those of all of it are so many that to
+// choose them takes longer than to look at what a plan has room for.
+constexpr int kRegionWidth = 8 * kPlanTileWidth, kRegionHeight = 8 * kPlanTileHeight;
 
 // In the camera's plane, to the sides first.
 glm::dvec3 direction(unsigned i) {
@@ -211,7 +215,7 @@ bool Planner::Impl::plan_fine(Question& q, ViewerView& view) {
   if (q.breaks_off()) return true;
   if (!view.fine_map) look_closer(q, view);
   if (plan_stages(q, view)) return true;
-  if (!view.still || view.fine_sequence == q.sequence || view.looks >= kMostLooks) return false;
+  if (!view.still || view.fine_changes == changes || view.looks >= kMostLooks) return false;
   if (q.breaks_off()) return true;
   look_closer(q, view);
   return plan_stages(q, view);
@@ -220,7 +224,7 @@ bool Planner::Impl::plan_fine(Question& q, ViewerView& view) {
 void Planner::Impl::look_closer(Question& q, ViewerView& view) {
   if (view.still || !view.map) map_view(q, view);
   view.fine_map = view.map;
-  view.fine_sequence = view.map_sequence;
+  view.fine_changes = view.map_changes;
   ++view.looks;
 }
 
@@ -231,9 +235,15 @@ bool Planner::Impl::plan_stages(Question& q, ViewerView& view) {
     int finer;
     bool edge;
   };
-  const Stage stages[] = {{&map->edge, 1, true},    {&map->edge, 2, true},  {&map->strong, 1, false},
-                          {&map->strong, 2, false}, {&map->weak, 1, false}, {&map->weak, 2, false}};
   const int while_still = view.still ? config.still_rays : 1;
+  // What differs little gets all of its rays at once: what waits for them shows little of it, and each pass more is
+  // another patch of each cluster for packer and viewers to merge.
+  const int weak = while_still >= 16 ? 2 : 1;
+  const Stage stages[] = {{&map->edge, 1, true},
+                          {&map->edge, 2, true},
+                          {&map->strong, 1, false},
+                          {&map->strong, 2, false},
+                          {&map->weak, weak, false}};
   for (const Stage& stage : stages) {
     const int most = stage.edge ? std::max(config.edge_rays, while_still) : while_still;
     if (most >= 1 << 2 * stage.finer && plan_fine(q, view, *stage.wanted, stage.finer)) return true;
@@ -243,30 +253,48 @@ bool Planner::Impl::plan_stages(Question& q, ViewerView& view) {
 
 namespace {
 
-// Part of a view, looked at with more rays.
-struct Part {
-  geometry::Rect rect;  // in the view
-  int tile;             // of the finer view
+// Part of a finer view whose points are chosen together.
+struct Region {
+  geometry::Rect rect;  // in the finer view
   double distance2;     // from its middle
 };
 
-// The pixels that have not had these rays, part by part, from the middle outwards.
-std::vector<Part> parts_of(const image::PixelMask& open, const splat::TileGrid& fine, int times) {
-  std::vector<Part> parts;
-  for (int i = 0; i < fine.count(); ++i) {
-    const geometry::Rect r = fine.rect(i);
-    const geometry::Rect in_view{r.x / times, r.y / times, r.width / times, r.height / times};
-    if (!any(open, in_view)) continue;
+// Those in which pixels have not had these rays, from the middle outwards.
+std::vector<Region> regions_of(const image::PixelMask& open, const geometry::Camera& fine, int times) {
+  const splat::TileGrid grid{fine.width, fine.height, kRegionWidth, kRegionHeight};
+  std::vector<Region> regions;
+  for (int i = 0; i < grid.count(); ++i) {
+    const geometry::Rect r = grid.rect(i);
+    if (!any(open, {r.x / times, r.y / times, r.width / times, r.height / times})) continue;
     const double dx = r.x + 0.5 * r.width - 0.5 * fine.width, dy = r.y + 0.5 * r.height - 0.5 * fine.height;
-    parts.push_back({in_view, i, dx * dx + dy * dy});
+    regions.push_back({r, dx * dx + dy * dy});
   }
-  std::stable_sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.distance2 < b.distance2; });
+  std::stable_sort(regions.begin(), regions.end(),
+                   [](const Region& a, const Region& b) { return a.distance2 < b.distance2; });
+  return regions;
+}
+
+// Part of a view, looked at with more rays.
+struct Part {
+  geometry::Rect rect;  // in the view
+  int tile;             // of the region
+};
+
+// The pixels of a region that have not had these rays, part by part.
+std::vector<Part> parts_of(const image::PixelMask& open, const geometry::Rect& region, int times) {
+  const splat::TileGrid grid{region.width, region.height, kPlanTileWidth, kPlanTileHeight};
+  std::vector<Part> parts;
+  for (int i = 0; i < grid.count(); ++i) {
+    const geometry::Rect r = grid.rect(i);
+    const geometry::Rect in_view{(region.x + r.x) / times, (region.y + r.y) / times, r.width / times, r.height / times};
+    if (any(open, in_view)) parts.push_back({in_view, i});
+  }
   return parts;
 }
 
 // Rays of a finer tile in the pixels `wanted` of the view (of the part's size) where the model has no sample.
-std::vector<RayTile> fine_tiles(const splat::ViewKeys::Tile& tile, const PixelJudge& judge,
-                                const image::PixelMask& wanted, int times, const TileLimits& limits) {
+image::PixelMask fine_rays(const splat::ViewKeys::Tile& tile, const PixelJudge& judge, const image::PixelMask& wanted,
+                           int times) {
   ViewMap local;
   reset_masks(tile.rect.width, tile.rect.height, local);
   judge.judge(tile, 0, 0, local);
@@ -280,12 +308,46 @@ std::vector<RayTile> fine_tiles(const splat::ViewKeys::Tile& tile, const PixelJu
       for (size_t w = 0; w < rays.words_per_row(); ++w)
         rays.row(row)[w] &= ~local.covered.row(row)[w] | local.lacking.row(row)[w];
   }
-  std::vector<RayTile> tiles = cut_tiles(rays, {0, 0, tile.rect.width, tile.rect.height}, limits);
-  for (RayTile& t : tiles) t.rect.x += tile.rect.x, t.rect.y += tile.rect.y;
-  return tiles;
+  return rays;
 }
 
 }  // namespace
+
+// Of one region: until there are enough rays, or the piece ends. Its tiles are cut from what was found in all of it:
+// packer and viewers pay for each tile.
+uint64_t Planner::Impl::look_into(Question& q, const geometry::Rect& region, const geometry::Camera& fine, uint64_t rays,
+                                  const image::PixelMask& open, image::PixelMask& refined,
+                                  std::vector<RayTile>& tiles) {
+  const int times = fine.width / open.width();
+  const std::vector<Part> parts = parts_of(open, region, times);
+  const geometry::Camera camera = geometry::crop(fine, region);
+  keys.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight);
+  const PixelJudge judge(camera, test, keys.rim());
+  image::PixelMask cast(region.width, region.height);
+  uint64_t found = 0;
+  std::mutex mutex;
+  for (size_t first = 0; first < parts.size() && !q.enough(rays + found); first += kTilesAtOnce) {
+    if (first > 0 && q.breaks_off()) break;
+    const std::span<const Part> some(parts.data() + first, std::min(kTilesAtOnce, parts.size() - first));
+    std::vector<int> indices;
+    for (const Part& part : some) indices.push_back(part.tile);
+    keys.draw(indices, [&](const splat::ViewKeys::Tile& tile) {
+      const geometry::Rect& part =
+          std::find_if(some.begin(), some.end(), [&](const Part& p) { return p.tile == tile.index; })->rect;
+      const image::PixelMask wanted = fine_rays(tile, judge, cropped(open, part), times);
+      const std::lock_guard lock(mutex);
+      merge(wanted, tile.rect.x, tile.rect.y, cast);
+      found += wanted.count();
+    });
+    for (const Part& part : some) merge(cropped(open, part.rect), part.rect.x, part.rect.y, refined);
+    q.looked_at += some.size() * uint64_t{kPlanTileWidth} * uint64_t{kPlanTileHeight};
+  }
+  for (RayTile& tile : cut_tiles(cast, {0, 0, region.width, region.height}, q.limits())) {
+    tile.rect.x += region.x, tile.rect.y += region.y;
+    tiles.push_back(std::move(tile));
+  }
+  return found;
+}
 
 bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const image::PixelMask& wanted, int finer) {
   const int times = 1 << finer;
@@ -295,34 +357,23 @@ bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const image::PixelM
   image::PixelMask open = wanted;
   for (int y = 0; y < open.height(); ++y)
     for (size_t w = 0; w < open.words_per_row(); ++w) open.row(y)[w] &= ~refined.row(y)[w];
-  const std::vector<Part> parts = parts_of(open, {camera.width, camera.height, kPlanTileWidth, kPlanTileHeight}, times);
-  if (parts.empty()) return false;
-  if (q.breaks_off()) return true;
+  const std::vector<Region> regions = regions_of(open, camera, times);
+  std::vector<RayTile>& tiles = view.found[static_cast<size_t>(finer)];
+  if (regions.empty() && tiles.empty()) return false;
+  if (!regions.empty() && q.breaks_off()) return true;
 
-  keys.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight);
-  const PixelJudge judge(camera, test, keys.rim());
-  std::vector<RayTile> tiles;
   uint64_t rays = 0;
-  std::mutex mutex;
-  for (size_t first = 0; first < parts.size() && !q.enough(rays); first += kTilesAtOnce) {
-    if (first > 0 && q.breaks_off()) break;
-    const std::span<const Part> some(parts.data() + first, std::min(kTilesAtOnce, parts.size() - first));
-    std::vector<int> indices;
-    for (const Part& part : some) indices.push_back(part.tile);
-    keys.draw(indices, [&](const splat::ViewKeys::Tile& tile) {
-      const geometry::Rect& part =
-          std::find_if(some.begin(), some.end(), [&](const Part& p) { return p.tile == tile.index; })->rect;
-      std::vector<RayTile> found = fine_tiles(tile, judge, cropped(open, part), times, q.limits());
-      const std::lock_guard lock(mutex);
-      for (RayTile& t : found) rays += t.rays, tiles.push_back(std::move(t));
-    });
-    for (const Part& part : some) merge(cropped(open, part.rect), part.rect.x, part.rect.y, refined);
-    q.looked_at += some.size() * uint64_t{kPlanTileWidth} * uint64_t{kPlanTileHeight};
+  for (const RayTile& tile : tiles) rays += tile.rays;
+  for (const Region& region : regions) {
+    if (q.enough(rays) || (&region != &regions.front() && q.breaks_off())) break;
+    rays += look_into(q, region.rect, camera, rays, open, refined, tiles);
   }
+  if (q.unfinished && !q.enough(rays)) return true;
   sort_by_distance_to_centre(tiles, camera.width, camera.height);
   view.fine_rays += rays;
   q.plan.figures["rays.refinement"] = static_cast<double>(rays);
-  return issue(q, std::move(tiles), {.kind = PlannedFrame::Kind::kFine, .camera = camera, .base = view.camera}) > 0 ||
+  return issue(q, std::exchange(tiles, {}),
+               {.kind = PlannedFrame::Kind::kFine, .camera = camera, .base = view.camera}) > 0 ||
          q.unfinished;
 }
 

@@ -72,10 +72,10 @@ std::shared_ptr<ViewMap> Planner::Impl::new_map() {
 
 // The same view of the same model looks as it did.
 void Planner::Impl::map_view(Question& q, ViewerView& view) {
-  if (view.map && view.map_sequence == q.sequence) return;
+  if (view.map && view.map_changes == changes) return;
   view.map = new_map();
   render_view_map(q.model, view.camera, test, true, keys, *view.map);
-  view.map_sequence = q.sequence;
+  view.map_changes = changes;
 }
 
 uint64_t Planner::Impl::validation_sets(const Question& q, ViewerView& view) const {
@@ -236,12 +236,14 @@ const PlanPicture& Planner::picture() const { return impl_->picture; }
 std::vector<points::ClusterKey> Planner::disproved() { return impl_->validation.disproved(); }
 
 void Planner::inserted(const points::PreparedPatch& patch) {
+  impl_->changes += !patch.mosaics.empty();
   impl_->known_empty.add(patch);
   note_inserted(patch, impl_->config.model, impl_->shelf);
 }
 
 void Planner::forgotten(std::span<const points::ClusterKey> clusters) {
   if (clusters.empty()) return;
+  ++impl_->changes;
   impl_->known_empty.forget(clusters);
   impl_->validation.forgotten(clusters);
   for (PlannedFrame& frame : impl_->shelf.frames()) frame.nearest_known = false;
@@ -249,6 +251,7 @@ void Planner::forgotten(std::span<const points::ClusterKey> clusters) {
 }
 
 void Planner::cleared() {
+  ++impl_->changes;
   impl_->known_empty.clear();
   impl_->validation.clear();
   impl_->viewers.clear();

@@ -47,8 +47,8 @@ class Planner final : public ModelWatcher {
   /// Numbers in the request may come from outside: what makes no sense gives a plan without tiles, or a full one.
   wire::Plan plan(const points::PointModel& model, Sequence sequence, const wire::PlanRequest& request, double now_s);
   /// The same in pieces, so that others can be answered in between: what is beyond a view takes seconds to look for
-  /// where little is left. nullopt: extra rays were looked for in kPiecePixels or a little more, and none found yet;
-  /// the same request goes on from there.
+  /// where little is left. nullopt: extra rays were looked for in kPiecePixels or a little more, and fewer found than
+  /// the plan may have; the same request goes on from there.
   std::optional<wire::Plan> plan_piece(const points::PointModel& model, Sequence sequence,
                                        const wire::PlanRequest& request, double now_s);
 

@@ -56,6 +56,8 @@ struct Planner::Impl {
   void look_closer(Question& q, ViewerView& view);
   bool plan_stages(Question& q, ViewerView& view);
   bool plan_fine(Question& q, ViewerView& view, const image::PixelMask& wanted, int finer);
+  uint64_t look_into(Question& q, const geometry::Rect& region, const geometry::Camera& fine, uint64_t rays,
+                     const image::PixelMask& open, image::PixelMask& refined, std::vector<RayTile>& tiles);
 
   /// Puts the tiles into the plan and on the shelf. Those that a message does not hold are left out. Returns their
   /// number.
@@ -85,6 +87,7 @@ struct Planner::Impl {
   PlanPicture picture;                         // config.pictures: of the newest view
   std::vector<std::shared_ptr<ViewMap>> maps;  // kept for their memory, some of them in use
   std::vector<float> clear_m;                  // kept for its memory
+  uint64_t changes = 0;                        // of the model: patches that brought nothing are none
 };
 
 }  // namespace telesplat::packer

@@ -97,8 +97,11 @@ void Planner::Impl::take_planned(PlannedFrame& frame, const SampledTile& tile, d
   if (!frame.map) return;
   const ViewMap& map = *frame.map;
   image::PixelMask contradicted;
+  ViewerView* view = viewers.find(frame.viewer);
+  const bool same = view && view->known && view->camera == frame.camera;
   validation.check({map.camera, map.depth_m, map.colour, map.normal, frame.firm}, tile.rect, cast, tile.image, now_s,
-                   contradicted);
+                   contradicted, same ? &view->doubted : nullptr);
+  if (same) merge(contradicted, tile.rect.x, tile.rect.y, view->doubted);
   refill_empty(frame, tile, contradicted);
 }
 

@@ -87,7 +87,8 @@ Validation::Verdict Validation::judge(const ShownView& shown, int shown_x, int s
 }
 
 void Validation::check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
-                       const image::DepthImage& came, double now_s, image::PixelMask& contradicted) {
+                       const image::DepthImage& came, double now_s, image::PixelMask& contradicted,
+                       const image::PixelMask* doubted) {
   const size_t pixels = static_cast<size_t>(shown.camera.width) * shown.camera.height;
   CHECK(shown.depth_m.size() == pixels && shown.colour.size() == pixels && shown.normal.size() == pixels);
   CHECK(shown.firm.width() == shown.camera.width && shown.firm.height() == shown.camera.height);
@@ -100,13 +101,13 @@ void Validation::check(const ShownView& shown, const geometry::Rect& rect, const
     image::for_each_set(cast.row(y), cast.words_per_row(), [&](size_t x) {
       const int column = static_cast<int>(x);
       if (!shown.firm.at(rect.x + column, rect.y + y)) return;
-      if (take(shown, rect, column, y, came, now_s)) contradicted.set(column, y);
+      if (take(shown, rect, column, y, came, now_s, doubted)) contradicted.set(column, y);
     });
 }
 
 // One ray at a firm pixel. True: it contradicts.
 bool Validation::take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
-                      double now_s) {
+                      double now_s, const image::PixelMask* doubted) {
   const int px = rect.x + x, py = rect.y + y;
   const size_t at = static_cast<size_t>(y) * rect.width + x;
   const float shown_m = shown.depth_m[static_cast<size_t>(py) * shown.camera.width + px];
@@ -119,6 +120,7 @@ bool Validation::take(const ShownView& shown, const geometry::Rect& rect, int x,
   if (!empty && verdict != Verdict::kNearer)
     if (const auto key = leaf_at(grid_, room(shown_m))) note(*key, verdict == Verdict::kAgrees, now_s);
   if (verdict == Verdict::kAgrees) return false;
+  if (doubted && doubted->at(px, py)) return true;
   const int square_x = x / kMarkPixels, square_y = y / kMarkPixels;
   if (!marked_.at(square_x, square_y)) {
     marked_.set(square_x, square_y);

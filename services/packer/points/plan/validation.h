@@ -52,10 +52,14 @@ class Validation {
 
   /// Compares a tile's rays at firm pixels with what was shown when its frame was planned.
   ///   cast: of rect's size; came: likewise, as sampled. shown.camera's image holds rect.
+  ///   doubted: of shown.camera's size, or null: pixels whose contradictions are evidence, but make nothing stale. There
+  ///   rays have contradicted before, from this camera: splats cannot show what is there, and a still view would cast
+  ///   the squares around again and again.
   ///   contradicted: becomes a mask of rect's size: the rays that saw something else than what is shown; their hits are
   ///   new points.
   void check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
-             const image::DepthImage& came, double now_s, image::PixelMask& contradicted);
+             const image::DepthImage& came, double now_s, image::PixelMask& contradicted,
+             const image::PixelMask* doubted = nullptr);
 
   /// Sets a square of kMarkPixels pixels around each mark in sight: stale. mask: of the camera's size.
   void mark_stale(const geometry::Camera& camera, double now_s, image::PixelMask& mask);
@@ -86,7 +90,7 @@ class Validation {
     uint8_t strikes = 0;  // how often it was forgotten for contradictions: each asks for twice the proof of the last
   };
   bool take(const ShownView& shown, const geometry::Rect& rect, int x, int y, const image::DepthImage& came,
-            double now_s);
+            double now_s, const image::PixelMask* doubted);
   void count(Verdict verdict, bool empty);
   void note(points::ClusterKey key, bool agrees, double now_s);
   void mark(const glm::dvec3& position_room, double now_s);

@@ -22,7 +22,9 @@ geometry::Box grown(const geometry::Box& box, float by_m) { return {box.lo - by_
 void forget_casts(ViewerView& view) {
   const int width = view.camera.width, height = view.camera.height;
   view.done.reset(width, height);
+  view.doubted.reset(width, height);
   for (image::PixelMask& mask : view.refined) mask.reset(width, height);
+  for (auto& tiles : view.found) tiles.clear();
   view.cells_done = 0;
   view.fine_map = nullptr;
   view.looks = 0;

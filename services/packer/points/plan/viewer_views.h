@@ -26,8 +26,9 @@ struct ViewerView {
   bool still = false;            ///< the view before was seen by the same camera
   glm::dvec3 movement_m{0};      ///< of the eye since the view before
   std::shared_ptr<ViewMap> map;  ///< of `camera`; null: none
-  Sequence map_sequence;         ///< of the model that it shows
+  uint64_t map_changes = 0;      ///< of the model that it shows: Planner::Impl::changes
   image::PixelMask done;         ///< pixels that were cast for this camera
+  image::PixelMask doubted;      ///< pixels whose rays have contradicted, from this camera
   uint64_t round = 0;            ///< of validation: sets of pixels that had their turn
   double sets_due = 0, validated_s = -1e9;
 
@@ -35,8 +36,9 @@ struct ViewerView {
   unsigned cell_turn = 0;                   ///< the direction that is next; goes on from view to view
   unsigned cells_done = 0;                  ///< bit i: nothing is left to be cast from direction i
   std::array<image::PixelMask, 3> refined;  ///< [n]: pixels of the view whose rays at 2^n rays a side were planned
+  std::array<std::vector<RayTile>, 3> found;  ///< of these, tiles that wait until they are as many as a plan may have
   std::shared_ptr<const ViewMap> fine_map;  ///< by which finer rays are chosen; null: none yet
-  Sequence fine_sequence;                   ///< of the model that it shows
+  uint64_t fine_changes = 0;                ///< of the model that it shows
   int looks = 0;                            ///< how many such maps there were for this camera
   std::deque<LostTiles> lost;
   uint64_t cell_rays = 0, fine_rays = 0;  ///< planned so far
