@@ -197,10 +197,12 @@ TEST(KnownEmpty, ASparseModelsSurfacesHaveNoHoles) {
 }
 
 TEST(KnownEmpty, OctreesOfAnyDepthAreTaken) {
+  const uint64_t cells = KnownEmpty(kModel).unseen_cells();
   for (const int depth : {0, 3, 8, 9, 10}) {
     points::ModelConfig model = kModel;
     model.depth = depth;
     KnownEmpty space(model);
+    EXPECT_EQ(space.unseen_cells(), cells) << depth;
     const geometry::Camera c = camera(0, 160, 100);
     const image::DepthImage image = test::sample_scene(c, {0, 0, 160, 100});
     const points::PreparedPatch patch = points::prepare_patch(model, {1}, c, {0, 0, 160, 100}, image);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
@@ -58,7 +59,7 @@ class KnownEmpty {
   /// For tests and records.
   bool unseen(const glm::ivec3& cell) const;
   uint64_t unseen_cells() const;
-  double cell_m() const { return grid_.leaf_size / (1 << (kCellLevel - grid_.depth)); }
+  double cell_m() const { return std::ldexp(grid_.leaf_size, grid_.depth - kCellLevel); }
 
  private:
   friend class EmptyCarver;
