@@ -83,6 +83,22 @@ TEST_F(PlannedTiles, AreComparedWithTheModelWhereThePlanDoesNotKnow) {
   EXPECT_FALSE(planner.reference(tiles[0])) << "the model shows less now";
 }
 
+// The master gave them up for a newer view, and their masks went with the next question.
+TEST_F(PlannedTiles, ThatComeAfterTheyWereGivenUpAreComparedWithTheModel) {
+  wire::PlanRequest beside = request({2});
+  beside.extra = true;
+  const wire::Plan given_up = planner.plan(with.model(), with.sequence(), beside, 1);
+  auto tiles = test::planned_tiles(beside, given_up);
+  ASSERT_FALSE(tiles.empty());
+  EXPECT_TRUE(planner.reference(tiles[0].tile));
+  beside.frame = {3}, beside.round = 1;
+  planner.plan(with.model(), with.sequence(), beside, 1.6);
+  for (const test::PlannedTile& late : tiles) {
+    planner.take(late.tile, late.whole, 1.7);
+    EXPECT_FALSE(planner.reference(late.tile));
+  }
+}
+
 TEST_F(PlannedTiles, AViewIsUnderWayUntilItIsCompleteOrOld) {
   EXPECT_FALSE(planner.view_under_way(1));
   const auto tiles = sample(plan({2}));

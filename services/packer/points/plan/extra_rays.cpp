@@ -141,7 +141,9 @@ bool Planner::Impl::plan_lost(Question& q, ViewerView& view) {
     LostTiles lost{frame.camera, frame.kind, {}};
     for (size_t i = 0; i < frame.tiles.size(); ++i)
       if (!frame.returned[i]) lost.tiles.push_back(std::move(frame.tiles[i]));
-    frame.returned.assign(frame.tiles.size(), true);  // what comes late has no mask any more
+    // What comes late has no mask any more: it is compared with the model.
+    frame.returned.assign(frame.tiles.size(), true);
+    frame.map = nullptr;
     frame.left = 0;
     frame.came_m.clear();  // settled with nothing to tell
     if (frame.kind == PlannedFrame::Kind::kFine && frame.base == view.camera) view.lost.push_back(std::move(lost));
