@@ -373,6 +373,29 @@ TEST(Plan, TilesOfAnExtraFrameThatComeLateAreTakenAllTheSame) {
   EXPECT_FALSE(s.last.full);
 }
 
+TEST(Plan, FinerRaysThatComeLateTellNothingOfWhatTheyMissed) {
+  PlanConfig config = plan_config();
+  config.view_cell_m = 0;
+  Session s(config);
+  const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 320, 240);
+  s.view(camera);
+  s.view(camera);
+  wire::PlanRequest given_up = s.request(camera, true);
+  given_up.still = true;
+  const wire::Plan plan = s.ask(given_up);
+  const auto tiles = test::planned_tiles(given_up, plan);
+  ASSERT_FALSE(tiles.empty());
+  EXPECT_EQ(s.planner.missed(tiles[0].tile).width(), tiles[0].tile.rect.width);
+  s.now_s += 0.6;
+  wire::PlanRequest next = s.request(camera, true, 1);
+  next.still = true;
+  s.ask(next);
+  for (const test::PlannedTile& late : tiles) {
+    s.planner.take(late.tile, late.whole, s.now_s);
+    EXPECT_EQ(s.planner.missed(late.tile).width(), 0) << "its mask is another frame's now";
+  }
+}
+
 TEST(Plan, ANewEpochIsSampledWholeAndFollowedByPlans) {
   Session s;
   const geometry::Camera camera = test::scene_camera({0.6, 0.3, 0.2}, 160, 120);

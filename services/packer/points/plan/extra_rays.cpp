@@ -140,7 +140,7 @@ bool Planner::Impl::plan_lost(Question& q, ViewerView& view) {
     if (q.now_s - frame.planned_s < kLost_s) continue;
     LostTiles lost{frame.camera, frame.kind, {}};
     for (size_t i = 0; i < frame.tiles.size(); ++i)
-      if (!frame.returned[i]) lost.tiles.push_back(std::move(frame.tiles[i]));
+      if (!frame.returned[i]) lost.tiles.push_back(std::exchange(frame.tiles[i], {frame.tiles[i].rect, {}, 0}));
     // What comes late has no mask any more: it is compared with the model.
     frame.returned.assign(frame.tiles.size(), true);
     frame.map = nullptr;
