@@ -26,6 +26,8 @@ constexpr int kNearEdge = 32;  // pixels; a word of a mask is twice as wide
 // The surfaces of a view that stands still are judged again when all of its finer rays are cast, so many times: what
 // these rays found has edges of its own.
 constexpr int kMostLooks = 3;
+// The finest rays are 2^this a side of a pixel.
+constexpr int kFinest = 2;
 // Tiles of a finer view that are looked at before rays are counted again.
 constexpr size_t kTilesAtOnce = 8;
 // Sides of the parts of a finer view whose points are chosen and binned at once: those of all of it are so many that to
@@ -232,23 +234,18 @@ void Planner::Impl::look_closer(Question& q, ViewerView& view) {
 
 bool Planner::Impl::plan_stages(Question& q, ViewerView& view) {
   const std::shared_ptr<const ViewMap> map = view.fine_map;
-  struct Stage {
-    const image::PixelMask* wanted;
-    int finer;
-    bool edge;
-  };
   const int while_still = view.still ? config.still_rays : 1;
   // What differs little gets all of its rays at once: what waits for them shows little of it, and each pass more is
   // another patch of each cluster for packer and viewers to merge.
   const int weak = while_still >= 16 ? 2 : 1;
-  const Stage stages[] = {{&map->edge, 1, true},
-                          {&map->edge, 2, true},
-                          {&map->strong, 1, false},
-                          {&map->strong, 2, false},
-                          {&map->weak, weak, false}};
-  for (const Stage& stage : stages) {
+  const FineStage stages[] = {{map->edge, 1, true},
+                              {map->edge, 2, true},
+                              {map->strong, 1, false},
+                              {map->strong, 2, false},
+                              {map->weak, weak, false}};
+  for (const FineStage& stage : stages) {
     const int most = stage.edge ? std::max(config.edge_rays, while_still) : while_still;
-    if (most >= 1 << 2 * stage.finer && plan_fine(q, view, *stage.wanted, stage.finer)) return true;
+    if (most >= 1 << 2 * stage.finer && plan_fine(q, view, stage)) return true;
   }
   return false;
 }
@@ -294,18 +291,19 @@ std::vector<Part> parts_of(const image::PixelMask& open, const geometry::Rect& r
   return parts;
 }
 
-// Rays of a finer tile in the pixels `wanted` of the view (of the part's size) where the model has no sample.
+// Rays of a finer tile in the pixels `wanted` of the view (of the part's size): all, or where the model has no sample.
 image::PixelMask fine_rays(const splat::ViewKeys::Tile& tile, const PixelJudge& judge, const image::PixelMask& wanted,
-                           int times) {
+                           int times, bool all) {
   ViewMap local;
   reset_masks(tile.rect.width, tile.rect.height, local);
-  judge.judge(tile, 0, 0, local);
+  if (!all) judge.judge(tile, 0, 0, local);
   image::PixelMask rays(tile.rect.width, tile.rect.height);
   for (int y = 0; y < wanted.height(); ++y) {
     image::for_each_set(wanted.row(y), wanted.words_per_row(), [&](size_t x) {
       for (int dy = 0; dy < times; ++dy)
         for (int dx = 0; dx < times; ++dx) rays.set(static_cast<int>(x) * times + dx, y * times + dy);
     });
+    if (all) continue;
     for (int row = y * times; row < (y + 1) * times; ++row)
       for (size_t w = 0; w < rays.words_per_row(); ++w)
         rays.row(row)[w] &= ~local.covered.row(row)[w] | local.lacking.row(row)[w];
@@ -317,18 +315,15 @@ image::PixelMask fine_rays(const splat::ViewKeys::Tile& tile, const PixelJudge& 
 
 // Of one region: until there are enough rays, or the piece ends. Its tiles are cut from what was found in all of it:
 // packer and viewers pay for each tile.
-uint64_t Planner::Impl::look_into(Question& q, const geometry::Rect& region, const geometry::Camera& fine, uint64_t rays,
-                                  const image::PixelMask& open, image::PixelMask& refined,
-                                  std::vector<RayTile>& tiles) {
-  const int times = fine.width / open.width();
-  const std::vector<Part> parts = parts_of(open, region, times);
-  const geometry::Camera camera = geometry::crop(fine, region);
+void Planner::Impl::look_into(Question& q, const geometry::Rect& region, FineSearch& search) {
+  const int times = search.camera.width / search.open.width();
+  const std::vector<Part> parts = parts_of(search.open, region, times);
+  const geometry::Camera camera = geometry::crop(search.camera, region);
   keys.begin(q.model, camera, kPlanTileWidth, kPlanTileHeight);
   const PixelJudge judge(camera, test, keys.rim());
   image::PixelMask cast(region.width, region.height);
-  uint64_t found = 0;
   std::mutex mutex;
-  for (size_t first = 0; first < parts.size() && !q.enough(rays + found); first += kTilesAtOnce) {
+  for (size_t first = 0; first < parts.size() && !q.enough(search.rays); first += kTilesAtOnce) {
     if (first > 0 && q.breaks_off()) break;
     const std::span<const Part> some(parts.data() + first, std::min(kTilesAtOnce, parts.size() - first));
     std::vector<int> indices;
@@ -336,46 +331,48 @@ uint64_t Planner::Impl::look_into(Question& q, const geometry::Rect& region, con
     keys.draw(indices, [&](const splat::ViewKeys::Tile& tile) {
       const geometry::Rect& part =
           std::find_if(some.begin(), some.end(), [&](const Part& p) { return p.tile == tile.index; })->rect;
-      const image::PixelMask wanted = fine_rays(tile, judge, cropped(open, part), times);
+      const image::PixelMask wanted = fine_rays(tile, judge, cropped(search.open, part), times, search.all);
       const std::lock_guard lock(mutex);
       merge(wanted, tile.rect.x, tile.rect.y, cast);
-      found += wanted.count();
+      search.rays += wanted.count();
     });
-    for (const Part& part : some) merge(cropped(open, part.rect), part.rect.x, part.rect.y, refined);
+    for (const Part& part : some) merge(cropped(search.open, part.rect), part.rect.x, part.rect.y, search.refined);
     q.looked_at += some.size() * uint64_t{kPlanTileWidth} * uint64_t{kPlanTileHeight};
   }
   for (RayTile& tile : cut_tiles(cast, {0, 0, region.width, region.height}, q.limits())) {
     tile.rect.x += region.x, tile.rect.y += region.y;
-    tiles.push_back(std::move(tile));
+    search.tiles.push_back(std::move(tile));
   }
-  return found;
 }
 
-bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const image::PixelMask& wanted, int finer) {
-  const int times = 1 << finer;
-  const geometry::Camera camera = finer_camera(view.camera, times);
-  if (!geometry::validate(camera)) return false;
-  image::PixelMask& refined = view.refined[static_cast<size_t>(finer)];
-  image::PixelMask open = wanted;
-  for (int y = 0; y < open.height(); ++y)
-    for (size_t w = 0; w < open.words_per_row(); ++w) open.row(y)[w] &= ~refined.row(y)[w];
-  const std::vector<Region> regions = regions_of(open, camera, times);
-  std::vector<RayTile>& tiles = view.found[static_cast<size_t>(finer)];
-  if (regions.empty() && tiles.empty()) return false;
+bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const FineStage& stage) {
+  const int times = 1 << stage.finer;
+  const auto finer = static_cast<size_t>(stage.finer);
+  // Of pixels at edges all of the finest rays are cast, also where the model has samples: where a ray passes beside a
+  // sample, none tells.
+  FineSearch search{.camera = finer_camera(view.camera, times),
+                    .all = stage.edge && stage.finer == kFinest,
+                    .open = stage.wanted,
+                    .refined = view.refined[finer],
+                    .tiles = view.found[finer]};
+  if (!geometry::validate(search.camera)) return false;
+  for (int y = 0; y < search.open.height(); ++y)
+    for (size_t w = 0; w < search.open.words_per_row(); ++w) search.open.row(y)[w] &= ~search.refined.row(y)[w];
+  const std::vector<Region> regions = regions_of(search.open, search.camera, times);
+  if (regions.empty() && search.tiles.empty()) return false;
   if (!regions.empty() && q.breaks_off()) return true;
 
-  uint64_t rays = 0;
-  for (const RayTile& tile : tiles) rays += tile.rays;
+  for (const RayTile& tile : search.tiles) search.rays += tile.rays;
   for (const Region& region : regions) {
-    if (q.enough(rays) || (&region != &regions.front() && q.breaks_off())) break;
-    rays += look_into(q, region.rect, camera, rays, open, refined, tiles);
+    if (q.enough(search.rays) || (&region != &regions.front() && q.breaks_off())) break;
+    look_into(q, region.rect, search);
   }
-  if (q.unfinished && !q.enough(rays)) return true;
-  sort_by_distance_to_centre(tiles, camera.width, camera.height);
-  view.fine_rays += rays;
-  q.plan.figures["rays.refinement"] = static_cast<double>(rays);
-  return issue(q, std::exchange(tiles, {}),
-               {.kind = PlannedFrame::Kind::kFine, .camera = camera, .base = view.camera}) > 0 ||
+  if (q.unfinished && !q.enough(search.rays)) return true;
+  sort_by_distance_to_centre(search.tiles, search.camera.width, search.camera.height);
+  view.fine_rays += search.rays;
+  q.plan.figures["rays.refinement"] = static_cast<double>(search.rays);
+  return issue(q, std::exchange(search.tiles, {}),
+               {.kind = PlannedFrame::Kind::kFine, .camera = search.camera, .base = view.camera}) > 0 ||
          q.unfinished;
 }
 

@@ -55,9 +55,23 @@ struct Planner::Impl {
   bool plan_fine(Question& q, ViewerView& view);
   void look_closer(Question& q, ViewerView& view);
   bool plan_stages(Question& q, ViewerView& view);
-  bool plan_fine(Question& q, ViewerView& view, const image::PixelMask& wanted, int finer);
-  uint64_t look_into(Question& q, const geometry::Rect& region, const geometry::Camera& fine, uint64_t rays,
-                     const image::PixelMask& open, image::PixelMask& refined, std::vector<RayTile>& tiles);
+  /// Pixels that shall have 2^finer rays a side; edge: they lie at one.
+  struct FineStage {
+    const image::PixelMask& wanted;
+    int finer;
+    bool edge;
+  };
+  bool plan_fine(Question& q, ViewerView& view, const FineStage& stage);
+  /// Pixels of a view that have not had such rays; what was looked at, and found there.
+  struct FineSearch {
+    geometry::Camera camera;  ///< of the finer view
+    bool all;                 ///< rays are wanted wherever the model has samples, too
+    image::PixelMask open;
+    image::PixelMask& refined;
+    std::vector<RayTile>& tiles;
+    uint64_t rays = 0;  ///< of the tiles
+  };
+  void look_into(Question& q, const geometry::Rect& region, FineSearch& search);
 
   /// Puts the tiles into the plan and on the shelf. Those that a message does not hold are left out. Returns their
   /// number.
