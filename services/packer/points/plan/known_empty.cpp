@@ -213,6 +213,13 @@ bool KnownEmpty::unseen(const glm::ivec3& cell) const {
   return (byte >> ((cell.x & 1) | (cell.y & 1) << 1 | (cell.z & 1) << 2) & 1) != 0;
 }
 
+bool KnownEmpty::unseen_at(const glm::dvec3& room) const {
+  const glm::dvec3 cell = glm::floor((room - grid_.lo) / cell_m());
+  for (int i = 0; i < 3; ++i)
+    if (!(cell[i] >= 0 && cell[i] < 1 << kCellLevel)) return false;
+  return unseen(glm::ivec3(cell));
+}
+
 uint64_t KnownEmpty::unseen_cells() const {
   return std::accumulate(any_[kCellLevel].begin(), any_[kCellLevel].end(), uint64_t{0},
                          [](uint64_t n, uint8_t byte) { return n + static_cast<uint64_t>(std::popcount(byte)); });

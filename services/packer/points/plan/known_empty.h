@@ -56,6 +56,10 @@ class KnownEmpty {
   void project(const geometry::Camera& camera, std::span<const float> shown_m, int threads,
                image::PixelMask& may_hold) const;
 
+  /// Whether no ray has looked into the cell around this place, as inside of what is solid. Outside the data set's box
+  /// everything is seen.
+  bool unseen_at(const glm::dvec3& room) const;
+
   /// For tests and records.
   bool unseen(const glm::ivec3& cell) const;
   uint64_t unseen_cells() const;

@@ -50,6 +50,7 @@ struct Planner::Impl {
   void plan_extra(Question& q, ViewerView& view);
   bool limit(Question& q, const ViewerView& view, uint64_t cast, double share) const;
   bool plan_lost(Question& q, ViewerView& view);
+  double step_aside_m(const ViewerView& view) const;
   bool plan_cell(Question& q, ViewerView& view, unsigned direction);
   bool plan_cells(Question& q, ViewerView& view);
   bool plan_fine(Question& q, ViewerView& view);
