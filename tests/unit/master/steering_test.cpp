@@ -577,7 +577,7 @@ TEST_F(Steered, CostsFollowTheRays) {
   answer(ask(5, 1), kTwoTiles);
   for (const auto& l : leases()) done(l, 1e-6 * double(l.rays));
   EXPECT_NEAR(schedule.costs().pixel_s("a"), 1e-6, 1e-12);
-  const auto question = ask(5, 2);
+  const auto question = ask(5, 2, 0.1);
   EXPECT_NEAR(double(question.tile_rays), 12'000, 1) << "three times 4 ms: one sampler need not share them";
   answer(question, {});
   EXPECT_NEAR(double(ask_extra().most_rays), 400'000, 1) << "400 ms of one sampler: the head rests";

@@ -24,7 +24,7 @@ constexpr float kNearestFromBeside = 1.5f;
 // samples that they hide, and rays at them brought nothing but what was known.
 constexpr float kEpsilonFromBeside = 0.02f;
 // A head moves no farther than this at once, in distances to the nearest that it sees.
-constexpr double kStepAside = 0.5;
+constexpr double kStepAside = 1.0;
 // What is shown there is cast if the view sees its place no more than so many times as coarsely.
 constexpr double kCloser = 1.5;
 constexpr int kNearEdge = 32;  // pixels; a word of a mask is twice as wide

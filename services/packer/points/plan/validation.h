@@ -52,9 +52,9 @@ class Validation {
 
   /// Compares a tile's rays at firm pixels with what was shown when its frame was planned.
   ///   cast: of rect's size; came: likewise, as sampled. shown.camera's image holds rect.
-  ///   doubted: of shown.camera's size, or null: pixels whose contradictions are evidence, but make nothing stale. There
-  ///   rays have contradicted before, from this camera: splats cannot show what is there, and a still view would cast
-  ///   the squares around again and again.
+  ///   doubted: of shown.camera's size, or null: pixels where rays have contradicted before, from this camera. There
+  ///   they are evidence, but make nothing stale: splats cannot show what is there, and a still view would cast the
+  ///   squares around again and again.
   ///   contradicted: becomes a mask of rect's size: the rays that saw something else than what is shown; their hits are
   ///   new points.
   void check(const ShownView& shown, const geometry::Rect& rect, const image::PixelMask& cast,
