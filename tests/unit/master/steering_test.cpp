@@ -580,7 +580,7 @@ TEST_F(Steered, CostsFollowTheRays) {
   const auto question = ask(5, 2, 0.1);
   EXPECT_NEAR(double(question.tile_rays), 12'000, 1) << "three times 4 ms: one sampler need not share them";
   answer(question, {});
-  EXPECT_NEAR(double(ask_extra().most_rays), 400'000, 1) << "400 ms of one sampler: the head rests";
+  EXPECT_NEAR(double(ask_extra().most_rays), 50'000, 1) << "50 ms of one sampler";
 }
 
 TEST_F(Steered, WithoutSteeringNothingIsAsked) {

@@ -279,8 +279,8 @@ TEST(PackerCore, TheLogIsBounded) {
     submit_all(unbounded, sampled_frame({frame}, camera(turn), 64), turn);
     submit_all(core, sampled_frame({frame}, camera(turn), 64), turn);
     forgot |= !core.tick(turn).empty();
-    EXPECT_LE(core.log_bytes(), config.max_log_bytes + 40 * core.statistics().clusters_forgotten +
-                                    40 * core.model().clusters().size());
+    EXPECT_LE(core.log_bytes(),
+              config.max_log_bytes + 40 * core.statistics().clusters_forgotten + 40 * core.model().clusters().size());
     EXPECT_GT(core.model().points(), 0u) << "the newest patches stay";
   }
   EXPECT_TRUE(forgot);

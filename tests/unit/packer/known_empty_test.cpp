@@ -68,8 +68,11 @@ TEST(KnownEmpty, AViewSeesTheSpaceBeforeItsSurfacesAndAllOfItWhereItMissed) {
   KnownEmpty space(kModel);
   const View view(camera(0));
   view.see(space);
-  EXPECT_FALSE(space.unseen(cell_at(space, {0.35, 0.1, 0})));      // between eye and ball
-  EXPECT_TRUE(space.unseen(cell_at(space, {0, 0, 0})));            // inside the ball
+  EXPECT_FALSE(space.unseen(cell_at(space, {0.35, 0.1, 0})));  // between eye and ball
+  EXPECT_TRUE(space.unseen(cell_at(space, {0, 0, 0})));        // inside the ball
+  EXPECT_TRUE(space.unseen_at({0, 0, 0}));
+  EXPECT_FALSE(space.unseen_at({0.35, 0.1, 0}));
+  for (const double far : {5.0, -5.0, 1e300, -1e300}) EXPECT_FALSE(space.unseen_at({0, far, 0})) << "outside the cube";
   EXPECT_TRUE(space.unseen(cell_at(space, {-0.3, -0.15, 0})));     // in its shadow
   EXPECT_FALSE(space.unseen(cell_at(space, {-0.3, 0.15, 0.35})));  // beside it, against the sky
   // Nothing is left before what was just seen, but for some pixels along steps of depth.

@@ -1,6 +1,9 @@
 // Plans, and what they lead to: an analytic scene is sampled by what is planned alone.
 #include <gtest/gtest.h>
 
+#include <set>
+#include <tuple>
+
 #include "services/packer/points/plan/planner.h"
 #include "services/packer/points/plan/view/view_map.h"
 #include "tests/support/packer_scenes.h"
@@ -371,6 +374,30 @@ TEST(Plan, TilesOfAnExtraFrameThatComeLateAreTakenAllTheSame) {
   EXPECT_GT(s.cast(given_up, plan), 0u);
   s.view(camera);
   EXPECT_FALSE(s.last.full);
+}
+
+// Near a surface a step aside shows another world: there is no end to what could be cast.
+TEST(Plan, FromBesideAHeadMovesNoFartherThanTheNearestSurface) {
+  Session s;
+  s.view(test::scene_camera({0.7, 0.1, 0}, 160, 120));
+  const geometry::Camera camera = test::scene_camera({0.34, 0.06, 0}, 160, 120);
+  s.view(camera);
+  s.view(camera);
+  const ViewMap map = shown(s.core, camera);
+  const double nearest_m = *std::min_element(map.depth_m.begin(), map.depth_m.end());
+  ASSERT_LT(nearest_m, 0.15);
+  std::set<std::tuple<double, double, double>> places;
+  for (uint64_t round = 0; round < 40; ++round) {
+    wire::PlanRequest r = s.request(camera, true, round);
+    r.still = true;
+    const wire::Plan plan = s.ask(r);
+    if (plan.tiles.empty()) break;
+    const glm::dvec3 p = plan.camera.pose.position_room;
+    EXPECT_LE(glm::distance(p, camera.pose.position_room), 1.02 * nearest_m);
+    places.insert({p.x, p.y, p.z});
+    s.cast(r, plan);
+  }
+  EXPECT_GT(places.size(), 2u) << "its own and others";
 }
 
 TEST(Plan, FinerRaysThatComeLateTellNothingOfWhatTheyMissed) {

@@ -23,8 +23,9 @@ constexpr float kNearestFromBeside = 1.5f;
 // And what lies so little behind what is shown, as a fraction of its depth: coarse splats stand out that far before the
 // samples that they hide, and rays at them brought nothing but what was known.
 constexpr float kEpsilonFromBeside = 0.02f;
-// A head moves no farther than this at once, in distances to the nearest that it sees.
-constexpr double kStepAside = 1.0;
+// A head moves no farther than this at once, in distances to the nearest that it sees. With half of it a
+// model grows a little less, and moving bones have holes in 0.095 % of their pixels instead of 0.059 %.
+constexpr double kStepAside = 1;
 // What is shown there is cast if the view sees its place no more than so many times as coarsely.
 constexpr double kCloser = 1.5;
 constexpr int kNearEdge = 32;  // pixels; a word of a mask is twice as wide
