@@ -52,7 +52,8 @@ bool write_frame(const std::string& directory, const SpooledFrame& f) {
   if (!out) return false;
   bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
   ok = ok && std::fwrite(f.view.colour.data(), 4, f.view.colour.size(), out.get()) == f.view.colour.size();
-  ok = ok && std::fwrite(f.view.depth_m.data(), 4, f.view.depth_m.size(), out.get()) == f.view.depth_m.size();
+  if (h.has_depth)  // else there is no array to point to
+    ok = ok && std::fwrite(f.view.depth_m.data(), 4, f.view.depth_m.size(), out.get()) == f.view.depth_m.size();
   ok = ok && std::fwrite(legend.data(), 1, legend.size(), out.get()) == legend.size();
   ok = ok && std::fflush(out.get()) == 0;
   std::error_code error;
