@@ -88,7 +88,7 @@ struct Planner::Impl {
   void refill_empty(const PlannedFrame& frame, const SampledTile& tile, const image::PixelMask& contradicted);
   bool settle();
   void settle(const PlannedFrame& frame);
-  void settle_whole(const PlannedFrame& frame);
+  void carve(const geometry::Camera& full, const std::vector<float>& all_m);
   void settle_old(double now_s);
 
   const PlanConfig config;
@@ -101,7 +101,7 @@ struct Planner::Impl {
   FrameShelf shelf;
   PlanPicture picture;                         // config.pictures: of the newest view
   std::vector<std::shared_ptr<ViewMap>> maps;  // kept for their memory, some of them in use
-  std::vector<float> clear_m;                  // kept for its memory
+  std::vector<float> clear_m, coarse_m;        // kept for their memory
   uint64_t changes = 0;                        // of the model: patches that brought nothing are none
 };
 

@@ -21,7 +21,7 @@ bool only_cast(const SampledTile& tile, const image::PixelMask& cast) {
   return covered + static_cast<size_t>(std::count(depth.begin(), depth.end(), 0u)) == depth.size();
 }
 
-constexpr size_t kCoarseCarve = size_t{1} << 19;  // pixels: larger whole views are carved at half their resolution
+constexpr size_t kCoarseCarve = size_t{1} << 19;  // pixels: larger views are carved at half their resolution
 
 }  // namespace
 
@@ -129,30 +129,32 @@ void Planner::Impl::refill_empty(const PlannedFrame& frame, const SampledTile& t
   if (!hits.empty()) known_empty.refill(hits);
 }
 
-// All of a view tells so much that half as many rays on each axis do, in a fourth of the time: later views look closer
-// where that leaves something open.
-void Planner::Impl::settle_whole(const PlannedFrame& frame) {
-  const int width = frame.camera.width / 2, height = frame.camera.height / 2;
-  if (frame.whole_m.size() < kCoarseCarve || width < 1 || height < 1)
-    return known_empty.carve(frame.camera, frame.whole_m, config.threads);
-  geometry::Camera camera = geometry::crop(frame.camera, {0, 0, 2 * width, 2 * height});
+// Pixels of large views are smaller than cells: half as many on each axis tell nearly as much, in a fourth of the time,
+// and later views look closer where that leaves something open.
+void Planner::Impl::carve(const geometry::Camera& full, const std::vector<float>& all_m) {
+  const int width = full.width / 2, height = full.height / 2;
+  if (all_m.size() < kCoarseCarve || width < 1 || height < 1) return known_empty.carve(full, all_m, config.threads);
+  geometry::Camera camera = geometry::crop(full, {0, 0, 2 * width, 2 * height});
   camera.width = width, camera.height = height;
-  clear_m.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
+  coarse_m.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      const float* upper = &frame.whole_m[static_cast<size_t>(2 * y) * frame.camera.width + 2 * x];
-      const float* lower = upper + frame.camera.width;
-      clear_m[static_cast<size_t>(y) * width + x] = std::min({upper[0], upper[1], lower[0], lower[1]});
+      const float* upper = &all_m[static_cast<size_t>(2 * y) * full.width + 2 * x];
+      const float* lower = upper + full.width;
+      // As far as all four are clear; it is new if one of them is.
+      const float clear = std::min({std::abs(upper[0]), std::abs(upper[1]), std::abs(lower[0]), std::abs(lower[1])});
+      const bool news = upper[0] > 0 || upper[1] > 0 || lower[0] > 0 || lower[1] > 0;
+      coarse_m[static_cast<size_t>(y) * width + x] = news ? clear : -clear;
     }
-  known_empty.carve(camera, clear_m, config.threads);
+  known_empty.carve(camera, coarse_m, config.threads);
 }
 
 void Planner::Impl::settle(const PlannedFrame& frame) {
   if (frame.whole) {
-    settle_whole(frame);
+    carve(frame.camera, frame.whole_m);
   } else if (!frame.came_m.empty()) {
     clear_depths(frame, clear_m);
-    known_empty.carve(frame.camera, clear_m, config.threads);
+    carve(frame.camera, clear_m);
   }
   if (frame.kind == PlannedFrame::Kind::kView && !frame.whole) validation.resampled(frame.planned_s);
 }
