@@ -8,7 +8,9 @@ constexpr size_t kMaxKeptEvents = 8192, kMaxKeptBytes = 256u << 20;
 
 size_t ModelEvent::bytes() const {
   const auto* patch = std::get_if<wire::Patch>(&body);
-  return 512 + (patch ? patch->image.size() : 0);
+  const auto* forget = std::get_if<wire::Forget>(&body);
+  return 512 + (patch ? patch->image.size() + patch->missed.size() * sizeof patch->missed[0] : 0) +
+         (forget ? (forget->clusters.size() + forget->frames.size()) * sizeof(uint32_t) : 0);
 }
 
 void EventSequencer::start() {

@@ -6,8 +6,8 @@
 
 namespace telesplat::viewer {
 
-/// Of a viewer's own patches: rays finer than its views, and what its views found where those had met nothing. image:
-/// the patch's, decoded. Error: the mask cannot be decoded; nothing was added.
+/// Rays finer than a viewer's views, of its own patches; and of all others what they found where those had met nothing.
+/// image: the patch's, decoded. Error: the mask cannot be decoded; nothing was added.
 Status add_rays(const wire::Patch& patch, const image::DepthImage& image, FineRays& rays);
 
 }  // namespace telesplat::viewer

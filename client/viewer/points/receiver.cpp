@@ -91,7 +91,7 @@ void PointReceiver::apply(const ModelEvent& event) {
   if (applied && options_.events) record(event);
 }
 
-// Rays of others' views are not shown here.
+// Without what finer rays of others' views missed.
 void PointReceiver::record(const ModelEvent& event) {
   const auto* patch = std::get_if<wire::Patch>(&event.body);
   if (!patch || patch->missed.empty() || patch->viewer == options_.viewer) return options_.events->add(event);
@@ -125,12 +125,14 @@ bool PointReceiver::apply_patch(const wire::Patch& patch) {
     log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
     return false;
   }
-  if (patch.viewer == options_.viewer)
-    if (const Status rays = add_rays(patch, tile_, rays_); !rays) {
-      ++decode_errors_;
-      log::warn("patch {}: {}", patch.sequence.value, rays.error().text);
-      return false;
-    }
+  // What finer rays of others' views missed is not shown here; what they met counts.
+  if (!patch.missed.empty() && patch.viewer != options_.viewer) {
+    rays_.revise(patch.camera, patch.rect, tile_);
+  } else if (const Status rays = add_rays(patch, tile_, rays_); !rays) {
+    ++decode_errors_;
+    log::warn("patch {}: {}", patch.sequence.value, rays.error().text);
+    return false;
+  }
   const double decoded = monotonic_s();
   epoch_ = patch.epoch;
   auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_,

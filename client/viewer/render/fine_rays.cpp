@@ -12,7 +12,11 @@ constexpr double kSteps = 2730;
 constexpr uint16_t kNothing = 0xffff;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // The eyes of rays and of pixels are the same if what is nearest does not move by more than this between them, pixels.
-constexpr double kParallax = 0.5;
+constexpr double kParallax = 1;
+// What is nearest may have been known before, and be no hit of finer rays.
+constexpr double kNearest_m = 0.3;
+// What is about another surface is forgotten so many rays around.
+constexpr int kRevised = 3;
 // More changes than this are told as one of everything.
 constexpr size_t kMostChanges = 4096;
 // Depths that differ by less are of one surface.
@@ -97,59 +101,84 @@ void FineRays::clear() {
 
 FineRays::Layer& FineRays::layer_of(const geometry::Camera& camera) {
   if (!layers_.empty() && !same_frustum(camera, layers_.front().camera)) forget();
+  const auto known = std::find_if(layers_.begin(), layers_.end(), [&](const Layer& l) { return l.camera == camera; });
+  if (known != layers_.end()) return *known;
+  if (layers_.size() == kMostLayers) forget();
   const auto coarser =
       std::find_if(layers_.begin(), layers_.end(), [&](const Layer& l) { return l.camera.width <= camera.width; });
-  if (coarser != layers_.end() && coarser->camera == camera) return *coarser;
   return *layers_.insert(coarser, Layer{camera, {}});
+}
+
+uint16_t* FineRays::Layer::at(int x, int y) {
+  const auto found = blocks.find(y / kBlock * columns() + x / kBlock);
+  if (found == blocks.end()) return nullptr;
+  return &(*found->second)[static_cast<size_t>(y % kBlock * kBlock + x % kBlock)];
+}
+
+void FineRays::put(Layer& layer, int x, int y, uint16_t met) {
+  if (uint16_t* known = layer.at(x, y)) {
+    *known = met;
+  } else if (blocks_ < kMostBlocks) {
+    ++blocks_;
+    layer.blocks[y / kBlock * layer.columns() + x / kBlock] = std::make_unique<Block>(Block{});
+    *layer.at(x, y) = met;
+  }
 }
 
 void FineRays::add(const Tile& tile) {
   const std::lock_guard lock(mutex_);
   if (tile.epoch != epoch_) forget(), epoch_ = tile.epoch;
   Layer& layer = layer_of(tile.camera);
-  const auto put = [&](int x, int y, uint16_t met) {
-    auto& block = layer.blocks[y / kBlock * layer.columns() + x / kBlock];
-    if (!block) {
-      if (blocks_ == kMostBlocks) return;
-      ++blocks_, block = std::make_unique<Block>(Block{});
-    }
-    (*block)[static_cast<size_t>(y % kBlock * kBlock + x % kBlock)] = met;
-  };
   const geometry::Rect& m = tile.missed_rect;
   for (int y = 0; y < m.height; ++y)
     image::for_each_set(tile.missed->row(y), tile.missed->words_per_row(),
-                        [&](size_t x) { put(m.x + static_cast<int>(x), m.y + y, kNothing); });
+                        [&](size_t x) { put(layer, m.x + static_cast<int>(x), m.y + y, kNothing); });
   const geometry::Rect& r = tile.rect;
   for (int y = 0; y < r.height; ++y)
     for (int x = 0; x < r.width; ++x)
       if (const uint32_t depth = tile.image->depth[static_cast<size_t>(y) * r.width + x]) {
         const double depth_m = image::decode_depth(depth, tile.camera.near_m);
         nearest_m_ = std::min(nearest_m_, depth_m);
-        put(r.x + x, r.y + y, code(depth_m, tile.camera.near_m));
+        put(layer, r.x + x, r.y + y, code(depth_m, tile.camera.near_m));
       }
   note_change(tile.camera, m);
 }
 
+// Whether all that is known of the rays at most one beside is that they went farther than this.
+bool FineRays::went_farther(Layer& layer, int x, int y, float depth_m) {
+  const uint16_t* own = layer.at(x, y);
+  if (!own || *own == 0) return false;
+  for (int j = std::max(y - 1, 0); j <= std::min(y + 1, layer.camera.height - 1); ++j)
+    for (int i = std::max(x - 1, 0); i <= std::min(x + 1, layer.camera.width - 1); ++i)
+      if (const uint16_t* met = layer.at(i, j); met && *met != 0)
+        if (depth_of(*met, layer.camera.near_m) <= kBehind * depth_m) return false;
+  return true;
+}
+
 void FineRays::revise(const geometry::Camera& camera, const geometry::Rect& rect, const image::DepthImage& image) {
   const std::lock_guard lock(mutex_);
-  if (layers_.empty() || !same_frustum(camera, layers_.front().camera)) return;
-  bool changed = false;
   for (Layer& layer : layers_) {
-    const int times = layer.camera.width / camera.width;
+    const auto t = layer.camera.room_to_pixel();
+    const int width = layer.camera.width, height = layer.camera.height;
     for (int i = 0; i < rect.width * rect.height; ++i) {
-      if (image.depth[static_cast<size_t>(i)] == 0) continue;
-      const auto depth_m = static_cast<float>(image::decode_depth(image.depth[static_cast<size_t>(i)], camera.near_m));
-      const int x0 = (rect.x + i % rect.width) * times, y0 = (rect.y + i / rect.width) * times;
-      for (int y = y0; y < y0 + times; ++y)
-        for (int x = x0; x < x0 + times; ++x) {
-          const auto block = layer.blocks.find(y / kBlock * layer.columns() + x / kBlock);
-          if (block == layer.blocks.end()) continue;
-          uint16_t& met = (*block->second)[static_cast<size_t>(y % kBlock * kBlock + x % kBlock)];
-          if (depth_of(met, layer.camera.near_m) > kBehind * depth_m) met = 0, changed = true;
-        }
+      const uint32_t depth = image.depth[static_cast<size_t>(i)];
+      if (depth == 0) continue;
+      const glm::dvec4 place(camera.unproject(rect.x + i % rect.width + 0.5, rect.y + i / rect.width + 0.5,
+                                              image::decode_depth(depth, camera.near_m)),
+                             1);
+      const double depth_m = glm::dot(t.w, place), u = glm::dot(t.x, place) / depth_m,
+                   v = glm::dot(t.y, place) / depth_m;
+      if (!(depth_m > 0 && u >= 0 && v >= 0 && u < width && v < height)) continue;
+      const int x = static_cast<int>(u), y = static_cast<int>(v);
+      if (!went_farther(layer, x, y, static_cast<float>(depth_m))) continue;
+      const int left = std::max(x - kRevised, 0), top = std::max(y - kRevised, 0);
+      const geometry::Rect around{left, top, std::min(x + kRevised + 1, width) - left,
+                                  std::min(y + kRevised + 1, height) - top};
+      for (int n = 0; n < around.width * around.height; ++n)
+        if (uint16_t* met = layer.at(left + n % around.width, top + n / around.width)) *met = 0;
+      note_change(layer.camera, around);
     }
   }
-  if (changed) note_change(camera, rect);
 }
 
 void FineRays::note_change(const geometry::Camera& camera, const geometry::Rect& rect) {
@@ -160,7 +189,7 @@ void FineRays::note_change(const geometry::Camera& camera, const geometry::Rect&
 
 bool FineRays::same_eye(const geometry::Camera& camera) const {
   const double apart_m = glm::distance(camera.pose.position_room, layers_.front().camera.pose.position_room);
-  return apart_m * std::max(camera.focal_x(), camera.focal_y()) <= kParallax * nearest_m_;
+  return apart_m * std::max(camera.focal_x(), camera.focal_y()) <= kParallax * std::min(nearest_m_, kNearest_m);
 }
 
 bool FineRays::look_up(const geometry::Camera& camera, EpochId epoch, std::vector<float>& met_m) const {

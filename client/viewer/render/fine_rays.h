@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <unordered_map>
@@ -23,6 +24,8 @@ class FineRays {
   static constexpr int kBlock = 64;
   /// More are not kept: 64 MiB. What is left out is shown as points alone do.
   static constexpr size_t kMostBlocks = 8192;
+  /// Of different sizes: with two and four rays a side of a pixel. One more makes all begin anew.
+  static constexpr size_t kMostLayers = 2;
 
   /// Of a tile of finer rays.
   struct Tile {
@@ -35,8 +38,8 @@ class FineRays {
   };
   /// Precondition: both rectangles lie in the frame, and mask and image are of their sizes.
   void add(const Tile& tile);
-  /// The view's own rays met something after all where finer ones had not: data that change. The rays around it are
-  /// forgotten.
+  /// Other rays met something where finer ones had gone farther, and so had those beside them: data that change. What
+  /// is around it is forgotten. Precondition: rect lies in the camera's picture, and the image is of its size.
   void revise(const geometry::Camera& camera, const geometry::Rect& rect, const image::DepthImage& image);
   void clear();
 
@@ -54,11 +57,14 @@ class FineRays {
     std::unordered_map<int, std::unique_ptr<Block>> blocks;  // by row, then column
     int columns() const { return (camera.width + kBlock - 1) / kBlock; }
     const Block* find(int block_x, int block_y) const;
+    uint16_t* at(int x, int y);  // null: nothing is known around
   };
   using Changes = std::vector<std::pair<geometry::Camera, geometry::Rect>>;
   void forget();
   void note_change(const geometry::Camera& camera, const geometry::Rect& rect);
   Layer& layer_of(const geometry::Camera& camera);
+  void put(Layer& layer, int x, int y, uint16_t met);
+  static bool went_farther(Layer& layer, int x, int y, float depth_m);
   bool same_eye(const geometry::Camera& camera) const;
   bool look_up(const Layer& layer, const geometry::Camera& camera, std::vector<float>& met_m) const;
 
@@ -66,7 +72,7 @@ class FineRays {
   EpochId epoch_;
   std::vector<Layer> layers_;  // of one frustum, the finest first
   size_t blocks_ = 0;
-  double nearest_m_ = 0;  // of what was met
+  double nearest_m_ = std::numeric_limits<double>::infinity();  // of what was met
   Changes changes_;
 };
 

@@ -92,7 +92,8 @@ bool Supersampler::draw(const Scene& scene, const geometry::Camera& camera, cons
   const Fineness fineness = this->fineness(rect);
   const geometry::Camera around = crop(fine, sub);
   if (!scene.rays || !scene.rays->look_up(around, list_.epoch, met_m_)) met_m_.clear();
-  if (!fineness.worthwhile && met_m_.empty()) return false;
+  const auto known = met_m_.size() - size_t(std::count(met_m_.begin(), met_m_.end(), 0.0f));
+  if (!fineness.worthwhile && double(known) <= kWorthwhile * rect.width * rect.height) return false;
   render(scene, list_, around, fine_);
   if (!met_m_.empty()) show_met(scene, around);
   const bool open = count_covered(rect), gaps = open || fineness.gaps;

@@ -16,8 +16,9 @@ bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequenc
 }  // namespace
 
 uint64_t EventLog::Patch::bytes() const {
-  return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() + event.missed.capacity() * sizeof event.missed[0] +
-         forgotten.capacity() * sizeof forgotten[0] + patch_forgotten.capacity() * sizeof patch_forgotten[0];
+  return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() +
+         event.missed.capacity() * sizeof event.missed[0] + forgotten.capacity() * sizeof forgotten[0] +
+         patch_forgotten.capacity() * sizeof patch_forgotten[0];
 }
 
 uint64_t EventLog::bytes() const {

@@ -45,6 +45,14 @@ float at(const FineRays& rays, const geometry::Camera& camera, int x, int y, Epo
   return met_m[size_t(y) * size_t(camera.width) + size_t(x)];
 }
 
+// Rays that met nothing, left of a surface 2 m away.
+void add_surface(FineRays& rays) {
+  Sampled fine(4, {600, 300, 80, 40});
+  for (int y = 300; y < 340; ++y)
+    for (int x = 600; x < 680; ++x) x < 640 ? fine.miss(x, y) : fine.hit(x, y);
+  rays.add(fine.tile());
+}
+
 TEST(FineRays, TellWhatEachRayMet) {
   FineRays rays;
   EXPECT_EQ(at(rays, finer(4), 5, 5), 0);
@@ -72,6 +80,11 @@ TEST(FineRays, TheFinestOnesCount) {
   rays.add(Sampled(4, {600, 300, 40, 40}).hit(600, 300).tile());
   rays.add(Sampled(2, {310, 160, 20, 20}).miss(310, 160).tile());
   EXPECT_NEAR(at(rays, finer(4), 600, 300), 2, 1e-3);
+  // There is no third size.
+  FineRays three;
+  add_surface(three);
+  for (const int times : {2, 3}) three.add(Sampled(times, {0, 0, 4, 4}).miss(0, 0).tile());
+  EXPECT_EQ(at(three, finer(4), 620, 320), 0);
   for (const auto& [x, y] : {std::pair{601, 300}, {600, 301}, {601, 301}, {604, 300}, {620, 320}})
     EXPECT_EQ(at(rays, finer(4), x, y), -kInf) << "one of twice the resolution was there at " << x << ", " << y;
 }
@@ -80,10 +93,14 @@ TEST(FineRays, AreOfOneEye) {
   FineRays rays;
   rays.add(Sampled(4, {600, 300, 40, 40}).miss(600, 300).hit(640 - 1, 300).tile());
   geometry::Camera beside = finer(4);
-  beside.pose.position_room.x += 1e-3;  // moves what is 2 m away by 0.3 pixels
+  beside.pose.position_room.x += 4e-4;  // moves what is 0.3 m away by 0.9 rays: something may be as near
   EXPECT_EQ(at(rays, beside, 600, 300), kInf);
-  beside.pose.position_room.x += 2e-3;
+  beside.pose.position_room.x += 2e-4;
   EXPECT_EQ(at(rays, beside, 600, 300), 0);
+  FineRays nothing_met;
+  nothing_met.add(Sampled(4, {600, 300, 40, 40}).miss(600, 300).tile());
+  EXPECT_EQ(at(nothing_met, finer(4), 600, 300), kInf);
+  EXPECT_EQ(at(nothing_met, beside, 600, 300), 0) << "it is not known how near things are";
 
   // The same eye looks elsewhere: what lies in another direction has another depth.
   geometry::Camera turned =
@@ -116,26 +133,43 @@ TEST(FineRays, AreOfOneEye) {
   EXPECT_EQ(at(rays, next.camera, 2, 2, {9}), kInf);
 }
 
-TEST(FineRays, WhatAViewFindsWhereTheyMetNothingIsForgotten) {
+TEST(FineRays, WhatOthersMeetWhereTheyMetNothingIsForgotten) {
   FineRays rays;
-  rays.add(Sampled(4, {600, 300, 40, 40})
-               .miss(600, 300)
-               .miss(603, 303)
-               .miss(604, 300)
-               .hit(601, 300, 5)
-               .hit(602, 300)
-               .tile());
-  rays.add(Sampled(2, {300, 150, 40, 40}).miss(301, 151).tile());
+  add_surface(rays);
   Sampled view(1, {140, 70, 40, 40});
-  view.hit(150, 75, 2);  // 600 to 603, 300 to 303 of the finest
+  view.hit(155, 80, 2);  // 620 to 623, 320 to 323 of the finest
   rays.revise(view.camera, view.rect, view.image);
-  for (const auto& [x, y] : {std::pair{600, 300}, {603, 303}, {601, 300}}) EXPECT_EQ(at(rays, finer(4), x, y), 0);
-  EXPECT_NEAR(at(rays, finer(4), 602, 300), 2, 1e-3) << "they agree";
-  EXPECT_EQ(at(rays, finer(4), 604, 300), kInf);
-  view.camera.pose.position_room.x = 1;
-  view.hit(151, 75, 2);
+  for (const auto& [x, y] : {std::pair{620, 320}, {623, 323}, {620, 323}, {622, 322}})
+    EXPECT_EQ(at(rays, finer(4), x, y), 0) << x << ", " << y;
+  EXPECT_EQ(at(rays, finer(4), 610, 320), kInf);
+  std::vector<geometry::Rect> changes;
+  rays.take_changes(finer(4), changes);
+  EXPECT_EQ(changes.size(), 2u) << "the tile, and around the ray";
+
+  // From another place, before the surface.
+  view = Sampled(1, {0, 0, 320, 200});
+  view.camera.pose.position_room = {0.5, 0, 0};
+  const glm::dvec3 there = finer(4).unproject(660.5, 320.5, 1);
+  const auto t = view.camera.room_to_pixel();
+  const double w = glm::dot(t.w, glm::dvec4(there, 1));
+  view.hit(int(glm::dot(t.x, glm::dvec4(there, 1)) / w), int(glm::dot(t.y, glm::dvec4(there, 1)) / w), w);
   rays.revise(view.camera, view.rect, view.image);
-  EXPECT_EQ(at(rays, finer(4), 604, 300), kInf) << "a view from elsewhere";
+  int forgotten = 0;
+  for (int x = 650; x < 670; ++x) forgotten += at(rays, finer(4), x, 320) == 0;
+  EXPECT_GT(forgotten, 3);
+}
+
+TEST(FineRays, WhatOthersMeetBesideASilhouetteChangesNothing) {
+  FineRays rays;
+  add_surface(rays);
+  FineRays same;
+  add_surface(same);
+  Sampled rim(4, {639, 320, 1, 1});
+  rays.revise(rim.camera, rim.rect, rim.hit(639, 320).image);
+  EXPECT_EQ(at(rays, finer(4), 639, 320), kInf) << "the ray beside it met that surface";
+  const Sampled view = Sampled(1, {140, 70, 40, 40}).hit(165, 80, 2).hit(166, 80, 2.05).hit(167, 80, 5);
+  rays.revise(view.camera, view.rect, view.image);
+  for (int x = 600; x < 680; ++x) EXPECT_EQ(at(rays, finer(4), x, 321), at(same, finer(4), x, 321)) << x;
 }
 
 TEST(FineRays, TakeBoundedMemory) {
@@ -150,6 +184,14 @@ TEST(FineRays, TakeBoundedMemory) {
   const auto known = [&](int y) { return at(rays, geometry::crop(camera, {0, y, 64, 64}), 0, 0) != 0; };
   const int kept = int(FineRays::kMostBlocks) / blocks;
   EXPECT_TRUE(known(0));
+  Sampled view(1, {0, 0, 1, 1});
+  view.camera = camera;
+  for (int y = 0; y < side; y += 2048) {
+    view.rect.y = y;
+    view.hit(0, y, 1);
+    rays.revise(view.camera, view.rect, view.image);
+  }
+  EXPECT_FALSE(known(0)) << "something came";
   EXPECT_TRUE(known((kept - 1) * FineRays::kBlock));
   EXPECT_FALSE(known(kept * FineRays::kBlock));
 }
@@ -188,9 +230,9 @@ TEST(FineRays, ComeWithPatches) {
   patch.missed.assign(5, 0xffffffff);
   EXPECT_FALSE(add_rays(patch, s.image, rays).ok());
 
-  Sampled view(1, {150, 75, 1, 1});
+  Sampled view(4, {600, 300, 1, 1});
   patch.extra = false, patch.missed.clear(), patch.camera = view.camera, patch.rect = view.rect;
-  view.hit(150, 75, 1);
+  view.hit(600, 300, 1);
   ASSERT_TRUE(add_rays(patch, view.image, rays).ok());
   EXPECT_EQ(at(rays, finer(4), 600, 300), 0) << "something came";
 }

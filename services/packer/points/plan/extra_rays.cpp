@@ -32,8 +32,6 @@ constexpr int kNearEdge = 32;  // pixels; a word of a mask is twice as wide
 // The surfaces of a view that stands still are judged again when all of its finer rays are cast, so many times: what
 // these rays found has edges of its own.
 constexpr int kMostLooks = 3;
-// The finest rays are 2^this a side of a pixel.
-constexpr int kFinest = 2;
 // Tiles of a finer view that are looked at before rays are counted again.
 constexpr size_t kTilesAtOnce = 8;
 // Sides of the parts of a finer view whose points are chosen and binned at once: those of all of it are so many that to
@@ -254,15 +252,16 @@ bool Planner::Impl::plan_stages(Question& q, ViewerView& view) {
   // What differs little gets all of its rays at once: what waits for them shows little of it, and each pass more is
   // another patch of each cluster for packer and viewers to merge.
   const int weak = while_still >= 16 ? 2 : 1;
-  const FineStage stages[] = {{map->edge, 1, true},
-                              {map->edge, 2, true},
-                              {map->strong, 1, false},
-                              {map->strong, 2, false},
-                              {map->weak, weak, false}};
-  for (const FineStage& stage : stages) {
-    const int most = stage.edge ? std::max(config.edge_rays, while_still) : while_still;
-    if (most >= 1 << 2 * stage.finer && plan_fine(q, view, stage)) return true;
-  }
+  // Of pixels at edges all of the finest rays are cast, also where the model has samples: where a ray passes beside a
+  // sample, none tells.
+  const int at_edges = std::max(config.edge_rays, while_still);
+  const FineStage stages[] = {{0, map->edge, 1, at_edges, at_edges < 16},
+                              {1, map->edge, 2, at_edges, true},
+                              {2, map->strong, 1, while_still, false},
+                              {3, map->strong, 2, while_still, false},
+                              {4, map->weak, weak, while_still, false}};
+  for (const FineStage& stage : stages)
+    if (stage.most >= 1 << 2 * stage.finer && plan_fine(q, view, stage)) return true;
   return false;
 }
 
@@ -363,14 +362,11 @@ void Planner::Impl::look_into(Question& q, const geometry::Rect& region, FineSea
 
 bool Planner::Impl::plan_fine(Question& q, ViewerView& view, const FineStage& stage) {
   const int times = 1 << stage.finer;
-  const auto finer = static_cast<size_t>(stage.finer);
-  // Of pixels at edges all of the finest rays are cast, also where the model has samples: where a ray passes beside a
-  // sample, none tells.
   FineSearch search{.camera = finer_camera(view.camera, times),
-                    .all = stage.edge && stage.finer == kFinest,
+                    .all = stage.all,
                     .open = stage.wanted,
-                    .refined = view.refined[finer],
-                    .tiles = view.found[finer]};
+                    .refined = view.refined[static_cast<size_t>(stage.finer)],
+                    .tiles = view.found[stage.number]};
   if (!geometry::validate(search.camera)) return false;
   for (int y = 0; y < search.open.height(); ++y)
     for (size_t w = 0; w < search.open.words_per_row(); ++w) search.open.row(y)[w] &= ~search.refined.row(y)[w];

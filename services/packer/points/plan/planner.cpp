@@ -242,8 +242,8 @@ void Planner::inserted(const points::PreparedPatch& patch) {
 }
 
 void Planner::forgotten(std::span<const points::ClusterKey> clusters) {
+  ++impl_->changes;  // single patches may have gone, and no cluster with them
   if (clusters.empty()) return;
-  ++impl_->changes;
   impl_->known_empty.forget(clusters);
   impl_->validation.forgotten(clusters);
   for (PlannedFrame& frame : impl_->shelf.frames()) frame.nearest_known = false;

@@ -56,11 +56,13 @@ struct Planner::Impl {
   bool plan_fine(Question& q, ViewerView& view);
   void look_closer(Question& q, ViewerView& view);
   bool plan_stages(Question& q, ViewerView& view);
-  /// Pixels that shall have 2^finer rays a side; edge: they lie at one.
+  /// Pixels that shall have 2^finer rays a side; all: also where the model has samples. number: of the stage.
   struct FineStage {
+    size_t number;
     const image::PixelMask& wanted;
     int finer;
-    bool edge;
+    int most;  ///< rays that such a pixel may have
+    bool all;
   };
   bool plan_fine(Question& q, ViewerView& view, const FineStage& stage);
   /// Pixels of a view that have not had such rays; what was looked at, and found there.

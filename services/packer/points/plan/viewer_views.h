@@ -33,13 +33,14 @@ struct ViewerView {
   double sets_due = 0, validated_s = -1e9;
 
   // Extra rays for this camera.
-  unsigned cell_turn = 0;                     ///< the direction that is next; goes on from view to view
-  unsigned cells_done = 0;                    ///< bit i: nothing is left to be cast from direction i
-  std::array<image::PixelMask, 3> refined;    ///< [n]: pixels of the view whose rays at 2^n rays a side were planned
-  std::array<std::vector<RayTile>, 3> found;  ///< of these, tiles that wait until they are as many as a plan may have
-  std::shared_ptr<const ViewMap> fine_map;    ///< by which finer rays are chosen; null: none yet
-  uint64_t fine_changes = 0;                  ///< of the model that it shows
-  int looks = 0;                              ///< how many such maps there were for this camera
+  unsigned cell_turn = 0;                   ///< the direction that is next; goes on from view to view
+  unsigned cells_done = 0;                  ///< bit i: nothing is left to be cast from direction i
+  std::array<image::PixelMask, 3> refined;  ///< [n]: pixels of the view whose rays at 2^n rays a side were planned
+  /// [stage]: tiles of these that wait until they are as many as a plan may have.
+  std::array<std::vector<RayTile>, 5> found;
+  std::shared_ptr<const ViewMap> fine_map;  ///< by which finer rays are chosen; null: none yet
+  uint64_t fine_changes = 0;                ///< of the model that it shows
+  int looks = 0;                            ///< how many such maps there were for this camera
   std::deque<LostTiles> lost;
   uint64_t cell_rays = 0, fine_rays = 0;  ///< planned so far
 };
