@@ -125,6 +125,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch) {
     log::warn("patch {} cannot be decoded: {}", patch.sequence.value, decoded.error().text);
     return false;
   }
+  if (patch.viewer == options_.viewer && !patch.extra) rays_.follow(patch.camera);
   // What finer rays of others' views missed is not shown here; what they met counts.
   if (!patch.missed.empty() && patch.viewer != options_.viewer) {
     rays_.revise(patch.camera, patch.rect, tile_);

@@ -99,6 +99,11 @@ void FineRays::clear() {
   forget();
 }
 
+void FineRays::follow(const geometry::Camera& view) {
+  const std::lock_guard lock(mutex_);
+  if (!layers_.empty() && !same_eye(view)) forget();
+}
+
 FineRays::Layer& FineRays::layer_of(const geometry::Camera& camera) {
   if (!layers_.empty() && !same_frustum(camera, layers_.front().camera)) forget();
   const auto known = std::find_if(layers_.begin(), layers_.end(), [&](const Layer& l) { return l.camera == camera; });

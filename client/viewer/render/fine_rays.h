@@ -22,8 +22,8 @@ class FineRays {
  public:
   /// Rays a side of a block; blocks that no ray looked into take no memory.
   static constexpr int kBlock = 64;
-  /// More are not kept: 64 MiB. What is left out is shown as points alone do.
-  static constexpr size_t kMostBlocks = 8192;
+  /// More are not kept: 128 MiB. What is left out is shown as points alone do.
+  static constexpr size_t kMostBlocks = 16384;
   /// Of different sizes: with two and four rays a side of a pixel. One more makes all begin anew.
   static constexpr size_t kMostLayers = 2;
 
@@ -42,6 +42,8 @@ class FineRays {
   /// is around it is forgotten. Precondition: rect lies in the camera's picture, and the image is of its size.
   void revise(const geometry::Camera& camera, const geometry::Rect& rect, const image::DepthImage& image);
   void clear();
+  /// The viewer's newest view: rays of another eye are forgotten.
+  void follow(const geometry::Camera& view);
 
   /// What the rays nearest to the camera's pixels have met, by rows: depth in metres, infinity: nothing, 0: not known.
   /// Less than 0: it was not of the finest rays that there are, so samples between them may tell more.

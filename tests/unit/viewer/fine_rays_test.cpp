@@ -119,6 +119,15 @@ TEST(FineRays, AreOfOneEye) {
   turned.pose.orientation = glm::angleAxis(3.1, glm::dvec3(0, 1, 0));
   EXPECT_FALSE(rays.look_up(turned, kEpoch, met_m)) << "it looks away";
 
+  rays.follow(kView);
+  EXPECT_EQ(at(rays, finer(4), 600, 300), kInf);
+  FineRays moved;
+  add_surface(moved);
+  geometry::Camera elsewhere = kView;
+  elsewhere.pose.position_room.z += 0.1;
+  moved.follow(elsewhere);
+  EXPECT_EQ(at(moved, finer(4), 620, 320), 0);
+
   // A view from elsewhere begins anew.
   Sampled next(4, {0, 0, 8, 8});
   next.camera.pose.position_room.z += 0.5;
