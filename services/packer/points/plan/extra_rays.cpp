@@ -178,7 +178,7 @@ bool Planner::Impl::plan_cells(Question& q, ViewerView& view) {
   return false;
 }
 
-// From beside what is near the surface is another world: a head 3 cm before a mesh that was looked at from 20 cm aside
+// From beside what is near the surface is another world: a head close to a mesh that was looked at from 20 cm aside
 // added 400,000 points a round, on and on.
 double Planner::Impl::step_aside_m(const ViewerView& view) const {
   if (!view.map) return config.view_cell_m;
