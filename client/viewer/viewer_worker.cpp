@@ -59,12 +59,12 @@ void ViewerWorker::on_first_points(double now_s) {
   if (first_points_s_ == 0) first_points_s_ = now_s - started_s_;
 }
 
-void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochId epoch,
-                            const ShownUpdate* waited_for) {
+void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown,
+                            bool waited) {
   ++frames_shown_;
   if (const uint64_t before = epoch_shown_.exchange(epoch.value); before != 0 && before != epoch.value) ++epochs_shown_;
   const std::lock_guard lock(mutex_);
-  poses_.push_back({now_s, camera, waited_for ? waited_for->requested_s : 0.0});
+  poses_.push_back({now_s, camera, waited ? shown.requested_s : 0.0, shown.request});
 }
 
 ViewerWorker::Figures ViewerWorker::figures() const {
@@ -83,6 +83,7 @@ void ViewerWorker::loop() {
   try {
     while (!stop_) {
       const double now = monotonic_s();
+      offset_s_ = link_.to_master_s(now) - now;
       link_.tick(now, [this] { return status(); });
       follow_session();
       request_views(now);
@@ -109,7 +110,7 @@ void ViewerWorker::receive() {
 }
 
 void ViewerWorker::receive_control() {
-  link_.receive(monotonic_s());
+  link_.receive();
   if (link_.shutdown_requested()) shutdown_ = true;
 }
 
@@ -120,7 +121,6 @@ void ViewerWorker::follow_session() {
   const scene::SessionView view(session);
   follow_record(session);
   legends_.follow(session);
-  offset_s_ = link_.to_master_s(0);
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
   requester_.set_min_scale(options_.least_sampling.value_or(told));
   requester_.set_steered(view.setting("sampling.steering", 0) != 0);
@@ -193,7 +193,9 @@ void ViewerWorker::on_part(const ViewPart& part) {
   const auto u = requester_.on_part(part, now_s);
   if (!u) return;
   updates_table_.add(update_row({*u, part}));
-  spans_.add("view update", u->requested_s, u->complete_s, 2);
+  stages_table_.complete({*u, part});
+  spans_.add("view update", u->requested_s, u->complete_s, metrics::kOverlapping,
+             {.frame = double(part.frame.value), .request = double(u->request.value)});
   const ShownUpdate update{u->request, u->requested_s, part.camera.pose};
   if (!gate_.waits()) may_display(update);
   {
@@ -227,6 +229,7 @@ void ViewerWorker::take_poses() {
   }
   for (const auto& p : poses) {
     requester_.on_pose(to_master_s(p.t_s), p.camera);
+    if (p.shown.value != 0) stages_table_.displayed(p.shown, to_master_s(p.t_s));
     if (p.waited_since_s > 0) requester_.on_displayed(to_master_s(p.t_s) - p.waited_since_s);
   }
 }
@@ -261,8 +264,10 @@ void ViewerWorker::request_views(double now_s) {
 void ViewerWorker::report(double now_s, bool last) {
   if (!last && now_s - last_report_s_ < kReportPeriod_s) return;
   last_report_s_ = now_s;
+  if (last) take_poses();
+  const InstanceId own = link_.instance();
   for (const auto& rows :
-       {frames_.flush(link_.instance()), updates_table_.flush(link_.instance()), spans_.flush(link_.instance())})
+       {frames_.flush(own), updates_table_.flush(own), stages_table_.flush(own, last), spans_.flush(own)})
     if (rows) link_.socket().send(*rows);
   if (received_) received_->report();
 }

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "client/viewer/coupling/stage_table.h"
 #include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
 #include "client/viewer/session_record.h"
@@ -41,8 +42,8 @@ class ViewerWorker {
   void on_pose(double now_s, const geometry::Camera& camera);
   /// Something of the scene was displayed for the first time (later calls change nothing).
   void on_first_points(double now_s);
-  /// A frame of this epoch was displayed with this camera. waited_for: the update that it waited for, if it did.
-  void on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate* waited_for);
+  /// A frame of this epoch was displayed with this camera. shown: the newest update in it; waited: it waited for that.
+  void on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown, bool waited);
   /// What to draw from, see Succession::at. Null: it is not known yet what the session shows.
   std::shared_ptr<Received> received_at(RequestId request) { return succession_.at(request); }
   /// True once one view update is complete.
@@ -86,6 +87,7 @@ class ViewerWorker {
   metrics::TableRecorder& frames_;
   metrics::SpanRecorder& spans_;
   metrics::TableRecorder updates_table_;
+  StageTable stages_table_;
   net::MasterLink link_;
   Feeds feeds_;
   ViewRequester requester_;
@@ -103,6 +105,7 @@ class ViewerWorker {
     geometry::Camera camera;
     /// Master's clock: when the update was requested that the frame waited for; 0: it did not.
     double waited_since_s = 0;
+    RequestId shown;  ///< the newest update in what was displayed; 0: nothing was
   };
   LegendBook legends_;
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below

@@ -20,6 +20,7 @@ std::vector<double> Rows::column(const std::string& name) const {
 Rows* Measured::table(const std::string& name) {
   if (name == "frames") return &frames;
   if (name == "updates") return &updates;
+  if (name == "stages") return &stages;
   return nullptr;
 }
 

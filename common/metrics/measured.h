@@ -24,14 +24,14 @@ struct Rows {
 };
 
 struct Measured {
-  Rows frames, updates;
+  Rows frames, updates, stages;
   std::vector<std::string> viewers;  ///< names of those that sent rows
   std::vector<wire::TileDone> tiles;
   std::vector<PlanRow> plans;
   std::map<std::string, double> busy_s;  ///< sample begin to encode end, by sampler
   size_t epochs = 0;
 
-  /// "frames" or "updates"; null for other names.
+  /// "frames", "updates" or "stages"; null for other names.
   Rows* table(const std::string& name);
   /// Refuses, and keeps nothing of, rows whose shape does not fit. Precondition: table(more.table).
   Status add(const std::string& viewer, const wire::MetricRows& more);

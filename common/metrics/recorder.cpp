@@ -23,12 +23,13 @@ std::optional<wire::MetricRows> TableRecorder::flush(InstanceId instance) {
   return out;
 }
 
-void SpanRecorder::add(const char* name, double begin_s, double end_s, int lane) {
+void SpanRecorder::add(const char* name, double begin_s, double end_s, int lane, const SpanOf& of) {
   const std::lock_guard lock(mutex_);
   if (values_.size() >= kMaxBuffered) return;
   auto it = std::find(names_.begin(), names_.end(), name);
   if (it == names_.end()) it = names_.insert(it, name);
-  values_.insert(values_.end(), {static_cast<double>(it - names_.begin()), begin_s, end_s, static_cast<double>(lane)});
+  values_.insert(values_.end(), {static_cast<double>(it - names_.begin()), begin_s, end_s, static_cast<double>(lane),
+                                 of.frame, of.tile, of.request});
 }
 
 std::optional<wire::MetricRows> SpanRecorder::flush(InstanceId instance) {

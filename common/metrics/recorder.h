@@ -30,16 +30,27 @@ class TableRecorder {
   std::vector<double> values_;
 };
 
-/// Spans "name, from, to, lane" in seconds of the master's clock; lane tells a process's threads apart.
+/// Values of a row of "spans".
+inline constexpr size_t kSpanWidth = 7;
+
+/// What a span is about; -1: that is not known, or it is about several.
+struct SpanOf {
+  double frame = -1, tile = -1, request = -1;
+};
+/// Spans of this lane may overlap: they are told apart by what they are about.
+inline constexpr int kOverlapping = -1;
+
+/// Spans "name, from, to, lane, frame, tile, request" in seconds of the master's clock; lane tells a process's threads
+/// apart.
 class SpanRecorder {
  public:
-  void add(const char* name, double begin_s, double end_s, int lane = 0);
+  void add(const char* name, double begin_s, double end_s, int lane = 0, const SpanOf& of = {});
   std::optional<wire::MetricRows> flush(InstanceId instance);
 
  private:
   std::mutex mutex_;
   std::vector<std::string> names_;
-  std::vector<double> values_;  // rows of name index, begin, end, lane
+  std::vector<double> values_;  // rows of kSpanWidth: name index, begin, end, lane, frame, tile, request
 };
 
 }  // namespace telesplat::metrics

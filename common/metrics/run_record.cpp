@@ -11,6 +11,7 @@
 
 #include "common/core/utf8.h"
 #include "common/metrics/columns.h"
+#include "common/metrics/recorder.h"
 #include "common/metrics/run_folder.h"
 #include "common/metrics/summary.h"
 
@@ -27,7 +28,8 @@ struct TileRow {
   const wire::TileDone& tile;
   double begin_s;  // of the run
 
-  std::string moment(double master_s) const { return seconds(master_s - begin_s); }
+  // Empty: it did not happen.
+  std::string moment(double master_s) const { return master_s > 0 ? seconds(master_s - begin_s) : ""; }
 };
 constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"frame", [](const TileRow& r) { return whole(r.tile.frame.value); }},
@@ -38,13 +40,13 @@ constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"kept", [](const TileRow& r) { return whole(r.tile.kept); }},
     {"bytes_sampled", [](const TileRow& r) { return whole(r.tile.bytes_sampled); }},
     {"bytes_sent", [](const TileRow& r) { return whole(r.tile.bytes_sent); }},
-    {"leased_s", [](const TileRow& r) { return r.moment(r.tile.leased_s); }},
-    {"sample_begin_s", [](const TileRow& r) { return r.moment(r.tile.sample_begin_s); }},
-    {"sample_end_s", [](const TileRow& r) { return r.moment(r.tile.sample_end_s); }},
-    {"encode_end_s", [](const TileRow& r) { return r.moment(r.tile.encode_end_s); }},
-    {"receive_s", [](const TileRow& r) { return r.moment(r.tile.receive_s); }},
-    {"packed_s", [](const TileRow& r) { return r.moment(r.tile.packed_s); }},
-    {"published_s", [](const TileRow& r) { return r.tile.published_s > 0 ? r.moment(r.tile.published_s) : ""; }},
+    {"leased_s", [](const TileRow& r) { return r.moment(r.tile.moments.leased_s); }},
+    {"sample_begin_s", [](const TileRow& r) { return r.moment(r.tile.moments.sample_begin_s); }},
+    {"sample_end_s", [](const TileRow& r) { return r.moment(r.tile.moments.sample_end_s); }},
+    {"encode_end_s", [](const TileRow& r) { return r.moment(r.tile.moments.encode_end_s); }},
+    {"receive_s", [](const TileRow& r) { return r.moment(r.tile.moments.receive_s); }},
+    {"packed_s", [](const TileRow& r) { return r.moment(r.tile.moments.packed_s); }},
+    {"published_s", [](const TileRow& r) { return r.moment(r.tile.moments.published_s); }},
     {"x", [](const TileRow& r) { return std::to_string(r.tile.rect.x); }},
     {"y", [](const TileRow& r) { return std::to_string(r.tile.rect.y); }},
     {"width", [](const TileRow& r) { return std::to_string(r.tile.rect.width); }},
@@ -52,6 +54,14 @@ constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"step", [](const TileRow& r) { return whole(r.tile.step); }},
     {"rays", [](const TileRow& r) { return whole(r.tile.rays); }},
     {"extra", [](const TileRow& r) { return whole(r.tile.extra); }},
+    {"request", [](const TileRow& r) { return r.tile.request.value ? whole(r.tile.request.value) : ""; }},
+    {"requested_s", [](const TileRow& r) { return r.moment(r.tile.moments.requested_s); }},
+    {"received_s", [](const TileRow& r) { return r.moment(r.tile.moments.received_s); }},
+    {"begun_s", [](const TileRow& r) { return r.moment(r.tile.moments.begun_s); }},
+    {"planned_s", [](const TileRow& r) { return r.moment(r.tile.moments.planned_s); }},
+    {"lease_arrived_s", [](const TileRow& r) { return r.moment(r.tile.moments.lease_arrived_s); }},
+    {"fetch_ms", [](const TileRow& r) { return exact(r.tile.moments.fetch_s * 1e3); }},
+    {"arrived_s", [](const TileRow& r) { return r.moment(r.tile.moments.arrived_s); }},
 };
 
 bool is_time(const std::string& column) { return column.ends_with("_s"); }
@@ -60,6 +70,7 @@ bool is_moment(const std::string& column) { return is_time(column) && column != 
 // Of a viewer's table. Moments count from the run's beginning.
 std::string cell_of(const std::string& column, double value, double begin_s) {
   if (is_moment(column)) return seconds(value - begin_s);
+  if (column == "display_ms" && value < 0) return "";  // no frame showed it
   return is_time(column) ? seconds(value) : exact(value);
 }
 
@@ -110,17 +121,21 @@ Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory,
 
 Status RunRecord::open_files() {
   if (!frames_file_.open(directory_ + "/frames.csv") || !updates_file_.open(directory_ + "/updates.csv") ||
-      !tiles_file_.open(directory_ + "/tiles.csv") || !epochs_file_.open(directory_ + "/epochs.csv") ||
+      !stages_file_.open(directory_ + "/stages.csv") || !tiles_file_.open(directory_ + "/tiles.csv") || !epochs_file_.open(directory_ + "/epochs.csv") ||
       !trace_.open(directory_ + "/trace.json", begin_.monotonic_s))
     return Error{fmt::format("{}: cannot write into it: {}", directory_, std::strerror(errno))};
   tiles_file_.write(csv_line(names(kTileColumns)));
   return ok_status();
 }
 
+TextFile& RunRecord::file_of(const std::string& table) {
+  return table == "frames" ? frames_file_ : table == "stages" ? stages_file_ : updates_file_;
+}
+
 Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows) {
   if (rows.table == "spans") {
-    if (rows.values.size() % 4)
-      return Error{fmt::format("spans hold {} values, not a multiple of 4", rows.values.size())};
+    if (rows.values.size() % kSpanWidth)
+      return Error{fmt::format("spans hold {} values, not a multiple of {}", rows.values.size(), kSpanWidth)};
     trace_.add(process, rows);
     return ok_status();
   }
@@ -147,7 +162,8 @@ Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows)
 
 void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& tile) {
   measured_.tiles.push_back(tile);
-  measured_.busy_s[sampler] += std::max(0.0, tile.encode_end_s - tile.sample_begin_s);
+  measured_.busy_s[sampler] += std::max(0.0, tile.moments.encode_end_s - tile.moments.sample_begin_s);
+  trace_.add_lease(sampler, tile);
   if (tiles_file_.is_open())
     tiles_file_.write(csv_line(values(kTileColumns, TileRow{sampler, tile, begin_.monotonic_s})));
 }
@@ -186,6 +202,7 @@ void RunRecord::add_assignment(const std::vector<Assignment>& transfers) {
 void RunRecord::add_plan(const std::string& viewer, const PlanRow& plan) {
   // The summary needs no more of it, and a session may last for hours.
   PlanRow& kept = measured_.plans.emplace_back(plan);
+  trace_.add_plan(viewer, plan);
   std::erase_if(kept.figures, [](const auto& figure) { return figure.first != "plan_ms"; });
   if (directory_.empty()) return;
   if (!plans_file_.is_open() && plans_file_.open(directory_ + "/plans.csv"))

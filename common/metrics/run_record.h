@@ -1,4 +1,4 @@
-// The record of a run: frames.csv, updates.csv, tiles.csv, plans.csv, epochs.csv, assignment.csv, trace.json and
+// The record of a run: frames.csv, updates.csv, stages.csv, tiles.csv, plans.csv, epochs.csv, assignment.csv, trace.json and
 // summary.json in one folder (docs/metrics.md tells every column and figure). The master writes it as rows arrive: what
 // was measured survives, however the run ends.
 #pragma once
@@ -33,7 +33,7 @@ class RunRecord {
   /// work. begin: from here on count the times of all files, which come on the master's clock.
   static Result<std::unique_ptr<RunRecord>> open(const std::string& directory, const Beginning& begin = {});
 
-  /// Rows of "frames", "updates" or "spans" from `process`. Refuses unknown tables and shapes that do not fit. Columns
+  /// Rows of "frames", "updates", "stages" or "spans" from `process`. Refuses unknown tables and shapes that do not fit. Columns
   /// whose names end in _s are moments of the master's clock; but for t_s, which each viewer counts from its own.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
   void add_tile(const std::string& sampler, const wire::TileDone& tile);
@@ -57,13 +57,13 @@ class RunRecord {
  private:
   RunRecord() = default;
   Status open_files();
-  TextFile& file_of(const std::string& table) { return table == "frames" ? frames_file_ : updates_file_; }
+  TextFile& file_of(const std::string& table);
 
   std::string directory_;
   Beginning begin_;
   Measured measured_;
   std::vector<std::string> epoch_columns_, epoch_texts_;
-  TextFile frames_file_, updates_file_, tiles_file_, epochs_file_;
+  TextFile frames_file_, updates_file_, stages_file_, tiles_file_, epochs_file_;
   TextFile assignment_file_, plans_file_;  // opened when there is something to write: the first of volumes alone
   TraceFile trace_;
 };

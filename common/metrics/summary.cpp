@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 
 #include "common/image/depth_image.h"
 #include "common/metrics/roster.h"
+#include "common/metrics/stages.h"
 #include "common/metrics/statistics.h"
 #include "common/scene/session.h"
 
@@ -77,10 +80,11 @@ FrameDurations frame_durations(const std::vector<wire::TileDone>& tiles) {
   for (const wire::TileDone& t : tiles) {
     if (t.step != 1 || t.extra) continue;
     Times& f = frames[t.frame.value];
-    f.leased = std::min(f.leased, t.leased_s);
-    f.begin = std::min(f.begin, t.sample_begin_s);
-    f.end = std::max(f.end, t.encode_end_s);
-    f.packing_s += t.packed_s - t.receive_s;
+    const wire::Moments& at = t.moments;
+    f.leased = std::min(f.leased, at.leased_s);
+    f.begin = std::min(f.begin, at.sample_begin_s);
+    f.end = std::max(f.end, at.encode_end_s);
+    f.packing_s += at.packed_s - at.receive_s;
   }
   FrameDurations out;
   for (const auto& [id, f] : frames) {
@@ -176,6 +180,41 @@ ordered_json what_was_shown(const Roster& roster) {
           {"sampling", viewer("sampling")}};
 }
 
+/// Where the time of view updates went: each stage's distribution, and its share of the sum of all latencies.
+ordered_json where_time_went(const Measured& m) {
+  const auto latencies = m.stages.column("latency_ms");
+  const double sum = std::accumulate(latencies.begin(), latencies.end(), 0.0);
+  auto out = ordered_json::object();
+  for (const Stage& stage : kStages) {
+    const auto ms = m.stages.column(stage.column);
+    if (ms.empty()) continue;
+    ordered_json& entry = out[std::string(stage.column, std::strlen(stage.column) - std::strlen("_ms"))];
+    entry = distribution_json(ms);
+    entry["share"] = sum > 0 ? std::round(std::accumulate(ms.begin(), ms.end(), 0.0) / sum * 1e4) / 1e4 : 0.0;
+  }
+  return if_measured(!latencies.empty(), out);
+}
+
+/// Completion to the end of the first frame that showed it.
+ordered_json display_latency(const Measured& m) {
+  auto ms = m.stages.column("display_ms");
+  std::erase_if(ms, [](double d) { return d < 0; });  // no frame did
+  return distribution_json(ms);
+}
+
+/// How well the processes' clocks are known: the worst of each.
+ordered_json clocks(const std::vector<Process>& processes) {
+  double offset_ms = 0, error_ms = -1;
+  for (const Process& p : processes) {
+    const auto error = p.values.find("clock_error_ms"), offset = p.values.find("clock_offset_ms");
+    if (error == p.values.end() || offset == p.values.end()) continue;
+    error_ms = std::max(error_ms, error->second);
+    if (std::abs(offset->second) > std::abs(offset_ms)) offset_ms = offset->second;
+  }
+  return if_measured(error_ms >= 0, ordered_json{{"largest_offset_ms", thousandths(offset_ms)},
+                                                 {"largest_error_ms", thousandths(error_ms)}});
+}
+
 double longest_s(const std::map<std::string, ViewerFigures>& viewers) {
   double out = 0;
   for (const auto& [name, v] : viewers) out = std::max(out, v.duration_s);
@@ -215,6 +254,8 @@ ordered_json how_long(const Measured& m) {
           {"view_construction_ms", distribution_json(m.frames.column("construction_ms"))},
           {"view_update_latency_ms", distribution_json(m.updates.column("latency_ms"))},
           {"start_up_latency_ms", distribution_json(m.updates.column("start_up_ms"))},
+          {"latency_stages_ms", where_time_went(m)},
+          {"display_latency_ms", display_latency(m)},
           {"sampling_ms", distribution_json(durations.sampling_ms)},
           {"lease_to_sampled_ms", distribution_json(durations.leased_ms)},
           {"packing_ms", distribution_json(durations.packing_ms)},
@@ -300,6 +341,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(what_was_shown(roster));
   out.update(how_often(measured, figures, counter("frames_completed")));
   out.update(how_long(measured));
+  out["clock"] = clocks(processes);
   out.update(how_much(traffic(measured, roster), run_s, viewers));
   out.update(what_was_steered(measured));
   out.update(what_was_held(measured, roster, counter("partitions"), viewers));

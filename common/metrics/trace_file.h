@@ -1,9 +1,13 @@
 // trace.json: who did what when, in Chrome's trace format (docs/metrics.md).
 #pragma once
 
+#include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <set>
 #include <string>
+#include <utility>
 
+#include "common/metrics/plans/plan_row.h"
 #include "common/metrics/process.h"
 #include "common/metrics/text_file.h"
 #include "common/wire/session_messages.h"
@@ -16,17 +20,27 @@ class TraceFile {
   ~TraceFile();
   /// begin_s: on the master's clock; times in the file count from there.
   bool open(const std::string& path, double begin_s);
-  /// Rows of "spans": name (its number among the columns), begin, end (seconds of the master's clock), lane. Rows whose
-  /// name is not among the columns are left out. Precondition: 4 values a row.
+  /// Rows of "spans" (recorder.h). Rows whose name is not among the columns are left out. Precondition: kSpanWidth
+  /// values a row.
   void add(const Process& process, const wire::MetricRows& rows);
+  /// What the master had of a tile: its lease, until the packer had it.
+  void add_lease(const std::string& sampler, const wire::TileDone& tile);
+  /// And of a plan: from the question to the answer.
+  void add_plan(const std::string& viewer, const PlanRow& plan);
 
  private:
-  void event(const std::string& json);
+  void event(const nlohmann::json& json);
+  int number_of(const std::string& process, const std::string& role, uint64_t pid);
+  void name_lane(int process, const std::string& role, int lane);
+  void overlapping(int process, const std::string& name, const std::string& category, double begin_s, double end_s,
+                   nlohmann::json args);
 
   TextFile file_;
   double begin_s_ = 0;
   bool has_events_ = false;
-  std::set<std::string> named_;  // processes whose names the file has
+  std::map<std::string, int> processes_;   // numbers of those whose names the file has
+  std::set<std::pair<int, int>> lanes_;    // that have names
+  uint64_t span_ = 0;                      // of those that may overlap: the last one's id
 };
 
 }  // namespace telesplat::metrics

@@ -9,11 +9,14 @@
 namespace telesplat::net {
 namespace {
 constexpr double kHelloPeriod_s = 0.25, kStatusPeriod_s = 1.0;
+// The clock is asked for in quick succession at first: the shortest round trip of some is near the shortest there is.
+constexpr double kClockPeriod_s = 1.0, kFirstClockPeriod_s = 0.05;
+constexpr int kFirstClocks = 8;
 }
 
 MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello)
     : hello_(std::move(hello)),
-      socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes}) {
+      socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes, .read_ahead = true}) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
@@ -23,42 +26,61 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
   if (const Status s = socket_.connect(endpoint); !s) log::error("{}", s.error().text);
 }
 
-void MasterLink::report(const std::function<Values()>& status) {
+void MasterLink::report(const std::function<Values()>& status, double now_s) {
   wire::StatusReport report{hello_.instance, status()};
   report.values["messages_rejected"] += static_cast<double>(socket_.rejected());
-  report.values["reported_s"] = monotonic_s();
+  report.values["reported_s"] = now_s;
+  if (clock_.known()) {
+    report.values["clock_offset_ms"] = clock_.offset_s(now_s) * 1e3;
+    report.values["clock_error_ms"] = clock_.error_s(now_s) * 1e3;
+    report.values["clock_drift_ppm"] = clock_.drift() * 1e6;
+    report.values["master_round_trip_ms"] = clock_.round_trip_s() * 1e3;
+  }
   socket_.send(report);
 }
 
 void MasterLink::tick(double now_s, const std::function<Values()>& status) {
   if (!welcomed_ && now_s - last_hello_s_ >= kHelloPeriod_s) {
-    hello_.sent_s = now_s;
+    hello_.sent_s = monotonic_s();
     socket_.send(hello_);
     last_hello_s_ = now_s;
   }
   if (welcomed_ && now_s - last_status_s_ >= kStatusPeriod_s) {
-    report(status);
+    report(status, now_s);
     last_status_s_ = now_s;
   }
+  if (welcomed_) ask_clock(now_s);
 }
 
-bool MasterLink::handle(const Message& message, double now_s) {
+void MasterLink::ask_clock(double now_s) {
+  if (now_s - last_clock_s_ < (clock_asked_ < kFirstClocks ? kFirstClockPeriod_s : kClockPeriod_s)) return;
+  socket_.send(wire::ClockRequest{monotonic_s()});
+  last_clock_s_ = now_s;
+  ++clock_asked_;
+}
+
+void MasterLink::learn_clock(const wire::ClockReply& reply, double arrived_s) {
+  if (!session_ || reply.master != session_->master) return;
+  clock_.add({reply.sent_s, reply.received_s, reply.replied_s, arrived_s});
+}
+
+bool MasterLink::handle(const Message& message) {
   if (message.type == wire::Welcome::kName) {
     if (auto welcome = socket_.decode<wire::Welcome>(message)) {
-      // Offset from the exchange with the shortest round trip (as NTP does).
-      if (welcome->hello_sent_s != 0) {
-        const double round_trip_s = now_s - welcome->hello_sent_s;
-        if (!session_ || session_->master != welcome->master) best_round_trip_s_ = 1e9;
-        if (round_trip_s >= 0 && round_trip_s < best_round_trip_s_) {
-          best_round_trip_s_ = round_trip_s;
-          offset_s_ = welcome->master_s - (now_s + welcome->hello_sent_s) / 2;
-          if (std::abs(offset_s_) < round_trip_s) offset_s_ = 0;  // one machine, one clock: do not add noise
-        }
-      }
+      const bool another = !session_ || session_->master != welcome->master;
+      if (another) clock_.clear(), clock_asked_ = 0;
       session_ = std::move(welcome);
       welcomed_ = true;
       ++version_;
+      // The hello and its answer are an exchange, too.
+      if (another && session_->hello_sent_s != 0)
+        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s},
+                    message.arrived_s);
     }
+    return true;
+  }
+  if (message.type == wire::ClockReply::kName) {
+    if (const auto reply = socket_.decode<wire::ClockReply>(message)) learn_clock(*reply, message.arrived_s);
     return true;
   }
   if (message.type == wire::WhoAreYou::kName) {
@@ -76,9 +98,9 @@ bool MasterLink::handle(const Message& message, double now_s) {
   return false;
 }
 
-void MasterLink::receive(double now_s) {
+void MasterLink::receive() {
   while (const auto message = socket_.receive())
-    if (!handle(*message, now_s)) socket_.reject(*message, "its type is not expected here");
+    if (!handle(*message)) socket_.reject(*message, "its type is not expected here");
 }
 
 void MasterLink::tell(const std::string& fact, const std::string& value) {
@@ -89,7 +111,7 @@ void MasterLink::tell(const std::string& fact, const std::string& value) {
 }
 
 void MasterLink::leave(const std::function<Values()>& status) {
-  report(status);
+  report(status, monotonic_s());
   socket_.send(wire::Goodbye{hello_.instance});
 }
 

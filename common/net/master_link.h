@@ -1,5 +1,5 @@
 // The client side of the master, the same for data, sampler, packer, viewer and ctl: hello until welcomed, a status
-// report a second, hello again when the master asks, a clock offset, shutdown.
+// report a second, hello again when the master asks, what the master's clock says, shutdown.
 #pragma once
 
 #include <functional>
@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "common/net/clock_estimate.h"
 #include "common/net/socket.h"
 
 namespace telesplat::net {
@@ -22,23 +23,24 @@ class MasterLink {
   Socket& socket() { return socket_; }
   InstanceId instance() const { return hello_.instance; }
 
-  /// To be called at least every 100 ms: says hello until welcomed (every 250 ms), then reports status (every second);
-  /// `status` is asked for its values then.
+  /// To be called at least every 100 ms: says hello until welcomed (every 250 ms), then reports status (every second)
+  /// and asks what the master's clock says; `status` is asked for its values then.
   void tick(double now_s, const std::function<Values()>& status);
 
-  /// Handles welcome, who_are_you and shutdown, rejects other unknown types unless the caller knows them: returns true
+  /// Handles welcome, who_are_you, clock_reply and shutdown, rejects other unknown types unless the caller knows them: returns true
   /// if the message was one of these.
-  bool handle(const Message& message, double now_s);
+  bool handle(const Message& message);
 
   /// Handles all messages that are here by now; those that handle() does not know are rejected.
-  void receive(double now_s);
+  void receive();
 
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
   bool shutdown_requested() const { return shutdown_; }
   /// This machine's monotonic time on the master's clock.
-  double to_master_s(double local_s) const { return local_s + offset_s_; }
+  double to_master_s(double local_s) const { return local_s + clock_.offset_s(local_s); }
+  const ClockEstimate& clock() const { return clock_; }
 
   /// Sets a fact that was not known at first; the master is told by another hello.
   void tell(const std::string& fact, const std::string& value);
@@ -47,15 +49,18 @@ class MasterLink {
   void leave(const std::function<Values()>& status);
 
  private:
-  void report(const std::function<Values()>& status);
+  void report(const std::function<Values()>& status, double now_s);
+  void ask_clock(double now_s);
+  void learn_clock(const wire::ClockReply& reply, double arrived_s);
 
   wire::Hello hello_;
   Socket socket_;
   std::optional<wire::Welcome> session_;
   int version_ = 0;
   bool shutdown_ = false, welcomed_ = false;
-  double offset_s_ = 0, best_round_trip_s_ = 1e9;
-  double last_hello_s_ = -1e9, last_status_s_ = -1e9;
+  ClockEstimate clock_;
+  int clock_asked_ = 0;  // since the master is known
+  double last_hello_s_ = -1e9, last_status_s_ = -1e9, last_clock_s_ = -1e9;
 };
 
 }  // namespace telesplat::net

@@ -6,12 +6,15 @@
 #include <atomic>
 #include <chrono>
 #include <cstring>
+#include <mutex>
 #include <random>
 #include <thread>
 #include <unordered_map>
 #include <zmq.hpp>
 
+#include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/net/read_ahead.h"
 
 namespace telesplat::net {
 namespace {
@@ -54,6 +57,15 @@ std::string printable(std::string_view bytes) {
   for (unsigned char c : bytes.substr(0, 24))
     out += c >= 32 && c < 127 ? std::string(1, char(c)) : fmt::format("\\x{:02x}", c);
   return out;
+}
+
+// True if one of them is readable.
+bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
+  try {
+    return zmq::poll(items, std::chrono::milliseconds(timeout_ms)) > 0;
+  } catch (const zmq::error_t&) {  // EINTR: a signal; the caller looks at its stop flag
+    return false;
+  }
 }
 
 }  // namespace
@@ -164,11 +176,98 @@ struct Socket::Impl {
   }
 
   void log_rejection(const std::string& what, const std::string& why) {
+    const std::lock_guard lock(log_mutex);
     if (limiter.allow(monotonic_s())) {
       const std::string more =
           limiter.suppressed() ? fmt::format(" ({} more since the last such line)", limiter.suppressed()) : "";
       log::warn("{}: dropped {}: {}{}", name, what, why, more);
     }
+  }
+
+  bool send(std::string_view peer, std::string_view type, std::string& body) {
+    if (kind == Kind::kPub) drain_subscriptions();
+    try {
+      using zmq::send_flags;
+      if (kind == Kind::kRouter && !socket.send(zmq::buffer(peer), send_flags::sndmore | send_flags::dontwait))
+        return false;
+      if (!socket.send(zmq::buffer(type), send_flags::sndmore | send_flags::dontwait)) return false;
+      // ZeroMQ takes the body over without copying it.
+      auto* owned = new std::string(std::move(body));
+      zmq::message_t frame(
+          owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
+      return socket.send(frame, send_flags::dontwait).has_value();
+    } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
+      return false;
+    }
+  }
+
+  std::optional<Message> receive() {
+    if (kind == Kind::kPub) {
+      drain_subscriptions();
+      return std::nullopt;
+    }
+    drain_monitor();
+    // A flood of bad messages must not keep the caller from its other sockets.
+    for (int bad = 0; bad < 100; ++bad) {
+      std::vector<zmq::message_t> frames;
+      try {
+        do {
+          zmq::message_t frame;
+          if (!socket.recv(frame, zmq::recv_flags::dontwait)) {
+            judge_closed();
+            return std::nullopt;
+          }
+          if (frames.size() < 4) frames.push_back(std::move(frame));
+        } while (socket.get(zmq::sockopt::rcvmore));
+      } catch (const zmq::error_t& e) {
+        if (e.num() == EINTR) continue;
+        log::error("{}: {}", name, e.what());
+        return std::nullopt;
+      }
+      note_spoken(frames.back());
+      Message out;
+      out.arrived_s = monotonic_s();
+      size_t next = 0;
+      if (kind == Kind::kRouter) out.peer = frames[next++].to_string();
+      if (frames.size() != next + 2) {
+        reject(out, fmt::format("{} frames instead of a type and a body", frames.size() - next));
+        continue;
+      }
+      out.type = frames[next].to_string().substr(0, kMaxTypeBytes);
+      auto body = std::make_shared<zmq::message_t>(std::move(frames[next + 1]));
+      if (body->size() > options.max_message_bytes) {
+        reject(out, fmt::format("{} bytes, limit {}", body->size(), options.max_message_bytes));
+        continue;
+      }
+      out.body = {static_cast<const std::byte*>(body->data()), body->size()};
+      out.owner = std::move(body);
+      return out;
+    }
+    return std::nullopt;
+  }
+
+  void reject(const Message& message, const std::string& why) {
+    ++rejected;
+    log_rejection(fmt::format("message '{}' from peer '{}'", printable(message.type), printable(message.peer)), why);
+  }
+
+  /// Starts the thread that reads ahead, where there is to be one.
+  bool reads_ahead() {
+    if (!options.read_ahead || ahead) return ahead != nullptr;
+    CHECK(kind == Kind::kDealer || kind == Kind::kPull || kind == Kind::kSub);
+    const ReadAhead::Ends ends{
+        .receive = [this] { return receive(); },
+        .send = [this](ReadAhead::Outgoing& o) { return send({}, o.type, o.body); },
+        .wait = [this](int descriptor, int timeout_ms) {
+          poll({{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, descriptor, ZMQ_POLLIN, 0}}, timeout_ms);
+        }};
+    ahead = std::make_unique<ReadAhead>(ends, ReadAhead::Limits{.unsent = size_t(options.high_water_mark)});
+    return true;
+  }
+
+  zmq::pollitem_t poll_item() {
+    if (reads_ahead()) return {nullptr, ahead->descriptor(), ZMQ_POLLIN, 0};
+    return {socket.handle(), 0, ZMQ_POLLIN, 0};
   }
 
   zmq::context_t& context;
@@ -184,8 +283,10 @@ struct Socket::Impl {
   };
   std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
   std::vector<Connection> closed;                   // not judged yet
-  uint64_t rejected = 0, failed_connections = 0;
+  std::atomic<uint64_t> rejected{0}, failed_connections{0};
+  std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
+  std::unique_ptr<ReadAhead> ahead;  // with read_ahead, once something was sent or received; it is the first to go
 };
 
 Socket::Socket(Context& context, Kind kind, std::string name, const SocketOptions& options)
@@ -195,6 +296,7 @@ Socket::Socket(Socket&&) noexcept = default;
 Socket& Socket::operator=(Socket&&) noexcept = default;
 
 Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
+  CHECK(!impl_->ahead);
   if (!insecure && !is_local(endpoint))
     return Error{fmt::format("{}: {} is not a loopback or ipc address; others need --insecure", impl_->name, endpoint)};
   try {
@@ -207,6 +309,7 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
 }
 
 Status Socket::connect(const std::string& endpoint) {
+  CHECK(!impl_->ahead);
   try {
     if (impl_->options.watch_connecting && !impl_->monitor) impl_->watch(ZMQ_EVENT_CONNECT_RETRIED);
     impl_->socket.connect(endpoint);
@@ -216,101 +319,32 @@ Status Socket::connect(const std::string& endpoint) {
   }
 }
 
-void Socket::disconnect(const std::string& endpoint) {
-  try {
-    impl_->socket.disconnect(endpoint);
-  } catch (const zmq::error_t&) {  // was not connected: that is what we want
-  }
-}
-
 bool Socket::send_frames(std::string_view peer, std::string_view type, std::string body) {
-  if (impl_->kind == Kind::kPub) impl_->drain_subscriptions();
-  try {
-    using zmq::send_flags;
-    auto& s = impl_->socket;
-    if (impl_->kind == Kind::kRouter && !s.send(zmq::buffer(peer), send_flags::sndmore | send_flags::dontwait))
-      return false;
-    if (!s.send(zmq::buffer(type), send_flags::sndmore | send_flags::dontwait)) return false;
-    // ZeroMQ takes the body over without copying it.
-    auto* owned = new std::string(std::move(body));
-    zmq::message_t frame(
-        owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
-    return s.send(frame, send_flags::dontwait).has_value();
-  } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
-    return false;
-  }
+  if (impl_->reads_ahead()) return impl_->ahead->send({std::string(type), std::move(body)});
+  return impl_->send(peer, type, body);
 }
 
 std::optional<Message> Socket::receive() {
-  if (impl_->kind == Kind::kPub) {
-    impl_->drain_subscriptions();
-    return std::nullopt;
-  }
-  impl_->drain_monitor();
-  // A flood of bad messages must not keep the caller from its other sockets.
-  for (int bad = 0; bad < 100; ++bad) {
-    std::vector<zmq::message_t> frames;
-    try {
-      do {
-        zmq::message_t frame;
-        if (!impl_->socket.recv(frame, zmq::recv_flags::dontwait)) {
-          impl_->judge_closed();
-          return std::nullopt;
-        }
-        if (frames.size() < 4) frames.push_back(std::move(frame));
-      } while (impl_->socket.get(zmq::sockopt::rcvmore));
-    } catch (const zmq::error_t& e) {
-      if (e.num() == EINTR) continue;
-      log::error("{}: {}", impl_->name, e.what());
-      return std::nullopt;
-    }
-    impl_->note_spoken(frames.back());
-    Message out;
-    size_t next = 0;
-    if (impl_->kind == Kind::kRouter) out.peer = frames[next++].to_string();
-    if (frames.size() != next + 2) {
-      reject(out, fmt::format("{} frames instead of a type and a body", frames.size() - next));
-      continue;
-    }
-    out.type = frames[next].to_string().substr(0, kMaxTypeBytes);
-    auto body = std::make_shared<zmq::message_t>(std::move(frames[next + 1]));
-    if (body->size() > impl_->options.max_message_bytes) {
-      reject(out, fmt::format("{} bytes, limit {}", body->size(), impl_->options.max_message_bytes));
-      continue;
-    }
-    out.body = {static_cast<const std::byte*>(body->data()), body->size()};
-    out.owner = std::move(body);
-    return out;
-  }
-  return std::nullopt;
+  return impl_->reads_ahead() ? impl_->ahead->receive() : impl_->receive();
 }
 
-void Socket::reject(const Message& message, const std::string& why) {
-  ++impl_->rejected;
-  impl_->log_rejection(fmt::format("message '{}' from peer '{}'", printable(message.type), printable(message.peer)),
-                       why);
-}
+void Socket::reject(const Message& message, const std::string& why) { impl_->reject(message, why); }
 
 uint64_t Socket::rejected() const {
   if (impl_->kind == Kind::kPub) impl_->drain_subscriptions();
   return impl_->rejected;
 }
 uint64_t Socket::failed_connections() const {
-  impl_->drain_monitor();
+  if (!impl_->ahead) impl_->drain_monitor();
   return impl_->failed_connections;
 }
 const std::string& Socket::name() const { return impl_->name; }
 
 bool wait_readable(const std::vector<Socket*>& sockets, int timeout_ms) {
   std::vector<zmq::pollitem_t> items;
-  for (const Socket* s : sockets) items.push_back({s->impl().socket.handle(), 0, ZMQ_POLLIN, 0});
-  try {
-    return zmq::poll(items, std::chrono::milliseconds(timeout_ms)) > 0;
-  } catch (const zmq::error_t&) {  // EINTR: a signal; the caller looks at its stop flag
-    return false;
-  }
+  for (const Socket* s : sockets) items.push_back(s->impl().poll_item());
+  return poll(std::move(items), timeout_ms);
 }
-
 bool wait_readable_s(const std::vector<Socket*>& sockets, double timeout_s) {
   const double until_s = monotonic_s() + timeout_s;
   if (wait_readable(sockets, static_cast<int>(timeout_s * 1e3))) return true;

@@ -36,6 +36,7 @@ struct Message {
   std::string type;
   wire::Bytes body;
   std::shared_ptr<const void> owner;
+  double arrived_s = 0;  ///< monotonic_s() when it was read off the connection
 };
 
 struct SocketOptions {
@@ -44,6 +45,10 @@ struct SocketOptions {
       wire::kMaxControlBytes;     ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
   int linger_ms = 500;            ///< for what is still to be sent when the socket goes
   bool watch_connecting = false;  ///< count attempts to connect that fail
+  /// A thread of its own reads messages as they come and sends what is given to it, so that Message::arrived_s tells
+  /// the network from the time that a message waited for its reader. For DEALER, PULL and SUB. Addresses must be bound
+  /// or connected before the first message is sent or received.
+  bool read_ahead = false;
 };
 
 class Socket {
@@ -58,7 +63,6 @@ class Socket {
   Result<std::string> bind(const std::string& endpoint, bool insecure = false);
   /// Connects; the peer need not exist yet and may come back after being away.
   Status connect(const std::string& endpoint);
-  void disconnect(const std::string& endpoint);
 
   /// Queues a message without waiting (ROUTER: for `peer`). False: dropped, because the queue is full or the peer is
   /// gone.

@@ -194,6 +194,12 @@ void Decoder::get(const msgpack::object& o, geometry::Camera& c) {
   if (const auto valid = geometry::validate(c); !valid) fail(": " + valid.error().text);
 }
 
+void Decoder::get(const msgpack::object& o, Moments& m) {
+  double v[std::size(kMoments)];
+  if (!numbers(o, v)) return;
+  for (size_t i = 0; i < std::size(kMoments); ++i) m.*kMoments[i] = v[i];
+}
+
 void Decoder::get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks) {
   const size_t size = list_size(o, geometry::kMaxChunks);
   for (size_t i = 0; i < size && !error_; ++i) {

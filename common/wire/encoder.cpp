@@ -29,7 +29,7 @@ void Encoder::version() {
   put(kProtocolVersion);
 }
 
-void Encoder::numbers(std::initializer_list<double> values) {
+void Encoder::numbers(std::span<const double> values) {
   begin_array(static_cast<uint32_t>(values.size()));
   for (const double v : values) put(v);
 }
@@ -74,6 +74,12 @@ void Encoder::put(const geometry::Camera& c) {
   const auto& q = c.pose.orientation;
   numbers({p.x, p.y, p.z, q.w, q.x, q.y, q.z, c.left, c.right, c.bottom, c.top, c.near_m, double(c.width),
            double(c.height)});
+}
+
+void Encoder::put(const Moments& m) {
+  double v[std::size(kMoments)];
+  for (size_t i = 0; i < std::size(kMoments); ++i) v[i] = m.*kMoments[i];
+  numbers(v);
 }
 
 void Encoder::put(const std::vector<geometry::ChunkInfo>& chunks) {

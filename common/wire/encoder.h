@@ -39,7 +39,8 @@ class Encoder {
   void begin_map(uint32_t entries);
   void begin_array(uint32_t entries);
   void version();
-  void numbers(std::initializer_list<double> values);
+  void numbers(std::span<const double> values);
+  void numbers(std::initializer_list<double> values) { numbers(std::span(values.begin(), values.size())); }
   void put_text(std::string_view text);
 
   void put(bool v);
@@ -55,6 +56,7 @@ class Encoder {
   void put(const geometry::Box& b);
   void put(const geometry::Rect& r);
   void put(const geometry::Camera& c);
+  void put(const Moments& m);
   void put(const std::vector<geometry::ChunkInfo>& chunks);
   void put(const volume::ShearFrame& s);
   template <class Tag>

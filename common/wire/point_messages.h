@@ -8,6 +8,7 @@
 #include "common/geometry/box.h"
 #include "common/geometry/camera.h"
 #include "common/wire/limits.h"
+#include "common/wire/moments.h"
 
 namespace telesplat::wire {
 
@@ -36,12 +37,13 @@ struct Patch {
   /// Of rays finer than a view's: those that met nothing (codec::encode_mask), and where they lie; else empty.
   std::vector<uint32_t> missed;
   geometry::Rect missed_rect{0, 0, 1, 1};
+  Moments moments;                        ///< of the tile that completed it; none where it is sent again later
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
     f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
     f("extra", m.extra); f("frame_complete", m.frame_complete); f("samples", m.samples); f("kept", m.kept);
     f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
-    f("missed", m.missed, kMaxMaskWords); f("missed_rect", m.missed_rect);
+    f("missed", m.missed, kMaxMaskWords); f("missed_rect", m.missed_rect); f("moments", m.moments);
   }
 };
 struct Forget {

@@ -11,6 +11,7 @@
 #include "common/geometry/box.h"
 #include "common/geometry/camera.h"
 #include "common/wire/limits.h"
+#include "common/wire/moments.h"
 
 namespace telesplat::wire {
 
@@ -66,6 +67,23 @@ struct WhoAreYou {
   template <class F> static void fields(F& f, auto& m) { f("master", m.master); }
 };
 
+/// Every process -> master, and its answer: what the master's clock says (common/net/clock_estimate.h).
+struct ClockRequest {
+  static constexpr std::string_view kName = "clock_request";
+  double sent_s = 0;      ///< sender's own clock
+  template <class F> static void fields(F& f, auto& m) { f("sent_s", m.sent_s); }
+};
+struct ClockReply {
+  static constexpr std::string_view kName = "clock_reply";
+  InstanceId master;
+  double sent_s = 0;      ///< ClockRequest::sent_s
+  double received_s = 0;  ///< master's clock when it took the request,
+  double replied_s = 0;   ///< and when it answered
+  template <class F> static void fields(F& f, auto& m) {
+    f("master", m.master); f("sent_s", m.sent_s); f("received_s", m.received_s); f("replied_s", m.replied_s);
+  }
+};
+
 /// Viewer -> master: sample this view. With `buffers` 0 (asynchronous coupling) only the newest request of a viewer
 /// waits: it replaces the one before. Otherwise (synchronous: 1, loose: the buffers of T6.4) requests wait in order, at
 /// most `buffers` of a viewer; more are dropped.
@@ -74,12 +92,12 @@ struct ViewRequest {
   InstanceId viewer;
   RequestId request;
   geometry::Camera camera;  ///< predicted pose; width x height is the sampling size
-  double sent_s = 0;
+  Moments moments;          ///< requested_s; the master goes on
   uint64_t buffers = 0;     ///< at most kMaxBuffers
   double footprint = 0;     ///< width of a displayed pixel at unit depth, for scenes whose detail depends on it; 0: of
                             ///< one of camera's pixels
   template <class F> static void fields(F& f, auto& m) {
-    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("sent_s", m.sent_s);
+    f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("moments", m.moments);
     f("buffers", m.buffers); f("footprint", m.footprint);
   }
 };

@@ -10,6 +10,7 @@
 #include "common/volume/levels.h"
 #include "common/volume/shear.h"
 #include "common/wire/limits.h"
+#include "common/wire/moments.h"
 
 namespace telesplat::wire {
 
@@ -79,8 +80,10 @@ struct SliceView {
   RequestId request;
   geometry::Camera camera;  ///< as requested
   uint64_t buffers = 0;     ///< ViewRequest::buffers
+  Moments moments;          ///< as far as the frame's beginning
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("buffers", m.buffers);
+    f("moments", m.moments);
   }
 };
 
@@ -95,11 +98,11 @@ struct SliceLease {
   uint64_t begin = 0, end = 0;   ///< the slab's slices
   volume::ShearFrame shear;      ///< validated against the session's grid by whoever uses it
   std::vector<SliceView> views;  ///< at least one, at most kMaxViews
-  double leased_s = 0;
+  Moments moments;               ///< from the lease on; a sampler sends it back with its own
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("partition", m.partition); f("slab", m.slab);
     f("slabs", m.slabs); f("begin", m.begin); f("end", m.end); f("shear", m.shear); f("views", m.views, kMaxViews);
-    f("leased_s", m.leased_s);
+    f("moments", m.moments);
   }
 };
 
@@ -147,13 +150,12 @@ struct SliceImages {
   static constexpr std::string_view kName = "slice_images";
   static constexpr bool kBulk = true;
   InstanceId sampler;
-  SliceLease lease;     ///< as leased
+  SliceLease lease;     ///< as leased, with moments as far as the encoded images
   uint64_t voxels = 0;  ///< splatted
-  double sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0;
   Bytes data;           ///< volume/slices/image.h, one after the other
   template <class F> static void fields(F& f, auto& m) {
-    f("sampler", m.sampler); f("lease", m.lease); f("voxels", m.voxels); f("sample_begin_s", m.sample_begin_s);
-    f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s); f("data", m.data, kMaxBulkBytes);
+    f("sampler", m.sampler); f("lease", m.lease); f("voxels", m.voxels);
+    f("data", m.data, kMaxBulkBytes);
   }
 };
 
@@ -170,12 +172,12 @@ struct SliceFrame {
   geometry::Camera camera;            ///< as requested
   volume::ShearFrame shear;
   uint64_t slabs = 1, voxels = 0;     ///< that it was made from
-  double leased_s = 0, packed_s = 0;  ///< first lease; when it was complete
+  Moments moments;                    ///< of the slab that completed it
   Bytes data;                         ///< volume/slices/image.h
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer); f("request", m.request);
-    f("camera", m.camera); f("shear", m.shear); f("slabs", m.slabs); f("voxels", m.voxels); f("leased_s", m.leased_s);
-    f("packed_s", m.packed_s); f("data", m.data, kMaxBulkBytes);
+    f("camera", m.camera); f("shear", m.shear); f("slabs", m.slabs); f("voxels", m.voxels); f("moments", m.moments);
+    f("data", m.data, kMaxBulkBytes);
   }
 };
 /// Viewer -> packer: this frame has left its buffer (it was decoded and replaced an older one, or was displayed and let

@@ -11,6 +11,7 @@
 #include "common/geometry/camera.h"
 #include "common/geometry/mesh_chunk.h"
 #include "common/wire/limits.h"
+#include "common/wire/moments.h"
 
 namespace telesplat::wire {
 
@@ -44,12 +45,12 @@ struct Lease {
   uint64_t rays = 0;          ///< to be cast: those of the mask; without one all of the rectangle
   std::vector<uint32_t> mask; ///< codec::encode_mask, of rect's size; empty: all pixels. Samplers do not send it back
   double footprint = 0;       ///< as ViewRequest::footprint; 0: of one of camera's pixels, over step
-  double leased_s = 0;
+  Moments moments;            ///< as far as the lease; a sampler sends it back with its own
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request);
     f("tile", m.tile); f("step", m.step); f("block", m.block); f("blocks_in_frame", m.blocks_in_frame);
     f("camera", m.camera); f("rect", m.rect); f("block_rect", m.block_rect); f("extra", m.extra); f("rays", m.rays);
-    f("mask", m.mask, kMaxMaskWords); f("footprint", m.footprint); f("leased_s", m.leased_s);
+    f("mask", m.mask, kMaxMaskWords); f("footprint", m.footprint); f("moments", m.moments);
   }
 };
 
@@ -68,21 +69,19 @@ struct TileDone {
   uint64_t tile = 0;
   LeaseId lease;
   InstanceId sampler;
+  RequestId request;                           ///< Lease::request; 0 where a frame serves several viewers
   uint64_t step = 1;                           ///< Lease::step
   bool extra = false;                          ///< Lease::extra
   uint64_t rays = 0;                           ///< Lease::rays
   geometry::Rect rect;                         ///< Lease::rect
   uint64_t samples = 0, kept = 0;              ///< covered pixels before and after redundancy elimination
   uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< encoded tile as received, as published
-  double leased_s = 0, sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0, receive_s = 0;
-  double packed_s = 0;                         ///< decoded, reduced and encoded; of a part of a block: taken in
-  double published_s = 0;                      ///< handed to viewers with its block or frame; 0: another tile's was
+  Moments moments;
   template <class F> static void fields(F& f, auto& m) {
-    f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler); f("step", m.step);
+    f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler);
+    f("request", m.request); f("step", m.step);
     f("extra", m.extra); f("rays", m.rays); f("rect", m.rect); f("samples", m.samples); f("kept", m.kept);
-    f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent); f("leased_s", m.leased_s);
-    f("sample_begin_s", m.sample_begin_s); f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s);
-    f("receive_s", m.receive_s); f("packed_s", m.packed_s); f("published_s", m.published_s);
+    f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent); f("moments", m.moments);
   }
 };
 
@@ -104,10 +103,11 @@ struct PlanRequest {
   /// extra: all tiles together have about as many at most. Else: as many rays, about, may refine surfaces that the
   /// model shows too coarsely; others wait for later views. 0: no limit.
   uint64_t most_rays = 0;
+  Moments moments;          ///< as far as the question
   template <class F> static void fields(F& f, auto& m) {
     f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request); f("camera", m.camera);
     f("extra", m.extra); f("round", m.round); f("still", m.still); f("tile_size", m.tile_size);
-    f("tile_rays", m.tile_rays); f("most_rays", m.most_rays);
+    f("tile_rays", m.tile_rays); f("most_rays", m.most_rays); f("moments", m.moments);
   }
 };
 
@@ -174,12 +174,10 @@ struct DepthTile {
   static constexpr std::string_view kName = "depth_tile";
   static constexpr bool kBulk = true;
   InstanceId sampler;
-  Lease lease;  ///< as leased
-  double sample_begin_s = 0, sample_end_s = 0, encode_end_s = 0;
+  Lease lease;  ///< as leased, with moments as far as the encoded tile
   Bytes image;  ///< codec stream of lease.rect's size
   template <class F> static void fields(F& f, auto& m) {
-    f("sampler", m.sampler); f("lease", m.lease); f("sample_begin_s", m.sample_begin_s);
-    f("sample_end_s", m.sample_end_s); f("encode_end_s", m.encode_end_s); f("image", m.image, kMaxBulkBytes);
+    f("sampler", m.sampler); f("lease", m.lease); f("image", m.image, kMaxBulkBytes);
   }
 };
 

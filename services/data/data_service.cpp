@@ -115,7 +115,7 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
   while (!net::stop_requested() && !link.shutdown_requested() && !stop()) {
     link.tick(monotonic_s(), status);
     net::wait_readable(sockets, served.busy() ? kBusy_ms : kQuiet_ms);
-    link.receive(monotonic_s());
+    link.receive();
     if (link.version() != version) {
       version = link.version();
       if (const Status s = served.follow(*link.session()); !s) log::warn("{}", s.error().text);

@@ -183,7 +183,9 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
   if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
   // The coarse pass looks a little beyond the view's edges, maybe beyond what a lease may.
   if (!geometry::validate(geometry::subsample(m.camera, kCoarseStep))) return;
-  plan_->views().request_view(m);
+  wire::ViewRequest request = m;
+  request.moments = {.requested_s = m.moments.requested_s, .received_s = now_s};
+  plan_->views().request_view(request);
   dispatch(now_s);
 }
 

@@ -48,6 +48,7 @@ class MasterCore {
   void shut_down(const std::string& reason);
 
   std::vector<Outgoing> take_outgoing() { return outbox_.take(); }
+  InstanceId instance() const { return instance_; }
   bool stop_requested() const { return stop_; }
   /// True once everyone who was told to finish has said goodbye.
   bool everyone_left() const;

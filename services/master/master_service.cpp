@@ -131,6 +131,13 @@ class MasterService {
   }
 
   void take(const net::Message& message, double now_s) {
+    // At once: what lies between the question and the answer makes the clock's error.
+    if (message.type == wire::ClockRequest::kName) {
+      if (const auto asked = control_.decode<wire::ClockRequest>(message))
+        control_.send(wire::ClockReply{core_.instance(), asked->sent_s, message.arrived_s, monotonic_s()},
+                      message.peer);
+      return;
+    }
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
                   wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::Goodbye,
                   wire::Control>(control_, message, [&](const auto& m) {

@@ -23,7 +23,9 @@ class PackerService {
   PackerService(const PackerOptions& o, net::Context& context)
       : options_(o),
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
-               {.high_water_mark = 256, .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes}),
+               {.high_water_mark = 256,
+                .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                .read_ahead = true}),
         patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),
         state_(context, net::Kind::kRouter, o.service.name + ":state",
                {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
@@ -81,7 +83,7 @@ class PackerService {
   void receive_control() {
     while (const auto message = link_->socket().receive()) {
       const double now_s = monotonic_s();
-      if (!link_->handle(*message, now_s))
+      if (!link_->handle(*message))
         net::dispatch<wire::PlanRequest>(link_->socket(), *message,
                                          [&](const wire::PlanRequest& request) { plan(request, now_s); });
       follow_news();

@@ -165,7 +165,7 @@ class SamplerService {
     while (const auto message = link_.socket().receive()) {
       const double now = monotonic_s();
       const int version = link_.version();
-      if (link_.handle(*message, now)) {
+      if (link_.handle(*message)) {
         if (message->type == wire::WhoAreYou::kName) leases_asked_ = 0;
         if (link_.version() != version) on_welcome();
         continue;
@@ -184,8 +184,8 @@ class SamplerService {
     if (!net::stop_requested()) ask_for_leases();  // the answer comes while we sample
     Delivery made = work_->sample_next();
     ++tiles_sampled_;
-    spans_.add("sample", link_.to_master_s(made.begin_s), link_.to_master_s(made.sampled_s));
-    spans_.add("encode", link_.to_master_s(made.sampled_s), link_.to_master_s(made.encoded_s));
+    spans_.add("sample", link_.to_master_s(made.begin_s), link_.to_master_s(made.sampled_s), 0, made.of);
+    spans_.add("encode", link_.to_master_s(made.sampled_s), link_.to_master_s(made.encoded_s), 0, made.of);
     unsent_ = std::move(made);
     send_out(monotonic_s());
   }

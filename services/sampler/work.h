@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/metrics/recorder.h"
 #include "common/net/master_link.h"
 
 namespace telesplat::sampler {
@@ -27,6 +28,7 @@ struct Delivery {
   std::string_view type;
   std::string body;
   double begin_s = 0, sampled_s = 0, encoded_s = 0;
+  metrics::SpanOf of;  ///< what was sampled
 };
 
 class Work {

@@ -75,8 +75,8 @@ void master_leases(benchmark::State& state) {
           done.sampler = {10 + i};
           done.step = l.step;
           done.rect = l.rect;
-          done.sample_begin_s = l.leased_s;
-          done.sample_end_s = done.encode_end_s = now_s;
+          done.moments.sample_begin_s = l.moments.leased_s;
+          done.moments.sample_end_s = done.moments.encode_end_s = now_s;
           core.on("packer2", done, now_s);
         }
       });

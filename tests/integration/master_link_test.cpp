@@ -66,7 +66,7 @@ class Link : public ::testing::Test {
       link.tick(link_s += 0.02, [] { return MasterLink::Values{{"answer", 42}}; });
       if (master) master->serve();
       wait_readable({&link.socket()}, 2);
-      while (const auto m = link.socket().receive()) EXPECT_TRUE(link.handle(*m, link_s));
+      while (const auto m = link.socket().receive()) EXPECT_TRUE(link.handle(*m));
       if (done()) return true;
     }
     return false;

@@ -92,7 +92,7 @@ class Schedule : public ::testing::TestWithParam<Case> {
     m.frame = w.lease.frame;
     m.tile = w.lease.tile;
     m.lease = w.lease.lease;
-    m.encode_end_s = s.row_s * w.lease.rect.height;
+    m.moments.encode_end_s = s.row_s * w.lease.rect.height;
     const bool counted = schedule.tile_done(m, s.name, now);
     if (!counted) {
       ASSERT_TRUE(w.lease.step != 1) << "only a coarse frame that was dropped has tiles nobody waits for";

@@ -47,6 +47,9 @@ struct Filler {
   void operator()(const char*, geometry::Camera& v, size_t = 0) {
     v = {{{0.1, 0.2, 0.3}, {0.6, 0, 0.8, 0}}, -1, 1, -0.5, 0.75, 0.01, 320, 200};
   }
+  void operator()(const char*, wire::Moments& v, size_t = 0) {
+    for (double wire::Moments::*m : wire::kMoments) v.*m = 0.5 + ++n_;
+  }
   void operator()(const char*, std::vector<geometry::ChunkInfo>& v, size_t = 0) {
     v = {{ChunkId{0}, {{-1, -1, -1}, {0, 0, 0}}, 12, 500}, {ChunkId{1}, {{0, 0, 0}, {1, 1, 1}}, 7, 300}};
   }

@@ -151,7 +151,7 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   while (open_.size() > kMaxOpen) open_.erase(open_.begin());
   sent_ = camera;
   sent_id_ = id;
-  return wire::ViewRequest{viewer_, id, camera, now_s, options_.buffers, 1 / display_->focal_x()};
+  return wire::ViewRequest{viewer_, id, camera, {.requested_s = now_s}, options_.buffers, 1 / display_->focal_x()};
 }
 
 std::vector<wire::ViewRequest> ViewRequester::again(std::span<const RequestId> requests, double now_s) {
@@ -160,7 +160,8 @@ std::vector<wire::ViewRequest> ViewRequester::again(std::span<const RequestId> r
     const auto it = open_.find(id);
     if (it == open_.end() || !display_) continue;
     it->second.camera = wanted(now_s, it->second.still);
-    out.push_back({viewer_, id, it->second.camera, now_s, options_.buffers, 1 / display_->focal_x()});
+    out.push_back(
+        {viewer_, id, it->second.camera, {.requested_s = now_s}, options_.buffers, 1 / display_->focal_x()});
   }
   return out;
 }
@@ -187,7 +188,9 @@ ViewPart part_of(const wire::Patch& p) {
           .samples = p.samples,
           .bytes = p.image.size(),
           .camera = p.camera,
-          .eliminated = p.samples - std::min(p.kept, p.samples)};
+          .eliminated = p.samples - std::min(p.kept, p.samples),
+          .tile = p.tile,
+          .moments = p.moments};
 }
 
 // By small steps, since views differ.

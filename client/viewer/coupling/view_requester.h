@@ -51,6 +51,10 @@ struct ViewPart {
   uint64_t tiles = 1, points = 0, samples = 0, bytes = 0;
   geometry::Camera camera;  ///< that was sampled
   uint64_t eliminated = 0;  ///< samples of which no points came, because the model has them already
+  uint64_t tile = 0;        ///< its number in the frame
+  wire::Moments moments;    ///< as far as it was published
+  /// Master's clock: it reached this machine; decoding began and was over.
+  double arrived_s = 0, decode_begin_s = 0, decoded_s = 0;
 };
 ViewPart part_of(const wire::Patch& patch);
 

@@ -192,7 +192,7 @@ class Display {
                              .intact = intact},
                             view_);
     m.end_s = monotonic_s();
-    worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, gate_.waits() ? &m.drawn.update : nullptr);
+    worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, m.drawn.update, gate_.waits());
     const auto legend = o_.legend ? worker_.legend_at(m.drawn.epoch) : nullptr;
     surface_.on_legend(legend);
     surface_.present(view_, m.drawn.changed);
@@ -217,7 +217,9 @@ class Display {
     frames_.add(frame_row(m));
     if (m.wait_s > 0)
       spans_.add("wait for update", worker_.to_master_s(m.begin_s - m.wait_s), worker_.to_master_s(m.begin_s), 0);
-    spans_.add("display frame", worker_.to_master_s(m.begin_s), worker_.to_master_s(m.end_s), 0);
+    const uint64_t shown = m.drawn.update.request.value;
+    spans_.add("display frame", worker_.to_master_s(m.begin_s), worker_.to_master_s(m.end_s), 0,
+               {.request = shown ? double(shown) : -1});
     previous_s_ = m.end_s;
   }
 

@@ -16,6 +16,7 @@ namespace telesplat::viewer {
 struct ModelEvent {
   std::variant<wire::Patch, wire::Forget, wire::EpochBegin> body;
   std::shared_ptr<const void> owner;
+  double arrived_s = 0;  ///< monotonic_s()
   InstanceId packer() const {
     return std::visit([](const auto& e) { return e.packer; }, body);
   }

@@ -39,7 +39,7 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
         sequencer_.on_mark(m);
       else
-        sequencer_.on_published({m, message->owner});
+        sequencer_.on_published({m, message->owner, message->arrived_s});
     });
   }
 }
@@ -53,7 +53,7 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
         sequencer_.on_mark(m);
       else
-        sequencer_.on_replayed({m, message->owner});
+        sequencer_.on_replayed({m, message->owner, message->arrived_s});
     });
   }
 }
@@ -71,10 +71,10 @@ void PointReceiver::tick(double now_s) {
 
 void PointReceiver::apply(const ModelEvent& event) {
   const bool applied = std::visit(
-      [this](const auto& e) {
+      [&](const auto& e) {
         using E = std::decay_t<decltype(e)>;
         if constexpr (std::is_same_v<E, wire::Patch>) {
-          return apply_patch(e);
+          return apply_patch(e, event.arrived_s);
         } else if constexpr (std::is_same_v<E, wire::Forget>) {
           if (options_.hold)
             batches_.add(UpdateBatches::Forget{e.sequence, {e.clusters.begin(), e.clusters.end()}, e.frames}, cache_);
@@ -110,7 +110,7 @@ void PointReceiver::begin_replica(const points::ModelConfig& config, EpochId epo
     switch_.begin(epoch, cache_.begin_replica(config, epoch, sequence), monotonic_s());
 }
 
-bool PointReceiver::apply_patch(const wire::Patch& patch) {
+bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   const double begin = monotonic_s();
   // Events in order always tell of an epoch before its first patch; a replica is never of two.
   if (epoch_.value != 0 && patch.epoch != epoch_) {
@@ -143,15 +143,20 @@ bool PointReceiver::apply_patch(const wire::Patch& patch) {
   else
     cache_.insert(std::move(prepared), patch.epoch);
   const double inserted = monotonic_s();
-  spans_.add("decode", links_.to_master_s(begin), links_.to_master_s(decoded), 1);
-  spans_.add("insert", links_.to_master_s(decoded), links_.to_master_s(inserted), 1);
+  const metrics::SpanOf of{double(patch.frame.value), double(patch.tile), double(patch.request.value)};
+  spans_.add("decode", links_.to_master_s(begin), links_.to_master_s(decoded), 1, of);
+  spans_.add("insert", links_.to_master_s(decoded), links_.to_master_s(inserted), 1, of);
   points_received_ += patch.kept;
   if (!options_.hold) {
     const bool complete = patch.frame_complete && !patch.extra;
     switch_.on_part({patch.epoch, patch.step, complete, patch.viewer == options_.viewer}, inserted);
     tick(inserted);
   }
-  links_.on_part(part_of(patch));
+  ViewPart part = part_of(patch);
+  part.arrived_s = links_.to_master_s(arrived_s);
+  part.decode_begin_s = links_.to_master_s(begin);
+  part.decoded_s = links_.to_master_s(decoded);
+  links_.on_part(part);
   return true;
 }
 

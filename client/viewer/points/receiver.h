@@ -53,7 +53,7 @@ class PointReceiver {
   void apply(const ModelEvent& event);
   void record(const ModelEvent& event);
   /// False if it cannot be decoded.
-  bool apply_patch(const wire::Patch& patch);
+  bool apply_patch(const wire::Patch& patch, double arrived_s);
   void begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence);
 
   Options options_;

@@ -65,7 +65,7 @@ Result<BufferedFrame> SliceReceiver::decode(const wire::SliceFrame& f, const vol
   BufferedFrame out;
   out.frame = std::make_shared<const volume::VolumeFrame>(
       volume::make_volume_frame(grid, f.shear, images, f.frame, f.epoch, f.data.size()));
-  out.update = {f.request, f.leased_s, f.camera.pose};
+  out.update = {f.request, f.moments.requested_s, f.camera.pose};
   out.pixels = out.frame->pixels();
   return out;
 }
@@ -74,11 +74,11 @@ void SliceReceiver::receive(net::Socket& state, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = state.receive();
     if (!message) return;
-    net::dispatch<wire::SliceFrame>(state, *message, [&](const wire::SliceFrame& f) { on(f, state); });
+    net::dispatch<wire::SliceFrame>(state, *message, [&](const wire::SliceFrame& f) { on(f, message->arrived_s, state); });
   }
 }
 
-void SliceReceiver::on(const wire::SliceFrame& f, net::Socket& state) {
+void SliceReceiver::on(const wire::SliceFrame& f, double arrived_s, net::Socket& state) {
   const double begin_s = monotonic_s();
   heard_s_ = begin_s;
   // What is not put into a buffer has left it.
@@ -98,7 +98,9 @@ void SliceReceiver::on(const wire::SliceFrame& f, net::Socket& state) {
   if (const auto requested_s = links_.requested_s(f.request)) frame->update.requested_s = *requested_s;
   const uint64_t pixels = frame->pixels;
   pixels_received_ += pixels;
-  spans_.add("decode", links_.to_master_s(begin_s), links_.to_master_s(monotonic_s()), 1);
+  const double decoded_s = monotonic_s();
+  spans_.add("decode", links_.to_master_s(begin_s), links_.to_master_s(decoded_s), 1,
+             {.frame = double(f.frame.value), .request = double(f.request.value)});
   cache_.put(std::move(*frame));
   if (options_.record) options_.record->add(*grid_, f);  // after it: it is shown first
   if (options_.buffers == 0) acknowledge(f.frame, state);
@@ -111,7 +113,11 @@ void SliceReceiver::on(const wire::SliceFrame& f, net::Socket& state) {
                   .points = pixels,
                   .samples = f.voxels,
                   .bytes = f.data.size(),
-                  .camera = f.camera});
+                  .camera = f.camera,
+                  .moments = f.moments,
+                  .arrived_s = links_.to_master_s(arrived_s),
+                  .decode_begin_s = links_.to_master_s(begin_s),
+                  .decoded_s = links_.to_master_s(decoded_s)});
 }
 
 void SliceReceiver::acknowledge(FrameId frame, net::Socket& state) {

@@ -57,7 +57,7 @@ class SliceReceiver {
   Figures figures() const { return {pixels_received_, decode_errors_}; }
 
  private:
-  void on(const wire::SliceFrame& frame, net::Socket& state);
+  void on(const wire::SliceFrame& frame, double arrived_s, net::Socket& state);
   void acknowledge(FrameId frame, net::Socket& state);
 
   Options options_;

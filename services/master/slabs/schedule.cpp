@@ -45,7 +45,8 @@ volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRe
   return empty_frame(grid, cameras[0].pose.position_room);
 }
 
-bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only) {
+bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only,
+                                 double now_s) {
   // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two
   // they might not.
   if (!partition || (!frames_.empty() && frames_.back().partition != partition)) return false;
@@ -61,6 +62,7 @@ bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition>
     requests.push_back(std::move(r));
   volume::ShearFrame shear = plan(grid_, requests, layers_);
   const size_t slabs = partition->slabs.size();
+  for (wire::ViewRequest& r : requests) r.moments.begun_s = now_s;
   const FrameId id = next_frame();
   begin(id, requests);
   frames_.push_back(
@@ -85,8 +87,8 @@ std::optional<wire::SliceLease> VolumeSchedule::lease(const std::string& sampler
                          .end = uint64_t(range.end),
                          .shear = f.shear,
                          .views = {},
-                         .leased_s = now_s};
-    for (const auto& r : f.requests) out.views.push_back({r.viewer, r.request, r.camera, r.buffers});
+                         .moments = {.leased_s = now_s}};
+    for (const auto& r : f.requests) out.views.push_back({r.viewer, r.request, r.camera, r.buffers, r.moments});
     return out;
   }
   return std::nullopt;

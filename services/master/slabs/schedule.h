@@ -37,7 +37,8 @@ class VolumeSchedule : public Views {
   /// kSameEye_m of its. Viewers take turns; turns_only: only those that have a turn. False: none waits, as many frames
   /// are in flight as may be (views_at_once()), or some of another partition are: so all of a viewer's views become
   /// complete in order.
-  bool begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only = false);
+  bool begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only = false,
+                   double now_s = 0);
 
   /// The slab of `sampler` in the oldest frame that still needs it. nullopt: there is none.
   std::optional<wire::SliceLease> lease(const std::string& sampler, double now_s);

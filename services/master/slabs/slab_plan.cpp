@@ -150,8 +150,8 @@ bool SlabPlan::may_begin(const Idle& idle) {
   return wanted && schedule_.view_waiting();
 }
 
-bool SlabPlan::begin(EpochId epoch, bool turns_only, double /*now_s*/) {
-  return schedule_.begin_frame(epoch, partitions_.in_use(), turns_only);
+bool SlabPlan::begin(EpochId epoch, bool turns_only, double now_s) {
+  return schedule_.begin_frame(epoch, partitions_.in_use(), turns_only, now_s);
 }
 
 void SlabPlan::give_leases(Idle& idle, double now_s) {

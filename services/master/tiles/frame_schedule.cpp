@@ -5,6 +5,14 @@
 #include <utility>
 
 namespace telesplat::master {
+namespace {
+
+wire::Moments leased(wire::Moments moments, double now_s) {
+  moments.leased_s = now_s;
+  return moments;
+}
+
+}  // namespace
 
 bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   const bool steered = plans_.on(now_s);
@@ -13,6 +21,7 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   if (!request) return false;
   close_extras(*request, now_s);
   PlannedView view{.epoch = epoch, .view = *request};
+  view.view.moments.begun_s = now_s, view.view.moments.planned_s = 0;
   if (cut_.coarse) view.coarse = next_frame();
   view.frame = next_frame();
   begin(view.frame, {*request});
@@ -101,7 +110,7 @@ wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& 
           .rays = t.rays,
           .mask = {mask.begin(), mask.end()},
           .footprint = f.request.footprint > 0 ? f.request.footprint : 1 / f.request.camera.focal_x(),
-          .leased_s = now_s};
+          .moments = leased(f.request.moments, now_s)};
 }
 
 void FrameSchedule::extend(LeaseId lease, double now_s) {
@@ -124,7 +133,7 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   // A sampler that cannot read a mask casts all.
   const auto& tile = f->tiles.tile(m.tile);
   const uint64_t all = uint64_t(tile.rect.width) * uint64_t(tile.rect.height);
-  costs_.learn(sampler, m.encode_end_s - m.sample_begin_s, double(std::clamp(m.rays, tile.rays, all)));
+  costs_.learn(sampler, m.moments.encode_end_s - m.moments.sample_begin_s, double(std::clamp(m.rays, tile.rays, all)));
   if (!f->tiles.complete()) return true;
   if (f->planned && !f->extra)
     refining_.learn(now_s - f->begun_s, f->refining, f->put_off, std::max<size_t>(costs_.samplers(), 1));

@@ -15,7 +15,8 @@ wire::PlanRequest request_of(const PlannedView& view, const PlanLimits& limits) 
           .request = view.view.request,
           .camera = view.view.camera,
           .tile_size = uint64_t(std::clamp(limits.tile_size, 32, 4096)),
-          .tile_rays = limits.tile_rays};
+          .tile_rays = limits.tile_rays,
+          .moments = view.view.moments};
 }
 
 auto answered_by(const wire::Plan& plan) {

@@ -19,6 +19,12 @@ constexpr int kPlannedSide = 2, kPlannedSideOfFew = 4;
 constexpr double kTargetsOfFew = 3;  // of lease_target_s
 constexpr size_t kFewSamplers = 2;
 
+// The wait for its plan is over.
+PlannedView planned(PlannedView view, double now_s) {
+  view.view.moments.planned_s = now_s;
+  return view;
+}
+
 }  // namespace
 
 PlanLimits FrameSchedule::limits() const {
@@ -57,7 +63,7 @@ void FrameSchedule::take_answer(const wire::Plan& plan, double now_s) {
     if (!plan.full && !plan.tiles.empty()) begin_planned(*asked, plan, now_s);
     return;
   }
-  if (plan.full) return begin_whole(asked->view);
+  if (plan.full) return begin_whole(planned(asked->view, now_s));
   plans_.known(asked->view);
   if (plan.tiles.empty())
     view_complete(asked->view);
@@ -73,7 +79,7 @@ void FrameSchedule::begin_planned(const PlanQuestions::Asked& asked, const wire:
   const bool learns = !asked.request.still;
   insert({.id = plan.frame,
           .epoch = plan.epoch,
-          .request = asked.view.view,
+          .request = planned(asked.view, now_s).view,
           .camera = plan.camera,
           .tiles = FrameTiles::of_plan(plan),
           .planned = true,
@@ -86,7 +92,7 @@ void FrameSchedule::begin_planned(const PlanQuestions::Asked& asked, const wire:
 void FrameSchedule::give_up_plans(double now_s) {
   for (const PlanQuestions::Asked& asked : plans_.give_up(now_s)) {
     plan_rows_.push_back({.asked = asked.request, .asked_s = asked.asked_s, .planned_s = now_s});
-    if (!asked.request.extra) begin_whole(asked.view);
+    if (!asked.request.extra) begin_whole(planned(asked.view, now_s));
   }
 }
 

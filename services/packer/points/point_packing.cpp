@@ -61,25 +61,29 @@ FramePart block_of(const wire::Lease& l) {
           .extra = l.extra};
 }
 
-wire::TileDone done_of(const wire::DepthTile& m, double receive_s) {
-  return {.frame = m.lease.frame,
+wire::TileDone done_of(const wire::DepthTile& m, double arrived_s, double receive_s) {
+  wire::TileDone out{.frame = m.lease.frame,
           .tile = m.lease.tile,
           .lease = m.lease.lease,
           .sampler = m.sampler,
+          .request = m.lease.request,
           .step = m.lease.step,
           .extra = m.lease.extra,
           .rays = m.lease.rays,
           .rect = m.lease.rect,
           .bytes_sampled = m.image.size(),
-          .leased_s = m.lease.leased_s,
-          .sample_begin_s = m.sample_begin_s,
-          .sample_end_s = m.sample_end_s,
-          .encode_end_s = m.encode_end_s,
-          .receive_s = receive_s};
+          .moments = m.lease.moments};
+  out.moments.arrived_s = arrived_s;
+  out.moments.receive_s = receive_s;
+  return out;
+}
+
+metrics::SpanOf of(const wire::TileDone& tile) {
+  return {double(tile.frame.value), double(tile.tile), double(tile.request.value)};
 }
 
 // The event as messages: calls send(message).
-void with_message(InstanceId packer, const Event& e, auto&& send) {
+void with_message(InstanceId packer, const Event& e, const wire::Moments& moments, auto&& send) {
   switch (e.kind) {
     case Event::Kind::kPatch:
       return send(wire::Patch{.packer = packer,
@@ -99,7 +103,8 @@ void with_message(InstanceId packer, const Event& e, auto&& send) {
                               .rect = e.rect,
                               .image = std::as_bytes(std::span(*e.blob)),
                               .missed = e.missed,
-                              .missed_rect = e.missed_rect});
+                              .missed_rect = e.missed_rect,
+                              .moments = moments});
     case Event::Kind::kForget:
       return send(wire::Forget{packer, e.sequence, e.epoch, e.clusters, e.frames});
     case Event::Kind::kEpoch:
@@ -173,7 +178,7 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   if (lease.epoch > core_->epoch()) return ahead_.add(received, message.body.size(), since_s);
   if (lease.epoch != core_->epoch()) return void(++other_epoch_);
   const double begin_s = outlets_.master_now();
-  wire::TileDone done = done_of(m, outlets_.to_master_s(since_s));
+  wire::TileDone done = done_of(m, outlets_.to_master_s(received.message.arrived_s), outlets_.to_master_s(since_s));
   // A tile that is here already is done. The master may not know; if it does, it takes no notice.
   if (core_->has(lease.frame, uint32_t(lease.block))) {
     ++duplicates_;
@@ -187,7 +192,7 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   done.samples = got.samples;
   if (core_->redundancy() == Redundancy::kKeep) done.kept = done.samples;
   if (!got.block) return tell_taken(done);
-  spans_.add("decode", begin_s, outlets_.master_now());
+  spans_.add("decode", begin_s, outlets_.master_now(), 0, of(done));
   std::shared_ptr<const std::vector<uint8_t>> ready;
   if (got.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
   const bool whole = lease.rays == 0 || lease.rays == uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
@@ -204,8 +209,8 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   // What a block gives is counted to the tile that completed it.
   const auto announce = [&](const Event& event) {
     // Taken before it is sent: a viewer may have it in its replica before the send returns.
-    done.packed_s = done.published_s = outlets_.master_now();
-    publish(event);
+    done.moments.packed_s = done.moments.published_s = outlets_.master_now();
+    publish(event, done.moments);
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
     done.bytes_sent = event.blob->size() + event.missed.size() * sizeof event.missed[0];
     bytes_sent_ += done.bytes_sent;
@@ -217,7 +222,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
     for (const auto& forget : core_->forget_superseded()) publish(forget);
   if (planner_)
     for (const auto& forget : core_->forget(planner_->disproved())) publish(forget);
-  spans_.add("pack", begin_s, outlets_.master_now());
+  spans_.add("pack", begin_s, outlets_.master_now(), 0, of(done));
   return ok_status();
 }
 
@@ -238,7 +243,8 @@ std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& requ
   if (!core_ || !planner_ || request.epoch != core_->epoch()) return all_rays(request);
   const double begin_s = monotonic_s(), begin_master_s = outlets_.master_now();
   auto piece = planner_->plan_piece(core_->model(), core_->sequence(), request, now_s);
-  spans_.add("plan", begin_master_s, outlets_.master_now());
+  spans_.add("plan", begin_master_s, outlets_.master_now(), 0,
+             {.frame = double(request.frame.value), .request = double(request.request.value)});
   double took_s = monotonic_s() - begin_s;
   if (request.extra) {
     if (std::exchange(planning_, request.frame) == request.frame) took_s += planning_s_;
@@ -260,13 +266,15 @@ std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& requ
                         .request = request.request,
                         .camera = request.camera};
   const auto event = core_->complete_empty(frame, now_s);
-  if (event && *event) publish(**event);
+  wire::Moments moments = request.moments;
+  moments.planned_s = moments.published_s = outlets_.master_now();
+  if (event && *event) publish(**event, moments);
   for (const auto& forget : core_->forget_superseded()) publish(forget);
   return plan;
 }
 
 void PointPacking::tell_taken(wire::TileDone& done) {
-  done.packed_s = outlets_.master_now();
+  done.moments.packed_s = outlets_.master_now();
   outlets_.tell(done);
 }
 
@@ -297,13 +305,13 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
     return log::info("a viewer that stopped after {} starts anew", after.value);
   }
   const auto events = core_->events_since(after);
-  for (const auto& e : events) with_message(instance_, e, [&](const auto& m) { outlets_.send(m, peer); });
+  for (const auto& e : events) with_message(instance_, e, {}, [&](const auto& m) { outlets_.send(m, peer); });
   outlets_.send(mark(true), peer);
   log::info("a viewer caught up: {} events after {}", events.size(), after.value);
 }
 
-void PointPacking::publish(const Event& event) {
-  with_message(instance_, event, [&](const auto& m) { outlets_.publish(m); });
+void PointPacking::publish(const Event& event, const wire::Moments& moments) {
+  with_message(instance_, event, moments, [&](const auto& m) { outlets_.publish(m); });
 }
 
 wire::StateMark PointPacking::mark(bool answer) const {

@@ -57,7 +57,7 @@ class PointPacking final : public Packing {
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
   void answer(const wire::StateRequest& request, const std::string& peer);
-  void publish(const Event& event);
+  void publish(const Event& event, const wire::Moments& moments = {});
   wire::StateMark mark(bool answer) const;
 
   Options options_;

@@ -77,7 +77,6 @@ std::shared_ptr<SliceGatherer::Frame> SliceGatherer::frame_of(const wire::SliceL
   frame->slabs.resize(lease.slabs);
   frame->slices.resize(lease.slabs);
   frame->missing = lease.slabs;
-  frame->leased_s = lease.leased_s;
   open_.push_back(frame);
   return frame;
 }
@@ -131,7 +130,7 @@ Result<SliceGatherer::Added> SliceGatherer::add(Slab slab, double now_s) {
   }
   const std::shared_ptr<Frame> frame = frame_of(lease, bytes.size());
   ++statistics_.slabs;
-  frame->leased_s = std::min(frame->leased_s, lease.leased_s);
+  frame->moments = lease.moments;
   frame->voxels += slab.images.voxels;
   frame->bytes += bytes.size();
   frame->slices[lease.slab] = std::move(*slices);
@@ -139,8 +138,13 @@ Result<SliceGatherer::Added> SliceGatherer::add(Slab slab, double now_s) {
   if (--frame->missing > 0) return out;
   out.frame_complete = true;
   open_.erase(find_open(lease.frame));
+  completed_ = frame;
   complete(frame, now_s);
   return out;
+}
+
+void SliceGatherer::packed(double master_s) {
+  if (completed_) completed_->moments.packed_s = master_s;
 }
 
 void SliceGatherer::complete(const std::shared_ptr<const Frame>& frame, double now_s) {
@@ -259,7 +263,11 @@ SliceGatherer::Outgoing SliceGatherer::make(InstanceId id, const Viewer& v, cons
   out.frame.shear = frame.lease.shear;
   out.frame.slabs = frame.lease.slabs;
   out.frame.voxels = frame.voxels;
-  out.frame.leased_s = frame.leased_s;
+  out.frame.moments = frame.moments;
+  const wire::Moments& view_moments = waiting.view.moments;
+  out.frame.moments.requested_s = view_moments.requested_s;
+  out.frame.moments.received_s = view_moments.received_s;
+  out.frame.moments.begun_s = view_moments.begun_s;
   out.frame.data = std::as_bytes(std::span(*out.bytes));
   return out;
 }

@@ -31,7 +31,8 @@ class SliceGatherer {
     wire::SliceImages images;
     std::shared_ptr<const void> owner;
   };
-  /// A frame for a viewer. frame.data points into `bytes`; packer and packed_s are the service's to fill in.
+  /// A frame for a viewer. frame.data points into `bytes`; packer and moments.published_s are the service's to
+  /// fill in.
   struct Outgoing {
     std::string peer;  ///< of the socket on which the viewer acknowledges
     wire::SliceFrame frame;
@@ -66,6 +67,8 @@ class SliceGatherer {
   /// Takes a slab; the last one that its frame lacked makes the frame ready for take_outgoing(). Error: lease or images
   /// make no sense, or contradict the frame's other slabs; nothing has changed then. Precondition: ready().
   Result<Added> add(Slab slab, double now_s);
+  /// The frame that add() has just completed is packed, at this moment of the master's clock.
+  void packed(double master_s);
   /// A viewer is there (frame 0), or has let a frame go. One that was there before gets what was under way to it once
   /// more. One that comes late gets the newest complete frame, unless it wants its own in order. Error: a number of
   /// buffers beyond its limits.
@@ -90,7 +93,7 @@ class SliceGatherer {
     std::vector<std::vector<volume::EncodedSlice>> slices;  // of each slab
     size_t missing = 0;
     size_t bytes = 0;
-    double leased_s = 0;  // the first lease
+    wire::Moments moments;  // of the slab that completed it
     uint64_t voxels = 0;
   };
   using Frames = std::deque<std::shared_ptr<Frame>>;
@@ -125,6 +128,7 @@ class SliceGatherer {
   EpochId epoch_;
   Frames open_;  // oldest first
   std::deque<FrameId> closed_;
+  std::shared_ptr<Frame> completed_;     // the last one
   std::shared_ptr<const Frame> newest_;  // complete
   std::map<InstanceId, Viewer> viewers_;
   InstanceId turn_;  // the viewer served last

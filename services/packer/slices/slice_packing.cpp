@@ -54,29 +54,31 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
     return ok_status();
   }
   const double receive_s = outlets_.to_master_s(now_s);
-  const auto added = gatherer_.add({m, message.owner}, now_s);
+  SliceGatherer::Slab slab{m, message.owner};
+  wire::Moments& moments = slab.images.lease.moments;
+  moments.arrived_s = outlets_.to_master_s(message.arrived_s);
+  moments.receive_s = receive_s;
+  const auto added = gatherer_.add(slab, now_s);
   if (!added) return added.error();
   bytes_received_ += m.data.size();
   wire::TileDone done{.frame = m.lease.frame,
                       .tile = m.lease.slab,
                       .lease = m.lease.lease,
                       .sampler = m.sampler,
+                      .request = m.lease.views.size() == 1 ? m.lease.views[0].request : RequestId{},
                       .rect = {0, 0, m.lease.shear.width, m.lease.shear.height},
                       .samples = m.voxels,
                       .kept = added->blocks * volume::kSliceBlock * volume::kSliceBlock,
                       .bytes_sampled = m.data.size(),
-                      .leased_s = m.lease.leased_s,
-                      .sample_begin_s = m.sample_begin_s,
-                      .sample_end_s = m.sample_end_s,
-                      .encode_end_s = m.encode_end_s,
-                      .receive_s = receive_s};
+                      .moments = moments};
   // What a frame gives is counted to the slab that completed it. A slab that is here already is done: the master may
   // not know.
   if (added->frame_complete) {
-    done.bytes_sent = send_out(now_s, &done.published_s);
-    spans_.add("pack", receive_s, outlets_.master_now());
+    gatherer_.packed(outlets_.master_now());
+    done.bytes_sent = send_out(now_s, &done.moments.published_s);
+    spans_.add("pack", receive_s, outlets_.master_now(), 0, {.frame = double(done.frame.value)});
   }
-  done.packed_s = done.published_s > 0 ? done.published_s : outlets_.master_now();
+  done.moments.packed_s = done.moments.published_s > 0 ? done.moments.published_s : outlets_.master_now();
   outlets_.tell(done);
   return ok_status();
 }
@@ -85,9 +87,9 @@ uint64_t SlicePacking::send_out(double now_s, double* first_s) {
   uint64_t bytes = 0;
   while (auto out = gatherer_.take_outgoing(now_s)) {
     out->frame.packer = instance_;
-    out->frame.packed_s = outlets_.master_now();
     // Taken before it is sent: a viewer may have it before the send returns.
-    if (first_s && *first_s == 0) *first_s = out->frame.packed_s;
+    out->frame.moments.published_s = outlets_.master_now();
+    if (first_s && *first_s == 0) *first_s = out->frame.moments.published_s;
     if (!outlets_.send(out->frame, out->peer)) {
       gatherer_.unreachable(out->peer);
       continue;

@@ -19,6 +19,7 @@ namespace telesplat::sampler {
 struct HeldLease {
   wire::Lease lease;  ///< without its mask
   double received_s = 0;
+  double waits_since_s = 0;  ///< it was the next one, and what it needs was not there; 0: that was not so
   std::optional<image::PixelMask> mask;  ///< what lease.mask says: the pixels to be sampled, counted from its rectangle
 
   const image::PixelMask* pixels() const { return mask ? &*mask : nullptr; }

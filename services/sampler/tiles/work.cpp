@@ -9,13 +9,14 @@ namespace telesplat::sampler {
 
 void TileWork::take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) {
   net::dispatch<wire::Lease>(from, message, [&](const wire::Lease& lease) {
-    if (takes_leases && leases_.size() < kMaxHeld) hold(lease, now_s);
+    if (takes_leases && leases_.size() < kMaxHeld) hold(lease, message.arrived_s, now_s);
   });
 }
 
 // The mask is decoded once, and does not go on to the packer.
-void TileWork::hold(const wire::Lease& lease, double now_s) {
-  HeldLease held{lease, now_s, std::nullopt};
+void TileWork::hold(const wire::Lease& lease, double arrived_s, double now_s) {
+  HeldLease held{.lease = lease, .received_s = now_s};
+  held.lease.moments.lease_arrived_s = link_.to_master_s(arrived_s);
   if (!lease.mask.empty()) {
     held.lease.mask.clear();
     auto mask = codec::decode_mask(lease.mask, lease.rect.width, lease.rect.height);
@@ -31,7 +32,9 @@ void TileWork::hold(const wire::Lease& lease, double now_s) {
 
 Readiness TileWork::look_at_next(double now_s) {
   while (!leases_.empty()) {
-    const Readiness r = source_->readiness(leases_.front(), now_s);
+    HeldLease& next = leases_.front();
+    const Readiness r = source_->readiness(next, now_s);
+    if (r.state == Readiness::State::kWaits && next.waits_since_s == 0) next.waits_since_s = now_s;
     if (r.state != Readiness::State::kHopeless) return r;
     leases_.pop_front();
   }
@@ -43,11 +46,14 @@ Delivery TileWork::sample_next() {
   leases_.pop_front();
   const Sampled sampled = source_->sample(held);
   const auto stream = codec::encode(sampled.image);
-  Delivery out{wire::DepthTile::kName, {}, sampled.begin_s, sampled.end_s, monotonic_s()};
+  Delivery out{wire::DepthTile::kName, {}, sampled.begin_s, sampled.end_s, monotonic_s(),
+               {double(held.lease.frame.value), double(held.lease.tile), double(held.lease.request.value)}};
   wire::DepthTile tile{link_.instance(), held.lease};
-  tile.sample_begin_s = link_.to_master_s(out.begin_s);
-  tile.sample_end_s = link_.to_master_s(out.sampled_s);
-  tile.encode_end_s = link_.to_master_s(out.encoded_s);
+  wire::Moments& moments = tile.lease.moments;
+  if (held.waits_since_s > 0) moments.fetch_s = out.begin_s - held.waits_since_s;
+  moments.sample_begin_s = link_.to_master_s(out.begin_s);
+  moments.sample_end_s = link_.to_master_s(out.sampled_s);
+  moments.encode_end_s = link_.to_master_s(out.encoded_s);
   tile.image = std::as_bytes(std::span(stream));
   out.body = wire::encode(tile);
   return out;

@@ -29,7 +29,7 @@ class TileWork final : public Work {
   void add_status(net::MasterLink::Values& values) const override { source_->add_status(values); }
 
  private:
-  void hold(const wire::Lease& lease, double now_s);
+  void hold(const wire::Lease& lease, double arrived_s, double now_s);
 
   std::unique_ptr<TileSource> source_;
   net::MasterLink& link_;

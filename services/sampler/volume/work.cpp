@@ -75,7 +75,10 @@ void VolumeWork::on_welcome(const wire::Welcome& welcome) {
 void VolumeWork::take(net::Socket& from, const net::Message& message, bool takes_leases, double now_s) {
   net::dispatch<wire::SliceLease, wire::SlabAssignment>(from, message, [&](const auto& m) {
     if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::SliceLease>) {
-      if (takes_leases && leases_.size() < kMaxHeld) leases_.push_back({m, now_s});
+      if (takes_leases && leases_.size() < kMaxHeld) {
+        leases_.push_back({m, now_s});
+        leases_.back().lease.moments.lease_arrived_s = master_.to_master_s(message.arrived_s);
+      }
     } else {
       if (!store_.scene()) return from.reject(message, "a slab of a volume that is not known yet");
       if (const Status s = store_.assign(m); !s) return from.reject(message, s.error().text);
@@ -118,7 +121,9 @@ Readiness VolumeWork::readiness(const Held& held, double now_s) {
 
 Readiness VolumeWork::look_at_next(double now_s) {
   while (!leases_.empty()) {
-    const Readiness r = readiness(leases_.front(), now_s);
+    Held& next = leases_.front();
+    const Readiness r = readiness(next, now_s);
+    if (r.state == Readiness::State::kWaits && next.waits_since_s == 0) next.waits_since_s = now_s;
     if (r.state != Readiness::State::kHopeless) return r;
     leases_.pop_front();
   }
@@ -132,12 +137,17 @@ Delivery VolumeWork::sample_next() {
   const Epoch& epoch = *epochs_.find(lease.epoch);
   store_.use(int(lease.begin), int(lease.end));
   const auto slab = store_.slab(want(lease.epoch, epoch, int(lease.begin), int(lease.end)));
-  Delivery out{wire::SliceImages::kName, {}, monotonic_s()};
+  Delivery out{.type = wire::SliceImages::kName,
+               .body = {},
+               .begin_s = monotonic_s(),
+               .of = {.frame = double(lease.frame.value), .tile = double(lease.slab)}};
   wire::SliceImages m{.sampler = master_.instance, .lease = lease};
   const auto send = [&](const std::vector<uint8_t>& bytes) {
-    m.sample_begin_s = master_.to_master_s(out.begin_s);
-    m.sample_end_s = master_.to_master_s(out.sampled_s);
-    m.encode_end_s = master_.to_master_s(out.encoded_s);
+    wire::Moments& moments = m.lease.moments;
+    if (held.waits_since_s > 0) moments.fetch_s = out.begin_s - held.waits_since_s;
+    moments.sample_begin_s = master_.to_master_s(out.begin_s);
+    moments.sample_end_s = master_.to_master_s(out.sampled_s);
+    moments.encode_end_s = master_.to_master_s(out.encoded_s);
     m.data = std::as_bytes(std::span(bytes));
     out.body = wire::encode(m);
     return out;

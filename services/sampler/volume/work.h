@@ -66,6 +66,7 @@ class VolumeWork final : public Work {
   struct Held {
     wire::SliceLease lease;
     double received_s = 0;
+    double waits_since_s = 0;  // HeldLease::waits_since_s
   };
   struct Asked {
     VoxelAsk ask;

@@ -24,8 +24,8 @@ wire::TileDone done(const wire::Lease& l, double took_s = 0) {
   m.lease = l.lease;
   m.step = l.step;
   m.rect = l.rect;
-  m.leased_s = m.sample_begin_s = l.leased_s;
-  m.sample_end_s = m.encode_end_s = l.leased_s + took_s;
+  m.moments.leased_s = m.moments.sample_begin_s = l.moments.leased_s;
+  m.moments.sample_end_s = m.moments.encode_end_s = l.moments.leased_s + took_s;
   return m;
 }
 

@@ -122,7 +122,7 @@ TEST_F(Slabs, EverySamplerHasASlabOfEveryFrame) {
   EXPECT_EQ(b->slabs, 2u);
   EXPECT_EQ(b->begin, 10u);
   EXPECT_EQ(b->end, 24u);
-  EXPECT_EQ(b->leased_s, 1.5);
+  EXPECT_EQ(b->moments.leased_s, 1.5);
   ASSERT_EQ(a->views.size(), 1u);
   EXPECT_EQ(a->views[0].request.value, 7u);
   EXPECT_EQ(a->shear, b->shear);

@@ -80,7 +80,9 @@ class Steered : public testing::Test {
   }
   bool done(const wire::Lease& l, double took_s = 0.001) {
     wire::TileDone m{.frame = l.frame, .tile = l.tile, .lease = l.lease, .extra = l.extra, .rays = l.rays};
-    m.sample_begin_s = l.leased_s, m.sample_end_s = m.encode_end_s = l.leased_s + took_s;
+    m.moments = l.moments;
+    m.moments.sample_begin_s = l.moments.leased_s;
+    m.moments.sample_end_s = m.moments.encode_end_s = l.moments.leased_s + took_s;
     return schedule.tile_done(m, "a", now);
   }
   // A view from beginning to end; nothing has to be cast for it.

@@ -33,11 +33,11 @@ class Record : public ::testing::Test {
     t.kept = 100;
     t.bytes_sampled = 4000;
     t.bytes_sent = 500;
-    t.sample_begin_s = begin_s;
-    t.sample_end_s = begin_s + 0.010;
-    t.encode_end_s = begin_s + 0.012;
-    t.receive_s = begin_s + 0.013;
-    t.packed_s = begin_s + 0.018;
+    t.moments.sample_begin_s = begin_s;
+    t.moments.sample_end_s = begin_s + 0.010;
+    t.moments.encode_end_s = begin_s + 0.012;
+    t.moments.receive_s = begin_s + 0.013;
+    t.moments.packed_s = begin_s + 0.018;
     return t;
   }
 

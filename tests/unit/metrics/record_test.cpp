@@ -1,15 +1,25 @@
 // The files of a run.
 #include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "common/core/utf8.h"
+#include "common/metrics/recorder.h"
 #include "tests/unit/metrics/record_fixture.h"
 
 namespace telesplat::metrics {
 namespace {
 
 namespace fs = std::filesystem;
+
+std::vector<nlohmann::json> of_phase(const nlohmann::json& trace, const std::string& phase) {
+  std::vector<nlohmann::json> out;
+  for (const auto& event : trace)
+    if (event["ph"] == phase) out.push_back(event);
+  return out;
+}
 
 TEST_F(Record, TablesBecomeCsv) {
   // Times have the digits of nanoseconds, everything else those that it has.
@@ -34,20 +44,62 @@ TEST_F(Record, BadTablesAreRefusedAndLeaveNothing) {
 
 TEST_F(Record, TheTraceIsValidWhateverSpansCome) {
   ASSERT_TRUE(
-      record->add_rows(viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 1, 2, 2.25, 3}}));
+      record->add_rows(viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 7, 3, 9, 1, 2, 2.25, 3, -1, -1, -1}}));
   ASSERT_TRUE(
-      record->add_rows(viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, -1, 1, 2, 0}}));  // names that are not there
+      record->add_rows(viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, 0, 0, 0, -1, 1, 2, 0, 0, 0, 0}}));  // names that are not there
   record.reset();
   const auto trace = nlohmann::json::parse(text("trace.json"), nullptr, false);
   ASSERT_TRUE(trace.is_array());
-  ASSERT_EQ(trace.size(), 3u);
-  EXPECT_EQ(trace[0]["ph"], "M");
-  EXPECT_EQ(trace[0]["args"]["name"], "viewer-1");
-  EXPECT_EQ(trace[1]["name"], "sample");
-  EXPECT_EQ(trace[1]["ts"], 1e6);
-  EXPECT_EQ(trace[1]["dur"], 5e5);
-  EXPECT_EQ(trace[1]["pid"], 5);
-  EXPECT_EQ(trace[2]["tid"], 3);
+  const auto spans = of_phase(trace, "X");
+  ASSERT_EQ(spans.size(), 2u);
+  EXPECT_EQ(spans[0]["name"], "sample");
+  EXPECT_EQ(spans[0]["ts"], 1e6);
+  EXPECT_EQ(spans[0]["dur"], 5e5);
+  EXPECT_EQ(spans[0]["args"], (nlohmann::json{{"frame", 7}, {"tile", 3}, {"request", 9}}));
+  EXPECT_EQ(spans[1]["tid"], 3);
+  EXPECT_EQ(spans[1]["args"], nlohmann::json::object()) << "it is about nothing that is known";
+  std::map<std::string, std::string> names;
+  for (const auto& e : of_phase(trace, "M"))
+    if (e["name"] != "process_labels") names[std::string(e["name"]) + e["tid"].dump()] = e["args"]["name"];
+  EXPECT_EQ(names["process_name0"], "viewer-1");
+  EXPECT_EQ(names["thread_name0"], "display");
+  EXPECT_EQ(names["thread_name3"], "epochs");
+}
+
+// What may overlap in one lane is told apart by its id.
+TEST_F(Record, TheTraceHasLeasesPlansAndViewUpdates) {
+  wire::TileDone done = tile(4, 2, 10);
+  done.lease = {77};
+  done.request = {5};
+  done.moments.leased_s = 9;
+  record->add_tile("sampler-1", done);
+  PlanRow plan;
+  plan.asked.frame = {4}, plan.asked.request = {5};
+  plan.asked_s = 8.5, plan.planned_s = 8.75;
+  record->add_plan("viewer-1", plan);
+  ASSERT_TRUE(record->add_rows(
+      viewer, {{5}, "spans", {"view update"}, {0, 8, 11, kOverlapping, 4, -1, 5, 0, 8.5, 12, kOverlapping, 5, -1, 6}}));
+  record.reset();
+  const auto trace = nlohmann::json::parse(text("trace.json"));
+  const auto begins = of_phase(trace, "b"), ends = of_phase(trace, "e");
+  ASSERT_EQ(begins.size(), 4u);
+  ASSERT_EQ(ends.size(), 4u);
+  std::set<uint64_t> ids;
+  for (size_t i = 0; i < begins.size(); ++i) {
+    ids.insert(uint64_t(begins[i]["id"]));
+    for (const char* key : {"id", "name", "cat", "pid"}) EXPECT_EQ(begins[i][key], ends[i][key]) << key;
+    EXPECT_LT(begins[i]["ts"], ends[i]["ts"]);
+  }
+  EXPECT_EQ(ids.size(), 4u);
+  EXPECT_EQ(begins[0]["name"], "lease");
+  EXPECT_EQ(begins[0]["ts"], 9e6);
+  EXPECT_EQ(ends[0]["ts"], 10.018e6) << "until the packer had it";
+  EXPECT_EQ(begins[0]["args"],
+            (nlohmann::json{{"frame", 4}, {"tile", 2}, {"request", 5}, {"lease", 77}, {"sampler", "sampler-1"}}));
+  EXPECT_EQ(begins[1]["name"], "plan");
+  EXPECT_EQ(begins[1]["pid"], begins[0]["pid"]) << "the master's";
+  EXPECT_NE(begins[2]["pid"], begins[0]["pid"]);
+  EXPECT_EQ(begins[3]["args"]["request"], 6);
 }
 
 // However long the machine runs: twelve days of uptime are 10^6 seconds.
@@ -55,11 +107,11 @@ TEST_F(Record, TimesCountFromTheRunsBeginning) {
   record = std::move(RunRecord::open(folder + "/run", {1'000'000, 1})).value();
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s", "begin_s"}, {0.5, 1'000'002.000000001}}));
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "updates", {"requested_s", "latency_ms"}, {1'000'001.25, 200}}));
-  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"sample"}, {0, 1'000'001, 1'000'001.000000123, 0}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"sample"}, {0, 1'000'001, 1'000'001.000000123, 0, -1, -1, -1}}));
   wire::TileDone done = tile(1, 0, 1'000'003);
-  done.leased_s = 1'000'002;
+  done.moments.leased_s = 1'000'002;
   record->add_tile("sampler-1", done);
-  done.published_s = 1'000'003.5;
+  done.moments.published_s = 1'000'003.5;
   record->add_tile("sampler-1", done);
   record->add_epoch({1}, 1'000'000.5, {});
   ASSERT_TRUE(record->finish({}, {}));
@@ -71,9 +123,10 @@ TEST_F(Record, TimesCountFromTheRunsBeginning) {
             std::string::npos)
       << "not published with this tile: " << text("tiles.csv");
   EXPECT_NE(text("tiles.csv").find(",3.018000000,3.500000000,0,"), std::string::npos);
-  const auto trace = nlohmann::json::parse(text("trace.json"));
-  EXPECT_EQ(trace[1]["ts"], 1e6);
-  EXPECT_NEAR(double(trace[1]["dur"]), 0.123, 1e-9) << "microseconds, to the nanosecond";
+  const auto spans = of_phase(nlohmann::json::parse(text("trace.json")), "X");
+  ASSERT_EQ(spans.size(), 1u);
+  EXPECT_EQ(spans[0]["ts"], 1e6);
+  EXPECT_NEAR(double(spans[0]["dur"]), 0.123, 1e-9) << "microseconds, to the nanosecond";
 }
 
 TEST_F(Record, ATraceWithoutSpansIsValidToo) {
@@ -122,7 +175,7 @@ TEST_F(Record, AFolderThatCannotBeMadeIsNamed) {
 // Nothing of this comes in through messages, which are UTF-8. Names of files and flags might.
 TEST_F(Record, FilesAreUtf8WhateverNamesAre) {
   viewer.name = "viewer \xff";
-  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"caf\xe9"}, {0, 1, 1.5, 0}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "spans", {"caf\xe9"}, {0, 1, 1.5, 0, -1, -1, -1}}));
   ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s", "caf\xe9"}, {0, 1}}));
   record->add_tile("sampler \xff", tile(1, 0, 1.0));
   record->add_epoch({1}, 0, {{"caf\xe9", 1}}, {{"transfer", "\xff"}});
@@ -131,7 +184,7 @@ TEST_F(Record, FilesAreUtf8WhateverNamesAre) {
   record.reset();
   for (const auto& file : fs::directory_iterator(folder + "/run"))
     EXPECT_TRUE(valid_utf8(text(file.path().filename()))) << file.path();
-  EXPECT_EQ(nlohmann::json::parse(text("trace.json"))[1]["name"], "caf\xef\xbf\xbd");
+  EXPECT_EQ(of_phase(nlohmann::json::parse(text("trace.json")), "X").at(0)["name"], "caf\xef\xbf\xbd");
   EXPECT_EQ(text("frames.csv"), "viewer,t_s,caf\xef\xbf\xbd\nviewer \xef\xbf\xbd,0.000000000,1\n");
 }
 

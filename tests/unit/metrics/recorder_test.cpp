@@ -40,12 +40,12 @@ TEST(Recorders, GiveWhatCameSinceTheLastTime) {
   EXPECT_FALSE(table.flush({9}));
   SpanRecorder spans;
   spans.add("one", 1, 2);
-  spans.add("two", 2, 3, 5);
+  spans.add("two", 2, 3, 5, {.frame = 8, .tile = 0, .request = 4});
   spans.add("one", 3, 4);
   const auto s = spans.flush({9});
   ASSERT_TRUE(s);
   EXPECT_EQ(s->columns, (std::vector<std::string>{"one", "two"}));
-  EXPECT_EQ(s->values, (std::vector<double>{0, 1, 2, 0, 1, 2, 3, 5, 0, 3, 4, 0}));
+  EXPECT_EQ(s->values, (std::vector<double>{0, 1, 2, 0, -1, -1, -1, 1, 2, 3, 5, 8, 0, 4, 0, 3, 4, 0, -1, -1, -1}));
 }
 
 TEST(Recorders, AreBoundedWhileTheMasterIsAway) {

@@ -45,7 +45,7 @@ class PointPackingTest : public testing::Test {
     l.lease = {frame * 10 + uint64_t(half)}, l.frame = {frame}, l.epoch = epoch, l.viewer = {77}, l.request = {5};
     l.tile = uint64_t(half), l.block = 0, l.blocks_in_frame = 1;
     l.camera = kCamera, l.rect = {0, 32 * half, 96, 32}, l.block_rect = {0, 0, 96, 64};
-    l.leased_s = 2;
+    l.moments.leased_s = 2;
     return m;
   }
   void sample(wire::DepthTile m, double now_s) {
@@ -143,11 +143,11 @@ TEST_F(PointPackingTest, ATileKeepsItsLabelFromLeaseToPatch) {
   EXPECT_EQ(told[0].lease.value, 10u);
   EXPECT_EQ(told[0].sampler.value, 9u);
   EXPECT_EQ(told[0].rect, (geometry::Rect{0, 0, 96, 32}));
-  EXPECT_EQ(told[0].leased_s, 2);
-  EXPECT_EQ(told[0].receive_s, 53);
-  EXPECT_EQ(told[0].packed_s, 99);
-  EXPECT_EQ(told[0].published_s, 0) << "published with the tile that completed the block";
-  EXPECT_EQ(told[1].published_s, 99);
+  EXPECT_EQ(told[0].moments.leased_s, 2);
+  EXPECT_EQ(told[0].moments.receive_s, 53);
+  EXPECT_EQ(told[0].moments.packed_s, 99);
+  EXPECT_EQ(told[0].moments.published_s, 0) << "published with the tile that completed the block";
+  EXPECT_EQ(told[1].moments.published_s, 99);
   EXPECT_EQ(told[0].bytes_sent, 0u);
   EXPECT_EQ(told[0].samples + told[1].samples, patch.samples);
   EXPECT_EQ(told[1].kept, patch.kept) << "counted to the tile that completed the block";
@@ -165,7 +165,7 @@ TEST_F(PointPackingTest, TilesAheadOfTheirEpochWaitForIt) {
   packing.tick(1.5);
   ASSERT_TRUE(packing.follow(welcome(next), 1.6));
   ASSERT_EQ(told.size(), 2u);
-  EXPECT_EQ(told[0].receive_s, 51) << "when it came";
+  EXPECT_EQ(told[0].moments.receive_s, 51) << "when it came";
   sample(tile(2, 0), 2);
   EXPECT_EQ(told.size(), 2u) << "the epoch is over";
   sample(tile(2, 0, next.next()), 3);

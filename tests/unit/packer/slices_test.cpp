@@ -38,7 +38,7 @@ wire::SliceLease lease(uint64_t frame, uint64_t slab, uint64_t slabs, std::vecto
   for (const auto& v : views) cameras.push_back(v.camera);
   l.shear = *volume::plan_frame(grid(), cameras);
   l.views = std::move(views);
-  l.leased_s = 10 + double(slab);
+  l.moments.leased_s = 10 + double(slab);
   return l;
 }
 
@@ -91,7 +91,7 @@ TEST(SliceGatherer, AFrameGoesOutWhenAllOfItsSlabsAreThere) {
   EXPECT_EQ(out->frame.request.value, 5u);
   EXPECT_EQ(out->frame.slabs, 3u);
   EXPECT_EQ(out->frame.voxels, 300u);
-  EXPECT_EQ(out->frame.leased_s, 10);
+  EXPECT_EQ(out->frame.moments.leased_s, 11) << "of the slab that completed it";
   EXPECT_EQ(out->frame.shear, lease(1, 0, 3, {view(7, 5)}).shear);
   const auto slices = slices_of(*out);
   EXPECT_EQ(slices.size(), 3 * out->frame.shear.layers.size());
@@ -414,7 +414,7 @@ TEST_F(SlicePackingTest, TellsTheMasterOfEverySlab) {
   ASSERT_EQ(told.size(), 3u);
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_NE(sent[0].first.packer.value, 0u);
-  EXPECT_EQ(sent[0].first.packed_s, 99);
+  EXPECT_EQ(sent[0].first.moments.published_s, 99);
   const auto& first = told[0];
   EXPECT_EQ(first.tile, 0u);
   EXPECT_EQ(first.frame.value, 1u);
@@ -424,10 +424,10 @@ TEST_F(SlicePackingTest, TellsTheMasterOfEverySlab) {
   EXPECT_GT(first.kept, 0u);
   EXPECT_EQ(first.kept % 4096, 0u);
   EXPECT_EQ(first.rect.width, lease(1, 0, 2, {view(7, 5)}).shear.width);
-  EXPECT_EQ(first.receive_s, 53);
+  EXPECT_EQ(first.moments.receive_s, 53);
   EXPECT_EQ(first.bytes_sent, 0u);
-  EXPECT_EQ(first.published_s, 0) << "published with the slab that completed the frame";
-  EXPECT_EQ(told[1].published_s, 99);
+  EXPECT_EQ(first.moments.published_s, 0) << "published with the slab that completed the frame";
+  EXPECT_EQ(told[1].moments.published_s, 99);
   EXPECT_EQ(told[1].bytes_sent, sent[0].first.data.size()) << "counted to the slab that completed the frame";
   EXPECT_EQ(told[2].bytes_sent, 0u);
 }

@@ -328,9 +328,9 @@ TEST_F(VolumeWorkTest, ALeaseWaitsForItsVoxelsAndIsExtendedMeanwhile) {
   EXPECT_EQ(m->sampler.value, 5u);
   EXPECT_EQ(m->lease.frame.value, 1u);
   EXPECT_EQ(m->voxels, voxels(0, 0, 12, shown(s)).size());
-  EXPECT_GE(m->sample_begin_s, 1000);
-  EXPECT_LE(m->sample_begin_s, m->sample_end_s);
-  EXPECT_LE(m->sample_end_s, m->encode_end_s);
+  EXPECT_GE(m->lease.moments.sample_begin_s, 1000);
+  EXPECT_LE(m->lease.moments.sample_begin_s, m->lease.moments.sample_end_s);
+  EXPECT_LE(m->lease.moments.sample_end_s, m->lease.moments.encode_end_s);
   const auto& shear = m->lease.shear;
   const auto slices = volume::parse_slices({reinterpret_cast<const uint8_t*>(m->data.data()), m->data.size()},
                                            shear.width, shear.height, int(shear.layers.size()));

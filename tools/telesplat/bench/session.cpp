@@ -43,7 +43,7 @@ Status BenchSession::request(const geometry::Camera& camera) {
   request_ = request_.next();
   progress_ = {};
   requested_s_ = heard_s_ = monotonic_s();
-  if (!link_->socket().send(wire::ViewRequest{link_->instance(), request_, camera, requested_s_}))
+  if (!link_->socket().send(wire::ViewRequest{link_->instance(), request_, camera, {.requested_s = requested_s_}}))
     return Error{"the master takes no requests"};
   return ok_status();
 }
@@ -66,7 +66,7 @@ void BenchSession::pump(int timeout_ms) {
   std::vector<net::Socket*> sockets{&link_->socket()};
   if (patches_) sockets.push_back(&*patches_);
   net::wait_readable(sockets, timeout_ms);
-  while (const auto message = link_->socket().receive()) link_->handle(*message, monotonic_s());
+  while (const auto message = link_->socket().receive()) link_->handle(*message);
   if (!patches_ && link_->session()) {
     const auto& endpoints = link_->session()->endpoints;
     if (const auto it = endpoints.find("patches"); it != endpoints.end()) {

@@ -82,7 +82,7 @@ void WaitingViewer::take(const net::Message& message, double now_s) {
 
 double WaitingViewer::turn(double now_s, double cost_s, bool asks) {
   link_.tick(now_s, [] { return net::MasterLink::Values{}; });
-  while (const auto message = link_.socket().receive()) link_.handle(*message, now_s);
+  while (const auto message = link_.socket().receive()) link_.handle(*message);
   if (!state_ && link_.session()) {
     const auto& endpoints = link_.session()->endpoints;
     if (const auto it = endpoints.find("state"); it != endpoints.end()) {
@@ -111,7 +111,8 @@ double WaitingViewer::turn(double now_s, double cost_s, bool asks) {
   if (!requested_.empty() && now_s - asked_s_ > kPatience_s) requested_.clear();
   while (asks && link_.session()->facts.contains("kind") && requested_.size() + complete_.size() < size_t(buffers_)) {
     link_.socket().send(
-        wire::ViewRequest{link_.instance(), next_, camera_, link_.to_master_s(now_s), uint64_t(buffers_)});
+        wire::ViewRequest{
+            link_.instance(), next_, camera_, {.requested_s = link_.to_master_s(now_s)}, uint64_t(buffers_)});
     if (requested_.empty()) asked_s_ = now_s;
     requested_.push_back(next_);
     next_ = next_.next();

@@ -68,7 +68,7 @@ Status TimedSession::finish_view() {
   auto cost = session_->view(began_s_, request.camera, request.footprint, whole ? &*whole : nullptr);
   if (!cost) return cost.error();
   expected_s_ = seconds(*cost);
-  cost->requested_s = request.sent_s;
+  cost->requested_s = request.moments.requested_s;
   cost->complete_s = began_s_ + expected_s_;
   requester_.on_part({.viewer = SteeredSession::kViewer,
                       .request = request.request,
