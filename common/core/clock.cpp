@@ -1,6 +1,8 @@
 #include "common/core/clock.h"
 
 #include <ctime>
+#include <fstream>
+#include <sstream>
 
 namespace telesplat {
 namespace {
@@ -11,8 +13,29 @@ double read_s(clockid_t clock) {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
+std::string text_of(const char* path) {
+  std::ostringstream out;
+  out << std::ifstream(path).rdbuf();
+  return out.str();
+}
+
+// The system's start, and by how much this process' clock is shifted against it.
+std::string read_clock_id() {
+  std::istringstream boot(text_of("/proc/sys/kernel/random/boot_id"));
+  std::string id;
+  if (!(boot >> id)) return {};
+  std::istringstream offsets(text_of("/proc/self/timens_offsets"));
+  for (std::string clock, s, ns; offsets >> clock >> s >> ns;)
+    if (clock == "monotonic") return id + "+" + s + "." + ns;
+  return id + "+0.0";  // a kernel without time namespaces
+}
+
 }  // namespace
 
+const std::string& clock_id() {
+  static const std::string id = read_clock_id();
+  return id;
+}
 double monotonic_s() { return read_s(CLOCK_MONOTONIC); }
 double thread_cpu_s() { return read_s(CLOCK_THREAD_CPUTIME_ID); }
 

@@ -1,10 +1,16 @@
 // Time. Cores of services take times as arguments; only main loops read clocks.
 #pragma once
 
+#include <string>
+
 namespace telesplat {
 
 /// Seconds since an arbitrary, machine-wide origin (CLOCK_MONOTONIC: the same for all processes of one machine).
 double monotonic_s();
+
+/// Which clock monotonic_s() reads: processes of one machine, in one time namespace, have the same id. Empty: that
+/// cannot be told here.
+const std::string& clock_id();
 
 /// CPU seconds used by the calling thread.
 double thread_cpu_s();

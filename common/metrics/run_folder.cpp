@@ -30,8 +30,8 @@ struct Ours {
 const std::vector<Ours>& ours() {
   static const std::vector<Ours> table{
       {"",
-       {"summary.json", "summary.json.part", "frames.csv", "updates.csv", "stages.csv", "tiles.csv", "plans.csv", "epochs.csv",
-        "assignment.csv", "quality.csv", "trace.json", "session.toml", "points.events", "slices.events"}},
+       {"summary.json", "summary.json.part", "frames.csv", "updates.csv", "stages.csv", "tiles.csv", "plans.csv",
+        "epochs.csv", "assignment.csv", "quality.csv", "trace.json", "session.toml", "points.events", "slices.events"}},
       {"images", {"frame-*.png", "frame-*.exr", "verify-*.png", "wall.png", "contact-sheet.png"}},
       {"depth", {"frame-*.depth", "cameras.csv"}},
       {"plans", {"plan-*.png"}},

@@ -121,8 +121,8 @@ Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory,
 
 Status RunRecord::open_files() {
   if (!frames_file_.open(directory_ + "/frames.csv") || !updates_file_.open(directory_ + "/updates.csv") ||
-      !stages_file_.open(directory_ + "/stages.csv") || !tiles_file_.open(directory_ + "/tiles.csv") || !epochs_file_.open(directory_ + "/epochs.csv") ||
-      !trace_.open(directory_ + "/trace.json", begin_.monotonic_s))
+      !stages_file_.open(directory_ + "/stages.csv") || !tiles_file_.open(directory_ + "/tiles.csv") ||
+      !epochs_file_.open(directory_ + "/epochs.csv") || !trace_.open(directory_ + "/trace.json", begin_.monotonic_s))
     return Error{fmt::format("{}: cannot write into it: {}", directory_, std::strerror(errno))};
   tiles_file_.write(csv_line(names(kTileColumns)));
   return ok_status();

@@ -1,6 +1,6 @@
-// The record of a run: frames.csv, updates.csv, stages.csv, tiles.csv, plans.csv, epochs.csv, assignment.csv, trace.json and
-// summary.json in one folder (docs/metrics.md tells every column and figure). The master writes it as rows arrive: what
-// was measured survives, however the run ends.
+// The record of a run: frames.csv, updates.csv, stages.csv, tiles.csv, plans.csv, epochs.csv, assignment.csv,
+// trace.json and summary.json in one folder (docs/metrics.md tells every column and figure). The master writes it as
+// rows arrive: what was measured survives, however the run ends.
 #pragma once
 
 #include <map>
@@ -15,7 +15,7 @@
 #include "common/metrics/measured.h"
 #include "common/metrics/process.h"
 #include "common/metrics/text_file.h"
-#include "common/metrics/trace_file.h"
+#include "common/metrics/trace/trace_file.h"
 
 namespace telesplat::metrics {
 
@@ -33,8 +33,9 @@ class RunRecord {
   /// work. begin: from here on count the times of all files, which come on the master's clock.
   static Result<std::unique_ptr<RunRecord>> open(const std::string& directory, const Beginning& begin = {});
 
-  /// Rows of "frames", "updates", "stages" or "spans" from `process`. Refuses unknown tables and shapes that do not fit. Columns
-  /// whose names end in _s are moments of the master's clock; but for t_s, which each viewer counts from its own.
+  /// Rows of "frames", "updates", "stages" or "spans" from `process`. Refuses unknown tables and shapes that do not
+  /// fit. Columns whose names end in _s are moments of the master's clock; but for t_s, which each viewer counts from
+  /// its own.
   Status add_rows(const Process& process, const wire::MetricRows& rows);
   void add_tile(const std::string& sampler, const wire::TileDone& tile);
   /// The scene's parameters and texts (quoted in the file) from t_s on. epochs.csv has the names of the first epoch.

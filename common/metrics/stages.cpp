@@ -4,15 +4,15 @@
 
 namespace telesplat::metrics {
 
-std::array<double, kStageCount> stages_ms(const wire::Moments& part, const UpdateMoments& update) {
+StagesMs stages_ms(const wire::Moments& part, const UpdateMoments& update) {
   // When each stage ended. What the sampler fetched ends where sampling begins.
   const double fetched_s = part.sample_begin_s;
   const double fetch_begin_s = part.fetch_s > 0 ? std::max(fetched_s - part.fetch_s, part.lease_arrived_s) : fetched_s;
   const double ends_s[kStageCount] = {
-      part.received_s,     part.begun_s,     part.planned_s,    part.leased_s,         part.lease_arrived_s, fetch_begin_s,
-      fetched_s,           part.sample_end_s, part.encode_end_s, part.arrived_s,        part.receive_s,       part.packed_s,
-      part.published_s,    update.arrived_s, update.decode_begin_s, update.decoded_s, update.complete_s};
-  std::array<double, kStageCount> out{};
+      part.received_s,  part.begun_s,      part.planned_s,        part.leased_s,    part.lease_arrived_s, fetch_begin_s,
+      fetched_s,        part.sample_end_s, part.encode_end_s,     part.arrived_s,   part.receive_s,       part.packed_s,
+      part.published_s, update.arrived_s,  update.decode_begin_s, update.decoded_s, update.complete_s};
+  StagesMs out{};
   double before_s = update.requested_s;
   for (size_t i = 0; i < kStageCount; ++i) {
     if (ends_s[i] == 0) continue;

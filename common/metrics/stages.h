@@ -5,28 +5,36 @@
 #include <array>
 #include <cstddef>
 
+#include "common/metrics/columns.h"
 #include "common/wire/moments.h"
 
 namespace telesplat::metrics {
 
-enum class StageKind { kWork, kNetwork, kQueue };
+inline constexpr size_t kStageCount = 17;
+/// Milliseconds of each stage, in the order in which they happen.
+using StagesMs = std::array<double, kStageCount>;
 
-struct Stage {
-  const char* column;  ///< of stages.csv; without "_ms" its name
-  StageKind kind;
+/// Names that end in "network_ms" are the network, in "queue_ms" waiting for someone who is busy; the rest is work.
+inline constexpr Column<StagesMs> kStageColumns[] = {
+    {"request_network_ms", [](const StagesMs& s) { return s[0]; }},
+    {"view_queue_ms", [](const StagesMs& s) { return s[1]; }},
+    {"plan_ms", [](const StagesMs& s) { return s[2]; }},
+    {"lease_queue_ms", [](const StagesMs& s) { return s[3]; }},
+    {"lease_network_ms", [](const StagesMs& s) { return s[4]; }},
+    {"sampler_queue_ms", [](const StagesMs& s) { return s[5]; }},
+    {"fetch_ms", [](const StagesMs& s) { return s[6]; }},
+    {"sampling_ms", [](const StagesMs& s) { return s[7]; }},
+    {"encoding_ms", [](const StagesMs& s) { return s[8]; }},
+    {"tile_network_ms", [](const StagesMs& s) { return s[9]; }},
+    {"packer_queue_ms", [](const StagesMs& s) { return s[10]; }},
+    {"packing_ms", [](const StagesMs& s) { return s[11]; }},
+    {"publishing_ms", [](const StagesMs& s) { return s[12]; }},
+    {"patch_network_ms", [](const StagesMs& s) { return s[13]; }},
+    {"viewer_queue_ms", [](const StagesMs& s) { return s[14]; }},
+    {"decoding_ms", [](const StagesMs& s) { return s[15]; }},
+    {"insertion_ms", [](const StagesMs& s) { return s[16]; }},
 };
-
-/// In the order in which they happen.
-inline constexpr Stage kStages[] = {{"request_network_ms", StageKind::kNetwork}, {"view_queue_ms", StageKind::kQueue},
-                                    {"plan_ms", StageKind::kWork},               {"lease_queue_ms", StageKind::kQueue},
-                                    {"lease_network_ms", StageKind::kNetwork},   {"sampler_queue_ms", StageKind::kQueue},
-                                    {"fetch_ms", StageKind::kWork},              {"sampling_ms", StageKind::kWork},
-                                    {"encoding_ms", StageKind::kWork},           {"tile_network_ms", StageKind::kNetwork},
-                                    {"packer_queue_ms", StageKind::kQueue},      {"packing_ms", StageKind::kWork},
-                                    {"publishing_ms", StageKind::kWork},         {"patch_network_ms", StageKind::kNetwork},
-                                    {"viewer_queue_ms", StageKind::kQueue},      {"decoding_ms", StageKind::kWork},
-                                    {"insertion_ms", StageKind::kWork}};
-inline constexpr size_t kStageCount = std::size(kStages);
+static_assert(std::size(kStageColumns) == kStageCount);
 
 /// What the viewer adds to the moments of the part that made an update complete; seconds of the master's clock.
 struct UpdateMoments {
@@ -34,11 +42,11 @@ struct UpdateMoments {
   double arrived_s = 0;       ///< the part reached the viewer's machine
   double decode_begin_s = 0;  ///< it was taken from its queue
   double decoded_s = 0;
-  double complete_s = 0;      ///< it was in the replica, or in the buffer of the display
+  double complete_s = 0;  ///< it was in the replica, or in the buffer of the display
 };
 
-/// Milliseconds of each stage. Their sum is complete_s - requested_s: each begins when the one before it ends. A stage
-/// whose end is 0 was not on the way and took no time.
-std::array<double, kStageCount> stages_ms(const wire::Moments& part, const UpdateMoments& update);
+/// Their sum is complete_s - requested_s: each begins when the one before it ends. A stage whose end is 0 was not on
+/// the way and took no time.
+StagesMs stages_ms(const wire::Moments& part, const UpdateMoments& update);
 
 }  // namespace telesplat::metrics

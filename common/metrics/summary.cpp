@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <set>
@@ -185,10 +184,10 @@ ordered_json where_time_went(const Measured& m) {
   const auto latencies = m.stages.column("latency_ms");
   const double sum = std::accumulate(latencies.begin(), latencies.end(), 0.0);
   auto out = ordered_json::object();
-  for (const Stage& stage : kStages) {
-    const auto ms = m.stages.column(stage.column);
+  for (const std::string& column : names(kStageColumns)) {
+    const auto ms = m.stages.column(column);
     if (ms.empty()) continue;
-    ordered_json& entry = out[std::string(stage.column, std::strlen(stage.column) - std::strlen("_ms"))];
+    ordered_json& entry = out[column.substr(0, column.rfind("_ms"))];
     entry = distribution_json(ms);
     entry["share"] = sum > 0 ? std::round(std::accumulate(ms.begin(), ms.end(), 0.0) / sum * 1e4) / 1e4 : 0.0;
   }

@@ -11,8 +11,7 @@ constexpr size_t kMostExchanges = 512;
 constexpr size_t kLeastForDrift = 8;
 constexpr double kMostDrift = 500e-6;    // what an operating system corrects at most
 constexpr double kLeastError_s = 20e-6;  // reading clocks and waking up take their time
-// Exchanges that count for the drift: round trips of so much more than the shortest.
-constexpr double kGoodFactor = 1.5, kGoodMore_s = 50e-6;
+constexpr double kSigmas = 3;            // of the line's slope
 
 }  // namespace
 
@@ -29,31 +28,27 @@ void ClockEstimate::add(const ClockExchange& e) {
   estimate_drift();
 }
 
-// A line through the offsets of the exchanges with short round trips, each counting by how well it tells.
+// A line through the offsets by least squares. An exchange counts by what its round trip says: the more of it lies above
+// the shortest one, the less its ways need be equal.
 void ClockEstimate::estimate_drift() {
   drift_ = 0, drift_error_ = kUnknownDrift;
-  const double longest_s = round_trip_s() * kGoodFactor + kGoodMore_s;
-  double weights = 0, t = 0, o = 0, first_s = 0, last_s = 0, error_s = 0;
-  size_t count = 0;
+  if (exchanges_.size() < kLeastForDrift || exchanges_.back().at_s - exchanges_.front().at_s < kDriftAfter_s) return;
+  const double shortest_s = round_trip_s();
+  const auto weight = [&](const Seen& s) { return 1 / std::pow((s.round_trip_s - shortest_s) / 2 + kLeastError_s, 2); };
+  double weights = 0, t = 0, o = 0, tt = 0, to = 0;
   for (const Seen& s : exchanges_) {
-    if (s.round_trip_s > longest_s) continue;
-    const double w = 1 / std::pow(s.round_trip_s + kLeastError_s, 2);
-    if (count++ == 0) first_s = s.at_s;
-    last_s = s.at_s;
+    const double w = weight(s);
     weights += w, t += w * s.at_s, o += w * s.offset_s;
-    error_s = std::max(error_s, s.round_trip_s / 2);
   }
-  if (count < kLeastForDrift || last_s - first_s < kDriftAfter_s) return;
   t /= weights, o /= weights;
-  double tt = 0, to = 0;
   for (const Seen& s : exchanges_) {
-    if (s.round_trip_s > longest_s) continue;
-    const double w = 1 / std::pow(s.round_trip_s + kLeastError_s, 2);
+    const double w = weight(s);
     tt += w * (s.at_s - t) * (s.at_s - t), to += w * (s.at_s - t) * (s.offset_s - o);
   }
-  if (tt <= 0) return;
+  const double error = kWander + kSigmas / std::sqrt(tt);
+  if (!(error < kUnknownDrift)) return;
   drift_ = std::clamp(to / tt, -kMostDrift, kMostDrift);
-  drift_error_ = std::min(kUnknownDrift, kWander + 2 * error_s / (last_s - first_s));
+  drift_error_ = error;
 }
 
 double ClockEstimate::error_s(const Seen& seen, double local_s) const {
@@ -61,24 +56,24 @@ double ClockEstimate::error_s(const Seen& seen, double local_s) const {
 }
 
 const ClockEstimate::Seen& ClockEstimate::best(double local_s) const {
-  return *std::min_element(exchanges_.begin(), exchanges_.end(), [&](const Seen& a, const Seen& b) {
-    return error_s(a, local_s) < error_s(b, local_s);
-  });
+  return *std::min_element(exchanges_.begin(), exchanges_.end(),
+                           [&](const Seen& a, const Seen& b) { return error_s(a, local_s) < error_s(b, local_s); });
 }
 
 double ClockEstimate::offset_s(double local_s) const {
-  if (!known()) return 0;
+  if (same_ || !known()) return 0;
   const Seen& seen = best(local_s);
   const double offset_s = seen.offset_s + drift_ * (local_s - seen.at_s);
   return std::abs(offset_s) <= error_s(seen, local_s) ? 0 : offset_s;
 }
 
 double ClockEstimate::error_s(double local_s) const {
+  if (same_) return 0;
   return known() ? error_s(best(local_s), local_s) : std::numeric_limits<double>::infinity();
 }
 
 double ClockEstimate::round_trip_s() const {
-  double out = known() ? exchanges_.front().round_trip_s : 0;
+  double out = !exchanges_.empty() ? exchanges_.front().round_trip_s : 0;
   for (const Seen& s : exchanges_) out = std::min(out, s.round_trip_s);
   return out;
 }

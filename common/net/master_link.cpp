@@ -12,11 +12,12 @@ constexpr double kHelloPeriod_s = 0.25, kStatusPeriod_s = 1.0;
 // The clock is asked for in quick succession at first: the shortest round trip of some is near the shortest there is.
 constexpr double kClockPeriod_s = 1.0, kFirstClockPeriod_s = 0.05;
 constexpr int kFirstClocks = 8;
-}
+}  // namespace
 
 MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello)
     : hello_(std::move(hello)),
-      socket_(context, Kind::kDealer, hello_.name + ":master", {.max_message_bytes = wire::kMaxBulkBytes, .read_ahead = true}) {
+      socket_(context, Kind::kDealer, hello_.name + ":master",
+              {.max_message_bytes = wire::kMaxBulkBytes, .read_ahead = true}) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
@@ -61,6 +62,7 @@ void MasterLink::ask_clock(double now_s) {
 
 void MasterLink::learn_clock(const wire::ClockReply& reply, double arrived_s) {
   if (!session_ || reply.master != session_->master) return;
+  if (!reply.clock.empty() && reply.clock == clock_id()) clock_.same_clock();
   clock_.add({reply.sent_s, reply.received_s, reply.replied_s, arrived_s});
 }
 
@@ -74,7 +76,7 @@ bool MasterLink::handle(const Message& message) {
       ++version_;
       // The hello and its answer are an exchange, too.
       if (another && session_->hello_sent_s != 0)
-        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s},
+        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s, {}},
                     message.arrived_s);
     }
     return true;

@@ -27,8 +27,8 @@ class MasterLink {
   /// and asks what the master's clock says; `status` is asked for its values then.
   void tick(double now_s, const std::function<Values()>& status);
 
-  /// Handles welcome, who_are_you, clock_reply and shutdown, rejects other unknown types unless the caller knows them: returns true
-  /// if the message was one of these.
+  /// Handles welcome, who_are_you, clock_reply and shutdown, rejects other unknown types unless the caller knows them:
+  /// returns true if the message was one of these.
   bool handle(const Message& message);
 
   /// Handles all messages that are here by now; those that handle() does not know are rejected.

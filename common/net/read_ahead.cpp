@@ -9,7 +9,7 @@
 namespace telesplat::net {
 namespace {
 
-constexpr int kIdle_ms = 100;    // the socket's bookkeeping is done so often, whatever happens
+constexpr int kIdle_ms = 100;     // the socket's bookkeeping is done so often, whatever happens
 constexpr int kSendAgain_ms = 5;  // a socket that takes nothing now is asked again
 
 int make_eventfd() {
@@ -32,11 +32,9 @@ void lower(int descriptor) {
 }  // namespace
 
 ReadAhead::ReadAhead(Ends ends, const Limits& limits)
-    : ends_(std::move(ends)),
-      limits_(limits),
-      there_(make_eventfd()),
-      woken_(make_eventfd()),
-      thread_([this] { loop(); }) {}
+    : ends_(std::move(ends)), limits_(limits), there_(make_eventfd()), woken_(make_eventfd()), thread_([this] {
+        loop();
+      }) {}
 
 ReadAhead::~ReadAhead() {
   {

@@ -20,9 +20,9 @@ class ReadAhead {
   };
   /// What can be done with the socket. From the constructor to the destructor nobody but the thread does it.
   struct Ends {
-    std::function<std::optional<Message>()> receive;                ///< without waiting
-    std::function<bool(Outgoing&)> send;                            ///< without waiting; false: not now, nothing changed
-    std::function<void(int descriptor, int timeout_ms)> wait;       ///< for a message, or until `descriptor` is readable
+    std::function<std::optional<Message>()> receive;           ///< without waiting
+    std::function<bool(Outgoing&)> send;                       ///< without waiting; false: not now, nothing changed
+    std::function<void(int descriptor, int timeout_ms)> wait;  ///< for a message, or until `descriptor` is readable
   };
   /// Messages that were not taken yet, at most, and the bytes of their bodies: then nothing more is read, and whoever
   /// sends has to wait. Messages that could not be sent yet: then send() refuses.

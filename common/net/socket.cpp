@@ -258,9 +258,10 @@ struct Socket::Impl {
     const ReadAhead::Ends ends{
         .receive = [this] { return receive(); },
         .send = [this](ReadAhead::Outgoing& o) { return send({}, o.type, o.body); },
-        .wait = [this](int descriptor, int timeout_ms) {
-          poll({{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, descriptor, ZMQ_POLLIN, 0}}, timeout_ms);
-        }};
+        .wait =
+            [this](int descriptor, int timeout_ms) {
+              poll({{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, descriptor, ZMQ_POLLIN, 0}}, timeout_ms);
+            }};
     ahead = std::make_unique<ReadAhead>(ends, ReadAhead::Limits{.unsent = size_t(options.high_water_mark)});
     return true;
   }
@@ -324,9 +325,7 @@ bool Socket::send_frames(std::string_view peer, std::string_view type, std::stri
   return impl_->send(peer, type, body);
 }
 
-std::optional<Message> Socket::receive() {
-  return impl_->reads_ahead() ? impl_->ahead->receive() : impl_->receive();
-}
+std::optional<Message> Socket::receive() { return impl_->reads_ahead() ? impl_->ahead->receive() : impl_->receive(); }
 
 void Socket::reject(const Message& message, const std::string& why) { impl_->reject(message, why); }
 

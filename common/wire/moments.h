@@ -24,10 +24,10 @@ struct Moments {
 };
 
 /// All of them, in their order on the wire.
-inline constexpr double Moments::* kMoments[] = {
-    &Moments::requested_s,     &Moments::received_s,   &Moments::begun_s,      &Moments::planned_s,
-    &Moments::leased_s,        &Moments::lease_arrived_s, &Moments::fetch_s,   &Moments::sample_begin_s,
-    &Moments::sample_end_s,    &Moments::encode_end_s, &Moments::arrived_s,    &Moments::receive_s,
-    &Moments::packed_s,        &Moments::published_s};
+inline constexpr double Moments::*kMoments[] = {
+    &Moments::requested_s,  &Moments::received_s,      &Moments::begun_s,   &Moments::planned_s,
+    &Moments::leased_s,     &Moments::lease_arrived_s, &Moments::fetch_s,   &Moments::sample_begin_s,
+    &Moments::sample_end_s, &Moments::encode_end_s,    &Moments::arrived_s, &Moments::receive_s,
+    &Moments::packed_s,     &Moments::published_s};
 
 }  // namespace telesplat::wire

@@ -79,8 +79,10 @@ struct ClockReply {
   double sent_s = 0;      ///< ClockRequest::sent_s
   double received_s = 0;  ///< master's clock when it took the request,
   double replied_s = 0;   ///< and when it answered
+  std::string clock;      ///< which clock that is: clock_id()
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("sent_s", m.sent_s); f("received_s", m.received_s); f("replied_s", m.replied_s);
+    f("clock", m.clock);
   }
 };
 

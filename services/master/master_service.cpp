@@ -134,7 +134,7 @@ class MasterService {
     // At once: what lies between the question and the answer makes the clock's error.
     if (message.type == wire::ClockRequest::kName) {
       if (const auto asked = control_.decode<wire::ClockRequest>(message))
-        control_.send(wire::ClockReply{core_.instance(), asked->sent_s, message.arrived_s, monotonic_s()},
+        control_.send(wire::ClockReply{core_.instance(), asked->sent_s, message.arrived_s, monotonic_s(), clock_id()},
                       message.peer);
       return;
     }

@@ -2,6 +2,9 @@
 // restarted.
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
@@ -34,6 +37,12 @@ struct FakeMaster {
         socket.send(w, m->peer);
       } else if (!known) {
         socket.send(wire::WhoAreYou{instance}, m->peer);
+      } else if (m->type == wire::ClockRequest::kName) {
+        const auto asked = socket.decode<wire::ClockRequest>(*m);
+        ASSERT_TRUE(asked);
+        ++clock_requests;
+        const double now_s = monotonic_s() + clock_ahead_s;
+        socket.send(wire::ClockReply{instance, asked->sent_s, now_s, now_s, clock}, m->peer);
       } else if (const auto report = socket.decode<wire::StatusReport>(*m)) {
         reports.push_back(report->values);
       }
@@ -46,7 +55,8 @@ struct FakeMaster {
   InstanceId instance;
   std::string endpoint, peer;
   bool known = false;
-  int hellos = 0;
+  int hellos = 0, clock_requests = 0;
+  std::string clock = "another";
   double clock_ahead_s = 0;
   std::vector<std::map<std::string, double>> reports;
 };
@@ -120,7 +130,42 @@ TEST_F(Link, LearnsTheMastersClock) {
   master.clock_ahead_s = 1000;
   MasterLink link = make_link(master.endpoint);
   ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
-  EXPECT_NEAR(link.to_master_s(link_s), monotonic_s() + 1000, 20) << "its own clock runs fast here";
+  EXPECT_NEAR(link.to_master_s(monotonic_s()), monotonic_s() + 1000, 0.5) << "from the hello alone";
+  ASSERT_TRUE(talk(link, &master, [&] { return master.reports.size() >= 3; }));
+  EXPECT_GE(master.clock_requests, 8);
+  const double error_s = link.clock().error_s(monotonic_s());
+  EXPECT_LT(error_s, 0.01);
+  EXPECT_NEAR(link.to_master_s(monotonic_s()), monotonic_s() + 1000, error_s + 1e-4);
+  EXPECT_NEAR(master.reports.back().at("clock_offset_ms"), 1e6, 10);
+  EXPECT_LT(master.reports.back().at("clock_error_ms"), 10);
+}
+
+TEST_F(Link, ProcessesOfOneMachineShareAClock) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  master.clock = clock_id();
+  ASSERT_FALSE(master.clock.empty());
+  MasterLink link = make_link(master.endpoint);
+  ASSERT_TRUE(talk(link, &master, [&] { return master.reports.size() >= 2; }));
+  EXPECT_EQ(link.to_master_s(5), 5);
+  EXPECT_EQ(master.reports.back().at("clock_offset_ms"), 0);
+  EXPECT_EQ(master.reports.back().at("clock_error_ms"), 0);
+}
+
+// A message that waits for its reader keeps the moment at which it came.
+TEST_F(Link, ArrivalsAreStampedWhileNobodyReads) {
+  FakeMaster master("tcp://127.0.0.1:*", {1});
+  MasterLink link = make_link(master.endpoint);
+  ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
+  const double before_s = monotonic_s();
+  master.socket.send(wire::Shutdown{"now"}, master.peer);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const double after_s = monotonic_s();
+  std::optional<Message> message;
+  while ((message = link.socket().receive()) && message->type != wire::Shutdown::kName) {
+  }
+  ASSERT_TRUE(message);
+  EXPECT_GE(message->arrived_s, before_s);
+  EXPECT_LT(message->arrived_s, after_s - 0.1);
 }
 
 }  // namespace

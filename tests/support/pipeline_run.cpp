@@ -122,7 +122,7 @@ bool is_running(pid_t pid) {
 
 Program::Program(const std::string& name, std::vector<std::string> arguments, const std::string& prefix)
     : prefix_(prefix) {
-  arguments.insert(arguments.begin(), std::string(TELESPLAT_BIN) + "/" + name);
+  arguments.insert(arguments.begin(), name.starts_with("/") ? name : std::string(TELESPLAT_BIN) + "/" + name);
   std::vector<char*> argv;
   for (auto& a : arguments) argv.push_back(a.data());
   argv.push_back(nullptr);

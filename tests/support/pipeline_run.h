@@ -44,7 +44,7 @@ bool wait_until(const std::function<bool()>& condition, double deadline_s = 30);
 /// Whether a process runs (a zombie does not).
 bool is_running(pid_t pid);
 
-/// A program of the build's bin folder.
+/// A program of the build's bin folder, or one with an absolute path.
 class Program {
  public:
   /// stdout and stderr go to `prefix`.out and `prefix`.err. Its sessions are found by those alone who have the same

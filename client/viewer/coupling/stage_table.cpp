@@ -2,24 +2,40 @@
 
 #include <iterator>
 
-#include "common/metrics/stages.h"
-
 namespace telesplat::viewer {
 namespace {
+
+using U = const UpdateStages&;
 
 constexpr size_t kMostWaiting = 256;
 constexpr double kNotShown = -1;
 
-std::vector<std::string> columns() {
-  std::vector<std::string> out{"request", "frame", "tile", "requested_s", "complete_s"};
-  for (const metrics::Stage& stage : metrics::kStages) out.emplace_back(stage.column);
-  for (const char* name : {"latency_ms", "patches", "display_ms"}) out.emplace_back(name);
+constexpr metrics::Column<UpdateStages> kBefore[] = {
+    {"request", [](U u) { return double(u.request.value); }},
+    {"frame", [](U u) { return double(u.frame.value); }},
+    {"tile", [](U u) { return double(u.tile); }},
+    {"requested_s", [](U u) { return u.requested_s; }},
+    {"complete_s", [](U u) { return u.complete_s; }},
+};
+// The stages come between.
+constexpr metrics::Column<UpdateStages> kAfter[] = {
+    {"latency_ms", [](U u) { return (u.complete_s - u.requested_s) * 1e3; }},
+    {"patches", [](U u) { return double(u.patches); }},
+    {"display_ms", [](U u) { return u.display_ms; }},
+};
+
+template <class T>
+std::vector<T> joined(std::vector<T> out, const std::vector<T>& b, const std::vector<T>& c) {
+  out.insert(out.end(), b.begin(), b.end());
+  out.insert(out.end(), c.begin(), c.end());
   return out;
 }
 
 }  // namespace
 
-StageTable::StageTable() : table_("stages", columns()) {}
+StageTable::StageTable()
+    : table_("stages",
+             joined(metrics::names(kBefore), metrics::names(metrics::kStageColumns), metrics::names(kAfter))) {}
 
 void StageTable::complete(const MeasuredUpdate& m) {
   const ViewRequester::Update& u = m.update;
@@ -28,22 +44,25 @@ void StageTable::complete(const MeasuredUpdate& m) {
                                        .decode_begin_s = m.last.decode_begin_s,
                                        .decoded_s = m.last.decoded_s,
                                        .complete_s = u.complete_s};
-  std::vector<double> row{double(u.request.value), double(m.last.frame.value), double(m.last.tile), u.requested_s,
-                          u.complete_s};
-  for (const double ms : metrics::stages_ms(m.last.moments, moments)) row.push_back(ms);
-  row.push_back((u.complete_s - u.requested_s) * 1e3);
-  row.push_back(double(u.tiles));
-  waiting_[u.request] = {std::move(row), u.complete_s};
+  waiting_[u.request] = {.request = u.request,
+                         .frame = m.last.frame,
+                         .tile = m.last.tile,
+                         .patches = u.tiles,
+                         .requested_s = u.requested_s,
+                         .complete_s = u.complete_s,
+                         .stages = metrics::stages_ms(m.last.moments, moments)};
   if (waiting_.size() > kMostWaiting) finish(std::next(waiting_.begin()), kNotShown);
 }
 
 void StageTable::displayed(RequestId request, double end_s) { finish(waiting_.upper_bound(request), end_s); }
 
 // The rows before `end`.
-void StageTable::finish(std::map<RequestId, Waiting>::iterator end, double shown_s) {
+void StageTable::finish(std::map<RequestId, UpdateStages>::iterator end, double shown_s) {
   for (auto w = waiting_.begin(); w != end; w = waiting_.erase(w)) {
-    w->second.row.push_back(shown_s == kNotShown ? kNotShown : (shown_s - w->second.complete_s) * 1e3);
-    table_.add(w->second.row);
+    UpdateStages& u = w->second;
+    if (shown_s != kNotShown) u.display_ms = (shown_s - u.complete_s) * 1e3;
+    table_.add(joined(metrics::values(kBefore, u), metrics::values(metrics::kStageColumns, u.stages),
+                      metrics::values(kAfter, u)));
   }
 }
 

@@ -7,8 +7,19 @@
 
 #include "client/viewer/coupling/update_table.h"
 #include "common/metrics/recorder.h"
+#include "common/metrics/stages.h"
 
 namespace telesplat::viewer {
+
+/// A row.
+struct UpdateStages {
+  RequestId request;
+  FrameId frame;
+  uint64_t tile = 0, patches = 0;
+  double requested_s = 0, complete_s = 0;
+  metrics::StagesMs stages{};
+  double display_ms = -1;  ///< -1: no frame showed it
+};
 
 /// Used by one thread.
 class StageTable {
@@ -22,14 +33,10 @@ class StageTable {
   std::optional<wire::MetricRows> flush(InstanceId instance, bool all);
 
  private:
-  struct Waiting {
-    std::vector<double> row;  // without what the display adds
-    double complete_s = 0;
-  };
-  void finish(std::map<RequestId, Waiting>::iterator end, double shown_s);
+  void finish(std::map<RequestId, UpdateStages>::iterator end, double shown_s);
 
   metrics::TableRecorder table_;
-  std::map<RequestId, Waiting> waiting_;
+  std::map<RequestId, UpdateStages> waiting_;
 };
 
 }  // namespace telesplat::viewer

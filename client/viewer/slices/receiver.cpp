@@ -74,7 +74,8 @@ void SliceReceiver::receive(net::Socket& state, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = state.receive();
     if (!message) return;
-    net::dispatch<wire::SliceFrame>(state, *message, [&](const wire::SliceFrame& f) { on(f, message->arrived_s, state); });
+    net::dispatch<wire::SliceFrame>(state, *message,
+                                    [&](const wire::SliceFrame& f) { on(f, message->arrived_s, state); });
   }
 }
 

@@ -63,16 +63,16 @@ FramePart block_of(const wire::Lease& l) {
 
 wire::TileDone done_of(const wire::DepthTile& m, double arrived_s, double receive_s) {
   wire::TileDone out{.frame = m.lease.frame,
-          .tile = m.lease.tile,
-          .lease = m.lease.lease,
-          .sampler = m.sampler,
-          .request = m.lease.request,
-          .step = m.lease.step,
-          .extra = m.lease.extra,
-          .rays = m.lease.rays,
-          .rect = m.lease.rect,
-          .bytes_sampled = m.image.size(),
-          .moments = m.lease.moments};
+                     .tile = m.lease.tile,
+                     .lease = m.lease.lease,
+                     .sampler = m.sampler,
+                     .request = m.lease.request,
+                     .step = m.lease.step,
+                     .extra = m.lease.extra,
+                     .rays = m.lease.rays,
+                     .rect = m.lease.rect,
+                     .bytes_sampled = m.image.size(),
+                     .moments = m.lease.moments};
   out.moments.arrived_s = arrived_s;
   out.moments.receive_s = receive_s;
   return out;

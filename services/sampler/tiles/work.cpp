@@ -46,7 +46,11 @@ Delivery TileWork::sample_next() {
   leases_.pop_front();
   const Sampled sampled = source_->sample(held);
   const auto stream = codec::encode(sampled.image);
-  Delivery out{wire::DepthTile::kName, {}, sampled.begin_s, sampled.end_s, monotonic_s(),
+  Delivery out{wire::DepthTile::kName,
+               {},
+               sampled.begin_s,
+               sampled.end_s,
+               monotonic_s(),
                {double(held.lease.frame.value), double(held.lease.tile), double(held.lease.request.value)}};
   wire::DepthTile tile{link_.instance(), held.lease};
   wire::Moments& moments = tile.lease.moments;

@@ -43,10 +43,10 @@ TEST_F(Record, BadTablesAreRefusedAndLeaveNothing) {
 }
 
 TEST_F(Record, TheTraceIsValidWhateverSpansCome) {
-  ASSERT_TRUE(
-      record->add_rows(viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 7, 3, 9, 1, 2, 2.25, 3, -1, -1, -1}}));
-  ASSERT_TRUE(
-      record->add_rows(viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, 0, 0, 0, -1, 1, 2, 0, 0, 0, 0}}));  // names that are not there
+  ASSERT_TRUE(record->add_rows(
+      viewer, {{5}, "spans", {"sample", "a \"quoted\"\nname"}, {0, 1, 1.5, 0, 7, 3, 9, 1, 2, 2.25, 3, -1, -1, -1}}));
+  ASSERT_TRUE(record->add_rows(
+      viewer, {{5}, "spans", {"sample"}, {7, 1, 1.5, 0, 0, 0, 0, -1, 1, 2, 0, 0, 0, 0}}));  // names that are not there
   record.reset();
   const auto trace = nlohmann::json::parse(text("trace.json"), nullptr, false);
   ASSERT_TRUE(trace.is_array());

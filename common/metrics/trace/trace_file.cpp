@@ -1,4 +1,4 @@
-#include "common/metrics/trace_file.h"
+#include "common/metrics/trace/trace_file.h"
 
 #include <algorithm>
 #include <cmath>

@@ -38,9 +38,9 @@ class TraceFile {
   TextFile file_;
   double begin_s_ = 0;
   bool has_events_ = false;
-  std::map<std::string, int> processes_;   // numbers of those whose names the file has
-  std::set<std::pair<int, int>> lanes_;    // that have names
-  uint64_t span_ = 0;                      // of those that may overlap: the last one's id
+  std::map<std::string, int> processes_;  // numbers of those whose names the file has
+  std::set<std::pair<int, int>> lanes_;   // that have names
+  uint64_t span_ = 0;                     // of those that may overlap: the last one's id
 };
 
 }  // namespace telesplat::metrics
