@@ -63,8 +63,7 @@ const ClockEstimate::Seen& ClockEstimate::best(double local_s) const {
 double ClockEstimate::offset_s(double local_s) const {
   if (same_ || !known()) return 0;
   const Seen& seen = best(local_s);
-  const double offset_s = seen.offset_s + drift_ * (local_s - seen.at_s);
-  return std::abs(offset_s) <= error_s(seen, local_s) ? 0 : offset_s;
+  return seen.offset_s + drift_ * (local_s - seen.at_s);
 }
 
 double ClockEstimate::error_s(double local_s) const {

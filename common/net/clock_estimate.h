@@ -30,7 +30,7 @@ class ClockEstimate {
   void same_clock() { same_ = true; }
 
   bool known() const { return same_ || !exchanges_.empty(); }
-  /// The other clock minus this one, at this moment of this one. 0 while it is no larger than error_s().
+  /// The other clock minus this one, at this moment of this one; 0 while nothing is known.
   double offset_s(double local_s) const;
   /// By how much offset_s() may be wrong: half the round trip it rests on, and what may have come since. Infinite while
   /// nothing is known.

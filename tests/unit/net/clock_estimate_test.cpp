@@ -79,14 +79,6 @@ TEST(ClockEstimate, IgnoresWhatCannotBe) {
   EXPECT_FALSE(e.known());
 }
 
-TEST(ClockEstimate, OffsetsWithinTheErrorAreNone) {
-  ClockEstimate e;
-  e.add(Clocks{0.0004}.exchange(1, 0.001, 0, 0.001));
-  EXPECT_EQ(e.offset_s(1), 0);
-  e.add(Clocks{0.0004}.exchange(2, 0.0001, 0, 0.0001));
-  EXPECT_NEAR(e.offset_s(2), 0.0004, 1e-9);
-}
-
 TEST(ClockEstimate, OneClockHasNoError) {
   ClockEstimate e;
   e.add(Clocks{0}.exchange(1, 0.3, 0, 0.1));
