@@ -28,13 +28,11 @@ void ClockEstimate::add(const ClockExchange& e) {
   estimate_drift();
 }
 
-// A line through the offsets by least squares. An exchange counts by what its round trip says: the more of it lies above
-// the shortest one, the less its ways need be equal.
+// A line through the offsets by least squares. An exchange counts by its round trip: half of it is how wrong it may be.
 void ClockEstimate::estimate_drift() {
   drift_ = 0, drift_error_ = kUnknownDrift;
   if (exchanges_.size() < kLeastForDrift || exchanges_.back().at_s - exchanges_.front().at_s < kDriftAfter_s) return;
-  const double shortest_s = round_trip_s();
-  const auto weight = [&](const Seen& s) { return 1 / std::pow((s.round_trip_s - shortest_s) / 2 + kLeastError_s, 2); };
+  const auto weight = [](const Seen& s) { return 1 / std::pow(std::max(s.round_trip_s / 2, kLeastError_s), 2); };
   double weights = 0, t = 0, o = 0, tt = 0, to = 0;
   for (const Seen& s : exchanges_) {
     const double w = weight(s);
