@@ -82,6 +82,19 @@ TEST(StatusText, ManyThatLeftAreNotAllNamed) {
             "more\n");
 }
 
+TEST(StatusText, ClocksAreToldWhereTheyAreNotTheMasters) {
+  const auto processes = [](double offset_ms, double error_ms) {
+    return Json::array({{{"role", "packer"},
+                         {"name", "packer"},
+                         {"alive", true},
+                         {"values", {{"clock_offset_ms", offset_ms}, {"clock_error_ms", error_ms}}}}});
+  };
+  EXPECT_EQ(process_tables(processes(0, 0)).find("clock"), std::string::npos) << process_tables(processes(0, 0));
+  const std::string text = process_tables(processes(-5000, 0.21));
+  EXPECT_NE(text.find("clock ms"), std::string::npos) << text;
+  EXPECT_NE(text.find("-5000.00 ± 0.21"), std::string::npos) << text;
+}
+
 TEST(StatusText, AKindThatTheSceneNamesIsNotSaidTwice) {
   Json status = volume_status();
   status["session"]["scene"] = "julia (coral)";

@@ -75,6 +75,17 @@ std::string heard(const Json& p) {
   return *silent_s > kSilent_s ? fmt::format("silent for {:.1f} s", *silent_s) : fmt::format("{:.1f} s ago", *silent_s);
 }
 
+// Against the master's; nothing where it is the same clock.
+Field clock_offset() {
+  return {"clock ms", [](const Json& p) {
+            const auto* values = field(p, "values");
+            const auto offset = values ? number(*values, "clock_offset_ms") : std::nullopt;
+            const auto error = values ? number(*values, "clock_error_ms") : std::nullopt;
+            if (!offset || !error || *error <= 0) return std::string();
+            return fmt::format("{:+.2f} ± {:.2f}", *offset, *error);
+          }};
+}
+
 struct RoleTable {
   const char* role;
   const char* title;
@@ -113,6 +124,7 @@ std::string table_of(const RoleTable& role, const std::vector<Json>& processes, 
   fields.insert(fields.end(), role.fields.begin(), role.fields.end());
   fields.push_back(value("MB", "values", "rss_mb", 1, 0));
   fields.push_back(value("most MB", "values", "peak_rss_mb", 1, 0));
+  fields.push_back(clock_offset());
   fields.push_back(unless_zero(counted("rejected", "messages_rejected")));
   fields.push_back({"heard of", heard});
   std::vector<tools::TextTable::Column> columns;
