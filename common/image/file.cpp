@@ -17,6 +17,9 @@ namespace {
 
 uint32_t byte_of(float v) { return v > 0 ? static_cast<uint32_t>(std::min(v, 1.0f) * 255.0f + 0.5f) : 0; }
 
+// OpenImageIO may tell of several errors, one a line.
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
 // Writes under a temporary name beside `path`, then renames, so that no reader ever sees half a file.
 Status write_whole(const std::string& path, const char* format, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
                    const void* pixels) {
@@ -110,10 +113,24 @@ Status write_exr(const std::string& path, const View& view, std::span<const glm:
   return write_whole(path, "openexr", spec, OIIO::TypeDesc::FLOAT, values.data());
 }
 
-namespace {
+Result<std::string> encode_jpeg(const View& view, int quality) {
+  std::vector<uint8_t> bytes(view.colour.size() * 3);
+  for (size_t i = 0; i < view.colour.size(); ++i)
+    for (int c = 0; c < 3; ++c) bytes[3 * i + size_t(c)] = static_cast<uint8_t>(view.colour[i] >> (16 - 8 * c));
+  OIIO::ImageSpec spec(view.width, view.height, 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("Compression", fmt::format("jpeg:{}", quality));
+  std::vector<unsigned char> encoded;
+  OIIO::Filesystem::IOVecOutput memory(encoded);
+  const auto output = OIIO::ImageOutput::create("picture.jpg", &memory);
+  if (!output || !output->supports("ioproxy"))
+    return Error{fmt::format("no JPEG can be made: {}", first_line(OIIO::geterror()))};
+  const bool written =
+      output->open("picture.jpg", spec) && output->write_image(OIIO::TypeDesc::UINT8, bytes.data()) && output->close();
+  if (!written) return Error{fmt::format("no JPEG can be made: {}", first_line(output->geterror()))};
+  return std::string(encoded.begin(), encoded.end());
+}
 
-// OpenImageIO may tell of several errors, one a line.
-std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+namespace {
 
 // OpenImageIO chooses a reader by the ending of a name, but pictures in other files have none, and some a wrong one.
 std::string name_for_reader(std::span<const std::byte> bytes, const std::string& name) {

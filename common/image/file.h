@@ -30,6 +30,8 @@ Status write_png(const std::string& path, const View& view, Alpha alpha = Alpha:
 Status write_exr(const std::string& path, const View& view, Alpha alpha = Alpha::kNone);
 /// The same without alpha, with the normals in N.X, N.Y, N.Z, half floats; one a pixel.
 Status write_exr(const std::string& path, const View& view, std::span<const glm::vec3> normals);
+/// The bytes of a JPEG file of its colours. quality: 1 to 100.
+Result<std::string> encode_jpeg(const View& view, int quality);
 /// Reads any picture OpenImageIO knows; channel Z becomes depth_m. At most 16384 pixels a side.
 Result<View> read_view(const std::string& path);
 /// Reads a picture of at most `most_pixels` from memory: its colours without its alpha, which changes nothing of them.

@@ -85,6 +85,7 @@ FLOORS = {
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],
         ["tools/telesplat/movie"],
+        ["tools/telesplat/report"],
         ["tools/telesplat/run"],
         ["tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare", "tools/telesplat/inspect"],
         ["tools/telesplat"],

@@ -38,6 +38,7 @@ Command control_command();
 Command inspect_command();
 Command compare_command();
 Command movie_command();
+Command report_command();
 Command bench_command();
 Command cache_command();
 Command presets_command();

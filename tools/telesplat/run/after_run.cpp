@@ -12,6 +12,7 @@
 #include "common/metrics/run_folder.h"
 #include "common/net/service.h"
 #include "tools/common/complain.h"
+#include "tools/telesplat/report/report.h"
 #include "tools/telesplat/run/run_report.h"
 #include "tools/telesplat/run/verify.h"
 #include "tools/telesplat/run/wall.h"
@@ -57,7 +58,11 @@ int AfterRun::run(bool stopped, const std::string& master_folder) {
   else
     print_joined(o_.out, master_folder);
   if (const int code = stitch(stopped)) return code;
-  return make_the_movie(stopped);
+  const int movie = make_the_movie(stopped);
+  if (movie == kInterrupted) return movie;
+  // A movie that failed is no reason to go without a report.
+  const int report = make_the_report(stopped);
+  return movie ? movie : report;
 }
 
 int AfterRun::verify(bool stopped) {
@@ -107,6 +112,28 @@ int AfterRun::make_the_movie(bool stopped) {
   for (const auto& line : report->lines) std::printf("%s\n", line.c_str());
   if (report->interrupted) progress_.line(fmt::format("interrupted: {} was not made; {}", file, later));
   return report->interrupted ? kInterrupted : 0;
+}
+
+int AfterRun::make_the_report(bool stopped) {
+  if (!o_.report) return 0;
+  const std::string later = fmt::format("telesplat report {} makes it", shell_quoted(o_.out));
+  if (stopped || net::stop_requested()) {
+    progress_.line(fmt::format("the report was not made; {}", later));
+    return 0;
+  }
+  ReportOptions options;
+  options.runs = {o_.out};
+  const auto settled = settle_report(std::move(options));
+  if (!settled) return tools::complain(settled.error(), 1);
+  const auto made = make_report(*settled, progress_, net::stop_requested);
+  progress_.close();
+  if (!made) return tools::complain(made.error(), 1);
+  if (made->interrupted) {
+    progress_.line(fmt::format("interrupted: the report was not made; {}", later));
+    return kInterrupted;
+  }
+  for (const auto& line : lines_of(*made)) std::printf("%s\n", line.c_str());
+  return 0;
 }
 
 void AfterRun::drop_spools() const {

@@ -1,5 +1,5 @@
 // What is made of a run's record once its processes are gone, step by step: pictures, the comparison with direct
-// rendering, the report, the wall's picture, the movie.
+// rendering, the figures, the wall's picture, the movie, the report.
 #pragma once
 
 #include <memory>
@@ -36,6 +36,7 @@ class AfterRun {
   int verify(bool stopped);
   int stitch(bool stopped) const;
   int make_the_movie(bool stopped);
+  int make_the_report(bool stopped);
 
   const RunOptions& o_;
   Scene* const scene_;

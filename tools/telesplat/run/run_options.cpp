@@ -69,6 +69,9 @@ Table own_rows(RunOptions& o) {
        .value = &o.record_plan,
        .help = "keep pictures of the first 50 plans: which rays of a view are cast, and why",
        .fits = points},
+      {.flag = "--report",
+       .value = &o.report,
+       .help = "at the end make a page about the run, report.html in the run folder, and plots (telesplat report)"},
       {.flag = "--verify-samples",
        .value = &o.verify_samples,
        .help = "rays a pixel of the direct rendering that --verify compares with, a square number; volumes have 1",
@@ -122,7 +125,8 @@ Status refuse_records_without_folder(const RunOptions& o) {
                                     {d.exr, "--exr"},
                                     {o.record_depth, "--record-depth"},
                                     {o.record_plan, "--record-plan"},
-                                    {!o.movie.file.empty(), "--movie"}})
+                                    {!o.movie.file.empty(), "--movie"},
+                                    {o.report, "--report"}})
     if (asked && o.out.empty())
       return Error{fmt::format("{} needs --out: nothing is recorded without a run folder", flag)};
   return ok_status();
@@ -142,6 +146,13 @@ Status check_movie(const RunOptions& o, const options::Given& given) {
         "FILE makes a movie of it afterwards"};
   if (o.viewer.record_points_mb == 0) return Error{"--movie needs the record that --record-points 0 leaves out"};
   return ok_status();
+}
+
+Status check_report(const RunOptions& o) {
+  if (!o.report || o.join_master.empty()) return ok_status();
+  return Error{
+      "--report needs a session of its own: the record of a joined one is its master's; telesplat report RUN makes a "
+      "report of it afterwards"};
 }
 
 // As a program of these options is to be told, where `defaults` is what it does anyway.
@@ -184,6 +195,7 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   if (const Status s = settle_wall(o, given); !s) return s.error();
   if (const Status s = refuse_records_without_folder(o); !s) return s.error();
   if (const Status s = check_movie(o, given); !s) return s.error();
+  if (const Status s = check_report(o); !s) return s.error();
   if (const Status s = image::validate_samples(o.verify_samples); !s)
     return Error{"--verify-samples: " + s.error().text};
   if (const Status s = viewer::settle(o.viewer); !s) return s.error();

@@ -23,6 +23,7 @@ struct RunOptions {
   int samplers = 1, data_servers = 1, viewers = 1;
   std::string join_master;         ///< --master: join a running session instead of starting one
   MovieOptions movie;              ///< made of the record after the run; no file: none
+  bool report = false;             ///< made of the record at the end (tools/telesplat/report/report.h)
   std::string out;                 ///< run folder; empty: run makes one, view records nothing
   bool overwrite = false;          ///< `out` may hold a record already, which is replaced
   std::string log_directory;       ///< of the processes; empty: OUT/logs

@@ -1,0 +1,174 @@
+// The page of a report: what it holds of whole, broken and strange runs, and that nothing from a run becomes code.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/core/utf8.h"
+#include "common/image/file.h"
+#include "tests/support/pipeline_run.h"
+#include "tools/telesplat/report/page.h"
+#include "tools/telesplat/report/picture_part.h"
+#include "tools/telesplat/report/report.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryFolder;
+
+void write(const std::string& path, const std::string& text) {
+  fs::create_directories(fs::path(path).parent_path());
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+const std::string kFrames =
+    "viewer,frame,t_s,inter_frame_ms,construction_ms,points_drawn,points_cached,update_age_ms,view_error_m,"
+    "view_error_deg,px,py,pz,qw,qx,qy,qz,begin_s\n"
+    "viewer-1,0,0,0,5,10,100,200,0.001,0.1,0,0,1,1,0,0,0,2\n"
+    "viewer-1,1,0.02,20,5,10,100,220,0.002,0.1,0,0,1,1,0,0,0,2.02\n"
+    "viewer-1,2,0.03,10,5,10,100,230,0.002,0.1,0.1,0,1,1,0,0,0,2.03\n";
+
+TEST(ReportPage, EscapesText) {
+  EXPECT_EQ(html_escaped("<b>\"a\" & 'b'</b>"), "&lt;b&gt;&quot;a&quot; &amp; &#39;b&#39;&lt;/b&gt;");
+  EXPECT_EQ(html_escaped("a\xff"), "a\xef\xbf\xbd");
+}
+
+TEST(ReportPage, JsonEndsNoScriptAndReadsBackAsItWas) {
+  const nlohmann::ordered_json data{{"name", "</script><!-- <script>&\xe2\x80\xa8\xe2\x80\xa9 \"quoted\" \xc3\xa9"}};
+  const std::string text = script_json(data);
+  EXPECT_EQ(text.find_first_of("<>&"), text.npos);
+  EXPECT_EQ(text.find("\xe2\x80\xa8"), text.npos);
+  EXPECT_EQ(nlohmann::ordered_json::parse(text), data);
+  EXPECT_TRUE(valid_utf8(script_json({{"bad", "\xff"}})));
+}
+
+TEST(ReportPage, HoldsWhatItNeedsAndAsksForNothing) {
+  const std::string page = page_html("a <run>", {{"runs", "{{CODE}} {{DATA}}"}});
+  EXPECT_NE(page.find("<title>a &lt;run&gt;</title>"), page.npos);
+  EXPECT_NE(page.find(R"({"runs":"{{CODE}} {{DATA}}"})"), page.npos) << "what takes a mark's place is not looked at";
+  EXPECT_NE(page.find("Dygraph"), page.npos);
+  for (const char* asks : {"src=\"http", "href=\"http", "@import", "<link"}) EXPECT_EQ(page.find(asks), page.npos);
+}
+
+TEST(ReportRun, WithoutASummaryIsToldFromItsTables) {
+  const TemporaryFolder folder;
+  write(folder / "frames.csv", kFrames + "viewer-1,3,0.05,2");
+  const auto run = run_json(folder.path(), "r", 1);
+  EXPECT_FALSE(run.at("finished").get<bool>());
+  EXPECT_EQ(run.at("spreads").at("inter_frame_ms").at("n"), 2);
+  EXPECT_NEAR(run.at("figures").at("delay_median").get<double>(), 15, 1e-9);
+  EXPECT_NEAR(run.at("figures").at("fps").get<double>(), 2 / 0.03, 0.01);
+  EXPECT_EQ(run.at("series").at("inter_frame_ms")[0].at("v").dump(), "[20.0,10.0]");
+  EXPECT_EQ(run.at("series").at("inter_frame_ms")[0].at("t").dump(), "[0.02,0.03]") << "from the first frame on";
+  EXPECT_TRUE(run.at("stages").is_null());
+  EXPECT_EQ(run.at("trace").at("why"), "trace.json is not there");
+  const std::string notes = run.at("notes").dump();
+  for (const char* told : {"summary.json", "updates.csv is not there", "stages.csv is not there", "1 line is cut off"})
+    EXPECT_NE(notes.find(told), notes.npos) << told;
+}
+
+TEST(ReportRun, OfNothingButItsIdHasNoFiguresAndNoHarm) {
+  const TemporaryFolder folder;
+  write(folder / "run.id", "telesplat-run 0123456789abcdef\n");
+  write(folder / "frames.csv", "viewer,frame,begin_s\n");
+  write(folder / "updates.csv", "");
+  write(folder / "trace.json", "[\n");
+  write(folder / "summary.json", "{\"fps\": ");
+  write(folder / "images/frame-000001.png", "no picture");
+  write(folder / "images/frame-.png", "no number");
+  const auto run = run_json(folder.path(), "r", 1);
+  EXPECT_TRUE(run.at("figures").empty());
+  EXPECT_TRUE(run.at("walk").is_null());
+  EXPECT_EQ(run.at("pictures").at("left_out"), 1);
+  EXPECT_FALSE(page_html("r", {{"runs", {run}}}).empty());
+}
+
+TEST(ReportRun, ReadsStagesByNameAndChecksThatTheyAddUp) {
+  const TemporaryFolder folder;
+  write(folder / "frames.csv", kFrames);
+  write(folder / "stages.csv",
+        "viewer,request,further,sampler,requested_s,sampling_ms,tile_network_ms,view_queue_ms,latency_ms,display_ms\n"
+        "viewer-1,1,x,<i>s</i>,2.01,10,5,5,20,3\nviewer-1,2,x,1,2.02,20,-5,5,20,\n");
+  const auto stages = run_json(folder.path(), "r", 1).at("stages");
+  EXPECT_EQ(stages.at("of"), 2);
+  EXPECT_EQ(stages.at("negative"), 1);
+  EXPECT_EQ(stages.at("off"), 0.0);
+  ASSERT_EQ(stages.at("stages").size(), 3u);
+  EXPECT_EQ(stages.at("stages")[0].at("group"), "queue") << "in the order of the stages, not of the file";
+  EXPECT_EQ(stages.at("stages")[1].at("row").at("mean"), 15.0);
+  EXPECT_EQ(stages.at("stages")[1].at("row").at("share"), 0.75);
+  EXPECT_EQ(stages.at("t").dump(), "[0.01,0.02]");
+  EXPECT_EQ(stages.at("sampler")[0], "<i>s</i>");
+  EXPECT_EQ(stages.at("display_row").at("median"), 3.0);
+}
+
+TEST(ReportRun, CountsWarningsAndErrorsOfLogs) {
+  const TemporaryFolder folder;
+  write(folder / "frames.csv", kFrames);
+  std::string log = "12:00:00.000 master info warning is only a word here\n12:00:00.000 master error <b>\xff\n";
+  for (int i = 0; i < 100; ++i) log += "12:00:00.000 master warning again\n";
+  write(folder / "logs/master.log", log + "12:00:00.000 master war");
+  const auto logs = run_json(folder.path(), "r", 1).at("logs");
+  ASSERT_EQ(logs.size(), 1u);
+  EXPECT_EQ(logs[0].at("errors"), 1);
+  EXPECT_EQ(logs[0].at("warnings"), 100);
+  EXPECT_EQ(logs[0].at("lines").size(), 8u);
+  EXPECT_TRUE(valid_utf8(logs[0].at("lines")[0].get<std::string>()));
+}
+
+TEST(ReportPictures, AreScaledToMeansAndBounded) {
+  image::View view{4, 2, {0x000000, 0xffffff, 0xff0000, 0xff0000, 0x000000, 0xffffff, 0x00ff00, 0x00ff00}, {}};
+  const auto small = scaled_down(view, 2);
+  EXPECT_EQ(small.width, 2);
+  EXPECT_EQ(small.height, 1);
+  EXPECT_EQ(small.colour[0], 0x808080u);
+  EXPECT_EQ(small.colour[1], 0x808000u);
+  EXPECT_EQ(scaled_down(view, 100).width, 4);
+
+  const TemporaryFolder folder;
+  write(folder / "frames.csv", kFrames);
+  fs::create_directories(folder / "images");
+  for (int i = 0; i < 30; ++i)
+    ASSERT_TRUE(image::write_png(folder / ("images/frame-" + std::to_string(100000 + i) + ".png"), view).ok());
+  ASSERT_TRUE(image::write_png(folder / "images/verify-worst-000001.png", view).ok());
+  const auto told = run_json(folder.path(), "r", 1).at("pictures");
+  EXPECT_EQ(told.at("of"), 30);
+  EXPECT_EQ(told.at("shown").size(), PageLimits{}.pictures);
+  EXPECT_EQ(told.at("shown").back().at("frame"), 100029);
+  EXPECT_EQ(told.at("compared")[0].at("name"), "worst");
+  EXPECT_NEAR(told.at("compared")[0].at("t").get<double>(), 0.02, 1e-9);
+  PageLimits tight;
+  tight.picture_bytes = 10;
+  EXPECT_EQ(run_json(folder.path(), "r", 1, tight).at("pictures").at("shown").size(), 0u);
+}
+
+TEST(ReportPictures, Base64IsRfc4648) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(base64("\xff\xfe\xfd"), "//79");
+}
+
+TEST(ReportOptions, SayWhereThePageGoesAndRefuseWhatIsNoRun) {
+  const TemporaryFolder folder;
+  write(folder / "a/frames.csv", kFrames);
+  write(folder / "b/summary.json", "{}");
+  fs::create_directories(folder / "none");
+  const auto settled = [](std::vector<std::string> runs, std::string out = "") {
+    return settle_report({.runs = std::move(runs), .out = std::move(out), .plots = {}});
+  };
+  EXPECT_EQ(settled({folder / "a/"})->out, folder / "a/report.html");
+  EXPECT_EQ(settled({folder / "a"})->plots, folder / "a/plots");
+  EXPECT_EQ(settled({folder / "a", folder / "b"})->out, folder / "report.html");
+  EXPECT_EQ(settled({folder / "a", folder / "b"})->plots, folder / "report-plots");
+  EXPECT_EQ(settled({folder / "a", folder / "b"}, "x/two.html")->plots, "x/two-plots");
+  EXPECT_EQ(settled({folder / "none"}).error().text, (folder / "none") + ": is no run folder");
+  EXPECT_FALSE(settled({folder / "a/frames.csv"}).ok());
+  EXPECT_FALSE(settled({folder / "a"}, folder / "b").ok());
+  EXPECT_FALSE(settled({}).ok());
+}
+
+}  // namespace
+}  // namespace telesplat::launcher

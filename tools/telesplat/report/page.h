@@ -1,0 +1,19 @@
+// One HTML page that holds all it needs: its data, its style and its code.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+
+namespace telesplat::launcher {
+
+/// `text` where HTML has text, or an attribute in quotes. What is not UTF-8 becomes U+FFFD.
+std::string html_escaped(std::string_view text);
+
+/// JSON that may stand in a <script>: without '<', '>', '&' and the line ends that only JavaScript knows.
+std::string script_json(const nlohmann::ordered_json& data);
+
+/// The page. title: of its window.
+std::string page_html(const std::string& title, const nlohmann::ordered_json& data);
+
+}  // namespace telesplat::launcher

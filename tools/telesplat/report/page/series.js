@@ -1,0 +1,173 @@
+// Charts over time (dygraphs). All show the same span of time: dragging zooms all of them, a double-click shows all.
+"use strict";
+
+R.time = {
+  full: [0, Math.max(1e-3, ...R.runs.map((run) => run.duration_s || 0))],
+  charts: [],
+  listeners: [],
+};
+R.time.now = R.time.full.slice();
+R.time.set = function (from, to) {
+  if (R.time.busy || !(to > from)) return;
+  R.time.busy = true;
+  R.time.now = [Math.max(R.time.full[0], from), Math.min(R.time.full[1], to)];
+  if (!(R.time.now[1] > R.time.now[0])) R.time.now = R.time.full.slice();
+  for (const chart of R.time.charts) chart.graph.updateOptions({ dateWindow: R.time.now.slice() });
+  R.time.listeners.forEach((listen) => listen());
+  R.time.busy = false;
+};
+R.time.point = function (t) {
+  for (const chart of R.time.charts) {
+    const area = chart.graph.getArea(), x = chart.graph.toDomXCoord(t);
+    chart.cursor.hidden = t === null || x < area.x || x > area.x + area.w;
+    chart.cursor.style.left = x + "px";
+  }
+};
+
+// One table of rows for several series, each with its own moments.
+function merged(series) {
+  const at = new Map();
+  series.forEach((s, k) => s.t.forEach((t, i) => {
+    let row = at.get(t);
+    if (!row) at.set(t, (row = [t, ...series.map(() => null)]));
+    row[k + 1] = s.v[i] === null ? NaN : s.v[i];
+  }));
+  return [...at.values()].sort((a, b) => a[0] - b[0]);
+}
+
+function linesAt(options, context, area, graph) {
+  const range = graph.yAxisRange();
+  context.save();
+  context.font = "11px system-ui, sans-serif";
+  for (const line of options.lines || []) {
+    if (line.y < range[0] || line.y > range[1]) continue;
+    const y = graph.toDomYCoord(line.y);
+    context.strokeStyle = R.css("--mark");
+    context.setLineDash([4, 4]);
+    context.beginPath();
+    context.moveTo(area.x, y);
+    context.lineTo(area.x + area.w, y);
+    context.stroke();
+    context.fillStyle = R.css("--mark");
+    context.textAlign = "right";
+    context.fillText(line.label, area.x + area.w - 4, y - 3);
+  }
+  context.restore();
+}
+
+// Lines of one picture are spread so that their labels do not stand on each other.
+R.hertz = [60, 72, 90].map((hz) => ({ y: 1000 / hz, x: 1000 / hz, label: hz + " Hz", hz }));
+
+// series: [{label, colour: () => css, t, v, of}]. options: unit, lines, stacked, high, log (offers it), hover (rows for
+// a tooltip in place of the usual ones), yMax, points.
+R.chart = function (title, series, options) {
+  const box = R.el("div", { class: "chart" + (options.high ? " high" : "") });
+  const log = options.log ? R.el("button", { class: "no-print", "aria-pressed": "false", text: "log scale" }) : null;
+  const thin = series.filter((s) => s.of > s.t.length);
+  const panel = R.el("div", { class: "panel" + (options.wide ? " wide" : "") },
+    R.el("div", { class: "chart-head" }, R.el("h3", { text: title + (options.unit ? ", " + options.unit : "") }), log),
+    series.length > 1 && !options.noLegend ? R.seriesLegend(series) : null, box,
+    thin.length ? R.el("div", { class: "muted small", text: `Thinned: ${thin.map((s) => `${R.number(s.t.length)} of ${R.number(s.of)} values`).join(", ")}; of each part of the time the least and the greatest stay.` }) : null);
+  const chart = { panel, box, series, options, cursor: R.el("div", { class: "cursor", hidden: "" }) };
+  chart.make = function () {
+    const colours = series.map((s) => s.colour());
+    chart.graph = new Dygraph(box, merged(series), {
+      labels: ["t", ...series.map((_, i) => "s" + i)],
+      colors: colours, dateWindow: R.time.now.slice(), connectSeparatedPoints: !options.stacked, legend: "never",
+      strokeWidth: options.stacked ? 0.4 : 1.3, stackedGraph: Boolean(options.stacked), fillAlpha: 0.85,
+      stackedGraphNaNFill: "none", drawPoints: Boolean(options.points), pointSize: 2.2, highlightCircleSize: 3, pixelRatio: Math.max(2, window.devicePixelRatio || 1),
+      includeZero: !options.free, gridLineColor: R.css("--line"), axisLineColor: R.css("--line"), gridLineWidth: 0.6,
+      valueRange: options.yMax ? [0, options.yMax] : null, yRangePad: 4, animatedZooms: false, logscale: Boolean(chart.logged),
+      axes: { x: { pixelsPerLabel: 70, axisLabelFormatter: (v) => R.number(v, 5) + " s" }, y: { axisLabelWidth: 46, axisLabelFormatter: (v) => R.short(v) } },
+      underlayCallback: (context, area, graph) => linesAt(options, context, area, graph),
+      drawCallback: (graph, initial) => {
+        if (initial || R.time.busy) return;
+        const [a, b] = graph.xAxisRange();
+        if (Math.abs(a - R.time.now[0]) + Math.abs(b - R.time.now[1]) > 1e-9) R.time.set(a, b);
+      },
+      highlightCallback: (event, x) => chart.hover(event, x),
+      unhighlightCallback: () => { R.hideTip(); R.time.point(null); },
+      interactionModel: Object.assign({}, Dygraph.defaultInteractionModel, { dblclick: () => R.time.set(...R.time.full) }),
+    });
+    box.append(chart.cursor);
+  };
+  chart.hover = function (event, x) {
+    R.time.point(x);
+    const near = (R.time.now[1] - R.time.now[0]) / 40;
+    const rows = options.hover ? options.hover(x) : series.map((s) => {
+      const i = R.nearest(s.t, x);
+      return i < 0 || Math.abs(s.t[i] - x) > Math.max(near, 1) ? null : [s.label, R.withUnit(s.v[i], options.unit), s.colour()];
+    }).filter((row) => row);
+    R.tip(event, R.number(x, 6) + "\u202fs", rows);
+  };
+  if (log)
+    log.addEventListener("click", () => {
+      chart.logged = !chart.logged;
+      log.setAttribute("aria-pressed", String(chart.logged));
+      chart.graph.updateOptions({ logscale: chart.logged, valueRange: null });
+    });
+  R.time.charts.push(chart);
+  return panel;
+};
+R.short = (v) => (Math.abs(v) >= 1e6 ? R.number(v / 1e6, 3) + " M" : Math.abs(v) >= 1e4 ? R.number(v / 1e3, 3) + " k" : R.number(v, 3));
+R.seriesLegend = function (series) {
+  const box = R.el("div", { class: "legend" });
+  const paint = () => box.replaceChildren(...series.map((s) => R.el("span", {}, R.el("i", { class: "swatch", style: { background: s.colour() } }), s.label)));
+  paint();
+  R.redraws.push(paint);
+  return box;
+};
+R.makeCharts = function () {
+  for (const chart of R.time.charts) chart.make();
+  R.redraws.push(() => {
+    for (const chart of R.time.charts) {
+      chart.graph.updateOptions({ colors: chart.series.map((s) => s.colour()), gridLineColor: R.css("--line"), axisLineColor: R.css("--line") }, true);
+      chart.graph.resize();
+      chart.graph.updateOptions({});
+    }
+  });
+};
+
+// The series of these names, of all runs. One run: a colour a series; several: a colour a run.
+R.seriesOf = function (...names) {
+  const out = [];
+  R.runs.forEach((run, r) => names.forEach((name) => (run.series[name] || []).forEach((s) => {
+    const k = out.length, many = (run.series[name] || []).length > 1;
+    const label = R.several ? run.name + (names.length > 1 || many ? ", " + s.label : "") : s.label;
+    out.push({ label, t: s.t, v: s.v, of: s.of, colour: () => R.colour(R.several ? r : k) });
+  })));
+  return out;
+};
+// A chart of them; null if there are none.
+R.chartOf = function (title, names, options) {
+  const series = R.seriesOf(...[].concat(names));
+  return series.length ? R.chart(title, series, options || {}) : null;
+};
+
+R.delays = function () {
+  const over = R.chartOf("Inter-frame delay", "inter_frame_ms", { unit: "ms", lines: R.hertz, high: true, wide: true, log: true });
+  const shapes = R.distribution();
+  if (!over && !shapes.length) return;
+  R.section("delay", "Inter-frame delay",
+    R.el("p", { class: "muted", text: "Time from the end of a frame to the end of the next. All charts over time zoom together: drag to zoom, double-click to see all; the time counts from the first displayed frame." }),
+    R.el("div", { class: "grid" }, over, shapes));
+};
+
+R.overTime = function () {
+  const measured = [
+    R.chartOf("Update age", "update_age_ms", { unit: "ms", log: true }),
+    R.chartOf("View update latency", "latency_ms", { unit: "ms", log: true, points: true }),
+    R.chartOf("View construction", "construction_ms", { unit: "ms", log: true }),
+    R.chartOf("View updates a second", "updates_per_s", { unit: "1/s" }),
+    ...(R.several
+      ? [R.chartOf("Data generating rate", "generating_mb_s", { unit: "MB/s" }), R.chartOf("Data transfer rate", "transfer_mb_s", { unit: "MB/s" }), R.chartOf("Data consuming rate", "consuming_mb_s", { unit: "MB/s" })]
+      : [R.chartOf("Data rates", ["generating_mb_s", "transfer_mb_s", "consuming_mb_s"], { unit: "MB/s", log: true })]),
+    R.chartOf("Points cached", "points_cached", {}),
+    R.chartOf("Points drawn", "points_drawn", {}),
+    R.chartOf("View error, distance", "view_error_mm", { unit: "mm" }),
+    R.chartOf("View error, angle", "view_error_deg", { unit: "degrees" }),
+    R.chartOf("Holes", "holes_percent", { unit: "% of object pixels", points: true }),
+    R.chartOf("PSNR against direct rendering", "psnr_db", { unit: "dB", points: true, free: true }),
+  ].filter((c) => c);
+  if (measured.length) R.section("time", "Over time", R.el("div", { class: "grid" }, measured));
+};

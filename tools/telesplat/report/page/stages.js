@@ -1,0 +1,69 @@
+// Where the time of view updates went: their stages over time, on average, and in a table.
+"use strict";
+
+R.stages = function () {
+  const with_ = R.runs.filter((run) => run.stages);
+  if (!with_.length) {
+    R.section("stages", "Where the time went", R.el("div", { class: "notes", text: "The stages of view updates are not known: " + (R.several ? "no run" : "the run") + " has a stages.csv, which records of earlier versions lack. What is known of latency stands below, over time." }));
+    return;
+  }
+  const top = Math.max(...with_.map((run) => Math.max(...run.stages.latency)));
+  const boxes = with_.flatMap((run) => {
+    const s = run.stages, colours = R.stageColours(s);
+    const series = s.stages.map((stage, i) => ({ label: stage.label, t: s.t, v: stage.v.map((v) => Math.max(0, v || 0)), of: 0, colour: () => colours()[i] }));
+    const hover = (x) => {
+      const i = R.nearest(s.t, x);
+      const told = [["request " + R.id(s.request[i]) + ", frame " + R.id(s.frame[i]) + ", tile " + R.id(s.tile[i]), s.sampler[i]], ["latency", R.withUnit(s.latency[i], "ms")]];
+      return told.concat(s.stages.map((stage, k) => [stage.label, R.withUnit(stage.v[i], "ms"), colours()[k]]));
+    };
+    const name = R.several ? run.name + ": " : "";
+    return [
+      R.chart(name + "stages of the view updates, by request time", series, { unit: "ms", stacked: true, high: true, wide: true, hover, yMax: top * 1.05, noLegend: true }),
+      R.el("div", { class: "panel wide" }, R.meanBar(run, colours), R.stageTable(run, colours)),
+    ];
+  });
+  const thin = with_.filter((run) => run.stages.of > run.stages.t.length);
+  R.section("stages", "Where the time went",
+    R.el("p", { class: "muted" }, "The stages of each view update, from its request to the insertion of its last points, in the tile that came last. Blue is the network, orange are queues, green is work."),
+    thin.length ? R.el("p", { class: "muted small", text: `Thinned over time: of each of ${thin[0].stages.t.length} parts the slowest update is shown (${thin.map((run) => `${R.number(run.stages.of)} updates`).join(", ")}). Tables count all.` }) : null,
+    R.el("div", { class: "grid" }, boxes));
+};
+R.id = (v) => (v === null || v === undefined || v < 0 ? "-" : String(v));
+R.stageColours = function (s) {
+  const of = (group) => s.stages.filter((x) => x.group === group);
+  return () => s.stages.map((stage) => R.stageColour(stage.group, of(stage.group).indexOf(stage), of(stage.group).length));
+};
+R.meanBar = function (run, colours) {
+  const bar = R.el("div", { class: "stack" }), legend = R.el("div", { class: "legend" });
+  const rows = run.stages.stages.map((stage) => stage.row), all = rows.reduce((sum, r) => sum + Math.max(0, (r || {}).mean || 0), 0) || 1;
+  const paint = () => bar.replaceChildren(...run.stages.stages.map((stage, i) =>
+    R.el("div", {
+      style: { background: colours()[i], flexBasis: (100 * Math.max(0, (rows[i] || {}).mean || 0)) / all + "%" },
+      onmousemove: (e) => R.tip(e, stage.label, [["mean", R.withUnit((rows[i] || {}).mean, "ms")], ["share", R.percent((rows[i] || {}).share)]]), onmouseleave: R.hideTip,
+    })));
+  paint();
+  R.redraws.push(paint);
+  for (const group of ["work", "queue", "network"]) {
+    const sum = run.stages.stages.reduce((s, stage, i) => s + (stage.group === group ? (rows[i] || {}).mean || 0 : 0), 0);
+    const words = { work: "work", queue: "queues", network: "network" }[group];
+    const swatch = R.el("i", { class: "swatch", style: { background: R.stageColour(group, 0, 1) } });
+    legend.append(R.el("span", {}, swatch, `${words} ${R.number(sum)}\u202fms (${R.percent(sum / all)})`));
+  }
+  return R.el("div", {}, R.el("h3", { text: (R.several ? run.name + ": " : "") + "mean update, " + R.withUnit(all, "ms") }), legend, bar);
+};
+R.stageTable = function (run, colours) {
+  const s = run.stages;
+  const cells = (row) => ["median", "p95", "mean"].map((k) => R.el("td", { class: "number", text: row ? R.withUnit(row[k], "ms") : "-" })).concat(R.el("td", { class: "number", text: row ? R.percent(row.share) : "-" }));
+  const rows = s.stages.map((stage, i) => {
+    const swatch = R.el("i", { class: "swatch" });
+    const paint = () => (swatch.style.background = colours()[i]);
+    paint();
+    R.redraws.push(paint);
+    return R.el("tr", {}, R.el("td", {}, swatch, stage.label), R.el("td", { class: "muted", text: stage.group }), cells(stage.row));
+  });
+  rows.push(R.el("tr", {}, R.el("td", {}, R.el("b", { text: "latency" })), R.el("td"), cells(s.latency_row)));
+  if (s.display_row) rows.push(R.el("tr", {}, R.el("td", { text: "then, to the end of the first frame that shows it" }), R.el("td"), cells(s.display_row)));
+  return R.el("div", {},
+    R.table([{ text: "stage" }, { text: "" }, { text: "median", number: true }, { text: "p95", number: true }, { text: "mean", number: true }, { text: "share of the mean", number: true }], rows),
+    R.el("p", { class: "muted small", text: `Of ${R.number(s.of)} updates. Stages add up to the latency to ${R.percent(s.off)} at worst; ${s.negative} are negative.` }));
+};

@@ -1,0 +1,37 @@
+// CSV files of runs that may have ended anyhow: what can be read of them counts.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/result.h"
+
+namespace telesplat::launcher {
+
+/// Columns of a table, by name. A line that is cut off (the last one, without a line end) or has another number of
+/// values than the header is left out.
+class LooseTable {
+ public:
+  /// The columns that are asked for, as far as the file has them. Error: the file is not there, is empty, or has more
+  /// than 4 GiB.
+  static Result<LooseTable> read(const std::string& path, const std::vector<std::string>& numbers,
+                                 const std::vector<std::string>& texts = {});
+
+  size_t rows() const { return rows_; }
+  size_t damaged() const { return damaged_; }  ///< lines that were left out
+  bool has(std::string_view name) const;
+  /// A value a row; NaN where there is no finite number. All NaN if the file has no such column.
+  const std::vector<double>& numbers(const std::string& name) const;
+  /// Valid UTF-8, at most 200 bytes each; empty if the file has no such column.
+  const std::vector<std::string>& texts(const std::string& name) const;
+
+ private:
+  size_t rows_ = 0, damaged_ = 0;
+  std::vector<std::string> header_;
+  std::map<std::string, std::vector<double>, std::less<>> numbers_;
+  std::map<std::string, std::vector<std::string>, std::less<>> texts_;
+};
+
+}  // namespace telesplat::launcher

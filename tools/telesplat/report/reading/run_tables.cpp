@@ -1,0 +1,112 @@
+#include "tools/telesplat/report/reading/run_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "tools/telesplat/report/reading/stage_columns.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Names = std::vector<std::string>;
+
+const Names kFrameNumbers{"frame",
+                          "t_s",
+                          "begin_s",
+                          "inter_frame_ms",
+                          "construction_ms",
+                          "wait_ms",
+                          "points_drawn",
+                          "points_cached",
+                          "update_age_ms",
+                          "view_error_m",
+                          "view_error_deg",
+                          "px",
+                          "py",
+                          "pz",
+                          "qw",
+                          "qx",
+                          "qy",
+                          "qz"};
+const Names kUpdateNumbers{"request",     "requested_s", "complete_s",  "latency_ms",
+                           "start_up_ms", "points",      "extra_points"};
+const Names kTileNumbers{"samples", "kept", "bytes_sent", "encode_end_s", "packed_s", "published_s"};
+const Names kQualityNumbers{"frame", "t_s", "psnr_db", "ssim", "flip", "hole_fraction", "object_pixels"};
+
+// lacks: what the page has not without it.
+std::optional<LooseTable> read(const std::string& directory, const char* name, const char* lacks, const Names& numbers,
+                               const Names& texts, std::vector<std::string>& notes) {
+  std::error_code error;
+  const std::string path = directory + "/" + name;
+  if (!fs::exists(path, error)) {
+    notes.push_back(fmt::format("{} is not there: {}", name, lacks));
+    return {};
+  }
+  auto table = LooseTable::read(path, numbers, texts);
+  if (!table || table->rows() == 0) {
+    notes.push_back(fmt::format("{} holds no rows: {}", name, lacks));
+    return {};
+  }
+  if (table->damaged() > 0)
+    notes.push_back(fmt::format("{}: {} line{} cut off or damaged and left out", name, table->damaged(),
+                                table->damaged() == 1 ? " is" : "s are"));
+  return std::move(*table);
+}
+
+Names stage_numbers() {
+  Names out{"request", "frame", "tile", "requested_s", "latency_ms", "display_ms"};
+  for (const auto& stage : kStageColumns) out.emplace_back(stage.column);
+  return out;
+}
+
+// Where rows of earlier versions have no begin_s, times count from the first frame of each viewer.
+void place_frames(RunTables& t) {
+  const auto& begin = t.frames->has("begin_s") ? t.frames->numbers("begin_s") : t.frames->numbers("t_s");
+  if (!t.frames->has("begin_s"))
+    t.notes.emplace_back("frames.csv has no begin_s: its frames may not line up with the other tables");
+  double first = INFINITY, last = -INFINITY;
+  for (const double s : begin)
+    if (std::isfinite(s)) first = std::min(first, s), last = std::max(last, s);
+  if (std::isfinite(first)) t.origin_s = first, t.end_s = last;
+  for (const double s : begin) t.frame_s.push_back(s - t.origin_s);
+}
+
+// Without frames the others tell when things began.
+void place_without_frames(RunTables& t) {
+  double first = INFINITY, last = -INFINITY;
+  const auto look = [&](const std::optional<LooseTable>& table, const char* column) {
+    if (!table) return;
+    for (const double s : table->numbers(column))
+      if (std::isfinite(s)) first = std::min(first, s), last = std::max(last, s);
+  };
+  look(t.updates, "requested_s"), look(t.updates, "complete_s"), look(t.tiles, "encode_end_s");
+  if (std::isfinite(first)) t.origin_s = first, t.end_s = last;
+}
+
+}  // namespace
+
+RunTables read_run_tables(const std::string& directory, const std::string& kind) {
+  RunTables t;
+  t.slices = kind == "volume";
+  const Names viewer{"viewer"};
+  t.frames =
+      read(directory, "frames.csv", "no inter-frame delay, points, update age and map", kFrameNumbers, viewer, t.notes);
+  t.updates = read(directory, "updates.csv", "no view updates and their latency", kUpdateNumbers, viewer, t.notes);
+  t.tiles = read(directory, "tiles.csv", "no rates of generating and transfer", kTileNumbers, {}, t.notes);
+  t.stages = read(directory, "stages.csv", "no stages of a view update (records of earlier versions have none)",
+                  stage_numbers(), {"viewer", "sampler"}, t.notes);
+  t.quality =
+      read(directory, "quality.csv", "no holes and PSNR (the run had no --verify)", kQualityNumbers, {}, t.notes);
+  if (t.frames)
+    place_frames(t);
+  else
+    place_without_frames(t);
+  return t;
+}
+
+}  // namespace telesplat::launcher

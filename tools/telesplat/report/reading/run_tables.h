@@ -1,0 +1,40 @@
+// The tables of a run folder, as far as they are there.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/telesplat/report/reading/loose_table.h"
+
+namespace telesplat::launcher {
+
+/// What a report reads of the tables. A table that is not there, or has no rows, is not there; `notes` say so.
+struct RunTables {
+  std::optional<LooseTable> frames, updates, tiles, quality, stages;
+  bool slices = false;             ///< a volume's frames, so that some columns mean other things (docs/metrics.md)
+  double origin_s = 0;             ///< begin of the first displayed frame, since the run's beginning
+  double end_s = 0;                ///< of the last one
+  std::vector<double> frame_s;     ///< begin of each row of frames, since origin_s
+  std::vector<std::string> notes;  ///< one line each: what is missing or damaged, and what the page lacks for it
+
+  bool has_frames() const { return frames.has_value(); }
+  double duration_s() const { return end_s - origin_s; }
+};
+
+/// What bounds a page.
+struct PageLimits {
+  size_t buckets = 2000;           ///< of a series over time: twice as many points
+  size_t stacked_updates = 1500;   ///< bars of the stages
+  size_t poses = 1500;             ///< of the map
+  size_t trace_events = 90'000;    ///< of all runs together
+  size_t trace_windows = 16;       ///< parts of a trace that is too long
+  size_t pictures = 10;            ///< of each run, and three that compare
+  size_t picture_bytes = 6 << 20;  ///< of all runs together
+  size_t text_bytes = 200'000;     ///< of a configuration
+};
+
+/// kind: of the scene, "mesh", "julia", "volume" or empty.
+RunTables read_run_tables(const std::string& directory, const std::string& kind);
+
+}  // namespace telesplat::launcher

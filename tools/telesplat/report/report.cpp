@@ -1,0 +1,174 @@
+#include "tools/telesplat/report/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "common/core/utf8.h"
+#include "common/core/version.h"
+#include "common/metrics/run_folder.h"
+#include "tools/telesplat/report/about_part.h"
+#include "tools/telesplat/report/page.h"
+#include "tools/telesplat/report/picture_part.h"
+#include "tools/telesplat/report/plots.h"
+#include "tools/telesplat/report/time_part.h"
+#include "tools/telesplat/report/trace_part.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr size_t kMostRuns = 12;
+
+bool is_run(const std::string& directory) {
+  std::error_code error;
+  if (!fs::is_directory(directory, error)) return false;
+  if (!metrics::folder_id(directory).empty()) return true;
+  for (const char* file : {"frames.csv", "updates.csv", "summary.json", "trace.json"})
+    if (fs::is_regular_file(fs::path(directory) / file, error)) return true;
+  return false;
+}
+
+fs::path without_slash(const std::string& directory) {
+  fs::path path = fs::path(directory).lexically_normal();
+  if (path.filename().empty()) path = path.parent_path();
+  return path;
+}
+
+// Names by which runs are told apart: those of their folders, of "latest" and of "." what they stand for; with a
+// number where two are alike.
+std::vector<std::string> names_of(const std::vector<std::string>& runs) {
+  std::vector<std::string> out;
+  std::set<std::string> taken;
+  for (const auto& run : runs) {
+    std::error_code error;
+    const fs::path real = fs::canonical(run, error);
+    std::string name = to_utf8((error ? without_slash(run) : real).filename().string()).substr(0, 100);
+    name = to_utf8(name.empty() ? "run" : name);
+    std::string own = name;
+    for (int n = 2; !taken.insert(own).second; ++n) own = fmt::format("{} ({})", name, n);
+    out.push_back(own);
+  }
+  return out;
+}
+
+ordered_json config_of(const std::string& directory, const PageLimits& limits) {
+  std::ifstream in(directory + "/session.toml", std::ios::binary);
+  if (!in) return nullptr;
+  std::string text(limits.text_bytes, '\0');
+  in.read(text.data(), std::streamsize(text.size()));
+  text.resize(size_t(in.gcount()));
+  return to_utf8(text);
+}
+
+Status write_whole(const std::string& path, const std::string& text) {
+  const std::string part = path + ".part";
+  std::ofstream out(part, std::ios::binary);
+  out << text;
+  out.close();
+  std::error_code error;
+  if (out) fs::rename(part, path, error);
+  if (out && !error) return ok_status();
+  fs::remove(part, error);
+  return Error{fmt::format("{}: cannot be written", path)};
+}
+
+std::string kind_of(const ordered_json& summary) {
+  if (!summary.is_object()) return {};
+  const auto found = summary.find("kind");
+  return found != summary.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+}  // namespace
+
+Result<ReportOptions> settle_report(ReportOptions o) {
+  if (o.runs.empty()) return Error{"a run folder is needed"};
+  if (o.runs.size() > kMostRuns)
+    return Error{fmt::format("{} runs are given, a page compares at most {}", o.runs.size(), kMostRuns)};
+  for (const auto& run : o.runs)
+    if (!is_run(run)) return Error{fmt::format("{}: is no run folder", run)};
+  const bool several = o.runs.size() > 1;
+  if (o.out.empty()) {
+    const fs::path first = without_slash(o.runs.front());
+    o.out = ((several ? first.parent_path() : first) / "report.html").string();
+  }
+  std::error_code error;
+  if (fs::is_directory(o.out, error)) return Error{fmt::format("--out {}: is a folder, not a file", o.out)};
+  if (o.plots.empty()) {
+    const fs::path page(o.out);
+    o.plots = (page.parent_path() / (several ? page.stem().string() + "-plots" : "plots")).string();
+  }
+  return o;
+}
+
+ordered_json run_json(const std::string& directory, const std::string& name, size_t runs, const PageLimits& limits) {
+  const ordered_json summary = read_summary(directory);
+  RunTables tables = read_run_tables(directory, kind_of(summary));
+  if (!summary.is_object())
+    tables.notes.emplace_back(
+        "summary.json is not there or cannot be read: the run has not ended in order; what is told here comes from its "
+        "tables");
+  ordered_json out{{"name", name}, {"directory", to_utf8(directory)}, {"facts", facts_json(summary)}};
+  out["finished"] = summary.is_object();
+  out["origin_s"] = tables.origin_s;
+  out["duration_s"] = tables.duration_s();
+  out["spreads"] = spreads(tables);
+  out["figures"] = figures_json(summary, out["spreads"], tables);
+  out["series"] = time_series(tables, limits);
+  out["stages"] = stages_json(tables, limits);
+  out["walk"] = walk_json(tables, limits);
+  out["trace"] = trace_part(directory, tables, limits.trace_events / runs, limits.trace_windows);
+  out["pictures"] = pictures_json(directory, tables, limits, limits.picture_bytes / runs);
+  out["config"] = config_of(directory, limits);
+  out["logs"] = logs_json(directory);
+  out["notes"] = tables.notes;
+  return out;
+}
+
+Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& progress, const ShouldStop& should_stop) {
+  const auto names = names_of(o.runs);
+  ordered_json data{{"version", version()}, {"figures", figure_kinds()}, {"runs", ordered_json::array()}};
+  ReportMade made;
+  for (size_t i = 0; i < o.runs.size(); ++i) {
+    progress.show(fmt::format("reading {}, run {} of {}", names[i], i + 1, o.runs.size()));
+    data["runs"].push_back(run_json(o.runs[i], names[i], o.runs.size()));
+    if (should_stop()) {
+      made.interrupted = true;
+      return made;
+    }
+  }
+  std::string title = "Telesplat report: " + names.front();
+  for (size_t i = 1; i < names.size(); ++i) title += (i + 1 < names.size() ? ", " : " and ") + names[i];
+  std::error_code error;
+  if (const auto folder = fs::path(o.out).parent_path(); !folder.empty()) fs::create_directories(folder, error);
+  if (const Status s = write_whole(o.out, page_html(title, data)); !s) return s.error();
+  made.page = o.out;
+  if (o.no_plots) return made;
+  progress.show("drawing plots");
+  auto plots = make_plots(data, o.plots, should_stop);
+  if (plots)
+    made.plots = std::move(*plots);
+  else
+    made.no_plots = plots.error().text;
+  progress.close();
+  return made;
+}
+
+std::vector<std::string> lines_of(const ReportMade& made) {
+  std::vector<std::string> out;
+  std::error_code error;
+  const double mb = double(fs::file_size(made.page, error)) / 1e6;
+  out.push_back(fmt::format("The report is {} ({:.1f} MB); open it in a browser", made.page, error ? 0.0 : mb));
+  if (!made.plots.empty())
+    out.push_back(fmt::format("Plots for papers are in {} ({} pictures)",
+                              fs::path(made.plots.front()).parent_path().string(), made.plots.size()));
+  if (!made.no_plots.empty()) out.push_back("No plots for papers were drawn: " + made.no_plots);
+  return out;
+}
+
+}  // namespace telesplat::launcher
