@@ -169,7 +169,7 @@ TEST(Report, DrawsPlotsWhereMatplotlibIsInstalled) {
   const Outcome made = report(folder, {folder / "run"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(fs::exists(folder / "run/report.html"));
-  if (std::system("python3 -c 'import matplotlib' 2> /dev/null") != 0) {
+  if (std::system("/usr/bin/python3 -c 'import matplotlib' 2> /dev/null || python3 -c 'import matplotlib' 2> /dev/null") != 0) {
     EXPECT_NE(made.out.find("No plots for papers were drawn: "), made.out.npos) << made.out;
     EXPECT_FALSE(fs::exists(folder / "run/plots"));
     return;

@@ -8,7 +8,7 @@
 
 #include "common/core/utf8.h"
 #include "tools/telesplat/report/reading/loose_table.h"
-#include "tools/telesplat/report/reading/stage_columns.h"
+#include "tools/telesplat/report/reading/update_stages.h"
 #include "tools/telesplat/report/reading/thinning.h"
 #include "tools/telesplat/report/reading/trace_reader.h"
 
@@ -255,11 +255,11 @@ TEST(TraceWindows, AreBoundedWhereAllHappensAtOnce) {
   EXPECT_TRUE(choose_windows({}, 0, 1, 100, 4).events.empty());
 }
 
-TEST(StageColumns, AreGroupedByTheirNames) {
+TEST(UpdateStages, AreGroupedByTheirNames) {
   EXPECT_STREQ(stage_group("tile_network_ms"), "network");
   EXPECT_STREQ(stage_group("view_queue_ms"), "queue");
   EXPECT_STREQ(stage_group("sampling_ms"), "work");
-  EXPECT_EQ(std::size(kStageColumns), 17u);
+  EXPECT_EQ(std::size(kUpdateStages), 17u);
 }
 
 }  // namespace

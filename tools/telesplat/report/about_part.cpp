@@ -63,7 +63,7 @@ std::string machines(const ordered_json& s) {
 
 /// A figure: its key, where it lies in the summary, how it is shown, what it means. better: 1 more, -1 less, 0 neither.
 /// table: "tile", "measure" (the thesis's seven), "more".
-struct Figure {
+struct Measure {
   const char *key, *path, *label, *unit, *meaning;
   double scale;
   int better;
@@ -71,7 +71,7 @@ struct Figure {
   const char* fallback = "";  ///< of spreads, where there is no summary
 };
 
-constexpr Figure kFigures[] = {
+constexpr Measure kFigures[] = {
     {"fps", "fps", "frames a second", "1/s", "displayed frames / duration, mean over the viewers", 1, 1, "tile"},
     {"delay_median", "inter_frame_delay_ms.median", "inter-frame delay, median", "ms",
      "end of a frame minus end of the one before", 1, -1, "tile", "inter_frame_ms.median"},
@@ -181,7 +181,7 @@ ordered_json facts_json(const ordered_json& s) {
 
 ordered_json figure_kinds() {
   ordered_json out = ordered_json::array();
-  for (const Figure& f : kFigures)
+  for (const Measure& f : kFigures)
     out.push_back({{"key", f.key},
                    {"label", f.label},
                    {"unit", f.unit},
@@ -194,7 +194,7 @@ ordered_json figure_kinds() {
 ordered_json figures_json(const ordered_json& summary, const ordered_json& spreads, const RunTables& tables) {
   ordered_json out = ordered_json::object();
   if (!summary.is_object()) add_counted(spreads, tables, out);
-  for (const Figure& f : kFigures) {
+  for (const Measure& f : kFigures) {
     ordered_json v = at(summary, f.path);
     if (!summary.is_object() && *f.fallback) v = at(spreads, f.fallback);
     if (v.is_number() && std::isfinite(v.get<double>())) out[f.key] = rounded(v.get<double>() * f.scale, 6);

@@ -1,6 +1,7 @@
 #include "tools/telesplat/report/plots.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -26,28 +27,47 @@ ordered_json for_plots(const ordered_json& data) {
   return out;
 }
 
+// The system's, which has the system's matplotlib, before another that stands in front of it.
+std::vector<std::string> pythons() {
+  std::vector<std::string> out;
+  for (const std::string& path : {std::string("/usr/bin/python3"), find_program("python3")})
+    if (!path.empty() && access(path.c_str(), X_OK) == 0 && (out.empty() || out.front() != path)) out.push_back(path);
+  return out;
+}
+
+// The paths of what it drew of `text`, a page's data.
+Result<std::vector<std::string>> draw(const std::string& python, const std::string& text, const std::string& folder,
+                                      const ShouldStop& should_stop) {
+  auto process = PipedProcess::start(python, {"-c", std::string(page_files::plots_py), folder});
+  if (!process) return process.error();
+  process->write(std::as_bytes(std::span(text)), should_stop);
+  const int code = process->finish(should_stop);
+  if (code < 0) return Error{"interrupted"};
+  if (code != 0) {
+    const std::string why = process->last_error_line();
+    return Error{why.empty() ? fmt::format("{} ended with code {}", python, code) : why};
+  }
+  std::vector<std::string> out;
+  std::istringstream lines(process->output());
+  for (std::string line; std::getline(lines, line);) out.push_back((fs::path(folder) / line).string());
+  return out;
+}
+
 }  // namespace
 
 Result<std::vector<std::string>> make_plots(const ordered_json& data, const std::string& folder,
                                             const ShouldStop& should_stop) {
-  const std::string python = find_program("python3");
-  if (python.empty()) return Error{"python3 is not installed"};
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder: {}", folder, error.message())};
-  auto process = PipedProcess::start(python, {"-c", std::string(page_files::plots_py), folder});
-  if (!process) return process.error();
   const std::string text = for_plots(data).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  process->write(std::as_bytes(std::span(text)), should_stop);
-  const int code = process->finish(should_stop);
-  std::vector<std::string> out;
-  std::istringstream lines(process->output());
-  for (std::string line; std::getline(lines, line);) out.push_back((fs::path(folder) / line).string());
-  if (code == 0) return out;
-  fs::remove(folder, error);  // if it is empty
-  if (code < 0) return Error{"interrupted"};
-  const std::string why = process->last_error_line();
-  return Error{why.empty() ? fmt::format("python3 ended with code {}", code) : why};
+  Result<std::vector<std::string>> out = Error{"python3 is not installed"};
+  for (const std::string& python : pythons()) {
+    out = draw(python, text, folder, should_stop);
+    if (out || should_stop()) break;
+  }
+  if (!out) fs::remove(folder, error);  // if it is empty
+  return out;
 }
 
 }  // namespace telesplat::launcher

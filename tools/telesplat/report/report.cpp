@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 constexpr size_t kMostRuns = 12;
+constexpr size_t kLeastBuckets = 500;  // of a series over time, however many runs there are
 
 bool is_run(const std::string& directory) {
   std::error_code error;
@@ -119,8 +120,10 @@ ordered_json run_json(const std::string& directory, const std::string& name, siz
   out["duration_s"] = tables.duration_s();
   out["spreads"] = spreads(tables);
   out["figures"] = figures_json(summary, out["spreads"], tables);
-  out["series"] = time_series(tables, limits);
-  out["stages"] = stages_json(tables, limits);
+  PageLimits own = limits;
+  own.buckets = std::max(std::min(limits.buckets, kLeastBuckets), limits.buckets / runs);
+  out["series"] = time_series(tables, own);
+  out["stages"] = stages_json(tables, own);
   out["walk"] = walk_json(tables, limits);
   out["trace"] = trace_part(directory, tables, limits.trace_events / runs, limits.trace_windows);
   out["pictures"] = pictures_json(directory, tables, limits, limits.picture_bytes / runs);

@@ -29,7 +29,7 @@ struct ReportMade {
 /// Where the page and the plots go. Error: no run, or a folder that is none.
 Result<ReportOptions> settle_report(ReportOptions options);
 
-/// What a page shows of one run. runs: how many share the limits.
+/// What a page shows of one run. runs: how many share the limits of the page.
 nlohmann::ordered_json run_json(const std::string& directory, const std::string& name, size_t runs,
                                 const PageLimits& limits = {});
 

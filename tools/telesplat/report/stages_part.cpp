@@ -4,8 +4,8 @@
 #include <numeric>
 
 #include "common/metrics/statistics.h"
-#include "tools/telesplat/report/reading/stage_columns.h"
 #include "tools/telesplat/report/reading/thinning.h"
+#include "tools/telesplat/report/reading/update_stages.h"
 #include "tools/telesplat/report/time_part.h"
 
 namespace telesplat::launcher {
@@ -57,7 +57,7 @@ void check_sums(const LooseTable& stages, ordered_json& out) {
   double off = 0;
   const auto& latency = stages.numbers("latency_ms");
   std::vector<const std::vector<double>*> columns;
-  for (const auto& c : kStageColumns)
+  for (const auto& c : kUpdateStages)
     if (stages.has(c.column)) columns.push_back(&stages.numbers(c.column));
   for (size_t row = 0; row < stages.rows(); ++row) {
     double sum = 0;
@@ -94,7 +94,7 @@ ordered_json stages_json(const RunTables& t, const PageLimits& limits) {
   ordered_json who = ordered_json::array();
   for (const size_t row : rows) who.push_back(stages.texts("sampler")[row]);
   out["sampler"] = std::move(who);
-  for (const auto& c : kStageColumns) {
+  for (const auto& c : kUpdateStages) {
     if (!stages.has(c.column)) continue;
     out["stages"].push_back({{"key", c.column},
                              {"label", c.label},

@@ -31,12 +31,15 @@ window.addEventListener("resize", () => {
 let themeBefore = null;
 window.addEventListener("beforeprint", () => {
   themeBefore = document.documentElement.dataset.theme;
-  document.getElementById("main").style.width = "700px";
+  document.documentElement.classList.add("printing");
   R.setTheme("light");
+  R.printCharts();
 });
 window.addEventListener("afterprint", () => {
-  document.getElementById("main").style.width = "";
+  document.querySelectorAll(".print-copy").forEach((copy) => copy.remove());
+  document.documentElement.classList.remove("printing");
   R.setTheme(themeBefore || "light");
 });
 
+document.documentElement.dataset.readyAfterMs = String(Math.round(performance.now()));
 document.documentElement.dataset.ready = "yes";

@@ -9,6 +9,8 @@ import sys
 
 HERTZ = (60, 72, 90)
 COLOURS = ("#2563c9", "#d9730d", "#14866d", "#b5368a", "#7a55c7", "#0e8aa8", "#8f6a00", "#c43c3c")
+SPAN_HUES = {"display frame": 214, "wait for update": 45, "view update": 262, "view": 280, "decode": 178, "insert": 150,
+             "pack": 22, "plan": 330, "settle": 55, "sample": 128, "encode": 90, "add chunks": 195, "lease": 240}
 SHADES = {"network": ("Blues", 0.35, 0.9), "queue": ("Oranges", 0.3, 0.8), "work": ("Greens", 0.3, 0.9)}
 
 
@@ -22,6 +24,7 @@ try:
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
+    from matplotlib.colors import hsv_to_rgb
 except ImportError as error:
     fail(f"Python's matplotlib is not installed ({error}); Debian has it as python3-matplotlib")
 
@@ -51,9 +54,11 @@ def over_time(runs, name, label, log=False, lines=False):
             axis.plot(s["t"], [float("nan") if v is None else v for v in s["v"]], linewidth=0.8, color=colour(i),
                       alpha=1 - 0.25 * min(k, 3), label=plain(run["name"]) if k == 0 else None)
     if lines:
+        near = axis.get_ylim()[1] > 60  # too near for a label each
         for hz in HERTZ:
             axis.axhline(1000 / hz, color="#888888", linewidth=0.7, linestyle="--")
-            axis.text(1.005, 1000 / hz, f"{hz} Hz", transform=axis.get_yaxis_transform(), fontsize=7, va="center")
+            text = f"{hz} Hz" if not near else "60/72/90 Hz" if hz == 72 else ""
+            axis.text(1.005, 1000 / hz, text, transform=axis.get_yaxis_transform(), fontsize=7, va="center")
     axis.set_xlabel("time, s")
     axis.set_ylabel(label)
     if log:
@@ -133,6 +138,12 @@ def first_view(trace, events):
     return nearest[2] - 0.12 * length, nearest[2] + 0.88 * length
 
 
+def span_colour(name):
+    """One colour a name, in all timelines, as in the page."""
+    hue = SPAN_HUES.get(name, sum(map(ord, name)) * 31 % 360)
+    return hsv_to_rgb(((hue % 360) / 360, 0.55, 0.82))
+
+
 def timeline(run):
     trace = run.get("trace") or {}
     if not trace.get("begin"):
@@ -149,7 +160,7 @@ def timeline(run):
         return None
     figure, axis = pyplot.subplots(figsize=(7.2, 0.6 + 0.34 * len(lanes)))
     names = sorted({e[1] for e in events})
-    paint = {name: pyplot.get_cmap("tab20")(k % 20) for k, name in enumerate(names)}
+    paint = {name: span_colour(name) for name in names}
     for place, lane in enumerate(lanes):
         for name in names:
             bars = [(e[2], max(e[3], (high - low) / 2000)) for e in events if e[0] == lane and e[1] == name]

@@ -35,27 +35,32 @@ function merged(series) {
   return [...at.values()].sort((a, b) => a[0] - b[0]);
 }
 
-function linesAt(options, context, area, graph) {
-  const range = graph.yAxisRange();
+function drawLines(lines, context, area, graph) {
   context.save();
-  context.font = "11px system-ui, sans-serif";
-  for (const line of options.lines || []) {
-    if (line.y < range[0] || line.y > range[1]) continue;
+  context.strokeStyle = R.css("--mark");
+  context.setLineDash([4, 4]);
+  for (const line of lines) {
     const y = graph.toDomYCoord(line.y);
-    context.strokeStyle = R.css("--mark");
-    context.setLineDash([4, 4]);
     context.beginPath();
     context.moveTo(area.x, y);
     context.lineTo(area.x + area.w, y);
     context.stroke();
-    context.fillStyle = R.css("--mark");
-    context.textAlign = "right";
-    context.fillText(line.label, area.x + area.w - 4, y - 3);
   }
   context.restore();
 }
+// Their labels stand beside the picture, at least 13 pixels from each other.
+function labelLines(chart, graph) {
+  const [low, high] = graph.yAxisRange(), area = graph.getArea();
+  const lines = (chart.options.lines || []).filter((line) => line.y >= low && line.y <= high);
+  const places = lines.map((line) => graph.toDomYCoord(line.y)), last = lines.length - 1;
+  const near = places.some((y, i) => i > 0 && y - places[i - 1] < 13);
+  const top = Math.min(area.y + area.h - 8 - 13 * last, (places[0] + places[last]) / 2 - 6.5 * last);
+  chart.box.querySelectorAll(".line-label").forEach((label) => label.remove());
+  lines.forEach((line, i) =>
+    chart.box.append(R.el("div", { class: "line-label", text: line.label, style: { left: area.x + area.w + 5 + "px", top: (near ? top + 13 * i : places[i]) - 9 + "px" } })));
+}
 
-// Lines of one picture are spread so that their labels do not stand on each other.
+// The periods of displays.
 R.hertz = [60, 72, 90].map((hz) => ({ y: 1000 / hz, x: 1000 / hz, label: hz + " Hz", hz }));
 
 // series: [{label, colour: () => css, t, v, of}]. options: unit, lines, stacked, high, log (offers it), hover (rows for
@@ -75,12 +80,13 @@ R.chart = function (title, series, options) {
       labels: ["t", ...series.map((_, i) => "s" + i)],
       colors: colours, dateWindow: R.time.now.slice(), connectSeparatedPoints: !options.stacked, legend: "never",
       strokeWidth: options.stacked ? 0.4 : 1.3, stackedGraph: Boolean(options.stacked), fillAlpha: 0.85,
-      stackedGraphNaNFill: "none", drawPoints: Boolean(options.points), pointSize: 2.2, highlightCircleSize: 3, pixelRatio: Math.max(2, window.devicePixelRatio || 1),
+      stackedGraphNaNFill: "none", drawPoints: Boolean(options.points) && series.every((s) => s.t.length <= 400), pointSize: 2.2, highlightCircleSize: 3, pixelRatio: Math.max(2, window.devicePixelRatio || 1),
       includeZero: !options.free, gridLineColor: R.css("--line"), axisLineColor: R.css("--line"), gridLineWidth: 0.6,
-      valueRange: options.yMax ? [0, options.yMax] : null, yRangePad: 4, animatedZooms: false, logscale: Boolean(chart.logged),
+      valueRange: options.yMax ? [0, options.yMax] : null, yRangePad: 4, rightGap: options.lines ? 44 : 8, animatedZooms: false, logscale: Boolean(chart.logged),
       axes: { x: { pixelsPerLabel: 70, axisLabelFormatter: (v) => R.number(v, 5) + " s" }, y: { axisLabelWidth: 46, axisLabelFormatter: (v) => R.short(v) } },
-      underlayCallback: (context, area, graph) => linesAt(options, context, area, graph),
+      underlayCallback: (context, area, graph) => drawLines(options.lines || [], context, area, graph),
       drawCallback: (graph, initial) => {
+        labelLines(chart, graph);
         if (initial || R.time.busy) return;
         const [a, b] = graph.xAxisRange();
         if (Math.abs(a - R.time.now[0]) + Math.abs(b - R.time.now[1]) > 1e-9) R.time.set(a, b);
@@ -126,6 +132,20 @@ R.makeCharts = function () {
       chart.graph.updateOptions({});
     }
   });
+};
+
+// dygraphs clears its canvases when a page takes its size on paper: a copy stays in front of them.
+R.printCharts = function () {
+  for (const chart of R.time.charts) {
+    const drawn = [...chart.box.querySelectorAll("canvas:not(.print-copy)")];
+    const copy = R.el("canvas", { class: "print-copy" });
+    copy.width = drawn[0].width;
+    copy.height = drawn[0].height;
+    copy.style.width = drawn[0].style.width;
+    copy.style.height = drawn[0].style.height;
+    for (const canvas of drawn) copy.getContext("2d").drawImage(canvas, 0, 0);
+    chart.box.append(copy);
+  }
 };
 
 // The series of these names, of all runs. One run: a colour a series; several: a colour a run.

@@ -13,11 +13,11 @@ function extent(spreads) {
 
 // A plot whose x is logarithmic; draw(context, x(ms), y(share), area), hover(ms) gives rows.
 function logPlot(title, [low, high], top, yLabel, draw, hover) {
-  const height = 230, left = 46, bottom = 24, right = 10;
+  const height = 236, left = 46, bottom = 24, right = 10, above = 20;
   let width = 0;
   const span = Math.log(high / low);
   const x = (ms) => left + (Math.log(Math.max(low, ms) / low) / span) * (width - left - right);
-  const y = (v) => 8 + (1 - v / top) * (height - bottom - 8);
+  const y = (v) => above + (1 - v / top) * (height - bottom - above);
   const canvas = R.canvas(height, (c, w) => {
     width = w;
     c.clearRect(0, 0, w, height);
@@ -46,16 +46,19 @@ function logPlot(title, [low, high], top, yLabel, draw, hover) {
     draw(c, x, y);
     c.strokeStyle = c.fillStyle = R.css("--mark");
     c.setLineDash([4, 4]);
-    R.hertz.forEach((line, i) => {
-      if (line.x < low || line.x > high) return;
+    c.lineWidth = 1;
+    // Above the picture; where there is no room the middle one goes without.
+    const narrow = x(1000 / 60) - x(1000 / 90) < 110, none = x(1000 / 60) - x(1000 / 90) < 50;
+    for (const line of R.hertz) {
+      if (line.x < low || line.x > high) continue;
       c.beginPath();
-      c.moveTo(x(line.x), 8);
+      c.moveTo(x(line.x), above);
       c.lineTo(x(line.x), height - bottom);
       c.stroke();
-      // 72 Hz stands lower: its neighbours are near.
-      c.textAlign = i === 0 ? "left" : i === 1 ? "center" : "right";
-      c.fillText(line.label, x(line.x) + (i === 0 ? 4 : i === 1 ? 0 : -4), i === 1 ? 30 : 16);
-    });
+      if (line.hz === 72 && none) continue;
+      c.textAlign = !narrow || line.hz === 72 ? "center" : line.hz === 90 ? "right" : "left";
+      c.fillText(narrow && line.hz !== 60 ? String(line.hz) : line.label, x(line.x), above - 5);
+    }
     c.setLineDash([]);
   });
   canvas.addEventListener("mousemove", (e) => {

@@ -10,7 +10,8 @@ R.stages = function () {
   const top = Math.max(...with_.map((run) => Math.max(...run.stages.latency)));
   const boxes = with_.flatMap((run) => {
     const s = run.stages, colours = R.stageColours(s);
-    const series = s.stages.map((stage, i) => ({ label: stage.label, t: s.t, v: stage.v.map((v) => Math.max(0, v || 0)), of: 0, colour: () => colours()[i] }));
+    // The first is drawn on top: in reverse, so that the request lies at the bottom.
+    const series = s.stages.map((stage, i) => ({ label: stage.label, t: s.t, v: stage.v.map((v) => Math.max(0, v || 0)), of: 0, colour: () => colours()[i] })).reverse();
     const hover = (x) => {
       const i = R.nearest(s.t, x);
       const told = [["request " + R.id(s.request[i]) + ", frame " + R.id(s.frame[i]) + ", tile " + R.id(s.tile[i]), s.sampler[i]], ["latency", R.withUnit(s.latency[i], "ms")]];

@@ -4,7 +4,7 @@
 const ROLES = ["viewer", "packer", "sampler", "data", "master", ""];
 const LANES = ["display", "update", "receive", "epochs"];
 const SPAN_HUES = { "display frame": 214, "wait for update": 45, "view update": 262, view: 262, decode: 178, insert: 150, pack: 22, plan: 330, settle: 55, sample: 128, encode: 90, "add chunks": 195, "add voxels": 195, lease: 240, "epoch held": 0, fetch: 195, publish: 10 };
-const ROW = 17, GUTTER = 148, AXIS = 22, STRIP = 16, MOST_SUB_ROWS = 6;
+const ROW = 17, GUTTER = 148, AXIS = 22, STRIP = 16, MOST_SUB_ROWS = 8;
 
 function spanColour(name) {
   let hue = SPAN_HUES[name];
@@ -209,10 +209,13 @@ class Timeline {
   // ---- hovering ----
 
   alike(k) {
-    const t = this.trace, m = this.marked;
-    if (t.request[m.k] >= 0) return t.request[k] === t.request[m.k];
-    if (t.frame[m.k] >= 0) return t.frame[k] === t.frame[m.k] && t.tile[k] === t.tile[m.k];
-    return true;
+    const t = this.trace, m = this.marked.k;
+    if (t.request[m] < 0 && t.frame[m] < 0) return true;
+    if (t.request[m] >= 0 && t.request[k] >= 0) return t.request[k] === t.request[m];
+    // Of displayed frames the number is another than that of sampled ones.
+    const shown = (i) => ["display frame", "wait for update"].includes(t.names[t.name[i]]);
+    if (t.frame[m] < 0 || t.frame[k] !== t.frame[m] || shown(m) !== shown(k)) return false;
+    return t.tile[m] < 0 || t.tile[k] < 0 || t.tile[k] === t.tile[m];
   }
   at(x, y) {
     const us = this.us(x), slack = (this.view[1] - this.view[0]) / (this.width - GUTTER) * 1.5;
@@ -266,10 +269,21 @@ class Timeline {
   }
 }
 
+// Of several runs the first views are equally long, so that they compare.
+R.sameScale = function (lines) {
+  const length = Math.max(0, ...lines.filter((line) => line).map((line) => line.home[1] - line.home[0]));
+  for (const line of lines)
+    if (line) {
+      line.home = [line.home[0], line.home[0] + length];
+      line.view = line.home.slice();
+    }
+  return lines;
+};
+
 R.timelines = function () {
   const lines = R.runs.map((run, i) => (run.trace.why ? null : new Timeline(run, i)));
   R.section("timeline", "Workflow timeline",
     R.el("p", { class: "muted" }, "As figures 6.1 to 6.3 of the thesis. A ", R.el("i", { text: "display frame" }), " is a view construction, the yellow line below from end to end the inter-frame delay, a ", R.el("i", { text: "view update" }),
       " the view update latency. Drag to move; buttons, or the wheel after a click, zoom; a double-click goes back. Hovering tells each span and shows what belongs to the same request or tile."),
-    lines.map((line, i) => (line ? line.panel() : R.el("div", { class: "notes", text: (R.several ? R.runs[i].name + ": " : "") + "no timeline: " + R.runs[i].trace.why }))));
+    R.sameScale(lines).map((line, i) => (line ? line.panel() : R.el("div", { class: "notes", text: (R.several ? R.runs[i].name + ": " : "") + "no timeline: " + R.runs[i].trace.why }))));
 };

@@ -24,7 +24,7 @@ R.map = function (runs) {
       .map(([key, [label]]) => R.el("option", { value: key, text: "colour: " + label })));
   const key = R.el("span", { class: "muted small" });
   let places = []; // [x, y, run, index] on the screen
-  const canvas = R.canvas(380, (c, w, h) => {
+  const canvas = R.canvas(430, (c, w, h) => {
     places = drawMap(c, w, h, runs, choice.value, key);
   });
   choice.addEventListener("change", () => canvas.redraw());
@@ -166,10 +166,12 @@ R.shownPictures = function () {
 };
 
 R.comparedPictures = function () {
-  const boxes = R.runs.flatMap((run, r) => run.pictures.compared.map((p) =>
-    R.el("div", { class: "panel", style: { marginTop: "10px" } },
+  // Of several runs those of one name stand side by side.
+  const names = [...new Set(["worst", "median", "last"].concat(R.runs.flatMap((run) => run.pictures.compared.map((p) => p.name))))];
+  const boxes = names.flatMap((name) => R.runs.flatMap((run, r) => run.pictures.compared.filter((p) => p.name === name).map((p) =>
+    R.el("div", { class: "panel" },
       R.el("h3", {}, R.several ? R.runSwatch(r) : null, (R.several ? run.name + ": " : "") + p.name + " verified frame" + (p.t === undefined ? "" : `, ${R.number(p.t, 4)} s`) + `, frame ${p.frame}`),
       R.el("div", { class: "three" }, ["reference (direct rendering)", "as displayed", "difference, 4 times"].map((t) => R.el("span", { text: t }))),
-      R.el("figure", {}, R.el("img", { src: p.src, alt: p.name + " verified frame beside its reference" })))));
-  return boxes.length ? R.el("div", {}, R.el("h3", { style: { marginTop: "16px" }, text: "Beside the reference" }), boxes) : null;
+      R.el("figure", {}, R.el("img", { src: p.src, alt: p.name + " verified frame beside its reference" }))))));
+  return boxes.length ? R.el("div", {}, R.el("h3", { style: { marginTop: "16px" }, text: "Beside the reference" }), R.el("div", { class: "compared" + (R.several ? " pairs" : "") }, boxes)) : null;
 };

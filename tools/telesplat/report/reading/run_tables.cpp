@@ -6,7 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "tools/telesplat/report/reading/stage_columns.h"
+#include "tools/telesplat/report/reading/update_stages.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -60,7 +60,7 @@ std::optional<LooseTable> read(const std::string& directory, const char* name, c
 
 Names stage_numbers() {
   Names out{"request", "frame", "tile", "requested_s", "latency_ms", "display_ms"};
-  for (const auto& stage : kStageColumns) out.emplace_back(stage.column);
+  for (const auto& stage : kUpdateStages) out.emplace_back(stage.column);
   return out;
 }
 

@@ -13,7 +13,7 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr size_t kLongestName = 200;
-constexpr int kEventDepth = 2;  // [ {
+constexpr double kShorter = 0.9, kShortest_us = 1;  // of windows
 
 // What was told of one event.
 struct Told {
@@ -219,16 +219,19 @@ TraceWindows choose_windows(const std::vector<TraceEvent>& events, double begin_
   std::vector<bool> taken(events.size(), false);
   for (size_t k = 0; k < windows; ++k) {
     const double middle = begin_us + (double(k) + 0.5) * pitch;
-    // Half as long until it fits.
-    double length = pitch;
+    // Shorter and shorter until it fits.
+    double length = pitch / kShorter;
     std::vector<size_t> inside;
-    for (int halving = 0; halving < 30; ++halving, length /= 2) {
-      const double from = middle - length / 2, to = middle + length / 2;
-      inside.clear();
-      for (size_t i = 0; i < events.size() && events[i].begin_us < to && inside.size() <= share; ++i)
-        if (events[i].begin_us + events[i].duration_us > from) inside.push_back(i);
-      if (inside.size() <= share) break;
-    }
+    for (size_t i = 0; i < events.size() && events[i].begin_us < middle + pitch / 2; ++i)
+      if (events[i].begin_us + events[i].duration_us > middle - pitch / 2) inside.push_back(i);
+    do {
+      length *= kShorter;
+      std::erase_if(inside, [&](size_t i) {
+        return events[i].begin_us >= middle + length / 2 ||
+               events[i].begin_us + events[i].duration_us <= middle - length / 2;
+      });
+    } while (inside.size() > share && length > kShortest_us);
+    if (inside.size() > share) inside.resize(share);
     out.windows_us.emplace_back(middle - length / 2, middle + length / 2);
     for (const size_t i : inside) taken[i] = true;
   }

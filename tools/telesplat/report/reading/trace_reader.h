@@ -45,8 +45,8 @@ struct TraceWindows {
 };
 
 /// At most `most` events: all, or those that touch one of `windows` windows, whose middles are evenly spaced from
-/// begin_us to end_us. A window is as long as it may be: half of the distance to the next, or half of that and so on,
-/// until its share of the events holds it.
+/// begin_us to end_us. A window is as long as the distance to the next, or as much shorter as it
+/// takes for it to have no more than its share of the events.
 TraceWindows choose_windows(const std::vector<TraceEvent>& events, double begin_us, double end_us, size_t most,
                             size_t windows);
 

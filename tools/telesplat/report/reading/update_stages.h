@@ -5,12 +5,12 @@
 
 namespace telesplat::launcher {
 
-struct StageColumn {
+struct UpdateStage {
   const char* column;  ///< in stages.csv
   const char* label;   ///< for people
 };
 
-inline constexpr StageColumn kStageColumns[] = {
+inline constexpr UpdateStage kUpdateStages[] = {
     {"request_network_ms", "request travels"},
     {"view_queue_ms", "request waits at the master"},
     {"plan_ms", "plan"},
