@@ -1,12 +1,12 @@
 // The page of a report: what it holds of whole, broken and strange runs, and that nothing from a run becomes code.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
 #include "common/core/utf8.h"
 #include "common/image/file.h"
-#include "tests/support/pipeline_run.h"
 #include "tools/telesplat/report/page.h"
 #include "tools/telesplat/report/picture_part.h"
 #include "tools/telesplat/report/report.h"
@@ -15,7 +15,20 @@ namespace telesplat::launcher {
 namespace {
 
 namespace fs = std::filesystem;
-using test::TemporaryFolder;
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (fs::temp_directory_path() / "telesplat-report-XXXXXX").string();
+    if (mkdtemp(pattern.data())) path_ = pattern;
+  }
+  ~TemporaryFolder() { fs::remove_all(path_); }
+  const std::string& path() const { return path_; }
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
 
 void write(const std::string& path, const std::string& text) {
   fs::create_directories(fs::path(path).parent_path());

@@ -2,7 +2,7 @@
 "use strict";
 
 R.stages = function () {
-  const with_ = R.runs.filter((run) => run.stages);
+  const with_ = R.runs.filter((run) => run.stages && run.stages.t.length);
   if (!with_.length) {
     R.section("stages", "Where the time went", R.el("div", { class: "notes", text: "The stages of view updates are not known: " + (R.several ? "no run" : "the run") + " has a stages.csv, which records of earlier versions lack. What is known of latency stands below, over time." }));
     return;
@@ -27,7 +27,22 @@ R.stages = function () {
   R.section("stages", "Where the time went",
     R.el("p", { class: "muted" }, "The stages of each view update, from its request to the insertion of its last points, in the tile that came last. Blue is the network, orange are queues, green is work."),
     thin.length ? R.el("p", { class: "muted small", text: `Thinned over time: of each of ${thin[0].stages.t.length} parts the slowest update is shown (${thin.map((run) => `${R.number(run.stages.of)} updates`).join(", ")}). Tables count all.` }) : null,
-    R.el("div", { class: "grid" }, boxes));
+    R.el("div", { class: "grid" }, with_.length > 1 ? R.stageComparison(with_) : null, boxes));
+};
+// Medians of the stages of several runs, and how they differ from the first.
+R.stageComparison = function (runs) {
+  const kinds = [];
+  for (const run of runs) for (const stage of run.stages.stages) if (!kinds.some((k) => k.key === stage.key)) kinds.push(stage);
+  const row = (label, group, of) => {
+    const values = runs.map((run) => (of(run.stages) || {}).median);
+    const best = R.best({ better: -1 }, values.map((v) => (v === undefined ? null : v)));
+    return R.el("tr", {}, R.el("td", { text: label }), R.el("td", { class: "muted", text: group }), values.flatMap((v, i) => [
+      R.el("td", { class: "number" + (i === best ? " better" : "") }, R.withUnit(v, "ms"), i === best ? " \u2713" : ""), i > 0 ? R.differenceCell(v, values[0]) : null]));
+  };
+  const rows = kinds.map((kind) => row(kind.label, kind.group, (s) => (s.stages.find((x) => x.key === kind.key) || {}).row));
+  rows.push(row("latency", "", (s) => s.latency_row));
+  const heads = runs.flatMap((run, i) => [{ text: run.name, number: true, swatch: R.runs.indexOf(run) }, i > 0 ? { text: "difference", number: true } : null]);
+  return R.el("div", { class: "panel wide" }, R.el("h3", { text: "Medians of the stages" }), R.table([{ text: "stage" }, { text: "" }, ...heads.filter((h) => h)], rows));
 };
 R.id = (v) => (v === null || v === undefined || v < 0 ? "-" : String(v));
 R.stageColours = function (s) {

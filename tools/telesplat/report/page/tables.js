@@ -3,12 +3,13 @@
 
 R.figure = (run, key) => (run.figures[key] === undefined ? null : run.figures[key]);
 
-// Index of the run whose value is the best; -1: none is, or they are all alike.
+// Index of the run whose value is the best; -1: none is by 1 % or more.
 R.best = function (kind, values) {
   const known = values.map((v, i) => [v, i]).filter(([v]) => v !== null);
   if (!kind.better || known.length < 2) return -1;
   known.sort((a, b) => kind.better * (b[0] - a[0]));
-  return known[0][0] === known[1][0] ? -1 : known[0][1];
+  const [first, second] = [known[0][0], known[1][0]];
+  return Math.abs(first - second) < 0.01 * Math.max(Math.abs(first), Math.abs(second)) || first === second ? -1 : known[0][1];
 };
 
 R.header = function () {
@@ -83,6 +84,13 @@ R.about = function () {
     R.several ? R.el("p", { class: "muted small", text: "What differs is marked." }) : null));
 };
 
+// What a value is more than the first run's, and in percent of that.
+R.differenceCell = function (v, first) {
+  const known = v !== null && v !== undefined && first !== null && first !== undefined, difference = known ? v - first : 0;
+  const share = known && first !== 0 ? ` (${R.signed((100 * difference) / Math.abs(first), 3)}\u202f%)` : "";
+  return R.el("td", { class: "number muted", text: known ? R.signed(difference) + share : "-" });
+};
+
 // A row a figure: value of each run, and from the second on its difference from the first.
 R.figureRows = function (kinds, withMeaning) {
   return kinds.map((kind) => {
@@ -93,9 +101,7 @@ R.figureRows = function (kinds, withMeaning) {
     values.forEach((v, i) => {
       cells.push(R.el("td", { class: "number" + (i === best ? " better" : "") }, R.withUnit(v, kind.unit), i === best ? " \u2713" : ""));
       if (i === 0) return;
-      const difference = v === null || values[0] === null ? null : v - values[0];
-      const share = difference === null || values[0] === 0 ? null : difference / Math.abs(values[0]);
-      cells.push(R.el("td", { class: "number muted", text: difference === null ? "-" : R.signed(difference) + (share === null ? "" : ` (${R.signed(100 * share, 3)}\u202f%)`) }));
+      cells.push(R.differenceCell(v, values[0]));
     });
     return R.el("tr", {}, R.el("td", { text: kind.label }),
       withMeaning ? R.el("td", { class: "muted", text: kind.meaning }) : null, cells);
@@ -122,7 +128,7 @@ R.allFigures = function () {
   const rows = R.figureRows(kinds, false);
   if (!rows.length) return;
   R.section("figures", R.several ? "Differences" : "Further figures",
-    R.several ? R.el("p", { class: "muted", text: `Differences are from ${R.runs[0].name}; the better one is marked with \u2713, where more or less is better.` }) : null,
+    R.several ? R.el("p", { class: "muted", text: `Differences are from ${R.runs[0].name}; the best one is marked with \u2713, where more or less is better and it is so by 1 % or more.` }) : null,
     R.el("div", { class: "panel" }, R.table(R.figureHead(false), rows)));
 };
 

@@ -33,8 +33,8 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
   bool number_float(number_float_t v, const string_t&) override { return number(v); }
   bool binary(binary_t&) override { return true; }
   bool string(string_t& v) override {
-    if (in_args_) {
-      if (key_ == "name") now_.args_name = v;
+    if (inside_ > 0) {
+      if (in_args() && key_ == "name") now_.args_name = v;
       return true;
     }
     if (key_ == "ph") now_.phase = v;
@@ -49,8 +49,7 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
   }
   bool start_object(std::size_t) override {
     if (in_event_) {
-      ++inside_;
-      in_args_ = inside_ == 1 && key_ == "args";
+      if (++inside_ == 1) args_ = key_ == "args";
     } else if (in_list_) {
       in_event_ = true;
       now_ = {};
@@ -63,15 +62,14 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
       take();
     } else if (in_event_) {
       --inside_;
-      in_args_ = false;
     }
     return true;
   }
   bool start_array(std::size_t) override {
-    if (in_event_)
-      ++inside_;
-    else
+    if (!in_event_)
       in_list_ = true;
+    else if (++inside_ == 1)
+      args_ = false;
     return true;
   }
   bool end_array() override {
@@ -99,8 +97,10 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
  private:
   using LaneKey = std::tuple<int64_t, int64_t, std::string>;  // pid, tid, category of async spans
 
+  bool in_args() const { return inside_ == 1 && args_; }
+
   bool number(double v) {
-    if (in_args_) {
+    if (in_args()) {
       if (key_ == "frame") now_.frame = v;
       if (key_ == "tile") now_.tile = v;
       if (key_ == "request") now_.request = v;
@@ -184,8 +184,9 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
   const size_t most_;
   std::string key_;
   Told now_;
-  bool in_list_ = false, in_event_ = false, in_args_ = false;
-  int inside_ = 0;  // objects and lists open within the event
+  bool in_list_ = false, in_event_ = false;
+  bool args_ = false;  // what is open at depth 1 in the event is its args
+  int inside_ = 0;     // objects and lists open within the event
   std::map<std::string, uint32_t> name_of_;
   std::map<LaneKey, uint32_t> lane_of_;
   std::map<int64_t, std::string> process_names_;
