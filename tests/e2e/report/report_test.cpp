@@ -163,13 +163,26 @@ TEST(Report, OfARunThatBrokeOffOpensAndSaysWhatItLacks) {
   expect_no_error(opened(folder, folder / "empty/report.html"));
 }
 
+TEST(Report, OfTenMinutesStaysSmallAndOpens) {
+  const TemporaryFolder folder;
+  write_run(folder / "run", 36'000, 1);
+  const Outcome made = report(folder, {folder / "run", "--no-plots"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_LT(fs::file_size(folder / "run/report.html"), 15'000'000u);
+  if (browser().empty()) GTEST_SKIP() << kNoBrowser;
+  const std::string dom = opened(folder, folder / "run/report.html");
+  expect_no_error(dom);
+  EXPECT_NE(dom.find("Thinned: "), dom.npos) << "the page does not say that it leaves something out";
+}
+
 TEST(Report, DrawsPlotsWhereMatplotlibIsInstalled) {
   const TemporaryFolder folder;
   write_run(folder / "run", 200, 1);
   const Outcome made = report(folder, {folder / "run"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_TRUE(fs::exists(folder / "run/report.html"));
-  if (std::system("/usr/bin/python3 -c 'import matplotlib' 2> /dev/null || python3 -c 'import matplotlib' 2> /dev/null") != 0) {
+  if (std::system(
+          "/usr/bin/python3 -c 'import matplotlib' 2> /dev/null || python3 -c 'import matplotlib' 2> /dev/null") != 0) {
     EXPECT_NE(made.out.find("No plots for papers were drawn: "), made.out.npos) << made.out;
     EXPECT_FALSE(fs::exists(folder / "run/plots"));
     return;
