@@ -42,6 +42,9 @@ class Received {
   /// A view update of this viewer's is complete. Where the display waits for whole updates: and may be displayed from
   /// now on, since all before it may.
   virtual void on_update(const ShownUpdate&) {}
+  /// The coupling has other buffers from now on, 0: the display waits for nothing. What is complete and waits for the
+  /// display is shown then, the newest last. To be called after the gate has changed, if that is so, else before it.
+  virtual void on_coupling(int buffers) = 0;
   /// Tells the packer what was drawn since the last call.
   virtual void report() {}
   /// The session goes on with another one: nothing of the above is called any more. What is here can still be drawn.

@@ -117,7 +117,7 @@ struct Served {
 // Shows the session until it, the person or the clock ends it.
 Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& renderers, SessionRecord& record) {
   net::Context context;
-  CouplingGate gate(int(o.requests.buffers));
+  CouplingGate gate(coupling_state(*coupling_named(o.coupling), o.buffers));
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
   const ViewerWorker::Options options{.service = o.service,

@@ -1,11 +1,13 @@
 #include "client/viewer/viewer_worker.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <utility>
 
 #include "client/viewer/coupling/update_table.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
-#include "common/scene/session.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -67,6 +69,11 @@ void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochI
   poses_.push_back({now_s, camera, waited ? shown.requested_s : 0.0, shown.request});
 }
 
+void ViewerWorker::on_measured(const MeasuredFrame& f) {
+  if (f.previous_s > 0) inter_frame_ms_.add(f.end_s, (f.end_s - f.previous_s) * 1e3);
+  update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
+}
+
 ViewerWorker::Figures ViewerWorker::figures() const {
   const std::lock_guard lock(mutex_);
   return {scene_, updates_, bytes_received_, latency_ms_, epochs_shown_};
@@ -79,13 +86,14 @@ ShownScene ViewerWorker::shown_scene() const {
 
 void ViewerWorker::loop() {
   net::lower_thread_priority(5);  // the display comes first
-  const double poll_s = gate_.waits() ? kCoupledPoll_s : kPoll_s;
   try {
     while (!stop_) {
+      const double poll_s = gate_.waits() ? kCoupledPoll_s : kPoll_s;
       const double now = monotonic_s();
       offset_s_ = link_.to_master_s(now) - now;
       link_.tick(now, [this] { return status(); });
       follow_session();
+      change_coupling(now);
       request_views(now);
       report(now, false);
       std::vector<net::Socket*> sockets{&link_.socket()};
@@ -123,6 +131,7 @@ void ViewerWorker::follow_session() {
   legends_.follow(session);
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
   requester_.set_min_scale(options_.least_sampling.value_or(told));
+  follow_coupling(view);
   requester_.set_steered(view.setting("sampling.steering", 0) != 0);
   if (std::exchange(master_, session.master) != session.master) {
     all_again_ = true;  // it knows nothing of what was asked for
@@ -141,6 +150,34 @@ void ViewerWorker::follow_session() {
     shown_scene_ = {session.box_room, *pipeline};
   }
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
+}
+
+// What `telesplat ctl coupling` wishes; a master that wishes nothing leaves it as it is.
+void ViewerWorker::follow_coupling(const scene::SessionView& session) {
+  const double mode = session.setting("viewer.coupling", -1);
+  if (mode < 0) return;
+  const auto told = coupling_told(mode, session.setting("viewer.buffers", 0));
+  if (!told) return log::warn("the session's coupling {} is none: it stays {}", mode, coupling_text(gate_.state()));
+  if (told == wished_) return;
+  wished_ = *told != gate_.state() ? told : std::nullopt;
+  wished_since_s_ = monotonic_s();
+}
+
+// A display that does not wait yet goes on to show what comes until the update that is on its way is complete: so none
+// is lost, and the first frame that waits waits for a request that knows of it.
+void ViewerWorker::change_coupling(double now_s) {
+  if (!wished_) return;
+  const CouplingState before = gate_.state(), after = *wished_;
+  const bool begins_to_wait = !before.waits() && after.waits();
+  if (begins_to_wait && requester_.answer_open() && now_s < wished_since_s_ + Coupling::kPatience_s) return;
+  wished_.reset();
+  log::info("coupling: {} instead of {}", coupling_text(after), coupling_text(before));
+  requester_.set_buffers(uint64_t(after.buffers));
+  if (begins_to_wait && received_) received_->on_coupling(after.buffers);
+  gate_.change(after);
+  if (!after.waits())
+    for (const auto& [request, update] : std::exchange(complete_, {})) may_display(update);
+  if (!begins_to_wait && received_) received_->on_coupling(after.buffers);
 }
 
 // Where the record lies is known before anything is received.
@@ -202,6 +239,7 @@ void ViewerWorker::on_part(const ViewPart& part) {
     const std::lock_guard lock(mutex_);
     latency_ms_ = (u->complete_s - u->requested_s) * 1e3;
     ++updates_;
+    latencies_ms_.add(local_s, latency_ms_);
   }
   if (!gate_.waits()) return;
   complete_[u->request] = update;
@@ -249,6 +287,7 @@ void ViewerWorker::request_views(double now_s) {
   take_poses();
   if (!link_.session() || !feeds_.connected()) return;
   ask_again(now_s);
+  if (wished_) return;  // nothing more is asked for until the coupling has changed
   bool may_ask = gate_.with([](Coupling& c) { return c.may_ask(); });
   while (may_ask) {
     const auto request = requester_.next(to_master_s(now_s));
@@ -272,6 +311,23 @@ void ViewerWorker::report(double now_s, bool last) {
   if (received_) received_->report();
 }
 
+// For people who watch: what was measured of late, and how the display waits.
+void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
+  const double now_s = monotonic_s();
+  for (const auto& [name, recent] : {std::pair{"inter_frame", &inter_frame_ms_},
+                                     {"update_latency", &latencies_ms_},
+                                     {"update_age", &update_age_ms_}}) {
+    const auto figures = recent->figures(now_s);
+    if (figures.count == 0) continue;
+    values[fmt::format("{}_ms", name)] = figures.median;
+    values[fmt::format("{}_p95_ms", name)] = figures.p95;
+  }
+  const CouplingState coupling = gate_.state();
+  values["coupling"] = double(coupling.mode);
+  values["buffers"] = double(coupling.buffers);
+  values["waits_s"] = waits_s_;
+}
+
 net::MasterLink::Values ViewerWorker::status() const {
   net::MasterLink::Values values{{"rss_mb", net::resident_mb()},
                                  {"peak_rss_mb", net::peak_resident_mb()},
@@ -289,6 +345,7 @@ net::MasterLink::Values ViewerWorker::status() const {
                                  {"sequence", 0},
                                  {"messages_rejected", double(feeds_.rejected())}};
   if (received_) received_->add_status(values);
+  add_recent(values);
   return values;
 }
 

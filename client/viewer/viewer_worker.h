@@ -9,11 +9,14 @@
 #include <thread>
 
 #include "client/viewer/coupling/stage_table.h"
+#include "client/viewer/display/frame_table.h"
 #include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
 #include "client/viewer/session_record.h"
 #include "client/viewer/succession.h"
+#include "common/metrics/recent_values.h"
 #include "common/net/service.h"
+#include "common/scene/session.h"
 
 namespace telesplat::viewer {
 
@@ -21,7 +24,7 @@ class ViewerWorker {
  public:
   struct Options {
     net::ServiceOptions service;
-    RequestOptions requests;  ///< buffers are the gate's
+    RequestOptions requests;  ///< buffers are the gate's, as it begins
     /// RequestOptions::min_scale. Nothing: the session's setting "viewer.least_sampling"; without that:
     /// requests.min_scale.
     std::optional<double> least_sampling;
@@ -44,6 +47,10 @@ class ViewerWorker {
   void on_first_points(double now_s);
   /// A frame of this epoch was displayed with this camera. shown: the newest update in it; waited: it waited for that.
   void on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown, bool waited);
+  /// The row that the frame has in frames.csv.
+  void on_measured(const MeasuredFrame& frame);
+  /// The display has waited so long for a view update, in seconds; 0: it waits no longer, or not for long.
+  void on_waiting(double waits_s) { waits_s_ = waits_s; }
   /// What to draw from, see Succession::at. Null: it is not known yet what the session shows.
   std::shared_ptr<Received> received_at(RequestId request) { return succession_.at(request); }
   /// True once one view update is complete.
@@ -65,10 +72,14 @@ class ViewerWorker {
   std::shared_ptr<const image::Legend> legend_at(EpochId epoch) const { return legends_.at(epoch); }
 
  private:
+  static constexpr double kRecent_s = 5;  // what status reports tell of
+
   void loop();
   void receive();
   void follow_session();
   void follow_record(const wire::Welcome& session);
+  void follow_coupling(const scene::SessionView& session);
+  void change_coupling(double now_s);
   Status follow(scene::Pipeline pipeline, const wire::Welcome& session);
   void retire();
   void receive_control();
@@ -81,6 +92,7 @@ class ViewerWorker {
   void report(double now_s, bool last);
   ReceivedLinks links();
   net::MasterLink::Values status() const;
+  void add_recent(net::MasterLink::Values& values) const;
 
   Options options_;
   CouplingGate& gate_;
@@ -99,6 +111,8 @@ class ViewerWorker {
   InstanceId master_;
   bool all_again_ = false;  // what is open is to be asked for again
   double started_s_ = 0, last_report_s_ = 0;
+  std::optional<CouplingState> wished_;  // for the time being another one is in force
+  double wished_since_s_ = 0;
 
   struct SeenPose {
     double t_s = 0;
@@ -116,7 +130,8 @@ class ViewerWorker {
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};
-  std::atomic<double> offset_s_{0}, first_points_s_{0};
+  std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0};
+  metrics::RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};
   std::thread thread_;
 };
 

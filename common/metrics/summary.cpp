@@ -1,5 +1,7 @@
 #include "common/metrics/summary.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -245,6 +247,29 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
           {"frames_sampled", whole(frames_completed)}};
 }
 
+std::string coupling_name(double mode, double buffers) {
+  if (mode == 0) return "async";
+  return mode == 1 ? "sync" : fmt::format("loose({:.0f})", buffers);
+}
+
+/// Which couplings were in force, and how often a viewer went from one to another.
+ordered_json how_coupled(const Measured& m) {
+  const auto modes = m.frames.column("coupling"), buffers = m.frames.column("buffers");
+  if (modes.empty() || modes.size() != buffers.size())
+    return {{"coupling_changes", nullptr}, {"frames_by_coupling", nullptr}};
+  size_t changes = 0;
+  auto frames = ordered_json::object();
+  std::map<size_t, std::string> before;  // of each viewer
+  for (size_t i = 0; i < modes.size(); ++i) {
+    const std::string name = coupling_name(modes[i], buffers[i]);
+    frames[name] = frames.value(name, size_t{0}) + 1;
+    std::string& last = before[m.frames.viewers[i]];
+    changes += !last.empty() && last != name;
+    last = name;
+  }
+  return {{"coupling_changes", changes}, {"frames_by_coupling", frames}};
+}
+
 ordered_json how_long(const Measured& m) {
   auto delays = m.frames.column("inter_frame_ms");
   std::erase_if(delays, [](double d) { return d <= 0; });  // the first frame of a viewer has none
@@ -339,6 +364,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(what_was_done(about, processes));
   out.update(what_was_shown(roster));
   out.update(how_often(measured, figures, counter("frames_completed")));
+  out.update(how_coupled(measured));
   out.update(how_long(measured));
   out["clock"] = clocks(processes);
   out.update(how_much(traffic(measured, roster), run_s, viewers));

@@ -131,7 +131,8 @@ struct Control {
   /// "status", "stop", "epoch", "set" (arguments: parameter -> value), "animate" (argument "timeline": as
   /// julia::parse_timeline takes it, or "off"), "tf" (argument "transfer": a preset's name or points, as
   /// volume::parse_transfer takes them), "colour" (arguments "array": as scene::parse_colour_by takes it, "map": as
-  /// colour::from_text takes it).
+  /// colour::from_text takes it), "coupling" (arguments "coupling": async, sync or loose; "buffers" of loose, 1 to
+  /// kMaxBuffers; "viewer": the name of the one that is meant).
   std::string command;
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) {

@@ -5,6 +5,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "common/scene/session.h"
+
 namespace telesplat::master {
 
 Result<double> read_number(const std::string& name, const std::string& text) {
@@ -14,6 +16,29 @@ Result<double> read_number(const std::string& name, const std::string& text) {
   if (text.empty() || read.ec != std::errc() || read.ptr != end || !std::isfinite(value))
     return Error{fmt::format("{} is \"{}\", not a finite number", name.substr(0, 64), text.substr(0, 40))};
   return value;
+}
+
+Result<CouplingOrder> read_coupling(const wire::Control& m) {
+  const std::string name = scene::value_or(m.arguments, "coupling", std::string()),
+                    buffers = scene::value_or(m.arguments, "buffers", std::string());
+  CouplingOrder out{.viewer = scene::value_or(m.arguments, "viewer", std::string()), .text = name};
+  if (name == "sync" || name == "loose") {
+    out.mode = name == "sync" ? 1 : 2;
+    out.buffers = name == "sync" ? 1 : kLooseBuffers;
+  } else if (name != "async") {
+    return Error{fmt::format("coupling is \"{}\", not async, sync or loose", name.substr(0, 40))};
+  }
+  if (!buffers.empty()) {
+    if (name != "loose") return Error{fmt::format("buffers are of loose coupling; {} has none", name)};
+    const auto number = read_number("buffers", buffers);
+    if (!number) return number.error();
+    if (*number < 1 || *number > double(wire::kMaxBuffers) || *number != std::floor(*number))
+      return Error{
+          fmt::format("buffers is {}, not a whole number of 1 to {}", buffers.substr(0, 40), wire::kMaxBuffers)};
+    out.buffers = *number;
+  }
+  if (out.mode == 2) out.text = fmt::format("loose, {} buffer{}", out.buffers, out.buffers == 1 ? "" : "s");
+  return out;
 }
 
 }  // namespace telesplat::master

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/core/result.h"
+#include "common/wire/messages.h"
 
 namespace telesplat::master {
 
@@ -13,6 +14,18 @@ struct Obeyed {
   std::string answer;      ///< for the person; unused where an epoch begins: its number is the answer
   bool tells_all = false;  ///< the session is told to everyone anew, though no epoch begins
 };
+
+/// `telesplat ctl coupling`, as everyone is told it: settings of the welcome.
+struct CouplingOrder {
+  double mode = 0;     ///< "viewer.coupling": 0 async, 1 sync, 2 loose
+  double buffers = 0;  ///< "viewer.buffers"
+  std::string viewer;  ///< whose; empty: everyone's who is here
+  std::string text;    ///< for people: "loose, 3 buffers"
+};
+/// Arguments "coupling" (async, sync or loose), "buffers" (of loose; kLooseBuffers without it) and "viewer". Error: what
+/// is wrong with them.
+Result<CouplingOrder> read_coupling(const wire::Control& command);
+inline constexpr double kLooseBuffers = 3;
 
 /// Reads the value that someone wants a parameter to have. Error: no finite number; names it.
 Result<double> read_number(const std::string& name, const std::string& text);

@@ -87,7 +87,10 @@ void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m
 
 MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& m, double now_s) {
   Peer& p = peers_[peer];
-  if (p.hello.instance != m.instance || p.hello.role != m.role) forget_viewer(p.hello);
+  if (p.hello.instance != m.instance || p.hello.role != m.role) {
+    forget_viewer(p.hello);
+    p.coupling.reset();
+  }
   instances_.erase(p.hello.instance);
   instances_[m.instance] = peer;
   p.hello = m;
@@ -119,7 +122,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
       p.refused = true;
       log::error("the scene of {} is refused: {}", m.name, s.error().text);
     }
-  wire::Welcome w = welcome(now_s);
+  wire::Welcome w = welcome(p, now_s);
   w.hello_sent_s = m.sent_s;
   outbox_.send(peer, w);
   if (changed && (!m.endpoints.empty() || m.role == "data")) announce(now_s);
@@ -173,7 +176,9 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
 Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double now_s) {
   Peer* p = known(peer, now_s);
   if (!p) return ok_status();
-  return record_.add_rows(p->process, m);
+  Status added = record_.add_rows(p->process, m);
+  if (added) live_.add_rows(p->hello.name, m);
+  return added;
 }
 
 // ---- leases ---------------------------------------------------------------------------------------------------------
@@ -221,7 +226,9 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   const auto sampler = by == instances_.end() ? peers_.end() : peers_.find(by->second);
   const bool known_sampler = sampler != peers_.end();
   if (!plan_->done(m, known_sampler ? sampler->first : std::string(), now_s)) return;
-  record_.add_tile(known_sampler ? sampler->second.hello.name : "?", m);
+  const std::string& name = known_sampler ? sampler->second.hello.name : std::string("?");
+  record_.add_tile(name, m);
+  live_.add_tile(name, m);
   dispatch(now_s);
 }
 
@@ -244,7 +251,7 @@ void MasterCore::tick(double now_s) {
   for (const auto& sampler : ticked.overdue)
     if (const auto p = peers_.find(sampler); p != peers_.end() && now_s - p->second.probed_s > kProbeEvery_s) {
       p->second.probed_s = now_s;
-      outbox_.send(sampler, welcome(now_s));
+      outbox_.send(sampler, welcome(p->second, now_s));
     }
   dispatch(now_s);
 }

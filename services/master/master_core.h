@@ -12,6 +12,7 @@
 
 #include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
+#include "services/master/live/exposition.h"
 #include "services/master/outbox.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
@@ -62,6 +63,10 @@ class MasterCore {
   const net::RunningSession& session() const { return session_; }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
+  /// For those who watch; what figures() and live() do not have of it is left to the caller: version, and the master
+  /// itself.
+  LiveSnapshot live_snapshot() const;
+  const LiveFigures& live() const { return live_; }
   Figures figures() const;  ///< of all plans together
   bool progressive() const { return plan_->progressive(); }
   std::string animation() const { return plan_->animation(); }
@@ -76,9 +81,10 @@ class MasterCore {
     std::deque<std::map<std::string, double>> reports;  ///< the newest few, for rates
     double seen_s = 0;
     bool gone = false;
-    bool refused = false;    ///< a data server whose scene cannot be shown
-    int leases_at_once = 0;  ///< a sampler's: Idle::Sampler::at_once
-    double probed_s = -1e9;  ///< when it was last asked whether it still is there
+    bool refused = false;                   ///< a data server whose scene cannot be shown
+    std::optional<CouplingOrder> coupling;  ///< a viewer's, if it was ordered one
+    int leases_at_once = 0;                 ///< a sampler's: Idle::Sampler::at_once
+    double probed_s = -1e9;                 ///< when it was last asked whether it still is there
   };
   // Who takes part.
   Peer* known(const std::string& peer, double now_s);
@@ -95,11 +101,12 @@ class MasterCore {
   Plan& plan_of(const wire::Hello& data);
   Status adopt_scene(const wire::Hello& data, double now_s);
   wire::Welcome scene_as_told() const;
-  wire::Welcome welcome(double now_s) const;
+  wire::Welcome welcome(const Peer& to, double now_s) const;
   void announce(double now_s);
   void next_epoch(double now_s);
   void record_epoch(double now_s);
   Result<std::string> obey(const wire::Control& m, double now_s);
+  Result<std::string> order_coupling(const wire::Control& m, double now_s);
   std::string status_json(double now_s) const;
 
   // Leases.
@@ -121,6 +128,7 @@ class MasterCore {
   std::map<std::string, Peer> peers_;                      // by routing id
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
   Idle idle_;
+  LiveFigures live_;
   uint64_t leases_expired_ = 0;
   bool stop_ = false;
 };

@@ -175,6 +175,13 @@ options::Table session_table(MasterServiceOptions& o) {
   return options::joined(options::joined(lease_table(o.master), steering_table(o.master)), packing_table(o.master));
 }
 
+options::Row metrics_port_row(MasterServiceOptions& o) {
+  return {.flag = "--metrics-port",
+          .value = &o.metrics_port,
+          .help = "port at which http://127.0.0.1:PORT/metrics has the session's figures for Prometheus; 0: none",
+          .limits = options::Range{0, 65535}};
+}
+
 options::Table table(MasterServiceOptions& o) {
   const options::Table own{
       {.flag = "--out", .value = &o.out, .help = "folder for the run's record", .reach = options::Reach::kHere},
@@ -186,6 +193,11 @@ options::Table table(MasterServiceOptions& o) {
        .value = &o.started_by,
        .help = "what telesplat ctl list shows: hand, or the command of telesplat that started it",
        .limits = options::Names{"hand", "run", "view", "bench"},
+       .reach = options::Reach::kHere},
+      metrics_port_row(o),
+      {.flag = "--metrics-address",
+       .value = &o.metrics_address,
+       .help = "address of --metrics-port; one that is not loopback needs --insecure",
        .reach = options::Reach::kHere},
       {.flag = "--animate",
        .value = &o.animate,

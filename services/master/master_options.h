@@ -15,12 +15,16 @@ struct MasterServiceOptions {
   std::string out;                  ///< run folder; empty: no record is written
   bool overwrite = false;           ///< it may hold a record already, which is replaced
   std::string started_by = "hand";  ///< as net::RunningSession has it
-  std::string animate;              ///< as julia::parse_timeline takes it; empty: what the data server says
+  int metrics_port = 0;             ///< HTTP, for programs that watch; 0: none
+  std::string metrics_address = "127.0.0.1";
+  std::string animate;  ///< as julia::parse_timeline takes it; empty: what the data server says
 };
 
 /// Flags that `telesplat run` has too: tiles, leases, packing. (There the data server is told of animations.) Rows
 /// point into `options`, whose settings get their default values here where they have none.
 options::Table session_table(MasterServiceOptions& options);
+/// --metrics-port, which `telesplat run` has too.
+options::Row metrics_port_row(MasterServiceOptions& options);
 /// All flags.
 options::Table table(MasterServiceOptions& options);
 

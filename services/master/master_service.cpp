@@ -18,6 +18,7 @@
 #include "common/net/process_facts.h"
 #include "common/net/session_file.h"
 #include "services/master/guarded.h"
+#include "services/master/live/http_endpoint.h"
 #include "services/master/master_core.h"
 #include "services/master/master_record.h"
 
@@ -27,6 +28,7 @@ namespace {
 // How long others may take to say goodbye; less where someone waits for the master itself to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
 constexpr int kMessagesAtOnce = 1000;  // between two ticks
+constexpr double kMetricsPeriod_s = 1;
 
 Result<MasterOptions> core_options(const MasterServiceOptions& o) {
   MasterOptions out = o.master;
@@ -57,6 +59,18 @@ class MasterService {
         record_(std::move(record)),
         run_id_(std::move(run_id)),
         core_(core, net::make_instance_id(), *record_) {}
+
+  /// Serves figures to programs that watch, where that was asked for.
+  Status open_metrics() {
+    if (options_.metrics_port == 0) return ok_status();
+    auto opened = HttpEndpoint::open(
+        {.address = options_.metrics_address, .port = options_.metrics_port, .insecure = options_.service.insecure});
+    if (!opened) return opened.error();
+    metrics_ = *std::move(opened);
+    publish_metrics(monotonic_s());
+    log::info("metrics at {}", metrics_->url());
+    return ok_status();
+  }
 
   /// Binds, and says so on stdout: whoever started this process waits for the line. From then on it can be found.
   Status listen() {
@@ -119,8 +133,25 @@ class MasterService {
     }
     core_.tick(monotonic_s());
     tell_news();
+    publish_metrics(monotonic_s());
     for (auto& out : core_.take_outgoing())
       if (!control_.send_frames(out.peer, out.type, std::move(out.body))) core_.undeliverable(out.peer);
+  }
+
+  void publish_metrics(double now_s) {
+    if (!metrics_ || now_s - published_s_ < kMetricsPeriod_s) return;
+    published_s_ = now_s;
+    LiveSnapshot snapshot = core_.live_snapshot();
+    snapshot.version = version();
+    snapshot.processes.push_back({.role = "master",
+                                  .name = options_.service.name,
+                                  .alive = true,
+                                  .leases = {},
+                                  .values = {{"rss_mb", net::resident_mb()},
+                                             {"peak_rss_mb", net::peak_resident_mb()},
+                                             {"messages_rejected", double(control_.rejected())}},
+                                  .rates = {}});
+    metrics_->publish(exposition(snapshot, core_.live()));
   }
 
   // The session's file says what it shows as soon as that is known.
@@ -157,6 +188,8 @@ class MasterService {
   MasterCore core_;
   net::RunningSession told_;  // in the file
   std::optional<net::SessionFile> file_;
+  std::unique_ptr<HttpEndpoint> metrics_;  // null: nobody watches
+  double published_s_ = -1e9;
 };
 
 }  // namespace
@@ -186,6 +219,7 @@ int run(const MasterServiceOptions& o) {
   auto record = metrics::RunRecord::open(o.out, metrics::begin_now());
   if (!record) return refuse(record.error());
   MasterService service(o, *options, *std::move(record), std::move(run_id));
+  if (const Status s = service.open_metrics(); !s) return refuse(s.error());
   if (const Status s = service.listen(); !s) return fail(2, s.error());
   service.serve();
   service.say_goodbye();

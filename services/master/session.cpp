@@ -1,6 +1,8 @@
 // What a session shows: its scene, its epochs, and the commands that begin them.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "common/points/point_model.h"
@@ -8,6 +10,11 @@
 #include "services/master/master_core.h"
 
 namespace telesplat::master {
+namespace {
+
+constexpr size_t kMostNamed = 16;  // viewers, in an answer
+
+}  // namespace
 
 // A data server that names no kind, or one that this program does not know, is taken for one of points.
 Plan& MasterCore::plan_of(const wire::Hello& data) {
@@ -47,7 +54,7 @@ wire::Welcome MasterCore::scene_as_told() const {
   return w;
 }
 
-wire::Welcome MasterCore::welcome(double now_s) const {
+wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   wire::Welcome w = scene_as_told();
   w.master = instance_;
   w.master_s = now_s;
@@ -60,16 +67,20 @@ wire::Welcome MasterCore::welcome(double now_s) const {
     w.facts["run_id"] = run_id_;
   }
   w.endpoints.erase("voxels");  // each part of a volume has its own: samplers get them in their sheets
+  if (to.coupling) {
+    w.settings["viewer.coupling"] = to.coupling->mode;
+    w.settings["viewer.buffers"] = to.coupling->buffers;
+  }
   return w;
 }
 
 void MasterCore::announce(double now_s) {
-  const std::string body = wire::encode(welcome(now_s));
+  const std::string body = wire::encode(welcome({}, now_s));
   // The packer first: it should know an epoch before tiles of it come.
   for (const bool packer : {true, false})
     for (const auto& [id, p] : peers_)
       if (!p.gone && p.hello.role != "ctl" && (p.hello.role == "packer") == packer)
-        outbox_.send({id, std::string(wire::Welcome::kName), body});
+        outbox_.send({id, std::string(wire::Welcome::kName), p.coupling ? wire::encode(welcome(p, now_s)) : body});
 }
 
 void MasterCore::record_epoch(double now_s) {
@@ -105,14 +116,37 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   if (done) dispatch(now_s);
 }
 
+// Of the viewers that are here; those that come later begin with their own.
+Result<std::string> MasterCore::order_coupling(const wire::Control& m, double now_s) {
+  const auto order = read_coupling(m);
+  if (!order) return order.error();
+  std::vector<std::string> here, told;
+  for (auto& [id, p] : peers_) {
+    if (p.gone || p.hello.role != "viewer") continue;
+    here.push_back(p.hello.name);
+    if (!order->viewer.empty() && order->viewer != p.hello.name) continue;
+    p.coupling = *order;
+    outbox_.send(id, welcome(p, now_s));
+    told.push_back(p.hello.name);
+  }
+  if (here.empty()) return Error{"no viewer is here"};
+  std::sort(here.begin(), here.end());
+  here.resize(std::min(here.size(), kMostNamed));
+  if (told.empty())
+    return Error{
+        fmt::format("no viewer is called \"{}\"; here is {}", order->viewer.substr(0, 64), fmt::join(here, ", "))};
+  return fmt::format("{}: {}", told.size() == 1 ? told.front() : fmt::format("{} viewers", told.size()), order->text);
+}
+
 Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
+  if (m.command == "coupling") return order_coupling(m, now_s);
   Obeyed obeyed{.begins_epoch = true, .answer = {}};  // "epoch"
   if (m.command == "set" || m.command == "animate" || m.command == "tf" || m.command == "colour") {
     auto by_scene = plan_->obey(m);
     if (!by_scene) return by_scene.error();
     obeyed = *std::move(by_scene);
   } else if (m.command != "epoch") {
-    return Error{fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf, colour",
+    return Error{fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf, colour, coupling",
                              m.command.substr(0, 64))};
   }
   if (obeyed.tells_all) announce(now_s);

@@ -21,13 +21,13 @@ Json number(double value) {
 }
 
 // What processes count on and on, so that it has a rate.
-constexpr const char* kCounters[] = {
-    "frames", "updates", "bytes_received", "points_received", "tiles_sampled",
-    "tiles",  "blocks",  "bytes_sent",     "requests",        "volume_frames_complete"};
+constexpr const char* kCounters[] = {"frames", "updates", "bytes_received", "points_received", "tiles_sampled",
+                                     "tiles",  "blocks",  "bytes_sent",     "requests",        "volume_frames_complete",
+                                     "busy_s"};
 
 // A second, between the first and the last of a process' newest reports, by its own clock.
-Json rates(const std::deque<std::map<std::string, double>>& reports) {
-  Json out = Json::object();
+std::map<std::string, double> rates(const std::deque<std::map<std::string, double>>& reports) {
+  std::map<std::string, double> out;
   if (reports.size() < 2) return out;
   const auto &first = reports.front(), &last = reports.back();
   const auto from = first.find("reported_s"), to = last.find("reported_s");
@@ -81,12 +81,40 @@ std::map<std::string, double> MasterCore::counters() const {
   return out;
 }
 
+LiveSnapshot MasterCore::live_snapshot() const {
+  const Figures f = figures();
+  LiveSnapshot out{.version = {},
+                   .scene = session_.scene,
+                   .kind = session_.kind,
+                   .started_at_s = session_.started_at_s,
+                   .epoch = double(epoch_.value),
+                   .views_completed = double(f.frames_completed),
+                   .views_in_flight = double(f.frames_in_flight),
+                   .views_waiting = double(plan_->views().views_waiting()),
+                   .leases_expired = double(leases_expired_),
+                   .leases_backup = double(f.backups),
+                   .tiles_released = double(f.released),
+                   .processes = {}};
+  for (const auto& [id, p] : peers_) {
+    if (p.hello.role == "ctl") continue;
+    LiveProcess& e = out.processes.emplace_back();
+    e.role = p.hello.role;
+    e.name = p.hello.name;
+    e.alive = !p.gone;
+    if (p.hello.role == "sampler") e.leases = double(plan_->leases_of(id));
+    e.values = p.process.values;
+    e.rates = rates(p.reports);
+  }
+  return out;
+}
+
 std::string MasterCore::status_json(double now_s) const {
   const Figures f = figures();
   Json out{{"session", told(session_)},
            {"epoch", epoch_.value},
            {"frames_completed", f.frames_completed},
            {"frames_in_flight", f.frames_in_flight},
+           {"views_waiting", plan_->views().views_waiting()},
            {"leases_expired", leases_expired_},
            {"tiles_released", f.released},
            {"leases_backup", f.backups},
@@ -107,7 +135,7 @@ std::string MasterCore::status_json(double now_s) const {
     for (const auto& [key, value] : p.hello.facts)
       if (key != metrics::kRecordFact) e["facts"][key] = value;
     for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
-    e["rates"] = rates(p.reports);
+    e["rates"] = Json(rates(p.reports));
     out["processes"].push_back(e);
   }
   // Texts from peers may be any bytes: what is not UTF-8 is shown as U+FFFD.

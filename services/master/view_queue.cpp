@@ -16,6 +16,8 @@ void ViewQueue::add(const wire::ViewRequest& request) {
     requests.assign(1, request);
     return;
   }
+  // A viewer that was asynchronous waits for nothing that it asked for before.
+  std::erase_if(requests, [](const wire::ViewRequest& r) { return r.buffers == 0; });
   for (wire::ViewRequest& r : requests)
     if (r.request == request.request) return void(r = request);  // the view wanted now
   if (requests.size() >= std::min(request.buffers, wire::kMaxBuffers)) return;
@@ -31,6 +33,12 @@ void ViewQueue::put_back(const wire::ViewRequest& request) {
 size_t ViewQueue::waiting(InstanceId viewer) const {
   const auto found = viewers_.find(viewer);
   return found == viewers_.end() ? 0 : found->second.requests.size();
+}
+
+size_t ViewQueue::waiting() const {
+  size_t out = 0;
+  for (const auto& [id, v] : viewers_) out += v.requests.size();
+  return out;
 }
 
 void ViewQueue::begin_turns() {

@@ -38,6 +38,7 @@ class Views {
   void request_view(const wire::ViewRequest& request);
   virtual void forget_viewer(InstanceId viewer);
   bool view_waiting() const { return !waiting_.empty(); }
+  size_t views_waiting() const { return waiting_.waiting(); }
   /// See ViewQueue.
   void begin_turns() { waiting_.begin_turns(); }
   bool turn_waiting() const { return waiting_.turn_waiting(); }

@@ -82,7 +82,9 @@ class SamplerService {
   net::MasterLink::Values status() const {
     net::MasterLink::Values values{{"rss_mb", net::resident_mb()},
                                    {"peak_rss_mb", net::peak_resident_mb()},
-                                   {"tiles_sampled", double(tiles_sampled_)}};
+                                   {"tiles_sampled", double(tiles_sampled_)},
+                                   {"busy_s", busy_s_},
+                                   {"leases_held", double(held())}};
     if (work_) work_->add_status(values);
     return values;
   }
@@ -184,6 +186,7 @@ class SamplerService {
     if (!net::stop_requested()) ask_for_leases();  // the answer comes while we sample
     Delivery made = work_->sample_next();
     ++tiles_sampled_;
+    busy_s_ += std::max(0.0, made.encoded_s - made.begin_s);
     spans_.add("sample", link_.to_master_s(made.begin_s), link_.to_master_s(made.sampled_s), 0, made.of);
     spans_.add("encode", link_.to_master_s(made.sampled_s), link_.to_master_s(made.encoded_s), 0, made.of);
     unsent_ = std::move(made);
@@ -212,6 +215,7 @@ class SamplerService {
   int leases_asked_ = 0;
   bool failed_ = false;
   uint64_t tiles_sampled_ = 0;
+  double busy_s_ = 0;  // sampling and encoding
   double last_flush_s_ = 0;
 };
 

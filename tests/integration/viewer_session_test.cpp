@@ -2,6 +2,9 @@
 // coupling.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <set>
+
 #include "client/viewer/display/display_loop.h"
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/slices/receiver.h"
@@ -13,7 +16,7 @@ namespace {
 
 struct Shown {
   test::FakeSession::Counts counts;
-  std::vector<double> request, sequence, epoch, wait_ms, filled, drawn;
+  std::vector<double> request, sequence, epoch, wait_ms, filled, drawn, coupling, buffers;
   std::vector<double> updates;
   std::map<std::string, double> status;
   std::vector<std::string> sources;  // what each one drew: points, samples
@@ -22,7 +25,7 @@ struct Shown {
 
 // A whole life of a viewer: `frames` frames as fast as they come, or at target_fps.
 Shown show(const test::FakeSession::Options& session_options, CouplingMode mode, uint64_t frames, double target_fps = 0,
-           const std::string& renderer = "cpu") {
+           const std::string& renderer = "cpu", double most_wait_s = StallWatch::kMost_s) {
   static int number = 0;
   net::Context context;
   test::FakeSession session(context, session_options, std::to_string(++number));
@@ -32,6 +35,7 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   display.target_fps = target_fps;
   display.duration_s = 120;  // a deadline
   display.frames = frames;
+  display.most_wait_s = most_wait_s;
   const auto orbit = std::make_shared<const geometry::Trajectory>(geometry::Trajectory::orbit(1.2, 0.4, 20));
   HeadlessSurface surface(display, {.recorded = orbit});
   CouplingGate gate(buffers_of(mode, 3));
@@ -69,6 +73,8 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   out.wait_ms = session.column("frames", "wait_ms");
   out.filled = session.column("frames", "buffers_filled");
   out.drawn = session.column("frames", "points_drawn");
+  out.coupling = session.column("frames", "coupling");
+  out.buffers = session.column("frames", "buffers");
   out.updates = session.column("updates", "request");
   wait_until([&] {
     const auto status = session.status();
@@ -226,6 +232,89 @@ TEST(ChangingSession, AVolumeMayBecomeAMeshToo) {
   const Shown s = show({.change_every = 10, .changes = 1}, CouplingMode::kLoose, 25);
   expect_complete(s, 25);
   EXPECT_EQ(s.sources, (std::vector<std::string>{"samples", "points"}));
+}
+
+// The settings of a session that goes through all couplings, forth and back, after so many answers.
+std::map<uint64_t, std::map<std::string, double>> all_couplings() {
+  const auto told = [](double mode, double buffers) {
+    return std::map<std::string, double>{{"viewer.coupling", mode}, {"viewer.buffers", buffers}};
+  };
+  return {{6, told(1, 1)},  {14, told(2, 3)}, {26, told(0, 0)}, {34, told(2, 8)},
+          {46, told(1, 1)}, {54, told(0, 0)}, {62, told(1, 1)}, {70, told(0, 0)}};
+}
+
+// Frames that waited show each another update, in the order of requests, none is left out, and none waited for long.
+void expect_changes_without_loss(const Shown& s) {
+  ASSERT_EQ(s.coupling.size(), s.request.size());
+  std::vector<std::pair<double, double>> order;  // couplings in force, with their buffers
+  double most_wait_ms = 0;
+  const std::set<double> updates(s.updates.begin(), s.updates.end());
+  for (size_t i = 0; i < s.request.size(); ++i) {
+    if (order.empty() || order.back() != std::pair(s.coupling[i], s.buffers[i]))
+      order.emplace_back(s.coupling[i], s.buffers[i]);
+    most_wait_ms = std::max(most_wait_ms, s.wait_ms[i]);
+    if (i == 0) continue;
+    EXPECT_GE(s.request[i], s.request[i - 1]) << "frame " << i << " goes back";
+    if (s.coupling[i] == 0) continue;
+    EXPECT_GT(s.request[i], s.request[i - 1]) << "frame " << i << " shows an update again";
+    if (s.coupling[i - 1] == 0) continue;
+    for (const double update : updates)
+      EXPECT_FALSE(update > s.request[i - 1] && update < s.request[i]) << "no frame shows update " << update;
+  }
+  EXPECT_EQ(order, (std::vector<std::pair<double, double>>{
+                       {0, 0}, {1, 1}, {2, 3}, {0, 0}, {2, 8}, {1, 1}, {0, 0}, {1, 1}, {0, 0}}));
+  EXPECT_LT(most_wait_ms, Coupling::kPatience_s * 1e3) << "a change cost the patience";
+  EXPECT_EQ(s.status.at("coupling"), 0);
+}
+
+TEST(CouplingChange, OfPointsLosesAndRepeatsNothing) {
+  const Shown s = show({.volume = false, .settings_after = all_couplings()}, CouplingMode::kAsync, 400, 100);
+  expect_complete(s, 400);
+  expect_changes_without_loss(s);
+}
+
+TEST(CouplingChange, OfVolumesLosesAndRepeatsNothing) {
+  const Shown s = show({.settings_after = all_couplings()}, CouplingMode::kAsync, 400, 100);
+  expect_complete(s, 400);
+  expect_changes_without_loss(s);
+  EXPECT_TRUE(s.counts.rising);
+}
+
+TEST(CouplingChange, WithEpochsNoFrameIsEmpty) {
+  for (const bool volume : {false, true}) {
+    const Shown s =
+        show({.volume = volume, .epoch_every = 5, .settings_after = all_couplings()}, CouplingMode::kAsync, 400, 100);
+    expect_complete(s, 400);
+    EXPECT_TRUE(std::is_sorted(s.epoch.begin(), s.epoch.end()));
+    EXPECT_GE(s.epoch.back(), 5);
+  }
+}
+
+TEST(CouplingChange, WhatIsNoCouplingChangesNothing) {
+  const Shown s =
+      show({.volume = false, .settings = {{"viewer.coupling", 2}, {"viewer.buffers", 99}}}, CouplingMode::kSync, 15);
+  expect_complete(s, 15);
+  expect_one_update_a_frame(s);
+  EXPECT_EQ(*std::max_element(s.buffers.begin(), s.buffers.end()), 1);
+}
+
+// A server that is silent for longer than the display waits: frames are drawn from what is there until it answers.
+TEST(Stall, TheDisplayGoesOnAfterItsLongestWait) {
+  for (const bool volume : {false, true}) {
+    const Shown s = show({.volume = volume, .silent_after_s = {{8, 3}}}, CouplingMode::kSync, 40, 0, "cpu", 1.5);
+    expect_complete(s, 40);
+    size_t again = 0;
+    double waited_ms = 0;
+    for (size_t i = 1; i < s.request.size(); ++i) {
+      EXPECT_GE(s.request[i], s.request[i - 1]);
+      again += s.request[i] == s.request[i - 1];
+      waited_ms = std::max(waited_ms, s.wait_ms[i]);
+    }
+    EXPECT_GE(again, 3u) << "about ten frames a second of what is there, for 1.5 s";
+    EXPECT_GE(waited_ms, 1400);
+    EXPECT_LT(again, 25u) << "then each frame waits for its own update again";
+    EXPECT_GE(s.counts.repeated, 1u) << "it was asked for again";
+  }
 }
 
 TEST(PointSession, ABoxBeyondTheLimitIsRefusedAndTheSessionGoesOn) {

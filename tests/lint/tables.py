@@ -53,7 +53,7 @@ FLOORS = {
     ],
     "services/master": [
         [("services/master", "services/master/master_options.*")],
-        ["services/master/tiles", "services/master/slabs"],
+        ["services/master/tiles", "services/master/slabs", "services/master/live"],
         ["services/master/plan.cpp"],
         [
             (
@@ -87,6 +87,7 @@ FLOORS = {
         ["tools/telesplat/movie"],
         ["tools/telesplat/report"],
         ["tools/telesplat/run"],
+        ["tools/telesplat/top"],
         ["tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare", "tools/telesplat/inspect"],
         ["tools/telesplat"],
     ],
@@ -120,6 +121,8 @@ OUTSIDE_HEADERS = [
     (r"toml\+\+/.*", ["tools/telesplat"]),
     (r"spdlog/.*", ["common/core"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
+    (r"boost/.*", ["services/master/live/http_endpoint.cpp"]),
+    (r"curses\.h", ["tools/telesplat/top/screen.cpp"]),
 ]
 
 # Folders without a limit of files: data, not sources.

@@ -134,7 +134,7 @@ void FakeSession::receive_state() {
         continue;
       }
       ++counts_.acknowledged;
-      counts_.rising &= ack->frame.value > last_acknowledged_;
+      counts_.rising &= ack->frame.value >= last_acknowledged_;  // said again where the buffers change
       last_acknowledged_ = ack->frame.value;
       unacknowledged_.erase(ack->frame.value);
     } else if (m->type == wire::StateRequest::kName) {
@@ -160,6 +160,9 @@ bool FakeSession::disturb() {
     --options_.changes;
     ++answers_;
     change_kind();
+  } else if (const auto news = options_.settings_after.find(answers_); news != options_.settings_after.end()) {
+    options_.settings = news->second;
+    options_.settings_after.erase(news);
   } else if (options_.strange_after && answers_ == options_.strange_after) {
     strange_ = true;
     begin_packer();
@@ -189,7 +192,7 @@ void FakeSession::change_kind() {
 
 void FakeSession::answer_next() {
   const std::lock_guard lock(mutex_);
-  if (open_.empty() || viewer_state_.empty()) return;
+  if (open_.empty() || viewer_state_.empty() || monotonic_s() < silent_until_s_) return;
   if (options_.volume && unacknowledged_.size() >= buffers_) return;
   if (options_.epoch_every && answers_ % options_.epoch_every == options_.epoch_every - 1) {
     epoch_ = epoch_.next();
@@ -199,6 +202,11 @@ void FakeSession::answer_next() {
     }
   }
   if (disturb()) return;
+  if (const auto silent = options_.silent_after_s.find(answers_); silent != options_.silent_after_s.end()) {
+    silent_until_s_ = monotonic_s() + silent->second;
+    options_.silent_after_s.erase(silent);
+    return;
+  }
   ++answers_;
   const wire::ViewRequest request = open_.front();
   open_.pop_front();

@@ -32,6 +32,10 @@ class FakeSession {
     /// After N answers the master tells of a box that no model can have, and another packer begins; 0: never.
     uint64_t strange_after = 0;
     std::map<std::string, double> settings;  ///< of the welcome
+    /// The same, instead of these, after so many answers.
+    std::map<uint64_t, std::map<std::string, double>> settings_after;
+    /// After so many answers nobody answers for so many seconds.
+    std::map<uint64_t, double> silent_after_s;
   };
   FakeSession(net::Context& context, const Options& options, std::string name);
   ~FakeSession();
@@ -75,6 +79,7 @@ class FakeSession {
   EpochId epoch_{1};
   InstanceId master_id_{11}, packer_{12};
   bool strange_ = false;
+  double silent_until_s_ = 0;
   std::vector<std::pair<std::string, std::string>> log_;  // published events: type, body
 
   mutable std::mutex mutex_;

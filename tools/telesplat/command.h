@@ -42,6 +42,7 @@ Command report_command();
 Command bench_command();
 Command cache_command();
 Command presets_command();
+Command top_command();
 
 /// `commands`, and two more that tell of all of them: completion and man.
 std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands);

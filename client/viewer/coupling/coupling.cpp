@@ -1,8 +1,12 @@
 #include "client/viewer/coupling/coupling.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 
 #include "common/core/check.h"
+#include "common/wire/limits.h"
 
 namespace telesplat::viewer {
 
@@ -18,6 +22,28 @@ const char* coupling_name(CouplingMode mode) {
 
 int buffers_of(CouplingMode mode, int loose) {
   return mode == CouplingMode::kAsync ? 0 : mode == CouplingMode::kSync ? 1 : loose;
+}
+
+CouplingState coupling_state(CouplingMode mode, int loose) { return {mode, buffers_of(mode, loose)}; }
+
+std::string coupling_text(const CouplingState& s) {
+  if (s.mode != CouplingMode::kLoose) return coupling_name(s.mode);
+  return fmt::format("loose, {} buffer{}", s.buffers, s.buffers == 1 ? "" : "s");
+}
+
+std::optional<CouplingState> coupling_told(double mode, double buffers) {
+  if (mode == 0) return coupling_state(CouplingMode::kAsync, 0);
+  if (mode == 1) return coupling_state(CouplingMode::kSync, 0);
+  if (mode != 2 || !(buffers >= 1 && buffers <= double(wire::kMaxBuffers)) || buffers != std::floor(buffers))
+    return std::nullopt;
+  return coupling_state(CouplingMode::kLoose, int(buffers));
+}
+
+void Coupling::set_buffers(int buffers) {
+  buffers_ = buffers;
+  if (waits()) return;
+  open_.clear();
+  ready_.clear();
 }
 
 void Coupling::asked(RequestId request, double now_s) {
@@ -43,7 +69,7 @@ std::vector<RequestId> Coupling::release() {
 }
 
 std::vector<RequestId> Coupling::completed(RequestId request, double now_s) {
-  heard_s_ = now_s;
+  progress(now_s);
   for (Open& o : open_) o.complete |= o.request == request;
   return release();
 }

@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -21,6 +22,21 @@ const char* coupling_name(CouplingMode mode);
 /// ViewRequest::buffers: 0, 1, or `loose`.
 int buffers_of(CouplingMode mode, int loose);
 
+/// A coupling with its buffers, as buffers_of() has them.
+struct CouplingState {
+  CouplingMode mode = CouplingMode::kAsync;
+  int buffers = 0;
+  bool waits() const { return buffers > 0; }
+  bool operator==(const CouplingState&) const = default;
+};
+/// loose: buffers of loose coupling.
+CouplingState coupling_state(CouplingMode mode, int loose);
+/// "async", "sync", "loose, 3 buffers".
+std::string coupling_text(const CouplingState& state);
+/// As the session's settings "viewer.coupling" (0 async, 1 sync, 2 loose) and "viewer.buffers" name it. They come from
+/// outside. nullopt: no coupling.
+std::optional<CouplingState> coupling_told(double mode, double buffers);
+
 /// Credits of a viewer that waits (sync, loose). A request holds a credit from when it is sent until the frame that
 /// shows its update has been displayed. Updates are displayed in the order of their requests, each in exactly one
 /// frame.
@@ -34,6 +50,9 @@ class Coupling {
   explicit Coupling(int buffers) : buffers_(buffers) {}
   int buffers() const { return buffers_; }
   bool waits() const { return buffers_ > 0; }
+  /// From now on there are so many. Credits that are out stay out: with fewer buffers than before nothing may be asked
+  /// for until enough updates were displayed. 0: what is open or complete is forgotten, nothing is waited for any more.
+  void set_buffers(int buffers);
 
   // ---- requests ----
   bool may_ask() const { return !waits() || open_.size() + ready_.size() + (displaying_ ? 1 : 0) < size_t(buffers_); }
@@ -41,7 +60,9 @@ class Coupling {
   void asked(RequestId request, double now_s);
   bool is_open(RequestId request) const;
   /// Part of an answer came.
-  void progress(double now_s) { heard_s_ = now_s; }
+  void progress(double now_s) { heard_s_ = sign_s_ = now_s; }
+  /// When the newest part of an answer came; 0: none ever.
+  double last_sign_s() const { return sign_s_; }
   /// Answers come in the order of requests: those before this one will not be answered any more. Their credits are
   /// free.
   void skip_before(RequestId request);
@@ -78,7 +99,8 @@ class Coupling {
   std::deque<Open> open_;
   std::deque<RequestId> ready_;
   bool displaying_ = false;
-  double heard_s_ = 0;
+  double heard_s_ = 0;  // a part of an answer, or the requests were sent again
+  double sign_s_ = 0;
 };
 
 }  // namespace telesplat::viewer

@@ -11,11 +11,34 @@ namespace telesplat::viewer {
 
 class CouplingGate {
  public:
-  explicit CouplingGate(int buffers) : coupling_(buffers) {}
-  int buffers() const { return coupling_.buffers(); }
-  bool waits() const { return coupling_.waits(); }
+  explicit CouplingGate(const CouplingState& state) : state_(state), coupling_(state.buffers) {}
+  /// What has so many buffers: 0 async, 1 sync, else loose.
+  explicit CouplingGate(int buffers)
+      : CouplingGate({buffers == 0   ? CouplingMode::kAsync
+                      : buffers == 1 ? CouplingMode::kSync
+                                     : CouplingMode::kLoose,
+                      buffers}) {}
 
-  /// Worker: runs f(Coupling&) alone; wakes the display if an update is there for it afterwards.
+  // ---- any thread ----
+  CouplingState state() const {
+    const std::lock_guard lock(mutex_);
+    return state_;
+  }
+  int buffers() const { return state().buffers; }
+  bool waits() const { return state().waits(); }
+
+  // ---- worker ----
+  /// Another coupling from now on (Coupling::set_buffers). A display that waits is woken.
+  void change(const CouplingState& state) {
+    {
+      const std::lock_guard lock(mutex_);
+      state_ = state;
+      coupling_.set_buffers(state.buffers);
+    }
+    changed_.notify_one();
+  }
+
+  /// Runs f(Coupling&) alone; wakes the display if an update is there for it afterwards.
   template <class F>
   auto with(F&& f) {
     struct Wake {
@@ -30,11 +53,19 @@ class CouplingGate {
     return f(coupling_);
   }
 
-  /// Display: the next complete update, waited for at most `timeout_s`.
-  std::optional<RequestId> take(double timeout_s) {
+  // ---- display ----
+  struct Taken {
+    CouplingState coupling;            ///< in force when the wait ended
+    std::optional<RequestId> request;  ///< the next complete update; none: there was none in time
+    double last_sign_s = 0;            ///< Coupling::last_sign_s()
+  };
+  /// The next complete update, waited for at most `timeout_s`; not at all where the coupling is asynchronous, also if
+  /// that is changed meanwhile.
+  Taken take(double timeout_s) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::duration<double>(timeout_s), [&] { return coupling_.filled() > 0; });
-    return coupling_.take();
+    changed_.wait_for(lock, std::chrono::duration<double>(timeout_s),
+                      [&] { return coupling_.filled() > 0 || !state_.waits(); });
+    return {state_, coupling_.take(), coupling_.last_sign_s()};
   }
   void displayed() {
     const std::lock_guard lock(mutex_);
@@ -48,6 +79,7 @@ class CouplingGate {
  private:
   mutable std::mutex mutex_;
   std::condition_variable changed_;
+  CouplingState state_;
   Coupling coupling_;
 };
 

@@ -135,6 +135,13 @@ void ViewRequester::on_epoch(double now_s) {
   quiet_.reset();
 }
 
+void ViewRequester::set_buffers(uint64_t buffers) {
+  if (options_.buffers == 0) std::erase_if(open_, [&](const auto& o) { return o.first != sent_id_; });
+  // How long it takes until an update is displayed is another thing now.
+  if ((options_.buffers == 0) != (buffers == 0)) displayed_latency_s_ = 0;
+  options_.buffers = buffers;
+}
+
 std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const bool paced = options_.buffers == 0;
   if (!display_ || (paced && (now_s < due_s_ || waits_for_answer(now_s)))) return std::nullopt;
@@ -156,12 +163,13 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
 
 std::vector<wire::ViewRequest> ViewRequester::again(std::span<const RequestId> requests, double now_s) {
   std::vector<wire::ViewRequest> out;
+  // There may be more of them than buffers, where these became fewer: the master shall keep them all.
+  const uint64_t buffers = std::min(std::max<uint64_t>(options_.buffers, requests.size()), wire::kMaxBuffers);
   for (const RequestId id : requests) {
     const auto it = open_.find(id);
     if (it == open_.end() || !display_) continue;
     it->second.camera = wanted(now_s, it->second.still);
-    out.push_back(
-        {viewer_, id, it->second.camera, {.requested_s = now_s}, options_.buffers, 1 / display_->focal_x()});
+    out.push_back({viewer_, id, it->second.camera, {.requested_s = now_s}, buffers, 1 / display_->focal_x()});
   }
   return out;
 }

@@ -74,6 +74,10 @@ class ViewRequester {
   /// Whether samplers cast only the rays that the model lacks: then a view that was seen already costs next to nothing,
   /// and its size is no measure of its time.
   void set_steered(bool steered) { steered_ = steered; }
+  /// RequestOptions::buffers from now on. Where that was 0, nothing but the newest request is answered any more.
+  void set_buffers(uint64_t buffers);
+  /// Whether the newest request waits for its answer.
+  bool answer_open() const { return open_.contains(sent_id_); }
   /// The scene changed: for a while it may change again, and a still head would wait long for each of its views at full
   /// resolution.
   void on_epoch(double now_s);

@@ -7,6 +7,7 @@
 
 #include "client/viewer/render/fit_view.h"
 #include "common/core/clock.h"
+#include "common/core/log.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -51,7 +52,8 @@ class Display {
         spans_(spans),
         find_spool_(spool),
         make_source_(make_source),
-        look_{o.render, o.shading.lit} {}
+        look_{o.render, o.shading.lit},
+        stall_(o.most_wait_s) {}
 
   DisplayResult run() {
     if (!wait_for_scene()) return stopped_early();
@@ -138,20 +140,56 @@ class Display {
     last_ = last_ || (o_.duration_s > 0 && t_s >= o_.duration_s) || (o_.frames > 0 && result_.frames + 1 >= o_.frames);
   }
 
-  // Where the display waits for updates: until the next one is there, or the end has come. Seconds that it took.
-  double wait_for_update() {
-    if (!gate_.waits()) return 0;
+  struct Waited {
+    double wait_s = 0;
+    CouplingState coupling;
+    bool for_update = false;  // and it came
+  };
+  // Where the display waits for updates: until the next one is there, the wait has become too long, the coupling
+  // changed, or the end has come.
+  Waited wait_for_update() {
+    if (const CouplingState coupling = gate_.state(); !coupling.waits()) {
+      end_stall();
+      return {0, coupling};
+    }
     const double begin_s = monotonic_s();
     for (;;) {
-      if (const auto request = gate_.take(kLookAfterSurface_s)) {
-        if (draw_from(*request)) source_->advance(*request);
-        return monotonic_s() - begin_s;
-      }
+      const auto [coupling, request, last_sign_s] = gate_.take(kLookAfterSurface_s);
       const double now_s = monotonic_s(), t_s = now_s - start_s_;
-      if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s)) return now_s - begin_s;
+      if (request || !coupling.waits()) end_stall();
+      if (request && draw_from(*request)) source_->advance(*request);
+      if (request || !coupling.waits()) return {monotonic_s() - begin_s, coupling, request.has_value()};
+      if (told_to_stop(worker_, surface_) || (o_.duration_s > 0 && t_s >= o_.duration_s))
+        return {now_s - begin_s, coupling};
+      const bool draws = stall_.waiting(now_s, begin_s, last_sign_s, coupling);
+      tell_stall(now_s);
+      if (draws) return {now_s - begin_s, coupling};
       worker_.on_pose(now_s, next_camera(now_s, t_s));
       if (view_intact_ && surface_.visible()) surface_.present(view_, true);
     }
+  }
+
+  void end_stall() {
+    const double now_s = monotonic_s();
+    stall_.over(now_s);
+    tell_stall(now_s);
+  }
+
+  // To the log, the window and the master.
+  void tell_stall(double now_s) {
+    if (const auto news = stall_.take_news()) log::warn("{}", *news);
+    const double waits_s = stall_.told_s(now_s);
+    if (waits_s == 0 && live_.waits_s == 0) return;
+    worker_.on_waiting(waits_s);
+    if (Overlays* overlays = surface_.overlays(); overlays && (waits_s > 0) != overlays->shows("waiting")) {
+      if (waits_s > 0)
+        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kLowerLeft});
+      else
+        overlays->hide("waiting");
+    }
+    live_.now_s = now_s;
+    live_.waits_s = waits_s;
+    surface_.report(live_);
   }
 
   uint32_t use_of_frame(double t_s) const {
@@ -165,9 +203,13 @@ class Display {
   }
 
   void frame() {
-    MeasuredFrame m{
-        .number = result_.frames, .start_s = start_s_, .previous_s = previous_s_, .wait_s = wait_for_update()};
-    if (!gate_.waits()) draw_from(Succession::kNewest);
+    const Waited waited = wait_for_update();
+    MeasuredFrame m{.number = result_.frames,
+                    .start_s = start_s_,
+                    .previous_s = previous_s_,
+                    .wait_s = waited.wait_s,
+                    .coupling = waited.coupling};
+    if (!m.coupling.waits()) draw_from(Succession::kNewest);
     if (!source_) {
       result_.interrupted = last_ = true;
       return;
@@ -192,7 +234,7 @@ class Display {
                              .intact = intact},
                             view_);
     m.end_s = monotonic_s();
-    worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, m.drawn.update, gate_.waits());
+    worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, m.drawn.update, waited.for_update);
     const auto legend = o_.legend ? worker_.legend_at(m.drawn.epoch) : nullptr;
     surface_.on_legend(legend);
     surface_.present(view_, m.drawn.changed);
@@ -204,7 +246,9 @@ class Display {
     record(m);
     keep(use, t_s, m, legend);
     ++result_.frames;
-    surface_.report(live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_));
+    live_ = live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_);
+    live_.waits_s = stall_.told_s(m.presented_s);
+    surface_.report(live_);
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
     else if (!m.drawn.changed)
@@ -215,6 +259,7 @@ class Display {
     m.begin_master_s = worker_.to_master_s(m.begin_s);
     m.update_age_s = worker_.to_master_s(m.end_s) - m.drawn.update.requested_s;
     frames_.add(frame_row(m));
+    worker_.on_measured(m);
     if (m.wait_s > 0)
       spans_.add("wait for update", worker_.to_master_s(m.begin_s - m.wait_s), worker_.to_master_s(m.begin_s), 0);
     const uint64_t shown = m.drawn.update.request.value;
@@ -259,6 +304,8 @@ class Display {
   double due_s_ = 0;  // when the frame at hand was
   double start_s_ = 0, previous_s_ = 0, next_picture_s_ = 0;
   bool last_ = false;
+  StallWatch stall_;
+  LiveFigures live_;  // of the newest frame
 };
 
 }  // namespace

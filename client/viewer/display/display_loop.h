@@ -24,7 +24,9 @@ using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&)
 
 /// Waits until it is known what there is to show and for the first complete view update (the head rests at the
 /// trajectory's beginning), then displays frames on the surface. Where the coupling says so each frame waits for a
-/// complete view update and shows the view of now from it; meanwhile the surface is looked after ten times a second.
+/// complete view update and shows the view of now from it; meanwhile the surface is looked after ten times a second,
+/// and after options.most_wait_s frames are drawn from what is there (docs/coupling.md). The coupling may change at any
+/// time.
 /// Only the last frame, when told to stop or at the end of the duration, waits for nothing. `spool` is asked once the
 /// session is known; it, or what it returns, may be null: nothing is recorded.
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,

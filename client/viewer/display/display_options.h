@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "client/viewer/coupling/stall_watch.h"
 #include "client/viewer/display/wall.h"
 #include "common/image/shading.h"
 #include "common/splat/render_options.h"
@@ -27,7 +28,10 @@ struct DisplayOptions {
   double clock_from_s = 0;
   double duration_s = 10;  ///< seconds from the first displayed frame; 0: until told to stop
   uint64_t frames = 0;     ///< frames to display; 0: no limit
-  double hold_s = 0;       ///< the head stands still for so long at the end of duration_s
+  /// Where the display waits for view updates: seconds without any sign of one until frames are drawn from what is
+  /// there.
+  double most_wait_s = StallWatch::kMost_s;
+  double hold_s = 0;  ///< the head stands still for so long at the end of duration_s
   /// Samples a pixel of a still picture: 4 or 16; 1: it is drawn as all others are. Only where pictures are antialiased
   /// and not transparent.
   int still_samples = 16;

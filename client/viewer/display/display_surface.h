@@ -24,6 +24,7 @@ struct LiveFigures {
   uint64_t epochs_shown = 0;          ///< times a changed scene took the place of the one on display
   const char* drawn_name = "points";  ///< what points_drawn counts
   const char* cached_name = "";       ///< and points_cached, with a space before it
+  double waits_s = 0;                 ///< seconds that the display has waited for a view update; 0: not for long
 };
 
 /// What the session shows.

@@ -59,6 +59,8 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"refined", [](F f) { return f.drawn.refined; }},
     {"refine_ms", [](F f) { return f.drawn.refine_ms; }},
     {"sub_pixels", [](F f) { return double(f.drawn.sub_pixels); }},
+    {"coupling", [](F f) { return double(f.coupling.mode); }},
+    {"buffers", [](F f) { return double(f.coupling.buffers); }},
 };
 
 }  // namespace

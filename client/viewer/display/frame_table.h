@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/viewer/coupling/coupling.h"
 #include "client/viewer/display/view_source.h"
 
 namespace telesplat::viewer {
@@ -20,7 +21,8 @@ struct MeasuredFrame {
   geometry::Camera camera{};
   Look look{};
   DrawnFrame drawn{};
-  int filled = 0;  ///< complete updates that waited to be displayed
+  int filled = 0;            ///< complete updates that waited to be displayed
+  CouplingState coupling{};  ///< that was in force
 };
 
 std::vector<std::string> frame_columns();

@@ -15,7 +15,9 @@ std::optional<std::string> TitleLine::update(const LiveFigures& f) {
   const double dt_s = news ? 0 : f.now_s - last_->now_s;
   if (!news && dt_s < kPeriod_s) return std::nullopt;
   std::string text;
-  if (f.frames == 0)
+  if (f.waits_s > 0)
+    text = fmt::format("{} - waiting for a view update, {:.0f} s", name, f.waits_s);
+  else if (f.frames == 0)
     text = fmt::format("{} - {}", name, f.scene.empty() ? "waiting for the data set" : "waiting for the first view");
   else if (news)
     text = name;
@@ -25,7 +27,7 @@ std::optional<std::string> TitleLine::update(const LiveFigures& f) {
         double(f.frames - last_->frames) / dt_s, double(f.updates - last_->updates) / dt_s, f.latency_ms,
         double(f.points_drawn) / 1e6, f.drawn_name, double(f.points_cached) / 1e6, f.cached_name,
         double(f.bytes_received - last_->bytes_received) / 1e6 / dt_s);
-  if (f.frames > 0 && !news && f.epochs_shown > last_->epochs_shown)
+  if (f.frames > 0 && !news && f.waits_s == 0 && f.epochs_shown > last_->epochs_shown)
     text += fmt::format(", {:.1f} epochs/s", double(f.epochs_shown - last_->epochs_shown) / dt_s);
   last_ = f;
   return text;

@@ -15,6 +15,8 @@ class TitleLine {
   /// (of a volume 12.31 M samples drawn, 2.10 M pixels cached) and, while the scene changes, how often a second the
   /// display did:
   ///   ..., 5.8 epochs/s
+  /// and where the display waits for long:
+  ///   SCENE - waiting for a view update, 3 s
   std::optional<std::string> update(const LiveFigures& figures);
 
  private:

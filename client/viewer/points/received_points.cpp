@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "client/viewer/points/source.h"
 #include "client/viewer/record/event_record.h"
@@ -63,11 +64,21 @@ void ReceivedPoints::on_update(const ShownUpdate& update) {
   shown_ = update;
 }
 
+void ReceivedPoints::on_coupling(int buffers) {
+  const bool waits = buffers > 0;
+  if (std::exchange(waits_, waits) == waits) return;
+  if (waits) return receiver_.hold();
+  if (const auto newest = receiver_.release()) show(*newest);
+}
+
 void ReceivedPoints::advance(RequestId request) {
-  const auto update = batches_.apply(request, cache_);
-  if (!update) return;
+  if (const auto update = batches_.apply(request, cache_)) show(*update);
+}
+
+// The other thread may have shown a newer one by now.
+void ReceivedPoints::show(const ShownUpdate& update) {
   const std::lock_guard lock(mutex_);
-  shown_ = *update;
+  if (shown_.request < update.request) shown_ = update;
 }
 
 ShownUpdate ReceivedPoints::shown() const {
@@ -104,7 +115,7 @@ void ReceivedPoints::add_status(net::MasterLink::Values& values) const {
   values["messages_rejected"] += double(received.decode_errors);
   if (waits_) return;
   // Where nothing is held back it is the receiver that knows when an epoch is shown.
-  values["epochs_shown"] = double(received.epochs_shown);
+  values["epochs_shown"] = std::max(values["epochs_shown"], double(received.epochs_shown));
   values["epoch"] = double(received.epoch.value);
 }
 

@@ -22,6 +22,7 @@ class ReceivedPoints final : public Received {
   void receive(int most) override;
   void tick(double now_s) override;
   void on_update(const ShownUpdate& update) override;
+  void on_coupling(int buffers) override;
   void report() override;
   void on_retired() override { retired_ = true; }
   void add_status(net::MasterLink::Values& values) const override;
@@ -41,9 +42,10 @@ class ReceivedPoints final : public Received {
 
  private:
   void summarise();
+  void show(const ShownUpdate& update);
 
   ReceivedLinks links_;
-  const bool waits_;             // the display, for whole updates
+  bool waits_;                   // the display, for whole updates; worker's
   EventRecorder* const events_;  // null: nothing is kept
   ModelCache cache_;
   FineRays fine_rays_;

@@ -60,13 +60,22 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
 
 void PointReceiver::tick(double now_s) {
   if (sequencer_.waiting() && now_s - asked_s_ > kAnswerPatience_s) sequencer_.retry();
-  if (!switch_.due(now_s)) return;
+  if (options_.hold || !switch_.due(now_s)) return;  // held: what is shown is decided update by update
   cache_.show_newest();
   if (const auto since_s = switch_.waiting_since_s()) {
     ++epochs_shown_;
     spans_.add("epoch held", links_.to_master_s(*since_s), links_.to_master_s(now_s), 3);
   }
   switch_.shown();
+}
+
+std::optional<ShownUpdate> PointReceiver::release() {
+  options_.hold = false;
+  const double now_s = monotonic_s();
+  // The replica of an update that is complete is on display: what the switch had to decide before is decided.
+  return batches_.release(
+      cache_, [&] { switch_.begin(cache_.epoch(), false, now_s); },
+      [&](const UpdateBatches::Begin& b, bool held) { switch_.begin(b.epoch, held, now_s); });
 }
 
 void PointReceiver::apply(const ModelEvent& event) {

@@ -35,6 +35,11 @@ class PointReceiver {
   PointReceiver(const Options& options, Links links, ModelCache& cache, FineRays& rays, UpdateBatches& batches,
                 metrics::SpanRecorder& spans);
 
+  /// Changes go to the batches from now on, until release().
+  void hold() { options_.hold = true; }
+  /// What is held is applied, and changes go to the cache from now on. Returns the newest update that is complete in
+  /// it, if one is.
+  std::optional<ShownUpdate> release();
   /// A packer at another address.
   void start() { sequencer_.start(); }
   void receive_events(net::Socket& patches, int most);

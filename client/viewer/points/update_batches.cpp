@@ -21,7 +21,9 @@ void UpdateBatches::close(const ShownUpdate& update) {
   ends_.push_back({update, first_ + changes_.size()});
 }
 
-void UpdateBatches::apply_front(ModelCache& cache) {
+// Of a replica that begins: whether an older one stays on display.
+bool UpdateBatches::apply_front(ModelCache& cache) {
+  bool held = false;
   std::visit(
       [&](auto& c) {
         using C = std::decay_t<decltype(c)>;
@@ -31,12 +33,33 @@ void UpdateBatches::apply_front(ModelCache& cache) {
         } else if constexpr (std::is_same_v<C, Forget>) {
           cache.forget(c.sequence, c.clusters, c.frames);
         } else {
-          cache.begin_replica(c.config, c.epoch, c.sequence);
+          held = cache.begin_replica(c.config, c.epoch, c.sequence);
         }
       },
       changes_.front());
   changes_.pop_front();
   ++first_;
+  return held;
+}
+
+std::optional<ShownUpdate> UpdateBatches::release(ModelCache& cache, const std::function<void()>& shown,
+                                                  const std::function<void(const Begin&, bool held)>& begun) {
+  const std::lock_guard lock(mutex_);
+  std::optional<ShownUpdate> newest;
+  if (!ends_.empty()) {
+    newest = ends_.back().update;
+    while (!changes_.empty() && first_ < ends_.back().change) apply_front(cache);
+    cache.show_newest();
+    ends_.clear();
+    shown();
+  }
+  while (!changes_.empty()) {
+    const auto* begins = std::get_if<Begin>(&changes_.front());
+    const Begin begin = begins ? *begins : Begin{};
+    const bool is_begin = begins != nullptr, held = apply_front(cache);
+    if (is_begin) begun(begin, held);
+  }
+  return newest;
 }
 
 std::optional<ShownUpdate> UpdateBatches::apply(RequestId request, ModelCache& cache) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <variant>
@@ -40,13 +41,18 @@ class UpdateBatches {
   void add(Change change, ModelCache& cache);
   /// Everything added so far belongs to this update or to earlier ones.
   void close(const ShownUpdate& update);
+  /// The display waits for nothing any more: applies everything and shows the newest replica that a closed update is
+  /// of; then it calls shown(). begun: told of each replica that begins after that, and whether an older one stays on
+  /// display. Returns the newest closed update; none: nothing was closed, and shown() is not called.
+  std::optional<ShownUpdate> release(ModelCache& cache, const std::function<void()>& shown,
+                                     const std::function<void(const Begin&, bool held)>& begun);
 
   // ---- display thread ----
   /// Applies all changes up to the end of this update and shows the newest replica. Nothing: it was not closed.
   std::optional<ShownUpdate> apply(RequestId request, ModelCache& cache);
 
  private:
-  void apply_front(ModelCache& cache);
+  bool apply_front(ModelCache& cache);
 
   std::mutex mutex_;
   std::deque<Change> changes_;

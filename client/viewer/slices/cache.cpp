@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace telesplat::viewer {
 
@@ -33,6 +34,17 @@ std::vector<FrameId> SliceCache::take_left() {
   const std::lock_guard lock(mutex_);
   out.swap(left_);
   return out;
+}
+
+void SliceCache::set_in_order(bool in_order) {
+  const std::lock_guard lock(mutex_);
+  if (std::exchange(in_order_, in_order) == in_order || in_order) return;
+  if (!std::exchange(counted_, true)) left_.push_back(displayed_.frame->frame);
+  for (BufferedFrame& f : waiting_) {
+    left_.push_back(f.frame->frame);
+    show(std::move(f));
+  }
+  waiting_.clear();
 }
 
 BufferedFrame SliceCache::displayed() const {

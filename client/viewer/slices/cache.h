@@ -31,6 +31,8 @@ class SliceCache {
   void free_dropped();
   /// In order: frames that have been displayed, or passed over, since the last call: they have left their buffers.
   std::vector<FrameId> take_left();
+  /// As in the constructor, from now on. Where frames waited in order the newest of them goes on display.
+  void set_in_order(bool in_order);
 
   // ---- display thread ----
   /// The frame on display; frame.frame is null before the first.
@@ -52,8 +54,8 @@ class SliceCache {
  private:
   void show(BufferedFrame frame);
 
-  const bool in_order_;
   mutable std::mutex mutex_;
+  bool in_order_;
   BufferedFrame displayed_;
   std::deque<BufferedFrame> waiting_;
   std::vector<std::shared_ptr<const volume::VolumeFrame>> dropped_;

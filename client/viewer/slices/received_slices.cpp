@@ -29,6 +29,11 @@ void ReceivedSlices::receive(int most) { receiver_.receive(*links_.feeds.find("s
 
 void ReceivedSlices::tick(double now_s) { receiver_.tick(now_s, *links_.feeds.find("state")); }
 
+void ReceivedSlices::on_coupling(int buffers) {
+  cache_.set_in_order(buffers > 0);
+  receiver_.set_buffers(uint64_t(buffers));
+}
+
 void ReceivedSlices::add_status(net::MasterLink::Values& values) const {
   values["pixels"] = double(cache_.figures().pixels);
   values["messages_rejected"] += double(receiver_.figures().decode_errors);

@@ -17,6 +17,7 @@ class ReceivedSlices final : public Received {
   void on_new_master() override { receiver_.begin_anew(); }
   void receive(int most) override;
   void tick(double now_s) override;
+  void on_coupling(int buffers) override;
   void add_status(net::MasterLink::Values& values) const override;
   Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) override;
 

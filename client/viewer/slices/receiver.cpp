@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "client/viewer/record/slice_record.h"
 #include "common/core/clock.h"
@@ -70,6 +71,11 @@ Result<BufferedFrame> SliceReceiver::decode(const wire::SliceFrame& f, const vol
   return out;
 }
 
+void SliceReceiver::set_buffers(uint64_t buffers) {
+  tell_buffers_ |= buffers != options_.buffers;
+  options_.buffers = buffers;
+}
+
 void SliceReceiver::receive(net::Socket& state, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = state.receive();
@@ -123,12 +129,15 @@ void SliceReceiver::on(const wire::SliceFrame& f, double arrived_s, net::Socket&
 
 void SliceReceiver::acknowledge(FrameId frame, net::Socket& state) {
   const bool in_order = options_.buffers > 0;
+  if (frame.value != 0) acknowledged_ = frame;
   state.send(wire::SliceAck{options_.viewer, frame, in_order ? options_.buffers : kAsyncBuffers, in_order});
 }
 
 void SliceReceiver::tick(double now_s, net::Socket& state) {
   for (const FrameId frame : cache_.take_left()) acknowledge(frame, state);
   cache_.free_dropped();
+  // The same acknowledgement once more changes nothing but what it says of the buffers.
+  if (std::exchange(tell_buffers_, false)) acknowledge(acknowledged_, state);
   const double period_s = heard_s_ > 0 ? kSilence_s : kIntroductionPeriod_s;
   if (now_s - std::max(heard_s_, introduced_s_) < period_s) return;
   introduced_s_ = now_s;

@@ -40,7 +40,9 @@ class SliceReceiver {
   /// What the master knows of the volume. Without a valid grid no frame is taken.
   Status set_session(const wire::Welcome& session);
   /// Another packer, which does not know this viewer; or another master, which numbers frames anew.
-  void begin_anew() { heard_s_ = introduced_s_ = -1e9, newest_ = {}; }
+  void begin_anew() { heard_s_ = introduced_s_ = -1e9, newest_ = acknowledged_ = {}; }
+  /// Of the coupling, from now on; the packer is told with the next tick().
+  void set_buffers(uint64_t buffers);
   void receive(net::Socket& state, int most);
   /// Acknowledges frames that have left their buffers; says "here I am" every second until a frame has come, and when
   /// none came for long: a packer that was restarted where it was does not know this viewer.
@@ -67,7 +69,8 @@ class SliceReceiver {
   std::optional<volume::Grid> grid_;
   std::vector<volume::SliceImage> images_;
   InstanceId packer_;
-  FrameId newest_;
+  FrameId newest_, acknowledged_;
+  bool tell_buffers_ = false;  // to the packer
   EpochId epoch_;
   double introduced_s_ = -1e9, heard_s_ = -1e9;  // -1e9: nothing came yet
   uint64_t pixels_received_ = 0, decode_errors_ = 0;

@@ -183,7 +183,7 @@ TEST(Coupling, NeverExceedsItsBuffersAndNeverHangs) {
 
 TEST(CouplingGate, HandsUpdatesFromThreadToThread) {
   CouplingGate gate(2);
-  EXPECT_FALSE(gate.take(0));
+  EXPECT_FALSE(gate.take(0).request);
   constexpr uint64_t kUpdates = 2000;
   std::thread worker([&] {
     uint64_t next = 1;
@@ -197,13 +197,13 @@ TEST(CouplingGate, HandsUpdatesFromThreadToThread) {
     }
   });
   for (uint64_t i = 1; i <= kUpdates; ++i) {
-    const auto request = gate.take(60);
+    const auto request = gate.take(60).request;
     ASSERT_TRUE(request);
     EXPECT_EQ(request->value, i);
     gate.displayed();
   }
   worker.join();
-  EXPECT_FALSE(gate.take(0));
+  EXPECT_FALSE(gate.take(0).request);
 }
 
 TEST(BufferedRequests, ArePacedByCreditsAndKeepTheirIdsWhenAskedAgain) {

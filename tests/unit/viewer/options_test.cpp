@@ -144,7 +144,9 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
                                     "begin_s",
                                     "refined",
                                     "refine_ms",
-                                    "sub_pixels"}));
+                                    "sub_pixels",
+                                    "coupling",
+                                    "buffers"}));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;

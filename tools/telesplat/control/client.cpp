@@ -28,6 +28,7 @@ Result<wire::ControlReply> ControlClient::order(const std::string& command, doub
   connect();
   auto reply = net::reply_of_master(socket_, endpoint_, command, timeout_s, arguments);
   unanswered_ = !reply.ok();
+  if (reply) failed_before_ = socket_.failed_connections();
   return reply;
 }
 
@@ -43,7 +44,9 @@ std::optional<nlohmann::json> ControlClient::poll_status() {
     const auto reply = socket_.decode<wire::ControlReply>(*message);
     if (!reply || !reply->ok) continue;
     auto json = nlohmann::json::parse(reply->text, nullptr, false);
-    if (json.is_object()) out = std::move(json);
+    if (!json.is_object()) continue;
+    out = std::move(json);
+    failed_before_ = socket_.failed_connections();
   }
   return out;
 }

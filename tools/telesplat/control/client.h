@@ -23,6 +23,8 @@ class ControlClient {
   bool unanswered() const { return unanswered_; }
   /// Sends "status" without waiting; poll_status() gives the answer once it is there.
   void request_status();
+  /// Nobody takes connections at the master's address any more, since the last answer.
+  bool nobody_there() const { return socket_.failed_connections() > failed_before_; }
   std::optional<nlohmann::json> poll_status();
 
  private:
@@ -32,6 +34,7 @@ class ControlClient {
   net::Context context_;
   net::Socket socket_;
   bool connected_ = false, unanswered_ = false;
+  uint64_t failed_before_ = 0;  // attempts to connect, by the last answer
 };
 
 }  // namespace telesplat::launcher

@@ -58,6 +58,7 @@ Table own_rows(RunOptions& o) {
       {.flag = "--overwrite",
        .value = &o.overwrite,
        .help = "the folder of --out may hold a record already: its files are replaced, others stay"},
+      master::metrics_port_row(o.master),
       {.flag = "!--same-priority",
        .value = &o.background_servers,
        .help = "run samplers, packer and data at the viewer's priority"},

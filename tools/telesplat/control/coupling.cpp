@@ -1,0 +1,58 @@
+#include "tools/telesplat/control/coupling.h"
+
+#include <cstdio>
+
+#include "common/wire/limits.h"
+#include "tools/common/complain.h"
+#include "tools/telesplat/control/choice.h"
+#include "tools/telesplat/control/orders.h"
+
+namespace telesplat::launcher {
+namespace {
+
+struct CouplingOptions {
+  SessionChoice session;
+  std::string coupling, viewer;
+  std::optional<int> buffers;
+};
+
+options::Table table(CouplingOptions& o) {
+  return joined({{.flag = "coupling",
+                  .value = &o.coupling,
+                  .help = "async: the display never waits; sync: each frame waits for its own view update; loose: for "
+                          "the next of --buffers",
+                  .limits = options::Names{"async", "sync", "loose"},
+                  .required = true},
+                 {.flag = "--buffers",
+                  .value = &o.buffers,
+                  .help = "of loose: view updates that are on their way or complete and not displayed, at most",
+                  .limits = options::Range{1, double(wire::kMaxBuffers)},
+                  .default_text = "3"},
+                 {.flag = "--viewer", .value = &o.viewer, .help = "name of the viewer; default: all that are here"}},
+                session_rows(o.session));
+}
+
+int order(CouplingOptions o, const options::Given& given) {
+  log::initialise("ctl", "warn");
+  if (o.buffers && o.coupling != "loose")
+    return tools::complain({"--buffers is of loose coupling; " + o.coupling + " has none"});
+  int exit_code = 0;
+  const auto client = reach(o.session, given, exit_code);
+  if (!client) return exit_code;
+  std::map<std::string, std::string> arguments{{"coupling", o.coupling}};
+  if (o.buffers) arguments["buffers"] = std::to_string(*o.buffers);
+  if (!o.viewer.empty()) arguments["viewer"] = o.viewer;
+  const auto reply = client->order("coupling", kPatience_s, arguments);
+  if (!reply) return tools::complain(reply.error(), 1);
+  if (!reply->ok) return tools::complain({reply->text});
+  std::printf("%s\n", reply->text.c_str());
+  return 0;
+}
+
+}  // namespace
+
+Command coupling_command() {
+  return make_command("coupling", "change how displays and server wait for each other", table, order);
+}
+
+}  // namespace telesplat::launcher
