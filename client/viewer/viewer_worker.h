@@ -14,7 +14,7 @@
 #include "client/viewer/received.h"
 #include "client/viewer/session_record.h"
 #include "client/viewer/succession.h"
-#include "common/metrics/recent_values.h"
+#include "common/metrics/recent/recent_values.h"
 #include "common/net/service.h"
 #include "common/scene/session.h"
 

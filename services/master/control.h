@@ -22,8 +22,8 @@ struct CouplingOrder {
   std::string viewer;  ///< whose; empty: everyone's who is here
   std::string text;    ///< for people: "loose, 3 buffers"
 };
-/// Arguments "coupling" (async, sync or loose), "buffers" (of loose; kLooseBuffers without it) and "viewer". Error: what
-/// is wrong with them.
+/// Arguments "coupling" (async, sync or loose), "buffers" (of loose; kLooseBuffers without it) and "viewer". Error:
+/// what is wrong with them.
 Result<CouplingOrder> read_coupling(const wire::Control& command);
 inline constexpr double kLooseBuffers = 3;
 

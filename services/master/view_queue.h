@@ -20,7 +20,8 @@ size_t views_at_once(int frames_in_flight, uint64_t buffers);
 class ViewQueue {
  public:
   /// buffers 0: it replaces the viewer's requests that wait. Otherwise it waits behind them, or takes the place of the
-  /// one with its id, and asynchronous ones of the viewer go. It is dropped where as many wait as the viewer has buffers (at most wire::kMaxBuffers).
+  /// one with its id, and asynchronous ones of the viewer go. It is dropped where as many wait as the viewer has
+  /// buffers (at most wire::kMaxBuffers).
   void add(const wire::ViewRequest& request);
   /// The view was begun and its frame dropped: it waits again, before all others of its viewer; not at all if it is
   /// asynchronous and a newer one waits. Where several are put back, the newest comes first.

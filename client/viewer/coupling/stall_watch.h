@@ -1,4 +1,5 @@
-// Where the display waits for view updates: what it does and says when none comes for long (docs/coupling.md). No clocks.
+// Where the display waits for view updates: what it does and says when none comes for long (docs/coupling.md). Times
+// come in.
 #pragma once
 
 #include <optional>

@@ -140,6 +140,7 @@ void ViewRequester::set_buffers(uint64_t buffers) {
   // How long it takes until an update is displayed is another thing now.
   if ((options_.buffers == 0) != (buffers == 0)) displayed_latency_s_ = 0;
   options_.buffers = buffers;
+  due_s_ = std::min(due_s_, last_sent_s_ + 1.0 / options_.max_rate_hz);  // credits knew no rate
 }
 
 std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {

@@ -1,5 +1,5 @@
 // What was measured in the last seconds.
-#include "common/metrics/recent_values.h"
+#include "common/metrics/recent/recent_values.h"
 
 #include <gtest/gtest.h>
 

@@ -147,8 +147,19 @@ TEST(ChangedRequests, ArePacedByCreditsOrByTheirRate) {
   ASSERT_TRUE(later);
   EXPECT_EQ(later->buffers, 0u);
   // What was asked for in order is answered all the same.
+  EXPECT_TRUE(requester.on_part({.viewer = {5}, .request = second->request, .complete = true}, 2.05));
   EXPECT_TRUE(requester.on_part({.viewer = {5}, .request = third->request, .complete = true}, 2.1));
   EXPECT_TRUE(requester.on_part({.viewer = {5}, .request = later->request, .complete = true}, 2.2));
+}
+
+// Credits may ask more often than the rate allows; that is no debt.
+TEST(ChangedRequests, TheRateBeginsAnew) {
+  ViewRequester requester{{.sampling_width = 640, .sampling_height = 400, .max_rate_hz = 10, .buffers = 2}, {5}};
+  requester.on_pose(0, geometry::make_camera({}, 90, 1280, 800));
+  for (int i = 0; i < 200; ++i) requester.next(0.01 * i);
+  requester.set_buffers(0);
+  EXPECT_FALSE(requester.next(2));
+  EXPECT_TRUE(requester.next(2.1));
 }
 
 TEST(StallWatch, SaysWhenItIsLongAndWhenItIsOver) {

@@ -155,18 +155,18 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   f.drawn.refined = 0.5;
   f.drawn.refine_ms = 6;
   f.drawn.sub_pixels = 4;
+  f.coupling = {CouplingMode::kLoose, 5};
   f.look = {{splat::Kernel::kEwa, {.fill = true, .smooth = false, .antialias = true}}, false};
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 9, row.end())), (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4}));
+  EXPECT_EQ((std::vector<double>(row.end() - 11, row.end())), (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5}));
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
-  EXPECT_EQ(update_columns(),
-            (Texts{"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
-                   "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch",
-                   "extra_points", "extra_bytes"}));
+  EXPECT_EQ(update_columns(), (Texts{"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms",
+                                     "start_up_ms", "tiles", "samples", "points", "bytes", "eliminated",
+                                     "sampling_width", "sampling_height", "epoch", "extra_points", "extra_bytes"}));
   ViewRequester::Update u;
   u.requested_s = 1, u.first_s = 1.25, u.complete_s = 1.5;
   u.samples = 100, u.points = 25, u.eliminated = 75;

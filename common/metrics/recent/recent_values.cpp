@@ -1,4 +1,4 @@
-#include "common/metrics/recent_values.h"
+#include "common/metrics/recent/recent_values.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,0 +1,145 @@
+// `telesplat ctl coupling` of running sessions, and what a display that waits does when nothing comes.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+bool holds(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+struct Said {
+  int code;
+  std::string out, err;
+};
+Said ctl(PipelineRun& run, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "ctl");
+  arguments.insert(arguments.end(), {"--master", run.master()});
+  Program p("telesplat", arguments, run.folder() / "ctl");
+  const int code = p.wait();
+  return {code, p.out(), p.err()};
+}
+
+class ChangedCouplings : public testing::TestWithParam<std::string> {};
+
+TEST_P(ChangedCouplings, EachFrameSaysWhichWasInForce) {
+  TemporaryFolder folder;
+  std::string scene;  // none: the terrain
+  if (GetParam() == "julia") scene = "julia";
+  if (GetParam() == "volume") write_volume(scene = folder / "balls.mha");
+  PipelineRun run({"--duration", "0", "--size", "320x200", "--sampling-size", "240x150", "--record-points", "0"},
+                  scene);
+  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 3; })) << run.program().err();
+  // In each coupling some more updates are displayed.
+  const auto goes_on_with = [&](double mode, double buffers) {
+    double before = -1;
+    return run.wait_status([&](const auto& s) {
+      if (value(s, "viewer-1", "coupling") != mode || value(s, "viewer-1", "buffers") != buffers) return false;
+      const double updates = value(s, "viewer-1", "updates"), frames = value(s, "viewer-1", "frames");
+      if (before < 0) before = updates + frames;
+      return updates + frames > before + 6;
+    });
+  };
+  for (const auto& [words, mode, buffers] : {std::tuple{std::vector<std::string>{"sync"}, 1, 1},
+                                             {{"loose", "--buffers", "2"}, 2, 2},
+                                             {{"async"}, 0, 0},
+                                             {{"loose", "--viewer", "viewer-1"}, 2, 3},
+                                             {{"async"}, 0, 0}}) {
+    auto order = words;
+    order.insert(order.begin(), "coupling");
+    const Said said = ctl(run, order);
+    EXPECT_EQ(said.code, 0) << said.err;
+    EXPECT_TRUE(said.out.starts_with("viewer-1: " + words.front())) << said.out;
+    EXPECT_TRUE(goes_on_with(mode, buffers)) << words.front();
+  }
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  const auto s = run.summary();
+  EXPECT_EQ(s["coupling"], "async") << "as it began";
+  EXPECT_EQ(s["coupling_changes"], 5);
+  EXPECT_EQ(s["frames_by_coupling"].size(), 4u) << s["frames_by_coupling"];
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  const auto mode = run.column("frames.csv", "coupling"), buffers = run.column("frames.csv", "buffers"),
+             request = run.column("frames.csv", "request");
+  ASSERT_EQ(mode.size(), size_t(s["frames"]));
+  ASSERT_EQ(buffers.size(), mode.size());
+  std::vector<std::pair<double, double>> order;
+  for (size_t i = 0; i < mode.size(); ++i)
+    if (order.empty() || order.back() != std::pair(mode[i], buffers[i])) order.emplace_back(mode[i], buffers[i]);
+  EXPECT_EQ(order, (std::vector<std::pair<double, double>>{{0, 0}, {1, 1}, {2, 2}, {0, 0}, {2, 3}, {0, 0}}));
+  // Where the display waits, each frame shows the next update: none twice, none left out.
+  const auto updates = run.column("updates.csv", "request");
+  const std::set<double> complete(updates.begin(), updates.end());
+  for (size_t i = 1; i < mode.size(); ++i) {
+    EXPECT_GE(request[i], request[i - 1]);
+    if (mode[i] == 0 || mode[i - 1] == 0) continue;
+    EXPECT_GT(request[i], request[i - 1]) << "frame " << i;
+    EXPECT_EQ(complete.upper_bound(request[i - 1]), complete.find(request[i])) << "frame " << i << " left one out";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, ChangedCouplings, testing::Values("mesh", "julia", "volume"),
+                         [](const auto& info) { return info.param; });
+
+// A packer that stands still: the picture stays, and says so; then frames are drawn from what is there; when it goes on
+// everything does.
+TEST(Stalls, AreToldAndDoNotFreezeTheDisplayForEver) {
+  for (const char* coupling : {"sync", "loose"}) {
+    PipelineRun run({"--duration", "0", "--coupling", coupling});
+    ASSERT_TRUE(run.wait_showing()) << run.program().err();
+    pid_t packer = 0;
+    ASSERT_TRUE(run.wait_status([&](const auto& s) {
+      const auto p = process(s, "packer");
+      if (p.is_object()) packer = p["pid"].template get<pid_t>();
+      return packer > 0 && value(s, "viewer-1", "frames") > 3;
+    }));
+    const auto log = [&] { return read_text(run.out() + "/logs/viewer-1.log"); };
+    ::kill(packer, SIGSTOP);
+    EXPECT_TRUE(wait_until([&] { return holds(log(), "no view update for 1."); })) << log();
+    EXPECT_TRUE(holds(log(), std::string("s (") + coupling)) << log();
+    double frames = 0, updates = 0;
+    EXPECT_TRUE(run.wait_status([&](const auto& s) {
+      frames = value(s, "viewer-1", "frames"), updates = value(s, "viewer-1", "updates");
+      return value(s, "viewer-1", "waits_s") > 2;
+    }));
+    EXPECT_TRUE(wait_until([&] { return holds(log(), "frames are drawn from what is there until one comes"); }))
+        << log();
+    EXPECT_TRUE(run.wait_status([&](const auto& s) { return value(s, "viewer-1", "frames") > frames + 3; }));
+    EXPECT_EQ(value(run.status(), "viewer-1", "updates"), updates);
+    ::kill(packer, SIGCONT);
+    EXPECT_TRUE(wait_until([&] { return holds(log(), "the display goes on, after 1"); })) << log();
+    EXPECT_TRUE(run.wait_status([&](const auto& s) {
+      return value(s, "viewer-1", "updates") > updates + 3 && value(s, "viewer-1", "waits_s") == 0;
+    }));
+    EXPECT_EQ(run.stop(), 0) << run.program().err();
+    // While it waited no frame was displayed, and then about ten a second.
+    const auto waits = run.column("frames.csv", "wait_ms");
+    ASSERT_FALSE(waits.empty());
+    EXPECT_GE(*std::max_element(waits.begin(), waits.end()), 9000);
+  }
+}
+
+TEST(CouplingOrders, ThatMakeNoSenseAreBadUsage) {
+  PipelineRun run({"--duration", "0"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  for (const auto& [words, told] : {std::pair{std::vector<std::string>{"coupling"}, "coupling"},
+                                    {{"coupling", "tight"}, "async, sync, loose"},
+                                    {{"coupling", "loose", "--buffers", "0"}, "between 1 and 8"},
+                                    {{"coupling", "loose", "--buffers", "9"}, "between 1 and 8"},
+                                    {{"coupling", "sync", "--buffers", "2"}, "--buffers is of loose coupling"},
+                                    {{"coupling", "sync", "--viewer", "nobody"}, "here is viewer-1"}}) {
+    const Said said = ctl(run, words);
+    EXPECT_EQ(said.code, 2) << said.out;
+    EXPECT_TRUE(holds(said.err, told)) << said.err;
+  }
+  EXPECT_EQ(ctl(run, {"coupling", "--help"}).code, 0);
+  EXPECT_EQ(value(run.status(), "viewer-1", "coupling"), 0);
+  EXPECT_EQ(run.stop(), 0);
+}
+
+}  // namespace
+}  // namespace telesplat::test
