@@ -34,6 +34,7 @@ struct Parser::Impl {
   Status refuse_unknown(const std::string& called, std::span<const std::string> arguments, std::string& command) const;
   Status unknown_flag(const std::string& called, const std::string& flag) const;
   Status unknown_command(const std::string& called, const std::string& name) const;
+  Status read(const std::string& called, std::vector<std::string> arguments, std::ostream& told, bool& ends);
 };
 
 namespace {
@@ -80,8 +81,11 @@ CLI::Option* add_row(CLI::App& app, const Row& row) {
   if (auto* const* flag = std::get_if<bool*>(&row.value); flag && !row.on_off)
     return app.add_flag_callback(
         name_of(row), [row] { throw_if_wrong(row, "true"); }, row.help);
-  if (auto* const* many = std::get_if<std::vector<std::string>*>(&row.value))
-    return app.add_option(row.flag, **many, row.help)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  if (auto* const* many = std::get_if<std::vector<std::string>*>(&row.value)) {
+    auto* option = app.add_option(row.flag, **many, row.help)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    // Of a flag that is given several times each takes one value: what follows is an argument.
+    return row.flag.starts_with("-") ? option->allow_extra_args(false) : option;
+  }
   auto* option = app.add_option_function<std::string>(
       row.flag, [row](const std::string& text) { throw_if_wrong(row, text); }, row.help);
   option->type_name(type_name(row));
@@ -170,6 +174,30 @@ Status Parser::Impl::refuse_unknown(const std::string& called, std::span<const s
   return commands.empty() ? ok_status() : unknown_command(called, {});
 }
 
+// ends: help or the like was asked for, and told.
+Status Parser::Impl::read(const std::string& called, std::vector<std::string> arguments, std::ostream& told,
+                          bool& ends) {
+  std::string command;
+  if (const Status s = refuse_unknown(called, arguments, command); !s) return s;
+  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
+  try {
+    app->parse(std::move(arguments));
+  } catch (const CLI::ExtrasError&) {
+    return Error{fmt::format("{} is one too many for {}", shown(app->remaining(true).front()), command)};
+  } catch (const CLI::RequiredError& e) {
+    const std::string_view what = e.what();
+    return Error{
+        fmt::format("{} needs {}; {} --help tells what that is", command, what.substr(0, what.find(' ')), command)};
+  } catch (const CLI::ArgumentMismatch& e) {
+    const std::string_view what = e.what();
+    return Error{fmt::format("{}: its value is missing", what.substr(0, what.find(':')))};
+  } catch (const CLI::ParseError& e) {
+    if (app->exit(e, told, discarded()) != 0) return Error{e.what()};
+    ends = true;
+  }
+  return ok_status();
+}
+
 void Parser::parse_or_exit(const std::string& program, std::vector<std::string> arguments) {
   auto& app = *impl_->app;
   const std::string name = program.substr(program.rfind('/') + 1);
@@ -186,23 +214,20 @@ void Parser::parse_or_exit(const std::string& program, std::vector<std::string> 
     std::fputs(man_page(impl_->manual(name), impl_->version, true).c_str(), stdout);
     std::exit(0);
   }
-  std::string command;
-  if (const Status s = impl_->refuse_unknown(name, arguments, command); !s) refuse(s.error().text);
-  std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
-  try {
-    app.parse(std::move(arguments));
-  } catch (const CLI::ExtrasError&) {
-    refuse(fmt::format("{} is one too many for {}", shown(app.remaining(true).front()), command));
-  } catch (const CLI::RequiredError& e) {
-    const std::string_view what = e.what();
-    refuse(fmt::format("{} needs {}; {} --help tells what that is", command, what.substr(0, what.find(' ')), command));
-  } catch (const CLI::ArgumentMismatch& e) {
-    const std::string_view what = e.what();
-    refuse(fmt::format("{}: its value is missing", what.substr(0, what.find(':'))));
-  } catch (const CLI::ParseError& e) {
-    if (app.exit(e, std::cout, discarded()) == 0) std::exit(0);
-    refuse(e.what());
-  }
+  bool ends = false;
+  if (const Status s = impl_->read(name, std::move(arguments), std::cout, ends); !s) refuse(s.error().text);
+  if (ends) std::exit(0);
+}
+
+Status Parser::parse(const std::string& called, std::vector<std::string> arguments) {
+  for (const Row& row : impl_->table)
+    if (std::holds_alternative<Action>(row.value))
+      for (const std::string& name : names_of(row))
+        if (std::find(arguments.begin(), arguments.end(), name) != arguments.end())
+          return Error{fmt::format("{}: tells something and ends {}", name, called)};
+  bool ends = false;
+  if (const Status s = impl_->read(called, std::move(arguments), discarded(), ends); !s) return s;
+  return ends ? Status(Error{fmt::format("--help: is of {} alone", called)}) : ok_status();
 }
 
 bool Parser::chosen() const { return impl_->app->parsed(); }

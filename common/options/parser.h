@@ -29,6 +29,10 @@ class Parser {
   /// which may have a path in front. arguments: without it.
   void parse_or_exit(const std::string& program, std::vector<std::string> arguments);
 
+  /// The same for words that a program was given for later: nothing is printed, and the program goes on. called: what a
+  /// person would type in front of them. Error: what is wrong, or that they ask for help.
+  Status parse(const std::string& called, std::vector<std::string> arguments);
+
   /// After parsing: whether this sub-command was chosen; the flags and arguments that were given here.
   bool chosen() const;
   Given given() const;

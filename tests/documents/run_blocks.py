@@ -4,7 +4,8 @@
 A block without a language holds commands. They run in a folder of their own, one after the other, and each must end
 with exit code 0. These things differ from what a person does:
 - data sets with the names that a page uses are small and made up (files.py);
-- runs are short and their displays small, unless the command says otherwise; windows open on an Xvfb;
+- runs, and those of sweeps, are short and their displays small, unless the command says otherwise;
+- windows open on an Xvfb;
 - the addresses of other machines are this machine's;
 - `telesplat ctl` talks to what the last `run` or `view` of its block started, or the command of a comment above the
   block, <!-- beside: COMMAND -->; a service goes to the background until `telesplat ctl stop`, or the page's end.
@@ -47,6 +48,14 @@ def shortened(text, seconds=SECONDS):
     else:
         text += f" --duration {seconds}"
     return text if re.search(r"--size[ =]", text) else f"{text} --size {SIZE}"
+
+
+def shortened_sweep(text):
+    """A `telesplat sweep`, of one short and small run for each configuration."""
+    own, behind, flags = text.partition(" -- ")
+    if not behind:
+        return text  # it goes on
+    return f"{own} --repeat 1 -- {shortened(flags, 1)}"
 
 
 class Screen:
@@ -160,6 +169,8 @@ class Page:
         elif program == "telesplat" and verb in ("run", "view"):
             self._beside = text
             self._foreground(where, shortened(text))
+        elif program == "telesplat" and verb == "sweep":
+            self._foreground(where, shortened_sweep(text))
         elif program == "telesplat" and verb == "ctl":
             self._control(where, text)
         else:

@@ -88,6 +88,7 @@ FLOORS = {
         ["tools/telesplat/report"],
         ["tools/telesplat/run"],
         ["tools/telesplat/top"],
+        ["tools/telesplat/sweep"],
         ["tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare", "tools/telesplat/inspect"],
         ["tools/telesplat"],
     ],

@@ -39,6 +39,7 @@ Command inspect_command();
 Command compare_command();
 Command movie_command();
 Command report_command();
+Command sweep_command();
 Command bench_command();
 Command cache_command();
 Command presets_command();

@@ -1,0 +1,236 @@
+// `telesplat sweep SCENE --vary FLAG=V1,V2,...`: a grid over flags of `telesplat run`, each of its configurations
+// several times, each run by the real command in a folder of its own.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "common/core/log.h"
+#include "common/core/machine.h"
+#include "common/core/version.h"
+#include "common/net/service.h"
+#include "tools/common/complain.h"
+#include "tools/telesplat/command.h"
+#include "tools/telesplat/movie/movie.h"
+#include "tools/telesplat/record/dated_folder.h"
+#include "tools/telesplat/run/process_group.h"
+#include "tools/telesplat/run/run_options.h"
+#include "tools/telesplat/sweep/page.h"
+#include "tools/telesplat/sweep/sweep.h"
+#include "tools/telesplat/sweep/tables.h"
+
+namespace telesplat::launcher {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SweepOptions {
+  std::string scene, out;
+  std::vector<std::string> vary, flags;
+  std::optional<int> repeat, shuffle;
+  double run_limit_s = 0;
+  bool dry_run = false;
+};
+
+/// A folder that no other sweep writes into as long as this lives.
+class Claim {
+ public:
+  static Result<Claim> take(const std::string& directory) {
+    const std::string path = directory + "/.sweep.lock";
+    const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (file < 0) return Error{fmt::format("{}: cannot be written to", directory)};
+    Claim out;
+    out.file_ = file;
+    if (flock(file, LOCK_EX | LOCK_NB) != 0) return Error{fmt::format("{}: another sweep works there", directory)};
+    return out;
+  }
+  Claim(Claim&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+  ~Claim() {
+    if (file_ >= 0) ::close(file_);
+  }
+
+ private:
+  Claim() = default;
+  int file_ = -1;
+};
+
+Status write_text(const std::string& path, const std::string& text) {
+  std::ofstream out(path);
+  out << text;
+  out.close();
+  return out ? ok_status() : Status(Error{fmt::format("{}: cannot be written", path)});
+}
+
+bool asks_for_nothing(const SweepOptions& o) { return o.scene.empty() && o.vary.empty() && o.flags.empty(); }
+
+// What is asked for; `before` is what the folder holds already.
+Result<Grid> wanted_grid(SweepOptions o, const std::optional<Manifest>& before) {
+  // Words behind "--" fill the scene's place where none is named.
+  if (o.scene.starts_with("-")) o.flags.insert(o.flags.begin(), std::exchange(o.scene, {}));
+  Grid out;
+  if (before && asks_for_nothing(o)) {
+    out = before->grid;
+  } else {
+    RunOptions run;
+    const options::Table flags = table(run);
+    out.scene = o.scene, out.flags = o.flags;
+    for (const std::string& text : o.vary)
+      if (const Status s = add_axis(text, flags, out.axes); !s) return s.error();
+    for (const Axis& axis : out.axes)
+      if (axis.flag == "scene" && !out.scene.empty())
+        return Error{fmt::format("{} is given, and --vary scene too", out.scene)};
+  }
+  out.repeat = o.repeat.value_or(before ? before->grid.repeat : out.repeat);
+  if (o.shuffle)
+    out.shuffle = uint64_t(*o.shuffle);
+  else if (before)
+    out.shuffle = before->grid.shuffle;
+  return out;
+}
+
+Result<Manifest> manifest_for(const SweepOptions& o, std::optional<Manifest> before) {
+  const auto grid = wanted_grid(o, before);
+  if (!grid) return grid.error();
+  std::error_code error;
+  const std::string here = fs::current_path(error).string();
+  if (!before) return begin_manifest(*grid, version(), here);
+  if (const Status s = extend(*before, *grid); !s)
+    return Error{
+        fmt::format("{}: holds another sweep: {}; name all that it has, or give another --out", o.out, s.error().text)};
+  if (before->directory != here && !asks_for_nothing(o))
+    return Error{fmt::format("{}: was begun in {}, from where paths count; telesplat sweep --out {} goes on", o.out,
+                             before->directory, shell_line({o.out}))};
+  return std::move(*before);
+}
+
+void list(const Sweep& sweep) {
+  const auto runs = sweep.to_do();
+  const Manifest& m = sweep.manifest();
+  std::printf("%zu runs (%zu configurations, %d times each), %zu to do\n", sweep.runs(), m.configurations.size(),
+              m.grid.repeat, runs.size());
+  for (const NextRun& run : runs) std::printf("telesplat %s\n", shell_line(sweep.command(run)).c_str());
+}
+
+// Writes and prints what is there; the exit code that follows from it.
+Result<int> conclude(const Sweep& sweep, const std::string& directory) {
+  const SweepRecord record = read_record(sweep.manifest(), directory);
+  if (const Status s = write_text(directory + "/sweep.csv", to_csv(record)); !s) return s.error();
+  if (const Status s = write_text(directory + "/sweep.html", to_html(record, sweep.manifest(), directory)); !s)
+    return s.error();
+  std::printf("%s", to_text(record).c_str());
+  for (const Noise& n : noises(record)) std::printf("! %s\n", sentence(record, n).c_str());
+  const auto failed = failures(record);
+  for (const std::string& f : failed) std::printf("failed: %s\n", f.c_str());
+  std::printf("\nreport: %s/sweep.html\ntable: %s/sweep.csv\n", directory.c_str(), directory.c_str());
+  std::fflush(stdout);
+  return failed.empty() ? 0 : 1;
+}
+
+int carry_out(Sweep& sweep, const std::string& directory) {
+  tools::ProgressLine progress;
+  const size_t to_do = sweep.to_do().size();
+  const Manifest& m = sweep.manifest();
+  progress.line(fmt::format("{} runs in {} ({} configurations, {} times each){}", sweep.runs(), directory,
+                            m.configurations.size(), m.grid.repeat,
+                            to_do < sweep.runs() ? fmt::format("; {} are done", sweep.runs() - to_do) : ""));
+  if (m.version != version())
+    progress.line(fmt::format("telesplat: the sweep was begun with version {}; this is {}", m.version, version()));
+  const auto end = sweep.carry_out(progress);
+  progress.close();
+  if (!end) return tools::complain(end.error(), 1);
+  const auto code = conclude(sweep, directory);
+  if (!code) return tools::complain(code.error(), 1);
+  if (*end == Sweep::End::kDone) return *code;
+  std::fprintf(stderr, "telesplat: interrupted; %zu of %zu runs are done, telesplat sweep --out %s goes on\n",
+               sweep.runs() - sweep.to_do().size(), sweep.runs(), shell_line({directory}).c_str());
+  return kInterrupted;
+}
+
+// A folder with other things in it is not a sweep's.
+Status check_folder(const std::string& directory, bool has_sweep) {
+  std::error_code error;
+  if (has_sweep || !fs::exists(directory, error)) return ok_status();
+  if (!fs::is_directory(directory, error)) return Error{fmt::format("--out {}: is no folder", directory)};
+  for (const auto& entry : fs::directory_iterator(directory, error))
+    if (entry.path().filename() != ".sweep.lock")
+      return Error{fmt::format("--out {}: is not empty, and holds no sweep", directory)};
+  return ok_status();
+}
+
+int sweep(SweepOptions o, const options::Given&) {
+  log::initialise("telesplat", "warn");
+  if (o.out.empty()) o.out = dated_folder("sweep-");
+  std::error_code error;
+  // Whole: the sweep may go on in the folder where it began.
+  const std::string directory = fs::absolute(o.out, error).lexically_normal().string();
+  auto before = read_manifest(directory);
+  if (!before) return tools::complain(before.error());
+  if (!*before && asks_for_nothing(o))
+    return tools::complain(
+        {"a scene is needed, telesplat sweep SCENE --vary FLAG=VALUE,VALUE; or --out FOLDER of a "
+         "sweep that shall go on"});
+  if (const Status s = check_folder(directory, before->has_value()); !s) return tools::complain(s.error());
+  auto manifest = manifest_for(o, std::move(*before));
+  if (!manifest) return tools::complain(manifest.error());
+  fs::current_path(manifest->directory, error);
+  if (error)
+    return tools::complain({fmt::format("{}: the sweep was begun there: {}", manifest->directory, error.message())});
+  Sweep sweep(std::move(*manifest), directory, program_directory() + "/telesplat", o.run_limit_s);
+  if (const Status s = sweep.check(); !s) return tools::complain(s.error());
+  if (o.dry_run) {
+    list(sweep);
+    return 0;
+  }
+  fs::create_directories(directory, error);
+  if (error) return tools::complain({fmt::format("--out {}: cannot be made: {}", o.out, error.message())});
+  const auto claim = Claim::take(directory);
+  if (!claim) return tools::complain(claim.error());
+  if (const Status s = write_manifest(sweep.manifest(), directory); !s) return tools::complain(s.error());
+  net::install_signal_handlers();
+  return carry_out(sweep, directory);
+}
+
+options::Table sweep_table(SweepOptions& o) {
+  return {
+      {.flag = "scene", .value = &o.scene, .help = "as telesplat run takes it; none where --vary scene names several"},
+      {.flag = "flags", .value = &o.flags, .help = "behind --: flags of telesplat run, of every run"},
+      {.flag = "--vary",
+       .value = &o.vary,
+       .help =
+           "FLAG=VALUE,VALUE,...: a flag of telesplat run and its values, or scene and several; again for another "
+           "flag, or more values; with ; between values, commas belong to them; on and off of a flag without value"},
+      {.flag = "--out",
+       .value = &o.out,
+       .help = "folder of the sweep; default: runs/sweep-DATE-TIME; of one that was begun: alone, it goes on"},
+      {.flag = "--repeat",
+       .value = &o.repeat,
+       .help = "runs of each configuration",
+       .limits = options::Range{1, 1000},
+       .default_text = "3"},
+      {.flag = "--shuffle",
+       .value = &o.shuffle,
+       .help = "seed: within a repetition the runs come in an order that it decides",
+       .limits = options::Range{0, 2147483647}},
+      {.flag = "--run-limit",
+       .value = &o.run_limit_s,
+       .help = "seconds after which a run has failed; 0: ten times what it is asked to last, and ten minutes",
+       .limits = options::Range{0, 1e6}},
+      {.flag = "--dry-run", .value = &o.dry_run, .help = "check everything, print the runs, start none"}};
+}
+
+}  // namespace
+
+Command sweep_command() {
+  Command out =
+      make_command("sweep", "run a grid over flags of telesplat run, several times, and compare", sweep_table, sweep);
+  out.footer =
+      "telesplat sweep terrain.ply --vary coupling=sync,loose,async --vary samplers=1,2 --out sweep -- --duration 20\n"
+      "telesplat sweep --out sweep     goes on, if it was interrupted";
+  return out;
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,55 @@
+// All that a sweep has measured, as tables and the report read it.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/telesplat/sweep/figures.h"
+#include "tools/telesplat/sweep/manifest.h"
+
+namespace telesplat::launcher {
+
+struct SweptRun {
+  size_t configuration = 0;
+  int repetition = 1;
+  std::string folder;                 ///< relative to the sweep's
+  std::optional<RunOutcome> outcome;  ///< none: it has not ended
+  Figures figures;                    ///< of its summary.json, if it is done
+};
+
+struct SweepRecord {
+  Grid grid;
+  std::vector<Configuration> configurations;
+  std::vector<SweptRun> runs;  ///< configuration after configuration
+
+  /// Of a figure over the finished runs of a configuration; nothing: no run has it.
+  std::optional<Spread> spread(size_t configuration, const std::string& figure) const;
+};
+
+/// "coupling-sync/2"
+std::string run_folder(const Configuration& configuration, int repetition);
+
+/// Reads the summaries of all runs that are done. A run whose summary.json is gone or broken counts as not done.
+SweepRecord read_record(const Manifest& manifest, const std::string& directory);
+
+/// A configuration whose runs differ so much in a main figure that the machine, rather than the configuration, may be
+/// what was measured.
+struct Noise {
+  size_t configuration;
+  const Measure* figure;
+  Spread spread;
+};
+inline constexpr int kLeastRepetitions = 3;
+inline constexpr double kMostSpread = 0.1;  ///< (most - least) / median
+
+/// Of inter-frame delay and view update latency (medians of a run), where at least kLeastRepetitions runs have them and
+/// they differ by more than kMostSpread.
+std::vector<Noise> noises(const SweepRecord& record);
+/// "coupling=sync: 3 runs differ by 23 % in ...: the machine was too noisy ..."
+std::string sentence(const SweepRecord& record, const Noise& noise);
+
+/// "coupling=sync, run 2: exit code 1: ..." of every run that failed.
+std::vector<std::string> failures(const SweepRecord& record);
+
+}  // namespace telesplat::launcher
