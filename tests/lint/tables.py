@@ -24,7 +24,7 @@ SHARED_TESTS = "tests/support"
 FLOORS = {
     "common": [
         ["common/core"],
-        ["common/geometry", "common/colour"],
+        ["common/geometry", "common/colour", "common/links"],
         ["common/image", "common/gl"],
         ["common/codec", "common/points"],
         [("common/volume", "common/volume/transfer"), "common/splat"],
@@ -80,7 +80,7 @@ FLOORS = {
     ],
     "tools": [
         ["tools/common"],
-        ["tools/make_terrain", "tools/make_volume", "tools/health"],
+        ["tools/make_terrain", "tools/make_volume", "tools/health", "tools/wan_relay"],
         ["tools/telesplat/command.h"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],
@@ -121,6 +121,7 @@ OUTSIDE_HEADERS = [
     (r"CLI/.*", ["common/options/parser.cpp"]),
     (r"toml\+\+/.*", ["tools/telesplat"]),
     (r"spdlog/.*", ["common/core"]),
+    (r"boost/.*", ["tools/wan_relay"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
     (r"boost/.*", ["services/master/live/http_endpoint.cpp"]),
     (r"curses\.h", ["tools/telesplat/top/screen.cpp"]),

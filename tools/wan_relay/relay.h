@@ -1,0 +1,32 @@
+// A link between whoever connects here and the places they connect to.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tools/wan_relay/options.h"
+
+namespace telesplat::wan_relay {
+
+class Relay {
+ public:
+  /// Listens at all doors. Error: which one cannot be, and why.
+  static Result<std::unique_ptr<Relay>> open(const Options& options);
+  ~Relay();
+
+  /// Where each door listens: ADDRESS:PORT.
+  std::vector<std::string> addresses() const;
+  /// Passes bytes on until SIGINT or SIGTERM; on SIGUSR1 `tell` gets the statistics.
+  void run(const std::function<void(const std::string&)>& tell);
+  /// What passed, in one line.
+  std::string statistics() const;
+
+ private:
+  struct Impl;
+  explicit Relay(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace telesplat::wan_relay
