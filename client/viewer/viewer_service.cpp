@@ -100,6 +100,7 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
                                          {"update_rate", fmt::format("{}", r.max_rate_hz)},
                                          {"splat_scale", fmt::format("{}", scale)}};
   add_trajectory(out, o);
+  if (!o.service.link.empty()) out["link"] = o.service.link;
   if (const std::string device = renderers.device(); !device.empty()) out["gpu"] = device;
   ViewerOptions shown = o;
   out[metrics::kRecordFact] = "\n[display]\n" + options::recorded(view_table(shown), {});
@@ -115,8 +116,9 @@ struct Served {
 };
 
 // Shows the session until it, the person or the clock ends it.
-Served serve(const ViewerOptions& o, DisplaySurface& surface, Renderers& renderers, SessionRecord& record) {
-  net::Context context;
+Served serve(const ViewerOptions& o, const net::Via& via, DisplaySurface& surface, Renderers& renderers,
+             SessionRecord& record) {
+  net::Context context(via);
   CouplingGate gate(coupling_state(*coupling_named(o.coupling), o.buffers));
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
@@ -160,10 +162,10 @@ Status develop(const std::string& directory, FrameSpool& spool) {
 }
 
 // Ends the session for everyone, if that is this viewer's part. Exit code.
-int farewell(const ViewerOptions& o, const Served& served) {
+int farewell(const ViewerOptions& o, const net::Via& via, const Served& served) {
   if (!o.end_session) return 0;
   if (!served.session_ended && !net::stop_requested())
-    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s); !answer)
+    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s, {}, via); !answer)
       log::warn("the session could not be ended: {}", answer.error().text);
   if (served.display.frames == 0) log::error("the session ended before anything was shown");
   return served.display.frames == 0 ? 1 : 0;
@@ -176,6 +178,8 @@ int run(ViewerOptions o) {
   net::install_signal_handlers();
   net::keep_freed_memory();
   if (const Status s = settle(o); !s) return refuse(s.error());
+  const auto via = net::via_of(o.service);
+  if (!via) return refuse(via.error());
   auto surface = open_surface(o);  // before the renderers, whose contexts may depend on the window's
   if (!surface) return refuse(surface.error());
   auto renderers = open_renderers(o);
@@ -183,13 +187,13 @@ int run(ViewerOptions o) {
   auto record = open_record(o);
   if (!record) return refuse(record.error());
 
-  const Served served = serve(o, **surface, *renderers, **record);
+  const Served served = serve(o, *via, **surface, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
   const std::string lost = (*surface)->failure();
   surface->reset();  // the window goes at once, however much there is to write
   if (FrameSpool* spool = (*record)->spool())
     if (const Status s = develop((*record)->directory(), *spool); !s) return fail(s.error());
-  const int code = farewell(o, served);
+  const int code = farewell(o, *via, served);
   return lost.empty() ? code : fail({lost});
 }
 

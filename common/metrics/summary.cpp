@@ -156,7 +156,15 @@ ordered_json peak_rss(const Roster& roster) {
 
 // ---- the sections of the summary, in its order ---------------------------------------------------------------------
 
-ordered_json what_was_shown(const Roster& roster) {
+/// Simulated links, by the process that they lie before.
+ordered_json links_of(const std::vector<Process>& processes) {
+  auto out = ordered_json::object();
+  for (const Process& p : processes)
+    if (const std::string link = scene::value_or(p.facts, "link", std::string()); !link.empty()) out[p.name] = link;
+  return out.empty() ? ordered_json() : out;
+}
+
+ordered_json what_was_shown(const std::vector<Process>& processes, const Roster& roster) {
   const auto viewer = [&](const char* key) { return or_null(roster.fact("viewer", key)); };
   const auto size = [&](const char* width, const char* height) -> ordered_json {
     if (roster.number("viewer", width) <= 0) return nullptr;
@@ -178,7 +186,8 @@ ordered_json what_was_shown(const Roster& roster) {
           {"shading", viewer("shading")},
           {"size", size("width", "height")},
           {"sampling_size", size("sampling_width", "sampling_height")},
-          {"sampling", viewer("sampling")}};
+          {"sampling", viewer("sampling")},
+          {"links", links_of(processes)}};
 }
 
 /// Where the time of view updates went: each stage's distribution, and its share of the sum of all latencies.
@@ -362,7 +371,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   const double run_s = longest_s(figures);
   ordered_json out{{"schema", 2}};
   out.update(what_was_done(about, processes));
-  out.update(what_was_shown(roster));
+  out.update(what_was_shown(processes, roster));
   out.update(how_often(measured, figures, counter("frames_completed")));
   out.update(how_coupled(measured));
   out.update(how_long(measured));

@@ -33,8 +33,8 @@ Result<std::string> ask_master(Socket& socket, const std::string& endpoint, cons
 }
 
 Result<std::string> ask_master(const std::string& endpoint, const std::string& command, double timeout_s,
-                               const std::map<std::string, std::string>& arguments) {
-  Context context;
+                               const std::map<std::string, std::string>& arguments, const Via& via) {
+  Context context(via);
   Socket socket(context, Kind::kDealer, "ctl", kControlSocket);
   if (const Status s = socket.connect(endpoint); !s) return s.error();
   return ask_master(socket, endpoint, command, timeout_s, arguments);

@@ -22,8 +22,8 @@ Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& en
 Result<std::string> ask_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                double timeout_s, const std::map<std::string, std::string>& arguments = {});
 
-/// The same over a socket of its own.
+/// The same over a socket of its own, through `via`.
 Result<std::string> ask_master(const std::string& endpoint, const std::string& command, double timeout_s,
-                               const std::map<std::string, std::string>& arguments = {});
+                               const std::map<std::string, std::string>& arguments = {}, const Via& via = {});
 
 }  // namespace telesplat::net

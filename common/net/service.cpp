@@ -53,6 +53,18 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
              "host that others are told to connect to; default: as bound, this host's name where that is a wildcard",
          .limits = options::Check(complain_about_host),
          .reach = options::Reach::kHere});
+  if (ends == Ends::kConnects) {
+    out.push_back({.flag = "--via",
+                   .value = &o.via,
+                   .help =
+                       "HOST:PORT of a SOCKS5 proxy that connections go through; ROLE=HOST:PORT: those to processes "
+                       "of this role, such as data",
+                   .reach = options::Reach::kHere});
+    out.push_back({.flag = "--link",
+                   .value = &o.link,
+                   .help = "what the link through --via is like, for the record",
+                   .reach = options::Reach::kHere});
+  }
   out.push_back({.flag = "--insecure",
                  .value = &o.insecure,
                  .help = "allow addresses other than loopback without encryption",
@@ -63,6 +75,8 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                  .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}});
   return out;
 }
+
+Result<Via> via_of(const ServiceOptions& o) { return Via::parse(o.via); }
 
 int settle_master(ServiceOptions& o) {
   MasterSearch search = find_master(o.master);

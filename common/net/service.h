@@ -3,8 +3,10 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "common/core/result.h"
+#include "common/net/via.h"
 #include "common/options/table.h"
 
 namespace telesplat::net {
@@ -15,13 +17,18 @@ struct ServiceOptions {
   std::string bind = "tcp://127.0.0.1:*";  ///< where data and packer bind; `*`: a free port
   std::string advertise;  ///< host that others are told to connect to; empty: as bound, or host_name() for a wildcard
   bool insecure = false;
+  std::vector<std::string> via;  ///< proxies, as Via::parse() takes them
+  std::string link;              ///< what the links through them are like, for the record; empty: they are none
   std::string log_level = "info";
 };
 
 /// Adds --name, --log-level, --insecure; --bind if the program binds, --master (or TELESPLAT_MASTER in the environment)
-/// if it connects to one, --advertise if it does both.
+/// if it connects to one, --advertise if it does both, --via and --link if it only connects.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
+
+/// What options.via comes to. Error: names the flag and its value.
+Result<Via> via_of(const ServiceOptions& options);
 
 /// Finds the session that --master auto means. Returns 0, or the exit code after a line on stderr that says why there
 /// is none.

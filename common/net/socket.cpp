@@ -72,14 +72,16 @@ bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
 
 struct Context::Impl {
   zmq::context_t context{1};
+  Via via;
 };
 
-Context::Context() : impl_(std::make_unique<Impl>()) {}
+Context::Context(Via via) : impl_(std::make_unique<Impl>()) { impl_->via = std::move(via); }
 Context::~Context() = default;
 
 struct Socket::Impl {
-  Impl(zmq::context_t& context, Kind kind, std::string name, const SocketOptions& options)
+  Impl(zmq::context_t& context, Kind kind, std::string name, const SocketOptions& options, const std::string& proxy)
       : context(context), kind(kind), name(std::move(name)), options(options), socket(context, zmq_type(kind)) {
+    if (!proxy.empty()) socket.set(zmq::sockopt::socks_proxy, proxy);
     socket.set(zmq::sockopt::sndhwm, options.high_water_mark);
     socket.set(zmq::sockopt::rcvhwm, options.high_water_mark);
     socket.set(zmq::sockopt::maxmsgsize, kind == Kind::kPub
@@ -291,7 +293,8 @@ struct Socket::Impl {
 };
 
 Socket::Socket(Context& context, Kind kind, std::string name, const SocketOptions& options)
-    : impl_(std::make_unique<Impl>(context.impl().context, kind, std::move(name), options)) {}
+    : impl_(std::make_unique<Impl>(context.impl().context, kind, std::move(name), options,
+                                   context.impl().via.proxy(std::string(options.toward)))) {}
 Socket::~Socket() = default;
 Socket::Socket(Socket&&) noexcept = default;
 Socket& Socket::operator=(Socket&&) noexcept = default;

@@ -12,6 +12,7 @@
 
 #include "common/core/log.h"
 #include "common/core/result.h"
+#include "common/net/via.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::net {
@@ -21,7 +22,8 @@ enum class Kind { kRouter, kDealer, kPush, kPull, kPub, kSub };
 /// One a process: ZeroMQ's I/O threads. Sockets must not outlive it.
 class Context {
  public:
-  Context();
+  /// via: the proxies that connections over TCP go through.
+  explicit Context(Via via = {});
   ~Context();
   struct Impl;
   Impl& impl() { return *impl_; }
@@ -49,6 +51,7 @@ struct SocketOptions {
   /// the network from the time that a message waited for its reader. For DEALER, PULL and SUB. Addresses must be bound
   /// or connected before the first message is sent or received.
   bool read_ahead = false;
+  std::string_view toward;  ///< role of who is connected to, where Via has a proxy of its own for it
 };
 
 class Socket {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <utility>
 
 #include "common/net/service.h"
 #include "common/net/socket.h"
@@ -11,8 +12,8 @@ namespace {
 constexpr std::chrono::duration<double> kLook{0.2};  // how late a stop is noticed
 }
 
-DrainGuard::DrainGuard(const std::string& master, InstanceId instance)
-    : thread_([this, master, instance] { watch(master, instance); }) {}
+DrainGuard::DrainGuard(const std::string& master, InstanceId instance, net::Via via)
+    : thread_([this, master, instance, via = std::move(via)] { watch(master, instance, via); }) {}
 
 DrainGuard::~DrainGuard() {
   {
@@ -23,7 +24,7 @@ DrainGuard::~DrainGuard() {
   thread_.join();
 }
 
-void DrainGuard::watch(const std::string& master, InstanceId instance) {
+void DrainGuard::watch(const std::string& master, InstanceId instance, const net::Via& via) {
   std::unique_lock lock(mutex_);
   const auto done = [this] { return done_; };
   while (!net::stop_requested())
@@ -32,7 +33,7 @@ void DrainGuard::watch(const std::string& master, InstanceId instance) {
   log::warn("told to stop, and a lease takes too long: it is given up");
   {
     // The service's own socket belongs to the thread that is busy.
-    net::Context context;
+    net::Context context(via);
     net::Socket socket(context, net::Kind::kDealer, "goodbye");
     if (socket.connect(master)) socket.send(wire::Goodbye{instance});
   }

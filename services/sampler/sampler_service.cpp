@@ -76,6 +76,7 @@ class SamplerService {
     hello.facts = {{"sampler", o.kind},
                    {"threads", std::to_string(o.threads > 0 ? o.threads : cores())},
                    {"leases", std::to_string(kLeases)}};
+    if (!o.service.link.empty()) hello.facts["link"] = o.service.link;
     return hello;
   }
 
@@ -225,6 +226,11 @@ int run(const SamplerOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   net::keep_freed_memory();
+  const auto via = net::via_of(o.service);
+  if (!via) {
+    log::error("{}", via.error().text);
+    return 2;
+  }
   std::unique_ptr<Sampler> sampler;
   std::unique_ptr<TileSource> replay;
   if (!o.replay.empty()) {
@@ -243,8 +249,8 @@ int run(const SamplerOptions& o) {
     sampler = std::move(*made);
   }
   const InstanceId instance = net::make_instance_id();
-  const DrainGuard guard(o.service.master, instance);
-  net::Context context;
+  const DrainGuard guard(o.service.master, instance, *via);
+  net::Context context(*via);
   return SamplerService(o, instance, std::move(sampler), std::move(replay), context).serve();
 }
 

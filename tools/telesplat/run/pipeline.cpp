@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "common/core/clock.h"
@@ -12,7 +13,7 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr int kMaxRestarts = 5;
-constexpr double kMasterPatience_s = 10, kAskEvery_s = 0.1;
+constexpr double kMasterPatience_s = 10, kRelayPatience_s = 5, kAskEvery_s = 0.1;
 // From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view
 // meanwhile.
 constexpr double kWallLead_s = 1.5;
@@ -47,8 +48,35 @@ Status Pipeline::start_servers() {
   for (int i = 1; i <= o.samplers; ++i) {
     Member sampler{
         .role = "sampler", .name = fmt::format("sampler-{}", i), .arguments = sampler_arguments(o), .nice = nice};
+    for (const auto place : {links::Place::kSampler, links::Place::kData})
+      if (const Status s = put_link(place, place == links::Place::kData ? "data" : sampler.name, sampler); !s) return s;
     if (const Status s = group_.start(std::move(sampler)); !s) return s;
   }
+  return ok_status();
+}
+
+Status Pipeline::put_link(links::Place place, const std::string& name, Member& before) {
+  const auto link = options_.links.find(place);
+  if (link == options_.links.end()) return ok_status();
+  const std::string relay = "link-" + name, text = links::text_of(link->second);
+  if (!relays_.contains(relay)) {
+    Member member{
+        .role = "wan-relay", .name = relay, .arguments = {"--socks", "127.0.0.1:*", "--link", text}, .joins = false};
+    const auto listens = group_.start_listener(std::move(member), kRelayPatience_s);
+    if (!listens) return listens.error();
+    relays_[relay] = *listens;
+    // Started again, it listens where it did: those before it know no other place.
+    group_.find(relay)->arguments[1] = *listens;
+  }
+  const std::string role = place == links::Place::kData ? "data" : "";
+  auto& told = before.arguments;
+  told.insert(told.end(), {"--via", role.empty() ? relays_[relay] : role + "=" + relays_[relay]});
+  const std::string is = (role.empty() ? "" : "data:") + text;
+  const auto flag = std::find(told.begin(), told.end(), "--link");
+  if (flag == told.end())
+    told.insert(told.end(), {"--link", is});
+  else
+    *(flag + 1) += " " + is;
   return ok_status();
 }
 
@@ -58,6 +86,7 @@ Status Pipeline::start_viewers(double clock_from_s) {
     // A session that is joined has a viewer-1 already.
     const std::string name = options_.join_master.empty() ? viewer_name(i) : net::unique_name(viewer_name(i));
     Member viewer{.role = "viewer", .name = name, .arguments = viewer_arguments(options_, i, clock_from_s)};
+    if (const Status s = put_link(links::Place::kViewer, name, viewer); !s) return s;
     if (const Status s = group_.start(std::move(viewer)); !s) return s;
   }
   return ok_status();

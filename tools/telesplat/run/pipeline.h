@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/links/link.h"
 #include "tools/common/time_left.h"
 #include "tools/telesplat/control/client.h"
 #include "tools/telesplat/run/process_group.h"
@@ -42,6 +43,9 @@ class Pipeline {
   Status start_servers();
   Status start_viewers(double clock_from_s);
   Status start_wall();
+  /// Puts the link of a place, if there is one, before a process that is not started yet, or before several: starts its
+  /// relay the first time.
+  Status put_link(links::Place place, const std::string& name, Member& before);
   void read(Member& member);
   void read_progress(const std::string& member, const std::string& told);
   /// What the end of a process means for the run.
@@ -52,6 +56,7 @@ class Pipeline {
   std::string progress_;
   std::map<std::string, tools::TimeLeft> time_left_;  // by member
   std::vector<std::string> notes_;
+  std::map<std::string, std::string> relays_;  // where they listen, by name
   bool has_viewers_ = false;
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
   double asked_s_ = -1e9;

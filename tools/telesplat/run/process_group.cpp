@@ -31,17 +31,25 @@ std::string program_directory() {
 }
 
 Status ProcessGroup::start_master(std::vector<std::string> arguments, double patience_s) {
-  if (const Status s = start({.role = "master", .name = "master", .arguments = std::move(arguments)}); !s) return s;
-  auto& master = *members_.back().process;
-  for (const double until = monotonic_s() + patience_s; endpoint_.empty();) {
-    for (const auto& line : master.read_lines())
-      if (line.starts_with(kListening)) endpoint_ = line.substr(kListening.size());
+  Member member{.role = "master", .name = "master", .arguments = std::move(arguments)};
+  auto listens = start_listener(std::move(member), patience_s);
+  if (!listens) return listens.error();
+  endpoint_ = std::move(*listens);
+  return ok_status();
+}
+
+Result<std::string> ProcessGroup::start_listener(Member member, double patience_s) {
+  const std::string name = member.name;
+  if (const Status s = start(std::move(member)); !s) return s.error();
+  auto& process = *members_.back().process;
+  for (const double until = monotonic_s() + patience_s;;) {
+    for (const auto& line : process.read_lines())
+      if (line.starts_with(kListening)) return line.substr(kListening.size());
     if (net::stop_requested()) return Error{"interrupted"};
-    if (master.ended() || monotonic_s() > until)
-      return Error{fmt::format("the master did not start: {}", last_log_line("master"))};
+    if (process.ended() || monotonic_s() > until)
+      return Error{fmt::format("the {} did not start: {}", name, last_log_line(name))};
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  return ok_status();
 }
 
 Status ProcessGroup::start(Member member) {
@@ -49,7 +57,7 @@ Status ProcessGroup::start(Member member) {
   fs::create_directories(log_directory_, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
   member.arguments.insert(member.arguments.end(), {"--name", member.name, "--log-level", log_level_});
-  if (!endpoint_.empty()) member.arguments.insert(member.arguments.end(), {"--master", endpoint_});
+  if (!endpoint_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--master", endpoint_});
   members_.push_back(std::move(member));
   return restart(members_.back());
 }

@@ -20,6 +20,7 @@ struct Member {
   std::string name;
   std::vector<std::string> arguments;  ///< beside name, log level and the master's address
   int nice = 0;
+  bool joins = true;  ///< is told where the master is
   int restarts = 0;
   std::optional<ChildProcess> process;
 };
@@ -38,8 +39,11 @@ class ProcessGroup {
   /// Where the master listens.
   const std::string& endpoint() const { return endpoint_; }
 
-  /// Starts a process that is told where the master is.
+  /// Starts a process that is told where the master is, if it joins.
   Status start(Member member);
+  /// Starts a process that listens somewhere, and says so in a line, and waits for that. Returns where. Error: it
+  /// ended, said nothing for `patience_s`, or Ctrl-C came.
+  Result<std::string> start_listener(Member member, double patience_s);
   /// Starts a member that died once more.
   Status restart(Member& member);
 

@@ -59,6 +59,11 @@ Table own_rows(RunOptions& o) {
        .value = &o.overwrite,
        .help = "the folder of --out may hold a record already: its files are replaced, others stay"},
       master::metrics_port_row(o.master),
+      {.flag = "--link",
+       .value = &o.link_texts,
+       .help = "simulate a link of a network: [PLACE:]rtt=40ms,rate=100mbit,jitter=5ms,stall=2s/30s, or shorter "
+               "50ms:100mbit, 20mbit, local; PLACE is viewer (default: between each viewer and the rest), sampler "
+               "(each sampler and the rest) or data (samplers and data servers)"},
       {.flag = "!--same-priority",
        .value = &o.background_servers,
        .help = "run samplers, packer and data at the viewer's priority"},
@@ -156,6 +161,22 @@ Status check_report(const RunOptions& o) {
       "report of it afterwards"};
 }
 
+// A place that is given twice has what was given last, as other flags do.
+Status settle_links(RunOptions& o) {
+  for (const auto& text : o.link_texts) {
+    const auto placed = links::parse_placed(text);
+    if (!placed) return Error{"--link " + placed.error().text};
+    o.links[placed->place] = placed->link;
+  }
+  std::erase_if(o.links, [](const auto& l) { return l.second.is_local(); });
+  const bool joins = !o.join_master.empty();
+  for (const auto& [place, link] : o.links)
+    if (joins && place != links::Place::kViewer)
+      return Error{fmt::format("--link {}:{}: a session that is joined has its own {}", name_of(place),
+                               links::text_of(link), place == links::Place::kData ? "data servers" : "samplers")};
+  return ok_status();
+}
+
 // As a program of these options is to be told, where `defaults` is what it does anyway.
 template <class Options>
 std::vector<std::string> arguments(Options o) {
@@ -194,6 +215,7 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
       if (const Status s = out->check(); !s) return s.error();
   }
   if (const Status s = settle_wall(o, given); !s) return s.error();
+  if (const Status s = settle_links(o); !s) return s.error();
   if (const Status s = refuse_records_without_folder(o); !s) return s.error();
   if (const Status s = check_movie(o, given); !s) return s.error();
   if (const Status s = check_report(o); !s) return s.error();

@@ -1,9 +1,11 @@
 // What `telesplat run` and `telesplat view` are told: the options of all services, and the launcher's own.
 #pragma once
 
+#include <map>
 #include <memory>
 
 #include "client/viewer/viewer_options.h"
+#include "common/links/link.h"
 #include "services/data/data_options.h"
 #include "services/master/master_options.h"
 #include "services/packer/packer_options.h"
@@ -21,13 +23,15 @@ struct RunOptions {
   sampler::SamplerOptions sampler;  ///< threads 0: the machine's cores shared among the samplers
   viewer::ViewerOptions viewer;     ///< wall "2x1": the viewers are its tiles; started_s: when the command began
   int samplers = 1, data_servers = 1, viewers = 1;
-  std::string join_master;         ///< --master: join a running session instead of starting one
-  MovieOptions movie;              ///< made of the record after the run; no file: none
-  bool report = false;             ///< made of the record at the end (tools/telesplat/report/report.h)
-  std::string out;                 ///< run folder; empty: run makes one, view records nothing
-  bool overwrite = false;          ///< `out` may hold a record already, which is replaced
-  std::string log_directory;       ///< of the processes; empty: OUT/logs
-  std::string log_level = "info";  ///< of the processes
+  std::string join_master;                    ///< --master: join a running session instead of starting one
+  MovieOptions movie;                         ///< made of the record after the run; no file: none
+  bool report = false;                        ///< made of the record at the end (tools/telesplat/report/report.h)
+  std::string out;                            ///< run folder; empty: run makes one, view records nothing
+  bool overwrite = false;                     ///< `out` may hold a record already, which is replaced
+  std::string log_directory;                  ///< of the processes; empty: OUT/logs
+  std::string log_level = "info";             ///< of the processes
+  std::vector<std::string> link_texts;        ///< --link as given
+  std::map<links::Place, links::Link> links;  ///< what they come to: simulated, none of them local
   int verify_samples = 16;         ///< rays a pixel of the pictures that displayed frames are verified against
   bool record_plan = false;        ///< keep pictures of plans in OUT/plans
   bool record_depth = false;       ///< keep sampled depth images in OUT/depth

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "tools/telesplat/movie/movie_target.h"
@@ -70,6 +71,18 @@ std::string head_of(const std::string& directory, const json& s) {
   if (const int viewers = s.at("viewers").get<int>(); viewers > 1)
     head += fmt::format(", {} (figures of all)", plural(viewers, "viewer"));
   return head;
+}
+
+// Simulated links: one line for all that are alike.
+void add_links(const json& s, RunReport& out) {
+  const json links = at(s, "links");
+  if (!links.is_object()) return;
+  std::map<std::string, std::string> whose;
+  for (const auto& [name, link] : links.items()) {
+    auto& names = whose[link.get<std::string>()];
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  for (const auto& [link, names] : whose) out.line("simulated link", fmt::format("{} (of {})", link, names));
 }
 
 void add_display(const json& s, RunReport& out) {
@@ -179,6 +192,7 @@ Result<RunReport> read_report(const std::string& directory) {
   if (!s.is_object()) return Error{path + ": is not there, or no summary"};
   try {
     RunReport out{head_of(directory, s), {}};
+    add_links(s, out);
     add_display(s, out);
     add_updates(s, out);
     add_quality(s, out);
