@@ -52,7 +52,7 @@ void LiveFigures::add_tile(const std::string& sampler, const wire::TileDone& til
   ++s->tiles;
   s->bytes += tile.bytes_sampled;
   s->rays += tile.rays;
-  const double busy_s = tile.encode_end_s - tile.sample_begin_s;
+  const double busy_s = tile.moments.encode_end_s - tile.moments.sample_begin_s;
   if (std::isfinite(busy_s)) s->busy_s += std::max(0.0, busy_s);
 }
 

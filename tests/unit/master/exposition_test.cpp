@@ -43,7 +43,7 @@ TEST(LiveFigures, FollowRowsAndTiles) {
   EXPECT_EQ(v.update_latency.count(), 1u);
   EXPECT_NEAR(v.start_up.sum_s(), 0.09, 1e-12);
   wire::TileDone tile;
-  tile.sample_begin_s = 1, tile.encode_end_s = 1.5, tile.bytes_sampled = 100, tile.rays = 7;
+  tile.moments.sample_begin_s = 1, tile.moments.encode_end_s = 1.5, tile.bytes_sampled = 100, tile.rays = 7;
   f.add_tile("s", tile);
   f.add_tile("s", tile);
   EXPECT_EQ(f.samplers().at("s").tiles, 2u);
@@ -67,7 +67,7 @@ TEST(Exposition, HasTheFormatThatPrometheusReads) {
   LiveFigures f;
   f.add_rows("v\"1", {{5}, "frames", {"inter_frame_ms"}, {0, 16, 40}});
   wire::TileDone tile;
-  tile.encode_end_s = 0.25;
+  tile.moments.encode_end_s = 0.25;
   f.add_tile("s", tile);
   const std::string text = exposition(snapshot(), f);
   for (const char* line :
