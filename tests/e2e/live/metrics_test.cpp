@@ -40,9 +40,9 @@ url = sys.argv[1]
 for attempt in range(100):
     text = urllib.request.urlopen(url, timeout=10).read().decode()
     families = {family.name: family for family in text_string_to_metric_families(text)}
-    def value(name, **labels):
-        for sample in families.get(name.removesuffix("_total"), families.get(name, None)).samples:
-            if sample.name == name and all(sample.labels.get(k) == v for k, v in labels.items()):
+    def value(series, **labels):
+        for sample in (families.get(series) or families[series.removesuffix("_total")]).samples:
+            if sample.name == series and all(sample.labels.get(k) == v for k, v in labels.items()):
                 return sample.value
     ready = "telesplat_viewer_frames" in families and "telesplat_viewer_frames_per_second" in families
     if ready and value("telesplat_viewer_frames_total", name="viewer-1") > 5: break
