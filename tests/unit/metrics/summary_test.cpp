@@ -263,6 +263,8 @@ TEST_F(Record, OfARunWithoutAnythingHoldsNoResults) {
                           "size",
                           "sampling_size",
                           "sampling",
+                          "coupling_changes",
+                          "frames_by_coupling",
                           "duration_s",
                           "fps",
                           "updates_per_s",
@@ -297,6 +299,20 @@ TEST_F(Record, OfARunWithoutAnythingHoldsNoResults) {
     EXPECT_TRUE(s[key].is_null()) << key << ": " << s[key];
   }
   EXPECT_TRUE(s["samplers_busy"]["spread"].is_null());
+}
+
+TEST_F(Record, CouplingsAreCountedForEachViewer) {
+  const std::vector<std::string> columns{"t_s", "inter_frame_ms", "coupling", "buffers"};
+  Process other = viewer;
+  other.name = "viewer-2";
+  // The first goes to sync and to loose; the second, whose rows come in between, stays asynchronous.
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 0, 0, 1, 9, 0, 0}}));
+  ASSERT_TRUE(record->add_rows(other, {{6}, "frames", columns, {0, 0, 0, 0}}));
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {2, 9, 1, 1, 3, 9, 2, 3, 4, 9, 2, 4}}));
+  const auto s = record->summary({viewer, other}, {}, {});
+  EXPECT_EQ(s["coupling_changes"], 3);
+  EXPECT_EQ(s["frames_by_coupling"],
+            (nlohmann::ordered_json{{"async", 3}, {"sync", 1}, {"loose(3)", 1}, {"loose(4)", 1}}));
 }
 
 TEST_F(Record, TheSummarySaysWhatWasDone) {
