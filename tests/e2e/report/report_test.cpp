@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -189,6 +191,25 @@ TEST(Report, DrawsPlotsWhereMatplotlibIsInstalled) {
   }
   for (const char* name : {"inter-frame-delay", "inter-frame-delay-cdf", "stages", "update-age", "timeline"})
     EXPECT_EQ(read_text(folder / fmt::format("run/plots/{}.png", name)).substr(1, 3), "PNG") << name;
+}
+
+TEST(Report, WithoutMatplotlibSaysSoInALineAndIsMade) {
+  const TemporaryFolder folder;
+  write_run(folder / "run", 20, 1);
+  write(folder / "python/matplotlib/__init__.py", "raise ImportError('it is hidden')\n");
+  const char* const before = std::getenv("PYTHONPATH");
+  const std::string kept = before ? before : "";
+  setenv("PYTHONPATH", (folder / "python").c_str(), 1);
+  const Outcome made = report(folder, {folder / "run"});
+  if (before)
+    setenv("PYTHONPATH", kept.c_str(), 1);
+  else
+    unsetenv("PYTHONPATH");
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_TRUE(fs::exists(folder / "run/report.html"));
+  EXPECT_FALSE(fs::exists(folder / "run/plots"));
+  EXPECT_NE(made.out.find("No plots for papers were drawn: "), made.out.npos) << made.out;
+  EXPECT_EQ(std::count(made.out.begin(), made.out.end(), '\n'), 2) << made.out;
 }
 
 TEST(Report, RefusesAFolderThatIsNoRunInOneLine) {

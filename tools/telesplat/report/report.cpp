@@ -138,7 +138,7 @@ Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& prog
   ordered_json data{{"version", version()}, {"figures", figure_kinds()}, {"runs", ordered_json::array()}};
   ReportMade made;
   for (size_t i = 0; i < o.runs.size(); ++i) {
-    progress.show(fmt::format("reading {}, run {} of {}", names[i], i + 1, o.runs.size()));
+    progress.show(fmt::format("report: reading {}, run {} of {}", names[i], i + 1, o.runs.size()));
     data["runs"].push_back(run_json(o.runs[i], names[i], o.runs.size()));
     if (should_stop()) {
       made.interrupted = true;
@@ -152,7 +152,7 @@ Result<ReportMade> make_report(const ReportOptions& o, tools::ProgressLine& prog
   if (const Status s = write_whole(o.out, page_html(title, data)); !s) return s.error();
   made.page = o.out;
   if (o.no_plots) return made;
-  progress.show("drawing plots");
+  progress.show("report: drawing plots");
   auto plots = make_plots(data, o.plots, should_stop);
   if (plots)
     made.plots = std::move(*plots);
