@@ -132,6 +132,39 @@ TEST(Report, OfARunOpensWithoutAnErrorAndShowsAllItsParts) {
   EXPECT_EQ(shown.find("<b>full"), shown.npos);
 }
 
+std::string attribute(const std::string& dom, const std::string& name) {
+  const std::string begin = "data-" + name + "=\"";
+  const size_t at = dom.find(begin);
+  if (at == dom.npos) return {};
+  return dom.substr(at + begin.size(), dom.find('"', at + begin.size()) - at - begin.size());
+}
+
+TEST(Report, AnswersHandsAndZoomsAllItsChartsTogether) {
+  if (browser().empty()) GTEST_SKIP() << kNoBrowser;
+  const TemporaryFolder folder;
+  write_run(folder / "run", 600, 1);
+  ASSERT_EQ(report(folder, {folder / "run", "--no-plots"}).code, 0);
+  std::string page = read_text(folder / "run/report.html");
+  const std::string act = read_text("tests/e2e/report/act.js");
+  ASSERT_FALSE(act.empty());
+  page.insert(page.rfind("</body>"), "<script>" + act + "</script>");
+  write(folder / "act.html", page);
+  const std::string dom = opened(folder, folder / "act.html");
+  expect_no_error(dom);
+  EXPECT_NE(attribute(dom, "chart").find("ms"), std::string::npos);
+  EXPECT_NE(attribute(dom, "histogram").find("%"), std::string::npos);
+  EXPECT_NE(attribute(dom, "span").find("begins"), std::string::npos);
+  EXPECT_NE(attribute(dom, "map").find("position"), std::string::npos);
+  EXPECT_EQ(attribute(dom, "toggled"), "true");
+  // One span of time in all charts: a part of the run, then all of it, 599 frames of 16.7 ms.
+  double from = 0, to = 0;
+  ASSERT_EQ(std::sscanf(attribute(dom, "zoomed").c_str(), "%lf %lf", &from, &to), 2);
+  EXPECT_EQ(attribute(dom, "zoomed").find('|'), std::string::npos) << attribute(dom, "zoomed");
+  EXPECT_GT(from, 0.5);
+  EXPECT_LT(to, 9);
+  EXPECT_EQ(attribute(dom, "reset"), "0.000 10.003");
+}
+
 TEST(Report, OfTwoRunsTellsTheirDifferences) {
   const TemporaryFolder folder;
   write_run(folder / "<b>quick", 300, 1);

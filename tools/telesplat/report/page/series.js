@@ -93,9 +93,15 @@ R.chart = function (title, series, options) {
       },
       highlightCallback: (event, x) => chart.hover(event, x),
       unhighlightCallback: () => { R.hideTip(); R.time.point(null); },
-      interactionModel: Object.assign({}, Dygraph.defaultInteractionModel, { dblclick: () => R.time.set(...R.time.full) }),
+      interactionModel: Object.assign({}, Dygraph.defaultInteractionModel, { dblclick: () => chart.reset() }),
     });
     box.append(chart.cursor);
+  };
+  chart.reset = function () {
+    R.time.busy = true; // what this chart takes as its whole time is no wish
+    chart.graph.resetZoom();
+    R.time.busy = false;
+    R.time.set(...R.time.full);
   };
   chart.hover = function (event, x) {
     R.time.point(x);

@@ -4,7 +4,7 @@
 R.stages = function () {
   const with_ = R.runs.filter((run) => run.stages && run.stages.t.length);
   if (!with_.length) {
-    R.section("stages", "Where the time went", R.el("div", { class: "notes", text: "The stages of view updates are not known: " + (R.several ? "no run" : "the run") + " has a stages.csv, which records of earlier versions lack. What is known of latency stands below, over time." }));
+    R.section("stages", "Where the time went", R.el("div", { class: "notes", text: "The stages of view updates are not known: " + (R.several ? "no run has a" : "the run has no") + " stages.csv, which records of earlier versions lack. What is known of latency stands below, over time." }));
     return;
   }
   const top = Math.max(...with_.map((run) => Math.max(...run.stages.latency)));

@@ -75,7 +75,7 @@ class Timeline {
     const told = t.all ? "" : `This page holds ${R.number(t.begin.length)} of ${R.number(t.of)} spans: those of ${t.windows.length} parts of the run, evenly chosen (shaded above the timeline). `;
     const damage = (t.whole ? "" : "trace.json ends in the middle; what could be read is shown. ") + (t.left_out ? `${R.number(t.left_out)} spans that make no sense or are too many are left out. ` : "") + (t.open ? `${R.number(t.open)} spans have no end and are left out.` : "");
     return R.el("div", { class: "panel", style: { marginBottom: "12px" } },
-      R.el("div", { class: "chart-head" }, R.el("h3", {}, R.several ? R.runSwatch(this.index) : null, (R.several ? this.run.name + ", " : "") + (R.fact(this.run, "coupling") || "?") + " coupling"), tools),
+      R.el("div", { class: "chart-head" }, R.el("h3", {}, R.several ? R.runSwatch(this.index) : null, (R.several ? this.run.name + ", " : "") + (R.fact(this.run, "coupling") ? R.fact(this.run, "coupling") + " coupling" : "all processes")), tools),
       this.canvas, told || damage ? R.el("div", { class: "muted small", text: told + damage }) : null);
   }
 
@@ -154,7 +154,9 @@ class Timeline {
     c.fillStyle = R.css("--text");
     c.textAlign = "left";
     const text = [lane.process, lane.lane].filter((s) => s).join(" ");
-    c.fillText(text.length > 25 ? text.slice(0, 24) + "\u2026" : text, 2, top + 12);
+    let fitting = text;
+    while (fitting.length > 1 && c.measureText(fitting + "\u2026").width > GUTTER - 8) fitting = fitting.slice(0, -1);
+    c.fillText(fitting === text || c.measureText(text).width <= GUTTER - 8 ? text : fitting + "\u2026", 2, top + 12);
     c.save();
     c.beginPath();
     c.rect(GUTTER, top - 2, w - GUTTER, lane.rows * ROW + 4);
