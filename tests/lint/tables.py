@@ -121,9 +121,8 @@ OUTSIDE_HEADERS = [
     (r"CLI/.*", ["common/options/parser.cpp"]),
     (r"toml\+\+/.*", ["tools/telesplat"]),
     (r"spdlog/.*", ["common/core"]),
-    (r"boost/.*", ["tools/wan_relay"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
-    (r"boost/.*", ["services/master/live/http_endpoint.cpp"]),
+    (r"boost/.*", ["services/master/live/http_endpoint.cpp", "tools/wan_relay"]),
     (r"curses\.h", ["tools/telesplat/top/screen.cpp"]),
 ]
 
