@@ -8,9 +8,9 @@
 
 #include "common/core/utf8.h"
 #include "tools/telesplat/report/reading/loose_table.h"
-#include "tools/telesplat/report/reading/update_stages.h"
 #include "tools/telesplat/report/reading/thinning.h"
 #include "tools/telesplat/report/reading/trace_reader.h"
+#include "tools/telesplat/report/reading/update_stages.h"
 
 namespace telesplat::launcher {
 namespace {
