@@ -15,6 +15,7 @@ Commands that need a network, root or a long time are told and left out (SKIPPED
 """
 
 import argparse
+import json
 import os
 import re
 import shutil
@@ -219,13 +220,16 @@ class Page:
     # ---- what runs meanwhile ----
 
     def _wait_for_session(self, where):
-        ask = [os.path.join(self._programs, "telesplat"), "ctl", "status"]
+        ask = [os.path.join(self._programs, "telesplat"), "ctl", "status", "--json"]
         for _ in range(120):
-            if subprocess.run(ask, env=self._environment, cwd=self._folder, stdout=subprocess.DEVNULL,
-                              stderr=subprocess.DEVNULL).returncode == 0:
-                return time.sleep(3)  # and its data are there
+            asked = subprocess.run(ask, env=self._environment, cwd=self._folder, stdout=subprocess.PIPE,
+                                   stderr=subprocess.DEVNULL)
+            status = json.loads(asked.stdout) if asked.returncode == 0 else {}
+            viewers = [p for p in status.get("processes", []) if p["role"] == "viewer"]
+            if viewers and all(p.get("values", {}).get("frames", 0) > 0 for p in viewers):
+                return
             time.sleep(0.5)
-        self._fail(f"{where}: nothing answers telesplat ctl status after a minute", "")
+        self._fail(f"{where}: no viewer of the session shows anything after a minute", "")
 
     def _stop_session(self):
         ask = [os.path.join(self._programs, "telesplat"), "ctl", "stop"]
