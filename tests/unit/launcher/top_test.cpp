@@ -141,7 +141,7 @@ TEST(TopLines, WhatIsWrongStandsOut) {
   const auto errors = [&](double now_s, double unanswered_s = 0) {
     std::map<std::string, TopStyle> out;
     for (const TopLine& line : top_lines(after, history, {.width = 200, .now_s = now_s, .unanswered_s = unanswered_s}))
-      if (line.front().text == "errors  ")
+      if (!line.empty() && line.front().text == "errors  ")
         for (const TopSpan& span : line) out[span.text] = span.style;
     return out;
   };
