@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
     wan_relay::Options o;
     options::Parser parser(
         "telesplat-wan-relay: passes TCP connections on as a link of a network would, with delay, rate, jitter and "
-        "stalls. SIGUSR1 tells what passed; so does the end");
+        "stalls; SIGUSR1 tells what passed, and so does the end");
     parser.add(wan_relay::table(o));
     parser.version(version());
     parser.parse_or_exit(kProgram, {argv + 1, argv + argc});
