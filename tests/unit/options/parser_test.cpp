@@ -46,6 +46,30 @@ TEST(Parser, GivesRowsTheirValues) {
 
 TEST(Parser, TheLastValueWins) { EXPECT_EQ(parsed({"a", "--speed=1", "-s", "4"}).speed, 4); }
 
+TEST(Parser, AFlagThatIsGivenAgainTakesOneValueEachTime) {
+  const Settings s = parsed({"--word", "x", "a.ply", "--word=y"});
+  EXPECT_EQ(s.scene, "a.ply");
+  EXPECT_EQ(s.words, (std::vector<std::string>{"x", "y"}));
+}
+
+TEST(Parser, WordsForLaterAreReadWithoutEnding) {
+  const auto wrong = [](std::vector<std::string> words) {
+    Settings s;
+    Parser parser("about");
+    parser.add(table(s));
+    const Status read = parser.parse("program run", std::move(words));
+    return read ? std::string() : read.error().text;
+  };
+  EXPECT_EQ(wrong({"a.ply", "--speed", "3"}), "");
+  EXPECT_EQ(wrong({"a.ply", "--sped", "3"}), "--sped: no such flag of program run; did you mean --speed?");
+  EXPECT_EQ(wrong({"a.ply", "--speed", "30"}), "--speed 30: is not between 0 and 10");
+  EXPECT_EQ(wrong({"a.ply", "b.ply"}), "b.ply is one too many for program run");
+  EXPECT_EQ(wrong({"a.ply", "--speed"}), "--speed: its value is missing");
+  EXPECT_NE(wrong({}).find("program run needs scene"), std::string::npos);
+  EXPECT_EQ(wrong({"--help"}), "--help: is of program run alone");
+  EXPECT_EQ(wrong({"a.ply", "--list"}), "--list: tells something and ends program run");
+}
+
 TEST(Parser, TellsWhatWasGiven) {
   Settings s;
   Parser parser("about");

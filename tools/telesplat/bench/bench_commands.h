@@ -9,5 +9,6 @@ Command bench_scaling_command();
 Command bench_volume_command();
 Command bench_cache_command();
 Command bench_steering_command();
+Command bench_thesis_command();
 
 }  // namespace telesplat::launcher

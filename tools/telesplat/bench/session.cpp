@@ -16,7 +16,9 @@ Result<std::unique_ptr<BenchSession>> BenchSession::start(const std::vector<std:
   std::unique_ptr<BenchSession> s(new BenchSession);
   std::vector<std::string> data{"julia"};
   data.insert(data.end(), scene_flags.begin(), scene_flags.end());
-  auto processes = BenchProcesses::start(data, {"--progressive", "off"}, directory, own_machines);
+  // Every picture is sampled whole, and nothing of it left out (T7.3): the same view comes again and again.
+  const std::vector<std::string> session{"--progressive", "off", "--steering", "off", "--packing.redundancy", "keep"};
+  auto processes = BenchProcesses::start(data, session, directory, own_machines);
   if (!processes) return processes.error();
   s->processes_ = std::move(*processes);
   wire::Hello hello;

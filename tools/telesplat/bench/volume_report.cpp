@@ -3,18 +3,25 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <set>
+
+#include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
 namespace {
 
-// Rows: 1 to 4 clients; columns: 1 to 4 servers.
-constexpr std::array<std::array<double, 4>, 4> kFoot{
-    {{27, 25, 21, 18}, {27, 25, 20, 17}, {27, 24, 20, 17}, {26, 23, 18, 15}}};
-constexpr std::array<std::array<double, 4>, 4> kTree{
-    {{4.2, 6.8, 9.3, 12.3}, {4.2, 6.7, 9.3, 12.3}, {3.4, 6.2, 9.2, 12.1}, {3.2, 5.6, 8.7, 11.8}}};
+// Rows: 1 to 4 clients; columns: servers, from 1 on.
+using Rates = std::vector<std::vector<double>>;
+
+const Rates& values_of(VolumeTable table) {
+  static const Rates foot{{27, 25, 21, 18}, {27, 25, 20, 17}, {27, 24, 20, 17}, {26, 23, 18, 15}};
+  static const Rates tree{{4.2, 6.8, 9.3, 12.3, 8.6, 5.4},
+                          {4.2, 6.7, 9.3, 12.3, 8.6, 5.4},
+                          {3.4, 6.2, 9.2, 12.1, 8.4, 5.4},
+                          {3.2, 5.6, 8.7, 11.8, 8.4, 5.3}};
+  return table == VolumeTable::kFoot ? foot : tree;
+}
 
 const VolumePoint* find(const VolumeReport& r, bool simulated, int samplers, int viewers) {
   for (const auto& p : r.points)
@@ -48,8 +55,12 @@ std::string table(const VolumeReport& r, bool simulated) {
   return out;
 }
 
-std::string thesis_table(const std::array<std::array<double, 4>, 4>& values) {
-  std::string out = "| views a second | 1 server | 2 servers | 3 servers | 4 servers |\n|---|---|---|---|---|\n";
+std::string thesis_table(VolumeTable of) {
+  const Rates& values = values_of(of);
+  std::string out = "| views a second |", rule = "|---|";
+  for (size_t s = 1; s <= values.front().size(); ++s)
+    out += fmt::format(" {} server{} |", s, s == 1 ? "" : "s"), rule += "---|";
+  out += "\n" + rule + "\n";
   for (size_t v = 0; v < values.size(); ++v) {
     out += fmt::format("| {} client{} |", v + 1, v == 0 ? "" : "s");
     for (const double f : values[v]) out += fmt::format(" {:g} |", f);
@@ -59,6 +70,13 @@ std::string thesis_table(const std::array<std::array<double, 4>, 4>& values) {
 }
 
 }  // namespace
+
+std::optional<double> thesis_fps(VolumeTable table, int servers, int clients) {
+  const Rates& values = values_of(table);
+  if (clients < 1 || servers < 1 || clients > int(values.size()) || servers > int(values.front().size()))
+    return std::nullopt;
+  return values[size_t(clients - 1)][size_t(servers - 1)];
+}
 
 std::string to_markdown(const VolumeReport& r) {
   std::string out = fmt::format(
@@ -80,8 +98,25 @@ std::string to_markdown(const VolumeReport& r) {
         "warping "
         "took one thread instead of doing it. The network is this machine's own.\n\n{}",
         r.cores, t);
-  out += "\nThe thesis, table 7.3, 256^3 foot, GPU servers:\n\n" + thesis_table(kFoot) +
-         "\nTable 7.4, 512 x 499 x 512 Christmas tree:\n\n" + thesis_table(kTree);
+  out += "\nThe thesis, table 7.3, 256^3 foot, GPU servers:\n\n" + thesis_table(VolumeTable::kFoot) +
+         "\nTable 7.4, 512 x 499 x 512 Christmas tree:\n\n" + thesis_table(VolumeTable::kTree);
+  return out;
+}
+
+Result<std::vector<VolumePoint>> read_points(const std::string& directory) {
+  const auto table = tools::CsvTable::read(directory + "/volume.csv", {});
+  if (!table) return table.error();
+  std::vector<std::vector<double>> columns;
+  for (const char* name : {"simulated", "samplers", "viewers", "fps", "least_fps", "sampling_ms", "packing_ms",
+                           "construction_ms", "bytes_per_frame"}) {
+    const auto column = table->column(name);
+    if (!column) return column.error();
+    columns.push_back(table->numbers(*column));
+  }
+  std::vector<VolumePoint> out;
+  for (size_t i = 0; i < table->rows(); ++i)
+    out.push_back({columns[0][i] != 0, int(columns[1][i]), int(columns[2][i]), columns[3][i], columns[4][i],
+                   columns[5][i], columns[6][i], columns[7][i], columns[8][i]});
   return out;
 }
 

@@ -1,6 +1,7 @@
 // What `telesplat bench volume` found, as tables for people and programs.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,14 @@ struct VolumeReport {
   std::vector<VolumePoint> points;
 };
 
+/// Frames a second in a table of the thesis; none where it has no such number of servers and clients.
+enum class VolumeTable { kFoot, kTree };  ///< tables 7.3 and 7.4
+std::optional<double> thesis_fps(VolumeTable table, int servers, int clients);
+
 /// Tables of frame rates, viewers down, samplers across, beside those of the thesis where they have that number.
 std::string to_markdown(const VolumeReport& report);
+/// Reads volume.csv, as write_report() writes it. Error: it is not there, or none.
+Result<std::vector<VolumePoint>> read_points(const std::string& directory);
 /// volume.csv and volume.md in `directory`.
 Status write_report(const VolumeReport& report, const std::string& directory);
 

@@ -1,0 +1,93 @@
+// `telesplat bench thesis` with real runs: its figures are drawn, and what is done is not done again.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "tests/support/pipeline_run.h"
+#include "tools/common/csv_table.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ThesisBench : public ::testing::Test {
+ protected:
+  ThesisBench() {
+    fs::create_directories(folder / "data/meshes");
+    write_terrain(folder / "data/meshes/colorado-5760k.ply", 20);
+  }
+  std::vector<std::string> words(std::vector<std::string> own) const {
+    std::vector<std::string> out{"bench", "thesis", "--out", folder / "thesis", "--data", folder / "data"};
+    out.insert(out.end(), own.begin(), own.end());
+    return out;
+  }
+  nlohmann::json state() const {
+    return nlohmann::json::parse(read_text(folder / "thesis/thesis.json"), nullptr, false);
+  }
+  size_t done() const { return state().is_object() ? state()["done"].size() : 0; }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(ThesisBench, DrawsTimelinesOfTheThreeCouplings) {
+  Program first("telesplat", words({"--quick", "--only", "6"}), folder / "first");
+  ASSERT_TRUE(wait_until([&] { return done() == 1 || first.wait(0) >= 0; }, 120)) << first.err();
+  first.signal(SIGINT);
+  EXPECT_EQ(first.wait(60), 130) << first.err();
+  EXPECT_NE(first.err().find("interrupted; the same command goes on"), std::string::npos) << first.err();
+  const auto before = state();
+  ASSERT_TRUE(before.is_object());
+  EXPECT_LT(before["done"].size(), 3u);
+
+  Program second("telesplat", words({"--quick", "--only", "6"}), folder / "second");
+  ASSERT_EQ(second.wait(180), 0) << second.err();
+  EXPECT_EQ(done(), 3u);
+  EXPECT_EQ(state()["done"]["figure 6.1, sync coupling"], before["done"]["figure 6.1, sync coupling"]);
+  for (const char* figure : {"6.1", "6.2", "6.3"}) {
+    const std::string svg = read_text(folder / "thesis/figure-" + figure + ".svg");
+    EXPECT_NE(svg.find("display frame: "), std::string::npos) << figure;
+    EXPECT_NE(svg.find("sample: "), std::string::npos) << figure << " has no server";
+    EXPECT_NE(read_text(folder / "thesis/thesis.md").find(std::string("![Figure ") + figure), std::string::npos);
+  }
+  EXPECT_NE(read_text(folder / "thesis/thesis.html").find("Figure 6.3: workflow timeline"), std::string::npos);
+
+  Program mixed("telesplat", words({"--only", "6"}), folder / "mixed");
+  EXPECT_EQ(mixed.wait(30), 2);
+  EXPECT_NE(mixed.err().find("was begun with --quick"), std::string::npos) << mixed.err();
+}
+
+TEST_F(ThesisBench, ChecksItsDataFirst) {
+  Program missing("telesplat", words({"--only", "7.1"}), folder / "missing");
+  EXPECT_EQ(missing.wait(30), 2);
+  EXPECT_NE(missing.err().find("meshes/crater-lake-srtm3-2880k.ply"), std::string::npos) << missing.err();
+  EXPECT_FALSE(fs::exists(folder / "thesis"));
+  Program wrong("telesplat", words({"--only", "7.9"}), folder / "wrong");
+  EXPECT_EQ(wrong.wait(30), 2);
+  EXPECT_EQ(wrong.err(), "telesplat: --only 7.9: \"7.9\" is none of 6, 7.1, 7.2, 7.3, 7.4\n");
+  Program listed("telesplat", words({"--only", "7.4", "--dry-run"}), folder / "listed");
+  EXPECT_EQ(listed.wait(30), 0);
+  EXPECT_NE(listed.out().find("--samplers 1,2,3,4,5,6 --viewers 1,2,3,4"), std::string::npos) << listed.out();
+  EXPECT_FALSE(fs::exists(folder / "thesis"));
+}
+
+TEST_F(ThesisBench, EveryPictureOfTheScalingStudyIsSampledWhole) {
+  // The same view again, with two samplers: half the waits are left, not less.
+  Program scaling("telesplat",
+                  {"bench", "scaling", "--no-kill", "--no-computed", "--nodes", "1,2", "--frames", "2", "--row-cost",
+                   "1.5", "--size", "64x40", "--out", folder / "scaling"},
+                  folder / "scaling-run");
+  ASSERT_EQ(scaling.wait(120), 0) << scaling.err();
+  const auto table = tools::CsvTable::read(folder / "scaling/scaling.csv", {});
+  ASSERT_TRUE(table) << table.error().text;
+  ASSERT_EQ(table->rows(), 2u);
+  for (size_t row = 0; row < 2; ++row) {
+    const double nodes = *table->number(row, *table->column("nodes")),
+                 time_s = *table->number(row, *table->column("time_s"));
+    EXPECT_GE(time_s, 0.9 * 1.5 / nodes) << nodes << " nodes";
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::test
