@@ -63,17 +63,32 @@ function labelLines(chart, graph) {
 // The periods of displays.
 R.hertz = [60, 72, 90].map((hz) => ({ y: 1000 / hz, x: 1000 / hz, label: hz + " Hz", hz }));
 
+// Where a few values lie far above all others, the axis ends before them: {limit, above}; null: it shows all.
+R.cap = function (values) {
+  const sorted = Float64Array.from(values.filter((v) => v > 0)).sort(), n = sorted.length;
+  if (n < 30) return null;
+  const usual = sorted[Math.floor(0.98 * (n - 1))];
+  if (sorted[n - 1] < 4 * usual) return null;
+  const limit = 1.25 * usual;
+  return { limit, above: sorted.filter((v) => v > limit).length };
+};
+
 // series: [{label, colour: () => css, t, v, of}]. options: unit, lines, stacked, high, log (offers it), hover (rows for
-// a tooltip in place of the usual ones), yMax, points.
+// a tooltip in place of the usual ones), points, free (the axis need not begin at 0), heights (what its end is judged by
+// in place of all values), yMax.
 R.chart = function (title, series, options) {
   const box = R.el("div", { class: "chart" + (options.high ? " high" : "") });
   const log = options.log ? R.el("button", { class: "no-print", "aria-pressed": "false", text: "log scale" }) : null;
+  const cap = options.free ? null : R.cap(options.heights || series.flatMap((s) => Array.from(s.v)));
+  const whole = cap ? R.el("button", { class: "no-print", "aria-pressed": "false", text: "whole range" }) : null;
   const thin = series.filter((s) => s.of > s.t.length);
   const panel = R.el("div", { class: "panel" + (options.wide ? " wide" : "") },
-    R.el("div", { class: "chart-head" }, R.el("h3", { text: title + (options.unit ? ", " + options.unit : "") }), log),
+    R.el("div", { class: "chart-head" }, R.el("h3", { text: title + (options.unit ? ", " + options.unit : "") }), whole, log),
     series.length > 1 && !options.noLegend ? R.seriesLegend(series) : null, box,
-    thin.length ? R.el("div", { class: "muted small", text: `Thinned: ${thin.map((s) => `${R.number(s.t.length)} of ${R.number(s.of)} values`).join(", ")}; of each part of the time the least and the greatest stay.` }) : null);
+    thin.length ? R.el("div", { class: "muted small", text: `Thinned: ${thin.map((s) => `${R.number(s.t.length)} of ${R.number(s.of)} values`).join(", ")}; of each part of the time the least and the greatest stay.` }) : null,
+    cap ? R.el("div", { class: "muted small", text: `${R.number(cap.above)} of the values lie above the axis.` }) : null);
   const chart = { panel, box, series, options, cursor: R.el("div", { class: "cursor", hidden: "" }) };
+  chart.range = () => (chart.whole || chart.logged ? null : cap ? [0, cap.limit] : options.yMax ? [0, options.yMax] : null);
   chart.make = function () {
     const colours = series.map((s) => s.colour());
     chart.graph = new Dygraph(box, merged(series), {
@@ -82,7 +97,7 @@ R.chart = function (title, series, options) {
       strokeWidth: options.stacked ? 0.4 : 1.3, stackedGraph: Boolean(options.stacked), fillAlpha: 0.85,
       stackedGraphNaNFill: "none", drawPoints: Boolean(options.points) && series.every((s) => s.t.length <= 400), pointSize: 2.2, highlightCircleSize: 3, pixelRatio: Math.max(2, window.devicePixelRatio || 1),
       includeZero: !options.free, gridLineColor: R.css("--line"), axisLineColor: R.css("--line"), gridLineWidth: 0.6,
-      valueRange: options.yMax ? [0, options.yMax] : null, yRangePad: 4, rightGap: options.lines ? 44 : 8, animatedZooms: false, logscale: Boolean(chart.logged),
+      valueRange: chart.range(), yRangePad: 4, rightGap: options.lines ? 44 : 8, animatedZooms: false, logscale: Boolean(chart.logged),
       axes: { x: { pixelsPerLabel: 70, axisLabelFormatter: (v) => R.number(v, 5) + " s" }, y: { axisLabelWidth: 46, axisLabelFormatter: (v) => R.short(v) } },
       underlayCallback: (context, area, graph) => drawLines(options.lines || [], context, area, graph),
       drawCallback: (graph, initial) => {
@@ -100,6 +115,7 @@ R.chart = function (title, series, options) {
   chart.reset = function () {
     R.time.busy = true; // what this chart takes as its whole time is no wish
     chart.graph.resetZoom();
+    chart.graph.updateOptions({ valueRange: chart.range() });
     R.time.busy = false;
     R.time.set(...R.time.full);
   };
@@ -116,7 +132,13 @@ R.chart = function (title, series, options) {
     log.addEventListener("click", () => {
       chart.logged = !chart.logged;
       log.setAttribute("aria-pressed", String(chart.logged));
-      chart.graph.updateOptions({ logscale: chart.logged, valueRange: null });
+      chart.graph.updateOptions({ logscale: chart.logged, valueRange: chart.range() });
+    });
+  if (whole)
+    whole.addEventListener("click", () => {
+      chart.whole = !chart.whole;
+      whole.setAttribute("aria-pressed", String(Boolean(chart.whole)));
+      chart.graph.updateOptions({ valueRange: chart.range() });
     });
   R.time.charts.push(chart);
   return panel;

@@ -7,6 +7,7 @@ R.stages = function () {
     R.section("stages", "Where the time went", R.el("div", { class: "notes", text: "The stages of view updates are not known: " + (R.several ? "no run has a" : "the run has no") + " stages.csv, which records of earlier versions lack. What is known of latency stands below, over time." }));
     return;
   }
+  const heights = with_.flatMap((run) => Array.from(run.stages.latency));
   const top = Math.max(...with_.map((run) => Math.max(...run.stages.latency)));
   const boxes = with_.flatMap((run) => {
     const s = run.stages, colours = R.stageColours(s);
@@ -19,7 +20,7 @@ R.stages = function () {
     };
     const name = R.several ? run.name + ": " : "";
     return [
-      R.chart(name + "stages of the view updates, by request time", series, { unit: "ms", stacked: true, high: true, wide: true, hover, yMax: top * 1.05, noLegend: true }),
+      R.chart(name + "stages of the view updates, by request time", series, { unit: "ms", stacked: true, high: true, wide: true, hover, yMax: top * 1.05, heights, noLegend: true }),
       R.el("div", { class: "panel wide" }, R.meanBar(run, colours), R.stageTable(run, colours)),
     ];
   });
