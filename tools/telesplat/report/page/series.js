@@ -83,7 +83,7 @@ R.chart = function (title, series, options) {
   const whole = cap ? R.el("button", { class: "no-print", "aria-pressed": "false", text: "whole range" }) : null;
   const thin = series.filter((s) => s.of > s.t.length);
   const panel = R.el("div", { class: "panel" + (options.wide ? " wide" : "") },
-    R.el("div", { class: "chart-head" }, R.el("h3", { text: title + (options.unit ? ", " + options.unit : "") }), whole, log),
+    R.el("div", { class: "chart-head" }, R.el("h3", { text: title + (options.unit ? ", " + options.unit : "") }), R.el("span", {}, whole, " ", log)),
     series.length > 1 && !options.noLegend ? R.seriesLegend(series) : null, box,
     thin.length ? R.el("div", { class: "muted small", text: `Thinned: ${thin.map((s) => `${R.number(s.t.length)} of ${R.number(s.of)} values`).join(", ")}; of each part of the time the least and the greatest stay.` }) : null,
     cap ? R.el("div", { class: "muted small", text: `${R.number(cap.above)} of the values lie above the axis.` }) : null);
