@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -18,6 +19,7 @@ namespace {
 // The relay that a run has started.
 pid_t relay_of(pid_t launcher) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    if (!std::isdigit(entry.path().filename().string()[0])) continue;
     const std::string stat = read_text(entry.path().string() + "/stat");
     const size_t end = stat.rfind(')');
     if (end == std::string::npos || stat.find("(telesplat-wan-r") == std::string::npos) continue;
