@@ -8,6 +8,7 @@
 
 #include <tuple>
 
+#include "common/wire/link_messages.h"
 #include "common/wire/point_messages.h"
 #include "common/wire/session_messages.h"
 #include "common/wire/slice_messages.h"
@@ -21,6 +22,6 @@ using Messages = std::tuple<Hello, Welcome, WhoAreYou, ClockRequest, ClockReply,
                             PlanRequest, Plan, StatusReport, MetricRows, Control, ControlReply, Shutdown, Goodbye,
                             ChunkListRequest, ChunkList, ChunkRequest, Chunk, DepthTile, Patch, Forget, EpochBegin,
                             StateMark, StateRequest, AccessReport, SliceWeights, SlabAssignment, SlabReady, SliceLease,
-                            VoxelRequest, VoxelData, SliceImages, SliceFrame, SliceAck>;
+                            VoxelRequest, VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport>;
 
 }  // namespace telesplat::wire

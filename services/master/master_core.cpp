@@ -232,6 +232,13 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   dispatch(now_s);
 }
 
+void MasterCore::on(const std::string& peer, const wire::LinkReport& m, double now_s) {
+  const Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "packer" || !instances_.contains(m.viewer)) return;
+  plan_->on_link(m, now_s);
+  dispatch(now_s);
+}
+
 Status MasterCore::on(const std::string& peer, const wire::Plan& m, double now_s) {
   const Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "packer") return ok_status();

@@ -34,6 +34,7 @@ class MasterCore {
   void on(const std::string& peer, const wire::Goodbye& m, double now_s);
   void on(const std::string& peer, const wire::Control& m, double now_s);
   void on(const std::string& peer, const wire::SlabReady& m, double now_s);
+  void on(const std::string& peer, const wire::LinkReport& m, double now_s);
   /// Errors are the sender's fault: the caller counts them.
   Status on(const std::string& peer, const wire::MetricRows& m, double now_s);
   Status on(const std::string& peer, const wire::SliceWeights& m, double now_s);

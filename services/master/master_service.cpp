@@ -170,8 +170,8 @@ class MasterService {
       return;
     }
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
-                  wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::Goodbye,
-                  wire::Control>(control_, message, [&](const auto& m) {
+                  wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::LinkReport,
+                  wire::Goodbye, wire::Control>(control_, message, [&](const auto& m) {
       if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
         core_.on(message.peer, m, now_s);
       else if (const Status s = core_.on(message.peer, m, now_s); !s)

@@ -109,6 +109,10 @@ class Schedule {
   /// The packer has this tile, from `sampler` (empty: unknown). False: it has it twice, or nobody waits for it any
   /// more.
   virtual bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) = 0;
+  /// How a viewer's link does.
+  virtual void on_link(const wire::LinkReport& /*link*/, double /*now_s*/) {}
+  /// The same for status; empty: nothing is known of it.
+  virtual std::map<std::string, double> link_of(InstanceId /*viewer*/) const { return {}; }
   /// A lease may be due before the next tick of 20 ms, if somebody is idle.
   virtual bool hurried() const { return false; }
   /// To be called every 50 ms or so.

@@ -135,6 +135,7 @@ std::string MasterCore::status_json(double now_s) const {
     for (const auto& [key, value] : p.hello.facts)
       if (key != metrics::kRecordFact) e["facts"][key] = value;
     for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
+    for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e["values"][key] = number(value);
     e["rates"] = Json(rates(p.reports));
     out["processes"].push_back(e);
   }

@@ -33,8 +33,10 @@ ViewQueue Views::release_views() {
 FrameId Views::next_frame() { return std::exchange(next_frame_, next_frame_.next()); }
 LeaseId Views::next_lease() { return std::exchange(next_lease_, next_lease_.next()); }
 
-std::optional<wire::ViewRequest> Views::take_view(bool turns_only, InFlight allowed) {
+std::optional<wire::ViewRequest> Views::take_view(bool turns_only, InFlight allowed,
+                                                  const std::function<bool(InstanceId)>& ready) {
   const wire::ViewRequest* next = waiting_.next(turns_only, [&](InstanceId viewer) {
+    if (ready && !ready(viewer)) return false;
     return allowed == InFlight::kAny || std::none_of(in_flight_.begin(), in_flight_.end(), [&](const Begun& f) {
              return std::any_of(f.views.begin(), f.views.end(), [&](const auto& v) { return v.viewer == viewer; });
            });

@@ -17,6 +17,7 @@ struct ScheduleOptions {
   int frames_in_flight = 2;  ///< views begun and not complete, at most
   /// Longest time before a lease goes to another sampler; shorter once tile times are known.
   double lease_timeout_s = 2.0;
+  double max_rate_mbit = 0;       ///< to each viewer, wished; 0: as much as its link carries
   double lease_target_s = 0.004;  ///< what a lease of rows should take its sampler
 };
 
@@ -61,7 +62,9 @@ class Views {
   enum class InFlight { kAny, kOneAViewer };
   /// The view to begin; viewers take turns. turns_only: only those that have a turn. kOneAViewer: only those that have
   /// no view in flight. nullopt: none waits, or as many are in flight as may be (views_at_once()).
-  std::optional<wire::ViewRequest> take_view(bool turns_only, InFlight allowed = InFlight::kAny);
+  /// ready: only viewers for which it is true; null: all.
+  std::optional<wire::ViewRequest> take_view(bool turns_only, InFlight allowed = InFlight::kAny,
+                                             const std::function<bool(InstanceId)>& ready = {});
   /// More views for the same frame, as ViewQueue::take_all().
   std::vector<wire::ViewRequest> take_more(const std::function<bool(const wire::ViewRequest&)>& wanted, size_t most) {
     return waiting_.take_all(wanted, most);

@@ -137,6 +137,7 @@ class PackerService {
                                          std::string body) { patches_.send_frames({}, type, std::move(body)); },
                     .to_viewer = [this](std::string_view peer, std::string_view type,
                                         std::string body) { return state_.send_frames(peer, type, std::move(body)); },
+                    .tell_link = [this](const wire::LinkReport& m) { link_->socket().send(m); },
                     .master_now = [this] { return link_->to_master_s(monotonic_s()); },
                     .to_master_s = [this](double s) { return link_->to_master_s(s); }};
     if (pipeline == scene::Pipeline::kSlices) return std::make_unique<SlicePacking>(std::move(outlets), spans_);

@@ -18,8 +18,9 @@ struct Outlets {
   std::function<void(std::string_view type, std::string body)> to_viewers;  ///< to all of them
   /// To one viewer. False: dropped, because its queue is full or it is gone.
   std::function<bool(std::string_view peer, std::string_view type, std::string body)> to_viewer;
-  std::function<double()> master_now;                 ///< seconds on the master's clock
-  std::function<double(double local_s)> to_master_s;  ///< monotonic_s() of this machine on the master's clock
+  std::function<void(const wire::LinkReport&)> tell_link;  ///< the master
+  std::function<double()> master_now;                      ///< seconds on the master's clock
+  std::function<double(double local_s)> to_master_s;       ///< monotonic_s() of this machine on the master's clock
 
   template <class M>
   void publish(const M& message) const {

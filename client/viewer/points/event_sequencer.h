@@ -50,6 +50,8 @@ class EventSequencer {
   bool synchronised() const { return !waiting_ && packer_; }
   bool waiting() const { return waiting_; }
   Sequence applied() const { return applied_; }
+  /// That is followed; 0: none yet.
+  InstanceId packer() const { return packer_.value_or(InstanceId{}); }
   uint64_t gaps() const { return gaps_; }
 
  private:

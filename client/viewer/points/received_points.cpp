@@ -13,6 +13,9 @@ namespace {
 
 constexpr Feed kFeeds[] = {{net::Kind::kSub, "patches"}, {net::Kind::kDealer, "state"}};
 constexpr size_t kSummariesAtOnce = 8;
+// Between two receipts: while events come, and while none do.
+constexpr double kReceipts_s = 0.03, kQuietReceipts_s = 0.5;
+constexpr uint64_t kReceiptBytes = 32 << 10;  // are told of at once
 
 }  // namespace
 
@@ -48,8 +51,23 @@ void ReceivedPoints::receive(int most) {
 
 void ReceivedPoints::tick(double now_s) {
   receiver_.tick(now_s);
+  send_receipt(now_s);
   if (!waits_) summarise();
   cache_.free_dropped();
+}
+
+// So the packer knows how much is on its way to this viewer, and how fast it arrives.
+void ReceivedPoints::send_receipt(double now_s) {
+  const auto received = receiver_.figures();
+  const double period_s = received.sequence == receipted_ ? kQuietReceipts_s : kReceipts_s;
+  const bool many = received.bytes_received - receipt_bytes_ >= kReceiptBytes;
+  if (received.packer.value == 0 || (now_s - receipt_s_ < period_s && !many)) return;
+  auto* state = links_.feeds.find("state");
+  if (!state) return;
+  state->send(wire::Receipt{links_.viewer, received.packer, received.sequence, now_s});
+  receipted_ = received.sequence;
+  receipt_s_ = now_s;
+  receipt_bytes_ = received.bytes_received;
 }
 
 void ReceivedPoints::summarise() {

@@ -43,6 +43,7 @@ class ReceivedPoints final : public Received {
  private:
   void summarise();
   void show(const ShownUpdate& update);
+  void send_receipt(double now_s);
 
   ReceivedLinks links_;
   bool waits_;                   // the display, for whole updates; worker's
@@ -53,6 +54,9 @@ class ReceivedPoints final : public Received {
   PointReceiver receiver_;
   points::ModelConfig config_;  // valid once the feeds are connected
   AccessLog reported_;          // takes turns with seen_
+  Sequence receipted_;          // the newest event that the packer was told of, and when
+  double receipt_s_ = -1e9;
+  uint64_t receipt_bytes_ = 0;
   std::atomic<bool> keeps_redundant_{false}, retired_{false};
 
   mutable std::mutex mutex_;  // guards what both threads use, below

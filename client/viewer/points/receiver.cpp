@@ -156,6 +156,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   spans_.add("decode", links_.to_master_s(begin), links_.to_master_s(decoded), 1, of);
   spans_.add("insert", links_.to_master_s(decoded), links_.to_master_s(inserted), 1, of);
   points_received_ += patch.kept;
+  bytes_received_ += patch.image.size();
   if (!options_.hold) {
     const bool complete = patch.frame_complete && !patch.extra;
     switch_.on_part({patch.epoch, patch.step, complete, patch.viewer == options_.viewer}, inserted);
@@ -170,8 +171,8 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
 }
 
 PointReceiver::Figures PointReceiver::figures() const {
-  return {points_received_, decode_errors_,      sequencer_.gaps(),
-          epochs_shown_,    switch_.displayed(), sequencer_.applied()};
+  return {points_received_,    decode_errors_,       sequencer_.gaps(),   epochs_shown_,
+          switch_.displayed(), sequencer_.applied(), sequencer_.packer(), bytes_received_};
 }
 
 }  // namespace telesplat::viewer

@@ -51,6 +51,8 @@ class PointReceiver {
     uint64_t points_received = 0, decode_errors = 0, gaps = 0, epochs_shown = 0;
     EpochId epoch;  ///< on display; only where nothing is held
     Sequence sequence;
+    InstanceId packer;            ///< whose sequence it is
+    uint64_t bytes_received = 0;  ///< images of patches
   };
   Figures figures() const;
 
@@ -73,7 +75,7 @@ class PointReceiver {
   EpochId epoch_;
   image::DepthImage tile_;  // memory that decoding reuses
   double asked_s_ = 0;
-  uint64_t points_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0;
+  uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0;
 };
 
 }  // namespace telesplat::viewer

@@ -17,7 +17,8 @@ wire::Moments leased(wire::Moments moments, double now_s) {
 bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   const bool steered = plans_.on(now_s);
   // The plan of a viewer's next view must know the samples of the one before.
-  const auto request = take_view(turns_only, steered ? InFlight::kOneAViewer : InFlight::kAny);
+  const auto ready = [&](InstanceId viewer) { return gate_.open(viewer, now_s); };
+  const auto request = take_view(turns_only, steered ? InFlight::kOneAViewer : InFlight::kAny, ready);
   if (!request) return false;
   close_extras(*request, now_s);
   PlannedView view{.epoch = epoch, .view = *request};
@@ -26,7 +27,7 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   view.frame = next_frame();
   begin(view.frame, {*request});
   if (steered) {
-    questions_.push_back(plans_.ask(view, limits(), now_s));
+    questions_.push_back(plans_.ask(view, limits(request->viewer), now_s));
   } else {
     plans_.begin_unplanned(view);
     begin_whole(view);
@@ -72,6 +73,7 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
   const auto extras = std::find_if(frames_.rbegin(), frames_.rend(), [](const Frame& f) { return !f.extra; });
   const Frame* newest = extras == frames_.rend() ? nullptr : &*extras;  // of views
   for (Frame& f : frames_) {
+    if (!may_lease(f, now_s)) continue;
     const double row_s = pixel_s * f.camera.width;
     // The last rows, one a sampler, go to those who have nothing else: kept for later by one who is busy they would
     // keep all waiting.
@@ -87,6 +89,29 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
     }
   }
   return std::nullopt;
+}
+
+bool FrameSchedule::may_lease(const Frame& f, double now_s) const {
+  return gate_.open(f.request.viewer, now_s) && (!f.extra || gate_.idle(now_s));
+}
+
+// What is out of such a frame still comes; its viewer's requests wait until the link takes more.
+void FrameSchedule::put_back_held(double now_s) {
+  std::vector<wire::ViewRequest> held;
+  for (Frame& f : frames_) {
+    if (f.extra || !f.tiles.open() || f.tiles.any_out() || gate_.open(f.request.viewer, now_s))
+      f.held_from_s = 0;
+    else if (f.held_from_s == 0)
+      f.held_from_s = now_s;
+    else if (f.step == 1 && now_s - f.held_from_s > kHeld_s)
+      held.push_back(f.request);
+  }
+  for (const auto& view : held)
+    std::erase_if(frames_, [&](const Frame& f) {
+      if (f.extra || f.request.viewer != view.viewer || f.request.request != view.request) return false;
+      if (f.step == 1) put_back(f.id);
+      return true;
+    });
 }
 
 wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& sampler, double now_s) {
@@ -122,6 +147,8 @@ void FrameSchedule::extend(LeaseId lease, double now_s) {
 
 bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
   const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
+  // What a block gives is counted to its last tile: of plans a block is a tile.
+  gate_.published(m.bytes_sent, f != frames_.end() && f->planned ? m.rays : 0, now_s);
   if (f == frames_.end()) return false;
   if (m.tile >= f->tiles.tiles()) return false;
   std::optional<double> took_s;
@@ -179,6 +206,7 @@ int FrameSchedule::expire(double now_s, const std::function<void(const std::stri
   }));
   released_ += uint64_t(count);
   end_closed();
+  put_back_held(now_s);
   return count;
 }
 

@@ -10,6 +10,7 @@
 
 #include "common/wire/messages.h"
 #include "services/master/tiles/frame_tiles.h"
+#include "services/master/tiles/link_gate.h"
 #include "services/master/tiles/plan_questions.h"
 #include "services/master/tiles/refining_rays.h"
 #include "services/master/tiles/sampling_costs.h"
@@ -33,6 +34,8 @@ inline constexpr double kDearRow_s = 0.01;
 inline constexpr double kExtraFrame_s = 0.05;
 /// When another view begins, open tiles of an extra frame that is older are dropped.
 inline constexpr double kExtraPatience_s = 0.25;
+/// A view whose viewer's link takes nothing for so long waits again, so that those of others can begin.
+inline constexpr double kHeld_s = 1;
 
 /// How the frames of a scene are leased.
 struct Cut {
@@ -44,7 +47,9 @@ struct Cut {
 
 class FrameSchedule : public Views {
  public:
-  explicit FrameSchedule(const ScheduleOptions& options) : Views(options) {}
+  explicit FrameSchedule(const ScheduleOptions& options) : Views(options) {
+    gate_.set_most(options.max_rate_mbit * 1e6 / 8);
+  }
 
   /// For frames that begin from now on.
   void set_cut(Cut cut) {
@@ -71,8 +76,12 @@ class FrameSchedule : public Views {
   std::vector<metrics::PlanRow> take_plan_rows() { return std::exchange(plan_rows_, {}); }
   bool steered(double now_s) const { return plans_.on(now_s); }
   /// There is another packer.
-  void trust_packer() { plans_.trust(); }
+  void trust_packer() { plans_.trust(), gate_.clear(); }
   void forget_viewer(InstanceId viewer) override;
+
+  /// How a viewer's link does: its views begin, and their tiles are leased, only when its queue is short.
+  void on_link(const wire::LinkReport& link, double now_s) { gate_.report(link, now_s); }
+  const LinkGate& links() const { return gate_; }
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been
   /// out for long in a frame that has none (see backup_after_s()). The newest frame's last rows, one a sampler, go only
@@ -124,6 +133,7 @@ class FrameSchedule : public Views {
     bool extra = false;                // of rays beyond a view
     double begun_s = 0;                // its plan came
     double refining = 0, put_off = 0;  // RefiningRays::learn()
+    double held_from_s = 0;            // its viewer's link has taken nothing since; 0: it takes more
   };
   // A lease whose tile another sampler delivered first; its own may be dead or slow.
   struct Overtaken {
@@ -139,7 +149,10 @@ class FrameSchedule : public Views {
   void close_extras(const wire::ViewRequest& view, double now_s);
   void view_complete(const PlannedView& view);
   void note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
-  PlanLimits limits() const;
+  /// viewer: of a view; nullopt: of extra rays, which go to all.
+  PlanLimits limits(std::optional<InstanceId> viewer) const;
+  bool may_lease(const Frame& frame, double now_s) const;
+  void put_back_held(double now_s);
   double target_s() const;
   std::deque<Frame>::iterator end_frame(std::deque<Frame>::iterator frame);
   void end_closed();
@@ -152,6 +165,7 @@ class FrameSchedule : public Views {
   std::deque<Frame> frames_;  // extra ones last
   std::map<LeaseId, Overtaken> overtaken_;
   SamplingCosts costs_;
+  LinkGate gate_;
   RefiningRays refining_;
   RunningMean tile_time_s_{0.05};     // lease -> done
   RunningMean planned_time_s_{0.05};  // the same of tiles of plans, which have few rays

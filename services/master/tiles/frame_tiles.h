@@ -49,6 +49,8 @@ class FrameTiles {
   };
 
   bool open() const { return !closed_ && (!reopened_.empty() || unleased_ < tiles_.size() || rows_.rows_left() > 0); }
+  /// Leases are out.
+  bool any_out() const { return !out_.empty(); }
   bool complete() const { return closed_ ? out_.empty() : done_ == tiles_.size() && rows_.rows_left() == 0; }
   /// Open tiles are not wanted any more; what is out may still come.
   void close() { closed_ = true; }

@@ -23,6 +23,13 @@ auto answered_by(const wire::Plan& plan) {
   return [&](const auto& asked) { return asked.request.frame == plan.frame && asked.request.epoch == plan.epoch; };
 }
 
+// Refining rays of a view: edges may have four times as many, and what is new has no limit.
+constexpr uint64_t kRefiningPart = 3;
+
+uint64_t within(uint64_t rays, uint64_t link_rays) {
+  return link_rays == 0 ? rays : std::max<uint64_t>(1, std::min(rays, link_rays));
+}
+
 }  // namespace
 
 PlanQuestions::Seen& PlanQuestions::see(const PlannedView& view) {
@@ -36,7 +43,7 @@ wire::PlanRequest PlanQuestions::ask(const PlannedView& view, const PlanLimits& 
   const Seen& seen = see(view);
   wire::PlanRequest request = request_of(view, limits);
   request.still = seen.still;
-  request.most_rays = limits.refining_rays * (seen.still ? kStillViews : 1);
+  request.most_rays = within(limits.refining_rays * (seen.still ? kStillViews : 1), limits.link_rays / kRefiningPart);
   open_.push_back({view, request, now_s});
   return request;
 }
@@ -69,7 +76,7 @@ wire::PlanRequest PlanQuestions::ask_extra(FrameId frame, EpochId epoch, Extra w
   request.extra = true;
   request.round = seen.round++;
   request.still = seen.still;
-  request.most_rays = limits.most_rays * (seen.still ? kStillExtras : 1);
+  request.most_rays = within(limits.most_rays * (seen.still ? kStillExtras : 1), limits.link_rays);
   open_.push_back({view, request, now_s});
   return request;
 }

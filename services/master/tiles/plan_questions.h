@@ -39,6 +39,7 @@ struct PlanLimits {
   int tile_size = 256;
   uint64_t tile_rays = 0;
   uint64_t most_rays = 0;      ///< of an extra frame
+  uint64_t link_rays = 0;      ///< that the viewer's link carries in an update's time; 0: no limit
   uint64_t refining_rays = 0;  ///< of a view: PlanRequest::most_rays
 };
 

@@ -27,13 +27,14 @@ PlannedView planned(PlannedView view, double now_s) {
 
 }  // namespace
 
-PlanLimits FrameSchedule::limits() const {
+PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer) const {
   const double ray_s = costs_.pixel_s({});
   const bool few = costs_.samplers() <= kFewSamplers;
   const int side = few ? kPlannedSideOfFew : kPlannedSide;
   PlanLimits out{.tile_size = side * options().tile_size, .tile_rays = kFirstTileRays, .most_rays = kFirstExtraRays};
   const size_t samplers = std::max<size_t>(costs_.samplers(), 1);
   out.refining_rays = refining_.most(samplers);
+  out.link_rays = viewer ? gate_.update_rays(*viewer) : gate_.least_update_rays();
   if (!(ray_s > 0)) return out;
   out.tile_rays = uint64_t(std::clamp((few ? kTargetsOfFew : 1) * target_s() / ray_s, kLeastTileRays, kMostRays));
   out.most_rays = uint64_t(std::clamp(kExtraFrame_s * double(samplers) / ray_s, kLeastTileRays, kMostRays));
@@ -105,11 +106,11 @@ void FrameSchedule::view_complete(const PlannedView& view) {
 // do its tiles in between; it is planned while they are busy with a view, as the packer is not.
 void FrameSchedule::begin_extra(EpochId epoch, double now_s) {
   const bool extra_out = std::any_of(frames_.begin(), frames_.end(), [](const Frame& f) { return f.extra; });
-  if (!plans_.on(now_s) || plans_.extra_open() || extra_out) return;
+  if (!plans_.on(now_s) || plans_.extra_open() || extra_out || !gate_.idle(now_s)) return;
   const bool nothing_else = !view_waiting() && views_in_flight() == 0;
   const auto which = nothing_else ? PlanQuestions::Extra::kAny : PlanQuestions::Extra::kDue;
   if (!plans_.extra_wanted(epoch, which)) return;
-  questions_.push_back(plans_.ask_extra(next_frame(), epoch, which, limits(), now_s));
+  questions_.push_back(plans_.ask_extra(next_frame(), epoch, which, limits(std::nullopt), now_s));
 }
 
 // A view makes what is beyond others old, but not what is beyond itself: a head that rests asks for it every second.
@@ -128,6 +129,7 @@ void FrameSchedule::end_closed() {
 void FrameSchedule::forget_viewer(InstanceId viewer) {
   Views::forget_viewer(viewer);
   plans_.forget_viewer(viewer);
+  gate_.forget(viewer);
 }
 
 }  // namespace telesplat::master

@@ -82,6 +82,12 @@ metrics::SpanOf of(const wire::TileDone& tile) {
   return {double(tile.frame.value), double(tile.tile), double(tile.request.value)};
 }
 
+// About as many bytes as the event has as a message.
+uint64_t size_on_wire(const Event& e) {
+  constexpr uint64_t kRest = 530;  // camera, moments, numbers, names
+  return kRest + (e.blob ? e.blob->size() : 0) + 4 * (e.missed.size() + e.clusters.size() + e.frames.size());
+}
+
 // The event as messages: calls send(message).
 void with_message(InstanceId packer, const Event& e, const wire::Moments& moments, auto&& send) {
   switch (e.kind) {
@@ -140,6 +146,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   }
   if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
     if (core_) instance_ = net::make_instance_id();  // viewers start anew
+    meter_.clear();
     model_ = config.model;
     planner_.reset();
     core_.emplace(config, session.epoch);
@@ -288,9 +295,12 @@ void PointPacking::record(const SampledTile& block) {
 }
 
 void PointPacking::take_state(net::Socket& from, const net::Message& message, double now_s) {
-  net::dispatch<wire::StateRequest, wire::AccessReport>(from, message, [&](const auto& m) {
+  net::dispatch<wire::StateRequest, wire::AccessReport, wire::Receipt>(from, message, [&](const auto& m) {
     if (!core_) return;
-    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::AccessReport>)
+    using M = std::decay_t<decltype(m)>;
+    if constexpr (std::is_same_v<M, wire::Receipt>)
+      on_receipt(m, now_s);
+    else if constexpr (std::is_same_v<M, wire::AccessReport>)
       core_->accessed(m.clusters, now_s, m.frames);
     else
       answer(m, message.peer);
@@ -310,7 +320,15 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
   log::info("a viewer caught up: {} events after {}", events.size(), after.value);
 }
 
+void PointPacking::on_receipt(const wire::Receipt& receipt, double now_s) {
+  if (receipt.packer != instance_) return;
+  meter_.received(receipt.viewer, receipt.newest, receipt.viewer_s, now_s);
+  const LinkFigures f = meter_.figures(receipt.viewer, now_s).value_or(LinkFigures{});
+  if (outlets_.tell_link) outlets_.tell_link({receipt.viewer, f.rate_bytes_s, f.backlog_bytes, f.rtt_s, f.oldest_s});
+}
+
 void PointPacking::publish(const Event& event, const wire::Moments& moments) {
+  meter_.published(event.sequence, size_on_wire(event), monotonic_s());
   with_message(instance_, event, moments, [&](const auto& m) { outlets_.publish(m); });
 }
 
@@ -331,6 +349,7 @@ bool PointPacking::idle(double now_s) {
 
 void PointPacking::tick(double now_s) {
   ahead_.expire(now_s);
+  meter_.expire(now_s);
   if (!core_) return;
   if (now_s - last_forget_s_ >= kForgetPeriod_s) {
     last_forget_s_ = now_s;

@@ -9,6 +9,7 @@
 #include "services/packer/packing.h"
 #include "services/packer/points/block_gatherer.h"
 #include "services/packer/points/depth_recorder.h"
+#include "services/packer/points/link_meter.h"
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
 
@@ -57,6 +58,7 @@ class PointPacking final : public Packing {
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
   void answer(const wire::StateRequest& request, const std::string& peer);
+  void on_receipt(const wire::Receipt& receipt, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});
   wire::StateMark mark(bool answer) const;
 
@@ -70,6 +72,7 @@ class PointPacking final : public Packing {
   points::ModelConfig model_;
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;
+  LinkMeter meter_;  // of the viewers' links
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
   uint64_t plans_ = 0;
   FrameId planning_;           // whose extra rays were planned last,

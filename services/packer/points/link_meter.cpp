@@ -1,0 +1,96 @@
+#include "services/packer/points/link_meter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace telesplat::packer {
+
+void LinkMeter::published(Sequence sequence, uint64_t bytes, double now_s) {
+  bytes_ += bytes;
+  published_.push_back({sequence, bytes_, now_s});
+  if (published_.size() <= kMostRemembered) return;
+  forgotten_bytes_ = published_.front().bytes_so_far;
+  published_.pop_front();
+}
+
+// The newest that is not newer.
+std::deque<LinkMeter::Published>::const_iterator LinkMeter::find(Sequence sequence) const {
+  const auto after = std::upper_bound(published_.begin(), published_.end(), sequence,
+                                      [](Sequence s, const Published& p) { return s < p.sequence; });
+  return after == published_.begin() ? published_.end() : std::prev(after);
+}
+
+double LinkMeter::Viewer::rtt_s() const {
+  if (least_rtt_s == 0 || least_before_s == 0) return std::max(least_rtt_s, least_before_s);
+  return std::min(least_rtt_s, least_before_s);
+}
+
+void LinkMeter::learn_rtt(Viewer& v, double rtt_s, double now_s) {
+  if (now_s - v.window_from_s > kRttWindow_s) {
+    v.least_before_s = v.least_rtt_s;
+    v.least_rtt_s = 0;
+    v.window_from_s = now_s;
+  }
+  if (rtt_s > 0) v.least_rtt_s = v.least_rtt_s == 0 ? rtt_s : std::min(v.least_rtt_s, rtt_s);
+}
+
+// From one receipt to the next the link was busy if the newest that arrived in between had been published before the
+// earlier one was given: then it, and all before it, waited for the link or were on it. Times in which the link had
+// nothing to do say nothing of what it can.
+void LinkMeter::learn_rate(Viewer& v, const Receipt& now, double published_s) {
+  const double span_s = now.viewer_s - v.last.viewer_s;
+  const uint64_t bytes = now.bytes_so_far - v.last.bytes_so_far;
+  if (span_s <= 0 || bytes < kLeastBusyBytes || published_s > v.last.arrived_s - v.rtt_s()) return;
+  const double keep = std::exp(-span_s / kRateWindow_s);
+  v.busy_bytes = keep * v.busy_bytes + double(bytes);
+  v.busy_s = keep * v.busy_s + span_s;
+}
+
+void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, double now_s) {
+  if (published_.empty() || newest > published_.back().sequence || !std::isfinite(viewer_s)) return;
+  const auto event = find(newest);  // none: it has nothing that is remembered
+  const Receipt receipt{newest, event == published_.end() ? forgotten_bytes_ : event->bytes_so_far, viewer_s, now_s};
+  const double rtt_s = event == published_.end() ? 0 : now_s - event->at_s;
+  auto known = viewers_.find(viewer);
+  if (known == viewers_.end()) {
+    if (viewers_.size() >= kMostViewers) return;
+    known = viewers_.emplace(viewer, Viewer{.window_from_s = now_s}).first;
+    known->second.last = receipt;
+    learn_rtt(known->second, rtt_s, now_s);
+    return;
+  }
+  Viewer& v = known->second;
+  if (newest > v.last.newest) {
+    learn_rtt(v, rtt_s, now_s);
+    learn_rate(v, receipt, now_s - rtt_s);
+    v.last = receipt;
+  } else if (newest == v.last.newest) {
+    // Nothing came meanwhile: what comes next is counted from here.
+    v.last.viewer_s = viewer_s;
+    v.last.arrived_s = now_s;
+  }
+}
+
+void LinkMeter::expire(double now_s) {
+  std::erase_if(viewers_, [&](const auto& v) { return now_s - v.second.last.arrived_s > kSilence_s; });
+}
+
+void LinkMeter::clear() {
+  published_.clear();
+  viewers_.clear();
+  bytes_ = forgotten_bytes_ = 0;
+}
+
+std::optional<LinkFigures> LinkMeter::figures(InstanceId viewer, double now_s) const {
+  const auto found = viewers_.find(viewer);
+  if (found == viewers_.end()) return std::nullopt;
+  const Viewer& v = found->second;
+  LinkFigures out{.backlog_bytes = bytes_ - v.last.bytes_so_far, .rtt_s = v.rtt_s()};
+  if (v.busy_s > 0) out.rate_bytes_s = v.busy_bytes / v.busy_s;
+  const auto oldest = std::upper_bound(published_.begin(), published_.end(), v.last.newest,
+                                       [](Sequence s, const Published& p) { return s < p.sequence; });
+  if (oldest != published_.end()) out.oldest_s = std::max(0.0, now_s - oldest->at_s);
+  return out;
+}
+
+}  // namespace telesplat::packer
