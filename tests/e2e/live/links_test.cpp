@@ -214,6 +214,30 @@ TEST(Links, AKilledRelayIsStartedAgainAndTheRunGoesOn) {
   EXPECT_TRUE(run.all_gone());
 }
 
+TEST(Links, AViewerThatDoesNotReadHoldsUpNoOther) {
+  PipelineRun run({"--duration", "0", "--viewers", "2", "--link", "rtt=20ms,rate=20mbit"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  pid_t stuck = 0;
+  ASSERT_TRUE(run.wait_status([&](const auto& s) {
+    const auto p = process(s, "viewer-2");
+    if (p.is_object()) stuck = p["pid"].template get<pid_t>();
+    return stuck > 0 && value(s, "viewer-2", "updates") > 2 && value(s, "viewer-1", "rtt_ms") >= 20;
+  }));
+  ::kill(stuck, SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  double updates = -1;
+  EXPECT_TRUE(run.wait_status(
+      [&](const auto& s) {
+        if (updates < 0) updates = value(s, "viewer-1", "updates");
+        return value(s, "viewer-1", "updates") > updates + 10;
+      },
+      20))
+      << "the other one waits for it";
+  ::kill(stuck, SIGCONT);
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+}
+
 TEST(Links, BadOnesAreRefused) {
   for (const auto& [link, why] :
        {std::pair{"rate=0",
