@@ -226,7 +226,8 @@ void ViewerWorker::on_part(const ViewPart& part) {
   const double local_s = monotonic_s(), now_s = to_master_s(local_s);
   bytes_received_ += part.bytes;
   if (part.viewer != link_.instance()) return;
-  gate_.with([&](Coupling& c) { c.progress(local_s); });
+  // Rays beyond views answer no request: while they come, one that was lost must be asked for again all the same.
+  if (!part.extra) gate_.with([&](Coupling& c) { c.progress(local_s); });
   const auto u = requester_.on_part(part, now_s);
   if (!u) return;
   updates_table_.add(update_row({*u, part}));
