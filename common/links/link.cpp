@@ -17,6 +17,7 @@ struct Unit {
 };
 constexpr std::array kTimes{Unit{"us", 1e-6}, Unit{"ms", 1e-3}, Unit{"s", 1}};
 constexpr std::array kRates{Unit{"kbit", 1e3}, Unit{"mbit", 1e6}, Unit{"gbit", 1e9}};
+constexpr double kLeastBetweenStalls_s = 0.01, kMostStalled = 0.99;
 constexpr double kLongest_s = 10, kMostBetweenStalls_s = 3600, kLeastRate = 1e4, kMostRate = 1e11;
 constexpr double kShortestQueue_s = 0.1;
 
@@ -60,9 +61,11 @@ Status read_stall(Link& link, std::string_view value) {
   const auto stall = slash == value.npos ? std::nullopt : part(0, slash);
   const auto every = slash == value.npos ? std::nullopt : part(slash + 1, value.npos);
   if (!stall || !every) return wrong("stall", value, "is not FOR/EVERY, two times such as 2s/30s");
-  if (!(*stall > 0 && *stall < *every && *every <= kMostBetweenStalls_s))
+  if (!(*stall > 0 && *every >= kLeastBetweenStalls_s && *stall <= kMostStalled * *every &&
+        *every <= kMostBetweenStalls_s))
     return wrong("stall", value,
-                 fmt::format("FOR must be above 0 and below EVERY, EVERY at most {}s", kMostBetweenStalls_s));
+                 fmt::format("FOR must be above 0 and at most {} of EVERY, EVERY {}s to {}s", kMostStalled,
+                             kLeastBetweenStalls_s, kMostBetweenStalls_s));
   link.stall_s = *stall;
   link.stall_every_s = *every;
   return ok_status();

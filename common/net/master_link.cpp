@@ -76,7 +76,8 @@ bool MasterLink::handle(const Message& message) {
       ++version_;
       // The hello and its answer are an exchange, too.
       if (another && session_->hello_sent_s != 0)
-        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s, {}},
+        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s,
+                     session_->clock},
                     message.arrived_s);
     }
     return true;

@@ -46,6 +46,7 @@ struct Welcome {
   InstanceId master;
   double hello_sent_s = 0;  ///< Hello::sent_s, echoed; 0 in an unasked welcome
   double master_s = 0;      ///< master's clock when sent
+  std::string clock;        ///< which clock that is: clock_id()
   EpochId epoch;
   uint64_t octree_depth = 0;
   geometry::Box box_room;                        ///< empty until a data server said hello
@@ -54,7 +55,8 @@ struct Welcome {
   std::map<std::string, double> parameters;      ///< of the scene in this epoch
   std::map<std::string, double> settings;        ///< packing.* and session.* values
   template <class F> static void fields(F& f, auto& m) {
-    f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s); f("epoch", m.epoch);
+    f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s);
+    f("clock", m.clock); f("epoch", m.epoch);
     f("octree_depth", m.octree_depth); f("box_room", m.box_room); f("endpoints", m.endpoints);
     f("facts", m.facts, kMaxFact); f("parameters", m.parameters); f("settings", m.settings);
   }

@@ -234,7 +234,10 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
 
 void MasterCore::on(const std::string& peer, const wire::LinkReport& m, double now_s) {
   const Peer* p = known(peer, now_s);
-  if (!p || p->hello.role != "packer" || !instances_.contains(m.viewer)) return;
+  if (!p || p->hello.role != "packer") return;
+  const auto by = instances_.find(m.viewer);
+  const auto viewer = by == instances_.end() ? peers_.end() : peers_.find(by->second);
+  if (viewer == peers_.end() || viewer->second.gone || viewer->second.hello.role != "viewer") return;
   plan_->on_link(m, now_s);
   dispatch(now_s);
 }

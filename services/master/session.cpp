@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/core/clock.h"
 #include "common/points/point_model.h"
 #include "common/scene/session.h"
 #include "services/master/master_core.h"
@@ -58,6 +59,7 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   wire::Welcome w = scene_as_told();
   w.master = instance_;
   w.master_s = now_s;
+  w.clock = clock_id();
   w.epoch = epoch_;
   for (const auto& [id, p] : peers_)
     if (!p.gone && !p.refused) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());

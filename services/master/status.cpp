@@ -103,6 +103,7 @@ LiveSnapshot MasterCore::live_snapshot() const {
     e.alive = !p.gone;
     if (p.hello.role == "sampler") e.leases = double(plan_->leases_of(id));
     e.values = p.process.values;
+    for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e.values[key] = value;
     e.rates = rates(p.reports);
   }
   return out;

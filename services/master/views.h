@@ -39,6 +39,8 @@ class Views {
   void request_view(const wire::ViewRequest& request);
   virtual void forget_viewer(InstanceId viewer);
   bool view_waiting() const { return !waiting_.empty(); }
+  /// A view of a viewer waits for which this is true.
+  bool view_waits(const std::function<bool(InstanceId)>& of) const { return waiting_.next(false, of) != nullptr; }
   size_t views_waiting() const { return waiting_.waiting(); }
   /// See ViewQueue.
   void begin_turns() { waiting_.begin_turns(); }

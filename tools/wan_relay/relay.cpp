@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -92,14 +93,17 @@ struct Relay::Impl {
   using Told = std::function<std::string(const error_code&)>;
   void resolve(std::shared_ptr<Connection> connection, const std::string& host, const std::string& port, Told told) {
     auto resolver = std::make_shared<Tcp::resolver>(context);
-    resolver->async_resolve(host, port,
-                            [resolver, connection, told = std::move(told)](const error_code& error, auto found) {
-                              if (!error) return connection->connect(*found.begin(), told);
-                              const std::string answer = told(error);
-                              error_code ignored;
-                              if (!answer.empty()) connection->near().write_some(boost::asio::buffer(answer), ignored);
-                              connection->close();
-                            });
+    resolver->async_resolve(
+        host, port, [resolver, connection, told = std::move(told)](const error_code& error, auto found) {
+          // Services listen at IPv4 addresses unless told otherwise.
+          const auto v4 = std::find_if(found.begin(), found.end(),
+                                       [](const auto& entry) { return entry.endpoint().address().is_v4(); });
+          if (!error) return connection->connect(v4 == found.end() ? *found.begin() : *v4, told);
+          const std::string answer = told(error);
+          error_code ignored;
+          if (!answer.empty()) connection->near().write_some(boost::asio::buffer(answer), ignored);
+          connection->close();
+        });
   }
 
   void note(const std::string& where, const error_code& error) {

@@ -39,6 +39,7 @@ StageTable::StageTable()
 
 void StageTable::complete(const MeasuredUpdate& m) {
   const ViewRequester::Update& u = m.update;
+  if (m.last.moments == wire::Moments{}) return;  // sent again later: nobody knows any more how it came about
   const metrics::UpdateMoments moments{.requested_s = u.requested_s,
                                        .arrived_s = m.last.arrived_s,
                                        .decode_begin_s = m.last.decode_begin_s,

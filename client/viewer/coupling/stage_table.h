@@ -25,7 +25,7 @@ struct UpdateStages {
 class StageTable {
  public:
   StageTable();
-  /// The update is complete.
+  /// The update is complete. One that a replay of events completed has no row.
   void complete(const MeasuredUpdate& measured);
   /// A frame that ended at this moment of the master's clock shows this update, and all before it.
   void displayed(RequestId request, double end_s);

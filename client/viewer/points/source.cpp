@@ -168,7 +168,6 @@ void PointSource::add_figures(DrawnFrame& out) const {
   out.detail = options_.selection.detail;
   out.budget_ms = budget_.budget_ms();
   out.epoch = list_.epoch;
-  out.update = received_.shown();
 }
 
 DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
@@ -177,6 +176,7 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(input.look.render.kernel);
   o.selection.best_patch_only = received_.keeps_redundant();
   DrawnFrame out;
+  out.update = received_.shown();  // before it is drawn: what comes meanwhile may not be in the picture
   received_.cache().take_changes(changes_);
   ray_changes_.clear();
   received_.fine_rays().take_changes(input.camera, ray_changes_);

@@ -23,12 +23,18 @@ const char* lane_name(const std::string& role, int lane) {
   return "work";
 }
 
+constexpr double kMostNumber = 9007199254740992;  // 2^53: peers may say anything
+constexpr int kMostLanes = 16;
+
 // What of these is known.
 json args_of(double frame, double tile, double request) {
   json out = json::object();
-  if (frame >= 0) out["frame"] = uint64_t(frame);
-  if (tile >= 0) out["tile"] = uint64_t(tile);
-  if (request >= 0) out["request"] = uint64_t(request);
+  const auto add = [&](const char* key, double number) {
+    if (number >= 0 && number <= kMostNumber) out[key] = uint64_t(number);
+  };
+  add("frame", frame);
+  add("tile", tile);
+  add("request", request);
   return out;
 }
 
@@ -76,6 +82,7 @@ void TraceFile::add(const Process& process, const wire::MetricRows& rows) {
   for (size_t i = 0; i + kSpanWidth <= rows.values.size(); i += kSpanWidth) {
     const double name = rows.values[i], begin_s = rows.values[i + 1], end_s = rows.values[i + 2];
     if (!(name >= 0 && name < double(rows.columns.size()))) continue;
+    if (!(rows.values[i + 3] >= kOverlapping && rows.values[i + 3] < kMostLanes)) continue;
     const int lane = int(rows.values[i + 3]);
     const double request = rows.values[i + 6];
     json args = args_of(rows.values[i + 4], rows.values[i + 5], request);

@@ -17,7 +17,8 @@ wire::Moments leased(wire::Moments moments, double now_s) {
 bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   const bool steered = plans_.on(now_s);
   // The plan of a viewer's next view must know the samples of the one before.
-  const auto ready = [&](InstanceId viewer) { return gate_.open(viewer, now_s); };
+  in_turns_ = turns_only;
+  const auto ready = [&](InstanceId viewer) { return open(viewer, now_s); };
   const auto request = take_view(turns_only, steered ? InFlight::kOneAViewer : InFlight::kAny, ready);
   if (!request) return false;
   close_extras(*request, now_s);
@@ -27,7 +28,7 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   view.frame = next_frame();
   begin(view.frame, {*request});
   if (steered) {
-    questions_.push_back(plans_.ask(view, limits(request->viewer), now_s));
+    questions_.push_back(plans_.ask(view, limits(request->viewer, now_s), now_s));
   } else {
     plans_.begin_unplanned(view);
     begin_whole(view);
@@ -92,18 +93,24 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
 }
 
 bool FrameSchedule::may_lease(const Frame& f, double now_s) const {
-  return gate_.open(f.request.viewer, now_s) && (!f.extra || gate_.idle(now_s));
+  return open(f.request.viewer, now_s) && (!f.extra || gate_.idle(now_s));
 }
 
-// What is out of such a frame still comes; its viewer's requests wait until the link takes more.
+// A view of another viewer waits, whose link takes more.
+bool FrameSchedule::other_waits(InstanceId viewer, double now_s) const {
+  return view_waits([&](InstanceId other) { return other != viewer && gate_.open(other, now_s); });
+}
+
+// Nothing is put back for the viewer's own sake: its samples would be made, and sent, once more. What is out of such a
+// frame still comes; its viewer's requests wait until the link takes more.
 void FrameSchedule::put_back_held(double now_s) {
   std::vector<wire::ViewRequest> held;
   for (Frame& f : frames_) {
-    if (f.extra || !f.tiles.open() || f.tiles.any_out() || gate_.open(f.request.viewer, now_s))
+    if (f.extra || !f.tiles.open() || f.tiles.any_out() || open(f.request.viewer, now_s))
       f.held_from_s = 0;
     else if (f.held_from_s == 0)
       f.held_from_s = now_s;
-    else if (f.step == 1 && now_s - f.held_from_s > kHeld_s)
+    else if (f.step == 1 && now_s - f.held_from_s > kHeld_s && other_waits(f.request.viewer, now_s))
       held.push_back(f.request);
   }
   for (const auto& view : held)

@@ -150,8 +150,10 @@ class FrameSchedule : public Views {
   void view_complete(const PlannedView& view);
   void note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
   /// viewer: of a view; nullopt: of extra rays, which go to all.
-  PlanLimits limits(std::optional<InstanceId> viewer) const;
+  PlanLimits limits(std::optional<InstanceId> viewer, double now_s) const;
+  bool open(InstanceId viewer, double now_s) const { return in_turns_ || gate_.open(viewer, now_s); }
   bool may_lease(const Frame& frame, double now_s) const;
+  bool other_waits(InstanceId viewer, double now_s) const;
   void put_back_held(double now_s);
   double target_s() const;
   std::deque<Frame>::iterator end_frame(std::deque<Frame>::iterator frame);
@@ -166,6 +168,7 @@ class FrameSchedule : public Views {
   std::map<LeaseId, Overtaken> overtaken_;
   SamplingCosts costs_;
   LinkGate gate_;
+  bool in_turns_ = false;  // an animation plays: who waits for its link would hold up the others
   RefiningRays refining_;
   RunningMean tile_time_s_{0.05};     // lease -> done
   RunningMean planned_time_s_{0.05};  // the same of tiles of plans, which have few rays

@@ -62,10 +62,10 @@ uint64_t LinkGate::update_rays(InstanceId viewer) const {
   return std::max(kLeastRays, uint64_t(std::min(1e9, bytes_s * kUpdate_s / bytes_a_ray_.value())));
 }
 
-uint64_t LinkGate::least_update_rays() const {
+uint64_t LinkGate::least_update_rays(double now_s) const {
   uint64_t least = 0;
   for (const auto& [viewer, link] : links_)
-    if (const uint64_t rays = update_rays(viewer); rays > 0 && (least == 0 || rays < least)) least = rays;
+    if (const uint64_t rays = reads(link, now_s) ? update_rays(viewer) : 0; rays > 0 && (least == 0 || rays < least)) least = rays;
   return least;
 }
 

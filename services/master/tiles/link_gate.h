@@ -40,8 +40,8 @@ class LinkGate {
   bool idle(double now_s) const;
   /// Rays that the link carries in an update's time, once coded; 0: no limit is known.
   uint64_t update_rays(InstanceId viewer) const;
-  /// The least of all viewers.
-  uint64_t least_update_rays() const;
+  /// The least of all viewers that read.
+  uint64_t least_update_rays(double now_s) const;
   /// "link_mbit", "backlog_bytes", "rtt_ms", as far as they are known.
   std::map<std::string, double> figures(InstanceId viewer) const;
 

@@ -27,14 +27,14 @@ PlannedView planned(PlannedView view, double now_s) {
 
 }  // namespace
 
-PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer) const {
+PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer, double now_s) const {
   const double ray_s = costs_.pixel_s({});
   const bool few = costs_.samplers() <= kFewSamplers;
   const int side = few ? kPlannedSideOfFew : kPlannedSide;
   PlanLimits out{.tile_size = side * options().tile_size, .tile_rays = kFirstTileRays, .most_rays = kFirstExtraRays};
   const size_t samplers = std::max<size_t>(costs_.samplers(), 1);
   out.refining_rays = refining_.most(samplers);
-  out.link_rays = viewer ? gate_.update_rays(*viewer) : gate_.least_update_rays();
+  out.link_rays = viewer ? gate_.update_rays(*viewer) : gate_.least_update_rays(now_s);
   if (!(ray_s > 0)) return out;
   out.tile_rays = uint64_t(std::clamp((few ? kTargetsOfFew : 1) * target_s() / ray_s, kLeastTileRays, kMostRays));
   out.most_rays = uint64_t(std::clamp(kExtraFrame_s * double(samplers) / ray_s, kLeastTileRays, kMostRays));
@@ -110,7 +110,7 @@ void FrameSchedule::begin_extra(EpochId epoch, double now_s) {
   const bool nothing_else = !view_waiting() && views_in_flight() == 0;
   const auto which = nothing_else ? PlanQuestions::Extra::kAny : PlanQuestions::Extra::kDue;
   if (!plans_.extra_wanted(epoch, which)) return;
-  questions_.push_back(plans_.ask_extra(next_frame(), epoch, which, limits(std::nullopt), now_s));
+  questions_.push_back(plans_.ask_extra(next_frame(), epoch, which, limits(std::nullopt, now_s), now_s));
 }
 
 // A view makes what is beyond others old, but not what is beyond itself: a head that rests asks for it every second.

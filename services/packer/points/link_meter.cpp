@@ -40,7 +40,8 @@ void LinkMeter::learn_rtt(Viewer& v, double rtt_s, double now_s) {
 void LinkMeter::learn_rate(Viewer& v, const Receipt& now, double published_s) {
   const double span_s = now.viewer_s - v.last.viewer_s;
   const uint64_t bytes = now.bytes_so_far - v.last.bytes_so_far;
-  if (span_s <= 0 || bytes < kLeastBusyBytes || published_s > v.last.arrived_s - v.rtt_s()) return;
+  if (span_s <= 0 || span_s > kSilence_s || bytes < kLeastBusyBytes || published_s > v.last.arrived_s - v.rtt_s())
+    return;
   const double keep = std::exp(-span_s / kRateWindow_s);
   v.busy_bytes = keep * v.busy_bytes + double(bytes);
   v.busy_s = keep * v.busy_s + span_s;
@@ -56,19 +57,34 @@ void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, do
     if (viewers_.size() >= kMostViewers) return;
     known = viewers_.emplace(viewer, Viewer{.window_from_s = now_s}).first;
     known->second.last = receipt;
-    learn_rtt(known->second, rtt_s, now_s);
+    known->second.moved_s = now_s;
+    if (const auto replay = replays_.extract(viewer)) known->second.replayed_until = replay.mapped();
+    if (newest >= known->second.replayed_until) learn_rtt(known->second, rtt_s, now_s);
     return;
   }
   Viewer& v = known->second;
   if (newest > v.last.newest) {
-    learn_rtt(v, rtt_s, now_s);
-    learn_rate(v, receipt, now_s - rtt_s);
+    // From a receipt within a replay on, or to one, nothing can be learnt.
+    if (v.last.newest >= v.replayed_until) {
+      learn_rtt(v, rtt_s, now_s);
+      learn_rate(v, receipt, now_s - rtt_s);
+    }
     v.last = receipt;
+    v.moved_s = now_s;
   } else if (newest == v.last.newest) {
     // Nothing came meanwhile: what comes next is counted from here.
     v.last.viewer_s = viewer_s;
     v.last.arrived_s = now_s;
   }
+}
+
+void LinkMeter::replayed(InstanceId viewer) {
+  if (published_.empty()) return;
+  const Sequence until = published_.back().sequence;
+  if (const auto known = viewers_.find(viewer); known != viewers_.end())
+    known->second.replayed_until = until;
+  else if (replays_.size() < kMostViewers)
+    replays_[viewer] = until;
 }
 
 void LinkMeter::expire(double now_s) {
@@ -78,6 +94,7 @@ void LinkMeter::expire(double now_s) {
 void LinkMeter::clear() {
   published_.clear();
   viewers_.clear();
+  replays_.clear();
   bytes_ = forgotten_bytes_ = 0;
 }
 
@@ -89,7 +106,7 @@ std::optional<LinkFigures> LinkMeter::figures(InstanceId viewer, double now_s) c
   if (v.busy_s > 0) out.rate_bytes_s = v.busy_bytes / v.busy_s;
   const auto oldest = std::upper_bound(published_.begin(), published_.end(), v.last.newest,
                                        [](Sequence s, const Published& p) { return s < p.sequence; });
-  if (oldest != published_.end()) out.oldest_s = std::max(0.0, now_s - oldest->at_s);
+  if (oldest != published_.end()) out.oldest_s = std::max(0.0, now_s - std::max(oldest->at_s, v.moved_s));
   return out;
 }
 

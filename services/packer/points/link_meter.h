@@ -16,7 +16,8 @@ struct LinkFigures {
   double rate_bytes_s = 0;     ///< what it carried when it was busy; 0: it never was, as far as is known
   uint64_t backlog_bytes = 0;  ///< published and not received
   double rtt_s = 0;            ///< from publishing to the receipt, at least, in the last 10 to 20 s; 0: not known
-  double oldest_s = 0;         ///< how long ago the oldest of the backlog was published; 0: there is none
+  /// How long it has had a backlog and received nothing of it; 0: there is none.
+  double oldest_s = 0;
 };
 
 class LinkMeter {
@@ -34,6 +35,8 @@ class LinkMeter {
   /// A viewer says that it has everything up to `newest`, at `viewer_s` of its own clock. What is not newer than an
   /// earlier receipt tells nothing.
   void received(InstanceId viewer, Sequence newest, double viewer_s, double now_s);
+  /// It was sent anew what it lacks, as far as is published: how fast sequences rise until then tells nothing.
+  void replayed(InstanceId viewer);
   /// Forgets viewers that fell silent.
   void expire(double now_s);
   /// Sequences begin anew: another model.
@@ -58,6 +61,8 @@ class LinkMeter {
     Receipt last;
     double busy_bytes = 0, busy_s = 0;  // decaying
     double least_rtt_s = 0, least_before_s = 0, window_from_s = 0;
+    double moved_s = 0;       // when it had something new
+    Sequence replayed_until;  // up to here sequences are those of a replay
     double rtt_s() const;
   };
   std::deque<Published>::const_iterator find(Sequence sequence) const;
@@ -67,6 +72,7 @@ class LinkMeter {
   std::deque<Published> published_;
   uint64_t bytes_ = 0, forgotten_bytes_ = 0;  // published in all; of events that are not remembered
   std::map<InstanceId, Viewer> viewers_;
+  std::map<InstanceId, Sequence> replays_;  // of viewers that have given no receipt yet
 };
 
 }  // namespace telesplat::packer

@@ -317,14 +317,16 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
   const auto events = core_->events_since(after);
   for (const auto& e : events) with_message(instance_, e, {}, [&](const auto& m) { outlets_.send(m, peer); });
   outlets_.send(mark(true), peer);
+  meter_.replayed(request.viewer);
   log::info("a viewer caught up: {} events after {}", events.size(), after.value);
 }
 
 void PointPacking::on_receipt(const wire::Receipt& receipt, double now_s) {
   if (receipt.packer != instance_) return;
   meter_.received(receipt.viewer, receipt.newest, receipt.viewer_s, now_s);
-  const LinkFigures f = meter_.figures(receipt.viewer, now_s).value_or(LinkFigures{});
-  if (outlets_.tell_link) outlets_.tell_link({receipt.viewer, f.rate_bytes_s, f.backlog_bytes, f.rtt_s, f.oldest_s});
+  const auto f = meter_.figures(receipt.viewer, now_s);
+  if (f && outlets_.tell_link)
+    outlets_.tell_link({receipt.viewer, f->rate_bytes_s, f->backlog_bytes, f->rtt_s, f->oldest_s});
 }
 
 void PointPacking::publish(const Event& event, const wire::Moments& moments) {

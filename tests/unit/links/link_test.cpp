@@ -50,7 +50,7 @@ TEST(LinkText, RefusalsNameWhatValueAndLimit) {
   EXPECT_EQ(refusal("rtt=40"), "rtt=40: is no time; a number and us, ms or s");
   EXPECT_EQ(refusal("jitter=x"), "jitter=x: is no time; a number and us, ms or s");
   EXPECT_EQ(refusal("stall=2s"), "stall=2s: is not FOR/EVERY, two times such as 2s/30s");
-  EXPECT_EQ(refusal("stall=30s/2s"), "stall=30s/2s: FOR must be above 0 and below EVERY, EVERY at most 3600s");
+  EXPECT_EQ(refusal("stall=30s/2s"), "stall=30s/2s: FOR must be above 0 and at most 0.99 of EVERY, EVERY 0.01s to 3600s");
   EXPECT_EQ(refusal("loss=1"), "loss: no such property of a link; rtt, rate, jitter and stall are");
   EXPECT_EQ(refusal("rtt=1ms,,"), ": is not PROPERTY=VALUE, as in rtt=40ms,rate=100mbit");
   for (const char* text :

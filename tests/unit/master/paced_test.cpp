@@ -70,11 +70,17 @@ TEST_F(Paced, ALinkThatTakesNothingDoesNotKeepOthersFromBeginning) {
   EXPECT_TRUE(done(*first, 500'000));
   EXPECT_EQ(schedule.views_in_flight(), 1u);
   const auto lost = [](const std::string&) {};
-  for (const double end = now + kHeld_s + 0.2; now < end; now += 0.05) schedule.expire(now, lost);
+  const auto wait = [&] {
+    for (const double end = now + kHeld_s + 0.2; now < end; now += 0.05) schedule.expire(now, lost);
+  };
+  wait();
+  EXPECT_EQ(schedule.views_in_flight(), 1u) << "nobody else waits: its samples are not made once more";
+  schedule.request_view(request(kNear, 1));
+  wait();
   EXPECT_EQ(schedule.views_in_flight(), 0u) << "it waits again";
   EXPECT_TRUE(schedule.view_waiting());
+  EXPECT_TRUE(schedule.begin_view({1}, false, now)) << "the other's";
   EXPECT_FALSE(schedule.begin_view({1}, false, now));
-  EXPECT_TRUE(begins(kNear, 1));
   link(kFar, 0);
   EXPECT_TRUE(schedule.begin_view({1}, false, now));
 }

@@ -46,6 +46,13 @@ TEST(StageTable, RowsComeWhenAFrameHasShownTheirUpdate) {
   EXPECT_EQ(cell(*last, 0, "display_ms"), -1) << "no frame showed it";
 }
 
+TEST(StageTable, NobodyKnowsHowAReplayedUpdateCameAbout) {
+  StageTable table;
+  const ViewRequester::Update update{.request = {1}, .requested_s = 1, .complete_s = 2, .tiles = 3};
+  table.complete({update, ViewPart{.frame = {7}, .arrived_s = 1.9}});
+  EXPECT_FALSE(table.flush({1}, true));
+}
+
 TEST(StageTable, IsBoundedWhereNothingIsDisplayed) {
   StageTable table;
   for (uint64_t i = 1; i <= 300; ++i) complete(table, i, double(i));

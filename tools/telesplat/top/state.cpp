@@ -15,8 +15,13 @@ constexpr size_t kMostProcesses = 4096;
 
 // Whoever named it does not move the cursor.
 std::string clean(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+  for (size_t i = 0; i < text.size(); ++i) {
+    // U+0080 to U+009F are control characters, too.
+    const bool wide = byte(i) == 0xc2 && i + 1 < text.size() && byte(i + 1) >= 0x80 && byte(i + 1) < 0xa0;
+    if (wide) text.erase(i + 1, 1);
+    if (wide || byte(i) < 0x20 || byte(i) == 0x7f) text[i] = '?';
+  }
   return text;
 }
 std::string clean_text(const Json& object, const char* key) { return clean(text(object, key)); }
