@@ -89,6 +89,7 @@ FLOORS = {
         ["tools/telesplat/run"],
         ["tools/telesplat/top"],
         ["tools/telesplat/sweep"],
+        ["tools/telesplat/tune"],
         ["tools/telesplat/bench", "tools/telesplat/cache", "tools/telesplat/compare", "tools/telesplat/inspect"],
         ["tools/telesplat"],
     ],

@@ -1,0 +1,146 @@
+#include "tools/telesplat/tune/choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/core/check.h"
+#include "tools/telesplat/tune/candidates.h"
+
+namespace telesplat::launcher {
+namespace {
+
+struct Guard {
+  double TuneFigures::*figure;
+  const char* title;
+  bool more_is_better, in_db;
+  double least, most;  // tolerated: never less, never more; a share, or dB
+};
+constexpr Guard kGuards[] = {{&TuneFigures::latency_ms, "latency", false, false, 0.01, 0.05},
+                             {&TuneFigures::psnr_db, "PSNR", true, true, 0.1, 0.5},
+                             {&TuneFigures::age_ms, "age of the displayed update", false, false, 0.02, 0.05},
+                             {&TuneFigures::frame_ms, "time between frames", false, false, 0.01, 0.05}};
+constexpr size_t kGains = 2;  // the first so many can make a configuration better
+
+// How much better b is than the defaults a (negative: worse), and how far runs of one of them lie apart.
+struct Difference {
+  double gain, apart;
+};
+std::optional<Difference> difference(const Guard& g, const Measured& a, const Measured& b) {
+  const Spread s = spread_of(a, g.figure), t = spread_of(b, g.figure);
+  if (s.runs == 0 || t.runs == 0) return std::nullopt;
+  const double unit = g.in_db ? 1 : s.median;
+  if (unit <= 0) return std::nullopt;
+  const double gain = (g.more_is_better ? t.median - s.median : s.median - t.median) / unit;
+  return Difference{gain, std::max(s.most - s.least, t.most - t.least) / unit};
+}
+
+std::string amount(const Guard& g, double share) {
+  return g.in_db ? fmt::format("{:.2f} dB", share) : fmt::format("{:.1f} %", 100 * share);
+}
+
+struct Judged {
+  bool allowed = true, better = false, maybe = false;
+  std::string reason;
+};
+
+Judged judge(const Measured& defaults, const Measured& m) {
+  Judged out;
+  if (m.runs.empty()) return {false, false, false, "no run of it came to its end"};
+  if (spread_of(m, &TuneFigures::latency_ms).runs == 0) return {false, false, false, "no view update was complete"};
+  std::vector<std::string> gains;
+  for (const Guard& g : kGuards) {
+    const auto d = difference(g, defaults, m);
+    if (!d) continue;
+    const double tolerated = std::clamp(d->apart, g.least, g.most);
+    if (-d->gain > tolerated) {
+      out.allowed = false;
+      out.reason =
+          fmt::format("{} is worse by {}, and {} is tolerated", g.title, amount(g, -d->gain), amount(g, tolerated));
+      return out;
+    }
+    if (&g >= kGuards + kGains || d->gain <= g.least) continue;
+    if (d->gain > d->apart) {
+      out.better = true;
+      gains.push_back(
+          fmt::format("{} is better by {} (runs differ by {})", g.title, amount(g, d->gain), amount(g, d->apart)));
+    } else {
+      out.maybe = true;
+    }
+  }
+  out.reason = out.better  ? fmt::format("{}", fmt::join(gains, "; "))
+               : out.maybe ? "what it seems to gain is less than runs differ by"
+                           : "it gains nothing";
+  return out;
+}
+
+double median_or(const Measured& m, double TuneFigures::*figure, double otherwise) {
+  const Spread s = spread_of(m, figure);
+  return s.runs > 0 ? s.median : otherwise;
+}
+
+double measured_score(const Measured& defaults, const Measured& m) {
+  const double psnr = spread_of(m, &TuneFigures::psnr_db).runs > 0 ? median_or(defaults, &TuneFigures::psnr_db, 0) : 0;
+  return score(median_or(m, &TuneFigures::latency_ms, 0), median_or(m, &TuneFigures::psnr_db, psnr),
+               median_or(defaults, &TuneFigures::latency_ms, 0), psnr);
+}
+
+bool noisy(const Measured& m) {
+  const Spread s = spread_of(m, &TuneFigures::latency_ms);
+  return s.runs > 1 && s.relative() > kQuiet;
+}
+
+}  // namespace
+
+TuneFigures tune_figures(const Figures& summary) {
+  const auto value = [&](const char* name) {
+    const double* found = find(summary, name);
+    return found ? *found : std::numeric_limits<double>::quiet_NaN();
+  };
+  return {value("view_update_latency_ms.median"), value("update_age_ms.p95"), value("quality.psnr_db.median"),
+          value("inter_frame_delay_ms.median"), value("updates_per_s")};
+}
+
+Spread spread_of(const Measured& measured, double TuneFigures::*figure) {
+  std::vector<double> values;
+  for (const TuneFigures& run : measured.runs)
+    if (std::isfinite(run.*figure)) values.push_back(run.*figure);
+  return values.empty() ? Spread{} : spread_of(values);
+}
+
+Choice choose(const std::vector<Measured>& all) {
+  CHECK(!all.empty() && !all[0].runs.empty());
+  Choice out;
+  out.reasons.emplace_back("the defaults");
+  bool maybe = false, loud = noisy(all[0]);
+  double best = 0;
+  for (size_t i = 1; i < all.size(); ++i) {
+    const Judged judged = judge(all[0], all[i]);
+    out.reasons.push_back(judged.reason);
+    maybe = maybe || (judged.allowed && judged.maybe);
+    loud = loud || noisy(all[i]);
+    if (!judged.allowed || !judged.better) continue;
+    const double gain = measured_score(all[0], all[i]);
+    if (gain <= best) continue;
+    best = gain;
+    out.chosen = i;
+  }
+  if (out.chosen != 0) {
+    out.verdict = Verdict::kBetter;
+    out.sentence = fmt::format("{} is better than the defaults: {}", all[out.chosen].name, out.reasons[out.chosen]);
+  } else if (loud) {
+    out.verdict = Verdict::kTooNoisy;
+    out.sentence = fmt::format(
+        "the machine was too noisy to tell: runs of one configuration differ by more than {:.0f} % in latency; the "
+        "defaults stay",
+        100 * kQuiet);
+  } else {
+    out.sentence = maybe ? "the defaults stay: no gain is larger than runs of one configuration differ by"
+                         : "the defaults were best";
+  }
+  return out;
+}
+
+}  // namespace telesplat::launcher

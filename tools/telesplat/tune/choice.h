@@ -1,0 +1,50 @@
+// Which of several measured configurations is taken, and whether the machine was quiet enough to tell.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/telesplat/sweep/figures.h"
+
+namespace telesplat::launcher {
+
+/// What a run is judged by. A figure that was not measured is NaN, and judges nothing.
+struct TuneFigures {
+  double latency_ms, age_ms, psnr_db, frame_ms, updates_per_s;
+};
+/// From the numbers of a run's summary.json.
+TuneFigures tune_figures(const Figures& summary);
+
+/// A configuration with its runs; the defaults are one, too.
+struct Measured {
+  std::string name;
+  std::vector<TuneFigures> runs;
+};
+
+/// A figure over the runs that have it; runs 0: none has.
+Spread spread_of(const Measured& measured, double TuneFigures::*figure);
+
+enum class Verdict {
+  kBetter,        ///< the chosen one is better than the defaults by more than runs differ
+  kDefaultsBest,  ///< none is, and runs differed little
+  kTooNoisy       ///< runs of one configuration differed too much to tell
+};
+
+struct Choice {
+  Verdict verdict = Verdict::kDefaultsBest;
+  size_t chosen = 0;                 ///< place in the list; 0: the defaults
+  std::vector<std::string> reasons;  ///< one for each of the list: why it is taken or not
+  std::string sentence;              ///< for people
+};
+
+/// The most that runs of a configuration may differ in latency, (most - least) / median, before a verdict counts for
+/// nothing.
+inline constexpr double kQuiet = 0.1;
+
+/// all[0]: the defaults. A configuration can be chosen if in no figure (latency, age, PSNR, frame time) it is worse
+/// than the defaults by more than runs of one configuration differ, and never by more than 5 % (0.5 dB); and if
+/// latency is less or PSNR is more by more than runs differ. Of these the best by score() is taken. Precondition: the
+/// defaults have a run.
+Choice choose(const std::vector<Measured>& all);
+
+}  // namespace telesplat::launcher
