@@ -39,6 +39,11 @@ TEST(TuneChoice, SaysWhenTheMachineWasTooNoisy) {
   EXPECT_EQ(c.chosen, 0u);
 }
 
+TEST(TuneChoice, WhatIsWorseByMoreThanTheNoiseIsTold) {
+  const auto c = choose({measured("defaults", {100, 120}), measured("samplers 2", {200, 210})});
+  EXPECT_EQ(c.verdict, Verdict::kDefaultsBest);
+}
+
 TEST(TuneChoice, SaysWhenTheDefaultsWereBest) {
   const auto c = choose({measured("defaults", {100, 101}), measured("samplers 2", {120, 121})});
   EXPECT_EQ(c.verdict, Verdict::kDefaultsBest);
@@ -75,7 +80,9 @@ TEST(TuneChoice, WhatWasNotMeasuredJudgesNothing) {
                          measured("samplers 2", {50, 51}, kNone, kNone, kNone), measured("failed", {})});
   EXPECT_EQ(c.chosen, 1u);
   EXPECT_EQ(c.reasons[2], "no run of it came to its end");
-  EXPECT_EQ(choose({measured("defaults", {100})}).verdict, Verdict::kDefaultsBest);
+  const auto alone = choose({measured("defaults", {100})});
+  EXPECT_EQ(alone.verdict, Verdict::kDefaultsBest);
+  EXPECT_NE(alone.sentence.find("nothing else was run"), std::string::npos) << alone.sentence;
 }
 
 TEST(TuneChoice, FiguresComeFromASummary) {

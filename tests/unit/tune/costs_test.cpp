@@ -59,6 +59,8 @@ CostSamples made_run(const TuneCosts& c, int samplers) {
     out.stages.patch_points.push_back(kept), out.stages.decode_s.push_back(kept * c.decode_s);
     const double pixels = 1e6 + 1e4 * i;
     out.plans.pixels.push_back(pixels), out.plans.seconds.push_back(c.plan.at(pixels));
+    out.plans.checked.push_back(pixels * c.checked);
+    out.plans.tiles.push_back(pixels / 65536 / 4);
     out.plans.cast.push_back(pixels * (c.checked + c.novelty_hz / out.updates_per_s));
   }
   return out;
@@ -71,7 +73,7 @@ TEST(TuneCostsFit, CostsAreFoundAgain) {
   c.plan = {1e-3, 2e-9}, c.pack = {1e-4, 4e-8}, c.decode_s = 1e-8, c.patch_bytes = {300, 3}, c.tile_bytes = 2;
   c.viewer = {0.04, 1e-7}, c.covered = 0.75, c.kept = 0.5, c.checked = 1 / 32.0, c.novelty_hz = 2;
   TuneCosts base;
-  base.cores = 4, base.checked = 1 / 32.0;
+  base.cores = 4;
   const auto found = fit_costs(base, false, {made_run(c, 1), made_run(c, 8)});
   EXPECT_NEAR(found.sample_s, c.sample_s, 1e-12);
   EXPECT_NEAR(found.encode_s, c.encode_s, 1e-12);
@@ -88,6 +90,7 @@ TEST(TuneCostsFit, CostsAreFoundAgain) {
   EXPECT_NEAR(found.covered, 0.75, 1e-9);
   EXPECT_NEAR(found.kept, 0.5, 1e-9);
   EXPECT_NEAR(found.novelty_hz, 2, 1e-6);
+  EXPECT_NEAR(found.tile_share, 0.25, 1e-9);
 
   // What a link states counts.
   base.viewer = {0.1, 5e-7};
@@ -117,7 +120,8 @@ TEST_F(TuneCostsRead, TablesOfARun) {
         "1,2,9,4,10,30,15,1,1,1.0,1.5,1.75,2.0,2.25\n");
   write("stages.csv",
         "frame,tile,lease_network_ms,patch_network_ms,decoding_ms,insertion_ms\n1,0,2,20,3,1\n7,0,4,20,3,1\n");
-  write("plans.csv", "extra,plan_ms,rays_cast,rays_full\n0,4,100,1000\n1,4,50,0\n");
+  write("plans.csv",
+        "extra,plan_ms,rays_cast,rays_full,rays_validation,tiles\n0,4,100,1000,30,2\n0,4,1000,1000,,\n1,4,50,0,0,1\n");
   write("updates.csv", "samples,points,sampling_width\n90,45,100\n");
   const auto read = read_costs(folder, false);
   ASSERT_TRUE(read) << read.error().text;
@@ -131,7 +135,8 @@ TEST_F(TuneCostsRead, TablesOfARun) {
   ASSERT_EQ(read->stages.patch_bytes.size(), 1u) << "of a patch that is known";
   EXPECT_EQ(read->stages.patch_bytes[0], 150);
   EXPECT_EQ(read->stages.lease_network_s.size(), 2u);
-  ASSERT_EQ(read->plans.cast.size(), 1u);
+  ASSERT_EQ(read->plans.cast.size(), 1u) << "neither an extra one nor one that sampled all";
+  EXPECT_EQ(read->plans.checked[0], 30);
   EXPECT_EQ(adaptive_scale(*read), 0.5);
 }
 

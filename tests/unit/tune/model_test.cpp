@@ -131,6 +131,8 @@ TEST(TuneModel, RaysOfASteeredViewGrowWithTheTimeBetweenUpdatesUpToAll) {
   c.steered = true, c.checked = 0.1, c.novelty_hz = 0.5;
   auto s = settings();
   EXPECT_NEAR(predict(c, s).rays, 0.6e6, 1);
+  c.tile_share = 0.5;
+  EXPECT_NEAR(predict(c, s).packing_s, 8 * c.pack.fixed + 0.6e6 * c.pack.slope, 1e-12) << "of 16 tiles";
   s.update_rate_hz = 10;
   EXPECT_NEAR(predict(c, s).rays, 0.15e6, 1);
   s.update_rate_hz = 0.1;
@@ -195,6 +197,21 @@ TEST(TuneCandidates, NoneIsPredictedWorseThanTheDefaults) {
           << "two that runs could not tell apart";
   EXPECT_GT(found[0].score, 0);
   EXPECT_TRUE(propose(c, d, {{1}, {250}, {}, true, {5}, {20}}, 3).empty()) << "nothing is free";
+}
+
+TEST(TuneCandidates, WhereNothingIsBetterNearOnesAreProposedForACheck) {
+  auto c = costs();
+  c.cores = 1, c.viewer = {0, 1e-8};
+  auto d = settings();
+  const TuneGrid grid{{1}, {250}, {0.4, 0.95, 1}, false, {5}, {1}};
+  const auto found = propose(c, d, grid, 3);
+  const auto base = predict(c, d);
+  for (const auto& candidate : found) {
+    EXPECT_LE(candidate.predicted.latency_s, 1.2 * base.latency_s);
+    EXPECT_GE(candidate.predicted.quality_db, base.quality_db - 1);
+  }
+  ASSERT_EQ(found.size(), 1u) << "0.4 is too coarse, 1 is the default";
+  EXPECT_EQ(found[0].settings.scale, 0.95);
 }
 
 TEST(TuneCandidates, OneGridValueIsNotTuned) {

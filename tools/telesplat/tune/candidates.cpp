@@ -10,6 +10,7 @@ constexpr double kHalfLatency_db = 3;      // so much quality counts as much as 
 constexpr double kPriceOfAChange = 0.005;  // in score: what a change must bring at least
 constexpr double kNoWorse = 1.01;
 constexpr double kNoWorse_db = 0.1;
+constexpr int kLeastCandidates = 2;  // where fewer are better than the defaults, near ones fill up
 
 template <class T>
 std::vector<T> with(std::vector<T> values, T more) {
@@ -19,9 +20,15 @@ std::vector<T> with(std::vector<T> values, T more) {
   return values;
 }
 
-bool no_worse(const Prediction& p, const Prediction& base) {
-  return p.latency_s <= base.latency_s * kNoWorse && p.age_s <= base.age_s * kNoWorse &&
-         p.frame_s <= base.frame_s * kNoWorse && p.quality_db >= base.quality_db - kNoWorse_db;
+struct Bounds {
+  double times, db;
+};
+constexpr Bounds kNone{kNoWorse, kNoWorse_db};
+constexpr Bounds kNear{1.2, 1};  // a model errs as much
+
+bool no_worse(const Prediction& p, const Prediction& base, const Bounds& by) {
+  return p.latency_s <= base.latency_s * by.times && p.age_s <= base.age_s * by.times &&
+         p.frame_s <= base.frame_s * by.times && p.quality_db >= base.quality_db - by.db;
 }
 
 // Runs could not tell them apart.
@@ -74,29 +81,38 @@ double score(double latency_s, double quality_db, double base_latency_s, double 
 
 std::vector<Candidate> propose(const TuneCosts& costs, const TuneSettings& defaults, const TuneGrid& grid, int count) {
   const Prediction base = predict(costs, defaults);
-  std::vector<Candidate> all;
+  const auto net = [&](const Candidate& c) { return c.score - kPriceOfAChange * differences(c.settings, defaults); };
+  std::vector<Candidate> better, near;
   for (const TuneSettings& s : settings_of(grid, defaults)) {
     if (s == defaults) continue;
     const Prediction p = predict(costs, s);
-    const double gain = score(p.latency_s, p.quality_db, base.latency_s, base.quality_db);
-    if (no_worse(p, base)) all.push_back({s, p, gain});
+    const Candidate c{s, p, score(p.latency_s, p.quality_db, base.latency_s, base.quality_db)};
+    if (no_worse(p, base, kNone) && net(c) > 0)
+      better.push_back(c);
+    else if (no_worse(p, base, kNear) && !alike(p, base))
+      near.push_back(c);
   }
-  const auto net = [&](const Candidate& c) { return c.score - kPriceOfAChange * differences(c.settings, defaults); };
-  std::erase_if(all, [&](const Candidate& c) { return net(c) <= 0; });
-  std::stable_sort(all.begin(), all.end(), [&](const auto& a, const auto& b) { return net(a) > net(b); });
+  const auto first = [&](const Candidate& a, const Candidate& b) { return net(a) > net(b); };
+  std::stable_sort(better.begin(), better.end(), first);
+  std::stable_sort(near.begin(), near.end(), first);
   std::vector<Candidate> out;
-  const auto take = [&](auto found) {
+  const auto take = [&](const Candidate& c, int most) {
     const bool there =
-        std::any_of(out.begin(), out.end(), [&](const auto& o) { return alike(o.predicted, found->predicted); });
-    if (!there && int(out.size()) < count) out.push_back(*found);
+        std::any_of(out.begin(), out.end(), [&](const auto& o) { return alike(o.predicted, c.predicted); });
+    if (!there && int(out.size()) < most) out.push_back(c);
   };
-  if (all.empty() || count < 1) return out;
-  take(all.begin());
-  take(std::min_element(all.begin(), all.end(),
-                        [](const auto& a, const auto& b) { return a.predicted.latency_s < b.predicted.latency_s; }));
-  take(std::max_element(all.begin(), all.end(),
-                        [](const auto& a, const auto& b) { return a.predicted.quality_db < b.predicted.quality_db; }));
-  for (auto i = all.begin(); i != all.end() && int(out.size()) < count; ++i) take(i);
+  if (!better.empty()) {
+    take(better.front(), count);
+    take(*std::min_element(better.begin(), better.end(),
+                           [](const auto& a, const auto& b) { return a.predicted.latency_s < b.predicted.latency_s; }),
+         count);
+    take(
+        *std::max_element(better.begin(), better.end(),
+                          [](const auto& a, const auto& b) { return a.predicted.quality_db < b.predicted.quality_db; }),
+        count);
+  }
+  for (const Candidate& c : better) take(c, count);
+  for (const Candidate& c : near) take(c, std::min(count, kLeastCandidates));
   return out;
 }
 

@@ -34,11 +34,11 @@ struct Candidate {
 /// that 3 dB count as half the latency. Above 0: better. It is what predictions and measurements are compared by.
 double score(double latency_s, double quality_db, double base_latency_s, double base_quality_db);
 
-/// At most `count` settings for a check by runs, best first: the best by score, then that of least latency and that of
-/// best quality, then the next best. All are predicted to be no worse than the defaults in latency, quality, age and
-/// frame time by more than a hundredth (0.1 dB); none is predicted to be like
-/// another, and where there are fewer than `count`, there are fewer. Of two that score
-/// alike, the one that changes less of the defaults comes first.
+/// At most `count` settings for a check by runs: the best by score, then that of least latency and that of best
+/// quality, then the next best. They are predicted to be better than the defaults, and in latency, quality, age and
+/// frame time not worse by more than a hundredth (0.1 dB). Where there are fewer than two, the best of those follow
+/// that are not worse by more than a fifth (1 dB), for the model may err. None is predicted to be like another. Of two
+/// that score alike, the one that changes less of the defaults comes first.
 std::vector<Candidate> propose(const TuneCosts& costs, const TuneSettings& defaults, const TuneGrid& grid, int count);
 
 }  // namespace telesplat::launcher

@@ -43,13 +43,15 @@ std::string amount(const Guard& g, double share) {
 
 struct Judged {
   bool allowed = true, better = false, maybe = false;
+  bool clearly = false;  // not allowed, and worse by more than runs differ
   std::string reason;
 };
 
 Judged judge(const Measured& defaults, const Measured& m) {
   Judged out;
-  if (m.runs.empty()) return {false, false, false, "no run of it came to its end"};
-  if (spread_of(m, &TuneFigures::latency_ms).runs == 0) return {false, false, false, "no view update was complete"};
+  if (m.runs.empty()) return {.allowed = false, .clearly = true, .reason = "no run of it came to its end"};
+  if (spread_of(m, &TuneFigures::latency_ms).runs == 0)
+    return {.allowed = false, .clearly = true, .reason = "no view update was complete"};
   std::vector<std::string> gains;
   for (const Guard& g : kGuards) {
     const auto d = difference(g, defaults, m);
@@ -57,6 +59,7 @@ Judged judge(const Measured& defaults, const Measured& m) {
     const double tolerated = std::clamp(d->apart, g.least, g.most);
     if (-d->gain > tolerated) {
       out.allowed = false;
+      out.clearly = -d->gain > d->apart;
       out.reason =
           fmt::format("{} is worse by {}, and {} is tolerated", g.title, amount(g, -d->gain), amount(g, tolerated));
       return out;
@@ -114,12 +117,13 @@ Choice choose(const std::vector<Measured>& all) {
   CHECK(!all.empty() && !all[0].runs.empty());
   Choice out;
   out.reasons.emplace_back("the defaults");
-  bool maybe = false, loud = noisy(all[0]);
+  bool maybe = false, open = false, loud = noisy(all[0]);
   double best = 0;
   for (size_t i = 1; i < all.size(); ++i) {
     const Judged judged = judge(all[0], all[i]);
     out.reasons.push_back(judged.reason);
     maybe = maybe || (judged.allowed && judged.maybe);
+    open = open || !judged.clearly;
     loud = loud || noisy(all[i]);
     if (!judged.allowed || !judged.better) continue;
     const double gain = measured_score(all[0], all[i]);
@@ -130,12 +134,14 @@ Choice choose(const std::vector<Measured>& all) {
   if (out.chosen != 0) {
     out.verdict = Verdict::kBetter;
     out.sentence = fmt::format("{} is better than the defaults: {}", all[out.chosen].name, out.reasons[out.chosen]);
-  } else if (loud) {
+  } else if (loud && open) {
     out.verdict = Verdict::kTooNoisy;
     out.sentence = fmt::format(
         "the machine was too noisy to tell: runs of one configuration differ by more than {:.0f} % in latency; the "
         "defaults stay",
         100 * kQuiet);
+  } else if (all.size() == 1) {
+    out.sentence = "the defaults stay: the model knows of nothing that could be better, so that nothing else was run";
   } else {
     out.sentence = maybe ? "the defaults stay: no gain is larger than runs of one configuration differ by"
                          : "the defaults were best";

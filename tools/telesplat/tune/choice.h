@@ -26,8 +26,8 @@ Spread spread_of(const Measured& measured, double TuneFigures::*figure);
 
 enum class Verdict {
   kBetter,        ///< the chosen one is better than the defaults by more than runs differ
-  kDefaultsBest,  ///< none is, and runs differed little
-  kTooNoisy       ///< runs of one configuration differed too much to tell
+  kDefaultsBest,  ///< none is, and runs differed little; or there was none
+  kTooNoisy       ///< runs of one configuration differed too much to tell, and not all others were clearly worse
 };
 
 struct Choice {

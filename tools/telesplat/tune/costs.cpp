@@ -90,7 +90,15 @@ void fit_views(TuneCosts& c, const std::vector<CostSamples>& runs) {
   // By the run of the defaults: what becomes new depends on the time between its updates.
   const CostSamples& first = runs.front();
   const double share = std::min(1.0, ratio(sum(first.plans.cast), sum(first.plans.pixels), 1));
-  c.checked = std::min(c.checked, share);
+  double checked = 0;
+  for (const double rays : first.plans.checked) checked += std::isfinite(rays) ? rays : 0;
+  c.checked = std::min(checked / sum(first.plans.pixels), share);
+  double tiles = 0, of = 0;
+  for (size_t i = 0; i < first.plans.tiles.size(); ++i) {
+    if (!std::isfinite(first.plans.tiles[i])) continue;
+    tiles += first.plans.tiles[i], of += first.plans.pixels[i] / (double(first.tile_px) * first.tile_px);
+  }
+  c.tile_share = std::min(1.0, ratio(tiles, of, 1));
   c.novelty_hz = (share - c.checked) * first.updates_per_s;
 }
 

@@ -16,14 +16,14 @@ Line fit_line(const std::vector<double>& xs, const std::vector<double>& ys);
 
 /// What a run tells of its costs, in its tables (docs/metrics.md). Parallel lists have a value a row.
 struct CostSamples {
-  int samplers = 1, octree_depth = 5;
+  int samplers = 1, octree_depth = 5, tile_px = 256;
   double others = 0;  ///< 0..1: share of the cores that others used
   struct {
     std::vector<double> work, samples, kept, bytes_sampled, bytes_sent, sampling_s, encoding_s, packing_s;
   } tiles;  ///< of full resolution; work: rays, of volumes voxels; samples: of volumes pixels
   struct {
-    std::vector<double> pixels, seconds, cast;
-  } plans;  ///< of views
+    std::vector<double> pixels, seconds, cast, checked, tiles;
+  } plans;  ///< of views of which a part was cast; checked: rays that only check what is known
   struct {
     std::vector<double> lease_network_s, patch_network_s, patch_bytes, decode_s, patch_points;
   } stages;

@@ -41,7 +41,7 @@ struct Tiling {
 Tiling tiling(const TuneCosts& c, const TuneSettings& s) {
   const double width = std::ceil(c.display_width * s.scale), height = std::ceil(c.display_height * s.scale);
   const double tiles = std::ceil(width / s.tile_px) * std::ceil(height / s.tile_px);
-  return {width * height, c.slices ? double(s.samplers) : std::max(1.0, tiles)};
+  return {width * height, c.slices ? double(s.samplers) : std::max(1.0, tiles * c.tile_share)};
 }
 
 // Costs of one update, given the time since the one before.

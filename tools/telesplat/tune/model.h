@@ -49,6 +49,7 @@ struct TuneCosts {
   double covered = 1;     ///< 0..1: samples a ray
   double kept = 1;        ///< 0..1: what redundancy elimination keeps of the samples
   double checked = 0;     ///< 0..1: share of a view that is cast again whatever the head does
+  double tile_share = 1;  ///< 0..1: tiles of a view in which any ray is cast
   double novelty_hz = 0;  ///< share of a view that becomes new in a second of this trajectory
   double voxels = 0, slice_pixels = 0;  ///< of volumes: an update's
   double display_pixels = 0;            ///< columns x rows

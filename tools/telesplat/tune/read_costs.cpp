@@ -52,15 +52,19 @@ Result<Patches> read_tiles(const std::string& path, bool slices, CostSamples& ou
 }
 
 void read_plans(const std::string& path, CostSamples& out) {
-  const auto table = LooseTable::read(path, {"extra", "plan_ms", "rays_cast", "rays_full"});
+  const auto table = LooseTable::read(path, {"extra", "plan_ms", "rays_cast", "rays_full", "rays_validation", "tiles"});
   if (!table) return;  // nothing is steered
   for (size_t i = 0; i < table->rows(); ++i) {
     const double full = table->numbers("rays_full")[i], cast = table->numbers("rays_cast")[i];
     const double plan_ms = table->numbers("plan_ms")[i];
     if (table->numbers("extra")[i] > 0 || !(full > 0) || !std::isfinite(cast + plan_ms)) continue;
+    // Nothing was known of the view, as of the first one: that is no view of a steady walk.
+    if (cast >= full) continue;
     out.plans.pixels.push_back(full);
     out.plans.seconds.push_back(plan_ms * 1e-3);
     out.plans.cast.push_back(cast);
+    out.plans.checked.push_back(table->numbers("rays_validation")[i]);
+    out.plans.tiles.push_back(table->numbers("tiles")[i]);
   }
 }
 

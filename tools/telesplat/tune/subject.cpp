@@ -126,8 +126,6 @@ void set_defaults(const Read& read, TuneSubject& out) {
   c.slices = scene::pipeline_of(out.kind) == scene::Pipeline::kSlices;
   c.polled = read.options.viewer.coupling == "async";
   c.cores = std::max(1, this_machine().cores);
-  const double validation = read.number("--validation", 32);
-  c.checked = validation > 0 ? 1 / validation : 0;
   c.target_fps = read.number("--target-fps", 60);
   c.data_servers = read.options.data_servers, c.viewers = read.options.viewers;
   c.frames_in_flight = int(read.number("--frames-in-flight", 2));

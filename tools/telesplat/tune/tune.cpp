@@ -89,7 +89,7 @@ Result<Tune::End> Tune::measure(tools::ProgressLine& progress) {
       continue;
     }
     read->others = end->load.others_cpu;
-    read->octree_depth = all[i].octree_depth;
+    read->octree_depth = all[i].octree_depth, read->tile_px = all[i].tile_px;
     samples.push_back(std::move(*read));
   }
   if (subject_.defaults.adaptive) subject_.defaults.scale = adaptive_scale(samples.front());
