@@ -88,6 +88,7 @@ void SliceReceiver::receive(net::Socket& state, int most) {
 void SliceReceiver::on(const wire::SliceFrame& f, double arrived_s, net::Socket& state) {
   const double begin_s = monotonic_s();
   heard_s_ = begin_s;
+  acknowledge_left(state);  // before this one: packers see frames let go in their order
   // What is not put into a buffer has left it.
   const bool again = f.packer == packer_ && f.frame <= newest_;
   if (again || f.viewer != options_.viewer || !grid_ || (options_.buffers > 0 && !links_.expected(f.request)))
@@ -133,8 +134,13 @@ void SliceReceiver::acknowledge(FrameId frame, net::Socket& state) {
   state.send(wire::SliceAck{options_.viewer, frame, in_order ? options_.buffers : kAsyncBuffers, in_order});
 }
 
-void SliceReceiver::tick(double now_s, net::Socket& state) {
+// Frames that have left their buffers since the last call.
+void SliceReceiver::acknowledge_left(net::Socket& state) {
   for (const FrameId frame : cache_.take_left()) acknowledge(frame, state);
+}
+
+void SliceReceiver::tick(double now_s, net::Socket& state) {
+  acknowledge_left(state);
   cache_.free_dropped();
   // The same acknowledgement once more changes nothing but what it says of the buffers.
   if (std::exchange(tell_buffers_, false)) acknowledge(acknowledged_, state);

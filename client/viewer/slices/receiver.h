@@ -61,6 +61,7 @@ class SliceReceiver {
  private:
   void on(const wire::SliceFrame& frame, double arrived_s, net::Socket& state);
   void acknowledge(FrameId frame, net::Socket& state);
+  void acknowledge_left(net::Socket& state);
 
   Options options_;
   Links links_;
