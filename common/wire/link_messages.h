@@ -29,7 +29,7 @@ struct LinkReport {
   double rate_bytes_s = 0;     ///< what the link carried when it was busy; 0: not known
   uint64_t backlog_bytes = 0;  ///< published and not received
   double rtt_s = 0;            ///< least, lately; 0: not known
-  double oldest_s = 0;         ///< since the oldest of the backlog was published
+  double oldest_s = 0;         ///< it has had a backlog so long and received nothing of it
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("rate_bytes_s", m.rate_bytes_s); f("backlog_bytes", m.backlog_bytes);
     f("rtt_s", m.rtt_s); f("oldest_s", m.oldest_s);

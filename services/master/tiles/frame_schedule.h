@@ -34,7 +34,7 @@ inline constexpr double kDearRow_s = 0.01;
 inline constexpr double kExtraFrame_s = 0.05;
 /// When another view begins, open tiles of an extra frame that is older are dropped.
 inline constexpr double kExtraPatience_s = 0.25;
-/// A view whose viewer's link takes nothing for so long waits again, so that those of others can begin.
+/// A view whose viewer's link takes nothing for so long waits again where one of another viewer could begin.
 inline constexpr double kHeld_s = 1;
 
 /// How the frames of a scene are leased.
