@@ -381,6 +381,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(what_was_held(measured, roster, counter("partitions"), viewers));
   out.update(ordered_json{{"tiles_released", whole(counter("tiles_released"))},
                           {"leases_backup", whole(counter("leases_backup"))},
+                          {"views_overtaken", whole(counter("views_overtaken"))},
                           {"quality", nullptr},
                           {"peak_rss_mb", peak_rss(roster)},
                           {"errors",

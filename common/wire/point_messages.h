@@ -30,6 +30,7 @@ struct Patch {
   uint64_t step = 1;                      ///< Lease::step
   bool extra = false;                     ///< Lease::extra
   bool frame_complete = false;            ///< the last tile of its frame to be packed
+  uint64_t left_out = 0;                  ///< tiles of the frame that are not sampled (FrameEnd): this ends it
   uint64_t samples = 0, kept = 0;
   geometry::Camera camera;  ///< of the whole frame
   geometry::Rect rect;      ///< the tile in it
@@ -41,7 +42,7 @@ struct Patch {
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
     f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
-    f("extra", m.extra); f("frame_complete", m.frame_complete); f("samples", m.samples); f("kept", m.kept);
+    f("extra", m.extra); f("frame_complete", m.frame_complete); f("left_out", m.left_out); f("samples", m.samples); f("kept", m.kept);
     f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
     f("missed", m.missed, kMaxMaskWords); f("missed_rect", m.missed_rect); f("moments", m.moments);
   }

@@ -131,6 +131,23 @@ struct Plan {
   }
 };
 
+/// Master -> packer: no more tiles of this frame come, because a newer view of its viewer overtook it. What is in the
+/// packer of it stays; the packer publishes that its update is over.
+struct FrameEnd {
+  static constexpr std::string_view kName = "frame_end";
+  FrameId frame;
+  EpochId epoch;
+  InstanceId viewer;
+  RequestId request;
+  uint64_t tiles = 0;       ///< Lease::blocks_in_frame
+  geometry::Camera camera;  ///< of the frame
+  Moments moments;          ///< of the view, until it was planned
+  template <class F> static void fields(F& f, auto& m) {
+    f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request); f("tiles", m.tiles);
+    f("camera", m.camera); f("moments", m.moments);
+  }
+};
+
 // ---- blocks of a mesh: sampler (DEALER) <-> data (ROUTER) ----------------------------------------------------------
 
 /// array: what the mesh is coloured by in this epoch (scene::Colouring::array): its chunks hold that array's values in

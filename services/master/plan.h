@@ -72,9 +72,10 @@ struct Ticked {
 
 struct Figures {
   uint64_t frames_completed = 0, frames_in_flight = 0;
-  uint64_t released = 0;  ///< leases that were taken back
-  uint64_t backups = 0;   ///< leases of what another sampler was slow with
-  uint64_t viewers = 0;   ///< of whom anything is remembered
+  uint64_t released = 0;   ///< leases that were taken back
+  uint64_t backups = 0;    ///< leases of what another sampler was slow with
+  uint64_t overtaken = 0;  ///< views that ended early, because their viewer's link is slow and a newer one waited
+  uint64_t viewers = 0;    ///< of whom anything is remembered
 };
 
 /// How views become frames and leases. Samplers are named by their routing ids.

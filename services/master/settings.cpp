@@ -42,6 +42,7 @@ bool steers(const MasterOptions& options, std::optional<scene::Kind> kind) {
 std::map<std::string, double> settings(const MasterOptions& options, std::optional<scene::Kind> kind) {
   auto out = options.settings;
   out.try_emplace("packing.max_points", policy(kind).max_points);
+  if (options.schedule.max_rate_mbit > 0) out["packing.max_rate_mbit"] = options.schedule.max_rate_mbit;
   out["packing.keep_redundant"] = keeps_redundant(options, kind);
   out["sampling.steering"] = steers(options, kind);
   out["viewer.least_sampling"] = policy(kind).least_sampling;

@@ -58,7 +58,7 @@ bool progressive(const MasterOptions& options, std::optional<scene::Kind> kind);
 bool keeps_redundant(const MasterOptions& options, std::optional<scene::Kind> kind);
 bool steers(const MasterOptions& options, std::optional<scene::Kind> kind);
 /// As everyone is told them (docs/protocol.md): the given ones, packing.keep_redundant, packing.max_points,
-/// sampling.steering and viewer.least_sampling.
+/// packing.max_rate_mbit if one is wished, sampling.steering and viewer.least_sampling.
 std::map<std::string, double> settings(const MasterOptions& options, std::optional<scene::Kind> kind);
 
 }  // namespace telesplat::master

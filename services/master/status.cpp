@@ -58,6 +58,7 @@ Figures MasterCore::figures() const {
     out.frames_in_flight += f.frames_in_flight;
     out.released += f.released;
     out.backups += f.backups;
+    out.overtaken += f.overtaken;
     out.viewers += f.viewers;
   }
   return out;
@@ -76,6 +77,7 @@ std::map<std::string, double> MasterCore::counters() const {
   std::map<std::string, double> out{{"leases_expired", double(leases_expired_)},
                                     {"tiles_released", double(f.released)},
                                     {"leases_backup", double(f.backups)},
+                                    {"views_overtaken", double(f.overtaken)},
                                     {"frames_completed", double(f.frames_completed)}};
   for (const auto& [pipeline, plan] : plans_) plan->add_counters(out);
   return out;
@@ -93,6 +95,7 @@ LiveSnapshot MasterCore::live_snapshot() const {
                    .views_waiting = double(plan_->views().views_waiting()),
                    .leases_expired = double(leases_expired_),
                    .leases_backup = double(f.backups),
+                   .views_overtaken = double(f.overtaken),
                    .tiles_released = double(f.released),
                    .processes = {}};
   for (const auto& [id, p] : peers_) {
@@ -119,6 +122,7 @@ std::string MasterCore::status_json(double now_s) const {
            {"leases_expired", leases_expired_},
            {"tiles_released", f.released},
            {"leases_backup", f.backups},
+           {"views_overtaken", f.overtaken},
            {"parameters", Json::object()},
            {"animation", animation()}};
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);

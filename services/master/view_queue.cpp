@@ -35,6 +35,11 @@ size_t ViewQueue::waiting(InstanceId viewer) const {
   return found == viewers_.end() ? 0 : found->second.requests.size();
 }
 
+const wire::ViewRequest* ViewQueue::first(InstanceId viewer) const {
+  const auto found = viewers_.find(viewer);
+  return found == viewers_.end() ? nullptr : &found->second.requests.front();
+}
+
 size_t ViewQueue::waiting() const {
   size_t out = 0;
   for (const auto& [id, v] : viewers_) out += v.requests.size();

@@ -31,6 +31,8 @@ class ViewQueue {
   bool empty() const { return viewers_.empty(); }
   size_t waiting(InstanceId viewer) const;
   size_t waiting() const;  ///< of all viewers
+  /// The viewer's first request; nullptr: none waits.
+  const wire::ViewRequest* first(InstanceId viewer) const;
 
   /// The viewers that wait now have a turn; those who come later have none. A turn ends when a request of the viewer is
   /// taken.

@@ -41,6 +41,8 @@ class Views {
   bool view_waiting() const { return !waiting_.empty(); }
   /// A view of a viewer waits for which this is true.
   bool view_waits(const std::function<bool(InstanceId)>& of) const { return waiting_.next(false, of) != nullptr; }
+  /// Of this viewer, the first; nullptr: none.
+  const wire::ViewRequest* waiting_of(InstanceId viewer) const { return waiting_.first(viewer); }
   size_t views_waiting() const { return waiting_.waiting(); }
   /// See ViewQueue.
   void begin_turns() { waiting_.begin_turns(); }

@@ -84,8 +84,8 @@ class PackerService {
     while (const auto message = link_->socket().receive()) {
       const double now_s = monotonic_s();
       if (!link_->handle(*message))
-        net::dispatch<wire::PlanRequest>(link_->socket(), *message,
-                                         [&](const wire::PlanRequest& request) { plan(request, now_s); });
+        net::dispatch<wire::PlanRequest, wire::FrameEnd>(link_->socket(), *message,
+                                                         [&](const auto& m) { on(m, now_s); });
       follow_news();
     }
   }
@@ -97,8 +97,12 @@ class PackerService {
     }
   }
 
+  void on(const wire::FrameEnd& end, double now_s) {
+    if (packing_) packing_->end_frame(end, now_s);
+  }
+
   // Rays beyond a view wait for spare time: to plan them takes as long as to plan a view.
-  void plan(const wire::PlanRequest& request, double now_s) {
+  void on(const wire::PlanRequest& request, double now_s) {
     if (request.extra && packing_) return spare_.keep(request);
     if (!request.extra) spare_.follow(request);
     link_->socket().send(packing_ ? packing_->plan(request, now_s) : all_rays(request));

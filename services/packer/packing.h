@@ -51,6 +51,8 @@ class Packing {
   /// A message of a viewer: likewise.
   virtual void take_state(net::Socket& from, const net::Message& message, double now_s) = 0;
 
+  /// No more tiles of that frame come.
+  virtual void end_frame(const wire::FrameEnd& /*end*/, double /*now_s*/) {}
   /// The master asks which rays of a view are needed.
   virtual wire::Plan plan(const wire::PlanRequest& request, double /*now_s*/) { return all_rays(request); }
   /// The same for rays beyond a view, by a piece of work of some tens of milliseconds. nullopt: there is no answer yet,

@@ -25,6 +25,7 @@ constexpr metrics::Column<MeasuredUpdate> kColumns[] = {
     {"epoch", [](U m) { return double(m.last.epoch.value); }},
     {"extra_points", [](U m) { return double(m.update.extra_points); }},
     {"extra_bytes", [](U m) { return double(m.update.extra_bytes); }},
+    {"left_out", [](U m) { return double(m.last.left_out); }},
 };
 
 }  // namespace

@@ -199,6 +199,7 @@ ViewPart part_of(const wire::Patch& p) {
           .camera = p.camera,
           .eliminated = p.samples - std::min(p.kept, p.samples),
           .tile = p.tile,
+          .left_out = p.left_out,
           .moments = p.moments};
 }
 

@@ -52,6 +52,7 @@ struct ViewPart {
   geometry::Camera camera;  ///< that was sampled
   uint64_t eliminated = 0;  ///< samples of which no points came, because the model has them already
   uint64_t tile = 0;        ///< its number in the frame
+  uint64_t left_out = 0;    ///< of a last part: tiles that are not sampled, because a newer view overtook this one
   wire::Moments moments;    ///< as far as it was published
   /// Master's clock: it reached this machine; decoding began and was over.
   double arrived_s = 0, decode_begin_s = 0, decoded_s = 0;

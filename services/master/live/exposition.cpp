@@ -140,6 +140,8 @@ void add_session(Text& text, const LiveSnapshot& s) {
   text.one("leases_expired_total", "counter", "Leases that ran out, and those of samplers that died.",
            s.leases_expired);
   text.one("leases_backup_total", "counter", "Tiles leased to a second sampler.", s.leases_backup);
+  text.one("views_overtaken_total", "counter", "Views that ended early, because a newer one waited.",
+           s.views_overtaken);
   text.one("tiles_released_total", "counter", "Leases that were taken back.", s.tiles_released);
 }
 

@@ -24,7 +24,7 @@ bool FrameSchedule::begin_view(EpochId epoch, bool turns_only, double now_s) {
   close_extras(*request, now_s);
   PlannedView view{.epoch = epoch, .view = *request};
   view.view.moments.begun_s = now_s, view.view.moments.planned_s = 0;
-  if (cut_.coarse) view.coarse = next_frame();
+  if (arrives_coarse(*request)) view.coarse = next_frame();
   view.frame = next_frame();
   begin(view.frame, {*request});
   if (steered) {
@@ -45,7 +45,14 @@ void FrameSchedule::begin_frame(const PlannedView& view, FrameId id, int step) {
   const geometry::Camera camera = step == 1 ? view.view.camera : geometry::subsample(view.view.camera, step);
   auto tiles = cut_.rows ? FrameTiles::of_rows(camera.width, camera.height)
                          : FrameTiles::of_squares(camera.width, camera.height, options().tile_size);
-  insert({id, view.epoch, view.view, step, camera, std::move(tiles)});
+  const wire::Moments& m = view.view.moments;
+  insert({.id = id,
+          .epoch = view.epoch,
+          .request = view.view,
+          .step = step,
+          .camera = camera,
+          .tiles = std::move(tiles),
+          .begun_s = std::max(m.begun_s, m.planned_s)});
 }
 
 void FrameSchedule::insert(Frame frame) {
@@ -92,35 +99,6 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
   return std::nullopt;
 }
 
-bool FrameSchedule::may_lease(const Frame& f, double now_s) const {
-  return open(f.request.viewer, now_s) && (!f.extra || gate_.idle(now_s));
-}
-
-// A view of another viewer waits, whose link takes more.
-bool FrameSchedule::other_waits(InstanceId viewer, double now_s) const {
-  return view_waits([&](InstanceId other) { return other != viewer && gate_.open(other, now_s); });
-}
-
-// Nothing is put back for the viewer's own sake: its samples would be made, and sent, once more. What is out of such a
-// frame still comes; its viewer's requests wait until the link takes more.
-void FrameSchedule::put_back_held(double now_s) {
-  std::vector<wire::ViewRequest> held;
-  for (Frame& f : frames_) {
-    if (f.extra || !f.tiles.open() || f.tiles.any_out() || open(f.request.viewer, now_s))
-      f.held_from_s = 0;
-    else if (f.held_from_s == 0)
-      f.held_from_s = now_s;
-    else if (f.step == 1 && now_s - f.held_from_s > kHeld_s && other_waits(f.request.viewer, now_s))
-      held.push_back(f.request);
-  }
-  for (const auto& view : held)
-    std::erase_if(frames_, [&](const Frame& f) {
-      if (f.extra || f.request.viewer != view.viewer || f.request.request != view.request) return false;
-      if (f.step == 1) put_back(f.id);
-      return true;
-    });
-}
-
 wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& sampler, double now_s) {
   const LeaseId id = next_lease();
   f.tiles.lease(tile, id, sampler, now_s, now_s + lease_time_s(f.planned));
@@ -154,8 +132,12 @@ void FrameSchedule::extend(LeaseId lease, double now_s) {
 
 bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
   const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
-  // What a block gives is counted to its last tile: of plans a block is a tile.
-  gate_.published(m.bytes_sent, f != frames_.end() && f->planned ? m.rays : 0, now_s);
+  // What a block gives is counted to its last tile: of plans, and of views in squares, a block is a tile.
+  const bool known = f != frames_.end() && f->tiles.whole_blocks() && f->step == 1 && m.tile < f->tiles.tiles();
+  if (known && !f->planned)
+    gate_.published(m.bytes_sent, f->tiles.tile(m.tile).rays, now_s, LinkGate::Rays::kAll);
+  else
+    gate_.published(m.bytes_sent, known ? m.rays : 0, now_s);
   if (f == frames_.end()) return false;
   if (m.tile >= f->tiles.tiles()) return false;
   std::optional<double> took_s;
@@ -169,7 +151,7 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   const uint64_t all = uint64_t(tile.rect.width) * uint64_t(tile.rect.height);
   costs_.learn(sampler, m.moments.encode_end_s - m.moments.sample_begin_s, double(std::clamp(m.rays, tile.rays, all)));
   if (!f->tiles.complete()) return true;
-  if (f->planned && !f->extra)
+  if (f->planned && !f->extra && !f->tiles.closed())
     refining_.learn(now_s - f->begun_s, f->refining, f->put_off, std::max<size_t>(costs_.samplers(), 1));
   end_frame(f);
   return true;
@@ -179,6 +161,16 @@ std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<F
   const bool view = frame->step == 1 && !frame->extra;
   const PlannedView ended{.frame = frame->id, .epoch = frame->epoch, .view = frame->request};
   if (!view) return frames_.erase(frame);
+  if (frame->tiles.left() > 0) {
+    ++overtaken_views_;
+    ends_.push_back({.frame = frame->id,
+                     .epoch = frame->epoch,
+                     .viewer = frame->request.viewer,
+                     .request = frame->request.request,
+                     .tiles = frame->tiles.blocks().size(),
+                     .camera = frame->camera,
+                     .moments = frame->request.moments});
+  }
   frames_.erase(frame);
   view_complete(ended);
   // A coarse frame that is not there yet shows nothing any more.
@@ -245,6 +237,7 @@ void FrameSchedule::drop_frames() {
   overtaken_.clear();
   plans_.clear();
   questions_.clear();
+  ends_.clear();
 }
 
 }  // namespace telesplat::master

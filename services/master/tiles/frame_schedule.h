@@ -37,10 +37,17 @@ inline constexpr double kExtraPatience_s = 0.25;
 /// A view whose viewer's link takes nothing for so long waits again where one of another viewer could begin.
 inline constexpr double kHeld_s = 1;
 
+/// An asynchronous view whose tiles wait for its viewer's link, and that was planned so long ago, ends where a newer
+/// view of the viewer waits.
+inline constexpr double kOvertaken_s = 0.25;
+/// A view that is sampled whole, and of which a link would have to carry so much, arrives coarse first.
+inline constexpr double kCoarseFrom_s = 0.25;
+
 /// How the frames of a scene are leased.
 struct Cut {
-  bool rows = false;     ///< bands of rows of blocks instead of square tiles
-  bool coarse = false;   ///< a view is two frames: one of step kCoarseStep, then one of step 1
+  bool rows = false;            ///< bands of rows of blocks instead of square tiles
+  bool coarse = false;          ///< a view is two frames: one of step kCoarseStep, then one of step 1
+  bool coarse_if_slow = false;  ///< the same where the viewer's link is slow
   bool steered = false;  ///< the packer is asked first which rays are needed; rows and coarse are for what it leaves
   bool operator==(const Cut&) const = default;
 };
@@ -67,6 +74,8 @@ class FrameSchedule : public Views {
   void begin_extra(EpochId epoch, double now_s);
   /// Questions for the packer, in order, each once.
   std::vector<wire::PlanRequest> take_questions() { return std::exchange(questions_, {}); }
+  /// Frames that ended before all of their tiles were sampled, for the packer, each once.
+  std::vector<wire::FrameEnd> take_ends() { return std::exchange(ends_, {}); }
   /// The packer's answer. What nobody waits for is dropped. Error: it does not fit what was asked (check_answer()), and
   /// counts as full.
   Status take_plan(const wire::Plan& plan, double now_s);
@@ -81,6 +90,8 @@ class FrameSchedule : public Views {
 
   /// How a viewer's link does: its views begin, and their tiles are leased, only when its queue is short.
   void on_link(const wire::LinkReport& link, double now_s) { gate_.report(link, now_s); }
+  /// Ends views that a newer one overtook while they waited for a link. The packer is to be told: take_ends().
+  void end_overtaken(double now_s);
   const LinkGate& links() const { return gate_; }
 
   /// What `sampler` should do next: an open tile of the oldest frame that has one; or a backup of a tile that has been
@@ -112,6 +123,7 @@ class FrameSchedule : public Views {
   size_t frames_in_flight() const { return frames_.size(); }
   uint64_t tiles_released() const { return released_; }
   uint64_t backups() const { return backups_; }
+  uint64_t overtaken() const { return overtaken_views_; }  ///< views that ended early
   size_t viewers_remembered() const { return plans_.viewers(); }
   const SamplingCosts& costs() const { return costs_; }
   /// Seconds after which a lease expires now: 25 typical tile times, within [0.3, lease_timeout_s]. planned: of a tile
@@ -133,7 +145,8 @@ class FrameSchedule : public Views {
     bool extra = false;                // of rays beyond a view
     double begun_s = 0;                // its plan came
     double refining = 0, put_off = 0;  // RefiningRays::learn()
-    double held_from_s = 0;            // its viewer's link has taken nothing since; 0: it takes more
+    bool paced = false;                // a tile of it has waited for its viewer's link
+    double held_from_s = 0;            // that takes nothing since; 0: it takes more
   };
   // A lease whose tile another sampler delivered first; its own may be dead or slow.
   struct Overtaken {
@@ -152,7 +165,9 @@ class FrameSchedule : public Views {
   /// viewer: of a view; nullopt: of extra rays, which go to all.
   PlanLimits limits(std::optional<InstanceId> viewer, double now_s) const;
   bool open(InstanceId viewer, double now_s) const { return in_turns_ || gate_.open(viewer, now_s); }
-  bool may_lease(const Frame& frame, double now_s) const;
+  bool may_lease(Frame& frame, double now_s) const;
+  bool is_overtaken(const Frame& frame, double now_s) const;
+  bool arrives_coarse(const wire::ViewRequest& view) const;
   bool other_waits(InstanceId viewer, double now_s) const;
   void put_back_held(double now_s);
   double target_s() const;
@@ -163,6 +178,7 @@ class FrameSchedule : public Views {
   Cut cut_;
   PlanQuestions plans_;
   std::vector<wire::PlanRequest> questions_;
+  std::vector<wire::FrameEnd> ends_;
   std::vector<metrics::PlanRow> plan_rows_;
   std::deque<Frame> frames_;  // extra ones last
   std::map<LeaseId, Overtaken> overtaken_;
@@ -172,7 +188,7 @@ class FrameSchedule : public Views {
   RefiningRays refining_;
   RunningMean tile_time_s_{0.05};     // lease -> done
   RunningMean planned_time_s_{0.05};  // the same of tiles of plans, which have few rays
-  uint64_t released_ = 0, backups_ = 0;
+  uint64_t released_ = 0, backups_ = 0, overtaken_views_ = 0;
 };
 
 }  // namespace telesplat::master

@@ -54,6 +54,11 @@ class FrameTiles {
   bool complete() const { return closed_ ? out_.empty() : done_ == tiles_.size() && rows_.rows_left() == 0; }
   /// Open tiles are not wanted any more; what is out may still come.
   void close() { closed_ = true; }
+  bool closed() const { return closed_; }
+  /// Tiles that are not done, those that were never carved left out.
+  size_t left() const { return tiles_.size() - done_; }
+  /// Each tile is a block of its own: what came of a frame can be shown though others do not come.
+  bool whole_blocks() const { return rows_.rows_left() == 0 && tiles_.size() == blocks_.size(); }
   int rows_left() const { return rows_.rows_left(); }
   const Tile& tile(size_t i) const { return tiles_[i]; }
   size_t tiles() const { return tiles_.size(); }

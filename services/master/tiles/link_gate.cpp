@@ -17,8 +17,8 @@ double LinkGate::wished_backlog(const Link& link, double now_s) const {
   return std::max(0.0, link.wished_bytes - most_bytes_s_ * (now_s - link.wished_s));
 }
 
-void LinkGate::published(uint64_t bytes, uint64_t rays, double now_s) {
-  if (rays > 0 && bytes > 0) bytes_a_ray_.add(double(bytes) / double(rays));
+void LinkGate::published(uint64_t bytes, uint64_t rays, double now_s, Rays which) {
+  if (rays > 0 && bytes > 0) (which == Rays::kAll ? bytes_of_all_ : bytes_a_ray_).add(double(bytes) / double(rays));
   for (auto& [viewer, link] : links_) {
     link.since_bytes += double(bytes);
     link.wished_bytes = wished_backlog(link, now_s) + double(bytes);
@@ -62,10 +62,18 @@ uint64_t LinkGate::update_rays(InstanceId viewer) const {
   return std::max(kLeastRays, uint64_t(std::min(1e9, bytes_s * kUpdate_s / bytes_a_ray_.value())));
 }
 
+std::optional<double> LinkGate::takes_s(InstanceId viewer, double rays) const {
+  const auto found = links_.find(viewer);
+  if (found == links_.end() || !bytes_of_all_.known()) return std::nullopt;
+  const double bytes_s = rate(found->second);
+  return bytes_s > 0 ? std::optional(rays * bytes_of_all_.value() / bytes_s) : std::nullopt;
+}
+
 uint64_t LinkGate::least_update_rays(double now_s) const {
   uint64_t least = 0;
   for (const auto& [viewer, link] : links_)
-    if (const uint64_t rays = reads(link, now_s) ? update_rays(viewer) : 0; rays > 0 && (least == 0 || rays < least)) least = rays;
+    if (const uint64_t rays = reads(link, now_s) ? update_rays(viewer) : 0; rays > 0 && (least == 0 || rays < least))
+      least = rays;
   return least;
 }
 

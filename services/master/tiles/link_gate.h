@@ -27,8 +27,12 @@ class LinkGate {
   void set_most(double bytes_s) { most_bytes_s_ = bytes_s; }
 
   void report(const wire::LinkReport& link, double now_s);
+  enum class Rays {
+    kPlanned,  ///< those of a plan, most of which find what is known
+    kAll       ///< of a view that is sampled whole
+  };
   /// A part of a frame went to all viewers. rays: that were cast for it; 0: not known.
-  void published(uint64_t bytes, uint64_t rays, double now_s);
+  void published(uint64_t bytes, uint64_t rays, double now_s, Rays which = Rays::kPlanned);
   void forget(InstanceId viewer) { links_.erase(viewer); }
   /// Another packer: nothing is under way from it.
   void clear() { links_.clear(); }
@@ -40,6 +44,8 @@ class LinkGate {
   bool idle(double now_s) const;
   /// Rays that the link carries in an update's time, once coded; 0: no limit is known.
   uint64_t update_rays(InstanceId viewer) const;
+  /// How long the link would need for a view of so many rays that is sampled whole; nullopt: it is not known.
+  std::optional<double> takes_s(InstanceId viewer, double rays) const;
   /// The least of all viewers that read.
   uint64_t least_update_rays(double now_s) const;
   /// "link_mbit", "backlog_bytes", "rtt_ms", as far as they are known.
@@ -60,7 +66,7 @@ class LinkGate {
 
   double most_bytes_s_ = 0;
   std::map<InstanceId, Link> links_;
-  RunningMean bytes_a_ray_{0.05};
+  RunningMean bytes_a_ray_{0.05}, bytes_of_all_{0.05};  // a ray
 };
 
 }  // namespace telesplat::master

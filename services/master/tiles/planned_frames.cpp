@@ -123,7 +123,8 @@ void FrameSchedule::close_extras(const wire::ViewRequest& view, double now_s) {
 }
 
 void FrameSchedule::end_closed() {
-  std::erase_if(frames_, [](const Frame& f) { return f.extra && f.tiles.complete(); });
+  for (auto f = frames_.begin(); f != frames_.end();)
+    f = f->tiles.closed() && f->tiles.complete() ? end_frame(f) : std::next(f);
 }
 
 void FrameSchedule::forget_viewer(InstanceId viewer) {

@@ -23,6 +23,7 @@ Result<Adopted> TilePlan::adopt(const wire::Hello& data, double /*now_s*/) {
   const auto kind = scene::kind_named(scene_.kind());
   const Cut cut{.rows = scene_.is_julia(),
                 .coarse = master::progressive(options_, kind),
+                .coarse_if_slow = options_.progressive == Progressive::kAuto,
                 .steered = master::steers(options_, kind)};
   out.changed |= cut != schedule_.cut();
   schedule_.set_cut(cut);
@@ -71,6 +72,10 @@ void TilePlan::new_packer() {
 void TilePlan::prepare(double now_s) {
   schedule_.give_up_plans(now_s);
   record_plans();
+  schedule_.end_overtaken(now_s);
+  const std::string packer = links_.packer();
+  for (const auto& end : schedule_.take_ends())
+    if (!packer.empty()) links_.outbox.send(packer, end);
 }
 
 bool TilePlan::begin(EpochId epoch, bool turns_only, double now_s) {
@@ -134,6 +139,7 @@ Figures TilePlan::figures() const {
           .frames_in_flight = schedule_.frames_in_flight(),
           .released = schedule_.tiles_released(),
           .backups = schedule_.backups(),
+          .overtaken = schedule_.overtaken(),
           .viewers = schedule_.viewers_remembered()};
 }
 

@@ -17,6 +17,16 @@ bool FrameBook::has(FrameId id, uint32_t tile) const {
   return frame && tile < frame->has_tile.size() && frame->has_tile[tile];
 }
 
+std::optional<FrameBook::Left> FrameBook::left(FrameId id, uint32_t tiles) const {
+  if (is_finished_.count(id)) return std::nullopt;
+  const Frame* frame = find(id);
+  if (!frame) return Left{.tiles = tiles, .tiles_in_frame = tiles};
+  const auto first = std::find(frame->has_tile.begin(), frame->has_tile.end(), false);
+  return Left{.tiles = frame->tiles_left,
+              .first = static_cast<uint32_t>(first - frame->has_tile.begin()),
+              .tiles_in_frame = static_cast<uint32_t>(frame->has_tile.size())};
+}
+
 Status FrameBook::check(const FramePart& tile) const {
   const Frame* frame = find(tile.frame);
   if (!frame) return ok_status();
@@ -36,6 +46,7 @@ FrameBook::Frame FrameBook::add(const FramePart& tile, const splat::Elimination&
   const auto at = std::find_if(open_.begin(), open_.end(), [&](const Frame& f) { return f.id == tile.frame; });
   at->has_tile[tile.tile] = true;
   --at->tiles_left;
+  if (tile.left_out > 0) at->tiles_left = 0;
   at->samples += elimination.samples;
   at->kept += elimination.kept;
 

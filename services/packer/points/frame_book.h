@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <unordered_set>
 #include <vector>
 
@@ -26,11 +27,18 @@ class FrameBook {
     uint64_t samples = 0, kept = 0;
   };
 
+  /// Of a frame, what was not packed yet.
+  struct Left {
+    uint32_t tiles = 0, first = 0;
+    uint32_t tiles_in_frame = 0;
+  };
+  /// `tiles`: that the frame has, where none of it was packed. Nothing: the frame is finished. Precondition: tiles > 0.
+  std::optional<Left> left(FrameId frame, uint32_t tiles) const;
   /// True if this tile was packed before.
   bool has(FrameId frame, uint32_t tile) const;
   /// Refuses a tile whose frame was said to have another camera or another number of tiles.
   Status check(const FramePart& tile) const;
-  /// Notes the tile as packed. Returns its frame as it is then; finished and forgotten if tiles_left is 0.
+  /// Notes the tile as packed, and its frame as finished if it leaves out others. Returns its frame as it is then; finished and forgotten if tiles_left is 0.
   /// Preconditions: not a duplicate, checked, tile < tiles_in_frame.
   Frame add(const FramePart& tile, const splat::Elimination& elimination);
   void clear();

@@ -24,6 +24,8 @@ struct FramePart {
   geometry::Camera camera;  ///< of the whole frame
   geometry::Rect rect;      ///< the tile in it
   bool extra = false;       ///< of rays beyond what the view asked for: it completes no update
+  /// Not 0: it ends its frame, of which so many tiles, itself included, are not sampled.
+  uint32_t left_out = 0;
 };
 
 /// "tile 3 of frame 17". noun: what the part is called in messages.

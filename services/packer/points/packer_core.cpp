@@ -138,7 +138,7 @@ struct PackerCore::Impl {
       }
       auto& patches = coarse.back().patches;
       for (const auto& [key, mosaic] : patch.mosaics) patches.push_back({key, mosaic.frame_tag()});
-    } else if (event.frame_complete && !event.extra) {
+    } else if (event.frame_complete && !event.extra && event.left_out == 0) {
       std::erase_if(coarse, [&](const CoarsePass& pass) {
         const bool over = pass.viewer == event.viewer && pass.request <= event.request;
         if (over) supersede(pass);
@@ -267,6 +267,14 @@ Result<std::optional<Event>> PackerCore::submit(SampledTile tile, double now_s, 
 
 Result<std::optional<Event>> PackerCore::complete_empty(FramePart frame, double now_s) {
   frame.tile = 0, frame.tiles_in_frame = 1;
+  frame.rect = {0, 0, 1, 1};
+  return submit({frame, image::DepthImage(1, 1)}, now_s);
+}
+
+Result<std::optional<Event>> PackerCore::end_frame(FramePart frame, double now_s) {
+  const auto left = impl_->frames.left(frame.frame, std::max(frame.tiles_in_frame, 1u));
+  if (!left) return std::optional<Event>();
+  frame.tile = left->first, frame.tiles_in_frame = left->tiles_in_frame, frame.left_out = left->tiles;
   frame.rect = {0, 0, 1, 1};
   return submit({frame, image::DepthImage(1, 1)}, now_s);
 }

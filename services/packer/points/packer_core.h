@@ -96,6 +96,11 @@ class PackerCore {
   /// it stands for one tile. Else as submit().
   Result<std::optional<Event>> complete_empty(FramePart frame, double now_s);
 
+  /// No more tiles of a frame come: the event of no points that says so to viewers, with the number of tiles that are
+  /// left out. frame: its label, with the number of its tiles. Nothing also where all of them were packed. Else as
+  /// submit().
+  Result<std::optional<Event>> end_frame(FramePart frame, double now_s);
+
   /// Tells everything that happens to the model from now on. watcher: null: nobody; it must outlive its use here.
   void watch(ModelWatcher* watcher);
 

@@ -103,6 +103,7 @@ void with_message(InstanceId packer, const Event& e, const wire::Moments& moment
                               .step = e.step,
                               .extra = e.extra,
                               .frame_complete = e.frame_complete,
+                              .left_out = e.left_out,
                               .samples = e.samples,
                               .kept = e.kept,
                               .camera = e.camera,
@@ -231,6 +232,22 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
     for (const auto& forget : core_->forget(planner_->disproved())) publish(forget);
   spans_.add("pack", begin_s, outlets_.master_now(), 0, of(done));
   return ok_status();
+}
+
+void PointPacking::end_frame(const wire::FrameEnd& end, double now_s) {
+  if (!core_ || end.epoch != core_->epoch()) return;
+  const FramePart frame{.frame = end.frame,
+                        .epoch = end.epoch,
+                        .viewer = end.viewer,
+                        .request = end.request,
+                        .tiles_in_frame = uint32_t(std::min<uint64_t>(end.tiles, kMaxTilesInFrame)),
+                        .camera = end.camera};
+  const auto event = core_->end_frame(frame, now_s);
+  if (!event) return log::warn("frame {} cannot be ended: {}", end.frame.value, event.error().text);
+  if (!*event) return;
+  wire::Moments moments = end.moments;
+  moments.published_s = outlets_.master_now();
+  publish(**event, moments);
 }
 
 void PointPacking::record_plan() {

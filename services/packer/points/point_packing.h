@@ -33,6 +33,7 @@ class PointPacking final : public Packing {
   bool follow(const wire::Welcome& session, double now_s) override;
   void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
   void take_state(net::Socket& from, const net::Message& message, double now_s) override;
+  void end_frame(const wire::FrameEnd& end, double now_s) override;
   wire::Plan plan(const wire::PlanRequest& request, double now_s) override;
   std::optional<wire::Plan> plan_piece(const wire::PlanRequest& request, double now_s) override;
   bool hurried(double now_s) const override { return planner_ && planner_->view_under_way(now_s); }

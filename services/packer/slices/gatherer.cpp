@@ -32,6 +32,11 @@ void SliceGatherer::set_scene(const volume::Grid& grid, EpochId epoch) {
   epoch_ = epoch;
 }
 
+void SliceGatherer::set_most(double bytes_s) {
+  most_bytes_s_ = bytes_s;
+  for (auto& [id, v] : viewers_) v.pace.set_most(bytes_s);
+}
+
 void SliceGatherer::clear_frames() {
   statistics_.frames_dropped += open_.size();
   open_.clear();
@@ -39,6 +44,7 @@ void SliceGatherer::clear_frames() {
   newest_ = nullptr;
   for (auto& [id, v] : viewers_) {
     v.unacknowledged.clear();
+    v.pace.lost();
     v.waiting.clear();
     v.newest = {};
   }
@@ -170,6 +176,7 @@ SliceGatherer::Viewer& SliceGatherer::viewer(InstanceId id, double now_s) {
   }
   Viewer& v = viewers_[id];
   v.heard_s = now_s;
+  v.pace.set_most(most_bytes_s_);
   return v;
 }
 
@@ -200,7 +207,9 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
     // lost.
     v.waiting.insert(v.waiting.begin(), v.unacknowledged.begin(), v.unacknowledged.end());
     v.unacknowledged.clear();
+    v.pace.lost();
   } else {
+    v.pace.acknowledged(ack.frame, now_s);
     std::erase_if(v.unacknowledged, [&](const Waiting& w) { return w.frame->lease.frame == ack.frame; });
   }
   for (; !v.in_order && v.waiting.size() > 1; v.waiting.pop_front()) ++statistics_.frames_skipped;
@@ -226,19 +235,26 @@ void SliceGatherer::expire(double now_s) {
   });
 }
 
+bool SliceGatherer::may_send(const Viewer& v, double now_s) {
+  if (v.peer.empty() || v.waiting.empty() || v.unacknowledged.size() >= v.buffers) return false;
+  return now_s >= (v.in_order ? v.pace.wished_s() : v.pace.next_s());
+}
+
 std::optional<SliceGatherer::Outgoing> SliceGatherer::take_outgoing(double now_s) {
   // The viewers after the one that was served last come first.
   auto next = viewers_.upper_bound(turn_);
   for (size_t n = 0; n < viewers_.size(); ++n, ++next) {
     if (next == viewers_.end()) next = viewers_.begin();
     Viewer& v = next->second;
-    if (v.peer.empty() || v.waiting.empty() || v.unacknowledged.size() >= v.buffers) continue;
+    if (!may_send(v, now_s)) continue;
     turn_ = next->first;
     if (v.unacknowledged.empty()) v.heard_s = std::max(v.heard_s, now_s);
     v.unacknowledged.push_back(std::move(v.waiting.front()));
     v.waiting.pop_front();
     ++statistics_.frames_sent;
-    return make(next->first, v, v.unacknowledged.back());
+    Outgoing out = make(next->first, v, v.unacknowledged.back());
+    v.pace.sent(out.frame.frame, out.bytes->size(), now_s);
+    return out;
   }
   return std::nullopt;
 }

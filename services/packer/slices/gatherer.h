@@ -12,6 +12,7 @@
 #include "common/volume/grid.h"
 #include "common/volume/slices/image.h"
 #include "common/wire/messages.h"
+#include "services/packer/slices/slice_pace.h"
 
 namespace telesplat::packer {
 
@@ -64,6 +65,9 @@ class SliceGatherer {
   /// them any more.
   void clear_frames();
 
+  /// Bytes a second to each viewer that are wished at most; 0: no wish.
+  void set_most(double bytes_s);
+
   /// Takes a slab; the last one that its frame lacked makes the frame ready for take_outgoing(). Error: lease or images
   /// make no sense, or contradict the frame's other slabs; nothing has changed then. Precondition: ready().
   Result<Added> add(Slab slab, double now_s);
@@ -77,8 +81,8 @@ class SliceGatherer {
   void unreachable(const std::string& peer);
   /// Forgets viewers that do not answer.
   void expire(double now_s);
-  /// The next frame to send: in order for each viewer, never more unacknowledged than it has buffers. It counts as
-  /// sent.
+  /// The next frame to send: in order for each viewer, never more unacknowledged than it has buffers, and to an
+  /// asynchronous viewer none that would wait on its link (SlicePace): a newer one takes its place. It counts as sent.
   std::optional<Outgoing> take_outgoing(double now_s);
 
   const Statistics& statistics() const { return statistics_; }
@@ -109,6 +113,7 @@ class SliceGatherer {
     std::deque<Waiting> unacknowledged, waiting;  // in order of frames
     FrameId newest;                               // that ever waited: older ones come too late
     double heard_s = 0;                           // or when it was first sent something since
+    SlicePace pace;
   };
 
   Status check(const wire::SliceLease& lease) const;
@@ -121,12 +126,14 @@ class SliceGatherer {
   void make_room(size_t bytes);
   void complete(const std::shared_ptr<const Frame>& frame, double now_s);
   Viewer& viewer(InstanceId id, double now_s);
+  static bool may_send(const Viewer& viewer, double now_s);
   void queue(Viewer& viewer, Waiting waiting);
   Outgoing make(InstanceId id, const Viewer& viewer, const Waiting& waiting) const;
 
   std::optional<volume::Grid> grid_;
   EpochId epoch_;
-  Frames open_;  // oldest first
+  double most_bytes_s_ = 0;  // wished
+  Frames open_;              // oldest first
   std::deque<FrameId> closed_;
   std::shared_ptr<Frame> completed_;     // the last one
   std::shared_ptr<const Frame> newest_;  // complete

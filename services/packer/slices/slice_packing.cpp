@@ -23,6 +23,7 @@ bool SlicePacking::follow(const wire::Welcome& session, double now_s) {
     grid_ = read->grid;
   }
   gatherer_.set_scene(read->grid, session.epoch);
+  gatherer_.set_most(scene::SessionView(session).setting("packing.max_rate_mbit", 0) * 1e6 / 8);
   for (const auto& [received, bytes, since_s] : ahead_.take()) {
     if (is_ahead(received.images))
       ahead_.add(received, bytes, since_s);
@@ -108,6 +109,7 @@ Status SlicePacking::acknowledged(const std::string& peer, const wire::SliceAck&
 
 void SlicePacking::tick(double now_s) {
   gatherer_.expire(now_s);
+  send_out(now_s);  // what was kept back while a link was busy
   ahead_.expire(now_s);
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -236,6 +237,36 @@ TEST(Links, AViewerThatDoesNotReadHoldsUpNoOther) {
   ::kill(stuck, SIGCONT);
   ASSERT_EQ(run.stop(), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
+}
+
+// A head that turns faster than the link carries what it sees.
+TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
+  TemporaryFolder folder;
+  const std::string turning = folder / "turning.csv";
+  std::ofstream file(turning);
+  file << "t_s,px,py,pz,qw,qx,qy,qz\n";
+  for (int i = 0; i <= 80; ++i) {
+    const double angle = 0.05 * i;
+    file << 0.1 * i << ',' << 0.7 * std::sin(angle) << ",0.3," << 0.7 * std::cos(angle) << ',' << std::cos(angle / 2)
+         << ",0," << std::sin(angle / 2) << ",0\n";
+  }
+  file.close();
+  PipelineRun run({"--trajectory", turning, "--hold", "6", "--link", "rtt=20ms,rate=400kbit", "--size", "640x400",
+                   "--sampling-size", "640x400"});
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+  const auto s = run.summary();
+  ASSERT_TRUE(s.is_object());
+  EXPECT_GT(s["views_overtaken"], 0);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  const auto left_out = run.column("updates.csv", "left_out");
+  ASSERT_GT(left_out.size(), 3u);
+  EXPECT_GT(*std::max_element(left_out.begin(), left_out.end()), 0);
+  EXPECT_EQ(left_out.back(), 0) << "the head rests";
+  // Nobody waits for what is of no use any more.
+  auto latency = run.column("updates.csv", "latency_ms");
+  std::sort(latency.begin(), latency.end());
+  EXPECT_LT(latency[latency.size() / 2], 2000);
 }
 
 TEST(Links, BadOnesAreRefused) {

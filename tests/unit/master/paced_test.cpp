@@ -1,6 +1,8 @@
 // Views and tiles at the pace of the viewers' links. Without sockets and clocks.
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "services/master/tiles/frame_schedule.h"
 
 namespace telesplat::master {
@@ -83,6 +85,126 @@ TEST_F(Paced, ALinkThatTakesNothingDoesNotKeepOthersFromBeginning) {
   EXPECT_FALSE(schedule.begin_view({1}, false, now));
   link(kFar, 0);
   EXPECT_TRUE(schedule.begin_view({1}, false, now));
+}
+
+// A view of four tiles, the first of which filled the link.
+class Overtaken : public Paced {
+ protected:
+  void begin(uint64_t buffers = 0) {
+    link(kFar, 0);
+    auto r = request(kFar, 1);
+    r.buffers = buffers;
+    r.moments.requested_s = 3;
+    schedule.request_view(r);
+    ASSERT_TRUE(schedule.begin_view({1}, false, now));
+    const auto first = schedule.lease("a", now);
+    out = schedule.lease("b", now);
+    ASSERT_TRUE(first && out);
+    EXPECT_TRUE(done(*first, 500'000));
+    EXPECT_FALSE(schedule.lease("a", now));
+  }
+  void ask(uint64_t buffers = 0, double x = 1) {
+    auto r = request(kFar, 2);
+    r.buffers = buffers;
+    r.camera.pose.position_room.x = x;
+    schedule.request_view(r);
+  }
+  bool ends_after(double s) {
+    schedule.end_overtaken(now + s);
+    return schedule.views_in_flight() == 0;
+  }
+
+  std::optional<wire::Lease> out;  // the second tile
+};
+
+TEST_F(Overtaken, AViewThatWaitsForTheLinkEndsWhereANewerOneWaits) {
+  begin();
+  ask();
+  schedule.end_overtaken(now + 0.2);
+  EXPECT_TRUE(schedule.tile_open()) << "it is not old yet";
+  EXPECT_FALSE(ends_after(0.3)) << "a tile of it is out";
+  EXPECT_FALSE(schedule.tile_open());
+  EXPECT_TRUE(schedule.take_ends().empty());
+  now += 0.35;
+  EXPECT_TRUE(done(*out, 1000)) << "what is out still comes";
+  EXPECT_EQ(schedule.views_in_flight(), 0u);
+  EXPECT_EQ(schedule.overtaken(), 1u);
+  const auto ends = schedule.take_ends();
+  ASSERT_EQ(ends.size(), 1u);
+  EXPECT_EQ(ends[0].frame, out->frame);
+  EXPECT_EQ(ends[0].viewer, kFar);
+  EXPECT_EQ(ends[0].request.value, 1u);
+  EXPECT_EQ(ends[0].tiles, 4u);
+  EXPECT_EQ(ends[0].camera, out->camera);
+  EXPECT_EQ(ends[0].moments.requested_s, 3);
+  EXPECT_NEAR(ends[0].moments.leased_s, now - 0.05, 1e-9) << "so long the rest waited";
+  EXPECT_TRUE(schedule.take_ends().empty()) << "once";
+  link(kFar, 0);
+  ASSERT_TRUE(schedule.begin_view({1}, false, now));
+  EXPECT_EQ(schedule.lease("a", now)->request.value, 2u);
+}
+
+TEST_F(Overtaken, ASamplerThatDiedDoesNotKeepIt) {
+  begin();
+  ask();
+  EXPECT_FALSE(ends_after(0.3));
+  schedule.release_sampler("b");
+  EXPECT_EQ(schedule.views_in_flight(), 0u);
+  EXPECT_EQ(schedule.take_ends().size(), 1u);
+}
+
+TEST_F(Overtaken, NobodyOvertakesWhereNoOtherViewWaits) {
+  begin();
+  EXPECT_TRUE(done(*out, 0));
+  EXPECT_FALSE(ends_after(9));
+  ask(0, 0);
+  EXPECT_FALSE(ends_after(9)) << "the same view";
+  ask();
+  EXPECT_TRUE(ends_after(9));
+}
+
+TEST_F(Overtaken, ViewsInOrderAreAllWanted) {
+  begin(2);
+  EXPECT_TRUE(done(*out, 0));
+  ask(2);
+  EXPECT_FALSE(ends_after(9));
+}
+
+TEST_F(Overtaken, AViewThatDoesNotWaitForItsLinkIsSampledToItsEnd) {
+  link(kFar, 0);
+  ASSERT_TRUE(begins(kFar, 1));
+  ASSERT_TRUE(schedule.lease("a", now));
+  ask();
+  EXPECT_FALSE(ends_after(9));
+  EXPECT_TRUE(schedule.tile_open());
+}
+
+TEST_F(Overtaken, BandsOfRowsMakeNoWholeBlocksAndAreSampledToTheirEnd) {
+  schedule.set_cut({.rows = true});
+  begin();
+  EXPECT_TRUE(done(*out, 0));
+  ask();
+  EXPECT_FALSE(ends_after(9));
+}
+
+TEST_F(Paced, WhatALinkWouldCarryForLongArrivesCoarseFirst) {
+  schedule.set_cut({.coarse_if_slow = true});
+  const auto steps = [&](uint64_t id, double rate_bytes_s) {
+    schedule.on_link({kFar, rate_bytes_s, 0, 0.02, 0}, now);
+    EXPECT_TRUE(begins(kFar, id));
+    std::set<uint64_t> out;
+    while (const auto l = schedule.lease("a", now)) {
+      out.insert(l->step);
+      done(*l, 4096);  // a byte a ray
+      schedule.on_link({kFar, rate_bytes_s, 0, 0.02, 0}, now);
+    }
+    return out;
+  };
+  EXPECT_EQ(steps(1, 1e4), std::set<uint64_t>{1}) << "nobody knows what a ray takes";
+  EXPECT_EQ(steps(2, 1e6), std::set<uint64_t>{1}) << "16 ms";
+  EXPECT_EQ(steps(3, 1e4), (std::set<uint64_t>{1, 4})) << "1.6 s";
+  schedule.set_cut({});
+  EXPECT_EQ(steps(4, 1e4), std::set<uint64_t>{1}) << "it is not wished";
 }
 
 TEST_F(Paced, ANewPackerHasNothingUnderWay) {

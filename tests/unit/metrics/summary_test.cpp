@@ -53,6 +53,7 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
                           "samplers_busy",
                           "epochs",
                           "leases_backup",
+                          "views_overtaken",
                           "packing_ms",
                           "data_generating_rate_mb_s",
                           "data_transfer_rate_mb_s",

@@ -89,6 +89,48 @@ TEST(PackerCore, DuplicateTilesAreDroppedAndCounted) {
   EXPECT_EQ(core.sequence(), before);
 }
 
+TEST(PackerCore, AFrameThatEndsEarlySaysWhatItLeavesOut) {
+  PackerCore core(packer_config(), kEpoch);
+  auto tiles = sampled_frame({1}, camera(), 64);
+  ASSERT_GT(tiles.size(), 4u);
+  auto coarse = sampled_frame({9}, geometry::subsample(camera(), 4), 320);
+  for (auto& t : coarse) t.step = 4;
+  submit_all(core, coarse);
+  submit_all(core, {tiles[0], tiles[2]});
+  FramePart label = tiles[0];
+  label.rect = {}, label.tile = 0;
+  const uint64_t digest = core.model().digest();
+  const auto end = core.end_frame(label, 0);
+  ASSERT_TRUE(end.ok() && end->has_value());
+  EXPECT_TRUE((*end)->frame_complete);
+  EXPECT_EQ((*end)->left_out, tiles.size() - 2);
+  EXPECT_EQ((*end)->tile, 1u) << "the first that is left out";
+  EXPECT_EQ((*end)->tiles_in_frame, tiles.size());
+  EXPECT_EQ((*end)->samples, 0u);
+  EXPECT_EQ((*end)->request, tiles[0].request);
+  EXPECT_EQ(core.model().digest(), digest) << "what came of it stays";
+  EXPECT_TRUE(core.forget_superseded().empty()) << "the coarse pass shows what is left out";
+  EXPECT_FALSE(core.end_frame(label, 0)->has_value()) << "once";
+  EXPECT_FALSE(core.submit(tiles[3], 0)->has_value()) << "what comes late is dropped";
+
+  // A view of which nothing came, one that is complete, and one of another epoch.
+  tiles = sampled_frame({2}, camera(), 64);
+  const auto none = core.end_frame(
+      [&] {
+        FramePart part = tiles[0];
+        part.tiles_in_frame = 7;
+        return part;
+      }(),
+      0);
+  ASSERT_TRUE(none.ok() && none->has_value());
+  EXPECT_EQ((*none)->left_out, 7u);
+  tiles = sampled_frame({3}, camera(), 160);
+  submit_all(core, tiles);
+  EXPECT_FALSE(core.end_frame(tiles[0], 0)->has_value());
+  label.epoch = {99}, label.frame = {4};
+  EXPECT_FALSE(core.end_frame(label, 0)->has_value());
+}
+
 TEST(PackerCore, TilesOfOtherEpochsAreDroppedAndCounted) {
   PackerCore core(packer_config(), kEpoch);
   for (const uint64_t epoch : {2, 4})

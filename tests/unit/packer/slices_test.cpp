@@ -216,6 +216,28 @@ TEST(SliceGatherer, ALateViewerGetsTheNewestFrameAtOnce) {
   EXPECT_FALSE(g.take_outgoing(3));
 }
 
+TEST(SliceGatherer, OnASlowLinkANewerFrameTakesThePlaceOfOneThatWouldWait) {
+  auto g = gatherer();
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 0), 0));
+  ASSERT_TRUE(g.acknowledged("ordered", ack(2, 0, 2, true), 0));
+  const auto sent = [&](uint64_t frame, double now_s) {
+    EXPECT_TRUE(g.add(slab(lease(frame, 0, 1, {view(1, frame), view(2, frame, 2)})), now_s).ok());
+    std::set<uint64_t> to;
+    while (const auto out = g.take_outgoing(now_s)) to.insert(out->frame.viewer.value);
+    return to;
+  };
+  EXPECT_EQ(sent(1, 0), (std::set<uint64_t>{1, 2}));
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 1), 1));
+  ASSERT_TRUE(g.acknowledged("ordered", ack(2, 1, 2, true), 1));
+  EXPECT_EQ(sent(2, 1), (std::set<uint64_t>{1, 2}));
+  EXPECT_EQ(sent(3, 1.3), std::set<uint64_t>{2}) << "in order each frame is wanted";
+  EXPECT_EQ(sent(4, 1.6), std::set<uint64_t>{}) << "its buffers are full";
+  const auto out = g.take_outgoing(1.85);
+  ASSERT_TRUE(out) << "the link is nearly done";
+  EXPECT_EQ(out->frame.frame.value, 4u);
+  EXPECT_EQ(g.statistics().frames_skipped, 1u);
+}
+
 TEST(SliceGatherer, FramesWaitForAViewerThatIsYetToIntroduceItself) {
   auto g = gatherer();
   for (uint64_t f = 1; f <= 2; ++f) ASSERT_TRUE(g.add(slab(lease(f, 0, 1, {view(1, f, 3)})), 1).ok());

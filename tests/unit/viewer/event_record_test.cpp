@@ -41,6 +41,7 @@ ModelEvent as_received(const packer::Event& e) {
                       e.step,
                       e.extra,
                       e.frame_complete,
+                      e.left_out,
                       e.samples,
                       e.kept,
                       e.camera,

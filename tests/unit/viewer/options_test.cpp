@@ -164,18 +164,19 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
-  EXPECT_EQ(update_columns(), (Texts{"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms",
-                                     "start_up_ms", "tiles", "samples", "points", "bytes", "eliminated",
-                                     "sampling_width", "sampling_height", "epoch", "extra_points", "extra_bytes"}));
+  EXPECT_EQ(update_columns(),
+            (Texts{"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
+                   "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch",
+                   "extra_points", "extra_bytes", "left_out"}));
   ViewRequester::Update u;
   u.requested_s = 1, u.first_s = 1.25, u.complete_s = 1.5;
   u.samples = 100, u.points = 25, u.eliminated = 75;
   u.extra_points = 8, u.extra_bytes = 16;
-  const auto row = update_row({u, {}});
+  const auto row = update_row({u, {.left_out = 3}});
   EXPECT_EQ(row[5], 500);
   EXPECT_EQ(row[6], 250);
   EXPECT_EQ(row[11], 0.75);
-  EXPECT_EQ((std::vector<double>(row.end() - 2, row.end())), (std::vector<double>{8, 16}));
+  EXPECT_EQ((std::vector<double>(row.end() - 3, row.end())), (std::vector<double>{8, 16, 3}));
 }
 
 TEST(LeastSampling, IsWhatTheSessionTellsWithinItsLimits) {
