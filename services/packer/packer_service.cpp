@@ -1,5 +1,7 @@
 #include "services/packer/packer_service.h"
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "common/core/clock.h"
@@ -62,7 +64,7 @@ class PackerService {
       if (packing_) packing_->tick(now);
       flush_spans(now);
       const std::vector<net::Socket*> sockets{&link_->socket(), &tiles_, &state_};
-      if (!net::wait_readable(sockets, 0) && !use_spare_time(now)) net::wait_readable(sockets, 50);
+      if (!net::wait_readable(sockets, 0) && !use_spare_time(now)) net::wait_readable(sockets, longest_wait_ms());
       receive_control();
       receive(state_, kStateAtOnce, &Packing::take_state);
       receive(tiles_, kSampledAtOnce, &Packing::take_sampled);
@@ -106,6 +108,12 @@ class PackerService {
     if (request.extra && packing_) return spare_.keep(request);
     if (!request.extra) spare_.follow(request);
     link_->socket().send(packing_ ? packing_->plan(request, now_s) : all_rays(request));
+  }
+
+  // Until something is due that no message tells of.
+  int longest_wait_ms() const {
+    const auto due_s = packing_ ? packing_->due_s() : std::nullopt;
+    return due_s ? int(std::ceil(std::clamp(*due_s - monotonic_s(), 0.001, 0.05) * 1e3)) : 50;
   }
 
   // One piece of what can wait. False: there is none, or it waits.

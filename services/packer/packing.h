@@ -68,6 +68,8 @@ class Packing {
 
   /// To be called at least every 100 ms: what happens by time.
   virtual void tick(double now_s) = 0;
+  /// When tick() has something to do, at the latest; nothing: within 50 ms.
+  virtual std::optional<double> due_s() const { return std::nullopt; }
   /// Adds what it counts to a status report.
   virtual void add_status(net::MasterLink::Values& values) const = 0;
 };

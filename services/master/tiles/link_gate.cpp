@@ -77,6 +77,11 @@ uint64_t LinkGate::least_update_rays(double now_s) const {
   return least;
 }
 
+bool LinkGate::known() const {
+  return links_.empty() ||
+         std::any_of(links_.begin(), links_.end(), [](const auto& l) { return l.second.told.rate_bytes_s > 0; });
+}
+
 std::map<std::string, double> LinkGate::figures(InstanceId viewer) const {
   const auto found = links_.find(viewer);
   if (found == links_.end()) return {};

@@ -46,6 +46,8 @@ class LinkGate {
   uint64_t update_rays(InstanceId viewer) const;
   /// How long the link would need for a view of so many rays that is sampled whole; nullopt: it is not known.
   std::optional<double> takes_s(InstanceId viewer, double rays) const;
+  /// There is no viewer that tells of its link, or of one the rate is known.
+  bool known() const;
   /// The least of all viewers that read.
   uint64_t least_update_rays(double now_s) const;
   /// "link_mbit", "backlog_bytes", "rtt_ms", as far as they are known.

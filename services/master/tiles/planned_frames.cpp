@@ -18,6 +18,8 @@ constexpr double kLeastTileRays = 1024, kMostRays = 1 << 24;
 constexpr int kPlannedSide = 2, kPlannedSideOfFew = 4;
 constexpr double kTargetsOfFew = 3;  // of lease_target_s
 constexpr size_t kFewSamplers = 2;
+constexpr uint64_t kUnknownTileRays = 16384;  // of rays beyond views, while nothing is known of any link
+constexpr uint64_t kTilesPerUpdate = 4;       // that a link carries in LinkGate::kUpdate_s
 
 // The wait for its plan is over.
 PlannedView planned(PlannedView view, double now_s) {
@@ -35,8 +37,15 @@ PlanLimits FrameSchedule::limits(std::optional<InstanceId> viewer, double now_s)
   const size_t samplers = std::max<size_t>(costs_.samplers(), 1);
   out.refining_rays = refining_.most(samplers);
   out.link_rays = viewer ? gate_.update_rays(*viewer) : gate_.least_update_rays(now_s);
+  // Tiles are leased at the pace of a link: one is no more than a part of what it carries for an update.
+  const auto of_link = [&](uint64_t rays) {
+    if (out.link_rays == 0) return !viewer && !gate_.known() ? std::min(rays, kUnknownTileRays) : rays;
+    return std::min(rays, std::max(uint64_t(kLeastTileRays), out.link_rays / kTilesPerUpdate));
+  };
+  out.tile_rays = of_link(out.tile_rays);
   if (!(ray_s > 0)) return out;
-  out.tile_rays = uint64_t(std::clamp((few ? kTargetsOfFew : 1) * target_s() / ray_s, kLeastTileRays, kMostRays));
+  out.tile_rays =
+      of_link(uint64_t(std::clamp((few ? kTargetsOfFew : 1) * target_s() / ray_s, kLeastTileRays, kMostRays)));
   out.most_rays = uint64_t(std::clamp(kExtraFrame_s * double(samplers) / ray_s, kLeastTileRays, kMostRays));
   return out;
 }

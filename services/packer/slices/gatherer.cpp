@@ -235,9 +235,17 @@ void SliceGatherer::expire(double now_s) {
   });
 }
 
-bool SliceGatherer::may_send(const Viewer& v, double now_s) {
-  if (v.peer.empty() || v.waiting.empty() || v.unacknowledged.size() >= v.buffers) return false;
-  return now_s >= (v.in_order ? v.pace.wished_s() : v.pace.next_s());
+bool SliceGatherer::has_room(const Viewer& v) {
+  return !v.peer.empty() && !v.waiting.empty() && v.unacknowledged.size() < v.buffers;
+}
+
+double SliceGatherer::may_send_s(const Viewer& v) { return v.in_order ? v.pace.wished_s() : v.pace.next_s(); }
+
+std::optional<double> SliceGatherer::due_s() const {
+  std::optional<double> out;
+  for (const auto& [id, v] : viewers_)
+    if (has_room(v)) out = std::min(out.value_or(1e300), may_send_s(v));
+  return out;
 }
 
 std::optional<SliceGatherer::Outgoing> SliceGatherer::take_outgoing(double now_s) {
@@ -246,7 +254,7 @@ std::optional<SliceGatherer::Outgoing> SliceGatherer::take_outgoing(double now_s
   for (size_t n = 0; n < viewers_.size(); ++n, ++next) {
     if (next == viewers_.end()) next = viewers_.begin();
     Viewer& v = next->second;
-    if (!may_send(v, now_s)) continue;
+    if (!has_room(v) || now_s < may_send_s(v)) continue;
     turn_ = next->first;
     if (v.unacknowledged.empty()) v.heard_s = std::max(v.heard_s, now_s);
     v.unacknowledged.push_back(std::move(v.waiting.front()));

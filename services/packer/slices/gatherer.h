@@ -85,6 +85,9 @@ class SliceGatherer {
   /// asynchronous viewer none that would wait on its link (SlicePace): a newer one takes its place. It counts as sent.
   std::optional<Outgoing> take_outgoing(double now_s);
 
+  /// When a frame that waits for a link may go out; nothing: none waits for one.
+  std::optional<double> due_s() const;
+
   const Statistics& statistics() const { return statistics_; }
   size_t open_frames() const { return open_.size(); }
   size_t viewers() const { return viewers_.size(); }
@@ -126,7 +129,8 @@ class SliceGatherer {
   void make_room(size_t bytes);
   void complete(const std::shared_ptr<const Frame>& frame, double now_s);
   Viewer& viewer(InstanceId id, double now_s);
-  static bool may_send(const Viewer& viewer, double now_s);
+  static bool has_room(const Viewer& viewer);
+  static double may_send_s(const Viewer& viewer);
   void queue(Viewer& viewer, Waiting waiting);
   Outgoing make(InstanceId id, const Viewer& viewer, const Waiting& waiting) const;
 

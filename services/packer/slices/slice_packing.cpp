@@ -76,7 +76,10 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
   // not know.
   if (added->frame_complete) {
     gatherer_.packed(outlets_.master_now());
-    done.bytes_sent = send_out(now_s, &done.moments.published_s);
+    send_out(now_s, &done.moments.published_s);
+    // What went out later, when its viewer was ready, is counted to the next frame.
+    done.bytes_sent = bytes_sent_ - bytes_told_;
+    bytes_told_ = bytes_sent_;
     spans_.add("pack", receive_s, outlets_.master_now(), 0, {.frame = double(done.frame.value)});
   }
   done.moments.packed_s = done.moments.published_s > 0 ? done.moments.published_s : outlets_.master_now();
@@ -84,8 +87,7 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
   return ok_status();
 }
 
-uint64_t SlicePacking::send_out(double now_s, double* first_s) {
-  uint64_t bytes = 0;
+void SlicePacking::send_out(double now_s, double* first_s) {
   while (auto out = gatherer_.take_outgoing(now_s)) {
     out->frame.packer = instance_;
     // Taken before it is sent: a viewer may have it before the send returns.
@@ -95,10 +97,8 @@ uint64_t SlicePacking::send_out(double now_s, double* first_s) {
       gatherer_.unreachable(out->peer);
       continue;
     }
-    bytes += out->frame.data.size();
+    bytes_sent_ += out->frame.data.size();
   }
-  bytes_sent_ += bytes;
-  return bytes;
 }
 
 Status SlicePacking::acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s) {

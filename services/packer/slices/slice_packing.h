@@ -19,6 +19,7 @@ class SlicePacking final : public Packing {
   void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
   void take_state(net::Socket& from, const net::Message& message, double now_s) override;
   void tick(double now_s) override;
+  std::optional<double> due_s() const override { return gatherer_.due_s(); }
   void add_status(net::MasterLink::Values& values) const override;
 
   /// As take_sampled(): slabs of an epoch that is not announced yet wait for it. Error: what makes no sense.
@@ -34,8 +35,8 @@ class SlicePacking final : public Packing {
   bool is_ahead(const wire::SliceImages& images) const {
     return !gatherer_.ready() || images.lease.epoch > gatherer_.epoch();
   }
-  /// Bytes. first_s: when the first was sent, on the master's clock; stays as it is if nobody takes one now.
-  uint64_t send_out(double now_s, double* first_s = nullptr);
+  /// first_s: when the first was sent, on the master's clock; stays as it is if nobody takes one now.
+  void send_out(double now_s, double* first_s = nullptr);
 
   Outlets outlets_;
   metrics::SpanRecorder& spans_;
@@ -43,7 +44,7 @@ class SlicePacking final : public Packing {
   EpochHold<Received> ahead_{{.items = 64, .bytes = 256u << 20}};
   InstanceId instance_ = net::make_instance_id(), master_;
   std::optional<volume::Grid> grid_;
-  uint64_t bytes_received_ = 0, bytes_sent_ = 0;
+  uint64_t bytes_received_ = 0, bytes_sent_ = 0, bytes_told_ = 0;  // told: of those sent, the master knows
 };
 
 }  // namespace telesplat::packer

@@ -245,13 +245,13 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
   const std::string turning = folder / "turning.csv";
   std::ofstream file(turning);
   file << "t_s,px,py,pz,qw,qx,qy,qz\n";
-  for (int i = 0; i <= 80; ++i) {
-    const double angle = 0.05 * i;
+  for (int i = 0; i <= 100; ++i) {
+    const double angle = 0.15 * i;
     file << 0.1 * i << ',' << 0.7 * std::sin(angle) << ",0.3," << 0.7 * std::cos(angle) << ',' << std::cos(angle / 2)
          << ",0," << std::sin(angle / 2) << ",0\n";
   }
   file.close();
-  PipelineRun run({"--trajectory", turning, "--hold", "6", "--link", "rtt=20ms,rate=400kbit", "--size", "640x400",
+  PipelineRun run({"--trajectory", turning, "--hold", "6", "--link", "rtt=20ms,rate=1mbit", "--size", "640x400",
                    "--sampling-size", "640x400"});
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
