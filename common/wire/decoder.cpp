@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <msgpack/unpack.hpp>
@@ -116,6 +117,11 @@ void Decoder::get(const msgpack::object& o, std::string& v) {
   v = text;
 }
 
+// What becomes a float must not become infinite.
+bool Decoder::all_single(std::span<const double> v) {
+  return std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(static_cast<float>(x)); });
+}
+
 bool Decoder::numbers(const msgpack::object& o, std::span<double> out) {
   if (o.type != msgpack::type::ARRAY || o.via.array.size != out.size())
     fail(fmt::format("is not a list of {} numbers", out.size()));
@@ -139,9 +145,7 @@ void Decoder::get_bin(const msgpack::object& o, std::vector<T>& v, size_t max_en
   v.resize(o.via.bin.size / sizeof(T));
   if (!v.empty()) std::memcpy(v.data(), o.via.bin.ptr, o.via.bin.size);
 }
-void Decoder::get(const msgpack::object& o, std::vector<uint32_t>& v) {
-  get_bin(o, v, limit_ > 0 ? limit_ : kMaxKeys);
-}
+void Decoder::get(const msgpack::object& o, std::vector<uint32_t>& v) { get_bin(o, v, limit_ > 0 ? limit_ : kMaxKeys); }
 void Decoder::get(const msgpack::object& o, std::vector<double>& v) { get_bin(o, v, kMaxBulkBytes / sizeof(double)); }
 
 void Decoder::get(const msgpack::object& o, std::vector<std::string>& v) {
@@ -169,8 +173,7 @@ void Decoder::get(const msgpack::object& o, std::map<std::string, double>& v) { 
 void Decoder::get(const msgpack::object& o, geometry::Box& b) {
   double v[6];
   if (!numbers(o, v)) return;
-  for (const double x : v)
-    if (std::abs(x) > 3.5e38) return fail("is beyond single precision");
+  if (!all_single(v)) return fail("is beyond single precision");
   b = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
 }
 
@@ -205,6 +208,7 @@ void Decoder::get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& ch
   for (size_t i = 0; i < size && !error_; ++i) {
     double v[9];
     if (!numbers(entry(o, i), v)) return;
+    if (!all_single(std::span(v).subspan(3))) return fail("holds a chunk whose box is beyond single precision");
     if (!is_integer(v[0], 0, geometry::kMaxChunks) || !is_integer(v[1], 0, geometry::kMaxChunkTriangles) ||
         !is_integer(v[2], 0, kMaxBulkBytes))
       return fail("holds a chunk whose id, triangles or bytes are out of range");

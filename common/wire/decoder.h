@@ -36,6 +36,7 @@ class Decoder {
   size_t list_size(const msgpack::object& o, size_t limit);
   static const msgpack::object& entry(const msgpack::object& list, size_t i);
   bool numbers(const msgpack::object& o, std::span<double> out);
+  static bool all_single(std::span<const double> v);
   template <class T>
   void get_bin(const msgpack::object& o, std::vector<T>& v, size_t max_entries);
   template <class V>

@@ -1,6 +1,8 @@
 // What decoding refuses: fields beyond their limits, and fields that do not go together.
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include <cmath>
 #include <limits>
 
@@ -258,6 +260,13 @@ TEST(Limits, OfChunkLists) {
   };
   const geometry::Box box{{0, 0, 0}, {1, 1, 1}};
   EXPECT_TRUE(decode<ChunkList>(bytes_of(with({ChunkId{5}, box, 10, 400}))));
+  // 3.45e38 is a number, and no float.
+  std::string list = "\x91\x99\x05\x0a\x64";
+  for (const double x : {0.0, 0.0, 0.0, 1.0, 3.45e38, 1.0}) {
+    list += '\xcb';
+    for (int shift = 56; shift >= 0; shift -= 8) list += static_cast<char>(std::bit_cast<uint64_t>(x) >> shift);
+  }
+  EXPECT_TRUE(refused<ChunkList>(with_value(encode(sample_message<ChunkList>()), "chunks", list), "single precision"));
   EXPECT_TRUE(refused<ChunkList>(with({ChunkId{geometry::kMaxChunks + 1}, box, 10, 400}), "chunk"));
   EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, box, geometry::kMaxChunkTriangles + 1, 400}), "chunk"));
   EXPECT_TRUE(refused<ChunkList>(with({ChunkId{5}, box, 10, kMaxBulkBytes + 1}), "chunk"));
