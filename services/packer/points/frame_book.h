@@ -38,7 +38,8 @@ class FrameBook {
   bool has(FrameId frame, uint32_t tile) const;
   /// Refuses a tile whose frame was said to have another camera or another number of tiles.
   Status check(const FramePart& tile) const;
-  /// Notes the tile as packed, and its frame as finished if it leaves out others. Returns its frame as it is then; finished and forgotten if tiles_left is 0.
+  /// Notes the tile as packed, and its frame as finished if it leaves out others. Returns its frame as it is then;
+  /// finished and forgotten if tiles_left is 0.
   /// Preconditions: not a duplicate, checked, tile < tiles_in_frame.
   Frame add(const FramePart& tile, const splat::Elimination& elimination);
   void clear();

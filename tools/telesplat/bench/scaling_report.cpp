@@ -152,6 +152,7 @@ Result<std::vector<double>> busy_times(const std::string& path, double from_s, d
     if (at("leased_s") >= from_s && at("leased_s") < to_s)
       busy[cells[column["sampler"]]] += at("encode_end_s") - at("sample_begin_s");
   }
+  if (busy.empty()) return Error{fmt::format("{}: no tile was leased from {:.3f} to {:.3f} s", path, from_s, to_s)};
   std::vector<double> out;
   for (const auto& [name, seconds] : busy) out.push_back(seconds);
   return out;

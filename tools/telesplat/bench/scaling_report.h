@@ -60,7 +60,8 @@ std::string to_text(const KillResult& result);
 /// Writes scaling.csv and scaling.json.
 Status write_report(const ScalingReport& report, const std::string& directory);
 
-/// A sampler's busy seconds over the tiles leased in [from_s, to_s), by name, from a record's tiles.csv.
+/// A sampler's busy seconds over the tiles leased in [from_s, to_s) of the master's clock, by name, from a record's
+/// tiles.csv. Error: it cannot be read, or none was.
 Result<std::vector<double>> busy_times(const std::string& tiles_csv, double from_s, double to_s);
 
 }  // namespace telesplat::launcher

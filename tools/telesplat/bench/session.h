@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/clock.h"
 #include "common/net/master_link.h"
 #include "tools/telesplat/bench/processes.h"
 
@@ -43,6 +44,8 @@ class BenchSession {
   }
 
   const std::string& directory() const { return processes_->directory(); }
+  /// The clock of the record.
+  double master_now() const { return link_->to_master_s(monotonic_s()); }
   std::optional<nlohmann::json> status() { return processes_->status(); }
   /// Ends all processes; the record is complete then.
   void finish();
