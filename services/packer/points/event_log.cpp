@@ -4,6 +4,8 @@
 #include <iterator>
 #include <tuple>
 
+#include "common/codec/depth_codec.h"
+
 namespace telesplat::packer {
 namespace {
 
@@ -12,6 +14,16 @@ constexpr uint64_t kNodeBytes = 96;
 constexpr uint64_t kForgetBytes = 40;  // a hash node and its bucket
 
 bool by_sequence(const Event& a, const Event& b) { return a.sequence < b.sequence; }
+
+// The same without what it brought.
+Event bare(const Event& event) {
+  static const auto kNothing = std::make_shared<const std::vector<uint8_t>>(codec::encode(image::DepthImage(1, 1)));
+  Event out = event;
+  out.blob = kNothing;
+  out.rect = {event.rect.x, event.rect.y, 1, 1};
+  out.missed = {};
+  return out;
+}
 
 }  // namespace
 
@@ -162,6 +174,28 @@ std::vector<Event> EventLog::patch_forgets(Sequence after, bool from_nothing) co
     out.back().frames.push_back(frame);
   }
   return out;
+}
+
+void Completions::add(const Event& event) {
+  if (event.kind == Event::Kind::kEpoch) return clear();
+  if (event.kind != Event::Kind::kPatch || !event.frame_complete || event.step > 1 || event.extra) return;
+  auto& views = of_[event.viewer];
+  views.push_back(bare(event));
+  if (views.size() > kMostViews) views.pop_front();
+  if (of_.size() <= kMostViewers) return;
+  of_.erase(std::min_element(of_.begin(), of_.end(), [](const auto& a, const auto& b) {
+    return a.second.back().sequence < b.second.back().sequence;
+  }));
+}
+
+void Completions::fill(std::vector<Event>& events, InstanceId viewer, Sequence after) const {
+  const auto found = of_.find(viewer);
+  if (found == of_.end()) return;
+  for (const Event& view : found->second) {
+    if (view.sequence <= after) continue;
+    const auto place = std::lower_bound(events.begin(), events.end(), view, by_sequence);
+    if (place == events.end() || place->sequence != view.sequence) events.insert(place, view);
+  }
 }
 
 std::unordered_set<Sequence> oldest_patches(const std::unordered_map<Sequence, double>& used_s, const EventLog& log,

@@ -70,6 +70,24 @@ class EventLog {
   uint64_t patch_bytes_ = 0;
 };
 
+/// Which views became complete of late: viewers that missed it wait for it. Where the patch that completed a view
+/// brought no points, or they were forgotten since, the event log leaves it out: the model does not need it.
+class Completions {
+ public:
+  static constexpr size_t kMostViews = 8;  ///< of each viewer, the newest; none has more buffers (wire::kMaxBuffers)
+  static constexpr size_t kMostViewers = 256;  ///< beyond, the one that waited longest for a view is dropped
+
+  /// An event was published. A new epoch voids what was complete before it.
+  void add(const Event& event);
+  /// Puts in, in order, what completed views of this viewer after `after` and is not among the events, as patches
+  /// without points. events: those after `after`, in order.
+  void fill(std::vector<Event>& events, InstanceId viewer, Sequence after) const;
+  void clear() { of_.clear(); }
+
+ private:
+  std::map<InstanceId, std::deque<Event>> of_;  // none is empty
+};
+
 /// The patches least recently used, until the others have at most 90 % of max_bytes; none if all have no more than
 /// max_bytes. used_s: when each patch of the log was used last.
 std::unordered_set<Sequence> oldest_patches(const std::unordered_map<Sequence, double>& used_s, const EventLog& log,

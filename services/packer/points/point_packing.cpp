@@ -148,6 +148,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
     if (core_) instance_ = net::make_instance_id();  // viewers start anew
     meter_.clear();
+    completions_.clear();
     model_ = config.model;
     planner_.reset();
     core_.emplace(config, session.epoch);
@@ -331,7 +332,8 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
     outlets_.send(wire::StateMark{net::make_instance_id(), {}, core_->epoch(), false, 0}, peer);
     return log::info("a viewer that stopped after {} starts anew", after.value);
   }
-  const auto events = core_->events_since(after);
+  auto events = core_->events_since(after);
+  completions_.fill(events, request.viewer, after);
   for (const auto& e : events) with_message(instance_, e, {}, [&](const auto& m) { outlets_.send(m, peer); });
   outlets_.send(mark(true), peer);
   meter_.replayed(request.viewer);
@@ -348,6 +350,7 @@ void PointPacking::on_receipt(const wire::Receipt& receipt, double now_s) {
 
 void PointPacking::publish(const Event& event, const wire::Moments& moments) {
   meter_.published(event.sequence, size_on_wire(event), monotonic_s());
+  completions_.add(event);
   with_message(instance_, event, moments, [&](const auto& m) { outlets_.publish(m); });
 }
 

@@ -9,6 +9,7 @@
 #include "services/packer/packing.h"
 #include "services/packer/points/block_gatherer.h"
 #include "services/packer/points/depth_recorder.h"
+#include "services/packer/points/event_log.h"
 #include "services/packer/points/link_meter.h"
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
@@ -74,6 +75,7 @@ class PointPacking final : public Packing {
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;
   LinkMeter meter_;  // of the viewers' links
+  Completions completions_;
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
   uint64_t plans_ = 0;
   FrameId planning_;           // whose extra rays were planned last,

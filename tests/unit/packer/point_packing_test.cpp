@@ -203,6 +203,80 @@ TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
   EXPECT_EQ(sent.size(), 2u);
 }
 
+// Else it would wait until it asked for the view again.
+TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
+  wire::Welcome session = welcome();
+  session.settings["sampling.validation"] = 0;
+  ASSERT_TRUE(packing.follow(session, 0));
+  wire::PlanRequest request{.frame = {1}, .epoch = test::kEpoch, .viewer = {77}, .request = {5}, .camera = kCamera};
+  ASSERT_TRUE(packing.plan(request, 1).full) << "nothing is known";
+  for (const int half : {0, 1}) sample(tile(1, half), 1);
+  const InstanceId packer = decoded<wire::Patch>(sent[0]).packer;
+  while (packing.idle(1e9)) {
+  }
+  for (uint64_t id = 6; id <= 8; ++id) {
+    request.frame = {id}, request.request = {id};
+    ASSERT_TRUE(packing.plan(request, 4).tiles.empty()) << "the model has all of it";
+  }
+
+  const auto told_after = [&](Sequence after) {
+    sent.clear();
+    ask(after, packer, 5);
+    std::vector<uint64_t> requests;
+    Sequence newest = after;
+    for (size_t i = 0; i + 1 < sent.size(); ++i) {
+      const auto patch = decoded<wire::Patch>(sent[i]);
+      EXPECT_GT(patch.sequence, newest) << "in order";
+      newest = patch.sequence;
+      EXPECT_EQ(patch.viewer.value, 77u);
+      EXPECT_TRUE(patch.frame_complete);
+      EXPECT_EQ(patch.kept > 0, patch.request.value == 5) << "the points come once";
+      requests.push_back(patch.request.value);
+    }
+    EXPECT_TRUE(decoded<wire::StateMark>(sent.back()).answer);
+    return requests;
+  };
+  EXPECT_EQ(told_after({}), (std::vector<uint64_t>{5, 6, 7, 8}));
+  EXPECT_EQ(told_after({2}), (std::vector<uint64_t>{7, 8}));
+  EXPECT_EQ(told_after({4}), std::vector<uint64_t>{});
+  // Of another epoch none is complete.
+  session.epoch = test::kEpoch.next();
+  ASSERT_TRUE(packing.follow(session, 6));
+  sent.clear();
+  ask({}, packer, 7);
+  ASSERT_EQ(sent.size(), 2u);
+  EXPECT_EQ(sent[0].type, wire::EpochBegin::kName);
+}
+
+TEST(Completions, AreBounded) {
+  Completions completions;
+  Event event;
+  event.frame_complete = true;
+  const auto add = [&](uint64_t viewer) {
+    event.sequence = event.sequence.next(), event.viewer = {viewer};
+    completions.add(event);
+  };
+  const auto count = [&](uint64_t viewer) {
+    std::vector<Event> events;
+    completions.fill(events, {viewer}, {});
+    return events.size();
+  };
+  for (int i = 0; i < 20; ++i) add(1);
+  EXPECT_EQ(count(1), Completions::kMostViews);
+  std::vector<Event> newest;
+  completions.fill(newest, {1}, {19});
+  ASSERT_EQ(newest.size(), 1u);
+  EXPECT_EQ(newest[0].sequence.value, 20u);
+  for (uint64_t viewer = 2; viewer <= Completions::kMostViewers + 1; ++viewer) add(viewer);
+  EXPECT_EQ(count(1), 0u) << "who waited longest for a view made room";
+  EXPECT_EQ(count(2), 1u);
+  for (const bool extra : {false, true}) {  // of a coarse pass, of rays beyond the view
+    event.step = extra ? 1 : 4, event.extra = extra;
+    add(2);
+  }
+  EXPECT_EQ(count(2), 1u);
+}
+
 TEST_F(PointPackingTest, AnotherBoxMeansAnotherModel) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   packing.tick(1);
