@@ -91,6 +91,7 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
     forget_viewer(p.hello);
     p.coupling.reset();
   }
+  live_.set_here(p.hello.role, p.hello.name, false);  // if it has another name now
   instances_.erase(p.hello.instance);
   instances_[m.instance] = peer;
   p.hello = m;
@@ -103,6 +104,7 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
   if (p.gone) p.reports.clear();
   p.seen_s = now_s;
   p.gone = p.refused = false;
+  live_.set_here(m.role, m.name, true);
   return p;
 }
 
@@ -162,6 +164,7 @@ void MasterCore::forget_viewer(const wire::Hello& hello) {
 
 void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
   p.gone = true;
+  live_.set_here(p.hello.role, p.hello.name, false);
   idle_.remove(routing_id);
   int leases = 0;
   for (auto& [pipeline, plan] : plans_) {
@@ -228,7 +231,7 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   if (!plan_->done(m, known_sampler ? sampler->first : std::string(), now_s)) return;
   const std::string& name = known_sampler ? sampler->second.hello.name : std::string("?");
   record_.add_tile(name, m);
-  live_.add_tile(name, m);
+  live_.add_tile(name, m, known_sampler && !sampler->second.gone);
   dispatch(now_s);
 }
 

@@ -6,10 +6,15 @@
 namespace telesplat::master {
 namespace {
 
+// Drops the one of those that left that was measured longest ago. False: all are here.
 template <class V>
-V* entry(std::map<std::string, V>& map, const std::string& name) {
-  if (const auto found = map.find(name); found != map.end()) return &found->second;
-  return map.size() < LiveFigures::kMostNames ? &map[name] : nullptr;
+bool make_room(std::map<std::string, V>& map) {
+  auto oldest = map.end();
+  for (auto at = map.begin(); at != map.end(); ++at)
+    if (!at->second.here && (oldest == map.end() || at->second.measured_at < oldest->second.measured_at)) oldest = at;
+  if (oldest == map.end()) return false;
+  map.erase(oldest);
+  return true;
 }
 
 // The column's values, in milliseconds; a first frame has no delay and tells 0.
@@ -37,17 +42,35 @@ uint64_t Histogram::up_to(size_t bucket) const {
   return out;
 }
 
+// Null: there is no room for another name.
+template <class V>
+V* LiveFigures::entry(std::map<std::string, V>& map, const std::string& name, bool here) {
+  auto found = map.find(name);
+  if (found == map.end()) {
+    if (map.size() >= kMostNames && !make_room(map)) return nullptr;
+    found = map.try_emplace(name).first;
+  }
+  found->second.here = here;
+  found->second.measured_at = ++measured_;
+  return &found->second;
+}
+
+void LiveFigures::set_here(const std::string& role, const std::string& name, bool here) {
+  if (const auto v = viewers_.find(name); role == "viewer" && v != viewers_.end()) v->second.here = here;
+  if (const auto s = samplers_.find(name); role == "sampler" && s != samplers_.end()) s->second.here = here;
+}
+
 void LiveFigures::add_rows(const std::string& viewer, const wire::MetricRows& rows) {
   if (rows.table != "frames" && rows.table != "updates") return;
-  Viewer* v = entry(viewers_, viewer);
+  Viewer* v = entry(viewers_, viewer, true);
   if (!v) return;
   if (rows.table == "frames") return add_column(rows, "inter_frame_ms", true, v->inter_frame);
   add_column(rows, "latency_ms", false, v->update_latency);
   add_column(rows, "start_up_ms", false, v->start_up);
 }
 
-void LiveFigures::add_tile(const std::string& sampler, const wire::TileDone& tile) {
-  Sampler* s = entry(samplers_, sampler);
+void LiveFigures::add_tile(const std::string& sampler, const wire::TileDone& tile, bool here) {
+  Sampler* s = entry(samplers_, sampler, here);
   if (!s) return;
   ++s->tiles;
   s->bytes += tile.bytes_sampled;

@@ -35,26 +35,40 @@ class Histogram {
 
 class LiveFigures {
  public:
-  static constexpr size_t kMostNames = 256;  ///< viewers, and samplers; of more nothing is kept
+  /// Viewers, and samplers. Of more, those that left make room, the one that was measured longest ago first; where all
+  /// are here, nothing is kept of a new one.
+  static constexpr size_t kMostNames = 256;
 
-  struct Viewer {
+  struct Named {
+    bool here = true;          ///< it takes part; else it left
+    uint64_t measured_at = 0;  ///< rises with each value of any name
+  };
+  struct Viewer : Named {
     Histogram inter_frame, update_latency, start_up;
   };
-  struct Sampler {
+  struct Sampler : Named {
     uint64_t tiles = 0, bytes = 0, rays = 0;
     double busy_s = 0;  ///< sampling and encoding
   };
 
-  /// Rows of frames.csv or updates.csv that the record took; others change nothing.
+  /// A process of this role and name takes part from now on, or does not any more. Roles that are not measured change
+  /// nothing.
+  void set_here(const std::string& role, const std::string& name, bool here);
+  /// Rows of frames.csv or updates.csv that the record took, of a viewer that takes part; others change nothing.
   void add_rows(const std::string& viewer, const wire::MetricRows& rows);
-  void add_tile(const std::string& sampler, const wire::TileDone& tile);
+  /// here: the sampler takes part; one that has left may have tiles that come later.
+  void add_tile(const std::string& sampler, const wire::TileDone& tile, bool here = true);
 
   const std::map<std::string, Viewer>& viewers() const { return viewers_; }
   const std::map<std::string, Sampler>& samplers() const { return samplers_; }
 
  private:
+  template <class V>
+  V* entry(std::map<std::string, V>& map, const std::string& name, bool here);
+
   std::map<std::string, Viewer> viewers_;
   std::map<std::string, Sampler> samplers_;
+  uint64_t measured_ = 0;
 };
 
 }  // namespace telesplat::master

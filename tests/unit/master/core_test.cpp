@@ -254,6 +254,18 @@ TEST_F(Master, ANewPackerStartsWithNewFrames) {
   EXPECT_EQ(core.counters().at("frames_completed"), 2);
 }
 
+TEST_F(Master, LiveFiguresGoOnHoweverManyViewersCameAndLeft) {
+  const auto name = [](uint64_t i) { return "viewer-" + std::to_string(i); };
+  for (uint64_t i = 1; i <= 3 * LiveFigures::kMostNames; ++i) {
+    core.on(name(i), hello("viewer", name(i), 100 + i), 1);
+    ASSERT_TRUE(core.on(name(i), wire::MetricRows{{100 + i}, "updates", {"latency_ms"}, {150}}, 1));
+    ASSERT_TRUE(core.live().viewers().contains(name(i))) << i;
+    EXPECT_LE(core.live().viewers().size(), LiveFigures::kMostNames);
+    if (i > 1) core.on(name(i), wire::Goodbye{{100 + i}}, 1);
+  }
+  EXPECT_TRUE(core.live().viewers().contains(name(1))) << "it is still here";
+}
+
 TEST_F(Master, AReplacedProcessIsMarked) {
   join_all();
   core.undeliverable("p");

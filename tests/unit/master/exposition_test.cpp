@@ -53,6 +53,33 @@ TEST(LiveFigures, FollowRowsAndTiles) {
   EXPECT_EQ(f.samplers().size(), LiveFigures::kMostNames);
 }
 
+// Samplers come and go all day: those that left make room, those that are here stay.
+TEST(LiveFigures, WhoLeftLongAgoMakesRoom) {
+  LiveFigures f;
+  const wire::TileDone tile;
+  const wire::MetricRows rows{{5}, "updates", {"latency_ms"}, {150}};
+  const auto name = [](size_t i) { return fmt::format("p{}", i); };
+  for (size_t i = 0; i < LiveFigures::kMostNames; ++i) f.add_tile(name(i), tile), f.add_rows(name(i), rows);
+  f.add_tile("new", tile), f.add_rows("new", rows);
+  EXPECT_FALSE(f.samplers().contains("new") || f.viewers().contains("new")) << "all are here";
+  for (const size_t i : {7, 3, 9}) f.set_here("sampler", name(i), false);
+  f.set_here("viewer", name(5), false);
+  f.set_here("packer", name(6), false);
+  f.add_tile(name(3), tile, false);  // its last tile comes after it left
+  f.set_here("sampler", name(9), true);
+  f.add_tile("new", tile), f.add_rows("new", rows);
+  EXPECT_TRUE(f.samplers().contains("new") && f.viewers().contains("new"));
+  EXPECT_FALSE(f.samplers().contains(name(7))) << "of those that left, measured longest ago";
+  EXPECT_FALSE(f.viewers().contains(name(5)));
+  f.add_tile("newer", tile);
+  EXPECT_FALSE(f.samplers().contains(name(3)));
+  f.add_tile("newest", tile);
+  EXPECT_FALSE(f.samplers().contains("newest")) << "the one that came back is here";
+  EXPECT_EQ(f.samplers().at(name(9)).tiles, 1u);
+  EXPECT_EQ(f.samplers().size(), LiveFigures::kMostNames);
+  EXPECT_EQ(f.viewers().size(), LiveFigures::kMostNames);
+}
+
 LiveSnapshot snapshot() {
   LiveSnapshot s{.version = "1.2", .scene = "hill \"A\"\\\n.ply", .kind = "mesh", .started_at_s = 1.7e9, .epoch = 3};
   s.processes.push_back(
