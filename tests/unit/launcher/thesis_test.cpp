@@ -81,7 +81,7 @@ TEST_F(ThesisFolder, TracesAreReadByTheirNames) {
   write("list.json", kTrace);
   write("object.json", std::string("{\"traceEvents\": ") + kTrace + "}");
   for (const char* file : {"/list.json", "/object.json"}) {
-    const auto lanes = read_trace(folder + file);
+    const auto lanes = read_timeline(folder + file);
     ASSERT_TRUE(lanes) << lanes.error().text;
     ASSERT_EQ(lanes->size(), 3u);
     EXPECT_EQ((*lanes)[0].process, "sampler-<1>");
@@ -93,8 +93,8 @@ TEST_F(ThesisFolder, TracesAreReadByTheirNames) {
     EXPECT_DOUBLE_EQ((*lanes)[1].spans[1].end_s, 1.15);
   }
   write("bad.json", "{\"a\": 1");
-  EXPECT_FALSE(read_trace(folder + "/bad.json"));
-  EXPECT_FALSE(read_trace(folder + "/none.json"));
+  EXPECT_FALSE(read_timeline(folder + "/bad.json"));
+  EXPECT_FALSE(read_timeline(folder + "/none.json"));
 }
 
 TEST_F(ThesisFolder, SpansThatOverlapMayComeAsBeginAndEnd) {
@@ -103,17 +103,17 @@ TEST_F(ThesisFolder, SpansThatOverlapMayComeAsBeginAndEnd) {
                           {"ph": "e", "pid": 1, "tid": 2, "cat": "u", "id": 2, "name": "view update", "ts": 1200000},
                           {"ph": "e", "pid": 1, "tid": 2, "cat": "u", "id": 1, "name": "view update", "ts": 1300000},
                           {"ph": "e", "pid": 1, "tid": 2, "cat": "u", "id": 3, "name": "view update", "ts": 1400000}])");
-  const auto lanes = read_trace(folder + "/trace.json");
+  const auto lanes = read_timeline(folder + "/trace.json");
   ASSERT_TRUE(lanes);
   ASSERT_EQ(lanes->size(), 1u);
   ASSERT_EQ((*lanes)[0].spans.size(), 2u) << "an end without a begin is none";
-  EXPECT_DOUBLE_EQ((*lanes)[0].spans[1].begin_s, 1.0);
-  EXPECT_DOUBLE_EQ((*lanes)[0].spans[1].end_s, 1.3);
+  EXPECT_DOUBLE_EQ((*lanes)[0].spans[0].begin_s, 1.0);
+  EXPECT_DOUBLE_EQ((*lanes)[0].spans[0].end_s, 1.3);
 }
 
 TEST_F(ThesisFolder, ATimelineShowsWhatHappenedInItsPart) {
   write("trace.json", kTrace);
-  const auto lanes = read_trace(folder + "/trace.json");
+  const auto lanes = read_timeline(folder + "/trace.json");
   ASSERT_TRUE(lanes);
   const auto count = [](const std::string& text, const std::string& what) {
     size_t out = 0;

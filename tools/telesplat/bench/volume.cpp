@@ -283,8 +283,8 @@ class VolumeStudy {
   }
 
   // What each viewer's newest view takes to construct.
-  Result<std::vector<ViewCost>> measure(const Wall& wall) const {
-    std::vector<ViewCost> out;
+  Result<std::vector<ConstructionCost>> measure(const Wall& wall) const {
+    std::vector<ConstructionCost> out;
     for (const auto& viewer : wall) {
       const auto session = volume::read_session(viewer->session()->parameters, viewer->session()->facts);
       if (!session) return session.error();

@@ -22,13 +22,13 @@ double thread_s() {
 
 }  // namespace
 
-Result<ViewCost> measure_view(const wire::SliceFrame& f, const volume::Grid& grid, const geometry::Camera& camera,
-                              int passes) {
+Result<ConstructionCost> measure_view(const wire::SliceFrame& f, const volume::Grid& grid,
+                                      const geometry::Camera& camera, int passes) {
   if (const Status s = volume::validate(f.shear, grid); !s) return s.error();
   const std::span bytes(reinterpret_cast<const uint8_t*>(f.data.data()), f.data.size());
   volume::Warper warper(1);
   std::vector<uint32_t> colour(size_t(camera.width) * size_t(camera.height));
-  ViewCost out{1e9, 1e9, bytes.size()};
+  ConstructionCost out{1e9, 1e9, bytes.size()};
   for (int pass = 0; pass < passes; ++pass) {
     const double begin_s = thread_s();
     const auto slices = volume::parse_slices(bytes, f.shear.width, f.shear.height, int(f.shear.layers.size()));
@@ -110,9 +110,8 @@ double WaitingViewer::turn(double now_s, double cost_s, bool asks) {
   }
   if (!requested_.empty() && now_s - asked_s_ > kPatience_s) requested_.clear();
   while (asks && link_.session()->facts.contains("kind") && requested_.size() + complete_.size() < size_t(buffers_)) {
-    link_.socket().send(
-        wire::ViewRequest{
-            link_.instance(), next_, camera_, {.requested_s = link_.to_master_s(now_s)}, uint64_t(buffers_)});
+    link_.socket().send(wire::ViewRequest{
+        link_.instance(), next_, camera_, {.requested_s = link_.to_master_s(now_s)}, uint64_t(buffers_)});
     if (requested_.empty()) asked_s_ = now_s;
     requested_.push_back(next_);
     next_ = next_.next();

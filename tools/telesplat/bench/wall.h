@@ -16,7 +16,7 @@
 namespace telesplat::launcher {
 
 /// What constructing a view took, in earnest.
-struct ViewCost {
+struct ConstructionCost {
   double decode_s = 0, warp_s = 0;  ///< CPU time of one thread
   uint64_t bytes = 0;               ///< of the frame as received
   double total_s() const { return decode_s + warp_s; }
@@ -24,8 +24,8 @@ struct ViewCost {
 
 /// Decodes the frame and warps it into `camera`'s view, `passes` times on one thread; each part's least time counts.
 /// Error: the frame cannot be decoded.
-Result<ViewCost> measure_view(const wire::SliceFrame& frame, const volume::Grid& grid, const geometry::Camera& camera,
-                              int passes);
+Result<ConstructionCost> measure_view(const wire::SliceFrame& frame, const volume::Grid& grid,
+                                      const geometry::Camera& camera, int passes);
 
 class WaitingViewer {
  public:

@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cstdlib>
-
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "tools/common/csv_table.h"
+#include "tools/common/json_file.h"
 #include "tools/telesplat/bench/scaling_report.h"
 #include "tools/telesplat/bench/thesis/report.h"
 #include "tools/telesplat/bench/thesis/timeline.h"
@@ -25,8 +24,7 @@ std::string number(const std::optional<double>& v, int decimals) {
 
 // Numbers of a JSON file; none where it is not there.
 Figures figures_of(const std::string& path) {
-  std::ifstream in(path);
-  const auto json = nlohmann::ordered_json::parse(in, nullptr, false);
+  const auto json = tools::read_json_file(path);
   return json.is_object() ? flatten(json) : Figures();
 }
 
@@ -150,7 +148,7 @@ ThesisFigure timeline(const std::string& directory, const ThesisCoupling& c) {
                    {}};
   const std::string folder = fmt::format("{}/figure-{}", directory, c.figure);
   const Figures run = figures_of(folder + "/summary.json");
-  const auto lanes = read_trace(folder + "/trace.json");
+  const auto lanes = read_timeline(folder + "/trace.json");
   if (!lanes) {
     out.notes.push_back("It has not been measured yet.");
     return out;

@@ -5,90 +5,25 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "common/metrics/statistics.h"
 #include "tools/common/text_table.h"
+#include "tools/telesplat/report/reading/trace_reader.h"
 #include "tools/telesplat/sweep/plot.h"
 
 namespace telesplat::launcher {
 namespace {
 
-using nlohmann::json;
-
 constexpr double kLabel = 250, kChart = 860, kLane = 24, kBar = 16, kTop = 34, kBottom = 54;
 constexpr double kUpdates = 4, kLeast_s = 0.2, kMost_s = 3, kSettled = 0.6;
 constexpr const char* kUpdateSpan = "view update";
 
-using Id = std::pair<std::string, std::string>;  // process, thread: numbers or words
-
-std::string text_of(const json& event, const char* key) {
-  const auto found = event.find(key);
-  if (found == event.end()) return {};
-  return found->is_string() ? found->get<std::string>() : found->dump();
+std::string names_of(const TimelineLane& lane) {
+  std::set<std::string> names;
+  for (const TimelineSpan& span : lane.spans) names.insert(span.name);
+  return fmt::format("{}", fmt::join(names, ", "));
 }
-
-/// Reads events one after the other.
-class Reader {
- public:
-  void take(const json& event) {
-    if (!event.is_object()) return;
-    const std::string phase = text_of(event, "ph"), name = text_of(event, "name");
-    const Id id{text_of(event, "pid"), text_of(event, "tid")};
-    if (phase == "M" && event.contains("args") && event["args"].is_object()) {
-      if (name == "process_name") processes_[id.first] = text_of(event["args"], "name");
-      if (name == "thread_name") threads_[id] = text_of(event["args"], "name");
-    }
-    if (!event.contains("ts") || !event["ts"].is_number()) return;
-    const double at_s = event["ts"].get<double>() * 1e-6;
-    if (phase == "X") {
-      const auto length = event.find("dur");
-      add(id, {name, at_s, at_s + (length != event.end() && length->is_number() ? length->get<double>() * 1e-6 : 0)});
-    }
-    // What overlaps with its like comes as begin and end, which an id joins.
-    const std::string key = id.first + "\n" + text_of(event, "cat") + "\n" + text_of(event, "id") + "\n" + name;
-    if (phase == "b") open_[key] = at_s;
-    if (const auto begin = open_.find(key); phase == "e" && begin != open_.end()) {
-      add({id.first, "async " + name}, {name, begin->second, at_s});
-      open_.erase(begin);
-    }
-  }
-
-  std::vector<TraceLane> lanes() && {
-    for (size_t i = 0; i < lanes_.size(); ++i) {
-      const auto process = processes_.find(ids_[i].first);
-      lanes_[i].process = process == processes_.end() ? ids_[i].first : process->second;
-      const auto thread = threads_.find(ids_[i]);
-      lanes_[i].lane = thread == threads_.end() ? names_of(lanes_[i]) : thread->second;
-    }
-    std::stable_sort(lanes_.begin(), lanes_.end(),
-                     [](const TraceLane& a, const TraceLane& b) { return a.process < b.process; });
-    return std::move(lanes_);
-  }
-
- private:
-  void add(const Id& id, TraceSpan span) {
-    const auto [at, is_new] = places_.try_emplace(id, lanes_.size());
-    if (is_new) {
-      lanes_.emplace_back();
-      ids_.push_back(id);
-    }
-    lanes_[at->second].spans.push_back(std::move(span));
-  }
-  static std::string names_of(const TraceLane& lane) {
-    std::set<std::string> names;
-    for (const TraceSpan& span : lane.spans) names.insert(span.name);
-    return fmt::format("{}", fmt::join(names, ", "));
-  }
-
-  std::map<std::string, std::string> processes_;
-  std::map<Id, std::string> threads_;
-  std::map<std::string, double> open_;  // when it began
-  std::map<Id, size_t> places_;
-  std::vector<TraceLane> lanes_;
-  std::vector<Id> ids_;
-};
 
 // Holds where the picture is part of a page, too.
 const char* style() {
@@ -112,13 +47,13 @@ size_t colour_of(const std::string& name) {
 }
 
 // Spans of a lane that overlap (several view updates are under way) lie in rows of their own.
-std::vector<std::vector<TraceSpan>> rows_of(const TraceLane& lane, const TimeSpan& part) {
-  std::vector<TraceSpan> seen;
-  for (const TraceSpan& s : lane.spans)
+std::vector<std::vector<TimelineSpan>> rows_of(const TimelineLane& lane, const TimeSpan& part) {
+  std::vector<TimelineSpan> seen;
+  for (const TimelineSpan& s : lane.spans)
     if (s.end_s > part.begin_s && s.begin_s < part.end_s) seen.push_back(s);
   std::stable_sort(seen.begin(), seen.end(), [](const auto& a, const auto& b) { return a.begin_s < b.begin_s; });
-  std::vector<std::vector<TraceSpan>> rows;
-  for (const TraceSpan& s : seen) {
+  std::vector<std::vector<TimelineSpan>> rows;
+  for (const TimelineSpan& s : seen) {
     const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return r.back().end_s <= s.begin_s; });
     if (row != rows.end())
       row->push_back(s);
@@ -144,23 +79,27 @@ std::string legend(const std::set<std::string>& names, double y) {
 
 }  // namespace
 
-Result<std::vector<TraceLane>> read_trace(const std::string& path) {
-  std::ifstream in(path);
+Result<std::vector<TimelineLane>> read_timeline(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
   if (!in) return Error{fmt::format("{}: cannot be read", path)};
-  const auto trace = json::parse(in, nullptr, false);
-  const json* events = &trace;
-  if (trace.is_object() && trace.contains("traceEvents")) events = &trace["traceEvents"];
-  if (!events->is_array()) return Error{fmt::format("{}: is no trace", path)};
-  Reader reader;
-  for (const auto& event : *events) reader.take(event);
-  return std::move(reader).lanes();
+  const Trace trace = read_trace(in);
+  if (!trace.whole) return Error{fmt::format("{}: is no trace", path)};
+  std::vector<TimelineLane> out;
+  for (const TraceLane& lane : trace.lanes) out.push_back({lane.process, lane.async ? "" : lane.name, {}});
+  for (const TraceEvent& e : trace.events)
+    out[e.lane].spans.push_back({trace.names[e.name], e.begin_us * 1e-6, (e.begin_us + e.duration_us) * 1e-6});
+  std::erase_if(out, [](const TimelineLane& lane) { return lane.spans.empty(); });
+  for (TimelineLane& lane : out)
+    if (lane.lane.empty()) lane.lane = names_of(lane);
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.process < b.process; });
+  return out;
 }
 
-TimeSpan steady_part(const std::vector<TraceLane>& lanes) {
+TimeSpan steady_part(const std::vector<TimelineLane>& lanes) {
   double begin_s = 1e300, end_s = 0;
   std::vector<double> updates_s;
-  for (const TraceLane& lane : lanes)
-    for (const TraceSpan& s : lane.spans) {
+  for (const TimelineLane& lane : lanes)
+    for (const TimelineSpan& s : lane.spans) {
       begin_s = std::min(begin_s, s.begin_s), end_s = std::max(end_s, s.end_s);
       if (s.name == kUpdateSpan) updates_s.push_back(s.end_s - s.begin_s);
     }
@@ -170,19 +109,19 @@ TimeSpan steady_part(const std::vector<TraceLane>& lanes) {
   return {from_s, from_s + length_s};
 }
 
-std::string timeline_svg(const std::vector<TraceLane>& lanes, const TimeSpan& part, const std::string& title) {
+std::string timeline_svg(const std::vector<TimelineLane>& lanes, const TimeSpan& part, const std::string& title) {
   const double length_s = part.end_s - part.begin_s;
   const auto x = [&](double s) { return kLabel + kChart * std::clamp((s - part.begin_s) / length_s, 0.0, 1.0); };
   std::string body;
   std::set<std::string> names;
   double y = kTop;
-  for (const TraceLane& lane : lanes) {
+  for (const TimelineLane& lane : lanes) {
     const auto rows = rows_of(lane, part);
     if (rows.empty()) continue;
     body += fmt::format("<text class=\"e\" x=\"{:.0f}\" y=\"{:.1f}\">{}</text>", kLabel - 8, y + kBar - 3,
                         escaped(tools::shortened(lane.process + ": " + lane.lane, 38)));
     for (const auto& row : rows) {
-      for (const TraceSpan& s : row) {
+      for (const TimelineSpan& s : row) {
         names.insert(s.name);
         body += fmt::format(
             "<rect class=\"bar s{}\" x=\"{:.2f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{:.0f}\"><title>{}: {:.2f} "

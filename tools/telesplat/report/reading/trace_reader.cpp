@@ -13,6 +13,9 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr size_t kLongestName = 200;
+// Of what a trace may have many of without being large. More are told under one name, or left out.
+constexpr size_t kMostNames = 10'000, kMostLanes = 10'000, kMostOpen = 1'000'000;
+constexpr const char* kOthers = "others";
 constexpr double kShorter = 0.9, kShortest_us = 1;  // of windows
 
 // What was told of one event.
@@ -116,18 +119,25 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
   }
 
   static std::string short_text(const std::string& text) { return to_utf8(text.substr(0, kLongestName)); }
+  static int64_t number_of(const std::optional<double>& v) { return v && std::abs(*v) < 9e15 ? int64_t(*v) : 0; }
   static int64_t whole(const std::optional<double>& v) { return v && *v >= 0 && *v < 9e15 ? int64_t(*v) : -1; }
 
   uint32_t name(const std::string& text) {
-    const auto [at, fresh] = name_of_.try_emplace(text, uint32_t(trace_.names.size()));
-    if (fresh) trace_.names.push_back(short_text(text));
+    std::string own = short_text(text);
+    if (name_of_.size() >= kMostNames && !name_of_.contains(own)) own = kOthers;
+    const auto [at, fresh] = name_of_.try_emplace(own, uint32_t(trace_.names.size()));
+    if (fresh) trace_.names.push_back(own);
     return at->second;
   }
   uint32_t lane(bool async) {
-    const int64_t pid = int64_t(now_.pid.value_or(0)), tid = async ? 0 : int64_t(now_.tid.value_or(0));
-    const auto [at, fresh] =
-        lane_of_.try_emplace({pid, tid, async ? "b" + now_.category : ""}, uint32_t(trace_.lanes.size()));
-    if (fresh) trace_.lanes.push_back({fmt::format("pid {}", pid), async ? short_text(now_.category) : "", tid, async});
+    const int64_t pid = number_of(now_.pid), tid = async ? 0 : number_of(now_.tid);
+    const std::string category = async ? short_text(now_.category) : std::string();
+    LaneKey key{pid, tid, async ? "b" + category : ""};
+    TraceLane own{fmt::format("pid {}", pid), category, tid, async};
+    if (lane_of_.size() >= kMostLanes && !lane_of_.contains(key))
+      key = {0, 0, kOthers}, own = {kOthers, kOthers, 0, true};
+    const auto [at, fresh] = lane_of_.try_emplace(key, uint32_t(trace_.lanes.size()));
+    if (fresh) trace_.lanes.push_back(std::move(own));
     return at->second;
   }
 
@@ -135,14 +145,16 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
     if (now_.phase == "M") return take_name();
     if (now_.phase == "X" && now_.ts && now_.duration) return add(event(false), *now_.ts, *now_.duration);
     if (now_.phase == "b" && now_.ts) {
-      auto& spans = open_[span_key()];
-      if (spans.size() < 1000) spans.push_back({event(true), *now_.ts});
+      if (open_spans_ >= kMostOpen) return void(++trace_.left_out);
+      open_[span_key()].push_back({event(true), *now_.ts});
+      ++open_spans_;
     }
     if (now_.phase == "e" && now_.ts) {
       const auto found = open_.find(span_key());
       if (found == open_.end() || found->second.empty()) return;
       const auto [begun, ts] = found->second.back();
       found->second.pop_back();
+      --open_spans_;
       if (found->second.empty()) open_.erase(found);
       TraceEvent whole_span = begun;
       // Ends may tell what was not known at the beginning.
@@ -155,9 +167,12 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
   }
 
   void take_name() {
-    const int64_t pid = int64_t(now_.pid.value_or(0));
-    if (now_.name == "process_name") process_names_[pid] = short_text(now_.args_name);
-    if (now_.name == "thread_name") thread_names_[{pid, int64_t(now_.tid.value_or(0))}] = short_text(now_.args_name);
+    const int64_t pid = number_of(now_.pid);
+    const auto keep = [&](auto& names, const auto& key) {
+      if (names.size() < kMostLanes || names.contains(key)) names[key] = short_text(now_.args_name);
+    };
+    if (now_.name == "process_name") keep(process_names_, pid);
+    if (now_.name == "thread_name") keep(thread_names_, std::pair(pid, number_of(now_.tid)));
   }
 
   TraceEvent event(bool async) {
@@ -167,7 +182,8 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
     return e;
   }
   std::string span_key() const {
-    return fmt::format("{}/{}/{}/{}", now_.pid.value_or(0), now_.category, now_.id, now_.name);
+    return fmt::format("{}/{}/{}/{}", now_.pid.value_or(0), short_text(now_.category), short_text(now_.id),
+                       short_text(now_.name));
   }
 
   void add(TraceEvent e, double begin_us, double duration_us) {
@@ -192,6 +208,7 @@ class Reader : public nlohmann::json_sax<nlohmann::json> {
   std::map<int64_t, std::string> process_names_;
   std::map<std::pair<int64_t, int64_t>, std::string> thread_names_;
   std::map<std::string, std::vector<std::pair<TraceEvent, double>>> open_;
+  size_t open_spans_ = 0;
 };
 
 }  // namespace

@@ -34,7 +34,8 @@ struct Trace {
 };
 
 /// Complete events (ph "X"), async spans (ph "b" and "e" with id and cat) and names (ph "M": process_name,
-/// thread_name), in a list or in an object's traceEvents. Others are ignored. Text is made valid UTF-8.
+/// thread_name), in a list or in an object's traceEvents. Others are ignored. Text is made valid UTF-8, names have at
+/// most 200 bytes; beyond 10 000 names or lanes all others are one.
 Trace read_trace(std::istream& in, size_t most_events = 20'000'000);
 
 /// Which events a page holds: all of them, or those of some windows of the run.
