@@ -1,6 +1,8 @@
 // The report of a sweep: which flag goes where, scales, and that nothing that people typed becomes markup.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tools/telesplat/sweep/page.h"
 #include "tools/telesplat/sweep/plot.h"
 
@@ -53,6 +55,21 @@ TEST(SweepLayout, TooManyValuesForColoursMakePanels) {
   EXPECT_EQ(layout_of(grid).across, 0u);
   EXPECT_FALSE(layout_of(grid).colours);
   EXPECT_EQ(layout_of(grid).panels, std::vector<size_t>{1});
+}
+
+TEST(SweepLayout, WhatIsNoFiniteNumberIsAWord) {
+  Grid grid;
+  for (const char* word : {"nan", "inf", "1e999"}) {
+    grid.axes = {{"scene", {"1", word, "3"}}};
+    EXPECT_FALSE(layout_of(grid).numeric) << word;
+  }
+}
+
+TEST(SweepScale, TakesWhatDiffersByRoundingForOneValue) {
+  const Scale s = scale_of(30, std::nextafter(30, 31), false);
+  EXPECT_LT(s.low, 30);
+  EXPECT_GT(s.high, 30);
+  EXPECT_GT(s.step, 1) << "an axis with a mark for each rounding has no end";
 }
 
 TEST(SweepScale, IsRoundAndHoldsEverything) {

@@ -166,6 +166,19 @@ TEST(SweepRun, SaysWhyItFailed) {
   EXPECT_EQ(complaint_in("telesplat: " + std::string(1000, 'x')).size(), 300u);
 }
 
+TEST(SweepRun, ReadsNoMoreThanTheEndOfALog) {
+  const std::string log = (std::filesystem::temp_directory_path() / "telesplat-sweep-long.log").string();
+  std::ofstream(log) << "before" << std::string(3 * kMostLastWords, 'x') << "\ntelesplat: out of disk\n";
+  EXPECT_EQ(last_words(log, 6).size(), kMostLastWords);
+  EXPECT_EQ(complaint_in(last_words(log, 6)), "out of disk");
+  std::ofstream(log) << "before behind";
+  EXPECT_EQ(last_words(log, 7), "behind");
+  EXPECT_EQ(last_words(log, 13), "");
+  EXPECT_EQ(last_words(log, 1000), "") << "somebody has cut the file";
+  std::filesystem::remove(log);
+  EXPECT_EQ(last_words(log, 0), "");
+}
+
 TEST(SweepRun, EndsWithCodeReasonAndTime) {
   const std::string log = (std::filesystem::temp_directory_path() / "telesplat-sweep-test.log").string();
   std::ofstream(log) << "telesplat: of the time before\n";

@@ -98,9 +98,7 @@ Result<Manifest> manifest_for(const SweepOptions& o, std::optional<Manifest> bef
   std::error_code error;
   const std::string here = fs::current_path(error).string();
   if (!before) return begin_manifest(*grid, version(), here);
-  if (const Status s = extend(*before, *grid); !s)
-    return Error{
-        fmt::format("{}: holds another sweep: {}; name all that it has, or give another --out", o.out, s.error().text)};
+  if (const Status s = extend(*before, *grid); !s) return holds_another(o.out, "sweep", s.error().text);
   if (before->directory != here && !asks_for_nothing(o))
     return Error{fmt::format("{}: was begun in {}, from where paths count; telesplat sweep --out {} goes on", o.out,
                              before->directory, shell_line({o.out}))};
@@ -209,7 +207,7 @@ options::Table sweep_table(SweepOptions& o) {
       {.flag = "--repeat",
        .value = &o.repeat,
        .help = "runs of each configuration",
-       .limits = options::Range{1, 1000},
+       .limits = options::Range{1, kMostRepetitions},
        .default_text = "3"},
       {.flag = "--shuffle",
        .value = &o.shuffle,

@@ -18,6 +18,8 @@ struct Axis {
   bool operator==(const Axis&) const = default;
 };
 
+inline constexpr int kMostRepetitions = 1000;
+
 struct Grid {
   std::string scene;                ///< empty: it varies
   std::vector<std::string> flags;   ///< of every run, as `telesplat run` takes them

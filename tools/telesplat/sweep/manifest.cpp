@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/core/utf8.h"
+#include "tools/common/json_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -70,7 +71,7 @@ bool is_whole(const Manifest& m) {
       return false;
   size_t cells = 1;
   for (const Axis& a : m.grid.axes) cells *= a.values.size();
-  return cells == m.configurations.size() && m.grid.repeat >= 1;
+  return cells == m.configurations.size() && m.grid.repeat >= 1 && m.grid.repeat <= kMostRepetitions;
 }
 
 }  // namespace
@@ -79,8 +80,7 @@ Result<std::optional<Manifest>> read_manifest(const std::string& directory) try 
   const std::string path = directory + "/" + kManifestFile;
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return std::optional<Manifest>();
-  std::ifstream in(path);
-  const auto j = ordered_json::parse(in);
+  const auto j = tools::read_json_file(path);
   if (const int schema = j.at("schema"); schema != kSchema)
     return Error{fmt::format("{}: has schema {}, this program reads {}", path, schema, kSchema)};
   Manifest out = manifest_of(j);
@@ -105,6 +105,11 @@ Status write_manifest(const Manifest& m, const std::string& directory) try {
   return ok_status();
 } catch (const nlohmann::json::exception&) {
   return Error{"a flag or a file's name is not UTF-8, so the sweep cannot be recorded"};
+}
+
+Error holds_another(const std::string& folder, const char* holds, const std::string& difference) {
+  return {
+      fmt::format("{}: holds another {}: {}; name all that it has, or give another --out", folder, holds, difference)};
 }
 
 Manifest begin_manifest(Grid grid, std::string version, std::string directory) {

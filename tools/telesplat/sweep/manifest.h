@@ -41,6 +41,10 @@ Result<std::optional<Manifest>> read_manifest(const std::string& directory);
 /// In one step: a reader sees the file before or the one after.
 Status write_manifest(const Manifest& manifest, const std::string& directory);
 
+/// The refusal of a folder that was begun with something else than what is asked for now. holds: "sweep"; difference:
+/// what it has, and what is asked for.
+Error holds_another(const std::string& folder, const char* holds, const std::string& difference);
+
 /// Manifest of a sweep that begins.
 Manifest begin_manifest(Grid grid, std::string version, std::string directory);
 /// The same with a larger grid; outcomes and names stay. Error: what check_extends() says.

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <thread>
 
@@ -21,12 +21,6 @@ namespace {
 constexpr double kLook_s = 0.05;
 constexpr double kEndPatience_s = 30;  // of a run that is told to end because it took too long
 constexpr size_t kLongestReason = 300;
-
-std::string text_from(const std::string& path, uintmax_t offset) {
-  std::ifstream in(path, std::ios::binary);
-  in.seekg(std::streamoff(offset));
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 std::string reason_for(int exit_code, const std::string& said) {
   const std::string why = complaint_in(said);
@@ -84,6 +78,19 @@ std::string complaint_in(const std::string& log) {
   return to_utf8((complaint.empty() ? last : complaint).substr(0, kLongestReason));
 }
 
+std::string last_words(const std::string& path, uintmax_t offset) {
+  std::error_code error;
+  const uintmax_t size = std::filesystem::file_size(path, error);
+  std::ifstream in(path, std::ios::binary);
+  if (error || !in || size <= offset) return {};
+  const uintmax_t from = std::max(offset, size - std::min(size, kMostLastWords));
+  in.seekg(std::streamoff(from));
+  std::string out(size_t(size - from), '\0');
+  in.read(out.data(), std::streamsize(out.size()));
+  out.resize(size_t(in.gcount()));
+  return out;
+}
+
 RunEnd carry_out(const RunRequest& request, const std::function<void(double)>& watch) {
   std::error_code error;
   const auto size = std::filesystem::file_size(request.log, error);
@@ -97,7 +104,7 @@ RunEnd carry_out(const RunRequest& request, const std::function<void(double)>& w
   if (watched.late())
     out.reason = fmt::format("took longer than {:.0f} s", request.limit_s);
   else if (out.exit_code != 0)
-    out.reason = reason_for(out.exit_code, text_from(request.log, said_before));
+    out.reason = reason_for(out.exit_code, last_words(request.log, said_before));
   return out;
 }
 

@@ -14,6 +14,7 @@ namespace {
 // Pixels of SVG.
 constexpr double kLeft = 46, kRight = 8, kTop = 20, kBottom = 22, kHeight = 110;
 constexpr double kLeastCategory = 62, kSeries = 15, kGap = 14, kWhisker = 3;
+constexpr double kAlike = 1e-9;
 constexpr double kBeside = 7;  // between lines, so that their whiskers do not cover each other
 
 double column_width(const Plot& plot) { return std::max(kLeastCategory, double(plot.series.size()) * kSeries + kGap); }
@@ -100,7 +101,8 @@ class Drawing {
 
 Scale scale_of(double least, double most, bool from_zero) {
   if (from_zero) least = std::min(least, 0.0), most = std::max(most, 0.0);
-  if (!(most > least)) {
+  // What differs by rounding alone is one value: an axis cannot tell it apart.
+  if (!(most - least > kAlike * std::max(std::abs(least), std::abs(most)))) {
     const double around = most != 0 ? std::abs(most) / 2 : 1;
     most += around;
     if (!from_zero) least -= around;

@@ -2,15 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
+#include "tools/common/json_file.h"
 
 namespace telesplat::launcher {
 namespace {
 
 std::optional<Figures> read_figures(const std::string& path) {
-  std::ifstream in(path);
-  const auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
+  const auto summary = tools::read_json_file(path);
   if (!summary.is_object()) return std::nullopt;
   return flatten(summary);
 }
