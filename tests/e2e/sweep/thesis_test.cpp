@@ -1,8 +1,10 @@
 // `telesplat bench thesis` with real runs: its figures are drawn, and what is done is not done again.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 
 #include "tests/support/pipeline_run.h"
 #include "tools/common/csv_table.h"
@@ -55,7 +57,41 @@ TEST_F(ThesisBench, DrawsTimelinesOfTheThreeCouplings) {
 
   Program mixed("telesplat", words({"--only", "6"}), folder / "mixed");
   EXPECT_EQ(mixed.wait(30), 2);
-  EXPECT_NE(mixed.err().find("was begun with --quick"), std::string::npos) << mixed.err();
+  EXPECT_EQ(mixed.err(), "telesplat: --out " + (folder / "thesis") +
+                             ": holds another record of bench thesis: it was begun with --quick, not without; name all "
+                             "that it has, or give another --out\n");
+}
+
+// The steps of one folder are of the same data; a step that needs none goes into any.
+TEST_F(ThesisBench, GoesOnWithTheDataItWasBegunWithAndNoOther) {
+  fs::create_directories(folder / "other/meshes");
+  write_terrain(folder / "other/meshes/colorado-5760k.ply", 20);
+  const std::string data = folder / "data", other = folder / "other", out = folder / "thesis";
+  const auto begun = [&](const nlohmann::json& state) {
+    fs::create_directories(out);
+    std::ofstream(out + "/thesis.json") << state;
+  };
+  int n = 0;
+  const auto asked = [&](std::vector<std::string> own) {
+    std::vector<std::string> all{"bench", "thesis", "--out", out, "--dry-run"};
+    all.insert(all.end(), own.begin(), own.end());
+    Program program("telesplat", all, folder / fmt::format("asked-{}", n++));
+    const int code = program.wait(30);
+    return std::pair(code, program.err());
+  };
+  begun({{"quick", false}, {"data", data}, {"done", nlohmann::json::object()}});
+  EXPECT_EQ(asked({"--only", "6", "--data", data + "/"}).first, 0);
+  const auto refused = asked({"--only", "6", "--data", other});
+  EXPECT_EQ(refused.first, 2);
+  EXPECT_EQ(refused.second, "telesplat: --out " + out +
+                                ": holds another record of bench thesis: it was begun with --data " + data + ", not " +
+                                other + "; name all that it has, or give another --out\n");
+  EXPECT_EQ(asked({"--only", "7.2", "--data", other}).first, 0) << "it needs no data";
+  // Records of earlier versions do not tell.
+  begun({{"quick", false}, {"done", nlohmann::json::object()}});
+  EXPECT_EQ(asked({"--only", "6", "--data", other}).first, 0);
+  begun({{"quick", false}, {"data", 5}, {"done", nlohmann::json::object()}});
+  EXPECT_EQ(asked({"--only", "6", "--data", other}).first, 2);
 }
 
 TEST_F(ThesisBench, ChecksItsDataFirst) {

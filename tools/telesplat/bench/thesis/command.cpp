@@ -7,21 +7,23 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/machine.h"
+#include "common/core/utf8.h"
 #include "common/core/version.h"
 #include "common/net/service.h"
 #include "tools/common/complain.h"
+#include "tools/common/json_file.h"
 #include "tools/common/progress_line.h"
 #include "tools/telesplat/bench/bench_commands.h"
 #include "tools/telesplat/bench/thesis/direct.h"
 #include "tools/telesplat/bench/thesis/report.h"
 #include "tools/telesplat/movie/movie.h"
 #include "tools/telesplat/run/process_group.h"
+#include "tools/telesplat/sweep/manifest.h"
 #include "tools/telesplat/sweep/one_run.h"
 
 namespace telesplat::launcher {
@@ -37,9 +39,10 @@ struct ThesisOptions {
   bool quick = false, dry_run = false;
 };
 
-/// Which steps are done, and how busy others kept the machine meanwhile: DIR/thesis.json.
+/// Which steps are done, of what, and how busy others kept the machine meanwhile: DIR/thesis.json.
 struct Progress {
   bool quick = false;
+  std::string data;  // folder of data sets, valid UTF-8; empty: no step needed one so far
   std::map<std::string, std::pair<double, double>> done;  // step -> seconds, share of the cores that others used
 };
 
@@ -47,10 +50,10 @@ Result<std::optional<Progress>> read_progress(const std::string& directory) try 
   const std::string path = directory + "/" + kStateFile;
   std::error_code error;
   if (!fs::exists(path, error)) return std::optional<Progress>();
-  std::ifstream in(path);
-  const auto json = nlohmann::json::parse(in);
+  const auto json = tools::read_json_file(path);
   Progress out;
   out.quick = json.at("quick").get<bool>();
+  out.data = json.value("data", std::string());
   for (const auto& [title, step] : json.at("done").items())
     out.done[title] = {step.at("wall_s").get<double>(), step.at("others_cpu").get<double>()};
   return std::optional(std::move(out));
@@ -68,8 +71,9 @@ Status write_text(const std::string& path, const std::string& text) {
 Status write_progress(const Progress& progress, const std::string& directory) {
   auto done = nlohmann::ordered_json::object();
   for (const auto& [title, step] : progress.done) done[title] = {{"wall_s", step.first}, {"others_cpu", step.second}};
-  return write_text(directory + "/" + kStateFile,
-                    nlohmann::ordered_json{{"quick", progress.quick}, {"done", done}}.dump(2) + "\n");
+  return write_text(
+      directory + "/" + kStateFile,
+      nlohmann::ordered_json{{"quick", progress.quick}, {"data", progress.data}, {"done", done}}.dump(2) + "\n");
 }
 
 class Thesis {
@@ -178,26 +182,46 @@ Status report(const Progress& state, const std::vector<std::string>& parts, cons
   return ok_status();
 }
 
-Result<Progress> begin(const ThesisOptions& o, const std::string& directory) {
+// Without a slash at its end.
+std::string whole_path(const std::string& path) {
+  std::error_code error;
+  const fs::path out = fs::absolute(path, error).lexically_normal();
+  return (out.filename().empty() ? out.parent_path() : out).string();
+}
+
+// data: that the steps need; empty: they need none.
+Result<Progress> begin(const ThesisOptions& o, const std::string& data, const std::string& directory) {
   auto before = read_progress(directory);
   if (!before) return before.error();
   std::error_code error;
   if (!*before && fs::exists(directory, error) && !fs::is_empty(directory, error))
     return Error{fmt::format("--out {}: is not empty, and holds no record of bench thesis", o.out)};
-  if (*before && (*before)->quick != o.quick)
-    return Error{fmt::format("--out {}: was begun {} --quick; both do not go into one folder", o.out,
-                             o.quick ? "without" : "with")};
-  return *before ? std::move(**before) : Progress{o.quick, {}};
+  Progress out = before->value_or(Progress{o.quick, data, {}});
+  const auto refuse = [&](const std::string& difference) {
+    return holds_another("--out " + o.out, "record of bench thesis", difference);
+  };
+  if (out.quick != o.quick)
+    return refuse(
+        fmt::format("it was begun {} --quick, not {}", out.quick ? "with" : "without", o.quick ? "with" : "without"));
+  if (!out.data.empty() && !data.empty() && out.data != data)
+    return refuse(fmt::format("it was begun with --data {}, not {}", out.data, data));
+  if (out.data.empty()) out.data = data;
+  return out;
 }
 
 int thesis(ThesisOptions o, const options::Given&) {
   log::initialise("bench", "warn");
   std::error_code error;
-  const std::string directory = fs::absolute(o.out, error).lexically_normal().string();
+  const std::string directory = whole_path(o.out);
   const auto parts = parse_parts(o.parts);
   if (!parts) return tools::complain({"--only: " + parts.error().text});
-  auto todo = steps({fs::absolute(o.data, error).lexically_normal().string(), o.quick, *parts});
-  auto state = begin(o, directory);
+  const std::string data = whole_path(o.data);
+  auto todo = steps({data, o.quick, *parts});
+  const bool needs_data = std::any_of(todo.begin(), todo.end(), [&](const Step& step) {
+    return !step.direct.empty() || std::any_of(step.arguments.begin(), step.arguments.end(),
+                                               [&](const std::string& word) { return word.starts_with(data + "/"); });
+  });
+  auto state = begin(o, needs_data ? to_utf8(data) : std::string(), directory);
   if (!state) return tools::complain(state.error());
   if (const Status s = check_data(todo); !s) return tools::complain(s.error());
   if (o.dry_run) {
