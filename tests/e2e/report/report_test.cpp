@@ -76,9 +76,9 @@ void write_run(const std::string& directory, int frames, double slow) {
       "view_error_deg,px,py,pz,qw,qx,qy,qz,begin_s\n";
   std::string updates = "viewer,request,frame,requested_s,complete_s,latency_ms,start_up_ms,points,extra_points\n";
   std::string stages =
-      "viewer,request,frame,tile,sampler,requested_s,sampling_ms,tile_network_ms,view_queue_ms,"
+      "viewer,request,frame,tile,requested_s,sampling_ms,tile_network_ms,view_queue_ms,"
       "latency_ms,display_ms,patches\n";
-  std::string tiles = "frame,tile,samples,kept,bytes_sent,encode_end_s,packed_s,published_s\n";
+  std::string tiles = "frame,tile,sampler,samples,kept,bytes_sent,encode_end_s,packed_s,published_s\n";
   std::string trace = "[\n{\"ph\":\"M\",\"name\":\"process_name\",\"pid\":5,\"args\":{\"name\":\"viewer-<b>1</b>\"}}";
   for (int i = 0; i < frames; ++i) {
     const double ms = slow * (i % 50 == 7 ? 50 : 16.7), s = 3 + i * 0.0167 * slow;
@@ -90,8 +90,9 @@ void write_run(const std::string& directory, int frames, double slow) {
         s * 1e6, ms * 500, i);
     if (i % 4) continue;
     updates += fmt::format("<i>v</i>,{0},{0},{1},{2},60,40,500,5\n", i, s, s + 0.06);
-    stages += fmt::format("<i>v</i>,{0},{0},3,\"s,<script>alert(1)</script>\",{1},40,15,5,60,9,4\n", i, s);
-    tiles += fmt::format("{},0,4000,500,2000,{},{},{}\n", i, s + 0.03, s + 0.04, s + 0.05);
+    stages += fmt::format("<i>v</i>,{0},{0},3,{1},40,15,5,60,9,4\n", i, s);
+    tiles +=
+        fmt::format("{},0,\"s,<script>alert(1)</script>\",4000,500,2000,{},{},{}\n", i, s + 0.03, s + 0.04, s + 0.05);
     trace += fmt::format(
         ",\n{{\"ph\":\"X\",\"name\":\"view update\",\"pid\":5,\"tid\":2,\"ts\":{},\"dur\":60000,"
         "\"args\":{{\"request\":{}}}}}",

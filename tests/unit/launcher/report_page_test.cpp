@@ -1,6 +1,7 @@
 // The page of a report: what it holds of whole, broken and strange runs, and that nothing from a run becomes code.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -101,8 +102,10 @@ TEST(ReportRun, ReadsStagesByNameAndChecksThatTheyAddUp) {
   const TemporaryFolder folder;
   write(folder / "frames.csv", kFrames);
   write(folder / "stages.csv",
-        "viewer,request,further,sampler,requested_s,sampling_ms,tile_network_ms,view_queue_ms,latency_ms,display_ms\n"
-        "viewer-1,1,x,<i>s</i>,2.01,10,5,5,20,3\nviewer-1,2,x,1,2.02,20,-5,5,20,\n");
+        "viewer,request,frame,further,requested_s,sampling_ms,tile_network_ms,view_queue_ms,latency_ms,display_ms\n"
+        "viewer-1,1,7,x,2.01,10,5,5,20,3\nviewer-1,2,8,x,2.02,20,-5,5,20,\n");
+  write(folder / "tiles.csv",
+        "frame,tile,sampler,published_s\n7,0,early,2.1\n7,1,<i>s</i>,2.3\n7,2,half a block,\n9,0,of another,2.9\n");
   const auto stages = run_json(folder.path(), "r", 1).at("stages");
   EXPECT_EQ(stages.at("of"), 2);
   EXPECT_EQ(stages.at("negative"), 1);
@@ -112,7 +115,8 @@ TEST(ReportRun, ReadsStagesByNameAndChecksThatTheyAddUp) {
   EXPECT_EQ(stages.at("stages")[1].at("row").at("mean"), 15.0);
   EXPECT_EQ(stages.at("stages")[1].at("row").at("share"), 0.75);
   EXPECT_EQ(stages.at("t").dump(), "[0.01,0.02]");
-  EXPECT_EQ(stages.at("sampler")[0], "<i>s</i>");
+  EXPECT_EQ(stages.at("sampler")[0], "<i>s</i>") << "who sampled the tile that was published last";
+  EXPECT_TRUE(stages.at("sampler")[1].is_null()) << "no ray was cast for it";
   EXPECT_EQ(stages.at("display_row").at("median"), 3.0);
 }
 
@@ -128,6 +132,65 @@ TEST(ReportRun, CountsWarningsAndErrorsOfLogs) {
   EXPECT_EQ(logs[0].at("warnings"), 100);
   EXPECT_EQ(logs[0].at("lines").size(), 8u);
   EXPECT_TRUE(valid_utf8(logs[0].at("lines")[0].get<std::string>()));
+}
+
+TEST(ReportRun, CutsLongLinesOfLogsAndSaysSo) {
+  const TemporaryFolder folder;
+  write(folder / "frames.csv", kFrames);
+  const std::string head = "12:00:00.000 master error ";
+  const size_t shown = 400;
+  write(folder / "logs/a.log", head + std::string(5'000'000, 'x') + "\n" + head + "short\n");
+  fs::create_directories(folder / "logs/folder.log");
+  const auto logs = run_json(folder.path(), "r", 1).at("logs");
+  ASSERT_EQ(logs.size(), 1u) << "a folder is no log";
+  EXPECT_EQ(logs[0].at("errors"), 2) << "the rest of a long line is no line of its own";
+  const std::string more = std::to_string(head.size() + 5'000'000 - shown);
+  EXPECT_EQ(logs[0].at("lines")[0], head + std::string(shown - head.size(), 'x') + " ... (" + more + " bytes more)");
+  EXPECT_EQ(logs[0].at("lines")[1], head + "short");
+}
+
+TEST(ReportRun, NumbersThatNoRunHasDoNoHarm) {
+  const TemporaryFolder folder;
+  std::string frames = kFrames;
+  const auto columns = std::count(kFrames.begin(), kFrames.begin() + long(kFrames.find('\n')), ',');
+  for (const char* strange : {"1e300", "-1e300", "1e18", "-0", "1e-320"}) {
+    frames += "v";
+    for (long i = 0; i < columns; ++i) frames += std::string(",") + strange;
+    frames += "\n";
+  }
+  write(folder / "frames.csv", frames);
+  write(folder / "updates.csv",
+        "viewer,request,requested_s,complete_s,latency_ms,points\nv,1,-1e300,1e300,1e300,1e300\nv,2,2,2.01,10,5\n");
+  write(folder / "stages.csv", "viewer,request,frame,requested_s,latency_ms,sampling_ms\nv,1,1e300,2,0,0\n");
+  write(folder / "summary.json", std::string(100'000, '['));
+  std::string trace = "[";
+  for (const char* pid : {"1e300", "-1e300", "1"})
+    trace += std::string(R"({"ph":"X","name":"a","pid":)") + pid + R"(,"tid":1e300,"ts":5,"dur":1},)";
+  write(folder / "trace.json", trace + "{}]");
+  const auto run = run_json(folder.path(), "r", 1);
+  EXPECT_FALSE(run.at("finished").get<bool>());
+  EXPECT_LT(run.at("duration_s").get<double>(), 1e4);
+  EXPECT_EQ(run.at("trace").at("of"), 3);
+  const std::string text = script_json(run);
+  EXPECT_EQ(nlohmann::ordered_json::parse(text, nullptr, false).is_discarded(), false);
+}
+
+TEST(ReportRun, VerifiedFramesFindTheirMomentsWhereAFrameHasNoNumber) {
+  const TemporaryFolder folder;
+  std::string frames = kFrames;
+  frames.replace(frames.find("viewer-1,0,0,"), 13, "viewer-1,?,0,");
+  write(folder / "frames.csv", frames);
+  write(folder / "quality.csv", "frame,t_s,psnr_db,object_pixels\n?,9,20,9\n2,8,30,9\n");
+  const auto psnr = run_json(folder.path(), "r", 1).at("series").at("psnr_db")[0];
+  EXPECT_EQ(psnr.at("t").dump(), "[0.03,9.0]");
+  EXPECT_EQ(psnr.at("v").dump(), "[30.0,20.0]");
+}
+
+TEST(ReportRun, StagesOfNoKnownColumnAreNone) {
+  const TemporaryFolder folder;
+  write(folder / "frames.csv", kFrames);
+  write(folder / "stages.csv", "viewer,request,requested_s,latency_ms\nviewer-1,1,2.01,20\n");
+  EXPECT_TRUE(run_json(folder.path(), "r", 1).at("stages").is_null());
 }
 
 TEST(ReportPictures, AreScaledToMeansAndBounded) {

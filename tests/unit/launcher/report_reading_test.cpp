@@ -1,4 +1,5 @@
 // What a report reads of runs that ended anyhow, and how it makes long measurements short.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -59,6 +60,17 @@ TEST(LooseTable, EveryBeginningOfAFileIsReadWithoutHarm) {
   }
   EXPECT_FALSE(table_of("", {"a"}).ok());
   EXPECT_FALSE(LooseTable::read("/no/such/file.csv", {"a"}).ok());
+}
+
+TEST(LooseTable, TakesNoLongLineAndNoNumberBeyondMeasure) {
+  const auto t = table_of("a,b\n1,2\n" + std::string(200'000, '3') + ",4\n1e13,-1e13\n5,1e12\n", {"a", "b"});
+  ASSERT_TRUE(t.ok());
+  EXPECT_EQ(t->damaged(), 1u);
+  ASSERT_EQ(t->rows(), 3u);
+  EXPECT_TRUE(std::isnan(t->numbers("a")[1]));
+  EXPECT_TRUE(std::isnan(t->numbers("b")[1]));
+  EXPECT_EQ(t->numbers("b")[2], 1e12);
+  EXPECT_FALSE(table_of(std::string(200'000, 'a') + "\n1\n", {"a"}).ok());
 }
 
 TEST(LooseTable, MakesTextsValid) {
@@ -212,6 +224,19 @@ TEST(TraceReader, LeavesOutWhatMakesNoSenseAndWhatIsTooMuch) {
   const Trace t = trace_of(text + "]", 12);
   EXPECT_EQ(t.events.size(), 12u);
   EXPECT_EQ(t.left_out, 10u);
+}
+
+TEST(TraceReader, BoundsNamesAndLanes) {
+  std::string text = R"([{"ph":"X","name":"first","pid":1,"tid":1,"ts":1,"dur":1})";
+  for (int i = 0; i < 12'000; ++i)
+    text += fmt::format(R"(,{{"ph":"X","name":"n{0}","pid":2,"tid":{0},"ts":5,"dur":1}})", i);
+  const Trace t = trace_of(text + "]", 100'000);
+  EXPECT_EQ(t.events.size(), 12'001u);
+  EXPECT_LE(t.names.size(), 10'001u);
+  EXPECT_LE(t.lanes.size(), 10'001u);
+  EXPECT_EQ(t.names[t.events.back().name], "others");
+  EXPECT_EQ(t.lanes[t.events.back().lane].process, "others");
+  EXPECT_EQ(t.names[t.events[0].name], "first");
 }
 
 std::vector<TraceEvent> even_events(size_t n) {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 
+#include "tools/common/json_file.h"
 #include "tools/telesplat/report/reading/thinning.h"
 
 namespace telesplat::launcher {
@@ -147,8 +147,7 @@ void add_counted(const ordered_json& spreads, const RunTables& t, ordered_json& 
 }  // namespace
 
 ordered_json read_summary(const std::string& directory) {
-  std::ifstream in(directory + "/summary.json", std::ios::binary);
-  auto out = ordered_json::parse(in, nullptr, false);
+  auto out = tools::read_json_file(directory + "/summary.json");
   return out.is_object() ? out : ordered_json();
 }
 

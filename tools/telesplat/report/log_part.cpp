@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "common/core/utf8.h"
+#include "tools/common/line_reader.h"
 #include "tools/telesplat/report/about_part.h"
 
 namespace telesplat::launcher {
@@ -14,8 +15,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr size_t kMostLogs = 64, kMostLines = 8, kLongestLine = 400;
-constexpr size_t kMostBytes = size_t{256} << 20;
+constexpr size_t kMostLogs = 64, kMostLines = 8;
+constexpr size_t kLongestLine = size_t{64} << 10, kShownOfALine = 400;
+constexpr uint64_t kMostBytes = uint64_t{256} << 20;
 
 // The word at this place, from 0, of words with one space between them.
 std::string_view word(std::string_view line, int place) {
@@ -27,18 +29,30 @@ std::string_view word(std::string_view line, int place) {
   return line.substr(0, line.find(' '));
 }
 
+// What is too long ends with how much more there was.
+std::string shown(const tools::LineReader::Line& line) {
+  const std::string text = to_utf8(line.text.substr(0, kShownOfALine));
+  const uint64_t more = line.left_out + line.text.size() - std::min(line.text.size(), kShownOfALine);
+  return more == 0 ? text : fmt::format("{} ... ({} bytes more)", text, more);
+}
+
 ordered_json log_json(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
-  size_t warnings = 0, errors = 0, bytes = 0;
+  tools::LineReader reader(in, kLongestLine);
+  size_t warnings = 0, errors = 0;
   ordered_json lines = ordered_json::array();
-  for (std::string line; bytes < kMostBytes && std::getline(in, line); bytes += line.size()) {
-    const auto level = word(line, 2);
+  while (reader.bytes() < kMostBytes) {
+    const auto line = reader.next();
+    if (!line) break;
+    const auto level = word(line->text, 2);
     const bool warning = level == "warning", error = level == "error" || level == "critical";
     warnings += warning, errors += error;
-    if ((warning || error) && lines.size() < kMostLines)
-      lines.push_back(to_utf8(std::string_view(line).substr(0, kLongestLine)));
+    if ((warning || error) && lines.size() < kMostLines) lines.push_back(shown(*line));
   }
-  return {{"process", to_utf8(path.stem().string())}, {"warnings", warnings}, {"errors", errors}, {"lines", lines}};
+  ordered_json out{
+      {"process", to_utf8(path.stem().string())}, {"warnings", warnings}, {"errors", errors}, {"lines", lines}};
+  if (reader.bytes() >= kMostBytes) out["read_mb"] = kMostBytes >> 20;
+  return out;
 }
 
 }  // namespace
@@ -47,7 +61,8 @@ ordered_json logs_json(const std::string& directory) {
   std::vector<fs::path> paths;
   std::error_code error;
   for (fs::directory_iterator entry(directory + "/logs", error), end; !error && entry != end; entry.increment(error))
-    if (entry->path().extension() == ".log") paths.push_back(entry->path());
+    if (std::error_code unknown; entry->path().extension() == ".log" && entry->is_regular_file(unknown))
+      paths.push_back(entry->path());
   std::sort(paths.begin(), paths.end());
   if (paths.size() > kMostLogs) paths.resize(kMostLogs);
   ordered_json out = ordered_json::array();

@@ -64,7 +64,8 @@ std::map<uint64_t, double> moments(const RunTables& t) {
   const auto& numbers = t.frames->numbers("frame");
   const auto& viewers = t.frames->texts("viewer");
   for (size_t row = 0; row < numbers.size(); ++row)
-    if (numbers[row] >= 0 && viewers[row] == viewers.front()) out.emplace(uint64_t(numbers[row]), t.frame_s[row]);
+    if (numbers[row] >= 0 && std::isfinite(t.frame_s[row]) && viewers[row] == viewers.front())
+      out.emplace(uint64_t(numbers[row]), t.frame_s[row]);
   return out;
 }
 

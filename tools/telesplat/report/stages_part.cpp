@@ -1,7 +1,9 @@
 // Where the time of view updates went: stages.csv.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
+#include <unordered_map>
 
 #include "common/metrics/statistics.h"
 #include "tools/telesplat/report/reading/thinning.h"
@@ -51,6 +53,34 @@ std::vector<size_t> slowest_rows(const LooseTable& stages, size_t most) {
   return out;
 }
 
+// Of each row who sampled the part whose way the stages follow: of its frame's tiles the one that was published last
+// (docs/metrics.md, "Joining the tables"). Null: nobody did, or it is not known.
+ordered_json samplers_of(const RunTables& t, const std::vector<size_t>& rows) {
+  const auto& frames = t.stages->numbers("frame");
+  struct Last {
+    double published_s = -INFINITY;
+    const std::string* sampler = nullptr;
+  };
+  std::unordered_map<double, Last> last;  // by frame
+  for (const size_t row : rows)
+    if (std::isfinite(frames[row])) last[frames[row]];
+  if (t.tiles) {
+    const auto &frame = t.tiles->numbers("frame"), &published_s = t.tiles->numbers("published_s");
+    const auto& sampler = t.tiles->texts("sampler");
+    for (size_t tile = 0; tile < t.tiles->rows(); ++tile)
+      if (const auto found = last.find(frame[tile]);
+          found != last.end() && published_s[tile] > found->second.published_s)
+        found->second = {published_s[tile], &sampler[tile]};
+  }
+  ordered_json out = ordered_json::array();
+  for (const size_t row : rows) {
+    const auto found = last.find(frames[row]);
+    const bool known = found != last.end() && found->second.sampler && !found->second.sampler->empty();
+    out.push_back(known ? ordered_json(*found->second.sampler) : ordered_json());
+  }
+  return out;
+}
+
 // How far the stages are from adding up to the latency, and how many of them are negative.
 void check_sums(const LooseTable& stages, ordered_json& out) {
   size_t negative = 0;
@@ -77,6 +107,9 @@ void check_sums(const LooseTable& stages, ordered_json& out) {
 ordered_json stages_json(const RunTables& t, const PageLimits& limits) {
   if (!t.stages) return nullptr;
   const LooseTable& stages = *t.stages;
+  if (std::none_of(std::begin(kUpdateStages), std::end(kUpdateStages),
+                   [&](const UpdateStage& s) { return stages.has(s.column); }))
+    return nullptr;
   const double mean_latency = mean_of(finite_of(stages.numbers("latency_ms")));
   const auto rows = slowest_rows(stages, limits.stacked_updates);
   const auto column = [&](const char* name, double offset, int digits) {
@@ -91,9 +124,7 @@ ordered_json stages_json(const RunTables& t, const PageLimits& limits) {
                    {"tile", column("tile", 0, 12)},
                    {"latency", column("latency_ms", 0, 5)},
                    {"stages", ordered_json::array()}};
-  ordered_json who = ordered_json::array();
-  for (const size_t row : rows) who.push_back(stages.texts("sampler")[row]);
-  out["sampler"] = std::move(who);
+  out["sampler"] = samplers_of(t, rows);
   for (const auto& c : kUpdateStages) {
     if (!stages.has(c.column)) continue;
     out["stages"].push_back({{"key", c.column},

@@ -109,13 +109,13 @@ std::vector<double> quality_s(const RunTables& t) {
     const auto& number = t.frames->numbers("frame");
     const auto& viewers = t.frames->texts("viewer");
     for (size_t row = 0; row < number.size(); ++row)
-      if (viewers[row] == viewers.front()) shown.emplace(number[row], t.frame_s[row]);
+      if (viewers[row] == viewers.front() && std::isfinite(number[row])) shown.emplace(number[row], t.frame_s[row]);
   }
   std::vector<double> out;
   const auto& number = t.quality->numbers("frame");
   const auto& own = t.quality->numbers("t_s");
   for (size_t row = 0; row < number.size(); ++row) {
-    const auto found = shown.find(number[row]);
+    const auto found = std::isfinite(number[row]) ? shown.find(number[row]) : shown.end();
     out.push_back(found != shown.end() ? found->second : own[row]);
   }
   return out;
@@ -167,7 +167,8 @@ ordered_json walk_json(const RunTables& t, const PageLimits& limits) {
   std::vector<size_t> rows;
   const auto& viewers = f.texts("viewer");
   for (size_t row = 0; row < f.rows(); ++row)
-    if (viewers[row] == viewers.front() && std::isfinite(f.numbers("px")[row]) && std::isfinite(f.numbers("pz")[row]))
+    if (viewers[row] == viewers.front() && std::isfinite(t.frame_s[row]) && std::isfinite(f.numbers("px")[row]) &&
+        std::isfinite(f.numbers("pz")[row]))
       rows.push_back(row);
   if (rows.empty()) return nullptr;
   // Of each part of the walk the frame with the longest delay stays.

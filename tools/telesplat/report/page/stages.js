@@ -15,7 +15,9 @@ R.stages = function () {
     const series = s.stages.map((stage, i) => ({ label: stage.label, t: s.t, v: stage.v.map((v) => Math.max(0, v || 0)), of: 0, colour: () => colours()[i] })).reverse();
     const hover = (x) => {
       const i = R.nearest(s.t, x);
-      const told = [["request " + R.id(s.request[i]) + ", frame " + R.id(s.frame[i]) + ", tile " + R.id(s.tile[i]), s.sampler[i]], ["latency", R.withUnit(s.latency[i], "ms")]];
+      const told = [["request " + R.id(s.request[i]), "frame " + R.id(s.frame[i]) + ", tile " + R.id(s.tile[i])]];
+      if (s.sampler[i] !== null) told.push(["sampled by", s.sampler[i]]);
+      told.push(["latency", R.withUnit(s.latency[i], "ms")]);
       return told.concat(s.stages.map((stage, k) => [stage.label, R.withUnit(stage.v[i], "ms"), colours()[k]]));
     };
     const name = R.several ? run.name + ": " : "";

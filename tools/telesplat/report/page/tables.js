@@ -142,7 +142,7 @@ R.errors = function () {
       body.push(R.el("p", { class: "muted", text: run.logs.length ? "No process logged a warning or an error." : "The run kept no logs." }));
     for (const log of loud) {
       body.push(R.el("p", {}, R.el("b", { text: log.process }), `: ${log.errors} errors, ${log.warnings} warnings`,
-        log.errors + log.warnings > log.lines.length ? `; the first ${log.lines.length}:` : ":"));
+        log.read_mb ? ` in the first ${log.read_mb} MiB` : "", log.errors + log.warnings > log.lines.length ? `; the first ${log.lines.length}:` : ":"));
       body.push(R.el("pre", { class: log.errors ? "error-line" : "", text: log.lines.join("\n") }));
     }
   });

@@ -11,12 +11,14 @@
 #include "common/core/check.h"
 #include "common/core/utf8.h"
 #include "tools/common/csv_table.h"
+#include "tools/common/line_reader.h"
 
 namespace telesplat::launcher {
 namespace {
 
 constexpr uintmax_t kMaxBytes = uintmax_t{4} << 30;
-constexpr size_t kLongestText = 200;
+constexpr size_t kLongestText = 200, kLongestLine = size_t{64} << 10;
+constexpr double kMost = 1e12;  // beyond it nothing was measured: no moment, size or number that a run can have
 
 // The fields of a line, those that were in quotes without them. False: a quoted text does not end.
 bool take_apart(std::string_view line, std::vector<std::string_view>& out, std::vector<std::string>& unquoted) {
@@ -39,7 +41,7 @@ bool take_apart(std::string_view line, std::vector<std::string_view>& out, std::
 double number_of(std::string_view text) {
   double value = 0;
   const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool good = read.ec == std::errc() && read.ptr == text.data() + text.size() && std::isfinite(value);
+  const bool good = read.ec == std::errc() && read.ptr == text.data() + text.size() && std::abs(value) <= kMost;
   return good ? value : std::numeric_limits<double>::quiet_NaN();
 }
 
@@ -61,9 +63,7 @@ Result<LooseTable> LooseTable::read(const std::string& path, const std::vector<s
   std::ifstream in(path, std::ios::binary | std::ios::ate);
   if (!in || in.tellg() <= 0) return Error{fmt::format("{}: is not there or is empty", path)};
   if (uintmax_t(in.tellg()) > kMaxBytes) return Error{fmt::format("{}: has more than {} bytes", path, kMaxBytes)};
-  std::string bytes(size_t(in.tellg()), '\0');
   in.seekg(0);
-  if (!in.read(bytes.data(), std::streamsize(bytes.size()))) return Error{path + ": cannot be read"};
 
   LooseTable out;
   std::vector<std::pair<size_t, std::vector<double>*>> number_columns;
@@ -74,13 +74,14 @@ Result<LooseTable> LooseTable::read(const std::string& path, const std::vector<s
   };
   std::vector<std::string_view> fields;
   std::vector<std::string> unquoted;
-  for (size_t begin = 0; begin < bytes.size();) {
-    const size_t end = bytes.find('\n', begin);
-    const bool whole = end != bytes.npos;
-    std::string_view line = std::string_view(bytes).substr(begin, whole ? end - begin : bytes.npos);
+  tools::LineReader reader(in, kLongestLine);
+  while (const auto next = reader.next()) {
+    std::string_view line = next->text;
+    const bool whole = next->ended && next->left_out == 0;
     if (line.ends_with('\r')) line.remove_suffix(1);
-    begin = whole ? end + 1 : bytes.size();
     if (out.header_.empty()) {
+      if (next->left_out > 0)
+        return Error{fmt::format("{}: its first line has more than {} bytes", path, kLongestLine)};
       read_header(line, out.header_);
       for (const auto& name : numbers) place(name, out.numbers_[name], number_columns);
       for (const auto& name : texts) place(name, out.texts_[name], text_columns);
@@ -94,6 +95,7 @@ Result<LooseTable> LooseTable::read(const std::string& path, const std::vector<s
     for (const auto& [at, column] : number_columns) column->push_back(number_of(fields[at]));
     for (const auto& [at, column] : text_columns) column->push_back(text_of(fields[at]));
   }
+  if (in.bad()) return Error{path + ": cannot be read"};
   for (auto& [name, column] : out.numbers_) column.resize(out.rows_, std::numeric_limits<double>::quiet_NaN());
   for (auto& [name, column] : out.texts_) column.resize(out.rows_);
   return out;

@@ -10,19 +10,19 @@
 
 namespace telesplat::launcher {
 
-/// Columns of a table, by name. A line that is cut off (the last one, without a line end) or has another number of
-/// values than the header is left out.
+/// Columns of a table, by name. A line that is cut off (the last one, without a line end), has another number of values
+/// than the header, or more than 64 KiB, is left out.
 class LooseTable {
  public:
-  /// The columns that are asked for, as far as the file has them. Error: the file is not there, is empty, or has more
-  /// than 4 GiB.
+  /// The columns that are asked for, as far as the file has them. Error: the file is not there, is empty, has more than
+  /// 4 GiB, or a header of more than 64 KiB.
   static Result<LooseTable> read(const std::string& path, const std::vector<std::string>& numbers,
                                  const std::vector<std::string>& texts = {});
 
   size_t rows() const { return rows_; }
   size_t damaged() const { return damaged_; }  ///< lines that were left out
   bool has(std::string_view name) const;
-  /// A value a row; NaN where there is no finite number. All NaN if the file has no such column.
+  /// A value a row, within 1e12 of 0; NaN where there is no such number. All NaN if the file has no such column.
   const std::vector<double>& numbers(const std::string& name) const;
   /// Valid UTF-8, at most 200 bytes each; empty if the file has no such column.
   const std::vector<std::string>& texts(const std::string& name) const;

@@ -35,7 +35,7 @@ const Names kFrameNumbers{"frame",
                           "qz"};
 const Names kUpdateNumbers{"request",     "requested_s", "complete_s",  "latency_ms",
                            "start_up_ms", "points",      "extra_points"};
-const Names kTileNumbers{"samples", "kept", "bytes_sent", "encode_end_s", "packed_s", "published_s"};
+const Names kTileNumbers{"frame", "samples", "kept", "bytes_sent", "encode_end_s", "packed_s", "published_s"};
 const Names kQualityNumbers{"frame", "t_s", "psnr_db", "ssim", "flip", "hole_fraction", "object_pixels"};
 
 // lacks: what the page has not without it.
@@ -97,9 +97,9 @@ RunTables read_run_tables(const std::string& directory, const std::string& kind)
   t.frames =
       read(directory, "frames.csv", "no inter-frame delay, points, update age and map", kFrameNumbers, viewer, t.notes);
   t.updates = read(directory, "updates.csv", "no view updates and their latency", kUpdateNumbers, viewer, t.notes);
-  t.tiles = read(directory, "tiles.csv", "no rates of generating and transfer", kTileNumbers, {}, t.notes);
+  t.tiles = read(directory, "tiles.csv", "no rates of generating and transfer", kTileNumbers, {"sampler"}, t.notes);
   t.stages = read(directory, "stages.csv", "no stages of a view update (records of earlier versions have none)",
-                  stage_numbers(), {"viewer", "sampler"}, t.notes);
+                  stage_numbers(), viewer, t.notes);
   t.quality =
       read(directory, "quality.csv", "no holes and PSNR (the run had no --verify)", kQualityNumbers, {}, t.notes);
   if (t.frames)
