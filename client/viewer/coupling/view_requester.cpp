@@ -245,7 +245,7 @@ std::optional<ViewRequester::Update> ViewRequester::on_part(const ViewPart& part
   u.complete_s = last_update_s_ = now_s;
   u.extra_points = std::exchange(extra_points_, 0);
   u.extra_bytes = std::exchange(extra_bytes_, 0);
-  quiet_ = u.points == 0 ? std::optional(u.camera) : std::nullopt;
+  quiet_ = u.points == 0 && part.left_out == 0 ? std::optional(u.camera) : std::nullopt;
   // The master's clock as seen from here may be set back when the connection is made anew.
   follow_latency(u, std::max(now_s - u.requested_s, 1e-3));
   const Update done = u;

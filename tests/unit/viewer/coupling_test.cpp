@@ -184,7 +184,7 @@ class SteeredRequester : public Requester {
  protected:
   SteeredRequester() { requester.set_steered(true); }
   // Requests within `for_s` of a head that moves by so many metres a second; each is answered after 50 ms.
-  int requests(double for_s, uint64_t kept, double speed_m_s = 0) {
+  int requests(double for_s, uint64_t kept, double speed_m_s = 0, uint64_t left_out = 0) {
     int count = 0;
     for (const double end_s = now_s + for_s; now_s < end_s; now_s += 0.01) {
       display.pose.position_room.x += speed_m_s * 0.01;
@@ -195,6 +195,7 @@ class SteeredRequester : public Requester {
       }
       if (open.value == 0 || now_s < answer_s) continue;
       auto p = part(open, 0, 1);
+      p.left_out = left_out;
       p.kept = kept, p.samples = kept + 300;  // the others were cast to see whether they agree
       EXPECT_TRUE(requester.on_part(part_of(p), now_s).has_value());
       open = {};
@@ -213,6 +214,11 @@ TEST_F(SteeredRequester, AViewThatLacksNothingIsAskedForOnceASecond) {
   EXPECT_GE(requests(2, 0, 0.5), 18) << "the head moves";
   EXPECT_LE(requests(3, 0), 6);
   EXPECT_GE(requests(2, 5), 12) << "something has changed: within a second it is asked for at the full rate again";
+}
+
+TEST_F(SteeredRequester, AViewThatWasOvertakenBeforeAnythingCameLacksSomething) {
+  EXPECT_GE(requests(2, 10), 17);
+  EXPECT_GE(requests(3, 0, 0, 5), 27);
 }
 
 TEST_F(SteeredRequester, TheNextViewIsAskedForWhenTheLastOneIsComplete) {
