@@ -210,8 +210,10 @@ void ViewRequester::follow_latency(const Update& u, double latency_s) {
   // Requests that were sent before it took their share.
   const double own_s = latency_s / double(1 + u.ahead);
   if (steered_) return step_scale(own_s);
-  // Time goes with the number of pixels, hence the root.
-  scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / own_s), 0.85, 1.1), min_scale(), 1.0);
+  // Time goes with the number of pixels, hence the root. On a slow link a few large views would take seconds.
+  slow_ = own_s > 2 * options_.target_latency_s ? slow_ + 1 : 0;
+  const double least = slow_ >= 2 ? 0.5 : 0.85;
+  scale_ = std::clamp(scale_ * std::clamp(std::sqrt(options_.target_latency_s / own_s), least, 1.1), min_scale(), 1.0);
 }
 
 // Rays are few however many pixels a view has, and what is cast stays: views that come often show more than fine ones.

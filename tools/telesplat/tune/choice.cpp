@@ -24,17 +24,26 @@ constexpr Guard kGuards[] = {{&TuneFigures::latency_ms, "latency", false, false,
                              {&TuneFigures::frame_ms, "time between frames", false, false, 0.01, 0.05}};
 constexpr size_t kGains = 2;  // the first so many can make a configuration better
 
-// How much better b is than the defaults a (negative: worse), and how far runs of one of them lie apart.
+// How much better b is than the defaults a (negative: worse), round by round: a machine that becomes slower does so for
+// both.
 struct Difference {
-  double gain, apart;
+  double gain = 0;   // median over the rounds that have both
+  double apart = 0;  // mean distance of the rounds from it
+  double least = 0;  // the worst round
+  size_t rounds = 0;
 };
 std::optional<Difference> difference(const Guard& g, const Measured& a, const Measured& b) {
-  const Spread s = spread_of(a, g.figure), t = spread_of(b, g.figure);
-  if (s.runs == 0 || t.runs == 0) return std::nullopt;
-  const double unit = g.in_db ? 1 : s.median;
-  if (unit <= 0) return std::nullopt;
-  const double gain = (g.more_is_better ? t.median - s.median : s.median - t.median) / unit;
-  return Difference{gain, std::max(s.most - s.least, t.most - t.least) / unit};
+  std::vector<double> gains;
+  for (size_t i = 0; i < std::min(a.runs.size(), b.runs.size()); ++i) {
+    const double x = a.runs[i].*g.figure, y = b.runs[i].*g.figure;
+    const double unit = g.in_db ? 1 : x;
+    if (std::isfinite(x) && std::isfinite(y) && unit > 0) gains.push_back((g.more_is_better ? y - x : x - y) / unit);
+  }
+  if (gains.empty()) return std::nullopt;
+  const Spread s = spread_of(gains);
+  double apart = 0;
+  for (const double gain : gains) apart += std::abs(gain - s.median) / static_cast<double>(gains.size());
+  return Difference{s.median, apart, s.least, gains.size()};
 }
 
 std::string amount(const Guard& g, double share) {
@@ -43,13 +52,15 @@ std::string amount(const Guard& g, double share) {
 
 struct Judged {
   bool allowed = true, better = false, maybe = false;
-  bool clearly = false;  // not allowed, and worse by more than runs differ
+  bool clearly = false;  // not allowed, and worse by more than rounds differ
   std::string reason;
 };
 
 Judged judge(const Measured& defaults, const Measured& m) {
   Judged out;
-  if (m.runs.empty()) return {.allowed = false, .clearly = true, .reason = "no run of it came to its end"};
+  const bool ended =
+      std::any_of(m.runs.begin(), m.runs.end(), [](const TuneFigures& f) { return f.updates_per_s >= 0; });
+  if (!ended) return {.allowed = false, .clearly = true, .reason = "no run of it came to its end"};
   if (spread_of(m, &TuneFigures::latency_ms).runs == 0)
     return {.allowed = false, .clearly = true, .reason = "no view update was complete"};
   std::vector<std::string> gains;
@@ -65,16 +76,15 @@ Judged judge(const Measured& defaults, const Measured& m) {
       return out;
     }
     if (&g >= kGuards + kGains || d->gain <= g.least) continue;
-    if (d->gain > d->apart) {
+    if (d->least > 0 && d->rounds > 1) {
       out.better = true;
-      gains.push_back(
-          fmt::format("{} is better by {} (runs differ by {})", g.title, amount(g, d->gain), amount(g, d->apart)));
+      gains.push_back(fmt::format("{} is better by {}, in each of {} rounds", g.title, amount(g, d->gain), d->rounds));
     } else {
       out.maybe = true;
     }
   }
   out.reason = out.better  ? fmt::format("{}", fmt::join(gains, "; "))
-               : out.maybe ? "what it seems to gain is less than runs differ by"
+               : out.maybe ? "what it seems to gain it does not gain in every round"
                            : "it gains nothing";
   return out;
 }
@@ -90,9 +100,9 @@ double measured_score(const Measured& defaults, const Measured& m) {
                median_or(defaults, &TuneFigures::latency_ms, 0), psnr);
 }
 
-bool noisy(const Measured& m) {
-  const Spread s = spread_of(m, &TuneFigures::latency_ms);
-  return s.runs > 1 && s.relative() > kQuiet;
+bool noisy(const Measured& defaults, const Measured& m) {
+  const auto d = difference(kGuards[0], defaults, m);
+  return d && d->apart > kQuiet;
 }
 
 }  // namespace
@@ -102,7 +112,7 @@ TuneFigures tune_figures(const Figures& summary) {
     const double* found = find(summary, name);
     return found ? *found : std::numeric_limits<double>::quiet_NaN();
   };
-  return {value("view_update_latency_ms.median"), value("update_age_ms.p95"), value("quality.psnr_db.median"),
+  return {value("view_update_latency_ms.median"), value("update_age_ms.median"), value("quality.psnr_db.median"),
           value("inter_frame_delay_ms.median"), value("updates_per_s")};
 }
 
@@ -117,14 +127,14 @@ Choice choose(const std::vector<Measured>& all) {
   CHECK(!all.empty() && !all[0].runs.empty());
   Choice out;
   out.reasons.emplace_back("the defaults");
-  bool maybe = false, open = false, loud = noisy(all[0]);
+  bool maybe = false, open = false, loud = false;
   double best = 0;
   for (size_t i = 1; i < all.size(); ++i) {
     const Judged judged = judge(all[0], all[i]);
     out.reasons.push_back(judged.reason);
     maybe = maybe || (judged.allowed && judged.maybe);
     open = open || !judged.clearly;
-    loud = loud || noisy(all[i]);
+    loud = loud || noisy(all[0], all[i]);
     if (!judged.allowed || !judged.better) continue;
     const double gain = measured_score(all[0], all[i]);
     if (gain <= best) continue;
@@ -137,14 +147,13 @@ Choice choose(const std::vector<Measured>& all) {
   } else if (loud && open) {
     out.verdict = Verdict::kTooNoisy;
     out.sentence = fmt::format(
-        "the machine was too noisy to tell: runs of one configuration differ by more than {:.0f} % in latency; the "
-        "defaults stay",
+        "the machine was too noisy to tell: from round to round the differences in latency vary by more than {:.0f} %; "
+        "the defaults stay",
         100 * kQuiet);
   } else if (all.size() == 1) {
     out.sentence = "the defaults stay: the model knows of nothing that could be better, so that nothing else was run";
   } else {
-    out.sentence = maybe ? "the defaults stay: no gain is larger than runs of one configuration differ by"
-                         : "the defaults were best";
+    out.sentence = maybe ? "the defaults stay: nothing gains in every round" : "the defaults were best";
   }
   return out;
 }

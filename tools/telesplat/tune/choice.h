@@ -8,14 +8,15 @@
 
 namespace telesplat::launcher {
 
-/// What a run is judged by. A figure that was not measured is NaN, and judges nothing.
+/// What a run is judged by. A figure that was not measured is NaN, and judges nothing; of a run that did not come to its
+/// end all are.
 struct TuneFigures {
   double latency_ms, age_ms, psnr_db, frame_ms, updates_per_s;
 };
 /// From the numbers of a run's summary.json.
 TuneFigures tune_figures(const Figures& summary);
 
-/// A configuration with its runs; the defaults are one, too.
+/// A configuration with its runs, one a round; the defaults are one, too.
 struct Measured {
   std::string name;
   std::vector<TuneFigures> runs;
@@ -25,9 +26,9 @@ struct Measured {
 Spread spread_of(const Measured& measured, double TuneFigures::*figure);
 
 enum class Verdict {
-  kBetter,        ///< the chosen one is better than the defaults by more than runs differ
-  kDefaultsBest,  ///< none is, and runs differed little; or there was none
-  kTooNoisy       ///< runs of one configuration differed too much to tell, and not all others were clearly worse
+  kBetter,        ///< the chosen one is better than the defaults in every round
+  kDefaultsBest,  ///< none is, and rounds differed little; or there was none
+  kTooNoisy       ///< rounds differed too much to tell, and not all others were clearly worse
 };
 
 struct Choice {
@@ -37,14 +38,14 @@ struct Choice {
   std::string sentence;              ///< for people
 };
 
-/// The most that runs of a configuration may differ in latency, (most - least) / median, before a verdict counts for
+/// The most that rounds may lie apart, as a mean, in what a configuration gains in latency, before a verdict counts for
 /// nothing.
 inline constexpr double kQuiet = 0.1;
 
-/// all[0]: the defaults. A configuration can be chosen if in no figure (latency, age, PSNR, frame time) it is worse
-/// than the defaults by more than runs of one configuration differ, and never by more than 5 % (0.5 dB); and if
-/// latency is less or PSNR is more by more than runs differ. Of these the best by score() is taken. Precondition: the
-/// defaults have a run.
+/// all[0]: the defaults. Each round compares a configuration with the defaults' run of that round. A configuration can
+/// be chosen if in no figure (latency, age, PSNR, frame time) it is worse, as a median of rounds, by more than rounds
+/// lie apart, and never by more than 5 % (0.5 dB); and if in each of at least two rounds latency is less, or PSNR more.
+/// Of these the best by score() is taken. Precondition: the defaults have a run.
 Choice choose(const std::vector<Measured>& all);
 
 }  // namespace telesplat::launcher

@@ -15,6 +15,8 @@ constexpr double kNear = 1e-9;
 
 // Clusters are cells of a surface: four times as many with each level.
 double clusters(int depth, int measured) { return std::pow(4.0, depth - measured); }
+// A plan looks at clusters and at pixels: measured from 5 to 6 levels it took 1.25 to 1.55 times as long.
+double planning(int depth, int measured) { return std::pow(1.4, depth - measured); }
 // Clusters at the picture's rim are drawn whole: a share of all that halves with each level.
 double rim(int depth) { return 1 + 4 * std::pow(0.5, depth); }
 // Points of all levels, a quarter with each coarser one.
@@ -52,7 +54,7 @@ Prediction update_after(const TuneCosts& c, const TuneSettings& s, double interv
   out.rays = c.slices ? c.voxels : share * pixels;
   const double samples = c.slices ? c.slice_pixels : out.rays * c.covered;
   const double kept = samples * c.kept;
-  out.plan_s = c.steered && !c.slices ? c.plan.at(pixels) : 0;
+  out.plan_s = c.steered && !c.slices ? c.plan.at(pixels) * planning(s.octree_depth, c.measured_depth) : 0;
   out.connections_s = c.connect_s * connections(c, s.samplers);
   const double one_s = c.tile_s + out.rays / tiles * (c.sample_s / threads_of(c, s.samplers) + c.encode_s);
   out.sampling_s = std::ceil(tiles / s.samplers) * one_s * crowding(c, s);

@@ -52,7 +52,7 @@ std::string table_text(const std::vector<Checked>& all, const std::string& inden
                           {"measured"},
                           {"quality dB: predicted"},
                           {"PSNR dB"},
-                          {"age p95 ms"},
+                          {"age ms"},
                           {"frame ms"}});
   for (const Checked& c : all)
     table.add({c.measured.name, fmt::format("{:.1f}", 1e3 * c.predicted.latency_s),

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 namespace telesplat::launcher {
@@ -12,6 +13,8 @@ namespace {
 
 constexpr int kAttempts = 2;
 constexpr double kStarting_s = 5;  // of a run, beside what it lasts: a guess until one is done
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr TuneFigures kNoFigures{kNaN, kNaN, kNaN, kNaN, kNaN};  // of a run that did not come to its end
 constexpr double kLimitTimes = 10, kLimitMore_s = 600;
 
 Result<TuneFigures> read_figures(const std::string& folder) {
@@ -115,12 +118,13 @@ Result<Tune::End> Tune::check(tools::ProgressLine& progress) {
       const auto end = run(c.settings, name, true, what, progress);
       if (!end) return end.error();
       if (end->interrupted) return End::kInterrupted;
-      if (!end->reason.empty()) continue;
-      const auto figures = read_figures(directory_ + "/" + name);
+      auto figures = end->reason.empty() ? read_figures(directory_ + "/" + name) : Result<TuneFigures>(kNoFigures);
       if (!figures) return figures.error();
       c.measured.runs.push_back(*figures);
     }
-  if (checked_[0].measured.runs.empty()) return Error{"no run of the defaults came to its end"};
+  const auto& runs = checked_[0].measured.runs;
+  if (std::none_of(runs.begin(), runs.end(), [](const TuneFigures& f) { return f.updates_per_s >= 0; }))
+    return Error{"no run of the defaults came to its end"};
   return End::kDone;
 }
 
