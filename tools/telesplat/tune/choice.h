@@ -8,8 +8,8 @@
 
 namespace telesplat::launcher {
 
-/// What a run is judged by. A figure that was not measured is NaN, and judges nothing; of a run that did not come to its
-/// end all are.
+/// What a run is judged by. A figure that was not measured is NaN, and judges nothing; of a run that did not come to
+/// its end all are.
 struct TuneFigures {
   double latency_ms, age_ms, psnr_db, frame_ms, updates_per_s;
 };
