@@ -63,16 +63,23 @@ std::vector<std::vector<TimelineSpan>> rows_of(const TimelineLane& lane, const T
   return rows;
 }
 
-// Which colour is what, in a line below the picture.
-std::string legend(const std::set<std::string>& names, double y) {
-  std::string out;
+// Which colour is what, in lines below the picture.
+struct Legend {
+  std::string svg;
+  double height = 0;  // of the lines after the first
+};
+Legend legend(const std::set<std::string>& names, double y) {
+  constexpr double kLine = 18;
+  Legend out;
   double x = kLabel;
   for (const std::string& name : names) {
-    out += fmt::format(
+    const double width = 16 + 7.2 * double(tools::width_of(name)) + 18;
+    if (x > kLabel && x + width > kLabel + kChart) x = kLabel, y += kLine, out.height += kLine;
+    out.svg += fmt::format(
         "<rect class=\"s{}\" x=\"{:.0f}\" y=\"{:.1f}\" width=\"11\" height=\"11\"/><text x=\"{:.0f}\" "
         "y=\"{:.1f}\">{}</text>",
         colour_of(name), x, y - 10, x + 16, y, escaped(name));
-    x += 16 + 7.2 * double(tools::width_of(name)) + 18;
+    x += width;
   }
   return out;
 }
@@ -139,13 +146,14 @@ std::string timeline_svg(const std::vector<TimelineLane>& lanes, const TimeSpan&
         "<line class=\"g\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.0f}\" y2=\"{2:.1f}\"/><text class=\"m\" "
         "x=\"{0:.1f}\" y=\"{3:.1f}\">{4:.6g} ms</text>",
         x(part.begin_s + ms * 1e-3), kTop - 6, y, y + 16, ms);
-  const double width = kLabel + kChart + 30, height = y + kBottom;
+  const Legend colours = legend(names, y + 42);
+  const double width = kLabel + kChart + 30, height = y + kBottom + colours.height;
   return fmt::format(
       "<svg class=\"timeline\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
       "height=\"{1:.0f}\">"
       "{2}<rect class=\"back\" width=\"{0:.0f}\" height=\"{1:.0f}\"/><text class=\"h\" x=\"8\" y=\"18\">{3}</text>"
       "{4}{5}{6}</svg>\n",
-      width, height, style(), escaped(title), grid, body, legend(names, y + 42));
+      width, height, style(), escaped(title), grid, body, colours.svg);
 }
 
 }  // namespace telesplat::launcher
