@@ -32,6 +32,24 @@ ordered_json if_measured(bool measured, V value) {
   return measured ? ordered_json(value) : ordered_json();
 }
 
+/// Of each row of updates.csv: nothing of it is left out.
+std::vector<bool> whole_updates(const Measured& m) {
+  std::vector<bool> out(m.updates.column("latency_ms").size(), true);
+  const auto left_out = m.updates.column("left_out");
+  for (size_t i = 0; i < std::min(out.size(), left_out.size()); ++i) out[i] = left_out[i] == 0;
+  return out;
+}
+
+/// Latencies of those.
+std::vector<double> whole_latencies(const Measured& m) {
+  const auto all = m.updates.column("latency_ms");
+  const auto is_whole = whole_updates(m);
+  std::vector<double> out;
+  for (size_t i = 0; i < all.size(); ++i)
+    if (is_whole[i]) out.push_back(all[i]);
+  return out;
+}
+
 /// What one viewer did.
 struct ViewerFigures {
   size_t frames = 0, updates = 0;
@@ -59,7 +77,9 @@ std::map<std::string, ViewerFigures> by_viewer(const Measured& m) {
     if (i < delays.size() && delays[i] > 0) v.inter_frame_ms.push_back(delays[i]);  // its first frame has none
   }
   const auto latencies = m.updates.column("latency_ms");
+  const auto is_whole = whole_updates(m);
   for (size_t i = 0; i < latencies.size(); ++i) {
+    if (!is_whole[i]) continue;
     ViewerFigures& v = whose(m.updates, i);
     ++v.updates;
     v.latency_ms.push_back(latencies[i]);
@@ -248,7 +268,7 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
   }
   return {{"epochs", m.epochs},
           {"frames", m.frames.column("t_s").size()},
-          {"updates", m.updates.column("latency_ms").size()},
+          {"updates", whole_latencies(m).size()},
           {"duration_s", if_measured(longest_s(viewers) > 0, thousandths(longest_s(viewers)))},
           {"fps", if_measured(longest_s(viewers) > 0, hundredths(fps))},
           {"updates_per_s", if_measured(longest_s(viewers) > 0, hundredths(updates_per_s))},
@@ -285,7 +305,7 @@ ordered_json how_long(const Measured& m) {
   const FrameDurations durations = frame_durations(m.tiles);
   return {{"inter_frame_delay_ms", distribution_json(delays)},
           {"view_construction_ms", distribution_json(m.frames.column("construction_ms"))},
-          {"view_update_latency_ms", distribution_json(m.updates.column("latency_ms"))},
+          {"view_update_latency_ms", distribution_json(whole_latencies(m))},
           {"start_up_latency_ms", distribution_json(m.updates.column("start_up_ms"))},
           {"latency_stages_ms", where_time_went(m)},
           {"display_latency_ms", display_latency(m)},

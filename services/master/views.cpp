@@ -56,9 +56,9 @@ std::vector<Views::Begun>::iterator Views::find(FrameId frame) {
   return found;
 }
 
-void Views::complete(FrameId frame) {
+void Views::complete(FrameId frame, bool whole) {
   in_flight_.erase(find(frame));
-  ++completed_;
+  completed_ += whole;
 }
 
 void Views::put_back(FrameId frame) {

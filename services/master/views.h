@@ -75,7 +75,8 @@ class Views {
   }
   /// `frame` shows these views: they are in flight until complete() or put_back().
   void begin(FrameId frame, const std::vector<wire::ViewRequest>& views);
-  void complete(FrameId frame);
+  /// whole: it counts as completed.
+  void complete(FrameId frame, bool whole = true);
   /// The frame was dropped: its views wait again, except those of viewers that left; of asynchronous viewers only if no
   /// newer request does. Where several are put back, the newest comes first.
   void put_back(FrameId frame);

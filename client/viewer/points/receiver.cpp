@@ -158,7 +158,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   points_received_ += patch.kept;
   bytes_received_ += patch.image.size();
   if (!options_.hold) {
-    const bool complete = patch.frame_complete && !patch.extra;
+    const bool complete = patch.frame_complete && !patch.extra && patch.left_out == 0;
     switch_.on_part({patch.epoch, patch.step, complete, patch.viewer == options_.viewer}, inserted);
     tick(inserted);
   }

@@ -161,7 +161,8 @@ std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<F
   const bool view = frame->step == 1 && !frame->extra;
   const PlannedView ended{.frame = frame->id, .epoch = frame->epoch, .view = frame->request};
   if (!view) return frames_.erase(frame);
-  if (frame->tiles.left() > 0) {
+  const bool whole = frame->tiles.left() == 0;
+  if (!whole) {
     ++overtaken_views_;
     ends_.push_back({.frame = frame->id,
                      .epoch = frame->epoch,
@@ -172,7 +173,7 @@ std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<F
                      .moments = frame->request.moments});
   }
   frames_.erase(frame);
-  view_complete(ended);
+  view_complete(ended, whole);
   // A coarse frame that is not there yet shows nothing any more.
   std::erase_if(frames_, [&](const Frame& f) {
     return f.step != 1 && f.request.viewer == ended.view.viewer && f.request.request == ended.view.request;

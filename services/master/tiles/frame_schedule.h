@@ -75,7 +75,7 @@ class FrameSchedule : public Views {
   /// Questions for the packer, in order, each once.
   std::vector<wire::PlanRequest> take_questions() { return std::exchange(questions_, {}); }
   /// Frames that ended before all of their tiles were sampled, for the packer, each once.
-  std::vector<wire::FrameEnd> take_ends() { return std::exchange(ends_, {}); }
+  std::vector<wire::FrameEnd> take_ends(double now_s);
   /// The packer's answer. What nobody waits for is dropped. Error: it does not fit what was asked (check_answer()), and
   /// counts as full.
   Status take_plan(const wire::Plan& plan, double now_s);
@@ -145,8 +145,7 @@ class FrameSchedule : public Views {
     bool extra = false;                // of rays beyond a view
     double begun_s = 0;                // its plan came
     double refining = 0, put_off = 0;  // RefiningRays::learn()
-    bool paced = false;                // a tile of it has waited for its viewer's link
-    double held_from_s = 0;            // that takes nothing since; 0: it takes more
+    double held_from_s = 0;            // its viewer's link has taken nothing since; 0: it takes more
   };
   // A lease whose tile another sampler delivered first; its own may be dead or slow.
   struct Overtaken {
@@ -160,12 +159,12 @@ class FrameSchedule : public Views {
   /// Views stand before extra frames.
   void insert(Frame frame);
   void close_extras(const wire::ViewRequest& view, double now_s);
-  void view_complete(const PlannedView& view);
+  void view_complete(const PlannedView& view, bool whole = true);
   void note(const PlanQuestions::Asked& asked, const wire::Plan& plan, double now_s);
   /// viewer: of a view; nullopt: of extra rays, which go to all.
   PlanLimits limits(std::optional<InstanceId> viewer, double now_s) const;
   bool open(InstanceId viewer, double now_s) const { return in_turns_ || gate_.open(viewer, now_s); }
-  bool may_lease(Frame& frame, double now_s) const;
+  bool may_lease(const Frame& frame, double now_s) const;
   bool is_overtaken(const Frame& frame, double now_s) const;
   bool arrives_coarse(const wire::ViewRequest& view) const;
   bool other_waits(InstanceId viewer, double now_s) const;

@@ -5,12 +5,8 @@
 
 namespace telesplat::master {
 
-bool FrameSchedule::may_lease(Frame& f, double now_s) const {
-  if (!open(f.request.viewer, now_s)) {
-    f.paced = true;
-    return false;
-  }
-  return !f.extra || gate_.idle(now_s);
+bool FrameSchedule::may_lease(const Frame& f, double now_s) const {
+  return open(f.request.viewer, now_s) && (!f.extra || gate_.idle(now_s));
 }
 
 // What a link would carry for long arrives coarse first, so that there is something to see.
@@ -22,7 +18,7 @@ bool FrameSchedule::arrives_coarse(const wire::ViewRequest& view) const {
 
 // Nothing is lost by it: what came stays, and the newer view's plan asks for what is still lacking in that view.
 bool FrameSchedule::is_overtaken(const Frame& f, double now_s) const {
-  if (f.extra || f.step != 1 || f.request.buffers > 0 || !f.paced || in_turns_) return false;
+  if (f.extra || f.step != 1 || f.request.buffers > 0 || open(f.request.viewer, now_s)) return false;
   if (!f.tiles.open() || !f.tiles.whole_blocks() || now_s - f.begun_s < kOvertaken_s) return false;
   const wire::ViewRequest* newer = waiting_of(f.request.viewer);
   if (!newer || newer->camera == f.request.camera) return false;
@@ -33,11 +29,13 @@ bool FrameSchedule::is_overtaken(const Frame& f, double now_s) const {
 
 void FrameSchedule::end_overtaken(double now_s) {
   for (Frame& f : frames_)
-    if (is_overtaken(f, now_s)) {
-      f.tiles.close();
-      f.request.moments.leased_s = now_s;  // what is left out waited until now
-    }
+    if (is_overtaken(f, now_s)) f.tiles.close();
   end_closed();
+}
+
+std::vector<wire::FrameEnd> FrameSchedule::take_ends(double now_s) {
+  for (wire::FrameEnd& end : ends_) end.moments.leased_s = now_s;  // what is left out waited until now
+  return std::exchange(ends_, {});
 }
 
 // A view of another viewer waits, whose link takes more.

@@ -106,8 +106,8 @@ void FrameSchedule::give_up_plans(double now_s) {
   }
 }
 
-void FrameSchedule::view_complete(const PlannedView& view) {
-  complete(view.frame);
+void FrameSchedule::view_complete(const PlannedView& view, bool whole) {
+  complete(view.frame, whole);
   plans_.known(view);
 }
 

@@ -74,7 +74,7 @@ void TilePlan::prepare(double now_s) {
   record_plans();
   schedule_.end_overtaken(now_s);
   const std::string packer = links_.packer();
-  for (const auto& end : schedule_.take_ends())
+  for (const auto& end : schedule_.take_ends(now_s))
     if (!packer.empty()) links_.outbox.send(packer, end);
 }
 

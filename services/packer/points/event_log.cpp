@@ -20,6 +20,7 @@ Event bare(const Event& event) {
   static const auto kNothing = std::make_shared<const std::vector<uint8_t>>(codec::encode(image::DepthImage(1, 1)));
   Event out = event;
   out.blob = kNothing;
+  out.samples = out.kept = 0;
   out.rect = {event.rect.x, event.rect.y, 1, 1};
   out.missed = {};
   return out;

@@ -243,6 +243,7 @@ void PointPacking::end_frame(const wire::FrameEnd& end, double now_s) {
                         .request = end.request,
                         .tiles_in_frame = uint32_t(std::min<uint64_t>(end.tiles, kMaxTilesInFrame)),
                         .camera = end.camera};
+  if (planner_) planner_->end_frame(end.frame);
   const auto event = core_->end_frame(frame, now_s);
   if (!event) return log::warn("frame {} cannot be ended: {}", end.frame.value, event.error().text);
   if (!*event) return;

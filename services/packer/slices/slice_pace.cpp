@@ -3,7 +3,8 @@
 namespace telesplat::packer {
 
 void SlicePace::sent(FrameId frame, uint64_t bytes, double now_s) {
-  under_way_.push_back({frame, bytes, now_s});
+  under_way_.push_back({frame, bytes, now_s, frame <= newest_});
+  newest_ = std::max(newest_, frame);
   if (wished_ > 0) wish_s_ = std::max(wish_s_, now_s) + static_cast<double>(bytes) / wished_;
 }
 
@@ -15,10 +16,12 @@ void SlicePace::acknowledged(FrameId frame, double now_s) {
   if (found == under_way_.end()) return;
   const double took_s = now_s - std::max(found->sent_s, last_s_);
   const auto bytes = static_cast<double>(found->bytes);
+  const bool tells = !found->again && took_s >= kLeast_s;
   under_way_.erase(found);
   last_s_ = now_s;
+  if (!tells) return;
   if (now_s - window_s_ > kWindow_s) before_ = most_, most_ = 0, window_s_ = now_s;
-  most_ = std::max(most_, bytes / std::max(took_s, 1e-4));
+  most_ = std::max(most_, bytes / took_s);
 }
 
 double SlicePace::link_free_s() const {

@@ -18,6 +18,8 @@ class SlicePace {
   /// so that the link is never idle, and that a rate that was taken for too low is found to be higher.
   static constexpr double kShare = 0.8;
   static constexpr double kWindow_s = 5;  ///< for the highest rate, and the window before
+  /// Two acknowledgements that are nearer than this were read together.
+  static constexpr double kLeast_s = 0.002;
 
   /// Bytes a second that are wished at most; 0: no wish.
   void set_most(double bytes_s) { wished_ = bytes_s; }
@@ -26,7 +28,8 @@ class SlicePace {
   void sent(FrameId frame, uint64_t bytes, double now_s);
   /// Frames that were not sent change nothing.
   void acknowledged(FrameId frame, double now_s);
-  /// What is under way is lost. The rate stays known.
+  /// What is under way is lost, or seems to be: it is sent again. The rate stays known; what is sent twice tells
+  /// nothing of it, for the first copy may be acknowledged.
   void lost() { under_way_.clear(); }
 
   /// The next frame may go out then; in the past: at once.
@@ -41,10 +44,12 @@ class SlicePace {
     FrameId frame;
     uint64_t bytes;
     double sent_s;
+    bool again;
   };
   double link_free_s() const;
 
   std::deque<Sent> under_way_;                   // oldest first
+  FrameId newest_;                               // that was sent
   double last_s_ = 0;                            // acknowledgement
   double most_ = 0, before_ = 0, window_s_ = 0;  // bytes a second; in this window and the one before; its begin
   double wished_ = 0, wish_s_ = 0;               // a link of the wished rate would be done by then

@@ -111,17 +111,27 @@ TEST_F(ThesisBench, ChecksItsDataFirst) {
 TEST_F(ThesisBench, EveryPictureOfTheScalingStudyIsSampledWhole) {
   // The same view again, with two samplers: half the waits are left, not less.
   Program scaling("telesplat",
-                  {"bench", "scaling", "--no-kill", "--no-computed", "--nodes", "1,2", "--frames", "2", "--row-cost",
-                   "1.5", "--size", "64x40", "--out", folder / "scaling"},
+                  {"bench", "scaling", "--no-kill", "--nodes", "1,2", "--frames", "2", "--row-cost", "1.5", "--size",
+                   "64x40", "--out", folder / "scaling"},
                   folder / "scaling-run");
   ASSERT_EQ(scaling.wait(120), 0) << scaling.err();
   const auto table = tools::CsvTable::read(folder / "scaling/scaling.csv", {});
   ASSERT_TRUE(table) << table.error().text;
-  ASSERT_EQ(table->rows(), 2u);
-  for (size_t row = 0; row < 2; ++row) {
+  const auto simulated = *table->column("simulated");
+  size_t rows = 0;
+  for (size_t row = 0; row < table->rows(); ++row) {
+    if (*table->number(row, simulated) == 0) continue;
+    ++rows;
     const double nodes = *table->number(row, *table->column("nodes")),
                  time_s = *table->number(row, *table->column("time_s"));
     EXPECT_GE(time_s, 0.9 * 1.5 / nodes) << nodes << " nodes";
+  }
+  EXPECT_EQ(rows, 2u);
+  const auto report = nlohmann::json::parse(read_text(folder / "scaling/scaling.json"));
+  ASSERT_FALSE(report["computed"].empty());
+  for (const auto& c : report["computed"]) {
+    EXPECT_EQ(c["busy_s"].size(), c["samplers"]);
+    for (const double busy_s : c["busy_s"]) EXPECT_GT(busy_s, 0);
   }
 }
 

@@ -248,6 +248,39 @@ TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
   EXPECT_EQ(sent[0].type, wire::EpochBegin::kName);
 }
 
+TEST_F(PointPackingTest, WhatCameOfAViewThatEndsEarlyIsKnown) {
+  wire::Welcome session = welcome();
+  session.settings["sampling.validation"] = 0;
+  ASSERT_TRUE(packing.follow(session, 0));
+  wire::PlanRequest request{.frame = {1}, .epoch = test::kEpoch, .viewer = {77}, .request = {5}, .camera = kCamera};
+  ASSERT_TRUE(packing.plan(request, 1).full) << "nothing is known";
+  wire::DepthTile most = tile(1, 0);
+  most.lease.rect = most.lease.block_rect = {0, 0, 72, 64};
+  most.lease.blocks_in_frame = 2;
+  sample(most, 1);
+  const wire::FrameEnd end{
+      .frame = {1}, .epoch = test::kEpoch, .viewer = {77}, .request = {5}, .tiles = 2, .camera = kCamera};
+  sent.clear();
+  packing.end_frame(end, 2);
+  ASSERT_EQ(sent.size(), 1u);
+  const auto patch = decoded<wire::Patch>(sent[0]);
+  EXPECT_TRUE(patch.frame_complete);
+  EXPECT_EQ(patch.left_out, 1u);
+  EXPECT_EQ(patch.request.value, 5u);
+  packing.end_frame(end, 2);
+  EXPECT_EQ(sent.size(), 1u) << "once";
+  EXPECT_TRUE(packing.idle(1e9)) << "there is something to learn";
+  while (packing.idle(1e9)) {
+  }
+  request.frame = {2}, request.request = {6};
+  const wire::Plan rest = packing.plan(request, 4);
+  ASSERT_FALSE(rest.full);
+  uint64_t rays = 0;
+  for (size_t i = 0; i < rest.tiles.size(); i += wire::kPlanNumbers) rays += rest.tiles[i + 4];
+  EXPECT_GT(rays, 20u * 64);
+  EXPECT_LT(rays, 28u * 64) << "the quarter that was left out, and its rim";
+}
+
 TEST(Completions, AreBounded) {
   Completions completions;
   Event event;

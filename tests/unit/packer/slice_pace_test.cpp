@@ -105,6 +105,22 @@ TEST(SlicePace, WhatIsLostHoldsUpNothing) {
   EXPECT_LE(pace.next_s(), 1);
 }
 
+TEST(SlicePace, WhatWasSentTwiceOrAcknowledgedTogetherTellsNothing) {
+  SlicePace pace;
+  pace.sent({1}, 500'000, 0);
+  pace.acknowledged({1}, 0.5);
+  pace.sent({2}, 500'000, 1);
+  pace.lost();  // it was late, and comes after all
+  pace.sent({2}, 500'000, 3);
+  pace.acknowledged({2}, 3.01);
+  EXPECT_DOUBLE_EQ(pace.rate_bytes_s(), 1e6);
+  pace.sent({3}, 500'000, 4);
+  pace.sent({4}, 500'000, 4);
+  pace.acknowledged({3}, 5.0005);
+  pace.acknowledged({4}, 5.001);
+  EXPECT_DOUBLE_EQ(pace.rate_bytes_s(), 1e6);
+}
+
 TEST(SlicePace, NoMoreThanIsWished) {
   SlicePace pace;
   pace.set_most(1e6);

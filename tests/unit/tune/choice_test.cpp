@@ -33,14 +33,28 @@ TEST(TuneChoice, AMachineThatBecomesSlowerDoesSoForAll) {
   EXPECT_EQ(c.chosen, 1u);
 }
 
-TEST(TuneChoice, RoundsThatLackARunCompareNothing) {
-  auto slow = measured("defaults", {100, 100, 100}), quick = measured("samplers 2", {90, kNone, 91});
-  quick.runs[1] = {kNone, kNone, kNone, kNone, kNone};
+TEST(TuneChoice, WhatDoesNotComeToItsEndIsNotTaken) {
+  const auto slow = measured("defaults", {100, 100, 100});
+  auto quick = measured("samplers 2", {90, 90, 91});
   EXPECT_EQ(choose({slow, quick}).chosen, 1u);
-  quick.runs[2] = quick.runs[1];
-  EXPECT_EQ(choose({slow, quick}).chosen, 0u) << "one round says little";
-  quick.runs[0] = quick.runs[1];
+  quick.runs[1] = {kNone, kNone, kNone, kNone, kNone};
+  const auto c = choose({slow, quick});
+  EXPECT_EQ(c.chosen, 0u);
+  EXPECT_EQ(c.reasons[1], "its run in round 2 did not come to its end");
+  quick.runs = {quick.runs[1], quick.runs[1], quick.runs[1]};
   EXPECT_EQ(choose({slow, quick}).reasons[1], "no run of it came to its end");
+  // A run of the defaults that failed compares with nothing.
+  auto failed = slow;
+  failed.runs[1] = {kNone, kNone, kNone, kNone, kNone};
+  EXPECT_EQ(choose({failed, measured("samplers 2", {90, 90, 91})}).chosen, 1u);
+}
+
+TEST(TuneChoice, NothingIsBoughtWithPicturesThatNobodyCompared) {
+  auto slow = measured("defaults", {100, 100}), quick = measured("samplers 2", {90, 90});
+  slow.runs[0].psnr_db = kNone, quick.runs[1].psnr_db = kNone;
+  const auto c = choose({slow, quick});
+  EXPECT_EQ(c.chosen, 0u);
+  EXPECT_EQ(c.reasons[1], "PSNR was measured in no round of both");
 }
 
 TEST(TuneChoice, AGainThatIsNotInEveryRoundIsNone) {

@@ -143,12 +143,11 @@ class Study {
       if (const Status s = (*session)->add_samplers(size_t(n), compute_flags()); !s) return s;
       const auto warm = frames(**session, n, 2, rows_s_ / n, "computed");  // the master learns what rows cost
       if (!warm) return warm.error();
-      const double from_s = (*session)->master_now();
+      const RequestId last_warm = (*session)->request();
       const auto times = frames(**session, n, count, rows_s_ / n, "computed");
       if (!times) return times.error();
-      const double to_s = (*session)->master_now();
       (*session)->finish();
-      const auto busy = busy_times((*session)->directory() + "/tiles.csv", from_s, to_s);
+      const auto busy = busy_times((*session)->directory() + "/tiles.csv", last_warm);
       if (!busy) return busy.error();
       const auto d = metrics::distribution(*times);
       series.points.push_back({n, count, d.median});

@@ -133,14 +133,14 @@ Status write_report(const ScalingReport& report, const std::string& directory) {
   return ok_status();
 }
 
-Result<std::vector<double>> busy_times(const std::string& path, double from_s, double to_s) {
+Result<std::vector<double>> busy_times(const std::string& path, RequestId after) {
   std::ifstream in(path);
   std::string line, cell;
   std::map<std::string, size_t> column;
   if (!std::getline(in, line)) return Error{path + ": cannot be read"};
   std::stringstream head(line);
   for (size_t i = 0; std::getline(head, cell, ','); ++i) column[cell] = i;
-  for (const char* name : {"sampler", "leased_s", "sample_begin_s", "encode_end_s"})
+  for (const char* name : {"sampler", "request", "sample_begin_s", "encode_end_s"})
     if (!column.contains(name)) return Error{fmt::format("{}: has no column {}", path, name)};
   std::map<std::string, double> busy;
   while (std::getline(in, line)) {
@@ -149,10 +149,10 @@ Result<std::vector<double>> busy_times(const std::string& path, double from_s, d
     while (std::getline(row, cell, ',')) cells.push_back(cell);
     if (cells.size() < column.size()) continue;
     const auto at = [&](const char* name) { return std::strtod(cells[column[name]].c_str(), nullptr); };
-    if (at("leased_s") >= from_s && at("leased_s") < to_s)
+    if (at("request") > static_cast<double>(after.value))
       busy[cells[column["sampler"]]] += at("encode_end_s") - at("sample_begin_s");
   }
-  if (busy.empty()) return Error{fmt::format("{}: no tile was leased from {:.3f} to {:.3f} s", path, from_s, to_s)};
+  if (busy.empty()) return Error{fmt::format("{}: has no tile of a request after {}", path, after.value)};
   std::vector<double> out;
   for (const auto& [name, seconds] : busy) out.push_back(seconds);
   return out;

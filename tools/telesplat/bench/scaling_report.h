@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/core/ids.h"
 #include "common/core/result.h"
 
 namespace telesplat::launcher {
@@ -60,8 +61,8 @@ std::string to_text(const KillResult& result);
 /// Writes scaling.csv and scaling.json.
 Status write_report(const ScalingReport& report, const std::string& directory);
 
-/// A sampler's busy seconds over the tiles leased in [from_s, to_s) of the master's clock, by name, from a record's
-/// tiles.csv. Error: it cannot be read, or none was.
-Result<std::vector<double>> busy_times(const std::string& tiles_csv, double from_s, double to_s);
+/// A sampler's busy seconds over the tiles of requests after this one, by name, from a record's tiles.csv. Error: it
+/// cannot be read, or has none.
+Result<std::vector<double>> busy_times(const std::string& tiles_csv, RequestId after);
 
 }  // namespace telesplat::launcher

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "common/core/clock.h"
 #include "common/net/master_link.h"
 #include "tools/telesplat/bench/processes.h"
 
@@ -44,8 +43,8 @@ class BenchSession {
   }
 
   const std::string& directory() const { return processes_->directory(); }
-  /// The clock of the record.
-  double master_now() const { return link_->to_master_s(monotonic_s()); }
+  /// Of the last frame.
+  RequestId request() const { return request_; }
   std::optional<nlohmann::json> status() { return processes_->status(); }
   /// Ends all processes; the record is complete then.
   void finish();

@@ -46,6 +46,8 @@ std::optional<Difference> difference(const Guard& g, const Measured& a, const Me
   return Difference{s.median, apart, s.least, gains.size()};
 }
 
+bool came_to_its_end(const TuneFigures& run) { return run.updates_per_s >= 0; }
+
 std::string amount(const Guard& g, double share) {
   return g.in_db ? fmt::format("{:.2f} dB", share) : fmt::format("{:.1f} %", 100 * share);
 }
@@ -58,14 +60,23 @@ struct Judged {
 
 Judged judge(const Measured& defaults, const Measured& m) {
   Judged out;
-  const bool ended =
-      std::any_of(m.runs.begin(), m.runs.end(), [](const TuneFigures& f) { return f.updates_per_s >= 0; });
-  if (!ended) return {.allowed = false, .clearly = true, .reason = "no run of it came to its end"};
+  if (std::none_of(m.runs.begin(), m.runs.end(), came_to_its_end))
+    return {.allowed = false, .clearly = true, .reason = "no run of it came to its end"};
+  for (size_t i = 0; i < defaults.runs.size(); ++i)
+    if (came_to_its_end(defaults.runs[i]) && !(i < m.runs.size() && came_to_its_end(m.runs[i])))
+      return {.allowed = false,
+              .clearly = true,
+              .reason = fmt::format("its run in round {} did not come to its end", i + 1)};
   if (spread_of(m, &TuneFigures::latency_ms).runs == 0)
     return {.allowed = false, .clearly = true, .reason = "no view update was complete"};
   std::vector<std::string> gains;
   for (const Guard& g : kGuards) {
     const auto d = difference(g, defaults, m);
+    if (!d && spread_of(defaults, g.figure).runs > 0) {
+      out.allowed = false;
+      out.reason = fmt::format("{} was measured in no round of both", g.title);
+      return out;
+    }
     if (!d) continue;
     const double tolerated = std::clamp(d->apart, g.least, g.most);
     if (-d->gain > tolerated) {

@@ -18,8 +18,8 @@ class Tune {
 
   /// Settings of the runs that measure costs: the defaults first, then others, so that costs show in several sizes.
   std::vector<TuneSettings> measuring() const;
-  int candidates() const { return subject_.request.quick ? 2 : 5; }
-  int repetitions() const { return subject_.request.quick ? 2 : 3; }
+  int candidates() const { return subject_.request.quick ? 2 : 3; }
+  int repetitions() const { return subject_.request.quick ? 2 : 5; }
 
   /// The interrupted one has found nothing.
   enum class End { kDone, kInterrupted };

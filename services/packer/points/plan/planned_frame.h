@@ -29,6 +29,7 @@ struct PlannedFrame {
   std::vector<RayTile> tiles;
   std::vector<bool> returned;  ///< one a tile
   bool whole = false;
+  bool ended = false;   ///< some of its tiles do not come
   uint64_t left = 0;    ///< tiles, or of a whole frame pixels, that have not come
   uint64_t passed = 0;  ///< rays that came, and met nothing
   size_t held = 0;      ///< FrameShelf::held()

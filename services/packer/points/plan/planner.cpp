@@ -224,6 +224,7 @@ std::optional<wire::Plan> Planner::plan_piece(const points::PointModel& model, S
 }
 
 void Planner::take(const SampledTile& tile, bool whole, double now_s) { impl_->take(tile, whole, now_s); }
+void Planner::end_frame(FrameId id) { impl_->end_frame(id); }
 std::optional<KnownReference> Planner::reference(const SampledTile& tile) const { return impl_->reference(tile); }
 image::PixelMask Planner::missed(const SampledTile& tile) const { return impl_->missed(tile); }
 void Planner::learn(const points::PointModel& model) { impl_->known_empty.add(model); }

@@ -59,6 +59,8 @@ class Planner final : public ModelWatcher {
   /// planned or not does not matter: of frames that are not known (any more) only what is certain is learned.
   ///   whole: every pixel of the tile was cast.
   void take(const SampledTile& tile, bool whole, double now_s);
+  /// No more tiles of this frame come: what came of it is all that it tells.
+  void end_frame(FrameId id);
   /// What the model shows where the tile of a planned frame was cast, as of now: PackerCore::submit() takes it in place
   /// of rendering the model. nullopt: it is not known. Valid until the planner or the model changes.
   std::optional<KnownReference> reference(const SampledTile& tile) const;

@@ -82,6 +82,7 @@ struct Planner::Impl {
 
   // planned tiles come back: take_tile.cpp
   void take(const SampledTile& tile, bool whole, double now_s);
+  void end_frame(FrameId id);
   std::optional<KnownReference> reference(const SampledTile& tile);
   image::PixelMask missed(const SampledTile& tile);
   void take_whole(const SampledTile& tile, double now_s);

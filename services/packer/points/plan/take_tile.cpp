@@ -38,6 +38,11 @@ void Planner::Impl::take(const SampledTile& tile, bool whole, double now_s) {
   }
 }
 
+void Planner::Impl::end_frame(FrameId id) {
+  PlannedFrame* frame = shelf.find(id);
+  if (frame) frame->left = 0, frame->ended = true;
+}
+
 std::optional<KnownReference> Planner::Impl::reference(const SampledTile& tile) {
   const PlannedFrame* frame = shelf.find(tile.frame);
   if (!frame || frame->whole || !frame->map || !frame->nearest_known || !(frame->camera == tile.camera)) return {};
@@ -83,7 +88,7 @@ void Planner::Impl::take_whole(const SampledTile& tile, double now_s) {
 
 void Planner::Impl::take_planned(PlannedFrame& frame, const SampledTile& tile, double now_s) {
   const size_t at = frame.find(tile.rect);
-  if (at == frame.tiles.size() || frame.returned[at]) return;
+  if (at == frame.tiles.size() || frame.returned[at] || frame.ended) return;
   frame.returned[at] = true;
   --frame.left;
   const image::PixelMask& cast = frame.tiles[at].mask;
@@ -156,7 +161,7 @@ void Planner::Impl::settle(const PlannedFrame& frame) {
     clear_depths(frame, clear_m);
     carve(frame.camera, clear_m);
   }
-  if (frame.kind == PlannedFrame::Kind::kView && !frame.whole) validation.resampled(frame.planned_s);
+  if (frame.kind == PlannedFrame::Kind::kView && !frame.whole && !frame.ended) validation.resampled(frame.planned_s);
 }
 
 // The newest one first: later views look at what it saw.
