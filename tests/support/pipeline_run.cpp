@@ -100,9 +100,11 @@ void write_volume(const std::string& path, int side, double turn) {
   std::ofstream(path, std::ios::binary) << out;
 }
 
-std::string read_text(const std::string& path) {
+std::string read_text(const std::string& path) try {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+} catch (const std::ios_base::failure&) {
+  return {};  // of /proc: its process has ended meanwhile
 }
 
 bool wait_until(const std::function<bool()>& condition, double deadline_s) {
