@@ -75,7 +75,8 @@ TEST(LegendRun, PicturesOfAColouredMeshHaveItUnlessToldOtherwise) {
       EXPECT_EQ(share, 1);
     else
       EXPECT_LT(share, 0.2);
-    quality[legend == "on"] = run.summary()["quality"]["psnr_db"]["median"].get<double>();
+    // The best frame: the first ones, of which a short run has many, show little.
+    quality[legend == "on"] = run.summary()["quality"]["psnr_db"]["max"].get<double>();
   }
   EXPECT_NEAR(quality[0], quality[1], 3) << "frames are verified without it";
 }
