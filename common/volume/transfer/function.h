@@ -63,6 +63,9 @@ std::string to_text(const TransferFunction& transfer);
 /// if that is wider than 2. Maps of more points than kMaxTransferText holds lose those that matter least.
 Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name, const ValueRange& range,
                                              std::string_view wanted = {});
+/// ParaView's JSON of it, one colour map called `name` with Points and RGBPoints, which ParaView and
+/// parse_paraview_json read.
+std::string to_paraview_json(const TransferFunction& transfer, std::string_view name);
 /// What people give: FILE.json or FILE.json:NAME, points (they have a ':'), or a preset's name.
 Result<TransferFunction> resolve_transfer(const std::string& text, const ValueRange& range);
 

@@ -84,8 +84,8 @@ TransferFunction joined(const std::vector<Colour>& colours, const std::vector<Op
 
 }  // namespace
 
-Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name,
-                                             const ValueRange& range, std::string_view wanted) {
+Result<TransferFunction> parse_paraview_json(std::string_view content, const std::string& name, const ValueRange& range,
+                                             std::string_view wanted) {
   auto map = colour::parse_paraview_map(content, name, wanted);
   if (!map) return map.error();
   std::vector<Colour>& colours = map->colours;
@@ -104,6 +104,22 @@ Result<TransferFunction> parse_paraview_json(std::string_view content, const std
   TransferFunction out = shortened(joined(colours, straightened(opacities)), kMaxTransferText);
   if (const Status valid = validate(out); !valid) return Error{name + ": " + valid.error().text};
   return out;
+}
+
+std::string to_paraview_json(const TransferFunction& transfer, std::string_view name) {
+  std::string quoted;
+  for (const char c : name)
+    if (c != '"' && c != '\\' && static_cast<unsigned char>(c) >= ' ') quoted += c;
+  std::string colours, opacities;
+  for (const auto& p : transfer.points) {
+    const char* comma = colours.empty() ? "" : ",";
+    colours += fmt::format("{}\n      {}, {}, {}, {}", comma, p.value, p.r, p.g, p.b);
+    opacities += fmt::format("{}\n      {}, {}, 0.5, 0.0", comma, p.value, p.opacity);
+  }
+  return fmt::format(
+      "[\n  {{\n    \"ColorSpace\": \"RGB\",\n    \"Name\": \"{}\",\n    \"Points\": [{}\n    ],\n    \"RGBPoints\": "
+      "[{}\n    ]\n  }}\n]\n",
+      quoted, opacities, colours);
 }
 
 }  // namespace telesplat::volume

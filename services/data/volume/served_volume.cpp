@@ -134,7 +134,8 @@ void ServedVolume::describe(wire::Hello& hello) const {
   const volume::Session& session = store_->session();
   const auto& size = session.grid.size;
   hello.facts.merge(volume::to_facts(session));
-  hello.facts.insert({{"format", store_->format()},
+  hello.facts.insert({{volume::kHistogramFact, volume::to_text(store_->histogram())},
+                      {"format", store_->format()},
                       {"primitives", std::to_string(session.grid.voxels())},
                       {"voxels", std::to_string(session.grid.voxels())},
                       {"content_hash", fmt::format("{:016x}", store_->content_hash())},

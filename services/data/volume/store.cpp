@@ -95,7 +95,9 @@ class Store final : public VolumeStore {
     const auto levels = choose_levels(all[0], lo, hi);
     if (!levels) return refuse(levels.error());
     session_.levels = *levels;
-    session_.range = describe_values(count_levels(all[0], *levels), *levels, lo, hi, all[0].hounsfield);
+    const auto counts = count_levels(all[0], *levels);
+    session_.range = describe_values(counts, *levels, lo, hi, all[0].hounsfield);
+    histogram_ = volume::histogram_of(counts, *levels);
     for (size_t step = 0; step < all.size(); ++step) {
       content_hash_ = XXH3_64bits_withSeed(all[step].stored.data(), all[step].stored.size(), content_hash_);
       keep(int(step), std::make_shared<VolumeSlices>(all[step], session_, begin_, end_));
@@ -114,6 +116,7 @@ class Store final : public VolumeStore {
   }
 
   const volume::Session& session() const override { return session_; }
+  const volume::Histogram& histogram() const override { return histogram_; }
   std::string format() const override { return format_; }
   uint64_t content_hash() const override { return content_hash_; }
 
@@ -202,6 +205,7 @@ class Store final : public VolumeStore {
   const std::string name_;
   const size_t cache_bytes_;
   volume::Session session_;
+  volume::Histogram histogram_;
   std::string format_;
   uint64_t content_hash_ = 0;
   int begin_ = 0, end_ = 0;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "common/volume/histogram.h"
 #include "common/volume/session.h"
 #include "common/volume/voxels.h"
 #include "services/data/base/placement_options.h"
@@ -33,6 +34,8 @@ class VolumeStore {
 
   /// As it begins; part and parts are this store's. Valid: read_session takes it.
   virtual const volume::Session& session() const = 0;
+  /// Of the values of all slices of the first step.
+  virtual const volume::Histogram& histogram() const = 0;
   virtual std::string format() const = 0;
   /// The hash of all steps that were read when it was opened, the same for all parts: other data have another hash.
   virtual uint64_t content_hash() const = 0;
