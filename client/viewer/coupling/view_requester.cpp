@@ -130,6 +130,18 @@ bool ViewRequester::waits_for_answer(double now_s) const {
   return steered_ && now_s - last_sent_s_ < kPatience_s && open_.contains(sent_id_);
 }
 
+void ViewRequester::set_sampling(const SamplingWish& wish) {
+  options_.adaptive = wish.adaptive;
+  if (wish.adaptive) {
+    set_min_scale(wish.least_sampling);
+  } else if (wish.width > 0 && wish.height > 0) {
+    options_.sampling_width = wish.width;
+    options_.sampling_height = wish.height;
+  }
+  scale_ = 0;
+  quiet_.reset();  // a head that rests sees it too
+}
+
 void ViewRequester::on_epoch(double now_s) {
   epoch_began_s_ = now_s;
   quiet_.reset();

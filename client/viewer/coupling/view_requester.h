@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/viewer/coupling/request_options.h"
+#include "client/viewer/coupling/sampling_wish.h"
 #include "common/geometry/camera.h"
 #include "common/wire/messages.h"
 
@@ -72,6 +73,8 @@ class ViewRequester {
   void on_pose(double t_s, const geometry::Camera& display);
   /// RequestOptions::min_scale, as the session sets it; within 0.1 to 1.
   void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
+  /// The size of views from now on, as a person wishes it.
+  void set_sampling(const SamplingWish& wish);
   /// Whether samplers cast only the rays that the model lacks: then a view that was seen already costs next to nothing,
   /// and its size is no measure of its time.
   void set_steered(bool steered) { steered_ = steered; }

@@ -61,6 +61,8 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"sub_pixels", [](F f) { return double(f.drawn.sub_pixels); }},
     {"coupling", [](F f) { return double(f.coupling.mode); }},
     {"buffers", [](F f) { return double(f.coupling.buffers); }},
+    {"head_light", [](F f) { return f.look.head_light ? 1.0 : 0.0; }},
+    {"background", [](F f) { return double(f.look.background); }},
 };
 
 }  // namespace

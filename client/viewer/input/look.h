@@ -1,13 +1,39 @@
-// How frames are drawn, as far as a person can change it while looking: keys write it, sources read it.
+// How frames are drawn, as far as a person can change it while looking: keys and panel write it, sources read it.
 #pragma once
 
+#include <cstdint>
+
+#include "common/image/shading.h"
 #include "common/splat/render_options.h"
 
 namespace telesplat::viewer {
 
 struct Look {
+  static constexpr double kLeastDetail = 0.25;
+
   splat::RenderOptions render;
   bool lit = true;
+  bool head_light = false;                                      ///< what is lit: by the head light alone
+  uint32_t background = image::ShadingParameters{}.background;  ///< 0x00RRGGBB
+  double most_detail = 1;  ///< splat::SelectionOptions::detail is no more, kLeastDetail to 1
 };
+
+/// The lights and the background of a look.
+inline void put_into(const Look& look, image::ShadingParameters& shading) {
+  const auto lights = image::shading_named(look.head_light ? "head" : "lit");
+  shading.ambient = lights->ambient;
+  shading.head = lights->head;
+  shading.key = lights->key;
+  shading.lit = look.lit;
+  shading.background = look.background;
+}
+
+/// The look that a display begins with.
+inline Look first_look(const splat::RenderOptions& render, const image::ShadingParameters& shading) {
+  return {.render = render,
+          .lit = shading.lit,
+          .head_light = shading.key == image::shading_named("head")->key,
+          .background = shading.background};
+}
 
 }  // namespace telesplat::viewer

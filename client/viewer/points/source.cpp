@@ -25,7 +25,8 @@ constexpr double kSeenPeriod_s = 0.5;
 int still_side(const DisplayOptions& o) { return o.still_samples >= 16 ? 4 : 2; }
 
 bool same_look(const Look& a, const Look& b) {
-  return a.render.kernel == b.render.kernel && a.lit == b.lit &&
+  return a.render.kernel == b.render.kernel && a.lit == b.lit && a.head_light == b.head_light &&
+         a.background == b.background && a.most_detail == b.most_detail &&
          splat::finish_bits(a.render.finish) == splat::finish_bits(b.render.finish);
 }
 
@@ -72,7 +73,7 @@ bool PointSource::stands_still(const FrameInput& input) {
 }
 
 void PointSource::select(const FrameInput& input, double detail, DrawnFrame& out) {
-  options_.selection.detail = float(detail);
+  options_.selection.detail = float(std::min(detail, input.look.most_detail));
   received_.cache().select(input.camera, options_.selection, list_);
   out.chosen_s = seen_s_ = monotonic_s();
   if (!input.resting) received_.on_seen(list_.clusters_seen, list_.frames_seen);
@@ -172,7 +173,7 @@ void PointSource::add_figures(DrawnFrame& out) const {
 
 DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   auto& o = options_;
-  o.shading.lit = input.look.lit;
+  put_into(input.look, o.shading);
   o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(input.look.render.kernel);
   o.selection.best_patch_only = received_.keeps_redundant();
   DrawnFrame out;

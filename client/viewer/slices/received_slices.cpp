@@ -39,10 +39,10 @@ void ReceivedSlices::add_status(net::MasterLink::Values& values) const {
   values["messages_rejected"] += double(receiver_.figures().decode_errors);
 }
 
-Result<std::unique_ptr<ViewSource>> ReceivedSlices::make_source(const DisplayOptions& options, Renderers& renderers) {
+Result<std::unique_ptr<ViewSource>> ReceivedSlices::make_source(const DisplayOptions&, Renderers& renderers) {
   auto renderer = renderers.for_slices();
   if (!renderer) return renderer.error();
-  return std::unique_ptr<ViewSource>(new SliceSource(std::move(*renderer), cache_, options.shading.background));
+  return std::unique_ptr<ViewSource>(new SliceSource(std::move(*renderer), cache_));
 }
 
 }  // namespace telesplat::viewer

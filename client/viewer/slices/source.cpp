@@ -12,7 +12,7 @@ DrawnFrame SliceSource::draw(const FrameInput& input, image::View& view) {
   if (out.empty && !input.even_empty) return out;
   const geometry::Camera& camera = input.camera;
   const auto stats = renderer_->render(
-      shown.frame.get(), camera, background_,
+      shown.frame.get(), camera, input.look.background,
       {camera.width, camera.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr});
   out.resolve_cpu_ms = stats.warp_cpu_ms;
   out.drawn = stats.samples;

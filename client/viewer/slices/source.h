@@ -10,9 +10,8 @@ namespace telesplat::viewer {
 
 class SliceSource final : public ViewSource {
  public:
-  /// background: 0x00RRGGBB.
-  SliceSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache, uint32_t background)
-      : renderer_(std::move(renderer)), cache_(cache), background_(background) {}
+  SliceSource(std::unique_ptr<VolumeRenderer> renderer, SliceCache& cache)
+      : renderer_(std::move(renderer)), cache_(cache) {}
 
   void advance(RequestId request) override { cache_.advance(request); }
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
@@ -23,7 +22,6 @@ class SliceSource final : public ViewSource {
  private:
   std::unique_ptr<VolumeRenderer> renderer_;
   SliceCache& cache_;
-  uint32_t background_;
 };
 
 }  // namespace telesplat::viewer

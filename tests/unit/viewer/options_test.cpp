@@ -146,7 +146,9 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
                                     "refine_ms",
                                     "sub_pixels",
                                     "coupling",
-                                    "buffers"}));
+                                    "buffers",
+                                    "head_light",
+                                    "background"}));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;
@@ -157,10 +159,13 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   f.drawn.sub_pixels = 4;
   f.coupling = {CouplingMode::kLoose, 5};
   f.look = {{splat::Kernel::kEwa, {.fill = true, .smooth = false, .antialias = true}}, false};
+  f.look.head_light = true;
+  f.look.background = 0xffeedd;
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 11, row.end())), (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5}));
+  EXPECT_EQ((std::vector<double>(row.end() - 13, row.end())),
+            (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5, 1, 0xffeedd}));
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {

@@ -44,7 +44,7 @@ class PointReplay final : public FrameReplay {
     list_.replica = models_->replica() + 1;
     list_.epoch = frame.epoch;
     image::ShadingParameters shading = run_.shading;
-    shading.lit = frame.look.lit;
+    put_into(frame.look, shading);
     render(frame, camera, shading, view);
     if (frame.refined > 0 && camera == frame.camera) refine(frame, selection, shading, view);
     keep(frame, camera, view);
@@ -61,7 +61,7 @@ class PointReplay final : public FrameReplay {
   bool same_as_last(const DisplayedFrame& frame, const geometry::Camera& camera) const {
     const DisplayedFrame& last = last_frame_;
     const auto look = [](const viewer::Look& l) {
-      return std::tuple(l.render.kernel, splat::finish_bits(l.render.finish), l.lit);
+      return std::tuple(l.render.kernel, splat::finish_bits(l.render.finish), l.lit, l.head_light, l.background);
     };
     return frame.refined > 0 && last.refined == frame.refined && last.sequence == frame.sequence &&
            last.replica == frame.replica && last.summaries == frame.summaries && last.epoch == frame.epoch &&
@@ -127,7 +127,7 @@ class SliceFrameReplay final : public FrameReplay {
     const auto there = slices_->advance({frame.sequence.value}, frame.replica);
     if (!there || !*there) return there;
     fit(view, camera);
-    renderer_->render(slices_->frame(), camera, run_.shading.background,
+    renderer_->render(slices_->frame(), camera, frame.look.background,
                       {camera.width, camera.height, view.colour.data(), nullptr});
     return true;
   }

@@ -98,7 +98,7 @@ Status read_look(const std::string& path, const toml::table& viewer, RecordedRun
   if (!known)
     return Error{fmt::format("{}: finish is \"{}\", not on, off or some of fill,smooth,antialias", path, finish)};
   run.look.render.finish = *known;
-  run.look.lit = run.shading.lit;
+  run.look = viewer::first_look(run.look.render, run.shading);
   const float suits = splat::suitable_scale(run.look.render.kernel);
   const auto scale = float(number(toml::node_view<const toml::node>(viewer["splat_scale"]), suits));
   if (!(scale > 0 && scale <= 10))
@@ -137,7 +137,8 @@ struct FrameColumns {
   size_t viewer, frame, t_s, sequence, points_drawn;
   std::array<size_t, 7> pose;  // px py pz qw qx qy qz
   // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1.
-  std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, refined, sub_pixels;
+  std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, head_light, background, refined,
+      sub_pixels;
 };
 
 Result<FrameColumns> find_columns(const tools::CsvTable& table) {
@@ -166,6 +167,8 @@ Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   out.splat = table.find("splat");
   out.finish = table.find("finish");
   out.lit = table.find("lit");
+  out.head_light = table.find("head_light");
+  out.background = table.find("background");
   out.refined = table.find("refined");
   out.sub_pixels = table.find("sub_pixels");
   return out;
@@ -181,9 +184,14 @@ Status read_look(const tools::CsvTable& table, size_t row, const FrameColumns& a
   const auto splat = optional_count(table, row, at.splat, uint64_t(f.look.render.kernel), splat::kKernels.size());
   const auto finish = optional_count(table, row, at.finish, splat::finish_bits(f.look.render.finish), 8);
   const auto lit = optional_count(table, row, at.lit, f.look.lit, 2);
-  for (const auto* value : {&splat, &finish, &lit})
+  const auto head = optional_count(table, row, at.head_light, f.look.head_light, 2);
+  const auto background = optional_count(table, row, at.background, f.look.background, 0x1000000);
+  for (const auto* value : {&splat, &finish, &lit, &head, &background})
     if (!*value) return value->error();
-  f.look = {{splat::kKernels[*splat], *splat::finish_of_bits(*finish)}, *lit == 1};
+  f.look = {.render = {splat::kKernels[*splat], *splat::finish_of_bits(*finish)},
+            .lit = *lit == 1,
+            .head_light = *head == 1,
+            .background = uint32_t(*background)};
   return ok_status();
 }
 
