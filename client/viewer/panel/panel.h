@@ -1,0 +1,151 @@
+// What the panel of a window shows and what a person does with it, without any window system, OpenGL or sockets:
+// figures come in, wishes and orders go out.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/viewer/coupling/coupling.h"
+#include "client/viewer/coupling/sampling_wish.h"
+#include "client/viewer/input/interaction.h"
+#include "client/viewer/input/look.h"
+#include "client/viewer/input/picture_wish.h"
+#include "client/viewer/panel/history.h"
+#include "client/viewer/panel/order.h"
+#include "client/viewer/panel/session_status.h"
+#include "common/scene/kind.h"
+
+namespace telesplat::viewer {
+
+/// What is known after a frame. Counters count from the beginning.
+struct PanelFigures {
+  double now_s = 0;  ///< monotonic clock
+  uint64_t frames = 0, updates = 0;
+  double inter_frame_ms = 0;  ///< 0: there was no frame before
+  double latency_ms = 0;      ///< of the newest view update; 0 before the first
+  uint64_t points_drawn = 0, points_cached = 0, bytes_received = 0;
+  double hole_share = 0;  ///< HoleMeter; NaN: not known
+  CouplingState coupling;
+  double detail = 1;
+  int sampled_width = 0, sampled_height = 0;  ///< of the newest request; 0: there was none
+  double waits_s = 0;
+  std::string scene;
+  const char* drawn_name = "points";
+};
+
+/// One thread, the display's.
+class Panel {
+ public:
+  struct Setup {
+    Look look;
+    bool transparent = false;  ///< the background is not the person's to choose
+    SamplingWish sampling;
+    std::string viewer;  ///< this viewer's name, for orders that are meant for it alone
+    bool shown = false;
+    bool opens = false;  ///< other data sets can be opened here
+  };
+  explicit Panel(Setup setup);
+
+  static constexpr double kSpan_s = 20;  ///< of the plots
+  static constexpr double kTold_s = 6;   ///< for so long the newest message is told outside the panel too
+  static constexpr size_t kMostMessages = 100;
+
+  struct Plot {
+    std::string name, unit;
+    History history;
+    uint32_t colour;  ///< 0x00RRGGBB, of Okabe and Ito's palette, which colour-blind people tell apart
+    int digits;       ///< after the point
+    double floor;     ///< the plot's top is no lower
+  };
+  struct Message {
+    double t_s = 0;
+    std::string text;
+    bool problem = false;
+  };
+
+  /// What is done with paths of the camera.
+  struct PathState {
+    bool records = false, plays = false, can_play = false;
+    double recorded_s = 0;
+  };
+
+  // ---- facts ----
+  void on_path(const PathState& path) { path_ = path; }
+  /// What the session's processes are busy with, such as reading; empty: nothing.
+  void on_progress(const std::string& progress) { progress_ = progress; }
+  void on_figures(const PanelFigures& figures);
+  /// The session shows a scene of this kind.
+  void on_scene(scene::Pipeline pipeline) { pipeline_ = pipeline; }
+  /// What keys changed.
+  void on_look(const Look& look) { look_ = look; }
+  void on_answer(double now_s, const OrderAnswer& answer);
+  /// Nothing: the master did not answer; then `problem` says why.
+  void on_status(double now_s, const std::optional<SessionStatus>& status, const std::string& problem);
+  void tell(double now_s, std::string text, bool problem = false);
+
+  bool shown() const { return shown_; }
+  void show(bool shown) { shown_ = shown; }
+  const std::string& progress() const { return progress_; }
+  const PathState& path() const { return path_; }
+  const PanelFigures& figures() const { return figures_; }
+  const std::vector<Plot>& plots() const { return plots_; }
+  double frames_a_second() const { return frames_a_second_; }
+  scene::Pipeline pipeline() const { return pipeline_; }
+  const Setup& setup() const { return setup_; }
+  const Look& look() const { return look_; }
+  const SamplingWish& sampling() const { return sampling_; }
+  /// The coupling in force, or the one that was ordered and is not in force yet.
+  const CouplingState& coupling() const { return wished_coupling_ ? *wished_coupling_ : figures_.coupling; }
+  bool coupling_pending() const { return wished_coupling_.has_value(); }
+  const std::optional<SessionStatus>& status() const { return status_; }
+  /// The oldest first.
+  const std::deque<Message>& messages() const { return messages_; }
+  /// What a person should know though the panel is hidden: what goes on, else what is missing, else
+  /// the newest message if it is young.
+  std::vector<std::string> news(double now_s) const;
+
+  // ---- the person ----
+  void choose_look(const Look& look);
+  void choose_coupling(const CouplingState& coupling);
+  void choose_sampling(const SamplingWish& sampling);
+  /// As if the person pressed this key.
+  void press(Key key) { pressed_.push_back(key); }
+  void choose_picture(const PictureWish& wish) { wished_picture_ = wish; }
+  void order(Order order) { orders_.push_back(std::move(order)); }
+
+  // ---- what comes of it, once each ----
+  std::optional<Look> take_look() { return std::exchange(wished_look_, std::nullopt); }
+  std::optional<SamplingWish> take_sampling() { return std::exchange(wished_sampling_, std::nullopt); }
+  std::vector<Key> take_pressed() { return std::exchange(pressed_, {}); }
+  std::optional<PictureWish> take_picture() { return std::exchange(wished_picture_, std::nullopt); }
+  std::vector<Order> take_orders() { return std::exchange(orders_, {}); }
+
+ private:
+  void count_rates(const PanelFigures& figures);
+
+  Setup setup_;
+  bool shown_;
+  Look look_;
+  SamplingWish sampling_;
+  scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
+  PanelFigures figures_, rated_;  // the newest; those that rates were last counted from
+  double frames_a_second_ = 0;
+  std::vector<Plot> plots_;
+  std::optional<CouplingState> wished_coupling_;
+  std::optional<Look> wished_look_;
+  std::optional<SamplingWish> wished_sampling_;
+  std::vector<Order> orders_;
+  std::vector<Key> pressed_;
+  std::optional<PictureWish> wished_picture_;
+  PathState path_;
+  std::string progress_;
+  std::optional<SessionStatus> status_;
+  std::vector<std::string> missing_;
+  std::deque<Message> messages_;
+};
+
+}  // namespace telesplat::viewer
