@@ -244,6 +244,14 @@ Table process_table(ViewerOptions& o) {
        .help = "when this viewer is done, the session is over for everyone"},
       {.flag = "--window", .value = &o.window, .help = "show a window; the person at it moves the camera"},
       {.flag = "--fullscreen", .value = &o.fullscreen, .help = "the window fills the screen"},
+      {.flag = "--launched",
+       .value = &o.launched,
+       .help = "standard input is the launcher's, which opens the data sets that the person chooses"},
+      {.flag = "--begins-empty", .value = &o.begins_empty, .help = "--launched: there is no data set yet"},
+      {.flag = "--panel",
+       .value = &o.panel,
+       .help = "on: the window begins with its panel, which Tab hides and shows",
+       .on_off = true},
   };
 }
 

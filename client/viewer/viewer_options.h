@@ -42,6 +42,9 @@ struct ViewerOptions {
   uint64_t record_points_mb = 1024;  ///< point-model events kept in the run folder, MiB at most; 0: none
   bool window = false;               ///< show a window instead of running headless
   bool fullscreen = false;           ///< the window fills the screen
+  bool panel = true;                 ///< the window begins with its panel
+  bool launched = false;             ///< standard input is the launcher's (LauncherLines), which opens data sets
+  bool begins_empty = false;         ///< launched: there is no data set yet
   double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
   bool end_session = false;          ///< tell the master to end the session once this viewer's run is over and recorded
   std::string out;                   ///< run folder; empty: the session's, if it is here

@@ -38,16 +38,35 @@ void tell(const std::string& text) {
   std::fflush(stdout);
 }
 
+// The launcher reads it.
+void ask_to_open(const std::string& path) {
+  if (path.find('\n') != path.npos) return;
+  std::printf("open %s\n", path.c_str());
+  std::fflush(stdout);
+}
+
 // A window may be given another size than it asked for: the options follow.
-Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o) {
+Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net::Via& via) {
   if (!o.window) {
     if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
     return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, o.movement));
   }
   const std::string folder = o.out.empty() ? "." : o.out;
-  const WindowSurface::Options options{o.display, o.movement, o.fullscreen, o.out.empty() ? "." : o.out + "/images",
-                                       folder};
-  auto opened = WindowSurface::open(options, tell);
+  const auto& r = o.requests;
+  const WindowSurface::Options options{
+      .display = o.display,
+      .movement = o.movement,
+      .fullscreen = o.fullscreen,
+      .screenshot_directory = o.out.empty() ? "." : o.out + "/images",
+      .path_directory = folder,
+      .panel = o.panel,
+      .viewer = o.service.name,
+      .sampling = {r.adaptive, r.sampling_width, r.sampling_height, o.least_sampling.value_or(r.min_scale)},
+      .sampling_chosen = o.least_sampling.has_value(),
+      .open = o.launched ? std::function<void(const std::string&)>(ask_to_open) : nullptr,
+      .begins_empty = o.begins_empty,
+      .launcher_fd = o.launched ? STDIN_FILENO : -1};
+  auto opened = WindowSurface::open(options, tell, std::make_unique<ControlDesk>(o.service.master, via));
   if (!opened) return opened.error();
   o.display.width = (*opened)->width();
   o.display.height = (*opened)->height();
@@ -180,7 +199,7 @@ int run(ViewerOptions o) {
   if (const Status s = settle(o); !s) return refuse(s.error());
   const auto via = net::via_of(o.service);
   if (!via) return refuse(via.error());
-  auto surface = open_surface(o);  // before the renderers, whose contexts may depend on the window's
+  auto surface = open_surface(o, *via);  // before the renderers, whose contexts may depend on the window's
   if (!surface) return refuse(surface.error());
   auto renderers = open_renderers(o);
   if (!renderers) return fail(renderers.error());

@@ -76,7 +76,29 @@ void ViewerWorker::on_measured(const MeasuredFrame& f) {
 
 ViewerWorker::Figures ViewerWorker::figures() const {
   const std::lock_guard lock(mutex_);
-  return {scene_, updates_, bytes_received_, latency_ms_, epochs_shown_};
+  return {scene_, updates_, bytes_received_, latency_ms_, epochs_shown_, sampled_width_, sampled_height_};
+}
+
+std::shared_ptr<const wire::Welcome> ViewerWorker::session() const {
+  const std::lock_guard lock(mutex_);
+  return session_;
+}
+
+void ViewerWorker::set_sampling(const SamplingWish& wish) {
+  const std::lock_guard lock(mutex_);
+  sampling_ = wish;
+}
+
+// What a person wishes goes before what the session tells.
+void ViewerWorker::take_sampling() {
+  std::optional<SamplingWish> wish;
+  {
+    const std::lock_guard lock(mutex_);
+    wish = std::exchange(sampling_, std::nullopt);
+  }
+  if (!wish) return;
+  if (wish->adaptive) options_.least_sampling = wish->least_sampling;
+  requester_.set_sampling(*wish);
 }
 
 ShownScene ViewerWorker::shown_scene() const {
@@ -94,6 +116,7 @@ void ViewerWorker::loop() {
       link_.tick(now, [this] { return status(); });
       follow_session();
       change_coupling(now);
+      take_sampling();
       request_views(now);
       report(now, false);
       std::vector<net::Socket*> sockets{&link_.socket()};
@@ -127,6 +150,11 @@ void ViewerWorker::follow_session() {
   seen_version_ = link_.version();
   const wire::Welcome& session = *link_.session();
   const scene::SessionView view(session);
+  {
+    auto told = std::make_shared<const wire::Welcome>(session);
+    const std::lock_guard lock(mutex_);
+    session_ = std::move(told);
+  }
   follow_record(session);
   legends_.follow(session);
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
@@ -294,6 +322,10 @@ void ViewerWorker::request_views(double now_s) {
     const auto request = requester_.next(to_master_s(now_s));
     if (!request) return;
     link_.socket().send(*request);
+    {
+      const std::lock_guard lock(mutex_);
+      sampled_width_ = request->camera.width, sampled_height_ = request->camera.height;
+    }
     gate_.with([&](Coupling& c) {
       c.asked(request->request, now_s);
       may_ask = c.waits() && c.may_ask();

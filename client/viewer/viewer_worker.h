@@ -62,10 +62,15 @@ class ViewerWorker {
   struct Figures {
     std::string scene;  ///< name of the data set; empty until the master told it
     uint64_t updates = 0, bytes_received = 0;
-    double latency_ms = 0;      ///< of the newest update; 0 before the first
-    uint64_t epochs_shown = 0;  ///< times a new epoch took the place of one on display
+    double latency_ms = 0;                      ///< of the newest update; 0 before the first
+    uint64_t epochs_shown = 0;                  ///< times a new epoch took the place of one on display
+    int sampled_width = 0, sampled_height = 0;  ///< of the newest view request; 0: there was none
   };
   Figures figures() const;
+  /// The session as its master told it last; null before that.
+  std::shared_ptr<const wire::Welcome> session() const;
+  /// Views are sampled like this from now on.
+  void set_sampling(const SamplingWish& wish);
   /// What there is to show; an empty box until that is known.
   ShownScene shown_scene() const;
   /// Of the frames of this epoch; null: there is nothing to tell.
@@ -87,6 +92,7 @@ class ViewerWorker {
   void may_display(const ShownUpdate& update);
   void release(const std::vector<RequestId>& requests);
   void take_poses();
+  void take_sampling();
   void ask_again(double now_s);
   void request_views(double now_s);
   void report(double now_s, bool last);
@@ -127,6 +133,9 @@ class ViewerWorker {
   std::string scene_;
   ShownScene shown_scene_;
   double latency_ms_ = 0;
+  std::shared_ptr<const wire::Welcome> session_;
+  std::optional<SamplingWish> sampling_;  // that is not in force yet
+  int sampled_width_ = 0, sampled_height_ = 0;
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};

@@ -187,6 +187,9 @@ PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::s
   if (mesh.empty() || mesh.ends_with(".ply") || surface) a.insert(a.end(), {"--cache", folder_ / "cache"});
   // Half the usual rate shows as much, and leaves time to others that run beside it.
   if (command == "run") a.insert(a.end(), {"--target-fps", "30"});
+  // Pictures show what is drawn, not what lies over it.
+  if (command == "view" && std::find(arguments.begin(), arguments.end(), "--panel") == arguments.end())
+    a.insert(a.end(), {"--panel", "off"});
   a.insert(a.end(), arguments.begin(), arguments.end());
   program_ = std::make_unique<Program>("telesplat", a, folder_ / "telesplat");
 }

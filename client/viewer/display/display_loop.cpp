@@ -36,7 +36,13 @@ LiveFigures live_figures(double now_s, uint64_t frames, const DrawnFrame& drawn,
           network.bytes_received,
           network.epochs_shown,
           source.drawn_name(),
-          source.cached_name()};
+          source.cached_name(),
+          0,
+          0,
+          {},
+          drawn.detail,
+          network.sampled_width,
+          network.sampled_height};
 }
 
 class Display {
@@ -52,7 +58,7 @@ class Display {
         spans_(spans),
         find_spool_(spool),
         make_source_(make_source),
-        look_{o.render, o.shading.lit},
+        look_(first_look(o.render, o.shading)),
         stall_(o.most_wait_s) {}
 
   DisplayResult run() {
@@ -93,6 +99,8 @@ class Display {
   geometry::Camera next_camera(double now_s, double t_s) {
     const ShownScene scene = worker_.shown_scene();
     if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
+    if (auto session = worker_.session(); session != session_) surface_.on_session(session_ = std::move(session));
+    if (const auto wish = surface_.take_sampling()) worker_.set_sampling(*wish);
     return surface_.begin_frame(now_s, t_s, look_);
   }
 
@@ -104,7 +112,7 @@ class Display {
       const geometry::Camera camera = next_camera(monotonic_s(), -1);
       if (!surface_.visible()) continue;
       fit(view_, camera, false);
-      std::fill(view_.colour.begin(), view_.colour.end(), o_.shading.background);
+      std::fill(view_.colour.begin(), view_.colour.end(), look_.background);
       surface_.present(view_, true);
       const auto network = worker_.figures();
       surface_.report({.now_s = monotonic_s(), .scene = network.scene});
@@ -239,6 +247,7 @@ class Display {
     surface_.on_legend(legend);
     surface_.present(view_, m.drawn.changed);
     if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
+    take_wished_picture(m.camera);
     m.presented_s = monotonic_s();
     m.filled = gate_.filled();
     source_->displayed();
@@ -248,11 +257,30 @@ class Display {
     ++result_.frames;
     live_ = live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_);
     live_.waits_s = stall_.told_s(m.presented_s);
+    live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
+    live_.coupling = m.coupling;
     surface_.report(live_);
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
     else if (!m.drawn.changed)
       sleep_until(m.begin_s + kRestPeriod_s / 2);
+  }
+
+  // A picture that is not the display's. It is drawn with all detail, and holds up the frames after it for so long.
+  void take_wished_picture(geometry::Camera camera) {
+    const auto wish = surface_.take_picture_wish(camera);
+    if (!wish) return;
+    image::View picture;
+    fit(picture, camera, true);
+    source_->draw({.begin_s = monotonic_s(),
+                   .camera = camera,
+                   .look = look_,
+                   .with_depth = wish->exr,
+                   .with_coverage = o_.transparent,
+                   .resting = true},
+                  picture);
+    surface_.take_wished_picture(*wish, std::move(picture),
+                                 o_.transparent ? image::Alpha::kCoverage : image::Alpha::kNone);
   }
 
   void record(MeasuredFrame& m) {
@@ -295,7 +323,8 @@ class Display {
   FrameSpool* spool_ = nullptr;
   const SourceMaker& make_source_;
   Look look_;
-  ShownScene scene_;  // as the surface knows it
+  ShownScene scene_;  // as the surface knows it, and the session too
+  std::shared_ptr<const wire::Welcome> session_;
   std::shared_ptr<Received> received_;
   std::unique_ptr<ViewSource> source_;  // draws received_; null: it cannot be drawn
   image::View view_;

@@ -3,14 +3,19 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "client/viewer/coupling/coupling.h"
+#include "client/viewer/coupling/sampling_wish.h"
 #include "client/viewer/display/overlay.h"
 #include "client/viewer/input/look.h"
+#include "client/viewer/input/picture_wish.h"
 #include "common/geometry/trajectory.h"
 #include "common/image/file.h"
 #include "common/image/legend.h"
 #include "common/scene/kind.h"
+#include "common/wire/messages.h"
 
 namespace telesplat::viewer {
 
@@ -25,6 +30,10 @@ struct LiveFigures {
   const char* drawn_name = "points";  ///< what points_drawn counts
   const char* cached_name = "";       ///< and points_cached, with a space before it
   double waits_s = 0;                 ///< seconds that the display has waited for a view update; 0: not for long
+  double inter_frame_ms = 0;          ///< from the end of the frame before to the end of this one; 0: it was the first
+  CouplingState coupling;
+  double detail = 1;                          ///< splat::SelectionOptions::detail of the frame
+  int sampled_width = 0, sampled_height = 0;  ///< of the newest view request; 0: there was none
 };
 
 /// What the session shows.
@@ -46,6 +55,10 @@ class DisplaySurface {
   virtual geometry::Camera begin_frame(double now_s, double t_s, Look& look) = 0;
   /// Whether frames without points are worth drawing, because somebody sees them.
   virtual bool visible() const = 0;
+  /// The session as its master tells of it, whenever that has changed.
+  virtual void on_session(const std::shared_ptr<const wire::Welcome>&) {}
+  /// How finely the person wants views to be sampled from now on, once after each change.
+  virtual std::optional<SamplingWish> take_sampling() { return std::nullopt; }
   /// The legend of the frame that is shown next; null: it has none.
   virtual void on_legend(const std::shared_ptr<const image::Legend>&) {}
   /// Shows a finished frame, drawn with the camera above. changed: it is not the one that was shown last.
@@ -54,6 +67,10 @@ class DisplaySurface {
   virtual bool wants_picture() const { return false; }
   /// It is this one. alpha: what the upper byte of its colours is.
   virtual void take_picture(const image::View&, image::Alpha) {}
+  /// A picture of another size than the display's, or with depth, once after each wish; `camera` becomes what it shows.
+  virtual std::optional<PictureWish> take_picture_wish(geometry::Camera& /*camera*/) { return std::nullopt; }
+  /// It is this one.
+  virtual void take_wished_picture(const PictureWish&, image::View, image::Alpha) {}
   /// After the frame's bookkeeping.
   virtual void report(const LiveFigures& figures) = 0;
   /// What lies over the frames that it shows; null: nobody sees them.

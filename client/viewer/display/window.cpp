@@ -11,9 +11,11 @@
 #include <atomic>
 #include <cstdlib>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "client/viewer/display/frame_presenter.h"
+#include "common/core/clock.h"
 #include "common/core/log.h"
 
 namespace telesplat::viewer {
@@ -61,28 +63,43 @@ void survive_broken_connection() {
   dlclose(xlib);
 }
 
+constexpr std::pair<int, Key> kGlfwKeys[] = {{GLFW_KEY_A, Key::kA},
+                                             {GLFW_KEY_C, Key::kC},
+                                             {GLFW_KEY_D, Key::kD},
+                                             {GLFW_KEY_E, Key::kE},
+                                             {GLFW_KEY_F, Key::kF},
+                                             {GLFW_KEY_H, Key::kH},
+                                             {GLFW_KEY_O, Key::kO},
+                                             {GLFW_KEY_P, Key::kP},
+                                             {GLFW_KEY_Q, Key::kQ},
+                                             {GLFW_KEY_R, Key::kR},
+                                             {GLFW_KEY_S, Key::kS},
+                                             {GLFW_KEY_T, Key::kT},
+                                             {GLFW_KEY_W, Key::kW},
+                                             {GLFW_KEY_F1, Key::kF1},
+                                             {GLFW_KEY_F11, Key::kF11},
+                                             {GLFW_KEY_F12, Key::kF12},
+                                             {GLFW_KEY_TAB, Key::kTab},
+                                             {GLFW_KEY_ESCAPE, Key::kEscape},
+                                             {GLFW_KEY_LEFT_SHIFT, Key::kShift},
+                                             {GLFW_KEY_RIGHT_SHIFT, Key::kShift}};
+
 std::optional<Key> key_of(int glfw_key) {
-  static constexpr std::pair<int, Key> kKeys[] = {{GLFW_KEY_A, Key::kA},
-                                                  {GLFW_KEY_C, Key::kC},
-                                                  {GLFW_KEY_D, Key::kD},
-                                                  {GLFW_KEY_E, Key::kE},
-                                                  {GLFW_KEY_F, Key::kF},
-                                                  {GLFW_KEY_H, Key::kH},
-                                                  {GLFW_KEY_P, Key::kP},
-                                                  {GLFW_KEY_Q, Key::kQ},
-                                                  {GLFW_KEY_R, Key::kR},
-                                                  {GLFW_KEY_S, Key::kS},
-                                                  {GLFW_KEY_T, Key::kT},
-                                                  {GLFW_KEY_W, Key::kW},
-                                                  {GLFW_KEY_F12, Key::kF12},
-                                                  {GLFW_KEY_ESCAPE, Key::kEscape},
-                                                  {GLFW_KEY_LEFT_SHIFT, Key::kShift},
-                                                  {GLFW_KEY_RIGHT_SHIFT, Key::kShift}};
-  for (const auto& [code, key] : kKeys)
+  for (const auto& [code, key] : kGlfwKeys)
     if (code == glfw_key) return key;
   for (const int first : {GLFW_KEY_1, GLFW_KEY_KP_1})
     if (glfw_key >= first && glfw_key < first + 8) return Key(int(Key::k1) + glfw_key - first);
   return std::nullopt;
+}
+
+bool is_ascii(std::string_view text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
+}
+
+std::string upper_case(std::string name) {
+  for (char& c : name)
+    if (c >= 'a' && c <= 'z') c = char(c - 'a' + 'A');
+  return name;
 }
 
 }  // namespace
@@ -93,6 +110,12 @@ struct Window::Impl {
   std::unique_ptr<FramePresenter> presenter;
   Interaction* interaction = nullptr;  // while poll() runs
   bool pointer_caught = false;
+  std::unique_ptr<Gui> gui;
+  struct Place {
+    int x = 0, y = 0, width = 0, height = 0;
+  };
+  Place before_fullscreen;
+  std::vector<std::string> dropped;
 
   ~Impl() {
     if (window) glfwDestroyWindow(window);
@@ -107,24 +130,49 @@ struct Window::Impl {
     return 1.0 / std::max(1, height);
   }
 
+  bool gui_takes_pointer() const {
+    if (!gui || pointer_caught) return false;
+    double x = 0, y = 0;
+    glfwGetCursorPos(window, &x, &y);
+    return gui->takes_pointer(x, y);
+  }
+
   void listen() {
     glfwSetWindowUserPointer(window, this);
-    glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
+    glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
+      const bool typed = of(w).gui && of(w).gui->takes_text();
+      if (of(w).gui) of(w).gui->on_key(key, scancode, action, mods);
+      if (typed && action != GLFW_RELEASE) return;
       if (const auto known = key_of(key); known && action != GLFW_REPEAT && of(w).interaction)
         of(w).interaction->key(*known, action == GLFW_PRESS);
     });
-    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
+    glfwSetCharCallback(window, [](GLFWwindow* w, unsigned code) {
+      if (of(w).gui) of(w).gui->on_character(code);
+    });
+    glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int entered) {
+      if (of(w).gui) of(w).gui->on_enter(entered);
+    });
+    glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
+      of(w).dropped.insert(of(w).dropped.end(), paths, paths + count);
+    });
+    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int mods) {
+      if (of(w).gui) of(w).gui->on_button(button, action, mods);
+      if (action == GLFW_PRESS && of(w).gui_takes_pointer()) return;
       if (!of(w).interaction || (button != GLFW_MOUSE_BUTTON_LEFT && button != GLFW_MOUSE_BUTTON_MIDDLE)) return;
       of(w).interaction->button(button == GLFW_MOUSE_BUTTON_LEFT ? MouseButton::kLeft : MouseButton::kMiddle,
                                 action == GLFW_PRESS);
     });
     glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+      if (of(w).gui) of(w).gui->on_move();
       if (of(w).interaction) of(w).interaction->move(x * of(w).per_height(), y * of(w).per_height());
     });
-    glfwSetScrollCallback(window, [](GLFWwindow* w, double, double steps) {
+    glfwSetScrollCallback(window, [](GLFWwindow* w, double across, double steps) {
+      if (of(w).gui) of(w).gui->on_wheel(across, steps);
+      if (of(w).gui_takes_pointer()) return;
       if (of(w).interaction) of(w).interaction->wheel(steps);
     });
     glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {
+      if (of(w).gui) of(w).gui->on_focus(focused);
       if (!focused && of(w).interaction) of(w).interaction->focus_lost();
     });
   }
@@ -184,6 +232,10 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
     auto presenter = FramePresenter::make();
     if (!presenter) return presenter.error();
     out->impl_->presenter = std::move(*presenter);
+    if (auto gui = Gui::make(out->impl_->window))
+      out->impl_->gui = std::move(*gui);
+    else
+      log::warn("{}", gui.error().text);
     log::info("window: {}x{} pixels, {}, {}", out->width(), out->height(),
               reinterpret_cast<const char*>(glGetString(GL_RENDERER)),
               out->impl_->presenter->has_pixel_ring() ? "mapped pixel buffers" : "no mapped pixel buffers");
@@ -201,6 +253,7 @@ Window::~Window() {
   }
   const Current current(*this);
   impl_->presenter.reset();
+  impl_->gui.reset();
 }
 
 Window::Current::Current(const Window& window)
@@ -250,13 +303,62 @@ void Window::set_title(const std::string& title) {
   if (!lost()) glfwSetWindowTitle(impl_->window, title.c_str());
 }
 
-void Window::present(const image::View& view, const Overlays& overlays) {
+bool Window::fullscreen() const { return !lost() && glfwGetWindowMonitor(impl_->window) != nullptr; }
+
+void Window::toggle_fullscreen() {
+  if (lost()) return;
+  Impl::Place& was = impl_->before_fullscreen;
+  if (fullscreen()) {
+    if (was.width == 0) was = {80, 80, 1280, 800};  // it filled the screen from the beginning
+    glfwSetWindowMonitor(impl_->window, nullptr, was.x, was.y, was.width, was.height, GLFW_DONT_CARE);
+    return;
+  }
+  glfwGetWindowPos(impl_->window, &was.x, &was.y);
+  glfwGetWindowSize(impl_->window, &was.width, &was.height);
+  int count = 0;
+  GLFWmonitor** const monitors = glfwGetMonitors(&count);
+  GLFWmonitor* best = nullptr;
+  const GLFWvidmode* mode = nullptr;
+  int64_t most = -1;
+  for (int i = 0; i < count; ++i) {
+    int x = 0, y = 0;
+    glfwGetMonitorPos(monitors[i], &x, &y);
+    const GLFWvidmode* m = glfwGetVideoMode(monitors[i]);
+    if (!m) continue;
+    const int64_t width = std::min(x + m->width, was.x + was.width) - std::max(x, was.x);
+    const int64_t height = std::min(y + m->height, was.y + was.height) - std::max(y, was.y);
+    const int64_t common = std::max<int64_t>(0, width) * std::max<int64_t>(0, height);
+    if (common > most) most = common, best = monitors[i], mode = m;
+  }
+  if (best) glfwSetWindowMonitor(impl_->window, best, 0, 0, mode->width, mode->height, mode->refreshRate);
+}
+
+std::string Window::key_name(Key key) const {
+  for (const auto& [code, known] : kGlfwKeys)
+    if (known == key && !lost())
+      // Keyboards of other scripts have Latin letters too, and the window's letters are ASCII.
+      if (const char* name = glfwGetKeyName(code, 0); name && *name && is_ascii(name)) return upper_case(name);
+  return us_name(key);
+}
+
+double Window::content_scale() const {
+  float x = 1, y = 1;
+  if (!lost()) glfwGetWindowContentScale(impl_->window, &x, &y);
+  return std::clamp(double(std::max(x, y)), 0.5, 8.0);
+}
+
+std::vector<std::string> Window::take_dropped() { return std::exchange(impl_->dropped, {}); }
+
+bool Window::gui_due(double now_s) const { return impl_->gui && impl_->gui->due(now_s); }
+
+void Window::present(const image::View& view, const Overlays& overlays, const std::function<void()>& gui) {
   if (lost()) return;
   int width = 0, height = 0;
   glfwGetFramebufferSize(impl_->window, &width, &height);
   if (width <= 0 || height <= 0) return;
   const Current current(*this);
   impl_->presenter->draw(view, width, height, overlays);
+  if (impl_->gui) impl_->gui->draw({width, height, content_scale()}, monotonic_s(), gui);
   glfwSwapBuffers(impl_->window);
 }
 

@@ -1,11 +1,14 @@
 // A window with an OpenGL context, through GLFW, and the person's keys and mouse. All calls from the main thread.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "client/viewer/display/overlay.h"
 #include "client/viewer/input/interaction.h"
+#include "client/viewer/panel/gui/gui.h"
 #include "common/core/result.h"
 #include "common/image/file.h"
 
@@ -52,8 +55,20 @@ class Window {
   int width() const { return width_; }
   int height() const { return height_; }
   void set_title(const std::string& title);
-  /// Shows a frame and what lies over it, in time with the screen; nothing happens while the window is minimised.
-  void present(const image::View& view, const Overlays& overlays);
+  /// Fills the screen that it lies on for the most part, or becomes the window again that it was.
+  void toggle_fullscreen();
+  bool fullscreen() const;
+  /// What is printed on a key of this keyboard.
+  std::string key_name(Key key) const;
+  /// How much larger than on a plain display texts should be, in pixels: 2 on one of twice the density.
+  double content_scale() const;
+  /// Files that were dropped onto the window since the last call.
+  std::vector<std::string> take_dropped();
+  /// Shows a frame and what lies over it, in time with the screen; nothing happens while the window is minimised. gui:
+  /// builds what lies over all, with Dear ImGui's functions; null: nothing.
+  void present(const image::View& view, const Overlays& overlays, const std::function<void()>& gui = {});
+  /// Whether what `gui` builds has changed since it was presented.
+  bool gui_due(double now_s) const;
 
  private:
   struct Impl;

@@ -9,19 +9,12 @@
 #include <mutex>
 
 #include "common/core/clock.h"
+#include "common/scene/session.h"
 
 namespace telesplat::viewer {
 namespace {
 
 constexpr double kShowAgain_s = 0.1;
-
-// Screenshots tell from a thread of theirs.
-std::function<void(const std::string&)> one_at_a_time(std::function<void(const std::string&)> tell) {
-  return [tell = std::move(tell), mutex = std::make_shared<std::mutex>()](const std::string& text) {
-    const std::lock_guard lock(*mutex);
-    tell(text);
-  };
-}
 
 // What plays from the beginning. An orbit is fitted once it is known around what.
 std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement) {
@@ -30,8 +23,8 @@ std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement)
 }
 
 // As large as the keys fit into the window.
-int help_scale(int width, int height) {
-  const image::View smallest = text_panel(key_help(), 1);
+int help_scale(const std::vector<std::string>& lines, int width, int height) {
+  const image::View smallest = text_panel(lines, 1);
   return std::clamp(std::min(width / (smallest.width + 12), height / (2 * smallest.height)), 1, 4);
 }
 
@@ -46,6 +39,25 @@ std::string dated_path(const std::string& before, const std::string& after) {
   return out;
 }
 
+PanelFigures panel_figures(const LiveFigures& f, double hole_share) {
+  return {.now_s = f.now_s,
+          .frames = f.frames,
+          .updates = f.updates,
+          .inter_frame_ms = f.inter_frame_ms,
+          .latency_ms = f.latency_ms,
+          .points_drawn = f.points_drawn,
+          .points_cached = f.points_cached,
+          .bytes_received = f.bytes_received,
+          .hole_share = hole_share,
+          .coupling = f.coupling,
+          .detail = f.detail,
+          .sampled_width = f.sampled_width,
+          .sampled_height = f.sampled_height,
+          .waits_s = f.waits_s,
+          .scene = f.scene,
+          .drawn_name = f.drawn_name};
+}
+
 }  // namespace
 
 geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int width, int height, double near_m) {
@@ -56,22 +68,51 @@ geometry::Camera window_camera(const geometry::Pose& pose, double fov_deg, int w
   return camera;
 }
 
+// Screenshots tell from a thread of theirs.
+struct WindowSurface::Lines {
+  std::mutex mutex;
+  std::function<void(const std::string&)> tell;
+  std::vector<std::string> for_panel;
+  void add(const std::string& line, bool to_panel = true) {
+    const std::lock_guard lock(mutex);
+    tell(line);
+    if (to_panel) for_panel.push_back(line);
+  }
+};
+
 Result<std::unique_ptr<WindowSurface>> WindowSurface::open(const Options& o,
-                                                           std::function<void(const std::string&)> tell) {
+                                                           std::function<void(const std::string&)> tell,
+                                                           std::unique_ptr<ControlDesk> desk) {
   auto window = Window::open({o.display.width, o.display.height, o.fullscreen, "Telesplat"});
   if (!window) return window.error();
-  return std::unique_ptr<WindowSurface>(new WindowSurface(o, std::move(*window), one_at_a_time(std::move(tell))));
+  auto lines = std::make_shared<Lines>();
+  lines->tell = std::move(tell);
+  return std::unique_ptr<WindowSurface>(new WindowSurface(o, std::move(*window), std::move(lines), std::move(desk)));
 }
 
-WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window,
-                             std::function<void(const std::string&)> tell)
+WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, std::shared_ptr<Lines> lines,
+                             std::unique_ptr<ControlDesk> desk)
     : options_(o),
       window_(std::move(window)),
-      interaction_(first_movement(o.movement), {o.display.render, o.display.shading.lit}),
-      tell_(tell),
-      screenshots_(o.screenshot_directory, tell) {
-  tell_(first_keys());
+      interaction_(first_movement(o.movement), first_look(o.display.render, o.display.shading)),
+      lines_(std::move(lines)),
+      panel_({.look = interaction_.look(),
+              .transparent = o.display.transparent,
+              .sampling = o.sampling,
+              .sampling_chosen = o.sampling_chosen,
+              .viewer = o.viewer,
+              .shown = o.panel,
+              .opens = bool(o.open)}),
+      launcher_(o.launcher_fd),
+      desk_(std::move(desk)),
+      screenshots_(o.screenshot_directory, [lines = lines_](const std::string& line) { lines->add(line); }) {
+  interaction_.show_panel(o.panel);
+  open_view_.shown = o.begins_empty;
+  interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
+  tell(first_keys());
 }
+
+void WindowSurface::tell(const std::string& line) { lines_->add(line); }
 
 WindowSurface::~WindowSurface() {
   interaction_.end_path();
@@ -86,6 +127,7 @@ geometry::Camera WindowSurface::whole(const geometry::Pose& pose) const {
 
 void WindowSurface::on_scene(const ShownScene& scene) {
   scene_ = scene;
+  panel_.on_scene(scene.pipeline);
   fitted_width_ = 0;
 }
 
@@ -101,48 +143,176 @@ void WindowSurface::fit_views() {
 
 geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look) {
   window_->poll(interaction_);
+  if (interaction_.take_fullscreen_wish()) window_->toggle_fullscreen();
   fit_views();
   const auto& o = options_.display;
   const bool playback = t_s >= 0 && (o.duration_s <= 0 || t_s < o.duration_s - o.hold_s);
   const geometry::Camera camera = tile_of(whole(interaction_.advance(now_s, playback)), o.wall);
   interaction_.set_height_tangent(camera.top - camera.bottom);
-  look = interaction_.look();
+  take_launcher_lines(now_s);
+  take_dropped();
+  run_panel(now_s, look);
   show_help();
+  show_news(now_s);
   keep_path();
   return camera;
 }
 
+// What is asked for goes out, what came is taken in; nothing here waits.
+void WindowSurface::run_panel(double now_s, Look& look) {
+  panel_.show(interaction_.shows_panel());
+  for (const Key key : panel_.take_pressed())
+    for (const bool down : {true, false}) interaction_.key(key, down);
+  if (const auto wish = panel_.take_look()) interaction_.set_look(*wish);
+  look = interaction_.look();
+  panel_.on_look(look);
+  panel_.on_path({.records = interaction_.records_path(),
+                  .plays = interaction_.playing(),
+                  .can_play = interaction_.can_play(),
+                  .recorded_s = interaction_.path_s()});
+  background_ = look.background;
+  std::vector<std::string> lines;
+  {
+    const std::lock_guard lock(lines_->mutex);
+    lines.swap(lines_->for_panel);
+  }
+  for (auto& line : lines) panel_.tell(now_s, std::move(line));
+  if (!desk_) return;
+  desk_->watch(panel_.shown() || scene_.box_room.empty() || panel_.figures().waits_s > 0);
+  for (auto& order : panel_.take_orders()) desk_->give(std::move(order));
+  for (const auto& answer : desk_->take_answers()) {
+    panel_.on_answer(now_s, answer);
+    scene_controls_.on_answer(answer);
+  }
+  const auto news = desk_->take_news();
+  if (!news) return;
+  panel_.on_status(now_s, news->status, news->problem);
+  if (news->status) scene_controls_.on_animation(news->status->animation);
+}
+
+// What a person should know who does not see the panel.
+void WindowSurface::show_news(double now_s) {
+  auto news = panel_.shown() ? std::vector<std::string>() : panel_.news(now_s);
+  if (news == news_) return;
+  news_ = std::move(news);
+  if (news_.empty()) return overlays_.hide("news");
+  overlays_.show("news", {text_panel(news_, std::max(1, int(std::lround(2 * window_->content_scale())))),
+                          Overlay::Corner::kUpperRight});
+}
+
+// The panel has a list of its own, beside it.
 void WindowSurface::show_help() {
-  const int scale = interaction_.shows_help() ? help_scale(window_->width(), window_->height()) : 0;
+  const bool here = interaction_.shows_help() && !panel_.shown();
+  const int scale = here ? help_scale(key_lines(), window_->width(), window_->height()) : 0;
   if (scale == help_scale_) return;
   help_scale_ = scale;
   if (scale > 0)
-    overlays_.show("help", {text_panel(key_help(), scale), Overlay::Corner::kUpperLeft});
+    overlays_.show("help", {text_panel(key_lines(), scale), Overlay::Corner::kUpperLeft});
   else
     overlays_.hide("help");
 }
 
+std::vector<std::string> WindowSurface::key_lines() const {
+  return key_help([this](Key key) { return window_->key_name(key); });
+}
+
 // What keys led to: lines for the person, and a path that is complete.
 void WindowSurface::keep_path() {
-  for (const auto& note : interaction_.take_notes()) tell_(note);
+  const auto notes = interaction_.take_notes();
+  const auto help = notes.empty() ? std::vector<std::string>() : key_lines();
+  for (const auto& note : notes) lines_->add(note, std::find(help.begin(), help.end(), note) == help.end());
   const auto path = interaction_.take_path();
   if (path.empty()) return;
   const std::string name = dated_path(options_.path_directory + "/path-", ".csv");
   std::error_code error;
   std::filesystem::create_directories(options_.path_directory, error);
   const Status written = geometry::write_trajectory(name, path);
-  tell_(written ? fmt::format("the camera's path of {:.1f} s: {} (T plays it, --trajectory takes it)", path.back().t_s,
-                              name)
-                : written.error().text);
+  tell(written
+           ? fmt::format("the camera's path of {:.1f} s: {} (T plays it, --trajectory takes it)", path.back().t_s, name)
+           : written.error().text);
 }
 
 // A window system may want it again at any time, without telling.
 void WindowSurface::present(const image::View& view, bool changed) {
-  const Shown now{monotonic_s(), window_->width(), window_->height(), overlays_.version()};
-  const bool same = now.width == shown_.width && now.height == shown_.height && now.overlays == shown_.overlays;
+  const Shown now{monotonic_s(), window_->width(), window_->height(), overlays_.version(),
+                  panel_.shown() || open_view_.shown};
+  const bool same = now.width == shown_.width && now.height == shown_.height && now.overlays == shown_.overlays &&
+                    now.panel == shown_.panel && !(now.panel && window_->gui_due(now.at_s));
+  if (panel_.shown() && changed && panel_.pipeline() == scene::Pipeline::kPoints) holes_.look_at(view, background_);
   if (!changed && same && now.at_s - shown_.at_s < kShowAgain_s) return;
   shown_ = now;
-  window_->present(view, overlays_);
+  if (!now.panel) return window_->present(view, overlays_);
+  window_->present(view, overlays_, [&] { build_panel(now.at_s); });
+}
+
+void WindowSurface::build_panel(double now_s) {
+  if (panel_.shown()) {
+    show_panel(panel_, panel_view_, now_s,
+               {[&](Panel&) { show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); }); }});
+  }
+  if (panel_.shown() && interaction_.shows_help()) show_keys(key_lines());
+  show_open(open_view_, !scene_.box_room.empty(), [this](const std::string& path) { open(path); });
+}
+
+void WindowSurface::take_launcher_lines(double now_s) {
+  for (const std::string& line : launcher_.read()) {
+    if (line == "progress") panel_.on_progress({});
+    if (line.starts_with("progress ")) panel_.on_progress(line.substr(9));
+    if (!line.starts_with("problem ")) continue;
+    panel_.tell(now_s, line.substr(8), true);
+    open_view_.shown = scene_.box_room.empty() || open_view_.shown;
+  }
+  if (interaction_.take_open_wish()) {
+    if (options_.open)
+      open_view_ = {.shown = !open_view_.shown};
+    else
+      open("");
+  }
+}
+
+void WindowSurface::open(const std::string& path) {
+  if (!options_.open)
+    return tell("this window shows somebody else's session: telesplat view FILE opens a data set in one of its own");
+  tell("opening " + path);
+  options_.open(path);
+}
+
+// What it is, its ending tells: a path of the camera, a transfer function, else a data set.
+void WindowSurface::take_dropped() {
+  const auto dropped = window_->take_dropped();
+  if (dropped.empty()) return;
+  const std::string& path = dropped.front();
+  if (path.ends_with(".csv")) return play_file(path);
+  if (path.ends_with(".json") && scene_controls_.volume()) return use_transfer_file(path);
+  open(path);
+}
+
+void WindowSurface::play_file(const std::string& path) {
+  auto read = geometry::Trajectory::read_csv(path);
+  if (!read) return tell(read.error().text);
+  interaction_.play(std::move(*read));
+  tell("playing " + path + "; T takes the camera");
+}
+
+void WindowSurface::use_transfer_file(const std::string& path) {
+  auto read = volume::resolve_transfer(path, scene_controls_.volume()->range);
+  if (!read) return tell(read.error().text);
+  panel_.order({"tf", {{"transfer", volume::to_text(*read)}}, {}});
+}
+
+void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& session) {
+  if (!session) return;
+  scene_controls_.on_session(monotonic_s(), *session);
+  panel_.on_told_sampling(
+      scene::SessionView(*session).setting("viewer.least_sampling", options_.sampling.least_sampling));
+}
+
+void WindowSurface::save_transfer() {
+  const std::string name = dated_path(options_.path_directory + "/transfer-", ".json");
+  std::error_code error;
+  std::filesystem::create_directories(options_.path_directory, error);
+  const Status saved = scene_controls_.save_transfer(name);
+  tell(saved ? "transfer function: " + name : saved.error().text);
 }
 
 void WindowSurface::on_legend(const std::shared_ptr<const image::Legend>& legend) {
@@ -169,7 +339,22 @@ void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
   screenshots_.take(copy, alpha);
 }
 
+// The same view, of the wished size: the field of view spans its longer side.
+std::optional<PictureWish> WindowSurface::take_picture_wish(geometry::Camera& camera) {
+  const auto wish = panel_.take_picture();
+  if (!wish || !wish->own_size()) return wish;
+  const auto& o = options_.display;
+  camera = window_camera(camera.pose, o.fov_deg, wish->width, wish->height, o.near_m);
+  return wish;
+}
+
+void WindowSurface::take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) {
+  if (legend_) image::draw_legend(picture, *legend_, part_of_wall(picture.width, picture.height, {}));
+  screenshots_.take(picture, alpha, wish.exr);
+}
+
 void WindowSurface::report(const LiveFigures& figures) {
+  panel_.on_figures(panel_figures(figures, holes_.share()));
   if (const auto title = title_.update(figures)) title_text_ = *title;
   const std::string title = interaction_.records_path() ? fmt::format("{} - recording the camera's path, {:.0f} s",
                                                                       title_text_, interaction_.path_s())

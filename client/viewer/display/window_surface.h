@@ -8,6 +8,14 @@
 #include "client/viewer/display/title_line.h"
 #include "client/viewer/display/window.h"
 #include "client/viewer/input/head_movement.h"
+#include "client/viewer/panel/control_desk.h"
+#include "client/viewer/panel/gui/open_view.h"
+#include "client/viewer/panel/gui/panel_view.h"
+#include "client/viewer/panel/gui/scene_view.h"
+#include "client/viewer/panel/hole_meter.h"
+#include "client/viewer/panel/launcher_lines.h"
+#include "client/viewer/panel/panel.h"
+#include "client/viewer/panel/scene_controls.h"
 #include "client/viewer/record/screenshots.h"
 
 namespace telesplat::viewer {
@@ -19,10 +27,20 @@ class WindowSurface final : public DisplaySurface {
     HeadMovement movement;  ///< unless it stands still it plays until the person takes the camera
     bool fullscreen = false;
     std::string screenshot_directory = ".", path_directory = ".";
+    bool panel = true;             ///< shown from the beginning
+    std::string viewer;            ///< this viewer's name
+    SamplingWish sampling;         ///< as it begins
+    bool sampling_chosen = false;  ///< its least sampling, by a flag
+    /// Asks whoever started the session for another data set; null: it is somebody else's session.
+    std::function<void(const std::string& path)> open;
+    bool begins_empty = false;  ///< there is nothing to see before a data set was opened
+    int launcher_fd = -1;       ///< LauncherLines
   };
-  /// tell: lines for the person; may be called from another thread, never from two at once.
+  /// tell: lines for the person; may be called from another thread, never from two at once. desk: takes what the panel
+  /// orders to the master.
   static Result<std::unique_ptr<WindowSurface>> open(const Options& options,
-                                                     std::function<void(const std::string&)> tell);
+                                                     std::function<void(const std::string&)> tell,
+                                                     std::unique_ptr<ControlDesk> desk);
   /// A path that is being recorded is written.
   ~WindowSurface() override;
 
@@ -31,23 +49,40 @@ class WindowSurface final : public DisplaySurface {
 
   void on_scene(const ShownScene& scene) override;
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
+  void on_session(const std::shared_ptr<const wire::Welcome>& session) override;
+  std::optional<SamplingWish> take_sampling() override { return panel_.take_sampling(); }
   bool visible() const override { return true; }
   void present(const image::View& view, bool changed) override;
   void on_legend(const std::shared_ptr<const image::Legend>& legend) override;
   bool wants_picture() const override { return interaction_.wants_screenshot(); }
   void take_picture(const image::View& view, image::Alpha alpha) override;
+  std::optional<PictureWish> take_picture_wish(geometry::Camera& camera) override;
+  void take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) override;
   void report(const LiveFigures& figures) override;
   Overlays* overlays() override { return &overlays_; }
   bool wants_to_stop() const override { return window_->closing() || interaction_.wants_to_quit(); }
   std::string failure() const override { return window_->lost() ? "the display went away" : ""; }
 
  private:
-  WindowSurface(const Options& options, std::unique_ptr<Window> window, std::function<void(const std::string&)> tell);
+  struct Lines;  // for the person, from any thread
+  WindowSurface(const Options& options, std::unique_ptr<Window> window, std::shared_ptr<Lines> lines,
+                std::unique_ptr<ControlDesk> desk);
   geometry::Camera whole(const geometry::Pose& pose) const;
   void fit_views();
   void show_help();
+  std::vector<std::string> key_lines() const;
   void show_legend();
+  void show_news(double now_s);
   void keep_path();
+  void tell(const std::string& line);
+  void run_panel(double now_s, Look& look);
+  void build_panel(double now_s);
+  void save_transfer();
+  void take_launcher_lines(double now_s);
+  void take_dropped();
+  void open(const std::string& path);
+  void play_file(const std::string& path);
+  void use_transfer_file(const std::string& path);
 
   Options options_;
   std::unique_ptr<Window> window_;
@@ -63,10 +98,21 @@ class WindowSurface final : public DisplaySurface {
     double at_s = -1e9;
     int width = 0, height = 0;  // of the window
     uint64_t overlays = 0;      // their version
+    bool panel = false;
   };
-  Shown shown_;         // what is in the window
-  int help_scale_ = 0;  // of the overlay's letters; 0: it is not shown
-  std::function<void(const std::string&)> tell_;
+  Shown shown_;                    // what is in the window
+  int help_scale_ = 0;             // of the overlay's letters; 0: it is not shown
+  std::vector<std::string> news_;  // that an overlay shows
+  std::shared_ptr<Lines> lines_;
+  Panel panel_;
+  SceneControls scene_controls_{[this](Order order) { panel_.order(std::move(order)); }};
+  SceneViewState scene_view_;
+  PanelViewState panel_view_;
+  OpenViewState open_view_;
+  LauncherLines launcher_;
+  std::unique_ptr<ControlDesk> desk_;
+  HoleMeter holes_;
+  uint32_t background_ = 0;  // of the frame at hand
   Screenshots screenshots_;
 };
 

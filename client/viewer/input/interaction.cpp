@@ -1,6 +1,7 @@
 #include "client/viewer/input/interaction.h"
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
 namespace telesplat::viewer {
@@ -9,35 +10,83 @@ namespace {
 // Between the poses of a recorded path, so that their times differ in the file too.
 constexpr double kLeastStep_s = 1e-5;
 
+constexpr char kLetters[] = "ACDEFHOPQRSTW";  // in the order of Key
+static_assert(sizeof kLetters - 1 == size_t(Key::k1));
+
+// "[" and "]" hold the letter of a key, or a function key's number.
+struct HelpLine {
+  const char *keys, *what;
+};
+constexpr HelpLine kHelp[] = {
+    {"left drag", "orbit around the data set"},
+    {"middle, [^]+left", "pan"},
+    {"wheel", "nearer, farther (in flight: faster, slower)"},
+    {"Tab", "show, hide the panel"},
+    {"[F]", "fly: [W] [A] [S] [D], [E] up, [Q] down, the mouse looks around, [^] is faster"},
+    {"[R]", "back to the first view"},
+    {"[T]", "play the recorded head movement (--trajectory, or [C]), or take the camera"},
+    {"[C]", "begin, end recording the camera's path; it is written as path-DATE.csv"},
+    {"[1] [2] [3] [4]", "splats: square, disc, ellipse, ewa (not of volumes)"},
+    {"[5] [6] [7]", "finish: fill pin-holes, smooth, antialias (not of volumes)"},
+    {"[8]", "shading on, off (not of volumes)"},
+    {"[P], F12", "screenshot, into images/ of the run folder or the current folder"},
+    {"[O]", "open another data set, where the session is this window's own"},
+    {"F11", "full screen, or a window again"},
+    {"F1, [H]", "show, hide these keys"},
+    {"Esc", "leave flight; quit"},
+    {"[Q]", "quit (not in flight)"},
+};
+
+Key key_of(char mark) {
+  if (mark == '^') return Key::kShift;
+  if (mark >= '1' && mark <= '8') return Key(int(Key::k1) + mark - '1');
+  return Key(std::string_view(kLetters).find(mark));
+}
+
+std::string named(std::string_view text, const KeyNames& name) {
+  std::string out;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '[' && i + 2 < text.size() && text[i + 2] == ']') {
+      out += name(key_of(text[i + 1]));
+      i += 2;
+    } else {
+      out += text[i];
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
-const std::vector<std::string>& key_help() {
-  static const std::vector<std::string> lines{
-      "left drag            orbit around the data set",
-      "middle, shift+left   pan",
-      "wheel                nearer, farther (in flight: faster, slower)",
-      "F                    fly: W A S D, E up, Q down, the mouse looks around, shift is faster",
-      "R                    back to the first view",
-      "T                    play the recorded head movement (--trajectory, or C), or take the camera",
-      "C                    begin, end recording the camera's path; it is written as path-DATE.csv",
-      "1 2 3 4              splats: square, disc, ellipse, ewa (not of volumes)",
-      "5 6 7                finish: fill pin-holes, smooth, antialias (not of volumes)",
-      "8                    shading on, off (not of volumes)",
-      "P, F12               screenshot, into images/ of the run folder or the current folder",
-      "H                    show, hide these keys",
-      "Esc                  leave flight; quit",
-      "Q                    quit (not in flight)",
-  };
-  return lines;
+std::string us_name(Key key) {
+  static constexpr std::pair<Key, const char*> kNames[] = {{Key::kF1, "F1"},      {Key::kF11, "F11"},
+                                                           {Key::kF12, "F12"},    {Key::kTab, "Tab"},
+                                                           {Key::kEscape, "Esc"}, {Key::kShift, "shift"}};
+  for (const auto& [named, name] : kNames)
+    if (named == key) return name;
+  if (key >= Key::k1 && key <= Key::k8) return std::string(1, char('1' + int(key) - int(Key::k1)));
+  return std::string(1, kLetters[size_t(key)]);
+}
+
+std::vector<std::string> key_help(const KeyNames& name) {
+  constexpr size_t kWhat = 21;  // column of the second part
+  std::vector<std::string> out;
+  for (const auto& [keys, what] : kHelp) {
+    std::string line = named(keys, name);
+    line.resize(std::max(line.size() + 1, kWhat), ' ');
+    out.push_back(line + named(what, name));
+  }
+  return out;
 }
 
 std::string first_keys() {
-  return "H shows all keys: left drag orbits, the wheel goes nearer, F flies, R goes back, P takes a screenshot, Q "
+  return "F1 shows all keys: Tab shows the panel, left drag orbits, the wheel goes nearer, F flies, R goes back, P "
+         "takes a screenshot, Q "
          "quits";
 }
 
 Interaction::Interaction(std::optional<geometry::Trajectory> recorded, const Look& look)
-    : recorded_(std::move(recorded)), look_(look), playing_(recorded_.has_value()), held_(size_t(Key::kShift) + 1) {}
+    : recorded_(std::move(recorded)), look_(look), playing_(recorded_.has_value()), held_(kKeys) {}
 
 void Interaction::key(Key key, bool down) {
   const bool was_down = held_[size_t(key)];
@@ -109,6 +158,12 @@ bool Interaction::choose_look(Key key) {
   return true;
 }
 
+void Interaction::show_help() {
+  shows_help_ = !shows_help_;
+  if (!shows_help_) return;
+  for (auto& line : key_help(key_names_)) notes_.push_back(std::move(line));
+}
+
 void Interaction::pressed(Key key) {
   if (choose_look(key)) return;
   switch (key) {
@@ -128,9 +183,17 @@ void Interaction::pressed(Key key) {
     case Key::kF12:
       screenshot_ = true;
       return;
+    case Key::kF1:
     case Key::kH:
-      shows_help_ = !shows_help_;
-      if (shows_help_) notes_.insert(notes_.end(), key_help().begin(), key_help().end());
+      return show_help();
+    case Key::kTab:
+      shows_panel_ = !shows_panel_;
+      return;
+    case Key::kO:
+      open_ = true;
+      return;
+    case Key::kF11:
+      fullscreen_ = true;
       return;
     case Key::kEscape:
       if (!controls_.flying()) quit_ = true;
@@ -178,6 +241,13 @@ void Interaction::set_recorded(geometry::Trajectory recorded) {
   if (!has_own_path_) recorded_ = std::move(recorded);
 }
 
+void Interaction::play(geometry::Trajectory path) {
+  recorded_ = std::move(path);
+  has_own_path_ = playing_ = true;
+  playback_s_ = 0;
+  controls_.set_flying(false);
+}
+
 geometry::Pose Interaction::advance(double now_s, bool playback) {
   const double dt_s = last_s_ ? std::max(0.0, now_s - *last_s_) : 0.0;
   last_s_ = now_s;
@@ -203,6 +273,8 @@ void Interaction::record_pose(double now_s, const geometry::Pose& pose) {
 }
 
 Interaction::Path Interaction::take_path() { return std::exchange(finished_path_, {}); }
+bool Interaction::take_open_wish() { return std::exchange(open_, false); }
+bool Interaction::take_fullscreen_wish() { return std::exchange(fullscreen_, false); }
 bool Interaction::take_screenshot_wish() { return std::exchange(screenshot_, false); }
 std::vector<std::string> Interaction::take_notes() { return std::exchange(notes_, {}); }
 

@@ -2,8 +2,10 @@
 // it is tested without one.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/viewer/input/camera_controls.h"
@@ -12,7 +14,8 @@
 
 namespace telesplat::viewer {
 
-/// Keys that mean something here, by what is printed on a US keyboard.
+/// Keys that mean something here. They are places on the keyboard, named by what is printed there on a US one: W A S D
+/// lie under one hand on every keyboard.
 enum class Key {
   kA,
   kC,
@@ -20,6 +23,7 @@ enum class Key {
   kE,
   kF,
   kH,
+  kO,
   kP,
   kQ,
   kR,
@@ -34,14 +38,23 @@ enum class Key {
   k6,
   k7,
   k8,
+  kF1,
+  kF11,
   kF12,
+  kTab,
   kEscape,
   kShift
 };
+inline constexpr size_t kKeys = size_t(Key::kShift) + 1;
 enum class MouseButton { kLeft, kMiddle };
 
-/// Keys and mouse, a line each: for H, for --help and for documentation.
-const std::vector<std::string>& key_help();
+/// What a key is called: what is printed on it where the person sits.
+using KeyNames = std::function<std::string(Key)>;
+/// As it is printed on a US keyboard.
+std::string us_name(Key key);
+
+/// Keys and mouse, a line each: for F1, for --help and for documentation.
+std::vector<std::string> key_help(const KeyNames& name = us_name);
 /// The ones to begin with, in one line.
 std::string first_keys();
 
@@ -65,17 +78,29 @@ class Interaction {
   void set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home);
   /// What T plays from now on, unless the person recorded a path.
   void set_recorded(geometry::Trajectory recorded);
+  /// T plays this from now on, and it plays at once.
+  void play(geometry::Trajectory path);
+  bool can_play() const { return recorded_.has_value(); }
   /// What the window shows, top to bottom, at distance 1: pans follow the pointer.
   void set_height_tangent(double tangent) { height_tangent_ = tangent; }
   /// The camera at `now_s`. A recorded movement advances only while `playback` is true.
   geometry::Pose advance(double now_s, bool playback);
 
   const Look& look() const { return look_; }
+  /// In place of what keys chose; they go on from it.
+  void set_look(const Look& look) { look_ = look; }
   bool wants_to_quit() const { return quit_; }
   /// In flight the mouse turns the head: the pointer should be caught and hidden.
   bool wants_pointer() const { return controls_.flying(); }
   bool playing() const { return playing_; }
   bool shows_help() const { return shows_help_; }
+  bool shows_panel() const { return shows_panel_; }
+  void show_panel(bool shown) { shows_panel_ = shown; }
+  /// True once after each press of the key for it.
+  bool take_fullscreen_wish();
+  bool take_open_wish();
+  /// For the lines that tell of keys.
+  void set_key_names(KeyNames names) { key_names_ = std::move(names); }
   bool records_path() const { return records_path_; }
   /// Seconds of the path that is being recorded.
   double path_s() const { return path_.empty() ? 0 : path_.back().t_s; }
@@ -93,6 +118,7 @@ class Interaction {
   void pressed(Key key);
   void play_or_take();
   bool choose_look(Key key);
+  void show_help();
   void take_camera();
   void begin_path();
   void record_pose(double now_s, const geometry::Pose& pose);
@@ -104,6 +130,8 @@ class Interaction {
   CameraControls controls_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
   bool playing_ = false, quit_ = false, screenshot_ = false, shows_help_ = false;
+  bool shows_panel_ = false, fullscreen_ = false, open_ = false;
+  KeyNames key_names_ = us_name;
   bool records_path_ = false, has_own_path_ = false;
   double path_from_s_ = 0;
   Path path_, finished_path_;

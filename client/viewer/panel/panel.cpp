@@ -63,6 +63,12 @@ void Panel::on_answer(double now_s, const OrderAnswer& answer) {
 void Panel::on_status(double now_s, const std::optional<SessionStatus>& status, const std::string& problem) {
   status_ = status;
   std::vector<std::string> missing = status ? missing_services(*status) : std::vector{problem};
+  if (!status || missing.empty()) missing_since_s_ = 0;
+  // Processes that start say hello one after the other.
+  if (status && !missing.empty()) {
+    if (missing_since_s_ == 0) missing_since_s_ = now_s;
+    if (now_s - missing_since_s_ < kGrace_s) missing.clear();
+  }
   if (missing == missing_) return;
   for (const auto& line : missing)
     if (std::find(missing_.begin(), missing_.end(), line) == missing_.end()) tell(now_s, line, true);
@@ -97,8 +103,13 @@ void Panel::choose_coupling(const CouplingState& wish) {
   order({"coupling", std::move(arguments), "coupling"});
 }
 
+void Panel::on_told_sampling(double least) {
+  if (!setup_.sampling_chosen) sampling_.least_sampling = least;
+}
+
 void Panel::choose_sampling(const SamplingWish& sampling) {
   if (sampling == sampling_) return;
+  setup_.sampling_chosen = true;
   sampling_ = sampling;
   wished_sampling_ = sampling;
 }

@@ -44,13 +44,15 @@ class Panel {
     Look look;
     bool transparent = false;  ///< the background is not the person's to choose
     SamplingWish sampling;
-    std::string viewer;  ///< this viewer's name, for orders that are meant for it alone
+    bool sampling_chosen = false;  ///< its least sampling, by a flag
+    std::string viewer;            ///< this viewer's name, for orders that are meant for it alone
     bool shown = false;
     bool opens = false;  ///< other data sets can be opened here
   };
   explicit Panel(Setup setup);
 
   static constexpr double kSpan_s = 20;  ///< of the plots
+  static constexpr double kGrace_s = 3;  ///< for so long a service may be missing before that is told
   static constexpr double kTold_s = 6;   ///< for so long the newest message is told outside the panel too
   static constexpr size_t kMostMessages = 100;
 
@@ -112,6 +114,8 @@ class Panel {
   void choose_look(const Look& look);
   void choose_coupling(const CouplingState& coupling);
   void choose_sampling(const SamplingWish& sampling);
+  /// What the session tells viewers to sample at least; nothing where the person or a flag chose.
+  void on_told_sampling(double least);
   /// As if the person pressed this key.
   void press(Key key) { pressed_.push_back(key); }
   void choose_picture(const PictureWish& wish) { wished_picture_ = wish; }
@@ -145,6 +149,7 @@ class Panel {
   std::string progress_;
   std::optional<SessionStatus> status_;
   std::vector<std::string> missing_;
+  double missing_since_s_ = 0;  // what the newest status lacks; 0: nothing
   std::deque<Message> messages_;
 };
 

@@ -24,6 +24,7 @@ Result<SessionStatus> read_status(const std::string& text) {
   if (!json.is_object()) return Error{"the master's answer is not a status"};
   SessionStatus out;
   out.animation = text_of(json, "animation");
+  if (out.animation == "off") out.animation.clear();
   const auto processes = json.find("processes");
   if (processes == json.end() || !processes->is_array()) return out;
   for (const Json& p : *processes) {

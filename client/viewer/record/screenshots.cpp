@@ -16,25 +16,26 @@ Screenshots::~Screenshots() {
   if (writing_.valid()) writing_.wait();
 }
 
-std::string Screenshots::next_path() {
+std::string Screenshots::next_path(const char* ending) {
   char date[32];
   const std::time_t now = std::time(nullptr);
   std::strftime(date, sizeof date, "%Y%m%d-%H%M%S", std::localtime(&now));
   std::string path;
   std::error_code error;
   do {
-    path = fmt::format("{}/telesplat-{}-{:03d}.png", directory_, date, ++count_);
+    path = fmt::format("{}/telesplat-{}-{:03d}.{}", directory_, date, ++count_, ending);
   } while (fs::exists(path, error));
   return path;
 }
 
-void Screenshots::take(const image::View& view, image::Alpha alpha) {
-  writing_ = std::async(std::launch::async, [this, alpha, path = next_path(), before = std::move(writing_),
-                                             copy = image::View{view.width, view.height, view.colour, {}}]() {
+void Screenshots::take(const image::View& view, image::Alpha alpha, bool exr) {
+  image::View copy{view.width, view.height, view.colour, exr ? view.depth_m : std::vector<float>()};
+  writing_ = std::async(std::launch::async, [this, alpha, exr, path = next_path(exr ? "exr" : "png"),
+                                             before = std::move(writing_), copy = std::move(copy)]() {
     if (before.valid()) before.wait();
     std::error_code error;
     fs::create_directories(directory_, error);
-    const Status written = image::write_png(path, copy, alpha);
+    const Status written = exr ? image::write_exr(path, copy, alpha) : image::write_png(path, copy, alpha);
     tell_(written ? "screenshot: " + path : written.error().text);
   });
 }

@@ -18,11 +18,12 @@ class Screenshots {
   /// Waits until all are written.
   ~Screenshots();
 
-  /// Copies the view and writes it as telesplat-YYYYMMDD-HHMMSS-NNN.png; no file is overwritten.
-  void take(const image::View& view, image::Alpha alpha = image::Alpha::kNone);
+  /// Copies the view and writes it as telesplat-YYYYMMDD-HHMMSS-NNN.png; no file is overwritten. exr: as .exr with its
+  /// depth, which it must have.
+  void take(const image::View& view, image::Alpha alpha = image::Alpha::kNone, bool exr = false);
 
  private:
-  std::string next_path();
+  std::string next_path(const char* ending);
 
   std::string directory_;
   std::function<void(const std::string&)> tell_;

@@ -425,6 +425,43 @@ TEST_F(InteractionTest, QQuitsAndHTellsEveryKey) {
   EXPECT_TRUE(i.wants_to_quit());
 }
 
+TEST_F(InteractionTest, F1TellsKeysAsTheyArePrintedHere) {
+  Interaction i(std::nullopt, look_);
+  i.set_key_names([](Key key) { return key == Key::kQ ? "A" : key == Key::kW ? "Z" : us_name(key); });
+  tap(i, Key::kF1);
+  EXPECT_TRUE(i.shows_help());
+  const auto notes = i.take_notes();
+  EXPECT_NE(std::find(notes.begin(), notes.end(), "A                    quit (not in flight)"), notes.end());
+  const auto flight = std::find_if(notes.begin(), notes.end(), [](const auto& n) { return n.starts_with("F   "); });
+  ASSERT_NE(flight, notes.end());
+  EXPECT_NE(flight->find("fly: Z A S D, E up, A down"), std::string::npos) << *flight;
+  for (const auto& line : key_help()) EXPECT_EQ(line.find_first_of("[]"), std::string::npos) << line;
+}
+
+TEST_F(InteractionTest, TabShowsThePanelAndF11AsksForAFullScreenOnce) {
+  Interaction i(std::nullopt, look_);
+  EXPECT_FALSE(i.shows_panel());
+  tap(i, Key::kTab);
+  EXPECT_TRUE(i.shows_panel());
+  tap(i, Key::kTab);
+  EXPECT_FALSE(i.shows_panel());
+  EXPECT_FALSE(i.take_fullscreen_wish());
+  tap(i, Key::kF11);
+  EXPECT_TRUE(i.take_fullscreen_wish());
+  EXPECT_FALSE(i.take_fullscreen_wish());
+}
+
+TEST_F(InteractionTest, KeysGoOnFromALookThatWasSet) {
+  Interaction i(std::nullopt, look_);
+  Look look = i.look();
+  look.render.finish.fill = false;
+  look.background = 0xffffff;
+  i.set_look(look);
+  tap(i, Key::k5);
+  EXPECT_TRUE(i.look().render.finish.fill);
+  EXPECT_EQ(i.look().background, 0xffffffu);
+}
+
 TEST_F(InteractionTest, PlaysTheRecordedMovementUntilTheCameraIsTaken) {
   Interaction i(recorded(), look_);
   EXPECT_TRUE(i.playing());

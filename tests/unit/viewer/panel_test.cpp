@@ -204,6 +204,27 @@ TEST_F(PanelTest, NewsAreWhatIsMissingElseAYoungMessage) {
   EXPECT_TRUE(panel_.news(100).empty());
 }
 
+TEST_F(PanelTest, AServiceThatIsMissingForAMomentIsNotTold) {
+  panel_.on_status(10, SessionStatus{}, "");
+  EXPECT_TRUE(panel_.news(10).empty());
+  panel_.on_status(10 + Panel::kGrace_s / 2, SessionStatus{}, "");
+  EXPECT_TRUE(panel_.messages().empty());
+  panel_.on_status(10.1 + Panel::kGrace_s, SessionStatus{}, "");
+  EXPECT_EQ(panel_.news(14).size(), 3u);
+  EXPECT_EQ(panel_.messages().size(), 3u);
+  panel_.on_progress("reading a.ply 43 %");
+  EXPECT_EQ(panel_.news(14), std::vector<std::string>{"reading a.ply 43 %"});
+}
+
+TEST_F(PanelTest, WhatTheSessionTellsToSampleIsShownUntilThePersonChooses) {
+  panel_.on_told_sampling(0.4);
+  EXPECT_EQ(panel_.sampling().least_sampling, 0.4);
+  EXPECT_FALSE(panel_.take_sampling()) << "it is in force already";
+  panel_.choose_sampling({.adaptive = true, .least_sampling = 0.8});
+  panel_.on_told_sampling(0.4);
+  EXPECT_EQ(panel_.sampling().least_sampling, 0.8);
+}
+
 TEST_F(PanelTest, MessagesAreBounded) {
   for (size_t i = 0; i < 3 * Panel::kMostMessages; ++i) panel_.tell(double(i), std::to_string(i));
   EXPECT_EQ(panel_.messages().size(), Panel::kMostMessages);
@@ -224,6 +245,7 @@ TEST(SessionStatus, TellsWhoIsHereAndWhoIsMissing) {
   EXPECT_NE(missing[1].find("waiting for a packer"), std::string::npos) << missing[1];
   for (const char* bad : {"", "[]", "17", "{", "\"status\""}) EXPECT_FALSE(read_status(bad)) << bad;
   EXPECT_TRUE(read_status("{}"));
+  EXPECT_EQ(read_status(R"({"animation": "off"})")->animation, "");
   EXPECT_EQ(missing_services({}).size(), 3u);
 }
 

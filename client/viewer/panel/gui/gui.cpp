@@ -1,0 +1,231 @@
+#include "client/viewer/panel/gui/gui.h"
+
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <epoxy/gl.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "client/viewer/panel/gui/style.h"
+#include "common/gl/program.h"
+
+namespace telesplat::viewer {
+namespace {
+
+constexpr double kPeriod_s = 0.1;  // of plots and figures while nothing happens
+constexpr int kRelease = 0;        // GLFW_RELEASE
+constexpr int kAfterEvent = 2;     // builds: hovering and layouts settle in the second
+
+// The texture has the window's size; both have their first row at the bottom.
+constexpr const char* kVertexShader = R"(#version 330 core
+void main() {
+  vec2 corner = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0);
+  gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
+})";
+constexpr const char* kFragmentShader = R"(#version 330 core
+uniform sampler2D drawn;
+out vec4 colour;
+void main() { colour = texelFetch(drawn, ivec2(gl_FragCoord.xy), 0); }
+)";
+
+// Of the window, screen coordinates.
+struct Area {
+  double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
+  bool empty() const { return right <= left || bottom <= top; }
+  bool has(double x, double y) const { return x >= left && x < right && y >= top && y < bottom; }
+  void add(const Area& a) {
+    left = std::min(left, a.left), top = std::min(top, a.top);
+    right = std::max(right, a.right), bottom = std::max(bottom, a.bottom);
+  }
+};
+
+// What a list of triangles covers.
+Area area_of(const ImDrawList& list) {
+  Area out;
+  for (const ImDrawVert& v : list.VtxBuffer) {
+    out.left = std::min(out.left, double(v.pos.x)), out.top = std::min(out.top, double(v.pos.y));
+    out.right = std::max(out.right, double(v.pos.x)), out.bottom = std::max(out.bottom, double(v.pos.y));
+  }
+  return out;
+}
+
+}  // namespace
+
+struct Gui::Impl {
+  GLFWwindow* window = nullptr;
+  ImGuiContext* context = nullptr;
+  bool glfw = false, gl = false;  // parts of Dear ImGui that are to be ended
+  gl::Program program;
+  GLuint vertex_array = 0, texture = 0, framebuffer = 0;
+  int width = 0, height = 0;  // of the texture
+  GuiStyle style;
+  std::vector<Area> areas;  // of what is shown, a window each
+  Area shown;               // their union: the texture holds nothing elsewhere
+  double built_at_s = -1e9;
+  int builds_due = kAfterEvent;
+
+  ~Impl() {
+    if (gl) ImGui_ImplOpenGL3_Shutdown();
+    if (glfw) ImGui_ImplGlfw_Shutdown();
+    if (context) ImGui::DestroyContext(context);
+    glDeleteFramebuffers(1, &framebuffer);
+    glDeleteTextures(1, &texture);
+    glDeleteVertexArrays(1, &vertex_array);
+  }
+
+  void resize(int to_width, int to_height) {
+    if (width == to_width && height == to_height) return;
+    width = to_width, height = to_height;
+    glDeleteTextures(1, &texture);
+    glGenTextures(1, &texture);
+    glBindTexture(GL_TEXTURE_2D, texture);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+      glTexParameteri(GL_TEXTURE_2D, filter, GL_NEAREST);
+    if (!framebuffer) glGenFramebuffers(1, &framebuffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture, 0);
+    shown = {0, 0, 1e9, 1e9};  // whatever the new one holds
+    builds_due = kAfterEvent;
+  }
+
+  // In pixels of the framebuffer, a rim for soft edges included.
+  void scissor(const Area& area) const {
+    const ImGuiIO& io = ImGui::GetIO();
+    const double sx = io.DisplayFramebufferScale.x, sy = io.DisplayFramebufferScale.y;
+    const int left = std::clamp(int(area.left * sx) - 1, 0, width), top = std::clamp(int(area.top * sy) - 1, 0, height);
+    const int right = std::clamp(int(std::min(area.right * sx, 1e6)) + 2, 0, width);
+    const int bottom = std::clamp(int(std::min(area.bottom * sy, 1e6)) + 2, 0, height);
+    glScissor(left, height - bottom, std::max(0, right - left), std::max(0, bottom - top));
+  }
+};
+
+Gui::Gui(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Gui::~Gui() = default;
+
+Result<std::unique_ptr<Gui>> Gui::make(GLFWwindow* window) {
+  auto impl = std::make_unique<Impl>();
+  auto program =
+      gl::Program::link("panel", {{GL_VERTEX_SHADER, {kVertexShader}}, {GL_FRAGMENT_SHADER, {kFragmentShader}}});
+  if (!program) return program.error();
+  impl->program = std::move(*program);
+  glGenVertexArrays(1, &impl->vertex_array);
+  impl->window = window;
+  impl->context = ImGui::CreateContext();
+  ImGuiIO& io = ImGui::GetIO();
+  io.IniFilename = io.LogFilename = nullptr;
+  impl->glfw = ImGui_ImplGlfw_InitForOpenGL(window, false);
+  if (!impl->glfw) return Error{"the panel cannot be shown: Dear ImGui does not take the window"};
+  impl->gl = ImGui_ImplOpenGL3_Init("#version 330 core");
+  if (!impl->gl) return Error{"the panel cannot be shown: Dear ImGui finds no OpenGL 3.3"};
+  return std::unique_ptr<Gui>(new Gui(std::move(impl)));
+}
+
+void Gui::stir() { impl_->builds_due = kAfterEvent; }
+
+// What happens while nothing is shown would be taken for new when it is: releases alone may not be missed.
+void Gui::on_key(int key, int scancode, int action, int mods) {
+  stir();
+  if (shows() || action == kRelease) ImGui_ImplGlfw_KeyCallback(impl_->window, key, scancode, action, mods);
+}
+void Gui::on_character(unsigned code) {
+  stir();
+  if (shows()) ImGui_ImplGlfw_CharCallback(impl_->window, code);
+}
+void Gui::on_button(int button, int action, int mods) {
+  stir();
+  if (shows()) ImGui_ImplGlfw_MouseButtonCallback(impl_->window, button, action, mods);
+}
+void Gui::on_wheel(double x, double y) {
+  stir();
+  if (shows()) ImGui_ImplGlfw_ScrollCallback(impl_->window, x, y);
+}
+void Gui::on_focus(bool focused) {
+  stir();
+  if (focused) return;
+  ImGuiIO& io = ImGui::GetIO();
+  std::fill(std::begin(io.KeysDown), std::end(io.KeysDown), false);  // released elsewhere
+  io.KeyCtrl = io.KeyShift = io.KeyAlt = io.KeySuper = false;
+}
+void Gui::on_enter(bool entered) {
+  stir();
+  ImGui_ImplGlfw_CursorEnterCallback(impl_->window, entered);
+}
+void Gui::on_move() { stir(); }
+
+bool Gui::takes_pointer(double x, double y) const {
+  return std::any_of(impl_->areas.begin(), impl_->areas.end(), [&](const Area& a) { return a.has(x, y); });
+}
+bool Gui::shows() const { return !impl_->areas.empty(); }
+bool Gui::takes_text() const { return shows() && ImGui::GetIO().WantTextInput; }
+
+bool Gui::due(double now_s) const { return impl_->builds_due > 0 || now_s - impl_->built_at_s >= kPeriod_s; }
+
+void Gui::build_texture(const Place& place, const std::function<void()>& build) {
+  Impl& m = *impl_;
+  m.resize(place.width, place.height);
+  ImGui_ImplGlfw_NewFrame();
+  const double pixels_a_unit = std::max(0.1, double(ImGui::GetIO().DisplayFramebufferScale.x));
+  if (m.style.fit(std::max(0.5, place.content_scale / pixels_a_unit), pixels_a_unit))
+    ImGui_ImplOpenGL3_DestroyFontsTexture();
+  ImGui_ImplOpenGL3_NewFrame();
+  if (ImGui::GetIO().Fonts->TexID == nullptr) ImGui_ImplOpenGL3_CreateFontsTexture();
+  ImGui::NewFrame();
+  build();
+  ImGui::Render();
+  const ImDrawData* drawn = ImGui::GetDrawData();
+  glBindFramebuffer(GL_FRAMEBUFFER, m.framebuffer);
+  glEnable(GL_SCISSOR_TEST);
+  m.scissor(m.shown);
+  glClearColor(0, 0, 0, 0);
+  glClear(GL_COLOR_BUFFER_BIT);
+  glDisable(GL_SCISSOR_TEST);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());  // colours come to be premultiplied: over nothing
+  m.areas.clear();
+  m.shown = {};
+  for (int i = 0; i < drawn->CmdListsCount; ++i) {
+    const Area area = area_of(*drawn->CmdLists[i]);
+    if (area.empty()) continue;
+    m.areas.push_back(area);
+    m.shown.add(area);
+  }
+}
+
+void Gui::blend(const Place& place) {
+  Impl& m = *impl_;
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  if (m.shown.empty()) return;
+  glViewport(0, 0, place.width, place.height);
+  glEnable(GL_SCISSOR_TEST);
+  m.scissor(m.shown);
+  glEnable(GL_BLEND);
+  glBlendEquation(GL_FUNC_ADD);
+  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  m.program.use();
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, m.texture);
+  glBindVertexArray(m.vertex_array);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDisable(GL_BLEND);
+  glDisable(GL_SCISSOR_TEST);
+}
+
+void Gui::draw(const Place& place, double now_s, const std::function<void()>& build) {
+  Impl& m = *impl_;
+  if (!build) {
+    m.areas.clear();
+    m.builds_due = kAfterEvent;  // for when it is shown again
+    return;
+  }
+  if (due(now_s) || place.width != m.width || place.height != m.height) {
+    m.builds_due = std::max(0, m.builds_due - 1);
+    m.built_at_s = now_s;
+    build_texture(place, build);
+  }
+  blend(place);
+}
+
+}  // namespace telesplat::viewer
