@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,13 +22,18 @@ namespace telesplat::launcher {
 
 Result<ChildProcess> ChildProcess::start(const std::string& name, const std::string& program,
                                          const std::vector<std::string>& arguments, const std::string& log_path,
-                                         int nice_value) {
+                                         int nice_value, bool told) {
   int out[2];
   const int log = ::open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (log < 0) return Error{fmt::format("{}: {}", log_path, std::strerror(errno))};
   if (pipe2(out, O_CLOEXEC) != 0) {
     ::close(log);
     return Error{fmt::format("{}: no pipe: {}", name, std::strerror(errno))};
+  }
+  int in[2] = {-1, -1};  // ours, the child's
+  if (told && socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) {
+    for (const int fd : {log, out[0], out[1]}) ::close(fd);
+    return Error{fmt::format("{}: no pair of sockets: {}", name, std::strerror(errno))};
   }
   std::vector<char*> argv;
   argv.push_back(const_cast<char*>(program.c_str()));
@@ -41,7 +47,7 @@ Result<ChildProcess> ChildProcess::start(const std::string& name, const std::str
     if (getppid() != launcher) _exit(1);  // the launcher died in between
     if (nice_value) setpriority(PRIO_PROCESS, 0, nice_value);
     const int null = ::open("/dev/null", O_RDONLY);
-    dup2(null, 0);
+    dup2(told ? in[1] : null, 0);
     dup2(out[1], 1);
     dup2(log, 2);
     execv(program.c_str(), argv.data());
@@ -50,8 +56,10 @@ Result<ChildProcess> ChildProcess::start(const std::string& name, const std::str
   }
   ::close(out[1]);
   ::close(log);
+  if (told) ::close(in[1]);
   if (pid < 0) {
     ::close(out[0]);
+    if (told) ::close(in[0]);
     return Error{fmt::format("{}: cannot fork: {}", name, std::strerror(errno))};
   }
   fcntl(out[0], F_SETFL, O_NONBLOCK);
@@ -59,6 +67,7 @@ Result<ChildProcess> ChildProcess::start(const std::string& name, const std::str
   child.name_ = name;
   child.pid_ = pid;
   child.stdout_fd_ = out[0];
+  child.stdin_fd_ = in[0];
   return child;
 }
 
@@ -68,6 +77,7 @@ ChildProcess& ChildProcess::operator=(ChildProcess&& o) noexcept {
   std::swap(name_, o.name_);
   std::swap(pid_, o.pid_);
   std::swap(stdout_fd_, o.stdout_fd_);
+  std::swap(stdin_fd_, o.stdin_fd_);
   std::swap(partial_line_, o.partial_line_);
   std::swap(exit_code_, o.exit_code_);
   return *this;
@@ -78,7 +88,14 @@ ChildProcess::~ChildProcess() {
     kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
   }
-  if (stdout_fd_ >= 0) ::close(stdout_fd_);
+  for (const int fd : {stdout_fd_, stdin_fd_})
+    if (fd >= 0) ::close(fd);
+}
+
+void ChildProcess::tell(const std::string& line) {
+  if (stdin_fd_ < 0) return;
+  const std::string whole = line + '\n';
+  [[maybe_unused]] const ssize_t sent = ::send(stdin_fd_, whole.data(), whole.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
 }
 
 std::vector<std::string> ChildProcess::read_lines() {

@@ -15,9 +15,10 @@ class ChildProcess {
  public:
   /// Starts `program` (a path). stderr goes to `log_path` (appended); stdout lines come back through read_lines(). The
   /// child is in a process group of its own, so that Ctrl-C reaches the launcher alone, and is ended by the kernel
-  /// should the launcher die.
+  /// should the launcher die. told: it reads what tell() says from its standard input.
   static Result<ChildProcess> start(const std::string& name, const std::string& program,
-                                    const std::vector<std::string>& arguments, const std::string& log_path, int nice);
+                                    const std::vector<std::string>& arguments, const std::string& log_path, int nice,
+                                    bool told = false);
   ~ChildProcess();  ///< kills the child if it still runs
   ChildProcess(ChildProcess&&) noexcept;
   ChildProcess& operator=(ChildProcess&&) noexcept;
@@ -26,6 +27,8 @@ class ChildProcess {
   pid_t pid() const { return pid_; }
   /// Complete lines written to stdout since the last call; does not wait.
   std::vector<std::string> read_lines();
+  /// Sends it a line; does not wait: one that finds no room is lost.
+  void tell(const std::string& line);
   /// Whether it has ended; does not wait.
   bool ended();
   /// Exit code, or 128 + signal. Precondition: ended().
@@ -39,7 +42,7 @@ class ChildProcess {
   ChildProcess() = default;
   std::string name_;
   pid_t pid_ = -1;
-  int stdout_fd_ = -1;
+  int stdout_fd_ = -1, stdin_fd_ = -1;
   std::string partial_line_;
   std::optional<int> exit_code_;
 };

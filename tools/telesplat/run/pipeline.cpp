@@ -37,12 +37,7 @@ Status Pipeline::start_servers() {
   const RunOptions& o = options_;
   const int nice = o.background_servers ? 10 : 0;
   if (const Status s = group_.start_master(master_arguments(o), kMasterPatience_s); !s) return s;
-  for (int i = 0; i < o.data_servers; ++i) {
-    const std::string name = o.data_servers == 1 ? "data" : fmt::format("data-{}", i + 1);
-    if (const Status s = group_.start({.role = "data", .name = name, .arguments = data_arguments(o, i), .nice = nice});
-        !s)
-      return s;
-  }
+  if (const Status s = start_data(); !s) return s;
   Member packer{.role = "packer", .name = "packer", .arguments = packer_arguments(o), .nice = nice / 2};
   if (const Status s = group_.start(std::move(packer)); !s) return s;
   for (int i = 1; i <= o.samplers; ++i) {
@@ -53,6 +48,33 @@ Status Pipeline::start_servers() {
     if (const Status s = group_.start(std::move(sampler)); !s) return s;
   }
   return ok_status();
+}
+
+// None where there is no data set yet.
+Status Pipeline::start_data() {
+  const RunOptions& o = options_;
+  const int nice = o.background_servers ? 10 : 0;
+  for (int i = 0; i < o.data_servers && !o.data.scene.empty(); ++i) {
+    const std::string name = o.data_servers == 1 ? "data" : fmt::format("data-{}", i + 1);
+    if (const Status s = group_.start({.role = "data", .name = name, .arguments = data_arguments(o, i), .nice = nice});
+        !s)
+      return s;
+  }
+  return ok_status();
+}
+
+Status Pipeline::open(const RunOptions& options) {
+  group_.end("data");
+  chosen_ = true;
+  progress_.clear();
+  options_.data = options.data;
+  options_.data_servers = options.data_servers;
+  return start_data();
+}
+
+void Pipeline::tell_viewers(const std::string& line) {
+  for (Member& m : group_.members())
+    if (m.told && m.process) m.process->tell(line);
 }
 
 Status Pipeline::put_link(links::Place place, const std::string& name, Member& before) {
@@ -85,7 +107,10 @@ Status Pipeline::start_viewers(double clock_from_s) {
   for (int i = 1; i <= options_.viewers; ++i) {
     // A session that is joined has a viewer-1 already.
     const std::string name = options_.join_master.empty() ? viewer_name(i) : net::unique_name(viewer_name(i));
-    Member viewer{.role = "viewer", .name = name, .arguments = viewer_arguments(options_, i, clock_from_s)};
+    Member viewer{.role = "viewer",
+                  .name = name,
+                  .arguments = viewer_arguments(options_, i, clock_from_s),
+                  .told = options_.viewer.launched};
     if (const Status s = put_link(links::Place::kViewer, name, viewer); !s) return s;
     if (const Status s = group_.start(std::move(viewer)); !s) return s;
   }
@@ -127,9 +152,13 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
   for (Member& m : group_.members()) {
     if (m.role == "viewer" && !m.process->ended()) ++viewing;
     read(m);
-    if (!m.process->ended()) continue;
+    if (m.given_up || !m.process->ended()) continue;
     read(m);  // its last words
     if (const State state = ended(m, news); state != State::kRunning) return state;
+  }
+  if (progress_ != told_progress_) {
+    told_progress_ = progress_;
+    tell_viewers(progress_.empty() ? "progress" : "progress " + progress_);
   }
   return viewing == 0 && has_viewers_ ? State::kFinished : State::kRunning;
 }
@@ -139,6 +168,14 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   const bool viewer = m.role == "viewer", master = m.role == "master";
   // Told to finish, by `telesplat ctl stop`: the viewers finish too.
   if (code == 0) return master ? State::kFinished : State::kRunning;
+  // A window stays, and another data set can be opened in it.
+  if (m.role == "data" && code == 2 && chosen_) {
+    m.given_up = true;
+    progress_.clear();
+    tell_viewers("problem " + group_.last_log_line(m.name));
+    news.push_back(group_.last_log_line(m.name));
+    return State::kRunning;
+  }
   if (viewer || master || code == 2 || m.restarts >= kMaxRestarts) {
     const std::string last = group_.last_log_line(m.name);
     news.push_back(code == 2 && !viewer ? last : fmt::format("{} ended with code {}: {}", m.name, code, last));
@@ -167,6 +204,7 @@ void Pipeline::read(Member& m) {
   for (const auto& line : m.process->read_lines()) {
     if (line.starts_with("progress ")) read_progress(m.name, line.substr(9));
     if (line.starts_with("note ")) notes_.push_back(line.substr(5));
+    if (line.starts_with("open ") && m.told) wishes_.push_back(line.substr(5));
   }
 }
 

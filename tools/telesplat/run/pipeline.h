@@ -35,12 +35,19 @@ class Pipeline {
   const std::string& progress() const { return progress_; }
   /// Lines that viewers told the person, since the last call.
   std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
+  /// Data sets that people at windows want to see, since the last call.
+  std::vector<std::string> take_wishes() { return std::exchange(wishes_, {}); }
+  /// Says something to the viewers that it started with a window (viewer::LauncherLines).
+  void tell_viewers(const std::string& line);
+  /// The session goes on with the data set of these options: other data servers take the place of those that are there.
+  Status open(const RunOptions& options);
   /// Ends everything: viewers first, then a "stop" to the master, then whoever is left.
   void finish() { group_.finish(); }
 
  private:
   Pipeline(const RunOptions& options, ProcessGroup group);
   Status start_servers();
+  Status start_data();
   Status start_viewers(double clock_from_s);
   Status start_wall();
   /// Puts the link of a place, if there is one, before a process that is not started yet, or before several: starts its
@@ -55,9 +62,11 @@ class Pipeline {
   ProcessGroup group_;
   std::string progress_;
   std::map<std::string, tools::TimeLeft> time_left_;  // by member
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, wishes_;
+  std::string told_progress_;                  // the viewers
   std::map<std::string, std::string> relays_;  // where they listen, by name
   bool has_viewers_ = false;
+  bool chosen_ = false;  // the data set, by a person at a window: one that cannot be read does not end the session
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
   double asked_s_ = -1e9;
 };

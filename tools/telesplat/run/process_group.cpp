@@ -63,13 +63,22 @@ Status ProcessGroup::start(Member member) {
 }
 
 Status ProcessGroup::restart(Member& member) {
-  auto child =
-      ChildProcess::start(member.name, fmt::format("{}/telesplat-{}", program_directory(), member.role),
-                          member.arguments, fmt::format("{}/{}.log", log_directory_, member.name), member.nice);
+  auto child = ChildProcess::start(member.name, fmt::format("{}/telesplat-{}", program_directory(), member.role),
+                                   member.arguments, fmt::format("{}/{}.log", log_directory_, member.name), member.nice,
+                                   member.told);
   if (!child) return child.error();
   member.process.reset();
   member.process.emplace(std::move(*child));
   return ok_status();
+}
+
+void ProcessGroup::end(const std::string& role) {
+  const auto of_role = [&](const Member& m) { return m.role == role; };
+  for (Member& m : members_)
+    if (of_role(m) && m.process) m.process->signal(SIGTERM);
+  for (Member& m : members_)
+    if (of_role(m) && m.process) m.process->finish(kFarewell_s);
+  std::erase_if(members_, of_role);
 }
 
 Member* ProcessGroup::find(const std::string& name) {

@@ -20,7 +20,9 @@ struct Member {
   std::string name;
   std::vector<std::string> arguments;  ///< beside name, log level and the master's address
   int nice = 0;
-  bool joins = true;  ///< is told where the master is
+  bool joins = true;      ///< is told where the master is
+  bool told = false;      ///< ChildProcess::tell() reaches it
+  bool given_up = false;  ///< it has ended, and nothing follows from that
   int restarts = 0;
   std::optional<ChildProcess> process;
 };
@@ -47,7 +49,10 @@ class ProcessGroup {
   /// Starts a member that died once more.
   Status restart(Member& member);
 
-  /// In the order of their start; addresses hold.
+  /// Ends the members of a role, which are forgotten; waits for that, some seconds at most.
+  void end(const std::string& role);
+
+  /// In the order of their start; addresses hold until some are forgotten.
   std::deque<Member>& members() { return members_; }
   Member* find(const std::string& name);
 

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "client/viewer/display/window.h"
+#include "client/viewer/panel/recent_files.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/machine.h"
@@ -56,6 +57,11 @@ class PassingFolder {
  private:
   std::string path_;
 };
+
+// For the dialog that opens data sets. A list that cannot be kept is no reason not to look at them.
+void keep_recent(const std::string& data_set) {
+  if (const Status s = viewer::add_recent(viewer::recent_files_path(), data_set); !s) log::info("{}", s.error().text);
+}
 
 /// A run from start to end. Exit codes: 0 done, 1 failed while running, 2 bad usage or input, 130 interrupted. No
 /// process is left behind in any case.
@@ -117,6 +123,7 @@ class Run {
       state = pipeline.supervise(news);
       for (const auto& n : news) progress_.line("telesplat: " + n);
       for (const auto& n : pipeline.take_notes()) progress_.line(n);
+      for (const auto& wish : pipeline.take_wishes()) open(pipeline, wish);
       if (monotonic_s() - asked_s > kAskEvery_s) {
         control.request_status();
         asked_s = monotonic_s();
@@ -137,6 +144,30 @@ class Run {
     }
     progress_.close();
     return state;
+  }
+
+  // What a person at the window wants to see instead. What cannot be is said there and here, and nothing else happens.
+  void open(Pipeline& pipeline, const std::string& wish) {
+    const Status opened = try_open(pipeline, wish);
+    if (opened) return;
+    pipeline.tell_viewers("problem " + opened.error().text);
+    progress_.line("telesplat: " + opened.error().text);
+  }
+
+  Status try_open(Pipeline& pipeline, const std::string& wish) {
+    if (!o_.out.empty())
+      return Error{"a session that is recorded keeps its data set: without --out others can be opened"};
+    RunOptions other = o_;
+    other.data_servers = 1;
+    other.data = {};
+    other.data.scene = wish;
+    other.data.mesh.cache_dir = o_.data.mesh.cache_dir;
+    other.data.mesh.use_cache = o_.data.mesh.use_cache;
+    const auto scene = scene_of(other.data);
+    if (!scene) return scene.error();
+    if (const Status s = (*scene)->check(); !s) return s;
+    keep_recent(wish);
+    return pipeline.open(other);
   }
 
   // The record of a joined session is its master's; so what its viewers did is asked for, once they have left.
@@ -266,6 +297,7 @@ int run(RunOptions o, const options::Given& given) {
   }
   net::install_signal_handlers();
   log::initialise("telesplat", "warn");
+  if (o.viewer.window && !o.data.scene.empty()) keep_recent(o.data.scene);
   return Run(std::move(o), std::move(*scene), std::move(movie)).go();
 }
 

@@ -23,7 +23,11 @@ constexpr double kWallHold_s = 2;
 Table display_rows(RunOptions& o) {
   if (o.viewer.window)
     return {{.flag = "--out", .value = &o.out, .help = "run folder; without it nothing is recorded"},
-            {.flag = "--fullscreen", .value = &o.viewer.fullscreen, .help = "the window fills the screen"}};
+            {.flag = "--fullscreen", .value = &o.viewer.fullscreen, .help = "the window fills the screen"},
+            {.flag = "--panel",
+             .value = &o.viewer.panel,
+             .help = "on: the window begins with its panel, which Tab hides and shows",
+             .on_off = true}};
   return {
       {.flag = "--out", .value = &o.out, .help = "run folder; default: runs/DATE-TIME"},
       {.flag = "--viewers",
@@ -203,7 +207,8 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   std::shared_ptr<Scene> out;
   if (o.data.scene.empty()) {
     if (o.join_master.empty()) o.join_master = net::master_from_environment();
-    if (o.join_master.empty())
+    // A window may begin with nothing: the person opens something there.
+    if (o.join_master.empty() && !(o.viewer.window && o.out.empty()))
       return Error{"a scene is needed: a mesh or volume file, a folder of DICOM slices, or the word julia"};
     if (const Status s = refuse_scene_flags(o, given); !s) return s.error();
   } else {
@@ -222,6 +227,8 @@ Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given
   if (const Status s = image::validate_samples(o.verify_samples); !s)
     return Error{"--verify-samples: " + s.error().text};
   if (const Status s = viewer::settle(o.viewer); !s) return s.error();
+  o.viewer.launched = o.viewer.window && o.join_master.empty();
+  o.viewer.begins_empty = o.viewer.launched && o.data.scene.empty();
   return out;
 }
 
