@@ -84,6 +84,7 @@ class WindowTest : public testing::Test {
  protected:
   void SetUp() override {
     if (!VirtualDisplay::installed()) GTEST_SKIP() << "there is no Xvfb here: tools/setup installs it (package xvfb)";
+    settings_.emplace("XDG_CONFIG_HOME", (folder_ / "config").c_str());
     display_.emplace();
     ASSERT_TRUE(display_->ready()) << "Xvfb did not start";
   }
@@ -95,6 +96,8 @@ class WindowTest : public testing::Test {
     return window.value_or(0);
   }
 
+  TemporaryFolder folder_;
+  std::optional<Environment> settings_;
   std::optional<VirtualDisplay> display_;
 };
 
@@ -177,7 +180,8 @@ TEST_F(WindowTest, TellsItsKeysOnTheTerminalAndInTheWindow) {
   PipelineRun run({}, "", "view");
   const auto window = live_window(run.program());
   ASSERT_NE(window, 0u);
-  EXPECT_NE(run.program().err().find("H shows all keys: left drag orbits"), std::string::npos) << run.program().err();
+  EXPECT_NE(run.program().err().find("F1 shows all keys: Tab shows the panel, left drag orbits"), std::string::npos)
+      << run.program().err();
   // The keys lie in the upper left corner, where nothing else was; they are in no screenshot.
   const auto ink = [](const image::View& v) {
     int out = 0;

@@ -1,0 +1,192 @@
+// The panel of `telesplat view`: a real window on a display without a screen, real input, real processes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "tests/support/pipeline_run.h"
+#include "tests/support/virtual_display.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Of a display of 96 dots an inch, as an X server without a screen is one.
+constexpr int kLetter = 15, kPanelWidth = 24 * kLetter;
+constexpr uint32_t kCheckMark = 0x56b4e9;
+
+uint32_t at(const image::View& v, int x, int y) { return v.colour[size_t(y * v.width + x)] & 0xffffff; }
+
+bool alike(uint32_t a, uint32_t b) {
+  for (const int shift : {0, 8, 16})
+    if (std::abs(int(a >> shift & 255) - int(b >> shift & 255)) > 3) return false;
+  return true;
+}
+
+// Whether the panel lies over the left side: its ground is there, and nothing like it at the right.
+bool shows_panel(const image::View& v) {
+  int ground = 0;
+  for (int y = 0; y < v.height; ++y) ground += alike(at(v, 3, y), 0x171819);
+  return ground > v.height * 9 / 10;
+}
+
+struct Place {
+  int x = 0, y = 0;
+};
+
+// The middles of check marks and chosen dots: compact blobs of their colour. Curves are thin.
+std::vector<Place> marks(const image::View& v) {
+  std::vector<Place> out;
+  for (int y = 0; y + 8 < v.height; ++y)
+    for (int x = 0; x + 8 < std::min(v.width, kPanelWidth); ++x) {
+      int count = 0;
+      for (int dy = 0; dy < 8; ++dy)
+        for (int dx = 0; dx < 8; ++dx) count += alike(at(v, x + dx, y + dy), kCheckMark);
+      const bool known = std::any_of(out.begin(), out.end(), [&](const Place& p) {
+        return std::abs(p.x - x - 4) < 14 && std::abs(p.y - y - 4) < 14;
+      });
+      if (count >= 20 && !known) out.push_back({x + 4, y + 4});
+    }
+  return out;
+}
+
+class PanelTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!VirtualDisplay::installed()) GTEST_SKIP() << "there is no Xvfb here: tools/setup installs it (package xvfb)";
+    ::setenv("XDG_CONFIG_HOME", (folder_ / "config").c_str(), 1);
+    display_.emplace();
+    ASSERT_TRUE(display_->ready()) << "Xvfb did not start";
+  }
+  void TearDown() override { ::unsetenv("XDG_CONFIG_HOME"); }
+
+  VirtualDisplay::WindowId live_window(const Program& program, const std::string& title = " fps, ") {
+    std::optional<VirtualDisplay::WindowId> window;
+    EXPECT_TRUE(wait_until([&] { return (window = display_->find(title)).has_value(); }, 60)) << program.err();
+    return window.value_or(0);
+  }
+  void click(VirtualDisplay::WindowId window, const Place& p) {
+    display_->move_pointer(window, p.x, p.y);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    display_->button(1, true);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    display_->button(1, false);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  void drag(VirtualDisplay::WindowId window, const Place& from, const Place& to) {
+    display_->move_pointer(window, from.x, from.y);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    display_->button(1, true);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    display_->move_pointer(window, to.x, to.y);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    display_->button(1, false);
+  }
+  image::View shown(VirtualDisplay::WindowId window) { return display_->content(window).value_or(image::View{}); }
+  bool panel_is(VirtualDisplay::WindowId window, bool wanted) {
+    return wait_until([&] {
+      const auto v = display_->content(window);
+      return v && shows_panel(*v) == wanted;
+    });
+  }
+
+  TemporaryFolder folder_;
+  std::optional<VirtualDisplay> display_;
+};
+
+TEST_F(PanelTest, LiesOverTheFrameKeepsThePointerAndGoesWithTab) {
+  PipelineRun run({"--panel", "on", "--size", "960x720", "--trajectory", "still"}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  EXPECT_TRUE(panel_is(window, true));
+  const auto pose = [&] {
+    const auto x = run.column("frames.csv", "px"), z = run.column("frames.csv", "pz");
+    const size_t rows = std::min(x.size(), z.size());
+    return rows > 0 ? std::pair(x[rows - 1], z[rows - 1]) : std::pair(0.0, 0.0);
+  };
+  ASSERT_TRUE(wait_until([&] { return pose().second > 0; }));
+  const auto home = pose();
+  drag(window, {40, 8}, {300, 8});
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  EXPECT_EQ(pose(), home) << "what happens over the panel is the panel's";
+  drag(window, {600, 300}, {700, 300});
+  EXPECT_TRUE(wait_until([&] { return std::abs(pose().first - home.first) > 0.01; }));
+
+  display_->tap("p");
+  const auto picture = [&] {
+    for (const auto& entry : fs::directory_iterator(run.out() + "/images"))
+      if (entry.path().filename().string().starts_with("telesplat-")) return entry.path().string();
+    return std::string();
+  };
+  ASSERT_TRUE(wait_until([&] { return fs::exists(run.out() + "/images") && !picture().empty(); }));
+  const auto read = image::read_view(picture());
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_FALSE(shows_panel(*read)) << "pictures show what is drawn";
+
+  display_->tap("Tab");
+  EXPECT_TRUE(panel_is(window, false));
+  display_->tap("Tab");
+  EXPECT_TRUE(panel_is(window, true));
+  display_->close(window);
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
+TEST_F(PanelTest, ACheckMarkChangesHowFramesAreDrawn) {
+  PipelineRun run({"--panel", "on", "--size", "960x760", "--trajectory", "still"}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  ASSERT_TRUE(panel_is(window, true));
+  // fill, smooth, antialias in one row.
+  std::vector<Place> found;
+  ASSERT_TRUE(wait_until([&] { return (found = marks(shown(window))).size() >= 4; })) << found.size();
+  const auto three = std::find_if(found.begin(), found.end(), [&](const Place& p) {
+    return std::count_if(found.begin(), found.end(), [&](const Place& q) { return std::abs(p.y - q.y) < 4; }) == 3;
+  });
+  ASSERT_NE(three, found.end());
+  Place fill = *three;
+  for (const Place& p : found)
+    if (std::abs(p.y - fill.y) < 4 && p.x < fill.x) fill = p;
+  click(window, fill);
+  const auto finish = [&] {
+    const auto v = run.column("frames.csv", "finish");
+    return v.empty() ? -1.0 : v.back();
+  };
+  EXPECT_TRUE(wait_until([&] { return finish() == 6; })) << finish() << ": 1 fill, 2 smooth, 4 antialias";
+  click(window, fill);
+  EXPECT_TRUE(wait_until([&] { return finish() == 7; })) << finish();
+  display_->tap("q");
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
+TEST_F(PanelTest, AWindowWithoutADataSetOpensOneByAWordOfTheDialog) {
+  Program view("telesplat", {"view", "--size", "960x720", "--sampler-threads", "1", "--panel", "off"},
+               folder_ / "view");
+  const auto window = live_window(view, "waiting for the data set");
+  ASSERT_NE(window, 0u);
+  // The dialog lies in the middle.
+  const auto has_dialog = [&] {
+    const auto v = display_->content(window);
+    return v && alike(at(*v, v->width / 2, v->height - 130), 0x171819);
+  };
+  EXPECT_TRUE(wait_until(has_dialog));
+  fs::path picture = folder_ / "dialog.png";
+  ASSERT_TRUE(image::write_png(picture, shown(window)));
+  // "julia" is the button at the right of the path's row.
+  const int dialog_right = 480 + 22 * kLetter, dialog_top = 360 - 17 * kLetter;
+  click(window, {dialog_right - 32, dialog_top + 62});
+  const auto live = live_window(view);
+  EXPECT_EQ(live, window) << "it is the same window";
+  EXPECT_TRUE(display_->title(window).starts_with("julia")) << display_->title(window);
+  EXPECT_TRUE(wait_until([&] { return !has_dialog(); }));
+  EXPECT_EQ(read_text(folder_ / "config/telesplat/recent"), "julia\n");
+  display_->tap("q");
+  EXPECT_EQ(view.wait(60), 0) << view.err();
+}
+
+}  // namespace
+}  // namespace telesplat::test
