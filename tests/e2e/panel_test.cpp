@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "tests/support/pipeline_run.h"
@@ -33,6 +34,13 @@ bool shows_panel(const image::View& v) {
   int ground = 0;
   for (int y = 0; y < v.height; ++y) ground += alike(at(v, 3, y), 0x171819);
   return ground > v.height * 9 / 10;
+}
+
+// Where the panel ends: the last column that is its ground for the most part of the lowest rows.
+int panel_width(const image::View& v) {
+  int width = 0;
+  for (int x = 0; x < v.width; ++x) width = alike(at(v, x, v.height - 3), 0x171819) ? x + 1 : width;
+  return width;
 }
 
 struct Place {
@@ -136,6 +144,18 @@ TEST_F(PanelTest, LiesOverTheFrameKeepsThePointerAndGoesWithTab) {
   EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
 }
 
+TEST_F(PanelTest, OnADenseScreenLettersHaveMorePixels) {
+  display_->set_density(192);
+  PipelineRun run({"--panel", "on", "--size", "1000x700", "--trajectory", "still"}, "", "view");
+  const auto window = live_window(run.program());
+  ASSERT_NE(window, 0u);
+  EXPECT_TRUE(panel_is(window, true));
+  EXPECT_TRUE(wait_until([&] { return std::abs(panel_width(shown(window)) - 2 * kPanelWidth) < 40; }))
+      << panel_width(shown(window));
+  display_->tap("q");
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
 TEST_F(PanelTest, ACheckMarkChangesHowFramesAreDrawn) {
   PipelineRun run({"--panel", "on", "--size", "960x760", "--trajectory", "still"}, "", "view");
   const auto window = live_window(run.program());
@@ -184,6 +204,54 @@ TEST_F(PanelTest, AWindowWithoutADataSetOpensOneByAWordOfTheDialog) {
   EXPECT_TRUE(display_->title(window).starts_with("julia")) << display_->title(window);
   EXPECT_TRUE(wait_until([&] { return !has_dialog(); }));
   EXPECT_EQ(read_text(folder_ / "config/telesplat/recent"), "julia\n");
+
+  // Letters that are typed are no keys of the window; what is not there is said, and the picture stays.
+  display_->tap("o");
+  EXPECT_TRUE(wait_until(has_dialog));
+  click(window, {480 - 21 * kLetter, dialog_top + 62});
+  for (const char* key : {"slash", "q", "period", "p", "l", "y", "Return"}) {
+    display_->tap(key);
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  }
+  EXPECT_TRUE(wait_until([&] { return view.err().find("/q.ply") != std::string::npos; })) << view.err();
+  EXPECT_TRUE(wait_until([&] { return display_->title(window).find(" fps, ") != std::string::npos; }));
+  EXPECT_EQ(read_text(folder_ / "config/telesplat/recent"), "julia\n");
+  display_->tap("o");
+  display_->tap("q");
+  EXPECT_EQ(view.wait(60), 0) << view.err();
+}
+
+TEST_F(PanelTest, AFileThatIsDroppedIsOpenedInTheSameWindow) {
+  write_terrain(folder_ / "first.ply");
+  write_volume(folder_ / "second.mha");
+  Program view(
+      "telesplat",
+      {"view", folder_ / "first.ply", "--cache", folder_ / "cache", "--size", "960x720", "--sampler-threads", "1"},
+      folder_ / "view");
+  const auto window = live_window(view, "first.ply - ");
+  ASSERT_NE(window, 0u);
+  EXPECT_EQ(live_window(view), window);
+  ASSERT_TRUE(display_->drop_file(window, folder_ / "second.mha"));
+  EXPECT_EQ(live_window(view, "second.mha - "), window) << view.err();
+  EXPECT_TRUE(wait_until([&] { return display_->title(window).find("samples drawn") != std::string::npos; }, 60))
+      << display_->title(window);
+  EXPECT_EQ(read_text(folder_ / "config/telesplat/recent"),
+            folder_ / "second.mha" + "\n" + (folder_ / "first.ply") + "\n");
+
+  // What cannot be read is said, and the next one is opened all the same.
+  std::ofstream(folder_ / "broken.ply") << "ply\nformat ascii 1.0\nelement vertex 3\nend_header\n1 2";
+  ASSERT_TRUE(display_->drop_file(window, folder_ / "broken.ply"));
+  EXPECT_TRUE(wait_until([&] { return view.err().find("broken.ply: ") != std::string::npos; }, 30)) << view.err();
+  ASSERT_TRUE(display_->drop_file(window, folder_ / "first.ply"));
+  EXPECT_EQ(live_window(view, "first.ply - "), window) << view.err();
+  EXPECT_TRUE(wait_until([&] { return display_->title(window).find("points drawn") != std::string::npos; }, 60))
+      << display_->title(window);
+
+  // A path plays at once.
+  std::ofstream(folder_ / "path.csv") << "t_s,px,py,pz,qw,qx,qy,qz\n0,0,0.3,1,1,0,0,0\n60,0.2,0.3,1,1,0,0,0\n";
+  ASSERT_TRUE(display_->drop_file(window, folder_ / "path.csv"));
+  EXPECT_TRUE(wait_until([&] { return view.err().find("playing " + (folder_ / "path.csv")) != std::string::npos; }))
+      << view.err();
   display_->tap("q");
   EXPECT_EQ(view.wait(60), 0) << view.err();
 }

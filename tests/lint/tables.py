@@ -120,7 +120,7 @@ OUTSIDE_HEADERS = [
     ),
     (r"(epoxy/egl\.h|EGL/.*)", ["common/gl", "client/viewer/display/window.cpp"]),
     (r"GLFW/.*", ["client/viewer/display/window.cpp"]),
-    (r"(imgui|backends/imgui_impl_).*", ["client/viewer/panel/gui"]),
+    (r"(imgui|backends/imgui_impl_).*", ["client/viewer/panel/gui", "tests/unit/viewer/panel_view_test.cpp"]),
     (r"GL/.*", []),
     (r"CLI/.*", ["common/options/parser.cpp"]),
     (r"toml\+\+/.*", ["tools/telesplat"]),

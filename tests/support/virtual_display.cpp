@@ -13,6 +13,7 @@
 #include <vector>
 
 // Last: its macros take common words.
+#include <X11/Xatom.h>
 #include <X11/Xlib.h>
 #include <X11/Xutil.h>
 #include <X11/extensions/XTest.h>
@@ -78,6 +79,14 @@ VirtualDisplay::VirtualDisplay() : display_before_(variable("DISPLAY")), wayland
   unsetenv("WAYLAND_DISPLAY");
   XSetErrorHandler(ignore_error);
   connection_ = XOpenDisplay(nullptr);
+}
+
+void VirtualDisplay::set_density(int dots_an_inch) {
+  Display* d = display_of(connection_);
+  const std::string resources = "Xft.dpi:\t" + std::to_string(dots_an_inch) + "\n";
+  XChangeProperty(d, DefaultRootWindow(d), XA_RESOURCE_MANAGER, XA_STRING, 8, PropModeReplace,
+                  reinterpret_cast<const unsigned char*>(resources.c_str()), int(resources.size()));
+  XSync(d, False);
 }
 
 void VirtualDisplay::go_away() {
@@ -156,6 +165,50 @@ void VirtualDisplay::tap(const std::string& keysym) {
   const KeyCode code = XKeysymToKeycode(d, XStringToKeysym(keysym.c_str()));
   for (const bool down : {true, false}) XTestFakeKeyEvent(d, code, down, CurrentTime);
   XFlush(d);
+}
+
+bool VirtualDisplay::drop_file(WindowId window, const std::string& path) {
+  Display* d = display_of(connection_);
+  const auto atom = [&](const char* name) { return XInternAtom(d, name, False); };
+  const Window source = XCreateSimpleWindow(d, DefaultRootWindow(d), 0, 0, 1, 1, 0, 0, 0);
+  XSetSelectionOwner(d, atom("XdndSelection"), source, CurrentTime);
+  const auto say = [&](const char* what, long second, long third, long fourth, long fifth) {
+    XEvent event{};
+    event.xclient = {.type = ClientMessage, .window = window, .message_type = atom(what), .format = 32};
+    const long values[] = {long(source), second, third, fourth, fifth};
+    for (int i = 0; i < 5; ++i) event.xclient.data.l[i] = values[i];
+    XSendEvent(d, window, False, NoEventMask, &event);
+  };
+  constexpr long kVersion = 5;
+  say("XdndEnter", kVersion << 24, long(atom("text/uri-list")), 0, 0);
+  say("XdndPosition", 0, 100 << 16 | 100, CurrentTime, long(atom("XdndActionCopy")));
+  say("XdndDrop", 0, CurrentTime, 0, 0);
+  XFlush(d);
+  const std::string text = "file://" + path + "\r\n";
+  bool asked = false;
+  for (int waited_ms = 0; waited_ms < kStart_ms && !asked; waited_ms += 10) {
+    XEvent event;
+    if (!XCheckTypedWindowEvent(d, source, SelectionRequest, &event)) {
+      usleep(10'000);
+      continue;
+    }
+    const XSelectionRequestEvent& request = event.xselectionrequest;
+    XChangeProperty(d, request.requestor, request.property, request.target, 8, PropModeReplace,
+                    reinterpret_cast<const unsigned char*>(text.c_str()), int(text.size()));
+    XEvent answer{};
+    answer.xselection = {.type = SelectionNotify,
+                         .requestor = request.requestor,
+                         .selection = request.selection,
+                         .target = request.target,
+                         .property = request.property,
+                         .time = request.time};
+    XSendEvent(d, request.requestor, False, NoEventMask, &answer);
+    XFlush(d);
+    asked = true;
+  }
+  XDestroyWindow(d, source);
+  XFlush(d);
+  return asked;
 }
 
 void VirtualDisplay::resize(WindowId window, int width, int height) {

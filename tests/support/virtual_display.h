@@ -37,8 +37,13 @@ class VirtualDisplay {
   /// Presses and releases; keysym: an X name, "p" or "F12".
   void tap(const std::string& keysym);
   void resize(WindowId window, int width, int height);
+  /// Drops a file, as a file manager does (XDND). False: the window did not ask for it.
+  bool drop_file(WindowId window, const std::string& path);
   /// What a window manager sends when the person closes a window.
   void close(WindowId window);
+
+  /// What desktops tell programs of their screen: so many dots an inch, 96 of a plain one. For windows that open later.
+  void set_density(int dots_an_inch);
 
   /// The server ends, as when the person's session or a forwarded connection does. Nothing else can be asked then.
   void go_away();

@@ -2,6 +2,7 @@
 
 #include <epoxy/gl.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace telesplat::viewer {
@@ -146,7 +147,7 @@ void FramePresenter::draw_overlays(const Overlays& overlays, int width, int heig
   glDisable(GL_BLEND);
 }
 
-void FramePresenter::draw(const image::View& view, int width, int height, const Overlays& overlays) {
+void FramePresenter::draw(const image::View& view, int width, int height, const Overlays& overlays, int hidden) {
   if (view.width != width_ || view.height != height_) resize(view.width, view.height);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, texture_);
@@ -161,7 +162,12 @@ void FramePresenter::draw(const image::View& view, int width, int height, const 
   glUseProgram(program_);
   glUniform1i(keeps_alpha_, 0);
   glBindVertexArray(vertex_array_);
+  if (hidden > 0) {
+    glEnable(GL_SCISSOR_TEST);
+    glScissor(hidden, 0, std::max(0, width - hidden), height);
+  }
   glDrawArrays(GL_TRIANGLES, 0, 3);
+  glDisable(GL_SCISSOR_TEST);
   draw_overlays(overlays, width, height);
 }
 

@@ -25,7 +25,8 @@ class FramePresenter {
 
   /// Draws the frame over the whole default framebuffer of width x height pixels; scales it if it has another size.
   /// What lies over it is blended on.
-  void draw(const image::View& view, int width, int height, const Overlays& overlays);
+  /// hidden: so many columns at the left will be covered by something else and are left out.
+  void draw(const image::View& view, int width, int height, const Overlays& overlays, int hidden = 0);
   bool has_pixel_ring() const { return has_ring_; }
 
  private:

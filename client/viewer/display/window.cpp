@@ -351,14 +351,16 @@ std::vector<std::string> Window::take_dropped() { return std::exchange(impl_->dr
 
 bool Window::gui_due(double now_s) const { return impl_->gui && impl_->gui->due(now_s); }
 
-void Window::present(const image::View& view, const Overlays& overlays, const std::function<void()>& gui) {
+void Window::present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui) {
   if (lost()) return;
   int width = 0, height = 0;
   glfwGetFramebufferSize(impl_->window, &width, &height);
   if (width <= 0 || height <= 0) return;
   const Current current(*this);
-  impl_->presenter->draw(view, width, height, overlays);
-  if (impl_->gui) impl_->gui->draw({width, height, content_scale()}, monotonic_s(), gui);
+  const Gui::Place place{width, height, content_scale()};
+  const int hidden = impl_->gui ? impl_->gui->prepare(place, monotonic_s(), gui) : 0;
+  impl_->presenter->draw(view, width, height, overlays, hidden);
+  if (impl_->gui) impl_->gui->show(place);
   glfwSwapBuffers(impl_->window);
 }
 

@@ -65,8 +65,8 @@ class Window {
   /// Files that were dropped onto the window since the last call.
   std::vector<std::string> take_dropped();
   /// Shows a frame and what lies over it, in time with the screen; nothing happens while the window is minimised. gui:
-  /// builds what lies over all, with Dear ImGui's functions; null: nothing.
-  void present(const image::View& view, const Overlays& overlays, const std::function<void()>& gui = {});
+  /// builds what lies over all (Gui::prepare()); null: nothing.
+  void present(const image::View& view, const Overlays& overlays, const std::function<double()>& gui = {});
   /// Whether what `gui` builds has changed since it was presented.
   bool gui_due(double now_s) const;
 

@@ -242,16 +242,18 @@ void WindowSurface::present(const image::View& view, bool changed) {
   if (!changed && same && now.at_s - shown_.at_s < kShowAgain_s) return;
   shown_ = now;
   if (!now.panel) return window_->present(view, overlays_);
-  window_->present(view, overlays_, [&] { build_panel(now.at_s); });
+  window_->present(view, overlays_, [&] { return build_panel(now.at_s); });
 }
 
-void WindowSurface::build_panel(double now_s) {
-  if (panel_.shown()) {
-    show_panel(panel_, panel_view_, now_s,
-               {[&](Panel&) { show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); }); }});
-  }
+// How much of the left side it covers.
+double WindowSurface::build_panel(double now_s) {
+  double width = 0;
+  if (panel_.shown())
+    width = show_panel(panel_, panel_view_, now_s,
+                       {[&](Panel&) { show_scene(scene_controls_, scene_view_, now_s, [this] { save_transfer(); }); }});
   if (panel_.shown() && interaction_.shows_help()) show_keys(key_lines());
   show_open(open_view_, !scene_.box_room.empty(), [this](const std::string& path) { open(path); });
+  return width;
 }
 
 void WindowSurface::take_launcher_lines(double now_s) {
@@ -303,6 +305,10 @@ void WindowSurface::use_transfer_file(const std::string& path) {
 void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& session) {
   if (!session) return;
   scene_controls_.on_session(monotonic_s(), *session);
+  // Another data set is looked at from its own first view.
+  const std::string name = scene::SessionView(*session).fact("scene");
+  if (!name.empty() && !scene_name_.empty() && name != scene_name_) panel_.press(Key::kR);
+  if (!name.empty()) scene_name_ = name;
   panel_.on_told_sampling(
       scene::SessionView(*session).setting("viewer.least_sampling", options_.sampling.least_sampling));
 }

@@ -76,7 +76,7 @@ class WindowSurface final : public DisplaySurface {
   void keep_path();
   void tell(const std::string& line);
   void run_panel(double now_s, Look& look);
-  void build_panel(double now_s);
+  double build_panel(double now_s);
   void save_transfer();
   void take_launcher_lines(double now_s);
   void take_dropped();
@@ -91,6 +91,7 @@ class WindowSurface final : public DisplaySurface {
   std::string title_text_, title_shown_;
   Overlays overlays_;
   ShownScene scene_;
+  std::string scene_name_;
   int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
   std::shared_ptr<const image::Legend> legend_;
   int legend_width_ = 0, legend_height_ = 0;  // of the window that the legend on display suits

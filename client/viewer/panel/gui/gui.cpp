@@ -64,6 +64,7 @@ struct Gui::Impl {
   GuiStyle style;
   std::vector<Area> areas;  // of what is shown, a window each
   Area shown;               // their union: the texture holds nothing elsewhere
+  int opaque = 0;           // pixels at the window's left that nothing shines through
   double built_at_s = -1e9;
   int builds_due = kAfterEvent;
 
@@ -92,14 +93,17 @@ struct Gui::Impl {
     builds_due = kAfterEvent;
   }
 
-  // In pixels of the framebuffer, a rim for soft edges included.
-  void scissor(const Area& area) const {
+  // Drawing is confined to an area, a rim for soft edges included, as far as it lies right of this column. False: nothing
+  // is left of it.
+  bool scissor(const Area& area, int from) const {
     const ImGuiIO& io = ImGui::GetIO();
     const double sx = io.DisplayFramebufferScale.x, sy = io.DisplayFramebufferScale.y;
-    const int left = std::clamp(int(area.left * sx) - 1, 0, width), top = std::clamp(int(area.top * sy) - 1, 0, height);
-    const int right = std::clamp(int(std::min(area.right * sx, 1e6)) + 2, 0, width);
-    const int bottom = std::clamp(int(std::min(area.bottom * sy, 1e6)) + 2, 0, height);
-    glScissor(left, height - bottom, std::max(0, right - left), std::max(0, bottom - top));
+    const auto pixel = [](double v, int most) { return int(std::clamp(v, 0.0, double(most))); };
+    const int left = std::max(from, pixel(area.left * sx - 1, width)), top = pixel(area.top * sy - 1, height);
+    const int right = pixel(area.right * sx + 2, width), bottom = pixel(area.bottom * sy + 2, height);
+    if (right <= left || bottom <= top) return false;
+    glScissor(left, height - bottom, right - left, bottom - top);
+    return true;
   }
 };
 
@@ -164,7 +168,7 @@ bool Gui::takes_text() const { return shows() && ImGui::GetIO().WantTextInput; }
 
 bool Gui::due(double now_s) const { return impl_->builds_due > 0 || now_s - impl_->built_at_s >= kPeriod_s; }
 
-void Gui::build_texture(const Place& place, const std::function<void()>& build) {
+void Gui::build_texture(const Place& place, const std::function<double()>& build) {
   Impl& m = *impl_;
   m.resize(place.width, place.height);
   ImGui_ImplGlfw_NewFrame();
@@ -174,14 +178,15 @@ void Gui::build_texture(const Place& place, const std::function<void()>& build) 
   ImGui_ImplOpenGL3_NewFrame();
   if (ImGui::GetIO().Fonts->TexID == nullptr) ImGui_ImplOpenGL3_CreateFontsTexture();
   ImGui::NewFrame();
-  build();
+  m.opaque = std::clamp(int(build() * pixels_a_unit), 0, place.width);
   ImGui::Render();
   const ImDrawData* drawn = ImGui::GetDrawData();
   glBindFramebuffer(GL_FRAMEBUFFER, m.framebuffer);
   glEnable(GL_SCISSOR_TEST);
-  m.scissor(m.shown);
-  glClearColor(0, 0, 0, 0);
-  glClear(GL_COLOR_BUFFER_BIT);
+  if (m.scissor(m.shown, 0)) {
+    glClearColor(0, 0, 0, 0);
+    glClear(GL_COLOR_BUFFER_BIT);
+  }
   glDisable(GL_SCISSOR_TEST);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());  // colours come to be premultiplied: over nothing
   m.areas.clear();
@@ -194,38 +199,45 @@ void Gui::build_texture(const Place& place, const std::function<void()>& build) 
   }
 }
 
-void Gui::blend(const Place& place) {
-  Impl& m = *impl_;
-  glBindFramebuffer(GL_FRAMEBUFFER, 0);
-  if (m.shown.empty()) return;
-  glViewport(0, 0, place.width, place.height);
-  glEnable(GL_SCISSOR_TEST);
-  m.scissor(m.shown);
-  glEnable(GL_BLEND);
-  glBlendEquation(GL_FUNC_ADD);
-  glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
-  m.program.use();
-  glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_2D, m.texture);
-  glBindVertexArray(m.vertex_array);
-  glDrawArrays(GL_TRIANGLES, 0, 3);
-  glDisable(GL_BLEND);
-  glDisable(GL_SCISSOR_TEST);
-}
-
-void Gui::draw(const Place& place, double now_s, const std::function<void()>& build) {
+int Gui::prepare(const Place& place, double now_s, const std::function<double()>& build) {
   Impl& m = *impl_;
   if (!build) {
     m.areas.clear();
+    m.opaque = 0;
     m.builds_due = kAfterEvent;  // for when it is shown again
-    return;
+    return 0;
   }
   if (due(now_s) || place.width != m.width || place.height != m.height) {
     m.builds_due = std::max(0, m.builds_due - 1);
     m.built_at_s = now_s;
     build_texture(place, build);
   }
-  blend(place);
+  return m.opaque;
+}
+
+// Blending reads what is there, which costs most where a processor does the work of OpenGL.
+void Gui::show(const Place& place) {
+  Impl& m = *impl_;
+  if (!shows()) return;
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, place.width, place.height);
+  m.program.use();
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D, m.texture);
+  glBindVertexArray(m.vertex_array);
+  glEnable(GL_SCISSOR_TEST);
+  if (m.opaque > 0) {
+    glScissor(0, 0, m.opaque, place.height);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+  if (m.scissor(m.shown, m.opaque)) {
+    glEnable(GL_BLEND);
+    glBlendEquation(GL_FUNC_ADD);
+    glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glDisable(GL_BLEND);
+  }
+  glDisable(GL_SCISSOR_TEST);
 }
 
 }  // namespace telesplat::viewer

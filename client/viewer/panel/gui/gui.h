@@ -13,7 +13,7 @@ namespace telesplat::viewer {
 
 /// What is built is drawn into a texture, only when something happened or a tenth of a second is over, and that texture
 /// is blended over each frame: so a panel costs little while nobody touches it. One at a time in a process. The
-/// window's context is current in make(), draw() and the destructor. One thread.
+/// window's context is current in make(), prepare(), show() and the destructor. One thread.
 class Gui {
  public:
   /// Error: the context's OpenGL cannot draw it.
@@ -35,24 +35,26 @@ class Gui {
   bool takes_pointer(double x, double y) const;
   /// Whether keys are meant for a text that is being written.
   bool takes_text() const;
-  /// Whether it has something else to show than what draw() showed last.
+  /// Whether it has something else to show than before.
   bool due(double now_s) const;
 
   struct Place {
     int width = 0, height = 0;  ///< of the default framebuffer, pixels
     double content_scale = 1;   ///< of the display; 2 where texts should have twice as many pixels
   };
-  /// Blends what `build` makes with Dear ImGui's functions over the default framebuffer. Null: nothing is drawn, and
-  /// nothing takes the pointer.
-  void draw(const Place& place, double now_s, const std::function<void()>& build);
+  /// Makes what is to be shown, if that is due: `build` does it with Dear ImGui's functions, and says how much of the
+  /// window's left side nothing shines through, in screen coordinates. Null: nothing is shown, and nothing takes the
+  /// pointer. Returns that part in pixels: what lies below need not be drawn.
+  int prepare(const Place& place, double now_s, const std::function<double()>& build);
+  /// Draws it over the default framebuffer.
+  void show(const Place& place);
 
  private:
   struct Impl;
   explicit Gui(std::unique_ptr<Impl> impl);
   void stir();
   bool shows() const;
-  void build_texture(const Place& place, const std::function<void()>& build);
-  void blend(const Place& place);
+  void build_texture(const Place& place, const std::function<double()>& build);
 
   std::unique_ptr<Impl> impl_;
 };

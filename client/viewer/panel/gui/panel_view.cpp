@@ -252,7 +252,7 @@ void show_messages(const Panel& panel) {
 
 }  // namespace
 
-void show_panel(Panel& panel, PanelViewState& state, double now_s, const std::vector<PanelSection>& more) {
+double show_panel(Panel& panel, PanelViewState& state, double now_s, const std::vector<PanelSection>& more) {
   const ImVec2 window = ImGui::GetIO().DisplaySize;
   const float width = std::min(ImGui::GetFontSize() * kWidth, window.x);
   ImGui::SetNextWindowPos({0, 0});
@@ -273,6 +273,7 @@ void show_panel(Panel& panel, PanelViewState& state, double now_s, const std::ve
     if (section("Messages", true)) show_messages(panel);
   }
   ImGui::End();
+  return double(width);
 }
 
 // What stands in the first column ends where two blanks are.

@@ -16,8 +16,9 @@ struct PanelViewState {
   PictureWish picture;
 };
 
-/// Builds the panel. Between Dear ImGui's frames, now_s: monotonic clock.
-void show_panel(Panel& panel, PanelViewState& state, double now_s, const std::vector<PanelSection>& more = {});
+/// Builds the panel. Between Dear ImGui's frames, now_s: monotonic clock. Returns its width: it lies at the left side,
+/// and nothing shines through.
+double show_panel(Panel& panel, PanelViewState& state, double now_s, const std::vector<PanelSection>& more = {});
 
 /// Builds a list of keys beside the panel.
 void show_keys(const std::vector<std::string>& lines);
