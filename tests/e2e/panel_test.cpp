@@ -198,7 +198,7 @@ TEST_F(PanelTest, AWindowWithoutADataSetOpensOneByAWordOfTheDialog) {
   ASSERT_TRUE(image::write_png(picture, shown(window)));
   // "julia" is the button at the right of the path's row.
   const int dialog_right = 480 + 22 * kLetter, dialog_top = 360 - 17 * kLetter;
-  click(window, {dialog_right - 32, dialog_top + 62});
+  click(window, {dialog_right - 73, dialog_top + 59});
   const auto live = live_window(view);
   EXPECT_EQ(live, window) << "it is the same window";
   EXPECT_TRUE(display_->title(window).starts_with("julia")) << display_->title(window);
@@ -208,7 +208,7 @@ TEST_F(PanelTest, AWindowWithoutADataSetOpensOneByAWordOfTheDialog) {
   // Letters that are typed are no keys of the window; what is not there is said, and the picture stays.
   display_->tap("o");
   EXPECT_TRUE(wait_until(has_dialog));
-  click(window, {480 - 21 * kLetter, dialog_top + 62});
+  click(window, {480 - 18 * kLetter, dialog_top + 59});
   for (const char* key : {"slash", "q", "period", "p", "l", "y", "Return"}) {
     display_->tap(key);
     std::this_thread::sleep_for(std::chrono::milliseconds(150));

@@ -51,6 +51,10 @@ void Panel::on_figures(const PanelFigures& f) {
   if (wished_coupling_ == f.coupling) wished_coupling_.reset();
 }
 
+bool Panel::means_something(const Plot& plot) const {
+  return pipeline_ == scene::Pipeline::kPoints || &plot != &plots_[kHoles];
+}
+
 void Panel::on_answer(double now_s, const OrderAnswer& answer) {
   if (!answer.obeyed && answer.order.command == "coupling") wished_coupling_.reset();
   // Sliders tell by what is seen; what is refused is told always.

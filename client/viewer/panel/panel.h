@@ -82,6 +82,8 @@ class Panel {
   void on_figures(const PanelFigures& figures);
   /// The session shows a scene of this kind.
   void on_scene(scene::Pipeline pipeline) { pipeline_ = pipeline; }
+  /// Whether a plot means something for what is shown: slice images have no holes.
+  bool means_something(const Plot& plot) const;
   /// What keys changed.
   void on_look(const Look& look) { look_ = look; }
   void on_answer(double now_s, const OrderAnswer& answer);

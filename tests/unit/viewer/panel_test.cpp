@@ -119,6 +119,10 @@ TEST_F(PanelTest, HolesThatAreNotKnownArePlottedNowhere) {
   EXPECT_TRUE(panel_.plots()[4].history.empty());
   panel_.on_figures({.now_s = 2, .hole_share = 0.02});
   EXPECT_NEAR(panel_.plots()[4].history.newest(), 2, 1e-9);
+  EXPECT_TRUE(panel_.means_something(panel_.plots()[4]));
+  panel_.on_scene(scene::Pipeline::kSlices);
+  EXPECT_FALSE(panel_.means_something(panel_.plots()[4]));
+  EXPECT_TRUE(panel_.means_something(panel_.plots()[0]));
 }
 
 TEST_F(PanelTest, ALookIsTakenOnceAndStaysWithinItsLimits) {

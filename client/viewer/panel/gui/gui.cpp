@@ -7,7 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
+#include <set>
+#include <utility>
 
 #include "client/viewer/panel/gui/style.h"
 #include "common/gl/program.h"
@@ -67,6 +68,8 @@ struct Gui::Impl {
   int opaque = 0;           // pixels at the window's left that nothing shines through
   double built_at_s = -1e9;
   int builds_due = kAfterEvent;
+  std::set<int> pressed;      // keys, since the last build
+  std::vector<int> released;  // of these
 
   ~Impl() {
     if (gl) ImGui_ImplOpenGL3_Shutdown();
@@ -130,10 +133,14 @@ Result<std::unique_ptr<Gui>> Gui::make(GLFWwindow* window) {
 
 void Gui::stir() { impl_->builds_due = kAfterEvent; }
 
+// A key that is pressed and released before the next build would never have been down: its release waits for that.
 // What happens while nothing is shown would be taken for new when it is: releases alone may not be missed.
 void Gui::on_key(int key, int scancode, int action, int mods) {
   stir();
-  if (shows() || action == kRelease) ImGui_ImplGlfw_KeyCallback(impl_->window, key, scancode, action, mods);
+  if (action == kRelease && impl_->pressed.contains(key)) return impl_->released.push_back(key);
+  if (!shows() && action != kRelease) return;
+  if (action != kRelease) impl_->pressed.insert(key);
+  ImGui_ImplGlfw_KeyCallback(impl_->window, key, scancode, action, mods);
 }
 void Gui::on_character(unsigned code) {
   stir();
@@ -180,6 +187,8 @@ void Gui::build_texture(const Place& place, const std::function<double()>& build
   ImGui::NewFrame();
   m.opaque = std::clamp(int(build() * pixels_a_unit), 0, place.width);
   ImGui::Render();
+  m.pressed.clear();
+  for (const int key : std::exchange(m.released, {})) ImGui_ImplGlfw_KeyCallback(m.window, key, 0, kRelease, 0);
   const ImDrawData* drawn = ImGui::GetDrawData();
   glBindFramebuffer(GL_FRAMEBUFFER, m.framebuffer);
   glEnable(GL_SCISSOR_TEST);

@@ -72,8 +72,7 @@ void show_figures(const Panel& panel, double now_s) {
     text(
         fmt::format("{:.1f} frames a second, {:.2f} M cached", panel.frames_a_second(), double(f.points_cached) / 1e6));
   for (const auto& plot : panel.plots()) {
-    if (panel.pipeline() != scene::Pipeline::kPoints && plot.history.empty()) continue;
-    show_plot(plot, now_s);
+    if (panel.means_something(plot)) show_plot(plot, now_s);
   }
 }
 
@@ -262,7 +261,7 @@ double show_panel(Panel& panel, PanelViewState& state, double now_s, const std::
   if (ImGui::Begin("panel", nullptr, kFixed)) {
     text(panel.figures().scene.empty() ? "Telesplat" : panel.figures().scene);
     ImGui::TextDisabled("Tab hides this, F1 lists keys");
-    if (!panel.progress().empty()) ImGui::TextWrapped("%s", panel.progress().c_str());
+    for (const auto& line : panel.news(now_s)) ImGui::TextWrapped("%s", line.c_str());
     if (panel.setup().opens && ImGui::Button("open ...")) panel.press(Key::kO);
     if (section("Figures", true)) show_figures(panel, now_s);
     if (section("Display", true)) show_display(panel);

@@ -118,8 +118,12 @@ void edit_points(SceneControls& controls, SceneViewState& state, const Plane& pl
 
 void show_chosen(SceneControls& controls, SceneViewState& state, double now_s) {
   const auto& points = controls.transfer().transfer().points;
-  if (state.point < 0 || size_t(state.point) >= points.size())
-    return ImGui::TextDisabled("drag points; double click adds, right click takes away");
+  if (state.point < 0 || size_t(state.point) >= points.size()) {
+    ImGui::PushTextWrapPos(0);
+    ImGui::TextDisabled("drag points; double click adds, right click takes away");
+    ImGui::PopTextWrapPos();
+    return;
+  }
   const auto p = points[size_t(state.point)];
   float colour[3] = {p.r, p.g, p.b};
   if (ImGui::ColorEdit3("##point", colour, ImGuiColorEditFlags_NoInputs))
