@@ -127,7 +127,11 @@ TEST_P(PanelView, AHandThatClicksEverywhereOrdersNothingWrong) {
   ImGuiIO& io = ImGui::GetIO();
   frame();
   for (int i = 0; i < 2500; ++i) {
-    io.MousePos = {float(number(380)), float(number(1400))};
+    // A list that a click opened lies below it.
+    if (number(2) == 0)
+      io.MousePos = {float(number(380)), float(number(1400))};
+    else
+      io.MousePos = {io.MousePos.x, io.MousePos.y + float(10 + number(60))};
     frame();
     const int button = number(8) == 0 ? 1 : 0;
     for (int press = 0; press < 1 + number(2); ++press) {

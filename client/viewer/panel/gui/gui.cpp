@@ -96,8 +96,8 @@ struct Gui::Impl {
     builds_due = kAfterEvent;
   }
 
-  // Drawing is confined to an area, a rim for soft edges included, as far as it lies right of this column. False: nothing
-  // is left of it.
+  // Drawing is confined to an area, a rim for soft edges included, as far as it lies right of this column. False:
+  // nothing is left of it.
   bool scissor(const Area& area, int from) const {
     const ImGuiIO& io = ImGui::GetIO();
     const double sx = io.DisplayFramebufferScale.x, sy = io.DisplayFramebufferScale.y;
