@@ -25,7 +25,7 @@ FLOORS = {
     "common": [
         ["common/core"],
         ["common/geometry", "common/colour", "common/links"],
-        ["common/image", "common/gl"],
+        ["common/image", "common/gl", "common/wall"],
         ["common/codec", "common/points"],
         [("common/volume", "common/volume/transfer"), "common/splat"],
         ["common/volume/slices"],
@@ -123,7 +123,7 @@ OUTSIDE_HEADERS = [
     (r"(imgui|backends/imgui_impl_).*", ["client/viewer/panel/gui", "tests/unit/viewer/panel_view_test.cpp"]),
     (r"GL/.*", []),
     (r"CLI/.*", ["common/options/parser.cpp"]),
-    (r"toml\+\+/.*", ["tools/telesplat"]),
+    (r"toml\+\+/.*", ["common/wall", "tools/telesplat"]),
     (r"spdlog/.*", ["common/core"]),
     (r"X11/.*", ["tests/support/virtual_display.cpp"]),
     (r"boost/.*", ["services/master/live/http_endpoint.cpp", "tools/wan_relay"]),
