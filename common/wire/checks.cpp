@@ -145,4 +145,12 @@ std::optional<Error> check(const VoxelRequest& m) { return check_slices(m.begin,
 
 std::optional<Error> check(const VoxelData& m) { return check_slices(m.begin, m.end); }
 
+std::optional<Error> check(const SwapReady& m) {
+  if (m.viewers < 1 || m.viewers > kMaxWallViewers || m.number >= m.viewers)
+    return Error{fmt::format("viewer {} of a wall of {}, limit {}", m.number, m.viewers, kMaxWallViewers)};
+  if (m.period_s < 0 || m.late_s < 0)
+    return Error{fmt::format("period {} s and {} s late, at least 0", m.period_s, m.late_s)};
+  return std::nullopt;
+}
+
 }  // namespace telesplat::wire

@@ -29,5 +29,6 @@ std::optional<Error> check(const SliceLease& m);
 std::optional<Error> check(const SliceImages& m);
 std::optional<Error> check(const VoxelRequest& m);
 std::optional<Error> check(const VoxelData& m);
+std::optional<Error> check(const SwapReady& m);
 
 }  // namespace telesplat::wire

@@ -187,6 +187,15 @@ void Decoder::get(const msgpack::object& o, geometry::Rect& r) {
   r = {int(v[0]), int(v[1]), int(v[2]), int(v[3])};
 }
 
+void Decoder::get(const msgpack::object& o, geometry::Pose& p) {
+  double v[7];
+  if (!numbers(o, v)) return;
+  p = {{v[0], v[1], v[2]}, glm::dquat(v[3], v[4], v[5], v[6])};
+  geometry::Camera camera;
+  camera.pose = p;
+  if (const auto valid = geometry::validate(camera); !valid) fail(": " + valid.error().text);
+}
+
 void Decoder::get(const msgpack::object& o, geometry::Camera& c) {
   double v[14];
   if (!numbers(o, v)) return;

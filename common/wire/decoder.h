@@ -54,6 +54,7 @@ class Decoder {
   void get(const msgpack::object& o, std::vector<double>& v);
   void get(const msgpack::object& o, geometry::Box& b);
   void get(const msgpack::object& o, geometry::Rect& r);
+  void get(const msgpack::object& o, geometry::Pose& p);
   void get(const msgpack::object& o, geometry::Camera& c);
   void get(const msgpack::object& o, Moments& m);
   void get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks);

@@ -69,6 +69,12 @@ void Encoder::put(const geometry::Box& b) { numbers({b.lo.x, b.lo.y, b.lo.z, b.h
 
 void Encoder::put(const geometry::Rect& r) { numbers({double(r.x), double(r.y), double(r.width), double(r.height)}); }
 
+void Encoder::put(const geometry::Pose& pose) {
+  const auto& p = pose.position_room;
+  const auto& q = pose.orientation;
+  numbers({p.x, p.y, p.z, q.w, q.x, q.y, q.z});
+}
+
 void Encoder::put(const geometry::Camera& c) {
   const auto& p = c.pose.position_room;
   const auto& q = c.pose.orientation;

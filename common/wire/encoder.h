@@ -55,6 +55,7 @@ class Encoder {
   void put(const std::vector<double>& v) { put(std::as_bytes(std::span(v))); }
   void put(const geometry::Box& b);
   void put(const geometry::Rect& r);
+  void put(const geometry::Pose& p);
   void put(const geometry::Camera& c);
   void put(const Moments& m);
   void put(const std::vector<geometry::ChunkInfo>& chunks);

@@ -13,6 +13,7 @@
 #include "common/wire/session_messages.h"
 #include "common/wire/slice_messages.h"
 #include "common/wire/tile_messages.h"
+#include "common/wire/wall_messages.h"
 
 namespace telesplat::wire {
 
@@ -23,6 +24,6 @@ using Messages =
                TileDone, PlanRequest, Plan, FrameEnd, StatusReport, MetricRows, Control, ControlReply, Shutdown,
                Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk, DepthTile, Patch, Forget, EpochBegin,
                StateMark, StateRequest, AccessReport, SliceWeights, SlabAssignment, SlabReady, SliceLease, VoxelRequest,
-               VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport>;
+               VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady, Swap>;
 
 }  // namespace telesplat::wire

@@ -11,7 +11,8 @@
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMaxPeers = 4096;      // remembered processes, the departed included
+constexpr size_t kMaxPeers = 4096;  // remembered processes, the departed included
+constexpr size_t kMaxWalls = 64;
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
 constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
 
@@ -152,6 +153,8 @@ void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_
 }
 
 void MasterCore::undeliverable(const std::string& peer) {
+  for (auto& [name, wall] : walls_) wall.unreachable(peer, now_s_);
+  send_swaps();
   const auto it = peers_.find(peer);
   if (it != peers_.end() && !it->second.gone) lose(it->second, peer, "cannot be reached");
 }
@@ -160,6 +163,8 @@ void MasterCore::undeliverable(const std::string& peer) {
 void MasterCore::forget_viewer(const wire::Hello& hello) {
   if (hello.role != "viewer") return;
   for (auto& [pipeline, plan] : plans_) plan->views().forget_viewer(hello.instance);
+  for (auto& [name, wall] : walls_) wall.forget(hello.instance, now_s_);
+  send_swaps();
 }
 
 void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
@@ -182,6 +187,40 @@ Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double
   Status added = record_.add_rows(p->process, m);
   if (added) live_.add_rows(p->hello.name, m);
   return added;
+}
+
+// ---- walls ----------------------------------------------------------------------------------------------------------
+
+void MasterCore::on(const std::string& peer, const wire::SwapReady& m, double now_s) {
+  now_s_ = now_s;
+  const auto by = instances_.find(m.viewer);
+  const auto viewer = by == instances_.end() ? peers_.end() : peers_.find(by->second);
+  // It says hello over its other connection, and this again.
+  if (viewer == peers_.end() || viewer->second.gone || viewer->second.hello.role != "viewer") return;
+  viewer->second.seen_s = now_s;
+  if (walls_.size() >= kMaxWalls && !walls_.contains(m.wall)) return;
+  walls_.try_emplace(m.wall, instance_).first->second.on(peer, m, now_s);
+  send_swaps();
+}
+
+void MasterCore::send_swaps() {
+  for (auto wall = walls_.begin(); wall != walls_.end();) {
+    for (const auto& [peer, swap] : wall->second.take_outgoing()) outbox_.send(peer, swap);
+    if (!wall->second.empty()) {
+      ++wall;
+      continue;
+    }
+    swaps_.frames += wall->second.figures().frames;
+    swaps_.incomplete += wall->second.figures().incomplete;
+    wall = walls_.erase(wall);
+  }
+}
+
+std::optional<double> MasterCore::due_s() const {
+  std::optional<double> out;
+  for (const auto& [name, wall] : walls_)
+    if (const auto due_s = wall.due_s(); due_s && (!out || *due_s < *out)) out = due_s;
+  return out;
 }
 
 // ---- leases ---------------------------------------------------------------------------------------------------------
@@ -256,6 +295,9 @@ Status MasterCore::on(const std::string& peer, const wire::Plan& m, double now_s
 }
 
 void MasterCore::tick(double now_s) {
+  now_s_ = now_s;
+  for (auto& [name, wall] : walls_) wall.tick(now_s);
+  send_swaps();
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
   const Ticked ticked = plan_->tick(now_s);

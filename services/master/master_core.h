@@ -16,6 +16,7 @@
 #include "services/master/outbox.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
+#include "services/master/wall/swap_barrier.h"
 
 namespace telesplat::master {
 
@@ -35,6 +36,8 @@ class MasterCore {
   void on(const std::string& peer, const wire::Control& m, double now_s);
   void on(const std::string& peer, const wire::SlabReady& m, double now_s);
   void on(const std::string& peer, const wire::LinkReport& m, double now_s);
+  /// peer: the connection over which the viewer swaps, not the one that it said hello on.
+  void on(const std::string& peer, const wire::SwapReady& m, double now_s);
   /// Errors are the sender's fault: the caller counts them.
   Status on(const std::string& peer, const wire::MetricRows& m, double now_s);
   Status on(const std::string& peer, const wire::SliceWeights& m, double now_s);
@@ -46,6 +49,8 @@ class MasterCore {
   void tick(double now_s);
   /// tick() should come every few ms.
   bool hurried() const { return !idle_.empty() && plan_->hurried(); }
+  /// tick() should come then, if nothing comes before: a wall waits for a viewer that may be late. Nothing: none does.
+  std::optional<double> due_s() const;
   /// Tells everyone to finish.
   void shut_down(const std::string& reason);
 
@@ -110,6 +115,9 @@ class MasterCore {
   Result<std::string> order_coupling(const wire::Control& m, double now_s);
   std::string status_json(double now_s) const;
 
+  // Walls.
+  void send_swaps();
+
   // Leases.
   void join(const std::string& sampler);
   bool begin_view(double now_s);
@@ -130,7 +138,10 @@ class MasterCore {
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
   Idle idle_;
   LiveFigures live_;
+  std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them
+  SwapBarrier::Figures swaps_;                // of walls that are gone
   uint64_t leases_expired_ = 0;
+  double now_s_ = 0;  // of what came last
   bool stop_ = false;
 };
 

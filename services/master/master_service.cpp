@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -125,7 +126,9 @@ class MasterService {
 
  private:
   void serve_for(int timeout_ms) {
-    net::wait_readable({&control_}, timeout_ms);
+    double timeout_s = timeout_ms * 1e-3;
+    if (const auto due_s = core_.due_s()) timeout_s = std::clamp(*due_s - monotonic_s(), 0.0, timeout_s);
+    net::wait_readable_s({&control_}, timeout_s);
     for (int n = 0; n < kMessagesAtOnce; ++n) {
       const auto message = control_.receive();
       if (!message) break;
@@ -171,7 +174,7 @@ class MasterService {
     }
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
                   wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::LinkReport,
-                  wire::Goodbye, wire::Control>(control_, message, [&](const auto& m) {
+                  wire::SwapReady, wire::Goodbye, wire::Control>(control_, message, [&](const auto& m) {
       if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
         core_.on(message.peer, m, now_s);
       else if (const Status s = core_.on(message.peer, m, now_s); !s)

@@ -79,6 +79,12 @@ std::map<std::string, double> MasterCore::counters() const {
                                     {"leases_backup", double(f.backups)},
                                     {"views_overtaken", double(f.overtaken)},
                                     {"frames_completed", double(f.frames_completed)}};
+  SwapBarrier::Figures swaps = swaps_;
+  for (const auto& [name, wall] : walls_) {
+    swaps.frames += wall.figures().frames;
+    swaps.incomplete += wall.figures().incomplete;
+  }
+  if (swaps.frames > 0) out["swaps"] = double(swaps.frames), out["swaps_incomplete"] = double(swaps.incomplete);
   for (const auto& [pipeline, plan] : plans_) plan->add_counters(out);
   return out;
 }

@@ -53,7 +53,7 @@ FLOORS = {
     ],
     "services/master": [
         [("services/master", "services/master/master_options.*")],
-        ["services/master/tiles", "services/master/slabs", "services/master/live"],
+        ["services/master/tiles", "services/master/slabs", "services/master/live", "services/master/wall"],
         ["services/master/plan.cpp"],
         [
             (

@@ -47,6 +47,7 @@ struct Filler {
   void operator()(const char*, geometry::Camera& v, size_t = 0) {
     v = {{{0.1, 0.2, 0.3}, {0.6, 0, 0.8, 0}}, -1, 1, -0.5, 0.75, 0.01, 320, 200};
   }
+  void operator()(const char*, geometry::Pose& v, size_t = 0) { v = {{0.1, 0.2, 0.3}, {0.6, 0, 0.8, 0}}; }
   void operator()(const char*, wire::Moments& v, size_t = 0) {
     for (double wire::Moments::*m : wire::kMoments) v.*m = 0.5 + ++n_;
   }
@@ -84,6 +85,7 @@ struct Filler {
     if constexpr (std::is_same_v<M, wire::SliceWeights>) m.begin = 3;
     if constexpr (std::is_same_v<M, wire::Plan>)
       m.tiles = {64, 32, 100, 50, 700, 2, 0, 0, 64, 32, 2048, 0, 200, 100, 1, 1, 1, 1};
+    if constexpr (std::is_same_v<M, wire::SwapReady>) m.number = 2, m.viewers = 4;
     if constexpr (requires { m.buffers; }) m.buffers = 3;
     if constexpr (requires { m.footprint; }) m.footprint = 0.00078125;
   }

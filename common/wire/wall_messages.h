@@ -1,0 +1,72 @@
+// Messages of a wall, whose viewers present their frames together: between each of them (DEALER, over a connection of
+// its own) and the master (ROUTER).
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "common/core/ids.h"
+#include "common/geometry/camera.h"
+#include "common/wire/limits.h"
+
+namespace telesplat::wire {
+
+inline constexpr uint64_t kMaxWallViewers = 256;  ///< of one wall
+
+// Structs and their fields() stand as tables.
+// clang-format off
+
+/// What of the data set a viewer shows, or could show.
+struct ShownState {
+  InstanceId source;     ///< whose numbers these are: the packer's that points come from, the master's of slice frames
+  uint64_t newest = 0;   ///< points: Sequence of the newest event; slices: FrameId
+  uint64_t replica = 0;  ///< points: one more than the Sequence with which the replica on display began; 0: none
+  bool operator==(const ShownState&) const = default;
+  template <class F> static void fields(F& f, auto& m) {
+    f("source", m.source); f("newest", m.newest); f("replica", m.replica);
+  }
+};
+
+/// Viewer -> master: a frame of the wall is drawn and may be presented; again while no answer comes.
+struct SwapReady {
+  static constexpr std::string_view kName = "swap_ready";
+  InstanceId viewer;
+  std::string wall;         ///< viewers that say the same swap together
+  uint64_t number = 0;      ///< the viewer's among the wall's; the least one's head is everyone's
+  uint64_t viewers = 1;     ///< that the wall has, at most kMaxWallViewers
+  uint64_t frame = 0;       ///< that is drawn; 0: none yet
+  double t_s = 0;           ///< of the next frame, on the clock of the head's movement
+  geometry::Pose head;      ///< then
+  ShownState state;         ///< the newest that the next frame could show
+  double period_s = 0;      ///< between two frames at least
+  uint64_t presented = 0;   ///< the frame that was presented last; 0: none yet
+  double presented_s = 0;   ///< when
+  double late_s = 0;        ///< word to present it came so long after its time
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("wall", m.wall); f("number", m.number); f("viewers", m.viewers); f("frame", m.frame);
+    f("t_s", m.t_s); f("head", m.head); f("state", m.state); f("period_s", m.period_s);
+    f("presented", m.presented); f("presented_s", m.presented_s); f("late_s", m.late_s);
+  }
+};
+
+/// Master -> all viewers of a wall: present this frame at this time, then draw the next one as this says.
+struct Swap {
+  static constexpr std::string_view kName = "swap";
+  InstanceId master;
+  uint64_t frame = 0;        ///< presented now; the next one has the next number
+  double at_s = 0;           ///< when
+  double t_s = 0;            ///< of the next frame, as in SwapReady; likewise:
+  geometry::Pose head;
+  ShownState state;
+  uint64_t viewers = 0;      ///< that had drawn this one
+  uint64_t skew_frame = 0;   ///< the newest frame of which it is known when all presented it; 0: none yet
+  double skew_s = 0;         ///< between the first and the last to present it
+  template <class F> static void fields(F& f, auto& m) {
+    f("master", m.master); f("frame", m.frame); f("at_s", m.at_s); f("t_s", m.t_s); f("head", m.head);
+    f("state", m.state); f("viewers", m.viewers); f("skew_frame", m.skew_frame); f("skew_s", m.skew_s);
+  }
+};
+
+// clang-format on
+
+}  // namespace telesplat::wire

@@ -1,0 +1,203 @@
+#include "services/master/wall/swap_barrier.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace telesplat::master {
+namespace {
+
+constexpr size_t kFramesRemembered = 8;  // whose presenting is not told by all yet
+constexpr double kPeriodShare = 0.1;     // of a frame in the mean of their distances
+constexpr double kSourcePatience_s = 1;  // until viewers show another packer's model without the one that lacks it
+constexpr double kLeadGrows = 0.5, kLeadShrinks = 0.99;
+
+}  // namespace
+
+double SwapBarrier::frame_s() const {
+  double period_s = 1e-3;
+  for (const auto& [id, m] : members_) period_s = std::max(period_s, m.said.period_s);
+  return std::min(std::max(period_s, between_s_), kMostFrame_s);
+}
+
+// Those who are ready have waited for a frame beyond the time at which they would have swapped.
+double SwapBarrier::deadline_s() const {
+  double period_s = 0;
+  for (const auto& [id, m] : members_) period_s = std::max(period_s, m.said.period_s);
+  return std::max(ready_s_, last_.at_s + std::min(period_s, kMostFrame_s)) + frame_s();
+}
+
+bool SwapBarrier::gathered(double now_s) const {
+  if (now_s >= first_s_ + kGather_s) return true;
+  return std::all_of(members_.begin(), members_.end(),
+                     [&](const auto& m) { return members_.size() >= m.second.said.viewers; });
+}
+
+// Nobody is waited for. While none is waited for, as all were late, all are.
+bool SwapBarrier::complete() const {
+  const bool any = std::any_of(members_.begin(), members_.end(), [](const auto& m) { return m.second.waited_for; });
+  return std::all_of(members_.begin(), members_.end(),
+                     [&](const auto& m) { return m.second.ready || (any && !m.second.waited_for); });
+}
+
+void SwapBarrier::note_presented(const wire::SwapReady& m) {
+  if (m.presented == 0 || m.presented + kFramesRemembered < frame_) return;
+  const auto before = members_.find(m.viewer);
+  if (before != members_.end() && before->second.said.presented == m.presented) return;  // said again
+  Presented& p = presented_[m.presented];
+  p.first_s = p.viewers == 0 ? m.presented_s : std::min(p.first_s, m.presented_s);
+  p.last_s = p.viewers == 0 ? m.presented_s : std::max(p.last_s, m.presented_s);
+  ++p.viewers;
+  while (presented_.size() > kFramesRemembered) presented_.erase(presented_.begin());
+}
+
+void SwapBarrier::on(const std::string& peer, const wire::SwapReady& m, double now_s) {
+  if (members_.empty()) first_s_ = now_s, begun_ = false;
+  // A viewer that was started again takes its place.
+  std::erase_if(members_, [&](const auto& o) { return o.first != m.viewer && o.second.said.number == m.number; });
+  note_presented(m);
+  const auto [place, fresh] = members_.try_emplace(m.viewer);
+  Member& member = place->second;
+  const bool again = !fresh && member.said.frame == m.frame;  // no answer came
+  member.peer = peer;
+  member.said = m;
+  if (fresh) member.waited_for = !begun_;
+  lead_s_ = m.late_s > 0 ? std::min(lead_s_ + kLeadGrows * m.late_s, kMostLead_s) : lead_s_;
+  if (begun_ && m.frame < frame_) {
+    // It is late, or new: it goes on with the others. So little late that they could have waited, it may be waited for.
+    const bool little = !again && m.frame == last_.frame && now_s <= deadline_before_s_;
+    note_pace(member, little);
+    if (fresh || again || member.told < last_.frame) tell(member, last_);
+    return go_on(now_s);
+  }
+  if (!std::exchange(member.ready, true)) ready_s_ = now_s;
+  go_on(now_s);
+}
+
+// A viewer that is not waited for was in time, or was not.
+void SwapBarrier::note_pace(Member& member, bool in_time) {
+  if (member.waited_for) return;
+  member.in_time = in_time ? member.in_time + 1 : 0;
+  member.waited_for = member.in_time >= kInTime;
+}
+
+// As forget(), by where it is.
+void SwapBarrier::unreachable(const std::string& peer, double now_s) {
+  if (std::erase_if(members_, [&](const auto& m) { return m.second.peer == peer; }) > 0) go_on(now_s);
+}
+
+void SwapBarrier::forget(InstanceId viewer, double now_s) {
+  if (members_.erase(viewer) > 0) go_on(now_s);
+}
+
+void SwapBarrier::tick(double now_s) { go_on(now_s); }
+
+std::optional<double> SwapBarrier::due_s() const {
+  if (members_.empty()) return std::nullopt;
+  if (!begun_) return first_s_ + kGather_s;
+  const bool any = std::any_of(members_.begin(), members_.end(), [](const auto& m) { return m.second.ready; });
+  return any ? std::optional(deadline_s()) : std::nullopt;
+}
+
+void SwapBarrier::go_on(double now_s) {
+  if (std::none_of(members_.begin(), members_.end(), [](const auto& m) { return m.second.ready; })) return;
+  if (!begun_) {
+    if (!gathered(now_s)) return;
+    begun_ = true;
+    // Viewers that another master led have numbers already.
+    for (const auto& [id, m] : members_) frame_ = std::max(frame_, m.said.frame);
+    return swap(now_s);
+  }
+  if (complete()) return swap(now_s);
+  if (now_s < deadline_s()) return;
+  ++figures_.incomplete;
+  leave_out_the_late();
+  swap(now_s);
+}
+
+void SwapBarrier::leave_out_the_late() {
+  for (auto& [id, m] : members_)
+    if (!m.ready) m.waited_for = false, m.in_time = 0;
+}
+
+const SwapBarrier::Member& SwapBarrier::leader() const {
+  const auto rank = [](const Member& m) { return std::pair(!m.ready, m.said.number); };
+  return std::min_element(members_.begin(), members_.end(),
+                          [&](const auto& a, const auto& b) { return rank(a.second) < rank(b.second); })
+      ->second;
+}
+
+// What all who are in time can show. Numbers of one source never fall.
+void SwapBarrier::choose_state(double now_s) {
+  wire::ShownState& state = last_.state;
+  const wire::ShownState& first = leader().said.state;
+  uint64_t least = std::numeric_limits<uint64_t>::max(), most = 0, replica = least;
+  bool one_source = true;
+  for (const auto& [id, m] : members_) {
+    if (!m.ready) continue;
+    one_source = one_source && m.said.state.source == first.source;
+    if (m.said.state.source != first.source) continue;
+    least = std::min(least, m.said.state.newest), most = std::max(most, m.said.state.newest);
+    replica = std::min(replica, m.said.state.replica);
+  }
+  if (!one_source) {
+    if (source_differs_s_ < 0) source_differs_s_ = now_s;
+    if (state.source.value != 0 && now_s - source_differs_s_ < kSourcePatience_s) return;
+  } else {
+    source_differs_s_ = -1;
+  }
+  if (state.source != first.source) {
+    state = {first.source, least, replica};
+    reached_.clear();
+  }
+  if (reached_.empty() || reached_.back().newest < most) reached_.push_back({now_s, most});
+  // What someone had so long ago is shown, whoever lacks it.
+  while (!reached_.empty() && reached_.front().at_s <= now_s - kModelPatience_s) {
+    least = std::max(least, reached_.front().newest);
+    reached_.pop_front();
+  }
+  state.newest = std::max(state.newest, least);
+  state.replica = std::max(state.replica, replica);
+}
+
+void SwapBarrier::tell(Member& member, const wire::Swap& swap) {
+  member.told = swap.frame;
+  outgoing_.push_back({member.peer, swap});
+}
+
+void SwapBarrier::swap(double now_s) {
+  double period_s = 0;
+  for (const auto& [id, m] : members_) period_s = std::max(period_s, m.said.period_s);
+  const double before_s = last_.at_s;
+  deadline_before_s_ = deadline_s();
+  const Member& first = leader();
+  last_.master = master_;
+  last_.frame = frame_;
+  last_.at_s = std::max(now_s + lead_s_, figures_.frames > 0 ? before_s + std::min(period_s, kMostFrame_s) : 0);
+  last_.t_s = first.said.t_s;
+  last_.head = first.said.head;
+  choose_state(now_s);
+  last_.viewers =
+      uint64_t(std::count_if(members_.begin(), members_.end(), [](const auto& m) { return m.second.ready; }));
+  if (figures_.frames > 0) {
+    const double between_s = std::min(last_.at_s - before_s, kMostFrame_s);
+    between_s_ = between_s_ == 0 ? between_s : (1 - kPeriodShare) * between_s_ + kPeriodShare * between_s;
+  }
+  lead_s_ = std::max(kLead_s, lead_s_ * kLeadShrinks);
+  // Of the frame before, which all who are ready have told of.
+  if (const auto p = presented_.find(frame_ - 1); frame_ > 0 && p != presented_.end() && p->second.viewers > 1) {
+    last_.skew_frame = p->first;
+    last_.skew_s = p->second.last_s - p->second.first_s;
+  }
+  for (auto& [id, m] : members_) {
+    if (m.ready) note_pace(m, true);
+    m.ready = false;
+    tell(m, last_);
+  }
+  ++figures_.frames;
+  ++frame_;
+}
+
+std::vector<SwapBarrier::Outgoing> SwapBarrier::take_outgoing() { return std::exchange(outgoing_, {}); }
+
+}  // namespace telesplat::master

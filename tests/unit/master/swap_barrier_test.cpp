@@ -1,0 +1,236 @@
+// Viewers of a wall swap together; one that is late, slow, lost or dead holds nobody for longer than a frame.
+#include <gtest/gtest.h>
+
+#include "services/master/wall/swap_barrier.h"
+
+namespace telesplat::master {
+namespace {
+
+constexpr double kPeriod_s = 1.0 / 60;
+
+class Swaps : public ::testing::Test {
+ protected:
+  wire::SwapReady ready(uint64_t viewer, uint64_t frame, uint64_t viewers = 4) {
+    wire::SwapReady m;
+    m.viewer = {100 + viewer};
+    m.wall = "lab";
+    m.number = viewer;
+    m.viewers = viewers;
+    m.frame = frame;
+    m.t_s = double(frame) + 0.1 * double(viewer);
+    m.head.position_room = {double(viewer), double(frame), 0};
+    m.state = {{7}, 10 * frame + viewer, 1};
+    m.period_s = kPeriod_s;
+    m.presented = frame == 0 ? 0 : frame - 1;
+    return m;
+  }
+  void say(uint64_t viewer, uint64_t frame, double now_s) {
+    barrier.on("peer-" + std::to_string(viewer), ready(viewer, frame), now_s);
+  }
+  // Those that were told to present `frame` since the last call, and when.
+  std::map<std::string, wire::Swap> told() {
+    std::map<std::string, wire::Swap> out;
+    for (const auto& o : barrier.take_outgoing()) out[o.peer] = o.swap;
+    return out;
+  }
+  // All four are there; frame 0 is told at 1 s.
+  void begin() {
+    for (uint64_t v = 0; v < 4; ++v) say(v, 0, 1);
+    ASSERT_EQ(told().size(), 4u);
+  }
+  SwapBarrier barrier{{42}};
+};
+
+TEST_F(Swaps, NobodyBeginsBeforeAllAreThere) {
+  for (uint64_t v = 0; v < 3; ++v) say(v, 0, 1);
+  EXPECT_TRUE(told().empty());
+  ASSERT_TRUE(barrier.due_s());
+  EXPECT_NEAR(*barrier.due_s(), 1 + SwapBarrier::kGather_s, 1e-9);
+  say(3, 0, 1.5);
+  const auto swaps = told();
+  ASSERT_EQ(swaps.size(), 4u);
+  for (const auto& [peer, swap] : swaps) {
+    EXPECT_EQ(swap.frame, 0u);
+    EXPECT_EQ(swap.master.value, 42u);
+    EXPECT_NEAR(swap.at_s, 1.5 + SwapBarrier::kLead_s, 1e-9);
+  }
+}
+
+TEST_F(Swaps, OneThatNeverComesIsNotWaitedForForEver) {
+  for (uint64_t v = 0; v < 3; ++v) say(v, 0, 1);
+  barrier.tick(1 + SwapBarrier::kGather_s);
+  EXPECT_EQ(told().size(), 3u);
+}
+
+TEST_F(Swaps, AllGetTheHeadOfTheFirstAndWhatEverybodyHas) {
+  begin();
+  for (uint64_t v = 3; v < 4; --v) say(v, 1, 1.01);
+  const auto swaps = told();
+  ASSERT_EQ(swaps.size(), 4u);
+  for (const auto& [peer, swap] : swaps) {
+    EXPECT_EQ(swap.frame, 1u);
+    EXPECT_EQ(swap.viewers, 4u);
+    EXPECT_EQ(swap.head.position_room, glm::dvec3(0, 1, 0));
+    EXPECT_EQ(swap.t_s, 1.0);
+    EXPECT_EQ(swap.state.newest, 10u) << "viewer 0 has no more";
+  }
+}
+
+TEST_F(Swaps, FramesAreAPeriodApart) {
+  begin();
+  const double first_s = 1 + SwapBarrier::kLead_s;
+  for (uint64_t v = 0; v < 4; ++v) say(v, 1, 1.004);
+  EXPECT_NEAR(told().begin()->second.at_s, first_s + kPeriod_s, 1e-9);
+  for (uint64_t v = 0; v < 4; ++v) say(v, 2, 1.1);  // slower than that
+  EXPECT_NEAR(told().begin()->second.at_s, 1.1 + SwapBarrier::kLead_s, 1e-9);
+}
+
+TEST_F(Swaps, ALateOneHoldsTheOthersForAFrameOnce) {
+  begin();
+  for (uint64_t v = 0; v < 3; ++v) say(v, 1, 1.005);
+  EXPECT_TRUE(told().empty());
+  ASSERT_TRUE(barrier.due_s());
+  const double due_s = *barrier.due_s();
+  EXPECT_LE(due_s, 1 + SwapBarrier::kLead_s + 2 * kPeriod_s + 1e-9) << "a frame beyond the swap that was due";
+  barrier.tick(due_s - 1e-4);
+  EXPECT_TRUE(told().empty());
+  barrier.tick(due_s);
+  auto swaps = told();
+  EXPECT_EQ(swaps.size(), 4u) << "the late one hears of it, too";
+  EXPECT_EQ(swaps.begin()->second.viewers, 3u);
+  EXPECT_EQ(barrier.figures().incomplete, 1u);
+  // From now on nobody waits for it.
+  for (uint64_t v = 0; v < 3; ++v) say(v, 2, due_s + 0.005);
+  EXPECT_EQ(told().size(), 4u);
+  // It comes back to the frame of the others, and is waited for after some in time.
+  say(3, 1, due_s + 0.006);
+  double now_s = due_s + 0.02;
+  for (uint64_t frame = 3; frame < 3 + SwapBarrier::kInTime; ++frame, now_s += 0.02) {
+    say(3, frame, now_s);
+    for (uint64_t v = 0; v < 3; ++v) say(v, frame, now_s);
+    EXPECT_EQ(told().begin()->second.viewers, 4u);
+  }
+  for (uint64_t v = 0; v < 3; ++v) say(v, 3 + SwapBarrier::kInTime, now_s);
+  EXPECT_TRUE(told().empty()) << "it is waited for again";
+}
+
+TEST_F(Swaps, ADeadOneHoldsNobody) {
+  begin();
+  for (uint64_t v = 0; v < 3; ++v) say(v, 1, 1.005);
+  EXPECT_TRUE(told().empty());
+  barrier.forget({103}, 1.006);
+  const auto swaps = told();
+  EXPECT_EQ(swaps.size(), 3u);
+  EXPECT_FALSE(swaps.contains("peer-3"));
+  for (uint64_t v = 0; v < 3; ++v) say(v, 2, 1.03);
+  EXPECT_EQ(told().size(), 3u);
+  EXPECT_FALSE(barrier.due_s());
+  for (uint64_t v = 0; v < 3; ++v) barrier.forget({100 + v}, 1.1);
+  EXPECT_TRUE(barrier.empty());
+}
+
+TEST_F(Swaps, OneThatIsStartedAgainTakesItsPlace) {
+  begin();
+  auto again = ready(2, 0);
+  again.viewer = {999};
+  barrier.on("peer-new", again, 1.001);
+  auto swaps = told();
+  ASSERT_TRUE(swaps.contains("peer-new")) << "it goes on with the frame of the others";
+  for (const uint64_t v : {0, 1, 3}) say(v, 1, 1.005);
+  swaps = told();
+  EXPECT_EQ(swaps.size(), 4u) << "a newcomer is not waited for";
+  EXPECT_FALSE(swaps.contains("peer-2"));
+}
+
+TEST_F(Swaps, OneWhoseAnswerWasLostIsToldAgain) {
+  begin();
+  for (uint64_t v = 0; v < 4; ++v) say(v, 1, 1.01);
+  told();
+  say(2, 1, 1.3);
+  const auto swaps = told();
+  ASSERT_EQ(swaps.size(), 1u);
+  EXPECT_EQ(swaps.begin()->first, "peer-2");
+  EXPECT_EQ(swaps.begin()->second.frame, 1u);
+}
+
+TEST_F(Swaps, SkewIsFromTheFirstToTheLastThatPresented) {
+  begin();
+  for (uint64_t v = 0; v < 4; ++v) say(v, 1, 1.01);
+  EXPECT_EQ(told().begin()->second.skew_frame, 0u) << "frame 0 shows nothing";
+  for (uint64_t v = 0; v < 4; ++v) {
+    auto m = ready(v, 2);
+    m.presented = 1;
+    m.presented_s = 1.02 + 0.001 * double(v);
+    barrier.on("peer-" + std::to_string(v), m, 1.03);
+  }
+  const auto swaps = told();
+  EXPECT_EQ(swaps.begin()->second.skew_frame, 1u);
+  EXPECT_NEAR(swaps.begin()->second.skew_s, 0.003, 1e-9);
+}
+
+TEST_F(Swaps, AnotherMasterGoesOnWhereTheWallIs) {
+  for (uint64_t v = 0; v < 4; ++v) say(v, 500 + v % 2, 1);
+  const auto swaps = told();
+  ASSERT_EQ(swaps.size(), 4u);
+  EXPECT_EQ(swaps.begin()->second.frame, 501u);
+}
+
+// The first viewer's head is everyone's; without it the next one's.
+TEST_F(Swaps, TheHeadOfTheNextOneServesWhereTheFirstIsLate) {
+  begin();
+  for (uint64_t v = 1; v < 4; ++v) say(v, 1, 1.005);
+  barrier.tick(*barrier.due_s());
+  EXPECT_EQ(told().begin()->second.head.position_room, glm::dvec3(1, 1, 0));
+}
+
+TEST_F(Swaps, NumbersOfAModelNeverFallAndWaitOnlySoLongForOne) {
+  begin();
+  const auto frame = [&](uint64_t number, double now_s, uint64_t slow, uint64_t others) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, number);
+      m.state = {{7}, v == 3 ? slow : others, 1};
+      barrier.on("peer-" + std::to_string(v), m, now_s);
+    }
+    const auto swaps = told();
+    return swaps.empty() ? ~uint64_t{0} : swaps.begin()->second.state.newest;
+  };
+  EXPECT_EQ(frame(1, 1.05, 20, 50), 20u);
+  EXPECT_EQ(frame(2, 1.10, 15, 60), 20u) << "what was shown stays";
+  EXPECT_EQ(frame(3, 1.56, 20, 70), 50u) << "the others had that half a second ago";
+  EXPECT_EQ(frame(4, 1.60, 80, 90), 80u);
+}
+
+// Another packer: its numbers begin anew, and it is shown once all have something of it.
+TEST_F(Swaps, AnotherSourceIsShownWhenAllReceiveFromIt) {
+  begin();
+  const auto frame = [&](uint64_t number, double now_s, uint64_t of_last) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, number);
+      m.state = v == 3 ? wire::ShownState{{of_last}, 3, 1} : wire::ShownState{{8}, 4, 1};
+      barrier.on("peer-" + std::to_string(v), m, now_s);
+    }
+    return told().begin()->second.state;
+  };
+  EXPECT_EQ(frame(1, 1.05, 7).source.value, 7u);
+  const auto state = frame(2, 1.1, 8);
+  EXPECT_EQ(state.source.value, 8u);
+  EXPECT_EQ(state.newest, 3u);
+}
+
+TEST_F(Swaps, AWallThatIsSlowIsNotTakenForLate) {
+  begin();
+  double now_s = 1.1;
+  for (uint64_t frame = 1; frame < 40; ++frame, now_s += 0.1) {
+    for (uint64_t v = 0; v < 3; ++v) say(v, frame, now_s);
+    barrier.tick(now_s + 0.04);
+    say(3, frame, now_s + 0.05);
+    const auto swaps = told();
+    ASSERT_FALSE(swaps.empty());
+    if (frame > 30) {
+      EXPECT_EQ(swaps.begin()->second.viewers, 4u) << frame;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::master
