@@ -53,6 +53,10 @@ class Received {
   virtual void add_status(net::MasterLink::Values& values) const = 0;
 
   // ---- display thread ----
+  /// Of a viewer that keeps in step with others (a wall), where it does not wait for whole updates: what it could show
+  /// by now, and from now on shows, or the nearest that it has. What comes after it waits.
+  virtual wire::ShownState newest_state() const = 0;
+  virtual void show_state(const wire::ShownState& state) = 0;
   /// What draws it, to be used no longer than this lives. Error: no renderer could be made.
   virtual Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) = 0;
 };
@@ -76,6 +80,7 @@ class SliceRecorder;
 
 struct ReceivedOptions {
   double epoch_patience_s = 0.15;  ///< EpochSwitch
+  bool in_step = false;            ///< the display shows what show_state() says, as other viewers do
   EventRecorder* events =
       nullptr;  ///< keeps every applied event of points; null: nothing is kept. Outlives the Received
   SliceRecorder* slices = nullptr;  ///< the same of frames of slice images

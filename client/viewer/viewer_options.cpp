@@ -228,8 +228,11 @@ Table process_table(ViewerOptions& o) {
        .help = "monotonic clock when the session was started, for start-up times; 0: now"},
       {.flag = "--wall",
        .value = &o.wall,
-       .help = "COLUMNSxROWS: this display is a tile of a wall; --fov is the wall's, --size the tile's"},
-      {.flag = "--wall-tile", .value = &o.wall_tile, .help = "which tile, counted by rows from the upper left, from 0"},
+       .help = "this display is a part of a wall: COLUMNSxROWS of tiles, --fov is the wall's, --size the tile's; or "
+               "the description of one, NAME.toml"},
+      {.flag = "--wall-tile",
+       .value = &o.wall_tile,
+       .help = "which tile, counted by rows from the upper left, from 0, or which screen of the description"},
       {.flag = "--clock-from",
        .value = &o.display.clock_from_s,
        .help =
@@ -284,23 +287,48 @@ void settle_duration(ViewerOptions& o) {
   if (d.duration_s > 0) d.hold_s = std::min(d.hold_s, d.duration_s);
 }
 
+Status settle_wall(ViewerOptions& o) {
+  auto wall = wall_tile(o.wall, o.wall_tile, o.wall_scale);
+  if (!wall) return wall.error();
+  o.display.wall = std::move(*wall);
+  if (!o.display.wall.described) return ok_status();
+  const wall::Wall& all = *o.display.wall.described;
+  const wall::Screen& screen = all.screens[size_t(o.wall_tile)];
+  o.display.width = screen.width, o.display.height = screen.height;
+  if (screen.sampling && o.sampling_size == "auto") {
+    std::tie(o.requests.sampling_width, o.requests.sampling_height) = *screen.sampling;
+    o.requests.adaptive = false;
+  }
+  if (all.anchor == wall::Anchor::kHead) return ok_status();
+  // The head stands before a wall that stands in the room, unless it is told to move.
+  if (o.trajectory == "orbit")
+    return Error{
+        fmt::format("--trajectory orbit: --wall {} stands in the room, and the data set would be seen from "
+                    "behind it; a file of poses moves the head before it, and anchor = \"head\" takes the "
+                    "wall along",
+                    o.wall)};
+  if (o.trajectory.empty()) o.trajectory = "still";
+  return ok_status();
+}
+
+// Before a wall that stands in the room.
+void stand_before_wall(ViewerOptions& o) {
+  const auto& all = o.display.wall.described;
+  if (!all || all->anchor == wall::Anchor::kHead || o.trajectory != "still" || !o.eye.empty()) return;
+  const auto in_room = [&](const glm::dvec3& p) { return all->in_room.position_room + all->in_room.orientation * p; };
+  o.movement.eye = in_room(all->head);
+  o.movement.look_at = in_room(all->head - glm::dvec3(0, 0, 1));
+}
+
 Status settle_head(ViewerOptions& o) {
+  if (const Status s = settle_wall(o); !s) return s;
   if (o.trajectory.empty()) o.trajectory = o.window || !o.eye.empty() ? "still" : "orbit";
   auto movement = head_movement(o.trajectory, o.loop);
   if (!movement) return movement.error();
   o.movement = std::move(*movement);
   if (const Status s = settle_eye(o); !s) return s;
+  stand_before_wall(o);
   settle_duration(o);
-  return ok_status();
-}
-
-Status settle_wall(ViewerOptions& o) {
-  const std::string text = o.wall.empty() ? "1x1" : o.wall;
-  const auto wall = parse_wall(text);
-  if (!wall) return wall.error();
-  if (o.wall_tile < 0 || o.wall_tile >= wall->tiles())
-    return Error{fmt::format("--wall-tile {}: --wall {} has the tiles 0..{}", o.wall_tile, text, wall->tiles() - 1)};
-  o.display.wall = {wall->columns, wall->rows, o.wall_tile};
   return ok_status();
 }
 
@@ -329,8 +357,23 @@ Table view_table(ViewerOptions& o) {
   return joined(seen, joined(coupling_table(o), record_table(o)));
 }
 
+Table wall_table(ViewerOptions& o) {
+  return {
+      {.flag = "--wall-scale",
+       .value = &o.wall_scale,
+       .help = "--wall NAME.toml: of the screens' pixels so many are drawn, on each axis: to try a wall on one machine",
+       .limits = Range{0.01, 1}},
+      {.flag = "--swap-barrier",
+       .value = &o.swap_barrier,
+       .help = "on: the displays of a wall present their frames together, all from one head and of one state of the "
+               "data set; off: each by itself",
+       .on_off = true},
+  };
+}
+
 Table table(ViewerOptions& o) {
-  return joined(net::service_table(o.service, net::Ends::kConnects), joined(view_table(o), process_table(o)));
+  return joined(net::service_table(o.service, net::Ends::kConnects),
+                joined(view_table(o), joined(process_table(o), wall_table(o))));
 }
 
 Result<std::pair<int, int>> parse_sampling_size(const std::string& text) {
@@ -344,15 +387,14 @@ Status settle(ViewerOptions& o) {
   if (!sampling) return sampling.error();
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
+  o.requests.adaptive = o.sampling_size == "auto";
   if (const Status s = settle_head(o); !s) return s;
-  if (const Status s = settle_wall(o); !s) return s;
   if (const Status s = settle_coupling(o); !s) return s;
   o.display.render.kernel = *splat::kernel_named(o.splat);
   o.display.splat_scale = float(o.splat_scale);
   if (const Status s = settle_shading(o); !s) return s;
   o.display.render.finish = *splat::finish_named(o.finish);
   o.display.still_samples = o.still_samples == "1" ? 1 : o.still_samples == "4" ? 4 : 16;
-  o.requests.adaptive = o.sampling_size == "auto";
   o.requests.follow_display = o.window;
   return ok_status();
 }

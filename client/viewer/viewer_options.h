@@ -33,9 +33,11 @@ struct ViewerOptions {
   std::string background = "#141820";  ///< "#rrggbb", a name, or "transparent"
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
   std::string still_samples = "16";
-  int buffers = 3;                 ///< of loose coupling
-  std::string wall;                ///< "CxR": this display is a tile of a wall; empty: it is none
-  int wall_tile = 0;               ///< which one, by rows from the upper left
+  int buffers = 3;           ///< of loose coupling
+  std::string wall;          ///< "CxR", or a description's file: this display is a part of a wall; empty: it is none
+  int wall_tile = 0;         ///< which tile, by rows from the upper left, or which of the file's screens
+  double wall_scale = 1;     ///< of a description: of the screens' pixels, on each axis
+  bool swap_barrier = true;  ///< a wall's displays present their frames together
   double epoch_patience_s = 0.15;  ///< EpochSwitch
   double splat_scale = 0;          ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;
@@ -53,6 +55,8 @@ struct ViewerOptions {
 
 /// Flags that `telesplat run` and `view` have too: size, trajectory, renderer and the like.
 options::Table view_table(ViewerOptions& options);
+/// Flags of walls that `telesplat run` has too.
+options::Table wall_table(ViewerOptions& options);
 /// All flags of telesplat-viewer.
 options::Table table(ViewerOptions& options);
 
@@ -62,6 +66,9 @@ Result<std::pair<int, int>> parse_sampling_size(const std::string& text);
 /// Works out what the texts of the flags come to: sizes, the head's movement (its file is read), the tile of the wall,
 /// kernels, buffers of the coupling. Error: names the flag that cannot be.
 Status settle(ViewerOptions& options);
+
+/// Whether the display presents its frames together with those of others.
+inline bool in_step(const ViewerOptions& options) { return options.swap_barrier && options.display.wall.tiles() > 1; }
 
 /// What happens where the trajectory of a file ends before the viewer does, a line for the person; empty: it does not.
 /// For settled options.

@@ -126,7 +126,22 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
   if (o.wall.empty()) return out;
   out["wall"] = o.wall;
   out["wall_tile"] = std::to_string(o.wall_tile);
+  out["wall_scale"] = fmt::format("{}", o.wall_scale);
   return out;
+}
+
+// What keeps the display in step with a wall's others; null: it is by itself.
+std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& context, const ViewerWorker& worker) {
+  if (!in_step(o)) return nullptr;
+  const auto& d = o.display;
+  return std::make_unique<WallPace>(context,
+                                    WallPace::Options{.master = o.service.master,
+                                                      .name = o.service.name,
+                                                      .wall = fmt::format("{} x{}", o.wall, o.wall_scale),
+                                                      .number = uint64_t(d.wall.tile),
+                                                      .viewers = uint64_t(d.wall.tiles()),
+                                                      .period_s = d.target_fps > 0 ? 1 / d.target_fps : 0},
+                                    worker.instance(), [&worker](double s) { return worker.to_master_s(s); });
 }
 
 struct Served {
@@ -145,14 +160,15 @@ Served serve(const ViewerOptions& o, const net::Via& via, DisplaySurface& surfac
                                       .requests = o.requests,
                                       .least_sampling = o.least_sampling,
                                       .facts = facts(o, renderers),
-                                      .received = {.epoch_patience_s = o.epoch_patience_s},
+                                      .received = {.epoch_patience_s = o.epoch_patience_s, .in_step = in_step(o)},
                                       .record = &record,
                                       .started_s = o.started_s};
   ViewerWorker worker(context, options, gate, frames, spans);
   const SourceMaker make_source = [&](Received& r) { return r.make_source(o.display, renderers); };
   Served served;
-  served.display =
-      run_display(o.display, surface, make_source, gate, worker, frames, spans, [&] { return record.spool(); });
+  const auto wall = wall_pace(o, context, worker);
+  served.display = run_display(
+      o.display, surface, make_source, gate, worker, frames, spans, [&] { return record.spool(); }, wall.get());
   served.session_ended = worker.shutdown_requested();
   return served;
 }

@@ -56,6 +56,7 @@ class ViewerWorker {
   /// True once one view update is complete.
   bool first_update_complete() const { return updates_ > 0; }
   bool shutdown_requested() const { return shutdown_; }
+  InstanceId instance() const { return link_.instance(); }
   double to_master_s(double local_s) const { return local_s + offset_s_; }
 
   /// For people who watch.

@@ -299,6 +299,19 @@ ordered_json how_coupled(const Measured& m) {
   return {{"coupling_changes", changes}, {"frames_by_coupling", frames}};
 }
 
+/// How well the displays of a wall kept in step: each of the wall's frames counts once, whoever told of it.
+ordered_json how_together(const Measured& m, double incomplete) {
+  const auto numbers = m.frames.column("wall_frame"), skews = m.frames.column("swap_skew_ms");
+  std::map<double, double> by_frame;
+  for (size_t i = 0; i < numbers.size() && i < skews.size(); ++i)
+    if (numbers[i] > 0 && skews[i] >= 0) by_frame[numbers[i]] = skews[i];
+  std::vector<double> ms;
+  for (const auto& [number, skew] : by_frame) ms.push_back(skew);
+  return {{"swap_skew_ms", distribution_json(ms)},
+          {"swaps", if_measured(!ms.empty(), ms.size())},
+          {"swaps_incomplete", if_measured(!ms.empty(), whole(incomplete))}};
+}
+
 ordered_json how_long(const Measured& m) {
   auto delays = m.frames.column("inter_frame_ms");
   std::erase_if(delays, [](double d) { return d <= 0; });  // the first frame of a viewer has none
@@ -395,6 +408,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(how_often(measured, figures, counter("frames_completed")));
   out.update(how_coupled(measured));
   out.update(how_long(measured));
+  out.update(how_together(measured, counter("swaps_incomplete")));
   out["clock"] = clocks(processes);
   out.update(how_much(traffic(measured, roster), run_s, viewers));
   out.update(what_was_steered(measured));

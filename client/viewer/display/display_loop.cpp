@@ -49,7 +49,7 @@ class Display {
  public:
   Display(const DisplayOptions& o, DisplaySurface& surface, CouplingGate& gate, ViewerWorker& worker,
           metrics::TableRecorder& frames, metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool,
-          const SourceMaker& make_source)
+          const SourceMaker& make_source, WallPace* wall)
       : o_(o),
         surface_(surface),
         gate_(gate),
@@ -58,6 +58,7 @@ class Display {
         spans_(spans),
         find_spool_(spool),
         make_source_(make_source),
+        wall_(wall),
         look_(first_look(o.render, o.shading)),
         stall_(o.most_wait_s) {}
 
@@ -67,7 +68,9 @@ class Display {
     if (!draw_from(newest_drawn()) || !rest()) return stopped_early();
     worker_.on_first_points(monotonic_s());
     start_s_ = o_.clock_from_s > 0 ? o_.clock_from_s : monotonic_s();
+    if (wall_) swap_with_wall();
     while (!last_) frame();
+    add_row();
     return result_;
   }
 
@@ -200,6 +203,29 @@ class Display {
     surface_.report(live_);
   }
 
+  // Of a wall: where to be when it goes on is this head's wish, and its master's word. Returns when the frame at hand
+  // is to be presented.
+  WallPace::Swapped swap_with_wall() {
+    const double now_s = monotonic_s(), t_s = now_s - start_s_;
+    next_camera(now_s, t_s);
+    return wall_->drawn({t_s, surface_.head(), received_->newest_state()},
+                        [this] { return told_to_stop(worker_, surface_); });
+  }
+
+  // What the frame that begins is drawn from, and its camera.
+  void begin_view(double t_s, MeasuredFrame& m) {
+    if (!wall_) {
+      m.camera = next_camera(m.begin_s, t_s);
+      m.head = surface_.head();
+      return;
+    }
+    const WallPace::Turn& turn = wall_->turn();
+    if (!m.coupling.waits()) received_->show_state(turn.state);
+    m.wall_frame = turn.frame;
+    m.head = turn.head;
+    m.camera = surface_.camera_of(turn.head);
+  }
+
   uint32_t use_of_frame(double t_s) const {
     if (!spool_) return 0;
     uint32_t use = 0;
@@ -223,20 +249,20 @@ class Display {
       return;
     }
     m.begin_s = monotonic_s();
-    const double t_s = m.begin_s - start_s_;
+    const double t_s = wall_ ? wall_->turn().t_s : m.begin_s - start_s_;
     see_whether_last(t_s);
     // The view of now, from what is cached now.
-    m.camera = next_camera(m.begin_s, t_s);
+    begin_view(t_s, m);
+    m.look = look_;
     const uint32_t use = use_of_frame(t_s);
     const bool with_depth = use & (kVerify | kExr);
     const bool intact = view_intact_ && view_.width == m.camera.width && view_.height == m.camera.height;
     fit(view_, m.camera, spool_ != nullptr);
-    m.look = look_;
     const bool wished = surface_.wants_picture();
     const bool coverage = o_.transparent && ((use & kPicture) || wished);
     m.drawn = source_->draw({.begin_s = m.begin_s,
                              .camera = m.camera,
-                             .look = look_,
+                             .look = m.look,
                              .with_depth = with_depth,
                              .with_coverage = coverage,
                              .intact = intact},
@@ -245,10 +271,12 @@ class Display {
     worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, m.drawn.update, waited.for_update);
     const auto legend = o_.legend ? worker_.legend_at(m.drawn.epoch) : nullptr;
     surface_.on_legend(legend);
+    const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
     surface_.present(view_, m.drawn.changed);
     if (wished) surface_.take_picture(view_, coverage ? image::Alpha::kCoverage : image::Alpha::kNone);
     take_wished_picture(m.camera);
     m.presented_s = monotonic_s();
+    if (wall_) note_swap(swapped, m);
     m.filled = gate_.filled();
     source_->displayed();
     gate_.displayed();
@@ -260,6 +288,7 @@ class Display {
     live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
     live_.coupling = m.coupling;
     surface_.report(live_);
+    if (wall_ && !swapped.alone) return;  // the wall has its pace
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
     else if (!m.drawn.changed)
@@ -286,7 +315,9 @@ class Display {
   void record(MeasuredFrame& m) {
     m.begin_master_s = worker_.to_master_s(m.begin_s);
     m.update_age_s = worker_.to_master_s(m.end_s) - m.drawn.update.requested_s;
-    frames_.add(frame_row(m));
+    add_row();
+    row_ = m;
+    if (!wall_) add_row();
     worker_.on_measured(m);
     if (m.wait_s > 0)
       spans_.add("wait for update", worker_.to_master_s(m.begin_s - m.wait_s), worker_.to_master_s(m.begin_s), 0);
@@ -294,6 +325,19 @@ class Display {
     spans_.add("display frame", worker_.to_master_s(m.begin_s), worker_.to_master_s(m.end_s), 0,
                {.request = shown ? double(shown) : -1});
     previous_s_ = m.end_s;
+  }
+
+  void note_swap(const WallPace::Swapped& swapped, MeasuredFrame& m) {
+    wall_->presented(m.presented_s);
+    m.swap_wait_s = swapped.wait_s;
+    if (swapped.alone) m.wall_frame = 0;
+    if (row_ && swapped.skew_frame > 0 && swapped.skew_frame == row_->wall_frame) row_->swap_skew_s = swapped.skew_s;
+  }
+
+  // Of a wall's frame it is known only with the next one when the others presented it.
+  void add_row() {
+    if (row_) frames_.add(frame_row(*row_));
+    row_.reset();
   }
 
   // Hands the picture to the spool, if it is to be kept.
@@ -322,6 +366,8 @@ class Display {
   const std::function<FrameSpool*()>& find_spool_;
   FrameSpool* spool_ = nullptr;
   const SourceMaker& make_source_;
+  WallPace* const wall_;  // null: the display is by itself
+  std::optional<MeasuredFrame> row_;
   Look look_;
   ShownScene scene_;  // as the surface knows it, and the session too
   std::shared_ptr<const wire::Welcome> session_;
@@ -341,8 +387,8 @@ class Display {
 
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
                           CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
-                          metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool) {
-  return Display(options, surface, gate, worker, frames, spans, spool, make_source).run();
+                          metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool, WallPace* wall) {
+  return Display(options, surface, gate, worker, frames, spans, spool, make_source, wall).run();
 }
 
 }  // namespace telesplat::viewer

@@ -9,6 +9,7 @@
 #include "client/viewer/display/view_source.h"
 #include "client/viewer/record/frame_spool.h"
 #include "client/viewer/viewer_worker.h"
+#include "client/viewer/wall_pace.h"
 
 namespace telesplat::viewer {
 
@@ -29,8 +30,10 @@ using SourceMaker = std::function<Result<std::unique_ptr<ViewSource>>(Received&)
 /// time.
 /// Only the last frame, when told to stop or at the end of the duration, waits for nothing. `spool` is asked once the
 /// session is known; it, or what it returns, may be null: nothing is recorded.
+/// wall: where the display is one of several that present their frames together, from one head; null: it is not.
 DisplayResult run_display(const DisplayOptions& options, DisplaySurface& surface, const SourceMaker& make_source,
                           CouplingGate& gate, ViewerWorker& worker, metrics::TableRecorder& frames,
-                          metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool);
+                          metrics::SpanRecorder& spans, const std::function<FrameSpool*()>& spool,
+                          WallPace* wall = nullptr);
 
 }  // namespace telesplat::viewer

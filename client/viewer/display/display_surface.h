@@ -53,6 +53,10 @@ class DisplaySurface {
   /// frame's, and changes `look` to the person's wishes. t_s: seconds since the first displayed frame; negative before
   /// it, while the head rests.
   virtual geometry::Camera begin_frame(double now_s, double t_s, Look& look) = 0;
+  /// The head whose view begin_frame() returned last, and what it would have returned for another head: viewers of a
+  /// wall show what one head sees.
+  virtual geometry::Pose head() const = 0;
+  virtual geometry::Camera camera_of(const geometry::Pose& head) const = 0;
   /// Whether frames without points are worth drawing, because somebody sees them.
   virtual bool visible() const = 0;
   /// The session as its master tells of it, whenever that has changed.

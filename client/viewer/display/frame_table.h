@@ -19,10 +19,14 @@ struct MeasuredFrame {
   double wait_s = 0;          ///< for the update, before begin_s
   double update_age_s = 0;    ///< since the update that it shows was requested
   geometry::Camera camera{};
+  geometry::Pose head{};  ///< that it was drawn for; of a screen of a wall not the camera's
   Look look{};
   DrawnFrame drawn{};
   int filled = 0;            ///< complete updates that waited to be displayed
   CouplingState coupling{};  ///< that was in force
+  uint64_t wall_frame = 0;   ///< its number among the wall's; 0: it is none, or none told when to present it
+  double swap_wait_s = 0;    ///< from its end until the wall's frames were due
+  double swap_skew_s = -1;   ///< from the first of the wall's displays to present it to the last; < 0: not known
 };
 
 std::vector<std::string> frame_columns();

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "client/viewer/display/display_options.h"
 #include "client/viewer/display/size_text.h"
+#include "common/wall/unrolled.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -13,10 +15,32 @@ constexpr int kMaxSide = 16;
 
 Result<WallLayout> parse_wall(const std::string& text, int most_tiles) {
   const auto pair = parse_pair(text, 1, kMaxSide);
-  if (!pair) return Error{fmt::format("--wall {}: not COLUMNSxROWS with both in 1..{}", text.substr(0, 40), kMaxSide)};
+  if (!pair)
+    return Error{fmt::format("--wall {}: neither a file NAME.toml nor COLUMNSxROWS with both in 1..{}",
+                             text.substr(0, 40), kMaxSide)};
   const WallLayout out{pair->first, pair->second};
   if (out.tiles() > most_tiles)
     return Error{fmt::format("--wall {}: it has {} tiles; at most {}", text, out.tiles(), most_tiles)};
+  return out;
+}
+
+bool is_description(const std::string& wall) { return wall.ends_with(".toml"); }
+
+Result<WallTile> wall_tile(const std::string& text, int tile, double scale) {
+  WallTile out;
+  out.tile = tile;
+  if (is_description(text)) {
+    auto read = wall::read_wall(text);
+    if (!read) return Error{"--wall " + read.error().text};
+    out.described = std::make_shared<const wall::Wall>(wall::scaled(std::move(*read), scale));
+  } else if (!text.empty()) {
+    const auto layout = parse_wall(text);
+    if (!layout) return layout.error();
+    out.columns = layout->columns, out.rows = layout->rows;
+  }
+  if (tile < 0 || tile >= out.tiles())
+    return Error{fmt::format("--wall-tile {}: --wall {} has the {} 0..{}", tile, text.empty() ? "1x1" : text,
+                             out.described ? "screens" : "tiles", out.tiles() - 1)};
   return out;
 }
 
@@ -27,8 +51,24 @@ geometry::Camera tile_of(const geometry::Camera& whole, const WallTile& wall) {
 }
 
 image::DisplayPart part_of_wall(int width, int height, const WallTile& wall) {
+  if (wall.described)
+    if (const auto flat = wall::unrolled(*wall.described)) {
+      const auto& place = flat->places[size_t(wall.tile)];
+      return {flat->width, flat->height, place.x, place.y};
+    }
   return {width * wall.columns, height * wall.rows, wall.tile % wall.columns * width,
           wall.tile / wall.columns * height};
+}
+
+geometry::Camera display_camera(const DisplayOptions& o, const geometry::Pose& head) {
+  if (o.wall.described) return wall::screen_camera(*o.wall.described, o.wall.tile, head, o.near_m);
+  return tile_of(geometry::make_camera(head, o.fov_deg, o.width * o.wall.columns, o.height * o.wall.rows, o.near_m),
+                 o.wall);
+}
+
+geometry::Camera fitting_camera(const DisplayOptions& o) {
+  if (o.wall.described) return wall::fitting_frustum(*o.wall.described, o.near_m);
+  return geometry::make_camera({}, o.fov_deg, o.width * o.wall.columns, o.height * o.wall.rows, o.near_m);
 }
 
 }  // namespace telesplat::viewer

@@ -1,11 +1,15 @@
-// A wall of displays that each show a part of one frustum (T3.3.3). Tiles are counted by rows, from the upper left.
+// A wall of displays that show what one head sees (T3.3.3, T7.4): tiles of one picture, counted by rows from the upper
+// left, or the screens of a description (common/wall).
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "common/core/result.h"
 #include "common/geometry/camera.h"
 #include "common/image/legend.h"
+#include "common/wall/screen_camera.h"
+#include "common/wall/wall.h"
 
 namespace telesplat::viewer {
 
@@ -18,15 +22,30 @@ struct WallLayout {
 /// "2x1": columns x rows, 1 to 16 of each. Error: not of that form, or more than `most_tiles` tiles.
 Result<WallLayout> parse_wall(const std::string& text, int most_tiles = 16 * 16);
 
+/// Whether --wall names a description: FILE.toml.
+bool is_description(const std::string& wall);
+
 /// Which part of a wall a display is.
 struct WallTile {
   int columns = 1, rows = 1, tile = 0;
+  std::shared_ptr<const wall::Wall> described;  ///< null: tiles of one picture; else `tile` is its screen
+  int tiles() const { return described ? int(described->screens.size()) : columns * rows; }
 };
+
+/// What --wall, --wall-tile and --wall-scale come to. An empty text is a wall of one. Error: names flag, value and
+/// limit, or file, line and key.
+Result<WallTile> wall_tile(const std::string& wall, int tile, double scale);
 
 /// The camera of this display, one of a wall's tiles: its part of the off-axis frustum of the whole.
 geometry::Camera tile_of(const geometry::Camera& whole, const WallTile& wall);
 
-/// The same in pixels, of a display of width x height.
+/// The same in pixels, of a display of width x height. Of a described wall: unrolled.
 image::DisplayPart part_of_wall(int width, int height, const WallTile& wall);
+
+struct DisplayOptions;
+/// What a display of these options shows a head.
+geometry::Camera display_camera(const DisplayOptions& options, const geometry::Pose& head);
+/// What the whole wall shows, for data to be fitted into.
+geometry::Camera fitting_camera(const DisplayOptions& options);
 
 }  // namespace telesplat::viewer

@@ -122,6 +122,7 @@ WindowSurface::~WindowSurface() {
 // Of all tiles of a wall.
 geometry::Camera WindowSurface::whole(const geometry::Pose& pose) const {
   const auto& o = options_.display;
+  if (o.wall.described) return wall::fitting_frustum(*o.wall.described, o.near_m);
   return window_camera(pose, o.fov_deg, window_->width() * o.wall.columns, window_->height() * o.wall.rows, o.near_m);
 }
 
@@ -147,7 +148,8 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   fit_views();
   const auto& o = options_.display;
   const bool playback = t_s >= 0 && (o.duration_s <= 0 || t_s < o.duration_s - o.hold_s);
-  const geometry::Camera camera = tile_of(whole(interaction_.advance(now_s, playback)), o.wall);
+  head_ = interaction_.advance(now_s, playback);
+  const geometry::Camera camera = camera_of(head_);
   interaction_.set_height_tangent(camera.top - camera.bottom);
   take_launcher_lines(now_s);
   take_dropped();
@@ -155,6 +157,15 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   show_help();
   show_news(now_s);
   keep_path();
+  return camera;
+}
+
+// A screen's picture has the window's pixels.
+geometry::Camera WindowSurface::camera_of(const geometry::Pose& head) const {
+  const auto& o = options_.display;
+  if (!o.wall.described) return tile_of(whole(head), o.wall);
+  geometry::Camera camera = wall::screen_camera(*o.wall.described, o.wall.tile, head, o.near_m);
+  camera.width = window_->width(), camera.height = window_->height();
   return camera;
 }
 
@@ -332,7 +343,8 @@ void WindowSurface::on_legend(const std::shared_ptr<const image::Legend>& legend
 // On a wall the tile in the lower right corner has it.
 void WindowSurface::show_legend() {
   const WallTile& wall = options_.display.wall;
-  if (!legend_ || wall.tile != wall.columns * wall.rows - 1) return overlays_.hide("legend");
+  const int tiles = wall.described ? int(wall.described->screens.size()) : wall.columns * wall.rows;
+  if (!legend_ || wall.tile != tiles - 1) return overlays_.hide("legend");
   overlays_.show("legend",
                  {image::legend_picture(*legend_, legend_width_, legend_height_), Overlay::Corner::kLowerRight});
 }

@@ -51,6 +51,8 @@ class WindowSurface final : public DisplaySurface {
   geometry::Camera begin_frame(double now_s, double t_s, Look& look) override;
   void on_session(const std::shared_ptr<const wire::Welcome>& session) override;
   std::optional<SamplingWish> take_sampling() override { return panel_.take_sampling(); }
+  geometry::Pose head() const override { return head_; }
+  geometry::Camera camera_of(const geometry::Pose& head) const override;
   bool visible() const override { return true; }
   void present(const image::View& view, bool changed) override;
   void on_legend(const std::shared_ptr<const image::Legend>& legend) override;
@@ -92,6 +94,7 @@ class WindowSurface final : public DisplaySurface {
   Overlays overlays_;
   ShownScene scene_;
   std::string scene_name_;
+  geometry::Pose head_;                       // of the frame at hand
   int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
   std::shared_ptr<const image::Legend> legend_;
   int legend_width_ = 0, legend_height_ = 0;  // of the window that the legend on display suits

@@ -22,8 +22,9 @@ constexpr uint64_t kReceiptBytes = 32 << 10;  // are told of at once
 ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLinks& links)
     : links_(links),
       waits_(links.gate.waits()),
+      in_step_(options.in_step),
       events_(options.events),
-      receiver_({links.viewer, options.epoch_patience_s, options.events, waits_},
+      receiver_({links.viewer, options.epoch_patience_s, options.events, waits_ || in_step_},
                 {[this] { return config_; },
                  [this](InstanceId packer, Sequence after) {
                    if (auto* state = links_.feeds.find("state"))
@@ -52,7 +53,7 @@ void ReceivedPoints::receive(int most) {
 void ReceivedPoints::tick(double now_s) {
   receiver_.tick(now_s);
   send_receipt(now_s);
-  if (!waits_) summarise();
+  if (!waits_ && !in_step_) summarise();  // held changes are applied by the display's thread
   cache_.free_dropped();
 }
 
@@ -77,7 +78,7 @@ void ReceivedPoints::summarise() {
 }
 
 void ReceivedPoints::on_update(const ShownUpdate& update) {
-  if (waits_) return batches_.close(update);
+  if (waits_ || in_step_) return batches_.close(update);
   const std::lock_guard lock(mutex_);
   shown_ = update;
 }
@@ -85,12 +86,16 @@ void ReceivedPoints::on_update(const ShownUpdate& update) {
 void ReceivedPoints::on_coupling(int buffers) {
   const bool waits = buffers > 0;
   if (std::exchange(waits_, waits) == waits) return;
-  if (waits) return receiver_.hold();
+  if (waits || in_step_) return receiver_.hold();
   if (const auto newest = receiver_.release()) show(*newest);
 }
 
 void ReceivedPoints::advance(RequestId request) {
   if (const auto update = batches_.apply(request, cache_)) show(*update);
+}
+
+void ReceivedPoints::show_state(const wire::ShownState& state) {
+  if (const auto update = batches_.apply_until(state, cache_)) show(*update);
 }
 
 // The other thread may have shown a newer one by now.
@@ -131,7 +136,7 @@ void ReceivedPoints::add_status(net::MasterLink::Values& values) const {
   values["gaps_resynced"] = double(received.gaps);
   values["sequence"] = double(received.sequence.value);
   values["messages_rejected"] += double(received.decode_errors);
-  if (waits_) return;
+  if (waits_ || in_step_) return;
   // Where nothing is held back it is the receiver that knows when an epoch is shown.
   values["epochs_shown"] = std::max(values["epochs_shown"], double(received.epochs_shown));
   values["epoch"] = double(received.epoch.value);

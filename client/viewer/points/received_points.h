@@ -9,6 +9,7 @@
 #include "client/viewer/points/receiver.h"
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/received.h"
+#include "common/core/clock.h"
 
 namespace telesplat::viewer {
 
@@ -24,6 +25,8 @@ class ReceivedPoints final : public Received {
   void on_update(const ShownUpdate& update) override;
   void on_coupling(int buffers) override;
   void report() override;
+  wire::ShownState newest_state() const override { return batches_.newest(monotonic_s()); }
+  void show_state(const wire::ShownState& state) override;
   void on_retired() override { retired_ = true; }
   void add_status(net::MasterLink::Values& values) const override;
   Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) override;
@@ -47,6 +50,7 @@ class ReceivedPoints final : public Received {
 
   ReceivedLinks links_;
   bool waits_;                   // the display, for whole updates; worker's
+  const bool in_step_;           // it shows what other viewers show, too (a wall)
   EventRecorder* const events_;  // null: nothing is kept
   ModelCache cache_;
   FineRays fine_rays_;

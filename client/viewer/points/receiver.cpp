@@ -86,7 +86,8 @@ void PointReceiver::apply(const ModelEvent& event) {
           return apply_patch(e, event.arrived_s);
         } else if constexpr (std::is_same_v<E, wire::Forget>) {
           if (options_.hold)
-            batches_.add(UpdateBatches::Forget{e.sequence, {e.clusters.begin(), e.clusters.end()}, e.frames}, cache_);
+            batches_.add(UpdateBatches::Forget{e.sequence, {e.clusters.begin(), e.clusters.end()}, e.frames}, cache_,
+                         sequencer_.packer());
           else
             cache_.forget(e.sequence, e.clusters, e.frames);
         } else {
@@ -114,7 +115,7 @@ void PointReceiver::begin_replica(const points::ModelConfig& config, EpochId epo
   epoch_ = epoch;
   rays_.clear();
   if (options_.hold)
-    batches_.add(UpdateBatches::Begin{config, epoch, sequence}, cache_);
+    batches_.add(UpdateBatches::Begin{config, epoch, sequence}, cache_, sequencer_.packer());
   else
     switch_.begin(epoch, cache_.begin_replica(config, epoch, sequence), monotonic_s());
 }
@@ -148,7 +149,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_,
                                         points::tagged(patch.frame, patch.step));
   if (options_.hold)
-    batches_.add(UpdateBatches::Insert{std::move(prepared), patch.epoch}, cache_);
+    batches_.add(UpdateBatches::Insert{std::move(prepared), patch.epoch}, cache_, sequencer_.packer());
   else
     cache_.insert(std::move(prepared), patch.epoch);
   const double inserted = monotonic_s();

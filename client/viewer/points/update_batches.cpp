@@ -1,15 +1,37 @@
 #include "client/viewer/points/update_batches.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "common/core/clock.h"
 #include "common/core/log.h"
 
 namespace telesplat::viewer {
+namespace {
 
-void UpdateBatches::add(Change change, ModelCache& cache) {
+uint64_t sequence_of(const UpdateBatches::Change& change) {
+  return std::visit(
+      [](const auto& c) {
+        if constexpr (requires { c.patch; })
+          return c.patch.sequence.value;
+        else
+          return c.sequence.value;
+      },
+      change);
+}
+
+}  // namespace
+
+void UpdateBatches::add(Change change, ModelCache& cache, InstanceId packer) {
   const std::lock_guard lock(mutex_);
   if (const auto* insert = std::get_if<Insert>(&change)) points_ += insert->patch.points;
-  changes_.push_back(std::move(change));
+  if (std::exchange(newest_.source, packer) != packer) newest_.replica = 0;
+  newest_.newest = sequence_of(change);
+  if (std::holds_alternative<Begin>(change)) {
+    begun_ = newest_.newest + 1;
+    begun_s_ = monotonic_s();
+  }
+  changes_.push_back({std::move(change), packer});
   if (points_ <= kMaxPoints) return;
   log::warn("{} points wait for a view update that does not become complete: they are shown as they are", points_);
   while (!changes_.empty()) apply_front(cache);
@@ -19,6 +41,14 @@ void UpdateBatches::add(Change change, ModelCache& cache) {
 void UpdateBatches::close(const ShownUpdate& update) {
   const std::lock_guard lock(mutex_);
   ends_.push_back({update, first_ + changes_.size()});
+  newest_.replica = begun_;
+}
+
+wire::ShownState UpdateBatches::newest(double now_s) const {
+  const std::lock_guard lock(mutex_);
+  wire::ShownState out = newest_;
+  if (now_s - begun_s_ > kReplicaPatience_s) out.replica = begun_;
+  return out;
 }
 
 // Of a replica that begins: whether an older one stays on display.
@@ -33,10 +63,11 @@ bool UpdateBatches::apply_front(ModelCache& cache) {
         } else if constexpr (std::is_same_v<C, Forget>) {
           cache.forget(c.sequence, c.clusters, c.frames);
         } else {
+          applied_ = {changes_.front().packer, c.sequence.value, c.sequence.value + 1};
           held = cache.begin_replica(c.config, c.epoch, c.sequence);
         }
       },
-      changes_.front());
+      changes_.front().change);
   changes_.pop_front();
   ++first_;
   return held;
@@ -54,7 +85,7 @@ std::optional<ShownUpdate> UpdateBatches::release(ModelCache& cache, const std::
     shown();
   }
   while (!changes_.empty()) {
-    const auto* begins = std::get_if<Begin>(&changes_.front());
+    const auto* begins = std::get_if<Begin>(&changes_.front().change);
     const Begin begin = begins ? *begins : Begin{};
     const bool is_begin = begins != nullptr, held = apply_front(cache);
     if (is_begin) begun(begin, held);
@@ -72,6 +103,33 @@ std::optional<ShownUpdate> UpdateBatches::apply(RequestId request, ModelCache& c
   while (!changes_.empty() && first_ < until) apply_front(cache);
   cache.show_newest();
   return update;
+}
+
+std::optional<ShownUpdate> UpdateBatches::apply_until(const wire::ShownState& state, ModelCache& cache) {
+  const std::lock_guard lock(mutex_);
+  const auto show = [&] {
+    if (applied_.source == state.source && applied_.replica <= state.replica) cache.show_newest();
+  };
+  while (!changes_.empty()) {
+    const Held& next = changes_.front();
+    const uint64_t sequence = sequence_of(next.change);
+    if (next.packer == state.source) {
+      if (sequence > state.newest) break;
+    } else if (std::none_of(changes_.begin(), changes_.end(),
+                            [&](const Held& h) { return h.packer == state.source; })) {
+      break;  // it is of a packer that the others do not show yet
+    }
+    // The replica before, if that was to be shown, would be passed over.
+    if (std::holds_alternative<Begin>(next.change)) show();
+    apply_front(cache);
+  }
+  show();
+  std::optional<ShownUpdate> out;
+  while (!ends_.empty() && ends_.front().change <= first_) {
+    out = ends_.front().update;
+    ends_.pop_front();
+  }
+  return out;
 }
 
 }  // namespace telesplat::viewer

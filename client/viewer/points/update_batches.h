@@ -12,6 +12,7 @@
 
 #include "client/viewer/coupling/shown_update.h"
 #include "client/viewer/points/model_cache.h"
+#include "common/wire/wall_messages.h"
 
 namespace telesplat::viewer {
 
@@ -38,7 +39,8 @@ class UpdateBatches {
   using Change = std::variant<Insert, Forget, Begin>;
 
   // ---- worker ----
-  void add(Change change, ModelCache& cache);
+  /// packer: whose event it is.
+  void add(Change change, ModelCache& cache, InstanceId packer = {});
   /// Everything added so far belongs to this update or to earlier ones.
   void close(const ShownUpdate& update);
   /// The display waits for nothing any more: applies everything and shows the newest replica that a closed update is
@@ -50,12 +52,23 @@ class UpdateBatches {
   // ---- display thread ----
   /// Applies all changes up to the end of this update and shows the newest replica. Nothing: it was not closed.
   std::optional<ShownUpdate> apply(RequestId request, ModelCache& cache);
+  /// Where several viewers show the same (a wall): what apply_until() could show by now. A replica that began is among
+  /// it once an update is closed in it, or kReplicaPatience_s later.
+  wire::ShownState newest(double now_s) const;
+  static constexpr double kReplicaPatience_s = 1;
+  /// Applies the changes up to that state, and shows its replica. Returns the newest update that is closed in it, if
+  /// that is not the one of an earlier call.
+  std::optional<ShownUpdate> apply_until(const wire::ShownState& state, ModelCache& cache);
 
  private:
+  struct Held {
+    Change change;
+    InstanceId packer;
+  };
   bool apply_front(ModelCache& cache);
 
-  std::mutex mutex_;
-  std::deque<Change> changes_;
+  mutable std::mutex mutex_;
+  std::deque<Held> changes_;
   struct End {
     ShownUpdate update;
     uint64_t change = 0;  // number of the first that does not belong to it
@@ -63,6 +76,10 @@ class UpdateBatches {
   std::deque<End> ends_;
   uint64_t first_ = 0;  // number of changes_.front()
   uint64_t points_ = 0;
+  wire::ShownState newest_;   // of the newest change
+  uint64_t begun_ = 0;        // ShownState::replica of the newest
+  double begun_s_ = 0;        // when it did, here
+  wire::ShownState applied_;  // its replica: the newest that began
 };
 
 }  // namespace telesplat::viewer

@@ -14,10 +14,30 @@ void SliceCache::show(BufferedFrame frame) {
 void SliceCache::put(BufferedFrame frame) {
   const std::lock_guard lock(mutex_);
   ++frames_;
-  if (in_order_)
+  newest_ = {frame.source, frame.frame->frame};
+  if (in_order_ || in_step_)
     waiting_.push_back(std::move(frame));
   else
     show(std::move(frame));
+  if (in_order_ || waiting_.size() <= kMostInStep) return;
+  show(std::move(waiting_.front()));
+  waiting_.pop_front();
+}
+
+void SliceCache::show_until(InstanceId source, FrameId frame) {
+  const std::lock_guard lock(mutex_);
+  if (in_order_) return;
+  const auto shown = [&](const BufferedFrame& f) { return f.source == source && f.frame->frame <= frame; };
+  const auto last = std::find_if(waiting_.rbegin(), waiting_.rend(), shown);
+  for (auto n = waiting_.rend() - last; n > 0; --n) {
+    show(std::move(waiting_.front()));
+    waiting_.pop_front();
+  }
+}
+
+std::pair<InstanceId, FrameId> SliceCache::newest() const {
+  const std::lock_guard lock(mutex_);
+  return newest_;
 }
 
 void SliceCache::free_dropped() {
@@ -39,6 +59,11 @@ std::vector<FrameId> SliceCache::take_left() {
 void SliceCache::set_in_order(bool in_order) {
   const std::lock_guard lock(mutex_);
   if (std::exchange(in_order_, in_order) == in_order || in_order) return;
+  if (in_step_) {
+    for (const BufferedFrame& f : waiting_) left_.push_back(f.frame->frame);
+    if (!std::exchange(counted_, true)) left_.push_back(displayed_.frame->frame);
+    return;
+  }
   if (!std::exchange(counted_, true)) left_.push_back(displayed_.frame->frame);
   for (BufferedFrame& f : waiting_) {
     left_.push_back(f.frame->frame);

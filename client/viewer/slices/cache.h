@@ -5,6 +5,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "client/viewer/coupling/shown_update.h"
@@ -17,13 +18,17 @@ struct BufferedFrame {
   std::shared_ptr<const volume::VolumeFrame> frame;
   ShownUpdate update;
   uint64_t pixels = 0;  ///< that it holds
+  InstanceId source;    ///< the master that numbered it
 };
 
 class SliceCache {
  public:
   /// in_order false (asynchronous): the newest frame is the one on display. true: frames wait in order until the
   /// display advances to them; whoever puts them in takes care that they are not too many.
-  explicit SliceCache(bool in_order) : in_order_(in_order) {}
+  /// in_step: asynchronously too frames wait, until show_until() says that other viewers show them as well; of more
+  /// than kMostInStep the oldest goes on display.
+  explicit SliceCache(bool in_order, bool in_step = false) : in_order_(in_order), in_step_(in_step) {}
+  static constexpr size_t kMostInStep = 8;
 
   // ---- worker ----
   void put(BufferedFrame frame);
@@ -40,6 +45,11 @@ class SliceCache {
   /// In order: the frame of this request goes on display, those before it that still wait are passed over. No effect if
   /// none waits for it.
   void advance(RequestId request);
+  /// In step, asynchronously: the newest that waits up to this one goes on display. Frames of other masters than
+  /// `source` go before its own.
+  void show_until(InstanceId source, FrameId frame);
+  /// The newest frame that is here, and who numbered it; 0: none is.
+  std::pair<InstanceId, FrameId> newest() const;
   /// The frame on display has been displayed.
   void frame_done();
 
@@ -56,6 +66,8 @@ class SliceCache {
 
   mutable std::mutex mutex_;
   bool in_order_;
+  const bool in_step_;
+  std::pair<InstanceId, FrameId> newest_;
   BufferedFrame displayed_;
   std::deque<BufferedFrame> waiting_;
   std::vector<std::shared_ptr<const volume::VolumeFrame>> dropped_;

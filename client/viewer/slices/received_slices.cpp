@@ -11,7 +11,7 @@ constexpr Feed kFeeds[] = {{net::Kind::kDealer, "state"}};
 
 ReceivedSlices::ReceivedSlices(const ReceivedOptions& options, const ReceivedLinks& links)
     : links_(links),
-      cache_(links.gate.waits()),
+      cache_(links.gate.waits(), options.in_step),
       receiver_({links.viewer, uint64_t(links.gate.buffers()), options.slices},
                 {links.requested_s,
                  [this](RequestId r) { return links_.gate.with([r](Coupling& c) { return c.is_open(r); }); },
@@ -33,6 +33,13 @@ void ReceivedSlices::on_coupling(int buffers) {
   cache_.set_in_order(buffers > 0);
   receiver_.set_buffers(uint64_t(buffers));
 }
+
+wire::ShownState ReceivedSlices::newest_state() const {
+  const auto [source, frame] = cache_.newest();
+  return {source, frame.value, 0};
+}
+
+void ReceivedSlices::show_state(const wire::ShownState& state) { cache_.show_until(state.source, {state.newest}); }
 
 void ReceivedSlices::add_status(net::MasterLink::Values& values) const {
   values["pixels"] = double(cache_.figures().pixels);

@@ -18,6 +18,8 @@ class ReceivedSlices final : public Received {
   void receive(int most) override;
   void tick(double now_s) override;
   void on_coupling(int buffers) override;
+  wire::ShownState newest_state() const override;
+  void show_state(const wire::ShownState& state) override;
   void add_status(net::MasterLink::Values& values) const override;
   Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) override;
 

@@ -47,6 +47,7 @@ Status SliceReceiver::set_session(const wire::Welcome& session) {
   if (!read) return read.error();
   if (const Status s = volume::validate(read->grid); !s) return s;
   grid_ = read->grid;
+  master_ = session.master;
   return ok_status();
 }
 
@@ -104,6 +105,7 @@ void SliceReceiver::on(const wire::SliceFrame& f, double arrived_s, net::Socket&
   if (epoch_.value != 0 && f.epoch != epoch_) links_.on_epoch();
   epoch_ = f.epoch;
   if (const auto requested_s = links_.requested_s(f.request)) frame->update.requested_s = *requested_s;
+  frame->source = master_;
   const uint64_t pixels = frame->pixels;
   pixels_received_ += pixels;
   const double decoded_s = monotonic_s();

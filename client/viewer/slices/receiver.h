@@ -69,7 +69,7 @@ class SliceReceiver {
   metrics::SpanRecorder& spans_;
   std::optional<volume::Grid> grid_;
   std::vector<volume::SliceImage> images_;
-  InstanceId packer_;
+  InstanceId packer_, master_;
   FrameId newest_, acknowledged_;
   bool tell_buffers_ = false;  // to the packer
   EpochId epoch_;

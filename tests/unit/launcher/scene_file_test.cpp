@@ -35,6 +35,13 @@ class SceneFile : public testing::Test {
   std::string path_;
 };
 
+TEST_F(SceneFile, AFlagsValueIsNone) {
+  const std::vector<std::string> arguments{"julia", "--wall", write("[head]\nposition = [0, 0, 1]\n")};
+  const auto same = expand(arguments);
+  ASSERT_TRUE(same.ok()) << same.error().text;
+  EXPECT_EQ(*same, arguments);
+}
+
 TEST_F(SceneFile, KeysBecomeFlagsAndTheFileIsRelativeToTheScene) {
   const auto flags = read_scene_file(write(
       "[scene]\nfile = \"a.ply\"\nroom_size = 1.5\n[view]\nexr = true\nframes = 7\n[packing]\nmax_points = 5e6\n"));

@@ -79,7 +79,7 @@ TEST_F(RunFolder, TheNewestPicturesOfAllTilesBecomeOne) {
   picture(1, 10, 4, 3, 0x00ff00);  // a later frame than 9, though not by its letters
   picture(2, 7, 4, 3, 0x0000ff);
   write("frames.csv", "t_s,viewer,frame\n0.5,viewer-1,9\n1.25,viewer-1,10\n1.5,viewer-2,7\n2,viewer-2,8\n");
-  const auto tiles = stitch_wall(path_, {2, 1});
+  const auto tiles = stitch_wall(path_, {2, 1, 0, {}});
   ASSERT_TRUE(tiles.ok()) << tiles.error().text;
   ASSERT_EQ(tiles->size(), 2u);
   EXPECT_EQ((*tiles)[0].frame, 10u);
@@ -96,11 +96,11 @@ TEST_F(RunFolder, TheNewestPicturesOfAllTilesBecomeOne) {
 
 TEST_F(RunFolder, TilesThatLackOrDoNotFitAreNamed) {
   picture(1, 1, 4, 3, 0);
-  auto tiles = stitch_wall(path_, {1, 2});
+  auto tiles = stitch_wall(path_, {1, 2, 0, {}});
   ASSERT_FALSE(tiles.ok());
   EXPECT_NE(tiles.error().text.find("viewer-2"), std::string::npos) << tiles.error().text;
   picture(2, 1, 5, 3, 0);
-  tiles = stitch_wall(path_, {1, 2});
+  tiles = stitch_wall(path_, {1, 2, 0, {}});
   ASSERT_FALSE(tiles.ok());
   EXPECT_NE(tiles.error().text.find("5x3"), std::string::npos) << tiles.error().text;
 }

@@ -266,6 +266,9 @@ TEST_F(Record, OfARunWithoutAnythingHoldsNoResults) {
                           "sampling",
                           "coupling_changes",
                           "frames_by_coupling",
+                          "swap_skew_ms",
+                          "swaps",
+                          "swaps_incomplete",
                           "duration_s",
                           "fps",
                           "updates_per_s",
@@ -314,6 +317,19 @@ TEST_F(Record, CouplingsAreCountedForEachViewer) {
   EXPECT_EQ(s["coupling_changes"], 3);
   EXPECT_EQ(s["frames_by_coupling"],
             (nlohmann::ordered_json{{"async", 3}, {"sync", 1}, {"loose(3)", 1}, {"loose(4)", 1}}));
+}
+
+TEST_F(Record, AWallsFramesCountOnceForTheirSkew) {
+  const std::vector<std::string> columns{"t_s", "inter_frame_ms", "wall_frame", "swap_skew_ms"};
+  Process other = viewer;
+  other.name = "viewer-2";
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", columns, {0, 0, 1, 2, 1, 9, 2, 4, 2, 9, 3, -1}}));
+  ASSERT_TRUE(record->add_rows(other, {{6}, "frames", columns, {0, 0, 1, 2, 1, 9, 2, 4, 2, 9, 0, 9}}));
+  const auto s = record->summary({viewer, other}, {{"swaps_incomplete", 1}}, {});
+  EXPECT_EQ(s["swaps"], 2);
+  EXPECT_EQ(s["swap_skew_ms"]["median"], 3);
+  EXPECT_EQ(s["swap_skew_ms"]["max"], 4);
+  EXPECT_EQ(s["swaps_incomplete"], 1);
 }
 
 TEST_F(Record, TheSummarySaysWhatWasDone) {

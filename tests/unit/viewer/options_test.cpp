@@ -1,6 +1,8 @@
 // The viewer's flags and the columns of its tables.
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include <algorithm>
 
 #include "client/viewer/coupling/update_table.h"
@@ -97,6 +99,57 @@ TEST(ViewerFlags, AreSettledOrRefused) {
   EXPECT_EQ(s.error().text, "--wall-tile 6: --wall 3x2 has the tiles 0..5");
 }
 
+// Written into a folder of the test's.
+std::string description(const std::string& anchor) {
+  const std::string path = testing::TempDir() + "/" + anchor + ".toml";
+  std::ofstream(path) << "[wall]\nanchor = \"" << anchor
+                      << "\"\n[head]\nposition = [0, 0.5, 1]\n[[planar]]\ncolumns = 2\nsize = [0.4, 0.3]\n"
+                         "resolution = [400, 300]\nsampling = [200, 150]\n";
+  return path;
+}
+
+TEST(Wall, AScreenOfADescriptionHasItsSizeAndSampling) {
+  ViewerOptions o;
+  o.wall = description("head");
+  o.wall_tile = 1;
+  o.wall_scale = 0.5;
+  ASSERT_TRUE(settle(o).ok());
+  ASSERT_TRUE(o.display.wall.described);
+  EXPECT_EQ(o.display.width, 200);
+  EXPECT_EQ(o.display.height, 150);
+  EXPECT_FALSE(o.requests.adaptive);
+  EXPECT_EQ(o.requests.sampling_width, 100);
+  EXPECT_EQ(o.trajectory, "orbit");
+  EXPECT_TRUE(in_step(o));
+  o.swap_barrier = false;
+  EXPECT_FALSE(in_step(o));
+  o.wall_tile = 2;
+  const Status s = settle(o);
+  ASSERT_FALSE(s.ok());
+  EXPECT_NE(s.error().text.find("has the screens 0..1"), std::string::npos) << s.error().text;
+}
+
+TEST(Wall, AHeadStandsBeforeAWallThatStandsInTheRoom) {
+  ViewerOptions o;
+  o.wall = description("room");
+  ASSERT_TRUE(settle(o).ok());
+  EXPECT_EQ(o.trajectory, "still");
+  ASSERT_TRUE(o.movement.eye);
+  EXPECT_EQ(*o.movement.eye, glm::dvec3(0, 0.5, 1));
+  o.trajectory = "orbit";
+  const Status s = settle(o);
+  ASSERT_FALSE(s.ok());
+  EXPECT_NE(s.error().text.find("stands in the room"), std::string::npos) << s.error().text;
+}
+
+TEST(Wall, WhatIsNoDescriptionIsToldByFileAndKey) {
+  ViewerOptions o;
+  o.wall = testing::TempDir() + "/none.toml";
+  EXPECT_NE(settle(o).error().text.find("none.toml: is no file"), std::string::npos);
+  o.wall = "2by1";
+  EXPECT_NE(settle(o).error().text.find("neither a file NAME.toml nor COLUMNSxROWS"), std::string::npos);
+}
+
 TEST(Wall, HasNoMoreTilesThanItMay) {
   EXPECT_EQ(parse_wall("4x4", 16).value(), (WallLayout{4, 4}));
   EXPECT_FALSE(parse_wall("5x4", 16).ok());
@@ -148,7 +201,10 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
                                     "coupling",
                                     "buffers",
                                     "head_light",
-                                    "background"}));
+                                    "background",
+                                    "wall_frame",
+                                    "swap_wait_ms",
+                                    "swap_skew_ms"}));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;
