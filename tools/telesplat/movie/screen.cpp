@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/image/canvas.h"
+#include "common/wall/unrolled.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -33,9 +34,24 @@ Result<Screen> Screen::open(const std::string& directory, int width, int height,
   return out;
 }
 
+// A described wall is laid flat, with the gaps of its bezels.
+Status Screen::choose_size_of_description(int width, int height, const char* size_flag) {
+  const auto flat = wall::unrolled(*run().wall.described);
+  if (!flat) return flat.error();
+  width_ = width ? width : flat->width;
+  height_ = height ? height : flat->height;
+  if (int64_t{width_} * height_ > kMaxPixels)
+    return Error{fmt::format("{} {}x{}: at most {} pixels", size_flag, width_, height_, kMaxPixels)};
+  const double x = double(width_) / flat->width, y = double(height_) / flat->height;
+  for (const auto& p : flat->places)
+    places_.push_back({int(p.x * x), int(p.y * y), std::max(1, int(p.width * x)), std::max(1, int(p.height * y))});
+  return ok_status();
+}
+
 // All tiles of a wall have one size.
 Status Screen::choose_size(int width, int height, const char* size_flag) {
   const RecordedRun& first = run();
+  if (first.wall.described) return choose_size_of_description(width, height, size_flag);
   const int columns = first.wall.columns, rows = first.wall.rows;
   width_ = width ? width : first.width * columns;
   height_ = height ? height : first.height * rows;
@@ -44,6 +60,8 @@ Status Screen::choose_size(int width, int height, const char* size_flag) {
                              height_, columns, rows)};
   if (int64_t{width_} * height_ > kMaxPixels)
     return Error{fmt::format("{} {}x{}: at most {} pixels", size_flag, width_, height_, kMaxPixels)};
+  const int across = width_ / columns, down = height_ / rows;
+  for (int i = 0; i < columns * rows; ++i) places_.push_back({i % columns * across, i / columns * down, across, down});
   return ok_status();
 }
 
@@ -97,7 +115,8 @@ Result<Screen::Shown> Screen::show(double t_s) {
 Result<bool> Screen::draw(Tile& tile) {
   const RecordedRun& run = *tile.run;
   const DisplayedFrame& frame = run.frames[tile.frame];
-  const geometry::Camera camera = run.camera_at(frame.camera.pose, width_ / run.wall.columns, height_ / run.wall.rows);
+  const geometry::Rect& place = places_[size_t(run.wall.tile)];
+  const geometry::Camera camera = run.camera_at(frame.head, place.width, place.height);
   if (const Status s = geometry::validate(camera); !s)
     return Error{fmt::format("frame {}: {}", frame.number, s.error().text)};
   const auto there = tile.replay->draw(frame, camera, tile.view);
@@ -112,9 +131,8 @@ void Screen::compose() {
   }
   image::Canvas canvas(width_, height_, 0xff000000u);
   for (const Tile& tile : tiles_) {
-    const auto& wall = tile.run->wall;
-    canvas.place(tile.view, wall.tile % wall.columns * (width_ / wall.columns),
-                 wall.tile / wall.columns * (height_ / wall.rows));
+    const geometry::Rect& place = places_[size_t(tile.run->wall.tile)];
+    canvas.place(tile.view, place.x, place.y);
   }
   view_ = canvas.view();
 }

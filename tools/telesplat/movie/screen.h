@@ -45,6 +45,7 @@ class Screen {
     image::View view;
   };
   Status choose_size(int width, int height, const char* size_flag);
+  Status choose_size_of_description(int width, int height, const char* size_flag);
   Status open_replays(int threads);
   void find_times();
   Result<bool> draw(Tile& tile);
@@ -52,7 +53,8 @@ class Screen {
 
   std::vector<Tile> tiles_;
   EpochLegends legends_;
-  int width_ = 0, height_ = 0;  // of the whole
+  int width_ = 0, height_ = 0;          // of the whole
+  std::vector<geometry::Rect> places_;  // of the tiles in it
   double begin_s_ = 0, duration_s_ = 0;
   uint64_t drawn_ = 0;
   image::View view_;

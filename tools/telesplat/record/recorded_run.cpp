@@ -76,17 +76,23 @@ Status read_size(const std::string& path, const toml::table& viewer, RecordedRun
   return ok_status();
 }
 
+// The record's own copy of a wall's description, where it has one.
+std::string described_in(const std::string& session, const std::string& wall) {
+  const std::string kept = (std::filesystem::path(session).parent_path() / "wall.toml").string();
+  std::error_code error;
+  return viewer::is_description(wall) && std::filesystem::is_regular_file(kept, error) ? kept : wall;
+}
+
 // Which part of a wall it was.
 Status read_wall(const std::string& path, const toml::table& viewer, RecordedRun& run) {
   const std::string text = viewer["wall"].value_or(std::string());
   if (text.empty()) return ok_status();
-  const auto layout = viewer::parse_wall(text);
-  if (!layout) return Error{fmt::format("{}: {}", path, layout.error().text)};
-  const double tile = number(toml::node_view<const toml::node>(viewer["wall_tile"]), 0);
-  if (!(tile >= 0 && tile < layout->tiles()) || tile != std::floor(tile))
-    return Error{
-        fmt::format("{}: wall_tile is {}, --wall {} has the tiles 0..{}", path, tile, text, layout->tiles() - 1)};
-  run.wall = {layout->columns, layout->rows, int(tile)};
+  const double tile = number(toml::node_view<const toml::node>(viewer["wall_tile"]), 0),
+               scale = number(toml::node_view<const toml::node>(viewer["wall_scale"]), 1);
+  if (!(scale > 0 && scale <= 1)) return Error{fmt::format("{}: wall_scale is {}, limits are 0 and 1", path, scale)};
+  const auto wall = viewer::wall_tile(described_in(path, text), int(std::clamp(tile, -1.0, 1e6)), scale);
+  if (!wall) return Error{fmt::format("{}: {}", path, wall.error().text)};
+  run.wall = *wall;
   return ok_status();
 }
 
@@ -136,9 +142,9 @@ Status read_display(const std::string& path, const toml::table& session, const t
 struct FrameColumns {
   size_t viewer, frame, t_s, sequence, points_drawn;
   std::array<size_t, 7> pose;  // px py pz qw qx qy qz
-  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1.
+  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1, 0.
   std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, head_light, background, refined,
-      sub_pixels;
+      sub_pixels, swap_wait_ms;
 };
 
 Result<FrameColumns> find_columns(const tools::CsvTable& table) {
@@ -171,6 +177,7 @@ Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   out.background = table.find("background");
   out.refined = table.find("refined");
   out.sub_pixels = table.find("sub_pixels");
+  out.swap_wait_ms = table.find("swap_wait_ms");
   return out;
 }
 
@@ -227,8 +234,14 @@ Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, cons
   f.number = *number;
   f.t_s = v[7];
   f.shown_s = v[7] + v[8] / 1e3;
+  if (at.swap_wait_ms) {
+    const auto wait_ms = table.number(row, *at.swap_wait_ms);
+    if (!wait_ms) return wait_ms.error();
+    f.shown_s += *wait_ms / 1e3;
+  }
   f.sequence = {*sequence};
   f.points_drawn = *drawn;
+  f.head = pose;
   f.camera = run.camera_at(pose, run.width, run.height);
   f.look = run.look;
   if (const Status s = geometry::validate(f.camera); !s) return table.wrong(row, s.error().text);
@@ -294,13 +307,13 @@ std::string folder_of(const toml::table& viewer) {
 // The viewers of the wall's tiles, in their order.
 Result<std::vector<const toml::table*>> wall_viewers(const std::string& path, const toml::table& session,
                                                      const std::string& wall) {
-  const auto layout = viewer::parse_wall(wall);
-  if (!layout) return Error{fmt::format("{}: {}", path, layout.error().text)};
-  std::vector<const toml::table*> out(size_t(layout->tiles()));
+  const auto whole = viewer::wall_tile(described_in(path, wall), 0, 1);
+  if (!whole) return Error{fmt::format("{}: {}", path, whole.error().text)};
+  std::vector<const toml::table*> out(size_t(whole->tiles()));
   for (const toml::table* t : viewers(session)) {
     const double tile = number(toml::node_view<const toml::node>((*t)["wall_tile"]), -1);
     const std::string name = folder_of(*t);
-    if (text_of(*t, "wall") != wall || !(tile >= 0 && tile < layout->tiles())) continue;
+    if (text_of(*t, "wall") != wall || !(tile >= 0 && tile < whole->tiles())) continue;
     const bool folder = name == "." || (!name.empty() && name.front() != '.' && name.find('/') == name.npos);
     if (!folder) return Error{fmt::format("{}: a viewer recorded in {:?}, which is no folder in it", path, name)};
     out[size_t(tile)] = t;
@@ -313,6 +326,11 @@ Result<std::vector<const toml::table*>> wall_viewers(const std::string& path, co
 }  // namespace
 
 geometry::Camera RecordedRun::camera_at(const geometry::Pose& pose, int width_px, int height_px) const {
+  if (wall.described) {
+    geometry::Camera camera = wall::screen_camera(*wall.described, wall.tile, pose, near_m);
+    camera.width = width_px, camera.height = height_px;
+    return camera;
+  }
   return viewer::tile_of(geometry::make_camera(pose, fov_deg, width_px * wall.columns, height_px * wall.rows, near_m),
                          wall);
 }
@@ -342,7 +360,7 @@ Result<std::vector<RecordedRun>> read_recorded_displays(const std::string& direc
   for (const toml::table* viewer : all) {
     auto run = read_viewer(directory, *session, *viewer);
     if (!run) return run.error();
-    if (!out.empty() && (run->width != out.front().width || run->height != out.front().height))
+    if (!out.empty() && !run->wall.described && (run->width != out.front().width || run->height != out.front().height))
       return Error{fmt::format("{}: the wall's tile {} has {}x{} pixels, its first {}x{}", path, out.size(), run->width,
                                run->height, out.front().width, out.front().height)};
     if (viewer != own) run->directory += "/" + folder_of(*viewer);

@@ -23,6 +23,7 @@ struct DisplayedFrame {
   uint32_t replica = 0;  ///< how many times numbers had begun again by then (another packer)
   uint64_t points_drawn = 0;
   geometry::Camera camera;
+  geometry::Pose head;                ///< that it was drawn for; of a screen of a described wall not the camera's
   double detail = 1;                  ///< SelectionOptions::detail it was drawn with
   viewer::Look look;                  ///< how it was drawn; a person may have changed it in the window
   uint64_t summaries = ~uint64_t{0};  ///< of bricks, that its viewer had made by then; else all that there are
@@ -49,7 +50,7 @@ struct RecordedRun {
 
   /// Scale factor of splat sizes that frames of this kernel were drawn with.
   float splat_scale_of(splat::Kernel k) const { return splat_scale > 0 ? splat_scale : splat::suitable_scale(k); }
-  /// What a display of the run's field of view and width x height pixels showed from this pose.
+  /// What a display of the run's field of view, or a screen of its wall, and width x height pixels showed this head.
   geometry::Camera camera_at(const geometry::Pose& pose, int width_px, int height_px) const;
 };
 

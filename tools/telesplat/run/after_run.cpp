@@ -87,7 +87,8 @@ int AfterRun::verify(bool stopped) {
 // The wall's picture, and the moments its tiles are of. A run that was stopped need not have one of each tile.
 int AfterRun::stitch(bool stopped) const {
   if (o_.viewer.wall.empty()) return 0;
-  const auto tiles = stitch_wall(o_.out, *viewer::parse_wall(o_.viewer.wall));
+  if (const Status s = keep_description(o_.out, o_.viewer.wall); !s) return tools::complain(s.error(), 1);
+  const auto tiles = stitch_wall(o_.out, o_.viewer.display.wall);
   if (!tiles) return tools::complain(tiles.error(), stopped ? 0 : 1);
   std::string moments;
   for (const auto& t : *tiles)

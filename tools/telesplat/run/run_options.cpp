@@ -28,7 +28,7 @@ Table display_rows(RunOptions& o) {
              .value = &o.viewer.panel,
              .help = "on: the window begins with its panel, which Tab hides and shows",
              .on_off = true}};
-  return {
+  const Table rows{
       {.flag = "--out", .value = &o.out, .help = "run folder; default: runs/DATE-TIME"},
       {.flag = "--viewers",
        .value = &o.viewers,
@@ -36,8 +36,10 @@ Table display_rows(RunOptions& o) {
        .limits = Range{1, kMaxViewers}},
       {.flag = "--wall",
        .value = &o.viewer.wall,
-       .help = "COLUMNSxROWS: a display wall of one viewer a tile, each with --size pixels of one picture of --fov; "
-               "its picture at the end becomes images/wall.png"}};
+       .help = "a display wall of one viewer a screen: COLUMNSxROWS tiles, each with --size pixels of one picture of "
+               "--fov, or the description of one, NAME.toml; its picture at the end becomes images/wall.png",
+       .is_file = true}};
+  return joined(rows, viewer::wall_table(o.viewer));
 }
 
 Table own_rows(RunOptions& o) {
@@ -117,10 +119,24 @@ Status refuse_scene_flags(RunOptions& o, const options::Given& given) {
 }
 
 Status settle_wall(RunOptions& o, const options::Given& given) {
-  if (o.viewer.wall.empty()) return ok_status();
-  const auto wall = viewer::parse_wall(o.viewer.wall, kMaxViewers);
-  if (!wall) return wall.error();
+  if (o.viewer.wall.empty()) {
+    for (const char* flag : {"--wall-scale", "--swap-barrier"})
+      if (std::find(given.begin(), given.end(), flag) != given.end())
+        return Error{fmt::format("{} is given, but no --wall", flag)};
+    return ok_status();
+  }
   const auto is_given = [&](const char* flag) { return std::find(given.begin(), given.end(), flag) != given.end(); };
+  const auto wall = viewer::wall_tile(o.viewer.wall, 0, o.viewer.wall_scale);
+  if (!wall) return wall.error();
+  if (wall->tiles() > kMaxViewers)
+    return Error{fmt::format("--wall {}: it has {} {}; at most {}", o.viewer.wall, wall->tiles(),
+                             wall->described ? "screens" : "tiles", kMaxViewers)};
+  for (const char* flag : {"--size", "--fov"})
+    if (wall->described && is_given(flag))
+      return Error{
+          fmt::format("{}: the screens of {} have their own; --wall-scale draws fewer pixels", flag, o.viewer.wall)};
+  if (!wall->described && is_given("--wall-scale"))
+    return Error{fmt::format("--wall-scale: --wall {} is no description; --size is its tiles'", o.viewer.wall)};
   if (!is_given("--viewers")) o.viewers = wall->tiles();
   if (!is_given("--hold")) o.viewer.display.hold_s = kWallHold_s;
   if (o.viewers == wall->tiles()) return ok_status();

@@ -10,6 +10,7 @@
 #include "common/geometry/camera.h"
 #include "common/image/canvas.h"
 #include "common/image/file.h"
+#include "common/wall/unrolled.h"
 #include "tools/common/csv_table.h"
 
 namespace telesplat::launcher {
@@ -44,6 +45,36 @@ void read_times(const std::string& path, std::vector<TilePicture>& tiles) {
         if (const auto t_s = table->number(row, *t)) tile.t_s = *t_s;
 }
 
+// Where pictures of tiles lie in the picture of all.
+using Flat = wall::Unrolled;
+
+Result<Flat> lay_flat(const std::string& directory, const viewer::WallTile& wall, const image::View& first) {
+  if (wall.described) {
+    auto flat = wall::unrolled(*wall.described);
+    if (!flat) return Error{fmt::format("{}/images: {}", directory, flat.error().text)};
+    return flat;
+  }
+  Flat out;
+  out.width = first.width * wall.columns, out.height = first.height * wall.rows;
+  if (std::max(out.width, out.height) > geometry::kMaxImageSide)
+    return Error{fmt::format("{}/images: the wall has {}x{} pixels, limit {} a side", directory, out.width, out.height,
+                             geometry::kMaxImageSide)};
+  for (int i = 0; i < wall.tiles(); ++i)
+    out.places.push_back({i % wall.columns * first.width, i / wall.columns * first.height, first.width, first.height});
+  return out;
+}
+
+// Screens whose pixels are coarser than the finest one's: the nearest pixel.
+image::View resized(const image::View& picture, int width, int height) {
+  image::View out{width, height, std::vector<uint32_t>(size_t(width) * size_t(height)), {}};
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      out.colour[size_t(y) * size_t(width) + size_t(x)] =
+          picture.colour[size_t(int64_t{y} * picture.height / height) * size_t(picture.width) +
+                         size_t(int64_t{x} * picture.width / width)];
+  return out;
+}
+
 }  // namespace
 
 std::string viewer_name(int number) { return fmt::format("viewer-{}", number); }
@@ -52,33 +83,46 @@ std::string viewer_directory(const std::string& run_directory, int number) {
   return number == 1 ? run_directory : run_directory + "/" + viewer_name(number);
 }
 
-Result<std::vector<TilePicture>> stitch_wall(const std::string& directory, const WallLayout& layout) {
+Result<std::vector<TilePicture>> stitch_wall(const std::string& directory, const viewer::WallTile& wall) {
   std::vector<TilePicture> tiles;
-  std::optional<image::Canvas> wall;
-  int width = 0, height = 0;
-  for (int i = 0; i < layout.tiles(); ++i) {
+  std::optional<image::Canvas> canvas;
+  std::optional<Flat> flat;
+  for (int i = 0; i < wall.tiles(); ++i) {
     const std::string folder = viewer_directory(directory, i + 1) + "/images";
     const auto newest = newest_picture(folder);
     if (!newest) return Error{fmt::format("{}: holds no picture of the wall's tile {}", folder, i + 1)};
     const auto picture = image::read_view(newest->second);
     if (!picture) return picture.error();
-    if (!wall) {
-      width = picture->width, height = picture->height;
-      const int across = width * layout.columns, down = height * layout.rows;
-      if (std::max(across, down) > geometry::kMaxImageSide)
-        return Error{fmt::format("{}/images: the wall has {}x{} pixels, limit {} a side", directory, across, down,
-                                 geometry::kMaxImageSide)};
-      wall.emplace(across, down, 0xff000000u);
+    if (!flat) {
+      auto laid = lay_flat(directory, wall, *picture);
+      if (!laid) return laid.error();
+      flat = std::move(*laid);
+      canvas.emplace(flat->width, flat->height, 0xff000000u);
     }
-    if (picture->width != width || picture->height != height)
-      return Error{fmt::format("{}: has {}x{} pixels, the wall's first tile {}x{}", newest->second, picture->width,
-                               picture->height, width, height)};
-    wall->place(*picture, i % layout.columns * width, i / layout.columns * height);
+    const geometry::Rect& place = flat->places[size_t(i)];
+    if (picture->width != place.width || picture->height != place.height) {
+      if (!wall.described)
+        return Error{fmt::format("{}: has {}x{} pixels, the wall's first tile {}x{}", newest->second, picture->width,
+                                 picture->height, place.width, place.height)};
+      canvas->place(resized(*picture, place.width, place.height), place.x, place.y);
+    } else {
+      canvas->place(*picture, place.x, place.y);
+    }
     tiles.push_back({viewer_name(i + 1), newest->first, 0});
   }
   read_times(directory + "/frames.csv", tiles);
-  if (const Status s = image::write_png(directory + "/images/wall.png", wall->view()); !s) return s.error();
+  if (const Status s = image::write_png(directory + "/images/wall.png", canvas->view()); !s) return s.error();
   return tiles;
+}
+
+std::string kept_description(const std::string& run_directory) { return run_directory + "/wall.toml"; }
+
+Status keep_description(const std::string& run_directory, const std::string& wall) {
+  if (!viewer::is_description(wall)) return ok_status();
+  std::error_code error;
+  fs::copy_file(wall, kept_description(run_directory), fs::copy_options::overwrite_existing, error);
+  if (error) return Error{fmt::format("{}: {}", kept_description(run_directory), error.message())};
+  return ok_status();
 }
 
 }  // namespace telesplat::launcher

@@ -11,7 +11,7 @@ namespace telesplat::launcher {
 
 using viewer::WallLayout;
 
-inline constexpr int kMaxViewers = 16;
+inline constexpr int kMaxViewers = 64;
 
 /// A viewer's name, and the folder it records into: the first one's is the run's own, the others have one of theirs in
 /// it.
@@ -25,8 +25,14 @@ struct TilePicture {
   double t_s = 0;  ///< on that viewer's clock, from frames.csv
 };
 
-/// Puts the newest recorded picture of each tile's viewer (1, 2, ...) into one, DIR/images/wall.png. Returns what it
-/// was made from. Error: a viewer recorded none, they differ in size, or the whole is larger than a picture may be.
-Result<std::vector<TilePicture>> stitch_wall(const std::string& run_directory, const WallLayout& layout);
+/// Puts the newest recorded picture of each tile's viewer (1, 2, ...) into one, DIR/images/wall.png: a described wall
+/// unrolled, black where its bezels are. Returns what it was made from. Error: a viewer recorded none, a picture has
+/// another size than its tile, or the whole is larger than a picture may be.
+Result<std::vector<TilePicture>> stitch_wall(const std::string& run_directory, const viewer::WallTile& wall);
+
+/// Where the record keeps the description of its wall.
+std::string kept_description(const std::string& run_directory);
+/// Puts it there, if the wall has one. Error: it cannot be read or written any more.
+Status keep_description(const std::string& run_directory, const std::string& wall);
 
 }  // namespace telesplat::launcher

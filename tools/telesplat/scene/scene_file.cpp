@@ -184,8 +184,15 @@ Result<std::vector<std::string>> read_scene_file(const std::string& path, const 
 }
 
 Result<std::vector<std::string>> expand_scene_file(std::vector<std::string> arguments, const options::Table& table) {
-  const auto scene = std::find_if(arguments.begin(), arguments.end(),
-                                  [](const std::string& a) { return a.ends_with(".toml") && !a.starts_with("-"); });
+  // Other files may be TOML, too: --wall NAME.toml.
+  const auto is_value = [&](const std::string& a) {
+    const options::Row* before = &a == arguments.data() ? nullptr : options::find(table, *(&a - 1));
+    const bool* const* flag = before ? std::get_if<bool*>(&before->value) : nullptr;
+    return before && (!flag || before->on_off) && !std::holds_alternative<options::Action>(before->value);
+  };
+  const auto scene = std::find_if(arguments.begin(), arguments.end(), [&](const std::string& a) {
+    return a.ends_with(".toml") && !a.starts_with("-") && !is_value(a);
+  });
   if (scene == arguments.end()) return arguments;
   auto flags = read_scene_file(*scene, table);
   if (!flags) return flags;

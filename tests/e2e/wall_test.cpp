@@ -1,0 +1,188 @@
+// Walls of screens: what they show together, that they show it together, and what becomes of them when one goes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "common/image/file.h"
+#include "tests/support/pipeline_run.h"
+#include "tools/common/csv_table.h"
+
+namespace telesplat::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+// 2 x 2 screens of 160 x 100 pixels, together a display of 60 degrees.
+constexpr const char* kPlane =
+    "[wall]\nanchor = \"head\"\n[head]\nposition = [0, 0, 1]\n[[planar]]\ncolumns = 2\nrows = 2\n"
+    "size = [0.5773502691896258, 0.3608439182435161]\nresolution = [160, 100]\n";
+
+std::string newest_picture(const std::string& folder) {
+  std::string out;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (const std::string path = entry.path().string();
+        path.find("frame-") != std::string::npos && path.ends_with(".png"))
+      out = std::max(out, path);
+  return out;
+}
+
+double psnr_db(const image::View& a, const image::View& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.colour.size(); ++i)
+    for (const int shift : {0, 8, 16}) {
+      const double d = double(a.colour[i] >> shift & 255) - double(b.colour[i] >> shift & 255);
+      sum += d * d;
+    }
+  return 10 * std::log10(255 * 255 / std::max(sum / (3.0 * double(a.colour.size())), 1e-9));
+}
+
+std::string write_wall(const TemporaryFolder& folder, const char* text = kPlane) {
+  const std::string path = folder / "lab.toml";
+  std::ofstream(path) << text;
+  return path;
+}
+
+struct Row {
+  std::string viewer;
+  double wall_frame, swap_skew_ms, sequence, px, py, pz, epoch;
+};
+std::vector<Row> frames(const PipelineRun& run) {
+  std::vector<Row> out;
+  const auto table = tools::CsvTable::read(run.out() + "/frames.csv", {});
+  EXPECT_TRUE(table.ok()) << (table ? "" : table.error().text);
+  if (!table) return out;
+  const auto number = [&](size_t row, const char* name) { return table->number(row, *table->find(name)).value(); };
+  for (size_t row = 0; row < table->rows(); ++row)
+    out.push_back({std::string(table->text(row, *table->find("viewer"))), number(row, "wall_frame"),
+                   number(row, "swap_skew_ms"), number(row, "sequence"), number(row, "px"), number(row, "py"),
+                   number(row, "pz"), number(row, "epoch")});
+  return out;
+}
+
+// All rows of one frame of the wall have one head, and those of `same_state` one state.
+void expect_in_step(const std::vector<Row>& rows, bool same_state = true) {
+  std::map<double, std::vector<Row>> by_frame;
+  for (const Row& r : rows)
+    if (r.wall_frame > 0) by_frame[r.wall_frame].push_back(r);
+  size_t whole = 0, apart = 0;
+  for (const auto& [number, of_frame] : by_frame) {
+    whole += of_frame.size() == 4;
+    for (const Row& r : of_frame) {
+      EXPECT_EQ(r.px, of_frame[0].px) << number;
+      EXPECT_EQ(r.pz, of_frame[0].pz) << number;
+      apart += r.sequence != of_frame[0].sequence || r.epoch != of_frame[0].epoch;
+    }
+  }
+  EXPECT_GT(whole, by_frame.size() * 8 / 10) << "of " << by_frame.size() << " frames most are presented by all";
+  if (same_state) {
+    EXPECT_LT(apart, rows.size() / 50) << "of " << rows.size() << " rows";
+  }
+}
+
+const std::vector<std::string> kCommon{"--duration",   "4",  "--hold",          "2",
+                                       "--target-fps", "20", "--detail-budget", "off"};
+
+std::vector<std::string> with(std::vector<std::string> more) {
+  more.insert(more.end(), kCommon.begin(), kCommon.end());
+  return more;
+}
+
+// The picture of the wall, and that of a single display of the same field of view.
+void expect_as_one(const std::string& scene, std::vector<std::string> more, double least_db, bool same_state) {
+  TemporaryFolder folder;
+  auto arguments = with({"--wall", write_wall(folder), "--sampling-size", "auto"});
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  PipelineRun wall(arguments, scene);
+  ASSERT_EQ(wall.program().wait(100), 0) << wall.program().err();
+  EXPECT_TRUE(wall.all_gone());
+  const auto s = wall.summary();
+  EXPECT_EQ(s["viewers"], 4);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  EXPECT_GT(s["swaps"], 10);
+  EXPECT_GT(s["swap_skew_ms"]["median"], 0);
+  EXPECT_LT(s["swap_skew_ms"]["median"], 50) << "frames of 50 ms";
+  expect_in_step(frames(wall), same_state);
+  EXPECT_TRUE(fs::exists(wall.out() + "/wall.toml"));
+
+  arguments = with({"--size", "320x200", "--fov", "60", "--sampling-size", "auto"});
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  PipelineRun single(arguments, scene);
+  ASSERT_EQ(single.program().wait(100), 0) << single.program().err();
+  const auto stitched = image::read_view(wall.out() + "/images/wall.png"),
+             whole = image::read_view(newest_picture(single.out() + "/images"));
+  ASSERT_TRUE(stitched.ok()) << stitched.error().text;
+  ASSERT_TRUE(whole.ok()) << whole.error().text;
+  ASSERT_EQ(stitched->width, 320);
+  ASSERT_EQ(stitched->height, 200);
+  EXPECT_GT(psnr_db(*whole, *stitched), least_db);
+}
+
+TEST(Wall, FourScreensShowWhatOneDisplayShowsOfAMesh) { expect_as_one("", {}, 30, true); }
+
+TEST(Wall, FourScreensShowWhatOneDisplayShowsOfAJuliaSet) { expect_as_one("julia", {}, 28, true); }
+
+TEST(Wall, FourScreensShowWhatOneDisplayShowsOfAVolume) {
+  TemporaryFolder folder;
+  write_volume(folder / "balls.mha");
+  expect_as_one(folder / "balls.mha", {"--tf", "0:#000000:0,60:#204080:0,150:#40a0e0:0.08,250:#ffffff:0.9"}, 38, true);
+}
+
+TEST(Wall, ADisplayThatStopsDoesNotHoldTheOthers) {
+  TemporaryFolder folder;
+  PipelineRun run({"--wall", write_wall(folder), "--duration", "0", "--target-fps", "20"});
+  ASSERT_TRUE(run.wait_status([](const auto& s) { return value(s, "viewer-1", "frames") > 20; }))
+      << run.program().err();
+  // It is stopped, not dead: nobody says goodbye.
+  pid_t stopped = 0;
+  const auto status = run.status();
+  for (const auto& p : status["processes"])
+    if (p.value("name", "") == "viewer-3") stopped = p.value("pid", 0);
+  ASSERT_GT(stopped, 0);
+  kill(stopped, SIGSTOP);
+  const auto frames_of = [&](const char* name) { return value(run.status(), name, "frames"); };
+  const double before = frames_of("viewer-1");
+  EXPECT_TRUE(wait_until([&] { return frames_of("viewer-1") > before + 30; }, 10)) << "the others are held";
+  kill(stopped, SIGCONT);
+  const double then = frames_of("viewer-3");
+  EXPECT_TRUE(wait_until([&] { return frames_of("viewer-3") > then + 20; }, 10)) << "it does not come back";
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
+  EXPECT_GE(run.summary()["swaps_incomplete"], 1);
+}
+
+TEST(Wall, ACylinderIsUnrolled) {
+  TemporaryFolder folder;
+  const std::string arc =
+      "[wall]\nanchor = \"head\"\n[head]\nposition = [0, 0, 0]\n[[cylindrical]]\ncolumns = 3\nrows = 2\nradius = "
+      "1\nsize = [0.4, 0.3]\nresolution = [80, 60]\nbezel = 0.02\n";
+  PipelineRun run({"--wall", write_wall(folder, arc.c_str()), "--duration", "2", "--hold", "1", "--target-fps", "15"});
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  const auto stitched = image::read_view(run.out() + "/images/wall.png");
+  ASSERT_TRUE(stitched.ok()) << stitched.error().text;
+  EXPECT_EQ(stitched->width, 3 * 80 + 2 * 8);  // a pixel is 5 mm
+  EXPECT_EQ(stitched->height, 2 * 60 + 8);
+  EXPECT_EQ(stitched->colour[84] & 0xffffff, 0u) << "a bezel";
+  const Row first = frames(run).front();
+  EXPECT_GT(std::hypot(first.px, first.pz), 0.1) << "frames.csv has the head";
+}
+
+TEST(Wall, WhatIsWrongWithADescriptionIsSaidBeforeAnythingStarts) {
+  TemporaryFolder folder;
+  const std::string path = write_wall(folder, "[head]\nposition = [0, 0, 1]\n[[planar]]\nsize = [0.4, 0.3]\n");
+  PipelineRun run({"--wall", path});
+  EXPECT_EQ(run.program().wait(20), 2);
+  EXPECT_NE(run.program().err().find("lab.toml:3: [[planar]] 1 resolution: is missing"), std::string::npos)
+      << run.program().err();
+  PipelineRun sized({"--wall", write_wall(folder), "--size", "100x100"});
+  EXPECT_EQ(sized.program().wait(20), 2);
+  EXPECT_NE(sized.program().err().find("--size: the screens of"), std::string::npos) << sized.program().err();
+}
+
+}  // namespace
+}  // namespace telesplat::test
