@@ -104,7 +104,7 @@ void show(const std::string& master, int number, double draw_s, double stops_s, 
     const double now_s = monotonic_s();
     pace.presented(now_s);
     if (swapped.alone) {
-      ++alone;
+      if (!stopped()) ++alone;
       std::this_thread::sleep_for(std::chrono::duration<double>(kPeriod_s));
     } else {
       presented.add(turn.frame, turn.head.position_room.x, now_s);

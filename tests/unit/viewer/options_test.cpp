@@ -220,8 +220,8 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 13, row.end())),
-            (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5, 1, 0xffeedd}));
+  EXPECT_EQ((std::vector<double>(row.end() - 16, row.end())),
+            (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5, 1, 0xffeedd, 0, 0, -1}));
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
