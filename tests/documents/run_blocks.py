@@ -48,7 +48,7 @@ def shortened(text, seconds=SECONDS):
         text = re.sub(r"--duration[ =]\S+", f"--duration {seconds}", text)
     else:
         text += f" --duration {seconds}"
-    return text if re.search(r"--size[ =]", text) else f"{text} --size {SIZE}"
+    return text if re.search(r"--size[ =]|--wall \S+\.toml", text) else f"{text} --size {SIZE}"
 
 
 def shortened_sweep(text):

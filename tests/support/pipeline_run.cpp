@@ -175,14 +175,15 @@ PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::s
                              terrain,
                              "--out",
                              out_,
-                             "--size",
-                             "480x300",
                              "--sampling-size",
                              "320x200",
                              "--tile-size",
                              "64",
                              "--sampler-threads",
                              "1"};
+  // The screens of a wall that a file describes have their own sizes.
+  const auto described = [](const std::string& word) { return word.ends_with(".toml"); };
+  if (std::none_of(arguments.begin(), arguments.end(), described)) a.insert(a.end(), {"--size", "480x300"});
   const bool surface = std::find(arguments.begin(), arguments.end(), "--iso") != arguments.end();
   if (mesh.empty() || mesh.ends_with(".ply") || surface) a.insert(a.end(), {"--cache", folder_ / "cache"});
   // Half the usual rate shows as much, and leaves time to others that run beside it.

@@ -39,8 +39,8 @@ struct Library {
 
 std::atomic<bool> connection_lost{false};
 
-// What Xlib does when its connection breaks is to write a line and end the process. Instead the window is lost, and the
-// viewer ends in order. GLFW loads Xlib by itself; so its functions are looked up where they are loaded, and a window
+// What Xlib does when its connection breaks, or a request is refused, is to write a line and end the process. Instead
+// the window is lost, and the viewer ends in order, or goes on. GLFW loads Xlib by itself; so its functions are looked up where they are loaded, and a window
 // of another system needs none. Displays are only passed on, so they need no type.
 void survive_broken_connection() {
   connection_lost = false;
@@ -52,6 +52,14 @@ void survive_broken_connection() {
   void* const display = reinterpret_cast<void* (*)()>(glfw)();
   const auto set_handler = reinterpret_cast<Handler (*)(Handler)>(dlsym(xlib, "XSetIOErrorHandler"));
   const auto set_exit = reinterpret_cast<void (*)(void*, ExitHandler, void*)>(dlsym(xlib, "XSetIOErrorExitHandler"));
+  // Another program that drops a file here and ends at once is no reason to end, either.
+  using ErrorHandler = int (*)(void* display, void* event);
+  const auto set_error = reinterpret_cast<ErrorHandler (*)(ErrorHandler)>(dlsym(xlib, "XSetErrorHandler"));
+  if (set_error)
+    set_error([](void*, void*) {
+      log::warn("the window system refused a request; the window goes on");
+      return 0;
+    });
   if (display && set_handler && set_exit) {
     set_handler([](void*) {
       connection_lost = true;
