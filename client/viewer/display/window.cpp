@@ -40,8 +40,9 @@ struct Library {
 std::atomic<bool> connection_lost{false};
 
 // What Xlib does when its connection breaks, or a request is refused, is to write a line and end the process. Instead
-// the window is lost, and the viewer ends in order, or goes on. GLFW loads Xlib by itself; so its functions are looked up where they are loaded, and a window
-// of another system needs none. Displays are only passed on, so they need no type.
+// the window is lost and the viewer ends in order, or the window goes on. GLFW loads Xlib by itself; so its functions
+// are looked up where they are loaded, and a window of another system needs none. Displays are only passed on, so they
+// need no type.
 void survive_broken_connection() {
   connection_lost = false;
   using Handler = int (*)(void* display);

@@ -161,10 +161,13 @@ class Run {
     other.data_servers = 1;
     other.data = {};
     other.data.scene = wish;
-    other.data.mesh.cache_dir = o_.data.mesh.cache_dir;
-    other.data.mesh.use_cache = o_.data.mesh.use_cache;
     const auto scene = scene_of(other.data);
     if (!scene) return scene.error();
+    // Meshes alone have a cache, and a data server of others refuses to be told where.
+    if ((*scene)->kind() == scene::Kind::kMesh) {
+      other.data.mesh.cache_dir = o_.data.mesh.cache_dir;
+      other.data.mesh.use_cache = o_.data.mesh.use_cache;
+    }
     if (const Status s = (*scene)->check(); !s) return s;
     keep_recent(wish);
     return pipeline.open(other);
