@@ -25,6 +25,7 @@ FLOORS = {
     "common": [
         ["common/core"],
         ["common/geometry", "common/colour", "common/links"],
+        ["common/notes"],
         ["common/image", "common/gl", "common/wall"],
         ["common/codec", "common/points"],
         [("common/volume", "common/volume/transfer"), "common/splat"],

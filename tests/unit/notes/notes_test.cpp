@@ -1,0 +1,191 @@
+// Books of notes: what is kept comes back; hostile and broken files are refused and left as they are.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <thread>
+
+#include "common/notes/shelf.h"
+
+namespace telesplat::notes {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Notes : public testing::Test {
+ protected:
+  void SetUp() override {
+    char name[] = "/tmp/telesplat-notes-XXXXXX";
+    folder = mkdtemp(name);
+    fs::create_directories(folder + "/data");
+    std::ofstream(folder + "/data/head.nrrd") << "data";
+    shelf = shelf_of(folder + "/data/head.nrrd", "head.nrrd", folder + "/cache");
+  }
+  void TearDown() override {
+    fs::permissions(folder + "/data", fs::perms::owner_all);
+    fs::remove_all(folder);
+  }
+  static std::string content(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  static void write(const std::string& path, const std::string& text) {
+    fs::create_directories(fs::path(path).parent_path());
+    std::ofstream(path, std::ios::binary) << text;
+  }
+  static Status add_note(const Shelf& shelf, const std::string& text, std::string* path = nullptr) {
+    return change_book(
+        shelf,
+        [&](Book& book) -> Status {
+          const auto number = book.add({.text = text});
+          if (!number) return number.error();
+          return ok_status();
+        },
+        path);
+  }
+  std::string folder;
+  Shelf shelf;
+};
+
+Book full_book() {
+  Book book;
+  EXPECT_TRUE(book.keep({"from above", {{0.1, 2.5, -3}, {0.6, 0, 0.8, 0}}, "2026-03-01T12:00:00Z"}));
+  EXPECT_TRUE(book.keep({"n\xc3\xa4her", {{1.0 / 3, 0, 1e-9}, {1, 0, 0, 0}}, ""}));
+  EXPECT_TRUE(book.add({.text = "a crack\nin the wall", .place = glm::dvec3(512000.25, 1e-3, -7), .value = "21.5 K"}));
+  EXPECT_TRUE(book.add({.text = "no place"}));
+  return book;
+}
+
+TEST_F(Notes, ABookComesBackAsItWas) {
+  const Book book = full_book();
+  const auto read = book_from_json(to_json(book));
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_EQ(*read, book);
+}
+
+TEST_F(Notes, LieBesideTheData) {
+  std::string path;
+  ASSERT_TRUE(add_note(shelf, "one", &path));
+  EXPECT_EQ(path, folder + "/data/head.nrrd.notes.json");
+  ASSERT_TRUE(add_note(shelf, "two"));
+  const auto book = read_book(shelf, &path);
+  ASSERT_TRUE(book);
+  EXPECT_EQ(path, folder + "/data/head.nrrd.notes.json");
+  ASSERT_EQ(book->notes.size(), 2u);
+  EXPECT_EQ(book->notes[1].text, "two");
+  EXPECT_EQ(book->notes[1].number, 2u);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder + "/data"), {}), 2) << "no temporary file stays";
+}
+
+// A book that lies where nobody may write is read, and goes on in the cache.
+TEST_F(Notes, LieInTheCacheWhereNobodyMayWrite) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
+  ASSERT_TRUE(add_note(shelf, "one"));
+  fs::permissions(folder + "/data", fs::perms::owner_read | fs::perms::owner_exec);
+  std::string path;
+  ASSERT_TRUE(add_note(shelf, "two", &path));
+  EXPECT_EQ(path, shelf.in_cache);
+  const auto book = read_book(shelf);
+  ASSERT_TRUE(book);
+  EXPECT_EQ(book->notes.size(), 2u);
+}
+
+TEST_F(Notes, LieInTheCacheWhereTheFolderIsNoFolderOfOurs) {
+  const Shelf elsewhere = shelf_of("/proc/version/head.nrrd", "head.nrrd", folder + "/cache");
+  std::string path;
+  ASSERT_TRUE(add_note(elsewhere, "one", &path));
+  EXPECT_EQ(path, elsewhere.in_cache);
+}
+
+TEST_F(Notes, OfScenesWithoutAFileLieInTheCache) {
+  const Shelf julia = shelf_of("", "julia lantern", folder + "/cache");
+  EXPECT_EQ(julia.beside, "");
+  std::string path;
+  ASSERT_TRUE(add_note(julia, "one", &path));
+  EXPECT_TRUE(path.starts_with(folder + "/cache/notes/")) << path;
+  EXPECT_NE(julia.in_cache, shelf_of("", "julia other", folder + "/cache").in_cache);
+  EXPECT_FALSE(add_note(shelf_of("", "julia", ""), "one"));
+}
+
+// Whatever is wrong with a file, it is told, and the file stays as it is.
+TEST_F(Notes, ABadFileIsRefusedAndStays) {
+  const std::string good = to_json(full_book());
+  std::vector<std::string> bad{"",
+                               "{",
+                               "[]",
+                               "null",
+                               "{}",
+                               "{\"telesplat_notes\":2}",
+                               "{\"telesplat_notes\":\"1\"}",
+                               std::string(1 << 20, '['),
+                               "\xff\xfe",
+                               std::string(5 << 20, ' ')};
+  for (const char* rest :
+       {"\"bookmarks\":{}", "\"bookmarks\":[1]", "\"bookmarks\":[{}]", "\"notes\":[{\"number\":0,\"text\":\"a\"}]",
+        "\"notes\":[{\"number\":-1,\"text\":\"a\"}]", "\"notes\":[{\"number\":1,\"text\":\"\"}]",
+        "\"notes\":[{\"number\":1,\"text\":\"a\"},{\"number\":1,\"text\":\"b\"}]",
+        "\"notes\":[{\"number\":1,\"text\":\"a\",\"place\":[1,2]}]",
+        "\"notes\":[{\"number\":1,\"text\":\"a\",\"place\":[1,2,1e999]}]",
+        "\"bookmarks\":[{\"name\":\"\",\"position\":[0,0,0],\"orientation\":[1,0,0,0]}]",
+        "\"bookmarks\":[{\"name\":\"a\\nb\",\"position\":[0,0,0],\"orientation\":[1,0,0,0]}]",
+        "\"bookmarks\":[{\"name\":\"a\",\"position\":[0,0,1e9],\"orientation\":[1,0,0,0]}]",
+        "\"bookmarks\":[{\"name\":\"a\",\"position\":[0,0,0],\"orientation\":[0,0,0,0]}]"})
+    bad.push_back(std::string("{\"telesplat_notes\":1,") + rest + "}");
+  for (const std::string& text : bad) {
+    write(shelf.beside, text);
+    const auto read = read_book(shelf);
+    ASSERT_FALSE(read) << text.substr(0, 80);
+    EXPECT_TRUE(read.error().text.starts_with(shelf.beside)) << read.error().text;
+    EXPECT_FALSE(add_note(shelf, "one"));
+    EXPECT_EQ(content(shelf.beside), text);
+  }
+}
+
+// Cut off anywhere, or with any byte changed: refused or read, and never changed by a refusal.
+TEST_F(Notes, DamagedFilesNeverHurt) {
+  const std::string good = to_json(full_book());
+  for (size_t n = 0; n + 2 < good.size(); ++n) EXPECT_FALSE(book_from_json(good.substr(0, n))) << n;
+  std::mt19937 random(17);
+  int refused = 0;
+  for (int i = 0; i < 3000; ++i) {
+    std::string text = good;
+    for (unsigned n = 1 + random() % 4; n > 0; --n) text[random() % text.size()] = char(random() & 255);
+    const auto read = book_from_json(text);
+    refused += !read;
+    if (read) EXPECT_EQ(*book_from_json(to_json(*read)), *read);
+  }
+  EXPECT_GT(refused, 500);
+}
+
+TEST_F(Notes, WhoWritesAtTheSameTimeLosesNothing) {
+  std::vector<std::thread> writers;
+  for (int w = 0; w < 4; ++w)
+    writers.emplace_back([&, w] {
+      for (int i = 0; i < 20; ++i) EXPECT_TRUE(add_note(shelf, "note " + std::to_string(w)));
+    });
+  for (auto& t : writers) t.join();
+  const auto book = read_book(shelf);
+  ASSERT_TRUE(book) << book.error().text;
+  EXPECT_EQ(book->notes.size(), 80u);
+}
+
+TEST_F(Notes, AChangeThatIsRefusedWritesNothing) {
+  EXPECT_FALSE(change_book(shelf, [](Book& book) { return book.remove_note(3); }));
+  EXPECT_FALSE(fs::exists(shelf.beside));
+  Book book;
+  EXPECT_FALSE(book.keep({"", {}, ""}));
+  EXPECT_FALSE(book.keep({std::string(81, 'a'), {}, ""}));
+  EXPECT_FALSE(book.add({.text = std::string(4001, 'a')}));
+  EXPECT_TRUE(book.keep({"a", {}, ""}));
+  EXPECT_TRUE(book.keep({"a", {{1, 0, 0}, {1, 0, 0, 0}}, ""}));
+  EXPECT_EQ(book.bookmarks.size(), 1u);
+  EXPECT_EQ(book.find("a")->pose.position_room.x, 1);
+  EXPECT_FALSE(book.remove_bookmark("b"));
+}
+
+}  // namespace
+}  // namespace telesplat::notes
