@@ -98,7 +98,19 @@ bool MasterLink::handle(const Message& message) {
     }
     return true;
   }
+  if (message.type == wire::Order::kName) {
+    const auto order = socket_.decode<wire::Order>(message);
+    if (order && obey_)
+      obey_(*order);
+    else if (order)
+      answer(order->number, false, hello_.role + " " + hello_.name + " takes no orders");
+    return true;
+  }
   return false;
+}
+
+void MasterLink::answer(uint64_t number, bool ok, std::string text) {
+  socket_.send(wire::OrderAnswer{hello_.instance, number, ok, to_utf8(text)});
 }
 
 void MasterLink::receive() {

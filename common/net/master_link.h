@@ -34,6 +34,12 @@ class MasterLink {
   /// Handles all messages that are here by now; those that handle() does not know are rejected.
   void receive();
 
+  /// What orders of others come to (wire::Order). Without one they are refused.
+  using Obey = std::function<void(const wire::Order&)>;
+  void on_order(Obey obey) { obey_ = std::move(obey); }
+  /// The answer to an order of this master's.
+  void answer(uint64_t number, bool ok, std::string text);
+
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
@@ -58,6 +64,7 @@ class MasterLink {
   std::optional<wire::Welcome> session_;
   int version_ = 0;
   bool shutdown_ = false, welcomed_ = false;
+  Obey obey_;
   ClockEstimate clock_;
   int clock_asked_ = 0;  // since the master is known
   double last_hello_s_ = -1e9, last_status_s_ = -1e9, last_clock_s_ = -1e9;

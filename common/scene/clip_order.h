@@ -1,5 +1,5 @@
-// What people ask to be cut away, in the data's own coordinates: --clip and `telesplat ctl clip`. The master makes planes
-// in the room of it, once it knows the placement, and tells everyone these as the fact "clip".
+// What people ask to be cut away, in the data's own coordinates: --clip and `telesplat ctl clip`. The master makes
+// planes in the room of it, once it knows the placement, and tells everyone these as the fact "clip".
 #pragma once
 
 #include <string>

@@ -24,6 +24,6 @@ using Messages =
                TileDone, PlanRequest, Plan, FrameEnd, StatusReport, MetricRows, Control, ControlReply, Shutdown,
                Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk, DepthTile, Patch, Forget, EpochBegin,
                StateMark, StateRequest, AccessReport, SliceWeights, SlabAssignment, SlabReady, SliceLease, VoxelRequest,
-               VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady, Swap>;
+               VoxelData, SliceImages, SliceFrame, SliceAck, Receipt, LinkReport, SwapReady, Swap, Order, OrderAnswer>;
 
 }  // namespace telesplat::wire

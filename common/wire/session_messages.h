@@ -133,8 +133,10 @@ struct Control {
   /// "status", "stop", "epoch", "set" (arguments: parameter -> value), "animate" (argument "timeline": as
   /// julia::parse_timeline takes it, or "off"), "tf" (argument "transfer": a preset's name or points, as
   /// volume::parse_transfer takes them), "colour" (arguments "array": as scene::parse_colour_by takes it, "map": as
-  /// colour::from_text takes it), "coupling" (arguments "coupling": async, sync or loose; "buffers" of loose, 1 to
-  /// kMaxBuffers; "viewer": the name of the one that is meant).
+  /// colour::from_text takes it), "clip" (argument "clip": as scene::parse_clip takes it), "play" (arguments "how":
+  /// play, pause or step; "steps"), orders that a viewer or a data server answers ("pick", "where", "go", "overlay",
+  /// "probe"; argument "viewer": whose), "coupling" (arguments "coupling": async, sync or loose; "buffers" of loose, 1
+  /// to kMaxBuffers; "viewer": the name of the one that is meant).
   std::string command;
   std::map<std::string, std::string> arguments;
   template <class F> static void fields(F& f, auto& m) {
@@ -146,6 +148,28 @@ struct ControlReply {
   bool ok = false;
   std::string text;  ///< JSON for "status", else one line; at most kMaxControlBytes
   template <class F> static void fields(F& f, auto& m) { f("ok", m.ok); f("text", m.text, kMaxControlBytes); }
+};
+
+/// Master -> viewer or data server: somebody asks what only this process knows, or wishes for something that is its
+/// business (docs/protocol.md has the orders). And its answer, which the master passes on.
+struct Order {
+  static constexpr std::string_view kName = "order";
+  uint64_t number = 0;  ///< of the master, for the answer
+  std::string command;  ///< viewer: "pick", "where", "go", "overlay"; data: "probe"
+  std::map<std::string, std::string> arguments;
+  template <class F> static void fields(F& f, auto& m) {
+    f("number", m.number); f("command", m.command); f("arguments", m.arguments, kMaxFact);
+  }
+};
+struct OrderAnswer {
+  static constexpr std::string_view kName = "order_answer";
+  InstanceId instance;  ///< whose
+  uint64_t number = 0;
+  bool ok = false;
+  std::string text;     ///< JSON, or why not; at most kMaxControlBytes
+  template <class F> static void fields(F& f, auto& m) {
+    f("instance", m.instance); f("number", m.number); f("ok", m.ok); f("text", m.text, kMaxControlBytes);
+  }
 };
 
 /// Master -> everyone: finish, flush metrics, say goodbye, exit 0. A process that leaves by itself sends Goodbye too.

@@ -107,6 +107,9 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
   net::MasterLink link(context, o.master, std::move(hello));
   BackgroundHash hash(recorded.files);
   served.begin(link.instance());
+  link.on_order([&](const wire::Order& order) {
+    if (const auto why = served.refuse(order)) link.answer(order.number, false, *why);
+  });
   const auto status = [&] { return status_of(served, requests); };
   std::vector<net::Socket*> sockets{&link.socket()};
   if (requests) sockets.push_back(&*requests);

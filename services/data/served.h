@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -49,6 +50,10 @@ class Served {
   virtual Status follow(const wire::Welcome& /*session*/) { return ok_status(); }
   /// Answers a request, now or later. A message that is none is rejected at its socket.
   virtual void answer(const net::Message& /*request*/, const Outlets& /*outlets*/) {}
+  /// An order of the master's. Nothing: it will be answered over outlets.master, else why not.
+  virtual std::optional<std::string> refuse(const wire::Order& order) {
+    return order.command + ": the scene is no volume, so no values lie in it";
+  }
   /// Sends what has been worked off meanwhile, where that has a thread of its own.
   virtual void send_finished(const Outlets& /*outlets*/) {}
   /// Facts of the hello that have changed since it was last asked: the master is told.

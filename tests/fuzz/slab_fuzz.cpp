@@ -14,7 +14,7 @@ constexpr int kSizeX = 24, kSizeY = 8, kSizeZ = 12, kLevels = 256;
 struct PlainSlab final : sampler::Slab {
   size_t bytes() const override { return 1; }
   std::vector<volume::SliceImage> splat(const std::vector<volume::LevelColour>&, const volume::ShearFrame&, int, int,
-                                        uint64_t&) const override {
+                                        const geometry::Clip&, uint64_t&) const override {
     return {};
   }
 };

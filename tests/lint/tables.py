@@ -146,7 +146,7 @@ METRICS_PAGE = "docs/metrics.md"
 # Flags of programs that are not ours, which ours start.
 FOREIGN_FLAGS = ()
 # Columns whose names are data: the master passes them on.
-FOREIGN_COLUMNS = ("viewer", "transfer", "colouring")
+FOREIGN_COLUMNS = ("viewer", "transfer", "colouring", "clip")
 # Files that pages and comments name and that are not in the repository: other people's, or made by a run.
 PLACEHOLDERS = ("NAME", "KIND")
 FOREIGN_FILES = ("highway.h", "nifti1.h", "nifti2.h", "volume.md", "compose/runs/latest", "compose/.env")

@@ -4,6 +4,7 @@
 
 #include "common/core/clock.h"
 #include "common/options/table.h"
+#include "common/scene/placement.h"
 
 namespace telesplat::data {
 namespace {
@@ -27,6 +28,13 @@ class ServedJulia final : public Served {
     hello.parameters = julia::to_map(scene_.parameters);
     hello.parameters.merge(julia::to_map(placement_));
     hello.box_room = placement_.box_room;
+    const glm::dvec3 lo(placement_.box_room.lo), hi(placement_.box_room.hi);
+    scene::Placement placement{
+        .data_to_room = glm::dmat4(glm::dmat3(placement_.scale)),
+        .box_data = {lo / placement_.scale + placement_.centre, hi / placement_.scale + placement_.centre},
+        .unit = {}};
+    placement.data_to_room[3] = glm::dvec4(-placement_.centre * placement_.scale, 1);
+    hello.facts[scene::kPlacementFact] = scene::to_text(placement);
   }
   std::string record() const override {
     std::string out = fmt::format("\n[scene]\nkind = \"{}\"\ntitle = {}\nroom_size = {}\n", scene::name_of(kind()),

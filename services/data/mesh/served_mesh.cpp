@@ -5,7 +5,9 @@
 #include <filesystem>
 
 #include "common/net/dispatch.h"
+#include "common/scene/placement.h"
 #include "common/scene/session.h"
+#include "services/data/base/placement_options.h"
 #include "services/data/mesh/array_stores.h"
 
 namespace telesplat::data {
@@ -44,6 +46,8 @@ class ServedMesh final : public Served {
     if (!info.arrays.empty()) hello.facts[scene::kArraysFact] = scene::to_text(info.arrays);
     if (as_begun_) hello.facts[scene::kColouringFact] = scene::to_text(*as_begun_);
     hello.facts[scene::kColourMapFact] = colour::to_text(map_);
+    if (const auto rotation = rotation_for_up(info.up); rotation && !info.box_data.empty())
+      hello.facts[scene::kPlacementFact] = scene::to_text(scene::placement_of(*rotation, info.box_data, info.box_room));
     hello.box_room = info.box_room;
   }
   Requests requests() const override { return {"chunks", 4096}; }

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <glm/vec4.hpp>
 
 #include "common/core/log.h"
 #include "common/scene/session.h"
@@ -86,9 +89,40 @@ Result<std::optional<VolumeAnswers::Reply>> VolumeAnswers::ask(const std::string
   return std::optional<Reply>();
 }
 
+Status VolumeAnswers::probe(const wire::Order& order) {
+  glm::dvec3 room;
+  for (const auto& [name, to] : {std::pair{"x", &room.x}, {"y", &room.y}, {"z", &room.z}}) {
+    const std::string text = scene::value_or(order.arguments, name, std::string());
+    const auto read = std::from_chars(text.data(), text.data() + text.size(), *to);
+    if (text.empty() || read.ec != std::errc() || read.ptr != text.data() + text.size() || !std::isfinite(*to))
+      return Error{fmt::format("probe: {} is \"{}\", not a number of metres in the room", name, text.substr(0, 40))};
+  }
+  const glm::dvec3 index(session_.grid.room_to_index() * glm::dvec4(room, 1));
+  const double k = std::floor(index.z + 0.5);
+  if (!(k >= begin_ && k < end_)) return Error{"probe: the place lies in no slice of the volume"};
+  const std::lock_guard lock(mutex_);
+  if (probes_.size() >= kProbesWaiting) return Error{fmt::format("probe: {} wait already", probes_.size())};
+  probes_.push_back({order.number, epochs_.empty() ? session_.step : epochs_.back().step, index});
+  return ok_status();
+}
+
+VolumeAnswers::Reply VolumeAnswers::answer(const Probe& probe, InstanceId self) {
+  wire::OrderAnswer out{.instance = self, .number = probe.number};
+  const auto value = store_.value_at(probe.step, probe.index);
+  if (value && *value) {
+    out.ok = true;
+    out.text = fmt::format("{{\"value\":{},\"value_error\":{},\"step\":{},\"index\":[{},{},{}]}}", **value,
+                           session_.levels.step / 2, probe.step, probe.index.x, probe.index.y, probe.index.z);
+  } else {
+    out.text = value ? "probe: the place lies outside of the volume" : value.error().text;
+  }
+  return {{}, wire::OrderAnswer::kName, wire::encode(out)};
+}
+
 bool VolumeAnswers::has_work() const {
   const std::lock_guard lock(mutex_);
-  return !waiting_.empty() || std::any_of(epochs_.begin(), epochs_.end(), [](const Epoch& e) { return e.weights_due; });
+  return !waiting_.empty() || !probes_.empty() ||
+         std::any_of(epochs_.begin(), epochs_.end(), [](const Epoch& e) { return e.weights_due; });
 }
 
 std::optional<VolumeAnswers::Reply> VolumeAnswers::work(InstanceId self) {
@@ -99,6 +133,12 @@ std::optional<VolumeAnswers::Reply> VolumeAnswers::work(InstanceId self) {
     const Epoch newest = epochs_.back();
     lock.unlock();
     return weigh(newest, self);
+  }
+  if (!probes_.empty()) {
+    const Probe probe = probes_.front();
+    probes_.pop_front();
+    lock.unlock();
+    return answer(probe, self);
   }
   if (waiting_.empty()) return std::nullopt;
   const auto first = std::min_element(waiting_.begin(), waiting_.end(),

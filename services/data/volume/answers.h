@@ -17,6 +17,7 @@ namespace telesplat::data {
 inline constexpr size_t kEpochsKept = 8;
 inline constexpr size_t kRequestsAPeer = 8;      ///< that wait; a newer one replaces the peer's oldest
 inline constexpr size_t kRequestsWaiting = 512;  ///< of all peers
+inline constexpr size_t kProbesWaiting = 64;
 inline constexpr int kSlicesAnAnswer = 64;
 inline constexpr uint64_t kVoxelsAnAnswer = 8u << 20;  ///< about 32 MB
 
@@ -41,6 +42,10 @@ class VolumeAnswers {
   /// Error: nonsense.
   Result<std::optional<Reply>> ask(const std::string& peer, const wire::VoxelRequest& request);
 
+  /// Queues the question for the value at a place in the room, of a step. Error: the place is no place, or lies in none
+  /// of this server's slices.
+  Status probe(const wire::Order& order);
+
   bool has_work() const;
   /// Does what is most urgent: weights first, then the request of the earliest round, of those the oldest. Nothing:
   /// there is nothing to do.
@@ -61,6 +66,12 @@ class VolumeAnswers {
     uint64_t round;
     volume::LevelSet have, shown;
   };
+  struct Probe {
+    uint64_t number;  // of the order
+    int step;
+    glm::dvec3 index;
+  };
+  Reply answer(const Probe& probe, InstanceId self);
   const Epoch* epoch(EpochId id) const;  // precondition: mutex_ is held
   std::optional<Reply> weigh(const Epoch& epoch, InstanceId self);
   Reply answer(const Waiting& request);
@@ -71,8 +82,9 @@ class VolumeAnswers {
   const int begin_, end_;  // this store's slices
   mutable std::mutex mutex_;
   InstanceId master_;
-  std::deque<Epoch> epochs_;         // newest last
-  std::list<Waiting> waiting_;       // in the order in which they came
+  std::deque<Epoch> epochs_;    // newest last
+  std::list<Waiting> waiting_;  // in the order in which they came
+  std::deque<Probe> probes_;
   uint64_t voxels_ = 0, bytes_ = 0;  // encoded so far
 };
 

@@ -82,6 +82,13 @@ class ServedVolume final : public Served {
     worker_->wake();
     return followed;
   }
+  std::optional<std::string> refuse(const wire::Order& order) override {
+    if (order.command != "probe") return Served::refuse(order);
+    const Status queued = answers_.probe(order);
+    if (!queued) return queued.error().text;
+    worker_->wake();
+    return std::nullopt;
+  }
   void answer(const net::Message& message, const Outlets& outlets) override {
     net::dispatch<wire::VoxelRequest>(outlets.requests, message, [&](const wire::VoxelRequest& request) {
       ++asked_;
@@ -140,6 +147,7 @@ void ServedVolume::describe(wire::Hello& hello) const {
                       {"voxels", std::to_string(session.grid.voxels())},
                       {"content_hash", fmt::format("{:016x}", store_->content_hash())},
                       {"size", fmt::format("{} x {} x {}", size[0], size[1], size[2])}});
+  hello.facts[scene::kPlacementFact] = scene::to_text(store_->placement());
   hello.parameters = volume::to_parameters(session);
   hello.box_room = session.grid.box_room();
 }

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <future>
+#include <glm/matrix.hpp>
 #include <list>
 
 #include "services/data/volume/slices.h"
@@ -75,6 +76,9 @@ class Store final : public VolumeStore {
     if (!index_to_room) return refuse(index_to_room.error());
     format_ = first->format;
     session_.grid = {first->size, *index_to_room};
+    placement_ = {.data_to_room = *index_to_room * glm::inverse(first->index_to_data),
+                  .box_data = first->box(),
+                  .unit = first->unit};
     if (const Status valid = volume::validate(session_.grid); !valid) return refuse(valid.error());
     const auto part = read_part(options.part, first->size[2]);
     if (!part) return refuse(part.error());
@@ -118,6 +122,7 @@ class Store final : public VolumeStore {
   const volume::Session& session() const override { return session_; }
   const volume::Histogram& histogram() const override { return histogram_; }
   std::string format() const override { return format_; }
+  const scene::Placement& placement() const override { return placement_; }
   uint64_t content_hash() const override { return content_hash_; }
 
   Result<volume::Voxels> voxels(int step, int k_begin, int k_end, const volume::LevelSet& shown,
@@ -129,6 +134,15 @@ class Store final : public VolumeStore {
     for (int l = 0; l < session_.levels.count; ++l)
       if (shown.has(l) && !have.has(l)) wanted.add(l);
     return (*slices)->voxels(begin, end, wanted);
+  }
+
+  Result<std::optional<double>> value_at(int step, const glm::dvec3& index) override {
+    for (int a = 0; a < 3; ++a)
+      if (!(index[a] >= -0.5 && index[a] < session_.grid.size[size_t(a)] - 0.5)) return std::optional<double>();
+    if (const int k = int(std::floor(index.z + 0.5)); k < begin_ || k >= end_) return std::optional<double>();
+    const auto slices = step_of(step);
+    if (!slices) return slices.error();
+    return std::optional(session_.levels.lo + (*slices)->level_at(index) * session_.levels.step);
   }
 
   Result<std::vector<uint32_t>> slice_weights(int step, const volume::LevelSet& shown) override {
@@ -206,6 +220,7 @@ class Store final : public VolumeStore {
   const size_t cache_bytes_;
   volume::Session session_;
   volume::Histogram histogram_;
+  scene::Placement placement_;
   std::string format_;
   uint64_t content_hash_ = 0;
   int begin_ = 0, end_ = 0;

@@ -4,8 +4,10 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "common/scene/placement.h"
 #include "common/volume/histogram.h"
 #include "common/volume/session.h"
 #include "common/volume/voxels.h"
@@ -37,6 +39,8 @@ class VolumeStore {
   /// Of the values of all slices of the first step.
   virtual const volume::Histogram& histogram() const = 0;
   virtual std::string format() const = 0;
+  /// Of the file's own coordinates.
+  virtual const scene::Placement& placement() const = 0;
   /// The hash of all steps that were read when it was opened, the same for all parts: other data have another hash.
   virtual uint64_t content_hash() const = 0;
 
@@ -45,6 +49,9 @@ class VolumeStore {
   /// a step that cannot be read.
   virtual Result<volume::Voxels> voxels(int step, int k_begin, int k_end, const volume::LevelSet& shown,
                                         const volume::LevelSet& have) = 0;
+  /// The value at a place, in the data's units, between voxels interpolated; as exact as levels are (Levels::step).
+  /// Nothing: the place lies outside the volume, or in a slice of another part. Error: as voxels().
+  virtual Result<std::optional<double>> value_at(int step, const glm::dvec3& index) = 0;
   /// Visible voxels of every slice of this part, for a set of levels. Error: as voxels().
   virtual Result<std::vector<uint32_t>> slice_weights(int step, const volume::LevelSet& shown) = 0;
 };

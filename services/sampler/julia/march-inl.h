@@ -46,6 +46,16 @@ HWY_INLINE Interval Clip(const Constants& k, const JuliaRays& rays, const VF* d,
     out.t0 = hn::Max(out.t0, hn::Min(ta, tb));
     out.t1 = hn::Min(out.t1, hn::Max(ta, tb));
   }
+  for (int i = 0; i < k.planes; ++i) {
+    const float* n = k.plane_normal[i];
+    const VF v = hn::Add(hn::Add(hn::Mul(set(n[0]), d[4]), hn::Mul(set(n[1]), d[5])), hn::Mul(set(n[2]), d[6]));
+    const VF inverse = hn::Div(set(1), hn::IfThenElse(hn::Lt(hn::Abs(v), set(kParallel)), set(kParallel), v));
+    const float eye = (n[0] * o[4] + n[1] * o[5]) + n[2] * o[6];
+    const VF t = hn::Mul(set((k.plane_offset[i] - margin) - eye), inverse);
+    const MF enters = hn::Gt(inverse, hn::Zero(f));
+    out.t0 = hn::IfThenElse(enters, hn::Max(out.t0, t), out.t0);
+    out.t1 = hn::IfThenElse(enters, out.t1, hn::Min(out.t1, t));
+  }
   return out;
 }
 

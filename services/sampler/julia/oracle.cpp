@@ -52,7 +52,10 @@ float estimate(const Constants& k, const Vec4& q) {
   return 0;
 }
 
-// Depths between which a line lies in the ball |q| <= radius and in the box grown by `margin`; none if t1 < t0.
+float dot(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
+
+// Depths between which a line lies in the ball |q| <= radius, in the box and inside the clip's planes, all grown by
+// `margin`; none if t1 < t0.
 struct Interval {
   float t0, t1;
 };
@@ -68,6 +71,14 @@ Interval clip(const Constants& k, const JuliaRays& rays, const float* d, float b
     const float ta = ((k.box_lo[i] - margin) - o[4 + i]) * inverse, tb = ((k.box_hi[i] + margin) - o[4 + i]) * inverse;
     out.t0 = std::max(out.t0, std::min(ta, tb));
     out.t1 = std::min(out.t1, std::max(ta, tb));
+  }
+  for (int i = 0; i < k.planes; ++i) {
+    const float v = dot(k.plane_normal[i], d + 4), inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
+    const float t = ((k.plane_offset[i] - margin) - dot(k.plane_normal[i], o + 4)) * inverse;
+    if (inverse > 0)
+      out.t0 = std::max(out.t0, t);
+    else
+      out.t1 = std::min(out.t1, t);
   }
   return out;
 }
@@ -176,8 +187,6 @@ Orbit follow(const Constants& k, const Vec4& q) {
   return out;
 }
 
-float dot(const float* a, const float* b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
-
 // To unit length; false if it has none or is not finite.
 bool normalise(float* n) {
   const float most = std::max(std::max(std::abs(n[0]), std::abs(n[1])), std::abs(n[2]));
@@ -237,22 +246,32 @@ void normal_at(const Constants& k, const Vec4& q, const float* gradient, float r
   widen(k, q, reach, back, n);
 }
 
-float occlusion_at(const Constants& k, const Vec4& q, const float* n) {
+// Set units from a point of the room to where a line leaves what the clip keeps: what is cut away darkens nothing.
+float exit_of(const Constants& k, const float* room, const float* towards) {
+  float out = kNothing;
+  for (int i = 0; i < k.planes; ++i) {
+    const float inside = dot(k.plane_normal[i], room) - k.plane_offset[i], along = dot(k.plane_normal[i], towards);
+    if (along < 0) out = std::min(out, std::max(inside / -along, 0.0f) * k.units_per_metre);
+  }
+  return out;
+}
+
+float occlusion_at(const Constants& k, const Vec4& q, const float* n, float exit) {
   const Vec4 step = orbit_vector(k, n);
   float sum = 0;
   for (int i = 0; i < kOcclusionSteps; ++i) {
     const float h = kOcclusionAt[i] * k.radius;
-    const float open = std::min(estimate(k, along(q.v, step, h)) / (kOpen * h), 1.0f);
+    const float open = h > exit ? 1.0f : std::min(estimate(k, along(q.v, step, h)) / (kOpen * h), 1.0f);
     sum = sum + kOcclusionWeight[i] * (1.0f - open);
   }
   return sum;
 }
 
 // 0 in full shadow .. 1 in full light.
-float lit_at(const Constants& k, const Vec4& q) {
+float lit_at(const Constants& k, const Vec4& q, float exit) {
   const Vec4 step = orbit_vector(k, k.light);
   float lit = 1, s = kShadowBegin * k.radius;
-  for (int i = 0; i < kShadowSteps && s < kShadowEnd * k.radius && lit > 0; ++i) {
+  for (int i = 0; i < kShadowSteps && s < std::min(kShadowEnd * k.radius, exit) && lit > 0; ++i) {
     const float r = estimate(k, along(q.v, step, s));
     lit = std::min(lit, kShadowSharpness * r / s);
     s = s + std::max(r, kShadowLeast * k.radius);
@@ -269,9 +288,10 @@ void add_point(const Constants& k, const JuliaRays& rays, int x, int y, const fl
   float n[3];
   normal_at(k, q, orbit.gradient, rays.footprint * t, d + 4, n);
   if (bracket.t0 == bracket.t1) face_normal(k, rays, d + 4, t, n);
-  float light = 1;
-  if (k.ambient > 0) light = light * (1.0f - k.ambient * occlusion_at(k, q, n));
-  if (k.shadow > 0) light = light * (1.0f - k.shadow * (1.0f - lit_at(k, q)));
+  float light = 1, room[3];
+  for (int a = 0; a < 3; ++a) room[a] = rays.origin[4 + a] + t * d[4 + a];
+  if (k.ambient > 0) light = light * (1.0f - k.ambient * occlusion_at(k, q, n, exit_of(k, room, n)));
+  if (k.shadow > 0) light = light * (1.0f - k.shadow * (1.0f - lit_at(k, q, exit_of(k, room, k.light))));
 
   const int i = out.count++;
   out.x[i] = x, out.y[i] = y;
@@ -306,6 +326,13 @@ bool face_normal(const Constants& k, const JuliaRays& rays, const float* directi
     if (std::min(ta, tb) != t) continue;
     std::fill_n(normal, 3, 0.0f);
     normal[i] = v < 0 ? 1.0f : -1.0f;
+    return true;
+  }
+  for (int i = 0; i < k.planes; ++i) {
+    const float v = dot(k.plane_normal[i], direction), inverse = 1.0f / (std::abs(v) < kParallel ? kParallel : v);
+    const float at = (k.plane_offset[i] - dot(k.plane_normal[i], rays.origin + 4)) * inverse;
+    if (inverse < 0 || at != t) continue;
+    for (int a = 0; a < 3; ++a) normal[a] = -k.plane_normal[i][a];
     return true;
   }
   return false;

@@ -21,7 +21,8 @@ glm::dmat3 basis_along(const glm::dvec3& v) {
 
 }  // namespace
 
-JuliaScene::JuliaScene(const julia::Parameters& parameters, const julia::Placement& placement)
+JuliaScene::JuliaScene(const julia::Parameters& parameters, const julia::Placement& placement,
+                       const geometry::Clip& clip)
     : centre_(placement.centre), units_per_metre_(1 / placement.scale), palette_(parameters.palette) {
   CHECK(palette_ >= 0 && palette_ < static_cast<int>(julia::palette_names().size()));
   const glm::dvec3 v(parameters.c);
@@ -47,6 +48,12 @@ JuliaScene::JuliaScene(const julia::Parameters& parameters, const julia::Placeme
     k.plane[i] = static_cast<float>(basis[i].y);
     for (int j = 0; j < 4; ++j) k.axes[i][j] = static_cast<float>(axes_[i][j]);
   }
+  for (const geometry::ClipPlane& plane : clip.planes) {
+    if (k.planes == static_cast<int>(geometry::Clip::kMostPlanes)) break;
+    for (int i = 0; i < 3; ++i) k.plane_normal[k.planes][i] = static_cast<float>(plane.normal[i]);
+    k.plane_offset[k.planes++] = static_cast<float>(plane.offset);
+  }
+  k.units_per_metre = static_cast<float>(units_per_metre_);
   k.colour = static_cast<int>(parameters.colour);
   k.tone_scale = static_cast<float>(parameters.colour_scale / (2 * radius));
   k.tone_shift = static_cast<float>(parameters.colour_shift - std::floor(parameters.colour_shift));

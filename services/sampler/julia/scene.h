@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "common/geometry/camera.h"
+#include "common/geometry/clip.h"
 #include "common/julia/parameters.h"
 
 namespace telesplat::sampler {
@@ -27,7 +28,8 @@ class JuliaScene {
   /// The palette index must be one of julia::palette_names(). An orbit counts as escaped no sooner than it must escape:
   /// the bailout used is the larger of the one given and 1.01 julia::radius(c),
   /// so that what has escaped never comes back, rounded as it is.
-  JuliaScene(const julia::Parameters& parameters, const julia::Placement& placement);
+  /// clip: what is cut away; where it cuts the set, the cut is shown.
+  JuliaScene(const julia::Parameters& parameters, const julia::Placement& placement, const geometry::Clip& clip = {});
 
   /// What the kernels read. Lengths in set units, room space in metres.
   struct Constants {
@@ -43,6 +45,9 @@ class JuliaScene {
     float tone_scale, tone_shift;  ///< tone = length / (2 radius) tone_scale + tone_shift, lengths doubled
     float ambient, shadow;
     float light[3];  ///< towards the light, unit length
+    int planes;      ///< of the clip
+    float plane_normal[geometry::Clip::kMostPlanes][3], plane_offset[geometry::Clip::kMostPlanes];  ///< room space
+    float units_per_metre;                                                                          ///< set units
   };
   const Constants& constants() const { return constants_; }
 

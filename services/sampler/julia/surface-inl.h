@@ -180,7 +180,20 @@ HWY_INLINE Vec3 NormalAt(const Constants& k, const Vec4& q, const Vec3& gradient
   return Widen(k, q, reach, back, n);
 }
 
-HWY_INLINE VF OcclusionAt(const Constants& k, const Vec4& q, const Vec3& n) {
+// Set units to where a line leaves what the clip keeps.
+HWY_INLINE VF ExitOf(const Constants& k, const Vec3& room, const Vec3& towards) {
+  VF out = set(kNothing);
+  for (int i = 0; i < k.planes; ++i) {
+    const float* n = k.plane_normal[i];
+    const Vec3 normal{{set(n[0]), set(n[1]), set(n[2])}};
+    const VF inside = hn::Sub(dot(normal, room), set(k.plane_offset[i])), along = dot(normal, towards);
+    const VF distance = hn::Mul(hn::Max(hn::Div(inside, hn::Neg(along)), hn::Zero(f)), set(k.units_per_metre));
+    out = hn::IfThenElse(hn::Lt(along, hn::Zero(f)), hn::Min(out, distance), out);
+  }
+  return out;
+}
+
+HWY_INLINE VF OcclusionAt(const Constants& k, const Vec4& q, const Vec3& n, VF exit) {
   const Vec4 step = orbit_vector(k, n);
   VF sum = hn::Zero(f);
   static_assert(kOcclusionSteps % 2 == 0);
@@ -190,18 +203,19 @@ HWY_INLINE VF OcclusionAt(const Constants& k, const Vec4& q, const Vec3& n) {
     VF e[2];
     Estimate<2>(k, points, e);
     for (int j = 0; j < 2; ++j) {
-      const VF open = hn::Min(hn::Div(e[j], set(kOpen * h[j])), set(1));
+      const VF near = hn::Min(hn::Div(e[j], set(kOpen * h[j])), set(1));
+      const VF open = hn::IfThenElse(hn::Gt(set(h[j]), exit), set(1), near);
       sum = hn::Add(sum, hn::Mul(set(kOcclusionWeight[i + j]), hn::Sub(set(1), open)));
     }
   }
   return sum;
 }
 
-HWY_INLINE VF LitAt(const Constants& k, const Vec4& q) {
+HWY_INLINE VF LitAt(const Constants& k, const Vec4& q, VF exit) {
   const Vec4 step = orbit_vector(k, {{set(k.light[0]), set(k.light[1]), set(k.light[2])}});
   VF lit = set(1), s = set(kShadowBegin * k.radius);
   for (int i = 0; i < kShadowSteps; ++i) {
-    const MF live = hn::And(hn::Lt(s, set(kShadowEnd * k.radius)), hn::Gt(lit, hn::Zero(f)));
+    const MF live = hn::And(hn::Lt(s, hn::Min(set(kShadowEnd * k.radius), exit)), hn::Gt(lit, hn::Zero(f)));
     if (hn::AllFalse(f, live)) break;
     const VF r = Estimate(k, along(q, step, s));
     lit = hn::IfThenElse(live, hn::Min(lit, hn::Div(hn::Mul(set(kShadowSharpness), r), s)), lit);
@@ -242,8 +256,16 @@ HWY_NOINLINE void Shade(const Constants& k, const JuliaRays& rays, const Queue& 
     }
 
     VF light = set(1);
-    if (k.ambient > 0) light = hn::Mul(light, hn::Sub(set(1), hn::Mul(set(k.ambient), OcclusionAt(k, q, n))));
-    if (k.shadow > 0) light = hn::Mul(light, hn::Sub(set(1), hn::Mul(set(k.shadow), hn::Sub(set(1), LitAt(k, q)))));
+    Vec3 room;
+    for (int a = 0; a < 3; ++a) room.v[a] = hn::Add(set(rays.origin[4 + a]), hn::Mul(t, ray.v[a]));
+    if (k.ambient > 0) {
+      const VF occlusion = OcclusionAt(k, q, n, ExitOf(k, room, n));
+      light = hn::Mul(light, hn::Sub(set(1), hn::Mul(set(k.ambient), occlusion)));
+    }
+    if (k.shadow > 0) {
+      const VF lit = LitAt(k, q, ExitOf(k, room, {{set(k.light[0]), set(k.light[1]), set(k.light[2])}}));
+      light = hn::Mul(light, hn::Sub(set(1), hn::Mul(set(k.shadow), hn::Sub(set(1), lit))));
+    }
     hn::StoreU(t, f, out.depth_m + at);
     hn::StoreU(hn::Add(hn::Mul(hn::Sqrt(orbit.trap), set(k.tone_scale)), set(k.tone_shift)), f, out.tone + at);
     hn::StoreU(light, f, out.light + at);

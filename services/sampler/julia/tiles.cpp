@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "common/core/log.h"
+#include "common/scene/clip_order.h"
+#include "common/scene/session.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -13,7 +15,9 @@ Result<JuliaScene> make_scene(const wire::Welcome& session) {
   if (const Status s = julia::validate(*parameters); !s) return s.error();
   const auto placement = julia::placement_from_map(session.parameters, session.box_room);
   if (!placement) return placement.error();
-  return JuliaScene(*parameters, *placement);
+  const auto clip = geometry::clip_from_text(scene::SessionView(session).fact(scene::kClipFact));
+  if (!clip) return clip.error();
+  return JuliaScene(*parameters, *placement, *clip);
 }
 
 // Pixels of the lease's camera that are one of the view's; within limits, whatever a lease says.
@@ -27,8 +31,10 @@ double footprint_px(const wire::Lease& lease) {
 void JuliaTiles::on_welcome(const wire::Welcome& session) {
   epochs_.follow(session.master);
   const Epoch* known = epochs_.find(session.epoch);
-  if (known && known->parameters == session.parameters && known->box_room == session.box_room) return;
-  Epoch epoch{session.parameters, session.box_room, std::nullopt};
+  const std::string clip = scene::SessionView(session).fact(scene::kClipFact);
+  if (known && known->parameters == session.parameters && known->box_room == session.box_room && known->clip == clip)
+    return;
+  Epoch epoch{session.parameters, session.box_room, clip, std::nullopt};
   if (auto scene = make_scene(session))
     epoch.scene = std::move(*scene);
   else

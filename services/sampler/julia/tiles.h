@@ -26,6 +26,7 @@ class JuliaTiles final : public TileSource {
   struct Epoch {
     std::map<std::string, double> parameters;
     geometry::Box box_room;
+    std::string clip;                 // the fact
     std::optional<JuliaScene> scene;  // none: the parameters are bad
   };
   JuliaSampler sampler_;

@@ -28,6 +28,7 @@ class RasterSampler final : public Sampler {
   Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override;
   void remove_chunk(ChunkId id) override;
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override;
+  void set_clip(const geometry::Clip& clip) override { clip_ = clip; }
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
                            const image::PixelMask* mask = nullptr) override;
 
@@ -46,6 +47,7 @@ class RasterSampler final : public Sampler {
   void reserve_targets(int width, int height);
   Status upload(ChunkId id, geometry::ChunkBytes chunk);
   static void release(Drawable& drawable);
+  void set_planes(const glm::dvec3& eye_room) const;
   void draw(const geometry::Camera& camera, const geometry::Rect& part);
   void read(const geometry::Rect& from, size_t to, std::vector<float>& depth_m, image::DepthImage& out) const;
   GLint uniform(const char* name) const { return glGetUniformLocation(program_, name); }
@@ -58,6 +60,7 @@ class RasterSampler final : public Sampler {
   GLuint colour_buffer_ = 0;                           // of colours_
   std::shared_ptr<const scene::ColourTable> colours_;  // null: none was told yet
   std::unordered_map<ChunkId, Drawable> chunks_;
+  geometry::Clip clip_;
 };
 
 Result<GLuint> compile(GLenum stage, const char* source) {
@@ -207,6 +210,18 @@ void RasterSampler::reserve_targets(int width, int height) {
   glDrawBuffers(3, kPlaces);
 }
 
+// What lies outside of the clip's planes is cut off by the rasteriser.
+void RasterSampler::set_planes(const glm::dvec3& eye_room) const {
+  static_assert(geometry::Clip::kMostPlanes == 8, "as the shader has it");
+  glm::vec4 planes[geometry::Clip::kMostPlanes]{};
+  for (size_t i = 0; i < geometry::Clip::kMostPlanes; ++i) {
+    const bool on = i < clip_.planes.size();
+    if (on) planes[i] = {clip_.planes[i].normal, clip_.planes[i].inside_m(eye_room)};
+    on ? glEnable(GL_CLIP_DISTANCE0 + GLenum(i)) : glDisable(GL_CLIP_DISTANCE0 + GLenum(i));
+  }
+  glUniform4fv(uniform("clip"), GLsizei(geometry::Clip::kMostPlanes), glm::value_ptr(planes[0]));
+}
+
 // Draws `part` of the camera's image; the rest of it is left as it was.
 void RasterSampler::draw(const geometry::Camera& camera, const geometry::Rect& part) {
   glViewport(0, 0, camera.width, camera.height);
@@ -229,6 +244,7 @@ void RasterSampler::draw(const geometry::Camera& camera, const geometry::Rect& p
   glUniformMatrix3fv(uniform("to_camera"), 1, GL_FALSE, glm::value_ptr(to_camera));
   glUniform4f(uniform("frustum"), float(camera.left), float(camera.right), float(camera.bottom), float(camera.top));
   glUniform1f(uniform("near_m"), float(camera.near_m));
+  set_planes(camera.pose.position_room);
   glUniform2f(uniform("size_pixels"), float(camera.width), float(camera.height));
   glUniform3f(uniform("range"), colours_->lo, colours_->scale, colours_->offset);
   glUniform1ui(uniform("entries"), GLuint{scene::ColourTable::kEntries});

@@ -11,7 +11,10 @@ uniform vec3 eye_room;
 uniform mat3 to_camera;
 uniform vec4 frustum;  // left, right, bottom, top at depth 1
 uniform float near_m;
+uniform vec4 clip[8];  // of each plane that is switched on: its normal, and how far inside the eye is
+out float gl_ClipDistance[8];
 void main() {
+  for (int i = 0; i < 8; ++i) gl_ClipDistance[i] = dot(clip[i].xyz, position_room - eye_room) + clip[i].w;
   vec3 c = to_camera * (position_room - eye_room);  // relative first: exact where it matters, near the eye
   float w = -c.z;
   gl_Position = vec4((2 * c.x - (frustum.x + frustum.y) * w) / (frustum.y - frustum.x),

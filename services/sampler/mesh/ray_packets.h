@@ -25,9 +25,14 @@ static_assert(kPacketWidth * kPacketHeight == kPacket);
 /// It is the sum of a term per column and a term per row, both held in double precision for the range that is traced.
 class PixelRays {
  public:
-  /// Rays for pixels [x0, x1) x [y0, y1), which may lie outside the image.
-  PixelRays(const geometry::Camera& camera, int x0, int y0, int x1, int y1)
-      : x0_(x0), y0_(y0), origin_(camera.pose.position_room), near_(static_cast<float>(camera.near_m)) {
+  /// Rays for pixels [x0, x1) x [y0, y1), which may lie outside the image; what lies outside of `clip` they do not see.
+  PixelRays(const geometry::Camera& camera, const geometry::Clip& clip, int x0, int y0, int x1, int y1)
+      : x0_(x0),
+        y0_(y0),
+        eye_(camera.pose.position_room),
+        origin_(eye_),
+        near_(static_cast<float>(camera.near_m)),
+        clip_(clip) {
     const glm::dquat& r = camera.pose.orientation;
     for (int x = x0; x < x1; ++x) columns_.push_back(r * glm::dvec3(camera.left + (x + 0.5) / camera.focal_x(), 0, 0));
     for (int y = y0; y < y1; ++y) rows_.push_back(r * glm::dvec3(0, camera.top - (y + 0.5) / camera.focal_y(), -1));
@@ -59,18 +64,26 @@ class PixelRays {
   }
 
  private:
-  static void aim(int k, const glm::dvec3& d, RTCRayHit8& packet) {
+  void aim(int k, const glm::dvec3& d, RTCRayHit8& packet) const {
     packet.ray.dir_x[k] = static_cast<float>(d.x);
     packet.ray.dir_y[k] = static_cast<float>(d.y);
     packet.ray.dir_z[k] = static_cast<float>(d.z);
     packet.ray.tfar[k] = std::numeric_limits<float>::infinity();
+    if (!clip_.empty()) {
+      const auto [begin, end] = clip_.stretch(eye_, d);
+      const bool any = begin <= end && end > near_;
+      packet.ray.tnear[k] = any ? std::max(near_, static_cast<float>(begin)) : 1.0f;
+      packet.ray.tfar[k] = any ? static_cast<float>(end) : 0.0f;  // before it begins: it meets nothing
+    }
     packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
   }
 
   int x0_, y0_;
+  glm::dvec3 eye_;
   glm::vec3 origin_;
   float near_;
+  const geometry::Clip& clip_;
   std::vector<glm::dvec3> columns_, rows_;
 };
 
@@ -92,7 +105,7 @@ void trace_tile(RayScene& scene, const geometry::Camera& camera, const geometry:
   if (tile.width <= 0 || tile.height <= 0) return;
   const int column0 = tile.x / kPacketWidth, column1 = (tile.x + tile.width - 1) / kPacketWidth + 1;
   const int row0 = tile.y / kPacketHeight, row1 = (tile.y + tile.height - 1) / kPacketHeight + 1;
-  const PixelRays rays(camera, column0 * kPacketWidth, row0 * kPacketHeight, column1 * kPacketWidth,
+  const PixelRays rays(camera, scene.clip(), column0 * kPacketWidth, row0 * kPacketHeight, column1 * kPacketWidth,
                        row1 * kPacketHeight);
   scene.commit();
 
@@ -133,7 +146,7 @@ void trace_pixels(RayScene& scene, const geometry::Camera& camera, const geometr
                   const image::PixelMask& mask, const Begin& begin, const Consume& consume, const End& end) {
   const std::vector<MaskedPixel> pixels = gather(mask);
   if (pixels.empty()) return;
-  const PixelRays rays(camera, tile.x, tile.y, tile.x + tile.width, tile.y + tile.height);
+  const PixelRays rays(camera, scene.clip(), tile.x, tile.y, tile.x + tile.width, tile.y + tile.height);
   scene.commit();
   constexpr size_t kTask = 16 * kPacket;  // pixels: fewer are not worth a thread
   const auto trace = [&](const tbb::blocked_range<size_t>& part) {

@@ -19,6 +19,7 @@ class RaySampler final : public Sampler {
   void set_colours(std::shared_ptr<const scene::ColourTable> colours) override {
     colours_ = colours ? std::move(colours) : neutral_colours();
   }
+  void set_clip(const geometry::Clip& clip) override { scene_.set_clip(clip); }
   image::DepthImage sample(const geometry::Camera& camera, const geometry::Rect& tile,
                            const image::PixelMask* mask = nullptr) override;
 

@@ -17,6 +17,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "common/geometry/clip.h"
 #include "services/sampler/mesh/chunk_input.h"
 
 namespace telesplat::sampler {
@@ -35,6 +36,9 @@ class RayScene {
   void commit();
 
   RTCScene scene() const { return top_.get(); }
+  /// What rays are cut to.
+  void set_clip(const geometry::Clip& clip) { clip_ = clip; }
+  const geometry::Clip& clip() const { return clip_; }
   /// The chunk behind a hit's instID.
   const geometry::MeshChunkView& chunk(unsigned slot) const { return slots_[slot].held.view; }
   /// Everything parallel runs in here.
@@ -61,6 +65,7 @@ class RayScene {
   std::vector<Slot> slots_;  // index = geometry id in the top scene = a hit's instID
   std::vector<unsigned> free_;
   std::unordered_map<ChunkId, unsigned> slot_of_;
+  geometry::Clip clip_;
   Scene top_;  // after the slots, so that it goes first
   bool changed_ = true;
 };

@@ -6,6 +6,7 @@
 #include "common/core/ids.h"
 #include "common/core/result.h"
 #include "common/geometry/camera.h"
+#include "common/geometry/clip.h"
 #include "common/geometry/mesh_chunk.h"
 #include "common/image/depth_image.h"
 #include "common/image/file.h"
@@ -33,6 +34,9 @@ class Sampler {
 
   /// What chunks that hold scalars are coloured with from now on; null: neutral. Others keep their colours.
   virtual void set_colours(std::shared_ptr<const scene::ColourTable> colours) = 0;
+
+  /// What is cut away from now on: rays begin and end at its planes, so that what lay behind is sampled.
+  virtual void set_clip(const geometry::Clip& clip) = 0;
 
   /// Samples the pixels `tile` of the frame `camera` at their centres. Colours are unlit albedo interpolated over the
   /// triangle, or looked up for scalars that are interpolated over it; normals are interpolated, in room space, flipped

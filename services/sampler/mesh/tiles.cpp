@@ -1,6 +1,7 @@
 #include "services/sampler/mesh/tiles.h"
 
 #include "common/net/dispatch.h"
+#include "common/scene/clip_order.h"
 #include "common/scene/session.h"
 
 namespace telesplat::sampler {
@@ -32,12 +33,23 @@ MeshTiles::MeshTiles(std::unique_ptr<Sampler> sampler, uint64_t cache_bytes, con
 
 void MeshTiles::learn_look(const wire::Welcome& session) {
   looks_.follow(session.master);
-  Look look{scene::SessionView(session).fact(scene::kColouringFact), {}, nullptr, true};
+  const scene::SessionView view(session);
+  Look look{.text = view.fact(scene::kColouringFact),
+            .array = {},
+            .colours = nullptr,
+            .clip_text = view.fact(scene::kClipFact),
+            .clip = {}};
   const Look* before = looks_.find(session.epoch);
-  if (before && before->text == look.text) return;
+  if (before && before->text == look.text && before->clip_text == look.clip_text) return;
+  if (const auto clip = geometry::clip_from_text(look.clip_text)) {
+    look.clip = *clip;
+  } else {
+    look.known = false;
+    log::error("epoch {} cannot be sampled: {}", session.epoch.value, clip.error().text);
+  }
   if (!look.text.empty()) {
     const auto colouring = scene::colouring_from_text(look.text);
-    look.known = colouring.ok();
+    look.known &= colouring.ok();
     if (colouring) {
       look.array = colouring->array;
       look.colours = std::make_shared<const scene::ColourTable>(scene::make_table(*colouring));
@@ -84,7 +96,9 @@ Readiness MeshTiles::readiness(const HeldLease& held, double now_s) {
 }
 
 Sampled MeshTiles::sample(const HeldLease& held) {
-  sampler_->set_colours(looks_.find(held.lease.epoch)->colours);
+  const Look& look = *looks_.find(held.lease.epoch);
+  sampler_->set_colours(look.colours);
+  sampler_->set_clip(look.clip);
   return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect, held.pixels()); });
 }
 

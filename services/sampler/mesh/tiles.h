@@ -36,7 +36,9 @@ class MeshTiles final : public TileSource {
     std::string text;   // the fact "colouring"
     std::string array;  // that chunks hold; empty: colours
     std::shared_ptr<const scene::ColourTable> colours;
-    bool known = true;  // the text could be read
+    bool known = true;      // the texts could be read
+    std::string clip_text;  // the fact "clip"
+    geometry::Clip clip;
   };
   void learn_look(const wire::Welcome& session);
   size_t missing_count() const;

@@ -179,7 +179,7 @@ void VolumeRaycaster::Impl::march(const Light& light, const Ray& ray, glm::dvec3
 }
 
 VolumeRaycaster::VolumeRaycaster(const volume::Grid& grid, const volume::Voxels& voxels,
-                                 std::vector<volume::LevelColour> colours, int threads)
+                                 std::vector<volume::LevelColour> colours, int threads, const geometry::Clip& clip)
     : impl_(std::make_unique<Impl>(threads)) {
   Impl& impl = *impl_;
   impl.grid = grid;
@@ -197,6 +197,9 @@ VolumeRaycaster::VolumeRaycaster(const volume::Grid& grid, const volume::Voxels&
       for (uint32_t n = voxels.rows[row]; n < voxels.rows[row + 1]; ++n) {
         const uint16_t level = voxels.level[n];
         if (level >= impl.colours.size() || !(impl.colours[level].extinction > 0)) continue;
+        // As the splatter has it: rounding does not decide about voxels that lie in a plane.
+        const glm::dvec3 room(grid.index_to_room * glm::dvec4(voxels.i[n], j, k, 1));
+        if (!clip.empty() && !clip.keeps(room, 1e-6 * grid.unit_m())) continue;
         impl.put(voxels.i[n], j, k, level | uint32_t(impl.lit ? voxels.normal[n] : volume::kNoNormal) << 16);
       }
 }

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "common/geometry/camera.h"
+#include "common/geometry/clip.h"
 #include "common/image/file.h"
 #include "common/volume/grid.h"
 #include "common/volume/transfer/function.h"
@@ -17,9 +18,9 @@ namespace telesplat::sampler {
 /// travel. Lit by volume/lighting.h for the camera's eye.
 class VolumeRaycaster {
  public:
-  /// voxels: of all slices.
+  /// voxels: of all slices; those whose centres the clip cuts away are not there.
   VolumeRaycaster(const volume::Grid& grid, const volume::Voxels& voxels, std::vector<volume::LevelColour> colours,
-                  int threads);
+                  int threads, const geometry::Clip& clip = {});
   ~VolumeRaycaster();
   /// Colours over background, in the upper byte how much of the pixel the volume covers; depth as volume::WarpTarget
   /// has it.

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/geometry/clip.h"
 #include "common/volume/shear.h"
 #include "common/volume/slices/image.h"
 #include "common/volume/transfer/function.h"
@@ -20,7 +21,7 @@ class Slab {
   /// As ShearSplatter::splat(); voxels: how many were splatted.
   virtual std::vector<volume::SliceImage> splat(const std::vector<volume::LevelColour>& colours,
                                                 const volume::ShearFrame& frame, int k_begin, int k_end,
-                                                uint64_t& voxels) const = 0;
+                                                const geometry::Clip& clip, uint64_t& voxels) const = 0;
 };
 
 /// Arranges voxels for splatting.

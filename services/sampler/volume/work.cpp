@@ -7,6 +7,7 @@
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
+#include "common/scene/clip_order.h"
 #include "common/scene/session.h"
 
 namespace telesplat::sampler {
@@ -14,7 +15,10 @@ namespace {
 
 constexpr size_t kMaxServers = 256;  // connections to data servers
 
-Result<volume::Session> read(const wire::Welcome& welcome) {
+Result<volume::Session> read(const wire::Welcome& welcome, const std::string& clip_text, geometry::Clip& clip) {
+  auto planes = geometry::clip_from_text(clip_text);
+  if (!planes) return planes.error();
+  clip = *std::move(planes);
   auto session = volume::read_session(welcome.parameters, welcome.facts);
   if (!session) return session;
   if (const Status s = volume::validate(session->grid); !s) return s.error();
@@ -49,11 +53,12 @@ void VolumeWork::on_welcome(const wire::Welcome& welcome) {
   if (epochs_.follow(welcome.master)) told_ready_ = {};
   const scene::SessionView view(welcome);
   if (!view.kind()) return;  // no scene for now: parts of another volume are missing, or nobody serves data yet
-  const std::string transfer = view.fact("transfer");
+  const std::string transfer = view.fact("transfer"), clip = view.fact(scene::kClipFact);
   const Epoch* known = epochs_.find(welcome.epoch);
-  if (known && known->parameters == welcome.parameters && known->transfer == transfer) return;
-  Epoch epoch{.parameters = welcome.parameters, .transfer = transfer};
-  if (const auto session = read(welcome)) {
+  if (known && known->parameters == welcome.parameters && known->transfer == transfer && known->clip_text == clip)
+    return;
+  Epoch epoch{.parameters = welcome.parameters, .transfer = transfer, .clip_text = clip};
+  if (const auto session = read(welcome, clip, epoch.clip)) {
     epoch.scene = SlabScene{session->grid, session->levels, session->lit, session->steps,
                             view.fact("scene") + "\n" + view.fact("content_hash")};
     epoch.step = session->step;
@@ -160,7 +165,7 @@ Delivery VolumeWork::sample_next() {
     return send(view->bytes);
   }
   const double begin_cpu_s = thread_cpu_s();
-  const auto images = slab->splat(epoch.colours, lease.shear, int(lease.begin), int(lease.end), m.voxels);
+  const auto images = slab->splat(epoch.colours, lease.shear, int(lease.begin), int(lease.end), epoch.clip, m.voxels);
   out.sampled_s = monotonic_s();
   const double sampled_cpu_s = thread_cpu_s();
   tbb::task_arena arena(threads_);

@@ -58,6 +58,8 @@ class VolumeWork final : public Work {
   struct Epoch {
     std::map<std::string, double> parameters;
     std::string transfer;
+    std::string clip_text;  // the fact "clip"
+    geometry::Clip clip;
     std::optional<SlabScene> scene;  // none: the parameters are bad
     int step = 0;
     std::vector<volume::LevelColour> colours;  // by level

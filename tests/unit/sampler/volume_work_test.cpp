@@ -113,7 +113,7 @@ struct FakeSlab final : Slab {
   explicit FakeSlab(Voxels v) : voxels(std::move(v)) {}
   size_t bytes() const override { return voxels.size() * 8; }
   std::vector<volume::SliceImage> splat(const std::vector<volume::LevelColour>& colours, const volume::ShearFrame& f,
-                                        int k_begin, int k_end, uint64_t& count) const override {
+                                        int k_begin, int k_end, const geometry::Clip&, uint64_t& count) const override {
     count = 0;
     for (const uint16_t l : voxels.level) count += colours[l].extinction > 0;
     std::vector<volume::SliceImage> out;

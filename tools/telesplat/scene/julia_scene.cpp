@@ -38,7 +38,7 @@ class DirectJulia : public DirectScene {
   Result<sampler::JuliaScene> at(EpochId epoch) const {
     const auto parameters = julia_.at(epoch);
     if (!parameters) return parameters.error();
-    return sampler::JuliaScene(*parameters, julia_.placement);
+    return sampler::JuliaScene(*parameters, julia_.placement, julia_.clips.at(epoch));
   }
 
   JuliaScene::Record julia_;
@@ -100,8 +100,10 @@ Status read_epochs(const std::string& path, JuliaScene::Record& out) {
   for (size_t row = 0; row < table->rows(); ++row) {
     const auto id = table->count(row, *epoch);
     if (!id) return id.error();
+    if (const Status s = out.clips.read(*table, row, *id); !s) return s;
     std::map<std::string, double> values;
     for (size_t i = 0; i < table->header().size(); ++i) {
+      if (table->header()[i] == scene::kClipFact) continue;
       const auto value = table->number(row, i);
       if (!value) return value.error();
       values[table->header()[i]] = *value;
@@ -136,7 +138,7 @@ Result<JuliaScene::Record> JuliaScene::record() const {
   if (!scene) return scene.error();
   const auto placement = julia::place(*scene, options_.mesh.room_size_m);
   if (!placement) return placement.error();
-  return Record{{}, scene->title, scene->parameters, *placement, {}};
+  return Record{{}, scene->title, scene->parameters, *placement, {}, {}};
 }
 
 std::string JuliaScene::name() const {

@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "tools/telesplat/scene/epoch_clips.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -28,6 +29,7 @@ class JuliaScene : public Scene {
     julia::Placement placement;
     std::map<uint64_t, julia::Parameters>
         epochs;  ///< by EpochId; empty if the run has no epochs.csv, it showed one set only
+    EpochClips clips;
     /// Error: epochs.csv has no such epoch.
     Result<julia::Parameters> at(EpochId epoch) const;
   };

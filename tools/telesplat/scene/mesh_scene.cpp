@@ -65,6 +65,7 @@ class DirectMesh : public DirectScene {
       if (const Status s = load(std::move(*store)); !s) return s;
     }
     colour_by(*colouring);
+    sampler_->set_clip(epochs_.clips.at(id));
     prepared_ = id;
     return ok_status();
   }
@@ -86,6 +87,7 @@ Status read_epochs(const std::string& path, MeshScene::Epochs& out) {
   for (size_t row = 0; row < table->rows(); ++row) {
     const auto id = table->count(row, *epoch);
     if (!id) return id.error();
+    if (const Status s = out.clips.read(*table, row, *id); !s) return s;
     const std::string colouring = table->text(row, *text);
     auto& at = out.by_id[*id];
     if (colouring.empty()) continue;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "common/scene/colouring.h"
+#include "tools/telesplat/scene/epoch_clips.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -23,6 +24,7 @@ class MeshScene : public Scene {
   struct Epochs {
     std::string directory;
     std::map<uint64_t, std::optional<scene::Colouring>> by_id;  ///< nothing: the file's own colours
+    EpochClips clips;
     bool told = false;  ///< else the run's record does not tell: all epochs look as the run began
     /// Error: epochs.csv has no such epoch.
     Result<std::optional<scene::Colouring>> at(EpochId epoch) const;

@@ -63,8 +63,8 @@ class DirectVolume : public DirectScene {
     const auto voxels = store_->voxels(epoch->step, 0, session.grid.size[2],
                                        data::shown_levels(*transfer, session.levels), volume::LevelSet());
     if (!voxels) return voxels.error();
-    raycaster_ = std::make_unique<sampler::VolumeRaycaster>(session.grid, *voxels,
-                                                            volume::level_colours(*transfer, session.levels), threads_);
+    raycaster_ = std::make_unique<sampler::VolumeRaycaster>(
+        session.grid, *voxels, volume::level_colours(*transfer, session.levels), threads_, epochs_.clips.at(id));
     prepared_ = id;
     return ok_status();
   }
@@ -87,6 +87,7 @@ Status read_epochs(const std::string& path, VolumeScene::Epochs& out) {
     const auto id = table->count(row, *epoch), at = table->count(row, *step, volume::kMaxSteps);
     if (!id) return id.error();
     if (!at) return at.error();
+    if (const Status s = out.clips.read(*table, row, *id); !s) return s;
     out.by_id[*id] = {table->text(row, *transfer), int(*at)};
   }
   return ok_status();

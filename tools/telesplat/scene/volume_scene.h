@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "tools/telesplat/scene/epoch_clips.h"
 #include "tools/telesplat/scene/scene.h"
 
 namespace telesplat::launcher {
@@ -25,6 +26,7 @@ class VolumeScene : public Scene {
   struct Epochs {
     std::string directory;
     std::map<uint64_t, Epoch> by_id;  ///< empty if the run has no epochs.csv: it showed one
+    EpochClips clips;
     /// Error: epochs.csv has no such epoch.
     Result<Epoch> at(EpochId epoch) const;
   };

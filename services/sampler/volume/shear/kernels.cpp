@@ -31,6 +31,14 @@ struct SliceInTile {
   int own_lo, own_hi;  // voxel rows whose centres lie in the tile's own rows: their voxels count
 };
 
+// The cells of a row that a clip keeps.
+CellRow KeptOf(const CellRow& row, const KeptCells& kept) {
+  const auto before = [](const ShearCell& cell, int u) { return int(cell.u) < u; };
+  CellRow out{std::lower_bound(row.begin, row.end, int(kept.first), before), row.end};
+  out.end = std::lower_bound(out.begin, row.end, int(kept.last) + 1, before);
+  return kept.first <= kept.last ? out : CellRow{row.end, row.end};
+}
+
 // The line of a voxel row.
 void MakeLine(const SliceInTile& s, int v, uint64_t needed, Scratch& scratch, Line& line, SplatOutcome& out) {
   const ShearRows& rows = *s.scene.rows;
@@ -42,8 +50,11 @@ void MakeLine(const SliceInTile& s, int v, uint64_t needed, Scratch& scratch, Li
   int count = 0;
   for (const int held : s.slice.held) {
     if (held < 0) continue;
-    const uint32_t* first = rows.first.data() + size_t(held) * size_t(rows.rows) + size_t(r);
-    if (first[0] != first[1]) cells[count++] = {rows.cells.data() + first[0], rows.cells.data() + first[1]};
+    const size_t row = size_t(held) * size_t(rows.rows) + size_t(r);
+    const uint32_t* first = rows.first.data() + row;
+    CellRow all{rows.cells.data() + first[0], rows.cells.data() + first[1]};
+    if (s.scene.kept) all = KeptOf(all, s.scene.kept[row]);
+    if (all.begin != all.end) cells[count++] = all;
   }
   if (count == 0) return;
   const uint64_t voxels = ResampleRow(s.scene, s.columns, cells, count, s.slice.weight, needed, scratch.dense, line);

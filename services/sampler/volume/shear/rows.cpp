@@ -1,6 +1,10 @@
 #include "services/sampler/volume/shear/rows.h"
 
 #include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 namespace telesplat::sampler {
 namespace {
@@ -63,6 +67,39 @@ ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int ax
       b.v_hi = v + out.row_begin;
     }
   }
+  return out;
+}
+
+// A voxel at (u, v, p) is kept by a plane if a[u] u + a[v] v + a[p] p >= least.
+std::vector<KeptCells> kept_cells(const volume::Grid& grid, const ShearRows& rows, int axis,
+                                  const geometry::Clip& clip) {
+  struct Plane {
+    double u, v, p, least;
+  };
+  const int of_u = (axis + 1) % 3, of_v = (axis + 2) % 3, last_u = grid.size[size_t(of_u)] - 1;
+  std::vector<Plane> planes;
+  for (const geometry::ClipPlane& plane : clip.planes) {
+    const glm::dvec3 a = glm::transpose(glm::dmat3(grid.index_to_room)) * plane.normal;
+    planes.push_back(
+        {a[of_u], a[of_v], a[axis], plane.offset - glm::dot(plane.normal, glm::dvec3(grid.index_to_room[3]))});
+  }
+  std::vector<KeptCells> out(size_t(rows.slices) * size_t(rows.rows));
+  for (int s = 0; s < rows.slices; ++s)
+    for (int r = 0; r < rows.rows; ++r) {
+      double lo = 0, hi = last_u;
+      for (const Plane& plane : planes) {
+        const double least = plane.least - plane.v * (rows.row_begin + r) - plane.p * (rows.slice_begin + s);
+        if (std::abs(plane.u) < 1e-12)
+          hi = least <= 0 ? hi : -1;
+        else if (plane.u > 0)
+          lo = std::max(lo, least / plane.u);
+        else
+          hi = std::min(hi, least / plane.u);
+      }
+      // Rounding does not decide about voxels that lie in a plane.
+      lo = std::ceil(lo - 1e-6), hi = std::floor(hi + 1e-6);
+      if (lo <= hi && hi >= 0) out[size_t(s) * size_t(rows.rows) + size_t(r)] = {uint16_t(lo), uint16_t(hi)};
+    }
   return out;
 }
 

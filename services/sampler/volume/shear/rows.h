@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/geometry/clip.h"
 #include "common/volume/grid.h"
 #include "common/volume/voxels.h"
 
@@ -27,6 +28,14 @@ struct ShearRows {
   };
   std::vector<Bounds> bounds;  ///< one a held slice
 };
+
+/// What of a row is kept: u in [first, last].
+struct KeptCells {
+  uint16_t first = 1, last = 0;
+};
+/// One a row of `rows`, in their order: of voxels, whose centres decide.
+std::vector<KeptCells> kept_cells(const volume::Grid& grid, const ShearRows& rows, int axis,
+                                  const geometry::Clip& clip);
 
 /// Arranges by counting: O(voxels + rows). axis: the principal one.
 ShearRows arrange(const volume::Grid& grid, const volume::Voxels& voxels, int axis);

@@ -47,6 +47,9 @@ struct SplatScene {
   const float* light_factors = nullptr;  ///< (i, i, i, 1) of every intensity i; 16-byte aligned
   /// For each raster row and block: path from a plane to the next, as the coefficients of 1, n and n^2 of its pixel n.
   const float* paths = nullptr;
+  /// Where a clip cuts rows: of each held row the first and last index u that is kept, none if first > last; null: all
+  /// is kept.
+  const KeptCells* kept = nullptr;
   int blocks_across = 0;  ///< of the raster, rounded up
   int width = 0, height = 0;
 };

@@ -13,9 +13,9 @@ class ShearSlab final : public Slab {
   size_t bytes() const override { return volume_.bytes(); }
   std::vector<volume::SliceImage> splat(const std::vector<volume::LevelColour>& colours,
                                         const volume::ShearFrame& frame, int k_begin, int k_end,
-                                        uint64_t& voxels) const override {
+                                        const geometry::Clip& clip, uint64_t& voxels) const override {
     ShearStats stats;
-    auto images = splatter_->splat(volume_, colours, frame, k_begin, k_end, &stats);
+    auto images = splatter_->splat(volume_, colours, frame, k_begin, k_end, &stats, clip);
     voxels = stats.voxels;
     return images;
   }

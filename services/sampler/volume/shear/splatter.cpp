@@ -171,7 +171,7 @@ ShearSplatter::~ShearSplatter() = default;
 std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
                                                      const std::vector<volume::LevelColour>& colours,
                                                      const volume::ShearFrame& frame, int k_begin, int k_end,
-                                                     ShearStats* stats) {
+                                                     ShearStats* stats, const geometry::Clip& clip) {
   const auto started = Clock::now();
   const volume::Grid& grid = volume.grid();
   const volume::Voxels& voxels = volume.voxels();
@@ -185,6 +185,8 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
   const Floats table = colour_table(colours);
   const std::vector<uint8_t> light = light_table(volume, frame);
   const std::vector<float> paths = block_paths(grid, frame, across, planes);
+  const std::vector<KeptCells> kept =
+      clip.empty() ? std::vector<KeptCells>() : kept_cells(grid, rows, frame.axis, clip);
   const SplatScene scene{.rows = &rows,
                          .size_u = grid.size[size_t(frame.u())],
                          .slices = plan.slices.data(),
@@ -192,6 +194,7 @@ std::vector<volume::SliceImage> ShearSplatter::splat(const SlabVolume& volume,
                          .light = light.data(),
                          .light_factors = impl_->light_factors.get(),
                          .paths = paths.data(),
+                         .kept = clip.empty() ? nullptr : kept.data(),
                          .blocks_across = across,
                          .width = frame.width,
                          .height = frame.height};

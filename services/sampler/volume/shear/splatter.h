@@ -33,10 +33,11 @@ class ShearSplatter {
 
   /// Images of the slab [k_begin, k_end) of the frame: pixels of owned_pixels() only. For those the volume must hold
   /// one slice more on both sides, where the grid has them; where pixels are larger than 1.5 voxels, the kernel ends
-  /// with what is held. colours: one a level of the epoch. Precondition: validate(frame, grid).
+  /// with what is held. colours: one a level of the epoch. clip: voxels whose centres it cuts away are not there, so
+  /// that what is shown ends within a voxel of its planes. Precondition: validate(frame, grid).
   std::vector<volume::SliceImage> splat(const SlabVolume& volume, const std::vector<volume::LevelColour>& colours,
                                         const volume::ShearFrame& frame, int k_begin, int k_end,
-                                        ShearStats* stats = nullptr);
+                                        ShearStats* stats = nullptr, const geometry::Clip& clip = {});
 
  private:
   struct Impl;
