@@ -106,8 +106,14 @@ ShownScene ViewerWorker::shown_scene() const {
   return shown_scene_;
 }
 
+std::shared_ptr<const SceneTerms> ViewerWorker::terms() const {
+  const std::lock_guard lock(mutex_);
+  return terms_;
+}
+
 void ViewerWorker::loop() {
   net::lower_thread_priority(5);  // the display comes first
+  link_.on_order([this](const wire::Order& order) { orders_.put(order); });
   try {
     while (!stop_) {
       const double poll_s = gate_.waits() ? kCoupledPoll_s : kPoll_s;
@@ -142,6 +148,7 @@ void ViewerWorker::receive() {
 
 void ViewerWorker::receive_control() {
   link_.receive();
+  for (auto& answer : orders_.take_answers()) link_.answer(answer.number, answer.ok, std::move(answer.text));
   if (link_.shutdown_requested()) shutdown_ = true;
 }
 
@@ -175,6 +182,7 @@ void ViewerWorker::follow_session() {
   {
     const std::lock_guard lock(mutex_);
     scene_ = view.fact("scene");
+    terms_ = std::make_shared<const SceneTerms>(terms_of(session));
     shown_scene_ = {session.box_room, *pipeline};
   }
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();

@@ -10,6 +10,8 @@
 
 #include "client/viewer/coupling/stage_table.h"
 #include "client/viewer/display/frame_table.h"
+#include "client/viewer/hands/meaning.h"
+#include "client/viewer/hands/order_desk.h"
 #include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
 #include "client/viewer/session_record.h"
@@ -74,6 +76,10 @@ class ViewerWorker {
   void set_sampling(const SamplingWish& wish);
   /// What there is to show; an empty box until that is known.
   ShownScene shown_scene() const;
+  /// What others ask of this viewer, for the display to carry out.
+  OrderDesk& orders() { return orders_; }
+  /// What the session's data are told in; null until the master told it.
+  std::shared_ptr<const SceneTerms> terms() const;
   /// Of the frames of this epoch; null: there is nothing to tell.
   std::shared_ptr<const image::Legend> legend_at(EpochId epoch) const { return legends_.at(epoch); }
 
@@ -129,10 +135,12 @@ class ViewerWorker {
     RequestId shown;  ///< the newest update in what was displayed; 0: nothing was
   };
   LegendBook legends_;
+  OrderDesk orders_;
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
   std::vector<SeenPose> poses_;
   std::string scene_;
   ShownScene shown_scene_;
+  std::shared_ptr<const SceneTerms> terms_;
   double latency_ms_ = 0;
   std::shared_ptr<const wire::Welcome> session_;
   std::optional<SamplingWish> sampling_;  // that is not in force yet

@@ -41,4 +41,26 @@ Result<CouplingOrder> read_coupling(const wire::Control& m) {
   return out;
 }
 
+Result<PlayOrder> read_play(const wire::Control& m) {
+  const std::string how = scene::value_or(m.arguments, "how", std::string()),
+                    steps = scene::value_or(m.arguments, "steps", std::string());
+  PlayOrder out;
+  if (how == "pause")
+    out.how = PlayOrder::How::kPause;
+  else if (how == "step")
+    out.how = PlayOrder::How::kStep;
+  else if (how != "play")
+    return Error{fmt::format("play: \"{}\" is not play, pause or step", how.substr(0, 40))};
+  if (steps.empty()) return out;
+  if (how != "step") return Error{fmt::format("play: steps are of step; {} has none", how)};
+  const auto number = read_number("steps", steps);
+  if (!number) return number.error();
+  constexpr double kMost = 4096;
+  if (*number != std::floor(*number) || *number == 0 || std::abs(*number) > kMost)
+    return Error{
+        fmt::format("steps is {}, not a whole number of -{} to {} other than 0", steps.substr(0, 40), kMost, kMost)};
+  out.steps = int(*number);
+  return out;
+}
+
 }  // namespace telesplat::master

@@ -15,6 +15,14 @@ struct Obeyed {
   bool tells_all = false;  ///< the session is told to everyone anew, though no epoch begins
 };
 
+/// `telesplat ctl play`: what becomes of an animation or a series that is playing or could.
+struct PlayOrder {
+  enum class How { kPlay, kPause, kStep } how = How::kPlay;
+  int steps = 1;  ///< of kStep: forwards, or if negative backwards
+};
+/// Arguments "how" (play, pause or step) and "steps" (-4096 to 4096, not 0). Error: what is wrong with them.
+Result<PlayOrder> read_play(const wire::Control& command);
+
 /// `telesplat ctl coupling`, as everyone is told it: settings of the welcome.
 struct CouplingOrder {
   double mode = 0;     ///< "viewer.coupling": 0 async, 1 sync, 2 loose

@@ -19,7 +19,7 @@ constexpr size_t kReports = 5;          // of a process, one a second: rates are
 }  // namespace
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
-    : options_(options), instance_(instance), record_(record) {
+    : options_(options), instance_(instance), record_(record), clipping_(options.clip) {
   const auto name_of = [this](const std::string& id) {
     const auto p = peers_.find(id);
     return p == peers_.end() ? std::string("?") : p->second.hello.name;
@@ -300,6 +300,7 @@ void MasterCore::tick(double now_s) {
   send_swaps();
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
+  for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
   const Ticked ticked = plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);
   // A message to a process that died is undeliverable, which is sooner known than that its lease ran out.

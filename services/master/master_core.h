@@ -13,6 +13,8 @@
 #include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
 #include "services/master/live/exposition.h"
+#include "services/master/orders/clipping.h"
+#include "services/master/orders/errands.h"
 #include "services/master/outbox.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
@@ -35,6 +37,7 @@ class MasterCore {
   void on(const std::string& peer, const wire::Goodbye& m, double now_s);
   void on(const std::string& peer, const wire::Control& m, double now_s);
   void on(const std::string& peer, const wire::SlabReady& m, double now_s);
+  void on(const std::string& peer, const wire::OrderAnswer& m, double now_s);
   void on(const std::string& peer, const wire::LinkReport& m, double now_s);
   /// peer: the connection over which the viewer swaps, not the one that it said hello on.
   void on(const std::string& peer, const wire::SwapReady& m, double now_s);
@@ -113,6 +116,7 @@ class MasterCore {
   void record_epoch(double now_s);
   Result<std::string> obey(const wire::Control& m, double now_s);
   Result<std::string> order_coupling(const wire::Control& m, double now_s);
+  Status pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s);
   std::string status_json(double now_s) const;
 
   // Walls.
@@ -131,6 +135,8 @@ class MasterCore {
   std::string run_id_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
   Plan* plan_;                       // of these, the one that leads
+  Clipping clipping_;
+  Errands errands_;
   std::optional<scene::Kind> kind_;  // of its scene
   bool scene_known_ = false;
   EpochId epoch_{1};

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "common/scene/clip_order.h"
 #include "common/volume/shear.h"
 
 namespace telesplat::master {
@@ -161,6 +162,18 @@ options::Row redundancy_row(MasterOptions& o) {
   return row;
 }
 
+options::Row clip_row(MasterOptions& o) {
+  return {.flag = "--clip",
+          .value = &o.clip,
+          .help =
+              "what is cut away, in the data's own coordinates: 'plane x>=50%' or 'plane A,B,C,D' keeps one side, "
+              "'box X0,Y0,Z0,X1,Y1,Z1' the inside; several are separated by \";\"",
+          .limits = options::Check([](const std::string& text) {
+            const auto order = scene::parse_clip(text);
+            return order ? std::string() : order.error().text;
+          })};
+}
+
 options::Table packing_table(MasterOptions& o) {
   return {setting_by_kind(o, "packing.max_points", "points the model holds at most", "20e6"),
           setting(o, "packing.obsolete_after_s", 0, "forget clusters not seen for so long; 0: never"),
@@ -176,7 +189,9 @@ options::Table packing_table(MasterOptions& o) {
 }  // namespace
 
 options::Table session_table(MasterServiceOptions& o) {
-  return options::joined(options::joined(lease_table(o.master), steering_table(o.master)), packing_table(o.master));
+  return options::joined(
+      options::joined(options::joined(lease_table(o.master), steering_table(o.master)), packing_table(o.master)),
+      {clip_row(o.master)});
 }
 
 options::Row metrics_port_row(MasterServiceOptions& o) {

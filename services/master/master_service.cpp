@@ -174,12 +174,13 @@ class MasterService {
     }
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
                   wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::LinkReport,
-                  wire::SwapReady, wire::Goodbye, wire::Control>(control_, message, [&](const auto& m) {
-      if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
-        core_.on(message.peer, m, now_s);
-      else if (const Status s = core_.on(message.peer, m, now_s); !s)
-        control_.reject(message, s.error().text);
-    });
+                  wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
+        control_, message, [&](const auto& m) {
+          if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
+            core_.on(message.peer, m, now_s);
+          else if (const Status s = core_.on(message.peer, m, now_s); !s)
+            control_.reject(message, s.error().text);
+        });
   }
 
   const MasterServiceOptions& options_;

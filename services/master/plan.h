@@ -48,7 +48,7 @@ class Scene {
   virtual void describe(wire::Welcome& welcome) const = 0;
   /// Texts that change with the epoch, for the run's record.
   virtual std::map<std::string, std::string> epoch_texts() const { return {}; }
-  /// "set", "animate", "tf", "colour". Error: what is wrong, for the person; then nothing changed.
+  /// "set", "animate", "play", "tf", "colour". Error: what is wrong, for the person; then nothing changed.
   virtual Result<Obeyed> obey(const wire::Control& command) = 0;
   /// As status and session.toml tell it.
   virtual std::string animation() const = 0;

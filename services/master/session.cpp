@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/log.h"
 #include "common/points/point_model.h"
 #include "common/scene/session.h"
 #include "services/master/master_core.h"
@@ -37,12 +38,15 @@ Status MasterCore::adopt_scene(const wire::Hello& data, double now_s) {
     plan.views().take_views(plan_->views().release_views());
     plan_ = &plan;
   }
+  std::string problem;
+  const bool other_clip = clipping_.adopt(data, problem);
+  if (!problem.empty()) log::error("the scene of {}: {}", data.name, problem);
   session_.kind = scene::value_or(data.facts, "kind", std::string());
   session_.scene = scene::value_or(data.facts, "scene", std::string());
   kind_ = scene::kind_named(session_.kind);
   if (!std::exchange(scene_known_, true) && !adopted->in_parts)
     record_epoch(now_s);
-  else if (other_plan || adopted->changed)
+  else if (other_plan || adopted->changed || other_clip)
     next_epoch(now_s);  // another scene than that of the server before
   return ok_status();
 }
@@ -52,6 +56,7 @@ wire::Welcome MasterCore::scene_as_told() const {
   w.octree_depth = octree_depth();
   w.settings = master::settings(options_, kind_);
   plan_->describe(w);  // the scene stays what it is while its data server is away
+  clipping_.describe(w);
   return w;
 }
 
@@ -86,7 +91,10 @@ void MasterCore::announce(double now_s) {
 }
 
 void MasterCore::record_epoch(double now_s) {
-  if (scene_known_) record_.add_epoch(epoch_, now_s, scene_as_told().parameters, plan_->epoch_texts());
+  if (!scene_known_) return;
+  auto texts = plan_->epoch_texts();
+  texts[scene::kClipFact] = clipping_.text();
+  record_.add_epoch(epoch_, now_s, scene_as_told().parameters, texts);
 }
 
 void MasterCore::next_epoch(double now_s) {
@@ -113,9 +121,40 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
     stop_ = true;
     return;
   }
+  if (const std::string role = errand_for(m.command); !role.empty()) {
+    if (const Status s = pass_on(peer, m, role, now_s); !s)
+      outbox_.send(peer, wire::ControlReply{false, s.error().text});
+    return;
+  }
   const auto done = obey(m, now_s);
   outbox_.send(peer, wire::ControlReply{done.ok(), done ? *done : done.error().text});
   if (done) dispatch(now_s);
+}
+
+// To the viewer that is named, or the first one; to all data servers of the scene, of which each knows its part.
+Status MasterCore::pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s) {
+  const std::string wanted = role == "viewer" ? scene::value_or(m.arguments, "viewer", std::string()) : std::string();
+  std::map<std::string, std::string> here;  // routing ids, by name
+  for (const auto& [id, p] : peers_)
+    if (!p.gone && !p.refused && p.hello.role == role) here[p.hello.name] = id;
+  if (here.empty()) return Error{fmt::format("{}: no {} is here", m.command, role == "data" ? "data server" : role)};
+  if (!wanted.empty() && !here.contains(wanted)) {
+    std::vector<std::string> names;
+    for (const auto& [name, id] : here)
+      if (names.size() < kMostNamed) names.push_back(name);
+    return Error{fmt::format("no {} is called \"{}\"; here is {}", role, wanted.substr(0, 64), fmt::join(names, ", "))};
+  }
+  if (!wanted.empty()) std::erase_if(here, [&](const auto& p) { return p.first != wanted; });
+  if (role == "viewer") here.erase(std::next(here.begin()), here.end());
+  const auto number = errands_.begin(peer, here.size(), now_s);
+  if (!number) return number.error();
+  for (const auto& [name, id] : here) outbox_.send(id, wire::Order{*number, m.command, m.arguments});
+  return ok_status();
+}
+
+void MasterCore::on(const std::string& peer, const wire::OrderAnswer& m, double now_s) {
+  if (!known(peer, now_s)) return;
+  if (const auto reply = errands_.answered(m)) outbox_.send(reply->peer, reply->reply);
 }
 
 // Of the viewers that are here; those that come later begin with their own.
@@ -143,13 +182,20 @@ Result<std::string> MasterCore::order_coupling(const wire::Control& m, double no
 Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
   if (m.command == "coupling") return order_coupling(m, now_s);
   Obeyed obeyed{.begins_epoch = true, .answer = {}};  // "epoch"
-  if (m.command == "set" || m.command == "animate" || m.command == "tf" || m.command == "colour") {
+  if (m.command == "set" || m.command == "animate" || m.command == "tf" || m.command == "colour" ||
+      m.command == "play") {
     auto by_scene = plan_->obey(m);
     if (!by_scene) return by_scene.error();
     obeyed = *std::move(by_scene);
+  } else if (m.command == "clip") {
+    auto clipped = clipping_.obey(m);
+    if (!clipped) return clipped.error();
+    obeyed = *std::move(clipped);
   } else if (m.command != "epoch") {
-    return Error{fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, tf, colour, coupling",
-                             m.command.substr(0, 64))};
+    return Error{
+        fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, play, tf, colour, clip, coupling, "
+                    "pick, where, go, overlay, probe",
+                    m.command.substr(0, 64))};
   }
   if (obeyed.tells_all) announce(now_s);
   if (!obeyed.begins_epoch) return obeyed.answer;

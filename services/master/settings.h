@@ -44,6 +44,7 @@ struct MasterOptions {
   Redundancy redundancy = Redundancy::kAuto;
   Steering steering = Steering::kAuto;
   julia::Timeline animation;  ///< of the scene's parameters, from the first view on; empty: what the data server says
+  std::string clip;           ///< what is cut away as it begins, as scene::parse_clip() takes it; empty: nothing
   uint64_t octree_depth = 0;  ///< 0: as the kind of scene has it
   /// packing.* and sampling.* values for the packer, volume.layers of a volume's frames; passed on in every welcome.
   /// packing.max_points that is not there is as the kind of scene has it.

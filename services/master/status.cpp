@@ -132,6 +132,7 @@ std::string MasterCore::status_json(double now_s) const {
            {"parameters", Json::object()},
            {"animation", animation()}};
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
+  if (!clipping_.order().empty()) out["clip"] = clipping_.order();
   plan_->add_status(out);
   out["processes"] = Json::array();
   for (const auto& [id, p] : peers_) {

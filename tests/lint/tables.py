@@ -54,7 +54,13 @@ FLOORS = {
     ],
     "services/master": [
         [("services/master", "services/master/master_options.*")],
-        ["services/master/tiles", "services/master/slabs", "services/master/live", "services/master/wall"],
+        [
+            "services/master/tiles",
+            "services/master/slabs",
+            "services/master/live",
+            "services/master/wall",
+            "services/master/orders",
+        ],
         ["services/master/plan.cpp"],
         [
             (
@@ -71,7 +77,7 @@ FLOORS = {
         ["services/packer"],
     ],
     "client/viewer": [
-        ["client/viewer/render", "client/viewer/coupling", "client/viewer/input"],
+        ["client/viewer/render", "client/viewer/coupling", "client/viewer/input", "client/viewer/hands"],
         ["client/viewer/record", "client/viewer/panel"],
         ["client/viewer/panel/gui"],
         ["client/viewer/display"],

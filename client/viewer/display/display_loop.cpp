@@ -5,6 +5,7 @@
 #include <cmath>
 #include <thread>
 
+#include "client/viewer/hands/errands.h"
 #include "client/viewer/render/fit_view.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
@@ -140,6 +141,7 @@ class Display {
       if (drawn.empty && !surface_.visible()) continue;
       surface_.present(view_, true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
+      carry_out_orders(camera, drawn.epoch);
       surface_.report(live_figures(monotonic_s(), 0, drawn, *source_, worker_));
     }
     return true;
@@ -288,6 +290,7 @@ class Display {
     live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
     live_.coupling = m.coupling;
     surface_.report(live_);
+    carry_out_orders(m.camera, m.drawn.epoch);
     if (wall_ && !swapped.alone) return;  // the wall has its pace
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
@@ -310,6 +313,22 @@ class Display {
                   picture);
     surface_.take_wished_picture(*wish, std::move(picture),
                                  o_.transparent ? image::Alpha::kCoverage : image::Alpha::kNone);
+  }
+
+  // What others ask of this viewer, of the frame that was just displayed.
+  void carry_out_orders(const geometry::Camera& camera, EpochId epoch) {
+    surface_.on_terms(worker_.terms());
+    if (const auto at = surface_.points_at()) surface_.on_pick(source_->pick(camera, at->x, at->y, kPickOpacity));
+    for (const wire::Order& order : worker_.orders().take_orders()) {
+      const auto done = carry_out(
+          order, {.camera = camera,
+                  .epoch = epoch,
+                  .terms = worker_.terms(),
+                  .pick = [&](double x, double y, double opacity) { return source_->pick(camera, x, y, opacity); },
+                  .go = [&](const geometry::Pose& pose) { return surface_.go_to(pose); },
+                  .overlay = [&](const std::string& name, bool on) { return surface_.show_overlay(name, on); }});
+      worker_.orders().answer({order.number, done.ok(), done ? *done : done.error().text});
+    }
   }
 
   void record(MeasuredFrame& m) {

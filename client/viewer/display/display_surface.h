@@ -9,6 +9,7 @@
 #include "client/viewer/coupling/coupling.h"
 #include "client/viewer/coupling/sampling_wish.h"
 #include "client/viewer/display/overlay.h"
+#include "client/viewer/hands/meaning.h"
 #include "client/viewer/input/look.h"
 #include "client/viewer/input/picture_wish.h"
 #include "common/geometry/trajectory.h"
@@ -79,6 +80,18 @@ class DisplaySurface {
   virtual void report(const LiveFigures& figures) = 0;
   /// What lies over the frames that it shows; null: nobody sees them.
   virtual Overlays* overlays() { return nullptr; }
+  /// A pixel of the frame that was displayed of which somebody wants to know what lies there; nothing: nobody does.
+  virtual std::optional<glm::dvec2> points_at() { return std::nullopt; }
+  /// What lies there; nothing: nothing does.
+  virtual void on_pick(const std::optional<Pick>&) {}
+  /// What the session's data are told in; null: that is not known yet.
+  virtual void on_terms(const std::shared_ptr<const SceneTerms>&) {}
+  /// Puts the camera there, at once. False: the head follows a trajectory.
+  virtual bool go_to(const geometry::Pose&) { return false; }
+  /// Shows or hides what lies over the picture. Error: there is no such overlay.
+  virtual Status show_overlay(const std::string& /*name*/, bool /*on*/) {
+    return Error{"overlay: nobody sees this viewer's display"};
+  }
   /// Whether the person is done.
   virtual bool wants_to_stop() const = 0;
   /// Why it can show nothing any more; empty: it can. It wants to stop then.

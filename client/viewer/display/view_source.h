@@ -5,6 +5,7 @@
 
 #include "client/viewer/coupling/shown_update.h"
 #include "client/viewer/display/display_surface.h"
+#include "client/viewer/hands/pick.h"
 
 namespace telesplat::viewer {
 
@@ -42,6 +43,9 @@ class ViewSource {
   virtual void advance(RequestId request) = 0;
   /// Draws the view of input.camera, into `view`, which has its size.
   virtual DrawnFrame draw(const FrameInput& input, image::View& view) = 0;
+  /// What lies at a pixel of the view of this camera; opacity: how much of what lies behind the place must be hidden by
+  /// it and what is in front of it, of volumes. Nothing: there is nothing.
+  virtual std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) = 0;
   /// The frame has been displayed.
   virtual void displayed() {}
   /// What is drawn and cached, for people: "points".

@@ -73,6 +73,10 @@ void survive_broken_connection() {
 }
 
 constexpr std::pair<int, Key> kGlfwKeys[] = {{GLFW_KEY_A, Key::kA},
+                                             {GLFW_KEY_B, Key::kB},
+                                             {GLFW_KEY_I, Key::kI},
+                                             {GLFW_KEY_N, Key::kN},
+                                             {GLFW_KEY_X, Key::kX},
                                              {GLFW_KEY_C, Key::kC},
                                              {GLFW_KEY_D, Key::kD},
                                              {GLFW_KEY_E, Key::kE},

@@ -7,6 +7,7 @@
 #include <ctime>
 #include <filesystem>
 #include <mutex>
+#include <utility>
 
 #include "common/core/clock.h"
 #include "common/scene/session.h"
@@ -14,7 +15,8 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kShowAgain_s = 0.1;
+constexpr double kShowAgain_s = 0.1, kPoint_s = 0.1;
+constexpr size_t kMostPicks = 3;
 
 // What plays from the beginning. An orbit is fitted once it is known around what.
 std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement) {
@@ -95,6 +97,7 @@ WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, s
     : options_(o),
       window_(std::move(window)),
       interaction_(first_movement(o.movement), first_look(o.display.render, o.display.shading)),
+      bookmarks_([lines](const std::string& line) { lines->add(line); }),
       lines_(std::move(lines)),
       panel_({.look = interaction_.look(),
               .transparent = o.display.transparent,
@@ -154,6 +157,14 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   take_launcher_lines(now_s);
   take_dropped();
   run_panel(now_s, look);
+  follow_bookmarks(camera.pose);
+  if (interaction_.take_overlay_wish()) hands_.toggle_all();
+  if (auto picture = hands_.update(now_s, camera, scene_.box_room)) {
+    if (picture->width > 0)
+      overlays_.show("hands", {std::move(*picture), Overlay::Corner::kLowerLeft});
+    else
+      overlays_.hide("hands");
+  }
   show_help();
   show_news(now_s);
   keep_path();
@@ -371,8 +382,43 @@ void WindowSurface::take_wished_picture(const PictureWish& wish, image::View pic
   screenshots_.take(picture, alpha, wish.exr);
 }
 
+void WindowSurface::follow_bookmarks(const geometry::Pose& pose) {
+  const bool keeps = interaction_.take_bookmark_wish(), next = interaction_.take_next_wish();
+  if ((keeps || next) && terms_) {
+    const auto shelf = notes::shelf_of(terms_->data_file, terms_->scene, notes::user_cache_folder());
+    if (keeps) bookmarks_.keep(shelf, pose);
+    if (next) bookmarks_.next(shelf);
+  }
+  if (const auto found = bookmarks_.take_found()) interaction_.go_to(found->pose);
+}
+
+// The cursor's overlay follows it a few times a second.
+std::optional<glm::dvec2> WindowSurface::points_at() {
+  tells_pick_ = interaction_.take_pick_wish();
+  const double now_s = monotonic_s();
+  const auto pointer = interaction_.pointer();
+  if (!pointer || (!tells_pick_ && (!hands_.shows("cursor") || now_s - pointed_s_ < kPoint_s))) return std::nullopt;
+  pointed_s_ = now_s;
+  const glm::dvec2 at = *pointer * double(window_->height());
+  if (!(at.x >= 0 && at.y >= 0 && at.x < window_->width() && at.y < window_->height())) return std::nullopt;
+  return at;
+}
+
+void WindowSurface::on_pick(const std::optional<Pick>& pick) {
+  hands_.on_pick(pick);
+  if (!std::exchange(tells_pick_, false) || !terms_) return;
+  if (!pick) return tell("nothing lies under the cursor");
+  if (picked_.size() == kMostPicks) picked_.erase(picked_.begin());
+  picked_.push_back(meaning_of(*pick, *terms_));
+  for (const auto& line : cursor_lines(picked_.back(), *terms_)) tell("picked " + line);
+  const Measured measured = measure(picked_, *terms_);
+  if (!measured.distances.empty()) tell("distance " + length_text(measured.distances.back(), measured.unit));
+  if (measured.angle_deg) tell(fmt::format("angle {:.4g} degrees", *measured.angle_deg));
+}
+
 void WindowSurface::report(const LiveFigures& figures) {
   panel_.on_figures(panel_figures(figures, holes_.share()));
+  hands_.on_frame(figures.now_s, figures.frames);
   if (const auto title = title_.update(figures)) title_text_ = *title;
   const std::string title = interaction_.records_path() ? fmt::format("{} - recording the camera's path, {:.0f} s",
                                                                       title_text_, interaction_.path_s())

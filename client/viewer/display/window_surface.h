@@ -7,6 +7,8 @@
 #include "client/viewer/display/display_surface.h"
 #include "client/viewer/display/title_line.h"
 #include "client/viewer/display/window.h"
+#include "client/viewer/hands/bookmarks.h"
+#include "client/viewer/hands/hand_overlays.h"
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/panel/control_desk.h"
 #include "client/viewer/panel/gui/open_view.h"
@@ -61,6 +63,17 @@ class WindowSurface final : public DisplaySurface {
   std::optional<PictureWish> take_picture_wish(geometry::Camera& camera) override;
   void take_wished_picture(const PictureWish& wish, image::View picture, image::Alpha alpha) override;
   void report(const LiveFigures& figures) override;
+  std::optional<glm::dvec2> points_at() override;
+  void on_pick(const std::optional<Pick>& pick) override;
+  void on_terms(const std::shared_ptr<const SceneTerms>& terms) override {
+    terms_ = terms;
+    hands_.on_terms(terms);
+  }
+  Status show_overlay(const std::string& name, bool on) override { return hands_.show(name, on); }
+  bool go_to(const geometry::Pose& pose) override {
+    interaction_.go_to(pose);
+    return true;
+  }
   Overlays* overlays() override { return &overlays_; }
   bool wants_to_stop() const override { return window_->closing() || interaction_.wants_to_quit(); }
   std::string failure() const override { return window_->lost() ? "the display went away" : ""; }
@@ -85,6 +98,7 @@ class WindowSurface final : public DisplaySurface {
   void open(const std::string& path);
   void play_file(const std::string& path);
   void use_transfer_file(const std::string& path);
+  void follow_bookmarks(const geometry::Pose& pose);
 
   Options options_;
   std::unique_ptr<Window> window_;
@@ -92,6 +106,12 @@ class WindowSurface final : public DisplaySurface {
   TitleLine title_;
   std::string title_text_, title_shown_;
   Overlays overlays_;
+  HandOverlays hands_{text_panel};
+  std::shared_ptr<const SceneTerms> terms_;
+  Bookmarks bookmarks_;
+  std::vector<PickedPlace> picked_;  // the last ones, three at most
+  bool tells_pick_ = false;          // the person asked for it, not the cursor's overlay
+  double pointed_s_ = -1e9;
   ShownScene scene_;
   std::string scene_name_;
   geometry::Pose head_;                       // of the frame at hand

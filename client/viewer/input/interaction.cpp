@@ -10,7 +10,7 @@ namespace {
 // Between the poses of a recorded path, so that their times differ in the file too.
 constexpr double kLeastStep_s = 1e-5;
 
-constexpr char kLetters[] = "ACDEFHOPQRSTW";  // in the order of Key
+constexpr char kLetters[] = "ABCDEFHINOPQRSTWX";  // in the order of Key
 static_assert(sizeof kLetters - 1 == size_t(Key::k1));
 
 // "[" and "]" hold the letter of a key, or a function key's number.
@@ -29,6 +29,9 @@ constexpr HelpLine kHelp[] = {
     {"[1] [2] [3] [4]", "splats: square, disc, ellipse, ewa (not of volumes)"},
     {"[5] [6] [7]", "finish: fill pin-holes, smooth, antialias (not of volumes)"},
     {"[8]", "shading on, off (not of volumes)"},
+    {"[X]", "what lies under the cursor; of the last two picks the distance, of three the angle"},
+    {"[B], [N]", "keep a bookmark of this view beside the data set; go to the next bookmark"},
+    {"[I]", "show, hide axes, scale, cursor and frame rate"},
     {"[P], F12", "screenshot, into images/ of the run folder or the current folder"},
     {"[O]", "open another data set, where the session is this window's own"},
     {"F11", "full screen, or a window again"},
@@ -103,6 +106,12 @@ void Interaction::take_camera() {
   if (!playing_) return;
   playing_ = false;
   controls_.take_over(recorded_->at(playback_s_));
+}
+
+void Interaction::go_to(const geometry::Pose& pose) {
+  playing_ = false;
+  controls_.set_flying(false);
+  controls_.take_over(pose);
 }
 
 void Interaction::play_or_take() {
@@ -194,6 +203,18 @@ void Interaction::pressed(Key key) {
       return;
     case Key::kF11:
       fullscreen_ = true;
+      return;
+    case Key::kB:
+      bookmark_wish_ = true;
+      return;
+    case Key::kN:
+      next_wish_ = true;
+      return;
+    case Key::kI:
+      overlay_wish_ = true;
+      return;
+    case Key::kX:
+      pick_wish_ = true;
       return;
     case Key::kEscape:
       if (!controls_.flying()) quit_ = true;

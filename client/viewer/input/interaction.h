@@ -18,11 +18,14 @@ namespace telesplat::viewer {
 /// lie under one hand on every keyboard.
 enum class Key {
   kA,
+  kB,
   kC,
   kD,
   kE,
   kF,
   kH,
+  kI,
+  kN,
   kO,
   kP,
   kQ,
@@ -30,6 +33,7 @@ enum class Key {
   kS,
   kT,
   kW,
+  kX,
   k1,
   k2,
   k3,
@@ -109,6 +113,16 @@ class Interaction {
   /// A path that is being recorded ends.
   void end_path();
   bool wants_screenshot() const { return screenshot_; }
+  /// Where the pointer is, in window heights; nothing: it was not seen yet, or is caught.
+  std::optional<glm::dvec2> pointer() const { return wants_pointer() ? std::nullopt : pointer_; }
+  /// True once after each press of the key that shows or hides axes, scale and cursor, or of the one that picks.
+  bool take_overlay_wish() { return std::exchange(overlay_wish_, false); }
+  bool take_pick_wish() { return std::exchange(pick_wish_, false); }
+  /// Likewise of the keys that keep a bookmark and that lead to the next one.
+  bool take_bookmark_wish() { return std::exchange(bookmark_wish_, false); }
+  bool take_next_wish() { return std::exchange(next_wish_, false); }
+  /// The person's camera goes on from there, at once.
+  void go_to(const geometry::Pose& pose);
   /// True once after each press of the screenshot key.
   bool take_screenshot_wish();
   /// Lines to tell the person, since the last call.
@@ -129,6 +143,7 @@ class Interaction {
   Look look_;
   CameraControls controls_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;
+  bool overlay_wish_ = false, pick_wish_ = false, bookmark_wish_ = false, next_wish_ = false;
   bool playing_ = false, quit_ = false, screenshot_ = false, shows_help_ = false;
   bool shows_panel_ = false, fullscreen_ = false, open_ = false;
   KeyNames key_names_ = us_name;

@@ -6,6 +6,7 @@
 
 #include "client/viewer/points/source.h"
 #include "client/viewer/record/event_record.h"
+#include "common/scene/clip_order.h"
 #include "common/scene/session.h"
 
 namespace telesplat::viewer {
@@ -38,6 +39,13 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
   const int depth = int(std::min<uint64_t>(session.octree_depth, std::numeric_limits<int>::max()));
   const points::ModelConfig config{session.box_room, depth, !keep};
   if (const Status s = points::validate(config); !s) return s;
+  auto clip = geometry::clip_from_text(scene::SessionView(session).fact(scene::kClipFact));
+  if (!clip) return clip.error();
+  if (*clip != *clip_) {
+    const std::lock_guard lock(mutex_);
+    clip_ = std::make_shared<const geometry::Clip>(*std::move(clip));
+    ++clip_version_;
+  }
   config_ = config;
   keeps_redundant_ = keep;
   return ok_status();

@@ -10,6 +10,7 @@
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/received.h"
 #include "common/core/clock.h"
+#include "common/geometry/clip.h"
 
 namespace telesplat::viewer {
 
@@ -42,6 +43,12 @@ class ReceivedPoints final : public Received {
   void on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames);
   /// The session packs without eliminating redundancy: of each cluster the best patches are to be drawn (T4.4.3.3).
   bool keeps_redundant() const { return keeps_redundant_; }
+  /// What the session cuts away now, and a number that changes with it. What is on display may be of an epoch before.
+  std::shared_ptr<const geometry::Clip> clip(uint64_t& version) const {
+    const std::lock_guard lock(mutex_);
+    version = clip_version_;
+    return clip_;
+  }
 
  private:
   void summarise();
@@ -66,6 +73,8 @@ class ReceivedPoints final : public Received {
   mutable std::mutex mutex_;  // guards what both threads use, below
   AccessLog seen_;
   ShownUpdate shown_;
+  std::shared_ptr<const geometry::Clip> clip_ = std::make_shared<const geometry::Clip>();
+  uint64_t clip_version_ = 0;
 };
 
 }  // namespace telesplat::viewer

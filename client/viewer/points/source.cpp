@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "client/viewer/hands/clip_list.h"
 #include "common/core/clock.h"
 #include "common/image/background.h"
 
@@ -52,7 +53,10 @@ void PointSource::find_coverage(const FrameInput& input, image::View& view) {
 }
 
 bool PointSource::stands_still(const FrameInput& input) {
-  const bool same = !input.resting && input.camera == camera_ && same_look(input.look, look_);
+  const uint64_t clipped_before = clip_version_;
+  clip_ = received_.clip(clip_version_);
+  const bool same =
+      !input.resting && input.camera == camera_ && same_look(input.look, look_) && clip_version_ == clipped_before;
   same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
   camera_ = input.camera;
   look_ = input.look;
@@ -75,6 +79,7 @@ bool PointSource::stands_still(const FrameInput& input) {
 void PointSource::select(const FrameInput& input, double detail, DrawnFrame& out) {
   options_.selection.detail = float(std::min(detail, input.look.most_detail));
   received_.cache().select(input.camera, options_.selection, list_);
+  clip_list(*clip_, list_);
   out.chosen_s = seen_s_ = monotonic_s();
   if (!input.resting) received_.on_seen(list_.clusters_seen, list_.frames_seen);
 }
@@ -134,6 +139,7 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
   const Supersampler::Scene scene{
       [this](const geometry::Camera& camera, const splat::SelectionOptions& selection, splat::DrawList& list) {
         received_.cache().select_part(camera, selection, list);
+        clip_list(*clip_, list);
       },
       options_.selection, input.look.render, *still_shading_, &received_.fine_rays()};
   for (double now_s = begin_s;;) {
@@ -188,6 +194,18 @@ DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
   if (input.with_coverage) find_coverage(input, view);
   received_.cache().end_frame();
   add_figures(out);
+  return out;
+}
+
+// As finely as there are points, whatever the frame had time for.
+std::optional<Pick> PointSource::pick(const geometry::Camera& camera, double x_pix, double y_pix, double) {
+  splat::SelectionOptions selection = options_.selection;
+  selection.detail = 1;
+  splat::DrawList list;
+  received_.cache().select_part(pick_camera(camera, x_pix, y_pix), selection, list);
+  clip_list(*clip_, list);
+  const auto out = pick_point(list, camera, x_pix, y_pix);
+  received_.cache().end_frame();
   return out;
 }
 

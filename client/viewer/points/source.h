@@ -17,6 +17,7 @@ class PointSource final : public ViewSource {
   PointSource(const DisplayOptions& options, std::unique_ptr<Renderer> renderer, ReceivedPoints& received);
 
   void advance(RequestId request) override { received_.advance(request); }
+  std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) override;
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
   const char* drawn_name() const override { return "points"; }
   const char* cached_name() const override { return ""; }
@@ -39,6 +40,8 @@ class PointSource final : public ViewSource {
   splat::SpeedDetail speed_;
   splat::DrawList list_;
   uint64_t drawn_ = 0;  // points of it
+  std::shared_ptr<const geometry::Clip> clip_ = std::make_shared<const geometry::Clip>();
+  uint64_t clip_version_ = 0;
 
   // Since when the camera stands still, and what was drawn since then.
   geometry::Camera camera_;

@@ -25,4 +25,10 @@ DrawnFrame SliceSource::draw(const FrameInput& input, image::View& view) {
   return out;
 }
 
+std::optional<Pick> SliceSource::pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) {
+  const BufferedFrame shown = cache_.displayed();
+  if (!shown.frame) return std::nullopt;
+  return pick_volume(*shown.frame, camera, x_pix, y_pix, opacity);
+}
+
 }  // namespace telesplat::viewer

@@ -14,6 +14,7 @@ class SliceSource final : public ViewSource {
       : renderer_(std::move(renderer)), cache_(cache) {}
 
   void advance(RequestId request) override { cache_.advance(request); }
+  std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) override;
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
   void displayed() override { cache_.frame_done(); }
   const char* drawn_name() const override { return "samples"; }

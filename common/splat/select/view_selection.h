@@ -1,6 +1,7 @@
 // Which points of a model are drawn for a view, at which level and splat size (T4.4.3).
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "common/geometry/camera.h"
@@ -34,8 +35,8 @@ struct DrawItem {
   float radius_m = 0;
   /// Surfel kernels: from the leaf towards the eye of the sampling view, unit length; or zero.
   glm::vec3 to_eye{0, 0, 1};
-  uint32_t first = 0;         ///< where level[0] lies in arrays()
-  uint32_t of = 0;            ///< how many points arrays() has; 0: as many as are drawn
+  uint32_t first = 0;          ///< where level[0] lies in arrays()
+  uint32_t of = 0;             ///< how many points arrays() has; 0: as many as are drawn
   bool may_face_away = false;  ///< some of its points may; those that do are not drawn (facing.h)
 
   /// The whole level: the points drawn are its points [first, first + level.count). The level stays the same from frame
@@ -63,6 +64,8 @@ struct DrawList {
   EpochId epoch;          ///< that model's; a list never has points of two epochs
   /// Together with it a DrawItem's cluster and sequence name the points: another packer's sequences begin again.
   uint64_t replica = 0;
+  std::vector<std::shared_ptr<const void>>
+      held;                ///< memory of items whose points are no model's; whoever adds it clears it
   uint64_t summaries = 0;  ///< how many summaries had been made by then, of any replica
 };
 

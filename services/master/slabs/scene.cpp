@@ -206,6 +206,19 @@ Status VolumeScene::animate(const std::string& text) {
   return ok_status();
 }
 
+Result<bool> VolumeScene::play(const PlayOrder& order) {
+  if (session_.steps < 2) return Error{"play: the volume has one step"};
+  if (order.how == PlayOrder::How::kPlay) {
+    if (const Status s = animate("on"); !s) return s.error();
+    return false;
+  }
+  playing_ = false;
+  begun_s_.reset();
+  if (order.how == PlayOrder::How::kPause) return false;
+  const int step = ((session_.step + order.steps) % session_.steps + session_.steps) % session_.steps;
+  return std::exchange(session_.step, step) != step;
+}
+
 bool VolumeScene::step(double now_s) {
   if (!playing()) return false;
   if (!begun_s_) begun_s_ = now_s, first_step_ = session_.step;

@@ -9,6 +9,7 @@
 
 #include "common/volume/session.h"
 #include "common/wire/messages.h"
+#include "services/master/control.h"
 
 namespace telesplat::master {
 
@@ -64,6 +65,9 @@ class VolumeScene {
   /// "set": volume.step stops the playing, volume.steps-per-s (0 or above) begins or stops it. Error: other names,
   /// limits; then nothing changed.
   Status set(const std::map<std::string, std::string>& arguments);
+  /// "play": goes on, pauses, or pauses some steps farther on or back, round and round. Error: a volume of one step.
+  /// True: the step is another one.
+  Result<bool> play(const PlayOrder& order);
   /// "animate": on, off.
   Status animate(const std::string& text);
 

@@ -80,6 +80,13 @@ Result<Obeyed> SlabPlan::obey(const wire::Control& m) {
     if (const Status s = volume_.animate(timeline == m.arguments.end() ? "" : timeline->second); !s) return s.error();
     return Obeyed{.begins_epoch = false, .answer = "animation " + animation()};
   }
+  if (m.command == "play") {
+    const auto order = read_play(m);
+    if (!order) return order.error();
+    const auto other = volume_.play(*order);
+    if (!other) return other.error();
+    return Obeyed{.begins_epoch = *other, .answer = "animation " + animation()};
+  }
   if (m.command == "set") return set(m.arguments);
   const auto transfer = m.arguments.find("transfer");
   if (transfer == m.arguments.end()) return Error{"tf: the argument transfer is missing: a preset's name, or points"};

@@ -78,6 +78,8 @@ Status JuliaParameters::begin(julia::Timeline timeline) {
   if (const Status s = julia::validate(*julia_, timeline); !s) return s;
   timeline_ = std::move(timeline);
   begun_s_.reset();
+  from_s_ = elapsed_s_ = 0;
+  paused_ = false;
   return ok_status();
 }
 
@@ -95,9 +97,28 @@ Status JuliaParameters::animate(const std::string& text) {
 }
 
 bool JuliaParameters::step(double now_s) {
-  if (!animated()) return false;
+  if (!playing()) return false;
   if (!begun_s_) begun_s_ = now_s;
-  auto next = julia::parameters_at(*julia_, timeline_, now_s - *begun_s_);
+  return take(from_s_ + now_s - *begun_s_);
+}
+
+Result<bool> JuliaParameters::play(const PlayOrder& order) {
+  if (!animated()) return Error{"play: nothing is animated; ctl animate begins an animation"};
+  if (order.how == PlayOrder::How::kPlay) {
+    paused_ = false;
+    return false;
+  }
+  paused_ = true;
+  begun_s_.reset();
+  const bool other = order.how == PlayOrder::How::kStep && take(std::max(elapsed_s_ + order.steps * kStep_s, 0.0));
+  from_s_ = elapsed_s_;
+  return other;
+}
+
+// The instant `elapsed_s` of the timeline.
+bool JuliaParameters::take(double elapsed_s) {
+  elapsed_s_ = elapsed_s;
+  auto next = julia::parameters_at(*julia_, timeline_, elapsed_s);
   // Checked at 256 instants when it began; between two of them a combination may still be out of limits: the last
   // values stay.
   if (!next || *next == *julia_) return false;

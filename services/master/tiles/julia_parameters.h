@@ -10,6 +10,7 @@
 #include "common/julia/timeline.h"
 #include "common/scene/kind.h"
 #include "common/wire/messages.h"
+#include "services/master/control.h"
 
 namespace telesplat::master {
 
@@ -36,13 +37,23 @@ class JuliaParameters {
   /// be read, does not fit the scene; then nothing changed.
   Status animate(const std::string& text);
 
+  /// Pauses the animation, goes on with it, or pauses it some steps of kStep_s farther on or back. Error: there is
+  /// none; then nothing changed. True: the values are others than before.
+  Result<bool> play(const PlayOrder& order);
+  static constexpr double kStep_s = 0.1;
+
   bool animated() const { return !timeline_.empty(); }
-  std::string animation() const { return animated() ? timeline_.text() : "off"; }
+  /// It is animated and not paused.
+  bool playing() const { return animated() && !paused_; }
+  std::string animation() const {
+    return !animated() ? "off" : paused_ ? timeline_.text() + " (paused)" : timeline_.text();
+  }
   /// Takes the animation's values at now_s; its clock begins with the first call. True: they are others than before.
   bool step(double now_s);
 
  private:
   Status begin(julia::Timeline timeline);
+  bool take(double elapsed_s);
   std::map<std::string, double> with(const julia::Parameters& parameters) const;
 
   julia::Timeline wished_;
@@ -51,7 +62,9 @@ class JuliaParameters {
   std::map<std::string, double> told_, values_;  // by the data server; now
   std::optional<julia::Parameters> julia_;       // of values_; none: nothing can be set
   julia::Timeline timeline_;
-  std::optional<double> begun_s_;
+  std::optional<double> begun_s_;      // of the clock; none: it goes on with the next step()
+  double from_s_ = 0, elapsed_s_ = 0;  // of the timeline: at begun_s_, and at the last step
+  bool paused_ = false;
 };
 
 }  // namespace telesplat::master

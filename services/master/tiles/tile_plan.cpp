@@ -51,6 +51,13 @@ Result<Obeyed> TilePlan::obey(const wire::Control& m) {
     if (const Status s = scene_.set(m.arguments); !s) return s.error();
     return Obeyed{.begins_epoch = true, .answer = {}};
   }
+  if (m.command == "play") {
+    const auto order = read_play(m);
+    if (!order) return order.error();
+    const auto other = scene_.play(*order);
+    if (!other) return other.error();
+    return Obeyed{.begins_epoch = *other, .answer = "animation " + scene_.animation()};
+  }
   const auto timeline = m.arguments.find("timeline");
   if (timeline == m.arguments.end())
     return Error{"animate: the argument timeline is missing, such as c.y=-0.4:0.4:10s, or off"};

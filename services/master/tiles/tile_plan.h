@@ -18,7 +18,7 @@ class TilePlan final : public Plan {
   std::map<std::string, std::string> epoch_texts() const override;
   Result<Obeyed> obey(const wire::Control& command) override;
   std::string animation() const override { return scene_.animation(); }
-  bool playing() const override { return scene_.animated(); }
+  bool playing() const override { return scene_.playing(); }
   bool step(double now_s) override { return scene_.step(now_s); }
   bool progressive() const override { return schedule_.cut().coarse; }
 

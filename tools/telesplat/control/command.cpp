@@ -11,6 +11,7 @@
 #include "tools/telesplat/command.h"
 #include "tools/telesplat/control/choice.h"
 #include "tools/telesplat/control/coupling.h"
+#include "tools/telesplat/control/hands.h"
 #include "tools/telesplat/control/list.h"
 #include "tools/telesplat/control/orders.h"
 #include "tools/telesplat/control/status_text.h"
@@ -100,6 +101,7 @@ Command control_command() {
       make_command("status", "who takes part in the session and what they count", status_table, show_status));
   out.commands.push_back(list_command());
   out.commands.push_back(coupling_command());
+  for (Command& command : hands_commands()) out.commands.push_back(std::move(command));
   for (const Order& order : orders()) out.commands.push_back(order_command(order));
   return out;
 }

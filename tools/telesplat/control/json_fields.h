@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace telesplat::launcher {
 
@@ -39,6 +40,14 @@ inline bool flag(const nlohmann::ordered_json& object, const char* key) {
 inline nlohmann::ordered_json array(const nlohmann::ordered_json& object, const char* key) {
   const auto* value = field(object, key);
   return value && value->is_array() ? *value : nlohmann::ordered_json::array();
+}
+
+/// Its elements, if it is an array of `count` numbers.
+inline std::optional<std::vector<double>> numbers(const nlohmann::ordered_json& object, const char* key, size_t count) {
+  std::vector<double> out;
+  for (const auto& v : array(object, key))
+    if (v.is_number()) out.push_back(v.get<double>());
+  return out.size() == count ? std::optional(out) : std::nullopt;
 }
 
 }  // namespace telesplat::launcher

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "common/julia/flags.h"
+#include "common/scene/clip_order.h"
 #include "common/scene/colouring.h"
 #include "common/volume/session.h"
 
@@ -125,6 +126,30 @@ Result<Arguments> colour_arguments(const Words& words, ControlClient&) {
   return out;
 }
 
+Result<Arguments> overlay_arguments(const Words& words, ControlClient&) {
+  if (words.size() != 2 || (words.back() != "on" && words.back() != "off"))
+    return Error{"ctl overlay: needs NAME on or NAME off, such as axes on"};
+  return Arguments{{"name", words.front()}, {"on", words.back()}};
+}
+
+// play, pause, step or step N.
+Result<Arguments> play_arguments(const Words& words, ControlClient&) {
+  const std::string how = words.empty() ? "play" : words.front();
+  if ((how != "play" && how != "pause" && how != "step") || words.size() > (how == "step" ? 2u : 1u))
+    return Error{"ctl play: needs play, pause, step or step N, such as step -1"};
+  Arguments out{{"how", how}};
+  if (words.size() == 2) out["steps"] = words.back();
+  return out;
+}
+
+// plane ..., box ..., off; parts may be separated by ";".
+Result<Arguments> clip_arguments(const Words& words, ControlClient&) {
+  if (words.empty()) return Error{"ctl clip: needs plane x>=50%, plane A,B,C,D, box X0,Y0,Z0,X1,Y1,Z1 or off"};
+  const std::string text = fmt::format("{}", fmt::join(words, " "));
+  if (const auto order = scene::parse_clip(text); !order) return Error{"ctl " + order.error().text};
+  return Arguments{{"clip", text}};
+}
+
 }  // namespace
 
 const std::vector<Order>& orders() {
@@ -139,6 +164,15 @@ const std::vector<Order>& orders() {
        .help = "change parameters with time, or play a series",
        .words = "a timeline as --animate of run takes it, or off; for a series of volumes on or off",
        .read = animate_arguments},
+      {.name = "play",
+       .help = "go on with an animation or a series, pause it, or go a step",
+       .words = "play, pause, or step N: N steps of a series, or tenths of a second of an animation, farther on (back "
+                "if it is below 0)",
+       .read = play_arguments},
+      {.name = "overlay",
+       .help = "show or hide what lies over a window's picture",
+       .words = "NAME on or NAME off; NAME is axes, scale, cursor, fps or all",
+       .read = overlay_arguments},
       {.name = "tf",
        .help = "change a volume's transfer function",
        .words = "as --tf of run: a preset (" + preset_names() +
@@ -148,7 +182,13 @@ const std::vector<Order>& orders() {
        .help = "colour a mesh by another array, range or colour map",
        .words = "ARRAY[:MIN:MAX] as --colour-by of run, or none; map NAME, NAME as --colour-map of run; or both: ARRAY "
                 "map NAME",
-       .read = colour_arguments}};
+       .read = colour_arguments},
+      {.name = "clip",
+       .help = "cut part of the data away, so that what lies behind is seen",
+       .words = "in the data's own coordinates: plane x>=50% (x, y, z; >= or <=; a number or a share of the data's "
+                "box) or plane A,B,C,D keeps A x + B y + C z >= D; box X0,Y0,Z0,X1,Y1,Z1 keeps the inside; several "
+                "are separated by \";\"; off: nothing is cut away",
+       .read = clip_arguments}};
   return all;
 }
 

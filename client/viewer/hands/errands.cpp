@@ -1,0 +1,135 @@
+#include "client/viewer/hands/errands.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/scene/session.h"
+
+namespace telesplat::viewer {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::optional<double> number(std::string_view text) {
+  double value = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || read.ec != std::errc() || read.ptr != text.data() + text.size() || !std::isfinite(value))
+    return std::nullopt;
+  return value;
+}
+
+std::vector<std::string_view> split(std::string_view text, char at) {
+  std::vector<std::string_view> out;
+  for (;;) {
+    const size_t end = text.find(at);
+    if (const auto part = text.substr(0, end); !part.empty()) out.push_back(part);
+    if (end == text.npos) return out;
+    text.remove_prefix(end + 1);
+  }
+}
+
+// Pixels, or a share of them.
+std::optional<double> coordinate(std::string_view text, int size) {
+  if (!text.ends_with('%')) return number(text);
+  const auto share = number(text.substr(0, text.size() - 1));
+  return share ? std::optional(*share / 100 * size) : std::nullopt;
+}
+
+Result<glm::dvec2> place(std::string_view text, const geometry::Camera& camera) {
+  const auto parts = split(text, ',');
+  const auto x = parts.size() == 2 ? coordinate(parts[0], camera.width) : std::nullopt;
+  const auto y = parts.size() == 2 ? coordinate(parts[1], camera.height) : std::nullopt;
+  if (!x || !y)
+    return Error{fmt::format("pick: \"{}\" is not X,Y in pixels, or in per cent of the display", text.substr(0, 40))};
+  if (!(*x >= 0 && *x <= camera.width && *y >= 0 && *y <= camera.height))
+    return Error{fmt::format("pick: {:g},{:g} lies outside of the display, which has {} x {} pixels", *x, *y,
+                             camera.width, camera.height)};
+  return glm::dvec2(*x, *y);
+}
+
+Result<std::string> pick(const wire::Order& order, const FrameHands& hands) {
+  if (!hands.terms) return Error{"pick: nothing is shown yet"};
+  const std::string at = scene::value_or(order.arguments, "at", std::string());
+  const auto wanted = split(at, ' ');
+  if (wanted.empty() || wanted.size() > kMostPicks)
+    return Error{fmt::format("pick: {} places, one to {} are possible", wanted.size(), kMostPicks)};
+  double opacity = kPickOpacity;
+  if (const auto given = order.arguments.find("opacity"); given != order.arguments.end()) {
+    const auto read = number(given->second);
+    if (!read || !(*read > 0 && *read <= 1))
+      return Error{fmt::format("pick: the opacity {} is not above 0 and up to 1", given->second.substr(0, 40))};
+    opacity = *read;
+  }
+  Json picks = Json::array();
+  std::vector<PickedPlace> places;
+  for (const auto text : wanted) {
+    const auto pixel = place(text, hands.camera);
+    if (!pixel) return pixel.error();
+    const auto found = hands.pick(pixel->x, pixel->y, opacity);
+    if (!found) {
+      picks.push_back(nullptr);
+      continue;
+    }
+    places.push_back(meaning_of(*found, *hands.terms));
+    Json told = to_json(places.back(), *hands.terms);
+    told["pixel"] = {pixel->x, pixel->y};
+    picks.push_back(std::move(told));
+  }
+  Json out{{"picks", std::move(picks)}, {"epoch", hands.epoch.value}};
+  const Measured measured = measure(places, *hands.terms);
+  out["distances"] = measured.distances;
+  if (measured.angle_deg) out["angle_deg"] = *measured.angle_deg;
+  out["unit"] = measured.unit;
+  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string where(const FrameHands& hands) {
+  const auto& [p, q] = hands.camera.pose;
+  return Json{{"position", {p.x, p.y, p.z}},
+              {"orientation", {q.w, q.x, q.y, q.z}},
+              {"width", hands.camera.width},
+              {"height", hands.camera.height},
+              {"epoch", hands.epoch.value}}
+      .dump();
+}
+
+Result<std::string> go(const wire::Order& order, const FrameHands& hands) {
+  const std::string text = scene::value_or(order.arguments, "pose", std::string());
+  const auto parts = split(text, ',');
+  double v[7];
+  for (size_t i = 0; i < 7; ++i) {
+    const auto read = parts.size() == 7 ? number(parts[i]) : std::nullopt;
+    if (!read) return Error{fmt::format("go: \"{}\" is not seven numbers px,py,pz,qw,qx,qy,qz", text.substr(0, 80))};
+    v[i] = *read;
+  }
+  geometry::Camera camera = hands.camera;
+  camera.pose = {{v[0], v[1], v[2]}, {v[3], v[4], v[5], v[6]}};
+  if (const Status s = geometry::validate(camera); !s) return Error{"go: " + s.error().text};
+  camera.pose.orientation = glm::normalize(camera.pose.orientation);
+  if (!hands.go(camera.pose))
+    return Error{"go: this viewer's head follows its trajectory; a window's camera can be sent"};
+  return std::string("{}");
+}
+
+Result<std::string> overlay(const wire::Order& order, const FrameHands& hands) {
+  const std::string on = scene::value_or(order.arguments, "on", std::string());
+  if (on != "on" && on != "off") return Error{fmt::format("overlay: \"{}\" is not on or off", on.substr(0, 40))};
+  const Status s = hands.overlay(scene::value_or(order.arguments, "name", std::string()), on == "on");
+  if (!s) return s.error();
+  return std::string("{}");
+}
+
+}  // namespace
+
+Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands) {
+  if (order.command == "pick") return pick(order, hands);
+  if (order.command == "where") return where(hands);
+  if (order.command == "go") return go(order, hands);
+  if (order.command == "overlay") return overlay(order, hands);
+  return Error{fmt::format("a viewer does not know the order '{}'", order.command.substr(0, 64))};
+}
+
+}  // namespace telesplat::viewer

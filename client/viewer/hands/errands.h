@@ -1,0 +1,39 @@
+// What a viewer does when somebody asks it: picks, tells where its head is, goes elsewhere. One for a display, in its
+// thread.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "client/viewer/hands/meaning.h"
+#include "client/viewer/hands/order_desk.h"
+
+namespace telesplat::viewer {
+
+/// What the display lends for one frame.
+struct FrameHands {
+  geometry::Camera camera;  ///< of the frame that was displayed
+  EpochId epoch;
+  std::shared_ptr<const SceneTerms> terms;  ///< null: the session is not known yet
+  /// What lies at a pixel; opacity: of volumes.
+  std::function<std::optional<Pick>(double x_pix, double y_pix, double opacity)> pick;
+  /// Puts the camera there. False: the head follows a trajectory.
+  std::function<bool(const geometry::Pose&)> go;
+  /// Shows or hides what lies over the picture. Error: there is no such overlay, or nobody sees them.
+  std::function<Status(const std::string& name, bool on)> overlay;
+};
+
+/// JSON. Error: what is wrong with the order, for the person.
+///   pick   "at": "X,Y" or "X%,Y%", up to three separated by blanks, pixels of the display from its upper left corner;
+///          "opacity" (0.25): of volumes. {"picks": [null or as to_json(PickedPlace)], "distances", "angle_deg",
+///          "unit"}
+///   where  {"position", "orientation" (w, x, y, z), "width", "height", "epoch"}
+///   go     "pose": seven numbers, px,py,pz,qw,qx,qy,qz. {}
+///   overlay  "name", "on": on or off. {}
+Result<std::string> carry_out(const wire::Order& order, const FrameHands& hands);
+
+inline constexpr double kPickOpacity = volume::kSolid;
+inline constexpr size_t kMostPicks = 3;
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,35 @@
+// Small pictures that tell where one is: axes, a scale bar, what lies under the cursor. Pure: no window, no session.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/viewer/hands/meaning.h"
+#include "common/geometry/camera.h"
+#include "common/image/file.h"
+
+namespace telesplat::viewer {
+
+/// The data's axes x, y and z as the camera sees them, red, green and blue (with letters, for who cannot tell them
+/// apart), those that point to the eye last. 0xAARRGGBB, `side` pixels.
+image::View axes_picture(const geometry::Camera& camera, const SceneTerms& terms, int side);
+
+/// A bar of a round length in the data's units, as long as it is seen at `depth_m`: at most `width` pixels. Nothing:
+/// the depth is no depth.
+struct ScaleBar {
+  double length = 0;  ///< in units of the data: 1, 2 or 5 times a power of ten
+  double pixels = 0;
+  std::string text;  ///< "20 mm"
+};
+std::optional<ScaleBar> scale_bar(const geometry::Camera& camera, const SceneTerms& terms, double depth_m, int width);
+/// scale: pixels a side of a letter's dot.
+image::View scale_picture(const ScaleBar& bar, int scale);
+
+/// What lies under the cursor, a line each; without a pick one that says so.
+std::vector<std::string> cursor_lines(const std::optional<PickedPlace>& place, const SceneTerms& terms);
+
+/// Depth of the middle of a box along the camera's axis, metres.
+double middle_depth_m(const geometry::Camera& camera, const geometry::Box& box_room);
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,27 @@
+// Asks a session's viewer what lies at places of its display.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tools/telesplat/control/client.h"
+
+namespace telesplat::launcher {
+
+struct PickQuestion {
+  std::vector<std::string> places;  ///< "X,Y", pixels, or per cent of the display
+  std::string viewer;               ///< empty: the first one
+  std::string opacity;              ///< of volumes; empty: the viewer's
+};
+
+/// The viewer's answer (docs/hands.md); of a volume each pick has "value" and "value_error" too, from the data server.
+/// Error: no answer, or a refusal.
+Result<nlohmann::ordered_json> ask_pick(ControlClient& client, const PickQuestion& question);
+
+/// For people: a paragraph a pick, then distances and the angle.
+std::string pick_text(const nlohmann::ordered_json& answer);
+/// "temperature 21.5 +- 0.2 K"; empty: no value is known there.
+std::string value_text(const nlohmann::ordered_json& pick);
+
+}  // namespace telesplat::launcher
