@@ -17,8 +17,9 @@ namespace {
 constexpr double kSameSurface = 0.01;
 // A tangent plane that is seen more edge-on tells little of where the ray meets the surface.
 constexpr double kLeastLean = 0.15;
-// A splat reaches so far beyond half its size: pin-holes between samples are filled.
-constexpr double kLeastReach_px = 1.5;
+// Points count as near the pixel within this part of their splat's size and a pixel more: between four samples of a
+// lattice the farthest place is 0.71 of their distance away, and the finish fills what splats leave.
+constexpr double kReach = 0.75;
 
 struct Candidate {
   glm::dvec3 position_room;
@@ -35,7 +36,7 @@ void add_candidates(const splat::DrawItem& item, const geometry::Camera& camera,
   const glm::dvec3 lo(leaf.lo), eye = camera.pose.position_room;
   const double step = (double{leaf.hi.x} - double{leaf.lo.x}) / 65536;
   const auto [rx, ry, rw] = camera.room_to_pixel();
-  const double reach_px = std::max(0.5 * double{item.splat_px} + 0.5, kLeastReach_px);
+  const double reach_px = kReach * double{item.splat_px} + 1;
   const glm::vec3 facing = splat::facing_vector(splat::leaf_view(leaf, glm::vec3(eye)));
   for (uint32_t i = 0; i < item.level.count; ++i) {
     const glm::dvec3 p = lo + (glm::dvec3(item.level.x[i], item.level.y[i], item.level.z[i]) + glm::dvec3(0.5)) * step;
