@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <span>
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
@@ -70,6 +71,19 @@ void write_background(const geometry::Rect& rect, uint32_t background, const Til
   }
 }
 
+// What is prepared for one view.
+struct Sight {
+  SurfelInput surfels;
+  std::vector<SurfelSource> sources;
+  EwaLight light;
+  ResolveInput resolve;
+  ItemRuns runs;
+  std::vector<ItemStyle> styles;
+  /// How far the largest splat reaches from its centre, pixels. Surfels reach farther by what reach_of() says.
+  float overhang = 0;
+  TileBinning binning;
+};
+
 }  // namespace
 
 struct CpuSplatter::Impl {
@@ -77,14 +91,16 @@ struct CpuSplatter::Impl {
       : arena(threads > 0 ? threads : tbb::task_arena::automatic),
         workspaces(static_cast<size_t>(arena.max_concurrency())) {}
 
-  void prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
+  void prepare(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
                const image::Shading& shading);
-  void prepare_items(const DrawList& list, const geometry::Camera& camera);
-  void bin(const DrawList& list, const geometry::Camera& camera);
-  float reach_of(const DrawList& list, const ItemRun& run) const;
-  TileCounts splat(const TileInput& input, const ResolvedTile& tile, Workspace& workspace);
-  void draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace);
+  void prepare_items(const DrawList& list, const geometry::Camera& camera, Sight& sight);
+  void bin(const DrawList& list, const geometry::Camera& camera, Sight& sight);
+  float reach_of(const DrawList& list, const ItemRun& run, const Sight& sight) const;
+  TileCounts splat(const TileInput& input, const ResolvedTile& tile, const Sight& sight, Workspace& workspace);
+  void draw_tile(int index, const DrawList& list, const Sight& sight, const FrameTarget& target, Workspace& workspace);
   void finish_tile(const ResolvedTile& tile, Workspace& workspace);
+  SplatStats render(const DrawList& list, std::span<const geometry::Camera> cameras, const RenderOptions& options,
+                    const image::Shading& shading, std::span<const FrameTarget> targets);
 
   tbb::task_arena arena;
   std::vector<Workspace> workspaces;
@@ -92,60 +108,65 @@ struct CpuSplatter::Impl {
   // The frame.
   const KernelTraits* kernel = nullptr;
   Finish finish;
-  SurfelInput surfels;
-  std::vector<SurfelSource> sources;
-  EwaLight light;
   Layout layout;
-  ResolveInput resolve;
   SplatTable table;
   TileGrid grid;
-  ItemRuns runs;
-  std::vector<ItemStyle> styles;
-  /// How far the largest splat reaches from its centre, pixels. Surfels reach farther by what reach_of() says.
-  float overhang = 0;
-  TileBinning binning;
+  std::array<Sight, 2> sights;
   std::vector<uint8_t> intensity = std::vector<uint8_t>(65536 + 3);
 };
 
-void CpuSplatter::Impl::prepare(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
-                                const image::Shading& shading) {
+void CpuSplatter::Impl::prepare(const DrawList& list, std::span<const geometry::Camera> cameras,
+                                const RenderOptions& options, const image::Shading& shading) {
+  const geometry::Camera& first = cameras.front();
   kernel = &traits_of(options.kernel);
   finish = options.finish;
   layout = {kernel->tile_width, kernel->tile_height, finish_reach(finish)};
-  grid = {camera.width, camera.height, layout.width, layout.height};
+  grid = {first.width, first.height, layout.width, layout.height};
   std::memcpy(intensity.data(), shading.table().data(), shading.table().size());
-  resolve = {intensity.data(), shading.background(), static_cast<float>(camera.near_m), {}};
-  if (kernel->surfel) {
-    surfels = {surfel_camera(camera), nullptr, spacing_limits(list.scale), widest_contour(camera)};
-    light = ewa_light(shading.parameters(), surfels.camera);
-  } else {
-    table.set_focal(camera.focal_x());
+  if (!kernel->surfel) table.set_focal(first.focal_x());
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    Sight& sight = sights[i];
+    sight.resolve = {intensity.data(), shading.background(), static_cast<float>(cameras[i].near_m), {}};
+    if (kernel->surfel) {
+      sight.surfels = {surfel_camera(cameras[i]), nullptr, spacing_limits(list.scale), widest_contour(cameras[i])};
+      sight.light = ewa_light(shading.parameters(), sight.surfels.camera);
+    }
+    if (i == 0 || kernel->surfel) {
+      prepare_items(list, cameras[i], sight);
+    } else {  // flat splats are the same for both
+      sight.styles = sights[0].styles;
+      sight.overhang = sights[0].overhang;
+      sight.resolve.rim = sights[0].resolve.rim;
+    }
+    if (i == 0)
+      sight.runs.build(list.items);
+    else
+      sight.runs.like(sights[0].runs);
+    bin(list, cameras[i], sight);
   }
-  prepare_items(list, camera);
-  bin(list, camera);
 }
 
-void CpuSplatter::Impl::prepare_items(const DrawList& list, const geometry::Camera& camera) {
+void CpuSplatter::Impl::prepare_items(const DrawList& list, const geometry::Camera& camera, Sight& sight) {
   FrameFigures figures(*kernel, camera, list.scale);
-  overhang = kernel->reach.least_px;
+  sight.overhang = kernel->reach.least_px;
   if (kernel->surfel) {
-    sources.resize(list.items.size());
-    for (size_t i = 0; i < list.items.size(); ++i) sources[i] = figures.add(list.items[i]).source;
-    surfels.sources = sources.data();
+    sight.sources.resize(list.items.size());
+    for (size_t i = 0; i < list.items.size(); ++i) sight.sources[i] = figures.add(list.items[i]).source;
+    sight.surfels.sources = sight.sources.data();
   } else {
-    styles.resize(list.items.size());
+    sight.styles.resize(list.items.size());
     for (size_t i = 0; i < list.items.size(); ++i) {
       const ItemFigures item = figures.add(list.items[i]);
-      styles[i] = {&table.shape(*kernel, *item.flat), item.spacing};
-      overhang = std::max(overhang, 0.5f * static_cast<float>(item.flat->side) + 0.5f);
+      sight.styles[i] = {&table.shape(*kernel, *item.flat), item.spacing};
+      sight.overhang = std::max(sight.overhang, 0.5f * static_cast<float>(item.flat->side) + 0.5f);
     }
   }
-  resolve.rim = figures.rim();
+  sight.resolve.rim = figures.rim();
 }
 
-void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera) {
-  runs.build(list.items);
-  binning.begin(grid, runs.runs.size(), resolve.near_m, static_cast<float>(layout.reach) + overhang);
+void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera, Sight& sight) {
+  ItemRuns& runs = sight.runs;
+  sight.binning.begin(grid, runs.runs.size(), sight.resolve.near_m, static_cast<float>(layout.reach) + sight.overhang);
   const auto room_to_pixel = camera.room_to_pixel();
   const glm::vec3 eye(camera.pose.position_room);
   arena.execute([&] {
@@ -154,28 +175,29 @@ void CpuSplatter::Impl::bin(const DrawList& list, const geometry::Camera& camera
         // Clusters lie scattered in memory.
         if (i + kBoxesAhead < r.end()) hwy::Prefetch(&list.items[runs.runs[i + kBoxesAhead].first].cluster->leaf_room);
         runs.transform(i, list.items, room_to_pixel, eye);
-        binning.place(i, runs.transforms[i], reach_of(list, runs.runs[i]), static_cast<float>(kMargin));
+        sight.binning.place(i, runs.transforms[i], reach_of(list, runs.runs[i], sight), static_cast<float>(kMargin));
       }
     });
   });
-  binning.list();
+  sight.binning.list();
 }
 
 // How far contours of a run reach, in pixels, times depth. Bins grown by kMargin for all had each point met
 // 1.63 times at 256 x 256 (bench splat_ellipse).
-float CpuSplatter::Impl::reach_of(const DrawList& list, const ItemRun& run) const {
+float CpuSplatter::Impl::reach_of(const DrawList& list, const ItemRun& run, const Sight& sight) const {
   if (!kernel->surfel) return 0;
   float radius_m = 0;
   for (uint32_t i = run.first; i < run.last; ++i) radius_m = std::max(radius_m, list.items[i].radius_m);
-  return kernel->reach.growth * surfels.widest * radius_m;
+  return kernel->reach.growth * sight.surfels.widest * radius_m;
 }
 
-TileCounts CpuSplatter::Impl::splat(const TileInput& input, const ResolvedTile& tile, Workspace& workspace) {
+TileCounts CpuSplatter::Impl::splat(const TileInput& input, const ResolvedTile& tile, const Sight& sight,
+                                    Workspace& workspace) {
   return kernel->splat_tile({.input = input,
-                             .styles = styles.data(),
-                             .surfels = surfels,
-                             .light = light,
-                             .background = resolve.background,
+                             .styles = sight.styles.data(),
+                             .surfels = sight.surfels,
+                             .light = sight.light,
+                             .background = sight.resolve.background,
                              .keys = {workspace.keys.get(), tile.stride, kMargin},
                              .tile = tile,
                              .reach = layout.reach,
@@ -200,12 +222,14 @@ void CpuSplatter::Impl::finish_tile(const ResolvedTile& tile, Workspace& workspa
   if (finish.antialias) antialias(content, workspace.finish), lap(stats.antialias_ms);
 }
 
-void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTarget& target, Workspace& workspace) {
+void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const Sight& sight, const FrameTarget& target,
+                                  Workspace& workspace) {
+  const ItemRuns& runs = sight.runs;
+  const ResolveInput& resolve = sight.resolve;
   const geometry::Rect rect = grid.rect(index);
-  const size_t first = static_cast<size_t>(rect.y) * target.width + rect.x;
-  const TileTarget out{target.colour + first, target.depth_m ? target.depth_m + first : nullptr,
-                       static_cast<size_t>(target.width)};
-  const auto entries = binning.tile(index);
+  const size_t first = static_cast<size_t>(rect.y) * target.row() + static_cast<size_t>(rect.x);
+  const TileTarget out{target.colour + first, target.depth_m ? target.depth_m + first : nullptr, target.row()};
+  const auto entries = sight.binning.tile(index);
   SplatStats& stats = workspace.stats;
   const double start = monotonic_s();
   if (entries.empty()) {
@@ -224,7 +248,7 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTa
                         runs.transforms.data(),
                         runs.facing.data(),
                         list.items.data()};
-  const TileCounts counts = splat(input, tile, workspace);
+  const TileCounts counts = splat(input, tile, sight, workspace);
   stats.points_projected += counts.projected;
   stats.points_drawn += counts.drawn;
   const double splatted = monotonic_s();
@@ -248,34 +272,39 @@ void CpuSplatter::Impl::draw_tile(int index, const DrawList& list, const FrameTa
 CpuSplatter::CpuSplatter(int threads) : impl_(std::make_unique<Impl>(threads)) {}
 CpuSplatter::~CpuSplatter() = default;
 
-SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
-                               const image::Shading& shading, const FrameTarget& target) {
-  CHECK(target.width == camera.width && target.height == camera.height && target.colour);
-  Impl& m = *impl_;
+SplatStats CpuSplatter::Impl::render(const DrawList& list, std::span<const geometry::Camera> cameras,
+                                     const RenderOptions& options, const image::Shading& shading,
+                                     std::span<const FrameTarget> targets) {
+  for (size_t i = 0; i < cameras.size(); ++i)
+    CHECK(targets[i].width == cameras[i].width && targets[i].height == cameras[i].height && targets[i].colour);
   const double start = monotonic_s();
-  m.prepare(list, camera, options, shading);
+  prepare(list, cameras, options, shading);
   const double prepare_ms = (monotonic_s() - start) * 1e3;
-  for (Workspace& w : m.workspaces) {
+  for (Workspace& w : workspaces) {
     // Emptied whole where the layout changes; else every tile leaves its pixels empty.
-    if (w.layout != m.layout) {
-      w.keys = hwy::AllocateAligned<uint64_t>(m.layout.size());
-      std::fill_n(w.keys.get(), m.layout.size(), static_cast<uint64_t>(kEmptyKey));
-      w.layout = m.layout;
+    if (w.layout != layout) {
+      w.keys = hwy::AllocateAligned<uint64_t>(layout.size());
+      std::fill_n(w.keys.get(), layout.size(), static_cast<uint64_t>(kEmptyKey));
+      w.layout = layout;
     }
     w.stats = {};
   }
-  m.arena.execute([&] {
+  const int count = grid.count();
+  arena.execute([&] {
     tbb::parallel_for(
-        tbb::blocked_range<int>(0, m.grid.count(), 1),
+        tbb::blocked_range<int>(0, count * static_cast<int>(cameras.size()), 1),
         [&](const tbb::blocked_range<int>& tiles) {
-          Workspace& workspace = m.workspaces[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
-          for (int i = tiles.begin(); i < tiles.end(); ++i) m.draw_tile(i, list, target, workspace);
+          Workspace& workspace = workspaces[static_cast<size_t>(tbb::this_task_arena::current_thread_index())];
+          for (int i = tiles.begin(); i < tiles.end(); ++i) {
+            const auto view = static_cast<size_t>(i / count);
+            draw_tile(i % count, list, sights[view], targets[view], workspace);
+          }
         },
         tbb::simple_partitioner());
   });
   SplatStats sum;
   sum.prepare_ms = prepare_ms;
-  for (const Workspace& w : m.workspaces) {
+  for (const Workspace& w : workspaces) {
     sum.points_projected += w.stats.points_projected;
     sum.points_drawn += w.stats.points_drawn;
     sum.project_ms += w.stats.project_ms;
@@ -285,6 +314,19 @@ SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& cam
     sum.antialias_ms += w.stats.antialias_ms;
   }
   return sum;
+}
+
+SplatStats CpuSplatter::render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
+                               const image::Shading& shading, const FrameTarget& target) {
+  return impl_->render(list, {&camera, 1}, options, shading, {&target, 1});
+}
+
+SplatStats CpuSplatter::render_pair(const DrawList& list, const std::array<geometry::Camera, 2>& cameras,
+                                    const RenderOptions& options, const image::Shading& shading,
+                                    const std::array<FrameTarget, 2>& targets) {
+  CHECK(cameras[0].width == cameras[1].width && cameras[0].height == cameras[1].height &&
+        cameras[0].near_m == cameras[1].near_m);
+  return impl_->render(list, cameras, options, shading, targets);
 }
 
 }  // namespace telesplat::splat

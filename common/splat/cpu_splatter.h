@@ -1,6 +1,7 @@
 // The CPU splatter: Highway SIMD, run-time dispatch, one screen tile a task, no lock in the hot path.
 #pragma once
 
+#include <array>
 #include <memory>
 
 #include "common/image/shading.h"
@@ -15,6 +16,8 @@ struct FrameTarget {
   int width = 0, height = 0;
   uint32_t* colour = nullptr;
   float* depth_m = nullptr;  ///< metres along the view axis; +infinity where nothing is
+  size_t pitch = 0;          ///< pixels from a row to the next one, of both; 0: width
+  size_t row() const { return pitch > 0 ? pitch : static_cast<size_t>(width); }
 };
 
 struct SplatStats {
@@ -34,6 +37,12 @@ class CpuSplatter {
   /// has on (finish.h) -> write. Pixels are shaded with shading.table(). camera.width/height are target's.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, const RenderOptions& options,
                     const image::Shading& shading, const FrameTarget& target);
+  /// Two views of one list, as fast as can be: what they have in common is prepared once, and threads draw both at a
+  /// time. Each is what render() makes of it. Preconditions: the cameras have one size and one near distance, and next
+  /// to one focal length (flat splats are those of the first); shading is of either.
+  SplatStats render_pair(const DrawList& list, const std::array<geometry::Camera, 2>& cameras,
+                         const RenderOptions& options, const image::Shading& shading,
+                         const std::array<FrameTarget, 2>& targets);
   /// Without any finish.
   SplatStats render(const DrawList& list, const geometry::Camera& camera, Kernel kernel, const image::Shading& shading,
                     const FrameTarget& target) {

@@ -32,6 +32,12 @@ struct ItemRuns {
     transforms.resize(runs.size());
     facing.resize(runs.size());
   }
+  /// The same for another view of the items that `other` was built for.
+  void like(const ItemRuns& other) {
+    runs = other.runs;
+    transforms.resize(runs.size());
+    facing.resize(runs.size());
+  }
   void transform(size_t run, const std::vector<DrawItem>& items, const geometry::Camera::PixelTransform& room_to_pixel,
                  const glm::vec3& eye_room) {
     const ItemRun& r = runs[run];

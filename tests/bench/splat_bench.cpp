@@ -260,24 +260,27 @@ BENCHMARK(splat_select_best)->ArgName("best")->Arg(0)->Arg(1)->Unit(benchmark::k
 void splat_eyes(benchmark::State& state) {
   const auto kernel = static_cast<splat::Kernel>(state.range(0));
   const auto eyes = static_cast<size_t>(state.range(1));
-  constexpr double kEyeDistance_m = 0.064;
+  constexpr double kEyeDistance_m = 0.064, kScreen_m = 0.75;
   const geometry::Camera head = display_camera();
-  const auto both = geometry::eye_cameras(head, kEyeDistance_m);
-  const geometry::Camera chooser = eyes == 2 ? geometry::enclosing_camera(head, kEyeDistance_m) : head;
+  const auto both = geometry::eye_cameras(head, kEyeDistance_m, kScreen_m);
   const points::PointModel& m = model(1);
   splat::CpuSplatter splatter(2);
-  std::vector<uint32_t> colour(size_t{kDisplayWidth} * kDisplayHeight);
+  std::vector<uint32_t> colour(size_t{2} * kDisplayWidth * kDisplayHeight);
   splat::DrawList list;
   splat::SelectionOptions options;
   options.scale = splat::suitable_scale(kernel);
+  if (eyes == 2) options.eyes = both;
+  const splat::FrameTarget one{kDisplayWidth, kDisplayHeight, colour.data(), nullptr};
+  const std::array<splat::FrameTarget, 2> beside{
+      splat::FrameTarget{kDisplayWidth, kDisplayHeight, colour.data(), nullptr, 2 * kDisplayWidth},
+      {kDisplayWidth, kDisplayHeight, colour.data() + kDisplayWidth, nullptr, 2 * kDisplayWidth}};
   for (auto _ : state) {
-    splat::select_view(m, chooser, options, list);
-    for (size_t eye = 0; eye < eyes; ++eye) {
-      const geometry::Camera& camera = eyes == 2 ? both[eye] : head;
-      const image::Shading shading({}, camera);
-      splatter.render(list, camera, splat::RenderOptions{kernel, {}}, shading,
-                      {kDisplayWidth, kDisplayHeight, colour.data(), nullptr});
-    }
+    splat::select_view(m, head, options, list);
+    const image::Shading shading({}, head);
+    if (eyes == 2)
+      splatter.render_pair(list, both, splat::RenderOptions{kernel, {}}, shading, beside);
+    else
+      splatter.render(list, head, splat::RenderOptions{kernel, {}}, shading, one);
   }
   state.counters["points"] = static_cast<double>(list.points);
   state.counters["fps"] = benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);

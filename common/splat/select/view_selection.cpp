@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/geometry/stereo.h"
 #include "common/splat/facing.h"
 #include "common/splat/select/cluster_walk.h"
 #include "common/splat/select/level_choice.h"
@@ -89,7 +90,13 @@ class Selector {
         backward_(camera.pose.orientation * glm::dvec3(0, 0, 1)),
         position_(camera.pose.position_room),
         focal_(camera.focal_x()),
-        patches_(patch_view(camera)) {}
+        patches_(patch_view(camera)) {
+    if (options.eyes)
+      for (const geometry::Camera& eye : *options.eyes) eyes_.emplace_back(eye.pose.position_room);
+    else
+      eyes_.push_back(eye_);
+    views_.resize(eyes_.size());
+  }
 
   /// The brick's summary and what it lacks; false if its clusters must be drawn.
   bool add_summary(const SeenBrick& seen, const geometry::Frustum& frustum, const points::Summaries& summaries) {
@@ -119,8 +126,7 @@ class Selector {
     const geometry::Box& leaf = cluster.leaf_room;
     const float leaf_m = leaf.hi.x - leaf.lo.x;
     const float range = pixel_range(leaf, double{leaf_m});
-    const LeafView view = leaf_view(leaf, eye_);
-    choose_mosaics(cluster, view, after);
+    choose_mosaics(cluster, after);
     chosen_.clear();
     for (const Visible& v : visible_) {
       const points::Mosaic& m = *v.mosaic;
@@ -131,7 +137,7 @@ class Selector {
                          static_cast<float>(m.count(0)) / (m.pixel_range() * m.pixel_range()), v.may_face_away});
     }
     if (chosen_.size() > 1) revise_sizes(options_, chosen_);
-    for (const Chosen& c : chosen_) add(cluster, c, 0.5f * leaf_m / range, view.distance);
+    for (const Chosen& c : chosen_) add(cluster, c, 0.5f * leaf_m / range, views_.front().distance);
   }
 
   double distance_sum() const { return distance_sum_; }
@@ -148,11 +154,21 @@ class Selector {
     return static_cast<float>(leaf_m * focal_ / std::max(depth, 0.5 * leaf_m));
   }
 
-  void choose_mosaics(const points::Cluster& cluster, const LeafView& view, Sequence after) {
+  // What faces one eye alone is tested point by point when it is drawn for the other one.
+  Facing facing(const points::Mosaic& m) const {
+    if (!options_.cone_culling) return Facing::kTowards;
+    const Facing first = facing_of(m, views_.front());
+    for (size_t i = 1; i < views_.size(); ++i)
+      if (facing_of(m, views_[i]) != first) return Facing::kMixed;
+    return first;
+  }
+
+  void choose_mosaics(const points::Cluster& cluster, Sequence after) {
     visible_.clear();
+    for (size_t i = 0; i < views_.size(); ++i) views_[i] = leaf_view(cluster.leaf_room, eyes_[i]);
     for (const points::Mosaic& m : cluster.mosaics) {
       if (after.value != 0 && m.sequence() <= after) continue;
-      const Facing facing = options_.cone_culling ? facing_of(m, view) : Facing::kTowards;
+      const Facing facing = this->facing(m);
       if (facing != Facing::kAway) visible_.push_back({&m, facing == Facing::kMixed});
     }
     if (!options_.best_patch_only) return out_.clusters_seen.push_back(cluster.key);
@@ -191,6 +207,8 @@ class Selector {
   const glm::dvec3 backward_, position_;
   const double focal_;
   const PatchView patches_;
+  std::vector<glm::vec3> eyes_;  // that points may face: the camera's, or those of SelectionOptions::eyes
+  std::vector<LeafView> views_;  // of the cluster at hand, from each of them
   PatchChooser chooser_;
   std::vector<Visible> visible_;
   std::vector<const points::Mosaic*> candidates_;
@@ -212,7 +230,7 @@ void select_view(const points::PointModel& model, const geometry::Camera& camera
   out.frames_seen.clear();
   out.points = 0;
   out.scale = options.scale;
-  const geometry::Frustum frustum(camera);
+  const geometry::Frustum frustum(options.eyes ? geometry::enclosing_camera(*options.eyes) : camera);
   Selector selector(camera, options, out);
   for (const SeenBrick& seen : seen_bricks(model, frustum, glm::vec3(camera.pose.position_room))) {
     if (summaries && !options.best_patch_only && selector.add_summary(seen, frustum, *summaries)) continue;

@@ -1,7 +1,9 @@
 // Which points of a model are drawn for a view, at which level and splat size (T4.4.3).
 #pragma once
 
+#include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/geometry/camera.h"
@@ -20,6 +22,9 @@ struct SelectionOptions {
   bool cone_culling = true;
   /// Packing kept redundant patches: the best ones of each cluster are drawn (patch_choice.h).
   bool best_patch_only = false;
+  /// The list is to serve both: what either eye sees is chosen, for splats of the size that the camera asks for, which
+  /// stands between them. They have its orientation and pixels of its size. Nothing: the camera alone.
+  std::optional<std::array<geometry::Camera, 2>> eyes = {};
 };
 
 /// Consecutive points of one mosaic level to draw. Pointers live as long as the model is not changed (or the viewer's

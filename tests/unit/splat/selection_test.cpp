@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <set>
 
+#include "common/geometry/stereo.h"
 #include "common/geometry/trajectory.h"
 #include "common/splat/select/view_selection.h"
 #include "tests/support/splat_scene.h"
@@ -276,9 +277,9 @@ TEST(ViewSelection, PointsThatFaceAwayAreNotDrawn) {
       DrawList list;
       splat::select_view(model, camera, options, list);
       std::vector<uint32_t> colour(size_t(camera.width) * camera.height);
-      const auto stats = splat::CpuSplatter(1).render(
-          list, camera, kernel, image::Shading(image::ShadingParameters{}, camera),
-          {camera.width, camera.height, colour.data(), nullptr});
+      const auto stats =
+          splat::CpuSplatter(1).render(list, camera, kernel, image::Shading(image::ShadingParameters{}, camera),
+                                       {camera.width, camera.height, colour.data(), nullptr});
       return std::pair(double(stats.points_drawn) / double(list.points), colour);
     };
     const auto [all, plain] = drawn(false);
@@ -294,6 +295,42 @@ TEST(ViewSelection, PointsThatFaceAwayAreNotDrawn) {
     }
     EXPECT_GT(covered, 500u);
     EXPECT_LT(differs * 20, covered) << differs << " of " << covered << " pixels";
+  }
+}
+
+// One list for both eyes: each sees what it would see of a list of its own, also where a mosaic faces it alone.
+TEST(Selection, OneListShowsEachEyeWhatItsOwnWould) {
+  const points::PointModel model = sphere_model();
+  for (const auto& [angle, distance] : {std::pair{0.3, 0.45}, {1.7, 0.7}, {4.0, 1.4}}) {
+    const geometry::Camera head = view(angle, distance);
+    const auto eyes = geometry::eye_cameras(head, 0.064, 0.6);
+    SelectionOptions options;
+    options.eyes = eyes;
+    DrawList both;
+    splat::select_view(model, head, options, both);
+    const image::Shading shading = testing::unlit(head);
+    const auto width = size_t(head.width);
+    std::vector<uint32_t> beside(2 * width * size_t(head.height));
+    splat::CpuSplatter(2).render_pair(both, eyes, {splat::Kernel::kDisc, {false, false, false}}, shading,
+                                      {splat::FrameTarget{head.width, head.height, beside.data(), nullptr, 2 * width},
+                                       {head.width, head.height, beside.data() + width, nullptr, 2 * width}});
+    for (size_t i = 0; i < 2; ++i) {
+      DrawList own;
+      splat::select_view(model, eyes[i], {}, own);
+      EXPECT_GT(own.points, 100u);
+      EXPECT_GE(both.points, own.points);
+      testing::Frame frame(head.width, head.height);
+      splat::CpuSplatter(2).render(own, eyes[i], splat::Kernel::kDisc, shading, frame.target());
+      size_t differ = 0, covered = 0;
+      for (int y = 0; y < head.height; ++y)
+        for (int x = 0; x < head.width; ++x) {
+          const uint32_t shown = beside[size_t(y) * 2 * width + i * width + size_t(x)];
+          differ += shown != frame.at(x, y);
+          covered += frame.at(x, y) != 0xff010203u;
+        }
+      EXPECT_GT(covered, 1000u);
+      EXPECT_LE(differ, covered / 200) << "eye " << i << " at " << distance;  // sizes at a rounding's edge
+    }
   }
 }
 
