@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 #include "client/viewer/coupling/coupling.h"
@@ -294,7 +295,13 @@ Status settle_wall(ViewerOptions& o) {
   if (!o.display.wall.described) return ok_status();
   const wall::Wall& all = *o.display.wall.described;
   const wall::Screen& screen = all.screens[size_t(o.wall_tile)];
+  if (const auto& panel = o.display.stereo.panel;
+      panel && (panel->width != screen.width || panel->height != screen.height))
+    return Error{fmt::format("--barrier {}: it is of {} x {} pixels, and screen {} of --wall {} has {} x {}",
+                             o.display.stereo.panel_file, panel->width, panel->height, o.wall_tile, o.wall,
+                             screen.width, screen.height)};
   o.display.width = screen.width, o.display.height = screen.height;
+  o.display.stereo.screen_width_m = screen.width_m;
   if (screen.sampling && o.sampling_size == "auto") {
     std::tie(o.requests.sampling_width, o.requests.sampling_height) = *screen.sampling;
     o.requests.adaptive = false;
@@ -332,6 +339,19 @@ Status settle_head(ViewerOptions& o) {
   return ok_status();
 }
 
+// A panel's pixels are the display's, and the field of view is what it covers of a person's before it.
+Status settle_stereo(ViewerOptions& o) {
+  auto stereo = settle(o.stereo);
+  if (!stereo) return stereo.error();
+  o.display.stereo = std::move(*stereo);
+  if (!o.display.stereo.panel) return ok_status();
+  const stereo::Panel& panel = *o.display.stereo.panel;
+  o.size = fmt::format("{}x{}", panel.width, panel.height);
+  o.display.width = panel.width, o.display.height = panel.height;
+  o.display.fov_deg = 2 * std::atan(0.5 * panel.width_m() / panel.distance_m) * 180 / 3.14159265358979323846;
+  return ok_status();
+}
+
 Status settle_shading(ViewerOptions& o) {
   const auto background = image::parse_background(o.background);
   if (!background) return Error{fmt::format("--background {}: {}", o.background, background.error().text)};
@@ -353,7 +373,8 @@ Status settle_coupling(ViewerOptions& o) {
 }  // namespace
 
 Table view_table(ViewerOptions& o) {
-  const Table seen = joined(joined(sampling_table(o), head_table(o)), drawing_table(o));
+  const Table looks = joined(drawing_table(o), stereo_table(o.stereo));
+  const Table seen = joined(joined(sampling_table(o), head_table(o)), looks);
   return joined(seen, joined(coupling_table(o), record_table(o)));
 }
 
@@ -388,6 +409,7 @@ Status settle(ViewerOptions& o) {
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
   o.requests.adaptive = o.sampling_size == "auto";
+  if (const Status s = settle_stereo(o); !s) return s;
   if (const Status s = settle_head(o); !s) return s;
   if (const Status s = settle_coupling(o); !s) return s;
   o.display.render.kernel = *splat::kernel_named(o.splat);

@@ -10,6 +10,7 @@
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/size_text.h"
 #include "client/viewer/input/head_movement.h"
+#include "client/viewer/stereo_flags.h"
 #include "common/net/service.h"
 #include "common/options/table.h"
 
@@ -33,6 +34,7 @@ struct ViewerOptions {
   std::string background = "#141820";  ///< "#rrggbb", a name, or "transparent"
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
   std::string still_samples = "16";
+  StereoFlags stereo;        ///< display.stereo comes of it
   int buffers = 3;           ///< of loose coupling
   std::string wall;          ///< "CxR", or a description's file: this display is a part of a wall; empty: it is none
   int wall_tile = 0;         ///< which tile, by rows from the upper left, or which of the file's screens

@@ -70,6 +70,12 @@ Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net
   if (!opened) return opened.error();
   o.display.width = (*opened)->width();
   o.display.height = (*opened)->height();
+  if (const auto& panel = o.display.stereo.panel;
+      panel && (panel->width != o.display.width || panel->height != o.display.height))
+    tell(
+        fmt::format("the window has {}x{} pixels and the autostereo display of --barrier {}x{}: it must fill that "
+                    "display pixel by pixel (--fullscreen)",
+                    o.display.width, o.display.height, panel->width, panel->height));
   return std::unique_ptr<DisplaySurface>(std::move(*opened));
 }
 
@@ -118,6 +124,10 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
                                          {"target_fps", fmt::format("{}", d.target_fps)},
                                          {"update_rate", fmt::format("{}", r.max_rate_hz)},
                                          {"splat_scale", fmt::format("{}", scale)}};
+  if (d.stereo.on()) {
+    out["stereo"] = stereo::name_of(d.stereo.mode);
+    out["eye_separation_m"] = fmt::format("{}", d.stereo.eye_separation_m);
+  }
   add_trajectory(out, o);
   if (!o.service.link.empty()) out["link"] = o.service.link;
   if (const std::string device = renderers.device(); !device.empty()) out["gpu"] = device;

@@ -204,6 +204,7 @@ ordered_json what_was_shown(const std::vector<Process>& processes, const Roster&
           {"splat", viewer("splat")},
           {"finish", viewer("finish")},
           {"shading", viewer("shading")},
+          {"stereo", viewer("stereo")},
           {"size", size("width", "height")},
           {"sampling_size", size("sampling_width", "sampling_height")},
           {"sampling", viewer("sampling")},

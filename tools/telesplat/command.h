@@ -44,6 +44,7 @@ Command tune_command();
 Command bench_command();
 Command cache_command();
 Command presets_command();
+Command autostereo_command();
 Command top_command();
 
 /// `commands`, and two more that tell of all of them: completion and man.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <thread>
 
+#include "client/viewer/display/eyes/eye_pictures.h"
 #include "client/viewer/hands/errands.h"
 #include "client/viewer/render/fit_view.h"
 #include "common/core/clock.h"
@@ -60,6 +61,7 @@ class Display {
         find_spool_(spool),
         make_source_(make_source),
         wall_(wall),
+        eyes_(o.stereo),
         look_(first_look(o.render, o.shading)),
         stall_(o.most_wait_s) {}
 
@@ -108,6 +110,18 @@ class Display {
     return surface_.begin_frame(now_s, t_s, look_);
   }
 
+  // What samplers are to be asked for: what the camera sees, or its eyes.
+  geometry::Camera asked(double now_s, double t_s, const geometry::Camera& camera, const geometry::Pose& head) {
+    return eyes_.begin(now_s, camera, head.orientation, t_s, scene_.box_room);
+  }
+
+  DrawnFrame draw(const FrameInput& input) {
+    if (eyes_.on()) return eyes_.draw(*source_, input, spool_ != nullptr, view_);
+    // A view that may be recorded has room for depth all the time: growing it costs milliseconds.
+    fit(view_, input.camera, spool_ != nullptr);
+    return source_->draw(input, view_);
+  }
+
   // Until it is known what there is to show.
   bool wait_for_scene() {
     for (; !worker_.received_at({}) || worker_.shown_scene().box_room.empty();
@@ -132,12 +146,9 @@ class Display {
       if (!draw_from(newest_drawn())) return false;
       const double now_s = monotonic_s();
       const geometry::Camera camera = next_camera(now_s, -1);
-      worker_.on_pose(now_s, camera);
-      // A view that may be recorded has room for depth all the time: growing it costs milliseconds.
-      fit(view_, camera, spool_ != nullptr);
-      const DrawnFrame drawn = source_->draw(
-          {.begin_s = now_s, .camera = camera, .look = look_, .resting = true, .even_empty = surface_.visible()},
-          view_);
+      worker_.on_pose(now_s, asked(now_s, -1, camera, surface_.head()));
+      const DrawnFrame drawn =
+          draw({.begin_s = now_s, .camera = camera, .look = look_, .resting = true, .even_empty = surface_.visible()});
       if (drawn.empty && !surface_.visible()) continue;
       surface_.present(view_, true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
@@ -177,7 +188,8 @@ class Display {
       const bool draws = stall_.waiting(now_s, begin_s, last_sign_s, coupling);
       tell_stall(now_s);
       if (draws) return {now_s - begin_s, coupling};
-      worker_.on_pose(now_s, next_camera(now_s, t_s));
+      const geometry::Camera camera = next_camera(now_s, t_s);
+      worker_.on_pose(now_s, asked(now_s, t_s, camera, surface_.head()));
       if (view_intact_ && surface_.visible()) surface_.present(view_, true);
     }
   }
@@ -255,23 +267,25 @@ class Display {
     see_whether_last(t_s);
     // The view of now, from what is cached now.
     begin_view(t_s, m);
+    const geometry::Camera sampled = asked(m.begin_s, t_s, m.camera, m.head);
     m.look = look_;
     const uint32_t use = use_of_frame(t_s);
     const bool with_depth = use & (kVerify | kExr);
-    const bool intact = view_intact_ && view_.width == m.camera.width && view_.height == m.camera.height;
-    fit(view_, m.camera, spool_ != nullptr);
+    const bool same_size = view_.width == m.camera.width && view_.height == m.camera.height;
+    const bool intact = view_intact_ && (same_size || eyes_.on());
     const bool wished = surface_.wants_picture();
     const bool coverage = o_.transparent && ((use & kPicture) || wished);
-    m.drawn = source_->draw({.begin_s = m.begin_s,
-                             .camera = m.camera,
-                             .look = m.look,
-                             .with_depth = with_depth,
-                             .with_coverage = coverage,
-                             .intact = intact},
-                            view_);
+    m.drawn = draw({.begin_s = m.begin_s,
+                    .camera = m.camera,
+                    .look = m.look,
+                    .with_depth = with_depth,
+                    .with_coverage = coverage,
+                    .intact = intact});
     m.end_s = monotonic_s();
-    worker_.on_frame(m.end_s, m.camera, m.drawn.epoch, m.drawn.update, waited.for_update);
-    const auto legend = o_.legend ? worker_.legend_at(m.drawn.epoch) : nullptr;
+    if (eyes_.on()) m.stereo = {o_.stereo.mode, eyes_.pair()};
+    worker_.on_frame(m.end_s, sampled, m.drawn.epoch, m.drawn.update, waited.for_update);
+    // A flat legend would lie in one eye's picture, or be torn by the other's.
+    const auto legend = o_.legend && !eyes_.on() ? worker_.legend_at(m.drawn.epoch) : nullptr;
     surface_.on_legend(legend);
     const WallPace::Swapped swapped = wall_ ? swap_with_wall() : WallPace::Swapped{};
     surface_.present(view_, m.drawn.changed);
@@ -318,7 +332,10 @@ class Display {
   // What others ask of this viewer, of the frame that was just displayed.
   void carry_out_orders(const geometry::Camera& camera, EpochId epoch) {
     surface_.on_terms(worker_.terms());
-    if (const auto at = surface_.points_at()) surface_.on_pick(source_->pick(camera, at->x, at->y, kPickOpacity));
+    if (const auto at = surface_.points_at()) {
+      const auto aim = eyes_.aim(camera, *at);
+      surface_.on_pick(source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, kPickOpacity));
+    }
     for (const wire::Order& order : worker_.orders().take_orders()) {
       const auto done = carry_out(
           order, {.camera = camera,
@@ -364,9 +381,17 @@ class Display {
     view_intact_ = use == 0;
     if (!use) return;
     if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
-    const auto& camera = m.camera;
-    view_ = spool_->exchange({m.number, t_s, use, camera, std::move(view_), m.drawn.epoch, legend,
-                              part_of_wall(camera.width, camera.height, o_.wall)});
+    geometry::Camera camera = m.camera;
+    camera.width = view_.width, camera.height = view_.height;
+    SpooledFrame frame{m.number, t_s,           use,    camera,
+                       {},       m.drawn.epoch, legend, part_of_wall(camera.width, camera.height, o_.wall)};
+    if (eyes_.on()) {
+      if (use & kVerify) eyes_.keep(*spool_, frame);
+      frame.use &= ~uint32_t{kVerify};
+      if (!frame.use) return;
+    }
+    frame.view = std::move(view_);
+    view_ = spool_->exchange(std::move(frame));
   }
 
   // Frames are due at equal distances: one that began late, because sleep ended late, does not delay those after it.
@@ -387,6 +412,7 @@ class Display {
   const SourceMaker& make_source_;
   WallPace* const wall_;  // null: the display is by itself
   std::optional<MeasuredFrame> row_;
+  EyePictures eyes_;
   Look look_;
   ShownScene scene_;  // as the surface knows it, and the session too
   std::shared_ptr<const wire::Welcome> session_;

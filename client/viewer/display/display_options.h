@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "client/viewer/coupling/stall_watch.h"
+#include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/display/wall.h"
 #include "common/image/shading.h"
 #include "common/splat/render_options.h"
@@ -15,6 +16,7 @@ struct DisplayOptions {
   int width = 1280, height = 800;      ///< of a window: at first
   double fov_deg = 90, near_m = 0.02;  ///< the field of view is that of the whole wall
   WallTile wall;
+  StereoOptions stereo;       ///< two eyes; the field of view is that of each eye's picture
   double target_fps = 60;     ///< frames are paced to this; 0: as fast as possible
   int threads = 1;            ///< that the renderer's stage times are summed over
   bool detail_budget = true;  ///< lower detail where a view takes longer to construct than target_fps leaves time for

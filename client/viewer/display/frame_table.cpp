@@ -15,6 +15,10 @@ double angle_deg(const glm::dquat& a, const glm::dquat& b) {
 }
 
 const glm::dvec3& position(F f) { return f.camera.pose.position_room; }
+// Of the left eye (0) or the right one; of one picture for both the camera's.
+const glm::dvec3& eye(F f, size_t i) {
+  return f.stereo.mode == stereo::Mode::kOff ? position(f) : f.stereo.pair.eyes[i].pose.position_room;
+}
 const glm::dquat& orientation(F f) { return f.camera.pose.orientation; }
 
 constexpr metrics::Column<MeasuredFrame> kColumns[] = {
@@ -66,6 +70,14 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"wall_frame", [](F f) { return double(f.wall_frame); }},
     {"swap_wait_ms", [](F f) { return f.swap_wait_s * 1e3; }},
     {"swap_skew_ms", [](F f) { return f.swap_skew_s < 0 ? -1.0 : f.swap_skew_s * 1e3; }},
+    {"stereo", [](F f) { return double(f.stereo.mode); }},
+    {"screen_m", [](F f) { return f.stereo.pair.screen_m; }},
+    {"left_x", [](F f) { return eye(f, 0).x; }},
+    {"left_y", [](F f) { return eye(f, 0).y; }},
+    {"left_z", [](F f) { return eye(f, 0).z; }},
+    {"right_x", [](F f) { return eye(f, 1).x; }},
+    {"right_y", [](F f) { return eye(f, 1).y; }},
+    {"right_z", [](F f) { return eye(f, 1).z; }},
 };
 
 }  // namespace

@@ -5,9 +5,17 @@
 #include <vector>
 
 #include "client/viewer/coupling/coupling.h"
+#include "client/viewer/display/eyes/eye_pair.h"
 #include "client/viewer/display/view_source.h"
+#include "common/stereo/mode.h"
 
 namespace telesplat::viewer {
+
+/// Of a frame that two eyes see.
+struct MeasuredEyes {
+  stereo::Mode mode = stereo::Mode::kOff;
+  EyePair pair;
+};
 
 /// A displayed frame as it was measured. Times are those of the monotonic clock.
 struct MeasuredFrame {
@@ -27,6 +35,7 @@ struct MeasuredFrame {
   uint64_t wall_frame = 0;   ///< its number among the wall's; 0: it is none, or none told when to present it
   double swap_wait_s = 0;    ///< from its end until the wall's frames were due
   double swap_skew_s = -1;   ///< from the first of the wall's displays to present it to the last; < 0: not known
+  MeasuredEyes stereo{};
 };
 
 std::vector<std::string> frame_columns();

@@ -1,11 +1,13 @@
 // What the display draws: points of the model, or frames of a volume. The display loop does not know which.
 #pragma once
 
+#include <array>
 #include <memory>
 
 #include "client/viewer/coupling/shown_update.h"
 #include "client/viewer/display/display_surface.h"
 #include "client/viewer/hands/pick.h"
+#include "common/splat/cpu_splatter.h"
 
 namespace telesplat::viewer {
 
@@ -25,7 +27,8 @@ struct DrawnFrame {
   bool empty = true;    ///< there was nothing of the scene to draw
   bool changed = true;  ///< false: the view is as FrameInput::intact found it
   double chosen_s = 0;  ///< monotonic clock: what to draw was chosen
-  double prepare_ms = 0, project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0, antialias_cpu_ms = 0;
+  double prepare_ms = 0, project_cpu_ms = 0, resolve_cpu_ms = 0, fill_cpu_ms = 0, smooth_cpu_ms = 0,
+         antialias_cpu_ms = 0;
   uint64_t selected = 0, drawn = 0, items = 0, cached = 0, sequence = 0;
   uint64_t summaries = 0;  ///< of bricks, that had been made by then
   double detail = 1, budget_ms = 0;
@@ -43,6 +46,12 @@ class ViewSource {
   virtual void advance(RequestId request) = 0;
   /// Draws the view of input.camera, into `view`, which has its size.
   virtual DrawnFrame draw(const FrameInput& input, image::View& view) = 0;
+  /// Draws what both eyes see, of one choice. input.camera stands between them (eye_pair.h). Targets have room for
+  /// depth where input asks for it; their rows follow each other unless draws_into_parts().
+  virtual DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
+                               const std::array<splat::FrameTarget, 2>& targets) = 0;
+  /// Whether it can draw pairs into parts of pictures, without coverage.
+  virtual bool draws_into_parts() const { return false; }
   /// What lies at a pixel of the view of this camera; opacity: how much of what lies behind the place must be hidden by
   /// it and what is in front of it, of volumes. Nothing: there is nothing.
   virtual std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) = 0;

@@ -61,14 +61,20 @@ image::DisplayPart part_of_wall(int width, int height, const WallTile& wall) {
 }
 
 geometry::Camera display_camera(const DisplayOptions& o, const geometry::Pose& head) {
-  if (o.wall.described) return wall::screen_camera(*o.wall.described, o.wall.tile, head, o.near_m);
-  return tile_of(geometry::make_camera(head, o.fov_deg, o.width * o.wall.columns, o.height * o.wall.rows, o.near_m),
+  const stereo::Size eye = o.stereo.eye_size(o.width, o.height);
+  if (o.wall.described) {
+    geometry::Camera camera = wall::screen_camera(*o.wall.described, o.wall.tile, head, o.near_m);
+    camera.width = eye.width, camera.height = eye.height;
+    return camera;
+  }
+  return tile_of(geometry::make_camera(head, o.fov_deg, eye.width * o.wall.columns, eye.height * o.wall.rows, o.near_m),
                  o.wall);
 }
 
 geometry::Camera fitting_camera(const DisplayOptions& o) {
   if (o.wall.described) return wall::fitting_frustum(*o.wall.described, o.near_m);
-  return geometry::make_camera({}, o.fov_deg, o.width * o.wall.columns, o.height * o.wall.rows, o.near_m);
+  const stereo::Size eye = o.stereo.eye_size(o.width, o.height);
+  return geometry::make_camera({}, o.fov_deg, eye.width * o.wall.columns, eye.height * o.wall.rows, o.near_m);
 }
 
 }  // namespace telesplat::viewer

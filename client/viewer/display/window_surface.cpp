@@ -126,7 +126,8 @@ WindowSurface::~WindowSurface() {
 geometry::Camera WindowSurface::whole(const geometry::Pose& pose) const {
   const auto& o = options_.display;
   if (o.wall.described) return wall::fitting_frustum(*o.wall.described, o.near_m);
-  return window_camera(pose, o.fov_deg, window_->width() * o.wall.columns, window_->height() * o.wall.rows, o.near_m);
+  const stereo::Size eye = o.stereo.eye_size(window_->width(), window_->height());
+  return window_camera(pose, o.fov_deg, eye.width * o.wall.columns, eye.height * o.wall.rows, o.near_m);
 }
 
 void WindowSurface::on_scene(const ShownScene& scene) {

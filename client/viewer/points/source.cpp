@@ -42,17 +42,18 @@ PointSource::PointSource(const DisplayOptions& options, std::unique_ptr<Renderer
       supersampler_(*renderer_, still_side(options)) {}
 
 // Splats that soften their edges let the background through; which is known from drawing the same over another one.
-void PointSource::find_coverage(const FrameInput& input, image::View& view) {
+void PointSource::find_coverage(const FrameInput& input, const geometry::Camera& camera, image::View& view) {
   auto shading = options_.shading;
   shading.background = 0xffffff;
   over_white_.width = view.width, over_white_.height = view.height;
   over_white_.colour.resize(view.colour.size());
-  renderer_->render(list_, input.camera, input.look.render, image::Shading(shading, input.camera),
+  renderer_->render(list_, camera, input.look.render, image::Shading(shading, camera),
                     {view.width, view.height, over_white_.colour.data(), nullptr});
   image::find_coverage(over_white_, view);
 }
 
-bool PointSource::stands_still(const FrameInput& input) {
+// For how many frames camera, look and clips have been the same.
+void PointSource::count_same(const FrameInput& input) {
   const uint64_t clipped_before = clip_version_;
   clip_ = received_.clip(clip_version_);
   const bool same =
@@ -60,6 +61,18 @@ bool PointSource::stands_still(const FrameInput& input) {
   same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
   camera_ = input.camera;
   look_ = input.look;
+}
+
+void PointSource::find_coverage(const FrameInput& input, const geometry::Camera& camera,
+                                const splat::FrameTarget& target) {
+  const size_t pixels = size_t(target.width) * size_t(target.height);
+  image::View view{target.width, target.height, {target.colour, target.colour + pixels}, {}};
+  find_coverage(input, camera, view);
+  std::copy(view.colour.begin(), view.colour.end(), target.colour);
+}
+
+bool PointSource::stands_still(const FrameInput& input) {
+  count_same(input);
   const bool refines = options_.still_samples > 1 && input.look.render.finish.antialias && !options_.transparent;
   if (!refines || same_frames_ < kStillFrames) {
     still_shading_.reset();
@@ -86,9 +99,13 @@ void PointSource::select(const FrameInput& input, double detail, DrawnFrame& out
 
 void PointSource::draw_list(const FrameInput& input, const image::Shading& shading, image::View& view,
                             DrawnFrame& out) {
-  const splat::SplatStats stats = renderer_->render(
-      list_, input.camera, input.look.render, shading,
-      {view.width, view.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr});
+  note_stats(renderer_->render(
+                 list_, input.camera, input.look.render, shading,
+                 {view.width, view.height, view.colour.data(), input.with_depth ? view.depth_m.data() : nullptr}),
+             out);
+}
+
+void PointSource::note_stats(const splat::SplatStats& stats, DrawnFrame& out) {
   out.prepare_ms = stats.prepare_ms;
   out.project_cpu_ms = stats.project_ms;
   out.resolve_cpu_ms = stats.resolve_ms;
@@ -98,20 +115,27 @@ void PointSource::draw_list(const FrameInput& input, const image::Shading& shadi
   drawn_ = stats.points_drawn;
 }
 
-void PointSource::draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out) {
+double PointSource::wanted_detail(const FrameInput& input) {
   if (!input.resting && options_.speed_detail)
     speed_.frame(input.begin_s, input.camera, list_.distance_m > 0 ? list_.distance_m : 1);
-  const double detail = std::min(budget_.detail(), speed_.detail());
-  select(input, input.resting ? 1.0 : detail, out);
-  if (list_.points > 0 || input.even_empty) draw_list(input, image::Shading(options_.shading, input.camera), view, out);
-  if (input.resting) return;
-  // What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
+  return std::min(budget_.detail(), speed_.detail());
+}
+
+// What this frame cost by itself: that samplers held a core for a while is no reason for a coarser picture.
+void PointSource::measure(const FrameInput& input, double detail, const DrawnFrame& out) {
   const double end_s = monotonic_s();
   const double threads_ms =
       out.project_cpu_ms + out.resolve_cpu_ms + out.fill_cpu_ms + out.smooth_cpu_ms + out.antialias_cpu_ms;
   const double work_ms = out.prepare_ms + threads_ms / std::max(options_.threads, 1);
   budget_.frame_done((out.chosen_s - input.begin_s) * 1e3, std::min((end_s - out.chosen_s) * 1e3, work_ms),
                      double(list_.points), detail);
+}
+
+void PointSource::draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out) {
+  const double detail = wanted_detail(input);
+  select(input, input.resting ? 1.0 : detail, out);
+  if (list_.points > 0 || input.even_empty) draw_list(input, image::Shading(options_.shading, input.camera), view, out);
+  if (!input.resting) measure(input, detail, out);
 }
 
 void PointSource::draw_still(const FrameInput& input, image::View& view, DrawnFrame& out) {
@@ -177,23 +201,64 @@ void PointSource::add_figures(DrawnFrame& out) const {
   out.epoch = list_.epoch;
 }
 
-DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
+// Before anything is drawn: what comes meanwhile may not be in the picture.
+DrawnFrame PointSource::begin_frame(const FrameInput& input) {
   auto& o = options_;
   put_into(input.look, o.shading);
   o.selection.scale = o.splat_scale > 0 ? o.splat_scale : splat::suitable_scale(input.look.render.kernel);
   o.selection.best_patch_only = received_.keeps_redundant();
+  o.selection.eyes.reset();
   DrawnFrame out;
-  out.update = received_.shown();  // before it is drawn: what comes meanwhile may not be in the picture
+  out.update = received_.shown();
   received_.cache().take_changes(changes_);
+  return out;
+}
+
+void PointSource::end_frame(DrawnFrame& out) {
+  received_.cache().end_frame();
+  add_figures(out);
+}
+
+DrawnFrame PointSource::draw(const FrameInput& input, image::View& view) {
+  DrawnFrame out = begin_frame(input);
   ray_changes_.clear();
   received_.fine_rays().take_changes(input.camera, ray_changes_);
   if (stands_still(input))
     draw_still(input, view, out);
   else
     draw_moving(input, view, out);
-  if (input.with_coverage) find_coverage(input, view);
-  received_.cache().end_frame();
-  add_figures(out);
+  if (input.with_coverage) find_coverage(input, input.camera, view);
+  end_frame(out);
+  return out;
+}
+
+// A pair of a head that stands still is drawn with all detail, and again only where something has changed.
+DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
+                                  const std::array<splat::FrameTarget, 2>& targets) {
+  DrawnFrame out = begin_frame(input);
+  options_.selection.eyes = eyes;
+  count_same(input);
+  const bool still = same_frames_ >= kStillFrames;
+  if (still && pair_sharp_ && input.intact && !changes_.any && !input.with_depth && !input.with_coverage) {
+    out.changed = false;
+    out.chosen_s = input.begin_s;
+    if (input.begin_s - seen_s_ >= kSeenPeriod_s) {
+      seen_s_ = input.begin_s;
+      received_.on_seen(list_.clusters_seen, list_.frames_seen);
+    }
+    end_frame(out);
+    return out;
+  }
+  const double allowed = wanted_detail(input), detail = still || input.resting ? 1 : allowed;
+  select(input, detail, out);
+  pair_sharp_ = still;
+  if (list_.points > 0 || input.even_empty) {
+    const image::Shading shading(options_.shading, input.camera);  // both look the same way
+    note_stats(renderer_->render_pair(list_, eyes, input.look.render, shading, targets), out);
+    for (size_t i = 0; i < eyes.size() && input.with_coverage; ++i) find_coverage(input, eyes[i], targets[i]);
+  }
+  if (!input.resting && !still) measure(input, detail, out);
+  end_frame(out);
   return out;
 }
 

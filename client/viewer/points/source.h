@@ -19,17 +19,28 @@ class PointSource final : public ViewSource {
   void advance(RequestId request) override { received_.advance(request); }
   std::optional<Pick> pick(const geometry::Camera& camera, double x_pix, double y_pix, double opacity) override;
   DrawnFrame draw(const FrameInput& input, image::View& view) override;
+  /// Without sub-pixels.
+  DrawnFrame draw_pair(const FrameInput& input, const std::array<geometry::Camera, 2>& eyes,
+                       const std::array<splat::FrameTarget, 2>& targets) override;
+  bool draws_into_parts() const override { return true; }
   const char* drawn_name() const override { return "points"; }
   const char* cached_name() const override { return ""; }
 
  private:
+  DrawnFrame begin_frame(const FrameInput& input);
+  void end_frame(DrawnFrame& out);
   bool stands_still(const FrameInput& input);
+  void count_same(const FrameInput& input);
+  double wanted_detail(const FrameInput& input);
+  void measure(const FrameInput& input, double detail, const DrawnFrame& out);
   void select(const FrameInput& input, double detail, DrawnFrame& out);
   void draw_list(const FrameInput& input, const image::Shading& shading, image::View& view, DrawnFrame& out);
+  void note_stats(const splat::SplatStats& stats, DrawnFrame& out);
   void draw_moving(const FrameInput& input, image::View& view, DrawnFrame& out);
   void draw_still(const FrameInput& input, image::View& view, DrawnFrame& out);
   void refine(const FrameInput& input, image::View& view, DrawnFrame& out);
-  void find_coverage(const FrameInput& input, image::View& view);
+  void find_coverage(const FrameInput& input, const geometry::Camera& camera, image::View& view);
+  void find_coverage(const FrameInput& input, const geometry::Camera& camera, const splat::FrameTarget& target);
   void add_figures(DrawnFrame& out) const;
 
   DisplayOptions options_;
@@ -54,6 +65,7 @@ class PointSource final : public ViewSource {
   std::optional<image::Shading> still_shading_;  // none: no still picture has begun
   bool base_stale_ = true;  // the picture without sub-pixels, wherever the view shows it, is not of the model as it is
   double tile_s_ = 0, saved_s_ = 0, seen_s_ = 0;
+  bool pair_sharp_ = false;  // the pair on display was drawn with all detail
 };
 
 }  // namespace telesplat::viewer

@@ -16,13 +16,14 @@ namespace fs = std::filesystem;
 
 // A spool file: this header, then colour (u32) and depth (f32) of width x height pixels, then the legend's text.
 struct FileHeader {
-  char magic[8] = {'T', 'S', 'F', 'R', 'A', 'M', 'E', '3'};
+  char magic[8] = {'T', 'S', 'F', 'R', 'A', 'M', 'E', '4'};
   uint64_t number = 0, epoch = 0;
   double t_s = 0;
   double camera[12] = {};
   int32_t width = 0, height = 0;
   uint32_t use = 0, has_depth = 0;
   int32_t part[4] = {};
+  uint32_t eye = 0, unused = 0;
   uint64_t legend_bytes = 0;
 };
 
@@ -43,11 +44,13 @@ bool write_frame(const std::string& directory, const SpooledFrame& f) {
   h.height = c.height;
   h.use = f.use;
   h.has_depth = !f.view.depth_m.empty();
+  h.eye = f.eye;
   const int32_t part[4] = {f.part.width, f.part.height, f.part.x, f.part.y};
   std::copy(part, part + 4, h.part);
   const std::string legend = f.legend ? image::to_text(*f.legend) : "";
   h.legend_bytes = legend.size();
-  const std::string path = fmt::format("{}/{:08d}.frame", directory, f.number);
+  constexpr const char* kEyes[] = {"", "-left", "-right"};
+  const std::string path = fmt::format("{}/{:08d}{}.frame", directory, f.number, kEyes[f.eye]);
   const FilePtr out = open_file(path + ".part", "wb");
   if (!out) return false;
   bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
@@ -167,7 +170,8 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
   if (h.magic[7] != FileHeader{}.magic[7])
     return Error{fmt::format("{}: is a recorded frame of version {:?} instead of {:?}", path, h.magic[7],
                              FileHeader{}.magic[7])};
-  SpooledFrame f{h.number, h.t_s, h.use, {}, {}, {h.epoch}, {}, {}};
+  if (h.eye > 2) return Error{fmt::format("{}: is of eye {}, limits are 0 and 2", path, h.eye)};
+  SpooledFrame f{h.number, h.t_s, h.use, {}, {}, {h.epoch}, {}, {}, h.eye};
   const double* c = h.camera;
   f.camera = {
       {{c[0], c[1], c[2]}, glm::dquat(c[3], c[4], c[5], c[6])}, c[7], c[8], c[9], c[10], c[11], h.width, h.height};

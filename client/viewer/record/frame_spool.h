@@ -38,13 +38,14 @@ struct SpooledFrame {
   /// Drawn onto the pictures alone: what is verified stays as it was displayed. Null: none.
   std::shared_ptr<const image::Legend> legend;
   image::DisplayPart part;  ///< of a legend: what the frame is of the display
+  uint32_t eye = 0;         ///< 1: the left eye's picture, 2: the right one's, 0: all of the display
 };
 
 class FrameSpool {
  public:
   /// Spools into `directory` (made if need be); at most `max_waiting` frames wait to be written, more are dropped and
   /// counted.
-  static Result<std::unique_ptr<FrameSpool>> open(const std::string& directory, size_t max_waiting = 4);
+  static Result<std::unique_ptr<FrameSpool>> open(const std::string& directory, size_t max_waiting = 8);
   ~FrameSpool();
 
   /// Takes the frame; hands back a view of the same size to draw the next one into.
@@ -58,7 +59,7 @@ class FrameSpool {
   void write_loop();
 
   std::string directory_;
-  size_t max_waiting_ = 4;
+  size_t max_waiting_ = 8;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<SpooledFrame> waiting_;

@@ -5,6 +5,24 @@
 
 namespace telesplat::viewer {
 
+splat::SplatStats Renderer::render_pair(const splat::DrawList& list, const std::array<geometry::Camera, 2>& cameras,
+                                        const splat::RenderOptions& options, const image::Shading& shading,
+                                        const std::array<splat::FrameTarget, 2>& targets) {
+  splat::SplatStats sum;
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    const splat::SplatStats one = render(list, cameras[i], options, shading, targets[i]);
+    sum.points_projected += one.points_projected;
+    sum.points_drawn += one.points_drawn;
+    sum.prepare_ms += one.prepare_ms;
+    sum.project_ms += one.project_ms;
+    sum.resolve_ms += one.resolve_ms;
+    sum.fill_ms += one.fill_ms;
+    sum.smooth_ms += one.smooth_ms;
+    sum.antialias_ms += one.antialias_ms;
+  }
+  return sum;
+}
+
 Result<std::unique_ptr<Renderer>> make_gl_renderer() {
   auto made = GlRenderer::make();
   if (!made) return made.error();

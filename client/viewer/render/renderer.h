@@ -1,6 +1,7 @@
 // The one interface of both display renderers.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 
@@ -23,6 +24,10 @@ class Renderer {
   virtual splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera,
                                    const splat::RenderOptions& options, const image::Shading& shading,
                                    const splat::FrameTarget& target) = 0;
+  /// Two views of one list (CpuSplatter::render_pair). Counts and times are those of both; points_drawn too.
+  virtual splat::SplatStats render_pair(const splat::DrawList& list, const std::array<geometry::Camera, 2>& cameras,
+                                        const splat::RenderOptions& options, const image::Shading& shading,
+                                        const std::array<splat::FrameTarget, 2>& targets);
   /// Without any finish.
   splat::SplatStats render(const splat::DrawList& list, const geometry::Camera& camera, splat::Kernel kernel,
                            const image::Shading& shading, const splat::FrameTarget& target) {

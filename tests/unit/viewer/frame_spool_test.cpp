@@ -159,7 +159,7 @@ TEST_F(Spool, FramesOfAnEarlierVersionAreNamed) {
   const auto back = read_spooled_frame(path);
   ASSERT_FALSE(back.ok());
   EXPECT_NE(back.error().text.find(path), std::string::npos);
-  EXPECT_NE(back.error().text.find("version '1' instead of '3'"), std::string::npos) << back.error().text;
+  EXPECT_NE(back.error().text.find("version '1' instead of '4'"), std::string::npos) << back.error().text;
 }
 
 TEST(ParseSize, TakesWidthAndHeightWithinLimits) {

@@ -22,10 +22,11 @@ Result<Screen> Screen::open(const std::string& directory, int width, int height,
   for (auto& run : *runs) {
     Tile& tile = out.tiles_.emplace_back();
     tile.run = std::make_unique<RecordedRun>(std::move(run));
+    if (tile.run->stereo.on()) tile.rig = std::make_unique<viewer::EyeRig>(tile.run->stereo);
   }
   if (const Status s = out.choose_size(width, height, size_flag); !s) return s.error();
   if (const Status s = out.open_replays(threads); !s) return s.error();
-  if (out.run().legend) {
+  if (out.run().legend && !out.run().stereo.on()) {
     auto legends = EpochLegends::read(directory);
     if (!legends) return legends.error();
     out.legends_ = std::move(*legends);
@@ -53,6 +54,9 @@ Status Screen::choose_size(int width, int height, const char* size_flag) {
   const RecordedRun& first = run();
   if (first.wall.described) return choose_size_of_description(width, height, size_flag);
   const int columns = first.wall.columns, rows = first.wall.rows;
+  if (first.stereo.panel && width && (width != first.width || height != first.height))
+    return Error{fmt::format("{} {}x{}: pictures for an autostereo display have its pixels, {}x{}", size_flag, width,
+                             height, first.width, first.height)};
   width_ = width ? width : first.width * columns;
   height_ = height ? height : first.height * rows;
   if (width_ % columns || height_ % rows)
@@ -119,9 +123,23 @@ Result<bool> Screen::draw(Tile& tile) {
   const geometry::Camera camera = run.camera_at(frame.head, place.width, place.height);
   if (const Status s = geometry::validate(camera); !s)
     return Error{fmt::format("frame {}: {}", frame.number, s.error().text)};
-  const auto there = tile.replay->draw(frame, camera, tile.view);
+  const auto there = tile.rig ? draw_pair(tile, frame, camera) : tile.replay->draw(frame, camera, tile.view);
   if (there && *there) tile.drawn = true;
   return there;
+}
+
+// Composed pictures may be a row or a column smaller than the display, whose sides may be odd.
+Result<bool> Screen::draw_pair(Tile& tile, const DisplayedFrame& frame, const geometry::Camera& camera) {
+  const viewer::EyePair pair = viewer::recorded_eyes(tile.run->stereo, camera, frame.screen_m, frame.eyes_room);
+  const auto there = tile.replay->draw_pair(frame, pair, tile.eyes);
+  if (!there || !*there) return there;
+  tile.rig->compose(pair, tile.eyes, false, tile.view);
+  const int width = width_ / tile.run->wall.columns, height = height_ / tile.run->wall.rows;
+  if (tile.view.width == width && tile.view.height == height) return true;
+  image::Canvas canvas(width, height, 0xff000000u);
+  canvas.place(tile.view, 0, 0);
+  tile.view = canvas.view();
+  return true;
 }
 
 void Screen::compose() {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "client/viewer/display/eyes/eye_rig.h"
 #include "tools/telesplat/record/epoch_legends.h"
 #include "tools/telesplat/record/frame_replay.h"
 
@@ -43,12 +44,15 @@ class Screen {
     size_t frame = 0;    // on screen
     bool drawn = false;  // view shows it
     image::View view;
+    std::unique_ptr<viewer::EyeRig> rig;  // two eyes saw it; else null
+    std::array<image::View, 2> eyes;
   };
   Status choose_size(int width, int height, const char* size_flag);
   Status choose_size_of_description(int width, int height, const char* size_flag);
   Status open_replays(int threads);
   void find_times();
   Result<bool> draw(Tile& tile);
+  Result<bool> draw_pair(Tile& tile, const DisplayedFrame& frame, const geometry::Camera& camera);
   void compose();
 
   std::vector<Tile> tiles_;

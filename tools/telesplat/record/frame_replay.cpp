@@ -35,28 +35,56 @@ class PointReplay final : public FrameReplay {
       view.colour = last_.colour;
       return true;
     }
-    splat::SelectionOptions selection;
-    selection.scale = run_.splat_scale_of(frame.look.render.kernel);
-    selection.detail = float(frame.detail);
-    selection.best_patch_only = run_.keeps_redundant;
-    splat::select_view(*models_->model(), camera, selection, list_, &models_->summaries());
-    list_.applied = models_->applied();
-    list_.replica = models_->replica() + 1;
-    list_.epoch = frame.epoch;
+    const splat::SelectionOptions selection = select(frame, camera, {});
     image::ShadingParameters shading = run_.shading;
     put_into(frame.look, shading);
     render(frame, camera, shading, view);
     if (frame.refined > 0 && camera == frame.camera) refine(frame, selection, shading, view);
     keep(frame, camera, view);
-    if (!run_.transparent) return true;
-    fit(over_white_, camera);
-    shading.background = 0xffffff;
-    render(frame, camera, shading, over_white_);
-    image::find_coverage(over_white_, view);
+    find_coverage(frame, camera, shading, view);
+    return true;
+  }
+
+  Result<bool> draw_pair(const DisplayedFrame& frame, const viewer::EyePair& pair,
+                         std::array<image::View, 2>& views) override {
+    const auto there = models_->advance(frame);
+    if (!there || !*there) return there;
+    select(frame, pair.head, pair.eyes);
+    image::ShadingParameters shading = run_.shading;
+    put_into(frame.look, shading);
+    for (size_t i = 0; i < 2; ++i) {
+      fit(views[i], pair.eyes[i]);
+      render(frame, pair.eyes[i], shading, views[i]);
+      find_coverage(frame, pair.eyes[i], shading, views[i]);
+    }
     return true;
   }
 
  private:
+  // What was drawn of the model as it is.
+  splat::SelectionOptions select(const DisplayedFrame& frame, const geometry::Camera& camera,
+                                 const std::optional<std::array<geometry::Camera, 2>>& eyes) {
+    splat::SelectionOptions selection;
+    selection.scale = run_.splat_scale_of(frame.look.render.kernel);
+    selection.detail = float(frame.detail);
+    selection.best_patch_only = run_.keeps_redundant;
+    selection.eyes = eyes;
+    splat::select_view(*models_->model(), camera, selection, list_, &models_->summaries());
+    list_.applied = models_->applied();
+    list_.replica = models_->replica() + 1;
+    list_.epoch = frame.epoch;
+    return selection;
+  }
+
+  void find_coverage(const DisplayedFrame& frame, const geometry::Camera& camera, image::ShadingParameters shading,
+                     image::View& view) {
+    if (!run_.transparent) return;
+    fit(over_white_, camera);
+    shading.background = 0xffffff;
+    render(frame, camera, shading, over_white_);
+    image::find_coverage(over_white_, view);
+  }
+
   // Frames of a head that stands still take a second to draw and are often alike.
   bool same_as_last(const DisplayedFrame& frame, const geometry::Camera& camera) const {
     const DisplayedFrame& last = last_frame_;
@@ -126,13 +154,25 @@ class SliceFrameReplay final : public FrameReplay {
   Result<bool> draw(const DisplayedFrame& frame, const geometry::Camera& camera, image::View& view) override {
     const auto there = slices_->advance({frame.sequence.value}, frame.replica);
     if (!there || !*there) return there;
-    fit(view, camera);
-    renderer_->render(slices_->frame(), camera, frame.look.background,
-                      {camera.width, camera.height, view.colour.data(), nullptr});
+    draw_now(frame, camera, view);
+    return true;
+  }
+
+  Result<bool> draw_pair(const DisplayedFrame& frame, const viewer::EyePair& pair,
+                         std::array<image::View, 2>& views) override {
+    const auto there = slices_->advance({frame.sequence.value}, frame.replica);
+    if (!there || !*there) return there;
+    for (size_t i = 0; i < 2; ++i) draw_now(frame, pair.eyes[i], views[i]);
     return true;
   }
 
  private:
+  void draw_now(const DisplayedFrame& frame, const geometry::Camera& camera, image::View& view) {
+    fit(view, camera);
+    renderer_->render(slices_->frame(), camera, frame.look.background,
+                      {camera.width, camera.height, view.colour.data(), nullptr});
+  }
+
   const RecordedRun& run_;
   std::unique_ptr<viewer::SliceReplay> slices_;
   std::unique_ptr<viewer::VolumeRenderer> renderer_;

@@ -45,6 +45,9 @@ class FrameReplay {
   /// is transparent, colours have the coverage in their upper byte (image/background.h). Frames come in order of
   /// display. False: the record ends before it. Errors name the file and what is wrong with it.
   virtual Result<bool> draw(const DisplayedFrame& frame, const geometry::Camera& camera, image::View& view) = 0;
+  /// The same of a frame that two eyes saw.
+  virtual Result<bool> draw_pair(const DisplayedFrame& frame, const viewer::EyePair& pair,
+                                 std::array<image::View, 2>& views) = 0;
 };
 
 /// The file that frames are made again from.

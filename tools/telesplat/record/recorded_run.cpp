@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <map>
 
+#include "client/viewer/stereo_flags.h"
 #include "common/image/background.h"
 #include "tools/common/csv_table.h"
 
@@ -96,6 +97,20 @@ Status read_wall(const std::string& path, const toml::table& viewer, RecordedRun
   return ok_status();
 }
 
+// How it showed two eyes' pictures.
+Status read_stereo(const std::string& path, const toml::table& session, RecordedRun& run) {
+  const auto& display = session["display"];
+  viewer::StereoFlags flags;
+  flags.mode = display["stereo"].value_or(std::string("off"));
+  flags.eye_separation_m = number(display["eye_separation"], flags.eye_separation_m);
+  flags.swap_eyes = display["swap_eyes"].value_or(std::string("off")) == "on";
+  flags.panel_file = display["barrier"].value_or(std::string());
+  auto stereo = viewer::settle(flags);
+  if (!stereo) return Error{fmt::format("{}: {}", path, stereo.error().text)};
+  run.stereo = std::move(*stereo);
+  return ok_status();
+}
+
 // How the display drew. Kernels are refused where they are drawn, if at all: volumes have none.
 Status read_look(const std::string& path, const toml::table& viewer, RecordedRun& run) {
   if (const auto kernel = splat::kernel_named(run.kernel)) run.look.render.kernel = *kernel;
@@ -135,6 +150,7 @@ Status read_display(const std::string& path, const toml::table& session, const t
   run.transparent = background->transparent;
   run.legend = session["display"]["legend"].value_or(std::string("on")) != "off";
   if (const Status s = read_wall(path, viewer, run); !s) return s;
+  if (const Status s = read_stereo(path, session, run); !s) return s;
   return read_look(path, viewer, run);
 }
 
@@ -142,9 +158,10 @@ Status read_display(const std::string& path, const toml::table& session, const t
 struct FrameColumns {
   size_t viewer, frame, t_s, sequence, points_drawn;
   std::array<size_t, 7> pose;  // px py pz qw qx qy qz
-  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1, 0.
+  // Of files that lack them: 0, 1, 0, all, as the run began, 0, 1, 0, 0.
   std::optional<size_t> construction_ms, detail, epoch, summaries, splat, finish, lit, head_light, background, refined,
-      sub_pixels, swap_wait_ms;
+      sub_pixels, swap_wait_ms, screen_m;
+  std::array<std::optional<size_t>, 6> eyes;  // left_x left_y left_z right_x right_y right_z
 };
 
 Result<FrameColumns> find_columns(const tools::CsvTable& table) {
@@ -178,6 +195,9 @@ Result<FrameColumns> find_columns(const tools::CsvTable& table) {
   out.refined = table.find("refined");
   out.sub_pixels = table.find("sub_pixels");
   out.swap_wait_ms = table.find("swap_wait_ms");
+  out.screen_m = table.find("screen_m");
+  const char* const eyes[] = {"left_x", "left_y", "left_z", "right_x", "right_y", "right_z"};
+  for (size_t i = 0; i < out.eyes.size(); ++i) out.eyes[i] = table.find(eyes[i]);
   return out;
 }
 
@@ -217,6 +237,25 @@ Status read_refinement(const tools::CsvTable& table, size_t row, const FrameColu
   return ok_status();
 }
 
+// Where the eyes were.
+Status read_eyes(const tools::CsvTable& table, size_t row, const FrameColumns& at, const RecordedRun& run,
+                 DisplayedFrame& f) {
+  if (!run.stereo.on()) return ok_status();
+  double values[7] = {};
+  for (size_t i = 0; i < 7; ++i) {
+    const auto& column = i < 6 ? at.eyes[i] : at.screen_m;
+    if (!column) return table.wrong(row, "two eyes saw the frame, but there are no columns that tell where they were");
+    const auto value = table.number(row, *column);
+    if (!value) return value.error();
+    values[i] = *value;
+  }
+  f.eyes_room = {glm::dvec3(values[0], values[1], values[2]), glm::dvec3(values[3], values[4], values[5])};
+  f.screen_m = values[6];
+  if (!(f.screen_m > 0 && f.screen_m <= 1e6))
+    return table.wrong(row, fmt::format("screen_m is {}, limits are above 0 and 1e6", f.screen_m));
+  return ok_status();
+}
+
 Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, const FrameColumns& at,
                                   const RecordedRun& run) {
   const auto number = table.count(row, at.frame), sequence = table.count(row, at.sequence),
@@ -247,6 +286,7 @@ Result<DisplayedFrame> read_frame(const tools::CsvTable& table, size_t row, cons
   if (const Status s = geometry::validate(f.camera); !s) return table.wrong(row, s.error().text);
   if (const Status s = read_look(table, row, at, f); !s) return s.error();
   if (const Status s = read_refinement(table, row, at, f); !s) return s.error();
+  if (const Status s = read_eyes(table, row, at, run, f); !s) return s.error();
   const auto summaries = optional_count(table, row, at.summaries, f.summaries, 9e15);
   if (!summaries) return summaries.error();
   f.summaries = *summaries;
@@ -326,12 +366,13 @@ Result<std::vector<const toml::table*>> wall_viewers(const std::string& path, co
 }  // namespace
 
 geometry::Camera RecordedRun::camera_at(const geometry::Pose& pose, int width_px, int height_px) const {
+  const stereo::Size eye = stereo.eye_size(width_px, height_px);
   if (wall.described) {
     geometry::Camera camera = wall::screen_camera(*wall.described, wall.tile, pose, near_m);
-    camera.width = width_px, camera.height = height_px;
+    camera.width = eye.width, camera.height = eye.height;
     return camera;
   }
-  return viewer::tile_of(geometry::make_camera(pose, fov_deg, width_px * wall.columns, height_px * wall.rows, near_m),
+  return viewer::tile_of(geometry::make_camera(pose, fov_deg, eye.width * wall.columns, eye.height * wall.rows, near_m),
                          wall);
 }
 

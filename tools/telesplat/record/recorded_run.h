@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "client/viewer/display/eyes/eye_pair.h"
+#include "client/viewer/display/eyes/stereo_options.h"
 #include "client/viewer/display/wall.h"
 #include "client/viewer/input/look.h"
 #include "common/core/ids.h"
@@ -22,14 +24,16 @@ struct DisplayedFrame {
   Sequence sequence;     ///< newest event of the model that was displayed; of volumes its slice images' frame
   uint32_t replica = 0;  ///< how many times numbers had begun again by then (another packer)
   uint64_t points_drawn = 0;
-  geometry::Camera camera;
-  geometry::Pose head;                ///< that it was drawn for; of a screen of a described wall not the camera's
-  double detail = 1;                  ///< SelectionOptions::detail it was drawn with
-  viewer::Look look;                  ///< how it was drawn; a person may have changed it in the window
-  uint64_t summaries = ~uint64_t{0};  ///< of bricks, that its viewer had made by then; else all that there are
-  EpochId epoch;                      ///< of all points in it
-  double refined = 0;                 ///< share of its pixels that were drawn with sub-pixels,
-  int sub_pixels = 1;                 ///< so many on each axis
+  geometry::Camera camera;                ///< with two eyes: the head's, of the size of one eye's picture
+  geometry::Pose head;                    ///< that it was drawn for; of a screen of a described wall not the camera's
+  double screen_m = 0;                    ///< with two eyes: how far the screen was before the head,
+  std::array<glm::dvec3, 2> eyes_room{};  ///< and where they were
+  double detail = 1;                      ///< SelectionOptions::detail it was drawn with
+  viewer::Look look;                      ///< how it was drawn; a person may have changed it in the window
+  uint64_t summaries = ~uint64_t{0};      ///< of bricks, that its viewer had made by then; else all that there are
+  EpochId epoch;                          ///< of all points in it
+  double refined = 0;                     ///< share of its pixels that were drawn with sub-pixels,
+  int sub_pixels = 1;                     ///< so many on each axis
 };
 
 struct RecordedRun {
@@ -44,13 +48,15 @@ struct RecordedRun {
   viewer::Look look;             ///< as the run began
   float splat_scale = 0;         ///< of splat sizes, whatever the kernel; 0: what suits it
   viewer::WallTile wall;         ///< which part of a wall the display was
+  viewer::StereoOptions stereo;  ///< how two eyes' pictures were shown
   bool keeps_redundant = false;  ///< packed with --packing.redundancy keep
   int octree_depth = 6;
   std::vector<DisplayedFrame> frames;  ///< of the run's own viewer, in order
 
   /// Scale factor of splat sizes that frames of this kernel were drawn with.
   float splat_scale_of(splat::Kernel k) const { return splat_scale > 0 ? splat_scale : splat::suitable_scale(k); }
-  /// What a display of the run's field of view, or a screen of its wall, and width x height pixels showed this head.
+  /// What a display of the run's field of view, or a screen of its wall, and width x height pixels showed this head;
+  /// with two eyes, what the head's camera between them would.
   geometry::Camera camera_at(const geometry::Pose& pose, int width_px, int height_px) const;
 };
 

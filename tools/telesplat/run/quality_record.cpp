@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "common/metrics/statistics.h"
 
 namespace telesplat::launcher {
@@ -53,14 +56,24 @@ Columns columns_of(const std::vector<VerifiedView>& views) {
   return c;
 }
 
+ordered_json quality_json_of_eye(const std::vector<VerifiedView>& views) {
+  const Columns c = columns_of(views);
+  return {{"views", c.psnr.size()},
+          {"psnr_db", metrics::distribution_json(c.psnr)},
+          {"flip", precise(c.flip)},
+          {"hole_fraction", precise(c.holes)}};
+}
+
 }  // namespace
 
 std::string quality_csv(const std::vector<VerifiedView>& views) {
   std::string out =
-      "frame,t_s,samples,psnr_db,ssim,flip,hole_fraction,object_pixels,flicker,popping,holes_followed,holes_closed\n";
+      "frame,t_s,samples,psnr_db,ssim,flip,hole_fraction,object_pixels,flicker,popping,"
+      "holes_followed,holes_closed,eye\n";
   for (const auto& v : views)
-    out += fmt::format("{},{:.4f},{},{:.3f},{:.5f},{:.5f},{:.6f},{},{}\n", v.frame, v.t_s, v.samples, v.quality.psnr_db,
-                       v.quality.ssim, v.flip, v.quality.hole_fraction, v.quality.object_pixels, change_columns(v));
+    out +=
+        fmt::format("{},{:.4f},{},{:.3f},{:.5f},{:.5f},{:.6f},{},{},{}\n", v.frame, v.t_s, v.samples, v.quality.psnr_db,
+                    v.quality.ssim, v.flip, v.quality.hole_fraction, v.quality.object_pixels, change_columns(v), v.eye);
   return out;
 }
 
@@ -89,6 +102,12 @@ ordered_json quality_json(const std::vector<VerifiedView>& views) {
                    {"popping", precise(c.popping)},
                    {"hole_lifetime_ms", lifetime ? ordered_json(*lifetime) : ordered_json()}};
   if (!views.empty()) out["last_view"] = last_view(views);
+  for (const auto& [eye, name] : {std::pair{1u, "left"}, {2u, "right"}}) {
+    std::vector<VerifiedView> of_eye;
+    std::copy_if(views.begin(), views.end(), std::back_inserter(of_eye),
+                 [eye = eye](const VerifiedView& v) { return v.eye == eye; });
+    if (!of_eye.empty()) out["eyes"][name] = quality_json_of_eye(of_eye);
+  }
   return out;
 }
 

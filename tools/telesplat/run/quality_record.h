@@ -16,7 +16,8 @@ namespace telesplat::launcher {
 struct VerifiedView {
   uint64_t frame = 0;
   double t_s = 0;
-  int samples = 1;  ///< rays a pixel of the reference
+  int samples = 1;   ///< rays a pixel of the reference
+  uint32_t eye = 0;  ///< 1: the left eye's picture, 2: the right one's, 0: one for both
   image::Quality quality;
   double flip = 0;  ///< mean over the pixels that count
   /// Where the frame before it was compared too.

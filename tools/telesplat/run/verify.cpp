@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -64,14 +65,16 @@ class Verification {
     if (!reference) return reference.error();
     Frame now{*std::move(read), *std::move(reference)};
     scene_.mark_shown(now.frame.view);
-    VerifiedView v{.frame = now.frame.number, .t_s = now.frame.t_s, .samples = now.reference.samples};
+    VerifiedView v{
+        .frame = now.frame.number, .t_s = now.frame.t_s, .samples = now.reference.samples, .eye = now.frame.eye};
+    std::optional<Frame>& before = before_[v.eye];  // of this eye
     v.quality = image::compare(now.reference, now.frame.view);
     v.flip = image::flip(now.reference, now.frame.view);
-    if (before_ && before_->frame.number + 1 == now.frame.number && alike(before_->frame.camera, now.frame.camera))
-      v.change = change_to(now);
+    if (before && before->frame.number + 1 == now.frame.number && alike(before->frame.camera, now.frame.camera))
+      v.change = change(*before, now);
     views_.push_back(v);
     paths_.push_back(path);
-    before_ = std::move(now);
+    before = std::move(now);
     return ok_status();
   }
 
@@ -101,11 +104,11 @@ class Verification {
     return a.width == b.width && a.height == b.height;
   }
 
-  VerifiedView::Change change_to(const Frame& now) const {
-    const image::VerifiedFrame a{before_->frame.camera, before_->reference, before_->frame.view};
+  VerifiedView::Change change(const Frame& before, const Frame& now) const {
+    const image::VerifiedFrame a{before.frame.camera, before.reference, before.frame.view};
     const image::VerifiedFrame b{now.frame.camera, now.reference, now.frame.view};
-    VerifiedView::Change out{now.frame.t_s - before_->frame.t_s, image::unsteadiness(a, b), {}};
-    if (scene_.has_surface() && before_->frame.epoch == now.frame.epoch) out.holes = image::follow_holes(a, b);
+    VerifiedView::Change out{now.frame.t_s - before.frame.t_s, image::unsteadiness(a, b), {}};
+    if (scene_.has_surface() && before.frame.epoch == now.frame.epoch) out.holes = image::follow_holes(a, b);
     return out;
   }
 
@@ -114,15 +117,17 @@ class Verification {
     if (!frame) return frame.error();
     const auto reference = scene_.draw_reference(frame->camera, options_.shading, frame->epoch, options_.samples);
     if (!reference) return reference.error();
-    return image::write_png(fmt::format("{}/images/verify-{}-{:06d}.png", directory, name, frame->number),
-                            side_by_side(reference->view, frame->view));
+    constexpr const char* kEyes[] = {"", "-left", "-right"};
+    return image::write_png(
+        fmt::format("{}/images/verify-{}{}-{:06d}.png", directory, name, kEyes[frame->eye], frame->number),
+        side_by_side(reference->view, frame->view));
   }
 
   DirectScene& scene_;
   const VerifyOptions& options_;
   std::vector<VerifiedView> views_;
-  std::vector<std::string> paths_;  // of views_
-  std::optional<Frame> before_;
+  std::vector<std::string> paths_;              // of views_
+  std::array<std::optional<Frame>, 3> before_;  // of both eyes, the left, the right
 };
 
 }  // namespace

@@ -12,6 +12,11 @@ class CpuRenderer final : public Renderer {
                            const splat::FrameTarget& target) override {
     return splatter_.render(list, camera, options, shading, target);
   }
+  splat::SplatStats render_pair(const splat::DrawList& list, const std::array<geometry::Camera, 2>& cameras,
+                                const splat::RenderOptions& options, const image::Shading& shading,
+                                const std::array<splat::FrameTarget, 2>& targets) override {
+    return splatter_.render_pair(list, cameras, options, shading, targets);
+  }
 
  private:
   splat::CpuSplatter splatter_;

@@ -211,9 +211,11 @@ splat::SplatStats GlRenderer::render(const splat::DrawList& list, const geometry
     // A frame that the GPU cannot hold shows nothing, rather than ending the viewer.
     release_state();
     if (refusals_.allow(start)) log::error("{}", drawn.error().text);
-    const size_t pixels = static_cast<size_t>(target.width) * static_cast<size_t>(target.height);
-    std::fill_n(target.colour, pixels, 0xff000000u | shading.background());
-    if (target.depth_m) std::fill_n(target.depth_m, pixels, std::numeric_limits<float>::infinity());
+    for (size_t y = 0; y < static_cast<size_t>(target.height); ++y) {
+      std::fill_n(target.colour + y * target.row(), target.width, 0xff000000u | shading.background());
+      if (target.depth_m)
+        std::fill_n(target.depth_m + y * target.row(), target.width, std::numeric_limits<float>::infinity());
+    }
     return {};
   }
   if (!parts_->timer.available()) glFinish();

@@ -23,11 +23,14 @@ void ReadBack::read(uint32_t framebuffer, const splat::FrameTarget& target) {
   glPixelStorei(GL_PACK_ALIGNMENT, 4);
   for (const GLenum whole : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS, GL_PACK_SWAP_BYTES})
     glPixelStorei(whole, 0);
+  if (target.row() != static_cast<size_t>(target.width) && !pack_buffers_)
+    glPixelStorei(GL_PACK_ROW_LENGTH, static_cast<GLint>(target.row()));
   const int images = target.depth_m ? 2 : 1;
   void* const to[2] = {target.colour, target.depth_m};
   if (!pack_buffers_) {
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     for (int i = 0; i < images; ++i) read_image(GL_COLOR_ATTACHMENT0 + static_cast<uint32_t>(i), i == 0, target, to[i]);
+    glPixelStorei(GL_PACK_ROW_LENGTH, 0);
     return;
   }
   const size_t bytes = static_cast<size_t>(target.width) * static_cast<size_t>(target.height) * 4;
@@ -45,11 +48,15 @@ void ReadBack::read(uint32_t framebuffer, const splat::FrameTarget& target) {
   for (int i = 0; i < images; ++i) {
     glBindBuffer(GL_PIXEL_PACK_BUFFER, buffers_[i]);
     if (const void* from = glMapBufferRange(GL_PIXEL_PACK_BUFFER, 0, static_cast<GLsizeiptr>(bytes), GL_MAP_READ_BIT)) {
-      std::memcpy(to[i], from, bytes);
+      const size_t row = static_cast<size_t>(target.width) * 4;
+      for (size_t y = 0; y < static_cast<size_t>(target.height); ++y)
+        std::memcpy(static_cast<char*>(to[i]) + y * target.row() * 4, static_cast<const char*>(from) + y * row, row);
       glUnmapBuffer(GL_PIXEL_PACK_BUFFER);
     } else {
       glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+      glPixelStorei(GL_PACK_ROW_LENGTH, static_cast<GLint>(target.row()));
       read_image(GL_COLOR_ATTACHMENT0 + static_cast<uint32_t>(i), i == 0, target, to[i]);
+      glPixelStorei(GL_PACK_ROW_LENGTH, 0);
     }
   }
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);

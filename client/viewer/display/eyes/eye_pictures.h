@@ -1,0 +1,49 @@
+// Both eyes' pictures of a frame: drawn from one choice, composed, kept for verification.
+#pragma once
+
+#include <array>
+
+#include "client/viewer/display/display_options.h"
+#include "client/viewer/display/eyes/eye_rig.h"
+#include "client/viewer/display/view_source.h"
+#include "client/viewer/record/frame_spool.h"
+
+namespace telesplat::viewer {
+
+/// Used by one thread, the display's.
+class EyePictures {
+ public:
+  explicit EyePictures(const StereoOptions& options) : rig_(options) {}
+
+  bool on() const { return rig_.on(); }
+  /// Where the eyes of the frame that begins are; the camera to ask samplers for. Without stereo it is the head's.
+  /// turned: the head, which a wall's screens need not face.
+  geometry::Camera begin(double now_s, const geometry::Camera& head, const glm::dquat& turned, double t_s,
+                         const geometry::Box& scene_room);
+  const EyePair& pair() const { return pair_; }
+
+  /// Draws both and composes them into `view`, which gets the display's size. input: of the head's camera. spooled:
+  /// frames may be kept, so room for depth is made at once. Precondition: begin().
+  DrawnFrame draw(ViewSource& source, FrameInput input, bool spooled, image::View& view);
+  /// What a pixel of the display shows, of this camera without stereo: where two eyes' pictures lie in each other, the
+  /// head's.
+  struct Aim {
+    geometry::Camera camera;
+    glm::dvec2 at_pix;
+  };
+  Aim aim(const geometry::Camera& head, const glm::dvec2& at_pix) const;
+  /// Keeps both pictures for verification.
+  void keep(FrameSpool& spool, const SpooledFrame& frame);
+
+ private:
+  void follow_panel_file(double now_s);
+  std::array<splat::FrameTarget, 2> parts_of(image::View& view) const;
+
+  EyeRig rig_;
+  EyePair pair_;
+  std::array<image::View, 2> views_;
+  double looked_s_ = -1e9;  // after the panel's file
+  int64_t panel_time_ = 0;  // when it was written
+};
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,51 @@
+// Where the eyes of a head are, what is to be sampled for them, and one picture made of theirs. No clocks, no OpenGL.
+#pragma once
+
+#include <memory>
+
+#include "client/viewer/display/eyes/eye_pair.h"
+#include "client/viewer/display/eyes/stereo_options.h"
+#include "common/geometry/box.h"
+#include "common/image/file.h"
+#include "common/stereo/autostereo/interleaver.h"
+
+namespace telesplat::viewer {
+
+class EyeRig {
+ public:
+  explicit EyeRig(const StereoOptions& options);
+
+  bool on() const { return options_.on(); }
+  const StereoOptions& options() const { return options_; }
+
+  /// The eyes of a frame. head: the display's camera, of the size of one eye's picture. turned: of the head, whose eyes
+  /// lie beside each other. t_s: of the tracked head's movement. scene_room: what is shown; where the screen is to be as far as its middle, the first box that is not
+  /// empty counts, once `t_s` is not negative any more.
+  EyePair eyes(const geometry::Camera& head, const glm::dquat& turned, double t_s, const geometry::Box& scene_room);
+  /// What is to be asked of the samplers: a view from the middle that has what either eye sees of the scene.
+  static geometry::Camera sampled(const EyePair& pair, const geometry::Box& scene_room);
+
+  /// One picture for the display, with depth if the views' holds and the mode has any. Precondition: on().
+  void compose(const EyePair& pair, const std::array<image::View, 2>& views, bool with_depth, image::View& out);
+  /// Its size, of eyes' pictures of this size.
+  stereo::Size composed_size(int width, int height) const;
+  /// Draws the pattern into both pictures, whose size is set. False: there is none.
+  bool draw_pattern(std::array<image::View, 2>& views) const;
+
+  /// Reads the panel's file again, as somebody may have changed it; pixels of the display stay as they are. Error: what
+  /// is wrong with it; the panel stays as it was.
+  Status read_panel_again();
+
+ private:
+  double screen_distance(const geometry::Camera& head, double t_s, const geometry::Box& scene_room);
+
+  StereoOptions options_;
+  double screen_m_ = 0;  // 0: not settled yet
+  std::unique_ptr<stereo::Interleaver> interleaver_;
+};
+
+/// The eyes of a frame that was recorded: where they were, and how far the screen was before the head.
+EyePair recorded_eyes(const StereoOptions& options, const geometry::Camera& head, double screen_m,
+                      const std::array<glm::dvec3, 2>& places_room);
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,119 @@
+// Where the eyes of a display's head are, what is sampled for them, and what is made of their pictures.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "client/viewer/display/eyes/eye_rig.h"
+#include "client/viewer/stereo_flags.h"
+#include "client/viewer/viewer_options.h"
+#include "common/geometry/stereo.h"
+
+namespace telesplat::viewer {
+namespace {
+
+const geometry::Box kScene{{-0.4f, -0.3f, -0.4f}, {0.4f, 0.3f, 0.4f}};
+
+geometry::Camera head_at(double z) {
+  return geometry::make_camera(geometry::look_at({0, 0.2, z}, {0, 0, 0}), 80, 640, 400);
+}
+
+TEST(EyeRig, TheScreenIsAsFarAsTheScenesMiddleInTheFirstFrame) {
+  EyeRig rig({.mode = stereo::Mode::kSideBySide});
+  const double first_m = std::hypot(0.2, 1.5), later_m = std::hypot(0.2, 0.8);
+  EXPECT_NEAR(rig.eyes(head_at(0.8), -1, kScene).screen_m, later_m, 1e-6) << "the head rests: nothing is settled";
+  EXPECT_NEAR(rig.eyes(head_at(1.5), 0, kScene).screen_m, first_m, 1e-6);
+  EXPECT_NEAR(rig.eyes(head_at(0.8), 1, kScene).screen_m, first_m, 1e-6) << "and stays there";
+  EyeRig told({.mode = stereo::Mode::kSideBySide, .screen_m = 0.6});
+  EXPECT_EQ(told.eyes(head_at(1.5), 0, kScene).screen_m, 0.6);
+}
+
+TEST(EyeRig, EyesAreThoseOfTheHead) {
+  EyeRig rig({.mode = stereo::Mode::kRows, .eye_separation_m = 0.07, .screen_m = 0.9});
+  const geometry::Camera head = head_at(1);
+  const EyePair pair = rig.eyes(head, 0, kScene);
+  const auto expected = geometry::eye_cameras(head, 0.07, 0.9);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_LT(glm::distance(pair.eyes[i].pose.position_room, expected[i].pose.position_room), 1e-12);
+    EXPECT_NEAR(pair.eyes[i].left, expected[i].left, 1e-12);
+    EXPECT_NEAR(pair.eyes[i].top, expected[i].top, 1e-12);
+  }
+  EXPECT_LT(glm::distance(pair.head.pose.position_room, head.pose.position_room), 1e-12);
+  const EyePair again = recorded_eyes(rig.options(), head, pair.screen_m,
+                                      {pair.eyes[0].pose.position_room, pair.eyes[1].pose.position_room});
+  EXPECT_EQ(again.eyes[0], pair.eyes[0]);
+  EXPECT_EQ(again.eyes[1], pair.eyes[1]);
+}
+
+TEST(EyeRig, SamplersAreAskedForWhatBothSeeOfTheScene) {
+  EyeRig rig({.mode = stereo::Mode::kSideBySide, .screen_m = 1});
+  const EyePair pair = rig.eyes(head_at(1), 0, kScene);
+  const geometry::Camera asked = EyeRig::sampled(pair, kScene);
+  EXPECT_EQ(asked.pose, pair.head.pose);
+  EXPECT_LT(asked.left, pair.head.left);
+  EXPECT_GT(asked.right, pair.head.right);
+  EXPECT_LT(asked.right - asked.left, 1.1 * (pair.head.right - pair.head.left));
+  EXPECT_NEAR(asked.focal_x() / pair.head.focal_x(), 1, 0.01);
+}
+
+TEST(EyeRig, APanelIsAWindowIntoAScaledRoom) {
+  stereo::Panel panel;
+  panel.width = 320, panel.height = 200, panel.pixel_m = 2e-3, panel.eye = {64, 64}, panel.distance_m = 0.8;
+  StereoOptions o{.mode = stereo::Mode::kAutostereo, .screen_m = 1.6, .panel = panel};
+  const double fov_deg = 2 * std::atan(0.32 / 0.8) * 180 / 3.14159265358979323846;
+  const geometry::Camera head = geometry::make_camera(geometry::look_at({0, 0, 1}, {0, 0, 0}), fov_deg, 64, 64);
+  EyeRig rig(o);
+  // The screen is twice as far away in the room: all is twice as large there.
+  const EyePair pair = rig.eyes(head, 0, kScene);
+  EXPECT_NEAR(glm::distance(pair.eyes[0].pose.position_room, pair.eyes[1].pose.position_room), 0.128, 1e-9);
+  EXPECT_NEAR((pair.head.top - pair.head.bottom) / (pair.head.right - pair.head.left), 200.0 / 320, 1e-9);
+  const auto before = stereo::eyes_of(panel, pair.eyes);
+  EXPECT_LT(glm::distance(before[0], glm::dvec3(-0.032, 0, 0.8)), 1e-9);
+  EXPECT_LT(glm::distance(before[1], glm::dvec3(0.032, 0, 0.8)), 1e-9);
+  // A head that is tracked: the eyes are where it is, and where its turn puts them.
+  o.tracked_head = geometry::Trajectory::still({{0.1, -0.05, 0.7}, glm::angleAxis(0.5, glm::dvec3(0, 0, 1))});
+  EyeRig tracking(o);
+  const auto tracked = stereo::eyes_of(panel, tracking.eyes(head, 0, kScene).eyes);
+  EXPECT_LT(glm::distance(0.5 * (tracked[0] + tracked[1]), glm::dvec3(0.1, -0.05, 0.7)), 1e-9);
+  EXPECT_NEAR(tracked[1].y - tracked[0].y, 0.064 * std::sin(0.5), 1e-9);
+}
+
+TEST(EyeRig, SwappedEyesSwapTheirPlaces) {
+  const std::array<image::View, 2> views{image::View{2, 1, {1, 1}, {}}, image::View{2, 1, {2, 2}, {}}};
+  image::View out;
+  EyeRig({.mode = stereo::Mode::kSideBySide}).compose({}, views, false, out);
+  EXPECT_EQ(out.colour, (std::vector<uint32_t>{1, 1, 2, 2}));
+  EyeRig({.mode = stereo::Mode::kSideBySide, .swap_eyes = true}).compose({}, views, false, out);
+  EXPECT_EQ(out.colour, (std::vector<uint32_t>{2, 2, 1, 1}));
+}
+
+TEST(StereoFlags, WhatCannotBeIsRefused) {
+  const auto refusal = [](const StereoFlags& f) {
+    const auto o = settle(f);
+    return o ? std::string() : o.error().text;
+  };
+  EXPECT_EQ(refusal({}), "");
+  EXPECT_EQ(refusal({.mode = "checker", .pattern = "test"}), "");
+  EXPECT_EQ(refusal({.mode = "autostereo"}),
+            "--stereo autostereo: needs --barrier, a file of the display's line screen");
+  EXPECT_NE(refusal({.mode = "rows", .panel_file = "a.toml"}).find("is for --stereo autostereo"), std::string::npos);
+  EXPECT_EQ(refusal({.pattern = "test"}), "--stereo-pattern test: needs --stereo");
+  EXPECT_NE(refusal({.mode = "autostereo", .panel_file = "/nowhere.toml"}).find("/nowhere.toml"), std::string::npos);
+}
+
+TEST(StereoFlags, APanelSetsSizeAndFieldOfView) {
+  const std::string path = ::testing::TempDir() + "/panel.toml";
+  std::ofstream(path) << "[panel]\npixels = [400, 300]\npixel_mm = 1\ndistance_m = 0.4\neye = [200, 150]\n"
+                         "[lines]\npitch_mm = 2\nthickness_mm = 3\n";
+  ViewerOptions o;
+  o.stereo.mode = "autostereo";
+  o.stereo.panel_file = path;
+  const Status s = settle(o);
+  ASSERT_TRUE(s) << s.error().text;
+  EXPECT_EQ(o.display.width, 400);
+  EXPECT_EQ(o.display.height, 300);
+  EXPECT_NEAR(o.display.fov_deg, 2 * std::atan(0.5) * 180 / 3.14159265358979, 1e-6);
+  EXPECT_EQ(o.display.stereo.eye_size(400, 300), (stereo::Size{200, 150}));
+}
+
+}  // namespace
+}  // namespace telesplat::viewer
