@@ -40,8 +40,8 @@ inline float off(const Lines& lines, int n) {
   return std::abs(line - float(int(line)) - 0.5f);
 }
 
-// Gives `bits` of each pixel to the eye that is nearer to a line. Without branches, so that pixels are worked on side by
-// side.
+// Gives `bits` of each pixel to the eye that is nearer to a line. Without branches, so that pixels are worked on side
+// by side.
 void add_part(const Lines& left_lines, const Lines& right_lines, float guard, uint32_t bits, int pixels,
               uint32_t* __restrict left, uint32_t* __restrict right) {
   for (int x = 0; x < pixels; ++x) {
