@@ -163,7 +163,7 @@ TEST(Autostereo, SightIsRefractedAsSnellSays) {
 TEST(Autostereo, SlantedLensesWorkByTheSameMap) {
   std::mt19937 rng(14);
   int seen = 0, wrong = 0, dark = 0;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < 120; ++round) {
     Panel p = any_panel(rng);
     p.lines.tilt_deg = uniform(rng, 5, 25) * (rng() % 2 ? 1 : -1);  // slanted
     p.lines.gap_m = 0;
