@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "common/core/utf8.h"
+#include "common/geometry/trajectory_file.h"
 
 namespace telesplat::geometry {
 namespace {
@@ -136,8 +137,10 @@ class Reader {
 
 }  // namespace
 
+Result<std::vector<Trajectory::Sample>> read_samples(const std::string& path) { return Reader(path).read(); }
+
 Result<Trajectory> Trajectory::read_csv(const std::string& path) {
-  auto samples = Reader(path).read();
+  auto samples = read_samples(path);
   if (!samples) return samples.error();
   return of(std::move(*samples));
 }

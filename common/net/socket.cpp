@@ -14,6 +14,7 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/net/local_endpoint.h"
 #include "common/net/read_ahead.h"
 
 namespace telesplat::net {
@@ -43,12 +44,6 @@ zmq::socket_type zmq_type(Kind kind) {
       return zmq::socket_type::sub;
   }
   return zmq::socket_type::dealer;
-}
-
-bool is_local(const std::string& endpoint) {
-  for (const char* prefix : {"ipc://", "inproc://", "tcp://127.", "tcp://localhost:", "tcp://[::1]:"})
-    if (endpoint.starts_with(prefix)) return true;
-  return false;
 }
 
 // For log lines: routing ids are binary.

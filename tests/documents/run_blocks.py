@@ -36,7 +36,9 @@ SKIPPED = {
     r"(cp .* compose/files|(\w+=\S+ )*docker|for s in master)\b": "it needs docker; compose/test runs it",
     r"(apt-get|debootstrap|tar -C)\b": "it needs root and a network",
 }
-SERVICES = {f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay")}
+SERVICES = {
+    f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay", "pose-replay")
+}
 OTHER_MACHINES = re.compile(r"\b192\.168\.\d+\.\d+\b")
 PATIENCE_S = 180  # for one command
 SECONDS, SIZE = 3, "320x240"  # of a run that does not say

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array kServices{"master", "data", "sampler", "packer", "viewer", "health", "wan-relay"};
+constexpr std::array kServices{"master", "data", "sampler", "packer", "viewer", "health", "pose-replay", "wan-relay"};
 
 struct CompletionOptions {
   std::string shell;
@@ -39,13 +39,11 @@ options::Table completion_table(CompletionOptions& o) {
 }
 
 options::Table man_table(ManOptions& o) {
-  return {
-      {.flag = "command",
-       .value = &o.words,
-       .help =
-           "a command of telesplat, or a service: master, data, sampler, packer, viewer, health, wan-relay; default: "
-           "telesplat itself"},
-      {.flag = "--out", .value = &o.out, .help = "folder to write all pages to instead: telesplat.1, ..."}};
+  return {{.flag = "command",
+           .value = &o.words,
+           .help = "a command of telesplat, or a service: master, data, sampler, packer, viewer, health, pose-replay, "
+                   "wan-relay; default: telesplat itself"},
+          {.flag = "--out", .value = &o.out, .help = "folder to write all pages to instead: telesplat.1, ..."}};
 }
 
 options::Manual manual_of(const std::string& name, const Command& command) {
