@@ -20,6 +20,7 @@ pkg_check_modules(epoxy REQUIRED IMPORTED_TARGET epoxy)
 pkg_check_modules(egl REQUIRED IMPORTED_TARGET egl)
 find_package(glfw3 3.3 REQUIRED)
 pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
+pkg_check_modules(openxr REQUIRED IMPORTED_TARGET openxr)
 find_package(Boost 1.74 REQUIRED)  # headers alone: asio and beast
 set(CURSES_NEED_WIDE TRUE)
 find_package(Curses REQUIRED)

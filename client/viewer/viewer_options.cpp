@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "client/viewer/coupling/coupling.h"
+#include "client/viewer/head_options.h"
 #include "common/image/background.h"
 #include "common/splat/kernel_traits.h"
 #include "common/wire/messages.h"
@@ -284,7 +285,7 @@ Status settle_eye(ViewerOptions& o) {
 void settle_duration(ViewerOptions& o) {
   auto& d = o.display;
   const double length_s = o.movement.recorded ? o.movement.recorded->duration_s() : 0;
-  d.duration_s = o.duration_s.value_or(o.window ? 0 : length_s > 0 ? length_s + d.hold_s : kDuration_s);
+  d.duration_s = o.duration_s.value_or(has_person(o) ? 0 : length_s > 0 ? length_s + d.hold_s : kDuration_s);
   if (d.duration_s > 0) d.hold_s = std::min(d.hold_s, d.duration_s);
 }
 
@@ -329,7 +330,7 @@ void stand_before_wall(ViewerOptions& o) {
 
 Status settle_head(ViewerOptions& o) {
   if (const Status s = settle_wall(o); !s) return s;
-  if (o.trajectory.empty()) o.trajectory = o.window || !o.eye.empty() ? "still" : "orbit";
+  if (o.trajectory.empty()) o.trajectory = has_person(o) || !o.eye.empty() || !o.poses.empty() ? "still" : "orbit";
   auto movement = head_movement(o.trajectory, o.loop);
   if (!movement) return movement.error();
   o.movement = std::move(*movement);
@@ -373,8 +374,9 @@ Status settle_coupling(ViewerOptions& o) {
 }  // namespace
 
 Table view_table(ViewerOptions& o) {
+  const Table head = joined(head_table(o), head_source_table(o));
   const Table looks = joined(drawing_table(o), stereo_table(o.stereo));
-  const Table seen = joined(joined(sampling_table(o), head_table(o)), looks);
+  const Table seen = joined(joined(sampling_table(o), head), looks);
   return joined(seen, joined(coupling_table(o), record_table(o)));
 }
 
@@ -393,8 +395,8 @@ Table wall_table(ViewerOptions& o) {
 }
 
 Table table(ViewerOptions& o) {
-  return joined(net::service_table(o.service, net::Ends::kConnects),
-                joined(view_table(o), joined(process_table(o), wall_table(o))));
+  const Table own = joined(view_table(o), joined(joined(xr_table(o), process_table(o)), wall_table(o)));
+  return joined(net::service_table(o.service, net::Ends::kConnects), own);
 }
 
 Result<std::pair<int, int>> parse_sampling_size(const std::string& text) {
@@ -410,6 +412,7 @@ Status settle(ViewerOptions& o) {
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
   o.requests.adaptive = o.sampling_size == "auto";
   if (const Status s = settle_stereo(o); !s) return s;
+  if (const Status s = settle_head_source(o); !s) return s;
   if (const Status s = settle_head(o); !s) return s;
   if (const Status s = settle_coupling(o); !s) return s;
   o.display.render.kernel = *splat::kernel_named(o.splat);
@@ -417,13 +420,13 @@ Status settle(ViewerOptions& o) {
   if (const Status s = settle_shading(o); !s) return s;
   o.display.render.finish = *splat::finish_named(o.finish);
   o.display.still_samples = o.still_samples == "1" ? 1 : o.still_samples == "4" ? 4 : 16;
-  o.requests.follow_display = o.window;
+  o.requests.follow_display = has_person(o);
   return ok_status();
 }
 
 std::string end_of_trajectory(const ViewerOptions& o) {
   const auto& d = o.display;
-  if (!o.movement.recorded || o.window) return {};
+  if (!o.movement.recorded || has_person(o)) return {};
   const double length_s = o.movement.recorded->duration_s();
   const bool ends = d.duration_s <= 0 || d.duration_s - d.hold_s > length_s + 0.05;
   if (!ends) return {};

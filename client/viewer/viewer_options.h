@@ -11,6 +11,7 @@
 #include "client/viewer/display/size_text.h"
 #include "client/viewer/input/head_movement.h"
 #include "client/viewer/stereo_flags.h"
+#include "client/viewer/xr/xr_options.h"
 #include "common/net/service.h"
 #include "common/options/table.h"
 
@@ -26,8 +27,11 @@ struct ViewerOptions {
   std::optional<double> least_sampling;
   std::string trajectory;    ///< "orbit", "still" or a CSV file; empty: orbit, in a window or with an eye still
   std::string eye, look_at;  ///< "x,y,z" of the first view, metres in the room; empty: fitted to the data set
-  bool loop = false;         ///< the trajectory of a file begins again where it ends
-  HeadMovement movement;     ///< what these four come to
+  std::string poses;         ///< endpoint of a publisher of poses that moves the head; empty: none
+  std::string prediction = "kalman";  ///< of poses: "none", "velocity" or "kalman"
+  double pose_horizon_s = 0;          ///< displayed poses of `poses` are predicted so far ahead; 0: as long as a frame
+  bool loop = false;                  ///< the trajectory of a file begins again where it ends
+  HeadMovement movement;              ///< what these four come to
   /// Seconds from the first displayed frame, 0: until stopped; not given: as long as the trajectory of a file (and
   /// display.hold_s) takes, else 10, in a window until it is closed.
   std::optional<double> duration_s;
@@ -49,12 +53,20 @@ struct ViewerOptions {
   bool panel = true;                 ///< the window begins with its panel
   bool launched = false;             ///< standard input is the launcher's (LauncherLines), which opens data sets
   bool begins_empty = false;         ///< launched: there is no data set yet
-  double started_s = 0;              ///< when the session was started (monotonic clock), for start-up times; 0: now
-  bool end_session = false;          ///< tell the master to end the session once this viewer's run is over and recorded
-  std::string out;                   ///< run folder; empty: the session's, if it is here
-  bool join_record = true;           ///< without `out`: keep a record in the session's folder
+  bool xr = false;                   ///< show it in a headset, through OpenXR
+  XrOptions xr_options;
+  std::string xr_origin;     ///< "x,y,z" of xr_options.origin_m; empty: what suits the headset's space
+  double started_s = 0;      ///< when the session was started (monotonic clock), for start-up times; 0: now
+  bool end_session = false;  ///< tell the master to end the session once this viewer's run is over and recorded
+  std::string out;           ///< run folder; empty: the session's, if it is here
+  bool join_record = true;   ///< without `out`: keep a record in the session's folder
 };
 
+/// Whether a person is there, who ends it.
+inline bool has_person(const ViewerOptions& o) { return o.window || o.xr; }
+
+/// Flags of a headset, which `telesplat view` has too.
+options::Table xr_table(ViewerOptions& options);
 /// Flags that `telesplat run` and `view` have too: size, trajectory, renderer and the like.
 options::Table view_table(ViewerOptions& options);
 /// Flags of walls that `telesplat run` has too.

@@ -11,6 +11,7 @@
 #include "client/viewer/display/headless_surface.h"
 #include "client/viewer/display/window_surface.h"
 #include "client/viewer/session_record.h"
+#include "client/viewer/xr/xr_display.h"
 #include "common/core/clock.h"
 #include "common/core/file_hash.h"
 #include "common/core/log.h"
@@ -45,17 +46,29 @@ void ask_to_open(const std::string& path) {
   std::fflush(stdout);
 }
 
+// Null: nobody publishes poses.
+Result<std::shared_ptr<PoseFeed>> open_poses(const ViewerOptions& o) {
+  if (o.poses.empty()) return std::shared_ptr<PoseFeed>();
+  auto opened = PoseFeed::open({o.poses, o.requests.prediction, o.pose_horizon_s});
+  if (!opened) return opened.error();
+  return std::shared_ptr<PoseFeed>(std::move(*opened));
+}
+
 // A window may be given another size than it asked for: the options follow.
-Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net::Via& via) {
+Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net::Via& via,
+                                                     const std::shared_ptr<PoseFeed>& poses) {
   if (!o.window) {
     if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
-    return std::unique_ptr<DisplaySurface>(new HeadlessSurface(o.display, o.movement));
+    auto made = std::make_unique<HeadlessSurface>(o.display, o.movement);
+    if (poses) made->follow(poses, tell);
+    return std::unique_ptr<DisplaySurface>(std::move(made));
   }
   const std::string folder = o.out.empty() ? "." : o.out;
   const auto& r = o.requests;
   const WindowSurface::Options options{
       .display = o.display,
       .movement = o.movement,
+      .poses = poses,
       .fullscreen = o.fullscreen,
       .screenshot_directory = o.out.empty() ? "." : o.out + "/images",
       .path_directory = folder,
@@ -77,6 +90,31 @@ Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net
                     "display pixel by pixel (--fullscreen)",
                     o.display.width, o.display.height, panel->width, panel->height));
   return std::unique_ptr<DisplaySurface>(std::move(*opened));
+}
+
+// Where frames go, and who moves the head.
+struct Display {
+  std::unique_ptr<DisplaySurface> surface;  // null: a headset's
+  std::unique_ptr<XrDevice> headset;
+  std::shared_ptr<PoseFeed> poses;  // null: nobody publishes any
+};
+
+// A headset wants pictures of another size than the options tell: they follow.
+Result<Display> open_display(ViewerOptions& o, const net::Via& via, const std::shared_ptr<PoseFeed>& poses) {
+  Display out{nullptr, nullptr, poses};
+  if (o.xr) {
+    auto headset = XrDevice::open();
+    if (!headset) return Error{"--xr: " + headset.error().text};
+    out.headset = std::move(*headset);
+    const auto& eye = out.headset->system().eye_size();
+    o.display.width = eye.width;
+    o.display.height = eye.height;
+    return out;
+  }
+  auto surface = open_surface(o, via, poses);
+  if (!surface) return surface.error();
+  out.surface = std::move(*surface);
+  return out;
 }
 
 Result<Renderers> open_renderers(ViewerOptions& o) {
@@ -119,6 +157,7 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
                                          {"duration_s", fmt::format("{}", d.duration_s)},
                                          {"frames", std::to_string(d.frames)},
                                          {"hold_s", fmt::format("{}", d.hold_s)},
+                                         {"prediction", o.prediction},
                                          {"verify_every", std::to_string(d.verify_every)},
                                          {"fov_deg", fmt::format("{}", d.fov_deg)},
                                          {"target_fps", fmt::format("{}", d.target_fps)},
@@ -129,6 +168,7 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
     out["eye_separation_m"] = fmt::format("{}", d.stereo.eye_separation_m);
   }
   add_trajectory(out, o);
+  if (!o.poses.empty()) out["poses"] = o.poses;
   if (!o.service.link.empty()) out["link"] = o.service.link;
   if (const std::string device = renderers.device(); !device.empty()) out["gpu"] = device;
   ViewerOptions shown = o;
@@ -160,7 +200,7 @@ struct Served {
 };
 
 // Shows the session until it, the person or the clock ends it.
-Served serve(const ViewerOptions& o, const net::Via& via, DisplaySurface& surface, Renderers& renderers,
+Served serve(const ViewerOptions& o, const net::Via& via, const Display& display, Renderers& renderers,
              SessionRecord& record) {
   net::Context context(via);
   CouplingGate gate(coupling_state(*coupling_named(o.coupling), o.buffers));
@@ -172,13 +212,26 @@ Served serve(const ViewerOptions& o, const net::Via& via, DisplaySurface& surfac
                                       .facts = facts(o, renderers),
                                       .received = {.epoch_patience_s = o.epoch_patience_s, .in_step = in_step(o)},
                                       .record = &record,
+                                      .poses = display.poses,
                                       .started_s = o.started_s};
   ViewerWorker worker(context, options, gate, frames, spans);
   const SourceMaker make_source = [&](Received& r) { return r.make_source(o.display, renderers); };
+  // Eyes never stand still, and each has half of the time.
+  DisplayOptions eye = o.display;
+  eye.still_samples = 1;
+  const XrSourceMaker make_source_for_eyes = [&](Received& r, double pictures_s) {
+    eye.target_fps = pictures_s;
+    return r.make_source(eye, renderers);
+  };
   Served served;
   const auto wall = wall_pace(o, context, worker);
-  served.display = run_display(
-      o.display, surface, make_source, gate, worker, frames, spans, [&] { return record.spool(); }, wall.get());
+  const std::function<FrameSpool*()> spool = [&] { return record.spool(); };
+  if (display.headset)
+    served.display = run_xr_display(o.display, o.xr_options, *display.headset, make_source_for_eyes, worker, frames,
+                                    spans, spool, tell);
+  else
+    served.display =
+        run_display(o.display, *display.surface, make_source, gate, worker, frames, spans, spool, wall.get());
   served.session_ended = worker.shutdown_requested();
   return served;
 }
@@ -225,17 +278,19 @@ int run(ViewerOptions o) {
   if (const Status s = settle(o); !s) return refuse(s.error());
   const auto via = net::via_of(o.service);
   if (!via) return refuse(via.error());
-  auto surface = open_surface(o, *via);  // before the renderers, whose contexts may depend on the window's
-  if (!surface) return refuse(surface.error());
+  const auto poses = open_poses(o);
+  if (!poses) return refuse(poses.error());
+  auto display = open_display(o, *via, *poses);  // before the renderers, whose contexts may depend on the window's
+  if (!display) return refuse(display.error());
   auto renderers = open_renderers(o);
   if (!renderers) return fail(renderers.error());
   auto record = open_record(o);
   if (!record) return refuse(record.error());
 
-  const Served served = serve(o, *via, **surface, *renderers, **record);
+  const Served served = serve(o, *via, *display, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
-  const std::string lost = (*surface)->failure();
-  surface->reset();  // the window goes at once, however much there is to write
+  const std::string lost = display->surface ? display->surface->failure() : "";
+  display->surface.reset();  // the window goes at once, however much there is to write
   if (FrameSpool* spool = (*record)->spool())
     if (const Status s = develop((*record)->directory(), *spool); !s) return fail(s.error());
   const int code = farewell(o, *via, served);

@@ -52,9 +52,22 @@ ViewerWorker::~ViewerWorker() {
   thread_.join();
 }
 
+void ViewerWorker::on_expected(double t_s, const geometry::Pose& pose) {
+  const std::lock_guard lock(mutex_);
+  expected_ = {t_s, pose};
+}
+
+void ViewerWorker::on_jump() {
+  const std::lock_guard lock(mutex_);
+  jumped_ = true;
+}
+
 void ViewerWorker::on_pose(double now_s, const geometry::Camera& camera) {
   const std::lock_guard lock(mutex_);
-  poses_.push_back({now_s, camera});
+  poses_.push_back({.t_s = now_s,
+                    .camera = camera,
+                    .expected = std::exchange(expected_, std::nullopt),
+                    .jumped = std::exchange(jumped_, false)});
 }
 
 void ViewerWorker::on_first_points(double now_s) {
@@ -66,7 +79,8 @@ void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochI
   ++frames_shown_;
   if (const uint64_t before = epoch_shown_.exchange(epoch.value); before != 0 && before != epoch.value) ++epochs_shown_;
   const std::lock_guard lock(mutex_);
-  poses_.push_back({now_s, camera, waited ? shown.requested_s : 0.0, shown.request});
+  poses_.push_back({now_s, camera, waited ? shown.requested_s : 0.0, shown.request,
+                    std::exchange(expected_, std::nullopt), std::exchange(jumped_, false)});
 }
 
 void ViewerWorker::on_measured(const MeasuredFrame& f) {
@@ -303,7 +317,9 @@ void ViewerWorker::take_poses() {
     poses.swap(poses_);
   }
   for (const auto& p : poses) {
+    if (p.jumped) requester_.on_jump();
     requester_.on_pose(to_master_s(p.t_s), p.camera);
+    if (p.expected) requester_.on_expected(to_master_s(p.expected->t_s), p.expected->pose);
     if (p.shown.value != 0) stages_table_.displayed(p.shown, to_master_s(p.t_s));
     if (p.waited_since_s > 0) requester_.on_displayed(to_master_s(p.t_s) - p.waited_since_s);
   }
@@ -322,6 +338,7 @@ void ViewerWorker::ask_again(double now_s) {
 
 void ViewerWorker::request_views(double now_s) {
   take_poses();
+  horizon_s_ = requester_.horizon_s();
   if (!link_.session() || !feeds_.connected()) return;
   ask_again(now_s);
   if (wished_) return;  // nothing more is asked for until the coupling has changed
@@ -369,6 +386,27 @@ void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
   values["waits_s"] = waits_s_;
 }
 
+// How well poses were predicted, means: those of view requests, and those that a tracker's poses were displayed with.
+void ViewerWorker::add_prediction(net::MasterLink::Values& values) const {
+  const auto add = [&](const char* what, const tracking::PredictionMeter::Figures& f) {
+    if (f.count == 0) return;
+    constexpr double kDegrees = 180 / 3.14159265358979323846;
+    values[fmt::format("{}s", what)] = double(f.count);
+    values[fmt::format("{}_horizon_ms", what)] = f.horizon_s * 1e3;
+    values[fmt::format("{}_error_mm", what)] = f.error_m * 1e3;
+    values[fmt::format("{}_error_deg", what)] = f.error_rad * kDegrees;
+    values[fmt::format("{}_none_mm", what)] = f.unpredicted_m * 1e3;
+    values[fmt::format("{}_none_deg", what)] = f.unpredicted_rad * kDegrees;
+  };
+  add("prediction", requester_.prediction());
+  if (!options_.poses) return;
+  const TrackedHead::Figures head = options_.poses->figures();
+  values["poses"] = double(head.poses);
+  values["poses_late"] = double(head.late);
+  values["poses_refused"] = double(head.refused);
+  add("pose_prediction", head.prediction);
+}
+
 net::MasterLink::Values ViewerWorker::status() const {
   net::MasterLink::Values values{{"rss_mb", net::resident_mb()},
                                  {"peak_rss_mb", net::peak_resident_mb()},
@@ -387,6 +425,7 @@ net::MasterLink::Values ViewerWorker::status() const {
                                  {"messages_rejected", double(feeds_.rejected())}};
   if (received_) received_->add_status(values);
   add_recent(values);
+  add_prediction(values);
   return values;
 }
 

@@ -12,6 +12,7 @@
 #include "client/viewer/display/frame_table.h"
 #include "client/viewer/hands/meaning.h"
 #include "client/viewer/hands/order_desk.h"
+#include "client/viewer/input/pose_feed.h"
 #include "client/viewer/legend_book.h"
 #include "client/viewer/received.h"
 #include "client/viewer/session_record.h"
@@ -33,6 +34,7 @@ class ViewerWorker {
     std::map<std::string, std::string> facts;  ///< for the hello
     ReceivedOptions received;                  ///< its recorders are the record's
     SessionRecord* record = nullptr;           ///< null: nothing is kept. Outlives the worker
+    std::shared_ptr<const PoseFeed> poses;     ///< moves the head; null: nobody does. Its figures are reported
     double started_s = 0;                      ///< when the session was started, on the monotonic clock; 0: now
   };
 
@@ -45,6 +47,12 @@ class ViewerWorker {
   // ---- display thread ----
   /// The head is here; nothing is displayed yet.
   void on_pose(double now_s, const geometry::Camera& camera);
+  /// Who tracks the head expects it here at t_s, which lies ahead (monotonic clock). Goes with the next pose or frame.
+  void on_expected(double t_s, const geometry::Pose& pose);
+  /// The next pose or frame is told in another space: how the head moved before means nothing.
+  void on_jump();
+  /// How far ahead views are asked for, seconds.
+  double horizon_s() const { return horizon_s_; }
   /// Something of the scene was displayed for the first time (later calls change nothing).
   void on_first_points(double now_s);
   /// A frame of this epoch was displayed with this camera. shown: the newest update in it; waited: it waited for that.
@@ -106,6 +114,7 @@ class ViewerWorker {
   ReceivedLinks links();
   net::MasterLink::Values status() const;
   void add_recent(net::MasterLink::Values& values) const;
+  void add_prediction(net::MasterLink::Values& values) const;
 
   Options options_;
   CouplingGate& gate_;
@@ -133,11 +142,15 @@ class ViewerWorker {
     /// Master's clock: when the update was requested that the frame waited for; 0: it did not.
     double waited_since_s = 0;
     RequestId shown;  ///< the newest update in what was displayed; 0: nothing was
+    std::optional<tracking::PosePredictor::Sample> expected{};
+    bool jumped = false;
   };
   LegendBook legends_;
   OrderDesk orders_;
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
   std::vector<SeenPose> poses_;
+  std::optional<tracking::PosePredictor::Sample> expected_;  // of the next one
+  bool jumped_ = false;                                      // before the next one
   std::string scene_;
   ShownScene shown_scene_;
   std::shared_ptr<const SceneTerms> terms_;
@@ -148,7 +161,7 @@ class ViewerWorker {
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};
-  std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0};
+  std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
   metrics::RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};
   std::thread thread_;
 };

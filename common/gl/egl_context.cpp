@@ -50,7 +50,7 @@ Result<std::unique_ptr<EglContext>> EglContext::make_on(EGLDisplay display) {
       EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
   const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, kVersion);
   if (context == EGL_NO_CONTEXT) return egl_error("eglCreateContext for OpenGL 4.3 core");
-  std::unique_ptr<EglContext> made(new EglContext(display, context));
+  std::unique_ptr<EglContext> made(new EglContext(display, config, context));
   const Current current(*made);
   if (!current.ok()) return egl_error("eglMakeCurrent");
   made->renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));

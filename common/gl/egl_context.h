@@ -27,6 +27,10 @@ class EglContext {
   /// GL_RENDERER, for logs.
   const std::string& renderer() const { return renderer_; }
   bool software() const { return is_software(renderer_); }
+  /// For libraries that share the context.
+  EGLDisplay display() const { return display_; }
+  EGLConfig config() const { return config_; }
+  EGLContext context() const { return context_; }
 
   /// Makes the context current in this thread for a scope, and then what was current before.
   class Current {
@@ -45,10 +49,12 @@ class EglContext {
   };
 
  private:
-  EglContext(EGLDisplay display, EGLContext context) : display_(display), context_(context) {}
+  EglContext(EGLDisplay display, EGLConfig config, EGLContext context)
+      : display_(display), config_(config), context_(context) {}
   static Result<std::unique_ptr<EglContext>> make_on(EGLDisplay display);
 
   EGLDisplay display_;
+  EGLConfig config_;
   EGLContext context_;
   std::string renderer_;
 };

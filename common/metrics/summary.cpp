@@ -394,6 +394,40 @@ ordered_json what_was_held(const Measured& m, const Roster& roster, double parti
           {"first_points_s", if_measured(first_points_s > 0, first_points_s / viewers)}};
 }
 
+/// Predictions of all viewers, each as often as it made them; null: none was made, or none could be judged.
+ordered_json predicted(const Roster& roster, const std::string& what) {
+  const auto counts = roster.each("viewer", what + "s");
+  const double count = std::accumulate(counts.begin(), counts.end(), 0.0);
+  if (!(count > 0)) return nullptr;
+  const auto mean = [&](const char* figure) {
+    const auto each = roster.each("viewer", what + figure);
+    double sum = 0;
+    for (size_t i = 0; i < std::min(each.size(), counts.size()); ++i) sum += each[i] * counts[i];
+    return sum / count;
+  };
+  const double mm = mean("_error_mm"), deg = mean("_error_deg"), none_mm = mean("_none_mm"),
+               none_deg = mean("_none_deg");
+  return {{"count", whole(count)},
+          {"horizon_ms", thousandths(mean("_horizon_ms"))},
+          {"error_mm", thousandths(mm)},
+          {"error_deg", thousandths(deg)},
+          {"none_mm", thousandths(none_mm)},
+          {"none_deg", thousandths(none_deg)},
+          {"over_none_mm", if_measured(none_mm > 0, thousandths(mm / none_mm))},
+          {"over_none_deg", if_measured(none_deg > 0, thousandths(deg / none_deg))}};
+}
+
+ordered_json how_heads_moved(const Measured& m, const Roster& roster) {
+  const auto leads = m.frames.column("lead_ms"), missed = m.frames.column("missed");
+  const bool headset = std::any_of(leads.begin(), leads.end(), [](double ms) { return ms != 0; });
+  const auto late = std::count_if(leads.begin(), leads.end(), [](double ms) { return ms < 0; });
+  return {{"frames_late", if_measured(headset, uint64_t(late))},
+          {"refreshes_missed", if_measured(headset, whole(std::accumulate(missed.begin(), missed.end(), 0.0)))},
+          {"predicted_by", or_null(roster.fact("viewer", "prediction"))},
+          {"prediction", predicted(roster, "prediction")},
+          {"pose_prediction", predicted(roster, "pose_prediction")}};
+}
+
 }  // namespace
 
 ordered_json summarise(const Measured& measured, const std::vector<Process>& processes,
@@ -410,6 +444,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(how_coupled(measured));
   out.update(how_long(measured));
   out.update(how_together(measured, counter("swaps_incomplete")));
+  out.update(how_heads_moved(measured, roster));
   out["clock"] = clocks(processes);
   out.update(how_much(traffic(measured, roster), run_s, viewers));
   out.update(what_was_steered(measured));

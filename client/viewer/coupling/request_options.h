@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "common/tracking/pose_predictor.h"
+
 namespace telesplat::viewer {
 
 struct RequestOptions {
@@ -17,6 +19,8 @@ struct RequestOptions {
   /// The same while the scene changes, when each view is displayed for a moment only.
   double min_scale_changing = 0.25;
   uint64_t buffers = 0;  ///< 0: asynchronous; else requests are paced by credits (coupling.h) and not by max_rate_hz
+  tracking::Prediction prediction = tracking::Prediction::kKalman;
+  double horizon_s = 0;  ///< seconds that poses are predicted ahead; 0: the latency of updates, as it is measured
   bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 

@@ -9,9 +9,9 @@
 namespace telesplat::viewer {
 namespace {
 
-constexpr double kVelocityWindow_s = 0.15, kMaxMove_m = 0.3, kMaxTurn_rad = 0.6;
 constexpr size_t kMaxOpen = 256;
-constexpr double kEpochSettles_s = 1.0;      // without a new epoch the scene counts as unchanging again
+constexpr double kMostBeyond_s = 0.02;   // what is expected of later than this after the time asked for is of no use
+constexpr double kEpochSettles_s = 1.0;  // without a new epoch the scene counts as unchanging again
 constexpr double kFirstPixels = 1280 * 800;  // what adaptive sampling begins with
 constexpr double kMotionOfRest = 0.002;      // radians, or as much of 0.6 m, until a view would be displayed
 // Steered: another resolution makes much of the model too coarse or needlessly fine, so it changes by octaves of pixels
@@ -23,24 +23,6 @@ constexpr double kSteeredAim = 0.5, kFastEnough = 0.6;  // of the target, of tha
 // Side of a sampled image: a multiple of 8 in range.
 int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }
 
-// Rotation vector of a unit quaternion.
-glm::dvec3 rotation_vector(glm::dquat q) {
-  if (q.w < 0) q = -q;
-  const glm::dvec3 v(q.x, q.y, q.z);
-  const double s = glm::length(v);
-  return s < 1e-9 ? 2.0 * v : v / s * 2.0 * std::atan2(s, q.w);
-}
-
-glm::dquat rotation(const glm::dvec3& v) {
-  const double angle = glm::length(v);
-  return angle < 1e-9 ? glm::dquat(1, 0, 0, 0) : glm::angleAxis(angle, v / angle);
-}
-
-glm::dvec3 clamp_length(const glm::dvec3& v, double limit) {
-  const double length = glm::length(v);
-  return length > limit ? v * (limit / length) : v;
-}
-
 }  // namespace
 
 std::pair<int, int> sampling_size(const RequestOptions& o, int width, int height) {
@@ -50,36 +32,29 @@ std::pair<int, int> sampling_size(const RequestOptions& o, int width, int height
   return {whole_side(side * stretch), whole_side(side / stretch)};
 }
 
-void PosePredictor::add(double t_s, const geometry::Pose& pose) {
-  if (!samples_.empty() && t_s <= samples_.back().t_s) return;
-  samples_.push_back({t_s, pose});
-  while (samples_.size() > 2 && samples_[1].t_s < t_s - kVelocityWindow_s) samples_.pop_front();
-}
-
-PosePredictor::Velocity PosePredictor::velocity() const {
-  if (samples_.size() < 2) return {};
-  const Sample &a = samples_.front(), &b = samples_.back();
-  const double dt = b.t_s - a.t_s;
-  if (dt < 1e-3) return {};
-  return {(b.pose.position_room - a.pose.position_room) / dt,
-          rotation_vector(b.pose.orientation * glm::conjugate(a.pose.orientation)) / dt};
-}
-
-double PosePredictor::speed_m_s() const { return glm::length(velocity().linear); }
-double PosePredictor::turn_rad_s() const { return glm::length(velocity().angular); }
-
-geometry::Pose PosePredictor::predict(double t_s) const {
-  if (samples_.empty()) return {};
-  const Sample& last = samples_.back();
-  const double dt = std::max(0.0, t_s - last.t_s);
-  const Velocity v = velocity();
-  return {last.pose.position_room + clamp_length(v.linear * dt, kMaxMove_m),
-          glm::normalize(rotation(clamp_length(v.angular * dt, kMaxTurn_rad)) * last.pose.orientation)};
-}
-
 void ViewRequester::on_pose(double t_s, const geometry::Camera& display) {
   predictor_.add(t_s, display.pose);
+  meter_.actual(t_s, display.pose);
   display_ = display;
+}
+
+void ViewRequester::on_jump() {
+  predictor_.forget();
+  expected_.reset();
+}
+
+double ViewRequester::horizon_s() const {
+  if (options_.horizon_s > 0) return options_.horizon_s;
+  if (displayed_latency_s_ > 0) return displayed_latency_s_;
+  return latency_s_ > 0 ? latency_s_ : options_.initial_latency_s;
+}
+
+// What the tracker expects holds as long as no pose of that time or later is known; the rest of the way, if it is one,
+// is the head's velocity.
+geometry::Pose ViewRequester::expected_at(double t_s) const {
+  const auto newest = predictor_.newest();
+  const bool ahead = expected_ && newest && expected_->t_s > newest->t_s && expected_->t_s - t_s < kMostBeyond_s;
+  return ahead ? predictor_.carried(expected_->pose, std::max(0.0, t_s - expected_->t_s)) : predictor_.predict(t_s);
 }
 
 // Whether what the head sees now looks as it does from there.
@@ -88,11 +63,10 @@ bool ViewRequester::rests_at(const geometry::Pose& pose) const {
 }
 
 geometry::Camera ViewRequester::wanted(double now_s, bool& still) {
-  const double horizon_s = displayed_latency_s_ > 0 ? displayed_latency_s_
-                           : latency_s_ > 0         ? latency_s_
-                                                    : options_.initial_latency_s;
+  const double horizon_s = this->horizon_s();
   geometry::Camera camera = *display_;
-  camera.pose = predictor_.predict(now_s + horizon_s);
+  camera.pose = expected_at(now_s + horizon_s);
+  meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
   const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
   const double margin = motion < kMotionOfRest ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);

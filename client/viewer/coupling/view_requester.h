@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <deque>
 #include <map>
 #include <optional>
 #include <span>
@@ -12,6 +11,8 @@
 #include "client/viewer/coupling/request_options.h"
 #include "client/viewer/coupling/sampling_wish.h"
 #include "common/geometry/camera.h"
+#include "common/tracking/pose_predictor.h"
+#include "common/tracking/prediction_meter.h"
 #include "common/wire/messages.h"
 
 namespace telesplat::viewer {
@@ -19,27 +20,6 @@ namespace telesplat::viewer {
 /// What to sample for a display of width x height pixels: the size of the options, or as many pixels in the display's
 /// aspect, sides multiples of 8 and at least 16.
 std::pair<int, int> sampling_size(const RequestOptions& options, int width, int height);
-
-/// Extrapolates a head pose with its recent velocity.
-class PosePredictor {
- public:
-  void add(double t_s, const geometry::Pose& pose);
-  /// Constant velocity from the poses of the last 0.15 s; at most 0.3 m and 0.6 rad away from the newest pose.
-  geometry::Pose predict(double t_s) const;
-  double speed_m_s() const;
-  double turn_rad_s() const;
-
- private:
-  struct Sample {
-    double t_s;
-    geometry::Pose pose;
-  };
-  struct Velocity {
-    glm::dvec3 linear{0.0}, angular{0.0};
-  };  // room space
-  Velocity velocity() const;
-  std::deque<Sample> samples_;
-};
 
 /// What came of an answer: a tile of points, or a whole volume frame.
 struct ViewPart {
@@ -67,10 +47,15 @@ class ViewRequester {
   static constexpr double kQuietPeriod_s = 1.0;  ///< what has changed without a word is found by asking again
   static constexpr double kPatience_s = 0.5;     ///< with a view on its way
 
-  ViewRequester(const RequestOptions& options, InstanceId viewer) : options_(options), viewer_(viewer) {}
+  ViewRequester(const RequestOptions& options, InstanceId viewer)
+      : options_(options), viewer_(viewer), predictor_(options.prediction) {}
 
   /// A displayed pose; display: the camera it was shown with.
   void on_pose(double t_s, const geometry::Camera& display);
+  /// Poses from now on are told in another space, or of another head: how it moved before means nothing.
+  void on_jump();
+  /// Who tracks the head expects it here at t_s, which lies ahead: better than what its poses alone tell.
+  void on_expected(double t_s, const geometry::Pose& pose) { expected_ = {t_s, pose}; }
   /// RequestOptions::min_scale, as the session sets it; within 0.1 to 1.
   void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
   /// The size of views from now on, as a person wishes it.
@@ -120,11 +105,17 @@ class ViewRequester {
   std::optional<Update> on_part(const ViewPart& part, double now_s);
 
   double latency_s() const { return latency_s_; }
+  /// How far ahead poses are predicted.
+  double horizon_s() const;
+  /// How well they were.
+  tracking::PredictionMeter::Figures prediction() const { return meter_.figures(); }
 
  private:
   RequestOptions options_;
   InstanceId viewer_;
-  PosePredictor predictor_;
+  tracking::PosePredictor predictor_;
+  tracking::PredictionMeter meter_;
+  std::optional<tracking::PosePredictor::Sample> expected_;
   std::optional<geometry::Camera> display_;
   RequestId next_{1};
   double scale_ = 0;  // adaptive: sampled pixels a displayed pixel on each axis; 0: not begun
@@ -132,6 +123,7 @@ class ViewRequester {
     return changing_ ? std::min(options_.min_scale, options_.min_scale_changing) : options_.min_scale;
   }
 
+  geometry::Pose expected_at(double t_s) const;
   geometry::Camera wanted(double now_s, bool& still);
   bool rests_at(const geometry::Pose& pose) const;
   bool quiet(const geometry::Camera& camera) const;

@@ -78,6 +78,8 @@ constexpr metrics::Column<MeasuredFrame> kColumns[] = {
     {"right_x", [](F f) { return eye(f, 1).x; }},
     {"right_y", [](F f) { return eye(f, 1).y; }},
     {"right_z", [](F f) { return eye(f, 1).z; }},
+    {"lead_ms", [](F f) { return f.lead_s * 1e3; }},
+    {"missed", [](F f) { return double(f.missed); }},
 };
 
 }  // namespace

@@ -36,6 +36,10 @@ struct MeasuredFrame {
   double swap_wait_s = 0;    ///< from its end until the wall's frames were due
   double swap_skew_s = -1;   ///< from the first of the wall's displays to present it to the last; < 0: not known
   MeasuredEyes stereo{};
+  /// Of a headset: it was handed over so long before it was due; refreshes of the display that went by without a new
+  /// picture before it.
+  double lead_s = 0;
+  int missed = 0;
 };
 
 std::vector<std::string> frame_columns();

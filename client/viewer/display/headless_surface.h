@@ -1,12 +1,17 @@
-// No window: the head follows a trajectory, frames are measured and recorded only.
+// No window: the head follows a trajectory or a publisher of poses, frames are measured and recorded only.
 #pragma once
 
 #include <algorithm>
+#include <functional>
+#include <memory>
+#include <string>
 #include <utility>
 
 #include "client/viewer/display/display_options.h"
 #include "client/viewer/display/display_surface.h"
 #include "client/viewer/input/head_movement.h"
+#include "client/viewer/input/pose_feed.h"
+#include "common/core/clock.h"
 
 namespace telesplat::viewer {
 
@@ -17,28 +22,43 @@ class HeadlessSurface final : public DisplaySurface {
     if (movement_.recorded) trajectory_ = *movement_.recorded;
   }
 
+  /// These poses move the head as soon as they come. tell: lines about them for the person.
+  void follow(std::shared_ptr<PoseFeed> poses, std::function<void(const std::string&)> tell) {
+    poses_ = std::move(poses);
+    tell_ = std::move(tell);
+  }
+
   /// A head that moves already stays on its way.
   void on_scene(const ShownScene& scene) override {
     if (!moves_) trajectory_ = movement_.trajectory(scene.box_room, fitting_camera(options_));
   }
-  geometry::Camera begin_frame(double, double t_s, Look&) override {
+  geometry::Camera begin_frame(double now_s, double t_s, Look&) override {
     const auto& o = options_;
+    if (poses_)
+      if (const auto told = poses_->begin_frame(now_s)) return camera_of(head_ = *told);
     moves_ = moves_ || t_s >= 0;
-    const double now_s = std::max(0.0, t_s);
-    const double moving_s = o.duration_s > 0 ? std::min(now_s, o.duration_s - o.hold_s) : now_s;
+    const double head_s = std::max(0.0, t_s);
+    const double moving_s = o.duration_s > 0 ? std::min(head_s, o.duration_s - o.hold_s) : head_s;
     head_ = trajectory_.at(moving_s);
     return camera_of(head_);
   }
   geometry::Pose head() const override { return head_; }
   geometry::Camera camera_of(const geometry::Pose& head) const override { return display_camera(options_, head); }
   bool visible() const override { return false; }
-  void present(const image::View&, bool) override {}
-  void report(const LiveFigures&) override {}
+  void present(const image::View&, bool) override {
+    if (poses_) poses_->presented(monotonic_s());
+  }
+  void report(const LiveFigures& figures) override {
+    if (!poses_) return;
+    if (const auto news = poses_->take_news(figures.now_s)) tell_(*news);
+  }
   bool wants_to_stop() const override { return false; }
 
  private:
   DisplayOptions options_;
   HeadMovement movement_;
+  std::shared_ptr<PoseFeed> poses_;
+  std::function<void(const std::string&)> tell_;
   geometry::Trajectory trajectory_ = geometry::Trajectory::still({});
   geometry::Pose head_;
   bool moves_ = false;

@@ -113,6 +113,7 @@ WindowSurface::WindowSurface(const Options& o, std::unique_ptr<Window> window, s
   open_view_.shown = o.begins_empty;
   interaction_.set_key_names([this](Key key) { return window_->key_name(key); });
   tell(first_keys());
+  if (o.poses) interaction_.set_tracked([poses = o.poses](double now_s) { return poses->begin_frame(now_s); });
 }
 
 void WindowSurface::tell(const std::string& line) { lines_->add(line); }
@@ -241,6 +242,8 @@ std::vector<std::string> WindowSurface::key_lines() const {
 
 // What keys led to: lines for the person, and a path that is complete.
 void WindowSurface::keep_path() {
+  if (options_.poses)
+    if (const auto news = options_.poses->take_news(monotonic_s())) tell(*news);
   const auto notes = interaction_.take_notes();
   const auto help = notes.empty() ? std::vector<std::string>() : key_lines();
   for (const auto& note : notes) lines_->add(note, std::find(help.begin(), help.end(), note) == help.end());
@@ -264,8 +267,11 @@ void WindowSurface::present(const image::View& view, bool changed) {
   if (panel_.shown() && changed && panel_.pipeline() == scene::Pipeline::kPoints) holes_.look_at(view, background_);
   if (!changed && same && now.at_s - shown_.at_s < kShowAgain_s) return;
   shown_ = now;
-  if (!now.panel) return window_->present(view, overlays_);
-  window_->present(view, overlays_, [&] { return build_panel(now.at_s); });
+  if (now.panel)
+    window_->present(view, overlays_, [&] { return build_panel(now.at_s); });
+  else
+    window_->present(view, overlays_);
+  if (options_.poses) options_.poses->presented(monotonic_s());
 }
 
 // How much of the left side it covers.

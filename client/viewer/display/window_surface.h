@@ -10,6 +10,7 @@
 #include "client/viewer/hands/bookmarks.h"
 #include "client/viewer/hands/hand_overlays.h"
 #include "client/viewer/input/head_movement.h"
+#include "client/viewer/input/pose_feed.h"
 #include "client/viewer/panel/control_desk.h"
 #include "client/viewer/panel/gui/open_view.h"
 #include "client/viewer/panel/gui/panel_view.h"
@@ -26,7 +27,8 @@ class WindowSurface final : public DisplaySurface {
  public:
   struct Options {
     DisplayOptions display;
-    HeadMovement movement;  ///< unless it stands still it plays until the person takes the camera
+    HeadMovement movement;            ///< unless it stands still it plays until the person takes the camera
+    std::shared_ptr<PoseFeed> poses;  ///< moves the camera until the person takes it; null: nobody does
     bool fullscreen = false;
     std::string screenshot_directory = ".", path_directory = ".";
     bool panel = true;             ///< shown from the beginning

@@ -105,7 +105,8 @@ void Interaction::toggle(bool& flag, const char* name) {
 void Interaction::take_camera() {
   if (!playing_) return;
   playing_ = false;
-  controls_.take_over(recorded_->at(playback_s_));
+  if (!tracked_) return controls_.take_over(recorded_->at(playback_s_));
+  if (told_) controls_.take_over(*told_);
 }
 
 void Interaction::go_to(const geometry::Pose& pose) {
@@ -115,13 +116,13 @@ void Interaction::go_to(const geometry::Pose& pose) {
 }
 
 void Interaction::play_or_take() {
-  if (!recorded_) {
+  if (!recorded_ && !tracked_) {
     notes_.push_back("no head movement to play: --trajectory names one, C records one");
     return;
   }
   if (playing_) return take_camera();
   controls_.set_flying(false);
-  if (recorded_->duration_s() > 0 && playback_s_ >= recorded_->duration_s()) playback_s_ = 0;
+  if (!tracked_ && recorded_->duration_s() > 0 && playback_s_ >= recorded_->duration_s()) playback_s_ = 0;
   playing_ = true;
 }
 
@@ -263,6 +264,7 @@ void Interaction::set_recorded(geometry::Trajectory recorded) {
 }
 
 void Interaction::play(geometry::Trajectory path) {
+  tracked_ = nullptr;
   recorded_ = std::move(path);
   has_own_path_ = playing_ = true;
   playback_s_ = 0;
@@ -272,12 +274,21 @@ void Interaction::play(geometry::Trajectory path) {
 geometry::Pose Interaction::advance(double now_s, bool playback) {
   const double dt_s = last_s_ ? std::max(0.0, now_s - *last_s_) : 0.0;
   last_s_ = now_s;
-  const geometry::Pose pose = next_pose(dt_s, playback);
+  const geometry::Pose pose = next_pose(now_s, dt_s, playback);
   if (records_path_) record_pose(now_s, pose);
   return pose;
 }
 
-geometry::Pose Interaction::next_pose(double dt_s, bool playback) {
+void Interaction::set_tracked(Tracked tracked) {
+  tracked_ = std::move(tracked);
+  playing_ = true;
+}
+
+geometry::Pose Interaction::next_pose(double now_s, double dt_s, bool playback) {
+  if (playing_ && tracked_) {
+    if (const auto told = tracked_(now_s)) told_ = told;
+    return told_ ? *told_ : controls_.advance(dt_s);
+  }
   if (playing_) {
     if (playback) playback_s_ += dt_s;
     return recorded_->at(playback_s_);

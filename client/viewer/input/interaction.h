@@ -85,6 +85,10 @@ class Interaction {
   /// T plays this from now on, and it plays at once.
   void play(geometry::Trajectory path);
   bool can_play() const { return recorded_.has_value(); }
+  /// From now on somebody else tells where the head is (nothing: not yet), until the person takes the camera; T goes
+  /// back to it.
+  using Tracked = std::function<std::optional<geometry::Pose>(double now_s)>;
+  void set_tracked(Tracked tracked);
   /// What the window shows, top to bottom, at distance 1: pans follow the pointer.
   void set_height_tangent(double tangent) { height_tangent_ = tangent; }
   /// The camera at `now_s`. A recorded movement advances only while `playback` is true.
@@ -136,10 +140,12 @@ class Interaction {
   void take_camera();
   void begin_path();
   void record_pose(double now_s, const geometry::Pose& pose);
-  geometry::Pose next_pose(double dt_s, bool playback);
+  geometry::Pose next_pose(double now_s, double dt_s, bool playback);
   void toggle(bool& flag, const char* name);
 
   std::optional<geometry::Trajectory> recorded_;
+  Tracked tracked_;
+  std::optional<geometry::Pose> told_;  // by it
   Look look_;
   CameraControls controls_;
   scene::Pipeline pipeline_ = scene::Pipeline::kPoints;

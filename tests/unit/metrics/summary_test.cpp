@@ -96,6 +96,26 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
   EXPECT_EQ(std::count(tiles.begin(), tiles.end(), '\n'), 4);
 }
 
+TEST_F(Record, PredictionsOfViewersAreMeansOverAllThatWereMade) {
+  ASSERT_TRUE(record->add_rows(viewer, {{5}, "frames", {"t_s", "lead_ms", "missed"}, {0, 3, 0, 1, -2, 1, 2, 4, 2}}));
+  Process first = viewer, second = viewer;
+  first.facts["prediction"] = "kalman";
+  first.values = {{"predictions", 10},        {"prediction_horizon_ms", 50}, {"prediction_error_mm", 2},
+                  {"prediction_none_mm", 10}, {"prediction_error_deg", 0.5}, {"prediction_none_deg", 1}};
+  second.values = {{"predictions", 30},        {"prediction_horizon_ms", 70}, {"prediction_error_mm", 4},
+                   {"prediction_none_mm", 10}, {"prediction_error_deg", 0.5}, {"prediction_none_deg", 1}};
+  const auto s = record->summary({first, second}, {});
+  EXPECT_EQ(s["predicted_by"], "kalman");
+  EXPECT_EQ(s["prediction"]["count"], 40);
+  EXPECT_EQ(s["prediction"]["horizon_ms"], 65);
+  EXPECT_EQ(s["prediction"]["error_mm"], 3.5);
+  EXPECT_EQ(s["prediction"]["over_none_mm"], 0.35);
+  EXPECT_EQ(s["prediction"]["over_none_deg"], 0.5);
+  EXPECT_TRUE(s["pose_prediction"].is_null()) << "no tracker told poses";
+  EXPECT_EQ(s["frames_late"], 1);
+  EXPECT_EQ(s["refreshes_missed"], 3);
+}
+
 TEST_F(Record, TilesTellWhereTheyLieAndCoarseFramesAreNotTimed) {
   auto coarse = tile(1, 0, 0.5), fine = tile(2, 3, 1.0);
   coarse.step = 4;

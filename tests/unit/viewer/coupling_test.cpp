@@ -13,34 +13,6 @@ constexpr InstanceId kMe{5}, kOther{6};
 
 geometry::Pose turned(double yaw_rad, const glm::dvec3& p) { return {p, glm::angleAxis(yaw_rad, glm::dvec3(0, 1, 0))}; }
 
-TEST(PosePredictor, FollowsConstantVelocity) {
-  PosePredictor predictor;
-  for (int i = 0; i <= 20; ++i) predictor.add(i * 0.01, turned(0.5 * i * 0.01, {0.4 * i * 0.01, 0, 0}));
-  const geometry::Pose p = predictor.predict(0.3);
-  EXPECT_NEAR(p.position_room.x, 0.4 * 0.3, 1e-9);
-  EXPECT_NEAR(glm::angle(p.orientation), 0.5 * 0.3, 1e-6);
-  EXPECT_NEAR(predictor.speed_m_s(), 0.4, 1e-9);
-  EXPECT_NEAR(predictor.turn_rad_s(), 0.5, 1e-6);
-}
-
-TEST(PosePredictor, StaysNearWhateverTheSpeed) {
-  PosePredictor predictor;
-  for (int i = 0; i <= 5; ++i) predictor.add(i * 0.01, turned(20.0 * i * 0.01, {100.0 * i * 0.01, 0, 0}));
-  const geometry::Pose last = turned(1.0, {5, 0, 0}), p = predictor.predict(10);
-  EXPECT_LE(glm::distance(p.position_room, last.position_room), 0.3 + 1e-9);
-  EXPECT_LE(2 * std::acos(std::abs(glm::dot(p.orientation, last.orientation))), 0.6 + 1e-6);
-}
-
-TEST(PosePredictor, ARestingHeadStaysWhereItIs) {
-  PosePredictor predictor;
-  const geometry::Pose pose = turned(0.3, {1, 2, 3});
-  predictor.add(0, pose);
-  EXPECT_TRUE(predictor.predict(1).position_room == pose.position_room);
-  EXPECT_NEAR(std::abs(glm::dot(predictor.predict(1).orientation, pose.orientation)), 1, 1e-15);
-  predictor.add(0.1, pose);
-  EXPECT_NEAR(glm::distance(predictor.predict(1).position_room, pose.position_room), 0, 1e-12);
-}
-
 class Requester : public testing::Test {
  protected:
   ViewRequester requester{{.sampling_width = 640, .sampling_height = 400, .max_rate_hz = 10}, kMe};

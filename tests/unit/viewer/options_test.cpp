@@ -212,7 +212,9 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
                                     "left_z",
                                     "right_x",
                                     "right_y",
-                                    "right_z"}));
+                                    "right_z",
+                                    "lead_ms",
+                                    "missed"}));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;
@@ -222,20 +224,22 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
   f.drawn.refine_ms = 6;
   f.drawn.sub_pixels = 4;
   f.coupling = {CouplingMode::kLoose, 5};
+  f.lead_s = 0.25;
+  f.missed = 3;
   f.look = {{splat::Kernel::kEwa, {.fill = true, .smooth = false, .antialias = true}}, false};
   f.look.head_light = true;
   f.look.background = 0xffeedd;
   const auto row = frame_row(f);
   ASSERT_EQ(row.size(), frame_columns().size());
   EXPECT_EQ((std::vector<double>(row.begin(), row.begin() + 6)), (std::vector<double>{7, 2, 1500, 500, 250, 250}));
-  EXPECT_EQ((std::vector<double>(row.end() - 24, row.end() - 8)),
+  EXPECT_EQ((std::vector<double>(row.end() - 26, row.end() - 10)),
             (std::vector<double>{2, 9, 3, 5, 0, 4, 0.5, 6, 4, 2, 5, 1, 0xffeedd, 0, 0, -1}));
-  EXPECT_EQ((std::vector<double>(row.end() - 8, row.end())), (std::vector<double>{0, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ((std::vector<double>(row.end() - 10, row.end())), (std::vector<double>{0, 0, 0, 0, 0, 0, 0, 0, 250, 3}));
   f.stereo = {stereo::Mode::kRows, {.screen_m = 0.75}};
   f.stereo.pair.eyes[0].pose.position_room = {1, 2, 3};
   f.stereo.pair.eyes[1].pose.position_room = {4, 5, 6};
   const auto seen_by_two = frame_row(f);
-  EXPECT_EQ((std::vector<double>(seen_by_two.end() - 8, seen_by_two.end())),
+  EXPECT_EQ((std::vector<double>(seen_by_two.end() - 10, seen_by_two.end() - 2)),
             (std::vector<double>{double(stereo::Mode::kRows), 0.75, 1, 2, 3, 4, 5, 6}));
 }
 

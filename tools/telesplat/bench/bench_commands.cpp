@@ -6,8 +6,8 @@ Command bench_command() {
   Command out;
   out.name = "bench";
   out.help = "measure the pipeline";
-  out.commands = {bench_scaling_command(), bench_volume_command(), bench_cache_command(), bench_steering_command(),
-                  bench_thesis_command()};
+  out.commands = {bench_scaling_command(),  bench_volume_command(), bench_cache_command(),
+                  bench_steering_command(), bench_thesis_command(), bench_tracking_command()};
   return out;
 }
 

@@ -136,7 +136,7 @@ class Run {
         heard = true;
         progress_.line(fmt::format("telesplat: no master answers at {} yet; waiting for one", o_.join_master));
       }
-      if (o_.viewer.window && !live.empty())
+      if (o_.viewer.window && !o_.viewer.xr && !live.empty())
         progress_.close();  // the window's title has the figures
       else if (!live.empty() || !pipeline.progress().empty())
         progress_.show(live.empty() ? pipeline.progress() : live);
@@ -288,7 +288,7 @@ int run(RunOptions o, const options::Given& given) {
   auto scene = settle(o, given);
   if (!scene) return tools::complain(scene.error());
   if (const int code = find_session(o)) return code;
-  if (o.viewer.window)
+  if (o.viewer.window && !o.viewer.xr)
     if (const Status s = viewer::check_display(); !s) return tools::complain(s.error());
   if (const std::string end = viewer::end_of_trajectory(o.viewer); !end.empty())
     std::fprintf(stderr, "%s\n", end.c_str());

@@ -22,12 +22,13 @@ constexpr double kWallHold_s = 2;
 // Either `run`'s or `view`'s.
 Table display_rows(RunOptions& o) {
   if (o.viewer.window)
-    return {{.flag = "--out", .value = &o.out, .help = "run folder; without it nothing is recorded"},
-            {.flag = "--fullscreen", .value = &o.viewer.fullscreen, .help = "the window fills the screen"},
-            {.flag = "--panel",
-             .value = &o.viewer.panel,
-             .help = "on: the window begins with its panel, which Tab hides and shows",
-             .on_off = true}};
+    return joined({{.flag = "--out", .value = &o.out, .help = "run folder; without it nothing is recorded"},
+                   {.flag = "--fullscreen", .value = &o.viewer.fullscreen, .help = "the window fills the screen"},
+                   {.flag = "--panel",
+                    .value = &o.viewer.panel,
+                    .help = "on: the window begins with its panel, which Tab hides and shows",
+                    .on_off = true}},
+                  viewer::xr_table(o.viewer));
   const Table rows{
       {.flag = "--out", .value = &o.out, .help = "run folder; default: runs/DATE-TIME"},
       {.flag = "--viewers",
@@ -279,6 +280,7 @@ std::vector<std::string> sampler_arguments(const RunOptions& o) {
 
 std::vector<std::string> viewer_arguments(const RunOptions& o, int number, double clock_from_s) {
   viewer::ViewerOptions v = o.viewer;
+  v.window = v.window && !v.xr;
   if (number != 1) v.display.verify_every = 0;
   if (o.out.empty())
     v.join_record = false;  // a guest without a folder leaves nothing in that of others

@@ -1,0 +1,83 @@
+#include "client/viewer/xr/picture_chain.h"
+
+#include <epoxy/gl.h>
+
+#include <cstring>
+#include <utility>
+
+namespace telesplat::viewer {
+
+Result<PictureChain> PictureChain::make(const XrSystem& system, XrSession session, int64_t format,
+                                        XrSwapchainUsageFlags usage, int width, int height) {
+  XrSwapchainCreateInfo info{XR_TYPE_SWAPCHAIN_CREATE_INFO};
+  info.usageFlags = usage | XR_SWAPCHAIN_USAGE_SAMPLED_BIT;
+  info.format = format;
+  info.sampleCount = info.faceCount = info.arraySize = info.mipCount = 1;
+  info.width = uint32_t(width), info.height = uint32_t(height);
+  XrSwapchain handle = nullptr;
+  if (const Status s = system.check("xrCreateSwapchain", xrCreateSwapchain(session, &info, &handle)); !s)
+    return s.error();
+  PictureChain out(system, handle, width, height);
+  uint32_t count = 0;
+  if (const Status s =
+          system.check("xrEnumerateSwapchainImages", xrEnumerateSwapchainImages(handle, 0, &count, nullptr));
+      !s)
+    return s.error();
+  std::vector<XrSwapchainImageOpenGLKHR> images(count, {XR_TYPE_SWAPCHAIN_IMAGE_OPENGL_KHR});
+  const XrResult listed =
+      xrEnumerateSwapchainImages(handle, count, &count, reinterpret_cast<XrSwapchainImageBaseHeader*>(images.data()));
+  if (const Status s = system.check("xrEnumerateSwapchainImages", listed); !s) return s.error();
+  for (const auto& image : images) out.textures_.push_back(image.image);
+  return out;
+}
+
+PictureChain::PictureChain(PictureChain&& o) noexcept
+    : system_(o.system_),
+      handle_(std::exchange(o.handle_, nullptr)),
+      width_(o.width_),
+      height_(o.height_),
+      textures_(std::move(o.textures_)) {}
+
+PictureChain::~PictureChain() {
+  if (handle_) xrDestroySwapchain(handle_);
+}
+
+template <class Upload>
+Status PictureChain::put_with(Upload upload) {
+  uint32_t index = 0;
+  if (const Status s = system_->check("xrAcquireSwapchainImage", xrAcquireSwapchainImage(handle_, nullptr, &index)); !s)
+    return s;
+  XrSwapchainImageWaitInfo wait{XR_TYPE_SWAPCHAIN_IMAGE_WAIT_INFO};
+  wait.timeout = XR_INFINITE_DURATION;
+  if (const Status s = system_->check("xrWaitSwapchainImage", xrWaitSwapchainImage(handle_, &wait)); !s) return s;
+  if (index < textures_.size()) {
+    glBindTexture(GL_TEXTURE_2D, textures_[index]);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    upload();
+    glBindTexture(GL_TEXTURE_2D, 0);
+  }
+  return system_->check("xrReleaseSwapchainImage", xrReleaseSwapchainImage(handle_, nullptr));
+}
+
+Status PictureChain::put(std::span<const uint32_t> colour) {
+  const size_t row = size_t(width_);
+  turned_.resize(row * size_t(height_));
+  for (size_t y = 0; y < size_t(height_); ++y)
+    std::memcpy(turned_.data() + (size_t(height_) - 1 - y) * row, colour.data() + y * row, row * 4);
+  return put_with([&] {
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, turned_.data());
+  });
+}
+
+Status PictureChain::put(std::span<const float> depth) {
+  const size_t row = size_t(width_);
+  turned_.resize(row * size_t(height_));
+  for (size_t y = 0; y < size_t(height_); ++y)
+    std::memcpy(turned_.data() + (size_t(height_) - 1 - y) * row, depth.data() + y * row, row * 4);
+  return put_with(
+      [&] { glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, turned_.data()); });
+}
+
+XrSwapchainSubImage PictureChain::sub_image() const { return {handle_, {{0, 0}, {width_, height_}}, 0}; }
+
+}  // namespace telesplat::viewer

@@ -1,0 +1,151 @@
+// Heads that other programs move: telesplat-pose-replay, silent and hostile publishers, real processes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <thread>
+
+#include "common/net/plain/plain_socket.h"
+#include "common/wire/head_pose.h"
+#include "tests/support/pipeline_run.h"
+
+namespace telesplat::test {
+namespace {
+
+// A head that sways before the data, 100 poses a second for ten seconds.
+void write_swaying(const std::string& path) {
+  std::ofstream out(path);
+  out << "t_s,px,py,pz,qw,qx,qy,qz\n";
+  for (int i = 0; i <= 1000; ++i) {
+    const double t_s = i * 0.01, x = 0.15 * std::sin(2 * t_s);
+    out << t_s << ',' << x << ",0.4,1,1,0,0,0\n";
+  }
+}
+
+class Replay {
+ public:
+  Replay(const TemporaryFolder& folder, std::vector<std::string> arguments) : program_(make(folder, arguments)) {
+    EXPECT_TRUE(wait_until([&] { return program_->out().find('\n') != std::string::npos; })) << program_->err();
+    const std::string out = program_->out();
+    address_ = out.substr(9, out.find('\n') - 9);  // "poses at ..."
+  }
+  const std::string& address() const { return address_; }
+  Program& program() { return *program_; }
+
+ private:
+  static std::unique_ptr<Program> make(const TemporaryFolder& folder, std::vector<std::string> arguments) {
+    write_swaying(folder / "swaying.csv");
+    arguments.insert(arguments.begin(), {folder / "swaying.csv", "--bind", "tcp://127.0.0.1:*"});
+    return std::make_unique<Program>("telesplat-pose-replay", std::move(arguments), folder / "replay");
+  }
+  std::unique_ptr<Program> program_;
+  std::string address_;
+};
+
+double most(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
+double least(const std::vector<double>& values) { return *std::min_element(values.begin(), values.end()); }
+
+TEST(Tracking, AReplayedTrackerMovesTheHead) {
+  TemporaryFolder folder;
+  Replay replay(folder, {"--loop", "--jitter", "5", "--loss", "0.1"});
+  PipelineRun run({"--poses", replay.address(), "--duration", "4"});
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  EXPECT_NE((run.program().err() + run.program().out()).find("poses move the head"), std::string::npos)
+      << run.program().err();
+  const auto x = run.column("frames.csv", "px");
+  ASSERT_GT(x.size(), 20u);
+  EXPECT_GT(most(x), 0.1);
+  EXPECT_LT(least(x), -0.1);
+  for (const double y : run.column("frames.csv", "py")) ASSERT_NEAR(y, 0.4, 0.02);
+  const auto summary = run.summary();
+  EXPECT_EQ(summary["predicted_by"], "kalman");
+  ASSERT_TRUE(summary["prediction"].is_object()) << summary.dump(2);
+  EXPECT_GT(summary["prediction"]["count"], 5);
+  EXPECT_GT(summary["prediction"]["horizon_ms"], 0);
+  ASSERT_TRUE(summary["pose_prediction"].is_object());
+  EXPECT_LT(summary["pose_prediction"]["over_none_mm"], 0.8);
+  replay.program().signal(SIGINT);
+  EXPECT_EQ(replay.program().wait(), 0);
+  EXPECT_NE(replay.program().err().find("lost on purpose"), std::string::npos);
+}
+
+TEST(Tracking, TheDisplayGoesOnWithoutAPublisherAndAfterIt) {
+  TemporaryFolder folder;
+  // Nobody publishes there.
+  PipelineRun alone({"--poses", "tcp://127.0.0.1:9", "--duration", "1"});
+  ASSERT_EQ(alone.program().wait(), 0) << alone.program().err();
+  EXPECT_GT(alone.column("frames.csv", "px").size(), 10u);
+
+  auto replay = std::make_unique<Replay>(folder, std::vector<std::string>{"--loop"});
+  PipelineRun run({"--poses", replay->address(), "--duration", "5"});
+  ASSERT_TRUE(run.wait_showing());
+  replay.reset();  // killed
+  ASSERT_EQ(run.program().wait(), 0) << run.program().err();
+  const std::string said = run.program().err() + run.program().out();
+  EXPECT_NE(said.find("no poses for 0.5 s: the head stays where it was"), std::string::npos) << said;
+  const auto x = run.column("frames.csv", "px");
+  ASSERT_GT(x.size(), 40u);
+  EXPECT_EQ(x[x.size() - 1], x[x.size() - 10]);
+}
+
+TEST(Tracking, AHostilePublisherIsToldAndChangesNothing) {
+  auto hostile = net::PlainPublisher::bind("tcp://127.0.0.1:*", false);
+  ASSERT_TRUE(hostile);
+  std::atomic<bool> stop{false};
+  std::thread sender([&] {
+    const std::string pose = wire::encode_head_pose({std::nullopt, {{0, 0.4, 1}, {1, 0, 0, 0}}});
+    std::string broken = pose;
+    broken[broken.size() - 30] = char(0xff);
+    for (uint64_t i = 0; !stop; ++i) {
+      (*hostile)->heard();
+      (*hostile)->send(i % 100 == 0 ? pose : i % 3 ? std::string(2000, char(i)) : broken.substr(0, i % broken.size()));
+      if (i % 200 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  PipelineRun run({"--poses", (*hostile)->endpoint(), "--duration", "3"});
+  const int code = run.program().wait();
+  stop = true;
+  sender.join();
+  ASSERT_EQ(code, 0) << run.program().err();
+  EXPECT_NE((run.program().err() + run.program().out()).find("no pose"), std::string::npos) << run.program().err();
+  const auto x = run.column("frames.csv", "px");
+  ASSERT_GT(x.size(), 20u) << "the display went on";
+  EXPECT_NEAR(x.back(), 0, 1e-6);
+}
+
+TEST(Tracking, WhatCannotBeIsRefused) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--poses", "nowhere"},
+                                                    {"--poses", "tcp://127.0.0.1:1", "--trajectory", "orbit"},
+                                                    {"--prediction", "gaze"}}) {
+    PipelineRun run(arguments);
+    EXPECT_EQ(run.program().wait(), 2) << arguments[1];
+    EXPECT_NE(run.program().complaint().find(arguments[0]), std::string::npos) << run.program().complaint();
+  }
+  TemporaryFolder folder;
+  Program missing("telesplat-pose-replay", {folder / "nothing.csv"}, folder / "missing");
+  EXPECT_EQ(missing.wait(), 2);
+  write_swaying(folder / "swaying.csv");
+  Program open("telesplat-pose-replay", {folder / "swaying.csv", "--bind", "tcp://0.0.0.0:*"}, folder / "open");
+  EXPECT_EQ(open.wait(), 2);
+  EXPECT_NE(open.err().find("--insecure"), std::string::npos) << open.err();
+}
+
+TEST(Tracking, TheBenchComparesWaysOfPredicting) {
+  TemporaryFolder folder;
+  write_swaying(folder / "swaying.csv");
+  Program bench("telesplat",
+                {"bench", "tracking", folder / "swaying.csv", "--horizons", "40,60", "--csv", folder / "table.csv"},
+                folder / "bench");
+  ASSERT_EQ(bench.wait(), 0) << bench.err();
+  EXPECT_NE(bench.out().find("| swaying | 60 |"), std::string::npos) << bench.out();
+  const std::string table = read_text(folder / "table.csv");
+  EXPECT_TRUE(table.starts_with("movement,horizon_ms,prediction,poses,mean_mm,")) << table;
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 7);
+}
+
+}  // namespace
+}  // namespace telesplat::test
