@@ -83,15 +83,15 @@ TEST(TrackedHead, ItsPredictionsAreMeasured) {
 
 TEST(Interaction, ATrackedHeadMovesTheCameraUntilThePersonTakesIt) {
   Interaction interaction(std::nullopt, {});
-  interaction.set_tracked([](double now_s) { return std::optional(geometry::Pose{{now_s, 1, 2}, {1, 0, 0, 0}}); });
-  EXPECT_EQ(interaction.advance(3, true).position_room.x, 3);
-  EXPECT_EQ(interaction.advance(4, false).position_room.x, 4);
+  interaction.set_tracked([](double now_s) { return std::optional(geometry::Pose{{0.1 * now_s, 0.2, 1}, {1, 0, 0, 0}}); });
+  EXPECT_EQ(interaction.advance(3, true).position_room.x, 0.1 * 3);
+  EXPECT_EQ(interaction.advance(4, false).position_room.x, 0.1 * 4);
   interaction.key(Key::kT, true);
   interaction.key(Key::kT, false);
   EXPECT_FALSE(interaction.playing());
-  EXPECT_NEAR(interaction.advance(5, true).position_room.x, 4, 0.1) << "it stays where it was taken";
+  EXPECT_NEAR(interaction.advance(5, true).position_room.x, 0.4, 0.02) << "it stays where it was taken";
   interaction.key(Key::kT, true);
-  EXPECT_EQ(interaction.advance(6, true).position_room.x, 6);
+  EXPECT_EQ(interaction.advance(6, true).position_room.x, 0.1 * 6);
 }
 
 }  // namespace
