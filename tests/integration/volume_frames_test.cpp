@@ -184,7 +184,7 @@ TEST(VolumeFrames, AViewerGetsWhatTheSamplersSplat) {
     const int begin = std::max(cut[n] - 1, 0), end = std::min(cut[n + 1] + 1, kSide);
     uint64_t count = 0;
     for (const auto& expected :
-         make(s.grid, voxels(begin, end, show))->splat(colours, lease.shear, cut[n], cut[n + 1], count)) {
+         make(s.grid, voxels(begin, end, show))->splat(colours, lease.shear, cut[n], cut[n + 1], {}, count)) {
       const auto slice = std::find_if(slices->begin(), slices->end(), [&](const auto& e) {
         return e.layer == expected.layer && e.k_begin == expected.k_begin;
       });
