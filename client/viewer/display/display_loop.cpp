@@ -299,17 +299,21 @@ class Display {
     record(m);
     keep(use, t_s, m, legend);
     ++result_.frames;
-    live_ = live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_);
-    live_.waits_s = stall_.told_s(m.presented_s);
-    live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
-    live_.coupling = m.coupling;
-    surface_.report(live_);
+    tell_of(m);
     carry_out_orders(m.camera, m.drawn.epoch);
     if (wall_ && !swapped.alone) return;  // the wall has its pace
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
     else if (!m.drawn.changed)
       sleep_until(m.begin_s + kRestPeriod_s / 2);
+  }
+
+  void tell_of(const MeasuredFrame& m) {
+    live_ = live_figures(m.presented_s, result_.frames, m.drawn, *source_, worker_);
+    live_.waits_s = stall_.told_s(m.presented_s);
+    live_.inter_frame_ms = m.previous_s > 0 ? (m.end_s - m.previous_s) * 1e3 : 0;
+    live_.coupling = m.coupling;
+    surface_.report(live_);
   }
 
   // A picture that is not the display's. It is drawn with all detail, and holds up the frames after it for so long.

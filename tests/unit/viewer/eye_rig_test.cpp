@@ -77,6 +77,28 @@ TEST(EyeRig, APanelIsAWindowIntoAScaledRoom) {
   EXPECT_NEAR(tracked[1].y - tracked[0].y, 0.064 * std::sin(0.5), 1e-9);
 }
 
+TEST(EyeRig, AWallsScreenIsWhereItIsAndEyesLieBesideEachOtherAsTheHeadTurns) {
+  // A screen to the right of the head, seen from 0.8 m.
+  const double width_m = 0.5, distance_m = 0.8;
+  const geometry::Pose facing{{1, 2, 3}, glm::angleAxis(-1.2, glm::dvec3(0, 1, 0))};
+  geometry::Camera camera = geometry::make_camera(facing, 60, 320, 200);
+  camera.left = (-0.2 * width_m) / distance_m, camera.right = (0.8 * width_m) / distance_m;
+  EyeRig rig({.mode = stereo::Mode::kRows, .eye_separation_m = 0.07, .screen_m = 9, .screen_width_m = width_m});
+  const glm::dquat turned = glm::angleAxis(0.3, glm::dvec3(0, 0, 1));
+  const EyePair pair = rig.eyes(camera, turned, 0, kScene);
+  EXPECT_NEAR(pair.screen_m, distance_m, 1e-9);
+  const glm::dvec3 apart = pair.eyes[1].pose.position_room - pair.eyes[0].pose.position_room;
+  EXPECT_LT(glm::distance(apart, turned * glm::dvec3(0.07, 0, 0)), 1e-9);
+  // Both see the screen's corners at the edges of their pictures.
+  const geometry::Screen screen = geometry::screen_before(camera, distance_m);
+  EXPECT_NEAR(screen.width_m, width_m, 1e-9);
+  for (const auto& eye : pair.eyes) {
+    const auto expected = geometry::camera_through(screen, eye.pose.position_room, 320, 200, camera.near_m);
+    EXPECT_NEAR(eye.left, expected.left, 1e-9);
+    EXPECT_NEAR(eye.top, expected.top, 1e-9);
+  }
+}
+
 TEST(EyeRig, SwappedEyesSwapTheirPlaces) {
   const std::array<image::View, 2> views{image::View{2, 1, {1, 1}, {}}, image::View{2, 1, {2, 2}, {}}};
   image::View out;

@@ -19,9 +19,12 @@ class EyeRig {
   const StereoOptions& options() const { return options_; }
 
   /// The eyes of a frame. head: the display's camera, of the size of one eye's picture. turned: of the head, whose eyes
-  /// lie beside each other. t_s: of the tracked head's movement. scene_room: what is shown; where the screen is to be as far as its middle, the first box that is not
-  /// empty counts, once `t_s` is not negative any more.
+  /// lie beside each other. t_s: of the tracked head's movement. scene_room: what is shown; where the screen is to be
+  /// as far as its middle, the first box that is not empty counts, once `t_s` is not negative any more.
   EyePair eyes(const geometry::Camera& head, const glm::dquat& turned, double t_s, const geometry::Box& scene_room);
+  EyePair eyes(const geometry::Camera& head, double t_s, const geometry::Box& scene_room) {
+    return eyes(head, head.pose.orientation, t_s, scene_room);
+  }
   /// What is to be asked of the samplers: a view from the middle that has what either eye sees of the scene.
   static geometry::Camera sampled(const EyePair& pair, const geometry::Box& scene_room);
 

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-image::View last_picture(const PipelineRun& run) {
+image::View last_picture(PipelineRun& run) {
   std::string newest;
   for (const auto& entry : fs::directory_iterator(run.out() + "/images"))
     if (entry.path().filename().string().starts_with("frame-")) newest = std::max(newest, entry.path().string());
