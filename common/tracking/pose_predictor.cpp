@@ -10,6 +10,7 @@ namespace {
 constexpr double kVelocityWindow_s = 0.15;
 // A jump is both: farther than predictions ever reach, and faster than heads are.
 constexpr double kFastest_m_s = 8, kFastest_rad_s = 40;
+constexpr double kLongestGap_s = 0.5;  // nothing is known of how a head moves that was not seen for longer
 
 }  // namespace
 
@@ -32,7 +33,8 @@ void PosePredictor::add(double t_s, const geometry::Pose& pose) {
     if (!(dt_s > 0)) return;
     const double move = glm::distance(pose.position_room, last->pose.position_room);
     const double turn = angle_between(pose.orientation, last->pose.orientation);
-    if ((move > kMaxMove_m && move > kFastest_m_s * dt_s) || (turn > kMaxTurn_rad && turn > kFastest_rad_s * dt_s))
+    if (dt_s > kLongestGap_s || (move > kMaxMove_m && move > kFastest_m_s * dt_s) ||
+        (turn > kMaxTurn_rad && turn > kFastest_rad_s * dt_s))
       forget();
   }
   samples_.push_back({t_s, pose});

@@ -21,6 +21,7 @@ class Files:
             "phases": self._series,
             "map.json": _colour_map,
             "plate.vtp": _scalars,
+            "walk.csv": _movement,
         }
 
     def names(self):
@@ -76,6 +77,15 @@ class Files:
             part = voxels[z * size * size * 2 : (z + 1) * size * size * 2]
             with open(f"{path}/slice{z:03}.dcm", "wb") as file:
                 file.write(_dicom_slice(size, z, part))
+
+
+def _movement(path):
+    """Of a head that walks past the data set, a second long."""
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("t_s,px,py,pz,qw,qx,qy,qz\n")
+        for i in range(201):
+            t = i / 200
+            file.write(f"{t},{0.4 * t - 0.2},0.1,{0.9 - 0.2 * t * t},1,0,0,0\n")
 
 
 def _element(group, element, kind, value):

@@ -16,6 +16,7 @@ namespace {
 constexpr int kPoll_ms = 50;
 constexpr double kTurn_s = 0.01;  // in which a hundredth of kMost_s messages is taken
 constexpr int kMostATurn = int(PoseFeed::kMost_s * kTurn_s);
+constexpr double kSilence_s = 1;      // after which the publisher is asked anew
 constexpr double kMostFrame_s = 0.1;  // a frame that took longer waited for something: no reason to look far ahead
 
 }  // namespace
@@ -46,11 +47,21 @@ PoseFeed::~PoseFeed() {
 
 void PoseFeed::listen() {
   log::RateLimiter refusals;
+  double turn_s = monotonic_s(), heard_s = turn_s;
+  int taken = 0;  // in this turn
   while (!stop_) {
-    if (!socket_->wait(kPoll_ms)) continue;
-    const double begin_s = monotonic_s();
-    int taken = 0;
-    for (; taken < kMostATurn && !stop_; ++taken) {
+    const bool there = socket_->wait(kPoll_ms);
+    const double began_s = monotonic_s();
+    if (began_s - turn_s >= kTurn_s) {
+      flooded_ = taken >= kMostATurn;
+      turn_s = began_s, taken = 0;
+    }
+    if (there) heard_s = began_s;
+    if (!there && began_s - heard_s >= kSilence_s) {
+      heard_s = began_s;
+      socket_->connect_again();
+    }
+    for (; there && taken < kMostATurn && !stop_; ++taken) {
       const auto body = socket_->receive();
       if (!body) break;
       const auto pose = wire::decode_head_pose({reinterpret_cast<const std::byte*>(body->data()), body->size()});
@@ -60,9 +71,8 @@ void PoseFeed::listen() {
       const std::lock_guard lock(mutex_);
       pose ? head_.told(*pose, now_s) : head_.refused();
     }
-    flooded_ = taken == kMostATurn;
-    const double rest_s = begin_s + kTurn_s - monotonic_s();
-    if (flooded_ && rest_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(rest_s));
+    const double rest_s = turn_s + kTurn_s - monotonic_s();
+    if (taken >= kMostATurn && rest_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(rest_s));
   }
 }
 

@@ -30,6 +30,7 @@ void set_common(zmq::socket_t& socket, const PlainLimits& limits, int64_t most_b
 struct PlainSubscriber::Impl {
   zmq::context_t context{1};
   zmq::socket_t socket{context, zmq::socket_type::sub};
+  std::string endpoint;
 };
 
 PlainSubscriber::PlainSubscriber(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -42,6 +43,7 @@ Result<std::unique_ptr<PlainSubscriber>> PlainSubscriber::connect(const std::str
     set_common(impl->socket, limits, limits.most_bytes);
     impl->socket.set(zmq::sockopt::subscribe, "");
     impl->socket.connect(endpoint);
+    impl->endpoint = endpoint;
   } catch (const zmq::error_t& e) {
     return Error{fmt::format("cannot connect to {}: {}", endpoint, e.what())};
   }
@@ -54,6 +56,17 @@ bool PlainSubscriber::wait(int timeout_ms) {
     return zmq::poll(items, std::chrono::milliseconds(timeout_ms)) > 0;
   } catch (const zmq::error_t&) {  // EINTR: a signal; the caller looks at its stop flag
     return false;
+  }
+}
+
+void PlainSubscriber::connect_again() {
+  try {
+    impl_->socket.disconnect(impl_->endpoint);
+  } catch (const zmq::error_t&) {  // ENOENT: there is no connection any more
+  }
+  try {
+    impl_->socket.connect(impl_->endpoint);
+  } catch (const zmq::error_t&) {  // EINTR, or no more sockets: the next time
   }
 }
 

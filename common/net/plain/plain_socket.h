@@ -24,6 +24,9 @@ class PlainSubscriber {
 
   /// Until a message is there, `timeout_ms` passed, or a signal came. True: a message is there.
   bool wait(int timeout_ms);
+  /// A publisher that broke the rules (a message over most_bytes) is never spoken to again unless it is asked anew. One
+  /// that is merely silent loses nothing but what it says in the meantime.
+  void connect_again();
   /// Without waiting. Of several frames the last one, so that publishers may put a topic in front.
   std::optional<std::string> receive();
 

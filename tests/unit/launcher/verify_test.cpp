@@ -132,10 +132,11 @@ TEST_F(VerifyRun, FramesInARowAreMeasuredInTime) {
   ASSERT_TRUE(verify(scene_, 16));
   const auto r = rows();
   ASSERT_EQ(r.size(), 4u);
-  EXPECT_EQ((std::vector<std::string>(r[0].end() - 4, r[0].end())),
-            (std::vector<std::string>{"flicker", "popping", "holes_followed", "holes_closed"}));
+  EXPECT_EQ((std::vector<std::string>(r[0].end() - 5, r[0].end())),
+            (std::vector<std::string>{"flicker", "popping", "holes_followed", "holes_closed", "eye"}));
   for (const auto& alone : {r[1], r[3]})
-    EXPECT_EQ((std::vector<std::string>(alone.end() - 4, alone.end())), (std::vector<std::string>{"", "", "", ""}));
+    EXPECT_EQ((std::vector<std::string>(alone.end() - 5, alone.end())),
+              (std::vector<std::string>{"", "", "", "", "0"}));
   EXPECT_NEAR(std::stod(r[2][8]), 48 / 110.0, 1e-4) << "one pixel came back by 48 steps";
   EXPECT_NEAR(std::stod(r[2][9]), 48 / 64.0, 1e-4) << "in a block of 64";
   EXPECT_EQ(r[2][10], "2");

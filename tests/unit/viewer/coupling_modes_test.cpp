@@ -232,7 +232,7 @@ TEST(BufferedRequests, ArePacedByCreditsAndKeepTheirIdsWhenAskedAgain) {
 }
 
 TEST(BufferedRequests, PredictUpToTheMomentOfDisplay) {
-  ViewRequester requester{{.initial_latency_s = 0.1, .buffers = 2}, {5}};
+  ViewRequester requester{{.initial_latency_s = 0.1, .buffers = 2, .prediction = tracking::Prediction::kVelocity}, {5}};
   geometry::Camera display = geometry::make_camera({}, 90, 1280, 800);
   for (int i = 0; i <= 20; ++i) {
     display.pose.position_room.x = 0.1 * i * 0.01;

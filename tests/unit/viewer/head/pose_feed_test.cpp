@@ -74,8 +74,8 @@ TEST(PoseFeed, AFloodIsBoundedAndTold) {
     return told.find("messages a second") != std::string::npos || sent > 5'000'000;
   }));
   // A machine that cannot send so many tells nothing.
-  const double rate = double((*feed)->figures().poses) / (monotonic_s() - begin_s);
-  EXPECT_LE(rate, 1.2 * PoseFeed::kMost_s);
+  const double most = PoseFeed::kMost_s * (1.2 * (monotonic_s() - begin_s) + 0.02);  // turns of 0.01 s are whole
+  EXPECT_LE(double((*feed)->figures().poses), most);
 }
 
 TEST(PoseFeed, RefusesWhatIsNoEndpoint) {
