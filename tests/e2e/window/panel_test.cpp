@@ -128,7 +128,9 @@ TEST_F(PanelTest, LiesOverTheFrameKeepsThePointerAndGoesWithTab) {
   display_->tap("p");
   const auto picture = [&] {
     for (const auto& entry : fs::directory_iterator(run.out() + "/images"))
-      if (entry.path().filename().string().starts_with("telesplat-")) return entry.path().string();
+      if (const auto& path = entry.path();
+          path.filename().string().starts_with("telesplat-") && path.extension() == ".png")  // else it is being written
+        return path.string();
     return std::string();
   };
   ASSERT_TRUE(wait_until([&] { return fs::exists(run.out() + "/images") && !picture().empty(); }));
