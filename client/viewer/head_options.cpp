@@ -32,6 +32,7 @@ Status settle_xr(ViewerOptions& o) {
                                     {!o.eye.empty(), "--eye"},
                                     {!o.wall.empty(), "--wall"},
                                     {o.stereo.mode != "off", "--stereo"},
+                                    {o.background == "transparent", "--background transparent"},
                                     {o.fullscreen, "--fullscreen"},
                                     {o.coupling != "async", "--coupling"}})
     if (given) return Error{fmt::format("{} has no meaning with --xr: the headset has its own head and clock", flag)};

@@ -48,11 +48,14 @@ options::Table stereo_table(StereoFlags& f) {
       {.flag = "--stereo-pattern",
        .value = &f.pattern,
        .help = "in place of the scene: calibration (left red, right blue, a cross in the middle of both), test",
-       .limits = stereo::pattern_names()},
+       .limits = stereo::pattern_names(),
+       .reach = Reach::kRecorded},
   };
 }
 
 namespace {
+
+constexpr double kMostLooks = 1e5;  // at a tracked head's movement
 
 Status read_files(const StereoFlags& f, StereoOptions& o) {
   const bool autostereo = o.mode == stereo::Mode::kAutostereo;
@@ -69,8 +72,8 @@ Status read_files(const StereoFlags& f, StereoOptions& o) {
   const auto head = geometry::Trajectory::read_csv(f.head_file);
   if (!head) return Error{"--tracked-head " + head.error().text};
   const double end_s = head->duration_s();
-  constexpr double kStep_s = 0.01;
-  for (double t_s = 0; t_s <= end_s + kStep_s; t_s += kStep_s) {
+  const double step_s = std::max(0.01, end_s / kMostLooks);
+  for (double t_s = 0; t_s <= end_s + step_s; t_s += step_s) {
     const glm::dvec3 at = head->at(t_s).position_room;
     const double reach_m = f.eye_separation_m;
     if (const Status s = stereo::validate(*panel, {at - glm::dvec3(0, 0, reach_m), at}); !s)

@@ -85,12 +85,13 @@ Camera widened_for(const Camera& head, const std::array<Camera, 2>& eyes, double
   const glm::dquat to_head = glm::conjugate(head.pose.orientation);
   for (const Camera& eye : eyes) {
     const glm::dvec3 aside = to_head * (eye.pose.position_room - head.pose.position_room);
-    // An edge of the eye's frustum is seen from the head under tangents between those of its two ends.
+    // An edge of the eye's frustum is seen from the head under tangents between those of its two ends: at the depth z
+    // before the head it is eye + tangent (z + behind) aside.
     for (const double per_m : {0.0, 1 / nearest_m}) {
-      out.left = std::min(out.left, eye.left + aside.x * per_m);
-      out.right = std::max(out.right, eye.right + aside.x * per_m);
-      out.bottom = std::min(out.bottom, eye.bottom + aside.y * per_m);
-      out.top = std::max(out.top, eye.top + aside.y * per_m);
+      out.left = std::min(out.left, eye.left + (aside.x + eye.left * aside.z) * per_m);
+      out.right = std::max(out.right, eye.right + (aside.x + eye.right * aside.z) * per_m);
+      out.bottom = std::min(out.bottom, eye.bottom + (aside.y + eye.bottom * aside.z) * per_m);
+      out.top = std::max(out.top, eye.top + (aside.y + eye.top * aside.z) * per_m);
     }
   }
   const auto pixels = [](double n) { return std::clamp(int(std::ceil(n - 1e-6)), 1, kMaxImageSide); };

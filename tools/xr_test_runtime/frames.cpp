@@ -118,7 +118,8 @@ XrResult WaitFrame(XrSession, const XrFrameWaitInfo*, XrFrameState* state) {
     s.display_s = frame.display_s;
     state->predictedDisplayTime = to_time(frame.display_s);
     state->predictedDisplayPeriod = to_time(s.pacing->period_s());
-    state->shouldRender = renders(s) ? XR_TRUE : XR_FALSE;
+    s.told_to_render = renders(s);
+    state->shouldRender = s.told_to_render ? XR_TRUE : XR_FALSE;
     return XR_SUCCESS;
   });
   const double wait_s = wake_s - monotonic_s();
@@ -155,7 +156,7 @@ XrResult EndFrame(XrSession, const XrFrameEndInfo* info) {
     if (frame.layers) {
       const auto& layer = *reinterpret_cast<const XrCompositionLayerProjection*>(info->layers[0]);
       if (const std::string why = complain_about(r, layer); !why.empty()) return r.wrong(XR_ERROR_LAYER_INVALID, why);
-      if (!renders(s)) r.wrong(XR_SUCCESS, "a picture that nobody sees");
+      if (!s.told_to_render) r.wrong(XR_SUCCESS, "a picture that nobody sees");
       frame.depth = depth_of(layer.views[0]) != nullptr;
       frame.left = from_xr(layer.views[0].pose);
       if (r.config.every > 0 && frame.number % uint64_t(r.config.every) == 0) keep_pictures(r, layer);

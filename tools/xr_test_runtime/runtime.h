@@ -46,6 +46,7 @@ struct Session {
   std::optional<Pacing> pacing;
   enum class Turn { kWait, kBegin, kEnd } turn = Turn::kWait;
   double display_s = 0;
+  bool told_to_render = true;  // by the last xrWaitFrame
   uint64_t begun = 0;
   std::map<XrSpace, Space> spaces;
   std::map<XrSwapchain, Swapchain> swapchains;

@@ -340,12 +340,18 @@ class Display {
       const auto aim = eyes_.aim(camera, *at);
       surface_.on_pick(source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, kPickOpacity));
     }
+    geometry::Camera shown = camera;
+    if (eyes_.on()) shown.width = view_.width, shown.height = view_.height;
+    const auto pick = [&](double x, double y, double opacity) {
+      const auto aim = eyes_.aim(camera, {x / shown.width, y / shown.height});
+      return source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, opacity);
+    };
     for (const wire::Order& order : worker_.orders().take_orders()) {
       const auto done = carry_out(
-          order, {.camera = camera,
+          order, {.camera = shown,
                   .epoch = epoch,
                   .terms = worker_.terms(),
-                  .pick = [&](double x, double y, double opacity) { return source_->pick(camera, x, y, opacity); },
+                  .pick = pick,
                   .go = [&](const geometry::Pose& pose) { return surface_.go_to(pose); },
                   .overlay = [&](const std::string& name, bool on) { return surface_.show_overlay(name, on); }});
       worker_.orders().answer({order.number, done.ok(), done ? *done : done.error().text});

@@ -80,7 +80,8 @@ class DisplaySurface {
   virtual void report(const LiveFigures& figures) = 0;
   /// What lies over the frames that it shows; null: nobody sees them.
   virtual Overlays* overlays() { return nullptr; }
-  /// A pixel of the frame that was displayed of which somebody wants to know what lies there; nothing: nobody does.
+  /// A place of the frame that was displayed of which somebody wants to know what lies there: a share of its width and
+  /// height, from the upper left corner; nothing: nobody does.
   virtual std::optional<glm::dvec2> points_at() { return std::nullopt; }
   /// What lies there; nothing: nothing does.
   virtual void on_pick(const std::optional<Pick>&) {}

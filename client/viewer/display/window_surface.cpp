@@ -178,7 +178,8 @@ geometry::Camera WindowSurface::camera_of(const geometry::Pose& head) const {
   const auto& o = options_.display;
   if (!o.wall.described) return tile_of(whole(head), o.wall);
   geometry::Camera camera = wall::screen_camera(*o.wall.described, o.wall.tile, head, o.near_m);
-  camera.width = window_->width(), camera.height = window_->height();
+  const stereo::Size eye = o.stereo.eye_size(window_->width(), window_->height());
+  camera.width = eye.width, camera.height = eye.height;
   return camera;
 }
 
@@ -375,12 +376,20 @@ void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
   screenshots_.take(copy, alpha);
 }
 
-// The same view, of the wished size: the field of view spans its longer side.
+// The same view, of the wished size: the field of view spans its longer side. Of a wall it is this screen's part, as
+// wide as it is. Two eyes' is the head's between them.
 std::optional<PictureWish> WindowSurface::take_picture_wish(geometry::Camera& camera) {
   const auto wish = panel_.take_picture();
   if (!wish || !wish->own_size()) return wish;
   const auto& o = options_.display;
-  camera = window_camera(camera.pose, o.fov_deg, wish->width, wish->height, o.near_m);
+  if (o.wall.tiles() == 1 && !o.wall.described) {
+    camera = window_camera(camera.pose, o.fov_deg, wish->width, wish->height, o.near_m);
+    return wish;
+  }
+  const double middle = 0.5 * (camera.bottom + camera.top),
+               half = 0.5 * (camera.right - camera.left) * wish->height / wish->width;
+  camera.bottom = middle - half, camera.top = middle + half;
+  camera.width = wish->width, camera.height = wish->height;
   return wish;
 }
 
@@ -408,7 +417,7 @@ std::optional<glm::dvec2> WindowSurface::points_at() {
   pointed_s_ = now_s;
   const glm::dvec2 at = *pointer * double(window_->height());
   if (!(at.x >= 0 && at.y >= 0 && at.x < window_->width() && at.y < window_->height())) return std::nullopt;
-  return at;
+  return at / glm::dvec2(window_->width(), window_->height());
 }
 
 void WindowSurface::on_pick(const std::optional<Pick>& pick) {

@@ -238,6 +238,8 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
   DrawnFrame out = begin_frame(input);
   options_.selection.eyes = eyes;
   count_same(input);
+  // A head that turns on the spot moves its eyes and not the place between them.
+  if (std::exchange(eyes_, eyes) != eyes) same_frames_ = 0;
   const bool still = same_frames_ >= kStillFrames;
   if (still && pair_sharp_ && input.intact && !changes_.any && !input.with_depth && !input.with_coverage) {
     out.changed = false;
@@ -266,6 +268,7 @@ DrawnFrame PointSource::draw_pair(const FrameInput& input, const std::array<geom
 std::optional<Pick> PointSource::pick(const geometry::Camera& camera, double x_pix, double y_pix, double) {
   splat::SelectionOptions selection = options_.selection;
   selection.detail = 1;
+  selection.eyes.reset();
   splat::DrawList list;
   received_.cache().select_part(pick_camera(camera, x_pix, y_pix), selection, list);
   clip_list(*clip_, list);

@@ -56,6 +56,7 @@ class PointSource final : public ViewSource {
 
   // Since when the camera stands still, and what was drawn since then.
   geometry::Camera camera_;
+  std::optional<std::array<geometry::Camera, 2>> eyes_;  // of the last pair
   Look look_;
   int same_frames_ = 0;
   ModelCache::Changes changes_;

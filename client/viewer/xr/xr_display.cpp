@@ -8,6 +8,7 @@
 #include <limits>
 #include <thread>
 
+#include "client/viewer/hands/errands.h"
 #include "client/viewer/render/fit_view.h"
 #include "client/viewer/xr/hand_rays.h"
 #include "common/core/clock.h"
@@ -38,7 +39,7 @@ class XrDisplay {
         spans_(spans),
         find_spool_(spool),
         tell_(tell),
-        look_{o.render, o.shading.lit} {}
+        look_(first_look(o.render, o.shading)) {}
 
   DisplayResult run() {
     while (!last_ && result_.error.empty()) {
@@ -46,6 +47,8 @@ class XrDisplay {
         result_.interrupted = true;
         break;
       }
+      // Frames that nobody sees end it too, if a little later.
+      if (start_s_ > 0 && o_.duration_s > 0 && monotonic_s() > start_s_ + o_.duration_s + kOpenAgain_s) break;
       if (!session_) {
         open_session();
         continue;
@@ -101,6 +104,9 @@ class XrDisplay {
     } else {
       sleep_s(kIdle_s);
     }
+    // Nobody waits for a headset that nobody wears.
+    for (const wire::Order& order : worker_.orders().take_orders())
+      worker_.orders().answer({order.number, false, order.command + ": the headset shows nothing now"});
   }
 
   // The runtime shall know that the application goes: states follow, for which there is little time.
@@ -156,7 +162,7 @@ class XrDisplay {
     if (counts && start_s_ == 0) m.start_s = start_s_ = m.begin_s;
     see_whether_last(counts ? m.begin_s - start_s_ : -1);
     const uint32_t use = counts ? use_of_frame(m.begin_s - start_s_) : 0;
-    draw_eyes(*eyes, session_->locate_hands(begun->display_time), counts, m);
+    draw_eyes(*eyes, session_->locate_hands(begun->display_time), counts, use != 0, m);
     m.end_s = monotonic_s();
     if (counts)
       worker_.on_frame(begun->display_s, m.camera, m.drawn.epoch, m.drawn.update, false);
@@ -166,7 +172,22 @@ class XrDisplay {
     m.presented_s = monotonic_s();
     m.lead_s = begun->display_s - m.presented_s;
     if (!m.drawn.empty) worker_.on_first_points(m.presented_s);
+    if (source_) carry_out_orders(m);
     if (counts) record(*begun, use, m);
+  }
+
+  // Places are the left eye's.
+  void carry_out_orders(const MeasuredFrame& m) {
+    for (const wire::Order& order : worker_.orders().take_orders()) {
+      const auto done = carry_out(
+          order, {.camera = left_,
+                  .epoch = m.drawn.epoch,
+                  .terms = worker_.terms(),
+                  .pick = [&](double x, double y, double opacity) { return source_->pick(left_, x, y, opacity); },
+                  .go = [](const geometry::Pose&) { return false; },
+                  .overlay = [](const std::string&, bool) -> Status { return Error{"overlay: a headset has none"}; }});
+      worker_.orders().answer({order.number, done.ok(), done ? *done : done.error().text});
+    }
   }
 
   void count_missed(const HeadsetSession::Frame& f, MeasuredFrame& m) {
@@ -179,9 +200,11 @@ class XrDisplay {
   // runtime's to say: it has more to tell it from than poses.
   void follow_head(const HeadsetSession::Frame& f, const HeadsetSession::Eyes& eyes, MeasuredFrame& m) {
     m.camera = both_eyes(eyes.cameras);
+    m.head = m.camera.pose;
     const double ahead_s = m.begin_s + worker_.horizon_s();
     const auto head = session_->locate_head(f.display_time);
     const auto then = ahead_s > f.display_s ? session_->locate_head(device_.system().to_time(ahead_s)) : std::nullopt;
+    if (head) m.head = *head;
     if (!head || !then) return;
     // both_eyes() stands still beside the head.
     const glm::dquat turn = then->orientation * glm::conjugate(head->orientation);
@@ -189,7 +212,7 @@ class XrDisplay {
                                   glm::normalize(turn * m.camera.pose.orientation)});
   }
 
-  void draw_eyes(const HeadsetSession::Eyes& eyes, const HandRays& rays, bool counts, MeasuredFrame& m) {
+  void draw_eyes(const HeadsetSession::Eyes& eyes, const HandRays& rays, bool counts, bool kept, MeasuredFrame& m) {
     for (int eye = 0; eye < 2; ++eye) {
       const geometry::Camera& camera = eyes.cameras[size_t(eye)];
       image::View& view = views_[eye];
@@ -206,6 +229,7 @@ class XrDisplay {
         std::fill(view.colour.begin(), view.colour.end(), o_.shading.background);
         std::fill(view.depth_m.begin(), view.depth_m.end(), std::numeric_limits<float>::infinity());
       }
+      if (eye == 0 && kept) kept_ = view;  // records have no rays
       // Where rays end is chosen in one picture, so that both eyes see the same.
       if (eye == 0) point(rays, view, camera);
       for (size_t hand = 0; hand < rays.size(); ++hand)
@@ -268,7 +292,7 @@ class XrDisplay {
       const double t_s = m.begin_s - start_s_;
       if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
       const auto legend = o_.legend ? worker_.legend_at(m.drawn.epoch) : nullptr;
-      views_[0] = spool_->exchange({m.number, t_s, use, left_, std::move(views_[0]), m.drawn.epoch, legend, {}});
+      kept_ = spool_->exchange({m.number, t_s, use, left_, std::move(kept_), m.drawn.epoch, legend, {}});
     }
     ++result_.frames;
   }
@@ -287,7 +311,7 @@ class XrDisplay {
   std::unique_ptr<HeadsetSession> session_;
   std::shared_ptr<Received> received_;
   std::unique_ptr<ViewSource> source_;  // draws received_
-  image::View views_[2];
+  image::View views_[2], kept_;
   geometry::Camera left_;             // of the frame at hand
   std::array<glm::dvec3, 2> ends_{};  // of the hands' rays
   std::array<bool, 2> pressed_{};

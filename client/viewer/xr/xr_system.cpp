@@ -44,6 +44,7 @@ Error XrSystem::error(const char* what, XrResult result) const {
 }
 
 Status XrSystem::check(const char* what, XrResult result) const {
+  if (result == XR_ERROR_SESSION_LOST) return Error{"the runtime lost the headset"};  // an event says so, too
   return XR_FAILED(result) ? Status(error(what, result)) : ok_status();
 }
 

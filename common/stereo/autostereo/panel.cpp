@@ -45,8 +45,10 @@ Eyes eyes_of(const Panel& panel, const std::array<geometry::Camera, 2>& cameras)
   return out;
 }
 
+double nearest_eye_m(const Panel& panel) { return std::max(0.05, panel.lines.gap_m + panel.lines.thickness_m + 0.01); }
+
 Status validate(const Panel& panel, const Eyes& eyes) {
-  const double least = std::max(0.05, panel.lines.gap_m + panel.lines.thickness_m + 0.01);
+  const double least = nearest_eye_m(panel) - 1e-9;
   for (const glm::dvec3& eye : eyes)
     if (!(eye.z >= least && eye.z <= 100))
       return Error{fmt::format("an eye is {:.3f} m before the display, limits are {:.2f} and 100", eye.z, least)};

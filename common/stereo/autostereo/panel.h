@@ -43,6 +43,8 @@ Eyes eyes_before(const Panel& panel, double separation_m, double distance_m);
 Eyes eyes_of(const Panel& panel, const std::array<geometry::Camera, 2>& cameras);
 /// Error: an eye is behind the lines or not before the panel, within 0.05 m and 100 m.
 Status validate(const Panel& panel, const Eyes& eyes);
+/// How far before the display's pixels an eye is at least, metres: beyond the plate.
+double nearest_eye_m(const Panel& panel);
 
 /// Middle of a subpixel on the panel's axes. subpixel: 0 to 2 from left to right; 1 is the pixel's middle.
 glm::dvec2 place_of(const Panel& panel, int x, int y, int subpixel);

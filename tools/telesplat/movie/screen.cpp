@@ -133,8 +133,10 @@ Result<bool> Screen::draw_pair(Tile& tile, const DisplayedFrame& frame, const ge
   const viewer::EyePair pair = viewer::recorded_eyes(tile.run->stereo, camera, frame.screen_m, frame.eyes_room);
   const auto there = tile.replay->draw_pair(frame, pair, tile.eyes);
   if (!there || !*there) return there;
+  tile.rig->draw_pattern(tile.eyes);
   tile.rig->compose(pair, tile.eyes, false, tile.view);
-  const int width = width_ / tile.run->wall.columns, height = height_ / tile.run->wall.rows;
+  const geometry::Rect& place = places_[size_t(tile.run->wall.tile)];
+  const int width = place.width, height = place.height;
   if (tile.view.width == width && tile.view.height == height) return true;
   image::Canvas canvas(width, height, 0xff000000u);
   canvas.place(tile.view, 0, 0);

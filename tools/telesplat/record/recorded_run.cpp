@@ -77,11 +77,14 @@ Status read_size(const std::string& path, const toml::table& viewer, RecordedRun
   return ok_status();
 }
 
-// The record's own copy of a wall's description, where it has one.
-std::string described_in(const std::string& session, const std::string& wall) {
-  const std::string kept = (std::filesystem::path(session).parent_path() / "wall.toml").string();
+// The record's own copy of a file, where it has one.
+std::string kept_or(const std::string& session, const char* name, const std::string& file) {
+  const std::string kept = (std::filesystem::path(session).parent_path() / name).string();
   std::error_code error;
-  return viewer::is_description(wall) && std::filesystem::is_regular_file(kept, error) ? kept : wall;
+  return std::filesystem::is_regular_file(kept, error) ? kept : file;
+}
+std::string described_in(const std::string& session, const std::string& wall) {
+  return viewer::is_description(wall) ? kept_or(session, "wall.toml", wall) : wall;
 }
 
 // Which part of a wall it was.
@@ -104,7 +107,9 @@ Status read_stereo(const std::string& path, const toml::table& session, Recorded
   flags.mode = display["stereo"].value_or(std::string("off"));
   flags.eye_separation_m = number(display["eye_separation"], flags.eye_separation_m);
   flags.swap_eyes = display["swap_eyes"].value_or(std::string("off")) == "on";
+  flags.pattern = display["stereo_pattern"].value_or(std::string("off"));
   flags.panel_file = display["barrier"].value_or(std::string());
+  if (!flags.panel_file.empty()) flags.panel_file = kept_or(path, "barrier.toml", flags.panel_file);
   auto stereo = viewer::settle(flags);
   if (!stereo) return Error{fmt::format("{}: {}", path, stereo.error().text)};
   run.stereo = std::move(*stereo);

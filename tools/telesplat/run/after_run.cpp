@@ -86,6 +86,7 @@ int AfterRun::verify(bool stopped) {
 
 // The wall's picture, and the moments its tiles are of. A run that was stopped need not have one of each tile.
 int AfterRun::stitch(bool stopped) const {
+  if (const Status s = keep_barrier(o_.out, o_.viewer.stereo.panel_file); !s) return tools::complain(s.error(), 1);
   if (o_.viewer.wall.empty()) return 0;
   if (const Status s = keep_description(o_.out, o_.viewer.wall); !s) return tools::complain(s.error(), 1);
   const auto tiles = stitch_wall(o_.out, o_.viewer.display.wall);

@@ -115,6 +115,15 @@ Result<std::vector<TilePicture>> stitch_wall(const std::string& directory, const
   return tiles;
 }
 
+Status keep_barrier(const std::string& run_directory, const std::string& barrier) {
+  if (barrier.empty()) return ok_status();
+  std::error_code error;
+  const std::string kept = run_directory + "/barrier.toml";
+  fs::copy_file(barrier, kept, fs::copy_options::overwrite_existing, error);
+  if (error) return Error{fmt::format("{}: {}", kept, error.message())};
+  return ok_status();
+}
+
 std::string kept_description(const std::string& run_directory) { return run_directory + "/wall.toml"; }
 
 Status keep_description(const std::string& run_directory, const std::string& wall) {

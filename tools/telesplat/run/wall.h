@@ -34,5 +34,7 @@ Result<std::vector<TilePicture>> stitch_wall(const std::string& run_directory, c
 std::string kept_description(const std::string& run_directory);
 /// Puts it there, if the wall has one. Error: it cannot be read or written any more.
 Status keep_description(const std::string& run_directory, const std::string& wall);
+/// The same of an autostereo display's file, which people edit to calibrate it; empty: there is none.
+Status keep_barrier(const std::string& run_directory, const std::string& barrier);
 
 }  // namespace telesplat::launcher

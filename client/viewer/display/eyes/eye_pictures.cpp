@@ -28,7 +28,7 @@ void EyePictures::follow_panel_file(double now_s) {
   if (const Status s = rig_.read_panel_again(); !s)
     log::warn("{}", s.error().text);
   else
-    log::info("{} was read again", o.panel_file);
+    log::info("{} was read again", o.panel_file), panel_changed_ = true;
 }
 
 geometry::Camera EyePictures::begin(double now_s, const geometry::Camera& head, const glm::dquat& turned, double t_s,
@@ -72,22 +72,21 @@ DrawnFrame EyePictures::draw(ViewSource& source, FrameInput input, bool spooled,
   }
   DrawnFrame drawn = source.draw_pair(input, pair_.eyes, targets);
   if (drawn.empty && !input.even_empty) return drawn;
-  if (rig_.draw_pattern(views_)) drawn.changed = true;
+  if (rig_.draw_pattern(views_) || std::exchange(panel_changed_, false)) drawn.changed = true;
   if (drawn.changed || !input.intact) rig_.compose(pair_, views_, input.with_depth, view);
   return drawn;
 }
 
-EyePictures::Aim EyePictures::aim(const geometry::Camera& head, const glm::dvec2& at_pix) const {
-  if (!on()) return {head, at_pix};
+EyePictures::Aim EyePictures::aim(const geometry::Camera& head, const glm::dvec2& share) const {
+  if (!on()) return {head, share * glm::dvec2(head.width, head.height)};
   const auto& o = rig_.options();
-  const glm::dvec2 eye(head.width, head.height);
-  const auto size = rig_.composed_size(head.width, head.height);
   const bool beside = o.mode == stereo::Mode::kSideBySide || o.mode == stereo::Mode::kSideBySideHalf;
   const bool above = o.mode == stereo::Mode::kTopBottom || o.mode == stereo::Mode::kTopBottomHalf;
-  if (!beside && !above) return {pair_.head, at_pix / glm::dvec2(size.width, size.height) * eye};
-  const bool second = beside ? at_pix.x >= eye.x : at_pix.y >= eye.y;
-  return {pair_.eyes[second != o.swap_eyes ? 1 : 0],
-          at_pix - (second ? eye * glm::dvec2(beside, above) : glm::dvec2(0))};
+  const glm::dvec2 size(pair_.head.width, pair_.head.height);
+  if (!beside && !above) return {pair_.head, share * size};
+  const bool second = beside ? share.x >= 0.5 : share.y >= 0.5;
+  const glm::dvec2 parts(beside ? 2 : 1, above ? 2 : 1), begin(second && beside, second && above);
+  return {pair_.eyes[second != o.swap_eyes ? 1 : 0], (share * parts - begin) * size};
 }
 
 void EyePictures::keep(FrameSpool& spool, const SpooledFrame& frame) {

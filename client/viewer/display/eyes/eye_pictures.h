@@ -25,13 +25,14 @@ class EyePictures {
   /// Draws both and composes them into `view`, which gets the display's size. input: of the head's camera. spooled:
   /// frames may be kept, so room for depth is made at once. Precondition: begin().
   DrawnFrame draw(ViewSource& source, FrameInput input, bool spooled, image::View& view);
-  /// What a pixel of the display shows, of this camera without stereo: where two eyes' pictures lie in each other, the
-  /// head's.
+  /// What a place of the display shows: a camera, and a pixel of its picture. Where both eyes' pictures lie in each
+  /// other it is the head's.
   struct Aim {
     geometry::Camera camera;
     glm::dvec2 at_pix;
   };
-  Aim aim(const geometry::Camera& head, const glm::dvec2& at_pix) const;
+  /// head: the display's camera. share: of the display's width and height, from its upper left corner.
+  Aim aim(const geometry::Camera& head, const glm::dvec2& share) const;
   /// Keeps both pictures for verification.
   void keep(FrameSpool& spool, const SpooledFrame& frame);
 
@@ -44,6 +45,7 @@ class EyePictures {
   std::array<image::View, 2> views_;
   double looked_s_ = -1e9;  // after the panel's file
   int64_t panel_time_ = 0;  // when it was written
+  bool panel_changed_ = false;
 };
 
 }  // namespace telesplat::viewer

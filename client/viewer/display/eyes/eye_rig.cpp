@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kLeastScreen_m = 0.05;  // else eyes would squint
 constexpr double kNearestEye_m = 0.01;   // to a wall's screen: a head may turn one eye behind it
+constexpr double kFarthestEye_m = 99;    // before a panel
 // Of the scene, for what is sampled: nearer parts are nobody's to look at, farther ones make no difference.
 constexpr double kNearest_m = 0.1, kFarthest_m = 10, kStepsAnOctave = 4;
 
@@ -72,7 +73,8 @@ EyePair EyeRig::eyes(const geometry::Camera& head, const glm::dquat& turned, dou
     to_right = tracked.orientation * half;
   }
   const auto in_room = [&](glm::dvec3 on_axes) {
-    on_axes.z = std::max(on_axes.z, kNearestEye_m / scale);
+    const double nearest_m = options_.panel ? stereo::nearest_eye_m(*options_.panel) : kNearestEye_m / scale;
+    on_axes.z = std::clamp(on_axes.z, nearest_m, std::max(kFarthestEye_m, nearest_m));
     return screen.pose.position_room + screen.pose.orientation * (on_axes * scale);
   };
   return recorded_eyes(options_, head, screen_m, {in_room(middle - to_right), in_room(middle + to_right)});

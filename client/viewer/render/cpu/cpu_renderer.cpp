@@ -1,7 +1,11 @@
+#include <cmath>
+
 #include "client/viewer/render/renderer.h"
 
 namespace telesplat::viewer {
 namespace {
+
+constexpr double kSameFocal = 1e-6;
 
 class CpuRenderer final : public Renderer {
  public:
@@ -15,6 +19,9 @@ class CpuRenderer final : public Renderer {
   splat::SplatStats render_pair(const splat::DrawList& list, const std::array<geometry::Camera, 2>& cameras,
                                 const splat::RenderOptions& options, const image::Shading& shading,
                                 const std::array<splat::FrameTarget, 2>& targets) override {
+    // Before a wall's screen one eye may be nearer than the other.
+    if (std::abs(cameras[0].focal_x() / cameras[1].focal_x() - 1) > kSameFocal)
+      return Renderer::render_pair(list, cameras, options, shading, targets);
     return splatter_.render_pair(list, cameras, options, shading, targets);
   }
 
