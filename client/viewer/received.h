@@ -57,6 +57,8 @@ class Received {
   /// by now, and from now on shows, or the nearest that it has. What comes after it waits.
   virtual wire::ShownState newest_state() const = 0;
   virtual void show_state(const wire::ShownState& state) = 0;
+  /// What it shows is one frame that was sampled for one head, so that viewers in step ask for views of the same head.
+  virtual bool shows_whole_frames() const { return false; }
   /// What draws it, to be used no longer than this lives. Error: no renderer could be made.
   virtual Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) = 0;
 };

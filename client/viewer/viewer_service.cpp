@@ -180,6 +180,9 @@ std::map<std::string, std::string> facts(const ViewerOptions& o, const Renderers
   return out;
 }
 
+// What all viewers of its wall call it.
+std::string wall_name(const ViewerOptions& o) { return fmt::format("{} x{}", o.wall, o.wall_scale); }
+
 // What keeps the display in step with a wall's others; null: it is by itself.
 std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& context, const ViewerWorker& worker) {
   if (!in_step(o)) return nullptr;
@@ -187,10 +190,11 @@ std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& contex
   return std::make_unique<WallPace>(context,
                                     WallPace::Options{.master = o.service.master,
                                                       .name = o.service.name,
-                                                      .wall = fmt::format("{} x{}", o.wall, o.wall_scale),
+                                                      .wall = wall_name(o),
                                                       .number = uint64_t(d.wall.tile),
                                                       .viewers = uint64_t(d.wall.tiles()),
-                                                      .period_s = d.target_fps > 0 ? 1 / d.target_fps : 0},
+                                                      .period_s = d.target_fps > 0 ? 1 / d.target_fps : 0,
+                                                      .asks_hz = o.requests.max_rate_hz},
                                     worker.instance(), [&worker](double s) { return worker.to_master_s(s); });
 }
 
@@ -206,8 +210,10 @@ Served serve(const ViewerOptions& o, const net::Via& via, const Display& display
   CouplingGate gate(coupling_state(*coupling_named(o.coupling), o.buffers));
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
+  RequestOptions requests = o.requests;
+  if (in_step(o)) requests.wall = wall_name(o), requests.wall_viewers = uint64_t(o.display.wall.tiles());
   const ViewerWorker::Options options{.service = o.service,
-                                      .requests = o.requests,
+                                      .requests = requests,
                                       .least_sampling = o.least_sampling,
                                       .facts = facts(o, renderers),
                                       .received = {.epoch_patience_s = o.epoch_patience_s, .in_step = in_step(o)},

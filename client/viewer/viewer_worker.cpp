@@ -17,6 +17,7 @@ constexpr int kMessagesAtOnce = 16;  // then requests and control get their turn
 // How long it takes until the worker looks at what the display did. Where the display waits, that is time lost in each
 // cycle.
 constexpr double kPoll_s = 0.01, kCoupledPoll_s = 0.001;
+constexpr double kWallPoll_s = 0.003;  // views of a wall wait for each other at the master
 
 wire::Hello make_hello(const ViewerWorker::Options& o) {
   wire::Hello hello;
@@ -83,6 +84,11 @@ void ViewerWorker::on_frame(double now_s, const geometry::Camera& camera, EpochI
                     std::exchange(expected_, std::nullopt), std::exchange(jumped_, false)});
 }
 
+void ViewerWorker::on_ask(uint64_t ask, const geometry::Camera& camera) {
+  const std::lock_guard lock(mutex_);
+  ask_ = {ask, camera};
+}
+
 void ViewerWorker::on_measured(const MeasuredFrame& f) {
   if (f.previous_s > 0) inter_frame_ms_.add(f.end_s, (f.end_s - f.previous_s) * 1e3);
   update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
@@ -130,7 +136,7 @@ void ViewerWorker::loop() {
   link_.on_order([this](const wire::Order& order) { orders_.put(order); });
   try {
     while (!stop_) {
-      const double poll_s = gate_.waits() ? kCoupledPoll_s : kPoll_s;
+      const double poll_s = gate_.waits() ? kCoupledPoll_s : options_.requests.wall.empty() ? kPoll_s : kWallPoll_s;
       const double now = monotonic_s();
       offset_s_ = link_.to_master_s(now) - now;
       link_.tick(now, [this] { return status(); });
@@ -312,9 +318,11 @@ void ViewerWorker::release(const std::vector<RequestId>& requests) {
 
 void ViewerWorker::take_poses() {
   std::vector<SeenPose> poses;
+  std::optional<std::pair<uint64_t, geometry::Camera>> ask;
   {
     const std::lock_guard lock(mutex_);
     poses.swap(poses_);
+    ask = std::exchange(ask_, std::nullopt);
   }
   for (const auto& p : poses) {
     if (p.jumped) requester_.on_jump();
@@ -323,6 +331,8 @@ void ViewerWorker::take_poses() {
     if (p.shown.value != 0) stages_table_.displayed(p.shown, to_master_s(p.t_s));
     if (p.waited_since_s > 0) requester_.on_displayed(to_master_s(p.t_s) - p.waited_since_s);
   }
+  if (ask) requester_.on_ask(to_master_s(monotonic_s()), ask->first, ask->second);
+  horizon_s_ = requester_.horizon_s();
 }
 
 void ViewerWorker::ask_again(double now_s) {

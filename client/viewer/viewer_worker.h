@@ -57,6 +57,8 @@ class ViewerWorker {
   void on_first_points(double now_s);
   /// A frame of this epoch was displayed with this camera. shown: the newest update in it; waited: it waited for that.
   void on_frame(double now_s, const geometry::Camera& camera, EpochId epoch, const ShownUpdate& shown, bool waited);
+  /// Of a wall: ViewRequester::on_ask().
+  void on_ask(uint64_t ask, const geometry::Camera& camera);
   /// The row that the frame has in frames.csv.
   void on_measured(const MeasuredFrame& frame);
   /// The display has waited so long for a view update, in seconds; 0: it waits no longer, or not for long.
@@ -149,8 +151,9 @@ class ViewerWorker {
   OrderDesk orders_;
   mutable std::mutex mutex_;  // guards what display thread and worker exchange, below
   std::vector<SeenPose> poses_;
-  std::optional<tracking::PosePredictor::Sample> expected_;  // of the next one
-  bool jumped_ = false;                                      // before the next one
+  std::optional<tracking::PosePredictor::Sample> expected_;   // of the next one
+  bool jumped_ = false;                                       // before the next one
+  std::optional<std::pair<uint64_t, geometry::Camera>> ask_;  // the newest of on_ask(), that is not taken yet
   std::string scene_;
   ShownScene shown_scene_;
   std::shared_ptr<const SceneTerms> terms_;

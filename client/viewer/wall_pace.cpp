@@ -64,9 +64,23 @@ std::optional<wire::Swap> WallPace::wait(const wire::SwapReady& ready, double pa
   return std::nullopt;
 }
 
+bool WallPace::asks(double now_s, const Wish& next) const {
+  return next.horizon_s > 0 && options_.asks_hz > 0 && now_s + options_.period_s / 2 >= ask_due_s_;
+}
+
+void WallPace::take_ask(const wire::Swap& swap, Swapped& out) {
+  if (swap.ask == 0 || (swap.master == asked_by_ && swap.ask == asked_)) return;
+  asked_by_ = swap.master;
+  asked_ = out.ask = swap.ask;
+  out.ask_head = swap.ask_head;
+  const double now_s = monotonic_s(), period_s = 1 / options_.asks_hz;
+  ask_due_s_ = now_s - ask_due_s_ < period_s ? ask_due_s_ + period_s : now_s + period_s;
+}
+
 WallPace::Swapped WallPace::drawn(const Wish& next, const std::function<bool()>& stopped) {
   const double begin_s = monotonic_s();
   late_s_ = begun_ ? late_s_ : 0;
+  predictor_.add(begin_s, next.head);
   const wire::SwapReady ready{.viewer = viewer_,
                               .wall = options_.wall,
                               .number = options_.number,
@@ -78,7 +92,9 @@ WallPace::Swapped WallPace::drawn(const Wish& next, const std::function<bool()>&
                               .period_s = options_.period_s,
                               .presented = presented_,
                               .presented_s = presented_s_,
-                              .late_s = std::exchange(late_s_, 0)};
+                              .late_s = std::exchange(late_s_, 0),
+                              .asks = asks(begin_s, next),
+                              .ahead = predictor_.predict(begin_s + next.horizon_s)};
   const double patience_s = alone_ ? 0 : begun_ ? kPatience_s + 2 * options_.period_s : kFirstPatience_s;
   const auto swap = wait(ready, patience_s, stopped);
   begun_ = true;
@@ -99,6 +115,7 @@ WallPace::Swapped WallPace::drawn(const Wish& next, const std::function<bool()>&
   out.wait_s = monotonic_s() - begin_s;
   out.skew_frame = swap->skew_frame;
   out.skew_s = swap->skew_s;
+  take_ask(*swap, out);
   return out;
 }
 

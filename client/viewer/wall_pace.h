@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "client/viewer/coupling/view_requester.h"
 #include "common/net/socket.h"
 #include "common/wire/wall_messages.h"
 
@@ -21,6 +22,7 @@ class WallPace {
     std::string wall;                  ///< what all viewers of the wall call it
     uint64_t number = 0, viewers = 1;  ///< this one's among them
     double period_s = 0;               ///< between two frames at least
+    double asks_hz = 20;               ///< how often all ask for views of one head, at most
   };
   /// A frame as it is to be drawn.
   struct Turn {
@@ -34,12 +36,15 @@ class WallPace {
     double t_s = 0;
     geometry::Pose head;
     wire::ShownState state;
+    double horizon_s = 0;  ///< views are asked for of where the head is so much later; 0: none are, of one head
   };
   struct Swapped {
     double wait_s = 0;        ///< from drawn() until it is to be presented
     bool alone = false;       ///< no word came in time
     uint64_t skew_frame = 0;  ///< wire::Swap
     double skew_s = 0;
+    uint64_t ask = 0;  ///< of which head to ask for a view now, and its number; 0: of none
+    geometry::Pose ask_head;
   };
 
   /// Connects. to_master_s: this machine's monotonic time on the master's clock.
@@ -53,6 +58,8 @@ class WallPace {
   const Turn& turn() const { return turn_; }
 
  private:
+  bool asks(double now_s, const Wish& next) const;
+  void take_ask(const wire::Swap& swap, Swapped& out);
   std::optional<wire::Swap> take(bool waited);
   std::optional<wire::Swap> wait(const wire::SwapReady& ready, double patience_s, const std::function<bool()>& stopped);
 
@@ -65,6 +72,10 @@ class WallPace {
   uint64_t drawn_ = 0, presented_ = 0;
   double presented_s_ = 0;  // master's clock
   double late_s_ = 0;
+  PosePredictor predictor_;  // of the head as this display sees it
+  InstanceId asked_by_;      // who said last what to ask for
+  uint64_t asked_ = 0;       // its number
+  double ask_due_s_ = -1e9;  // the next one
 };
 
 }  // namespace telesplat::viewer

@@ -111,6 +111,8 @@ std::optional<Error> check(const AccessReport& m) { return check_frames(m.cluste
 
 std::optional<Error> check(const ViewRequest& m) {
   if (auto bad = check_footprint(m.footprint)) return bad;
+  if (m.wall_viewers > kMaxWallViewers)
+    return Error{fmt::format("a wall of {} viewers, limit {}", m.wall_viewers, kMaxWallViewers)};
   return check_buffers(m.buffers);
 }
 

@@ -100,9 +100,13 @@ struct ViewRequest {
   uint64_t buffers = 0;     ///< at most kMaxBuffers
   double footprint = 0;     ///< width of a displayed pixel at unit depth, for scenes whose detail depends on it; 0: of
                             ///< one of camera's pixels
+  std::string wall;           ///< SwapReady::wall of a viewer that presents with others; empty: it does not
+  uint64_t wall_viewers = 0;  ///< that the wall has, at most kMaxWallViewers
+  uint64_t ask = 0;           ///< Swap::ask: views of the same are of one head; 0: of the viewer's own
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("request", m.request); f("camera", m.camera); f("moments", m.moments);
-    f("buffers", m.buffers); f("footprint", m.footprint);
+    f("buffers", m.buffers); f("footprint", m.footprint); f("wall", m.wall); f("wall_viewers", m.wall_viewers);
+    f("ask", m.ask);
   }
 };
 

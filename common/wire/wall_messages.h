@@ -21,9 +21,10 @@ struct ShownState {
   InstanceId source;     ///< whose numbers these are: the packer's that points come from, the master's of slice frames
   uint64_t newest = 0;   ///< points: Sequence of the newest event; slices: FrameId
   uint64_t replica = 0;  ///< points: one more than the Sequence with which the replica on display began; 0: none
+  uint64_t held = 0;     ///< slices: bit n: the frame `newest` - n is here too; 0: not told
   bool operator==(const ShownState&) const = default;
   template <class F> static void fields(F& f, auto& m) {
-    f("source", m.source); f("newest", m.newest); f("replica", m.replica);
+    f("source", m.source); f("newest", m.newest); f("replica", m.replica); f("held", m.held);
   }
 };
 
@@ -42,10 +43,13 @@ struct SwapReady {
   uint64_t presented = 0;   ///< the frame that was presented last; 0: none yet
   double presented_s = 0;   ///< when
   double late_s = 0;        ///< word to present it came so long after its time
+  bool asks = false;        ///< it is time that all ask for views
+  geometry::Pose ahead;     ///< where the head will be when those are there
   template <class F> static void fields(F& f, auto& m) {
     f("viewer", m.viewer); f("wall", m.wall); f("number", m.number); f("viewers", m.viewers); f("frame", m.frame);
     f("t_s", m.t_s); f("head", m.head); f("state", m.state); f("period_s", m.period_s);
     f("presented", m.presented); f("presented_s", m.presented_s); f("late_s", m.late_s);
+    f("asks", m.asks); f("ahead", m.ahead);
   }
 };
 
@@ -61,9 +65,12 @@ struct Swap {
   uint64_t viewers = 0;      ///< that had drawn this one
   uint64_t skew_frame = 0;   ///< the newest frame of which it is known when all presented it; 0: none yet
   double skew_s = 0;         ///< between the first and the last to present it
+  uint64_t ask = 0;          ///< rises by one when all are to ask for views of one head; 0: never yet
+  geometry::Pose ask_head;   ///< that head
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("frame", m.frame); f("at_s", m.at_s); f("t_s", m.t_s); f("head", m.head);
     f("state", m.state); f("viewers", m.viewers); f("skew_frame", m.skew_frame); f("skew_s", m.skew_s);
+    f("ask", m.ask); f("ask_head", m.ask_head);
   }
 };
 

@@ -36,7 +36,7 @@ class RunningMean {
 class Views {
  public:
   /// As ViewQueue::add(). A buffered request whose view is in flight is not taken again.
-  void request_view(const wire::ViewRequest& request);
+  virtual void request_view(const wire::ViewRequest& request);
   virtual void forget_viewer(InstanceId viewer);
   bool view_waiting() const { return !waiting_.empty(); }
   /// A view of a viewer waits for which this is true.

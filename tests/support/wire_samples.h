@@ -87,6 +87,7 @@ struct Filler {
       m.tiles = {64, 32, 100, 50, 700, 2, 0, 0, 64, 32, 2048, 0, 200, 100, 1, 1, 1, 1};
     if constexpr (std::is_same_v<M, wire::SwapReady>) m.number = 2, m.viewers = 4;
     if constexpr (requires { m.buffers; }) m.buffers = 3;
+    if constexpr (requires { m.wall_viewers; }) m.wall_viewers = 4;
     if constexpr (requires { m.footprint; }) m.footprint = 0.00078125;
   }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "common/tracking/pose_predictor.h"
 
@@ -20,7 +21,9 @@ struct RequestOptions {
   double min_scale_changing = 0.25;
   uint64_t buffers = 0;  ///< 0: asynchronous; else requests are paced by credits (coupling.h) and not by max_rate_hz
   tracking::Prediction prediction = tracking::Prediction::kKalman;
-  double horizon_s = 0;  ///< seconds that poses are predicted ahead; 0: the latency of updates, as it is measured
+  double horizon_s = 0;       ///< seconds that poses are predicted ahead; 0: the latency of updates, as it is measured
+  std::string wall;           ///< wire::ViewRequest
+  uint64_t wall_viewers = 0;  ///< likewise
   bool follow_display = false;  ///< sample as many pixels, in the display's aspect: for windows that change theirs
 };
 

@@ -43,6 +43,11 @@ void ViewRequester::on_jump() {
   expected_.reset();
 }
 
+void ViewRequester::on_ask(double now_s, uint64_t ask, const geometry::Camera& camera) {
+  asked_ = Ask{ask, camera};
+  asked_s_ = now_s;
+}
+
 double ViewRequester::horizon_s() const {
   if (options_.horizon_s > 0) return options_.horizon_s;
   if (displayed_latency_s_ > 0) return displayed_latency_s_;
@@ -57,16 +62,18 @@ geometry::Pose ViewRequester::expected_at(double t_s) const {
   return ahead ? predictor_.carried(expected_->pose, std::max(0.0, t_s - expected_->t_s)) : predictor_.predict(t_s);
 }
 
-// Whether what the head sees now looks as it does from there.
-bool ViewRequester::rests_at(const geometry::Pose& pose) const {
-  return splat::screen_movement(pose, display_->pose, kNearest_m, display_->focal_x()) < kDeadBand_px;
+// Whether what one sees from there looks as it does from here.
+bool ViewRequester::rests_at(const geometry::Pose& there, const geometry::Pose& here) const {
+  return splat::screen_movement(there, here, kNearest_m, display_->focal_x()) < kDeadBand_px;
 }
 
-geometry::Camera ViewRequester::wanted(double now_s, bool& still) {
+geometry::Camera ViewRequester::wanted(double now_s, bool& still, const geometry::Camera* asked) {
   const double horizon_s = this->horizon_s();
-  geometry::Camera camera = *display_;
-  camera.pose = expected_at(now_s + horizon_s);
-  meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
+  geometry::Camera camera = asked ? *asked : *display_;
+  if (!asked) {
+    camera.pose = expected_at(now_s + horizon_s);
+    meter_.predicted(now_s, display_->pose, now_s + horizon_s, camera.pose);
+  }
   // The faster the head, the wider the view that is sampled; a still head gets exactly what it looks at.
   const double motion = predictor_.turn_rad_s() * horizon_s + predictor_.speed_m_s() * horizon_s / 0.6;
   const double margin = motion < kMotionOfRest ? 0.0 : std::min(options_.max_margin, 0.02 + 0.6 * motion);
@@ -87,10 +94,11 @@ geometry::Camera ViewRequester::wanted(double now_s, bool& still) {
   const double du = (camera.right - camera.left) * margin / 2, dv = (camera.top - camera.bottom) * margin / 2;
   camera.left -= du, camera.right += du, camera.bottom -= dv, camera.top += dv;
   if (margin > 0) return camera;
-  if (sent_ && rests_at(sent_->pose))
+  const geometry::Pose& here = asked ? asked->pose : display_->pose;
+  if (sent_ && rests_at(sent_->pose, here))
     camera.pose = sent_->pose;
-  else if (rests_at(camera.pose))
-    camera.pose = display_->pose;
+  else if (rests_at(camera.pose, here))
+    camera.pose = here;
   return camera;
 }
 
@@ -131,10 +139,13 @@ void ViewRequester::set_buffers(uint64_t buffers) {
 
 std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   const bool paced = options_.buffers == 0;
-  if (!display_ || (paced && (now_s < due_s_ || waits_for_answer(now_s)))) return std::nullopt;
+  if (!display_) return std::nullopt;
+  const bool together = paced && now_s - asked_s_ < kAskPatience_s;
+  if (together ? !asked_ : paced && (now_s < due_s_ || waits_for_answer(now_s))) return std::nullopt;
+  const Ask ask = together ? *std::exchange(asked_, std::nullopt) : Ask{};
   bool still = false;
-  const geometry::Camera camera = wanted(now_s, still);
-  if (paced && quiet(camera) && now_s - last_sent_s_ < kQuietPeriod_s) return std::nullopt;
+  const geometry::Camera camera = wanted(now_s, still, together ? &ask.camera : nullptr);
+  if (paced && !together && quiet(camera) && now_s - last_sent_s_ < kQuietPeriod_s) return std::nullopt;
   last_sent_s_ = now_s;
   const double period_s = 1.0 / options_.max_rate_hz;
   due_s_ = now_s - due_s_ < period_s ? due_s_ + period_s : now_s + period_s;
@@ -145,7 +156,20 @@ std::optional<wire::ViewRequest> ViewRequester::next(double now_s) {
   while (open_.size() > kMaxOpen) open_.erase(open_.begin());
   sent_ = camera;
   sent_id_ = id;
-  return wire::ViewRequest{viewer_, id, camera, {.requested_s = now_s}, options_.buffers, 1 / display_->focal_x()};
+  return request(id, camera, now_s, options_.buffers, ask.number);
+}
+
+wire::ViewRequest ViewRequester::request(RequestId id, const geometry::Camera& camera, double now_s, uint64_t buffers,
+                                         uint64_t ask) const {
+  return {.viewer = viewer_,
+          .request = id,
+          .camera = camera,
+          .moments = {.requested_s = now_s},
+          .buffers = buffers,
+          .footprint = 1 / display_->focal_x(),
+          .wall = options_.wall,
+          .wall_viewers = options_.wall_viewers,
+          .ask = ask};
 }
 
 std::vector<wire::ViewRequest> ViewRequester::again(std::span<const RequestId> requests, double now_s) {
@@ -156,7 +180,7 @@ std::vector<wire::ViewRequest> ViewRequester::again(std::span<const RequestId> r
     const auto it = open_.find(id);
     if (it == open_.end() || !display_) continue;
     it->second.camera = wanted(now_s, it->second.still);
-    out.push_back({viewer_, id, it->second.camera, {.requested_s = now_s}, buffers, 1 / display_->focal_x()});
+    out.push_back(request(id, it->second.camera, now_s, buffers, 0));
   }
   return out;
 }

@@ -46,6 +46,7 @@ class ViewRequester {
   static constexpr double kNearest_m = 0.3;
   static constexpr double kQuietPeriod_s = 1.0;  ///< what has changed without a word is found by asking again
   static constexpr double kPatience_s = 0.5;     ///< with a view on its way
+  static constexpr double kAskPatience_s = 0.5;  ///< until views are asked for of the own head again
 
   ViewRequester(const RequestOptions& options, InstanceId viewer)
       : options_(options), viewer_(viewer), predictor_(options.prediction) {}
@@ -56,6 +57,9 @@ class ViewRequester {
   void on_jump();
   /// Who tracks the head expects it here at t_s, which lies ahead: better than what its poses alone tell.
   void on_expected(double t_s, const geometry::Pose& pose) { expected_ = {t_s, pose}; }
+  /// Of a wall: all of its viewers ask for views of one head now, this one with this camera. While such words come,
+  /// nothing else is asked for asynchronously. ask: wire::ViewRequest.
+  void on_ask(double now_s, uint64_t ask, const geometry::Camera& camera);
   /// RequestOptions::min_scale, as the session sets it; within 0.1 to 1.
   void set_min_scale(double scale) { options_.min_scale = scale >= 0.1 ? std::min(scale, 1.0) : 0.1; }
   /// The size of views from now on, as a person wishes it.
@@ -124,12 +128,22 @@ class ViewRequester {
   }
 
   geometry::Pose expected_at(double t_s) const;
-  geometry::Camera wanted(double now_s, bool& still);
-  bool rests_at(const geometry::Pose& pose) const;
+  /// asked: where the head will be is known.
+  geometry::Camera wanted(double now_s, bool& still, const geometry::Camera* asked = nullptr);
+  wire::ViewRequest request(RequestId id, const geometry::Camera& camera, double now_s, uint64_t buffers,
+                            uint64_t ask) const;
+  bool rests_at(const geometry::Pose& there, const geometry::Pose& here) const;
   bool quiet(const geometry::Camera& camera) const;
   bool waits_for_answer(double now_s) const;
   void follow_latency(const Update& update, double latency_s);
   void step_scale(double own_s);
+
+  struct Ask {
+    uint64_t number = 0;
+    geometry::Camera camera;
+  };
+  std::optional<Ask> asked_;  // that is not sent yet
+  double asked_s_ = -1e9;     // the newest
 
   bool steered_ = false;
   std::optional<geometry::Camera> sent_, quiet_;  // of the last request; of the last update, if it brought no points

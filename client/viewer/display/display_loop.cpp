@@ -222,8 +222,17 @@ class Display {
   WallPace::Swapped swap_with_wall() {
     const double now_s = monotonic_s(), t_s = now_s - start_s_;
     next_camera(now_s, t_s);
-    return wall_->drawn({t_s, surface_.head(), received_->newest_state()},
-                        [this] { return told_to_stop(worker_, surface_); });
+    const bool one_head = !gate_.waits() && received_->shows_whole_frames();
+    const auto swapped =
+        wall_->drawn({t_s, surface_.head(), received_->newest_state(), one_head ? worker_.horizon_s() : 0},
+                     [this] { return told_to_stop(worker_, surface_); });
+    if (swapped.ask > 0) ask_for(swapped.ask, swapped.ask_head);
+    return swapped;
+  }
+
+  // All viewers of a wall ask for views of this head now.
+  void ask_for(uint64_t ask, const geometry::Pose& head) {
+    worker_.on_ask(ask, eyes_.sampled(surface_.camera_of(head), head.orientation, wall_->turn().t_s, scene_.box_room));
   }
 
   // What the frame that begins is drawn from, and its camera.

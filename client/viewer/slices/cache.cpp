@@ -14,7 +14,8 @@ void SliceCache::show(BufferedFrame frame) {
 void SliceCache::put(BufferedFrame frame) {
   const std::lock_guard lock(mutex_);
   ++frames_;
-  newest_ = {frame.source, frame.frame->frame};
+  newest_source_ = frame.source;
+  newest_ = frame.frame->frame;
   if (in_order_ || in_step_)
     waiting_.push_back(std::move(frame));
   else
@@ -35,9 +36,16 @@ void SliceCache::show_until(InstanceId source, FrameId frame) {
   }
 }
 
-std::pair<InstanceId, FrameId> SliceCache::newest() const {
+SliceCache::Newest SliceCache::newest() const {
   const std::lock_guard lock(mutex_);
-  return newest_;
+  Newest out{newest_source_, newest_};
+  const auto add = [&](const BufferedFrame& f) {
+    if (!f.frame || f.source != newest_source_ || f.frame->frame > newest_) return;
+    if (const uint64_t before = newest_.value - f.frame->frame.value; before < 64) out.held |= uint64_t{1} << before;
+  };
+  add(displayed_);
+  for (const BufferedFrame& f : waiting_) add(f);
+  return out;
 }
 
 void SliceCache::free_dropped() {

@@ -48,8 +48,13 @@ class SliceCache {
   /// In step, asynchronously: the newest that waits up to this one goes on display. Frames of other masters than
   /// `source` go before its own.
   void show_until(InstanceId source, FrameId frame);
-  /// The newest frame that is here, and who numbered it; 0: none is.
-  std::pair<InstanceId, FrameId> newest() const;
+  struct Newest {
+    InstanceId source;  ///< who numbered it
+    FrameId frame;      ///< 0: there is none
+    uint64_t held = 0;  ///< bit n: the frame so many before it is here too, on display or waiting
+  };
+  /// The newest frame that is here.
+  Newest newest() const;
   /// The frame on display has been displayed.
   void frame_done();
 
@@ -67,7 +72,8 @@ class SliceCache {
   mutable std::mutex mutex_;
   bool in_order_;
   const bool in_step_;
-  std::pair<InstanceId, FrameId> newest_;
+  InstanceId newest_source_;
+  FrameId newest_;
   BufferedFrame displayed_;
   std::deque<BufferedFrame> waiting_;
   std::vector<std::shared_ptr<const volume::VolumeFrame>> dropped_;

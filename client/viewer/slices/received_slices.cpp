@@ -35,8 +35,8 @@ void ReceivedSlices::on_coupling(int buffers) {
 }
 
 wire::ShownState ReceivedSlices::newest_state() const {
-  const auto [source, frame] = cache_.newest();
-  return {source, frame.value, 0};
+  const auto [source, frame, held] = cache_.newest();
+  return {source, frame.value, 0, held};
 }
 
 void ReceivedSlices::show_state(const wire::ShownState& state) { cache_.show_until(state.source, {state.newest}); }

@@ -20,6 +20,7 @@ class ReceivedSlices final : public Received {
   void on_coupling(int buffers) override;
   wire::ShownState newest_state() const override;
   void show_state(const wire::ShownState& state) override;
+  bool shows_whole_frames() const override { return true; }
   void add_status(net::MasterLink::Values& values) const override;
   Result<std::unique_ptr<ViewSource>> make_source(const DisplayOptions& options, Renderers& renderers) override;
 

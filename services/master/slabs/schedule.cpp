@@ -45,21 +45,45 @@ volume::ShearFrame plan(const volume::Grid& grid, const std::vector<wire::ViewRe
   return empty_frame(grid, cameras[0].pose.position_room);
 }
 
+void VolumeSchedule::request_view(const wire::ViewRequest& request) {
+  if (WallViews::concerns(request)) walls_.on(request);
+  Views::request_view(request);
+}
+
+void VolumeSchedule::forget_viewer(InstanceId viewer) {
+  walls_.forget(viewer);
+  Views::forget_viewer(viewer);
+}
+
+bool VolumeSchedule::wait_for_others(InstanceId viewer, double now_s) const {
+  const auto waiting = [this](InstanceId of) { return waiting_of(of); };
+  const wire::ViewRequest* view = waiting(viewer);
+  return view && WallViews::concerns(*view) && !walls_.ready(*view, waiting, now_s);
+}
+
+// Views of a wall's viewers go with each other, and late ones with them where they look from there.
+bool VolumeSchedule::in_one_frame(const wire::ViewRequest& first, const wire::ViewRequest& other) const {
+  if (other.viewer == first.viewer) return false;
+  if (WallViews::concerns(other)) {
+    if (!WallViews::concerns(first) || other.wall != first.wall || other.ask > first.ask) return false;
+    if (WallViews::together(first, other)) return true;
+  }
+  return glm::distance(other.camera.pose.position_room, first.camera.pose.position_room) <= kSameEye_m;
+}
+
 bool VolumeSchedule::begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only,
                                  double now_s) {
   // Frames of one partition become complete in order, since every sampler has a part in each and works in order; of two
   // they might not.
   if (!partition || (!frames_.empty() && frames_.back().partition != partition)) return false;
-  const auto first = take_view(turns_only);
+  const auto first =
+      take_view(turns_only, InFlight::kAny, [&](InstanceId viewer) { return !wait_for_others(viewer, now_s); });
   if (!first) return false;
-  const glm::dvec3 eye = first->camera.pose.position_room;
   std::vector<wire::ViewRequest> requests{*first};
-  for (auto& r : take_more(
-           [&](const wire::ViewRequest& other) {
-             return other.viewer != first->viewer && glm::distance(other.camera.pose.position_room, eye) <= kSameEye_m;
-           },
-           wire::kMaxViews - 1))
+  for (auto& r :
+       take_more([&](const wire::ViewRequest& other) { return in_one_frame(*first, other); }, wire::kMaxViews - 1))
     requests.push_back(std::move(r));
+  if (WallViews::concerns(*first)) walls_.begun(requests);
   volume::ShearFrame shear = plan(grid_, requests, layers_);
   const size_t slabs = partition->slabs.size();
   for (wire::ViewRequest& r : requests) r.moments.begun_s = now_s;
@@ -133,6 +157,7 @@ int VolumeSchedule::drop_where(const std::function<bool(const Frame&)>& lost) {
     const Frame& f = frames_[i];
     for (const SlabState& s : f.slabs) out += s.state == SlabState::State::kLeased;
     put_back(f.id);
+    walls_.dropped(f.requests);
     frames_.erase(frames_.begin() + std::ptrdiff_t(i));
   }
   return out;

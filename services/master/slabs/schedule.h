@@ -11,6 +11,7 @@
 
 #include "common/volume/shear.h"
 #include "services/master/slabs/partition.h"
+#include "services/master/slabs/wall_views.h"
 #include "services/master/views.h"
 
 namespace telesplat::master {
@@ -32,11 +33,16 @@ class VolumeSchedule : public Views {
   void set_grid(const volume::Grid& grid) { grid_ = grid; }
   void set_layers(int layers) { layers_ = layers; }
   int layers() const { return layers_; }
+  bool walls_here() const { return !walls_.empty(); }  ///< viewers of walls ask for views
+
+  void request_view(const wire::ViewRequest& request) override;
+  void forget_viewer(InstanceId viewer) override;
 
   /// Begins the frame of the next view that waits, and of the first view of every other viewer whose eye is within
-  /// kSameEye_m of its. Viewers take turns; turns_only: only those that have a turn. False: none waits, as many frames
-  /// are in flight as may be (views_at_once()), or some of another partition are: so all of a viewer's views become
-  /// complete in order.
+  /// kSameEye_m of its. Views of a wall's viewers begin together (WallViews). Viewers take turns; turns_only: only
+  /// those that have a turn. False: none waits, or only some of a wall that wait for others; as many frames are in
+  /// flight as may be (views_at_once()); or some of another partition are: so all of a viewer's views become complete
+  /// in order.
   bool begin_frame(EpochId epoch, std::shared_ptr<const Partition> partition, bool turns_only = false,
                    double now_s = 0);
 
@@ -79,12 +85,15 @@ class VolumeSchedule : public Views {
     std::vector<wire::ViewRequest> requests;
     std::vector<SlabState> slabs;
   };
+  bool wait_for_others(InstanceId viewer, double now_s) const;
+  bool in_one_frame(const wire::ViewRequest& first, const wire::ViewRequest& other) const;
   /// Drops where `lost`; returns how many leases were out.
   int drop_where(const std::function<bool(const Frame&)>& lost);
 
   volume::Grid grid_;
   int layers_ = 16;
   std::deque<Frame> frames_;
+  WallViews walls_;
   RunningMean slab_time_s_{0.1};  // lease -> done
   double patience_ = 1;
   uint64_t released_ = 0;

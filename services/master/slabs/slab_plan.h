@@ -34,6 +34,8 @@ class SlabPlan final : public Plan {
   void give_leases(Idle& idle, double now_s) override;
   void extend(LeaseId lease, double now_s) override { schedule_.extend(lease, now_s); }
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override;
+  /// Views of a wall may be about to begin without one that is late.
+  bool hurried() const override { return schedule_.walls_here() && schedule_.view_waiting(); }
   Ticked tick(double now_s) override;
   void join(const std::string& sampler) override { partitions_.join(sampler); }
   void slab_ready(const std::string& sampler, const wire::SlabReady& slab) override;

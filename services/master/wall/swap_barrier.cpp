@@ -1,6 +1,7 @@
 #include "services/master/wall/swap_barrier.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <utility>
 
@@ -11,6 +12,14 @@ constexpr size_t kFramesRemembered = 8;  // whose presenting is not told by all 
 constexpr double kPeriodShare = 0.1;     // of a frame in the mean of their distances
 constexpr double kSourcePatience_s = 1;  // until viewers show another packer's model without the one that lacks it
 constexpr double kLeadGrows = 0.5, kLeadShrinks = 0.99;
+
+// Bit n of a mask of frames is the frame n before the newest. The same frames, by another newest one.
+uint64_t seen_from(uint64_t newest, const wire::ShownState& state) {
+  const uint64_t earlier = newest > state.newest ? newest - state.newest : 0;
+  const uint64_t later = state.newest > newest ? state.newest - newest : 0;
+  if (earlier > 63 || later > 63) return 0;
+  return later > 0 ? state.held >> later : state.held << earlier;
+}
 
 }  // namespace
 
@@ -130,16 +139,35 @@ const SwapBarrier::Member& SwapBarrier::leader() const {
 // What all who are in time can show. Numbers of one source never fall.
 void SwapBarrier::choose_state(double now_s) {
   wire::ShownState& state = last_.state;
-  const wire::ShownState& first = leader().said.state;
-  uint64_t least = std::numeric_limits<uint64_t>::max(), most = 0, replica = least;
-  bool one_source = true;
-  for (const auto& [id, m] : members_) {
-    if (!m.ready) continue;
-    one_source = one_source && m.said.state.source == first.source;
-    if (m.said.state.source != first.source) continue;
-    least = std::min(least, m.said.state.newest), most = std::max(most, m.said.state.newest);
-    replica = std::min(replica, m.said.state.replica);
+  for (auto& [id, m] : members_) {
+    if (!m.ready || !m.behind) continue;
+    m.caught_up = m.said.state.source == state.source && m.said.state.newest >= state.newest ? m.caught_up + 1 : 0;
+    m.behind = m.caught_up < kInTime;
   }
+  std::vector<const Member*> counted, ready;
+  for (const auto& [id, m] : members_) {
+    if (m.ready) ready.push_back(&m);
+    if (m.ready && m.waited_for && !m.behind) counted.push_back(&m);
+  }
+  if (counted.empty()) counted = std::move(ready);
+  const wire::ShownState& first = (*std::min_element(counted.begin(), counted.end(), [](const auto* a, const auto* b) {
+                                    return a->said.number < b->said.number;
+                                  }))->said.state;
+  uint64_t least = std::numeric_limits<uint64_t>::max(), most = 0, replica = least, held = least;
+  bool one_source = true;
+  for (const Member* m : counted) {
+    const wire::ShownState& own = m->said.state;
+    one_source = one_source && own.source == first.source;
+    if (own.source != first.source) continue;
+    least = std::min(least, own.newest), most = std::max(most, own.newest);
+    replica = std::min(replica, own.replica);
+    held &= seen_from(first.newest, own);
+  }
+  // Of frames each may lack others, so the least of the newest ones need not be with all.
+  if (first.held != 0 && held != 0)
+    least = first.newest - uint64_t(std::countr_zero(held));
+  else if (first.held != 0 && state.source == first.source)
+    least = state.newest;
   if (!one_source) {
     if (source_differs_s_ < 0) source_differs_s_ = now_s;
     if (state.source.value != 0 && now_s - source_differs_s_ < kSourcePatience_s) return;
@@ -153,11 +181,18 @@ void SwapBarrier::choose_state(double now_s) {
   if (reached_.empty() || reached_.back().newest < most) reached_.push_back({now_s, most});
   // What someone had so long ago is shown, whoever lacks it.
   while (!reached_.empty() && reached_.front().at_s <= now_s - kModelPatience_s) {
-    least = std::max(least, reached_.front().newest);
+    if (least < reached_.front().newest) note_behind(least = reached_.front().newest);
     reached_.pop_front();
   }
   state.newest = std::max(state.newest, least);
   state.replica = std::max(state.replica, replica);
+}
+
+// The others do not wait for those who had less for so long.
+void SwapBarrier::note_behind(uint64_t newest) {
+  for (auto& [id, m] : members_)
+    if (m.ready && m.said.state.source == last_.state.source && m.said.state.newest < newest)
+      m.behind = true, m.caught_up = 0;
 }
 
 void SwapBarrier::tell(Member& member, const wire::Swap& swap) {
@@ -176,6 +211,7 @@ void SwapBarrier::swap(double now_s) {
   last_.at_s = std::max(now_s + lead_s_, figures_.frames > 0 ? before_s + std::min(period_s, kMostFrame_s) : 0);
   last_.t_s = first.said.t_s;
   last_.head = first.said.head;
+  if (first.said.asks) ++last_.ask, last_.ask_head = first.said.ahead;
   choose_state(now_s);
   last_.viewers =
       uint64_t(std::count_if(members_.begin(), members_.end(), [](const auto& m) { return m.second.ready; }));

@@ -24,7 +24,8 @@ class SwapBarrier {
   static constexpr int kInTime = 3;
   /// A frame is taken for no longer than this, however slow a wall is.
   static constexpr double kMostFrame_s = 0.25;
-  /// A viewer that receives the model so much later than the others does not hold back what they show.
+  /// A viewer that receives the model so much later than the others does not hold back what they show, until it has had
+  /// what they show for kInTime frames.
   static constexpr double kModelPatience_s = 0.5;
 
   struct Outgoing {
@@ -60,6 +61,8 @@ class SwapBarrier {
     bool waited_for = true;  // it was in time, or has been again for long enough
     int in_time = 0;         // frames in a row, while it is not waited for
     uint64_t told = 0;       // the newest frame that it was told to present
+    bool behind = false;     // it receives what is shown later than the others, who do not wait for it
+    int caught_up = 0;       // frames in a row for which it had what is shown, while it is behind
   };
 
   double frame_s() const;
@@ -73,6 +76,7 @@ class SwapBarrier {
   static void note_pace(Member& member, bool in_time);
   const Member& leader() const;
   void choose_state(double now_s);
+  void note_behind(uint64_t newest);
   void tell(Member& member, const wire::Swap& swap);
 
   InstanceId master_;

@@ -1,6 +1,8 @@
 // Viewers of a wall swap together; one that is late, slow, lost or dead holds nobody for longer than a frame.
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "services/master/wall/swap_barrier.h"
 
 namespace telesplat::master {
@@ -197,7 +199,10 @@ TEST_F(Swaps, NumbersOfAModelNeverFallAndWaitOnlySoLongForOne) {
   EXPECT_EQ(frame(1, 1.05, 20, 50), 20u);
   EXPECT_EQ(frame(2, 1.10, 15, 60), 20u) << "what was shown stays";
   EXPECT_EQ(frame(3, 1.56, 20, 70), 50u) << "the others had that half a second ago";
-  EXPECT_EQ(frame(4, 1.60, 80, 90), 80u);
+  EXPECT_EQ(frame(4, 1.60, 20, 90), 90u) << "it is not waited for any more";
+  EXPECT_EQ(frame(5, 1.65, 90, 100), 100u);
+  EXPECT_EQ(frame(6, 1.70, 100, 110), 110u);
+  EXPECT_EQ(frame(7, 1.75, 110, 120), 110u) << "for three frames it had what was shown";
 }
 
 // Another packer: its numbers begin anew, and it is shown once all have something of it.
@@ -215,6 +220,61 @@ TEST_F(Swaps, AnotherSourceIsShownWhenAllReceiveFromIt) {
   const auto state = frame(2, 1.1, 8);
   EXPECT_EQ(state.source.value, 8u);
   EXPECT_EQ(state.newest, 3u);
+}
+
+// Of frames of slice images each may lack others than its neighbours.
+TEST_F(Swaps, TheNewestFrameThatAllHaveIsShown) {
+  begin();
+  const auto frame = [&](uint64_t number, double now_s, const std::vector<std::set<uint64_t>>& held) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, number);
+      m.state = {{7}, *held[v].rbegin(), 0};
+      for (const uint64_t f : held[v]) m.state.held |= uint64_t{1} << (m.state.newest - f);
+      barrier.on("peer-" + std::to_string(v), m, now_s);
+    }
+    return told().begin()->second.state.newest;
+  };
+  EXPECT_EQ(frame(1, 1.02, {{5, 6, 7, 8}, {5, 6, 7}, {5, 6, 7}, {6, 7, 9}}), 7u);
+  EXPECT_EQ(frame(2, 1.04, {{7, 8, 9}, {7, 8, 9}, {7, 10, 11}, {7, 8, 9}}), 7u) << "the third lacks 8 and 9";
+  EXPECT_EQ(frame(3, 1.06, {{7, 9, 12}, {7, 9, 12}, {7, 10, 12, 13}, {7, 9, 12}}), 12u);
+  EXPECT_EQ(frame(4, 1.08, {{12, 14}, {12, 14}, {12, 13, 15}, {12, 14}}), 12u);
+  EXPECT_EQ(frame(5, 1.57, {{12, 16}, {12, 16}, {12, 15}, {12, 14}}), 13u)
+      << "for half a second the others had newer ones";
+}
+
+TEST_F(Swaps, WhoIsNotWaitedForDoesNotHoldBackWhatTheOthersShow) {
+  begin();
+  for (uint64_t v = 0; v < 3; ++v) say(v, 1, 1.005);
+  barrier.tick(*barrier.due_s());
+  told();
+  for (const uint64_t v : {3, 0, 1, 2}) {
+    auto m = ready(v, 2);
+    m.state = {{7}, v == 3 ? 12u : 40u, 1};
+    barrier.on("peer-" + std::to_string(v), m, 1.06);
+  }
+  EXPECT_EQ(told().begin()->second.state.newest, 40u);
+}
+
+// When the first viewer says that views are to be asked for, all ask for views of the head that it says.
+TEST_F(Swaps, AllAskForViewsOfOneHead) {
+  begin();
+  const auto frame = [&](uint64_t number, bool asks) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, number);
+      m.asks = v == 0 ? asks : !asks;
+      m.ahead.position_room = {0, 0, double(10 * number + v)};
+      barrier.on("peer-" + std::to_string(v), m, 1 + 0.02 * double(number));
+    }
+    const auto swaps = told();
+    for (const auto& [peer, swap] : swaps) EXPECT_EQ(swap.ask, swaps.begin()->second.ask);
+    return swaps.begin()->second;
+  };
+  EXPECT_EQ(frame(1, false).ask, 0u);
+  EXPECT_EQ(frame(2, true).ask, 1u);
+  const auto same = frame(3, false);
+  EXPECT_EQ(same.ask, 1u);
+  EXPECT_EQ(same.ask_head.position_room.z, 20);
+  EXPECT_EQ(frame(4, true).ask_head.position_room.z, 40);
 }
 
 TEST_F(Swaps, AWallThatIsSlowIsNotTakenForLate) {

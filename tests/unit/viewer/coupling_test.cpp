@@ -31,6 +31,29 @@ class Requester : public testing::Test {
   }
 };
 
+TEST_F(Requester, OfAWallItAsksForTheHeadThatAllAskFor) {
+  ViewRequester of_wall{
+      {.sampling_width = 640, .sampling_height = 400, .max_rate_hz = 10, .wall = "lab", .wall_viewers = 4}, kMe};
+  of_wall.on_pose(0.9, display);
+  of_wall.on_pose(1, display);
+  const auto own = of_wall.next(1);
+  ASSERT_TRUE(own);
+  EXPECT_EQ(own->ask, 0u);
+  EXPECT_EQ(own->wall, "lab");
+  EXPECT_EQ(own->wall_viewers, 4u);
+  geometry::Camera asked = display;
+  asked.pose.position_room = {0.5, 0, 0};
+  of_wall.on_ask(1.01, 7, asked);
+  const auto together = of_wall.next(1.01);
+  ASSERT_TRUE(together) << "however short ago the last one was";
+  EXPECT_EQ(together->ask, 7u);
+  EXPECT_EQ(together->camera.pose.position_room, asked.pose.position_room);
+  EXPECT_FALSE(of_wall.next(1.01 + 0.9 * ViewRequester::kAskPatience_s)) << "nothing else meanwhile";
+  const auto alone = of_wall.next(1.02 + ViewRequester::kAskPatience_s);
+  ASSERT_TRUE(alone) << "nobody says any more what to ask for";
+  EXPECT_EQ(alone->ask, 0u);
+}
+
 TEST_F(Requester, AStillHeadGetsExactlyWhatItLooksAt) {
   EXPECT_FALSE(requester.next(0).has_value());  // no pose yet
   for (int i = 0; i < 5; ++i) requester.on_pose(i * 0.02, display);

@@ -126,7 +126,7 @@ TEST(SlicesInStep, FramesWaitUntilTheOthersHaveThem) {
   SliceCache cache(false, true);
   for (const uint64_t n : {1, 2, 4}) cache.put(frame_of(n));
   EXPECT_EQ(cache.displayed().frame, nullptr);
-  EXPECT_EQ(cache.newest().second.value, 4u);
+  EXPECT_EQ(cache.newest().frame.value, 4u);
   cache.show_until(kPacker, {3});
   EXPECT_EQ(cache.displayed().frame->frame.value, 2u) << "the nearest that is here";
   cache.show_until(kPacker, {3});
@@ -135,6 +135,18 @@ TEST(SlicesInStep, FramesWaitUntilTheOthersHaveThem) {
   EXPECT_EQ(cache.displayed().frame->frame.value, 4u);
   cache.frame_done();
   EXPECT_TRUE(cache.take_left().empty()) << "they were acknowledged when they came";
+}
+
+TEST(SlicesInStep, TellsWhichFramesAreHere) {
+  SliceCache cache(false, true);
+  EXPECT_EQ(cache.newest().held, 0u);
+  for (const uint64_t n : {1, 2, 4}) cache.put(frame_of(n));
+  EXPECT_EQ(cache.newest().held, 0b1101u) << "4, 2, 1";
+  cache.show_until(kPacker, {2});
+  EXPECT_EQ(cache.newest().held, 0b101u) << "4 waits, 2 is on display";
+  cache.put(frame_of(1, kOther));
+  EXPECT_EQ(cache.newest().source, kOther);
+  EXPECT_EQ(cache.newest().held, 1u);
 }
 
 TEST(SlicesInStep, AnotherMastersFramesFollowThoseOfTheFirst) {

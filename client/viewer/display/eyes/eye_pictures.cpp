@@ -39,6 +39,11 @@ geometry::Camera EyePictures::begin(double now_s, const geometry::Camera& head, 
   return EyeRig::sampled(pair_, scene_room);
 }
 
+geometry::Camera EyePictures::sampled(const geometry::Camera& head, const glm::dquat& turned, double t_s,
+                                      const geometry::Box& scene_room) {
+  return on() ? EyeRig::sampled(rig_.eyes(head, turned, t_s, scene_room), scene_room) : head;
+}
+
 // The places of both pictures in a display that has one beside or above the other.
 std::array<splat::FrameTarget, 2> EyePictures::parts_of(image::View& view) const {
   const int width = pair_.head.width, height = pair_.head.height;

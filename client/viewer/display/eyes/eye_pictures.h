@@ -20,6 +20,9 @@ class EyePictures {
   /// turned: the head, which a wall's screens need not face.
   geometry::Camera begin(double now_s, const geometry::Camera& head, const glm::dquat& turned, double t_s,
                          const geometry::Box& scene_room);
+  /// The camera to ask samplers for where a head is to be.
+  geometry::Camera sampled(const geometry::Camera& head, const glm::dquat& turned, double t_s,
+                           const geometry::Box& scene_room);
   const EyePair& pair() const { return pair_; }
 
   /// Draws both and composes them into `view`, which gets the display's size. input: of the head's camera. spooled:
