@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "client/viewer/coupling/view_requester.h"
 #include "common/net/socket.h"
+#include "common/tracking/pose_predictor.h"
 #include "common/wire/wall_messages.h"
 
 namespace telesplat::viewer {
@@ -72,10 +72,10 @@ class WallPace {
   uint64_t drawn_ = 0, presented_ = 0;
   double presented_s_ = 0;  // master's clock
   double late_s_ = 0;
-  PosePredictor predictor_;  // of the head as this display sees it
-  InstanceId asked_by_;      // who said last what to ask for
-  uint64_t asked_ = 0;       // its number
-  double ask_due_s_ = -1e9;  // the next one
+  tracking::PosePredictor predictor_;  // of the head as this display sees it
+  InstanceId asked_by_;                // who said last what to ask for
+  uint64_t asked_ = 0;                 // its number
+  double ask_due_s_ = -1e9;            // the next one
 };
 
 }  // namespace telesplat::viewer
