@@ -82,7 +82,7 @@ image::View picture_of(Runtime& r, const XrCompositionLayerProjectionView& view)
   out.colour = turned(colour, chain.width, chain.height);
   if (const auto* info = depth_of(view)) {
     const Swapchain& depth = *chain_of(r, info->subImage, true);
-    std::vector<float> values(pixels);
+    std::vector<float> values(size_t(depth.width) * size_t(depth.height));
     glBindTexture(GL_TEXTURE_2D, depth.textures[*depth.released]);
     glGetTexImage(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT, GL_FLOAT, values.data());
     const float near = 1 / info->nearZ, far = 1 / info->farZ;
@@ -90,7 +90,13 @@ image::View picture_of(Runtime& r, const XrCompositionLayerProjectionView& view)
       const float d = (v - info->minDepth) / (info->maxDepth - info->minDepth);
       v = d >= 1 ? std::numeric_limits<float>::infinity() : 1 / (near + d * (far - near));
     }
-    out.depth_m = turned(values, chain.width, chain.height);
+    // It may have fewer pixels than the picture.
+    values = turned(values, depth.width, depth.height);
+    out.depth_m.resize(pixels);
+    for (int y = 0; y < out.height; ++y)
+      for (int x = 0; x < out.width; ++x)
+        out.depth_m[size_t(y) * size_t(out.width) + size_t(x)] =
+            values[size_t(y * depth.height / out.height) * size_t(depth.width) + size_t(x * depth.width / out.width)];
   }
   glBindTexture(GL_TEXTURE_2D, 0);
   return out;

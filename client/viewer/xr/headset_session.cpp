@@ -92,8 +92,8 @@ Status HeadsetSession::make_chains() {
     if (!made) return made.error();
     colour_.push_back(std::move(*made));
     if (!options_.depth || !system_.takes_depth() || depth == 0) continue;
-    auto deep =
-        PictureChain::make(system_, session_, depth, XR_SWAPCHAIN_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT, width_, height_);
+    auto deep = PictureChain::make(system_, session_, depth, XR_SWAPCHAIN_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT,
+                                   width_ / 2, height_ / 2);
     if (!deep) return deep.error();
     depth_.push_back(std::move(*deep));
   }
@@ -220,13 +220,8 @@ HandRays HeadsetSession::locate_hands(XrTime time) {
 }
 
 void HeadsetSession::put(int eye, const image::View& picture) {
-  if (over_ || !done(colour_[size_t(eye)].put(picture.colour)) || depth_.empty()) return;
-  // As a projection of near_m_ to kFar_m has it: 0 is near, 1 is far.
-  const float scale = float(1 / (1 / near_m_ - 1 / kFar_m)), near = float(1 / near_m_);
-  depth_values_.resize(picture.depth_m.size());
-  for (size_t i = 0; i < depth_values_.size(); ++i)
-    depth_values_[i] = std::clamp((near - 1 / picture.depth_m[i]) * scale, 0.0f, 1.0f);
-  done(depth_[size_t(eye)].put(depth_values_));
+  if (over_ || !done(colour_[size_t(eye)].put_colour(picture)) || depth_.empty()) return;
+  done(depth_[size_t(eye)].put_depth(picture, {near_m_, kFar_m}));
 }
 
 void HeadsetSession::end_frame(const Frame& frame, const Eyes* eyes) {

@@ -90,7 +90,6 @@ class HeadsetSession {
   int width_ = 0, height_ = 0;
   std::vector<PictureChain> colour_, depth_;  // an eye each
   std::unique_ptr<Hands> hands_;
-  std::vector<float> depth_values_;
   bool running_ = false, over_ = false, quits_ = false, recentred_ = false;
   std::optional<XrTime> recentres_at_;
   std::vector<std::string> news_;

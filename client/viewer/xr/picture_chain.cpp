@@ -1,11 +1,17 @@
 #include "client/viewer/xr/picture_chain.h"
 
 #include <epoxy/gl.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
-#include <cstring>
 #include <utility>
 
 namespace telesplat::viewer {
+namespace {
+
+constexpr int kRowsAtOnce = 64;
+
+}  // namespace
 
 Result<PictureChain> PictureChain::make(const XrSystem& system, XrSession session, int64_t format,
                                         XrSwapchainUsageFlags usage, int width, int height) {
@@ -59,21 +65,28 @@ Status PictureChain::put_with(Upload upload) {
   return system_->check("xrReleaseSwapchainImage", xrReleaseSwapchainImage(handle_, nullptr));
 }
 
-Status PictureChain::put(std::span<const uint32_t> colour) {
-  const size_t row = size_t(width_);
-  turned_.resize(row * size_t(height_));
-  for (size_t y = 0; y < size_t(height_); ++y)
-    std::memcpy(turned_.data() + (size_t(height_) - 1 - y) * row, colour.data() + y * row, row * 4);
-  return put_with([&] {
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV, turned_.data());
+// OpenGL begins with the lowest row. Each pixel is brought into the texture's own order here, by all threads: drivers
+// that do it take one, and several times as long.
+template <class Row>
+void PictureChain::turn(Row row) {
+  turned_.resize(size_t(width_) * size_t(height_));
+  tbb::parallel_for(tbb::blocked_range<int>(0, height_, kRowsAtOnce), [&](const tbb::blocked_range<int>& rows) {
+    for (int y = rows.begin(); y < rows.end(); ++y)
+      row(size_t(y), turned_.data() + size_t(height_ - 1 - y) * size_t(width_));
   });
 }
 
-Status PictureChain::put(std::span<const float> depth) {
-  const size_t row = size_t(width_);
-  turned_.resize(row * size_t(height_));
-  for (size_t y = 0; y < size_t(height_); ++y)
-    std::memcpy(turned_.data() + (size_t(height_) - 1 - y) * row, depth.data() + y * row, row * 4);
+Status PictureChain::put_colour(const image::View& picture) {
+  turn([&](size_t y, uint32_t* to) { to_rgba(picture.colour.data() + y * size_t(picture.width), size_t(width_), to); });
+  return put_with(
+      [&] { glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, turned_.data()); });
+}
+
+Status PictureChain::put_depth(const image::View& picture, const DepthRange& range) {
+  turn([&](size_t y, uint32_t* to) {
+    const float* above = picture.depth_m.data() + 2 * y * size_t(picture.width);
+    to_half_depth(above, above + picture.width, range, size_t(width_), reinterpret_cast<float*>(to));
+  });
   return put_with(
       [&] { glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, turned_.data()); });
 }

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
+#include "client/viewer/xr/texture_rows.h"
 #include "client/viewer/xr/xr_system.h"
+#include "common/image/file.h"
 
 namespace telesplat::viewer {
 
@@ -19,16 +20,18 @@ class PictureChain {
   PictureChain(PictureChain&& other) noexcept;
   PictureChain& operator=(PictureChain&&) = delete;
 
-  /// Puts one picture into the next texture: rows from the upper left; colours are 0x00RRGGBB.
-  Status put(std::span<const uint32_t> colour);
-  /// The same of depth, 0 to 1.
-  Status put(std::span<const float> depth);
+  /// Puts one picture, of the chain's size, into the next texture: rows from the upper left; colours are 0x00RRGGBB.
+  Status put_colour(const image::View& picture);
+  /// The same of its depth; the chain has half of the picture's width and height.
+  Status put_depth(const image::View& picture, const DepthRange& range);
   /// What a layer shows: all of the picture that was put last.
   XrSwapchainSubImage sub_image() const;
 
  private:
   PictureChain(const XrSystem& system, XrSwapchain handle, int width, int height)
       : system_(&system), handle_(handle), width_(width), height_(height) {}
+  template <class Row>
+  void turn(Row row);
   template <class Upload>
   Status put_with(Upload upload);
 

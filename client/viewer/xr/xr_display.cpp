@@ -17,8 +17,9 @@
 namespace telesplat::viewer {
 namespace {
 
+constexpr double kParallel = 1e-6, kSameFocal = 1e-4;
 // Of a refresh, for drawing both eyes; the rest is for handing the pictures over, and for what else runs.
-constexpr double kDrawingShare = 0.75, kShortest_s = 1.0 / 1000;
+constexpr double kDrawingShare = 0.6, kShortest_s = 1.0 / 1000;
 constexpr double kIdle_s = 0.02, kOpenAgain_s = 1.0, kLeave_s = 2.0, kPicturePeriod_s = 2.5;
 constexpr uint32_t kHandColours[]{0x56b4e9, 0xe69f00};  // left, right; told apart by everyone
 constexpr const char* kHandNames[]{"left", "right"};
@@ -126,6 +127,14 @@ class XrDisplay {
     session_.reset();
   }
 
+  // One choice of points serves both where they look the same way and their pixels are of one size; else each is
+  // drawn by itself.
+  static bool alike(const std::array<geometry::Camera, 2>& eyes) {
+    const double turned = std::abs(glm::dot(eyes[0].pose.orientation, eyes[1].pose.orientation));
+    return 1 - turned < kParallel && eyes[0].width == eyes[1].width && eyes[0].height == eyes[1].height &&
+           std::abs(eyes[0].focal_x() / eyes[1].focal_x() - 1) < kSameFocal;
+  }
+
   // What to draw from, once it is known; false: it cannot be drawn.
   bool follow_scene(double period_s) {
     auto received = worker_.received_at(Succession::kNewest);
@@ -133,7 +142,8 @@ class XrDisplay {
     source_.reset();
     received_ = std::move(received);
     if (!received_) return true;
-    auto made = make_source_(*received_, 2 / (kDrawingShare * std::max(period_s, kShortest_s)));
+    const int pictures = as_pair_ ? 1 : 2;
+    auto made = make_source_(*received_, pictures / (kDrawingShare * std::max(period_s, kShortest_s)));
     if (!made) {
       result_.error = made.error().text;
       return false;
@@ -147,7 +157,6 @@ class XrDisplay {
     const gl::EglContext::Current current(device_.context());
     const auto begun = session_->begin_frame();
     if (!begun) return;
-    if (!follow_scene(begun->period_s)) return session_->end_frame(*begun, nullptr);
     MeasuredFrame m{.number = result_.frames, .start_s = start_s_, .previous_s = previous_s_};
     m.begin_s = monotonic_s();
     m.look = look_;
@@ -155,6 +164,8 @@ class XrDisplay {
     if (session_->take_recentring()) worker_.on_jump();
     const auto eyes = session_->locate_eyes(begun->display_time);
     if (!eyes) return session_->end_frame(*begun, nullptr);
+    if (!received_) as_pair_ = alike(eyes->cameras);
+    if (!follow_scene(begun->period_s)) return session_->end_frame(*begun, nullptr);
     left_ = eyes->cameras[0];
     follow_head(*begun, *eyes, m);
     if (!begun->renders) return session_->end_frame(*begun, nullptr);
@@ -213,30 +224,55 @@ class XrDisplay {
   }
 
   void draw_eyes(const HeadsetSession::Eyes& eyes, const HandRays& rays, bool counts, bool kept, MeasuredFrame& m) {
-    for (int eye = 0; eye < 2; ++eye) {
-      const geometry::Camera& camera = eyes.cameras[size_t(eye)];
-      image::View& view = views_[eye];
-      fit(view, camera, true);
-      const double begin_s = monotonic_s();
-      if (source_) {
-        const DrawnFrame drawn = source_->draw(
-            {.begin_s = begin_s, .camera = camera, .look = look_, .with_depth = true, .resting = !counts}, view);
-        if (eye == 0)
-          m.drawn = drawn;
-        else
-          add(drawn, m.drawn);
-      } else {
+    for (size_t eye = 0; eye < 2; ++eye) fit(views_[eye], eyes.cameras[eye], true);
+    if (!source_)
+      for (image::View& view : views_) {
         std::fill(view.colour.begin(), view.colour.end(), o_.shading.background);
         std::fill(view.depth_m.begin(), view.depth_m.end(), std::numeric_limits<float>::infinity());
       }
-      if (eye == 0 && kept) kept_ = view;  // records have no rays
+    else if (as_pair_ && alike(eyes.cameras))
+      draw_pair(eyes.cameras, counts, m);
+    else
+      draw_each(eyes.cameras, counts, m);
+    if (kept) kept_ = views_[0];  // records have no rays
+    for (size_t eye = 0; eye < 2; ++eye) {
       // Where rays end is chosen in one picture, so that both eyes see the same.
-      if (eye == 0) point(rays, view, camera);
+      if (eye == 0) point(rays, views_[0], eyes.cameras[0]);
       for (size_t hand = 0; hand < rays.size(); ++hand)
-        if (rays[hand]) draw_line(view, camera, rays[hand]->pose.position_room, ends_[hand], kHandColours[hand]);
-      session_->put(eye, view);
+        if (rays[hand])
+          draw_line(views_[eye], eyes.cameras[eye], rays[hand]->pose.position_room, ends_[hand], kHandColours[hand]);
+      session_->put(int(eye), views_[eye]);
     }
     if (counts) source_->displayed();
+  }
+
+  void draw_pair(const std::array<geometry::Camera, 2>& cameras, bool counts, MeasuredFrame& m) {
+    std::array<splat::FrameTarget, 2> targets;
+    for (size_t eye = 0; eye < 2; ++eye)
+      targets[eye] = {views_[eye].width, views_[eye].height, views_[eye].colour.data(), views_[eye].depth_m.data()};
+    m.drawn = source_->draw_pair({.begin_s = monotonic_s(),
+                                  .camera = m.camera,
+                                  .look = look_,
+                                  .with_depth = true,
+                                  .resting = !counts,
+                                  .even_empty = true},
+                                 cameras, targets);
+  }
+
+  void draw_each(const std::array<geometry::Camera, 2>& cameras, bool counts, MeasuredFrame& m) {
+    for (size_t eye = 0; eye < 2; ++eye) {
+      const DrawnFrame drawn = source_->draw({.begin_s = monotonic_s(),
+                                              .camera = cameras[eye],
+                                              .look = look_,
+                                              .with_depth = true,
+                                              .resting = !counts,
+                                              .even_empty = true},
+                                             views_[eye]);
+      if (eye == 0)
+        m.drawn = drawn;
+      else
+        add(drawn, m.drawn);
+    }
   }
 
   // Both eyes are one frame of the tables.
@@ -318,6 +354,7 @@ class XrDisplay {
   DisplayResult result_;
   std::string trouble_;
   bool last_ = false, lost_ = false;
+  bool as_pair_ = true;  // source_ draws both eyes at a time
   double open_at_s_ = 0, start_s_ = 0, previous_s_ = 0, last_display_s_ = 0, next_picture_s_ = 0;
 };
 
