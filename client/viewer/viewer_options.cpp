@@ -15,6 +15,8 @@
 namespace telesplat::viewer {
 namespace {
 
+constexpr double kLeastUpdateRate_hz = 0.1, kHeadsetUpdateRate_hz = 10;
+
 using options::Names;
 using options::Range;
 using options::Reach;
@@ -185,9 +187,10 @@ Table coupling_table(ViewerOptions& o) {
        .help = "--coupling loose: view updates that are on their way or complete and not displayed, at most",
        .limits = Range{1, double(wire::kMaxBuffers)}},
       {.flag = "--update-rate",
-       .value = &o.requests.max_rate_hz,
-       .help = "--coupling async: view requests a second at most",
-       .limits = Range{0.1, 1000}},
+       .value = &o.update_rate_hz,
+       .help = "--coupling async: view requests a second at most; 0: 20, and 10 for a headset, whose frames must be in "
+               "time",
+       .limits = Range{0, 1000}},
       {.flag = "--epoch-patience",
        .value = &o.epoch_patience_s,
        .help = "seconds that a changed scene's last picture is kept while the new one is incomplete",
@@ -411,6 +414,9 @@ Status settle(ViewerOptions& o) {
   std::tie(o.display.width, o.display.height) = *size;
   std::tie(o.requests.sampling_width, o.requests.sampling_height) = *sampling;
   o.requests.adaptive = o.sampling_size == "auto";
+  o.requests.max_rate_hz = o.update_rate_hz > 0 ? std::max(o.update_rate_hz, kLeastUpdateRate_hz)
+                           : o.xr               ? kHeadsetUpdateRate_hz
+                                                : viewer::RequestOptions{}.max_rate_hz;
   if (const Status s = settle_stereo(o); !s) return s;
   if (const Status s = settle_head_source(o); !s) return s;
   if (const Status s = settle_head(o); !s) return s;

@@ -38,12 +38,13 @@ struct ViewerOptions {
   std::string background = "#141820";  ///< "#rrggbb", a name, or "transparent"
   std::string renderer = "auto", splat = "disc", coupling = "async", shading = "lit", finish = "on";
   std::string still_samples = "16";
-  StereoFlags stereo;        ///< display.stereo comes of it
-  int buffers = 3;           ///< of loose coupling
-  std::string wall;          ///< "CxR", or a description's file: this display is a part of a wall; empty: it is none
-  int wall_tile = 0;         ///< which tile, by rows from the upper left, or which of the file's screens
-  double wall_scale = 1;     ///< of a description: of the screens' pixels, on each axis
-  bool swap_barrier = true;  ///< a wall's displays present their frames together
+  StereoFlags stereo;         ///< display.stereo comes of it
+  int buffers = 3;            ///< of loose coupling
+  std::string wall;           ///< "CxR", or a description's file: this display is a part of a wall; empty: it is none
+  int wall_tile = 0;          ///< which tile, by rows from the upper left, or which of the file's screens
+  double wall_scale = 1;      ///< of a description: of the screens' pixels, on each axis
+  bool swap_barrier = true;   ///< a wall's displays present their frames together
+  double update_rate_hz = 0;  ///< view requests a second at most; 0: what suits the display
   double epoch_patience_s = 0.15;  ///< EpochSwitch
   double splat_scale = 0;          ///< scale factor of splat sizes (T eq. 4.8); 0: what suits the kernel
   int threads = 0;

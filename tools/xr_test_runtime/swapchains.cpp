@@ -14,9 +14,12 @@ using Of = Runtime::Of;
 Runtime& runtime() { return Runtime::get(); }
 
 constexpr uint32_t kTextures = 3;
-constexpr std::array<int64_t, 4> kFormats{GL_SRGB8_ALPHA8, GL_RGBA8, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24};
+constexpr std::array<int64_t, 5> kFormats{GL_SRGB8_ALPHA8, GL_RGBA8, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24,
+                                          GL_DEPTH_COMPONENT16};
 
-bool is_depth(int64_t format) { return format == GL_DEPTH_COMPONENT32F || format == GL_DEPTH_COMPONENT24; }
+bool is_depth(int64_t format) {
+  return format == GL_DEPTH_COMPONENT32F || format == GL_DEPTH_COMPONENT24 || format == GL_DEPTH_COMPONENT16;
+}
 
 template <class Body>
 XrResult with(const char* name, XrSwapchain handle, Body body) {

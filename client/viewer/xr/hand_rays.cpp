@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace telesplat::viewer {
 namespace {
@@ -56,9 +57,10 @@ void draw_line(image::View& picture, const geometry::Camera& camera, const glm::
   const auto transform = camera.room_to_pixel();
   // As many steps as pixels at most, should it cross the picture.
   const int steps = 2 * std::max(picture.width, picture.height);
+  size_t last = ~size_t{0};
   for (int i = 0; i <= steps; ++i) {
     const auto pixel = pixel_of(picture, transform, camera.near_m, glm::mix(from, to, double(i) / steps));
-    if (!pixel) continue;
+    if (!pixel || std::exchange(last, pixel->at) == pixel->at) continue;
     for (int y = std::max(pixel->y - 1, 0); y <= std::min(pixel->y + 1, picture.height - 1); ++y)
       for (int x = std::max(pixel->x - 1, 0); x <= std::min(pixel->x + 1, picture.width - 1); ++x) {
         const size_t at = size_t(y) * size_t(picture.width) + size_t(x);

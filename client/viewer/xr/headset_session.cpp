@@ -82,7 +82,8 @@ Status HeadsetSession::make_chains() {
   const XrResult listed = xrEnumerateSwapchainFormats(session_, count, &count, formats.data());
   if (const Status s = system_.check("xrEnumerateSwapchainFormats", listed); !s) return s;
   const int64_t colour = chosen(formats, {GL_SRGB8_ALPHA8, GL_SRGB8, GL_RGBA8});
-  const int64_t depth = chosen(formats, {GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT16});
+  // Drivers take 16 bits as they are, and work on floats one by one. A metre away they are 0.8 mm apart.
+  const int64_t depth = chosen(formats, {GL_DEPTH_COMPONENT16, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24});
   if (colour == 0) return Error{system_.name() + " has no textures of 8 bits a colour"};
   const auto& size = system_.eye_size();
   width_ = scaled(size.width, size.most_width, options_.scale);

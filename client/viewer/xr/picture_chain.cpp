@@ -23,7 +23,7 @@ Result<PictureChain> PictureChain::make(const XrSystem& system, XrSession sessio
   XrSwapchain handle = nullptr;
   if (const Status s = system.check("xrCreateSwapchain", xrCreateSwapchain(session, &info, &handle)); !s)
     return s.error();
-  PictureChain out(system, handle, width, height);
+  PictureChain out(system, handle, format, width, height);
   uint32_t count = 0;
   if (const Status s =
           system.check("xrEnumerateSwapchainImages", xrEnumerateSwapchainImages(handle, 0, &count, nullptr));
@@ -40,6 +40,7 @@ Result<PictureChain> PictureChain::make(const XrSystem& system, XrSession sessio
 PictureChain::PictureChain(PictureChain&& o) noexcept
     : system_(o.system_),
       handle_(std::exchange(o.handle_, nullptr)),
+      format_(o.format_),
       width_(o.width_),
       height_(o.height_),
       textures_(std::move(o.textures_)) {}
@@ -67,28 +68,41 @@ Status PictureChain::put_with(Upload upload) {
 
 // OpenGL begins with the lowest row. Each pixel is brought into the texture's own order here, by all threads: drivers
 // that do it take one, and several times as long.
-template <class Row>
-void PictureChain::turn(Row row) {
-  turned_.resize(size_t(width_) * size_t(height_));
+template <class T, class Row>
+void PictureChain::turn(std::vector<T>& turned, Row row) {
+  turned.resize(size_t(width_) * size_t(height_));
   tbb::parallel_for(tbb::blocked_range<int>(0, height_, kRowsAtOnce), [&](const tbb::blocked_range<int>& rows) {
     for (int y = rows.begin(); y < rows.end(); ++y)
-      row(size_t(y), turned_.data() + size_t(height_ - 1 - y) * size_t(width_));
+      row(size_t(y), turned.data() + size_t(height_ - 1 - y) * size_t(width_));
   });
 }
 
 Status PictureChain::put_colour(const image::View& picture) {
-  turn([&](size_t y, uint32_t* to) { to_rgba(picture.colour.data() + y * size_t(picture.width), size_t(width_), to); });
+  turn(turned_,
+       [&](size_t y, uint32_t* to) { to_rgba(picture.colour.data() + y * size_t(picture.width), size_t(width_), to); });
   return put_with(
       [&] { glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, turned_.data()); });
 }
 
 Status PictureChain::put_depth(const image::View& picture, const DepthRange& range) {
-  turn([&](size_t y, uint32_t* to) {
+  const auto row = [&](size_t y, auto* to) {
     const float* above = picture.depth_m.data() + 2 * y * size_t(picture.width);
-    to_half_depth(above, above + picture.width, range, size_t(width_), reinterpret_cast<float*>(to));
+    to_half_depth(above, above + picture.width, range, size_t(width_), to);
+  };
+  const bool is_short = format_ == GL_DEPTH_COMPONENT16;
+  if (is_short)
+    turn(turned_depth16_, row);
+  else
+    turn(turned_depth_, row);
+  return put_with([&] {
+    if (is_short) {
+      glPixelStorei(GL_UNPACK_ALIGNMENT, 2);
+      glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_UNSIGNED_SHORT,
+                      turned_depth16_.data());
+    } else {
+      glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, turned_depth_.data());
+    }
   });
-  return put_with(
-      [&] { glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, turned_.data()); });
 }
 
 XrSwapchainSubImage PictureChain::sub_image() const { return {handle_, {{0, 0}, {width_, height_}}, 0}; }

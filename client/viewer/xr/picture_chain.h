@@ -28,18 +28,22 @@ class PictureChain {
   XrSwapchainSubImage sub_image() const;
 
  private:
-  PictureChain(const XrSystem& system, XrSwapchain handle, int width, int height)
-      : system_(&system), handle_(handle), width_(width), height_(height) {}
-  template <class Row>
-  void turn(Row row);
+  PictureChain(const XrSystem& system, XrSwapchain handle, int64_t format, int width, int height)
+      : system_(&system), handle_(handle), format_(format), width_(width), height_(height) {}
+  template <class T, class Row>
+  void turn(std::vector<T>& turned, Row row);
   template <class Upload>
   Status put_with(Upload upload);
 
   const XrSystem* system_;
   XrSwapchain handle_;
+  int64_t format_;
   int width_, height_;
   std::vector<uint32_t> textures_;
-  std::vector<uint32_t> turned_;  // OpenGL's textures begin with the lowest row
+  // OpenGL's textures begin with the lowest row.
+  std::vector<uint32_t> turned_;
+  std::vector<float> turned_depth_;
+  std::vector<uint16_t> turned_depth16_;
 };
 
 }  // namespace telesplat::viewer

@@ -24,8 +24,22 @@ size_t ToRgba(const uint32_t* HWY_RESTRICT colour, size_t pixels, uint32_t* HWY_
   return x;
 }
 
-size_t ToHalfDepth(const float* HWY_RESTRICT above, const float* HWY_RESTRICT below, float near, float scale,
-                   size_t pixels, float* HWY_RESTRICT out) {
+template <class D>
+HWY_INLINE void Put(D d, hn::Vec<D> value, float* HWY_RESTRICT out) {
+  hn::StoreU(value, d, out);
+}
+
+template <class D>
+HWY_INLINE void Put(D d, hn::Vec<D> value, uint16_t* HWY_RESTRICT out) {
+  const hn::RebindToSigned<D> di;
+  const hn::Rebind<uint16_t, D> d16;
+  const auto whole = hn::ConvertTo(di, hn::MulAdd(value, hn::Set(d, 65535.0f), hn::Set(d, 0.5f)));
+  hn::StoreU(hn::DemoteTo(d16, whole), d16, out);
+}
+
+template <class T>
+size_t HalfDepth(const float* HWY_RESTRICT above, const float* HWY_RESTRICT below, float near, float scale,
+                 size_t pixels, T* HWY_RESTRICT out) {
   const hn::ScalableTag<float> d;
   const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   size_t x = 0;
@@ -35,9 +49,17 @@ size_t ToHalfDepth(const float* HWY_RESTRICT above, const float* HWY_RESTRICT be
     hn::LoadInterleaved2(d, below + 2 * x, e, f);
     const auto nearest = hn::Min(hn::Min(a, b), hn::Min(e, f));
     const auto value = hn::Mul(hn::Sub(hn::Set(d, near), hn::Div(one, nearest)), hn::Set(d, scale));
-    hn::StoreU(hn::Min(hn::Max(value, zero), one), d, out + x);
+    Put(d, hn::Min(hn::Max(value, zero), one), out + x);
   }
   return x;
+}
+
+size_t ToHalfDepth(const float* above, const float* below, float near, float scale, size_t pixels, float* out) {
+  return HalfDepth(above, below, near, scale, pixels, out);
+}
+
+size_t ToHalfDepth16(const float* above, const float* below, float near, float scale, size_t pixels, uint16_t* out) {
+  return HalfDepth(above, below, near, scale, pixels, out);
 }
 
 }  // namespace telesplat::viewer::HWY_NAMESPACE
@@ -48,6 +70,21 @@ namespace telesplat::viewer {
 
 HWY_EXPORT(ToRgba);
 HWY_EXPORT(ToHalfDepth);
+HWY_EXPORT(ToHalfDepth16);
+
+namespace {
+
+struct Scale {
+  float near, scale;
+  explicit Scale(const DepthRange& range)
+      : near(float(1 / range.near_m)), scale(float(1 / (1 / range.near_m - 1 / range.far_m))) {}
+  float of_four(const float* above, const float* below) const {
+    const float nearest = std::min({above[0], above[1], below[0], below[1]});
+    return std::clamp((near - 1 / nearest) * scale, 0.0f, 1.0f);
+  }
+};
+
+}  // namespace
 
 void to_rgba(const uint32_t* colour, size_t pixels, uint32_t* out) {
   for (size_t x = HWY_DYNAMIC_DISPATCH(ToRgba)(colour, pixels, out); x < pixels; ++x)
@@ -55,11 +92,15 @@ void to_rgba(const uint32_t* colour, size_t pixels, uint32_t* out) {
 }
 
 void to_half_depth(const float* above, const float* below, const DepthRange& range, size_t pixels, float* out) {
-  const float scale = float(1 / (1 / range.near_m - 1 / range.far_m)), near = float(1 / range.near_m);
-  for (size_t x = HWY_DYNAMIC_DISPATCH(ToHalfDepth)(above, below, near, scale, pixels, out); x < pixels; ++x) {
-    const float nearest = std::min({above[2 * x], above[2 * x + 1], below[2 * x], below[2 * x + 1]});
-    out[x] = std::clamp((near - 1 / nearest) * scale, 0.0f, 1.0f);
-  }
+  const Scale s(range);
+  for (size_t x = HWY_DYNAMIC_DISPATCH(ToHalfDepth)(above, below, s.near, s.scale, pixels, out); x < pixels; ++x)
+    out[x] = s.of_four(above + 2 * x, below + 2 * x);
+}
+
+void to_half_depth(const float* above, const float* below, const DepthRange& range, size_t pixels, uint16_t* out) {
+  const Scale s(range);
+  for (size_t x = HWY_DYNAMIC_DISPATCH(ToHalfDepth16)(above, below, s.near, s.scale, pixels, out); x < pixels; ++x)
+    out[x] = uint16_t(s.of_four(above + 2 * x, below + 2 * x) * 65535.0f + 0.5f);
 }
 
 }  // namespace telesplat::viewer

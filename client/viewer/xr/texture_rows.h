@@ -16,5 +16,7 @@ struct DepthRange {
 /// Half as many pixels on each axis, of each 2 x 2 the nearest one: what reprojection must not tear apart is in front.
 /// above, below: two rows of 2 x pixels depths, metres; infinity: nothing.
 void to_half_depth(const float* above, const float* below, const DepthRange& range, size_t pixels, float* out);
+/// The same as shares of 65535.
+void to_half_depth(const float* above, const float* below, const DepthRange& range, size_t pixels, uint16_t* out);
 
 }  // namespace telesplat::viewer

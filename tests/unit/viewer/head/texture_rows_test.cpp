@@ -33,7 +33,10 @@ TEST(TextureRows, TheNearestOfFourDepthsIsKept) {
     for (size_t i = 0; i < pixels; ++i)
       if (i % 5 != 4) ((i & 1) ? above : below)[2 * i + (i >> 1 & 1)] = 0.1f + 0.3f * float(i);
     to_half_depth(above.data(), below.data(), range, pixels, out.data());
+    std::vector<uint16_t> shares(pixels);
+    to_half_depth(above.data(), below.data(), range, pixels, shares.data());
     for (size_t i = 0; i < pixels; ++i) {
+      EXPECT_NEAR(shares[i] / 65535.0, out[i], 0.51 / 65535) << i;
       if (i % 5 == 4) {
         EXPECT_EQ(out[i], 1);
         continue;
