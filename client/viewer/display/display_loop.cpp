@@ -128,6 +128,7 @@ class Display {
          sleep_until(monotonic_s() + kRestPeriod_s)) {
       if (told_to_stop(worker_, surface_)) return false;
       const geometry::Camera camera = next_camera(monotonic_s(), -1);
+      refuse_orders();
       if (!surface_.visible()) continue;
       fit(view_, camera, false);
       std::fill(view_.colour.begin(), view_.colour.end(), look_.background);
@@ -149,10 +150,13 @@ class Display {
       worker_.on_pose(now_s, asked(now_s, -1, camera, surface_.head()));
       const DrawnFrame drawn =
           draw({.begin_s = now_s, .camera = camera, .look = look_, .resting = true, .even_empty = surface_.visible()});
-      if (drawn.empty && !surface_.visible()) continue;
+      if (drawn.empty && !surface_.visible()) {
+        refuse_orders();
+        continue;
+      }
       surface_.present(view_, true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
-      carry_out_orders(camera, drawn.epoch);
+      carry_out_orders(camera, surface_.head(), drawn.epoch);
       surface_.report(live_figures(monotonic_s(), 0, drawn, *source_, worker_));
     }
     return true;
@@ -190,6 +194,10 @@ class Display {
       if (draws) return {now_s - begin_s, coupling};
       const geometry::Camera camera = next_camera(now_s, t_s);
       worker_.on_pose(now_s, asked(now_s, t_s, camera, surface_.head()));
+      if (source_ && shown_.epoch.value > 0)
+        carry_out_orders(shown_.camera, shown_.head, shown_.epoch);
+      else
+        refuse_orders();
       if (view_intact_ && surface_.visible()) surface_.present(view_, true);
     }
   }
@@ -208,7 +216,7 @@ class Display {
     worker_.on_waiting(waits_s);
     if (Overlays* overlays = surface_.overlays(); overlays && (waits_s > 0) != overlays->shows("waiting")) {
       if (waits_s > 0)
-        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kLowerLeft});
+        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kLowerRight});
       else
         overlays->hide("waiting");
     }
@@ -309,7 +317,8 @@ class Display {
     keep(use, t_s, m, legend);
     ++result_.frames;
     tell_of(m);
-    carry_out_orders(m.camera, m.drawn.epoch);
+    carry_out_orders(m.camera, m.head, m.drawn.epoch);
+    shown_ = {m.camera, m.head, m.drawn.epoch};
     if (wall_ && !swapped.alone) return;  // the wall has its pace
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
@@ -343,7 +352,11 @@ class Display {
   }
 
   // What others ask of this viewer, of the frame that was just displayed.
-  void carry_out_orders(const geometry::Camera& camera, EpochId epoch) {
+  void refuse_orders() {
+    for (const wire::Order& order : worker_.orders().take_orders())
+      worker_.orders().answer({order.number, false, order.command + ": nothing is shown yet"});
+  }
+  void carry_out_orders(const geometry::Camera& camera, const geometry::Pose& head, EpochId epoch) {
     surface_.on_terms(worker_.terms());
     if (const auto at = surface_.points_at()) {
       const auto aim = eyes_.aim(camera, *at);
@@ -358,6 +371,7 @@ class Display {
     for (const wire::Order& order : worker_.orders().take_orders()) {
       const auto done = carry_out(
           order, {.camera = shown,
+                  .head = head,
                   .epoch = epoch,
                   .terms = worker_.terms(),
                   .pick = pick,
@@ -397,6 +411,7 @@ class Display {
 
   // Hands the picture to the spool, if it is to be kept.
   void keep(uint32_t use, double t_s, const MeasuredFrame& m, const std::shared_ptr<const image::Legend>& legend) {
+    if (m.drawn.between_clips) use &= ~uint32_t{kVerify};  // there is no epoch that looks like it
     view_intact_ = use == 0;
     if (!use) return;
     if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
@@ -432,6 +447,11 @@ class Display {
   WallPace* const wall_;  // null: the display is by itself
   std::optional<MeasuredFrame> row_;
   EyePictures eyes_;
+  struct Shown {
+    geometry::Camera camera;
+    geometry::Pose head;
+    EpochId epoch;
+  } shown_;  // last
   Look look_;
   ShownScene scene_;  // as the surface knows it, and the session too
   std::shared_ptr<const wire::Welcome> session_;

@@ -132,14 +132,14 @@ void FramePresenter::load_overlays(const Overlays& overlays) {
 }
 
 // With the frame's program and vertices.
-void FramePresenter::draw_overlays(const Overlays& overlays, int width, int height) {
+void FramePresenter::draw_overlays(const Overlays& overlays, int width, int height, int hidden) {
   if (overlays.version() != overlay_version_) load_overlays(overlays);
   if (overlay_textures_.empty()) return;
   glUniform1i(keeps_alpha_, 1);
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   for (const auto& [name, overlay] : overlays.all()) {
-    const auto place = place_overlay(overlay, width, height);
+    const auto place = place_overlay(overlay, width, height, hidden);
     glViewport(place.x, height - place.y - place.height, place.width, place.height);
     glBindTexture(GL_TEXTURE_2D, overlay_textures_[name]);
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -168,7 +168,7 @@ void FramePresenter::draw(const image::View& view, int width, int height, const 
   }
   glDrawArrays(GL_TRIANGLES, 0, 3);
   glDisable(GL_SCISSOR_TEST);
-  draw_overlays(overlays, width, height);
+  draw_overlays(overlays, width, height, hidden);
 }
 
 }  // namespace telesplat::viewer

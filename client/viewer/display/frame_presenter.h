@@ -25,7 +25,7 @@ class FramePresenter {
 
   /// Draws the frame over the whole default framebuffer of width x height pixels; scales it if it has another size.
   /// What lies over it is blended on.
-  /// hidden: so many columns at the left will be covered by something else and are left out.
+  /// hidden: so many columns at the left will be covered by something else and are left out; overlays lie beside them.
   void draw(const image::View& view, int width, int height, const Overlays& overlays, int hidden = 0);
   bool has_pixel_ring() const { return has_ring_; }
 
@@ -34,7 +34,7 @@ class FramePresenter {
   FramePresenter() = default;
   void resize(int width, int height);
   void upload(const image::View& view);
-  void draw_overlays(const Overlays& overlays, int width, int height);
+  void draw_overlays(const Overlays& overlays, int width, int height, int hidden);
   void load_overlays(const Overlays& overlays);
 
   bool has_ring_ = false;

@@ -35,16 +35,17 @@ image::View text_panel(const std::vector<std::string>& lines, int scale) {
   return canvas.view();
 }
 
-geometry::Rect place_overlay(const Overlay& overlay, int window_width, int window_height) {
+geometry::Rect place_overlay(const Overlay& overlay, int window_width, int window_height, int hidden) {
   using Corner = Overlay::Corner;
   const int margin = std::min({kMargin, window_width / 8, window_height / 8});
-  const double room_x = window_width - 2 * margin, room_y = window_height - 2 * margin;
+  const int left = std::clamp(hidden, 0, std::max(0, window_width - 4 * margin - 1));
+  const double room_x = window_width - left - 2 * margin, room_y = window_height - 2 * margin;
   const double scale = std::min({1.0, room_x / overlay.picture.width, room_y / overlay.picture.height});
   const int width = std::max(1, int(overlay.picture.width * scale));
   const int height = std::max(1, int(overlay.picture.height * scale));
   const bool right = overlay.corner == Corner::kUpperRight || overlay.corner == Corner::kLowerRight;
   const bool low = overlay.corner == Corner::kLowerLeft || overlay.corner == Corner::kLowerRight;
-  return {right ? window_width - margin - width : margin, low ? window_height - margin - height : margin, width,
+  return {right ? window_width - margin - width : left + margin, low ? window_height - margin - height : margin, width,
           height};
 }
 

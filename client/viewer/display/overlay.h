@@ -38,7 +38,8 @@ class Overlays {
 /// Lines of text on a dark, translucent ground. scale: pixels a side of a letter's dot.
 image::View text_panel(const std::vector<std::string>& lines, int scale);
 
-/// Where a picture of width x height lies in a window; scaled down, never up, to fit with a small margin.
-geometry::Rect place_overlay(const Overlay& overlay, int window_width, int window_height);
+/// Where a picture of width x height lies in a window; scaled down, never up, to fit with a small margin. hidden: so
+/// many columns at the window's left are covered by something else.
+geometry::Rect place_overlay(const Overlay& overlay, int window_width, int window_height, int hidden = 0);
 
 }  // namespace telesplat::viewer

@@ -35,7 +35,8 @@ struct DrawnFrame {
   double refined = 0, refine_ms = 0;  ///< of a still picture: share of pixels drawn with sub-pixels; time for that
   int sub_pixels = 1;                 ///< of such a pixel, on each axis
   EpochId epoch;
-  ShownUpdate update;  ///< the newest view update that it shows
+  bool between_clips = false;  ///< it is cut as the session is now, and its points are of an epoch before that
+  ShownUpdate update;          ///< the newest view update that it shows
 };
 
 /// Used by one thread, the display's.

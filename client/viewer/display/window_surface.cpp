@@ -16,7 +16,8 @@ namespace telesplat::viewer {
 namespace {
 
 constexpr double kShowAgain_s = 0.1, kPoint_s = 0.1;
-constexpr size_t kMostPicks = 3;
+constexpr size_t kMostPicks = 3, kMostPicture_pixels = 100'000'000;
+constexpr uintmax_t kMostDropped_bytes = 64'000'000;
 
 // What plays from the beginning. An orbit is fitted once it is known around what.
 std::optional<geometry::Trajectory> first_movement(const HeadMovement& movement) {
@@ -159,7 +160,7 @@ geometry::Camera WindowSurface::begin_frame(double now_s, double t_s, Look& look
   take_launcher_lines(now_s);
   take_dropped();
   run_panel(now_s, look);
-  follow_bookmarks(camera.pose);
+  follow_bookmarks(head_);
   if (interaction_.take_overlay_wish()) hands_.toggle_all();
   if (auto picture = hands_.update(now_s, camera, scene_.box_room)) {
     if (picture->width > 0)
@@ -319,7 +320,19 @@ void WindowSurface::take_dropped() {
   open(path);
 }
 
+// Whole, by the display's thread: what is no file of a sensible size is not opened.
+Status WindowSurface::readable(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return Error{path + ": is no regular file"};
+  const uintmax_t bytes = std::filesystem::file_size(path, error);
+  if (error || bytes > kMostDropped_bytes)
+    return Error{fmt::format("{}: has {:.0f} MB, at most {:.0f} are read here", path, double(bytes) / 1e6,
+                             double(kMostDropped_bytes) / 1e6)};
+  return ok_status();
+}
+
 void WindowSurface::play_file(const std::string& path) {
+  if (const Status s = readable(path); !s) return tell(s.error().text);
   auto read = geometry::Trajectory::read_csv(path);
   if (!read) return tell(read.error().text);
   interaction_.play(std::move(*read));
@@ -327,6 +340,7 @@ void WindowSurface::play_file(const std::string& path) {
 }
 
 void WindowSurface::use_transfer_file(const std::string& path) {
+  if (const Status s = readable(path); !s) return tell(s.error().text);
   auto read = volume::resolve_transfer(path, scene_controls_.volume()->range);
   if (!read) return tell(read.error().text);
   panel_.order({"tf", {{"transfer", volume::to_text(*read)}}, {}});
@@ -335,10 +349,16 @@ void WindowSurface::use_transfer_file(const std::string& path) {
 void WindowSurface::on_session(const std::shared_ptr<const wire::Welcome>& session) {
   if (!session) return;
   scene_controls_.on_session(monotonic_s(), *session);
-  // Another data set is looked at from its own first view.
-  const std::string name = scene::SessionView(*session).fact("scene");
-  if (!name.empty() && !scene_name_.empty() && name != scene_name_) panel_.press(Key::kR);
-  if (!name.empty()) scene_name_ = name;
+  // Another data set is looked at from its own first view, by who has the camera, and has nothing picked yet.
+  const scene::SessionView facts(*session);
+  const std::string name =
+      facts.fact("scene") + '\n' + facts.fact("data_file") + '\n' + facts.fact(scene::kPlacementFact);
+  if (!facts.fact("scene").empty() && name != std::exchange(scene_name_, name) && had_scene_) {
+    interaction_.back_to_first_view();
+    picked_.clear();
+    hands_.on_pick(std::nullopt);
+  }
+  had_scene_ = had_scene_ || !facts.fact("scene").empty();
   panel_.on_told_sampling(
       scene::SessionView(*session).setting("viewer.least_sampling", options_.sampling.least_sampling));
 }
@@ -381,6 +401,11 @@ void WindowSurface::take_picture(const image::View& view, image::Alpha alpha) {
 std::optional<PictureWish> WindowSurface::take_picture_wish(geometry::Camera& camera) {
   const auto wish = panel_.take_picture();
   if (!wish || !wish->own_size()) return wish;
+  if (size_t(wish->width) * size_t(wish->height) > kMostPicture_pixels) {
+    tell(fmt::format("a picture of {} x {} has more than {} million pixels", wish->width, wish->height,
+                     kMostPicture_pixels / 1'000'000));
+    return std::nullopt;
+  }
   const auto& o = options_.display;
   if (o.wall.tiles() == 1 && !o.wall.described) {
     camera = window_camera(camera.pose, o.fov_deg, wish->width, wish->height, o.near_m);

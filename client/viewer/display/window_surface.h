@@ -98,6 +98,7 @@ class WindowSurface final : public DisplaySurface {
   void take_launcher_lines(double now_s);
   void take_dropped();
   void open(const std::string& path);
+  static Status readable(const std::string& path);
   void play_file(const std::string& path);
   void use_transfer_file(const std::string& path);
   void follow_bookmarks(const geometry::Pose& pose);
@@ -116,6 +117,7 @@ class WindowSurface final : public DisplaySurface {
   double pointed_s_ = -1e9;
   ShownScene scene_;
   std::string scene_name_;
+  bool had_scene_ = false;
   geometry::Pose head_;                       // of the frame at hand
   int fitted_width_ = 0, fitted_height_ = 0;  // of the window that the first view suits; 0: none yet
   std::shared_ptr<const image::Legend> legend_;

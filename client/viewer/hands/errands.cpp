@@ -87,7 +87,7 @@ Result<std::string> pick(const wire::Order& order, const FrameHands& hands) {
 }
 
 std::string where(const FrameHands& hands) {
-  const auto& [p, q] = hands.camera.pose;
+  const auto& [p, q] = hands.head;
   return Json{{"position", {p.x, p.y, p.z}},
               {"orientation", {q.w, q.x, q.y, q.z}},
               {"width", hands.camera.width},

@@ -14,6 +14,7 @@ namespace telesplat::viewer {
 /// What the display lends for one frame.
 struct FrameHands {
   geometry::Camera camera;  ///< of the frame that was displayed
+  geometry::Pose head;      ///< that it was drawn for: a wall's screens look elsewhere
   EpochId epoch;
   std::shared_ptr<const SceneTerms> terms;  ///< null: the session is not known yet
   /// What lies at a pixel; opacity: of volumes.

@@ -105,7 +105,7 @@ void Interaction::toggle(bool& flag, const char* name) {
 void Interaction::take_camera() {
   if (!playing_) return;
   playing_ = false;
-  if (!tracked_) return controls_.take_over(recorded_->at(playback_s_));
+  if (!tracked_ || std::exchange(plays_path_, false)) return controls_.take_over(recorded_->at(playback_s_));
   if (told_) controls_.take_over(*told_);
 }
 
@@ -264,7 +264,7 @@ void Interaction::set_recorded(geometry::Trajectory recorded) {
 }
 
 void Interaction::play(geometry::Trajectory path) {
-  tracked_ = nullptr;
+  plays_path_ = true;
   recorded_ = std::move(path);
   has_own_path_ = playing_ = true;
   playback_s_ = 0;
@@ -285,7 +285,7 @@ void Interaction::set_tracked(Tracked tracked) {
 }
 
 geometry::Pose Interaction::next_pose(double now_s, double dt_s, bool playback) {
-  if (playing_ && tracked_) {
+  if (playing_ && tracked_ && !plays_path_) {
     if (const auto told = tracked_(now_s)) told_ = told;
     return told_ ? *told_ : controls_.advance(dt_s);
   }

@@ -10,6 +10,7 @@ namespace telesplat::viewer {
 namespace {
 
 // What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
+constexpr double kClipSettles_s = 2;  // by then an epoch is on display that is cut alike
 constexpr double kBudgetShare = 0.85;
 // Of a frame's time, for sub-pixels. The samplers of a small machine need the rest: a head that has just come to rest
 // is when they have the most to do.
@@ -56,6 +57,7 @@ void PointSource::find_coverage(const FrameInput& input, const geometry::Camera&
 void PointSource::count_same(const FrameInput& input) {
   const uint64_t clipped_before = clip_version_;
   clip_ = received_.clip(clip_version_);
+  if (clip_version_ != clipped_before) clipped_s_ = input.begin_s, clipped_ = list_.epoch;
   const bool same =
       !input.resting && input.camera == camera_ && same_look(input.look, look_) && clip_version_ == clipped_before;
   same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
@@ -199,6 +201,7 @@ void PointSource::add_figures(DrawnFrame& out) const {
   out.detail = options_.selection.detail;
   out.budget_ms = budget_.budget_ms();
   out.epoch = list_.epoch;
+  out.between_clips = list_.epoch == clipped_ && monotonic_s() - clipped_s_ < kClipSettles_s;
 }
 
 // Before anything is drawn: what comes meanwhile may not be in the picture.

@@ -192,6 +192,7 @@ class XrDisplay {
     for (const wire::Order& order : worker_.orders().take_orders()) {
       const auto done = carry_out(
           order, {.camera = left_,
+                  .head = m.head,
                   .epoch = m.drawn.epoch,
                   .terms = worker_.terms(),
                   .pick = [&](double x, double y, double opacity) { return source_->pick(left_, x, y, opacity); },

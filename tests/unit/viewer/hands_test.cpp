@@ -263,6 +263,7 @@ class Errands : public testing::Test {
     return carry_out({1, command, arguments}, hands);
   }
   FrameHands hands{.camera = display(),
+                   .head = display().pose,
                    .epoch = {3},
                    .terms = std::make_shared<const SceneTerms>(millimetres()),
                    .pick = [this](double x, double y, double o) -> std::optional<Pick> {

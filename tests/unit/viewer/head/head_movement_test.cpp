@@ -170,6 +170,8 @@ TEST(Overlay, LiesInItsCornerAndShrinksToFit) {
   EXPECT_GE(small.x, 0);
   overlay.corner = Overlay::Corner::kUpperLeft;
   EXPECT_EQ(place_overlay(overlay, 640, 480).x, place_overlay(overlay, 640, 480).y);
+  // Beside a panel.
+  EXPECT_EQ(place_overlay(overlay, 640, 480, 200).x, 200 + place_overlay(overlay, 640, 480).x);
   Overlays overlays;
   const auto before = overlays.version();
   overlays.show("help", overlay);
