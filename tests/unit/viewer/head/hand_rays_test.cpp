@@ -44,5 +44,16 @@ TEST(HandRays, LinesHideBehindWhatIsBeforeThem) {
   EXPECT_LT(*std::min_element(picture.depth_m.begin(), picture.depth_m.end()), 1.1f) << "the line has its depth";
 }
 
+TEST(HandRays, LinesFromBehindTheCameraAreWhole) {
+  const auto camera = geometry::make_camera({}, 90, 200, 200);
+  auto picture = wall(camera);
+  draw_line(picture, camera, {0.3, -0.3, 0.2}, {0.3, -0.3, -5}, kBlue);
+  for (int y = 108; y < 200; ++y) {
+    const auto row = picture.colour.begin() + y * 200;
+    EXPECT_NE(std::find(row, row + 200, kBlue), row + 200) << "row " << y;
+  }
+  EXPECT_EQ(std::count(picture.colour.begin(), picture.colour.begin() + 95 * 200, kBlue), 0);
+}
+
 }  // namespace
 }  // namespace telesplat::viewer
