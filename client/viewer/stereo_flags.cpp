@@ -15,7 +15,8 @@ options::Table stereo_table(StereoFlags& f) {
       {.flag = "--stereo",
        .value = &f.mode,
        .help = "two eyes: side-by-side, top-bottom (-half: squeezed, the display stretches them), anaglyph-grey, "
-               "anaglyph-colour, anaglyph-dubois, rows, columns, checker (interleaved), autostereo (--barrier)",
+               "anaglyph-colour, anaglyph-dubois, rows, columns, checker (interleaved), autostereo (--barrier), "
+               "quad-buffer (of the driver)",
        .limits = stereo::mode_names(),
        .reach = Reach::kRecorded},
       {.flag = "--eye-separation",

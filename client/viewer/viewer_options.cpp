@@ -348,6 +348,8 @@ Status settle_stereo(ViewerOptions& o) {
   auto stereo = settle(o.stereo);
   if (!stereo) return stereo.error();
   o.display.stereo = std::move(*stereo);
+  if (o.display.stereo.mode == stereo::Mode::kQuadBuffer && !o.window)
+    return Error{"--stereo quad-buffer: needs a window; side-by-side has both pictures without one"};
   if (!o.display.stereo.panel) return ok_status();
   const stereo::Panel& panel = *o.display.stereo.panel;
   o.size = fmt::format("{}x{}", panel.width, panel.height);

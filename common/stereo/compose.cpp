@@ -92,6 +92,7 @@ struct Pictures {
   void arrange(Mode mode) const {
     switch (mode) {
       case Mode::kSideBySide:
+      case Mode::kQuadBuffer:
         return side_by_side();
       case Mode::kSideBySideHalf:
         return side_by_side_half();

@@ -8,7 +8,7 @@ const std::vector<std::string>& mode_names() {
   static const std::vector<std::string> names{
       "off",           "side-by-side",    "side-by-side-half", "top-bottom", "top-bottom-half",
       "anaglyph-grey", "anaglyph-colour", "anaglyph-dubois",   "rows",       "columns",
-      "checker",       "autostereo"};
+      "checker",       "autostereo",      "quad-buffer"};
   return names;
 }
 
@@ -28,7 +28,7 @@ Size eye_size(Mode mode, Size display) {
 }
 
 Size composed_size(Mode mode, Size eye) {
-  if (mode == Mode::kSideBySide) eye.width *= 2;
+  if (mode == Mode::kSideBySide || mode == Mode::kQuadBuffer) eye.width *= 2;
   if (mode == Mode::kTopBottom) eye.height *= 2;
   return eye;
 }

@@ -20,7 +20,8 @@ enum class Mode {
   kRows,            ///< even rows (from the top, counted from 0) are the left eye's
   kColumns,         ///< even columns are
   kChecker,         ///< pixels of which row + column is even are
-  kAutostereo       ///< each subpixel is of the eye that sees it through a line screen (autostereo/)
+  kAutostereo,      ///< each subpixel is of the eye that sees it through a line screen (autostereo/)
+  kQuadBuffer       ///< each eye has a frame buffer of its own; composed as kSideBySide of a display twice as wide
 };
 
 /// Of --stereo; by their numbers.

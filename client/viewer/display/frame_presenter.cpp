@@ -10,10 +10,11 @@ namespace {
 
 // The first row of a frame is the uppermost one, that of a texture the lowest.
 constexpr const char* kVertexShader = R"(#version 330 core
+uniform vec2 part;  // of the frame's width: where it begins, how much it is
 out vec2 place;
 void main() {
   vec2 corner = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0);
-  place = vec2(corner.x, 1.0 - corner.y);
+  place = vec2(part.x + part.y * corner.x, 1.0 - corner.y);
   gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
 })";
 constexpr const char* kFragmentShader = R"(#version 330 core
@@ -52,6 +53,7 @@ Result<std::unique_ptr<FramePresenter>> FramePresenter::make() {
   glGetProgramiv(out->program_, GL_LINK_STATUS, &linked);
   if (!linked) return Error{"the window's shaders do not link"};
   out->keeps_alpha_ = glGetUniformLocation(out->program_, "keeps_alpha");
+  out->part_ = glGetUniformLocation(out->program_, "part");
   glGenVertexArrays(1, &out->vertex_array_);
   out->has_ring_ = epoxy_gl_version() >= 44 || epoxy_has_gl_extension("GL_ARB_buffer_storage");
   return out;
@@ -136,6 +138,7 @@ void FramePresenter::draw_overlays(const Overlays& overlays, int width, int heig
   if (overlays.version() != overlay_version_) load_overlays(overlays);
   if (overlay_textures_.empty()) return;
   glUniform1i(keeps_alpha_, 1);
+  glUniform2f(part_, 0, 1);
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   for (const auto& [name, overlay] : overlays.all()) {
@@ -152,15 +155,28 @@ void FramePresenter::draw(const image::View& view, int width, int height, const 
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, texture_);
   upload(view);
-  const GLint filter = view.width == width && view.height == height ? GL_NEAREST : GL_LINEAR;
+  const bool same = view.width == (two_eyes_ ? 2 * width : width) && view.height == height;
+  const GLint filter = same ? GL_NEAREST : GL_LINEAR;
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  if (!two_eyes_) return draw_part(0, 1, width, height, overlays, hidden);
+  for (const auto& [buffer, begin] : {std::pair{GL_BACK_LEFT, 0.0f}, {GL_BACK_RIGHT, 0.5f}}) {
+    glDrawBuffer(GLenum(buffer));
+    draw_part(begin, 0.5f, width, height, overlays, hidden);
+    glBindTexture(GL_TEXTURE_2D, texture_);
+  }
+  glDrawBuffer(GL_BACK);  // both: what comes over the frame
+}
+
+// A part of the frame's width, over all of the buffer.
+void FramePresenter::draw_part(float begin, float share, int width, int height, const Overlays& overlays, int hidden) {
   glViewport(0, 0, width, height);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
   glUseProgram(program_);
   glUniform1i(keeps_alpha_, 0);
+  glUniform2f(part_, begin, share);
   glBindVertexArray(vertex_array_);
   if (hidden > 0) {
     glEnable(GL_SCISSOR_TEST);

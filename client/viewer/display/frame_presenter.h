@@ -27,6 +27,9 @@ class FramePresenter {
   /// What lies over it is blended on.
   /// hidden: so many columns at the left will be covered by something else and are left out; overlays lie beside them.
   void draw(const image::View& view, int width, int height, const Overlays& overlays, int hidden = 0);
+  /// From now on frames are two eyes' pictures side by side, and each goes into a buffer of its own. Precondition: the
+  /// context has them (GL_STEREO).
+  void draw_two_eyes() { two_eyes_ = true; }
   bool has_pixel_ring() const { return has_ring_; }
 
  private:
@@ -35,12 +38,14 @@ class FramePresenter {
   void resize(int width, int height);
   void upload(const image::View& view);
   void draw_overlays(const Overlays& overlays, int width, int height, int hidden);
+  void draw_part(float begin, float share, int width, int height, const Overlays& overlays, int hidden);
   void load_overlays(const Overlays& overlays);
 
   bool has_ring_ = false;
   int width_ = 0, height_ = 0, slot_ = 0;
   uint32_t program_ = 0, vertex_array_ = 0, texture_ = 0;
-  int keeps_alpha_ = -1;  // uniform
+  int keeps_alpha_ = -1, part_ = -1;  // uniforms
+  bool two_eyes_ = false;
   std::map<std::string, uint32_t> overlay_textures_;
   uint64_t overlay_version_ = 0;
   struct Slot {

@@ -228,13 +228,16 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
     glfwWindowHintString(GLFW_X11_CLASS_NAME, "telesplat");
     glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "telesplat");
     if (mode) glfwWindowHint(GLFW_REFRESH_RATE, mode->refreshRate);
+    if (o.two_eyes && api == GLFW_EGL_CONTEXT_API) continue;  // it has none
+    glfwWindowHint(GLFW_STEREO, o.two_eyes);
     impl->window = glfwCreateWindow(mode ? mode->width : o.width, mode ? mode->height : o.height, o.title.c_str(),
                                     monitor, nullptr);
     if (impl->window) break;
     tried += fmt::format("{}OpenGL {}.{} through {}: {}", tried.empty() ? "" : "; ", minor / 10, minor % 10,
                          api == GLFW_EGL_CONTEXT_API ? "EGL" : "the window system", last_error());
   }
-  if (!impl->window) return Error{"no window with OpenGL: " + tried};
+  if (!impl->window)
+    return Error{fmt::format("no window with {}OpenGL: {}", o.two_eyes ? "quad-buffered " : "", tried)};
   survive_broken_connection();
   glfwSetWindowSizeLimits(impl->window, kSmallestSide, kSmallestSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
   impl->listen();
@@ -245,6 +248,12 @@ Result<std::unique_ptr<Window>> Window::open(const Options& o) {
     auto presenter = FramePresenter::make();
     if (!presenter) return presenter.error();
     out->impl_->presenter = std::move(*presenter);
+    if (o.two_eyes) {
+      GLboolean there = GL_FALSE;
+      glGetBooleanv(GL_STEREO, &there);
+      if (!there) return Error{"the driver has no quad-buffered OpenGL, which --stereo quad-buffer needs"};
+      out->impl_->presenter->draw_two_eyes();
+    }
     if (auto gui = Gui::make(out->impl_->window))
       out->impl_->gui = std::move(*gui);
     else

@@ -23,6 +23,7 @@ class Window {
     int width = 1280, height = 800;  ///< of the content, in screen coordinates; ignored if fullscreen
     bool fullscreen = false;
     std::string title = "Telesplat";
+    bool two_eyes = false;  ///< frames are two eyes' pictures, side by side, for a buffer each (quad-buffered OpenGL)
   };
   /// One at a time in a process. The context is OpenGL 4.3 core, or 3.3 where that is not to be had. Nothing is left
   /// current.

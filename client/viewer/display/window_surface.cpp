@@ -86,7 +86,8 @@ struct WindowSurface::Lines {
 Result<std::unique_ptr<WindowSurface>> WindowSurface::open(const Options& o,
                                                            std::function<void(const std::string&)> tell,
                                                            std::unique_ptr<ControlDesk> desk) {
-  auto window = Window::open({o.display.width, o.display.height, o.fullscreen, "Telesplat"});
+  auto window = Window::open({o.display.width, o.display.height, o.fullscreen, "Telesplat",
+                              o.display.stereo.mode == stereo::Mode::kQuadBuffer});
   if (!window) return window.error();
   auto lines = std::make_shared<Lines>();
   lines->tell = std::move(tell);

@@ -73,7 +73,7 @@ TEST(Stereo, EveryModeShowsBothEyes) {
   TemporaryFolder folder;
   write_panel(folder / "panel.toml");
   for (const std::string& mode : stereo::mode_names()) {
-    if (mode == "off") continue;
+    if (mode == "off" || mode == "quad-buffer") continue;  // which needs a window
     std::vector<std::string> flags{"--stereo", mode, "--duration", "0.3", "--trajectory", "still", "--size", "320x200"};
     if (mode == "autostereo") flags.insert(flags.end(), {"--barrier", folder / "panel.toml"});
     PipelineRun run(flags);
@@ -115,6 +115,13 @@ TEST(Stereo, WhatCannotBeIsBadUsage) {
     EXPECT_EQ(run.program().wait(), 2);
     EXPECT_NE(run.program().err().find(part), std::string::npos) << run.program().err();
   }
+}
+
+TEST(Stereo, QuadBuffersNeedAWindow) {
+  PipelineRun run({"--stereo", "quad-buffer"}, "julia");
+  EXPECT_EQ(run.program().wait(), 2);
+  EXPECT_NE(run.program().complaint().find("--stereo quad-buffer: needs a window"), std::string::npos)
+      << run.program().complaint();
 }
 
 }  // namespace

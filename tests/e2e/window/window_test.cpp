@@ -361,6 +361,14 @@ TEST_F(WindowTest, LeavesNothingBehindUnlessTold) {
   }
 }
 
+// A virtual display has no buffers for two eyes.
+TEST_F(WindowTest, QuadBuffersAreRefusedWhereThereAreNone) {
+  Program program("telesplat", {"view", "julia", "--stereo", "quad-buffer", "--size", "320x200"},
+                  folder_ / "telesplat");
+  EXPECT_EQ(program.wait(60), 2);
+  EXPECT_NE(program.err().find("quad-buffered OpenGL"), std::string::npos) << program.err();
+}
+
 TEST_F(WindowTest, JoinsARunningSessionAndLeavesIt) {
   PipelineRun run({"--duration", "0", "--trajectory", "still"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();

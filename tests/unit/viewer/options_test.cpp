@@ -33,7 +33,8 @@ TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {
   const auto recorded =
       names_of(view_table(o), [](const options::Row& r) { return r.reach == options::Reach::kRecorded; });
   EXPECT_EQ(recorded, (Texts{"--size", "--fov", "--near", "--background", "--shading", "--legend", "--stereo",
-                             "--eye-separation", "--screen-distance", "--swap-eyes", "--barrier"}));
+                             "--eye-separation", "--screen-distance", "--swap-eyes", "--barrier",
+                             "--stereo-pattern"}));
 }
 
 TEST(ViewerFlags, StillPicturesHaveOneFourOrSixteenSamples) {

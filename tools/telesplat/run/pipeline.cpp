@@ -39,7 +39,8 @@ Status Pipeline::start_servers() {
   if (const Status s = group_.start_master(master_arguments(o), kMasterPatience_s); !s) return s;
   if (const Status s = start_data(); !s) return s;
   // A headset's frames come first; else views are worth more than that they are drawn a little later.
-  Member packer{.role = "packer", .name = "packer", .arguments = packer_arguments(o), .nice = o.viewer.xr ? nice : nice / 2};
+  Member packer{
+      .role = "packer", .name = "packer", .arguments = packer_arguments(o), .nice = o.viewer.xr ? nice : nice / 2};
   if (const Status s = group_.start(std::move(packer)); !s) return s;
   for (int i = 1; i <= o.samplers; ++i) {
     Member sampler{

@@ -47,7 +47,7 @@ geometry::Camera EyePictures::sampled(const geometry::Camera& head, const glm::d
 // The places of both pictures in a display that has one beside or above the other.
 std::array<splat::FrameTarget, 2> EyePictures::parts_of(image::View& view) const {
   const int width = pair_.head.width, height = pair_.head.height;
-  const bool beside = rig_.options().mode == stereo::Mode::kSideBySide;
+  const bool beside = rig_.options().mode != stereo::Mode::kTopBottom;
   const size_t pitch = size_t(view.width), second = beside ? size_t(width) : pitch * size_t(height);
   std::array<splat::FrameTarget, 2> out{splat::FrameTarget{width, height, view.colour.data(), nullptr, pitch},
                                         {width, height, view.colour.data() + second, nullptr, pitch}};
@@ -61,7 +61,8 @@ DrawnFrame EyePictures::draw(ViewSource& source, FrameInput input, bool spooled,
   const auto& o = rig_.options();
   const bool same_size = view.width == size.width && view.height == size.height;
   input.intact = input.intact && same_size;
-  const bool halves = o.mode == stereo::Mode::kSideBySide || o.mode == stereo::Mode::kTopBottom;
+  const bool halves =
+      o.mode == stereo::Mode::kSideBySide || o.mode == stereo::Mode::kTopBottom || o.mode == stereo::Mode::kQuadBuffer;
   if (halves && source.draws_into_parts() && !input.with_depth && !input.with_coverage &&
       o.pattern == stereo::Pattern::kNone) {
     view.width = size.width, view.height = size.height;
