@@ -136,6 +136,17 @@ const SwapBarrier::Member& SwapBarrier::leader() const {
       ->second;
 }
 
+// Of those who have the source that most have, of as many that of the least number, the state of the first.
+const wire::ShownState& SwapBarrier::first_of_most(const std::vector<const Member*>& members) {
+  const auto having = [&](InstanceId source) {
+    return std::count_if(members.begin(), members.end(), [&](const auto* m) { return m->said.state.source == source; });
+  };
+  const auto rank = [&](const Member* m) { return std::pair(-having(m->said.state.source), m->said.number); };
+  const auto first = std::min_element(members.begin(), members.end(),
+                                      [&](const Member* a, const Member* b) { return rank(a) < rank(b); });
+  return (*first)->said.state;
+}
+
 // What all who are in time can show. Numbers of one source never fall.
 void SwapBarrier::choose_state(double now_s) {
   wire::ShownState& state = last_.state;
@@ -149,10 +160,14 @@ void SwapBarrier::choose_state(double now_s) {
     if (m.ready) ready.push_back(&m);
     if (m.ready && m.waited_for && !m.behind) counted.push_back(&m);
   }
+  // Who has received nothing yet has no say in what is shown, while anybody has received something.
+  const auto empty = [](const Member* m) { return m->said.state.source.value == 0; };
+  if (!std::all_of(ready.begin(), ready.end(), empty)) {
+    std::erase_if(counted, empty);
+    std::erase_if(ready, empty);
+  }
   if (counted.empty()) counted = std::move(ready);
-  const wire::ShownState& first = (*std::min_element(counted.begin(), counted.end(), [](const auto* a, const auto* b) {
-                                    return a->said.number < b->said.number;
-                                  }))->said.state;
+  const wire::ShownState& first = first_of_most(counted);
   uint64_t least = std::numeric_limits<uint64_t>::max(), most = 0, replica = least, held = least;
   bool one_source = true;
   for (const Member* m : counted) {

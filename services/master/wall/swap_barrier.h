@@ -75,6 +75,7 @@ class SwapBarrier {
   void leave_out_the_late();
   static void note_pace(Member& member, bool in_time);
   const Member& leader() const;
+  static const wire::ShownState& first_of_most(const std::vector<const Member*>& members);
   void choose_state(double now_s);
   void note_behind(uint64_t newest);
   void tell(Member& member, const wire::Swap& swap);

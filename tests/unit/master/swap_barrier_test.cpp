@@ -222,6 +222,42 @@ TEST_F(Swaps, AnotherSourceIsShownWhenAllReceiveFromIt) {
   EXPECT_EQ(state.newest, 3u);
 }
 
+// A viewer that was started again, or whose link to the packer is cut, has nothing to show: the others go on.
+TEST_F(Swaps, AFirstViewerThatHasReceivedNothingFreezesNobody) {
+  begin();
+  auto again = ready(0, 0);
+  again.viewer = {999};
+  again.state = {};
+  barrier.on("peer-new", again, 1.001);
+  told();
+  double now_s = 1.02;
+  for (uint64_t frame = 1; frame < 200; ++frame, now_s += 0.02) {
+    for (uint64_t v = 1; v < 4; ++v) say(v, frame, now_s);
+    again.frame = frame;
+    barrier.on("peer-new", again, now_s);
+    const auto swaps = told();
+    ASSERT_EQ(swaps.size(), 4u);
+    ASSERT_EQ(swaps.begin()->second.state.source.value, 7u) << frame;
+    ASSERT_EQ(swaps.begin()->second.state.newest, 10 * frame + 1) << frame;
+  }
+}
+
+TEST_F(Swaps, WhereSourcesDifferForLongThatOfMostIsShown) {
+  begin();
+  const auto frame = [&](uint64_t number, double now_s) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, number);
+      if (v > 0) m.state.source = {8};
+      barrier.on("peer-" + std::to_string(v), m, now_s);
+    }
+    return told().begin()->second.state;
+  };
+  EXPECT_EQ(frame(1, 1.05).source.value, 7u);
+  EXPECT_EQ(frame(2, 1.5).source.value, 7u) << "the first may yet receive from the other one";
+  EXPECT_EQ(frame(3, 2.06).source.value, 8u);
+  EXPECT_EQ(frame(4, 2.08).newest, 41u);
+}
+
 // Of frames of slice images each may lack others than its neighbours.
 TEST_F(Swaps, TheNewestFrameThatAllHaveIsShown) {
   begin();
