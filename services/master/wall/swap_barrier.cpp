@@ -50,7 +50,8 @@ bool SwapBarrier::complete() const {
 }
 
 void SwapBarrier::note_presented(const wire::SwapReady& m) {
-  if (m.presented == 0 || m.presented + kFramesRemembered < frame_) return;
+  // What nobody was told to present yet nobody has presented.
+  if (m.presented == 0 || m.presented >= frame_ || m.presented + kFramesRemembered < frame_) return;
   const auto before = members_.find(m.viewer);
   if (before != members_.end() && before->second.said.presented == m.presented) return;  // said again
   Presented& p = presented_[m.presented];
@@ -75,7 +76,7 @@ void SwapBarrier::on(const std::string& peer, const wire::SwapReady& m, double n
   if (begun_ && m.frame < frame_) {
     // It is late, or new: it goes on with the others. So little late that they could have waited, it may be waited for.
     const bool little = !again && m.frame == last_.frame && now_s <= deadline_before_s_;
-    note_pace(member, little);
+    note_pace(member, m.frame, little);
     if (fresh || again || member.told < last_.frame) tell(member, last_);
     return go_on(now_s);
   }
@@ -83,10 +84,12 @@ void SwapBarrier::on(const std::string& peer, const wire::SwapReady& m, double n
   go_on(now_s);
 }
 
-// A viewer that is not waited for was in time, or was not.
-void SwapBarrier::note_pace(Member& member, bool in_time) {
+// A viewer that is not waited for was in time for this frame, or was not.
+void SwapBarrier::note_pace(Member& member, uint64_t frame, bool in_time) {
   if (member.waited_for) return;
-  member.in_time = in_time ? member.in_time + 1 : 0;
+  const bool next = member.in_time_for + 1 == frame;  // else it was absent meanwhile
+  member.in_time = !in_time ? 0 : next ? member.in_time + 1 : 1;
+  if (in_time) member.in_time_for = frame;
   member.waited_for = member.in_time >= kInTime;
 }
 
@@ -241,7 +244,7 @@ void SwapBarrier::swap(double now_s) {
     last_.skew_s = p->second.last_s - p->second.first_s;
   }
   for (auto& [id, m] : members_) {
-    if (m.ready) note_pace(m, true);
+    if (m.ready) note_pace(m, frame_, true);
     m.ready = false;
     tell(m, last_);
   }

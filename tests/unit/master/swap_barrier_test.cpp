@@ -116,6 +116,32 @@ TEST_F(Swaps, ALateOneHoldsTheOthersForAFrameOnce) {
   EXPECT_TRUE(told().empty()) << "it is waited for again";
 }
 
+TEST_F(Swaps, OneThatComesNowAndThenIsNotWaitedFor) {
+  begin();
+  for (uint64_t v = 0; v < 3; ++v) say(v, 1, 1.005);
+  barrier.tick(*barrier.due_s());
+  told();
+  double now_s = 1.1;
+  for (uint64_t frame = 2; frame < 20; ++frame, now_s += 0.02) {
+    if (frame % 2 == 0) say(3, frame, now_s);
+    for (uint64_t v = 0; v < 3; ++v) say(v, frame, now_s);
+    ASSERT_EQ(told().size(), 4u) << frame << ": it was not in time for three frames in a row";
+  }
+}
+
+// A hostile viewer tells of frames that nobody has shown: what the others tell still counts.
+TEST_F(Swaps, FramesThatNobodyWasToldToPresentDoNotCount) {
+  begin();
+  for (uint64_t frame = 1; frame < 20; ++frame) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, frame);
+      m.presented = v == 3 ? frame + 1000 : frame - 1;
+      barrier.on("peer-" + std::to_string(v), m, 1 + 0.02 * double(frame));
+    }
+    EXPECT_EQ(told().begin()->second.skew_frame, frame - 1);
+  }
+}
+
 TEST_F(Swaps, ADeadOneHoldsNobody) {
   begin();
   for (uint64_t v = 0; v < 3; ++v) say(v, 1, 1.005);
