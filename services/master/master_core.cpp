@@ -178,6 +178,7 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
   }
   if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
   forget_viewer(p.hello);
+  for (const auto& [peer, reply] : errands_.lost(routing_id)) outbox_.send(peer, reply);
   if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "common/core/clock.h"
@@ -146,15 +147,17 @@ Status MasterCore::pass_on(const std::string& peer, const wire::Control& m, cons
   }
   if (!wanted.empty()) std::erase_if(here, [&](const auto& p) { return p.first != wanted; });
   if (role == "viewer") here.erase(std::next(here.begin()), here.end());
-  const auto number = errands_.begin(peer, here.size(), now_s);
+  std::set<std::string> asked;
+  for (const auto& [name, id] : here) asked.insert(id);
+  const auto number = errands_.begin(peer, asked, now_s);
   if (!number) return number.error();
-  for (const auto& [name, id] : here) outbox_.send(id, wire::Order{*number, m.command, m.arguments});
+  for (const auto& id : asked) outbox_.send(id, wire::Order{*number, m.command, m.arguments});
   return ok_status();
 }
 
 void MasterCore::on(const std::string& peer, const wire::OrderAnswer& m, double now_s) {
   if (!known(peer, now_s)) return;
-  if (const auto reply = errands_.answered(m)) outbox_.send(reply->peer, reply->reply);
+  if (const auto reply = errands_.answered(peer, m)) outbox_.send(reply->peer, reply->reply);
 }
 
 // Of the viewers that are here; those that come later begin with their own.
