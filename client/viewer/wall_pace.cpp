@@ -40,7 +40,8 @@ std::optional<wire::Swap> WallPace::take(bool waited) {
       continue;
     }
     auto swap = socket_.decode<wire::Swap>(*message);
-    if (!swap || swap->frame < turn_.frame) continue;
+    // A master that was started again may not know how far the wall is: its numbers count from now on.
+    if (!swap || (swap->master == led_by_ && swap->frame < turn_.frame)) continue;
     if (waited) late_s_ = std::clamp(to_master_s_(message->arrived_s) - swap->at_s, 0.0, kFarAway_s);
     out = std::move(swap);
   }
@@ -111,6 +112,7 @@ WallPace::Swapped WallPace::drawn(const Wish& next, const std::function<bool()>&
   if (std::exchange(alone_, false)) log::info("the wall's frames are presented together again");
   const double offset_s = to_master_s_(begin_s) - begin_s, at_s = swap->at_s - offset_s;
   if (at_s - monotonic_s() < kFarAway_s) sleep_until(at_s);
+  led_by_ = swap->master;
   turn_ = {swap->frame + 1, swap->t_s, swap->head, swap->state};
   out.wait_s = monotonic_s() - begin_s;
   out.skew_frame = swap->skew_frame;

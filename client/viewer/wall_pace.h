@@ -68,6 +68,7 @@ class WallPace {
   std::function<double(double)> to_master_s_;
   net::Socket socket_;
   Turn turn_;
+  InstanceId led_by_;  // whose number its frame has
   bool begun_ = false, alone_ = false;
   uint64_t drawn_ = 0, presented_ = 0;
   double presented_s_ = 0;  // master's clock

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -55,6 +56,21 @@ struct Entry {
   }
 };
 
+// The keys that this program does not know, as JSON; empty: there are none.
+std::string others_of(const Json& json, std::initializer_list<std::string_view> known) {
+  Json out = Json::object();
+  for (const auto& [key, value] : json.items())
+    if (std::find(known.begin(), known.end(), key) == known.end()) out[key] = value;
+  return out.empty() ? std::string() : out.dump();
+}
+
+void add_others(Json& to, const std::string& others) {
+  if (others.empty()) return;
+  const Json read = Json::parse(others, nullptr, false);
+  for (const auto& [key, value] : read.items())
+    if (!to.contains(key)) to[key] = value;
+}
+
 Result<Bookmark> read_bookmark(const Entry& entry) {
   const auto name = entry.line("name", kMaxName, true);
   const auto made_at = entry.line("made_at", kMaxName, false);
@@ -66,7 +82,7 @@ Result<Bookmark> read_bookmark(const Entry& entry) {
   geometry::Camera camera;
   camera.pose = {{(*p)[0], (*p)[1], (*p)[2]}, {(*q)[0], (*q)[1], (*q)[2], (*q)[3]}};
   if (const Status s = geometry::validate(camera); !s) return Error{entry.what + ": " + s.error().text};
-  return Bookmark{*name, camera.pose, *made_at};
+  return Bookmark{*name, camera.pose, *made_at, others_of(entry.json, {"name", "position", "orientation", "made_at"})};
 }
 
 Result<Note> read_note(const Entry& entry) {
@@ -89,6 +105,7 @@ Result<Note> read_note(const Entry& entry) {
     if (!line) return line.error();
     *to = *line;
   }
+  out.others = others_of(entry.json, {"number", "text", "place", "value", "made_at"});
   return out;
 }
 
@@ -118,6 +135,7 @@ const Bookmark* Book::find(std::string_view name) const {
 Status Book::keep(Bookmark bookmark) {
   if (!is_line(bookmark.name, kMaxName))
     return Error{fmt::format("a bookmark's name is one line of 1 to {} bytes of UTF-8", kMaxName)};
+  if (const Bookmark* before = find(bookmark.name); before && bookmark.others.empty()) bookmark.others = before->others;
   std::erase_if(bookmarks, [&](const Bookmark& b) { return b.name == bookmark.name; });
   if (bookmarks.size() >= kMostEntries) return Error{fmt::format("{} bookmarks are kept at most", kMostEntries)};
   bookmarks.push_back(std::move(bookmark));
@@ -149,6 +167,7 @@ std::string to_json(const Book& book) {
     const auto& [p, q] = b.pose;
     Json entry{{"name", b.name}, {"position", {p.x, p.y, p.z}}, {"orientation", {q.w, q.x, q.y, q.z}}};
     if (!b.made_at.empty()) entry["made_at"] = b.made_at;
+    add_others(entry, b.others);
     out["bookmarks"].push_back(std::move(entry));
   }
   for (const Note& n : book.notes) {
@@ -156,14 +175,22 @@ std::string to_json(const Book& book) {
     if (n.place) entry["place"] = {n.place->x, n.place->y, n.place->z};
     if (!n.value.empty()) entry["value"] = n.value;
     if (!n.made_at.empty()) entry["made_at"] = n.made_at;
+    add_others(entry, n.others);
     out["notes"].push_back(std::move(entry));
   }
+  add_others(out, book.others);
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 Result<Book> book_from_json(std::string_view text) {
   if (text.size() > kMaxBytes) return Error{fmt::format("{} bytes, limit {}", text.size(), kMaxBytes)};
-  const Json json = Json::parse(text, nullptr, false);
+  bool deep = false;  // what lies deeper is not even kept while reading
+  const auto keeps = [&](int depth, Json::parse_event_t, const Json&) {
+    deep = deep || depth > kMaxDepth;
+    return depth <= kMaxDepth;
+  };
+  const Json json = Json::parse(text, keeps, false);
+  if (deep) return Error{fmt::format("lists and objects lie more than {} deep in each other", kMaxDepth)};
   if (!json.is_object()) return Error{"is no JSON object, or is cut off"};
   const auto version = json.find(kMark);
   if (version == json.end() || !version->is_number_integer())
@@ -189,6 +216,7 @@ Result<Book> book_from_json(std::string_view text) {
     return ok_status();
   });
   if (!s) return s.error();
+  out.others = others_of(json, {kMark, "bookmarks", "notes"});
   return out;
 }
 

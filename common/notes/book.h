@@ -16,11 +16,13 @@ namespace telesplat::notes {
 inline constexpr size_t kMaxBytes = 4 << 20;   ///< of a book's file
 inline constexpr size_t kMostEntries = 10000;  ///< bookmarks, and notes
 inline constexpr size_t kMaxName = 80, kMaxText = 4000;
+inline constexpr int kMaxDepth = 32;  ///< of lists and objects in each other
 
 struct Bookmark {
   std::string name;  ///< one line of UTF-8, not empty; one a book
   geometry::Pose pose;
-  std::string made_at;  ///< "2026-03-01T12:00:00Z"; empty: not known
+  std::string made_at;      ///< "2026-03-01T12:00:00Z"; empty: not known
+  std::string others = {};  ///< what other programs keep with it: a JSON object; empty: nothing
   bool operator==(const Bookmark&) const = default;
 };
 
@@ -30,16 +32,19 @@ struct Note {
   std::optional<glm::dvec3> place;  ///< in the data's own coordinates
   std::string value;                ///< what was there, as it was told: "temperature 21.5 K"; empty: nothing was
   std::string made_at;
+  std::string others = {};  ///< as a bookmark's
   bool operator==(const Note&) const = default;
 };
 
 struct Book {
   std::vector<Bookmark> bookmarks;
   std::vector<Note> notes;
+  std::string others = {};  ///< as a bookmark's
   bool operator==(const Book&) const = default;
 
   const Bookmark* find(std::string_view name) const;
-  /// In place of one that has this name. Error: a name that is none, too many.
+  /// In place of one that has this name, whose `others` it gets unless it has some. Error: a name that is none, too
+  /// many.
   Status keep(Bookmark bookmark);
   /// Returns the number that the note got. Error: no text, too long, too many.
   Result<uint64_t> add(Note note);

@@ -7,6 +7,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -62,39 +63,83 @@ class FolderLock {
   int descriptor_;
 };
 
-Status write_all(int descriptor, const std::string& text) {
+// Returns 0, else errno.
+int write_all(int descriptor, const std::string& text) {
   for (size_t done = 0; done < text.size();) {
     const ssize_t n = write(descriptor, text.data() + done, text.size() - done);
     if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return Error{std::strerror(errno)};
+    if (n <= 0) return n < 0 ? errno : EIO;
     done += size_t(n);
   }
-  if (fsync(descriptor) != 0) return Error{std::strerror(errno)};
-  return ok_status();
+  return fsync(descriptor) != 0 ? errno : 0;
 }
 
-// The old file stays until the new one is whole.
-Status replace_file(const std::string& path, const std::string& text) {
-  std::string part = path + ".XXXXXX";
-  const int descriptor = mkostemp(part.data(), O_CLOEXEC);
-  if (descriptor < 0) return Error{fmt::format("{}: {}", path, std::strerror(errno))};
-  fchmod(descriptor, 0644);
-  Status written = write_all(descriptor, text);
-  if (close(descriptor) != 0 && written) written = Error{std::strerror(errno)};
-  if (written && rename(part.c_str(), path.c_str()) != 0) written = Error{std::strerror(errno)};
-  if (written) return ok_status();
-  unlink(part.c_str());
-  return Error{fmt::format("{}: cannot be written: {}", path, written.error().text)};
+// A new file in this folder, of a name that nobody has, which any file system takes.
+int make_part(const fs::path& folder, mode_t mode, std::string& name) {
+  static std::atomic<unsigned> made{0};
+  for (int tries = 0; tries < 1000; ++tries) {
+    name = (folder / fmt::format(".notes-{}-{}.part", getpid(), made++)).string();
+    const int descriptor = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+    if (descriptor >= 0 || errno != EEXIST) return descriptor;
+  }
+  return -1;
+}
+
+// The old file stays until the new one is whole; who may read and write it stays as it is. Returns 0, else errno.
+int replace_file(const std::string& path, const std::string& text) {
+  struct stat before;
+  const bool there = stat(path.c_str(), &before) == 0;
+  std::string part;
+  const int descriptor = make_part(fs::path(path).parent_path(), there ? 0600 : 0666, part);
+  if (descriptor < 0) return errno;
+  int failed = there && fchmod(descriptor, before.st_mode & 0777) != 0 ? errno : write_all(descriptor, text);
+  if (close(descriptor) != 0 && failed == 0) failed = errno;
+  if (failed == 0 && rename(part.c_str(), path.c_str()) != 0) failed = errno;
+  if (failed != 0) unlink(part.c_str());
+  return failed;
+}
+
+// Where a file lies that a link may stand for. Empty: the link leads nowhere.
+std::string behind_links(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
+  const fs::path file = fs::canonical(path, error);
+  return error ? std::string() : file.string();
 }
 
 bool can_write_beside(const std::string& path) {
-  if (path.empty()) return false;
-  const std::string folder = fs::path(path).parent_path().string();
-  return access(folder.c_str(), W_OK | X_OK) == 0 && (!exists(path) || access(path.c_str(), W_OK) == 0);
+  const std::string file = path.empty() ? path : behind_links(path);
+  if (file.empty()) return false;
+  const std::string folder = fs::path(file).parent_path().string();
+  return access(folder.c_str(), W_OK | X_OK) == 0 && (!exists(file) || access(file.c_str(), W_OK) == 0);
 }
+
+// A folder may be one where files are written, and this file one that is not.
+bool is_elsewhere(int failed) { return failed == ENAMETOOLONG || failed == EROFS || failed == EACCES; }
 
 std::string read_path(const Shelf& shelf) {
   return exists(shelf.in_cache) || !exists(shelf.beside) ? shelf.in_cache : shelf.beside;
+}
+
+// change_book() to this file. failed: errno of a file that could not be written, else it stays.
+Status change_in(const std::string& to, const Shelf& shelf, const std::function<Status(Book&)>& change, int& failed) {
+  const std::string file = behind_links(to);
+  if (file.empty()) return Error{to + ": is a link that leads nowhere"};
+  const fs::path folder = fs::path(file).parent_path();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return Error{fmt::format("{}: {}", folder.string(), error.message())};
+  const FolderLock lock(folder);
+  auto book = read_book(shelf);
+  if (!book) return book.error();
+  if (const Status s = change(*book); !s) return s;
+  const std::string text = to_json(*book);
+  if (text.size() > kMaxBytes)
+    return Error{fmt::format("{}: would have {} bytes, limit {}", to, text.size(), kMaxBytes)};
+  failed = replace_file(file, text);
+  if (failed != 0) return Error{fmt::format("{}: cannot be written: {}", to, std::strerror(failed))};
+  lock.sync();
+  return ok_status();
 }
 
 }  // namespace
@@ -130,21 +175,15 @@ Status change_book(const Shelf& shelf, const std::function<Status(Book&)>& chang
   const bool beside = !exists(shelf.in_cache) && can_write_beside(shelf.beside);
   const std::string& to = beside ? shelf.beside : shelf.in_cache;
   if (to.empty()) return Error{"notes have nowhere to go: neither HOME nor XDG_CACHE_HOME is set"};
-  const fs::path folder = fs::path(to).parent_path();
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return Error{fmt::format("{}: {}", folder.string(), error.message())};
-  const FolderLock lock(folder);
-  auto book = read_book(shelf);
-  if (!book) return book.error();
-  if (const Status s = change(*book); !s) return s;
-  const std::string text = to_json(*book);
-  if (text.size() > kMaxBytes)
-    return Error{fmt::format("{}: would have {} bytes, limit {}", to, text.size(), kMaxBytes)};
-  if (const Status s = replace_file(to, text); !s) return s;
-  lock.sync();
-  if (path) *path = to;
-  return ok_status();
+  int failed = 0;
+  Status changed = change_in(to, shelf, change, failed);
+  const std::string* written = &to;
+  if (!changed && beside && is_elsewhere(failed) && !shelf.in_cache.empty()) {
+    written = &shelf.in_cache;
+    changed = change_in(*written, shelf, change, failed);
+  }
+  if (changed && path) *path = *written;
+  return changed;
 }
 
 }  // namespace telesplat::notes

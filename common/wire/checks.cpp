@@ -5,6 +5,8 @@
 namespace telesplat::wire {
 namespace {
 
+constexpr uint64_t kMaxWallFrame = uint64_t{1} << 53;  // the number of a wall's frame
+
 // A tile's rectangle must lie in its frame, its number among the frame's tiles.
 std::optional<Error> check_tile(const geometry::Camera& c, const geometry::Rect& r, uint64_t tile, uint64_t tiles) {
   if (tiles < 1 || tiles > kMaxTiles || tile >= tiles)
@@ -150,6 +152,8 @@ std::optional<Error> check(const VoxelData& m) { return check_slices(m.begin, m.
 std::optional<Error> check(const SwapReady& m) {
   if (m.viewers < 1 || m.viewers > kMaxWallViewers || m.number >= m.viewers)
     return Error{fmt::format("viewer {} of a wall of {}, limit {}", m.number, m.viewers, kMaxWallViewers)};
+  for (const uint64_t frame : {m.frame, m.presented})
+    if (frame > kMaxWallFrame) return Error{fmt::format("frame {} of a wall, limit {}", frame, kMaxWallFrame)};
   if (m.period_s < 0 || m.late_s < 0)
     return Error{fmt::format("period {} s and {} s late, at least 0", m.period_s, m.late_s)};
   return std::nullopt;

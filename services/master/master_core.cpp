@@ -16,6 +16,12 @@ constexpr size_t kMaxWalls = 64;
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
 constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
 
+// Data servers of one volume: neither is the other's new life, whatever they are called.
+bool hold_different_parts(const wire::Hello& a, const wire::Hello& b) {
+  const auto of_a = a.parameters.find("volume.part"), of_b = b.parameters.find("volume.part");
+  return of_a != a.parameters.end() && of_b != b.parameters.end() && of_a->second != of_b->second;
+}
+
 }  // namespace
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
@@ -80,7 +86,8 @@ bool MasterCore::make_room(const std::string& peer) {
 void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m) {
   for (auto& [id, p] : peers_)
     if (id != peer && p.hello.role == m.role &&
-        (p.hello.instance == m.instance || (m.role != "ctl" && p.hello.name == m.name))) {
+        (p.hello.instance == m.instance ||
+         (m.role != "ctl" && p.hello.name == m.name && !hold_different_parts(p.hello, m)))) {
       if (!p.gone) lose(p, id, "was replaced");
       p.process.replaced = true;
     }
@@ -178,6 +185,7 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
   }
   if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
   forget_viewer(p.hello);
+  for (const auto& [peer, reply] : errands_.lost(routing_id)) outbox_.send(peer, reply);
   if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
 }
 

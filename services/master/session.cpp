@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "common/core/clock.h"
@@ -131,30 +132,42 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   if (done) dispatch(now_s);
 }
 
-// To the viewer that is named, or the first one; to all data servers of the scene, of which each knows its part.
+// To the viewer that is named, or the first one; to all data servers of the scene, of which each knows its part. Of
+// viewers that have one name the one that was heard last is meant: it may be another's new life.
 Status MasterCore::pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s) {
   const std::string wanted = role == "viewer" ? scene::value_or(m.arguments, "viewer", std::string()) : std::string();
-  std::map<std::string, std::string> here;  // routing ids, by name
+  struct Here {
+    std::string name;
+    double unheard_s;  // for so long
+    std::string id;
+    auto operator<=>(const Here&) const = default;
+  };
+  std::vector<Here> here;
   for (const auto& [id, p] : peers_)
-    if (!p.gone && !p.refused && p.hello.role == role) here[p.hello.name] = id;
+    if (!p.gone && !p.refused && p.hello.role == role) here.push_back({p.hello.name, now_s - p.seen_s, id});
   if (here.empty()) return Error{fmt::format("{}: no {} is here", m.command, role == "data" ? "data server" : role)};
-  if (!wanted.empty() && !here.contains(wanted)) {
-    std::vector<std::string> names;
-    for (const auto& [name, id] : here)
-      if (names.size() < kMostNamed) names.push_back(name);
-    return Error{fmt::format("no {} is called \"{}\"; here is {}", role, wanted.substr(0, 64), fmt::join(names, ", "))};
+  std::sort(here.begin(), here.end());
+  if (!wanted.empty()) {
+    std::set<std::string> names;
+    for (const Here& h : here)
+      if (names.size() < kMostNamed) names.insert(h.name);
+    std::erase_if(here, [&](const Here& h) { return h.name != wanted; });
+    if (here.empty())
+      return Error{
+          fmt::format("no {} is called \"{}\"; here is {}", role, wanted.substr(0, 64), fmt::join(names, ", "))};
   }
-  if (!wanted.empty()) std::erase_if(here, [&](const auto& p) { return p.first != wanted; });
-  if (role == "viewer") here.erase(std::next(here.begin()), here.end());
-  const auto number = errands_.begin(peer, here.size(), now_s);
+  if (role == "viewer") here.resize(1);
+  std::set<std::string> asked;
+  for (const Here& h : here) asked.insert(h.id);
+  const auto number = errands_.begin(peer, asked, now_s);
   if (!number) return number.error();
-  for (const auto& [name, id] : here) outbox_.send(id, wire::Order{*number, m.command, m.arguments});
+  for (const auto& id : asked) outbox_.send(id, wire::Order{*number, m.command, m.arguments});
   return ok_status();
 }
 
 void MasterCore::on(const std::string& peer, const wire::OrderAnswer& m, double now_s) {
   if (!known(peer, now_s)) return;
-  if (const auto reply = errands_.answered(m)) outbox_.send(reply->peer, reply->reply);
+  if (const auto reply = errands_.answered(peer, m)) outbox_.send(reply->peer, reply->reply);
 }
 
 // Of the viewers that are here; those that come later begin with their own.

@@ -158,6 +158,43 @@ TEST(WallPace, OneThatStopsHoldsTheOthersOnceAndComesBack) {
   EXPECT_EQ(alone, 0);
 }
 
+// One that was started again counts from where it likes.
+TEST(WallPace, AnotherMastersNumbersMayBeLower) {
+  net::Context context;
+  net::Socket master(context, net::Kind::kRouter, "master");
+  const auto bound = master.bind("tcp://127.0.0.1:*");
+  ASSERT_TRUE(bound);
+  std::atomic<bool> stop{false};
+  struct Word {
+    uint64_t master, frame;
+  };
+  const std::vector<Word> words{{1, 500}, {1, 501}, {2, 3}, {2, 4}};
+  std::vector<uint64_t> drawn;
+  std::thread leads([&] {
+    while (!stop) {
+      net::wait_readable_s({&master}, 0.02);
+      while (const auto m = master.receive()) {
+        const auto ready = master.decode<wire::SwapReady>(*m);
+        if (!ready) continue;
+        drawn.push_back(ready->frame);
+        if (drawn.size() > words.size()) continue;
+        const Word& word = words[drawn.size() - 1];
+        master.send(wire::Swap{.master = {word.master}, .frame = word.frame, .at_s = monotonic_s()}, m->peer);
+      }
+    }
+  });
+  WallPace pace(context, {.master = *bound, .name = "viewer-1", .wall = "lab", .period_s = kPeriod_s}, {100},
+                [](double s) { return s; });
+  for (const Word& word : words) {
+    const auto swapped = pace.drawn({}, [] { return false; });
+    EXPECT_FALSE(swapped.alone) << word.frame;
+    EXPECT_EQ(pace.turn().frame, word.frame + 1);
+  }
+  stop = true;
+  leads.join();
+  EXPECT_EQ(drawn, (std::vector<uint64_t>{0, 501, 502, 4}));
+}
+
 TEST(WallPace, WithoutAMasterADisplayGoesOnByItself) {
   Presented presented;
   std::atomic<int> alone{0};

@@ -29,8 +29,8 @@ struct ControlDesk::Line {
         connected(socket.connect(master)) {}
 };
 
-ControlDesk::ControlDesk(std::string master, net::Via via)
-    : master_(std::move(master)), via_(std::move(via)), thread_([this] { loop(); }) {}
+ControlDesk::ControlDesk(std::string master, net::Via via, double patience_s)
+    : master_(std::move(master)), via_(std::move(via)), patience_s_(patience_s), thread_([this] { loop(); }) {}
 
 ControlDesk::~ControlDesk() {
   {
@@ -96,15 +96,19 @@ bool ControlDesk::waits_for_work(std::optional<Order>& order, bool& status) {
   }
 }
 
-// nullopt: the end came.
-std::optional<OrderAnswer> ControlDesk::ask(Line& line, Order order) {
-  const auto failed = [&](std::string why) { return OrderAnswer{order, false, std::move(why)}; };
+// nullopt: the end came. An answer does not say what it answers: where one may still come, the line is given up.
+std::optional<OrderAnswer> ControlDesk::ask(std::optional<Line>& to, Order order) {
+  // A connection over which nothing is said counts at the master as a message that it rejected.
+  if (!to) to.emplace(master_, via_);
+  Line& line = *to;
+  const auto failed = [&](std::string why) {
+    to.reset();
+    return OrderAnswer{order, false, std::move(why)};
+  };
   if (!line.connected) return failed(line.connected.error().text);
-  while (line.socket.receive()) {
-  }  // answers that came too late
   const uint64_t failed_before = line.socket.failed_connections();
   line.socket.send(wire::Control{order.command, order.arguments});
-  for (const double until_s = monotonic_s() + kPatience_s; monotonic_s() < until_s;) {
+  for (const double until_s = monotonic_s() + patience_s_; monotonic_s() < until_s;) {
     {
       const std::lock_guard lock(mutex_);
       if (stop_) return std::nullopt;
@@ -118,7 +122,7 @@ std::optional<OrderAnswer> ControlDesk::ask(Line& line, Order order) {
     if (line.socket.failed_connections() != failed_before)
       return failed(fmt::format("no master is at {}: nothing takes connections there", master_));
   }
-  return failed(fmt::format("the master at {} has not answered for {:.0f} s", master_, kPatience_s));
+  return failed(fmt::format("the master at {} has not answered for {:.0f} s", master_, patience_s_));
 }
 
 void ControlDesk::loop() {
@@ -128,9 +132,7 @@ void ControlDesk::loop() {
     std::optional<Order> order;
     bool status = false;
     if (!waits_for_work(order, status)) return;
-    // A connection over which nothing is said counts at the master as a message that it rejected.
-    if (!line) line.emplace(master_, via_);
-    auto answer = ask(*line, order ? *std::move(order) : Order{"status", {}, {}});
+    auto answer = ask(line, order ? *std::move(order) : Order{"status", {}, {}});
     if (!answer) return;
     const std::lock_guard lock(mutex_);
     if (!status) {

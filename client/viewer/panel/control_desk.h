@@ -20,7 +20,7 @@ class ControlDesk {
   static constexpr double kPatience_s = 5;      ///< for an answer
   static constexpr double kStatusPeriod_s = 1;  ///< while somebody watches
 
-  ControlDesk(std::string master, net::Via via);
+  ControlDesk(std::string master, net::Via via, double patience_s = kPatience_s);
   /// Does not wait for answers that are due.
   ~ControlDesk();
 
@@ -41,10 +41,11 @@ class ControlDesk {
   struct Line;  // to the master
   void loop();
   bool waits_for_work(std::optional<Order>& order, bool& status);
-  std::optional<OrderAnswer> ask(Line& line, Order order);
+  std::optional<OrderAnswer> ask(std::optional<Line>& to, Order order);
 
   const std::string master_;
   const net::Via via_;
+  const double patience_s_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Order> orders_;

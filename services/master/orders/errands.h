@@ -4,6 +4,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,18 +23,22 @@ class Errands {
     wire::ControlReply reply;
   };
 
-  /// An order that `asked` processes have been sent, under this number; the first answer that is good counts, and if
-  /// none is the last one. Error: too many are under way.
-  Result<uint64_t> begin(const std::string& peer, size_t asked, double now_s);
-  /// Nothing: others may still answer, or nobody waits for it any more.
-  std::optional<Reply> answered(const wire::OrderAnswer& answer);
+  /// An order that these processes (routing ids) have been sent, under this number; the first answer that is good
+  /// counts, and if none is the last one. Error: too many are under way.
+  Result<uint64_t> begin(const std::string& peer, std::set<std::string> asked, double now_s);
+  /// from: who answers. Of each that was asked one answer counts. Nothing: others may still answer, nobody waits for it
+  /// any more, or this one was not asked.
+  std::optional<Reply> answered(const std::string& from, const wire::OrderAnswer& answer);
+  /// It is gone and will answer nothing: those for which it was the last to be asked.
+  std::vector<Reply> lost(const std::string& asked);
   /// Those that nobody answered in time.
   std::vector<Reply> overdue(double now_s);
 
  private:
   struct Errand {
     std::string peer;
-    size_t open = 1;
+    std::set<std::string> open;  // who has not answered yet
+    std::string refusal;         // what the last one said that could not; empty: none did yet
     double until_s = 0;
   };
   uint64_t last_ = 0;

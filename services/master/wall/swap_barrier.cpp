@@ -50,7 +50,8 @@ bool SwapBarrier::complete() const {
 }
 
 void SwapBarrier::note_presented(const wire::SwapReady& m) {
-  if (m.presented == 0 || m.presented + kFramesRemembered < frame_) return;
+  // What nobody was told to present yet nobody has presented.
+  if (m.presented == 0 || m.presented >= frame_ || m.presented + kFramesRemembered < frame_) return;
   const auto before = members_.find(m.viewer);
   if (before != members_.end() && before->second.said.presented == m.presented) return;  // said again
   Presented& p = presented_[m.presented];
@@ -75,7 +76,7 @@ void SwapBarrier::on(const std::string& peer, const wire::SwapReady& m, double n
   if (begun_ && m.frame < frame_) {
     // It is late, or new: it goes on with the others. So little late that they could have waited, it may be waited for.
     const bool little = !again && m.frame == last_.frame && now_s <= deadline_before_s_;
-    note_pace(member, little);
+    note_pace(member, m.frame, little);
     if (fresh || again || member.told < last_.frame) tell(member, last_);
     return go_on(now_s);
   }
@@ -83,10 +84,12 @@ void SwapBarrier::on(const std::string& peer, const wire::SwapReady& m, double n
   go_on(now_s);
 }
 
-// A viewer that is not waited for was in time, or was not.
-void SwapBarrier::note_pace(Member& member, bool in_time) {
+// A viewer that is not waited for was in time for this frame, or was not.
+void SwapBarrier::note_pace(Member& member, uint64_t frame, bool in_time) {
   if (member.waited_for) return;
-  member.in_time = in_time ? member.in_time + 1 : 0;
+  const bool next = member.in_time_for + 1 == frame;  // else it was absent meanwhile
+  member.in_time = !in_time ? 0 : next ? member.in_time + 1 : 1;
+  if (in_time) member.in_time_for = frame;
   member.waited_for = member.in_time >= kInTime;
 }
 
@@ -136,6 +139,17 @@ const SwapBarrier::Member& SwapBarrier::leader() const {
       ->second;
 }
 
+// Of those who have the source that most have, of as many that of the least number, the state of the first.
+const wire::ShownState& SwapBarrier::first_of_most(const std::vector<const Member*>& members) {
+  const auto having = [&](InstanceId source) {
+    return std::count_if(members.begin(), members.end(), [&](const auto* m) { return m->said.state.source == source; });
+  };
+  const auto rank = [&](const Member* m) { return std::pair(-having(m->said.state.source), m->said.number); };
+  const auto first = std::min_element(members.begin(), members.end(),
+                                      [&](const Member* a, const Member* b) { return rank(a) < rank(b); });
+  return (*first)->said.state;
+}
+
 // What all who are in time can show. Numbers of one source never fall.
 void SwapBarrier::choose_state(double now_s) {
   wire::ShownState& state = last_.state;
@@ -149,10 +163,14 @@ void SwapBarrier::choose_state(double now_s) {
     if (m.ready) ready.push_back(&m);
     if (m.ready && m.waited_for && !m.behind) counted.push_back(&m);
   }
+  // Who has received nothing yet has no say in what is shown, while anybody has received something.
+  const auto empty = [](const Member* m) { return m->said.state.source.value == 0; };
+  if (!std::all_of(ready.begin(), ready.end(), empty)) {
+    std::erase_if(counted, empty);
+    std::erase_if(ready, empty);
+  }
   if (counted.empty()) counted = std::move(ready);
-  const wire::ShownState& first = (*std::min_element(counted.begin(), counted.end(), [](const auto* a, const auto* b) {
-                                    return a->said.number < b->said.number;
-                                  }))->said.state;
+  const wire::ShownState& first = first_of_most(counted);
   uint64_t least = std::numeric_limits<uint64_t>::max(), most = 0, replica = least, held = least;
   bool one_source = true;
   for (const Member* m : counted) {
@@ -226,7 +244,7 @@ void SwapBarrier::swap(double now_s) {
     last_.skew_s = p->second.last_s - p->second.first_s;
   }
   for (auto& [id, m] : members_) {
-    if (m.ready) note_pace(m, true);
+    if (m.ready) note_pace(m, frame_, true);
     m.ready = false;
     tell(m, last_);
   }

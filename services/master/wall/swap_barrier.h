@@ -57,12 +57,13 @@ class SwapBarrier {
   struct Member {
     std::string peer;
     wire::SwapReady said;
-    bool ready = false;      // for the frame at hand
-    bool waited_for = true;  // it was in time, or has been again for long enough
-    int in_time = 0;         // frames in a row, while it is not waited for
-    uint64_t told = 0;       // the newest frame that it was told to present
-    bool behind = false;     // it receives what is shown later than the others, who do not wait for it
-    int caught_up = 0;       // frames in a row for which it had what is shown, while it is behind
+    bool ready = false;        // for the frame at hand
+    bool waited_for = true;    // it was in time, or has been again for long enough
+    int in_time = 0;           // frames in a row, while it is not waited for
+    uint64_t in_time_for = 0;  // the last of them
+    uint64_t told = 0;         // the newest frame that it was told to present
+    bool behind = false;       // it receives what is shown later than the others, who do not wait for it
+    int caught_up = 0;         // frames in a row for which it had what is shown, while it is behind
   };
 
   double frame_s() const;
@@ -73,8 +74,9 @@ class SwapBarrier {
   void go_on(double now_s);
   void swap(double now_s);
   void leave_out_the_late();
-  static void note_pace(Member& member, bool in_time);
+  static void note_pace(Member& member, uint64_t frame, bool in_time);
   const Member& leader() const;
+  static const wire::ShownState& first_of_most(const std::vector<const Member*>& members);
   void choose_state(double now_s);
   void note_behind(uint64_t newest);
   void tell(Member& member, const wire::Swap& swap);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -61,6 +62,19 @@ std::vector<Place> marks(const image::View& v) {
       if (count >= 20 && !known) out.push_back({x + 4, y + 4});
     }
   return out;
+}
+
+// A process of this program that `parent` started; 0: there is none that runs.
+pid_t child_of(pid_t parent, const std::string& program) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator("/proc", error)) {
+    std::ifstream in(entry.path() / "stat");
+    std::string pid, name, state;
+    pid_t of = 0;
+    if (in >> pid >> name >> state >> of && of == parent && name == "(" + program + ")" && state != "Z")
+      return std::atoi(pid.c_str());
+  }
+  return 0;
 }
 
 class PanelTest : public testing::Test {
@@ -220,6 +234,33 @@ TEST_F(PanelTest, AWindowWithoutADataSetOpensOneByAWordOfTheDialog) {
   EXPECT_EQ(read_text(folder_ / "config/telesplat/recent"), "julia\n");
   display_->tap("o");
   display_->tap("q");
+  EXPECT_EQ(view.wait(60), 0) << view.err();
+}
+
+TEST_F(PanelTest, ADataSetThatKillsItsServerDoesNotEndTheWindow) {
+  Program view("telesplat", {"view", "--size", "960x720", "--sampler-threads", "1", "--panel", "off"},
+               folder_ / "view");
+  const auto window = live_window(view, "waiting for the data set");
+  ASSERT_NE(window, 0u);
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  click(window, {480 + 22 * kLetter - 73, 360 - 17 * kLetter + 59});  // "julia"
+  ASSERT_EQ(live_window(view), window);
+  const auto given_up = [&] { return view.err().find("data ended with code 137") != std::string::npos; };
+  for (pid_t before = 0, now = 0; !given_up(); before = now) {
+    ASSERT_TRUE(wait_until([&] {
+      now = child_of(view.pid(), "telesplat-data");
+      return given_up() || (now != 0 && now != before);
+    })) << view.err();
+    if (now != 0 && now != before) ::kill(now, SIGKILL);
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  ASSERT_TRUE(is_running(view.pid())) << view.err();
+  // Another one is opened in the same window.
+  display_->tap("o");
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  click(window, {480 + 22 * kLetter - 73, 360 - 17 * kLetter + 59});
+  EXPECT_TRUE(wait_until([&] { return child_of(view.pid(), "telesplat-data") != 0; })) << view.err();
+  display_->close(window);
   EXPECT_EQ(view.wait(60), 0) << view.err();
 }
 

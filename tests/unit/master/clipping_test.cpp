@@ -155,5 +155,85 @@ TEST_F(ClipOrders, AProbeIsAnsweredByWhoeverKnows) {
   EXPECT_EQ(replies["ctl"].text, "{\"value\":1}");
 }
 
+// Both were started by hand, without a name of their own.
+TEST_F(ClipOrders, AProbeGoesToAllPartsWhateverTheyAreCalled) {
+  wire::Hello first = hello("data", "data", 7), second = hello("data", "data", 8);
+  first.parameters["volume.part"] = 0, second.parameters["volume.part"] = 1;
+  core.on("p", first, 0);
+  core.on("q", second, 0);
+  take();
+  control("probe", {{"x", "0"}});
+  EXPECT_EQ(orders.size(), 2u);
+  second.instance = {9};  // started again
+  core.on("r", second, 0);
+  control("probe", {{"x", "0"}});
+  ASSERT_EQ(orders.size(), 2u);
+  EXPECT_TRUE(orders.contains("p") && orders.contains("r"));
+}
+
+// Whatever others say, and however often one says it, those that were asked answer.
+TEST_F(ClipOrders, OnlyWhoWasAskedAnswersAndOnce) {
+  core.on("p", hello("data", "data-1", 7), 0);
+  core.on("q", hello("data", "data-2", 8), 0);
+  core.on("s", hello("sampler", "sampler-1", 9), 0);
+  take();
+  control("probe", {{"x", "0"}});
+  ASSERT_EQ(orders.size(), 2u);
+  const uint64_t number = orders["p"].number;
+  core.on("s", wire::OrderAnswer{{7}, number, true, "forged"}, now_s);
+  take();
+  EXPECT_TRUE(replies.empty()) << "it was not asked";
+  for (int i = 0; i < 3; ++i) core.on("p", wire::OrderAnswer{{7}, number, false, "not mine"}, now_s);
+  take();
+  EXPECT_TRUE(replies.empty()) << "the other one may know";
+  core.on("q", wire::OrderAnswer{{8}, number, true, "{}"}, now_s);
+  take();
+  EXPECT_EQ(replies["ctl"].text, "{}");
+}
+
+// A viewer's process died, which nobody knows yet, and was started again; its predecessor's answer counts no more.
+TEST_F(ClipOrders, OfOneNameTheNewLifeIsMeant) {
+  core.on("z", hello("viewer", "viewer-1", 5), 0);
+  take();
+  control("where", {});
+  ASSERT_TRUE(orders.contains("z"));
+  now_s = 1.5;
+  core.on("a", hello("viewer", "viewer-1", 6), now_s);
+  take();
+  EXPECT_FALSE(replies["ctl"].ok) << "the old one is gone";
+  for (const char* named : {"", "viewer-1"}) {
+    control("where",
+            *named ? std::map<std::string, std::string>{{"viewer", named}} : std::map<std::string, std::string>());
+    ASSERT_EQ(orders.size(), 1u);
+    ASSERT_TRUE(orders.contains("a"));
+    core.on("a", wire::OrderAnswer{{6}, orders["a"].number, true, "{}"}, now_s);
+    take();
+    EXPECT_TRUE(replies["ctl"].ok);
+  }
+}
+
+TEST_F(ClipOrders, NobodyWaitsForWhoIsGone) {
+  core.on("p", hello("data", "data-1", 7), 0);
+  core.on("q", hello("data", "data-2", 8), 0);
+  core.on("a", hello("viewer", "viewer-1", 5), 0);
+  take();
+  control("where", {});
+  core.undeliverable("a");
+  take();
+  ASSERT_TRUE(replies.contains("ctl"));
+  EXPECT_FALSE(replies["ctl"].ok);
+  EXPECT_NE(replies["ctl"].text.find("gone"), std::string::npos);
+
+  control("probe", {{"x", "0"}});
+  const uint64_t number = orders["p"].number;
+  core.on("p", wire::OrderAnswer{{7}, number, false, "not mine"}, now_s);
+  take();
+  EXPECT_TRUE(replies.empty());
+  core.on("q", wire::Goodbye{{8}}, now_s);
+  take();
+  ASSERT_TRUE(replies.contains("ctl"));
+  EXPECT_EQ(replies["ctl"].text, "not mine");
+}
+
 }  // namespace
 }  // namespace telesplat::master

@@ -116,6 +116,32 @@ TEST_F(Swaps, ALateOneHoldsTheOthersForAFrameOnce) {
   EXPECT_TRUE(told().empty()) << "it is waited for again";
 }
 
+TEST_F(Swaps, OneThatComesNowAndThenIsNotWaitedFor) {
+  begin();
+  for (uint64_t v = 0; v < 3; ++v) say(v, 1, 1.005);
+  barrier.tick(*barrier.due_s());
+  told();
+  double now_s = 1.1;
+  for (uint64_t frame = 2; frame < 20; ++frame, now_s += 0.02) {
+    if (frame % 2 == 0) say(3, frame, now_s);
+    for (uint64_t v = 0; v < 3; ++v) say(v, frame, now_s);
+    ASSERT_EQ(told().size(), 4u) << frame << ": it was not in time for three frames in a row";
+  }
+}
+
+// A hostile viewer tells of frames that nobody has shown: what the others tell still counts.
+TEST_F(Swaps, FramesThatNobodyWasToldToPresentDoNotCount) {
+  begin();
+  for (uint64_t frame = 1; frame < 20; ++frame) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, frame);
+      m.presented = v == 3 ? frame + 1000 : frame - 1;
+      barrier.on("peer-" + std::to_string(v), m, 1 + 0.02 * double(frame));
+    }
+    EXPECT_EQ(told().begin()->second.skew_frame, frame - 1);
+  }
+}
+
 TEST_F(Swaps, ADeadOneHoldsNobody) {
   begin();
   for (uint64_t v = 0; v < 3; ++v) say(v, 1, 1.005);
@@ -220,6 +246,42 @@ TEST_F(Swaps, AnotherSourceIsShownWhenAllReceiveFromIt) {
   const auto state = frame(2, 1.1, 8);
   EXPECT_EQ(state.source.value, 8u);
   EXPECT_EQ(state.newest, 3u);
+}
+
+// A viewer that was started again, or whose link to the packer is cut, has nothing to show: the others go on.
+TEST_F(Swaps, AFirstViewerThatHasReceivedNothingFreezesNobody) {
+  begin();
+  auto again = ready(0, 0);
+  again.viewer = {999};
+  again.state = {};
+  barrier.on("peer-new", again, 1.001);
+  told();
+  double now_s = 1.02;
+  for (uint64_t frame = 1; frame < 200; ++frame, now_s += 0.02) {
+    for (uint64_t v = 1; v < 4; ++v) say(v, frame, now_s);
+    again.frame = frame;
+    barrier.on("peer-new", again, now_s);
+    const auto swaps = told();
+    ASSERT_EQ(swaps.size(), 4u);
+    ASSERT_EQ(swaps.begin()->second.state.source.value, 7u) << frame;
+    ASSERT_EQ(swaps.begin()->second.state.newest, 10 * frame + 1) << frame;
+  }
+}
+
+TEST_F(Swaps, WhereSourcesDifferForLongThatOfMostIsShown) {
+  begin();
+  const auto frame = [&](uint64_t number, double now_s) {
+    for (uint64_t v = 0; v < 4; ++v) {
+      auto m = ready(v, number);
+      if (v > 0) m.state.source = {8};
+      barrier.on("peer-" + std::to_string(v), m, now_s);
+    }
+    return told().begin()->second.state;
+  };
+  EXPECT_EQ(frame(1, 1.05).source.value, 7u);
+  EXPECT_EQ(frame(2, 1.5).source.value, 7u) << "the first may yet receive from the other one";
+  EXPECT_EQ(frame(3, 2.06).source.value, 8u);
+  EXPECT_EQ(frame(4, 2.08).newest, 41u);
 }
 
 // Of frames of slice images each may lack others than its neighbours.

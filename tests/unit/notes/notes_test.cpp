@@ -101,6 +101,71 @@ TEST_F(Notes, LieInTheCacheWhereTheFolderIsNoFolderOfOurs) {
   EXPECT_EQ(path, elsewhere.in_cache);
 }
 
+// The book's name would be longer than a file system takes, and the data's is not.
+TEST_F(Notes, LieInTheCacheWhereTheirNameIsTooLong) {
+  const std::string data = folder + "/data/" + std::string(250, 'a');
+  write(data, "data");
+  const Shelf longest = shelf_of(data, "", folder + "/cache");
+  std::string path;
+  for (const char* text : {"one", "two"}) {
+    const Status added = add_note(longest, text, &path);
+    ASSERT_TRUE(added) << added.error().text;
+    EXPECT_EQ(path, longest.in_cache);
+  }
+  EXPECT_EQ(read_book(longest)->notes.size(), 2u);
+  // One that is just short enough, so that nothing may be appended for a while.
+  const std::string fits = folder + "/data/" + std::string(244, 'b');
+  ASSERT_TRUE(add_note(shelf_of(fits, "", folder + "/cache"), "one", &path));
+  EXPECT_EQ(path, fits + ".notes.json");
+}
+
+TEST_F(Notes, WhatOtherProgramsKeepStays) {
+  write(shelf.beside, R"({"by": {"who": ["me", 1.5]}, "telesplat_notes": 1,
+    "bookmarks": [{"name": "a", "position": [0, 0, 1], "orientation": [1, 0, 0, 0], "colour": "red"}],
+    "notes": [{"number": 3, "text": "crack", "status": {"open": true}}]})");
+  const Status changed = change_book(shelf, [](Book& book) -> Status {
+    if (const Status s = book.keep({"a", {{1, 0, 0}, {1, 0, 0, 0}}, ""}); !s) return s;
+    return book.keep({"b", {{1, 0, 0}, {1, 0, 0, 0}}, ""});
+  });
+  ASSERT_TRUE(changed) << changed.error().text;
+  const std::string text = content(shelf.beside);
+  for (const char* kept : {"\"who\"", "1.5", "\"colour\": \"red\"", "\"open\": true"})
+    EXPECT_NE(text.find(kept), std::string::npos) << kept << " in " << text;
+  const auto book = read_book(shelf);
+  ASSERT_TRUE(book) << book.error().text;
+  EXPECT_EQ(book->find("a")->pose.position_room.x, 1);
+  EXPECT_EQ(book->find("b")->others, "");
+  EXPECT_EQ(*book_from_json(to_json(*book)), *book);
+  // Reading what lies deep in itself, or writing it, would end the program.
+  const std::string deep(200000, '[');
+  EXPECT_FALSE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + std::string(deep.size(), ']') + "}"));
+}
+
+TEST_F(Notes, WhoMayReadThemStays) {
+  const auto mode = [&] { return fs::status(shelf.beside).permissions(); };
+  ASSERT_TRUE(add_note(shelf, "one"));
+  const mode_t mask = umask(0);
+  umask(mask);
+  EXPECT_EQ(mode(), fs::perms(0666 & ~mask)) << "as any new file";
+  fs::permissions(shelf.beside, fs::perms(0600));
+  ASSERT_TRUE(add_note(shelf, "two"));
+  EXPECT_EQ(mode(), fs::perms(0600));
+}
+
+TEST_F(Notes, ALinkStaysALink) {
+  const std::string kept = folder + "/elsewhere/mine.json";
+  write(kept, to_json(full_book()));
+  fs::create_symlink("../elsewhere/mine.json", shelf.beside);
+  std::string path;
+  ASSERT_TRUE(add_note(shelf, "one", &path));
+  EXPECT_EQ(path, shelf.beside);
+  EXPECT_TRUE(fs::is_symlink(shelf.beside));
+  EXPECT_EQ(book_from_json(content(kept))->notes.size(), full_book().notes.size() + 1);
+  fs::remove(kept);
+  ASSERT_TRUE(add_note(shelf, "one", &path)) << "the link leads nowhere";
+  EXPECT_EQ(path, shelf.in_cache);
+}
+
 TEST_F(Notes, OfScenesWithoutAFileLieInTheCache) {
   const Shelf julia = shelf_of("", "julia lantern", folder + "/cache");
   EXPECT_EQ(julia.beside, "");

@@ -54,6 +54,17 @@ TEST(Limits, OfStringsListsAndMaps) {
   EXPECT_TRUE(decode<ControlReply>(bytes_of(encode(reply))));
 }
 
+// Numbers of a wall's frames stay far from where they would begin anew.
+TEST(Limits, OfFramesOfAWall) {
+  for (uint64_t SwapReady::*number : {&SwapReady::frame, &SwapReady::presented}) {
+    SwapReady ready = sample_message<SwapReady>();
+    ready.*number = uint64_t{1} << 53;
+    EXPECT_TRUE(decode<SwapReady>(bytes_of(encode(ready))));
+    ++(ready.*number);
+    EXPECT_TRUE(refused<SwapReady>(encode(ready), "frame"));
+  }
+}
+
 // Texts go into JSON, CSV and logs: nothing but UTF-8 comes in.
 TEST(Limits, OfTexts) {
   const auto with = [](auto message, auto change) {

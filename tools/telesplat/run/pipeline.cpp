@@ -165,23 +165,31 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
   return viewing == 0 && has_viewers_ ? State::kFinished : State::kRunning;
 }
 
+Consequence consequence_of(const Ended& e) {
+  const bool viewer = e.role == "viewer", master = e.role == "master";
+  // Told to finish, by `telesplat ctl stop`: the viewers finish too.
+  if (e.code == 0) return master ? Consequence::kFinish : Consequence::kNone;
+  const bool refused = e.code == 2;
+  if (!refused && !viewer && !master && e.restarts < kMaxRestarts) return Consequence::kRestart;
+  // A window stays, and another data set can be opened in it.
+  if (e.role == "data" && e.chosen) return Consequence::kGiveUp;
+  return refused ? Consequence::kRefuse : Consequence::kFail;
+}
+
 Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   const int code = m.process->exit_code();
-  const bool viewer = m.role == "viewer", master = m.role == "master";
-  // Told to finish, by `telesplat ctl stop`: the viewers finish too.
-  if (code == 0) return master ? State::kFinished : State::kRunning;
-  // A window stays, and another data set can be opened in it.
-  if (m.role == "data" && code == 2 && chosen_) {
+  const auto follows = consequence_of({m.role, code, m.restarts, chosen_});
+  if (follows == Consequence::kNone) return State::kRunning;
+  if (follows == Consequence::kFinish) return State::kFinished;
+  if (follows != Consequence::kRestart) {
+    const std::string last = group_.last_log_line(m.name);
+    news.push_back(code == 2 && m.role != "viewer" ? last
+                                                   : fmt::format("{} ended with code {}: {}", m.name, code, last));
+    if (follows != Consequence::kGiveUp) return follows == Consequence::kRefuse ? State::kBadInput : State::kFailed;
     m.given_up = true;
     progress_.clear();
-    tell_viewers("problem " + group_.last_log_line(m.name));
-    news.push_back(group_.last_log_line(m.name));
+    tell_viewers("problem " + news.back());
     return State::kRunning;
-  }
-  if (viewer || master || code == 2 || m.restarts >= kMaxRestarts) {
-    const std::string last = group_.last_log_line(m.name);
-    news.push_back(code == 2 && !viewer ? last : fmt::format("{} ended with code {}: {}", m.name, code, last));
-    return code == 2 ? State::kBadInput : State::kFailed;
   }
   ++m.restarts;
   news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again", m.name,

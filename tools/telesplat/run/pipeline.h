@@ -16,6 +16,24 @@
 
 namespace telesplat::launcher {
 
+/// A process of a session that ended.
+struct Ended {
+  std::string role;
+  int code = 0;         ///< exit code; 128 + the signal's number
+  int restarts = 0;     ///< how often it was started again
+  bool chosen = false;  ///< it serves a data set that a person chose at a window
+};
+enum class Consequence {
+  kNone,
+  kRestart,
+  kGiveUp,  ///< the session goes on without it, and its window tells why
+  kFinish,  ///< the session's end, in order
+  kFail,    ///< the same, as an error
+  kRefuse,  ///< the same: what it was given cannot be used
+};
+/// What follows from its end.
+Consequence consequence_of(const Ended& ended);
+
 class Pipeline {
  public:
   /// Starts master, data servers, packer, samplers and viewers (the viewers alone if options.join_master is set). Those
@@ -28,8 +46,8 @@ class Pipeline {
 
   enum class State { kRunning, kFinished, kFailed, kBadInput };
   /// Looks after the children; does not wait. Samplers, packer and data that die are restarted (5 times each at most);
-  /// the master's or a viewer's death ends the run, which is finished when all viewers are. `news` gets lines for the
-  /// person.
+  /// the master's or a viewer's death ends the run, which is finished when all viewers are. A data set that was chosen
+  /// at a window and cannot be served does not end it. `news` gets lines for the person.
   State supervise(std::vector<std::string>& news);
   /// "reading a.ply 43 %, 12 s left" and the like, from the children's progress lines; empty: nothing to tell.
   const std::string& progress() const { return progress_; }

@@ -80,6 +80,30 @@ TEST_F(ControlDeskTest, OfOrdersOfOneSubjectTheNewestWaits) {
   EXPECT_EQ(seen, (std::vector<std::string>{"100", "5", "epoch", "epoch"}));
 }
 
+// What came too late for one order is no answer to the next one.
+TEST_F(ControlDeskTest, ALateAnswerIsNotTakenForTheNextOnes) {
+  ControlDesk desk(endpoint_, {}, 0.3);
+  const auto answered = [&] {
+    std::vector<OrderAnswer> answers;
+    EXPECT_TRUE(wait_for([&] { return !(answers = desk.take_answers()).empty(); }));
+    return answers.empty() ? OrderAnswer{} : answers[0];
+  };
+  desk.give({"set", {{"c.y", "9"}}, {}});
+  ASSERT_TRUE(next());
+  const std::string late = peer_;
+  EXPECT_FALSE(answered().obeyed) << "no answer came in time";
+  desk.give({"epoch", {}, {}});
+  const auto told = next();
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->command, "epoch");
+  master_.send(wire::ControlReply{false, "c.y is 9, at most 2"}, late);
+  answer(true, "epoch 2");
+  const OrderAnswer second = answered();
+  EXPECT_EQ(second.order.command, "epoch");
+  EXPECT_TRUE(second.obeyed) << second.text;
+  EXPECT_EQ(second.text, "epoch 2");
+}
+
 TEST_F(ControlDeskTest, TheStatusIsAskedForWhileSomebodyWatches) {
   ControlDesk desk(endpoint_, {});
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
