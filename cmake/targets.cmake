@@ -49,6 +49,14 @@ function(telesplat_program name)
   telesplat_headers(${name} common)
 endfunction()
 
+# telesplat_tests_of(LABEL PROGRAM)   the target tests_LABEL builds PROGRAM, too
+function(telesplat_tests_of label program)
+  if(NOT TARGET tests_${label})
+    add_custom_target(tests_${label})
+  endif()
+  add_dependencies(tests_${label} ${program})
+endfunction()
+
 # telesplat_test(LABEL NAME sources... [DEPS targets...] [TIMEOUT seconds] [SERIAL])
 #   one GoogleTest executable, each of its cases a CTest test with LABEL. Its working directory is the repository's
 #   root. SERIAL: its cases measure time or need the whole machine, so no other test runs beside them.
@@ -57,10 +65,14 @@ function(telesplat_test label name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
+  if(TELESPLAT_SANITIZE)
+    math(EXPR ARG_TIMEOUT "4 * ${ARG_TIMEOUT}")  # sanitized programs are slow
+  endif()
   if(ARG_SERIAL)
     set(serial RUN_SERIAL TRUE)
   endif()
   add_executable(${name} ${ARG_UNPARSED_ARGUMENTS})
+  telesplat_tests_of(${label} ${name})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${ARG_DEPS} GTest::gtest GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${TELESPLAT_TEST_FLAGS})
@@ -70,7 +82,8 @@ function(telesplat_test label name)
 endfunction()
 
 # telesplat_fuzz(NAME CORPUS folder [DEPS targets...])   of NAME_fuzz.cpp and corpus/folder
-#   with TELESPLAT_FUZZ a libFuzzer program; always a CTest test (label unit) that replays the corpus.
+#   with TELESPLAT_FUZZ a libFuzzer program; always a CTest test (label unit) that replays the corpus, and what becomes
+#   of its files when they are damaged.
 function(telesplat_fuzz stem)
   cmake_parse_arguments(ARG "" "CORPUS" "DEPS" ${ARGN})
   set(name ${stem}_fuzz)
@@ -79,6 +92,7 @@ function(telesplat_fuzz stem)
     telesplat_program(${name} ${source} DEPS ${ARG_DEPS} -fsanitize=fuzzer)
   endif()
   telesplat_program(${name}_replay ${source} ${PROJECT_SOURCE_DIR}/tests/fuzz/replay_main.cpp DEPS ${ARG_DEPS})
+  telesplat_tests_of(unit ${name}_replay)
   add_test(NAME fuzz_corpus.${name} COMMAND ${name}_replay ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${ARG_CORPUS})
   set_tests_properties(fuzz_corpus.${name} PROPERTIES LABELS unit TIMEOUT 60)
 endfunction()
