@@ -92,6 +92,7 @@ Result<Placement> placement_from_text(std::string_view text) {
     if (!lo) return lo.error();
     if (!hi) return hi.error();
     out.box_data = {{(*lo)[0], (*lo)[1], (*lo)[2]}, {(*hi)[0], (*hi)[1], (*hi)[2]}};
+    if (out.box_data.empty()) return Error{"a placement's box ends before it begins"};
   }
   if (const auto unit = json.find("unit"); unit != json.end()) {
     if (!unit->is_string() || unit->get_ref<const std::string&>().size() > kMaxUnit ||

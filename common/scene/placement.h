@@ -34,7 +34,8 @@ Placement placement_of(const glm::dmat3& rotation, const geometry::DBox& box_dat
 
 /// JSON {"matrix": twelve numbers, row by row, "lo", "hi", "unit"}; comes back to the last bit.
 std::string to_text(const Placement& placement);
-/// Error: no such text, numbers that are not finite, a matrix without inverse, a unit that is no short UTF-8.
+/// Error: no such text, numbers that are not finite, a matrix without inverse, a box that ends before it begins, a unit
+/// that is no short UTF-8.
 Result<Placement> placement_from_text(std::string_view text);
 
 }  // namespace telesplat::scene

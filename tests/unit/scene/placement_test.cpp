@@ -58,5 +58,12 @@ TEST(Placement, BadTextsAreRefused) {
     EXPECT_FALSE(placement_from_text(text)) << text;
 }
 
+TEST(Placement, ABoxThatEndsBeforeItBeginsIsRefused) {
+  const auto read =
+      placement_from_text("{\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0],\"lo\":[0,0,0],\"hi\":[1,-1,1],\"unit\":\"mm\"}");
+  ASSERT_FALSE(read) << "it would not come back: a box that is empty is not told";
+  EXPECT_NE(read.error().text.find("ends before it begins"), std::string::npos) << read.error().text;
+}
+
 }  // namespace
 }  // namespace telesplat::scene
