@@ -41,6 +41,8 @@ class PointPacking final : public Packing {
   bool idle(double now_s) override;
   void tick(double now_s) override;
   void add_status(net::MasterLink::Values& values) const override;
+  /// Of the model, for tests of replication; 0: there is none yet.
+  uint64_t digest() const { return core_ ? core_->model().digest() : 0; }
 
  private:
   struct Received {

@@ -1,0 +1,49 @@
+// Whatever valid messages come, from whoever, in whatever order: nobody falls over, and those who are honest are
+// served. Fuzz targets (tests/fuzz/play) play the same with bytes that they look for.
+#include "tests/support/play/play.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "tests/support/play/dice.h"
+
+namespace telesplat::test {
+namespace {
+
+constexpr size_t kBytes = 3000;
+
+// reaches: what some of the plays must have come to.
+void expect_no_complaint(Play play, uint64_t seeds, const std::vector<std::string>& reaches) {
+  // More of them, for people who look for mistakes.
+  if (const char* more = std::getenv("TELESPLAT_PLAYS")) seeds = std::strtoull(more, nullptr, 10);
+  Reached reached;
+  for (uint64_t seed = 1; seed <= seeds; ++seed) {
+    const Complaint complaint = play(bytes_of_seed(seed, kBytes), &reached);
+    ASSERT_FALSE(complaint) << "seed " << seed << ": " << *complaint;
+  }
+  for (const auto& what : reaches) EXPECT_GT(reached[what], 0u) << what;
+  for (const auto& [what, times] : reached) testing::Test::RecordProperty(what, std::to_string(times));
+}
+
+TEST(Play, TheMasterServesTheHonestWhateverOthersSay) {
+  expect_no_complaint(play_master, 100,
+                      {"welcome", "lease", "plan_request", "control_reply", "order", "swap", "slab_assignment",
+                       "frames completed"});
+}
+TEST(Play, ReplicasOfPointsEqualTheirPackersModel) {
+  expect_no_complaint(play_points, 30,
+                      {"patch", "forget", "epoch_begin", "gaps", "models with points", "plans with tiles"});
+}
+TEST(Play, FramesOfVolumesReachTheHonest) {
+  expect_no_complaint(play_slices, 100,
+                      {"frames sent", "volume_frames_complete", "slabs_refused", "volume_frames_dropped"});
+}
+TEST(Play, AViewerFollowsAnHonestPackerWhateverCameBefore) {
+  expect_no_complaint(play_receiver, 100, {"points", "gaps", "epochs shown", "decode errors"});
+}
+
+}  // namespace
+}  // namespace telesplat::test
