@@ -1,0 +1,90 @@
+// Any bytes as what data servers read besides meshes and headers of volumes: chunks of a store, a store, what the
+// program that imports says, glTF with its pictures, packed voxels and voxels in words. The first byte chooses.
+#include <cstdlib>
+#include <cstring>
+
+#include "common/geometry/mesh_chunk.h"
+#include "services/data/import/report.h"
+#include "services/data/mesh/formats/gltf_header.h"
+#include "services/data/mesh/reader.h"
+#include "services/data/mesh/store_file.h"
+#include "services/data/texture/gltf_textures.h"
+#include "services/data/volume/formats/import_stream.h"
+#include "services/data/volume/formats/payload.h"
+#include "services/data/volume/volume.h"
+#include "tests/support/memory_file.h"
+
+namespace telesplat::data {
+namespace {
+
+using Bytes = std::span<const uint8_t>;
+
+// The sum of a chunk's numbers: they can be read.
+uint64_t use(const geometry::MeshChunkView& chunk) {
+  uint64_t sum = 0;
+  for (const uint32_t i : chunk.indices) {
+    if (i >= chunk.vertices()) std::abort();
+    sum += chunk.normals[i] + chunk.colours[i] + uint64_t(std::abs(chunk.positions_room[3 * i + 2]) < 1);
+  }
+  return sum;
+}
+void chunk(Bytes bytes) {
+  const std::vector<uint32_t> aligned = [&] {
+    std::vector<uint32_t> out((bytes.size() + 3) / 4);
+    if (!bytes.empty()) std::memcpy(out.data(), bytes.data(), bytes.size());
+    return out;
+  }();
+  if (const auto view = geometry::MeshChunkView::validate(std::as_bytes(std::span(aligned)).first(bytes.size()));
+      view.ok())
+    use(*view);
+}
+void store(Bytes bytes) {
+  const test::MemoryFile file(bytes);
+  const auto content = read_store(file.descriptor(), "fuzz");
+  if (content.ok() && content->offsets.size() != content->chunks.size()) std::abort();
+}
+void report(Bytes bytes) {
+  const test::MemoryFile file(bytes);
+  const auto mesh = read_import_report(file.descriptor(), "fuzz", "vtu");
+  if (mesh.ok()) (void)validate_mesh(*mesh, "fuzz");
+}
+void stream(Bytes bytes) {
+  const test::MemoryFile file(bytes);
+  (void)receive_volume(file.descriptor(), 1 << 20, "fuzz", nullptr);
+}
+void gltf(Bytes bytes) {
+  const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (!check_gltf(content, bytes.size(), "fuzz").ok()) return;
+  gltf_json(content);
+  gltf_picture_files(content, "fuzz/fuzz.gltf");
+  companion_files(content, "gltf", "fuzz/fuzz.gltf");
+  (void)read_gltf_textures(content, "fuzz/fuzz.gltf");
+}
+void companions(Bytes bytes) {
+  const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  companion_files(content, "obj", "fuzz/fuzz.obj");
+  companion_files(content, "glb", "fuzz/fuzz.glb");
+}
+void payload(Bytes bytes) {
+  const test::MemoryFile file(bytes);
+  const std::string_view content(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  for (auto header : {parse_nrrd(content, "fuzz"), parse_metaimage(content, "fuzz"), parse_nifti(content, "fuzz")}) {
+    if (!header.ok() || !check_header(*header, bytes.size(), "fuzz").ok() || header->voxel_bytes() > 1 << 20) continue;
+    header->data_path = file.path();
+    auto voxels = read_payload(*header, file.path(), nullptr);
+    if (!voxels.ok()) continue;
+    if (voxels->size() != header->voxel_bytes()) std::abort();
+    (void)make_volume(*header, *std::move(voxels), "fuzz");
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::data
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace telesplat::data;
+  constexpr void (*kReaders[])(Bytes) = {chunk, store, report, stream, gltf, companions, payload};
+  if (size == 0) return 0;
+  kReaders[data[0] % std::size(kReaders)]({data + 1, size - 1});
+  return 0;
+}

@@ -1,0 +1,6 @@
+// What valid messages of anyone do to the master.
+#include "tests/fuzz/play/play_fuzz.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  return telesplat::test::play_or_abort(telesplat::test::play_master, data, size);
+}
