@@ -92,6 +92,15 @@ class MasterPlay {
   explicit MasterPlay(std::span<const uint8_t> bytes) : dice_(bytes), any_(dice_, values()) {}
 
   Complaint run() {
+    // Most plays begin with a session that is under way.
+    if (dice_.chance(85)) {
+      const uint64_t kind = dice_.below(kKinds.size());
+      for (const std::string& peer : kPeerIds) on(peer, hello(peer, role_of(peer), kind));
+      if (kind == 2)
+        on("a",
+           wire::SliceWeights{
+               .data = {1}, .epoch = {1}, .begin = 0, .voxels = std::vector<uint32_t>(24, 9), .bytes_per_voxel = 3});
+    }
     for (size_t step = 0; step < kMostSteps && !dice_.over(); ++step) {
       now_s_ += 0.01 * double(dice_.below(16));
       act();
@@ -138,13 +147,13 @@ class MasterPlay {
         return something_else(peer);
       case 8:
       case 9:
-        return on(peer, hello(peer, dice_.pick(kRoles), dice_.chance(85) ? uint64_t(peer[0] - 'a') : dice_.below(9)));
+        return on(peer, hello(peer, dice_.chance(80) ? role_of(peer) : dice_.pick(kRoles), dice_.below(9)));
       case 10:
       case 11:
-        return ask_for_a_view(peer);
+        return ask_for_a_view(dice_.chance(80) ? "e" : peer);
       case 12:
       case 13:
-        return on(peer, wire::LeaseRequest{instance(peer)});
+        return ask_for_a_lease(dice_.chance(80) ? "c" : peer);
       case 14:
       case 15:
         return finish_a_lease(peer);
@@ -192,10 +201,15 @@ class MasterPlay {
   }
 
   InstanceId instance(const std::string& peer) {
-    return {dice_.chance(90) ? 1 + uint64_t(peer[0] - 'a') : dice_.below(12)};
+    return {dice_.chance(95) ? 1 + uint64_t(peer[0] - 'a') : dice_.below(12)};
   }
 
   // As an honest process says it. salt: which of the roles' variants.
+  static const std::string& role_of(const std::string& peer) {
+    // data, packer, two samplers, two viewers, ctl, another data server
+    constexpr std::array<size_t, kPeers> kRoleOf{0, 2, 1, 1, 3, 3, 4, 0};
+    return kRoles[kRoleOf[size_t(peer[0] - 'a')]];
+  }
   wire::Hello hello(const std::string& peer, const std::string& role, uint64_t salt) {
     wire::Hello h;
     h.role = role, h.name = fmt::format("{}-{}", role, peer), h.instance = instance(peer);
@@ -214,6 +228,7 @@ class MasterPlay {
     return h;
   }
 
+  void ask_for_a_lease(const std::string& peer) { on(peer, wire::LeaseRequest{instance(peer)}); }
   void ask_for_a_view(const std::string& peer) {
     wire::ViewRequest r;
     r.viewer = instance(peer);
