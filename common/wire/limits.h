@@ -7,7 +7,7 @@
 
 namespace telesplat::wire {
 
-inline constexpr uint64_t kProtocolVersion = 7;
+inline constexpr uint64_t kProtocolVersion = 8;
 
 inline constexpr size_t kMaxString = 4096;            ///< bytes of any string
 inline constexpr size_t kMaxFact = 64u << 10;         ///< bytes of a text in facts and arguments: transfer functions
@@ -23,6 +23,8 @@ inline constexpr uint64_t kMaxStep = 16;              ///< of a coarse frame
 inline constexpr int64_t kMaxTilePixels = 1 << 24;    ///< of a tile: what the codec takes
 inline constexpr uint64_t kMaxSlabs = 1024;           ///< of a volume, and samplers that share it
 inline constexpr uint64_t kMaxBuffers = 8;            ///< of a loosely coupled viewer
+inline constexpr size_t kSealWords = 4;               ///< of a lease's seal: 16 bytes
+inline constexpr size_t kLeaseKeyWords = 8;           ///< of the key that seals leases: 32 bytes
 inline constexpr size_t kMaxViews = 64;               ///< viewers that one sampling frame of a volume serves
 
 /// A bulk field. When encoding it points to the sender's bytes; when decoded it points into the received frame.

@@ -25,7 +25,15 @@ bool hold_different_parts(const wire::Hello& a, const wire::Hello& b) {
 }  // namespace
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
-    : options_(options), instance_(instance), record_(record), clipping_(options.clip) {
+    : options_(options),
+      instance_(instance),
+      record_(record),
+      signer_(instance,
+              [this](const std::string& id) {
+                const auto p = peers_.find(id);
+                return p == peers_.end() ? InstanceId{} : p->second.hello.instance;
+              }),
+      clipping_(options.clip) {
   const auto name_of = [this](const std::string& id) {
     const auto p = peers_.find(id);
     return p == peers_.end() ? std::string("?") : p->second.hello.name;
@@ -34,10 +42,12 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
     const auto id = instances_.find(instance);
     return id == instances_.end() ? std::string("?") : name_of(id->second);
   };
-  const PlanLinks links{
-      .outbox = outbox_, .record = record_, .name_of = name_of, .name_of_instance = name_of_instance, .packer = [this] {
-        return packer();
-      }};
+  const PlanLinks links{.outbox = outbox_,
+                        .signer = signer_,
+                        .record = record_,
+                        .name_of = name_of,
+                        .name_of_instance = name_of_instance,
+                        .packer = [this] { return packer(); }};
   for (const auto kind : scene::kKinds)
     if (auto& plan = plans_[scene::pipeline_of(kind)]; !plan)
       plan = make_plan(scene::pipeline_of(kind), options_, links);
@@ -259,7 +269,7 @@ void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double n
 void MasterCore::on(const std::string& peer, const wire::LeaseExtend& m, double now_s) {
   if (!known_sampler(peer, now_s)) return;
   join(peer);
-  plan_->extend(m.lease, now_s);
+  plan_->extend(m.lease, peer, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::SlabReady& m, double now_s) {
@@ -279,6 +289,21 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   const std::string& name = known_sampler ? sampler->second.hello.name : std::string("?");
   record_.add_tile(name, m);
   live_.add_tile(name, m, known_sampler && !sampler->second.gone);
+  dispatch(now_s);
+}
+
+// Refused by whom it was leased to: of a sampler that is gone nothing is known any more, and its leases are back.
+void MasterCore::on(const std::string& peer, const wire::TileRefused& m, double now_s) {
+  const Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "packer") return;
+  const auto by = instances_.find(m.sampler);
+  if (by == instances_.end()) return;
+  const auto sampler = peers_.find(by->second);
+  if (sampler == peers_.end()) return;
+  plan_->refused(m, sampler->first);
+  if (refusals_.allow(now_s))
+    log::warn("{} cannot use what sampler {} made of tile {} of frame {}: {}", p->hello.name,
+              sampler->second.hello.name, m.tile, m.frame.value, m.why);
   dispatch(now_s);
 }
 

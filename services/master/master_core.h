@@ -10,8 +10,10 @@
 #include <unordered_map>
 #include <vector>
 
+#include "common/core/log.h"
 #include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
+#include "services/master/lease_signer.h"
 #include "services/master/live/exposition.h"
 #include "services/master/orders/clipping.h"
 #include "services/master/orders/errands.h"
@@ -34,6 +36,7 @@ class MasterCore {
   void on(const std::string& peer, const wire::LeaseRequest& m, double now_s);
   void on(const std::string& peer, const wire::LeaseExtend& m, double now_s);
   void on(const std::string& peer, const wire::TileDone& m, double now_s);
+  void on(const std::string& peer, const wire::TileRefused& m, double now_s);
   void on(const std::string& peer, const wire::Goodbye& m, double now_s);
   void on(const std::string& peer, const wire::Control& m, double now_s);
   void on(const std::string& peer, const wire::SlabReady& m, double now_s);
@@ -131,10 +134,11 @@ class MasterCore {
   InstanceId instance_;
   metrics::RunRecord& record_;
   Outbox outbox_;
+  LeaseSigner signer_;
   net::RunningSession session_;
   std::string run_id_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
-  Plan* plan_;                       // of these, the one that leads
+  Plan* plan_;  // of these, the one that leads
   Clipping clipping_;
   Errands errands_;
   std::optional<scene::Kind> kind_;  // of its scene
@@ -147,7 +151,8 @@ class MasterCore {
   std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them
   SwapBarrier::Figures swaps_;                // of walls that are gone
   uint64_t leases_expired_ = 0;
-  double now_s_ = 0;  // of what came last
+  log::RateLimiter refusals_;  // of lines about them
+  double now_s_ = 0;           // of what came last
   bool stop_ = false;
 };
 

@@ -173,8 +173,8 @@ class MasterService {
       return;
     }
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
-                  wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::LinkReport,
-                  wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
+                  wire::TileDone, wire::TileRefused, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady,
+                  wire::LinkReport, wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
         control_, message, [&](const auto& m) {
           if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
             core_.on(message.peer, m, now_s);

@@ -75,6 +75,7 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
     w.facts["run_id"] = run_id_;
   }
   w.endpoints.erase("voxels");  // each part of a volume has its own: samplers get them in their sheets
+  if (to.hello.role == "packer") w.lease_key = signer_.key();
   if (to.coupling) {
     w.settings["viewer.coupling"] = to.coupling->mode;
     w.settings["viewer.buffers"] = to.coupling->buffers;
@@ -88,7 +89,8 @@ void MasterCore::announce(double now_s) {
   for (const bool packer : {true, false})
     for (const auto& [id, p] : peers_)
       if (!p.gone && p.hello.role != "ctl" && (p.hello.role == "packer") == packer)
-        outbox_.send({id, std::string(wire::Welcome::kName), p.coupling ? wire::encode(welcome(p, now_s)) : body});
+        outbox_.send(
+            {id, std::string(wire::Welcome::kName), p.coupling || packer ? wire::encode(welcome(p, now_s)) : body});
 }
 
 void MasterCore::record_epoch(double now_s) {

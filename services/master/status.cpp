@@ -59,6 +59,7 @@ Figures MasterCore::figures() const {
     out.released += f.released;
     out.backups += f.backups;
     out.overtaken += f.overtaken;
+    out.given_up += f.given_up;
     out.viewers += f.viewers;
   }
   return out;
@@ -74,11 +75,10 @@ std::vector<metrics::Process> MasterCore::processes() const {
 
 std::map<std::string, double> MasterCore::counters() const {
   const Figures f = figures();
-  std::map<std::string, double> out{{"leases_expired", double(leases_expired_)},
-                                    {"tiles_released", double(f.released)},
-                                    {"leases_backup", double(f.backups)},
-                                    {"views_overtaken", double(f.overtaken)},
-                                    {"frames_completed", double(f.frames_completed)}};
+  std::map<std::string, double> out{
+      {"leases_expired", double(leases_expired_)}, {"tiles_released", double(f.released)},
+      {"leases_backup", double(f.backups)},        {"views_overtaken", double(f.overtaken)},
+      {"frames_given_up", double(f.given_up)},     {"frames_completed", double(f.frames_completed)}};
   SwapBarrier::Figures swaps = swaps_;
   for (const auto& [name, wall] : walls_) {
     swaps.frames += wall.figures().frames;
@@ -102,6 +102,7 @@ LiveSnapshot MasterCore::live_snapshot() const {
                    .leases_expired = double(leases_expired_),
                    .leases_backup = double(f.backups),
                    .views_overtaken = double(f.overtaken),
+                   .frames_given_up = double(f.given_up),
                    .tiles_released = double(f.released),
                    .processes = {}};
   for (const auto& [id, p] : peers_) {
@@ -129,6 +130,7 @@ std::string MasterCore::status_json(double now_s) const {
            {"tiles_released", f.released},
            {"leases_backup", f.backups},
            {"views_overtaken", f.overtaken},
+           {"frames_given_up", f.given_up},
            {"parameters", Json::object()},
            {"animation", animation()}};
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);

@@ -145,6 +145,7 @@ class PackerService {
 
   std::unique_ptr<Packing> make_packing(scene::Pipeline pipeline) {
     Outlets outlets{.tell = [this](const wire::TileDone& m) { link_->socket().send(m); },
+                    .refuse = [this](const wire::TileRefused& m) { link_->socket().send(m); },
                     .to_viewers = [this](std::string_view type,
                                          std::string body) { patches_.send_frames({}, type, std::move(body)); },
                     .to_viewer = [this](std::string_view peer, std::string_view type,

@@ -115,6 +115,7 @@ class SamplerService {
     if (session.master != master_) {  // another master knows nothing of the leases we asked for
       master_ = session.master;
       leases_asked_ = 0;
+      unsent_.reset();
       if (work_) work_->drop_leases();
     }
     const scene::SessionView view(session);

@@ -10,6 +10,7 @@
 #include "common/net/socket.h"
 #include "common/volume/session.h"
 #include "services/packer/packer_service.h"
+#include "tests/support/lease_key.h"
 
 namespace telesplat {
 namespace {
@@ -57,7 +58,7 @@ class PackerServiceTest : public testing::Test {
 
   wire::Welcome mesh() {
     wire::Welcome w;
-    w.master = {1}, w.epoch = {1}, w.octree_depth = 6;
+    w.master = {1}, w.lease_key = test::lease_key(), w.epoch = {1}, w.octree_depth = 6;
     w.hello_sent_s = hello.sent_s;
     w.box_room = {{-1, -1, -1}, {1, 1, 1}};
     w.facts["kind"] = "mesh";
@@ -92,6 +93,7 @@ class PackerServiceTest : public testing::Test {
       lease.end = uint64_t(grid.size[2]);
       lease.shear = *volume::plan_frame(grid, std::span(&camera, 1));
       lease.views = {{{77}, {5}, camera, 0}};
+      test::seal_lease(lease, {9});
       sampler.send(wire::SliceImages{.sampler = {9}, .lease = lease, .voxels = 3});
     });
     if (!message) return std::nullopt;

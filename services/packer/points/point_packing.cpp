@@ -6,6 +6,7 @@
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/net/dispatch.h"
+#include "common/wire/lease_seal.h"
 #include "services/packer/points/plan/blue_noise.h"
 
 namespace telesplat::packer {
@@ -140,6 +141,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   // patches are told apart by their frames, the model starts anew, too.
   const bool another_master = core_ && master_ != session.master;
   master_ = session.master;
+  lease_key_ = session.lease_key;
   if (another_master) {
     core_->forget_frames();
     if (planner_) planner_->forget_frames();
@@ -183,8 +185,14 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   const auto& [from, message, m] = received;
   const wire::Lease& lease = m.lease;
   if (!core_) return;
-  // The announcement of its epoch comes on another socket and may be about to.
-  if (lease.epoch > core_->epoch()) return ahead_.add(received, message.body.size(), since_s);
+  // The announcement of its epoch, or of its master, comes on another socket and may be about to. A tile that an earlier
+  // master leased waits in vain: what it is of, this one may have numbered the same.
+  if (lease.master != master_ || lease.epoch > core_->epoch())
+    return ahead_.add(received, message.body.size(), since_s);
+  if (!wire::is_sealed(lease, m.sampler, lease_key_)) {
+    ++unsealed_;
+    return from->reject(message, "its lease was not given to who says to have sampled it");
+  }
   if (lease.epoch != core_->epoch()) return void(++other_epoch_);
   const double begin_s = outlets_.master_now();
   wire::TileDone done = done_of(m, outlets_.to_master_s(received.message.arrived_s), outlets_.to_master_s(since_s));
@@ -195,7 +203,7 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   }
   const std::span stream(reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size());
   auto gathered = gatherer_.add({block_of(lease), {}}, lease.rect, stream);
-  if (!gathered) return from->reject(message, gathered.error().text);
+  if (!gathered) return refuse(received, gathered.error().text);
   if (!*gathered) return tell_taken(done);
   BlockGatherer::Gathered& got = **gathered;
   done.samples = got.samples;
@@ -206,7 +214,14 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   if (got.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
   const bool whole = lease.rays == 0 || lease.rays == uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
   if (const Status s = pack_block(std::move(*got.block), whole, std::move(ready), done, now_s); !s)
-    from->reject(message, s.error().text);
+    refuse(received, s.error().text);
+}
+
+void PointPacking::refuse(const Received& received, const std::string& why) {
+  const auto& [from, message, m] = received;
+  ++refused_;
+  from->reject(message, why);
+  if (outlets_.refuse) outlets_.refuse({m.lease.frame, m.lease.tile, m.lease.lease, m.sampler, why});
 }
 
 Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<const std::vector<uint8_t>> stream,
@@ -396,6 +411,8 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"tiles", double(g.tiles)},
                  {"tiles_duplicate", double(s.tiles_duplicate + g.tiles_duplicate + duplicates_)},
                  {"tiles_other_epoch", double(s.tiles_other_epoch + other_epoch_ + ahead_.dropped())},
+                 {"tiles_refused", double(refused_)},
+                 {"tiles_unsealed", double(unsealed_)},
                  {"blocks", double(s.tiles)},
                  {"blocks_dropped", double(g.blocks_dropped)},
                  {"frames_complete", double(s.frames_complete)},

@@ -52,6 +52,7 @@ class PointPacking final : public Packing {
   void begin_planner(const PlanConfig& config);
   void record_plan();
   void pack(const Received& received, double since_s, double now_s);
+  void refuse(const Received& received, const std::string& why);
   /// A block whose every row is here. stream: of the whole block, if it came as one tile; else null.
   ///   whole: every pixel of it was cast.
   Status pack_block(SampledTile block, bool whole, std::shared_ptr<const std::vector<uint8_t>> stream,
@@ -68,15 +69,16 @@ class PointPacking final : public Packing {
   Outlets outlets_;
   metrics::SpanRecorder& spans_;
   InstanceId instance_ = net::make_instance_id(), master_;
-  std::optional<PackerCore> core_;  // none before the data set's box is known
-  std::optional<Planner> planner_;  // of its model; none where redundant points are kept
-  PlanConfig plan_config_;          // that it was made with
+  std::vector<uint32_t> lease_key_;  // of the master
+  std::optional<PackerCore> core_;   // none before the data set's box is known
+  std::optional<Planner> planner_;   // of its model; none where redundant points are kept
+  PlanConfig plan_config_;           // that it was made with
   points::ModelConfig model_;
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;
   LinkMeter meter_;  // of the viewers' links
   Completions completions_;
-  uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
+  uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0, refused_ = 0, unsealed_ = 0;
   uint64_t plans_ = 0;
   FrameId planning_;           // whose extra rays were planned last,
   double planning_s_ = 0;      // and for how long so far

@@ -1,5 +1,8 @@
 #include "services/sampler/mesh/tiles.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "common/net/dispatch.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/session.h"
@@ -10,6 +13,7 @@ namespace {
 constexpr size_t kChunksInFlight = 8;  // requests to the data server not yet answered
 constexpr double kRetry_s = 2.0;       // a data server that does not answer is asked again
 constexpr double kExtend_s = 0.1;      // between two requests for more time
+constexpr double kPatience_s = 6.0;    // nothing came for so long: a lease is left to others
 
 // Chunk bytes must be 4-byte aligned to be used in place; a received field may lie anywhere.
 geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
@@ -116,7 +120,8 @@ void MeshTiles::fetch(const HeldLease* next, double now_s) {
   std::vector<ChunkId> wanted;
   if (next) {
     wanted = cache_.missing(part(next->lease));
-    if (!wanted.empty() && now_s - last_extend_s_ > kExtend_s) {
+    const bool patient = now_s - std::max(progress_s_, next->received_s) < kPatience_s;
+    if (!wanted.empty() && patient && now_s - last_extend_s_ > kExtend_s) {
       link_.socket().send(wire::LeaseExtend{link_.instance(), next->lease.lease});
       last_extend_s_ = now_s;
     }
@@ -148,16 +153,27 @@ std::vector<net::Socket*> MeshTiles::sockets() {
   return blocks_ ? std::vector<net::Socket*>{&*blocks_} : std::vector<net::Socket*>{};
 }
 
+// It would have none of it the next time, either. What it shows there is a hole.
+void MeshTiles::missed(ChunkId id) {
+  for (const ChunkId old : cache_.insert(id)) sampler_->remove_chunk(old);
+  if (!std::exchange(told_missed_, true)) log::error("{} does not have chunk {} of its own list", endpoint_, id.value);
+}
+
 void MeshTiles::receive() {
   if (!blocks_) return;
+  const double now_s = monotonic_s();
   std::vector<std::pair<ChunkId, geometry::ChunkBytes>> batch;
   while (const auto message = blocks_->receive()) {
     net::dispatch<wire::ChunkList, wire::Chunk>(*blocks_, *message, [&](const auto& m) {
       if (m.epoch != epoch_) return;
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::ChunkList>) {
         if (!cache_.known()) cache_.reset(m.chunks);
-      } else if (!m.data.empty() && cache_.waiting(m.chunk)) {
+        progress_s_ = now_s;
+      } else if (m.data.empty() && cache_.waiting(m.chunk)) {
+        missed(m.chunk);
+      } else if (cache_.waiting(m.chunk)) {
         batch.emplace_back(m.chunk, aligned(*message, m.data));
+        progress_s_ = now_s;
       }
     });
     if (batch.size() >= kChunksInFlight) break;

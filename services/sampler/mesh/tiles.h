@@ -42,6 +42,7 @@ class MeshTiles final : public TileSource {
   };
   void learn_look(const wire::Welcome& session);
   size_t missing_count() const;
+  void missed(ChunkId id);
 
   std::unique_ptr<Sampler> sampler_;
   ChunkCache cache_;
@@ -54,8 +55,9 @@ class MeshTiles final : public TileSource {
   std::string array_;  // that the chunks held have
   EpochId epoch_;      // the newest
   EpochBook<Look> looks_;
-  bool prefetched_ = false;
+  bool prefetched_ = false, told_missed_ = false;
   double last_request_s_ = -1e9, last_extend_s_ = -1e9;
+  double progress_s_ = -1e9;  // when something came of the data server
 };
 
 }  // namespace telesplat::sampler

@@ -295,7 +295,6 @@ void VolumeWork::receive(double now_s) {
         if (!data.known || data.begin >= data.end) {
           asked_.reset();
           pause_until_s_ = now_s + kPause_s;
-          progress_s_ = now_s;
           return;
         }
         const Epoch* epoch = epochs_.find(data.epoch);

@@ -132,6 +132,38 @@ TEST_F(Master, LeasesArePulled) {
   EXPECT_EQ(next[0].request.value, 2u);
 }
 
+TEST_F(Master, SealsLeasesWithAKeyThatThePackerAloneIsTold) {
+  join_all();
+  const auto told = sent<wire::Welcome>("p");
+  ASSERT_FALSE(told.empty());
+  const auto key = told.back().lease_key;
+  EXPECT_EQ(key.size(), wire::kLeaseKeyWords);
+  for (const auto& peer : {"s1", "v", "d"})
+    for (const auto& welcome : sent<wire::Welcome>(peer)) EXPECT_TRUE(welcome.lease_key.empty()) << peer;
+  request(1);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  EXPECT_EQ(leases[0].master.value, 42u);
+  EXPECT_TRUE(wire::is_sealed(leases[0], {3}, key));
+  EXPECT_FALSE(wire::is_sealed(leases[0], {4}, key)) << "it is s1's";
+}
+
+TEST_F(Master, TilesThatThePackerRefusesAreLeasedAgainAtOnce) {
+  join_all();
+  request(1);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  core.on("s2", wire::LeaseRequest{}, 1);
+  EXPECT_TRUE(sent<wire::Lease>("s2").empty());
+  const wire::TileRefused refused{leases[0].frame, leases[0].tile, leases[0].lease, {3}, "no image"};
+  core.on("v", refused, 1.1);
+  EXPECT_TRUE(sent<wire::Lease>("s2").empty()) << "that is the packer's to say";
+  core.on("p", refused, 1.1);
+  EXPECT_EQ(sent<wire::Lease>("s2").size(), 1u);
+}
+
 TEST_F(Master, NothingIsLeasedWithoutAPacker) {
   core.on("s1", hello("sampler", "sampler-1", 3), 0);
   core.on("v", hello("viewer", "viewer-1", 5), 0);

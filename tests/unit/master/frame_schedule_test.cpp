@@ -108,7 +108,7 @@ TEST(FrameSchedule, ALeaseThatRunsOutGoesToAnother) {
   std::vector<std::string> lost;
   const auto note = [&](const std::string& name) { lost.push_back(name); };
   EXPECT_EQ(s.expire(11.9, note), 0);
-  s.extend(first->lease, 11.9);
+  s.extend(first->lease, "slow", 11.9);
   EXPECT_EQ(s.expire(13.8, note), 0) << "it was extended";
   EXPECT_EQ(s.expire(14, note), 1);
   EXPECT_EQ(lost, std::vector<std::string>{"slow"});
@@ -118,7 +118,7 @@ TEST(FrameSchedule, ALeaseThatRunsOutGoesToAnother) {
   EXPECT_EQ(second->frame, first->frame);
   EXPECT_EQ(second->tile, first->tile);
   EXPECT_NE(second->lease, first->lease);
-  s.extend(first->lease, 100);  // of the lease before: unknown now
+  s.extend(first->lease, "slow", 100);  // of the lease before: unknown now
   EXPECT_EQ(s.expire(17, kNobody), 1);
   // Whoever's tile comes first counts.
   EXPECT_TRUE(done(s, first->frame, first->tile, 17.5));

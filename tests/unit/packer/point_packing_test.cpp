@@ -6,6 +6,7 @@
 #include <deque>
 
 #include "services/packer/slices/slice_packing.h"
+#include "tests/support/lease_key.h"
 #include "tests/support/packer_scenes.h"
 
 namespace telesplat::packer {
@@ -17,6 +18,7 @@ wire::Welcome welcome(EpochId epoch = test::kEpoch, InstanceId master = {1}) {
   const points::ModelConfig model = test::scene_config();
   wire::Welcome w;
   w.master = master;
+  w.lease_key = test::lease_key();
   w.epoch = epoch;
   w.octree_depth = uint64_t(model.depth);
   w.box_room = model.box_room;
@@ -48,7 +50,11 @@ class PointPackingTest : public testing::Test {
     l.moments.leased_s = 2;
     return m;
   }
-  void sample(wire::DepthTile m, double now_s) {
+  void sample(wire::DepthTile m, double now_s, InstanceId master = {1}) {
+    test::seal_lease(m.lease, m.sampler, master);
+    deliver(m, now_s);
+  }
+  void deliver(wire::DepthTile m, double now_s) {
     const auto stream = codec::encode(test::sample_scene(m.lease.camera, m.lease.rect));
     m.image = std::as_bytes(std::span(stream));
     packing.take_sampled(socket, message(m), now_s);
@@ -68,6 +74,7 @@ class PointPackingTest : public testing::Test {
   }
   Outlets outlets() {
     return {.tell = [this](const wire::TileDone& m) { told.push_back(m); },
+            .refuse = [this](const wire::TileRefused& m) { refused.push_back(m); },
             .to_viewers =
                 [this](std::string_view type, std::string body) {
                   sent.push_back({"", std::string(type), std::move(body)});
@@ -84,6 +91,7 @@ class PointPackingTest : public testing::Test {
   net::Context context;
   net::Socket socket{context, net::Kind::kDealer, "from"};
   std::vector<wire::TileDone> told;
+  std::vector<wire::TileRefused> refused;
   std::deque<Sent> sent;
   metrics::SpanRecorder spans;
   PointPacking packing{{}, outlets(), spans};
@@ -281,6 +289,69 @@ TEST_F(PointPackingTest, WhatCameOfAViewThatEndsEarlyIsKnown) {
   EXPECT_LT(rays, 28u * 64) << "the quarter that was left out, and its rim";
 }
 
+TEST_F(PointPackingTest, TilesOfAMasterThatIsGoneAreDropped) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  ASSERT_TRUE(packing.follow(welcome(test::kEpoch, {2}), 1));
+  // The earlier master's frame 1 was seen from elsewhere, and in one tile of two.
+  wire::DepthTile late = tile(1, 0);
+  late.lease.camera = test::scene_camera({0.1, 0.1, 0}, 96, 64);
+  sample(late, 1, {1});
+  EXPECT_TRUE(told.empty());
+  for (const int half : {0, 1}) sample(tile(1, half), 1.1, {2});
+  ASSERT_EQ(told.size(), 2u);
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_TRUE(decoded<wire::Patch>(sent[0]).frame_complete);
+  packing.tick(3);
+  EXPECT_EQ(told.size(), 2u);
+  EXPECT_TRUE(refused.empty()) << "this master did not lease it";
+  EXPECT_EQ(status("tiles_other_epoch"), 1);
+}
+
+TEST_F(PointPackingTest, TilesOfAMasterThatIsNotKnownYetWaitForIt) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  for (const int half : {0, 1}) sample(tile(1, half), 1, {2});
+  EXPECT_TRUE(told.empty());
+  ASSERT_TRUE(packing.follow(welcome(test::kEpoch, {2}), 1.2));
+  EXPECT_EQ(told.size(), 2u);
+}
+
+TEST_F(PointPackingTest, OnlyWhatWasLeasedIsTaken) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  wire::DepthTile made_up = tile(1, 0);
+  made_up.lease.master = {1};
+  deliver(made_up, 1);
+  EXPECT_EQ(socket.rejected(), 1u) << "without a seal";
+  wire::seal(made_up.lease, {8}, test::lease_key());
+  deliver(made_up, 1);
+  EXPECT_EQ(socket.rejected(), 2u) << "of a lease that another sampler was given";
+  wire::seal(made_up.lease, made_up.sampler, test::lease_key());
+  made_up.lease.blocks_in_frame = 2;
+  deliver(made_up, 1);
+  EXPECT_EQ(socket.rejected(), 3u) << "of another frame than was leased";
+  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(refused.empty()) << "the master has nothing to do with them";
+  EXPECT_EQ(status("tiles_unsealed"), 3);
+  for (const int half : {0, 1}) sample(tile(1, half), 2);
+  EXPECT_EQ(told.size(), 2u);
+}
+
+TEST_F(PointPackingTest, ARefusedTileIsToldTheMaster) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  wire::DepthTile bad = tile(1, 1);
+  test::seal_lease(bad.lease, bad.sampler);
+  const std::string rubbish = "this is no depth image";
+  bad.image = std::as_bytes(std::span(rubbish));
+  packing.take_sampled(socket, message(bad), 1);
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_EQ(refused[0].frame.value, 1u);
+  EXPECT_EQ(refused[0].tile, 1u);
+  EXPECT_EQ(refused[0].lease, bad.lease.lease);
+  EXPECT_EQ(refused[0].sampler.value, 9u);
+  EXPECT_FALSE(refused[0].why.empty());
+  EXPECT_TRUE(told.empty());
+  EXPECT_EQ(status("tiles_refused"), 1);
+}
+
 TEST(Completions, AreBounded) {
   Completions completions;
   Event event;
@@ -348,6 +419,7 @@ TEST_F(PointPackingTest, TilesThatMakeNoSenseAreRefused) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   auto bad = tile(1, 0);
   bad.image = {};
+  test::seal_lease(bad.lease, bad.sampler);
   packing.take_sampled(socket, message(bad), 1);
   EXPECT_EQ(socket.rejected(), 1u);
   sample(tile(1, 0), 1);

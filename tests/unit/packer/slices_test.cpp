@@ -9,6 +9,7 @@
 
 #include "common/volume/session.h"
 #include "services/packer/slices/slice_packing.h"
+#include "tests/support/lease_key.h"
 
 namespace telesplat::packer {
 namespace {
@@ -400,21 +401,25 @@ class SlicePackingTest : public testing::Test {
     s.transfer.points = {{0, 1, 1, 1, 0.5f}};
     wire::Welcome w;
     w.master = master;
+    w.lease_key = test::lease_key();
     w.epoch = epoch;
     w.facts = volume::to_facts(s);
     w.facts["kind"] = "volume";
     w.parameters = volume::to_parameters(s);
     return w;
   }
-  Status receive(const SliceGatherer::Slab& s, double now) {
+  Status receive(SliceGatherer::Slab s, double now, InstanceId master = {1}) {
+    test::seal_lease(s.images.lease, s.images.sampler, master);
     return packing.receive({"", "slice_images", s.images.data, s.owner}, s.images, now);
   }
   std::vector<wire::TileDone> told;
+  std::vector<wire::TileRefused> refused;
   std::vector<std::pair<wire::SliceFrame, std::string>> sent;
   std::set<std::string> gone;
   std::deque<std::string> bodies;  // which `sent` points into
   metrics::SpanRecorder spans;
   SlicePacking packing{{.tell = [this](const wire::TileDone& m) { told.push_back(m); },
+                        .refuse = [this](const wire::TileRefused& m) { refused.push_back(m); },
                         .to_viewer =
                             [this](std::string_view peer, std::string_view type, std::string body) {
                               if (gone.contains(std::string(peer))) return false;
@@ -487,18 +492,50 @@ TEST_F(SlicePackingTest, OthersFramesAreTakenForOthersAfterAMastersRestart) {
   ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0, 1), 0));
   ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 5)})), 1));
   ASSERT_TRUE(packing.follow(welcome(kEpoch, {2}), 2));
-  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2));
+  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2, {2}));
   ASSERT_EQ(sent.size(), 2u);
   EXPECT_NE(sent[0].first.packer, sent[1].first.packer);
   // A viewer that is gone does not keep others waiting.
   gone.insert("peer");
   ASSERT_TRUE(packing.acknowledged("other", ack(8, 0, 1), 2));
   ASSERT_TRUE(packing.acknowledged("peer", ack(7, 1, 1), 2));
-  ASSERT_TRUE(receive(slab(lease(2, 0, 1, {view(7, 7), view(8, 1)})), 2));
+  ASSERT_TRUE(receive(slab(lease(2, 0, 1, {view(7, 7), view(8, 1)})), 2, {2}));
   net::MasterLink::Values values;
   packing.add_status(values);
   EXPECT_EQ(values["volume_viewers"], 1);
   EXPECT_EQ(values["volume_frames_complete"], 3);
+}
+
+TEST_F(SlicePackingTest, SlabsOfAMasterThatIsGoneCompleteNothing) {
+  ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
+  ASSERT_TRUE(packing.follow(welcome(kEpoch, {2}), 1));
+  ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0, 1), 1));
+  ASSERT_TRUE(receive(slab(lease(50, 0, 1, {view(7, 5)})), 1, {1}));
+  EXPECT_TRUE(told.empty());
+  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2, {2}));
+  ASSERT_EQ(sent.size(), 1u) << "frame 50 of the earlier master keeps nobody from frame 1 of this one";
+  EXPECT_EQ(sent[0].first.request.value, 6u);
+}
+
+TEST_F(SlicePackingTest, AFrameThatNobodyLeasedStarvesNoViewer) {
+  ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
+  ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0, 1), 0));
+  auto made_up = slab(lease(uint64_t{1} << 50, 0, 1, {view(7, 5)}));
+  made_up.images.lease.master = {1};
+  EXPECT_FALSE(packing.receive({"", "slice_images", made_up.images.data, made_up.owner}, made_up.images, 1));
+  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2));
+  EXPECT_EQ(sent.size(), 1u);
+}
+
+TEST_F(SlicePackingTest, ARefusedSlabIsToldTheMaster) {
+  ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
+  auto bad = slab(lease(1, 0, 2, {view(7, 5)}));
+  const std::string rubbish = "no slices";
+  bad.images.data = std::as_bytes(std::span(rubbish));
+  EXPECT_FALSE(receive(bad, 1));
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_EQ(refused[0].lease.value, 100u);
+  EXPECT_EQ(refused[0].sampler.value, 1u);
 }
 
 TEST_F(SlicePackingTest, BadSessionsArePackedByNobody) {
