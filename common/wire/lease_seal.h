@@ -1,6 +1,6 @@
 // Seals of leases: the packer takes only what its master leased, for the frame, the rectangle and the sampler that it
-// was leased for. A seal is a keyed BLAKE2b hash (libsodium's crypto_generichash) of the encoded lease. The master makes
-// a key when it starts, and tells it to the packer alone (Welcome::lease_key).
+// was leased for. A seal is a keyed BLAKE2b hash (libsodium's crypto_generichash) of the encoded lease. The master
+// makes a key when it starts, and tells it to the packer alone (Welcome::lease_key).
 #pragma once
 
 #include <cstdint>

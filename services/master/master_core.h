@@ -13,7 +13,7 @@
 #include "common/core/log.h"
 #include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
-#include "services/master/lease_signer.h"
+#include "services/master/leases/lease_signer.h"
 #include "services/master/live/exposition.h"
 #include "services/master/orders/clipping.h"
 #include "services/master/orders/errands.h"

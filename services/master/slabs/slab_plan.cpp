@@ -7,7 +7,7 @@
 
 #include "common/core/log.h"
 #include "common/metrics/run_record.h"
-#include "services/master/lease_signer.h"
+#include "services/master/leases/lease_signer.h"
 #include "services/master/outbox.h"
 #include "services/master/settings.h"
 #include "services/master/slabs/assignment.h"

@@ -185,8 +185,8 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   const auto& [from, message, m] = received;
   const wire::Lease& lease = m.lease;
   if (!core_) return;
-  // The announcement of its epoch, or of its master, comes on another socket and may be about to. A tile that an earlier
-  // master leased waits in vain: what it is of, this one may have numbered the same.
+  // The announcement of its epoch, or of its master, comes on another socket and may be about to. A tile that an
+  // earlier master leased waits in vain: what it is of, this one may have numbered the same.
   if (lease.master != master_ || lease.epoch > core_->epoch())
     return ahead_.add(received, message.body.size(), since_s);
   if (!wire::is_sealed(lease, m.sampler, lease_key_)) {
