@@ -67,36 +67,94 @@ TEST(Limits, OfFramesOfAWall) {
 
 // Texts go into JSON, CSV and logs: nothing but UTF-8 comes in.
 TEST(Limits, OfTexts) {
-  const auto with = [](auto message, auto change) {
+  // What no sender of ours sends: `good` in the encoded message becomes `bad`, which is as long.
+  const auto with = [](auto message, auto change, const std::string& good = {}, const std::string& bad = {}) {
     change(message);
-    return encode(message);
+    std::string body = encode(message);
+    const size_t at = body.find(good);
+    EXPECT_NE(at, body.npos);
+    return body.replace(at, good.size(), bad);
   };
   const Hello hello = sample_message<Hello>();
   EXPECT_TRUE(decode<Hello>(bytes_of(with(hello, [](Hello& m) { m.name = "caf\xc3\xa9 \xe2\x82\xac"; }))));
-  EXPECT_TRUE(refused<Hello>(with(hello, [](Hello& m) { m.name = "\xff"; }), "field name is not UTF-8"));
-  EXPECT_TRUE(refused<Hello>(with(hello, [](Hello& m) { m.role = "caf\xe9"; }), "field role is not UTF-8"));
-  EXPECT_TRUE(refused<Hello>(with(hello, [](Hello& m) { m.facts = {{"\xff", ""}}; }), "field facts is not UTF-8"));
-  EXPECT_TRUE(refused<Hello>(with(hello,
-                                  [](Hello& m) {
-                                    m.facts = {{"scene", "caf\xe9.ply"}};
-                                  }),
+  EXPECT_TRUE(refused<Hello>(with(
+                                 hello, [](Hello& m) { m.name = "n=@"; }, "n=@", "n=\xff"),
+                             "field name is not UTF-8"));
+  EXPECT_TRUE(refused<Hello>(with(
+                                 hello, [](Hello& m) { m.role = "caf@"; }, "caf@", "caf\xe9"),
+                             "field role is not UTF-8"));
+  EXPECT_TRUE(refused<Hello>(with(
+                                 hello,
+                                 [](Hello& m) {
+                                   m.facts = {{"f=@", ""}};
+                                 },
+                                 "f=@", "f=\xff"),
                              "field facts is not UTF-8"));
-  EXPECT_TRUE(refused<Hello>(with(hello,
-                                  [](Hello& m) {
-                                    m.parameters = {{"\xc0\x80", 1}};
-                                  }),
+  EXPECT_TRUE(refused<Hello>(with(
+                                 hello,
+                                 [](Hello& m) {
+                                   m.facts = {{"scene", "caf@.ply"}};
+                                 },
+                                 "caf@.ply", "caf\xe9.ply"),
+                             "field facts is not UTF-8"));
+  EXPECT_TRUE(refused<Hello>(with(
+                                 hello,
+                                 [](Hello& m) {
+                                   m.parameters = {{"p=@@", 1}};
+                                 },
+                                 "p=@@", "p=\xc0\x80"),
                              "field parameters is not UTF-8"));
-  EXPECT_TRUE(
-      refused<StatusReport>(with(sample_message<StatusReport>(), [](StatusReport& m) { m.values["\xed\xa0\x80"] = 1; }),
-                            "field values is not UTF-8"));
-  EXPECT_TRUE(refused<MetricRows>(with(sample_message<MetricRows>(),
-                                       [](MetricRows& m) {
-                                         m.columns = {"good", "\xff"};
-                                       }),
+  EXPECT_TRUE(refused<StatusReport>(
+      with(
+          sample_message<StatusReport>(), [](StatusReport& m) { m.values["v=@@@"] = 1; }, "v=@@@", "v=\xed\xa0\x80"),
+      "field values is not UTF-8"));
+  EXPECT_TRUE(refused<MetricRows>(with(
+                                      sample_message<MetricRows>(),
+                                      [](MetricRows& m) {
+                                        m.columns = {"good", "c=@"};
+                                      },
+                                      "c=@", "c=\xff"),
                                   "field columns is not UTF-8"));
-  EXPECT_TRUE(refused<SlabAssignment>(
-      with(sample_message<SlabAssignment>(), [](SlabAssignment& m) { m.sheet[1].endpoint = "tcp://\xff"; }),
-      "field sheet : field endpoint is not UTF-8"));
+  EXPECT_TRUE(
+      refused<SlabAssignment>(with(
+                                  sample_message<SlabAssignment>(),
+                                  [](SlabAssignment& m) { m.sheet[1].endpoint = "tcp://@"; }, "tcp://@", "tcp://\xff"),
+                              "field sheet : field endpoint is not UTF-8"));
+}
+
+// A file, a folder or a name of this machine may be any bytes: nobody is refused for it.
+TEST(Texts, AreUtf8HoweverTheyWereGiven) {
+  Hello hello = sample_message<Hello>();
+  hello.name = "caf\xe9";
+  hello.endpoints = {{"patches", "ipc:///tmp/\xff"}};
+  hello.facts = {{"sc\xff", "\xff"}};
+  hello.parameters = {{"\xff", 2}};
+  const auto taken = decode<Hello>(bytes_of(encode(hello)));
+  ASSERT_TRUE(taken) << taken.error().text;
+  EXPECT_EQ(taken->name, "caf\xef\xbf\xbd");
+  EXPECT_EQ(taken->endpoints.at("patches"), "ipc:///tmp/\xef\xbf\xbd");
+  EXPECT_EQ(taken->facts.at("sc\xef\xbf\xbd"), "\xef\xbf\xbd");
+  EXPECT_EQ(taken->parameters.at("\xef\xbf\xbd"), 2);
+
+  Welcome welcome = sample_message<Welcome>();
+  welcome.facts["run_folder"] = "/runs/caf\xe9";
+  EXPECT_TRUE(decode<Welcome>(bytes_of(encode(welcome))));
+  ViewRequest request = sample_message<ViewRequest>();
+  request.wall = "mur \xe9.toml x1";
+  EXPECT_TRUE(decode<ViewRequest>(bytes_of(encode(request))));
+  Control control{"clip", {{"\xe9", "\xff"}}};
+  EXPECT_TRUE(decode<Control>(bytes_of(encode(control))));
+
+  // U+FFFD takes three bytes: a text that was within its limit stays there, and is cut between characters.
+  for (const size_t size : {kMaxString, kMaxString - 1, kMaxString - 2}) {
+    hello.name = std::string(size - 1, 'n') + "\xff";
+    const auto cut = decode<Hello>(bytes_of(encode(hello)));
+    ASSERT_TRUE(cut) << cut.error().text;
+    EXPECT_TRUE(cut->name.starts_with(std::string(size - 1, 'n')));
+    EXPECT_EQ(cut->name.size(), size - 1 + (size == kMaxString - 2 ? 3 : 0));
+  }
+  hello.facts = {{"transfer", std::string(kMaxFact, '\xff')}};
+  EXPECT_TRUE(decode<Hello>(bytes_of(encode(hello))));
 }
 
 TEST(Limits, OfKeysAndNumbersInBinary) {
