@@ -16,6 +16,7 @@
 #include "services/master/orders/clipping.h"
 #include "services/master/orders/errands.h"
 #include "services/master/outbox.h"
+#include "services/master/peers/namesakes.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
 #include "services/master/wall/swap_barrier.h"
@@ -89,6 +90,7 @@ class MasterCore {
     metrics::Process process;
     std::deque<std::map<std::string, double>> reports;  ///< the newest few, for rates
     double seen_s = 0;
+    uint64_t joined = 0;  ///< rises with each process that joins, in whichever life
     bool gone = false;
     bool refused = false;                   ///< a data server whose scene cannot be shown
     std::optional<CouplingOrder> coupling;  ///< a viewer's, if it was ordered one
@@ -98,10 +100,13 @@ class MasterCore {
   // Who takes part.
   Peer* known(const std::string& peer, double now_s);
   Peer* known_sampler(const std::string& peer, double now_s);
+  /// The packer that has been here for longest: others wait for it to leave.
   std::string packer() const;
+  void follow_packer();
+  void follow_another_packer(double now_s);
   bool samplers_here() const;
   bool make_room(const std::string& peer);
-  void replace_namesakes(const std::string& peer, const wire::Hello& m);
+  void replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s);
   Peer& enter(const std::string& peer, const wire::Hello& m, double now_s);
   void forget_viewer(const wire::Hello& hello);
   void lose(Peer& peer, const std::string& routing_id, const char* why, bool said_goodbye = false);
@@ -134,7 +139,7 @@ class MasterCore {
   net::RunningSession session_;
   std::string run_id_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
-  Plan* plan_;                       // of these, the one that leads
+  Plan* plan_;  // of these, the one that leads
   Clipping clipping_;
   Errands errands_;
   std::optional<scene::Kind> kind_;  // of its scene
@@ -142,6 +147,9 @@ class MasterCore {
   EpochId epoch_{1};
   std::map<std::string, Peer> peers_;                      // by routing id
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
+  Namesakes namesakes_;
+  uint64_t joined_ = 0;
+  std::string leading_packer_;  // that frames were begun with; empty: none, or it is gone
   Idle idle_;
   LiveFigures live_;
   std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them

@@ -67,8 +67,10 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   w.master_s = now_s;
   w.clock = clock_id();
   w.epoch = epoch_;
+  const std::string packs = packer();
   for (const auto& [id, p] : peers_)
-    if (!p.gone && !p.refused) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
+    if (!p.gone && !p.refused && (p.hello.role != "packer" || id == packs))
+      w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
   w.facts.erase(metrics::kRecordFact);  // of the master alone
   if (!run_id_.empty()) {
     w.facts["run_folder"] = session_.run_folder;

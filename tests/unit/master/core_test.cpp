@@ -280,6 +280,50 @@ TEST_F(Master, AReplacedProcessIsMarked) {
   EXPECT_EQ(replaced, 1);
 }
 
+TEST_F(Master, TwoLivingProcessesOfOneNameStay) {
+  join_all();
+  sent<wire::Welcome>("p");
+  core.on("p2", hello("packer", "packer", 20), 1);
+  EXPECT_EQ(status()["processes"].size(), 6u);
+  // The one that was taken for the other's old life lives: it is asked who it is, and says so.
+  core.on("p", wire::StatusReport{}, 1.5);
+  ASSERT_EQ(sent<wire::WhoAreYou>("p").size(), 1u);
+  core.on("p", hello("packer", "packer", 2), 1.6);
+  sent<wire::Welcome>("v");
+  for (double now_s = 2; now_s < 30; now_s += 1) {
+    for (const auto& [peer, instance] : {std::pair{"p", 2}, {"p2", 20}}) {
+      core.on(peer, wire::StatusReport{}, now_s);
+      if (int(now_s) % 7 == 0) core.on(peer, hello("packer", "packer", uint64_t(instance)), now_s);
+      EXPECT_TRUE(sent<wire::WhoAreYou>(peer).empty()) << peer << " at " << now_s;
+    }
+    for (const char* other : {"d", "s1", "s2", "v"}) core.on(other, wire::StatusReport{}, now_s);
+    core.tick(now_s);
+    for (const auto& w : sent<wire::Welcome>("v")) EXPECT_EQ(w.endpoints.at("state"), "spacker");
+  }
+  // The one that packs does so until it leaves.
+  done(lease_to("s1", 1, 30), "p2", 30.1);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "it was there first since the other was taken for dead";
+  core.on("p2", wire::Goodbye{{20}}, 31);
+  EXPECT_FALSE(sent<wire::Welcome>("v").empty()) << "the other one packs now";
+}
+
+// Whatever their names are.
+TEST_F(Master, ASecondPackerWaitsForTheFirstToLeave) {
+  join_all();
+  sent<wire::Welcome>("v");
+  core.on("another", hello("packer", "packer-2", 20), 1);
+  for (const auto& w : sent<wire::Welcome>("v")) EXPECT_EQ(w.endpoints.at("state"), "spacker");
+  const auto kept = lease_to("s1", 1, 1.1);
+  core.on("another", hello("packer", "packer-2", 20), 1.2);
+  done(kept, "p", 1.3);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "nothing was dropped";
+  core.undeliverable("p");
+  core.tick(1.4);
+  const auto welcomes = sent<wire::Welcome>("v");
+  ASSERT_FALSE(welcomes.empty());
+  EXPECT_EQ(welcomes.back().endpoints.at("state"), "spacker-2");
+}
+
 TEST_F(Master, StatusTellsWhoIsWhere) {
   join_all();
   wire::StatusReport report;
