@@ -152,6 +152,11 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
 
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
   if (!make_room(peer)) return;
+  if (const auto said = peers_.find(peer); said != peers_.end()) {
+    if (!said->second.hello_pace.allows(now_s)) return void(said->second.put_off = m);
+    said->second.hello_pace.count(now_s);
+    said->second.put_off.reset();
+  }
   replace_namesakes(peer, m, now_s);
   const auto before = peers_.find(peer);
   const bool changed = before == peers_.end() || before->second.hello.instance != m.instance || before->second.gone ||
@@ -162,6 +167,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   Peer& p = enter(peer, m, now_s);
   follow_packer();
   if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
+  const EpochId epoch = epoch_;
   if (m.role == "data")
     if (const Status s = adopt_scene(m, now_s); !s) {
       p.refused = true;
@@ -170,9 +176,16 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   wire::Welcome w = welcome(p, now_s);
   w.hello_sent_s = m.sent_s;
   outbox_.send(peer, w);
-  if (changed && (!m.endpoints.empty() || m.role == "data")) announce(now_s);
+  if (changed && epoch == epoch_ && (!m.endpoints.empty() || m.role == "data")) announce_soon(now_s);
   if (m.role == "sampler") join(peer);
   dispatch(now_s);
+}
+
+void MasterCore::take_put_off_hellos(double now_s) {
+  std::vector<std::pair<std::string, wire::Hello>> due;
+  for (const auto& [id, p] : peers_)
+    if (p.put_off && p.hello_pace.allows(now_s)) due.emplace_back(id, *p.put_off);
+  for (const auto& [id, hello] : due) on(id, hello, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
@@ -212,6 +225,7 @@ void MasterCore::forget_viewer(const wire::Hello& hello) {
 
 void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
   p.gone = true;
+  p.put_off.reset();
   if (routing_id == leading_packer_) leading_packer_.clear();
   live_.set_here(p.hello.role, p.hello.name, false);
   idle_.remove(routing_id);
@@ -343,9 +357,11 @@ void MasterCore::tick(double now_s) {
   now_s_ = now_s;
   for (auto& [name, wall] : walls_) wall.tick(now_s);
   send_swaps();
+  take_put_off_hellos(now_s);
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
   follow_another_packer(now_s);
+  if (announce_due_) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
   const Ticked ticked = plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);

@@ -93,6 +93,7 @@ TEST_F(Master, WelcomesEveryoneAndAnnouncesNewEndpoints) {
   EXPECT_TRUE(welcomes[0].box_room.empty());
   core.on("d", hello("data", "data", 1), 4);
   core.on("p", hello("packer", "packer", 2), 4);
+  core.tick(4.05);
   welcomes = sent<wire::Welcome>("v");
   ASSERT_EQ(welcomes.size(), 2u);
   EXPECT_EQ(welcomes[1].endpoints.size(), 4u);
@@ -392,6 +393,33 @@ TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
   for (uint64_t i = 0; i < 6000; ++i)
     core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 1000 + i), 1);
   EXPECT_LE(core.processes().size(), 4096u);
+}
+
+// Each may change what everybody is told.
+TEST_F(Master, AFloodOfHellosIsToldOnce) {
+  join_all();
+  core.tick(1);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);
+  wire::Hello m = hello("packer", "flood", 50);
+  for (int i = 0; i < 1000; ++i) {
+    m.endpoints["tiles"] = "tcp://" + std::to_string(i);
+    core.on("f", m, 1 + 0.05 * i / 1000);
+  }
+  core.tick(1.05);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) EXPECT_LE(sent<wire::Welcome>(peer).size(), 2u) << peer;
+  EXPECT_LE(sent<wire::Welcome>("f").size(), 12u) << "answers, and what all are told";
+  // The newest one counts, a little later.
+  for (double now_s = 1.06; now_s < 3; now_s += 0.02) core.tick(now_s);
+  bool there = false;
+  for (const auto& p : status()["processes"])
+    there |= p["name"] == "flood" && p["endpoints"]["tiles"] == "tcp://999";
+  EXPECT_TRUE(there);
+  // Many processes, each of which says hello once.
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);
+  for (uint64_t i = 0; i < 1000; ++i)
+    core.on("f" + std::to_string(i), hello("packer", "f" + std::to_string(i), 1000 + i), 3 + 0.05 * double(i) / 1000);
+  core.tick(3.05);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) EXPECT_LE(sent<wire::Welcome>(peer).size(), 2u) << peer;
 }
 
 TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {
