@@ -8,6 +8,7 @@
 
 #include "common/scene/clip_order.h"
 #include "common/volume/shear.h"
+#include "common/wire/limits.h"
 
 namespace telesplat::master {
 namespace {
@@ -111,7 +112,7 @@ options::Table lease_table(MasterOptions& o) {
   return {{.flag = "--tile-size",
            .value = &o.schedule.tile_size,
            .help = "pixels a side of a tile",
-           .limits = options::Range{16, 4096}},
+           .limits = options::Range{16, wire::kMaxTileSide}},
           {.flag = "--frames-in-flight",
            .value = &o.schedule.frames_in_flight,
            .help = "sampling frames begun and not complete",

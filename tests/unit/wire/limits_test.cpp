@@ -248,17 +248,19 @@ TEST(Limits, OfTiles) {
   patch.missed_rect = {316, 0, 5, 5};
   EXPECT_TRUE(refused<Patch>(encode(patch), "frame"));
   patch.camera.width = patch.camera.height = 8192;
-  patch.missed_rect = {0, 0, 8192, 2048};
+  patch.missed_rect = {0, 0, 8192, 512};
   EXPECT_TRUE(decode<Patch>(bytes_of(encode(patch))));
-  patch.missed_rect = {0, 0, 8192, 2049};
+  patch.missed_rect = {0, 0, 8192, 513};
   EXPECT_TRUE(refused<Patch>(encode(patch), "pixels"));
   Lease lease = sample_message<Lease>();
   lease.tile = kMaxTiles;
   EXPECT_TRUE(refused<Lease>(encode(lease), "tile 65536"));
   lease = sample_message<Lease>();
   lease.camera.width = lease.camera.height = geometry::kMaxImageSide;
-  lease.rect = lease.block_rect = {0, 0, 4097, 4096};
-  EXPECT_TRUE(refused<Lease>(encode(lease), "16777216"));
+  lease.rect = lease.block_rect = {0, 0, 2048, 2048};
+  EXPECT_TRUE(decode<Lease>(bytes_of(encode(lease))));
+  lease.rect = lease.block_rect = {0, 0, 2049, 2048};
+  EXPECT_TRUE(refused<Lease>(encode(lease), "4194304"));
   lease = sample_message<Lease>();
   lease.block_rect = {64, 32, 100, 49};
   EXPECT_TRUE(refused<Lease>(encode(lease), "not inside its block"));
@@ -276,7 +278,7 @@ TEST(Limits, OfMasks) {
   lease.mask.push_back(1);
   EXPECT_TRUE(refused<Lease>(encode(lease), "mask"));
   PlanRequest request = sample_message<PlanRequest>();
-  for (const auto& [size, good] : {std::pair{32, true}, {4096, true}, {31, false}, {4097, false}, {0, false}}) {
+  for (const auto& [size, good] : {std::pair{32, true}, {2048, true}, {31, false}, {2049, false}, {0, false}}) {
     request.tile_size = uint64_t(size);
     EXPECT_EQ(bool(decode<PlanRequest>(bytes_of(encode(request)))), good) << size;
   }
