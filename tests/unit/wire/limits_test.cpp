@@ -157,6 +157,29 @@ TEST(Texts, AreUtf8HoweverTheyWereGiven) {
   EXPECT_TRUE(decode<Hello>(bytes_of(encode(hello))));
 }
 
+// An element takes a byte in a message and 24 of memory, also in fields that nobody knows.
+TEST(Limits, OfElementsInAll) {
+  const auto with = [](const std::string& value) {
+    std::string body = encode(sample_message<Control>());
+    EXPECT_LT(static_cast<unsigned char>(body[0]), 0x8f);
+    ++body[0];  // one field more
+    return body + "\xa7unknown" + value;
+  };
+  const auto nils = [](size_t count) {
+    const auto byte = [&](int shift) { return char(count >> shift & 0xff); };
+    return std::string{'\xdd', byte(24), byte(16), byte(8), byte(0)} + std::string(count, '\xc0');
+  };
+  EXPECT_TRUE(decode<Control>(bytes_of(with(nils(60000)))));
+  std::string lists = "\x9f";  // 15 lists, each within the limit of one
+  for (int i = 0; i < 15; ++i) lists += nils(60000);
+  EXPECT_TRUE(refused<Control>(with(lists), "has more than 65536 elements"));
+  EXPECT_TRUE(refused<Control>(with(std::string(200000, '\x91') + "\xc0")));
+  ChunkList most{EpochId{1}, {}};
+  for (size_t i = 0; i < geometry::kMaxChunks; ++i)
+    most.chunks.push_back({ChunkId{i}, {{0, 0, 0}, {1, 1, 1}}, 10, 400});
+  EXPECT_TRUE(decode<ChunkList>(bytes_of(encode(most))));
+}
+
 TEST(Limits, OfKeysAndNumbersInBinary) {
   Forget forget = sample_message<Forget>();
   forget.clusters.assign(kMaxKeys, 7);
