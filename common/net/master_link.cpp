@@ -17,7 +17,7 @@ constexpr int kFirstClocks = 8;
 MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello)
     : hello_(std::move(hello)),
       socket_(context, Kind::kDealer, hello_.name + ":master",
-              {.max_message_bytes = wire::kMaxBulkBytes, .read_ahead = true}) {
+              {.max_message_bytes = wire::kMaxControlBytes, .read_ahead = true}) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
@@ -76,8 +76,7 @@ bool MasterLink::handle(const Message& message) {
       ++version_;
       // The hello and its answer are an exchange, too.
       if (another && session_->hello_sent_s != 0)
-        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s,
-                     session_->clock},
+        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s, session_->clock},
                     message.arrived_s);
     }
     return true;

@@ -168,5 +168,16 @@ TEST_F(Link, ArrivalsAreStampedWhileNobodyReads) {
   EXPECT_LT(message->arrived_s, after_s - 0.1);
 }
 
+// Whatever the master is: a message of the control plane has at most 1 MiB.
+TEST_F(Link, AControlMessageBeyondItsLimitIsDropped) {
+  FakeMaster master("tcp://127.0.0.1:*", InstanceId{7});
+  MasterLink link = make_link(master.endpoint);
+  ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
+  const int version = link.version();
+  master.socket.send_frames(master.peer, "of any type", std::string(wire::kMaxControlBytes + 1, 'x'));
+  ASSERT_TRUE(talk(link, &master, [&] { return link.socket().rejected() > 0; })) << "nobody was given it";
+  EXPECT_EQ(link.version(), version);
+}
+
 }  // namespace
 }  // namespace telesplat::net
