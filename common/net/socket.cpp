@@ -63,6 +63,19 @@ bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
   }
 }
 
+// A call of ZeroMQ that a signal may interrupt, until it is done: given up between two parts of a message it would tear
+// the message. It does not wait.
+template <class Call>
+auto undisturbed(const Call& call) {
+  for (;;) {
+    try {
+      return call();
+    } catch (const zmq::error_t& e) {
+      if (e.num() != EINTR) throw;
+    }
+  }
+}
+
 }  // namespace
 
 struct Context::Impl {
@@ -110,8 +123,8 @@ struct Socket::Impl {
   void drain_monitor() {
     if (!monitor) return;
     zmq::message_t event, address;
-    while (monitor->recv(event, zmq::recv_flags::dontwait)) {
-      if (event.more() && monitor->recv(address)) {
+    while (undisturbed([&] { return monitor->recv(event, zmq::recv_flags::dontwait); })) {
+      if (event.more() && undisturbed([&] { return monitor->recv(address); })) {
       }
       if (event.size() < 6) continue;
       uint16_t what = 0;
@@ -160,7 +173,7 @@ struct Socket::Impl {
     drain_monitor();
     for (int n = 0; n < 1000; ++n) {
       try {
-        if (!socket.recv(message, zmq::recv_flags::dontwait)) return judge_closed();
+        if (!undisturbed([&] { return socket.recv(message, zmq::recv_flags::dontwait); })) return judge_closed();
       } catch (const zmq::error_t&) {
         return;
       }
@@ -185,14 +198,16 @@ struct Socket::Impl {
     if (kind == Kind::kPub) drain_subscriptions();
     try {
       using zmq::send_flags;
-      if (kind == Kind::kRouter && !socket.send(zmq::buffer(peer), send_flags::sndmore | send_flags::dontwait))
-        return false;
-      if (!socket.send(zmq::buffer(type), send_flags::sndmore | send_flags::dontwait)) return false;
+      const auto part = [&](std::string_view bytes) {
+        return undisturbed([&] { return socket.send(zmq::buffer(bytes), send_flags::sndmore | send_flags::dontwait); });
+      };
+      if (kind == Kind::kRouter && !part(peer)) return false;
+      if (!part(type)) return false;
       // ZeroMQ takes the body over without copying it.
       auto* owned = new std::string(std::move(body));
       zmq::message_t frame(
           owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
-      return socket.send(frame, send_flags::dontwait).has_value();
+      return undisturbed([&] { return socket.send(frame, send_flags::dontwait); }).has_value();
     } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
       return false;
     }
@@ -210,14 +225,13 @@ struct Socket::Impl {
       try {
         do {
           zmq::message_t frame;
-          if (!socket.recv(frame, zmq::recv_flags::dontwait)) {
+          if (!undisturbed([&] { return socket.recv(frame, zmq::recv_flags::dontwait); })) {
             judge_closed();
             return std::nullopt;
           }
           if (frames.size() < 4) frames.push_back(std::move(frame));
         } while (socket.get(zmq::sockopt::rcvmore));
       } catch (const zmq::error_t& e) {
-        if (e.num() == EINTR) continue;
         log::error("{}: {}", name, e.what());
         return std::nullopt;
       }

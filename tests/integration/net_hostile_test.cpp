@@ -1,7 +1,10 @@
 // Sockets and peers that misbehave: everything bad is dropped and counted, everyone else is served.
 #include <gtest/gtest.h>
 
+#include <pthread.h>
+
 #include <atomic>
+#include <csignal>
 #include <random>
 #include <thread>
 
@@ -249,6 +252,45 @@ TEST(HostilePeers, BytesThatTrickleInMakeAMessage) {
   ASSERT_TRUE(receive_until(
       bound.socket, [&] { return !got.empty(); }, &got));
   EXPECT_TRUE(bound.socket.decode<wire::Goodbye>(got[0]));
+  EXPECT_EQ(bound.socket.rejected(), 0u);
+}
+
+// A signal may come between two parts of a message, on either side.
+TEST(HostilePeers, SignalsDoNotTearMessages) {
+  struct sigaction quiet = {}, before = {};
+  quiet.sa_handler = [](int) {};  // without SA_RESTART: calls are interrupted
+  sigaction(SIGUSR1, &quiet, &before);
+  constexpr int kMessages = 100000;
+  Bound bound(Kind::kRouter, {.high_water_mark = 1000});
+  std::atomic<bool> stop{false};
+  const pthread_t receiver = pthread_self();
+  std::thread sender([&] {
+    Context context;
+    Socket socket(context, Kind::kDealer, "sender", {.high_water_mark = 1000});
+    EXPECT_TRUE(socket.connect(bound.endpoint).ok());
+    for (int i = 0; i < kMessages && !stop;)
+      if (socket.send(kGoodbye))
+        ++i;
+      else
+        std::this_thread::yield();
+    while (!stop) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
+  std::thread signaller([&, sends = sender.native_handle()] {
+    while (!stop) {
+      pthread_kill(receiver, SIGUSR1);
+      pthread_kill(sends, SIGUSR1);
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+  });
+  int got = 0;
+  for (const double until = monotonic_s() + 60; got < kMessages && monotonic_s() < until;
+       wait_readable({&bound.socket}, 5))
+    while (const auto m = bound.socket.receive()) got += m->type == wire::Goodbye::kName;
+  stop = true;
+  signaller.join();
+  sender.join();
+  sigaction(SIGUSR1, &before, nullptr);
+  EXPECT_EQ(got, kMessages);
   EXPECT_EQ(bound.socket.rejected(), 0u);
 }
 
