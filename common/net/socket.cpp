@@ -105,6 +105,12 @@ struct Socket::Impl {
     if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);
   }
 
+  // ZeroMQ's thread must find someone who takes its events until it stops to make them.
+  ~Impl() {
+    ahead.reset();
+    if (monitor) zmq_socket_monitor(socket.handle(), nullptr, 0);
+  }
+
   // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too
   // much are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed
   // handshake is certain to be told.
@@ -116,7 +122,7 @@ struct Socket::Impl {
     if (zmq_socket_monitor(socket.handle(), address.c_str(), events) != 0) return;
     monitor.emplace(context, zmq::socket_type::pair);
     monitor->set(zmq::sockopt::linger, 0);
-    monitor->set(zmq::sockopt::rcvhwm, 10000);
+    monitor->set(zmq::sockopt::rcvhwm, 0);  // a queue that is full would stop ZeroMQ's thread
     monitor->connect(address);
   }
 

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <mutex>
 #include <random>
 #include <thread>
 
@@ -292,6 +293,50 @@ TEST(HostilePeers, SignalsDoNotTearMessages) {
   sigaction(SIGUSR1, &before, nullptr);
   EXPECT_EQ(got, kMessages);
   EXPECT_EQ(bound.socket.rejected(), 0u);
+}
+
+// ZeroMQ's thread tells of connections; it must not wait for a socket that is about to end, or that nobody reads.
+TEST(HostilePeers, SocketsEndWhilePeersComeAndGo) {
+  std::atomic<bool> stop{false};
+  std::mutex mutex;
+  std::string endpoint;
+  std::vector<std::thread> peers;
+  for (int i = 0; i < 4; ++i)
+    peers.emplace_back([&] {
+      while (!stop) {
+        std::string to;
+        {
+          const std::lock_guard lock(mutex);
+          to = endpoint;
+        }
+        if (!to.empty()) RawPeer(to).send("x");
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    });
+  std::atomic<int> ended{0};
+  std::thread sockets([&] {
+    for (; ended < 200 && !stop; ++ended) {
+      Bound bound(Kind::kRouter);
+      const std::lock_guard lock(mutex);
+      endpoint = bound.endpoint;
+    }
+  });
+  for (const double until = monotonic_s() + 60; ended < 200 && monotonic_s() < until;)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_EQ(ended, 200) << "one did not end";
+  stop = true;
+  sockets.join();
+  for (auto& peer : peers) peer.join();
+}
+
+TEST(HostilePeers, ASocketThatNobodyReadsTakesConnections) {
+  Bound bound(Kind::kRouter);
+  for (int i = 0; i < 6000; ++i) RawPeer(bound.endpoint).send("x");
+  Context context;
+  Socket friendly(context, Kind::kDealer, "friend");
+  ASSERT_TRUE(friendly.connect(bound.endpoint).ok());
+  ASSERT_TRUE(friendly.send(kGoodbye));
+  EXPECT_TRUE(wait_readable({&bound.socket}, 10000));
 }
 
 }  // namespace
