@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -37,7 +38,7 @@ class ReadAhead {
   /// Gives the socket what is left to send, as far as it takes it at once; ends the thread.
   ~ReadAhead();
 
-  /// The next message, without waiting.
+  /// The next message, without waiting. Throws what ended the thread, if something did.
   std::optional<Message> receive();
   /// False: dropped, because too many wait already.
   bool send(Outgoing message);
@@ -45,6 +46,7 @@ class ReadAhead {
   int descriptor() const { return there_; }
 
  private:
+  void run();
   void loop();
   bool send_waiting();
   bool full() const;
@@ -57,6 +59,7 @@ class ReadAhead {
   std::deque<Outgoing> unsent_;
   size_t bytes_ = 0;  // of received_
   bool stalled_ = false, stop_ = false;
+  std::exception_ptr failed_;
   std::thread thread_;
 };
 

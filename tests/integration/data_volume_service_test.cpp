@@ -261,5 +261,56 @@ TEST(DataServer, AFloodOfChunkRequestsQueuesFew) {
   server.join();
 }
 
+// A store whose memory has run out.
+class NoMemory final : public VolumeStore {
+ public:
+  explicit NoMemory(std::shared_ptr<VolumeStore> store) : store_(std::move(store)) {}
+  const volume::Session& session() const override { return store_->session(); }
+  const volume::Histogram& histogram() const override { return store_->histogram(); }
+  std::string format() const override { return store_->format(); }
+  const scene::Placement& placement() const override { return store_->placement(); }
+  uint64_t content_hash() const override { return store_->content_hash(); }
+  Result<volume::Voxels> voxels(int, int, int, const volume::LevelSet&, const volume::LevelSet&) override {
+    throw std::bad_alloc();
+  }
+  Result<std::optional<double>> value_at(int, const glm::dvec3&) override { throw std::bad_alloc(); }
+  Result<std::vector<uint32_t>> slice_weights(int, const volume::LevelSet&) override { throw std::bad_alloc(); }
+
+ private:
+  std::shared_ptr<VolumeStore> store_;
+};
+
+// main() says it in one line and ends with code 1; so it must come out of the serve loop.
+TEST(DataServer, AnAnswerThatThrowsEndsTheServerInOrder) {
+  DataServiceOptions options;
+  options.service.name = "data-1", options.service.master = "inproc://master";
+  options.service.bind = "inproc://voxels";
+  const auto served = serve_volume(std::make_shared<NoMemory>(open_or_fail(noise(3, {40, 30, 100}))), "noise.raw");
+  net::Context context;
+  net::Socket master(context, net::Kind::kRouter, "master");
+  ASSERT_TRUE(master.bind("inproc://master"));
+  std::atomic<bool> ended = false, threw = false;
+  const double until_s = monotonic_s() + kDeadline_s;
+  std::thread server([&] {
+    try {
+      serve(context, *served, options.service, [&] { return monotonic_s() > until_s; });
+    } catch (const std::bad_alloc&) {
+      threw = true;
+    }
+    ended = true;
+  });
+  const auto hello = next<wire::Hello>(master);
+  if (hello) {
+    wire::Welcome w;
+    w.master = InstanceId{5}, w.epoch = EpochId{1};
+    w.facts = hello->first.facts, w.parameters = hello->first.parameters;
+    master.send(w, hello->second.peer);
+  }
+  while (!ended) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  server.join();
+  EXPECT_TRUE(hello);
+  EXPECT_TRUE(threw);
+}
+
 }  // namespace
 }  // namespace telesplat::data
