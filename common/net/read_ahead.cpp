@@ -79,6 +79,7 @@ void ReadAhead::run() {
 
 void ReadAhead::loop() {
   for (bool stop = false; !stop;) {
+    if (auto due = ends_.due ? ends_.due() : std::nullopt) send(std::move(*due));
     const bool sent = send_waiting();
     bool stalled = false;
     for (;;) {

@@ -24,6 +24,8 @@ class ReadAhead {
     std::function<std::optional<Message>()> receive;           ///< without waiting
     std::function<bool(Outgoing&)> send;                       ///< without waiting; false: not now, nothing changed
     std::function<void(int descriptor, int timeout_ms)> wait;  ///< for a message, or until `descriptor` is readable
+    /// What is to be said by time alone, however busy the owner is; asked at least every 100 ms. May be empty.
+    std::function<std::optional<Outgoing>()> due = {};
   };
   /// Messages that were not taken yet, at most, and the bytes of their bodies: then nothing more is read, and whoever
   /// sends has to wait. Messages that could not be sent yet: then send() refuses.

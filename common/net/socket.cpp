@@ -278,7 +278,12 @@ struct Socket::Impl {
         .wait =
             [this](int descriptor, int timeout_ms) {
               poll({{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, descriptor, ZMQ_POLLIN, 0}}, timeout_ms);
-            }};
+            },
+        .due = [this]() -> std::optional<ReadAhead::Outgoing> {
+          auto message = due ? due() : std::nullopt;
+          if (!message) return std::nullopt;
+          return ReadAhead::Outgoing{std::move(message->first), std::move(message->second)};
+        }};
     ahead = std::make_unique<ReadAhead>(ends, ReadAhead::Limits{.unsent = size_t(options.high_water_mark)});
     return true;
   }
@@ -301,6 +306,7 @@ struct Socket::Impl {
   };
   std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
   std::vector<Connection> closed;                   // not judged yet
+  Due due;                                          // what the thread that reads says by itself
   std::atomic<uint64_t> rejected{0}, failed_connections{0};
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
@@ -341,6 +347,11 @@ Status Socket::connect(const std::string& endpoint) {
 bool Socket::send_frames(std::string_view peer, std::string_view type, std::string body) {
   if (impl_->reads_ahead()) return impl_->ahead->send({std::string(type), std::move(body)});
   return impl_->send(peer, type, body);
+}
+
+void Socket::set_due(Due due) {
+  CHECK(impl_->options.read_ahead && !impl_->ahead);
+  impl_->due = std::move(due);
 }
 
 std::optional<Message> Socket::receive() { return impl_->reads_ahead() ? impl_->ahead->receive() : impl_->receive(); }

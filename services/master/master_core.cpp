@@ -190,7 +190,7 @@ void MasterCore::take_put_off_hellos(double now_s) {
 
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
   Peer* p = known(peer, now_s);
-  if (!p) return;
+  if (!p || m.values.empty()) return;  // without values it is a sign of life, of a process that works
   p->process.values = m.values;
   p->reports.push_back(m.values);
   if (p->reports.size() > kReports) p->reports.pop_front();

@@ -236,6 +236,21 @@ TEST_F(Master, ASilentSamplerIsTakenForDead) {
   for (const auto& p : now["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << p["name"];
 }
 
+TEST_F(Master, AnEmptyStatusIsASignOfLife) {
+  join_all();
+  wire::StatusReport report;
+  report.values = {{"tiles_sampled", 7}};
+  core.on("s1", report, 1);
+  for (double now_s = 2; now_s <= 30; now_s += 1.5) {
+    core.on("s1", wire::StatusReport{{3}, {}}, now_s);
+    core.tick(now_s);
+  }
+  for (const auto& p : status()["processes"]) {
+    EXPECT_EQ(p["alive"], p["name"] == "sampler-1") << p["name"];
+    if (p["name"] == "sampler-1") EXPECT_EQ(p["values"]["tiles_sampled"], 7) << "as it said before";
+  }
+}
+
 TEST_F(Master, ANewPackerStartsWithNewFrames) {
   join_all();
   const auto old = lease_to("s1");
@@ -411,8 +426,7 @@ TEST_F(Master, AFloodOfHellosIsToldOnce) {
   // The newest one counts, a little later.
   for (double now_s = 1.06; now_s < 3; now_s += 0.02) core.tick(now_s);
   bool there = false;
-  for (const auto& p : status()["processes"])
-    there |= p["name"] == "flood" && p["endpoints"]["tiles"] == "tcp://999";
+  for (const auto& p : status()["processes"]) there |= p["name"] == "flood" && p["endpoints"]["tiles"] == "tcp://999";
   EXPECT_TRUE(there);
   // Many processes, each of which says hello once.
   for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);

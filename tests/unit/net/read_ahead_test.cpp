@@ -137,5 +137,17 @@ TEST(ReadAhead, WhatEndsItsThreadIsTheOwners) {
   EXPECT_THROW(ahead.receive(), std::bad_alloc) << "and so it stays";
 }
 
+TEST(ReadAhead, SaysWhatIsDueWhileItsOwnerIsAway) {
+  FakeSocket socket;
+  ReadAhead::Ends ends = socket.ends();
+  std::atomic<int> asked{0};
+  ends.due = [&]() -> std::optional<ReadAhead::Outgoing> {
+    if (++asked % 3 != 0) return std::nullopt;
+    return ReadAhead::Outgoing{"due", {}};
+  };
+  const ReadAhead ahead(ends, {});
+  EXPECT_TRUE(eventually([&] { return socket.sent() >= 3; }));
+}
+
 }  // namespace
 }  // namespace telesplat::net
