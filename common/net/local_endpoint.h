@@ -5,10 +5,7 @@
 
 namespace telesplat::net {
 
-inline bool is_local(std::string_view endpoint) {
-  for (const char* prefix : {"ipc://", "inproc://", "tcp://127.", "tcp://localhost:", "tcp://[::1]:"})
-    if (endpoint.starts_with(prefix)) return true;
-  return false;
-}
+/// ipc, inproc, and tcp on a loopback address or localhost. Names that only begin like one are none.
+bool is_local(std::string_view endpoint);
 
 }  // namespace telesplat::net

@@ -1,9 +1,11 @@
 // The client side of the master, the same for data, sampler, packer, viewer and ctl: hello until welcomed, a status
-// report a second, hello again when the master asks, what the master's clock says, shutdown.
+// report a second, hello again when the master asks, what the master's clock says, shutdown. While its owner works and
+// does not tick, the thread that reads the socket says that the process lives.
 #pragma once
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -15,6 +17,8 @@ namespace telesplat::net {
 class MasterLink {
  public:
   using Values = std::map<std::string, double>;
+  /// An owner that does not tick for longer hangs: it is not said to live any more.
+  static constexpr double kLongestWork_s = 60;
 
   /// Connects to the master at `endpoint`; instance, pid and process_facts() are filled in. Nothing is sent before the
   /// first tick().
@@ -58,8 +62,11 @@ class MasterLink {
   void report(const std::function<Values()>& status, double now_s);
   void ask_clock(double now_s);
   void learn_clock(const wire::ClockReply& reply, double arrived_s);
+  void follow_welcomed(bool welcomed);
 
+  struct Life;
   wire::Hello hello_;
+  std::shared_ptr<Life> life_;  // shared with the socket's thread
   Socket socket_;
   std::optional<wire::Welcome> session_;
   int version_ = 0;

@@ -63,6 +63,19 @@ bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
   }
 }
 
+// A call of ZeroMQ that a signal may interrupt, until it is done: given up between two parts of a message it would tear
+// the message. It does not wait.
+template <class Call>
+auto undisturbed(const Call& call) {
+  for (;;) {
+    try {
+      return call();
+    } catch (const zmq::error_t& e) {
+      if (e.num() != EINTR) throw;
+    }
+  }
+}
+
 }  // namespace
 
 struct Context::Impl {
@@ -92,6 +105,12 @@ struct Socket::Impl {
     if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);
   }
 
+  // ZeroMQ's thread must find someone who takes its events until it stops to make them.
+  ~Impl() {
+    ahead.reset();
+    if (monitor) zmq_socket_monitor(socket.handle(), nullptr, 0);
+  }
+
   // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too
   // much are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed
   // handshake is certain to be told.
@@ -103,15 +122,15 @@ struct Socket::Impl {
     if (zmq_socket_monitor(socket.handle(), address.c_str(), events) != 0) return;
     monitor.emplace(context, zmq::socket_type::pair);
     monitor->set(zmq::sockopt::linger, 0);
-    monitor->set(zmq::sockopt::rcvhwm, 10000);
+    monitor->set(zmq::sockopt::rcvhwm, 0);  // a queue that is full would stop ZeroMQ's thread
     monitor->connect(address);
   }
 
   void drain_monitor() {
     if (!monitor) return;
     zmq::message_t event, address;
-    while (monitor->recv(event, zmq::recv_flags::dontwait)) {
-      if (event.more() && monitor->recv(address)) {
+    while (undisturbed([&] { return monitor->recv(event, zmq::recv_flags::dontwait); })) {
+      if (event.more() && undisturbed([&] { return monitor->recv(address); })) {
       }
       if (event.size() < 6) continue;
       uint16_t what = 0;
@@ -160,7 +179,7 @@ struct Socket::Impl {
     drain_monitor();
     for (int n = 0; n < 1000; ++n) {
       try {
-        if (!socket.recv(message, zmq::recv_flags::dontwait)) return judge_closed();
+        if (!undisturbed([&] { return socket.recv(message, zmq::recv_flags::dontwait); })) return judge_closed();
       } catch (const zmq::error_t&) {
         return;
       }
@@ -185,14 +204,16 @@ struct Socket::Impl {
     if (kind == Kind::kPub) drain_subscriptions();
     try {
       using zmq::send_flags;
-      if (kind == Kind::kRouter && !socket.send(zmq::buffer(peer), send_flags::sndmore | send_flags::dontwait))
-        return false;
-      if (!socket.send(zmq::buffer(type), send_flags::sndmore | send_flags::dontwait)) return false;
+      const auto part = [&](std::string_view bytes) {
+        return undisturbed([&] { return socket.send(zmq::buffer(bytes), send_flags::sndmore | send_flags::dontwait); });
+      };
+      if (kind == Kind::kRouter && !part(peer)) return false;
+      if (!part(type)) return false;
       // ZeroMQ takes the body over without copying it.
       auto* owned = new std::string(std::move(body));
       zmq::message_t frame(
           owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
-      return socket.send(frame, send_flags::dontwait).has_value();
+      return undisturbed([&] { return socket.send(frame, send_flags::dontwait); }).has_value();
     } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
       return false;
     }
@@ -210,14 +231,13 @@ struct Socket::Impl {
       try {
         do {
           zmq::message_t frame;
-          if (!socket.recv(frame, zmq::recv_flags::dontwait)) {
+          if (!undisturbed([&] { return socket.recv(frame, zmq::recv_flags::dontwait); })) {
             judge_closed();
             return std::nullopt;
           }
           if (frames.size() < 4) frames.push_back(std::move(frame));
         } while (socket.get(zmq::sockopt::rcvmore));
       } catch (const zmq::error_t& e) {
-        if (e.num() == EINTR) continue;
         log::error("{}: {}", name, e.what());
         return std::nullopt;
       }
@@ -258,7 +278,12 @@ struct Socket::Impl {
         .wait =
             [this](int descriptor, int timeout_ms) {
               poll({{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, descriptor, ZMQ_POLLIN, 0}}, timeout_ms);
-            }};
+            },
+        .due = [this]() -> std::optional<ReadAhead::Outgoing> {
+          auto message = due ? due() : std::nullopt;
+          if (!message) return std::nullopt;
+          return ReadAhead::Outgoing{std::move(message->first), std::move(message->second)};
+        }};
     ahead = std::make_unique<ReadAhead>(ends, ReadAhead::Limits{.unsent = size_t(options.high_water_mark)});
     return true;
   }
@@ -281,6 +306,7 @@ struct Socket::Impl {
   };
   std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
   std::vector<Connection> closed;                   // not judged yet
+  Due due;                                          // what the thread that reads says by itself
   std::atomic<uint64_t> rejected{0}, failed_connections{0};
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
@@ -321,6 +347,11 @@ Status Socket::connect(const std::string& endpoint) {
 bool Socket::send_frames(std::string_view peer, std::string_view type, std::string body) {
   if (impl_->reads_ahead()) return impl_->ahead->send({std::string(type), std::move(body)});
   return impl_->send(peer, type, body);
+}
+
+void Socket::set_due(Due due) {
+  CHECK(impl_->options.read_ahead && !impl_->ahead);
+  impl_->due = std::move(due);
 }
 
 std::optional<Message> Socket::receive() { return impl_->reads_ahead() ? impl_->ahead->receive() : impl_->receive(); }

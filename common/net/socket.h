@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/core/log.h"
@@ -75,6 +76,11 @@ class Socket {
   }
   /// Sends an already encoded message, shared by several receivers.
   bool send_frames(std::string_view peer, std::string_view type, std::string body);
+
+  /// With read_ahead: what the thread that reads is to say by itself, a message's type and body. It is asked at least
+  /// every 100 ms, however busy the owner is. To be set before anything is sent or received.
+  using Due = std::function<std::optional<std::pair<std::string, std::string>>()>;
+  void set_due(Due due);
 
   /// Next message, without waiting (PUB: never one, but viewers' subscriptions are looked at). Messages that are not
   /// [peer,] type, body within the limits are dropped and counted.

@@ -178,6 +178,7 @@ struct ChunkListRequest {
 struct ChunkList {
   static constexpr std::string_view kName = "chunk_list";
   static constexpr bool kBulk = true;
+  static constexpr size_t kElements = 10 * geometry::kMaxChunks;
   EpochId epoch;
   std::vector<geometry::ChunkInfo> chunks;  ///< at most kMaxChunks
   template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); f("chunks", m.chunks); }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "common/core/log.h"
 #include "common/scene/session.h"
@@ -72,9 +73,27 @@ MasterCore::Peer* MasterCore::known_sampler(const std::string& peer, double now_
 }
 
 std::string MasterCore::packer() const {
-  const auto packer = std::find_if(peers_.begin(), peers_.end(),
-                                   [](const auto& p) { return !p.second.gone && p.second.hello.role == "packer"; });
-  return packer == peers_.end() ? std::string() : packer->first;
+  auto longest = peers_.end();
+  for (auto p = peers_.begin(); p != peers_.end(); ++p)
+    if (!p->second.gone && p->second.hello.role == "packer" &&
+        (longest == peers_.end() || p->second.joined < longest->second.joined))
+      longest = p;
+  return longest == peers_.end() ? std::string() : longest->first;
+}
+
+// Another packer has nothing of what the one before it had.
+void MasterCore::follow_packer() {
+  const std::string now = packer();
+  if (now.empty() || now == leading_packer_) return;
+  leading_packer_ = now;
+  plan_->new_packer();
+}
+
+// One that waited takes the place of one that is gone: everyone is told where.
+void MasterCore::follow_another_packer(double now_s) {
+  const bool gone = leading_packer_.empty();
+  follow_packer();
+  if (gone && !leading_packer_.empty()) announce(now_s);
 }
 
 bool MasterCore::samplers_here() const {
@@ -92,15 +111,28 @@ bool MasterCore::make_room(const std::string& peer) {
   return true;
 }
 
-// A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet.
-void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m) {
-  for (auto& [id, p] : peers_)
-    if (id != peer && p.hello.role == m.role &&
-        (p.hello.instance == m.instance ||
-         (m.role != "ctl" && p.hello.name == m.name && !hold_different_parts(p.hello, m)))) {
-      if (!p.gone) lose(p, id, "was replaced");
-      p.process.replaced = true;
+// A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet. Two that
+// both live stay: they would replace each other for ever.
+void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s) {
+  const auto before = peers_.find(peer);
+  const bool here = before != peers_.end() && !before->second.gone && before->second.hello.instance == m.instance;
+  const bool lives_on = namesakes_.lives_on(m.instance, now_s);
+  bool told = false;
+  for (auto& [id, p] : peers_) {
+    if (id == peer || p.hello.role != m.role) continue;
+    const bool moved = p.hello.instance == m.instance;  // to another connection
+    if (!moved && (m.role == "ctl" || p.hello.name != m.name || hold_different_parts(p.hello, m))) continue;
+    if (!moved && !p.gone && (here || lives_on)) {
+      if (!here && !std::exchange(told, true))
+        log::warn("two processes of the role {} are called {}: give one another --name", m.role, m.name);
+      continue;
     }
+    if (!p.gone) {
+      lose(p, id, "was replaced");
+      if (!moved) namesakes_.replaced(p.hello.instance, now_s);
+    }
+    p.process.replaced = true;
+  }
 }
 
 MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& m, double now_s) {
@@ -109,6 +141,8 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
     forget_viewer(p.hello);
     p.coupling.reset();
   }
+  if (p.hello.instance != m.instance || p.hello.role != m.role || p.gone)
+    p.joined = ++joined_, p.process.replaced = false;
   live_.set_here(p.hello.role, p.hello.name, false);  // if it has another name now
   instances_.erase(p.hello.instance);
   instances_[m.instance] = peer;
@@ -128,15 +162,22 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
 
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
   if (!make_room(peer)) return;
-  replace_namesakes(peer, m);
+  if (const auto said = peers_.find(peer); said != peers_.end()) {
+    if (!said->second.hello_pace.allows(now_s)) return void(said->second.put_off = m);
+    said->second.hello_pace.count(now_s);
+    said->second.put_off.reset();
+  }
+  replace_namesakes(peer, m, now_s);
   const auto before = peers_.find(peer);
   const bool changed = before == peers_.end() || before->second.hello.instance != m.instance || before->second.gone ||
                        before->second.hello.endpoints != m.endpoints;
-  if (changed && m.role == "packer") plan_->new_packer();
+  if (changed && peer == leading_packer_) leading_packer_.clear();
   if (changed && m.role == "sampler")
     for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new one holds nothing yet
   Peer& p = enter(peer, m, now_s);
+  follow_packer();
   if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
+  const EpochId epoch = epoch_;
   if (m.role == "data")
     if (const Status s = adopt_scene(m, now_s); !s) {
       p.refused = true;
@@ -145,14 +186,21 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   wire::Welcome w = welcome(p, now_s);
   w.hello_sent_s = m.sent_s;
   outbox_.send(peer, w);
-  if (changed && (!m.endpoints.empty() || m.role == "data")) announce(now_s);
+  if (changed && epoch == epoch_ && (!m.endpoints.empty() || m.role == "data")) announce_soon(now_s);
   if (m.role == "sampler") join(peer);
   dispatch(now_s);
 }
 
+void MasterCore::take_put_off_hellos(double now_s) {
+  std::vector<std::pair<std::string, wire::Hello>> due;
+  for (const auto& [id, p] : peers_)
+    if (p.put_off && p.hello_pace.allows(now_s)) due.emplace_back(id, *p.put_off);
+  for (const auto& [id, hello] : due) on(id, hello, now_s);
+}
+
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
   Peer* p = known(peer, now_s);
-  if (!p) return;
+  if (!p || m.values.empty()) return;  // without values it is a sign of life, of a process that works
   p->process.values = m.values;
   p->reports.push_back(m.values);
   if (p->reports.size() > kReports) p->reports.pop_front();
@@ -166,6 +214,7 @@ void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_
   if (it == peers_.end() || it->second.gone) return;
   const std::string id = it->first;  // not the other connection's
   lose(it->second, id, "left", true);
+  follow_another_packer(now_s);
   dispatch(now_s);
 }
 
@@ -186,6 +235,8 @@ void MasterCore::forget_viewer(const wire::Hello& hello) {
 
 void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
   p.gone = true;
+  p.put_off.reset();
+  if (routing_id == leading_packer_) leading_packer_.clear();
   live_.set_here(p.hello.role, p.hello.name, false);
   idle_.remove(routing_id);
   int leases = 0;
@@ -331,8 +382,11 @@ void MasterCore::tick(double now_s) {
   now_s_ = now_s;
   for (auto& [name, wall] : walls_) wall.tick(now_s);
   send_swaps();
+  take_put_off_hellos(now_s);
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
+  follow_another_packer(now_s);
+  if (announce_due_) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
   const Ticked ticked = plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);

@@ -18,6 +18,8 @@
 #include "services/master/orders/clipping.h"
 #include "services/master/orders/errands.h"
 #include "services/master/outbox.h"
+#include "services/master/peers/hello_pace.h"
+#include "services/master/peers/namesakes.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
 #include "services/master/wall/swap_barrier.h"
@@ -61,6 +63,7 @@ class MasterCore {
   void shut_down(const std::string& reason);
 
   std::vector<Outgoing> take_outgoing() { return outbox_.take(); }
+  size_t outgoing() const { return outbox_.size(); }
   InstanceId instance() const { return instance_; }
   bool stop_requested() const { return stop_; }
   /// True once everyone who was told to finish has said goodbye.
@@ -92,19 +95,26 @@ class MasterCore {
     metrics::Process process;
     std::deque<std::map<std::string, double>> reports;  ///< the newest few, for rates
     double seen_s = 0;
+    uint64_t joined = 0;  ///< rises with each process that joins, in whichever life
     bool gone = false;
     bool refused = false;                   ///< a data server whose scene cannot be shown
     std::optional<CouplingOrder> coupling;  ///< a viewer's, if it was ordered one
     int leases_at_once = 0;                 ///< a sampler's: Idle::Sampler::at_once
-    double probed_s = -1e9;                 ///< when it was last asked whether it still is there
+    HelloPace hello_pace;
+    std::optional<wire::Hello> put_off;  ///< its newest hello, if it says more than the pace allows
+    double probed_s = -1e9;              ///< when it was last asked whether it still is there
   };
   // Who takes part.
   Peer* known(const std::string& peer, double now_s);
   Peer* known_sampler(const std::string& peer, double now_s);
+  /// The packer that has been here for longest: others wait for it to leave.
   std::string packer() const;
+  void follow_packer();
+  void follow_another_packer(double now_s);
   bool samplers_here() const;
   bool make_room(const std::string& peer);
-  void replace_namesakes(const std::string& peer, const wire::Hello& m);
+  void replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s);
+  void take_put_off_hellos(double now_s);
   Peer& enter(const std::string& peer, const wire::Hello& m, double now_s);
   void forget_viewer(const wire::Hello& hello);
   void lose(Peer& peer, const std::string& routing_id, const char* why, bool said_goodbye = false);
@@ -115,6 +125,7 @@ class MasterCore {
   wire::Welcome scene_as_told() const;
   wire::Welcome welcome(const Peer& to, double now_s) const;
   void announce(double now_s);
+  void announce_soon(double now_s);
   void next_epoch(double now_s);
   void record_epoch(double now_s);
   Result<std::string> obey(const wire::Control& m, double now_s);
@@ -146,13 +157,18 @@ class MasterCore {
   EpochId epoch_{1};
   std::map<std::string, Peer> peers_;                      // by routing id
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
+  Namesakes namesakes_;
+  uint64_t joined_ = 0;
+  std::string leading_packer_;  // that frames were begun with; empty: none, or it is gone
   Idle idle_;
   LiveFigures live_;
   std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them
   SwapBarrier::Figures swaps_;                // of walls that are gone
   uint64_t leases_expired_ = 0;
   log::RateLimiter refusals_;  // of lines about them
-  double now_s_ = 0;           // of what came last
+  double announced_s_ = -1e9;  // when everyone was told of the session
+  bool announce_due_ = false;
+  double now_s_ = 0;  // of what came last
   bool stop_ = false;
 };
 

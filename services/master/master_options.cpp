@@ -8,6 +8,7 @@
 
 #include "common/scene/clip_order.h"
 #include "common/volume/shear.h"
+#include "common/wire/limits.h"
 
 namespace telesplat::master {
 namespace {
@@ -111,7 +112,7 @@ options::Table lease_table(MasterOptions& o) {
   return {{.flag = "--tile-size",
            .value = &o.schedule.tile_size,
            .help = "pixels a side of a tile",
-           .limits = options::Range{16, 4096}},
+           .limits = options::Range{16, wire::kMaxTileSide}},
           {.flag = "--frames-in-flight",
            .value = &o.schedule.frames_in_flight,
            .help = "sampling frames begun and not complete",
@@ -124,6 +125,10 @@ options::Table lease_table(MasterOptions& o) {
            .value = &o.schedule.longest_fetch_s,
            .help = "seconds that a sampler may have a lease that it asks to be extended, while it fetches data",
            .limits = options::Range{1, 3600}},
+          {.flag = "--silent-after",
+           .value = &o.silent_after_s,
+           .help = "seconds after which a process that says nothing is taken for dead",
+           .limits = options::Range{2.0, 600.0}},
           {.flag = "--max-rate",
            .value = &o.schedule.max_rate_mbit,
            .help = "Mbit/s to each viewer at most, as near as updates can be measured out; 0: what its link carries",

@@ -28,7 +28,8 @@ namespace {
 
 // How long others may take to say goodbye; less where someone waits for the master itself to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
-constexpr int kMessagesAtOnce = 1000;  // between two ticks
+constexpr int kMessagesAtOnce = 1000;   // between two ticks
+constexpr size_t kMostOutgoing = 2000;  // messages that wait to be sent before more are read
 constexpr double kMetricsPeriod_s = 1;
 
 Result<MasterOptions> core_options(const MasterServiceOptions& o) {
@@ -129,7 +130,7 @@ class MasterService {
     double timeout_s = timeout_ms * 1e-3;
     if (const auto due_s = core_.due_s()) timeout_s = std::clamp(*due_s - monotonic_s(), 0.0, timeout_s);
     net::wait_readable_s({&control_}, timeout_s);
-    for (int n = 0; n < kMessagesAtOnce; ++n) {
+    for (int n = 0; n < kMessagesAtOnce && core_.outgoing() < kMostOutgoing; ++n) {
       const auto message = control_.receive();
       if (!message) break;
       guarded(control_, *message, [&] { take(*message, monotonic_s()); });

@@ -21,6 +21,7 @@ class Outbox {
     messages_.push_back({peer, std::string(M::kName), wire::encode(m)});
   }
   void send(Outgoing message) { messages_.push_back(std::move(message)); }
+  size_t size() const { return messages_.size(); }
   /// In the order in which they were sent.
   std::vector<Outgoing> take() { return std::exchange(messages_, {}); }
 

@@ -15,7 +15,8 @@
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMostNamed = 16;  // viewers, in an answer
+constexpr size_t kMostNamed = 16;          // viewers, in an answer
+constexpr double kAnnounceEvery_s = 0.05;  // where no epoch begins
 
 }  // namespace
 
@@ -67,8 +68,10 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   w.master_s = now_s;
   w.clock = clock_id();
   w.epoch = epoch_;
+  const std::string packs = packer();
   for (const auto& [id, p] : peers_)
-    if (!p.gone && !p.refused) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
+    if (!p.gone && !p.refused && (p.hello.role != "packer" || id == packs))
+      w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
   w.facts.erase(metrics::kRecordFact);  // of the master alone
   if (!run_id_.empty()) {
     w.facts["run_folder"] = session_.run_folder;
@@ -83,7 +86,15 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   return w;
 }
 
+// What changes again and again is told so often at most.
+void MasterCore::announce_soon(double now_s) {
+  announce_due_ = now_s - announced_s_ < kAnnounceEvery_s;
+  if (!announce_due_) announce(now_s);
+}
+
 void MasterCore::announce(double now_s) {
+  announced_s_ = now_s;
+  announce_due_ = false;
   const std::string body = wire::encode(welcome({}, now_s));
   // The packer first: it should know an epoch before tiles of it come.
   for (const bool packer : {true, false})

@@ -6,7 +6,7 @@
 namespace telesplat::packer {
 
 struct PackerOptions {
-  net::ServiceOptions service{.name = "packer"};
+  net::ServiceOptions service{.name = net::unique_name("packer")};
   int threads = 0;           ///< for reference depth maps; 0: all cores
   std::string record_depth;  ///< folder for sampled depth images; empty: none are kept
   int record_depth_frames = 50;

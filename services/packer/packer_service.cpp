@@ -25,7 +25,7 @@ class PackerService {
   PackerService(const PackerOptions& o, net::Context& context)
       : options_(o),
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
-               {.high_water_mark = 256,
+               {.high_water_mark = 16,
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
                 .read_ahead = true}),
         patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),

@@ -60,6 +60,7 @@ FLOORS = {
             "services/master/live",
             "services/master/wall",
             "services/master/orders",
+            "services/master/peers",
         ],
         ["services/master/plan.cpp"],
         [

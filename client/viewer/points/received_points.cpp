@@ -46,6 +46,9 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
     clip_ = std::make_shared<const geometry::Clip>(*std::move(clip));
     ++clip_version_;
   }
+  // The packer's first event for another model may have come before this, and a replica of the old one with it. On
+  // another connection nothing comes that was sent to the old one.
+  if (config_ != config && receiver_.begun()) links_.feeds.close();
   config_ = config;
   keeps_redundant_ = keep;
   return ok_status();

@@ -42,6 +42,8 @@ class PointReceiver {
   std::optional<ShownUpdate> release();
   /// A packer at another address.
   void start() { sequencer_.start(); }
+  /// start() was called: there may be a replica.
+  bool begun() const { return sequencer_.begun(); }
   void receive_events(net::Socket& patches, int most);
   void receive_answers(net::Socket& state, int most);
   /// What is due by time alone. To be called every few milliseconds.

@@ -93,6 +93,7 @@ TEST_F(Master, WelcomesEveryoneAndAnnouncesNewEndpoints) {
   EXPECT_TRUE(welcomes[0].box_room.empty());
   core.on("d", hello("data", "data", 1), 4);
   core.on("p", hello("packer", "packer", 2), 4);
+  core.tick(4.05);
   welcomes = sent<wire::Welcome>("v");
   ASSERT_EQ(welcomes.size(), 2u);
   EXPECT_EQ(welcomes[1].endpoints.size(), 4u);
@@ -267,6 +268,21 @@ TEST_F(Master, ASilentSamplerIsTakenForDead) {
   for (const auto& p : now["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << p["name"];
 }
 
+TEST_F(Master, AnEmptyStatusIsASignOfLife) {
+  join_all();
+  wire::StatusReport report;
+  report.values = {{"tiles_sampled", 7}};
+  core.on("s1", report, 1);
+  for (double now_s = 2; now_s <= 30; now_s += 1.5) {
+    core.on("s1", wire::StatusReport{{3}, {}}, now_s);
+    core.tick(now_s);
+  }
+  for (const auto& p : status()["processes"]) {
+    EXPECT_EQ(p["alive"], p["name"] == "sampler-1") << p["name"];
+    if (p["name"] == "sampler-1") EXPECT_EQ(p["values"]["tiles_sampled"], 7) << "as it said before";
+  }
+}
+
 TEST_F(Master, ANewPackerStartsWithNewFrames) {
   join_all();
   const auto old = lease_to("s1");
@@ -310,6 +326,50 @@ TEST_F(Master, AReplacedProcessIsMarked) {
     }
   }
   EXPECT_EQ(replaced, 1);
+}
+
+TEST_F(Master, TwoLivingProcessesOfOneNameStay) {
+  join_all();
+  sent<wire::Welcome>("p");
+  core.on("p2", hello("packer", "packer", 20), 1);
+  EXPECT_EQ(status()["processes"].size(), 6u);
+  // The one that was taken for the other's old life lives: it is asked who it is, and says so.
+  core.on("p", wire::StatusReport{}, 1.5);
+  ASSERT_EQ(sent<wire::WhoAreYou>("p").size(), 1u);
+  core.on("p", hello("packer", "packer", 2), 1.6);
+  sent<wire::Welcome>("v");
+  for (double now_s = 2; now_s < 30; now_s += 1) {
+    for (const auto& [peer, instance] : {std::pair{"p", 2}, {"p2", 20}}) {
+      core.on(peer, wire::StatusReport{}, now_s);
+      if (int(now_s) % 7 == 0) core.on(peer, hello("packer", "packer", uint64_t(instance)), now_s);
+      EXPECT_TRUE(sent<wire::WhoAreYou>(peer).empty()) << peer << " at " << now_s;
+    }
+    for (const char* other : {"d", "s1", "s2", "v"}) core.on(other, wire::StatusReport{}, now_s);
+    core.tick(now_s);
+    for (const auto& w : sent<wire::Welcome>("v")) EXPECT_EQ(w.endpoints.at("state"), "spacker");
+  }
+  // The one that packs does so until it leaves.
+  done(lease_to("s1", 1, 30), "p2", 30.1);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "it was there first since the other was taken for dead";
+  core.on("p2", wire::Goodbye{{20}}, 31);
+  EXPECT_FALSE(sent<wire::Welcome>("v").empty()) << "the other one packs now";
+}
+
+// Whatever their names are.
+TEST_F(Master, ASecondPackerWaitsForTheFirstToLeave) {
+  join_all();
+  sent<wire::Welcome>("v");
+  core.on("another", hello("packer", "packer-2", 20), 1);
+  for (const auto& w : sent<wire::Welcome>("v")) EXPECT_EQ(w.endpoints.at("state"), "spacker");
+  const auto kept = lease_to("s1", 1, 1.1);
+  core.on("another", hello("packer", "packer-2", 20), 1.2);
+  done(kept, "p", 1.3);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "nothing was dropped";
+  core.undeliverable("p");
+  core.tick(1.4);
+  const auto welcomes = sent<wire::Welcome>("v");
+  ASSERT_FALSE(welcomes.empty());
+  EXPECT_EQ(welcomes.back().endpoints.at("state"), "spacker-2");
 }
 
 TEST_F(Master, StatusTellsWhoIsWhere) {
@@ -380,6 +440,32 @@ TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
   for (uint64_t i = 0; i < 6000; ++i)
     core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 1000 + i), 1);
   EXPECT_LE(core.processes().size(), 4096u);
+}
+
+// Each may change what everybody is told.
+TEST_F(Master, AFloodOfHellosIsToldOnce) {
+  join_all();
+  core.tick(1);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);
+  wire::Hello m = hello("packer", "flood", 50);
+  for (int i = 0; i < 1000; ++i) {
+    m.endpoints["tiles"] = "tcp://" + std::to_string(i);
+    core.on("f", m, 1 + 0.05 * i / 1000);
+  }
+  core.tick(1.05);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) EXPECT_LE(sent<wire::Welcome>(peer).size(), 2u) << peer;
+  EXPECT_LE(sent<wire::Welcome>("f").size(), 12u) << "answers, and what all are told";
+  // The newest one counts, a little later.
+  for (double now_s = 1.06; now_s < 3; now_s += 0.02) core.tick(now_s);
+  bool there = false;
+  for (const auto& p : status()["processes"]) there |= p["name"] == "flood" && p["endpoints"]["tiles"] == "tcp://999";
+  EXPECT_TRUE(there);
+  // Many processes, each of which says hello once.
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);
+  for (uint64_t i = 0; i < 1000; ++i)
+    core.on("f" + std::to_string(i), hello("packer", "f" + std::to_string(i), 1000 + i), 3 + 0.05 * double(i) / 1000);
+  core.tick(3.05);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) EXPECT_LE(sent<wire::Welcome>(peer).size(), 2u) << peer;
 }
 
 TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {

@@ -268,6 +268,42 @@ TEST(SliceGatherer, WhatWasUnderWayToABrokenConnectionComesAgain) {
   EXPECT_EQ(g.take_outgoing(2)->frame.frame.value, 3u);
 }
 
+// On a link that needs longer for a frame than a viewer is silent, copies would pile up.
+TEST(SliceGatherer, ASignOfLifeOverTheSameConnectionSendsNothingAgain) {
+  auto g = gatherer();
+  const auto sent = [&](double now_s) {
+    std::vector<uint64_t> frames;
+    while (const auto out = g.take_outgoing(now_s)) frames.push_back(out->frame.frame.value);
+    return frames;
+  };
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 0), 0));
+  ASSERT_TRUE(g.add(slab(lease(1, 0, 1, {view(1, 1)})), 0).ok());
+  EXPECT_EQ(sent(0), std::vector<uint64_t>{1});
+  for (double now_s = 2; now_s <= 10; now_s += 2) {
+    ASSERT_TRUE(g.acknowledged("far", ack(1, 0), now_s));
+    EXPECT_TRUE(sent(now_s).empty()) << "it is under way, " << now_s;
+    g.expire(now_s);
+    EXPECT_EQ(g.viewers(), 1u) << "it lives";
+  }
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 0), 12));
+  EXPECT_EQ(sent(12), std::vector<uint64_t>{1}) << "it seems lost";
+  for (double now_s = 14; now_s <= 60; now_s += 2) {
+    ASSERT_TRUE(g.acknowledged("far", ack(1, 0), now_s));
+    EXPECT_TRUE(sent(now_s).empty()) << "once is enough, " << now_s;
+  }
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 1), 61));
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 0), 63));
+  EXPECT_TRUE(sent(63).empty()) << "it has the newest";
+  ASSERT_TRUE(g.acknowledged("again", ack(1, 0), 64));
+  EXPECT_EQ(sent(64), std::vector<uint64_t>{1}) << "what it had on another connection may be lost";
+  // Frames in order may lie in their buffers for long.
+  ASSERT_TRUE(g.acknowledged("ordered", ack(2, 0, 2, true), 0));
+  ASSERT_TRUE(g.add(slab(lease(2, 0, 1, {view(2, 1, 2)})), 65).ok());
+  EXPECT_EQ(sent(65), std::vector<uint64_t>{2});
+  ASSERT_TRUE(g.acknowledged("ordered", ack(2, 0, 2, true), 165));
+  EXPECT_TRUE(sent(165).empty());
+}
+
 TEST(SliceGatherer, ViewersThatDoNotAnswerAreForgottenAndMayComeBack) {
   auto g = gatherer();
   ASSERT_TRUE(g.acknowledged("peer", ack(1, 0, 1), 0));
