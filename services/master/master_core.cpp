@@ -14,6 +14,7 @@ namespace {
 
 constexpr size_t kMaxPeers = 4096;  // remembered processes, the departed included
 constexpr size_t kMaxWalls = 64;
+constexpr double kCatchUp_s = 0.5;      // after this process stood still, until all that has come is read
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
 constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
 
@@ -353,6 +354,12 @@ Status MasterCore::on(const std::string& peer, const wire::Plan& m, double now_s
   return Error{fmt::format("{}: {}", name, taken.error().text)};
 }
 
+void MasterCore::stood_still(double for_s, double now_s) {
+  for (auto& [id, p] : peers_)
+    if (!p.gone) p.seen_s += for_s;
+  leases_rest_until_s_ = now_s + kCatchUp_s;
+}
+
 void MasterCore::tick(double now_s) {
   now_s_ = now_s;
   for (auto& [name, wall] : walls_) wall.tick(now_s);
@@ -363,7 +370,7 @@ void MasterCore::tick(double now_s) {
   follow_another_packer(now_s);
   if (announce_due_) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
-  const Ticked ticked = plan_->tick(now_s);
+  const Ticked ticked = now_s < leases_rest_until_s_ ? Ticked{} : plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);
   // A message to a process that died is undeliverable, which is sooner known than that its lease ran out.
   for (const auto& sampler : ticked.overdue)

@@ -52,6 +52,9 @@ class MasterCore {
   void undeliverable(const std::string& peer);
   /// To be called every 50 ms or so: expires leases, notices the dead.
   void tick(double now_s);
+  /// This process did not run for so long: nobody else's silence counts, and leases are given a moment to be told of.
+  /// To be called before what has come meanwhile is taken.
+  void stood_still(double for_s, double now_s);
   /// tick() should come every few ms.
   bool hurried() const { return !idle_.empty() && plan_->hurried(); }
   /// tick() should come then, if nothing comes before: a wall waits for a viewer that may be late. Nothing: none does.
@@ -161,6 +164,7 @@ class MasterCore {
   std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them
   SwapBarrier::Figures swaps_;                // of walls that are gone
   uint64_t leases_expired_ = 0;
+  double leases_rest_until_s_ = -1e9;
   double announced_s_ = -1e9;  // when everyone was told of the session
   bool announce_due_ = false;
   double now_s_ = 0;  // of what came last

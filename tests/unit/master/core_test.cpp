@@ -251,6 +251,25 @@ TEST_F(Master, AnEmptyStatusIsASignOfLife) {
   }
 }
 
+// What the others said meanwhile is yet to be read.
+TEST_F(Master, AMasterThatStoodStillTakesNobodyForDead) {
+  join_all();
+  const auto lease = lease_to("s1", 1, 1);
+  core.tick(1.1);
+  core.stood_still(10, 11.1);
+  core.tick(11.1);
+  for (const auto& p : status()["processes"]) EXPECT_EQ(p["alive"], true) << p["name"];
+  EXPECT_EQ(core.counters().at("leases_expired"), 0);
+  done(lease, "p", 11.2);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "its tile had come";
+  const auto next = lease_to("s1", 2, 11.3);
+  core.tick(12);
+  EXPECT_EQ(core.counters().at("leases_expired"), 0);
+  core.on("p", wire::StatusReport{}, 16.3);
+  core.tick(16.5);
+  for (const auto& p : status()["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << "silent since";
+}
+
 TEST_F(Master, ANewPackerStartsWithNewFrames) {
   join_all();
   const auto old = lease_to("s1");
