@@ -8,6 +8,7 @@
 
 #include "common/core/log.h"
 #include "common/scene/session.h"
+#include "services/master/peers/hello_check.h"
 
 namespace telesplat::master {
 namespace {
@@ -97,9 +98,29 @@ bool MasterCore::make_room(const std::string& peer) {
   if (peers_.size() < kMaxPeers || peers_.contains(peer)) return true;
   const auto departed = std::find_if(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone; });
   if (departed == peers_.end()) return false;
-  instances_.erase(departed->second.hello.instance);
+  forget(departed->second, departed->first);
   peers_.erase(departed);
   return true;
+}
+
+void MasterCore::forget(const Peer& p, const std::string& routing_id) {
+  if (const auto by = instances_.find(p.hello.instance); by != instances_.end() && by->second == routing_id)
+    instances_.erase(by);
+  if (p.hello.role != "ctl") departed_.add(p.process);
+}
+
+void MasterCore::forget_departed(double now_s) {
+  std::erase_if(peers_, [&](const auto& entry) {
+    const auto& [id, p] = entry;
+    if (!p.gone || (p.hello.role != "ctl" && now_s - p.seen_s < Departed::kAfter_s)) return false;
+    forget(p, id);
+    return true;
+  });
+}
+
+void MasterCore::refuse_hello(const std::string& why, double now_s) {
+  ++hellos_refused_;
+  if (refusals_.allow(now_s)) log::warn("a process is not let in: {}", why);
 }
 
 // A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet. Two that
@@ -152,7 +173,8 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
 }
 
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
-  if (!make_room(peer)) return;
+  if (const Status fits = check_hello(m); !fits) return refuse_hello(fits.error().text, now_s);
+  if (!make_room(peer)) return refuse_hello(fmt::format("{} are here", kMaxPeers), now_s);
   if (const auto said = peers_.find(peer); said != peers_.end()) {
     if (!said->second.hello_pace.allows(now_s)) return void(said->second.put_off = m);
     said->second.hello_pace.count(now_s);
@@ -170,8 +192,9 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
   const EpochId epoch = epoch_;
   if (m.role == "data")
-    if (const Status s = adopt_scene(m, now_s); !s) {
+    if (const Status s = adopt_scene(peer, m, now_s); !s) {
       p.refused = true;
+      if (shows_ == peer) shows_.clear();
       log::error("the scene of {} is refused: {}", m.name, s.error().text);
     }
   wire::Welcome w = welcome(p, now_s);
@@ -367,6 +390,7 @@ void MasterCore::tick(double now_s) {
   take_put_off_hellos(now_s);
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
+  forget_departed(now_s);
   follow_another_packer(now_s);
   if (announce_due_) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
