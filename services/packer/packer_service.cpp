@@ -27,10 +27,12 @@ class PackerService {
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
                {.high_water_mark = 16,
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                .patience_s = net::kBulkPatience_s,
                 .read_ahead = true}),
-        patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),
+        patches_(context, net::Kind::kPub, o.service.name + ":patches",
+                 {.high_water_mark = 4096, .patience_s = net::kBulkPatience_s}),
         state_(context, net::Kind::kRouter, o.service.name + ":state",
-               {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
+               {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20, .patience_s = net::kBulkPatience_s}) {}
 
   /// Binds the three sockets and says hello with their addresses.
   Status open(net::Context& context) {
