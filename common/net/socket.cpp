@@ -99,7 +99,7 @@ struct Socket::Impl {
     socket.set(zmq::sockopt::reconnect_ivl, 50);
     socket.set(zmq::sockopt::reconnect_ivl_max, 500);
     socket.set(zmq::sockopt::heartbeat_ivl, 2000);
-    socket.set(zmq::sockopt::heartbeat_timeout, 10000);
+    socket.set(zmq::sockopt::heartbeat_timeout, static_cast<int>(options.patience_s * 1e3));
     if (kind == Kind::kSub) socket.set(zmq::sockopt::subscribe, "");
     if (kind == Kind::kRouter) socket.set(zmq::sockopt::router_mandatory, 1);
     if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);

@@ -47,6 +47,7 @@ struct SocketOptions {
   size_t max_message_bytes =
       wire::kMaxControlBytes;     ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
   int linger_ms = 500;            ///< for what is still to be sent when the socket goes
+  double patience_s = 10;         ///< a connection over which not one whole message came for longer is taken for broken
   bool watch_connecting = false;  ///< count attempts to connect that fail
   /// A thread of its own reads messages as they come and sends what is given to it, so that Message::arrived_s tells
   /// the network from the time that a message waited for its reader. For DEALER, PULL and SUB. Addresses must be bound
@@ -54,6 +55,9 @@ struct SocketOptions {
   bool read_ahead = false;
   std::string_view toward;  ///< role of who is connected to, where Via has a proxy of its own for it
 };
+
+/// SocketOptions::patience_s where messages of megabytes go over links of a megabit a second.
+inline constexpr double kBulkPatience_s = 60;
 
 class Socket {
  public:

@@ -42,7 +42,7 @@ Result<std::string> bind_requests(std::optional<net::Socket>& socket, net::Conte
                                   const Served::Requests& requests, const net::ServiceOptions& o) {
   if (requests.endpoint.empty()) return std::string();
   socket.emplace(context, net::Kind::kRouter, o.name + ":" + std::string(requests.endpoint),
-                 net::SocketOptions{.high_water_mark = requests.high_water_mark});
+                 net::SocketOptions{.high_water_mark = requests.high_water_mark, .patience_s = net::kBulkPatience_s});
   const auto bound = socket->bind(o.bind, o.insecure);
   if (!bound) return bound.error();
   return net::announced(*bound, o.advertise);

@@ -8,12 +8,14 @@
 
 #include "common/core/log.h"
 #include "common/scene/session.h"
+#include "services/master/peers/hello_check.h"
 
 namespace telesplat::master {
 namespace {
 
 constexpr size_t kMaxPeers = 4096;  // remembered processes, the departed included
 constexpr size_t kMaxWalls = 64;
+constexpr double kCatchUp_s = 0.5;      // after this process stood still, until all that has come is read
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
 constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
 
@@ -106,9 +108,29 @@ bool MasterCore::make_room(const std::string& peer) {
   if (peers_.size() < kMaxPeers || peers_.contains(peer)) return true;
   const auto departed = std::find_if(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone; });
   if (departed == peers_.end()) return false;
-  instances_.erase(departed->second.hello.instance);
+  forget(departed->second, departed->first);
   peers_.erase(departed);
   return true;
+}
+
+void MasterCore::forget(const Peer& p, const std::string& routing_id) {
+  if (const auto by = instances_.find(p.hello.instance); by != instances_.end() && by->second == routing_id)
+    instances_.erase(by);
+  if (p.hello.role != "ctl") departed_.add(p.process);
+}
+
+void MasterCore::forget_departed(double now_s) {
+  std::erase_if(peers_, [&](const auto& entry) {
+    const auto& [id, p] = entry;
+    if (!p.gone || (p.hello.role != "ctl" && now_s - p.seen_s < Departed::kAfter_s)) return false;
+    forget(p, id);
+    return true;
+  });
+}
+
+void MasterCore::refuse_hello(const std::string& why, double now_s) {
+  ++hellos_refused_;
+  if (refusals_.allow(now_s)) log::warn("a process is not let in: {}", why);
 }
 
 // A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet. Two that
@@ -161,7 +183,8 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
 }
 
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
-  if (!make_room(peer)) return;
+  if (const Status fits = check_hello(m); !fits) return refuse_hello(fits.error().text, now_s);
+  if (!make_room(peer)) return refuse_hello(fmt::format("{} are here", kMaxPeers), now_s);
   if (const auto said = peers_.find(peer); said != peers_.end()) {
     if (!said->second.hello_pace.allows(now_s)) return void(said->second.put_off = m);
     said->second.hello_pace.count(now_s);
@@ -179,8 +202,9 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
   const EpochId epoch = epoch_;
   if (m.role == "data")
-    if (const Status s = adopt_scene(m, now_s); !s) {
+    if (const Status s = adopt_scene(peer, m, now_s); !s) {
       p.refused = true;
+      if (shows_ == peer) shows_.clear();
       log::error("the scene of {} is refused: {}", m.name, s.error().text);
     }
   wire::Welcome w = welcome(p, now_s);
@@ -378,6 +402,12 @@ Status MasterCore::on(const std::string& peer, const wire::Plan& m, double now_s
   return Error{fmt::format("{}: {}", name, taken.error().text)};
 }
 
+void MasterCore::stood_still(double for_s, double now_s) {
+  for (auto& [id, p] : peers_)
+    if (!p.gone) p.seen_s += for_s;
+  leases_rest_until_s_ = now_s + kCatchUp_s;
+}
+
 void MasterCore::tick(double now_s) {
   now_s_ = now_s;
   for (auto& [name, wall] : walls_) wall.tick(now_s);
@@ -385,10 +415,11 @@ void MasterCore::tick(double now_s) {
   take_put_off_hellos(now_s);
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
+  forget_departed(now_s);
   follow_another_packer(now_s);
   if (announce_due_) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
-  const Ticked ticked = plan_->tick(now_s);
+  const Ticked ticked = now_s < leases_rest_until_s_ ? Ticked{} : plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);
   // A message to a process that died is undeliverable, which is sooner known than that its lease ran out.
   for (const auto& sampler : ticked.overdue)

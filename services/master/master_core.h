@@ -5,6 +5,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -18,6 +19,7 @@
 #include "services/master/orders/clipping.h"
 #include "services/master/orders/errands.h"
 #include "services/master/outbox.h"
+#include "services/master/peers/departed.h"
 #include "services/master/peers/hello_pace.h"
 #include "services/master/peers/namesakes.h"
 #include "services/master/plan.h"
@@ -55,6 +57,9 @@ class MasterCore {
   void undeliverable(const std::string& peer);
   /// To be called every 50 ms or so: expires leases, notices the dead.
   void tick(double now_s);
+  /// This process did not run for so long: nobody else's silence counts, and leases are given a moment to be told of.
+  /// To be called before what has come meanwhile is taken.
+  void stood_still(double for_s, double now_s);
   /// tick() should come every few ms.
   bool hurried() const { return !idle_.empty() && plan_->hurried(); }
   /// tick() should come then, if nothing comes before: a wall waits for a viewer that may be late. Nothing: none does.
@@ -64,6 +69,8 @@ class MasterCore {
 
   std::vector<Outgoing> take_outgoing() { return outbox_.take(); }
   size_t outgoing() const { return outbox_.size(); }
+  /// Processes of which anything is remembered but for the record.
+  size_t remembered() const { return peers_.size(); }
   InstanceId instance() const { return instance_; }
   bool stop_requested() const { return stop_; }
   /// True once everyone who was told to finish has said goodbye.
@@ -113,6 +120,9 @@ class MasterCore {
   void follow_another_packer(double now_s);
   bool samplers_here() const;
   bool make_room(const std::string& peer);
+  void refuse_hello(const std::string& why, double now_s);
+  void forget_departed(double now_s);
+  void forget(const Peer& peer, const std::string& routing_id);
   void replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s);
   void take_put_off_hellos(double now_s);
   Peer& enter(const std::string& peer, const wire::Hello& m, double now_s);
@@ -121,9 +131,10 @@ class MasterCore {
 
   // The scene and its epochs.
   Plan& plan_of(const wire::Hello& data);
-  Status adopt_scene(const wire::Hello& data, double now_s);
+  Status adopt_scene(const std::string& peer, const wire::Hello& data, double now_s);
   wire::Welcome scene_as_told() const;
   wire::Welcome welcome(const Peer& to, double now_s) const;
+  void add_endpoints(wire::Welcome& welcome) const;
   void announce(double now_s);
   void announce_soon(double now_s);
   void next_epoch(double now_s);
@@ -131,7 +142,9 @@ class MasterCore {
   Result<std::string> obey(const wire::Control& m, double now_s);
   Result<std::string> order_coupling(const wire::Control& m, double now_s);
   Status pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s);
-  std::string status_json(double now_s) const;
+  /// all: facts are told whole.
+  nlohmann::ordered_json process_json(const std::string& routing_id, const Peer& peer, double now_s, bool all) const;
+  std::string status_json(double now_s, bool all) const;
 
   // Walls.
   void send_swaps();
@@ -158,6 +171,10 @@ class MasterCore {
   std::map<std::string, Peer> peers_;                      // by routing id
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
   Namesakes namesakes_;
+  Departed departed_;
+  uint64_t hellos_refused_ = 0;
+  log::RateLimiter refusals_;
+  std::string shows_;  // the data server that the scene is of
   uint64_t joined_ = 0;
   std::string leading_packer_;  // that frames were begun with; empty: none, or it is gone
   Idle idle_;
@@ -166,6 +183,7 @@ class MasterCore {
   SwapBarrier::Figures swaps_;                // of walls that are gone
   uint64_t leases_expired_ = 0;
   log::RateLimiter refusals_;  // of lines about them
+  double leases_rest_until_s_ = -1e9;
   double announced_s_ = -1e9;  // when everyone was told of the session
   bool announce_due_ = false;
   double now_s_ = 0;  // of what came last

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <fstream>
 #include <optional>
+#include <utility>
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
@@ -31,6 +32,7 @@ constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
 constexpr int kMessagesAtOnce = 1000;   // between two ticks
 constexpr size_t kMostOutgoing = 2000;  // messages that wait to be sent before more are read
 constexpr double kMetricsPeriod_s = 1;
+constexpr double kStandstill_s = 1;  // the loop comes by every 20 ms; stopped, it does not know that others spoke
 
 Result<MasterOptions> core_options(const MasterServiceOptions& o) {
   MasterOptions out = o.master;
@@ -130,6 +132,11 @@ class MasterService {
     double timeout_s = timeout_ms * 1e-3;
     if (const auto due_s = core_.due_s()) timeout_s = std::clamp(*due_s - monotonic_s(), 0.0, timeout_s);
     net::wait_readable_s({&control_}, timeout_s);
+    const double now_s = monotonic_s(), passed_s = now_s - std::exchange(served_s_, now_s);
+    if (passed_s > kStandstill_s) {
+      log::warn("the master stood still for {:.1f} s", passed_s);
+      core_.stood_still(passed_s, now_s);
+    }
     for (int n = 0; n < kMessagesAtOnce && core_.outgoing() < kMostOutgoing; ++n) {
       const auto message = control_.receive();
       if (!message) break;
@@ -193,6 +200,7 @@ class MasterService {
   MasterCore core_;
   net::RunningSession told_;  // in the file
   std::optional<net::SessionFile> file_;
+  double served_s_ = monotonic_s();        // when the loop came by last
   std::unique_ptr<HttpEndpoint> metrics_;  // null: nobody watches
   double published_s_ = -1e9;
 };

@@ -38,6 +38,16 @@ std::map<std::string, double> rates(const std::deque<std::map<std::string, doubl
   return out;
 }
 
+// Texts from peers may be any bytes: what is not UTF-8 is shown as U+FFFD.
+std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+constexpr size_t kMostBytes = 768u << 10;  // of an answer, whose other fields are few
+constexpr size_t kMostFactBytes = 4096;    // a path is shorter, a transfer function may be longer
+
+std::string shortened(const std::string& fact) {
+  return fact.size() <= kMostFactBytes ? fact : fact.substr(0, kMostFactBytes - 3) + "...";
+}
+
 Json told(const net::RunningSession& s) {
   return {{"address", s.address},
           {"pid", s.pid},
@@ -66,7 +76,7 @@ Figures MasterCore::figures() const {
 }
 
 std::vector<metrics::Process> MasterCore::processes() const {
-  std::vector<metrics::Process> out;
+  std::vector<metrics::Process> out(departed_.kept().begin(), departed_.kept().end());
   for (const auto& [id, p] : peers_)
     if (p.hello.role != "ctl") out.push_back(p.process);
   std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
@@ -85,6 +95,8 @@ std::map<std::string, double> MasterCore::counters() const {
     swaps.incomplete += wall.figures().incomplete;
   }
   if (swaps.frames > 0) out["swaps"] = double(swaps.frames), out["swaps_incomplete"] = double(swaps.incomplete);
+  if (hellos_refused_ > 0) out["hellos_refused"] = double(hellos_refused_);
+  if (departed_.forgotten() > 0) out["processes_forgotten"] = double(departed_.forgotten());
   for (const auto& [pipeline, plan] : plans_) plan->add_counters(out);
   return out;
 }
@@ -119,7 +131,23 @@ LiveSnapshot MasterCore::live_snapshot() const {
   return out;
 }
 
-std::string MasterCore::status_json(double now_s) const {
+Json MasterCore::process_json(const std::string& id, const Peer& p, double now_s, bool all) const {
+  Json e{{"role", p.hello.role},
+         {"name", p.hello.name},
+         {"pid", p.hello.pid},
+         {"alive", !p.gone},
+         {"silent_s", std::max(0.0, now_s - p.seen_s)}};
+  if (p.hello.role == "sampler") e["leases"] = plan_->leases_of(id);
+  for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
+  for (const auto& [key, value] : p.hello.facts)
+    if (key != metrics::kRecordFact) e["facts"][key] = all ? value : shortened(value);
+  for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
+  for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e["values"][key] = number(value);
+  e["rates"] = Json(rates(p.reports));
+  return e;
+}
+
+std::string MasterCore::status_json(double now_s, bool all) const {
   const Figures f = figures();
   Json out{{"session", told(session_)},
            {"epoch", epoch_.value},
@@ -136,25 +164,23 @@ std::string MasterCore::status_json(double now_s) const {
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
   if (!clipping_.order().empty()) out["clip"] = clipping_.order();
   plan_->add_status(out);
+  out["departed"] = departed_.count();
+  if (hellos_refused_ > 0) out["hellos_refused"] = hellos_refused_;
+  // Those who are here first: an answer is one message.
   out["processes"] = Json::array();
-  for (const auto& [id, p] : peers_) {
-    if (p.hello.role == "ctl") continue;
-    Json e{{"role", p.hello.role},
-           {"name", p.hello.name},
-           {"pid", p.hello.pid},
-           {"alive", !p.gone},
-           {"silent_s", std::max(0.0, now_s - p.seen_s)}};
-    if (p.hello.role == "sampler") e["leases"] = plan_->leases_of(id);
-    for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
-    for (const auto& [key, value] : p.hello.facts)
-      if (key != metrics::kRecordFact) e["facts"][key] = value;
-    for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
-    for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e["values"][key] = number(value);
-    e["rates"] = Json(rates(p.reports));
-    out["processes"].push_back(e);
-  }
-  // Texts from peers may be any bytes: what is not UTF-8 is shown as U+FFFD.
-  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+  size_t bytes = dumped(out).size(), left_out = 0;
+  for (const bool gone : {false, true})
+    for (const auto& [id, p] : peers_) {
+      if (p.hello.role == "ctl" || p.gone != gone) continue;
+      Json e = process_json(id, p, now_s, all);
+      bytes += left_out > 0 ? 0 : dumped(e).size() + 1;
+      if (bytes > kMostBytes)
+        ++left_out;
+      else
+        out["processes"].push_back(std::move(e));
+    }
+  if (left_out > 0) out["processes_left_out"] = left_out;
+  return dumped(out);
 }
 
 }  // namespace telesplat::master

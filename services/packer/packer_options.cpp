@@ -33,6 +33,11 @@ options::Table table(PackerOptions& o) {
                            .value = &o.log_limit_mb,
                            .help = "memory for the events that late joiners get",
                            .limits = Range{1, 1e6},
+                           .fits = points},
+                          {.flag = "--answer-window-mb",
+                           .value = &o.answer_window_mb,
+                           .help = "of these events, under way to a viewer at most",
+                           .limits = Range{0.1, 1024},
                            .fits = points}});
 }
 

@@ -12,7 +12,8 @@ struct PackerOptions {
   int record_depth_frames = 50;
   std::string record_plan;  ///< folder for pictures of plans; empty: none are kept
   int record_plan_frames = 50;
-  double log_limit_mb = 512;  ///< events kept for late joiners
+  double log_limit_mb = 512;    ///< events kept for late joiners
+  double answer_window_mb = 8;  ///< of these, under way to a viewer at most
 };
 
 /// A row a flag; they point into `options`.

@@ -19,6 +19,7 @@ namespace {
 constexpr double kSpanFlush_s = 1;
 constexpr int kSampledAtOnce = 8;  // then control and viewers get their turn
 constexpr int kStateAtOnce = 64;
+constexpr int kStateQueue = 1 << 16;  // messages that wait for a viewer: more than StateAnswers has under way
 
 class PackerService {
  public:
@@ -27,10 +28,12 @@ class PackerService {
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
                {.high_water_mark = 16,
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                .patience_s = net::kBulkPatience_s,
                 .read_ahead = true}),
-        patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),
+        patches_(context, net::Kind::kPub, o.service.name + ":patches",
+                 {.high_water_mark = 4096, .patience_s = net::kBulkPatience_s}),
         state_(context, net::Kind::kRouter, o.service.name + ":state",
-               {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
+               {.high_water_mark = kStateQueue, .max_message_bytes = 16u << 20, .patience_s = net::kBulkPatience_s}) {}
 
   /// Binds the three sockets and says hello with their addresses.
   Status open(net::Context& context) {
@@ -156,6 +159,7 @@ class PackerService {
     if (pipeline == scene::Pipeline::kSlices) return std::make_unique<SlicePacking>(std::move(outlets), spans_);
     const PointPacking::Options options{.threads = options_.threads,
                                         .max_log_bytes = uint64_t(options_.log_limit_mb * 1e6),
+                                        .answers = {.window_bytes = uint64_t(options_.answer_window_mb * 1e6)},
                                         .recorder = recorder_ ? &*recorder_ : nullptr,
                                         .plans = plan_recorder_ ? &*plan_recorder_ : nullptr};
     return std::make_unique<PointPacking>(options, std::move(outlets), spans_);

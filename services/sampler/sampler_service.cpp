@@ -128,7 +128,7 @@ class SamplerService {
     if (endpoint.empty() || endpoint == tiles_endpoint_) return;
     tiles_endpoint_ = endpoint;
     tiles_.emplace(context_, net::Kind::kPush, options_.service.name + ":tiles",
-                   net::SocketOptions{.high_water_mark = 64});
+                   net::SocketOptions{.high_water_mark = 64, .patience_s = net::kBulkPatience_s});
     if (const Status s = tiles_->connect(endpoint); !s) log::error("{}", s.error().text);
   }
 

@@ -149,6 +149,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   }
   if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
     if (core_) instance_ = net::make_instance_id();  // viewers start anew
+    answers_.clear();
     meter_.clear();
     completions_.clear();
     model_ = config.model;
@@ -333,7 +334,7 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
     if (!core_) return;
     using M = std::decay_t<decltype(m)>;
     if constexpr (std::is_same_v<M, wire::Receipt>)
-      on_receipt(m, now_s);
+      on_receipt(m, message.peer, now_s);
     else if constexpr (std::is_same_v<M, wire::AccessReport>)
       core_->accessed(m.clusters, now_s, m.frames);
     else
@@ -345,19 +346,39 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
   const Sequence after = request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
   if (!core_->remembers(after)) {
     // A mark of a packer that the viewer does not know: it then asks for everything.
+    answers_.drop(peer);
     outlets_.send(wire::StateMark{net::make_instance_id(), {}, core_->epoch(), false, 0}, peer);
     return log::info("a viewer that stopped after {} starts anew", after.value);
   }
-  auto events = core_->events_since(after);
-  completions_.fill(events, request.viewer, after);
-  for (const auto& e : events) with_message(instance_, e, {}, [&](const auto& m) { outlets_.send(m, peer); });
-  outlets_.send(mark(true), peer);
+  const bool follows = request.packer == instance_ || request.packer.value == 0;
+  if (answers_.goes_on(peer, request.viewer, after, follows)) return;
+  StateAnswers::Answer answer{.viewer = request.viewer, .left = core_->replay(after), .mark = mark(true)};
+  completions_.fill(answer.left.others, request.viewer, after);
+  answers_.begin(peer, after, std::move(answer));
   meter_.replayed(request.viewer);
-  log::info("a viewer caught up: {} events after {}", events.size(), after.value);
+  send_answers();
 }
 
-void PointPacking::on_receipt(const wire::Receipt& receipt, double now_s) {
+// A mark that says less than was sent would leave a viewer with a wrong replica: who misses an event gets none.
+void PointPacking::send_answers() {
+  answers_.pump([&](EventLog::Replay& left) { return core_->next(left); },
+                [&](const std::string& peer, const Event& event) {
+                  bool sent = false;
+                  with_message(instance_, event, {}, [&](const auto& m) { sent = outlets_.send(m, peer); });
+                  return sent;
+                },
+                [&](const std::string& peer, const StateAnswers::Answer& answer) {
+                  if (!outlets_.send(answer.mark, peer)) return false;
+                  meter_.replayed(answer.viewer);
+                  log::info("a viewer caught up: {} events up to {}", answer.events, answer.mark.sequence.value);
+                  return true;
+                },
+                size_on_wire);
+}
+
+void PointPacking::on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s) {
   if (receipt.packer != instance_) return;
+  answers_.received(peer, receipt.newest);
   meter_.received(receipt.viewer, receipt.newest, receipt.viewer_s, now_s);
   const auto f = meter_.figures(receipt.viewer, now_s);
   if (f && outlets_.tell_link)
@@ -389,6 +410,7 @@ void PointPacking::tick(double now_s) {
   ahead_.expire(now_s);
   meter_.expire(now_s);
   if (!core_) return;
+  send_answers();
   if (now_s - last_forget_s_ >= kForgetPeriod_s) {
     last_forget_s_ = now_s;
     for (const auto& event : core_->tick(now_s)) publish(event);
@@ -419,6 +441,8 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"patches_forgotten", double(s.patches_forgotten)},
                  {"points_forgotten", double(s.points_forgotten)},
                  {"points_outside", double(s.points_outside)},
+                 {"answers", double(answers_.size())},
+                 {"answer_bytes", double(answers_.bytes_under_way())},
                  {"plans", double(plans_)}});
 }
 

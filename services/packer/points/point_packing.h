@@ -13,6 +13,7 @@
 #include "services/packer/points/link_meter.h"
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
+#include "services/packer/points/state_answers.h"
 
 namespace telesplat::packer {
 
@@ -24,12 +25,13 @@ class PointPacking final : public Packing {
   struct Options {
     int threads = 1;                    ///< for reference depth maps; 0: all cores
     uint64_t max_log_bytes = 0;         ///< Config::max_log_bytes
+    StateAnswers::Limits answers = {};  ///< to viewers that join or have gaps
     DepthRecorder* recorder = nullptr;  ///< of sampled depth images; null: none are kept
     PlanRecorder* plans = nullptr;      ///< of plans; null: none are kept
   };
   /// Keeps a reference to the spans, and the recorders' addresses.
   PointPacking(const Options& options, Outlets outlets, metrics::SpanRecorder& spans)
-      : options_(options), outlets_(std::move(outlets)), spans_(spans) {}
+      : options_(options), outlets_(std::move(outlets)), spans_(spans), answers_(options.answers) {}
 
   bool follow(const wire::Welcome& session, double now_s) override;
   void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
@@ -40,6 +42,7 @@ class PointPacking final : public Packing {
   bool hurried(double now_s) const override { return planner_ && planner_->view_under_way(now_s); }
   bool idle(double now_s) override;
   void tick(double now_s) override;
+  std::optional<double> due_s() const override { return answers_.can_go_on() ? std::optional(0.0) : std::nullopt; }
   void add_status(net::MasterLink::Values& values) const override;
 
  private:
@@ -61,7 +64,8 @@ class PointPacking final : public Packing {
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
   void answer(const wire::StateRequest& request, const std::string& peer);
-  void on_receipt(const wire::Receipt& receipt, double now_s);
+  void send_answers();
+  void on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});
   wire::StateMark mark(bool answer) const;
 
@@ -77,6 +81,7 @@ class PointPacking final : public Packing {
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;
   LinkMeter meter_;  // of the viewers' links
+  StateAnswers answers_;
   Completions completions_;
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0, refused_ = 0, unsealed_ = 0;
   uint64_t plans_ = 0;

@@ -72,9 +72,10 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
   epoch_ = session.epoch;
   if (chunks != endpoint_) {
     endpoint_ = chunks;
-    blocks_.emplace(
-        context_, net::Kind::kDealer, service_name_ + ":chunks",
-        net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes, .toward = "data"});
+    blocks_.emplace(context_, net::Kind::kDealer, service_name_ + ":chunks",
+                    net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                                       .patience_s = net::kBulkPatience_s,
+                                       .toward = "data"});
     if (const Status s = blocks_->connect(endpoint_); !s) log::error("{}", s.error().text);
   }
   // A restarted data server with the same data has the same chunks: keep what we hold.

@@ -210,9 +210,10 @@ void VolumeWork::ask(double now_s) {
     if (servers_.size() >= kMaxServers) servers_.clear();
     server =
         servers_
-            .emplace(next->endpoint,
-                     net::Socket(context_, net::Kind::kDealer, service_name_ + ":voxels",
-                                 {.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes, .toward = "data"}))
+            .emplace(next->endpoint, net::Socket(context_, net::Kind::kDealer, service_name_ + ":voxels",
+                                                 {.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                                                  .patience_s = net::kBulkPatience_s,
+                                                  .toward = "data"}))
             .first;
     if (const Status s = server->second.connect(next->endpoint); !s) log::error("{}", s.error().text);
   }

@@ -283,6 +283,25 @@ TEST_F(Master, AnEmptyStatusIsASignOfLife) {
   }
 }
 
+// What the others said meanwhile is yet to be read.
+TEST_F(Master, AMasterThatStoodStillTakesNobodyForDead) {
+  join_all();
+  const auto lease = lease_to("s1", 1, 1);
+  core.tick(1.1);
+  core.stood_still(10, 11.1);
+  core.tick(11.1);
+  for (const auto& p : status()["processes"]) EXPECT_EQ(p["alive"], true) << p["name"];
+  EXPECT_EQ(core.counters().at("leases_expired"), 0);
+  done(lease, "p", 11.2);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "its tile had come";
+  const auto next = lease_to("s1", 2, 11.3);
+  core.tick(12);
+  EXPECT_EQ(core.counters().at("leases_expired"), 0);
+  core.on("p", wire::StatusReport{}, 16.3);
+  core.tick(16.5);
+  for (const auto& p : status()["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << "silent since";
+}
+
 TEST_F(Master, ANewPackerStartsWithNewFrames) {
   join_all();
   const auto old = lease_to("s1");
@@ -466,6 +485,117 @@ TEST_F(Master, AFloodOfHellosIsToldOnce) {
     core.on("f" + std::to_string(i), hello("packer", "f" + std::to_string(i), 1000 + i), 3 + 0.05 * double(i) / 1000);
   core.tick(3.05);
   for (const char* peer : {"d", "p", "s1", "s2", "v"}) EXPECT_LE(sent<wire::Welcome>(peer).size(), 2u) << peer;
+}
+
+TEST_F(Master, AHelloOfManyEndpointsKeepsNobodyOut) {
+  join_all();
+  wire::Hello m = hello("viewer", "many", 50);
+  for (int i = 0; i < 4095; ++i) m.endpoints["e" + std::to_string(i)] = "tcp://nowhere";
+  core.on("m", m, 1);
+  m = hello("sampler", "large", 51);
+  for (int i = 0; i < 16; ++i) m.facts["f" + std::to_string(i)] = std::string(wire::kMaxFact, 'x');
+  core.on("l", m, 1);
+  m = hello("none", "stranger", 52);
+  core.on("r", m, 1);
+  m = hello("viewer", "nobody", 0);
+  core.on("n", m, 1);
+  m = hello("viewer", std::string(wire::kMaxString, 'n'), 53);
+  core.on("o", m, 1);
+  EXPECT_EQ(core.counters().at("hellos_refused"), 5);
+  for (const char* peer : {"m", "l", "r", "n", "o"}) EXPECT_TRUE(sent<wire::Welcome>(peer).empty()) << peer;
+  core.on("v2", hello("viewer", "viewer-2", 6), 1);
+  ASSERT_EQ(sent<wire::Welcome>("v2").size(), 1u);
+  EXPECT_EQ(status()["hellos_refused"], 5);
+}
+
+TEST_F(Master, OnlyThePackerTellsWherePatchesAre) {
+  join_all();
+  for (const char* role : {"viewer", "sampler", "data", "ctl"}) {
+    wire::Hello m = hello(role, "hijacker", 60);
+    m.facts.clear();
+    m.endpoints = {
+        {"patches", "tcp://evil"}, {"state", "tcp://evil"}, {"tiles", "tcp://evil"}, {"chunks", "tcp://evil"}};
+    if (m.role == "data") m.box_room = {{-1e9f, -1, -1}, {1, 1, 1}}, m.endpoints.erase("chunks");
+    core.on("a", m, 1);  // before the others in any order of theirs
+    core.tick(1.1);
+    core.on("v2", hello("viewer", "viewer-2", 6), 1.2);
+    const auto welcomes = sent<wire::Welcome>("v2");
+    ASSERT_FALSE(welcomes.empty());
+    const std::map<std::string, std::string> right{
+        {"tiles", "tpacker"}, {"patches", "ppacker"}, {"state", "spacker"}, {"chunks", "cdata"}};
+    EXPECT_EQ(welcomes.back().endpoints, right) << role;
+  }
+}
+
+TEST_F(Master, StatusFitsAMessageHoweverManyCameAndLeft) {
+  join_all();
+  for (uint64_t i = 0; i < 2000; ++i) {
+    const std::string peer = "x" + std::to_string(i);
+    wire::Hello m = hello("sampler", peer, 1000 + i);
+    m.facts = {{"command", std::string(2000, 'c')}, {"arrays", std::string(60000, 'a')}};
+    core.on(peer, m, 1 + double(i) * 0.01);
+    wire::StatusReport report;
+    for (int k = 0; k < 40; ++k) report.values["value_" + std::to_string(k)] = k + 0.5;
+    core.on(peer, report, 1 + double(i) * 0.01);
+    if (i % 2) core.on(peer, wire::Goodbye{{1000 + i}}, 1 + double(i) * 0.01);
+    if (i % 100 == 0) core.tick(1 + double(i) * 0.01);
+    core.take_outgoing();
+  }
+  core.on("c", wire::Control{"status", {}}, 21);
+  for (const auto& out : core.take_outgoing()) {
+    if (out.type != wire::ControlReply::kName) continue;
+    const auto reply = wire::decode<wire::ControlReply>(std::as_bytes(std::span(out.body)));
+    ASSERT_TRUE(reply) << reply.error().text;
+    const auto json = nlohmann::json::parse(reply->text, nullptr, false);
+    ASSERT_TRUE(json.is_object());
+    EXPECT_EQ(json["processes"][0]["alive"], true) << "those who are here come first";
+    EXPECT_GT(json["processes_left_out"], 0);
+  }
+  core.on("c", wire::Control{"status", {{"all", ""}}}, 21);
+  for (const auto& out : core.take_outgoing())
+    if (out.type == wire::ControlReply::kName) {
+      EXPECT_TRUE(wire::decode<wire::ControlReply>(std::as_bytes(std::span(out.body))));
+    }
+  // Who left a minute ago is told of in the record alone.
+  core.tick(100);
+  const auto later = status();
+  EXPECT_GE(later["departed"].get<int>(), 1000);
+  EXPECT_LE(core.processes().size(), 4096u);
+}
+
+// Containers ask every ten seconds, from a connection of their own each time.
+TEST_F(Master, TenThousandPastHealthChecksCostNothing) {
+  join_all();
+  const auto ask = [&](int i, double now_s) {
+    const std::string peer = "h" + std::to_string(i);
+    if (i % 2) core.on(peer, hello("ctl", "health", 5000 + uint64_t(i)), now_s);
+    core.on(peer, wire::Control{"status", {}}, now_s);
+    if (i % 4 == 1) core.on(peer, wire::Goodbye{{5000 + uint64_t(i)}}, now_s);
+    if (i % 4 == 3) core.undeliverable(peer);
+    core.take_outgoing();
+  };
+  ask(0, 1);
+  const auto before = status();
+  for (int i = 0; i < 10000; ++i) {
+    ask(i, 1 + 0.0001 * i);
+    if (i % 100 == 0) core.tick(1 + 0.0001 * i);
+  }
+  core.tick(2.1);
+  EXPECT_EQ(core.remembered(), 5u) << "those who take part";
+  EXPECT_EQ(status()["processes"].size(), before["processes"].size());
+  EXPECT_EQ(status()["departed"], 0);
+  EXPECT_EQ(core.processes().size(), 5u);
+}
+
+TEST_F(Master, AWelcomeThatNobodyCouldReadIsNotSent) {
+  Outbox outbox;
+  wire::Welcome w;
+  for (int i = 0; i < 17; ++i) w.facts["f" + std::to_string(i)] = std::string(wire::kMaxFact, 'x');
+  outbox.send("v", w);
+  EXPECT_EQ(outbox.size(), 0u);
+  w.facts.erase("f16"), w.facts.erase("f15");
+  outbox.send("v", w);
+  EXPECT_EQ(outbox.size(), 1u);
 }
 
 TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {

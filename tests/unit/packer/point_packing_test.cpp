@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <map>
 
 #include "services/packer/slices/slice_packing.h"
 #include "tests/support/lease_key.h"
@@ -29,6 +30,7 @@ wire::Welcome welcome(EpochId epoch = test::kEpoch, InstanceId master = {1}) {
 
 class PointPackingTest : public testing::Test {
  protected:
+  explicit PointPackingTest(const PointPacking::Options& options = {}) : packing(options, outlets(), spans) {}
   struct Sent {
     std::string peer;  // empty: to all
     std::string type, body;
@@ -64,8 +66,11 @@ class PointPackingTest : public testing::Test {
     const auto body = std::make_shared<std::string>(wire::encode(m));
     return {peer, std::string(M::kName), std::as_bytes(std::span(*body)), body};
   }
-  void ask(Sequence after, InstanceId packer, double now_s) {
-    packing.take_state(socket, message(wire::StateRequest{{77}, packer, after}, "peer"), now_s);
+  void ask(Sequence after, InstanceId packer, double now_s, const std::string& peer = "peer", uint64_t viewer = 77) {
+    packing.take_state(socket, message(wire::StateRequest{{viewer}, packer, after}, peer), now_s);
+  }
+  void receipt(Sequence newest, InstanceId packer, double now_s, const std::string& peer = "peer") {
+    packing.take_state(socket, message(wire::Receipt{{77}, packer, newest, now_s}, peer), now_s);
   }
   double status(const std::string& key) {
     net::MasterLink::Values values;
@@ -81,6 +86,7 @@ class PointPackingTest : public testing::Test {
                 },
             .to_viewer =
                 [this](std::string_view peer, std::string_view type, std::string body) {
+                  if (--takes < 0) return false;
                   sent.push_back({std::string(peer), std::string(type), std::move(body)});
                   return true;
                 },
@@ -94,7 +100,8 @@ class PointPackingTest : public testing::Test {
   std::vector<wire::TileRefused> refused;
   std::deque<Sent> sent;
   metrics::SpanRecorder spans;
-  PointPacking packing{{}, outlets(), spans};
+  int takes = 1 << 30;  // messages to one viewer, then no more
+  PointPacking packing;
 };
 
 TEST_F(PointPackingTest, AViewThatNeedsNoRaysIsCompleteWithItsPlan) {
@@ -242,6 +249,7 @@ TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
       requests.push_back(patch.request.value);
     }
     EXPECT_TRUE(decoded<wire::StateMark>(sent.back()).answer);
+    receipt({8}, packer, 5);  // else what it asks for again is under way
     return requests;
   };
   EXPECT_EQ(told_after({}), (std::vector<uint64_t>{5, 6, 7, 8}));
@@ -350,6 +358,132 @@ TEST_F(PointPackingTest, ARefusedTileIsToldTheMaster) {
   EXPECT_FALSE(refused[0].why.empty());
   EXPECT_TRUE(told.empty());
   EXPECT_EQ(status("tiles_refused"), 1);
+}
+
+// Answers of some events at a time, to viewers that join.
+class StateAnswersTest : public PointPackingTest {
+ protected:
+  static constexpr uint64_t kWindow = 60000;
+  StateAnswersTest() : PointPackingTest({.answers = {.window_bytes = kWindow, .bytes_at_once = kWindow / 2}}) {
+    wire::Welcome session = welcome();
+    session.settings["packing.keep_redundant"] = 1;
+    EXPECT_TRUE(packing.follow(session, 0));
+    for (uint64_t frame = 1; frame <= kFrames; ++frame) publish(frame);
+    packer = decoded<wire::Patch>(sent.front()).packer;
+    for (const Sent& s : sent) total_bytes += s.body.size();
+    EXPECT_GT(total_bytes, 4 * kWindow);
+    sent.clear();
+  }
+  void publish(uint64_t frame) {
+    for (const int half : {0, 1}) {
+      auto m = tile(frame, half);
+      m.lease.camera = test::scene_camera({0.7 + 0.05 * double(frame), 0.4, 0}, 96, 64);
+      sample(m, 1);
+    }
+  }
+  // What went to this viewer since the last call: sequences of patches; 0: the mark at the end.
+  std::vector<uint64_t> to(const std::string& peer) {
+    std::vector<uint64_t> out;
+    bytes = 0;
+    for (const Sent& s : sent) {
+      if (s.peer != peer) continue;
+      bytes += s.body.size();
+      if (s.type == wire::StateMark::kName) {
+        const auto mark = decoded<wire::StateMark>(s);
+        EXPECT_TRUE(mark.answer);
+        EXPECT_EQ(mark.sequence.value, kFrames);
+        out.push_back(0);
+      } else {
+        out.push_back(decoded<wire::Patch>(s).sequence.value);
+      }
+    }
+    std::erase_if(sent, [&](const Sent& s) { return s.peer == peer; });
+    return out;
+  }
+
+  static constexpr uint64_t kFrames = 60;
+  InstanceId packer;
+  uint64_t total_bytes = 0, bytes = 0;
+};
+
+TEST_F(StateAnswersTest, AnAnswerGoesOutAsFastAsItIsReceived) {
+  ask({}, {}, 2);
+  double now_s = 2;
+  std::vector<uint64_t> got = to("peer");
+  EXPECT_LE(bytes, kWindow) << "one turn";
+  for (int n = 0; n < 100; ++n) packing.tick(now_s += 0.02);
+  for (const uint64_t more : to("peer")) got.push_back(more);
+  EXPECT_LT(got.size(), kFrames / 2) << "nothing of it was received";
+  EXPECT_GE(got.size(), 2u);
+  EXPECT_NE(got.back(), 0u) << "no mark";
+  EXPECT_GT(status("answer_bytes"), 0);
+  // Packing goes on meanwhile.
+  publish(kFrames + 1);
+  EXPECT_EQ(sent.back().peer, "");
+  for (int n = 0; n < 1000 && got.back() != 0; ++n) {
+    receipt({got.back()}, packer, now_s);
+    packing.tick(now_s += 0.02);
+    for (const uint64_t more : to("peer")) got.push_back(more);
+    EXPECT_LE(bytes, kWindow);
+  }
+  ASSERT_EQ(got.size(), kFrames + 1) << "what is published meanwhile is not part of it";
+  for (uint64_t i = 0; i < kFrames; ++i) EXPECT_EQ(got[i], i + 1);
+  EXPECT_EQ(got.back(), 0u);
+  receipt({kFrames}, packer, now_s);
+  EXPECT_EQ(status("answers"), 0);
+}
+
+TEST_F(StateAnswersTest, RequestsOfOneViewerAreOneAnswer) {
+  for (int n = 0; n < 30; ++n) ask({}, n % 2 ? packer : InstanceId{}, 2);
+  for (int n = 0; n < 100; ++n) packing.tick(2 + 0.02 * n);
+  const auto first = to("peer");
+  EXPECT_LE(bytes, 2 * kWindow);
+  receipt({first.back()}, packer, 5);
+  ask({first.back()}, packer, 5);
+  packing.tick(5.1);
+  EXPECT_EQ(to("peer").front(), first.back() + 1) << "it goes on where it was";
+  // Over another connection nothing is under way; what was left of the old one is not sent.
+  ask({}, {}, 6, "again");
+  EXPECT_EQ(to("again").front(), 1u);
+  packing.tick(6.1);
+  EXPECT_TRUE(to("peer").empty());
+  // It lost what it had.
+  receipt({3}, packer, 7, "again");
+  to("again");
+  ask({}, packer, 7, "again");
+  EXPECT_EQ(to("again").front(), 1u);
+}
+
+TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
+  for (int n = 0; n < 8; ++n) ask({}, {}, 2, "peer" + std::to_string(n), uint64_t(100 + n));
+  double now_s = 2;
+  std::map<std::string, uint64_t> newest;
+  for (int turn = 0; turn < 40; ++turn) {
+    const size_t before = sent.size();
+    packing.tick(now_s += 0.02);
+    uint64_t turn_bytes = 0;
+    for (size_t i = before; i < sent.size(); ++i) turn_bytes += sent[i].peer.empty() ? 0 : sent[i].body.size();
+    EXPECT_LE(turn_bytes, kWindow) << "a turn is short";
+    for (int n = 0; n < 8; ++n) {
+      const std::string peer = "peer" + std::to_string(n);
+      for (const uint64_t sequence : to(peer)) newest[peer] = std::max(newest[peer], sequence);
+      receipt({newest[peer]}, packer, now_s, peer);
+    }
+  }
+  for (int n = 0; n < 8; ++n) EXPECT_GT(newest["peer" + std::to_string(n)], 10u) << "each has its turn";
+}
+
+TEST_F(StateAnswersTest, AnAnswerThatCannotBeSentHasNoMark) {
+  takes = 3;
+  ask({}, {}, 2);
+  takes = std::max(takes, 0);
+  for (int n = 0; n < 10; ++n) packing.tick(2.1 + n);
+  const auto got = to("peer");
+  EXPECT_EQ(got, (std::vector<uint64_t>{1, 2, 3}));
+  EXPECT_EQ(status("answers"), 0);
+  takes = 1 << 30;
+  ask({3}, packer, 20);
+  EXPECT_EQ(to("peer").front(), 4u) << "it asks again";
 }
 
 TEST(Completions, AreBounded) {
