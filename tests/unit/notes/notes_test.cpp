@@ -1,8 +1,12 @@
 // Books of notes: what is kept comes back; hostile and broken files are refused and left as they are.
+#include <fmt/format.h>
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -139,6 +143,28 @@ TEST_F(Notes, WhatOtherProgramsKeepStays) {
   // Reading what lies deep in itself, or writing it, would end the program.
   const std::string deep(200000, '[');
   EXPECT_FALSE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + std::string(deep.size(), ']') + "}"));
+}
+
+// Reading takes time as the file is long, and not as that squared, whatever other programs keep in it.
+TEST_F(Notes, LongListsOfOthersAreReadAtOnce) {
+  std::string list = "{}";
+  for (int i = 0; i < 200'000; ++i) list += ",{\"a\":1}";
+  const std::clock_t begin = std::clock();
+  const auto book = book_from_json("{\"telesplat_notes\":1,\"x\":[" + list + "]}");
+  ASSERT_TRUE(book) << book.error().text;
+  EXPECT_GT(to_json(*book).size(), list.size());
+  EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 4);
+  std::string keys = "\"a0\":0";
+  for (size_t i = 1; i < kMostKeys; ++i) keys += fmt::format(",\"a{}\":{}", i, i);
+  const auto with = [](const std::string& keys) { return "{\"telesplat_notes\":1,\"x\":{" + keys + "}}"; };
+  EXPECT_TRUE(book_from_json(with(keys)));
+  const auto more = book_from_json(with(keys + ",\"\\\":\":1"));
+  ASSERT_FALSE(more);
+  EXPECT_NE(more.error().text.find("1000 keys"), std::string::npos) << more.error().text;
+  const std::string deep(size_t(kMaxDepth) - 1, '['), up(deep.size(), ']');
+  EXPECT_TRUE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + up + "}"));
+  EXPECT_FALSE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + "[]" + up + "}"));
+  EXPECT_TRUE(book_from_json(with("\"x\":\"" + std::string(100, '[') + ":\"")));
 }
 
 TEST_F(Notes, WhoMayReadThemStays) {
