@@ -178,6 +178,71 @@ TEST_F(Notes, WhoMayReadThemStays) {
   EXPECT_EQ(mode(), fs::perms(0600));
 }
 
+constexpr uid_t kAlice = 61001, kBob = 61002;
+constexpr gid_t kLab = 61003;
+
+struct stat facts_of(const std::string& path) {
+  struct stat out {};
+  EXPECT_EQ(stat(path.c_str(), &out), 0) << path;
+  return out;
+}
+
+TEST_F(Notes, WhoseTheyAreStays) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root writes for others";
+  ASSERT_TRUE(add_note(shelf, "one"));
+  ASSERT_EQ(chown(shelf.beside.c_str(), kAlice, kLab), 0);
+  fs::permissions(shelf.beside, fs::perms(0600));
+  const Status added = add_note(shelf, "two");
+  ASSERT_TRUE(added) << added.error().text;
+  const struct stat now = facts_of(shelf.beside);
+  EXPECT_EQ(now.st_uid, kAlice);
+  EXPECT_EQ(now.st_gid, kLab);
+  EXPECT_EQ(now.st_mode & 0777, 0600u);
+}
+
+// Bob writes into what Alice shares with him, and takes nothing from her.
+TEST_F(Notes, WhoWritesForAGroupTakesThemFromNobody) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+  fs::permissions(folder, fs::perms(0755));
+  fs::create_directories(folder + "/cache");
+  ASSERT_EQ(chown((folder + "/cache").c_str(), kBob, kBob), 0);
+  // Exit code of Bob, of these groups: 0: beside the data, 1: in the cache, 2: nowhere.
+  const auto add_as_bob = [&](const std::vector<gid_t>& groups) {
+    const pid_t child = fork();
+    if (child == 0) {
+      std::string path;
+      const bool bob = setgroups(groups.size(), groups.data()) == 0 && setgid(kBob) == 0 && setuid(kBob) == 0;
+      _exit(!bob || !add_note(shelf, "two", &path) ? 2 : path == shelf.in_cache);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  struct Case {
+    const char* name;
+    mode_t folder, file;
+    std::vector<gid_t> groups;
+    int expected;
+  };
+  for (const Case& c : {Case{"a group's folder", 0777, 0660, {kLab}, 0}, Case{"everybody's", 0777, 0666, {}, 0},
+                        Case{"the group could read it no more", 0777, 0676, {}, 1},
+                        Case{"a folder like /tmp", 01777, 0666, {kLab}, 1}}) {
+    fs::remove_all(folder + "/cache/notes");
+    write(shelf.beside, to_json(full_book()));
+    ASSERT_EQ(chown(shelf.beside.c_str(), kAlice, kLab), 0);
+    ASSERT_EQ(chmod(shelf.beside.c_str(), c.file), 0);
+    ASSERT_EQ(chmod((folder + "/data").c_str(), c.folder), 0);
+    EXPECT_EQ(add_as_bob(c.groups), c.expected) << c.name;
+    const struct stat now = facts_of(shelf.beside);
+    EXPECT_EQ(now.st_mode & 0777, c.file) << c.name;
+    if (!c.groups.empty()) EXPECT_EQ(now.st_gid, kLab) << c.name;
+    if (c.expected == 1) EXPECT_EQ(now.st_uid, kAlice) << c.name;
+    const auto book = book_from_json(content(shelf.beside));
+    ASSERT_TRUE(book) << c.name;
+    EXPECT_EQ(book->notes.size(), full_book().notes.size() + (c.expected == 0 ? 1 : 0)) << c.name;
+  }
+}
+
 TEST_F(Notes, ALinkStaysALink) {
   const std::string kept = folder + "/elsewhere/mine.json";
   write(kept, to_json(full_book()));
