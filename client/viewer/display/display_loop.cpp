@@ -103,9 +103,10 @@ class Display {
 
   // Of the frame that begins; the surface knows by then what there is to show.
   geometry::Camera next_camera(double now_s, double t_s) {
+    auto session = worker_.session();  // first: so a session's scene is never told after it
     const ShownScene scene = worker_.shown_scene();
     if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
-    if (auto session = worker_.session(); session != session_) surface_.on_session(session_ = std::move(session));
+    if (session != session_) surface_.on_session(session_ = std::move(session));
     if (const auto wish = surface_.take_sampling()) worker_.set_sampling(*wish);
     return surface_.begin_frame(now_s, t_s, look_);
   }
