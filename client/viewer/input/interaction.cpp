@@ -110,7 +110,7 @@ void Interaction::take_camera() {
 }
 
 void Interaction::go_to(const geometry::Pose& pose) {
-  playing_ = false;
+  playing_ = plays_path_ = false;
   controls_.set_flying(false);
   controls_.take_over(pose);
 }

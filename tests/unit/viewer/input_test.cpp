@@ -511,6 +511,19 @@ TEST_F(InteractionTest, AnotherDataSetIsSeenFromItsOwnFirstView) {
   expect_same_pose(wait(i), moved, 1e-5);
 }
 
+TEST_F(InteractionTest, WhoGoesElsewhereDuringAPathGoesBackToTheTracker) {
+  Interaction i(std::nullopt, look_);
+  const Pose told = geometry::look_at({2, 1, 3}, {0, 0, 0}), elsewhere = geometry::look_at({0, 0, 2}, {0, 0, 0});
+  i.set_tracked([&](double) { return std::optional(told); });
+  expect_same_pose(wait(i), told);
+  i.play(recorded());
+  wait(i, 0.5);
+  i.go_to(elsewhere);
+  expect_same_pose(wait(i), elsewhere, 1e-5);
+  tap(i, Key::kT);
+  expect_same_pose(wait(i), told);
+}
+
 // ---- title, camera, sampling size, screenshots ----
 
 TEST(TitleLine, HasRatesSinceTheLastOne) {
