@@ -177,11 +177,6 @@ void ViewerWorker::follow_session() {
   seen_version_ = link_.version();
   const wire::Welcome& session = *link_.session();
   const scene::SessionView view(session);
-  {
-    auto told = std::make_shared<const wire::Welcome>(session);
-    const std::lock_guard lock(mutex_);
-    session_ = std::move(told);
-  }
   follow_record(session);
   legends_.follow(session);
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
@@ -195,16 +190,23 @@ void ViewerWorker::follow_session() {
   const auto pipeline = view.pipeline();
   if (!pipeline && !view.fact("kind").empty())
     log::error("the session's scene is of the kind \"{}\", which this viewer does not know", view.fact("kind"));
-  if (session.box_room.empty() || !pipeline) return;
-  if (const Status s = follow(*pipeline, session); !s)
-    return log::error("the session as the master at {} tells of it cannot be shown: {}", options_.service.master,
-                      s.error().text);
+  // The display hears of a session when its scene is there to be shown, or cannot be.
+  auto copy = std::make_shared<const wire::Welcome>(session);
+  const bool has_scene = !session.box_room.empty() && pipeline;
+  const Status followed = has_scene ? follow(*pipeline, session) : ok_status();
   {
     const std::lock_guard lock(mutex_);
-    scene_ = view.fact("scene");
-    terms_ = std::make_shared<const SceneTerms>(terms_of(session));
-    shown_scene_ = {session.box_room, *pipeline};
+    session_ = std::move(copy);
+    if (has_scene && followed) {
+      scene_ = view.fact("scene");
+      terms_ = std::make_shared<const SceneTerms>(terms_of(session));
+      shown_scene_ = {session.box_room, *pipeline};
+    }
   }
+  if (!followed)
+    return log::error("the session as the master at {} tells of it cannot be shown: {}", options_.service.master,
+                      followed.error().text);
+  if (!has_scene) return;
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
 }
 
