@@ -42,6 +42,7 @@ class MeshTiles final : public TileSource {
   };
   void learn_look(const wire::Welcome& session);
   size_t missing_count() const;
+  void refuse(ChunkId id, const std::string& why);
 
   std::unique_ptr<Sampler> sampler_;
   ChunkCache cache_;
@@ -55,6 +56,7 @@ class MeshTiles final : public TileSource {
   EpochId epoch_;      // the newest
   EpochBook<Look> looks_;
   bool prefetched_ = false;
+  uint64_t chunks_refused_ = 0;
   double last_request_s_ = -1e9, last_extend_s_ = -1e9;
 };
 
