@@ -12,6 +12,7 @@
 #include "common/points/point_model.h"
 #include "common/splat/reference_depth.h"
 #include "services/packer/points/event.h"
+#include "services/packer/points/event_log.h"
 #include "services/packer/points/known_reference.h"
 #include "services/packer/points/model_watcher.h"
 #include "services/packer/points/sampled_tile.h"

@@ -154,12 +154,6 @@ std::vector<net::Socket*> MeshTiles::sockets() {
   return blocks_ ? std::vector<net::Socket*>{&*blocks_} : std::vector<net::Socket*>{};
 }
 
-// It would have none of it the next time, either. What it shows there is a hole.
-void MeshTiles::missed(ChunkId id) {
-  for (const ChunkId old : cache_.insert(id)) sampler_->remove_chunk(old);
-  if (!std::exchange(told_missed_, true)) log::error("{} does not have chunk {} of its own list", endpoint_, id.value);
-}
-
 void MeshTiles::receive() {
   if (!blocks_) return;
   const double now_s = monotonic_s();
@@ -170,9 +164,8 @@ void MeshTiles::receive() {
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::ChunkList>) {
         if (!cache_.known()) cache_.reset(m.chunks);
         progress_s_ = now_s;
-      } else if (m.data.empty() && cache_.waiting(m.chunk)) {
-        missed(m.chunk);
       } else if (cache_.waiting(m.chunk)) {
+        if (m.data.empty()) return refuse(m.chunk, "there is no such chunk");
         batch.emplace_back(m.chunk, aligned(*message, m.data));
         progress_s_ = now_s;
       }
@@ -181,15 +174,30 @@ void MeshTiles::receive() {
   }
   if (batch.empty()) return;
   const double begin_s = monotonic_s();
-  for (const auto& [id, bytes] : batch)
-    for (const ChunkId old : cache_.insert(id)) sampler_->remove_chunk(old);
-  if (const Status s = sampler_->add_chunks(std::move(batch)); !s)
-    log::warn("a chunk from {} was refused: {}", endpoint_, s.error().text);
+  const bool all_good = sampler_->add_chunks(batch).ok();
+  for (auto& [id, bytes] : batch) {
+    const uint64_t size = bytes.bytes.size();
+    if (!all_good)  // which one is not?
+      if (const Status s = sampler_->add_chunk(id, std::move(bytes)); !s) {
+        refuse(id, s.error().text);
+        continue;
+      }
+    for (const ChunkId old : cache_.insert(id, size)) sampler_->remove_chunk(old);
+  }
   spans_.add("add chunks", link_.to_master_s(begin_s), link_.to_master_s(monotonic_s()));
+}
+
+void MeshTiles::refuse(ChunkId id, const std::string& why) {
+  ++chunks_refused_;
+  if (cache_.refuse(id))
+    log::warn("chunk {} of {} was refused {} times: {}; views do without it", id.value, endpoint_, ChunkCache::kTries,
+              why);
 }
 
 void MeshTiles::add_status(net::MasterLink::Values& values) const {
   values["chunk_mb"] = double(cache_.bytes()) / 1e6;
+  values["chunks_refused"] = double(chunks_refused_);
+  values["chunks_lacking"] = double(cache_.holes());
   values["messages_rejected"] = blocks_ ? double(blocks_->rejected()) : 0.0;
 }
 

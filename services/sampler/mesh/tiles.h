@@ -42,7 +42,7 @@ class MeshTiles final : public TileSource {
   };
   void learn_look(const wire::Welcome& session);
   size_t missing_count() const;
-  void missed(ChunkId id);
+  void refuse(ChunkId id, const std::string& why);
 
   std::unique_ptr<Sampler> sampler_;
   ChunkCache cache_;
@@ -55,7 +55,8 @@ class MeshTiles final : public TileSource {
   std::string array_;  // that the chunks held have
   EpochId epoch_;      // the newest
   EpochBook<Look> looks_;
-  bool prefetched_ = false, told_missed_ = false;
+  bool prefetched_ = false;
+  uint64_t chunks_refused_ = 0;
   double last_request_s_ = -1e9, last_extend_s_ = -1e9;
   double progress_s_ = -1e9;  // when something came of the data server
 };
