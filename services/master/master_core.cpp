@@ -376,7 +376,7 @@ void MasterCore::on(const std::string& peer, const wire::TileRefused& m, double 
   const auto sampler = peers_.find(by->second);
   if (sampler == peers_.end()) return;
   plan_->refused(m, sampler->first);
-  if (refusals_.allow(now_s))
+  if (refused_tiles_.allow(now_s))
     log::warn("{} cannot use what sampler {} made of tile {} of frame {}: {}", p->hello.name,
               sampler->second.hello.name, m.tile, m.frame.value, m.why);
   dispatch(now_s);

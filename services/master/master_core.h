@@ -182,7 +182,7 @@ class MasterCore {
   std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them
   SwapBarrier::Figures swaps_;                // of walls that are gone
   uint64_t leases_expired_ = 0;
-  log::RateLimiter refusals_;  // of lines about them
+  log::RateLimiter refused_tiles_;  // of lines about them
   double leases_rest_until_s_ = -1e9;
   double announced_s_ = -1e9;  // when everyone was told of the session
   bool announce_due_ = false;

@@ -495,13 +495,13 @@ TEST(Completions, AreBounded) {
     completions.add(event);
   };
   const auto count = [&](uint64_t viewer) {
-    std::vector<Event> events;
+    std::deque<Event> events;
     completions.fill(events, {viewer}, {});
     return events.size();
   };
   for (int i = 0; i < 20; ++i) add(1);
   EXPECT_EQ(count(1), Completions::kMostViews);
-  std::vector<Event> newest;
+  std::deque<Event> newest;
   completions.fill(newest, {1}, {19});
   ASSERT_EQ(newest.size(), 1u);
   EXPECT_EQ(newest[0].sequence.value, 20u);
