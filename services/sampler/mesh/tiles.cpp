@@ -129,7 +129,8 @@ Sampled MeshTiles::sample(const HeldLease& held) {
 // Asks for the list of chunks, then for what the next tile needs, then for the rest as far as the budget goes.
 void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
-  if (std::exchange(failed_before_, blocks_->failed_connections()) != failed_before_) broken_ = true;
+  const uint64_t failed = blocks_->failed_connections();
+  broken_ |= std::exchange(failed_before_, failed) != failed;
   if (!cache_.known()) return fetch_list(now_s);
   if (retry_.overdue(now_s, broken_)) begin_anew();
   std::vector<ChunkId> wanted;

@@ -200,6 +200,7 @@ std::optional<VoxelAsk> VolumeWork::next_ask() {
 }
 
 bool VolumeWork::overdue(double now_s) const {
+  if (asked_->refused_s > 0 && now_s - asked_->refused_s > RetryClock::kLeast_s) return true;
   const auto server = servers_.find(asked_->ask.endpoint);
   const bool broken = server == servers_.end() || server->second.failed_connections() != asked_->failed_before;
   return retry_.overdue(now_s, broken);
@@ -318,7 +319,7 @@ void VolumeWork::receive(double now_s) {
         const double begin_s = monotonic_s();
         const auto taken = store_.take(ask, data, epoch->shown);
         if (!taken) {
-          // It is asked again when its time is up.
+          asked_->refused_s = now_s;
           return socket.reject(*message, taken.error().text);
         }
         if (!*taken) return;

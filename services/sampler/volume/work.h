@@ -74,6 +74,7 @@ class VolumeWork final : public Work {
   struct Asked {
     VoxelAsk ask;
     uint64_t failed_before = 0;  // Socket::failed_connections()
+    double refused_s = 0;        // when an answer came that was none; 0: none did
   };
 
   Readiness readiness(const Held& held, double now_s);

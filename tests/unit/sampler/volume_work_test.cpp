@@ -334,7 +334,7 @@ TEST_F(VolumeWorkTest, ALeaseWaitsForItsVoxelsAndIsExtendedMeanwhile) {
   for (int n = 0; n < 5; ++n) now += VolumeWork::kExtend_s * 0.6, work.fetch(now);
   EXPECT_GE(extended.size(), 2u);
   EXPECT_LE(extended.size(), 4u);
-  now += VolumeWork::kPatience_s + 3;
+  now += RetryClock::kFirst_s + 1;
   const size_t before = extended.size();
   work.fetch(now);
   EXPECT_EQ(extended.size(), before) << "a server that never answers shall not hold a frame for ever";
