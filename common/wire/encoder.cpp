@@ -22,8 +22,8 @@ class Packer : Appender, public msgpack::packer<Appender> {
   explicit Packer(std::string& out) : Appender{out}, msgpack::packer<Appender>(static_cast<Appender&>(*this)) {}
 };
 
-// Text that is not UTF-8, as receivers take it: to_utf8() of it, which may be three times as long, cut at a character so
-// that it stays within the limit that the text was within.
+// Text that is not UTF-8, as receivers take it: to_utf8() of it, which may be three times as long, cut at a character
+// so that it stays within the limit that the text was within.
 std::string presentable(std::string_view text) {
   std::string out = to_utf8(text);
   for (const size_t limit : {kMaxString, kMaxFact, kMaxControlBytes}) {

@@ -198,7 +198,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
   if (changed && m.role == "sampler")
     for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new one holds nothing yet
   Peer& p = enter(peer, m, now_s);
-  follow_packer();
+  if (m.role == "packer") follow_packer();
   if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
   const EpochId epoch = epoch_;
   if (m.role == "data")
@@ -219,7 +219,8 @@ void MasterCore::take_put_off_hellos(double now_s) {
   std::vector<std::pair<std::string, wire::Hello>> due;
   for (const auto& [id, p] : peers_)
     if (p.put_off && p.hello_pace.allows(now_s)) due.emplace_back(id, *p.put_off);
-  for (const auto& [id, hello] : due) on(id, hello, now_s);
+  for (const auto& [id, hello] : due)
+    if (const auto p = peers_.find(id); p != peers_.end() && p->second.put_off) on(id, hello, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {

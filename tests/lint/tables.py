@@ -47,7 +47,7 @@ FLOORS = {
         ["services/data"],
     ],
     "services/sampler": [
-        [("services/sampler/work.h", "services/sampler/epoch_book.h")],
+        [("services/sampler/work.h", "services/sampler/epoch_book.h", "services/sampler/retry_clock.h")],
         ["services/sampler/tiles", "services/sampler/volume"],
         ["services/sampler/mesh", "services/sampler/julia", "services/sampler/volume/shear"],
         ["services/sampler"],

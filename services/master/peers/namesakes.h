@@ -15,7 +15,7 @@ class Namesakes {
 
   /// Another process of its role and name took this one's place.
   void replaced(InstanceId instance, double now_s);
-  /// This process says hello. True: it was replaced a moment ago, and yet it lives. Told once each time it was replaced.
+  /// This process says hello. True: it was replaced a moment ago, and yet it lives. Told once for each time.
   bool lives_on(InstanceId instance, double now_s);
 
  private:
