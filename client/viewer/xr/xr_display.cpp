@@ -325,6 +325,7 @@ class XrDisplay {
     spans_.add("display frame", m.begin_master_s, worker_.to_master_s(m.presented_s), 0);
     previous_s_ = m.end_s;
     if (f.discarded) log::debug("the runtime discarded a frame");
+    if (m.drawn.between_clips) use &= ~uint32_t{kVerify};  // there is no epoch that looks like it
     if (use) {
       const double t_s = m.begin_s - start_s_;
       if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;
