@@ -164,7 +164,11 @@ class XrDisplay {
     if (session_->take_recentring()) worker_.on_jump();
     const auto eyes = session_->locate_eyes(begun->display_time);
     if (!eyes) return session_->end_frame(*begun, nullptr);
-    if (!received_) as_pair_ = alike(eyes->cameras);
+    // A pair has another share of a frame's time than two pictures, so its source is another one.
+    if (const bool pair = alike(eyes->cameras); !received_ || (as_pair_ && !pair)) {
+      as_pair_ = pair;
+      received_.reset();
+    }
     if (!follow_scene(begun->period_s)) return session_->end_frame(*begun, nullptr);
     left_ = eyes->cameras[0];
     follow_head(*begun, *eyes, m);
@@ -231,7 +235,7 @@ class XrDisplay {
         std::fill(view.colour.begin(), view.colour.end(), o_.shading.background);
         std::fill(view.depth_m.begin(), view.depth_m.end(), std::numeric_limits<float>::infinity());
       }
-    else if (as_pair_ && alike(eyes.cameras))
+    else if (as_pair_)
       draw_pair(eyes.cameras, counts, m);
     else
       draw_each(eyes.cameras, counts, m);
