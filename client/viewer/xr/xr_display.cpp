@@ -256,7 +256,7 @@ class XrDisplay {
     for (size_t eye = 0; eye < 2; ++eye)
       targets[eye] = {views_[eye].width, views_[eye].height, views_[eye].colour.data(), views_[eye].depth_m.data()};
     m.drawn = source_->draw_pair({.begin_s = monotonic_s(),
-                                  .camera = m.camera,
+                                  .camera = between(cameras),  // m.camera stands behind them
                                   .look = look_,
                                   .with_depth = true,
                                   .resting = !counts,
