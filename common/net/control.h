@@ -14,8 +14,8 @@ inline constexpr SocketOptions kControlSocket{
 
 /// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer,
 /// which may be a refusal. Error: it did not answer within `timeout_s`; if the socket has kControlSocket, at once where
-/// nothing takes connections. Answers to earlier commands that are there by then are dropped; one that comes later would
-/// be taken for this one's, so after an error the socket is to be given up.
+/// nothing takes connections. Answers to earlier commands that are there by then are dropped; one that comes later
+/// would be taken for this one's, so after an error the socket is to be given up.
 Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                            double timeout_s, const std::map<std::string, std::string>& arguments = {});
 

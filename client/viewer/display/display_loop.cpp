@@ -225,7 +225,7 @@ class Display {
     worker_.on_waiting(waits_s);
     if (Overlays* overlays = surface_.overlays(); overlays && (waits_s > 0) != overlays->shows("waiting")) {
       if (waits_s > 0)
-        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kLowerRight});
+        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kUpperLeft});
       else
         overlays->hide("waiting");
     }

@@ -41,10 +41,9 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
   if (const Status s = points::validate(config); !s) return s;
   auto clip = geometry::clip_from_text(scene::SessionView(session).fact(scene::kClipFact));
   if (!clip) return clip.error();
-  if (*clip != *clip_) {
+  if (*clip != *cut_.clip) {
     const std::lock_guard lock(mutex_);
-    clip_ = std::make_shared<const geometry::Clip>(*std::move(clip));
-    ++clip_version_;
+    cut_ = {std::make_shared<const geometry::Clip>(*std::move(clip)), cut_.version + 1, session.epoch};
   }
   // The packer's first event for another model may have come before this, and a replica of the old one with it. On
   // another connection nothing comes that was sent to the old one.
