@@ -12,6 +12,7 @@
 
 #include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
+#include "services/master/gate/gate.h"
 #include "services/master/live/exposition.h"
 #include "services/master/orders/clipping.h"
 #include "services/master/orders/errands.h"
@@ -28,6 +29,8 @@ class MasterCore {
   MasterCore(const MasterCore&) = delete;  // plans refer to it
   MasterCore& operator=(const MasterCore&) = delete;
 
+  /// One more message of this peer may be handed to on(): it does not send more than its part. False: it is dropped.
+  bool admit(const std::string& peer, double now_s);
   void on(const std::string& peer, const wire::Hello& m, double now_s);
   void on(const std::string& peer, const wire::StatusReport& m, double now_s);
   void on(const std::string& peer, const wire::ViewRequest& m, double now_s);
@@ -70,6 +73,7 @@ class MasterCore {
     run_id_ = run_id;
   }
   const net::RunningSession& session() const { return session_; }
+  const LimitsHit& limits_hit() const { return gate_.hit(); }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
   /// For those who watch; what figures() and live() do not have of it is left to the caller: version, and the master
@@ -101,6 +105,7 @@ class MasterCore {
   std::string packer() const;
   bool samplers_here() const;
   bool make_room(const std::string& peer);
+  void refuse(const std::string& peer, const wire::Hello& m, const std::string& why, double now_s);
   void replace_namesakes(const std::string& peer, const wire::Hello& m);
   Peer& enter(const std::string& peer, const wire::Hello& m, double now_s);
   void forget_viewer(const wire::Hello& hello);
@@ -131,10 +136,11 @@ class MasterCore {
   InstanceId instance_;
   metrics::RunRecord& record_;
   Outbox outbox_;
+  Gate gate_{options_.limits};
   net::RunningSession session_;
   std::string run_id_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
-  Plan* plan_;                       // of these, the one that leads
+  Plan* plan_;  // of these, the one that leads
   Clipping clipping_;
   Errands errands_;
   std::optional<scene::Kind> kind_;  // of its scene

@@ -84,6 +84,10 @@ std::map<std::string, double> MasterCore::counters() const {
     swaps.frames += wall.figures().frames;
     swaps.incomplete += wall.figures().incomplete;
   }
+  const LimitsHit& hit = gate_.hit();
+  out["limits.views_coarser"] = double(hit.views_coarser);
+  out["limits.hellos_refused"] = double(hit.hellos_refused);
+  out["limits.messages_refused"] = double(hit.messages_refused);
   if (swaps.frames > 0) out["swaps"] = double(swaps.frames), out["swaps_incomplete"] = double(swaps.incomplete);
   for (const auto& [pipeline, plan] : plans_) plan->add_counters(out);
   return out;
@@ -129,10 +133,18 @@ std::string MasterCore::status_json(double now_s) const {
            {"tiles_released", f.released},
            {"leases_backup", f.backups},
            {"views_overtaken", f.overtaken},
+           {"limits",
+            {{"max_sampling_pixels", options_.limits.max_sampling_pixels},
+             {"max_peers", options_.limits.max_peers},
+             {"max_messages", options_.limits.max_messages},
+             {"views_coarser", gate_.hit().views_coarser},
+             {"hellos_refused", gate_.hit().hellos_refused},
+             {"messages_refused", gate_.hit().messages_refused}}},
            {"parameters", Json::object()},
            {"animation", animation()}};
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
   if (!clipping_.order().empty()) out["clip"] = clipping_.order();
+  if (const auto failed = record_.losses().failed; !failed.empty()) out["record_failed"] = failed;
   plan_->add_status(out);
   out["processes"] = Json::array();
   for (const auto& [id, p] : peers_) {
