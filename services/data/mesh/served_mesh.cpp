@@ -13,6 +13,10 @@
 namespace telesplat::data {
 namespace {
 
+// Answers that wait for a sampler: it asks for 8 chunks at a time, and for the list. One that does not read costs no
+// more than these; what it misses it asks for again.
+constexpr int kChunksAPeer = 16;
+
 class ServedMesh final : public Served {
  public:
   ServedMesh(std::shared_ptr<const MeshStore> store, std::string title, ServedColours colours)
@@ -50,7 +54,7 @@ class ServedMesh final : public Served {
       hello.facts[scene::kPlacementFact] = scene::to_text(scene::placement_of(*rotation, info.box_data, info.box_room));
     hello.box_room = info.box_room;
   }
-  Requests requests() const override { return {"chunks", 4096}; }
+  Requests requests() const override { return {"chunks", kChunksAPeer}; }
 
   // The session may want other colours than it began with: by order of the master, or because another data server that
   // was here before had them.
