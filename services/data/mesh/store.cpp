@@ -136,11 +136,11 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
   return Error{fmt::format("{}: was removed as soon as it was made", name)};
 }
 
-// One process at a time makes a store; others wait for it here and then find it. The lock ends with its holder. Whoever
-// clears the cache removes locks that nobody holds, so the one that was waited for may be gone: then once more.
 constexpr const char* kWaitingForAnother = "waiting for another process that reads it";
 constexpr double kLongestWait_s = 600;
 
+// One process at a time makes a store; others wait for it here and then find it. The lock ends with its holder. Whoever
+// clears the cache removes locks that nobody holds, so the one that was waited for may be gone: then once more.
 Descriptor lock_making(const std::string& stem, const Progress& progress) {
   const std::string name = stem + ".lock";
   const double begin_s = monotonic_s();
