@@ -33,6 +33,13 @@ int fail(const Error& error) {
   return 1;
 }
 
+// The launcher reads it: this is no reason to end the session for others.
+int not_recorded(const std::string& directory) {
+  if (!isatty(STDOUT_FILENO)) std::printf("record failed\n");
+  std::fflush(stdout);
+  return fail({fmt::format("{}: not all of the record could be written", directory)});
+}
+
 // To the person: on a terminal as it is, else marked so that the launcher passes it on.
 void tell(const std::string& text) {
   std::printf("%s%s\n", isatty(1) ? "" : "note ", text.c_str());
@@ -246,6 +253,7 @@ Served serve(const ViewerOptions& o, const net::Via& via, const Display& display
 Status develop(const std::string& directory, FrameSpool& spool) {
   spool.flush();
   if (spool.dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool.dropped());
+  if (spool.failed()) log::warn("{} frames to record could not be written", spool.failed());
   // The launcher reads lines, a person one that is rewritten.
   const auto progress = [person = isatty(STDOUT_FILENO) != 0](size_t done, size_t of) {
     if (person)
@@ -297,10 +305,13 @@ int run(ViewerOptions o) {
   if (!served.display.error.empty()) return fail({served.display.error});
   const std::string lost = display->surface ? display->surface->failure() : "";
   display->surface.reset();  // the window goes at once, however much there is to write
-  if (FrameSpool* spool = (*record)->spool())
-    if (const Status s = develop((*record)->directory(), *spool); !s) return fail(s.error());
+  FrameSpool* const spool = (*record)->spool();
+  const Status developed = spool ? develop((*record)->directory(), *spool) : ok_status();
   const int code = farewell(o, *via, served);
-  return lost.empty() ? code : fail({lost});
+  if (!lost.empty()) return fail({lost});
+  if (!developed) log::error("{}", developed.error().text);
+  if (code == 0 && (!developed || (*record)->files_failed() > 0)) return not_recorded((*record)->directory());
+  return code;
 }
 
 }  // namespace telesplat::viewer

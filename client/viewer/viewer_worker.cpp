@@ -8,6 +8,7 @@
 #include "client/viewer/coupling/update_table.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/metrics/process.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -359,6 +360,7 @@ void ViewerWorker::request_views(double now_s) {
     const auto request = requester_.next(to_master_s(now_s));
     if (!request) return;
     link_.socket().send(*request);
+    tell_if_coarser(request->camera);
     {
       const std::lock_guard lock(mutex_);
       sampled_width_ = request->camera.width, sampled_height_ = request->camera.height;
@@ -368,6 +370,15 @@ void ViewerWorker::request_views(double now_s) {
       may_ask = c.waits() && c.may_ask();
     });
   }
+}
+
+// Once: the master samples it coarser than it was asked for.
+void ViewerWorker::tell_if_coarser(const geometry::Camera& camera) {
+  const double most = scene::value_or(link_.session()->settings, "sampling.max_pixels", 0.0);
+  const double pixels = double(camera.width) * double(camera.height);
+  if (most <= 0 || pixels <= most || std::exchange(told_coarser_, true)) return;
+  log::warn("views of {}x{} pixels are sampled coarser: the master's --max-sampling-pixels is {:.0f}", camera.width,
+            camera.height, most);
 }
 
 void ViewerWorker::report(double now_s, bool last) {
@@ -436,6 +447,7 @@ net::MasterLink::Values ViewerWorker::status() const {
                                  {"sequence", 0},
                                  {"messages_rejected", double(feeds_.rejected())}};
   if (received_) received_->add_status(values);
+  if (options_.record) values[metrics::kRecordFailed] = double(options_.record->files_failed());
   add_recent(values);
   add_prediction(values);
   return values;

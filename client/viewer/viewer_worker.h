@@ -112,6 +112,7 @@ class ViewerWorker {
   void take_sampling();
   void ask_again(double now_s);
   void request_views(double now_s);
+  void tell_if_coarser(const geometry::Camera& camera);
   void report(double now_s, bool last);
   ReceivedLinks links();
   net::MasterLink::Values status() const;
@@ -132,6 +133,7 @@ class ViewerWorker {
   Succession succession_;
   std::map<RequestId, ShownUpdate> complete_;  // where the display waits: those that wait for earlier ones
   int seen_version_ = 0;
+  bool told_coarser_ = false;
   InstanceId master_;
   bool all_again_ = false;  // what is open is to be asked for again
   double started_s_ = 0, last_report_s_ = 0;

@@ -116,7 +116,10 @@ bool MasterLink::handle(const Message& message) {
   }
   if (message.type == wire::Shutdown::kName) {
     if (const auto shutdown = socket_.decode<wire::Shutdown>(message)) {
-      log::debug("shutdown: {}", shutdown->reason);
+      if (welcomed_ || session_)
+        log::debug("shutdown: {}", shutdown->reason);
+      else
+        log::error("the master refuses this process: {}", printable(shutdown->reason));
       shutdown_ = true;
     }
     return true;

@@ -115,7 +115,10 @@ std::string complain_about_host(const std::string& host) {
 }
 
 void end_on_signals() { handle_signals(end_process); }
-void install_signal_handlers() { handle_signals(set_flag); }
+void install_signal_handlers() {
+  handle_signals(set_flag);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of who writes it, like a disk that is full
+}
 bool stop_requested() { return stop_flag; }
 void forget_stop() { stop_flag = false; }
 

@@ -14,6 +14,7 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/core/utf8.h"
 #include "common/net/local_endpoint.h"
 #include "common/net/read_ahead.h"
 
@@ -196,7 +197,7 @@ struct Socket::Impl {
     if (limiter.allow(monotonic_s())) {
       const std::string more =
           limiter.suppressed() ? fmt::format(" ({} more since the last such line)", limiter.suppressed()) : "";
-      log::warn("{}: dropped {}: {}{}", name, what, why, more);
+      log::warn("{}: dropped {}: {}{}", name, printable(what), printable(why, 512), more);
     }
   }
 

@@ -7,13 +7,14 @@
 #include <utility>
 
 #include "common/core/log.h"
+#include "common/core/utf8.h"
 #include "common/scene/session.h"
 #include "services/master/peers/hello_check.h"
 
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMaxPeers = 4096;  // remembered processes, the departed included
+constexpr size_t kMaxDeparted = 1024;  // processes that left and are remembered
 constexpr size_t kMaxWalls = 64;
 constexpr double kCatchUp_s = 0.5;      // after this process stood still, until all that has come is read
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
@@ -105,9 +106,13 @@ bool MasterCore::samplers_here() const {
 
 // Forgets someone who left if there are too many. False: all are here.
 bool MasterCore::make_room(const std::string& peer) {
-  if (peers_.size() < kMaxPeers || peers_.contains(peer)) return true;
+  const auto before = peers_.find(peer);
+  if (before != peers_.end() && !before->second.gone) return true;
+  const auto here = size_t(std::count_if(peers_.begin(), peers_.end(), [](const auto& p) { return !p.second.gone; }));
+  if (here >= options_.limits.max_peers) return false;
+  if (before != peers_.end() || peers_.size() < here + kMaxDeparted) return true;
   const auto departed = std::find_if(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone; });
-  if (departed == peers_.end()) return false;
+  if (departed == peers_.end()) return true;
   forget(departed->second, departed->first);
   peers_.erase(departed);
   return true;
@@ -126,11 +131,6 @@ void MasterCore::forget_departed(double now_s) {
     forget(p, id);
     return true;
   });
-}
-
-void MasterCore::refuse_hello(const std::string& why, double now_s) {
-  ++hellos_refused_;
-  if (refusals_.allow(now_s)) log::warn("a process is not let in: {}", why);
 }
 
 // A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet. Two that
@@ -182,9 +182,24 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
   return p;
 }
 
+bool MasterCore::admit(const std::string& peer, double now_s) {
+  const auto p = peers_.find(peer);
+  const bool packer = p != peers_.end() && !p->second.gone && p->second.hello.role == "packer";
+  return packer || gate_.admit(peer, now_s);
+}
+
+// It is told why, and ends: it could do nothing here.
+void MasterCore::refuse(const std::string& peer, const wire::Hello& m, const std::string& why, double now_s) {
+  gate_.refuse_hello();
+  if (gate_.may_log(now_s)) log::warn("{} {} is refused: {}", printable(m.role, 64), printable(m.name, 128), why);
+  outbox_.send(peer, wire::Shutdown{why});
+}
+
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
-  if (const Status fits = check_hello(m); !fits) return refuse_hello(fits.error().text, now_s);
-  if (!make_room(peer)) return refuse_hello(fmt::format("{} are here", kMaxPeers), now_s);
+  if (const Status fits = check_hello(m); !fits) return refuse(peer, m, fits.error().text, now_s);
+  if (!make_room(peer))
+    return refuse(peer, m, fmt::format("{} processes take part already (--max-peers)", options_.limits.max_peers),
+                  now_s);
   if (const auto said = peers_.find(peer); said != peers_.end()) {
     if (!said->second.hello_pace.allows(now_s)) return void(said->second.put_off = m);
     said->second.hello_pace.count(now_s);
@@ -199,7 +214,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
     for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new one holds nothing yet
   Peer& p = enter(peer, m, now_s);
   if (m.role == "packer") follow_packer();
-  if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
+  if (changed && m.role != "ctl" && gate_.may_log(now_s)) log::info("{} {} joined", m.role, m.name);
   const EpochId epoch = epoch_;
   if (m.role == "data")
     if (const Status s = adopt_scene(peer, m, now_s); !s) {
@@ -272,7 +287,7 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
   if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
   forget_viewer(p.hello);
   for (const auto& [peer, reply] : errands_.lost(routing_id)) outbox_.send(peer, reply);
-  if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
+  if (p.hello.role != "ctl" && gate_.may_log(now_s_)) log::info("{} {} {}", p.hello.role, p.hello.name, why);
 }
 
 Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double now_s) {
@@ -323,8 +338,8 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
   // The coarse pass looks a little beyond the view's edges, maybe beyond what a lease may.
-  if (!geometry::validate(geometry::subsample(m.camera, kCoarseStep))) return;
-  wire::ViewRequest request = m;
+  wire::ViewRequest request = gate_.admit(m);
+  if (!geometry::validate(geometry::subsample(request.camera, kCoarseStep))) return;
   request.moments = {.requested_s = m.moments.requested_s, .received_s = now_s};
   plan_->views().request_view(request);
   dispatch(now_s);

@@ -14,6 +14,7 @@
 #include "common/core/log.h"
 #include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
+#include "services/master/gate/gate.h"
 #include "services/master/leases/lease_signer.h"
 #include "services/master/live/exposition.h"
 #include "services/master/orders/clipping.h"
@@ -34,6 +35,8 @@ class MasterCore {
   MasterCore(const MasterCore&) = delete;  // plans refer to it
   MasterCore& operator=(const MasterCore&) = delete;
 
+  /// One more message of this peer may be handed to on(): it does not send more than its part. False: it is dropped.
+  bool admit(const std::string& peer, double now_s);
   void on(const std::string& peer, const wire::Hello& m, double now_s);
   void on(const std::string& peer, const wire::StatusReport& m, double now_s);
   void on(const std::string& peer, const wire::ViewRequest& m, double now_s);
@@ -83,6 +86,7 @@ class MasterCore {
     run_id_ = run_id;
   }
   const net::RunningSession& session() const { return session_; }
+  const LimitsHit& limits_hit() const { return gate_.hit(); }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
   /// For those who watch; what figures() and live() do not have of it is left to the caller: version, and the master
@@ -120,7 +124,7 @@ class MasterCore {
   void follow_another_packer(double now_s);
   bool samplers_here() const;
   bool make_room(const std::string& peer);
-  void refuse_hello(const std::string& why, double now_s);
+  void refuse(const std::string& peer, const wire::Hello& m, const std::string& why, double now_s);
   void forget_departed(double now_s);
   void forget(const Peer& peer, const std::string& routing_id);
   void replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s);
@@ -159,6 +163,7 @@ class MasterCore {
   metrics::RunRecord& record_;
   Outbox outbox_;
   LeaseSigner signer_;
+  Gate gate_{options_.limits};
   net::RunningSession session_;
   std::string run_id_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
@@ -172,8 +177,6 @@ class MasterCore {
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
   Namesakes namesakes_;
   Departed departed_;
-  uint64_t hellos_refused_ = 0;
-  log::RateLimiter refusals_;
   std::string shows_;  // the data server that the scene is of
   uint64_t joined_ = 0;
   std::string leading_packer_;  // that frames were begun with; empty: none, or it is gone

@@ -203,6 +203,35 @@ options::Table session_table(MasterServiceOptions& o) {
       {clip_row(o.master)});
 }
 
+options::Table limit_table(MasterServiceOptions& o) {
+  Limits& l = o.master.limits;
+  return {{.flag = "--max-sampling-pixels",
+           .value = &l.max_sampling_pixels,
+           .help = "pixels of a view at most; of one that has more, every second, third, ... of each row and column is "
+                   "sampled",
+           .limits = options::Range{1, 1 << 28}},
+          {.flag = "--max-peers",
+           .value = &l.max_peers,
+           .help = "processes that take part at a time; further ones are refused",
+           .limits = options::Range{1, 4096}},
+          {.flag = "--max-messages",
+           .value = &l.max_messages,
+           .help = "messages of one process a second, the packer's left out; what is beyond is dropped and counted",
+           .limits = options::Range{10.0, 1e6}}};
+}
+
+options::Table record_table(MasterServiceOptions& o) {
+  return {{.flag = "--table-limit-mb",
+           .value = &o.table_limit_mb,
+           .help = "MB that each table of the record has at most (frames.csv, tiles.csv, ...); what is beyond is "
+                   "counted; 0: no limit",
+           .limits = options::Range{0.0, 1e9}},
+          {.flag = "--trace-limit-mb",
+           .value = &o.trace_limit_mb,
+           .help = "MB that the record's trace.json has at most; 0: no limit",
+           .limits = options::Range{0.0, 1e9}}};
+}
+
 options::Row metrics_port_row(MasterServiceOptions& o) {
   return {.flag = "--metrics-port",
           .value = &o.metrics_port,
@@ -216,6 +245,10 @@ options::Table table(MasterServiceOptions& o) {
       {.flag = "--overwrite",
        .value = &o.overwrite,
        .help = "the folder of --out may hold a record already: its files are replaced, others stay",
+       .reach = options::Reach::kHere},
+      {.flag = "--continue",
+       .value = &o.goes_on,
+       .help = "go on with the record that a master before left in the folder of --out, if there is one",
        .reach = options::Reach::kHere},
       {.flag = "--started-by",
        .value = &o.started_by,
@@ -232,7 +265,8 @@ options::Table table(MasterServiceOptions& o) {
        .help = "change a Julia set's parameters with time: c.y=-0.4:0.4:10s, or c.y=@0s:-0.4@5s:0.4@10s:-0.4; several "
                "are separated by \";\"",
        .reach = options::Reach::kHere}};
-  return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own), session_table(o));
+  return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own),
+                         options::joined(options::joined(record_table(o), limit_table(o)), session_table(o)));
 }
 
 }  // namespace telesplat::master

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <optional>
 #include <utility>
 
@@ -122,9 +121,12 @@ class MasterService {
                                .begin = record_->begin(),
                                .end_unix_ns = metrics::begin_now().unix_ns,
                                .settings = core_.settings()};
-    if (!options_.out.empty())
-      std::ofstream(options_.out + "/session.toml") << session_text(options_, core_, about, processes);
-    return record_->finish(processes, core_.counters(), about);
+    // It is among the files that finish() tells of.
+    if (const Status s = record_->write_file("session.toml", session_text(options_, core_, about, processes)); !s)
+      log::error("{}", s.error().text);
+    const Status finished = record_->finish(processes, core_.counters(), about);
+    if (finished && options_.overwrite) metrics::forget_replaced(options_.out);
+    return finished;
   }
 
  private:
@@ -180,6 +182,7 @@ class MasterService {
                       message.peer);
       return;
     }
+    if (!core_.admit(message.peer, now_s)) return control_.reject(message, "its peer sends more than --max-messages");
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
                   wire::TileDone, wire::TileRefused, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady,
                   wire::LinkReport, wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
@@ -221,22 +224,31 @@ int run(const MasterServiceOptions& o) {
   };
   const auto options = core_options(o);
   if (!options) return fail(2, options.error());
+  if (o.overwrite && o.goes_on) return refuse({"--continue and --overwrite: the record goes on, or is replaced"});
   std::string run_id;
+  const bool goes_on = o.goes_on && metrics::may_go_on(o.out);
   if (!o.out.empty()) {
     if (const Status s = net::refuse_folder_in_use(o.out); !s) return refuse(s.error());
-    auto begun = metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
+    auto begun =
+        goes_on ? metrics::go_on_in_folder(o.out) : metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
     if (!begun) return refuse(begun.error());
-    if (o.overwrite) metrics::forget_replaced(o.out);
     run_id = *std::move(begun);
   }
-  auto record = metrics::RunRecord::open(o.out, metrics::begin_now());
+  const auto bytes = [](double mb) { return uint64_t(mb * 1e6); };
+  auto record = metrics::RunRecord::open(
+      o.out, metrics::begin_now(),
+      {.table_bytes = bytes(o.table_limit_mb), .trace_bytes = bytes(o.trace_limit_mb), .goes_on = goes_on});
   if (!record) return refuse(record.error());
+  if (goes_on) log::info("{}: its record goes on; this is master {} of it", o.out, (*record)->lives());
   MasterService service(o, *options, *std::move(record), std::move(run_id));
   if (const Status s = service.open_metrics(); !s) return refuse(s.error());
   if (const Status s = service.listen(); !s) return fail(2, s.error());
   service.serve();
   service.say_goodbye();
-  if (const Status s = service.write_record(); !s) return fail(1, s.error());
+  if (const Status s = service.write_record(); !s) {
+    if (o.started_by != "hand") std::printf("record failed\n");  // the launcher reads it
+    return fail(1, s.error());
+  }
   return 0;
 }
 

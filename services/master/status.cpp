@@ -94,8 +94,11 @@ std::map<std::string, double> MasterCore::counters() const {
     swaps.frames += wall.figures().frames;
     swaps.incomplete += wall.figures().incomplete;
   }
+  const LimitsHit& hit = gate_.hit();
+  out["limits.views_coarser"] = double(hit.views_coarser);
+  out["limits.hellos_refused"] = double(hit.hellos_refused);
+  out["limits.messages_refused"] = double(hit.messages_refused);
   if (swaps.frames > 0) out["swaps"] = double(swaps.frames), out["swaps_incomplete"] = double(swaps.incomplete);
-  if (hellos_refused_ > 0) out["hellos_refused"] = double(hellos_refused_);
   if (departed_.forgotten() > 0) out["processes_forgotten"] = double(departed_.forgotten());
   for (const auto& [pipeline, plan] : plans_) plan->add_counters(out);
   return out;
@@ -159,13 +162,20 @@ std::string MasterCore::status_json(double now_s, bool all) const {
            {"leases_backup", f.backups},
            {"views_overtaken", f.overtaken},
            {"frames_given_up", f.given_up},
+           {"limits",
+            {{"max_sampling_pixels", options_.limits.max_sampling_pixels},
+             {"max_peers", options_.limits.max_peers},
+             {"max_messages", options_.limits.max_messages},
+             {"views_coarser", gate_.hit().views_coarser},
+             {"hellos_refused", gate_.hit().hellos_refused},
+             {"messages_refused", gate_.hit().messages_refused}}},
            {"parameters", Json::object()},
            {"animation", animation()}};
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
   if (!clipping_.order().empty()) out["clip"] = clipping_.order();
+  if (const auto failed = record_.losses().failed; !failed.empty()) out["record_failed"] = failed;
   plan_->add_status(out);
   out["departed"] = departed_.count();
-  if (hellos_refused_ > 0) out["hellos_refused"] = hellos_refused_;
   // Those who are here first: an answer is one message.
   out["processes"] = Json::array();
   size_t bytes = dumped(out).size(), left_out = 0;

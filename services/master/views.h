@@ -81,6 +81,8 @@ class Views {
   /// The frame was dropped: its views wait again, except those of viewers that left; of asynchronous viewers only if no
   /// newer request does. Where several are put back, the newest comes first.
   void put_back(FrameId frame);
+  /// All whose views `frame` shows are gone. Precondition: it is in flight.
+  bool left(FrameId frame);
 
  private:
   struct Begun {

@@ -74,7 +74,9 @@ class PackerService {
     }
     flush_spans(1e300);
     link_->leave([&] { return status(); });
-    return 0;
+    const auto values = status();
+    const auto failed = values.find(metrics::kRecordFailed);
+    return failed != values.end() && failed->second > 0 ? 1 : 0;
   }
 
  private:

@@ -185,6 +185,11 @@ std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<F
   const bool view = frame->step == 1 && !frame->extra;
   const PlannedView ended{.frame = frame->id, .epoch = frame->epoch, .view = frame->request};
   if (!view) return frames_.erase(frame);
+  if (left(frame->id)) {  // nobody waits for what is missing
+    frames_.erase(frame);
+    complete(ended.frame, false);
+    return frames_.end();
+  }
   const bool whole = frame->tiles.left() == 0;
   if (!whole) {
     overtaken_views_ += !frame->tiles.hopeless(kMostRefused, kMostLost);

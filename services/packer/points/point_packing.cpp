@@ -272,7 +272,8 @@ void PointPacking::record_plan() {
   if (!options_.plans) return;
   const Status s = options_.plans->add(planner_->picture());
   if (s) return;
-  log::error("{}", s.error().text);
+  ++records_failed_;
+  log::error("{}; plans are not recorded any more", s.error().text);
   options_.plans = nullptr;
 }
 
@@ -325,7 +326,8 @@ void PointPacking::record(const SampledTile& block) {
   if (!options_.recorder || block.step != 1) return;
   const Status s = options_.recorder->add(block.frame, block.camera, block.rect, block.tiles_in_frame, block.image);
   if (s) return;
-  log::error("{}", s.error().text);
+  ++records_failed_;
+  log::error("{}; depth images are not recorded any more", s.error().text);
   options_.recorder = nullptr;
 }
 
@@ -423,6 +425,7 @@ void PointPacking::tick(double now_s) {
 
 void PointPacking::add_status(net::MasterLink::Values& values) const {
   values["bytes_sent"] += double(bytes_sent_);
+  values[metrics::kRecordFailed] = double(records_failed_);
   if (!core_) return;
   const auto& s = core_->statistics();
   const auto& g = gatherer_.statistics();

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "common/metrics/process.h"
 #include "common/metrics/recorder.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/packing.h"
@@ -84,6 +85,7 @@ class PointPacking final : public Packing {
   StateAnswers answers_;
   Completions completions_;
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0, refused_ = 0, unsealed_ = 0;
+  uint64_t records_failed_ = 0;  // of depth images and plans
   uint64_t plans_ = 0;
   FrameId planning_;           // whose extra rays were planned last,
   double planning_s_ = 0;      // and for how long so far

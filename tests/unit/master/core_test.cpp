@@ -448,6 +448,85 @@ TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {
   EXPECT_FALSE(core.on("v", rows, 1));
 }
 
+TEST_F(Master, AFullHouseIsToldAndCounted) {
+  join_all();
+  const uint64_t most = Limits{}.max_peers;
+  for (uint64_t i = 5; i < most; ++i)
+    core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 100 + i), 1);
+  core.on("late", hello("viewer", "late", 99), 1);
+  const auto told = sent<wire::Shutdown>("late");
+  ASSERT_EQ(told.size(), 1u) << "it is not left to wait";
+  EXPECT_NE(told[0].reason.find("--max-peers"), std::string::npos) << told[0].reason;
+  EXPECT_TRUE(sent<wire::Welcome>("late").empty());
+  EXPECT_EQ(status()["limits"]["hellos_refused"], 1);
+  EXPECT_EQ(core.counters().at("limits.hellos_refused"), 1);
+  core.on("v", hello("viewer", "viewer-1", 5), 1);
+  EXPECT_FALSE(sent<wire::Welcome>("v").empty()) << "who is here may say hello again";
+  core.on("x5", wire::Goodbye{{105}}, 1);
+  core.on("late", hello("viewer", "late", 99), 1);
+  EXPECT_EQ(sent<wire::Welcome>("late").size(), 1u) << "somebody left";
+}
+
+TEST_F(Master, HellosOfStrangeRolesAndNamesAreRefused) {
+  const std::pair<const char*, std::string> bad[] = {{"x", "name"},
+                                                     {"master", "name"},
+                                                     {"viewer", ""},
+                                                     {"viewer", "\x1b[2J"},
+                                                     {"viewer", "a\nb"},
+                                                     {"viewer", "a\xc2\x9b"},
+                                                     {"viewer", "a\xe2\x80\xae"},
+                                                     {"viewer", std::string(129, 'x')}};
+  for (const auto& [role, name] : bad) {
+    core.on("x", hello(role, name, 9), 0);
+    EXPECT_EQ(sent<wire::Shutdown>("x").size(), 1u) << role;
+    EXPECT_TRUE(sent<wire::Welcome>("x").empty()) << role;
+  }
+  EXPECT_EQ(core.limits_hit().hellos_refused, std::size(bad));
+  EXPECT_TRUE(core.processes().empty());
+  core.on("v", hello("viewer", "J\xc3\xbcrgen, \"the first\"", 5), 0);
+  EXPECT_EQ(sent<wire::Welcome>("v").size(), 1u) << "anything that can be read is a name";
+}
+
+TEST_F(Master, AFloodOfOnePeerIsDroppedAndOthersAreHeard) {
+  join_all();
+  int heard = 0, others = 0, packers = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    heard += core.admit("v", 1 + 1e-6 * i);
+    if (i % 100 == 0) others += core.admit("s1", 1 + 1e-6 * i);
+    packers += core.admit("p", 1 + 1e-6 * i);
+  }
+  const double most = Limits{}.max_messages;
+  EXPECT_LE(heard, 2.2 * most);
+  EXPECT_GE(heard, 2 * most);
+  EXPECT_EQ(others, 1000);
+  EXPECT_EQ(packers, 100'000) << "it tells of every tile";
+  EXPECT_EQ(status()["limits"]["messages_refused"], 100'000 - heard);
+  EXPECT_TRUE(core.admit("v", 5)) << "later it is heard again";
+  for (int i = 0; i < 20'000; ++i) core.admit("stranger" + std::to_string(i), 6);  // bounded
+  EXPECT_TRUE(core.admit("v", 7));
+}
+
+TEST_F(Master, AViewBeyondTheLimitIsSampledCoarser) {
+  join_all();
+  wire::ViewRequest r;
+  r.viewer = {5};
+  r.request = {1};
+  r.camera.width = r.camera.height = 16384;
+  r.footprint = 1e-4;
+  core.on("v", r, 1);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  const auto& camera = leases[0].camera;
+  EXPECT_LE(uint64_t(camera.width) * uint64_t(camera.height), Limits{}.max_sampling_pixels);
+  EXPECT_EQ(camera.width, 4096);
+  EXPECT_NEAR(camera.right - camera.left, r.camera.right - r.camera.left, 1e-3) << "all of the view";
+  EXPECT_EQ(leases[0].footprint, 1e-4);
+  EXPECT_EQ(status()["limits"]["views_coarser"], 1);
+  EXPECT_EQ(sent<wire::Welcome>("v").back().settings.at("sampling.max_pixels"), double(Limits{}.max_sampling_pixels))
+      << "so that its viewer can tell";
+}
+
 TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
   join_all();
   for (int i = 0; i < 1000; ++i) core.on("s1", wire::LeaseRequest{}, 1);
@@ -501,11 +580,11 @@ TEST_F(Master, AHelloOfManyEndpointsKeepsNobodyOut) {
   core.on("n", m, 1);
   m = hello("viewer", std::string(wire::kMaxString, 'n'), 53);
   core.on("o", m, 1);
-  EXPECT_EQ(core.counters().at("hellos_refused"), 5);
+  EXPECT_EQ(core.counters().at("limits.hellos_refused"), 5);
   for (const char* peer : {"m", "l", "r", "n", "o"}) EXPECT_TRUE(sent<wire::Welcome>(peer).empty()) << peer;
   core.on("v2", hello("viewer", "viewer-2", 6), 1);
   ASSERT_EQ(sent<wire::Welcome>("v2").size(), 1u);
-  EXPECT_EQ(status()["hellos_refused"], 5);
+  EXPECT_EQ(status()["limits"]["hellos_refused"], 5);
 }
 
 TEST_F(Master, OnlyThePackerTellsWherePatchesAre) {

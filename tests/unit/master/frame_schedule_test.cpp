@@ -83,6 +83,35 @@ TEST(FrameSchedule, LeasesEveryTileOnceThenCompletes) {
   EXPECT_FALSE(done(s, frame, 1000, 0.2));
 }
 
+// What nobody waits for any more takes no sampler from those who are here.
+TEST(FrameSchedule, FramesOfAViewerThatLeftEnd) {
+  for (const Cut cut : {Cut{}, Cut{.rows = true}, Cut{.coarse = true}, Cut{.rows = true, .coarse = true}}) {
+    FrameSchedule s({.tile_size = 64, .frames_in_flight = 2});
+    s.set_cut(cut);
+    s.request_view(request(1, 5, 1024, 1024));
+    const auto out = next(s, "a", 0);
+    ASSERT_TRUE(out);
+    s.forget_viewer({1});
+    EXPECT_FALSE(next(s, "b", 0.1)) << "of the view of one that left";
+    s.request_view(request(2, 1));
+    const auto others = next(s, "b", 0.1);
+    ASSERT_TRUE(others);
+    EXPECT_EQ(others->viewer.value, 2u);
+    done(s, out->frame, out->tile, 0.2, out->lease);  // what was out may still come
+    EXPECT_EQ(s.views_in_flight(), 1u) << "the other's";
+    EXPECT_EQ(s.frames_completed(), 0u) << "it was not completed";
+  }
+}
+
+TEST(FrameSchedule, AFrameOfOneThatLeftWithNothingOutEndsAtOnce) {
+  FrameSchedule s({.tile_size = 64, .frames_in_flight = 1});
+  s.request_view(request(1, 5));
+  ASSERT_TRUE(s.begin_view({1}));
+  s.forget_viewer({1});
+  EXPECT_EQ(s.views_in_flight(), 0u);
+  EXPECT_EQ(s.frames_in_flight(), 0u);
+}
+
 TEST(FrameSchedule, LeasesTellThePixelOfTheViewOrOfTheDisplay) {
   FrameSchedule s({.tile_size = 256});
   s.set_cut({.coarse = true});

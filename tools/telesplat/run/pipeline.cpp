@@ -74,6 +74,17 @@ Status Pipeline::open(const RunOptions& options) {
   return start_data();
 }
 
+// Who could not write all of the record says so, or ends with 1.
+void Pipeline::finish() {
+  group_.finish();
+  for (Member& m : group_.members()) {
+    if (!m.process) continue;
+    read(m);
+    const bool records = m.role == "master" || m.role == "packer";
+    record_failed_ |= m.record_failed || (records && m.process->ended() && m.process->exit_code() == 1);
+  }
+}
+
 void Pipeline::tell_viewers(const std::string& line) {
   for (Member& m : group_.members())
     if (m.told && m.process) m.process->tell(line);
@@ -169,6 +180,7 @@ Consequence consequence_of(const Ended& e) {
   const bool viewer = e.role == "viewer", master = e.role == "master";
   // Told to finish, by `telesplat ctl stop`: the viewers finish too.
   if (e.code == 0) return master ? Consequence::kFinish : Consequence::kNone;
+  if (e.record_failed && e.code == 1) return master ? Consequence::kFinish : Consequence::kNone;  // all else is well
   const bool refused = e.code == 2;
   if (!refused && !viewer && !master && e.restarts < kMaxRestarts) return Consequence::kRestart;
   // A window stays, and another data set can be opened in it.
@@ -178,7 +190,7 @@ Consequence consequence_of(const Ended& e) {
 
 Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   const int code = m.process->exit_code();
-  const auto follows = consequence_of({m.role, code, m.restarts, chosen_});
+  const auto follows = consequence_of({m.role, code, m.restarts, chosen_, m.record_failed});
   if (follows == Consequence::kNone) return State::kRunning;
   if (follows == Consequence::kFinish) return State::kFinished;
   if (follows != Consequence::kRestart) {
@@ -213,6 +225,7 @@ void Pipeline::read_progress(const std::string& member, const std::string& told)
 void Pipeline::read(Member& m) {
   for (const auto& line : m.process->read_lines()) {
     if (line.starts_with("progress ")) read_progress(m.name, line.substr(9));
+    if (line == "record failed") m.record_failed = true;
     if (line.starts_with("note ")) notes_.push_back(line.substr(5));
     if (line.starts_with("open ") && m.told) wishes_.push_back(line.substr(5));
   }

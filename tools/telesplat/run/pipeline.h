@@ -19,9 +19,10 @@ namespace telesplat::launcher {
 /// A process of a session that ended.
 struct Ended {
   std::string role;
-  int code = 0;         ///< exit code; 128 + the signal's number
-  int restarts = 0;     ///< how often it was started again
-  bool chosen = false;  ///< it serves a data set that a person chose at a window
+  int code = 0;                ///< exit code; 128 + the signal's number
+  int restarts = 0;            ///< how often it was started again
+  bool chosen = false;         ///< it serves a data set that a person chose at a window
+  bool record_failed = false;  ///< it said that it could not write all of the record, and nothing else was wrong
 };
 enum class Consequence {
   kNone,
@@ -60,7 +61,9 @@ class Pipeline {
   /// The session goes on with the data set of these options: other data servers take the place of those that are there.
   Status open(const RunOptions& options);
   /// Ends everything: viewers first, then a "stop" to the master, then whoever is left.
-  void finish() { group_.finish(); }
+  void finish();
+  /// After that: somebody could not write all of the record.
+  bool record_failed() const { return record_failed_; }
 
  private:
   Pipeline(const RunOptions& options, ProcessGroup group);
@@ -83,7 +86,7 @@ class Pipeline {
   std::vector<std::string> notes_, wishes_;
   std::string told_progress_;                  // the viewers
   std::map<std::string, std::string> relays_;  // where they listen, by name
-  bool has_viewers_ = false;
+  bool has_viewers_ = false, record_failed_ = false;
   bool chosen_ = false;  // the data set, by a person at a window: one that cannot be read does not end the session
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
   double asked_s_ = -1e9;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/utf8.h"
 #include "common/net/service.h"
 #include "tools/telesplat/control/client.h"
 
@@ -92,7 +93,7 @@ std::string ProcessGroup::last_log_line(const std::string& name) const {
   std::string line, last;
   while (std::getline(in, line))
     if (!line.empty()) last = line;
-  return last.starts_with("telesplat: ") ? last.substr(11) : last;
+  return printable(last.starts_with("telesplat: ") ? last.substr(11) : last, 1000);
 }
 
 void ProcessGroup::finish() {

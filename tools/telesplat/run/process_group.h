@@ -20,9 +20,10 @@ struct Member {
   std::string name;
   std::vector<std::string> arguments;  ///< beside name, log level and the master's address
   int nice = 0;
-  bool joins = true;      ///< is told where the master is
-  bool told = false;      ///< ChildProcess::tell() reaches it
-  bool given_up = false;  ///< it has ended, and nothing follows from that
+  bool joins = true;           ///< is told where the master is
+  bool told = false;           ///< ChildProcess::tell() reaches it
+  bool given_up = false;       ///< it has ended, and nothing follows from that
+  bool record_failed = false;  ///< it said that it could not write all of the record
   int restarts = 0;
   std::optional<ChildProcess> process;
 };

@@ -82,6 +82,7 @@ class Run {
     const bool stopped = state == State::kRunning;
     if (stopped) net::forget_stop();
     pipeline->finish();
+    record_failed_ = pipeline->record_failed();
     if (!o_.join_master.empty()) ask_for_results(*pipeline);
     if (state != State::kBadInput && !o_.out.empty()) after_.develop_pictures();
     for (const auto& n : pipeline->take_notes()) progress_.line(n);
@@ -253,6 +254,10 @@ class Run {
     const int code = after_.run(stopped, master_folder_);
     if (!net::stop_requested() || code == 0) after_.drop_spools();
     if (code != 0) return code;
+    if (record_failed_)
+      return tools::complain({o_.out + ": not all of the record could be written; errors of summary.json and the logs "
+                                       "tell what is missing"},
+                             1);
     const bool again = net::stop_requested();
     if (again)
       progress_.line("telesplat: interrupted; the record lacks what is made after the run");
@@ -264,7 +269,7 @@ class Run {
   RunOptions o_;
   std::shared_ptr<Scene> scene_;
   std::optional<MoviePlan> movie_;
-  bool folder_existed_ = false;
+  bool folder_existed_ = false, record_failed_ = false;
   std::string master_folder_;         // where the session's record is; empty: not known, or nowhere
   std::vector<std::string> results_;  // of the viewers of a joined session
   PassingFolder logs_;

@@ -217,7 +217,9 @@ Table table(RunOptions& o) {
   const Table own = joined(joined(own_rows(o), display_rows(o)), movie_rows(o.movie));
   const Table launcher = joined(own, sampler_rows(o));
   const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
-  return joined(joined(launcher, services), master::session_table(o.master));
+  const Table of_master =
+      joined(joined(master::record_table(o.master), master::limit_table(o.master)), master::session_table(o.master));
+  return joined(joined(launcher, services), of_master);
 }
 
 Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given) {
