@@ -53,7 +53,7 @@ class FakeSession {
     uint64_t most_unacknowledged = 0;     ///< volume frames on their way, at most
     uint64_t introductions = 0, acknowledged = 0;
     uint64_t began_anew = 0;  ///< state requests for everything
-    bool rising = true;  ///< acknowledgements came in the order of frames
+    bool rising = true;       ///< acknowledgements came in the order of frames
     uint64_t buffers = 0;
     bool in_order = false;
   };

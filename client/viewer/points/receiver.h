@@ -52,8 +52,8 @@ class PointReceiver {
     uint64_t points_received = 0, decode_errors = 0, gaps = 0, epochs_shown = 0;
     EpochId epoch;  ///< on display; only where nothing is held
     Sequence sequence;
-    InstanceId packer;            ///< whose sequence it is
-    uint64_t bytes_received = 0;  ///< images of patches
+    InstanceId packer;                                  ///< whose sequence it is
+    uint64_t bytes_received = 0;                        ///< images of patches
     uint64_t digests_equal = 0, digests_different = 0;  ///< ReplicaCheck
   };
   Figures figures() const;

@@ -81,11 +81,11 @@ Program& Fault::start_guest(bool wait) {
       std::vector<std::string>{"--master", run_->master(), "--name", "viewer-2", "--size", "160x100", "--sampling-size",
                                "160x100", "--duration", "0", "--target-fps", "20", "--no-record"},
       run_->folder() / fmt::format("guest-{}", ++guests_));
-  if (wait)
-    EXPECT_TRUE(run_->wait_status([&](const auto& s) {
-      const auto p = process(s, "viewer-2");
-      return p.is_object() && p["pid"] == guest_->pid() && value(s, "viewer-2", "updates") > 0;
-    })) << guest_->err();
+  if (!wait) return *guest_;
+  EXPECT_TRUE(run_->wait_status([&](const auto& s) {
+    const auto p = process(s, "viewer-2");
+    return p.is_object() && p["pid"] == guest_->pid() && value(s, "viewer-2", "updates") > 0;
+  })) << guest_->err();
   return *guest_;
 }
 
@@ -203,8 +203,8 @@ void Fault::finish_ended(int exit_code) {
 void Fault::measure() {
   const FaultBounds bounds = fault_bounds();
   const auto summary = run_->summary();
-  const auto begin = summary.is_object() && summary.contains("begin_monotonic_s") ? summary["begin_monotonic_s"]
-                                                                                   : nlohmann::json();
+  const auto begin =
+      summary.is_object() && summary.contains("begin_monotonic_s") ? summary["begin_monotonic_s"] : nlohmann::json();
   if (begin_s_) {
     double gap_ms = gap_after_ms_ > gap_before_ms_ ? gap_after_ms_ : 0;
     size_t frames = 0;
@@ -227,6 +227,18 @@ void Fault::measure() {
   if (!resync_s_) return;
   EXPECT_LT(*resync_s_, bounds.resync_s) << "new views were displayed too late";
   ::testing::Test::RecordProperty("resync_s", fmt::format("{:.2f}", *resync_s_));
+}
+
+OwnRelay::OwnRelay(Fault& fault, const std::string& link, const std::string& at)
+    : program_("telesplat-wan-relay", {"--socks", at, "--link", link}, fault.run().folder() / "relay") {
+  const std::string words = "listening on ";
+  EXPECT_TRUE(wait_until([&] {
+    const std::string out = program_.out();
+    const size_t begin = out.find(words), end = out.find('\n');
+    if (begin == std::string::npos || end == std::string::npos) return false;
+    address_ = out.substr(begin + words.size(), end - begin - words.size());
+    return true;
+  })) << program_.err();
 }
 
 double Fault::resident_mb(pid_t pid) {

@@ -78,6 +78,20 @@ class Fault {
   std::optional<double> resync_s_;
 };
 
+/// A relay of the test's own, for a process that it starts itself with --via data=address().
+class OwnRelay {
+ public:
+  /// link: as telesplat-wan-relay takes it. at: an address to listen at, which is free.
+  explicit OwnRelay(Fault& fault, const std::string& link = "local", const std::string& at = "127.0.0.1:*");
+  const std::string& address() const { return address_; }
+
+ private:
+  Program program_;
+  std::string address_;
+};
+/// So little passes that a list of chunks does, and chunks do not.
+constexpr const char* kTrickle = "10kbit";
+
 /// Sleeps; faults last some time.
 void pass(double seconds);
 

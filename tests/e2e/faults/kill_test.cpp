@@ -28,12 +28,18 @@ struct Case {
 
 const char* words(Stage s) {
   switch (s) {
-    case Stage::kStarting: return "as it starts";
-    case Stage::kFetching: return "while a sampler fetches";
-    case Stage::kLeased: return "while tiles are leased";
-    case Stage::kSampled: return "while tiles wait for the packer";
-    case Stage::kEpoch: return "while an epoch begins";
-    case Stage::kShown: return "between views";
+    case Stage::kStarting:
+      return "as it starts";
+    case Stage::kFetching:
+      return "while a sampler fetches";
+    case Stage::kLeased:
+      return "while tiles are leased";
+    case Stage::kSampled:
+      return "while tiles wait for the packer";
+    case Stage::kEpoch:
+      return "while an epoch begins";
+    case Stage::kShown:
+      return "between views";
   }
   return "";
 }
@@ -42,8 +48,7 @@ std::string test_name(const Case& c) {
   std::string out;
   bool upper = true;
   for (const char letter : fmt::format("{} {}", c.victim, words(c.stage))) {
-    if (std::isalnum(static_cast<unsigned char>(letter)))
-      out += upper ? char(std::toupper(letter)) : letter;
+    if (std::isalnum(static_cast<unsigned char>(letter))) out += upper ? char(std::toupper(letter)) : letter;
     upper = !std::isalnum(static_cast<unsigned char>(letter));
   }
   return out;
@@ -56,11 +61,12 @@ class Killed : public ::testing::TestWithParam<Case> {
   void hold(Fault& fault) {
     switch (GetParam().stage) {
       case Stage::kFetching:
-        held_.push_back(fault.signal("data", SIGSTOP));
-        late_ = std::make_unique<Program>(
-            "telesplat-sampler",
-            std::vector<std::string>{"--master", fault.run().master(), "--name", "late", "--threads", "1"},
-            fault.run().folder() / "late");
+        relay_ = std::make_unique<OwnRelay>(fault, kTrickle);
+        late_ =
+            std::make_unique<Program>("telesplat-sampler",
+                                      std::vector<std::string>{"--master", fault.run().master(), "--name", "late",
+                                                               "--threads", "1", "--via", "data=" + relay_->address()},
+                                      fault.run().folder() / "late");
         EXPECT_TRUE(fault.run().wait_status([](const auto& s) {
           const auto p = process(s, "late");
           return p.is_object() && p["leases"] > 0;
@@ -79,12 +85,14 @@ class Killed : public ::testing::TestWithParam<Case> {
         return;
       }
       case Stage::kStarting:
-      case Stage::kShown: return;
+      case Stage::kShown:
+        return;
     }
   }
   void release(pid_t killed) {
     for (const pid_t pid : held_)
       if (pid > 0 && pid != killed) ::kill(pid, SIGCONT);
+    if (late_) late_->signal(SIGTERM);
   }
 
  private:
@@ -92,6 +100,7 @@ class Killed : public ::testing::TestWithParam<Case> {
     EXPECT_TRUE(fault.run().wait_status([](const auto& s) { return s["frames_in_flight"] > 0; }));
   }
   std::vector<pid_t> held_;
+  std::unique_ptr<OwnRelay> relay_;
   std::unique_ptr<Program> late_;
 };
 
@@ -102,8 +111,10 @@ TEST_P(Killed, AndStartedAgain) {
   const bool guest = name == "viewer-2", starting = stage == Stage::kStarting;
   pid_t killed = 0;
   if (starting) {
-    if (guest) ASSERT_TRUE(fault.showing());
-    if (guest) fault.start_guest(false);
+    if (guest) {
+      ASSERT_TRUE(fault.showing());
+      fault.start_guest(false);
+    }
     killed = fault.pid_of(name);
   } else {
     ASSERT_TRUE(fault.showing());

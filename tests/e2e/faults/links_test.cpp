@@ -34,16 +34,9 @@ pid_t relay_called(const std::string& name, const std::string& run_folder) {
 TEST(CutOff, ASamplerFromTheDataServerAlone) {
   Fault fault("a sampler is cut off from the data server alone", {"--samplers", "1"});
   ASSERT_TRUE(fault.showing());
-  Program relay("telesplat-wan-relay", {"--socks", "127.0.0.1:*"}, fault.run().folder() / "relay");
-  std::string at;
-  ASSERT_TRUE(wait_until([&] {
-    const std::string out = relay.out();
-    const size_t begin = out.find("listening on "), end = out.find('\n');
-    if (begin == out.npos || end == out.npos) return false;
-    at = out.substr(begin + 13, end - begin - 13);
-    return true;
-  }));
-  relay.signal(SIGSTOP);
+  // What must be known before leases are asked for passes; chunks do not.
+  auto relay = std::make_unique<OwnRelay>(fault, kTrickle);
+  const std::string at = relay->address();
   fault.begins();
   Program guest("telesplat-sampler",
                 {"--master", fault.run().master(), "--name", "cut-off", "--threads", "1", "--via", "data=" + at},
@@ -61,7 +54,8 @@ TEST(CutOff, ASamplerFromTheDataServerAlone) {
         << fault.run().status().dump(1);
   }
   EXPECT_EQ(value(fault.run().status(), "cut-off", "tiles_sampled"), 0);
-  relay.signal(SIGCONT);
+  relay.reset();
+  relay = std::make_unique<OwnRelay>(fault, "local", at);
   EXPECT_TRUE(fault.run().wait_status([](const auto& s) { return value(s, "cut-off", "tiles_sampled") > 0; }))
       << guest.err();
   guest.signal(SIGTERM);
@@ -114,8 +108,10 @@ constexpr double kReadsNothing_s = 4;
 
 // A viewer that stands still, and a peer that asks and asks and never reads an answer.
 TEST(ReadsNothing, AViewerBesideOneThatMustNotNotice) {
-  Fault fault(fmt::format("a viewer reads nothing for {:.0f} s, a peer asks for all points again and again and reads "
-                          "none", kReadsNothing_s));
+  Fault fault(
+      fmt::format("a viewer reads nothing for {:.0f} s, a peer asks for all points again and again and reads "
+                  "none",
+                  kReadsNothing_s));
   ASSERT_TRUE(fault.showing());
   Program& guest = fault.start_guest();
   const pid_t packer = fault.pid_of("packer");

@@ -162,7 +162,13 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
     told_progress_ = progress_;
     tell_viewers(progress_.empty() ? "progress" : "progress " + progress_);
   }
-  return viewing == 0 && has_viewers_ ? State::kFinished : State::kRunning;
+  if (viewing > 0 || !has_viewers_) return State::kRunning;
+  // The record is complete when a master has ended it.
+  if (Member* master = group_.find("master"); master && master->again_s) {
+    master->again_s = 0;
+    return start_again(*master, news);
+  }
+  return State::kFinished;
 }
 
 Consequence consequence_of(const Ended& e) {
