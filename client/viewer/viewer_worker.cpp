@@ -91,7 +91,11 @@ void ViewerWorker::on_ask(uint64_t ask, const geometry::Camera& camera) {
 }
 
 void ViewerWorker::on_measured(const MeasuredFrame& f) {
-  if (f.previous_s > 0) inter_frame_ms_.add(f.end_s, (f.end_s - f.previous_s) * 1e3);
+  if (f.previous_s > 0) {
+    const double gap_ms = (f.end_s - f.previous_s) * 1e3;
+    inter_frame_ms_.add(f.end_s, gap_ms);
+    if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // one thread displays
+  }
   update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
 }
 
@@ -407,6 +411,7 @@ void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
   values["coupling"] = double(coupling.mode);
   values["buffers"] = double(coupling.buffers);
   values["waits_s"] = waits_s_;
+  values["longest_gap_ms"] = longest_gap_ms_;
 }
 
 // How well poses were predicted, means: those of view requests, and those that a tracker's poses were displayed with.

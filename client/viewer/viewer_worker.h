@@ -167,6 +167,7 @@ class ViewerWorker {
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
   std::atomic<bool> shutdown_{false}, stop_{false};
   std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
+  std::atomic<double> longest_gap_ms_{0};  // between two displayed frames
   metrics::RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};
   std::thread thread_;
 };

@@ -145,6 +145,8 @@ void ReceivedPoints::add_status(net::MasterLink::Values& values) const {
   values["points_received"] = double(received.points_received);
   values["gaps_resynced"] = double(received.gaps);
   values["sequence"] = double(received.sequence.value);
+  values["digests_equal"] = double(received.digests_equal);
+  values["digests_different"] = double(received.digests_different);
   values["messages_rejected"] += double(received.decode_errors);
   if (waits_ || in_step_) return;
   // Where nothing is held back it is the receiver that knows when an epoch is shown.

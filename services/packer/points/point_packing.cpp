@@ -349,7 +349,7 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
   if (!core_->remembers(after)) {
     // A mark of a packer that the viewer does not know: it then asks for everything.
     answers_.drop(peer);
-    outlets_.send(wire::StateMark{net::make_instance_id(), {}, core_->epoch(), false, 0}, peer);
+    outlets_.send(wire::StateMark{.packer = net::make_instance_id(), .epoch = core_->epoch()}, peer);
     return log::info("a viewer that stopped after {} starts anew", after.value);
   }
   const bool follows = request.packer == instance_ || request.packer.value == 0;
@@ -394,7 +394,20 @@ void PointPacking::publish(const Event& event, const wire::Moments& moments) {
 }
 
 wire::StateMark PointPacking::mark(bool answer) const {
-  return {instance_, core_->sequence(), core_->epoch(), answer, core_->model().points()};
+  return {.packer = instance_,
+          .sequence = core_->sequence(),
+          .epoch = core_->epoch(),
+          .answer = answer,
+          .points = core_->model().points()};
+}
+
+uint64_t PointPacking::due_digest(double now_s) {
+  if (now_s < next_digest_s_) return 0;
+  const double begin_s = monotonic_s();
+  const uint64_t digest = core_->model().digest();
+  next_digest_s_ = now_s + std::max(kDigestPeriod_s, (monotonic_s() - begin_s) / kDigestShare);
+  digests_told_ += digest != 0;
+  return digest;
 }
 
 // Messages wait meanwhile, so it may take a quarter of the time at most, unless it saves more than it takes.
@@ -419,7 +432,9 @@ void PointPacking::tick(double now_s) {
   }
   if (now_s - last_mark_s_ >= kMarkPeriod_s) {
     last_mark_s_ = now_s;
-    outlets_.publish(mark(false));
+    wire::StateMark told = mark(false);
+    told.digest = due_digest(now_s);
+    outlets_.publish(told);
   }
 }
 
@@ -446,7 +461,8 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"points_outside", double(s.points_outside)},
                  {"answers", double(answers_.size())},
                  {"answer_bytes", double(answers_.bytes_under_way())},
-                 {"plans", double(plans_)}});
+                 {"plans", double(plans_)},
+                 {"digests_told", double(digests_told_)}});
 }
 
 }  // namespace telesplat::packer

@@ -21,6 +21,9 @@ namespace telesplat::packer {
 class PointPacking final : public Packing {
  public:
   static constexpr double kMarkPeriod_s = 0.5;  ///< between two marks, by which viewers notice that they missed events
+  /// Between two marks that tell the model's digest, by which viewers see that they hold the same, at least; and how
+  /// much of the time digests may take.
+  static constexpr double kDigestPeriod_s = 2.0, kDigestShare = 0.002;
   static constexpr double kForgetPeriod_s = 1.0;  ///< between two looks for what is obsolete
 
   struct Options {
@@ -69,6 +72,8 @@ class PointPacking final : public Packing {
   void on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});
   wire::StateMark mark(bool answer) const;
+  /// The model's digest where one is due; else 0.
+  uint64_t due_digest(double now_s);
 
   Options options_;
   Outlets outlets_;
@@ -92,6 +97,8 @@ class PointPacking final : public Packing {
   bool told_of_size_ = false;  // that views are too large for plans
   double next_settle_s_ = 0;
   double last_mark_s_ = -1e9, last_forget_s_ = -1e9;
+  double next_digest_s_ = 0;
+  uint64_t digests_told_ = 0;
 };
 
 }  // namespace telesplat::packer

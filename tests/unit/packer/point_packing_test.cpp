@@ -218,6 +218,29 @@ TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
   EXPECT_EQ(sent.size(), 2u);
 }
 
+TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  for (const int half : {0, 1}) sample(tile(1, half), 1);
+  sent.clear();
+  size_t told_digests = 0;
+  uint64_t digest = 0;
+  for (double now_s = 10; now_s < 20; now_s += PointPacking::kMarkPeriod_s) {
+    packing.tick(now_s);
+    const auto mark = decoded<wire::StateMark>(sent.back());
+    EXPECT_EQ(mark.sequence.value, 1u);
+    if (mark.digest == 0) continue;
+    if (++told_digests > 1) EXPECT_EQ(mark.digest, digest) << "nothing has changed";
+    digest = mark.digest;
+  }
+  EXPECT_EQ(told_digests, size_t(10 / PointPacking::kDigestPeriod_s));
+  sample(tile(2, 0), 21), sample(tile(2, 1), 21);
+  packing.tick(30);
+  EXPECT_NE(decoded<wire::StateMark>(sent.back()).digest, digest);
+  EXPECT_EQ(status("digests_told"), double(told_digests + 1));
+  ask({}, {}, 31);
+  EXPECT_EQ(decoded<wire::StateMark>(sent.back()).digest, 0u) << "an answer has no time for it";
+}
+
 // Else it would wait until it asked for the view again.
 TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
   wire::Welcome session = welcome();

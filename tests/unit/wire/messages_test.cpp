@@ -171,9 +171,9 @@ std::string hex(const std::string& bytes) {
   return out;
 }
 TEST(GoldenBytes, OfAMark) {
-  EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000})),
-            "86a17608a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
-            "73ce00011170");
+  EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000, 5})),
+            "87a17608a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
+            "73ce00011170a664696765737405");
 }
 TEST(GoldenBytes, OfALease) {
   EXPECT_EQ(hex(encode(sample_message<Lease>())),

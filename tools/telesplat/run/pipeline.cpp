@@ -12,7 +12,6 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr int kMaxRestarts = 5;
 constexpr double kMasterPatience_s = 10, kRelayPatience_s = 5, kAskEvery_s = 0.1;
 // From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view
 // meanwhile.
@@ -167,13 +166,20 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
     read(m);
     if (m.given_up || !m.process->ended()) continue;
     read(m);  // its last words
-    if (const State state = ended(m, news); state != State::kRunning) return state;
+    const State state = m.again_s ? start_again(m, news) : ended(m, news);
+    if (state != State::kRunning) return state;
   }
   if (progress_ != told_progress_) {
     told_progress_ = progress_;
     tell_viewers(progress_.empty() ? "progress" : "progress " + progress_);
   }
-  return viewing == 0 && has_viewers_ ? State::kFinished : State::kRunning;
+  if (viewing > 0 || !has_viewers_) return State::kRunning;
+  // The record is complete when a master has ended it.
+  if (Member* master = group_.find("master"); master && master->again_s) {
+    master->again_s = 0;
+    return start_again(*master, news);
+  }
+  return State::kFinished;
 }
 
 Consequence consequence_of(const Ended& e) {
@@ -182,7 +188,7 @@ Consequence consequence_of(const Ended& e) {
   if (e.code == 0) return master ? Consequence::kFinish : Consequence::kNone;
   if (e.record_failed && e.code == 1) return master ? Consequence::kFinish : Consequence::kNone;  // all else is well
   const bool refused = e.code == 2;
-  if (!refused && !viewer && !master && e.restarts < kMaxRestarts) return Consequence::kRestart;
+  if (!refused && !viewer && e.restarts < Restarts::kMost) return Consequence::kRestart;
   // A window stays, and another data set can be opened in it.
   if (e.role == "data" && e.chosen) return Consequence::kGiveUp;
   return refused ? Consequence::kRefuse : Consequence::kFail;
@@ -190,7 +196,7 @@ Consequence consequence_of(const Ended& e) {
 
 Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   const int code = m.process->exit_code();
-  const auto follows = consequence_of({m.role, code, m.restarts, chosen_, m.record_failed});
+  const auto follows = consequence_of({m.role, code, m.restarts.lately(monotonic_s()), chosen_, m.record_failed});
   if (follows == Consequence::kNone) return State::kRunning;
   if (follows == Consequence::kFinish) return State::kFinished;
   if (follows != Consequence::kRestart) {
@@ -203,14 +209,25 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
     tell_viewers("problem " + news.back());
     return State::kRunning;
   }
-  ++m.restarts;
-  news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again", m.name,
-                             code > 128 ? "signal" : "code", code > 128 ? code - 128 : code));
-  if (const Status s = group_.restart(m); !s) {
-    news.push_back(s.error().text);
-    return State::kFailed;
-  }
-  return State::kRunning;
+  const double now_s = monotonic_s();
+  m.again_s = m.restarts.died(now_s);
+  const std::string when = *m.again_s > now_s ? fmt::format(" in {:.2g} s", *m.again_s - now_s) : "";
+  news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again{}", m.name,
+                             code > 128 ? "signal" : "code", code > 128 ? code - 128 : code, when));
+  return start_again(m, news);
+}
+
+Pipeline::State Pipeline::start_again(Member& m, std::vector<std::string>& news) {
+  if (monotonic_s() < *m.again_s) return State::kRunning;
+  m.again_s.reset();
+  // The record is the session's, not one master's.
+  auto& told = m.arguments;
+  const auto has = [&](const char* flag) { return std::find(told.begin(), told.end(), flag) != told.end(); };
+  if (m.role == "master" && has("--out") && !has("--continue")) told.push_back("--continue");
+  const Status s = group_.restart(m);
+  if (s) return State::kRunning;
+  news.push_back(s.error().text);
+  return State::kFailed;
 }
 
 // "STAGE 0.430"

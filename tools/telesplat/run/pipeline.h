@@ -20,7 +20,7 @@ namespace telesplat::launcher {
 struct Ended {
   std::string role;
   int code = 0;                ///< exit code; 128 + the signal's number
-  int restarts = 0;            ///< how often it was started again
+  int restarts = 0;            ///< how often it was started again in the last minute (Restarts::lately)
   bool chosen = false;         ///< it serves a data set that a person chose at a window
   bool record_failed = false;  ///< it said that it could not write all of the record, and nothing else was wrong
 };
@@ -46,9 +46,9 @@ class Pipeline {
   std::vector<std::string> viewers();
 
   enum class State { kRunning, kFinished, kFailed, kBadInput };
-  /// Looks after the children; does not wait. Samplers, packer and data that die are restarted (5 times each at most);
-  /// the master's or a viewer's death ends the run, which is finished when all viewers are. A data set that was chosen
-  /// at a window and cannot be served does not end it. `news` gets lines for the person.
+  /// Looks after the children; does not wait. Servers that die are started again, the master at its old address, unless
+  /// they die too often (Restarts); a viewer's death ends the run, which is finished when all viewers are. A data set
+  /// that was chosen at a window and cannot be served does not end it. `news` gets lines for the person.
   State supervise(std::vector<std::string>& news);
   /// "reading a.ply 43 %, 12 s left" and the like, from the children's progress lines; empty: nothing to tell.
   const std::string& progress() const { return progress_; }
@@ -78,6 +78,8 @@ class Pipeline {
   void read_progress(const std::string& member, const std::string& told);
   /// What the end of a process means for the run.
   State ended(Member& member, std::vector<std::string>& news);
+  /// It has died, and its time has come.
+  State start_again(Member& member, std::vector<std::string>& news);
 
   RunOptions options_;
   ProcessGroup group_;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -36,6 +37,10 @@ Status ProcessGroup::start_master(std::vector<std::string> arguments, double pat
   auto listens = start_listener(std::move(member), patience_s);
   if (!listens) return listens.error();
   endpoint_ = std::move(*listens);
+  // Started again, it listens where it did: those who look for it know no other place.
+  auto& told = members_.back().arguments;
+  const auto bind = std::find(told.begin(), told.end(), "--bind");
+  if (bind != told.end() && bind + 1 != told.end()) *(bind + 1) = endpoint_;
   return ok_status();
 }
 

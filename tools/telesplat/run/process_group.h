@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tools/telesplat/run/child_process.h"
+#include "tools/telesplat/run/restarts.h"
 
 namespace telesplat::launcher {
 
@@ -24,7 +25,8 @@ struct Member {
   bool told = false;           ///< ChildProcess::tell() reaches it
   bool given_up = false;       ///< it has ended, and nothing follows from that
   bool record_failed = false;  ///< it said that it could not write all of the record
-  int restarts = 0;
+  Restarts restarts;
+  std::optional<double> again_s;  ///< it has died, and is to be started again then (monotonic_s())
   std::optional<ChildProcess> process;
 };
 
