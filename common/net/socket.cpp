@@ -178,7 +178,7 @@ struct Socket::Impl {
     if (limiter.allow(monotonic_s())) {
       const std::string more =
           limiter.suppressed() ? fmt::format(" ({} more since the last such line)", limiter.suppressed()) : "";
-      log::warn("{}: dropped {}: {}{}", name, printable(what), printable(why, 512), more);
+      log::warn("{}: dropped {}: {}{}", name, telesplat::printable(what), telesplat::printable(why, 512), more);
     }
   }
 
