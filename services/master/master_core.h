@@ -21,8 +21,8 @@
 #include "services/master/orders/errands.h"
 #include "services/master/outbox.h"
 #include "services/master/peers/departed.h"
-#include "services/master/peers/hello_pace.h"
 #include "services/master/peers/namesakes.h"
+#include "services/master/peers/pace.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
 #include "services/master/wall/swap_barrier.h"
@@ -111,9 +111,9 @@ class MasterCore {
     bool refused = false;                   ///< a data server whose scene cannot be shown
     std::optional<CouplingOrder> coupling;  ///< a viewer's, if it was ordered one
     int leases_at_once = 0;                 ///< a sampler's: Idle::Sampler::at_once
-    HelloPace hello_pace;
-    std::optional<wire::Hello> put_off;  ///< its newest hello, if it says more than the pace allows
-    double probed_s = -1e9;              ///< when it was last asked whether it still is there
+    Pace hello_pace{8, 4};                  ///< as its facts become known; then as often as one that is not welcomed
+    std::optional<wire::Hello> put_off;     ///< its newest hello, if it says more than the pace allows
+    double probed_s = -1e9;                 ///< when it was last asked whether it still is there
   };
   // Who takes part.
   Peer* known(const std::string& peer, double now_s);
@@ -187,7 +187,7 @@ class MasterCore {
   uint64_t leases_expired_ = 0;
   log::RateLimiter refused_tiles_;  // of lines about them
   double leases_rest_until_s_ = -1e9;
-  double announced_s_ = -1e9;  // when everyone was told of the session
+  Pace announcements_{8, 20};
   bool announce_due_ = false;
   double now_s_ = 0;  // of what came last
   bool stop_ = false;

@@ -15,8 +15,7 @@
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMostNamed = 16;          // viewers, in an answer
-constexpr double kAnnounceEvery_s = 0.05;  // where no epoch begins
+constexpr size_t kMostNamed = 16;  // viewers, in an answer
 
 }  // namespace
 
@@ -105,12 +104,12 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
 
 // What changes again and again is told so often at most.
 void MasterCore::announce_soon(double now_s) {
-  announce_due_ = now_s - announced_s_ < kAnnounceEvery_s;
+  announce_due_ = !announcements_.allows(now_s);
   if (!announce_due_) announce(now_s);
 }
 
 void MasterCore::announce(double now_s) {
-  announced_s_ = now_s;
+  announcements_.count(now_s);
   announce_due_ = false;
   const std::string body = wire::encode(welcome({}, now_s));
   if (!outbox_.fits<wire::Welcome>(body)) return;
