@@ -233,7 +233,11 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
     digest = mark.digest;
   }
   EXPECT_EQ(told_digests, size_t(10 / PointPacking::kDigestPeriod_s));
-  sample(tile(2, 0), 21), sample(tile(2, 1), 21);
+  for (const int half : {0, 1}) {
+    wire::DepthTile elsewhere = tile(2, half);
+    elsewhere.lease.camera = test::scene_camera({0.1, 0.1, 0}, 96, 64);
+    sample(elsewhere, 21);
+  }
   packing.tick(30);
   EXPECT_NE(decoded<wire::StateMark>(sent.back()).digest, digest);
   EXPECT_EQ(status("digests_told"), double(told_digests + 1));

@@ -39,6 +39,11 @@ class Taker final : public Sampler {
   std::map<ChunkId, int>& taken_;
 };
 
+net::MasterLink make_link(net::Context& context) {
+  const wire::Hello nobody;
+  return net::MasterLink(context, "inproc://nobody", nobody);
+}
+
 class MeshTilesTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -84,7 +89,7 @@ class MeshTilesTest : public testing::Test {
 
   net::Context context;
   net::Socket data{context, net::Kind::kRouter, "data"};
-  net::MasterLink link{context, "inproc://nobody", {}};
+  net::MasterLink link = make_link(context);
   metrics::SpanRecorder spans;
   std::map<ChunkId, int> taken;
   MeshTiles tiles{std::make_unique<Taker>(taken), 1 << 30, "sampler", context, link, spans};
