@@ -110,6 +110,7 @@ FLOORS = {
 OUTSIDE_HEADERS = [
     (r"msgpack.*", ["common/wire"]),
     (r"zmq.*", ["common/net"]),
+    (r"sodium\.h", ["common/net/keys"]),
     (r"vtk.*", ["services/data/import"]),
     (r"(gdal|ogr|cpl)[_a-z]*\.h", ["services/data/import"]),
     (r"embree.*", ["services/sampler/mesh", "tests/bench"]),
