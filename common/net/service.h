@@ -23,8 +23,8 @@ struct ServiceOptions {
   std::string log_level = "info";
 };
 
-/// Adds --name, --log-level, --insecure, --keys; --bind if the program binds, --master (or TELESPLAT_MASTER in the environment)
-/// if it connects to one, --advertise if it does both, --via and --link if it only connects.
+/// Adds --name, --log-level, --insecure, --keys; --bind if the program binds, --master (or TELESPLAT_MASTER in the
+/// environment) if it connects to one, --advertise if it does both, --via and --link if it only connects.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 
@@ -37,8 +37,8 @@ options::Row keys_row(std::string& folder);
 /// value.
 Result<Access> access_of(const ServiceOptions& options, const std::vector<Role>& roles, bool binds = false);
 
-/// Finds the session that --master auto means, and the keys that it runs with. Returns 0, or the exit code after a line on stderr that says why there
-/// is none.
+/// Finds the session that --master auto means, and the keys that it runs with. Returns 0, or the exit code after a line
+/// on stderr that says why there is none.
 int settle_master(ServiceOptions& options);
 
 /// This machine's name; in a container that of the container.

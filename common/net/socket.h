@@ -104,8 +104,8 @@ class Socket {
   /// With SocketOptions::watch_connecting: attempts to connect so far that came to nothing, because nobody listens
   /// there or the address is of no machine. ZeroMQ goes on trying.
   uint64_t failed_connections() const;
-  /// Of a socket that binds with keys: connections that were not let in, because they showed no key, another server's, or
-  /// one that is not on the allow-list or is for something else.
+  /// Of a socket that binds with keys: connections that were not let in, because they showed no key, another server's,
+  /// or one that is not on the allow-list or is for something else.
   uint64_t keys_refused() const;
   /// With SocketOptions::watch_connecting: why it was not let in where it connects to, as far as it was told; empty: it
   /// was, or nothing is known yet. What is told does not change by waiting, unless `may_pass`.

@@ -18,7 +18,7 @@
 #include "common/net/dispatch.h"
 #include "common/net/process_facts.h"
 #include "common/net/session_file.h"
-#include "services/master/gate.h"
+#include "services/master/gate/gate.h"
 #include "services/master/guarded.h"
 #include "services/master/live/http_endpoint.h"
 #include "services/master/master_core.h"

@@ -44,8 +44,8 @@ Table display_rows(RunOptions& o) {
   return joined(rows, viewer::wall_table(o.viewer));
 }
 
-Row keys_row(RunOptions& o) {
-  Row out = net::keys_row(o.keys);
+options::Row keys_row(RunOptions& o) {
+  options::Row out = net::keys_row(o.keys);
   out.help += "; auto: keys that are made for this run and go with it";
   return out;
 }

@@ -1,4 +1,4 @@
-#include "services/master/gate.h"
+#include "services/master/gate/gate.h"
 
 #include <fmt/format.h>
 
