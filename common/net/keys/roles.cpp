@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <initializer_list>
 #include <iterator>
 
@@ -117,10 +118,18 @@ bool may_command(Role role, std::string_view command) {
   return role == kOperator || (found != std::end(kCommands) && found->roles.have(role));
 }
 
+std::string as_word(std::string_view text) {
+  constexpr size_t kMost = 64;
+  std::string out(text.substr(0, kMost));
+  for (char& c : out)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_' && c != '-') c = '?';
+  return out;
+}
+
 std::string refused_command(Role role, std::string_view user, std::string_view command) {
   const bool tells = std::ranges::find(kCommands, command, &Command::name) != std::end(kCommands);
   return fmt::format(
-      "refused: {} {}, and the key {} is {}'s", command.substr(0, 64),
+      "refused: {} {}, and the key {} is {}'s", as_word(command),
       tells ? "is for viewers and operators" : "changes the session for everyone, which needs an operator's key", user,
       described(role));
 }

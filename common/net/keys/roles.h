@@ -30,6 +30,10 @@ bool may_be(Role role, std::string_view hello_role);
 /// operator's key.
 bool may_command(Role role, std::string_view command);
 
+/// A word that a peer sent, for a log or an answer: 64 characters at most, and '?' for what is no letter, digit, '.',
+/// '_' or '-'.
+std::string as_word(std::string_view text);
+
 /// Why a command was refused, for the person who gave it. user: the name of their key.
 std::string refused_command(Role role, std::string_view user, std::string_view command);
 

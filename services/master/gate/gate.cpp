@@ -9,7 +9,7 @@ namespace telesplat::master {
 Status Gate::admit(const net::Message& from, const wire::Hello& m) {
   if (from.role && !net::may_be(*from.role, m.role))
     return Error{fmt::format("the key {} is {}'s: its owner cannot be a {}", from.user, net::described(*from.role),
-                             m.role.substr(0, 64))};
+                             net::as_word(m.role))};
   if (Status s = is_same_user(from, m.instance); !s) return s;
   const auto [owner, is_new] = owners_.try_emplace(m.instance);
   if (is_new) order_.push_back(m.instance);

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "common/wire/messages.h"
@@ -55,14 +57,19 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       {{"state", wire::Receipt::kName}, watchers},
       {{"state", wire::SliceAck::kName}, watchers}};
   // Answers, and what servers say of themselves: nobody sends them to a socket that binds.
-  std::set<std::string_view> types{wire::Welcome::kName,        wire::WhoAreYou::kName,  wire::ClockReply::kName,
-                                   wire::Lease::kName,          wire::SliceLease::kName, wire::ControlReply::kName,
-                                   wire::Order::kName,          wire::Shutdown::kName,   wire::PlanRequest::kName,
-                                   wire::FrameEnd::kName,       wire::Chunk::kName,      wire::ChunkList::kName,
-                                   wire::VoxelData::kName,      wire::Patch::kName,      wire::Forget::kName,
-                                   wire::EpochBegin::kName,     wire::StateMark::kName,  wire::SliceFrame::kName,
-                                   wire::SlabAssignment::kName, wire::Swap::kName,       "nonsense"};
-  for (const auto& [place, roles] : allowed) types.insert(place.second);
+  const std::set<std::string_view> answers{
+      wire::Welcome::kName,     wire::WhoAreYou::kName,  wire::ClockReply::kName,     wire::Lease::kName,
+      wire::SliceLease::kName,  wire::Order::kName,      wire::ControlReply::kName,   wire::Shutdown::kName,
+      wire::PlanRequest::kName, wire::FrameEnd::kName,   wire::ChunkList::kName,      wire::Chunk::kName,
+      wire::VoxelData::kName,   wire::Patch::kName,      wire::Forget::kName,         wire::EpochBegin::kName,
+      wire::StateMark::kName,   wire::SliceFrame::kName, wire::SlabAssignment::kName, wire::Swap::kName};
+  std::set<std::string_view> types{"nonsense"};
+  const auto look_at = [&](std::string_view type) {
+    types.insert(type);
+    const bool has_row = std::ranges::any_of(allowed, [&](const auto& row) { return row.first.second == type; });
+    EXPECT_NE(has_row, answers.contains(type)) << type << ": who may send it?";
+  };
+  std::apply([&](const auto&... message) { (look_at(message.kName), ...); }, wire::Messages());
   for (const std::string& socket : kSockets)
     for (const std::string_view type : types)
       for (const Role role : kRoles) {
@@ -107,6 +114,9 @@ TEST(Roles, WhatChangesTheSessionForAllIsTheOperators) {
   EXPECT_EQ(refused_command(kViewer, "anna", "stop"),
             "refused: stop changes the session for everyone, which needs an operator's key, and the key anna is a "
             "viewer's");
+  EXPECT_TRUE(refused_command(kViewer, "anna", "\x1b[2J\nst op" + std::string(100, 'x'))
+                  .starts_with("refused: ??2J?st?op" + std::string(54, 'x') + " changes"))
+      << "what a peer sends steers no terminal";
   EXPECT_EQ(refused_command(kSampler, "sampler", "pick"),
             "refused: pick is for viewers and operators, and the key sampler is a sampler's");
 }
