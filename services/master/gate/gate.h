@@ -16,8 +16,8 @@ class Gate {
  public:
   static constexpr size_t kMost = 8192;  ///< processes that are remembered: of more the first are forgotten
 
-  /// Errors are the sender's fault; the message must not reach the core then. A sender who is not known is let pass:
-  /// the core asks who it is.
+  /// Errors are the sender's fault; the message must not reach the core then. A sender who is not known, and does not
+  /// speak for a process of another key, is let pass: the core asks who it is.
   Status admit(const net::Message& from, const wire::Hello& m);
   Status admit(const net::Message& from, const wire::Goodbye& m);
   Status admit(const net::Message& from, const wire::SwapReady& m);

@@ -97,6 +97,8 @@ TEST(Gate, NobodyTakesAProcessOfAnotherKey) {
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().text, "the key ben speaks in the name of a process of anna");
   EXPECT_FALSE(gate.admit(from("c", "ben", Role::kViewer), wire::Goodbye{{1}}).ok());
+  EXPECT_FALSE(gate.admit(from("c", "ben", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
+  EXPECT_TRUE(gate.admit(from("d", "anna", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
   EXPECT_TRUE(gate.admit(from("d", "anna", Role::kViewer), wire::Goodbye{{1}}).ok()) << "over another connection";
   wire::SwapReady swap;
   swap.viewer = {1};
