@@ -26,7 +26,8 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
     : hello_(std::move(hello)),
       life_(std::make_shared<Life>()),
       socket_(context, Kind::kDealer, hello_.name + ":master",
-              {.max_message_bytes = wire::kMaxControlBytes, .read_ahead = true}) {
+              {.max_message_bytes = wire::kMaxControlBytes, .watch_connecting = true, .read_ahead = true}),
+      endpoint_(endpoint) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
@@ -75,6 +76,22 @@ void MasterLink::tick(double now_s, const std::function<Values()>& status) {
     last_status_s_ = now_s;
   }
   if (welcomed_) ask_clock(now_s);
+  look_for_refusal();
+}
+
+// What merely breaks off may be a tunnel whose other end is not there yet.
+void MasterLink::look_for_refusal() {
+  if (refused_) return;
+  const auto refusal = socket_.refusal();
+  if (refusal.text.empty()) {
+    warned_ = false;
+  } else if (!refusal.may_pass) {
+    log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, refusal.text);
+    refused_ = shutdown_ = true;
+  } else if (!warned_) {
+    log::warn("the master at {} does not let {} in: {}; trying on", endpoint_, hello_.name, refusal.text);
+    warned_ = true;
+  }
 }
 
 void MasterLink::ask_clock(double now_s) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 #include "common/core/clock.h"
@@ -29,11 +30,15 @@ class PackerService {
                {.high_water_mark = 16,
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
                 .patience_s = net::kBulkPatience_s,
-                .read_ahead = true}),
+                .read_ahead = true,
+                .serves = "tiles"}),
         patches_(context, net::Kind::kPub, o.service.name + ":patches",
-                 {.high_water_mark = 4096, .patience_s = net::kBulkPatience_s}),
+                 {.high_water_mark = 4096, .patience_s = net::kBulkPatience_s, .serves = "patches"}),
         state_(context, net::Kind::kRouter, o.service.name + ":state",
-               {.high_water_mark = kStateQueue, .max_message_bytes = 16u << 20, .patience_s = net::kBulkPatience_s}) {}
+               {.high_water_mark = kStateQueue,
+                .max_message_bytes = 16u << 20,
+                .patience_s = net::kBulkPatience_s,
+                .serves = "state"}) {}
 
   /// Binds the three sockets and says hello with their addresses.
   Status open(net::Context& context) {
@@ -74,6 +79,7 @@ class PackerService {
     }
     flush_spans(1e300);
     link_->leave([&] { return status(); });
+    if (link_->refused()) return 2;
     const auto values = status();
     const auto failed = values.find(metrics::kRecordFailed);
     return failed != values.end() && failed->second > 0 ? 1 : 0;
@@ -184,7 +190,8 @@ class PackerService {
         {"rss_mb", net::resident_mb()},
         {"peak_rss_mb", net::peak_resident_mb()},
         {"bytes_sent", 0},
-        {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())}};
+        {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())},
+        {"keys_refused", double(tiles_.keys_refused() + patches_.keys_refused() + state_.keys_refused())}};
     if (packing_) packing_->add_status(v);
     return v;
   }
@@ -215,7 +222,12 @@ int run(const PackerOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   net::keep_freed_memory();
-  net::Context context;
+  const auto access = net::access_of(o.service, {net::Role::kPacker}, true);
+  if (!access) {
+    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
+    return 2;
+  }
+  net::Context context(*access);
   PackerService service(o, context);
   if (const Status s = service.open(context); !s) {
     log::error("{}", s.error().text);

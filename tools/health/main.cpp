@@ -17,6 +17,7 @@ namespace {
 struct Options {
   std::string master = "tcp://127.0.0.1:7700";
   health::Subject subject;
+  std::string keys;
   bool this_host = false, show = false;
   double timeout_s = 1.2;  // the answer to a health check is due within 2 s, ends of sockets included
 };
@@ -37,7 +38,8 @@ options::Table table(Options& o) {
       {.flag = "--timeout",
        .value = &o.timeout_s,
        .help = "seconds to wait for the master",
-       .limits = options::Range{0.05, 60}}};
+       .limits = options::Range{0.05, 60}},
+      net::keys_row(o.keys)};
 }
 
 int check(Options o) {
@@ -45,7 +47,9 @@ int check(Options o) {
   if (o.this_host) o.subject.host = net::host_name();
   const auto master = net::find_master(o.master);
   if (master.address.empty()) return tools::complain({master.problem}, master.exit_code(), "telesplat-health");
-  const auto status = net::ask_master(master.address, "status", o.timeout_s);
+  const auto access = net::Access::open({}, o.keys.empty() ? master.keys : o.keys, net::any_role());
+  if (!access) return tools::complain(access.error(), 2, "telesplat-health");
+  const auto status = net::ask_master(master.address, "status", o.timeout_s, {}, *access);
   const Status well = status ? health::check(*status, o.subject) : Status(status.error());
   if (status && o.show) std::printf("%s\n", status->c_str());
   return well.ok() ? 0 : tools::complain(well.error(), 1, "telesplat-health");

@@ -687,7 +687,8 @@ TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {
                   .kind = {},
                   .run_folder = "/data/run",
                   .started_at_s = 1795377266,
-                  .started_by = "view"});
+                  .started_by = "view",
+                  .keys = {}});
   EXPECT_EQ(core.session().scene, "");
   const auto before = status()["session"];
   EXPECT_EQ(before, (nlohmann::json{{"address", "tcp://127.0.0.1:4711"},

@@ -7,19 +7,21 @@
 namespace telesplat::launcher {
 
 struct ControlClient::Line {
+  explicit Line(const net::Access& access) : context(access) {}
   net::Context context;
   net::Socket socket{context, net::Kind::kDealer, "ctl", net::kControlSocket};
   uint64_t failed_before = 0;  // attempts to connect, by the last answer
   uint64_t due = 0;            // answers to request_status()
 };
 
-ControlClient::ControlClient(const std::string& master_endpoint) : endpoint_(master_endpoint) {}
+ControlClient::ControlClient(const std::string& master_endpoint, const net::Access& access)
+    : endpoint_(master_endpoint), access_(access) {}
 ControlClient::~ControlClient() = default;
 
 // A connection over which nothing is said counts at the master as a message that it rejected.
 ControlClient::Line& ControlClient::line() {
   if (line_) return *line_;
-  line_ = std::make_unique<Line>();
+  line_ = std::make_unique<Line>(access_);
   if (const Status s = line_->socket.connect(endpoint_); !s) log::error("{}", s.error().text);
   return *line_;
 }

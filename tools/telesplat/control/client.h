@@ -14,7 +14,7 @@ namespace telesplat::launcher {
 class ControlClient {
  public:
   /// Connects when the first question is asked.
-  explicit ControlClient(const std::string& master_endpoint);
+  explicit ControlClient(const std::string& master_endpoint, const net::Access& access = {});
   ~ControlClient();
 
   /// Sends a command and waits for its answer. Error: the master refused, or there is no answer.
@@ -37,6 +37,7 @@ class ControlClient {
   Line& line();
 
   std::string endpoint_;
+  net::Access access_;
   std::unique_ptr<Line> line_;
   bool unanswered_ = false, nobody_there_ = false;
 };
