@@ -116,7 +116,7 @@ TEST(Senders, CommandsNeedTheirRole) {
 
 TEST(Senders, RemembersSoManyAndNoMore) {
   Senders gate;
-  for (uint64_t i = 1; i <= Gate::kMost + 10; ++i)
+  for (uint64_t i = 1; i <= Senders::kMost + 10; ++i)
     ASSERT_TRUE(gate.admit(from("p" + std::to_string(i)), hello("viewer", i)).ok());
   EXPECT_TRUE(gate.admit(from("p1"), wire::StatusReport{{2}, {}}).ok()) << "forgotten: the core asks who it is";
   EXPECT_FALSE(gate.admit(from("p11"), wire::StatusReport{{2}, {}}).ok());
