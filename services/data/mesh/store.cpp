@@ -47,9 +47,9 @@ std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& p
   return std::make_shared<Store>(std::move(content), std::move(use));
 }
 
-// Reads the mesh file and writes its store into the descriptor.
+// Reads the mesh file and writes its store into the descriptor. unwritten: set if that is what failed.
 Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
-                   const Progress& progress, std::vector<std::string>& notes) {
+                   const Progress& progress, std::vector<std::string>& notes, bool* unwritten = nullptr) {
   auto mesh = source.read([&](double fraction) { progress(kReading, fraction); });
   if (!mesh) return mesh.error();
   progress(kReading, 1.0);
@@ -72,7 +72,9 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.box_room = placed->box_room;
   info.up = placed->up;
   info.up_reason = placed->up_reason;
-  return write_store(descriptor, path, *placed, info, progress);
+  Status written = write_store(descriptor, path, *placed, info, progress);
+  if (unwritten) *unwritten = !written;
+  return written;
 }
 
 // Without a cache: a file that has no name and goes away with its last mapping.
@@ -114,21 +116,24 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
                                                const Progress& progress) {
   const std::string name = stem + ".mesh", part = stem + ".part";
   std::vector<std::string> notes;
+  bool unwritten = false;
   {
     const auto out = Descriptor::open_file(part, O_RDWR | O_CREAT | O_TRUNC);
     if (!out.valid()) {
       log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
       return open_unnamed(path, options, source, progress);
     }
-    const Status built = build_store(out.get(), path, options, source, progress, notes);
+    const Status built = build_store(out.get(), path, options, source, progress, notes, &unwritten);
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
       const std::string reason =
           built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
       std::error_code error;
       fs::remove(part, error);
-      return Error{reason};
+      if (!unwritten) return Error{reason};
+      log::warn("{}; going on without a cache", reason);
     }
   }
+  if (unwritten) return open_unnamed(path, options, source, progress);  // elsewhere, there may be room
   if (std::string told = after_growth(fs::path(stem).parent_path().string()); !told.empty())
     notes.push_back(std::move(told));
   auto store = open_existing(stem, path, false, std::move(notes));
