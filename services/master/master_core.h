@@ -118,6 +118,7 @@ class MasterCore {
   Result<std::string> order_coupling(const wire::Control& m, double now_s);
   Status pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s);
   std::string status_json(double now_s) const;
+  wire::ControlReply health(const wire::Control& m, double now_s) const;
 
   // Walls.
   void send_swaps();
