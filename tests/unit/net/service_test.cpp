@@ -31,6 +31,18 @@ TEST(Service, NeverAnnouncesAWildcard) {
     EXPECT_EQ(announced(bound, ""), "tcp://" + host_name() + ":7000") << bound;
 }
 
+TEST(Service, SocketsOfAProcessHaveNeighbouringPorts) {
+  EXPECT_EQ(*bind_of("tcp://*:7701", 0), "tcp://*:7701");
+  EXPECT_EQ(*bind_of("tcp://*:7701", 2), "tcp://*:7703");
+  EXPECT_EQ(*bind_of("tcp://[::1]:65533", 2), "tcp://[::1]:65535");
+  EXPECT_EQ(*bind_of("tcp://127.0.0.1:*", 2), "tcp://127.0.0.1:*");
+  EXPECT_EQ(*bind_of("tcp://127.0.0.1:0", 2), "tcp://127.0.0.1:0");
+  EXPECT_EQ(*bind_of("ipc:///run/telesplat", 2), "ipc:///run/telesplat");
+  const auto beyond = bind_of("tcp://*:65534", 2);
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().text, "tcp://*:65534: its 3 ports end at 65535");
+}
+
 TEST(Service, RefusesHostsThatNobodyCanConnectTo) {
   for (const char* host : {"lab-3.example.org", "10.0.0.7", "fe80::1", "[fe80::1%eth0]", "a_container"})
     EXPECT_EQ(complain_about_host(host), "") << host;

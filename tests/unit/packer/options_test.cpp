@@ -8,7 +8,7 @@ namespace {
 
 TEST(PackerOptions, AChildIsToldWhatDiffers) {
   PackerOptions options, defaults;
-  EXPECT_EQ(options.service.name, "packer");
+  EXPECT_EQ(options.service.name, net::unique_name("packer")) << "two of one name would take turns";
   EXPECT_TRUE(options::arguments(table(options), table(defaults)).empty());
   options.record_depth = "run/depth";
   options.log_limit_mb = 64;
