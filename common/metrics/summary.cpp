@@ -456,6 +456,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
                           {"peak_rss_mb", peak_rss(roster)},
                           {"errors",
                            {{"messages_rejected", whole(roster.counted("", "messages_rejected"))},
+                            {"keys_refused", whole(roster.counted("", "keys_refused"))},
                             {"gaps_resynced", whole(roster.counted("viewer", "gaps_resynced"))},
                             {"leases_expired", whole(counter("leases_expired"))}}}});
   return out;

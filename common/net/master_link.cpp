@@ -17,7 +17,8 @@ constexpr int kFirstClocks = 8;
 MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello)
     : hello_(std::move(hello)),
       socket_(context, Kind::kDealer, hello_.name + ":master",
-              {.max_message_bytes = wire::kMaxBulkBytes, .read_ahead = true}) {
+              {.max_message_bytes = wire::kMaxBulkBytes, .watch_connecting = true, .read_ahead = true}),
+      endpoint_(endpoint) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
@@ -51,6 +52,16 @@ void MasterLink::tick(double now_s, const std::function<Values()>& status) {
     last_status_s_ = now_s;
   }
   if (welcomed_) ask_clock(now_s);
+  look_for_refusal();
+}
+
+// A master that is just ending, or beginning anew, breaks off handshakes, too: no reason to leave a session.
+void MasterLink::look_for_refusal() {
+  if (refused_) return;
+  const auto refusal = socket_.refusal();
+  if (refusal.text.empty() || (refusal.may_pass && session_)) return;
+  log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, refusal.text);
+  refused_ = shutdown_ = true;
 }
 
 void MasterLink::ask_clock(double now_s) {
@@ -76,8 +87,7 @@ bool MasterLink::handle(const Message& message) {
       ++version_;
       // The hello and its answer are an exchange, too.
       if (another && session_->hello_sent_s != 0)
-        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s,
-                     session_->clock},
+        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s, session_->clock},
                     message.arrived_s);
     }
     return true;

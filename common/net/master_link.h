@@ -43,7 +43,10 @@ class MasterLink {
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
+  /// The session is over for this process: its end was told, or the master does not let it in.
   bool shutdown_requested() const { return shutdown_; }
+  /// The master does not let it in with its keys (why was logged): bad usage, exit code 2.
+  bool refused() const { return refused_; }
   /// This machine's monotonic time on the master's clock.
   double to_master_s(double local_s) const { return local_s + clock_.offset_s(local_s); }
   const ClockEstimate& clock() const { return clock_; }
@@ -57,16 +60,18 @@ class MasterLink {
  private:
   void report(const std::function<Values()>& status, double now_s);
   void ask_clock(double now_s);
+  void look_for_refusal();
   void learn_clock(const wire::ClockReply& reply, double arrived_s);
 
   wire::Hello hello_;
   Socket socket_;
   std::optional<wire::Welcome> session_;
   int version_ = 0;
-  bool shutdown_ = false, welcomed_ = false;
+  bool shutdown_ = false, welcomed_ = false, refused_ = false;
   Obey obey_;
   ClockEstimate clock_;
   int clock_asked_ = 0;  // since the master is known
+  const std::string endpoint_;
   double last_hello_s_ = -1e9, last_status_s_ = -1e9, last_clock_s_ = -1e9;
 };
 

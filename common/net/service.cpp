@@ -72,6 +72,7 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                  .value = &o.insecure,
                  .help = "allow addresses other than loopback without encryption",
                  .reach = options::Reach::kHere});
+  out.push_back(keys_row(o.keys));
   out.push_back({.flag = "--log-level",
                  .value = &o.log_level,
                  .help = "trace, debug, info, warn, error or off",
@@ -79,7 +80,19 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
   return out;
 }
 
-Result<Via> via_of(const ServiceOptions& o) { return Via::parse(o.via); }
+options::Row keys_row(std::string& folder) {
+  return {.flag = "--keys",
+          .value = &folder,
+          .help = "folder of keys, made by telesplat keys: encrypts, and lets in only those on its allow-list",
+          .reach = options::Reach::kHere,
+          .environment = kKeysVariable};
+}
+
+Result<Access> access_of(const ServiceOptions& o, const std::vector<Role>& roles, bool binds) {
+  auto via = Via::parse(o.via);
+  if (!via) return via.error();
+  return Access::open(*std::move(via), o.keys, roles, binds);
+}
 
 int settle_master(ServiceOptions& o) {
   MasterSearch search = find_master(o.master);
@@ -88,6 +101,7 @@ int settle_master(ServiceOptions& o) {
     return search.exit_code();
   }
   o.master = std::move(search.address);
+  if (o.keys.empty()) o.keys = std::move(search.keys);
   return 0;
 }
 

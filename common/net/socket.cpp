@@ -14,6 +14,7 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
 #include "common/net/read_ahead.h"
 
@@ -27,6 +28,8 @@ constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads
 constexpr size_t kMaxTypeBytes = 64;
 constexpr double kQuietPusher_s = 1.0;
 constexpr size_t kMaxClosed = 4096;
+// Handshakes that broke off without a word, one after the other: a server that ends breaks off one or two.
+constexpr uint32_t kBrokenOff = 3;
 
 zmq::socket_type zmq_type(Kind kind) {
   switch (kind) {
@@ -67,15 +70,27 @@ bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
 
 struct Context::Impl {
   zmq::context_t context{1};
-  Via via;
+  Access access;
+  std::mutex mutex;                        // of the doorkeeper: sockets may be bound by several threads
+  std::unique_ptr<Doorkeeper> doorkeeper;  // from the first socket on that binds with keys
+
+  Status let_in() {
+    const std::lock_guard lock(mutex);
+    if (doorkeeper) return ok_status();
+    auto opened = Doorkeeper::open(context, *access.keys());
+    if (!opened) return opened.error();
+    doorkeeper = *std::move(opened);
+    return ok_status();
+  }
 };
 
-Context::Context(Via via) : impl_(std::make_unique<Impl>()) { impl_->via = std::move(via); }
+Context::Context(Access access) : impl_(std::make_unique<Impl>()) { impl_->access = std::move(access); }
 Context::~Context() = default;
 
 struct Socket::Impl {
-  Impl(zmq::context_t& context, Kind kind, std::string name, const SocketOptions& options, const std::string& proxy)
-      : context(context), kind(kind), name(std::move(name)), options(options), socket(context, zmq_type(kind)) {
+  Impl(Context::Impl& home, Kind kind, std::string name, const SocketOptions& options)
+      : home(home), kind(kind), name(std::move(name)), options(options), socket(home.context, zmq_type(kind)) {
+    const std::string proxy = home.access.via().proxy(std::string(options.toward));
     if (!proxy.empty()) socket.set(zmq::sockopt::socks_proxy, proxy);
     socket.set(zmq::sockopt::sndhwm, options.high_water_mark);
     socket.set(zmq::sockopt::rcvhwm, options.high_water_mark);
@@ -95,13 +110,31 @@ struct Socket::Impl {
   // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too
   // much are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed
   // handshake is certain to be told.
-  void watch_connections() { watch(ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED); }
+  void watch_connections() { watch(ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED | (guarded ? kHandshakeFailed : 0)); }
+
+  static constexpr int kHandshakeFailed =
+      ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
+
+  // Of a socket that binds: whoever fails shows no key that fits. Of one that connects: why it is not let in.
+  void note_handshake(uint16_t what) {
+    if (what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
+      broken_off = 0;
+      return;
+    }
+    ++failed_unseen;
+    if (guarded)
+      ++keys_refused;
+    else if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
+      ++broken_off;
+    else
+      turned_away = what;
+  }
 
   void watch(int events) {
     static std::atomic<int> counter{0};
     const std::string address = fmt::format("inproc://monitor-{}", ++counter);
     if (zmq_socket_monitor(socket.handle(), address.c_str(), events) != 0) return;
-    monitor.emplace(context, zmq::socket_type::pair);
+    monitor.emplace(home.context, zmq::socket_type::pair);
     monitor->set(zmq::sockopt::linger, 0);
     monitor->set(zmq::sockopt::rcvhwm, 10000);
     monitor->connect(address);
@@ -119,7 +152,13 @@ struct Socket::Impl {
       std::memcpy(&what, event.data(), 2);
       std::memcpy(&fd, static_cast<const char*>(event.data()) + 2, 4);
       if (what == ZMQ_EVENT_CONNECT_RETRIED) {
-        ++failed_connections;
+        // Somebody is there, who did not let us in.
+        if (failed_unseen > 0)
+          --failed_unseen;
+        else
+          ++failed_connections;
+      } else if (what & (kHandshakeFailed | ZMQ_EVENT_HANDSHAKE_SUCCEEDED)) {
+        note_handshake(what);
       } else if (what == ZMQ_EVENT_ACCEPTED) {
         connections[fd] = {fd, monotonic_s(), false};
       } else if (const auto it = connections.find(fd); it != connections.end()) {
@@ -148,6 +187,10 @@ struct Socket::Impl {
   void judge_closed() {
     for (const Connection& c : closed) {
       if (c.has_spoken || (kind == Kind::kPull && monotonic_s() - c.accepted_s > kQuietPusher_s)) continue;
+      if (failed_unseen > 0) {  // counted as not let in
+        --failed_unseen;
+        continue;
+      }
       ++rejected;
       log_rejection("a connection", "it brought nothing that is a ZeroMQ message");
     }
@@ -232,6 +275,7 @@ struct Socket::Impl {
       }
       out.type = frames[next].to_string().substr(0, kMaxTypeBytes);
       auto body = std::make_shared<zmq::message_t>(std::move(frames[next + 1]));
+      if (guarded && !admit(out, *body)) continue;
       if (body->size() > options.max_message_bytes) {
         reject(out, fmt::format("{} bytes, limit {}", body->size(), options.max_message_bytes));
         continue;
@@ -241,6 +285,21 @@ struct Socket::Impl {
       return out;
     }
     return std::nullopt;
+  }
+
+  // Who sent it, and whether they may.
+  bool admit(Message& message, zmq::message_t& body) {
+    const char* text = zmq_msg_gets(body.handle(), "User-Id");
+    const auto visitor = visitor_of(text ? text : "");
+    if (visitor) {
+      message.user = visitor->name;
+      message.role = visitor->role;
+      if (may_send(visitor->role, options.serves, message.type)) return true;
+    }
+    const std::string who = visitor ? fmt::format("the key {} is {}'s", visitor->name, described(visitor->role))
+                                    : std::string("nobody knows whose it is");
+    reject(message, fmt::format("not allowed: {}", who));
+    return false;
   }
 
   void reject(const Message& message, const std::string& why) {
@@ -268,7 +327,7 @@ struct Socket::Impl {
     return {socket.handle(), 0, ZMQ_POLLIN, 0};
   }
 
-  zmq::context_t& context;
+  Context::Impl& home;
   Kind kind;
   std::string name;
   SocketOptions options;
@@ -281,24 +340,35 @@ struct Socket::Impl {
   };
   std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
   std::vector<Connection> closed;                   // not judged yet
-  std::atomic<uint64_t> rejected{0}, failed_connections{0};
+  std::atomic<uint64_t> rejected{0}, failed_connections{0}, keys_refused{0};
+  bool guarded = false;                                 // bound with keys
+  size_t failed_unseen = 0;                             // handshakes whose connection's end was not heard of yet
+  std::atomic<uint32_t> broken_off{0}, turned_away{0};  // of a socket that connects: handshakes; event, 0: none
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
   std::unique_ptr<ReadAhead> ahead;  // with read_ahead, once something was sent or received; it is the first to go
 };
 
 Socket::Socket(Context& context, Kind kind, std::string name, const SocketOptions& options)
-    : impl_(std::make_unique<Impl>(context.impl().context, kind, std::move(name), options,
-                                   context.impl().via.proxy(std::string(options.toward)))) {}
+    : impl_(std::make_unique<Impl>(context.impl(), kind, std::move(name), options)) {}
 Socket::~Socket() = default;
 Socket::Socket(Socket&&) noexcept = default;
 Socket& Socket::operator=(Socket&&) noexcept = default;
 
 Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
   CHECK(!impl_->ahead);
-  if (!insecure && !is_local(endpoint))
-    return Error{fmt::format("{}: {} is not a loopback or ipc address; others need --insecure", impl_->name, endpoint)};
+  const Keys* keys = impl_->home.access.keys();
+  if (!insecure && !keys && !is_local(endpoint))
+    return Error{fmt::format("{}: {} is not a loopback or ipc address; others need --keys, or --insecure", impl_->name,
+                             endpoint)};
   try {
+    if (keys) {
+      if (keys->server_secret.empty() || impl_->options.serves.empty())
+        return Error{fmt::format("{}: its keys are not for binding", impl_->name)};
+      if (const Status s = impl_->home.let_in(); !s) return Error{fmt::format("--keys {}", s.error().text)};
+      guard(impl_->socket, *keys, impl_->options.serves);
+      impl_->guarded = true;
+    }
     impl_->watch_connections();
     impl_->socket.bind(endpoint);
     return impl_->socket.get(zmq::sockopt::last_endpoint);
@@ -310,7 +380,12 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
 Status Socket::connect(const std::string& endpoint) {
   CHECK(!impl_->ahead);
   try {
-    if (impl_->options.watch_connecting && !impl_->monitor) impl_->watch(ZMQ_EVENT_CONNECT_RETRIED);
+    if (impl_->options.watch_connecting && !impl_->monitor)
+      impl_->watch(ZMQ_EVENT_CONNECT_RETRIED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED | Impl::kHandshakeFailed);
+    if (const Keys* keys = impl_->home.access.keys()) {
+      if (!keys->own) return Error{fmt::format("{}: its keys are not for connecting", impl_->name)};
+      identify(impl_->socket, *keys);
+    }
     impl_->socket.connect(endpoint);
     return ok_status();
   } catch (const zmq::error_t& e) {
@@ -335,6 +410,24 @@ uint64_t Socket::failed_connections() const {
   if (!impl_->ahead) impl_->drain_monitor();
   return impl_->failed_connections;
 }
+uint64_t Socket::keys_refused() const {
+  if (!impl_->ahead) impl_->drain_monitor();
+  return impl_->keys_refused;
+}
+
+Socket::Refusal Socket::refusal() const {
+  if (!impl_->ahead) impl_->drain_monitor();
+  const Keys* keys = impl_->home.access.keys();
+  if (keys && impl_->turned_away == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH)
+    return {.text =
+                fmt::format("the key {} of {} is not let in there", keys->own ? keys->own->name : "", keys->folder)};
+  const bool broken_off = impl_->broken_off >= kBrokenOff;
+  if (impl_->turned_away == 0 && !broken_off) return {};
+  return {.text = keys ? fmt::format("it does not take the keys of {}: it has others, or none", keys->folder)
+                       : std::string("it wants a key (--keys DIR)"),
+          .may_pass = broken_off};
+}
+
 const std::string& Socket::name() const { return impl_->name; }
 
 bool wait_readable(const std::vector<Socket*>& sockets, int timeout_ms) {

@@ -12,7 +12,7 @@
 
 #include "common/core/log.h"
 #include "common/core/result.h"
-#include "common/net/via.h"
+#include "common/net/keys/access.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::net {
@@ -22,8 +22,9 @@ enum class Kind { kRouter, kDealer, kPush, kPull, kPub, kSub };
 /// One a process: ZeroMQ's I/O threads. Sockets must not outlive it.
 class Context {
  public:
-  /// via: the proxies that connections over TCP go through.
-  explicit Context(Via via = {});
+  /// access: the proxies that connections over TCP go through, and the keys by which its sockets know others and are
+  /// known; without keys nothing is encrypted.
+  explicit Context(Access access = {});
   ~Context();
   struct Impl;
   Impl& impl() { return *impl_; }
@@ -38,7 +39,9 @@ struct Message {
   std::string type;
   wire::Bytes body;
   std::shared_ptr<const void> owner;
-  double arrived_s = 0;  ///< monotonic_s() when it was read off the connection
+  double arrived_s = 0;      ///< monotonic_s() when it was read off the connection
+  std::string user;          ///< of a socket that binds with keys: the name of the sender's key
+  std::optional<Role> role;  ///< and its role; nothing: there are no keys, and anybody may be the sender
 };
 
 struct SocketOptions {
@@ -52,6 +55,9 @@ struct SocketOptions {
   /// or connected before the first message is sent or received.
   bool read_ahead = false;
   std::string_view toward;  ///< role of who is connected to, where Via has a proxy of its own for it
+  /// What a socket that binds is for, as the table of roles calls it (keys/roles.h): "control", "tiles" and so on. With
+  /// keys, one that is for nothing cannot be bound.
+  std::string_view serves;
 };
 
 class Socket {
@@ -62,7 +68,7 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
 
   /// Binds to tcp://ADDRESS:PORT (PORT may be *), ipc:// or inproc://. Returns the endpoint with its real port. An
-  /// address other than loopback is refused unless `insecure`.
+  /// address other than loopback is refused unless the context has keys, or `insecure`.
   Result<std::string> bind(const std::string& endpoint, bool insecure = false);
   /// Connects; the peer need not exist yet and may come back after being away.
   Status connect(const std::string& endpoint);
@@ -77,7 +83,8 @@ class Socket {
   bool send_frames(std::string_view peer, std::string_view type, std::string body);
 
   /// Next message, without waiting (PUB: never one, but viewers' subscriptions are looked at). Messages that are not
-  /// [peer,] type, body within the limits are dropped and counted.
+  /// [peer,] type, body within the limits are dropped and counted; with keys, also those that the sender's role may not
+  /// send here.
   std::optional<Message> receive();
 
   /// Decodes a message of known type; a bad one is counted and logged, naming its peer, and nothing comes back.
@@ -97,6 +104,16 @@ class Socket {
   /// With SocketOptions::watch_connecting: attempts to connect so far that came to nothing, because nobody listens
   /// there or the address is of no machine. ZeroMQ goes on trying.
   uint64_t failed_connections() const;
+  /// Of a socket that binds with keys: connections that were not let in, because they showed no key, another server's,
+  /// or one that is not on the allow-list or is for something else.
+  uint64_t keys_refused() const;
+  /// With SocketOptions::watch_connecting: why it was not let in where it connects to, as far as it was told; empty: it
+  /// was, or nothing is known yet. What is told does not change by waiting, unless `may_pass`.
+  struct Refusal {
+    std::string text;
+    bool may_pass = false;
+  };
+  Refusal refusal() const;
   const std::string& name() const;
 
   struct Impl;

@@ -77,6 +77,11 @@ class MasterCore {
   LiveSnapshot live_snapshot() const;
   const LiveFigures& live() const { return live_; }
   Figures figures() const;  ///< of all plans together
+  /// What the socket counts, for status.
+  struct Door {
+    uint64_t messages_rejected = 0, keys_refused = 0;
+  };
+  void tell_door(const Door& door) { door_ = door; }
   bool progressive() const { return plan_->progressive(); }
   std::string animation() const { return plan_->animation(); }
   /// As everyone is told them: what was left to the kind of scene is decided.
@@ -134,6 +139,7 @@ class MasterCore {
   Outbox outbox_;
   net::RunningSession session_;
   std::string run_id_;
+  Door door_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
   Plan* plan_;                       // of these, the one that leads
   Clipping clipping_;

@@ -18,6 +18,7 @@
 #include "common/net/dispatch.h"
 #include "common/net/process_facts.h"
 #include "common/net/session_file.h"
+#include "services/master/gate/gate.h"
 #include "services/master/guarded.h"
 #include "services/master/live/http_endpoint.h"
 #include "services/master/master_core.h"
@@ -48,15 +49,17 @@ net::RunningSession introduction(const MasterServiceOptions& o, const std::strin
           .run_folder = net::absolute_path(o.out),
           .started_at_s =
               std::floor(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()),
-          .started_by = o.started_by};
+          .started_by = o.started_by,
+          .keys = net::absolute_path(o.service.keys)};
 }
 
 /// The control socket, and the core that answers what comes over it.
 class MasterService {
  public:
   MasterService(const MasterServiceOptions& o, const MasterOptions& core, std::unique_ptr<metrics::RunRecord> record,
-                std::string run_id)
+                std::string run_id, const net::Access& access)
       : options_(o),
+        context_(access),
         record_(std::move(record)),
         run_id_(std::move(run_id)),
         core_(core, net::make_instance_id(), *record_) {}
@@ -87,6 +90,8 @@ class MasterService {
     if (options_.started_by == "hand")
       std::printf("telesplat ctl status asks this session; others join it with --master %s\n",
                   net::announced(*endpoint, {}).c_str());
+    if (!options_.service.keys.empty())
+      log::info("keys of {}: others need theirs", options_.service.keys);
     else
       log::info("listening on {}", *endpoint);  // stdout is read by who started it, and goes nowhere
     std::fflush(stdout);
@@ -108,12 +113,13 @@ class MasterService {
 
   Status write_record() {
     auto processes = core_.processes();
-    processes.push_back(
-        {"master",
-         options_.service.name,
-         uint64_t(getpid()),
-         net::process_facts(),
-         {{"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(control_.rejected())}}});
+    processes.push_back({"master",
+                         options_.service.name,
+                         uint64_t(getpid()),
+                         net::process_facts(),
+                         {{"peak_rss_mb", net::peak_resident_mb()},
+                          {"messages_rejected", double(control_.rejected())},
+                          {"keys_refused", double(control_.keys_refused())}}});
     const metrics::About about{.id = run_id_,
                                .version = version(),
                                .begin = record_->begin(),
@@ -135,6 +141,7 @@ class MasterService {
       guarded(control_, *message, [&] { take(*message, monotonic_s()); });
     }
     core_.tick(monotonic_s());
+    core_.tell_door({control_.rejected(), control_.keys_refused()});
     tell_news();
     publish_metrics(monotonic_s());
     for (auto& out : core_.take_outgoing())
@@ -152,7 +159,8 @@ class MasterService {
                                   .leases = {},
                                   .values = {{"rss_mb", net::resident_mb()},
                                              {"peak_rss_mb", net::peak_resident_mb()},
-                                             {"messages_rejected", double(control_.rejected())}},
+                                             {"messages_rejected", double(control_.rejected())},
+                                             {"keys_refused", double(control_.keys_refused())}},
                                   .rates = {}});
     metrics_->publish(exposition(snapshot, core_.live()));
   }
@@ -176,6 +184,7 @@ class MasterService {
                   wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::LinkReport,
                   wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
         control_, message, [&](const auto& m) {
+          if (const Status s = gate_.admit(message, m); !s) return refuse(message, m, s.error());
           if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
             core_.on(message.peer, m, now_s);
           else if (const Status s = core_.on(message.peer, m, now_s); !s)
@@ -183,10 +192,20 @@ class MasterService {
         });
   }
 
+  // Whoever gave a command waits for an answer.
+  void refuse(const net::Message& message, const auto& m, const Error& why) {
+    control_.reject(message, why.text);
+    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Control>)
+      control_.send(wire::ControlReply{false, why.text}, message.peer);
+  }
+
   const MasterServiceOptions& options_;
   net::Context context_;
-  net::Socket control_{
-      context_, net::Kind::kRouter, "master", {.high_water_mark = 10000, .max_message_bytes = 16u << 20}};
+  net::Socket control_{context_,
+                       net::Kind::kRouter,
+                       "master",
+                       {.high_water_mark = 10000, .max_message_bytes = 16u << 20, .serves = "control"}};
+  Gate gate_;
   std::unique_ptr<metrics::RunRecord> record_;
   const std::string run_id_;  // empty: no record is written
   MasterCore core_;
@@ -210,6 +229,8 @@ int run(const MasterServiceOptions& o) {
     std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
     return 2;
   };
+  const auto access = net::access_of(o.service, {}, true);
+  if (!access) return refuse(access.error());
   const auto options = core_options(o);
   if (!options) return fail(2, options.error());
   std::string run_id;
@@ -222,7 +243,7 @@ int run(const MasterServiceOptions& o) {
   }
   auto record = metrics::RunRecord::open(o.out, metrics::begin_now());
   if (!record) return refuse(record.error());
-  MasterService service(o, *options, *std::move(record), std::move(run_id));
+  MasterService service(o, *options, *std::move(record), std::move(run_id), *access);
   if (const Status s = service.open_metrics(); !s) return refuse(s.error());
   if (const Status s = service.listen(); !s) return fail(2, s.error());
   service.serve();

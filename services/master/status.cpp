@@ -45,7 +45,8 @@ Json told(const net::RunningSession& s) {
           {"kind", s.kind},
           {"started_at", fmt::format("{:%FT%TZ}", fmt::gmtime(std::time_t(s.started_at_s)))},
           {"started_by", s.started_by},
-          {"run_folder", s.run_folder}};
+          {"run_folder", s.run_folder},
+          {"keys", s.keys}};
 }
 
 }  // namespace
@@ -121,6 +122,8 @@ LiveSnapshot MasterCore::live_snapshot() const {
 std::string MasterCore::status_json(double now_s) const {
   const Figures f = figures();
   Json out{{"session", told(session_)},
+           {"messages_rejected", door_.messages_rejected},
+           {"keys_refused", door_.keys_refused},
            {"epoch", epoch_.value},
            {"frames_completed", f.frames_completed},
            {"frames_in_flight", f.frames_in_flight},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 #include "common/core/clock.h"
@@ -27,10 +28,11 @@ class PackerService {
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
                {.high_water_mark = 256,
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
-                .read_ahead = true}),
-        patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),
+                .read_ahead = true,
+                .serves = "tiles"}),
+        patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096, .serves = "patches"}),
         state_(context, net::Kind::kRouter, o.service.name + ":state",
-               {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
+               {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20, .serves = "state"}) {}
 
   /// Binds the three sockets and says hello with their addresses.
   Status open(net::Context& context) {
@@ -76,7 +78,7 @@ class PackerService {
     }
     flush_spans(1e300);
     link_->leave([&] { return status(); });
-    return 0;
+    return link_->refused() ? 2 : 0;
   }
 
  private:
@@ -186,7 +188,8 @@ class PackerService {
         {"rss_mb", net::resident_mb()},
         {"peak_rss_mb", net::peak_resident_mb()},
         {"bytes_sent", 0},
-        {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())}};
+        {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())},
+        {"keys_refused", double(tiles_.keys_refused() + patches_.keys_refused() + state_.keys_refused())}};
     if (packing_) packing_->add_status(v);
     return v;
   }
@@ -217,7 +220,12 @@ int run(const PackerOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   net::keep_freed_memory();
-  net::Context context;
+  const auto access = net::access_of(o.service, {net::Role::kPacker}, true);
+  if (!access) {
+    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
+    return 2;
+  }
+  net::Context context(*access);
   PackerService service(o, context);
   if (const Status s = service.open(context); !s) {
     log::error("{}", s.error().text);

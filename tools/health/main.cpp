@@ -16,7 +16,7 @@ namespace {
 
 struct Options {
   std::string master = "tcp://127.0.0.1:7700";
-  std::string role, name;
+  std::string role, name, keys;
   bool this_host = false, show = false, may_be_away = false;
   double timeout_s = 1.2;  // the answer to a health check is due within 2 s, ends of sockets included
 };
@@ -40,13 +40,14 @@ options::Table table(Options& o) {
       {.flag = "--timeout",
        .value = &o.timeout_s,
        .help = "seconds to wait for the master",
-       .limits = options::Range{0.05, 60}}};
+       .limits = options::Range{0.05, 60}},
+      net::keys_row(o.keys)};
 }
 
 // No answer is an Error, a bad one a refusal.
-Result<wire::ControlReply> ask(const std::string& master, const std::string& command, double timeout_s,
-                               const std::map<std::string, std::string>& about = {}) {
-  net::Context context;
+Result<wire::ControlReply> ask(const net::Access& access, const std::string& master, const std::string& command,
+                               double timeout_s, const std::map<std::string, std::string>& about = {}) {
+  net::Context context(access);
   net::Socket socket(context, net::Kind::kDealer, "health", net::kControlSocket);
   if (const Status s = socket.connect(master); !s) return s.error();
   return net::reply_of_master(socket, master, command, timeout_s, about);
@@ -56,14 +57,16 @@ int check(const Options& o) {
   log::initialise("health", "error");
   const auto master = net::find_master(o.master);
   if (master.address.empty()) return tools::complain({master.problem}, master.exit_code(), "telesplat-health");
+  const auto access = net::Access::open({}, o.keys.empty() ? master.keys : o.keys, net::any_role());
+  if (!access) return tools::complain(access.error(), 2, "telesplat-health");
   std::map<std::string, std::string> about;
   if (!o.role.empty()) about["role"] = o.role;
   if (!o.name.empty()) about["name"] = o.name;
   if (o.this_host) about["host"] = net::host_name();
-  const auto well = ask(master.address, "health", o.timeout_s, about);
+  const auto well = ask(*access, master.address, "health", o.timeout_s, about);
   if (!well) return o.may_be_away ? 0 : tools::complain(well.error(), 1, "telesplat-health");
   if (o.show)
-    if (const auto status = ask(master.address, "status", o.timeout_s); status)
+    if (const auto status = ask(*access, master.address, "status", o.timeout_s); status)
       std::printf("%s\n", status->text.c_str());
   return well->ok ? 0 : tools::complain({well->text}, 1, "telesplat-health");
 }

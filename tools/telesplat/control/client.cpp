@@ -6,8 +6,8 @@
 
 namespace telesplat::launcher {
 
-ControlClient::ControlClient(const std::string& master_endpoint)
-    : endpoint_(master_endpoint), socket_(context_, net::Kind::kDealer, "ctl", net::kControlSocket) {}
+ControlClient::ControlClient(const std::string& master_endpoint, const net::Access& access)
+    : endpoint_(master_endpoint), context_(access), socket_(context_, net::Kind::kDealer, "ctl", net::kControlSocket) {}
 
 // A connection over which nothing is said counts at the master as a message that it rejected.
 void ControlClient::connect() {

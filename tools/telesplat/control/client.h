@@ -11,7 +11,7 @@ namespace telesplat::launcher {
 class ControlClient {
  public:
   /// Connects when the first question is asked.
-  explicit ControlClient(const std::string& master_endpoint);
+  explicit ControlClient(const std::string& master_endpoint, const net::Access& access = {});
 
   /// Sends a command and waits for its answer. Error: the master refused, or there is no answer.
   Result<std::string> ask(const std::string& command, double timeout_s,

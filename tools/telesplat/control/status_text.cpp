@@ -62,7 +62,10 @@ std::string head(const Json& status, double now_s) {
     out += line("address", fmt::format("{}, process {}", text(*session, "address"), count(*session, "pid")));
     const std::string folder = text(*session, "run_folder");
     out += line("record", folder.empty() ? "none" : folder);
+    if (const std::string keys = text(*session, "keys"); !keys.empty()) out += line("keys", keys);
   }
+  if (const uint64_t refused = count(status, "keys_refused"); refused > 0)
+    out += line("not let in", fmt::format("{} connections without a key that the master lets in", refused));
   out += line("views", fmt::format("{} complete, {} in flight; epoch {}", count(status, "frames_completed"),
                                    count(status, "frames_in_flight"), count(status, "epoch")));
   out += line("leases", fmt::format("{} expired, {} given to a second sampler; {} tiles taken back",

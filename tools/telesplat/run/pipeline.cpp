@@ -24,6 +24,7 @@ Pipeline::Pipeline(const RunOptions& options, ProcessGroup group) : options_(opt
 
 Result<Pipeline> Pipeline::start(const RunOptions& o) {
   Pipeline p(o, ProcessGroup(o.log_directory.empty() ? o.out + "/logs" : o.log_directory, o.log_level));
+  if (const Status s = p.group_.use_keys(o.keys); !s) return s.error();
   if (!o.join_master.empty())
     p.group_.join(o.join_master);
   else if (const Status s = p.start_servers(); !s)
@@ -123,7 +124,7 @@ Status Pipeline::start_viewers(double clock_from_s) {
 // are there.
 Status Pipeline::start_wall() {
   const double now = monotonic_s();
-  if (!control_) control_ = std::make_unique<ControlClient>(group_.endpoint());
+  if (!control_) control_ = std::make_unique<ControlClient>(group_.endpoint(), group_.access());
   if (now - asked_s_ > kAskEvery_s) {
     control_->request_status();
     asked_s_ = now;

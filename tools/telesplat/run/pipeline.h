@@ -41,6 +41,8 @@ class Pipeline {
   static Result<Pipeline> start(const RunOptions& options);
 
   const std::string& master_endpoint() const { return group_.endpoint(); }
+  /// By which its master is asked.
+  const net::Access& access() const { return group_.access(); }
   /// Names of the viewers that were started.
   std::vector<std::string> viewers();
 

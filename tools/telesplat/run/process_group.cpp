@@ -30,6 +30,14 @@ std::string program_directory() {
   return fs::read_symlink("/proc/self/exe", error).parent_path().string();
 }
 
+Status ProcessGroup::use_keys(const std::string& folder) {
+  auto access = net::Access::open({}, folder, net::asking_roles());
+  if (!access) return access.error();
+  access_ = *std::move(access);
+  keys_ = folder;
+  return ok_status();
+}
+
 Status ProcessGroup::start_master(std::vector<std::string> arguments, double patience_s) {
   Member member{.role = "master", .name = "master", .arguments = std::move(arguments)};
   auto listens = start_listener(std::move(member), patience_s);
@@ -57,6 +65,7 @@ Status ProcessGroup::start(Member member) {
   fs::create_directories(log_directory_, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
   member.arguments.insert(member.arguments.end(), {"--name", member.name, "--log-level", log_level_});
+  if (!keys_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--keys", keys_});
   if (!endpoint_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--master", endpoint_});
   members_.push_back(std::move(member));
   return restart(members_.back());
@@ -108,7 +117,7 @@ void ProcessGroup::finish() {
   end([](const Member& m) { return m.role == "viewer"; }, kViewersFarewell_s);
   Member* master = find("master");
   if (master && master->process && !master->process->ended() && !endpoint_.empty()) {
-    ControlClient control(endpoint_);
+    ControlClient control(endpoint_, access_);
     if (net::stop_requested() || !control.ask("stop", 2)) master->process->signal(SIGTERM);
     for (const double until = monotonic_s() + kSoon_s; !master->process->ended() && monotonic_s() < until;)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));

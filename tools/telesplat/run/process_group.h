@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/net/keys/access.h"
 #include "tools/telesplat/run/child_process.h"
 
 namespace telesplat::launcher {
@@ -32,6 +33,12 @@ class ProcessGroup {
   /// stderr of each process goes to LOG_DIRECTORY/NAME.log; the folder is made when the first process starts.
   ProcessGroup(const std::string& log_directory, const std::string& log_level)
       : log_directory_(log_directory), log_level_(log_level) {}
+
+  /// Those that are started from now on are told of this folder of keys, and a master is asked with them. Error: they
+  /// are not good for that.
+  Status use_keys(const std::string& folder);
+  /// By which a master is asked.
+  const net::Access& access() const { return access_; }
 
   /// Starts a master of the group's own and waits until it listens. Error: it ended, said nothing for `patience_s`, or
   /// Ctrl-C came.
@@ -65,7 +72,8 @@ class ProcessGroup {
   void finish();
 
  private:
-  std::string log_directory_, log_level_, endpoint_;
+  std::string log_directory_, log_level_, endpoint_, keys_;
+  net::Access access_;
   std::deque<Member> members_;
 };
 

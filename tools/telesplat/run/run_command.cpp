@@ -25,6 +25,7 @@
 #include "tools/telesplat/run/live_figures.h"
 #include "tools/telesplat/run/overwrite.h"
 #include "tools/telesplat/run/pipeline.h"
+#include "tools/telesplat/run/run_keys.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -111,7 +112,7 @@ class Run {
 
   // Shows what goes on until the pipeline ends or somebody wants it to; kRunning: the latter.
   State watch(Pipeline& pipeline) {
-    ControlClient control(pipeline.master_endpoint());
+    ControlClient control(pipeline.master_endpoint(), pipeline.access());
     SessionFigures figures;
     double asked_s = 0;
     const double begin_s = monotonic_s();
@@ -184,7 +185,7 @@ class Run {
   }
 
   void ask_for_results(Pipeline& pipeline) try {
-    const auto answer = ControlClient(pipeline.master_endpoint()).ask("status", kResultPatience_s);
+    const auto answer = ControlClient(pipeline.master_endpoint(), pipeline.access()).ask("status", kResultPatience_s);
     const auto status = answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
     if (status.is_object()) results_ = viewer_results(status, pipeline.viewers());
   } catch (const nlohmann::json::exception&) {
@@ -278,6 +279,7 @@ int find_session(RunOptions& o) {
   const auto search = net::find_master(o.join_master);
   if (search.address.empty()) return tools::complain({search.problem}, search.exit_code());
   o.join_master = search.address;
+  if (o.keys.empty()) o.keys = search.keys;
   return 0;
 }
 
@@ -288,6 +290,8 @@ int run(RunOptions o, const options::Given& given) {
   auto scene = settle(o, given);
   if (!scene) return tools::complain(scene.error());
   if (const int code = find_session(o)) return code;
+  const auto passing_keys = settle_keys(o);
+  if (!passing_keys) return tools::complain(passing_keys.error());
   if (o.viewer.window && !o.viewer.xr)
     if (const Status s = viewer::check_display(); !s) return tools::complain(s.error());
   if (const std::string end = viewer::end_of_trajectory(o.viewer); !end.empty())

@@ -7,6 +7,7 @@
 
 #include "common/image/measures/reference.h"
 #include "common/net/master_address.h"
+#include "common/net/service.h"
 #include "services/data/kinds.h"
 #include "tools/telesplat/run/wall.h"
 
@@ -43,6 +44,12 @@ Table display_rows(RunOptions& o) {
   return joined(rows, viewer::wall_table(o.viewer));
 }
 
+options::Row keys_row(RunOptions& o) {
+  options::Row out = net::keys_row(o.keys);
+  out.help += "; auto: keys that are made for this run and go with it";
+  return out;
+}
+
 Table own_rows(RunOptions& o) {
   const auto points = scene::Kinds::of(scene::Pipeline::kPoints);
   return {
@@ -62,6 +69,7 @@ Table own_rows(RunOptions& o) {
        .help =
            "join the running session at this address instead of starting one; auto: yours on this machine; default, "
            "where no scene is named: $TELESPLAT_MASTER"},
+      keys_row(o),
       {.flag = "--overwrite",
        .value = &o.overwrite,
        .help = "the folder of --out may hold a record already: its files are replaced, others stay"},
