@@ -49,9 +49,6 @@ std::string unique_name(const std::string& role);
 /// HOST, or with host_name() if it was bound to a wildcard (0.0.0.0, [::]) and `advertise` is empty. Other transports
 /// stay as they are.
 std::string announced(const std::string& endpoint, const std::string& advertise);
-/// Where the n-th socket (from 0) of a process that was told to bind to `bind` does so: tcp://HOST:PORT with PORT + n.
-/// Free ports (`*`) and other transports stay as they are. Error: a port above 65535.
-Result<std::string> bind_of(const std::string& bind, int n);
 /// Empty if `host` is a name or address that others can connect to, else what is wrong with it.
 std::string complain_about_host(const std::string& host);
 

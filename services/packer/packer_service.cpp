@@ -7,6 +7,7 @@
 
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
+#include "common/net/bind_address.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"

@@ -89,8 +89,8 @@ FLOORS = {
     ],
     "tools": [
         ["tools/common"],
-        ["tools/make_terrain", "tools/make_volume", "tools/health", "tools/pose_replay", "tools/wan_relay",
-         "tools/xr_test_runtime"],
+        ["tools/health", "tools/make_keys", "tools/make_terrain", "tools/make_volume", "tools/pose_replay",
+         "tools/wan_relay", "tools/xr_test_runtime"],
         ["tools/telesplat/command.h"],
         ["tools/telesplat/scene", "tools/telesplat/control"],
         ["tools/telesplat/record"],

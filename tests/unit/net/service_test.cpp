@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "common/net/bind_address.h"
 #include "common/net/master_address.h"
 #include "common/net/service.h"
 #include "common/options/parser.h"
