@@ -55,13 +55,19 @@ void MasterLink::tick(double now_s, const std::function<Values()>& status) {
   look_for_refusal();
 }
 
-// A master that is just ending, or beginning anew, breaks off handshakes, too: no reason to leave a session.
+// What merely breaks off may be a tunnel whose other end is not there yet.
 void MasterLink::look_for_refusal() {
   if (refused_) return;
   const auto refusal = socket_.refusal();
-  if (refusal.text.empty() || (refusal.may_pass && session_)) return;
-  log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, refusal.text);
-  refused_ = shutdown_ = true;
+  if (refusal.text.empty()) {
+    warned_ = false;
+  } else if (!refusal.may_pass) {
+    log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, refusal.text);
+    refused_ = shutdown_ = true;
+  } else if (!warned_) {
+    log::warn("the master at {} does not let {} in: {}; trying on", endpoint_, hello_.name, refusal.text);
+    warned_ = true;
+  }
 }
 
 void MasterLink::ask_clock(double now_s) {

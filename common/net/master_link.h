@@ -67,7 +67,7 @@ class MasterLink {
   Socket socket_;
   std::optional<wire::Welcome> session_;
   int version_ = 0;
-  bool shutdown_ = false, welcomed_ = false, refused_ = false;
+  bool shutdown_ = false, welcomed_ = false, refused_ = false, warned_ = false;
   Obey obey_;
   ClockEstimate clock_;
   int clock_asked_ = 0;  // since the master is known

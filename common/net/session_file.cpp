@@ -114,7 +114,8 @@ std::optional<File> parse(const std::string& text) {
              folder = text_at(json, "run_folder"), by = text_at(json, "started_by"), host = text_at(json, "host"),
              numbers = text_at(json, "numbers"), boot = text_at(json, "boot"), keys = text_at(json, "keys");
   if (!pid || !start || at == json.end() || !at->is_number() || !std::isfinite(at->get<double>()) || !address ||
-      !is_address(*address) || !scene || !kind || !folder || !by || !host || !numbers || !boot)
+      !is_address(*address) || !scene || !kind || !folder || !by || !host || !numbers || !boot ||
+      (!keys && json.contains("keys")))
     return std::nullopt;
   return File{.session = {.address = *address,
                           .pid = *pid,

@@ -421,11 +421,14 @@ Socket::Refusal Socket::refusal() const {
   if (keys && impl_->turned_away == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH)
     return {.text =
                 fmt::format("the key {} of {} is not let in there", keys->own ? keys->own->name : "", keys->folder)};
-  const bool broken_off = impl_->broken_off >= kBrokenOff;
-  if (impl_->turned_away == 0 && !broken_off) return {};
-  return {.text = keys ? fmt::format("it does not take the keys of {}: it has others, or none", keys->folder)
-                       : std::string("it wants a key (--keys DIR)"),
-          .may_pass = broken_off};
+  const bool turned_away = impl_->turned_away != 0, broken_off = impl_->broken_off >= kBrokenOff;
+  if (!turned_away && !broken_off) return {};
+  if (keys)
+    return {.text = fmt::format("it does not take the keys of {}: it has others, or none", keys->folder),
+            .may_pass = !turned_away};
+  return {.text = turned_away ? "it wants a key (--keys DIR)"
+                              : "it breaks off connections, as one that wants a key does (--keys DIR)",
+          .may_pass = !turned_away};
 }
 
 const std::string& Socket::name() const { return impl_->name; }

@@ -179,7 +179,9 @@ TEST(KeysCommand, MakesListsHandsOutAndRevokes) {
     arguments.insert(arguments.begin(), "keys");
     Program p("telesplat", arguments, folder / "keys-command");
     EXPECT_EQ(p.wait(20), code) << p.out() << p.err();
-    if (code != 0) EXPECT_EQ(std::ranges::count(p.err(), '\n'), 1) << p.err();
+    if (code != 0) {
+      EXPECT_EQ(std::ranges::count(p.err(), '\n'), 1) << p.err();
+    }
     return p.out() + p.err();
   };
   EXPECT_NE(run({keys, "--list"}, 2).find("holds no keys"), std::string::npos);

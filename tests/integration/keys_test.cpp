@@ -1,7 +1,6 @@
 // Sockets with keys: who comes in, who does not, and what each may send.
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <chrono>
 #include <deque>
 #include <thread>
@@ -103,7 +102,7 @@ TEST(Keys, WithoutAKeyNobodyComesIn) {
   ASSERT_TRUE(master.refuses(1));
   ASSERT_TRUE(receive_until(
       peer.socket, [&] { return !peer.socket.refusal().text.empty(); }, nullptr, kRefused_s));
-  EXPECT_EQ(peer.socket.refusal().text, "it wants a key (--keys DIR)");
+  EXPECT_NE(peer.socket.refusal().text.find("wants a key"), std::string::npos) << peer.socket.refusal().text;
   EXPECT_FALSE(master.socket.receive());
   EXPECT_EQ(master.socket.rejected(), 0u);
 }
@@ -305,20 +304,14 @@ TEST(Keys, NobodyIsLetInWhileTheListCannotBeRead) {
 TEST(Keys, WhoAsksAMasterIsToldWhatIsWrongAtOnce) {
   const KeyFolder keys, others;
   Bound master(keys, Kind::kRouter, "control");
-  for (const auto& [access, why] :
-       {std::pair{Access(), std::string("it wants a key (--keys DIR)")},
-        {others.of(Role::kOperator), "it does not take the keys of " + others.path() + ": it has others, or none"}}) {
+  for (const auto& [access, why] : {std::pair{Access(), std::string("wants a key")},
+                                    {others.of(Role::kOperator), "it does not take the keys of " + others.path()}}) {
     const double begin_s = monotonic_s();
-    std::atomic<bool> done{false};
-    std::jthread serving([&] {
-      while (!done)
-        receive_until(
-            master.socket, [&] { return done.load(); }, nullptr, 0.05);
-    });
     const auto answer = ask_master(master.endpoint, "status", 10, {}, access);
-    done = true;
     ASSERT_FALSE(answer.ok());
-    EXPECT_EQ(answer.error().text, "the master at " + master.endpoint + " refuses: " + why);
+    EXPECT_TRUE(answer.error().text.starts_with("the master at " + master.endpoint + " refuses: "))
+        << answer.error().text;
+    EXPECT_NE(answer.error().text.find(why), std::string::npos) << answer.error().text;
     EXPECT_LT(monotonic_s() - begin_s, kRefused_s);
   }
 }

@@ -139,7 +139,7 @@ TEST(KeyFiles, ThatOthersMayReadAreRefusedAsSshDoes) {
     chmod(file.c_str(), mode_t(mode));
     const auto read = read_keys(keys.path(), {Role::kViewer}, false);
     ASSERT_FALSE(read.ok()) << mode;
-    EXPECT_NE(read.error().text.find(file + ": others may read this secret key (mode 0"), std::string::npos)
+    EXPECT_NE(read.error().text.find(file + ": others may read this secret key (mode 6"), std::string::npos)
         << read.error().text;
   }
   chmod(file.c_str(), 0400);
