@@ -7,11 +7,11 @@
 
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
-#include "common/net/bind_address.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/points/point_packing.h"
+#include "services/packer/ports.h"
 #include "services/packer/slices/slice_packing.h"
 #include "services/packer/spare_time.h"
 
@@ -44,7 +44,7 @@ class PackerService {
     for (const auto& [socket, key, host] : {std::tuple{&patches_, "patches", for_viewers()},
                                             {&state_, "state", for_viewers()},
                                             {&tiles_, "tiles", options_.service.advertise}}) {
-      const auto bind = net::bind_of(options_.service.bind, n++);
+      const auto bind = bind_of(options_.service.bind, n++);
       if (!bind) return bind.error();
       const auto endpoint = socket->bind(*bind, options_.service.insecure);
       if (!endpoint) return endpoint.error();

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "common/net/bind_address.h"
 #include "common/net/master_address.h"
 #include "common/net/service.h"
 #include "common/options/parser.h"
@@ -30,18 +29,6 @@ TEST(Service, AnnouncesWhatItIsToldOrIsBoundTo) {
 TEST(Service, NeverAnnouncesAWildcard) {
   for (const char* bound : {"tcp://0.0.0.0:7000", "tcp://[::]:7000", "tcp://*:7000"})
     EXPECT_EQ(announced(bound, ""), "tcp://" + host_name() + ":7000") << bound;
-}
-
-TEST(Service, SocketsOfAProcessHaveNeighbouringPorts) {
-  EXPECT_EQ(*bind_of("tcp://*:7701", 0), "tcp://*:7701");
-  EXPECT_EQ(*bind_of("tcp://*:7701", 2), "tcp://*:7703");
-  EXPECT_EQ(*bind_of("tcp://[::1]:65533", 2), "tcp://[::1]:65535");
-  EXPECT_EQ(*bind_of("tcp://127.0.0.1:*", 2), "tcp://127.0.0.1:*");
-  EXPECT_EQ(*bind_of("tcp://127.0.0.1:0", 2), "tcp://127.0.0.1:0");
-  EXPECT_EQ(*bind_of("ipc:///run/telesplat", 2), "ipc:///run/telesplat");
-  const auto beyond = bind_of("tcp://*:65534", 2);
-  ASSERT_FALSE(beyond);
-  EXPECT_EQ(beyond.error().text, "tcp://*:65534: its 3 ports end at 65535");
 }
 
 TEST(Service, RefusesHostsThatNobodyCanConnectTo) {

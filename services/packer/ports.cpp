@@ -1,10 +1,10 @@
-#include "common/net/bind_address.h"
+#include "services/packer/ports.h"
 
 #include <fmt/format.h>
 
 #include <charconv>
 
-namespace telesplat::net {
+namespace telesplat::packer {
 
 Result<std::string> bind_of(const std::string& bind, int n) {
   const size_t colon = bind.rfind(':');
@@ -17,4 +17,4 @@ Result<std::string> bind_of(const std::string& bind, int n) {
   return fmt::format("{}:{}", bind.substr(0, colon), port + n);
 }
 
-}  // namespace telesplat::net
+}  // namespace telesplat::packer
