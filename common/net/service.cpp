@@ -43,7 +43,9 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
   if (ends != Ends::kConnects)
     out.push_back({.flag = "--bind",
                    .value = &o.bind,
-                   .help = "address to bind to; port * takes a free one",
+                   .help =
+                       "address to bind to; port * takes a free one; a process of several sockets takes this port and "
+                       "those after it",
                    .reach = options::Reach::kHere});
   if (ends == Ends::kBoth)
     out.push_back(

@@ -154,6 +154,7 @@ class MasterCore {
   /// all: facts are told whole.
   nlohmann::ordered_json process_json(const std::string& routing_id, const Peer& peer, double now_s, bool all) const;
   std::string status_json(double now_s, bool all) const;
+  wire::ControlReply health(const wire::Control& m, double now_s) const;
 
   // Walls.
   void send_swaps();

@@ -11,6 +11,7 @@
 #include "common/points/point_model.h"
 #include "common/scene/session.h"
 #include "services/master/master_core.h"
+#include "services/master/orders/health.h"
 
 namespace telesplat::master {
 namespace {
@@ -148,6 +149,7 @@ Status MasterCore::on(const std::string& peer, const wire::SliceWeights& m, doub
 void MasterCore::on(const std::string& peer, const wire::Control& m, double now_s) {
   if (m.command == "status")
     return outbox_.send(peer, wire::ControlReply{true, status_json(now_s, m.arguments.contains("all"))});
+  if (m.command == "health") return outbox_.send(peer, health(m, now_s));
   if (m.command == "stop") {
     outbox_.send(peer, wire::ControlReply{true, "stopping"});
     stop_ = true;
@@ -161,6 +163,14 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   const auto done = obey(m, now_s);
   outbox_.send(peer, wire::ControlReply{done.ok(), done ? *done : done.error().text});
   if (done) dispatch(now_s);
+}
+
+wire::ControlReply MasterCore::health(const wire::Control& m, double now_s) const {
+  HealthQuestion question(m);
+  for (const auto& [id, p] : peers_)
+    if (p.hello.role != "ctl") question.look_at(p.hello, p.gone, now_s - p.seen_s);
+  const auto answer = question.answer();
+  return {answer.ok(), answer ? *answer : answer.error().text};
 }
 
 // To the viewer that is named, or the first one; to all data servers of the scene, of which each knows its part. Of
@@ -236,10 +246,10 @@ Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
     if (!clipped) return clipped.error();
     obeyed = *std::move(clipped);
   } else if (m.command != "epoch") {
-    return Error{
-        fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, play, tf, colour, clip, coupling, "
-                    "pick, where, go, overlay, probe",
-                    m.command.substr(0, 64))};
+    return Error{fmt::format(
+        "unknown command '{}'; known: status, health, stop, epoch, set, animate, play, tf, colour, clip, coupling, "
+        "pick, where, go, overlay, probe",
+        m.command.substr(0, 64))};
   }
   if (obeyed.tells_all) announce(now_s);
   if (!obeyed.begins_epoch) return obeyed.answer;

@@ -6,7 +6,13 @@ options::Table table(PackerOptions& o) {
   using options::Range;
   const auto points = scene::Kinds::of(scene::Pipeline::kPoints);
   return options::joined(net::service_table(o.service, net::Ends::kBoth),
-                         {{.flag = "--threads",
+                         {{.flag = "--advertise-to-viewers",
+                           .value = &o.advertise_to_viewers,
+                           .help = "host that viewers are told to connect to, where it is another than samplers are "
+                                   "told; default: as --advertise",
+                           .limits = options::Check(net::complain_about_host),
+                           .reach = options::Reach::kHere},
+                          {.flag = "--threads",
                            .value = &o.threads,
                            .help = "threads for reference depth maps; 0: one a core",
                            .limits = Range{0, 1024},

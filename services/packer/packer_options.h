@@ -7,8 +7,9 @@ namespace telesplat::packer {
 
 struct PackerOptions {
   net::ServiceOptions service{.name = net::unique_name("packer")};
-  int threads = 0;           ///< for reference depth maps; 0: all cores
-  std::string record_depth;  ///< folder for sampled depth images; empty: none are kept
+  std::string advertise_to_viewers;  ///< host for the sockets of viewers; empty: service.advertise
+  int threads = 0;                   ///< for reference depth maps; 0: all cores
+  std::string record_depth;          ///< folder for sampled depth images; empty: none are kept
   int record_depth_frames = 50;
   std::string record_plan;  ///< folder for pictures of plans; empty: none are kept
   int record_plan_frames = 50;

@@ -11,6 +11,7 @@
 #include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/points/point_packing.h"
+#include "services/packer/ports.h"
 #include "services/packer/slices/slice_packing.h"
 #include "services/packer/spare_time.h"
 
@@ -45,10 +46,15 @@ class PackerService {
     wire::Hello hello;
     hello.role = "packer";
     hello.name = options_.service.name;
-    for (const auto& [socket, key] : {std::pair{&tiles_, "tiles"}, {&patches_, "patches"}, {&state_, "state"}}) {
-      const auto endpoint = socket->bind(options_.service.bind, options_.service.insecure);
+    int n = 0;
+    for (const auto& [socket, key, host] : {std::tuple{&patches_, "patches", for_viewers()},
+                                            {&state_, "state", for_viewers()},
+                                            {&tiles_, "tiles", options_.service.advertise}}) {
+      const auto bind = bind_of(options_.service.bind, n++);
+      if (!bind) return bind.error();
+      const auto endpoint = socket->bind(*bind, options_.service.insecure);
       if (!endpoint) return endpoint.error();
-      hello.endpoints[key] = net::announced(*endpoint, options_.service.advertise);
+      hello.endpoints[key] = net::announced(*endpoint, host);
     }
     if (!options_.record_depth.empty()) {
       auto recorder = DepthRecorder::open(options_.record_depth, options_.record_depth_frames);
@@ -92,6 +98,10 @@ class PackerService {
     net::Message message;
     Take take;
   };
+
+  const std::string& for_viewers() const {
+    return options_.advertise_to_viewers.empty() ? options_.service.advertise : options_.advertise_to_viewers;
+  }
 
   void receive_control() {
     while (const auto message = link_->socket().receive()) {

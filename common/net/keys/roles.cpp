@@ -71,6 +71,7 @@ struct Command {
 // Those that only tell something. All others are an operator's.
 constexpr Command kCommands[] = {
     {"status", kEveryone},
+    {"health", kEveryone},
     {"pick", kWatchers},
     {"where", kWatchers},
     {"probe", kWatchers},
