@@ -13,7 +13,7 @@
 #include "common/net/socket.h"
 #include "common/volume/session.h"
 #include "services/packer/packer_service.h"
-#include "tests/support/lease_key.h"
+#include "tests/support/keys/lease_key.h"
 
 namespace telesplat {
 namespace {

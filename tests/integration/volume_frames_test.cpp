@@ -10,7 +10,7 @@
 #include "services/packer/slices/slice_packing.h"
 #include "services/sampler/volume/shear/slabs.h"
 #include "services/sampler/volume/work.h"
-#include "tests/support/lease_key.h"
+#include "tests/support/keys/lease_key.h"
 
 namespace telesplat {
 namespace {

@@ -53,7 +53,7 @@ FLOORS = {
         ["services/sampler"],
     ],
     "services/master": [
-        [("services/master", "services/master/master_options.*")],
+        [("services/master", "services/master/gate/gate.*", "services/master/master_options.*")],
         [
             "services/master/gate",
             "services/master/tiles",
@@ -112,7 +112,7 @@ FLOORS = {
 OUTSIDE_HEADERS = [
     (r"msgpack.*", ["common/wire"]),
     (r"zmq.*", ["common/net"]),
-    (r"sodium\.h", ["common/net/keys"]),
+    (r"sodium\.h", ["common/net/keys", "common/wire/lease_seal.cpp"]),
     (r"vtk.*", ["services/data/import"]),
     (r"(gdal|ogr|cpl)[_a-z]*\.h", ["services/data/import"]),
     (r"embree.*", ["services/sampler/mesh", "tests/bench"]),

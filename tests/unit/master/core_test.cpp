@@ -279,7 +279,9 @@ TEST_F(Master, AnEmptyStatusIsASignOfLife) {
   const auto told = status();
   for (const auto& p : told["processes"]) {
     EXPECT_EQ(p["alive"], p["name"] == "sampler-1") << p["name"];
-    if (p["name"] == "sampler-1") EXPECT_EQ(p["values"]["tiles_sampled"], 7) << "as it said before";
+    if (p["name"] == "sampler-1") {
+      EXPECT_EQ(p["values"]["tiles_sampled"], 7) << "as it said before";
+    }
   }
 }
 

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "services/packer/slices/slice_packing.h"
-#include "tests/support/lease_key.h"
+#include "tests/support/keys/lease_key.h"
 #include "tests/support/packer_scenes.h"
 
 namespace telesplat::packer {
@@ -229,7 +229,9 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
     const auto mark = decoded<wire::StateMark>(sent.back());
     EXPECT_EQ(mark.sequence.value, 1u);
     if (mark.digest == 0) continue;
-    if (++told_digests > 1) EXPECT_EQ(mark.digest, digest) << "nothing has changed";
+    if (++told_digests > 1) {
+      EXPECT_EQ(mark.digest, digest) << "nothing has changed";
+    }
     digest = mark.digest;
   }
   EXPECT_EQ(told_digests, size_t(10 / PointPacking::kDigestPeriod_s));

@@ -9,7 +9,7 @@
 
 #include "common/net/keys/access.h"
 #include "tools/telesplat/run/child_process.h"
-#include "tools/telesplat/run/restarts.h"
+#include "tools/telesplat/run/children/restarts.h"
 
 namespace telesplat::launcher {
 
