@@ -18,7 +18,7 @@
 #include "common/net/dispatch.h"
 #include "common/net/process_facts.h"
 #include "common/net/session_file.h"
-#include "services/master/gate/gate.h"
+#include "services/master/gate/senders.h"
 #include "services/master/guarded.h"
 #include "services/master/live/http_endpoint.h"
 #include "services/master/master_core.h"
@@ -184,7 +184,7 @@ class MasterService {
                   wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::LinkReport,
                   wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
         control_, message, [&](const auto& m) {
-          if (const Status s = gate_.admit(message, m); !s) return refuse(message, m, s.error());
+          if (const Status s = senders_.admit(message, m); !s) return refuse(message, m, s.error());
           if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
             core_.on(message.peer, m, now_s);
           else if (const Status s = core_.on(message.peer, m, now_s); !s)
@@ -205,7 +205,7 @@ class MasterService {
                        net::Kind::kRouter,
                        "master",
                        {.high_water_mark = 10000, .max_message_bytes = 16u << 20, .serves = "control"}};
-  Gate gate_;
+  Senders senders_;
   std::unique_ptr<metrics::RunRecord> record_;
   const std::string run_id_;  // empty: no record is written
   MasterCore core_;

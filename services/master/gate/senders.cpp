@@ -1,4 +1,4 @@
-#include "services/master/gate/gate.h"
+#include "services/master/gate/senders.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 
 namespace telesplat::master {
 
-Status Gate::admit(const net::Message& from, const wire::Hello& m) {
+Status Senders::admit(const net::Message& from, const wire::Hello& m) {
   if (from.role && !net::may_be(*from.role, m.role))
     return Error{fmt::format("the key {} is {}'s: its owner cannot be a {}", from.user, net::described(*from.role),
                              net::as_word(m.role))};
@@ -33,24 +33,24 @@ Status Gate::admit(const net::Message& from, const wire::Hello& m) {
 }
 
 // A process whose own connection is busy says it over another.
-Status Gate::admit(const net::Message& from, const wire::Goodbye& m) { return speaks_for(from, m.instance); }
+Status Senders::admit(const net::Message& from, const wire::Goodbye& m) { return speaks_for(from, m.instance); }
 
 // Viewers of walls have a connection of its own for this.
-Status Gate::admit(const net::Message& from, const wire::SwapReady& m) { return is_same_user(from, m.viewer); }
+Status Senders::admit(const net::Message& from, const wire::SwapReady& m) { return is_same_user(from, m.viewer); }
 
-Status Gate::admit(const net::Message& from, const wire::Control& m) {
+Status Senders::admit(const net::Message& from, const wire::Control& m) {
   if (!from.role || net::may_command(*from.role, m.command)) return ok_status();
   return Error{net::refused_command(*from.role, from.user, m.command)};
 }
 
-Status Gate::speaks_for(const net::Message& from, InstanceId instance) const {
+Status Senders::speaks_for(const net::Message& from, InstanceId instance) const {
   const auto said = instances_.find(from.peer);
   if (said == instances_.end()) return is_same_user(from, instance);  // over a second connection
   if (said->second == instance) return ok_status();
   return Error{"it speaks in the name of another process"};
 }
 
-Status Gate::is_same_user(const net::Message& from, InstanceId instance) const {
+Status Senders::is_same_user(const net::Message& from, InstanceId instance) const {
   const auto owner = owners_.find(instance);
   if (owner == owners_.end() || owner->second.user == from.user) return ok_status();
   return Error{fmt::format("the key {} speaks in the name of a process of {}", from.user, owner->second.user)};

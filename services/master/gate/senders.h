@@ -12,7 +12,7 @@
 
 namespace telesplat::master {
 
-class Gate {
+class Senders {
  public:
   static constexpr size_t kMost = 8192;  ///< processes that are remembered: of more the first are forgotten
 
