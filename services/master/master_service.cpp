@@ -92,10 +92,9 @@ class MasterService {
     if (options_.started_by == "hand")
       std::printf("telesplat ctl status asks this session; others join it with --master %s\n",
                   net::announced(*endpoint, {}).c_str());
-    if (!options_.service.keys.empty())
-      log::info("keys of {}: others need theirs", options_.service.keys);
     else
       log::info("listening on {}", *endpoint);  // stdout is read by who started it, and goes nowhere
+    if (!options_.service.keys.empty()) log::info("keys of {}: others need theirs", options_.service.keys);
     std::fflush(stdout);
     return ok_status();
   }

@@ -48,6 +48,7 @@ constexpr Row kTable[] = {
     {"control", "lease_extend", {kSampler}},
     {"control", "slab_ready", {kSampler}},
     {"control", "tile_done", {kPacker}},
+    {"control", "tile_refused", {kPacker}},
     {"control", "plan", {kPacker}},
     {"control", "link_report", {kPacker}},
     {"control", "slice_weights", {kData}},

@@ -24,46 +24,46 @@ wire::Hello hello(const std::string& role, uint64_t instance) {
 }
 
 TEST(Senders, AHelloIsOfTheRoleOfItsKey) {
-  Senders gate;
-  EXPECT_TRUE(gate.admit(from("a", "sampler", Role::kSampler), hello("sampler", 1)).ok());
-  const Status refused = gate.admit(from("b", "anna", Role::kViewer), hello("sampler", 2));
+  Senders senders;
+  EXPECT_TRUE(senders.admit(from("a", "sampler", Role::kSampler), hello("sampler", 1)).ok());
+  const Status refused = senders.admit(from("b", "anna", Role::kViewer), hello("sampler", 2));
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().text, "the key anna is a viewer's: its owner cannot be a sampler");
-  EXPECT_FALSE(gate.admit(from("c", "sampler", Role::kSampler), hello("data", 3)).ok());
-  EXPECT_TRUE(gate.admit(from("d", "ben", Role::kOperator), hello("viewer", 4)).ok());
-  EXPECT_TRUE(gate.admit(from("e"), hello("data", 5)).ok()) << "without keys anybody may say what they like";
+  EXPECT_FALSE(senders.admit(from("c", "sampler", Role::kSampler), hello("data", 3)).ok());
+  EXPECT_TRUE(senders.admit(from("d", "ben", Role::kOperator), hello("viewer", 4)).ok());
+  EXPECT_TRUE(senders.admit(from("e"), hello("data", 5)).ok()) << "without keys anybody may say what they like";
 }
 
 TEST(Senders, EveryoneSpeaksForThemselves) {
-  Senders gate;
-  ASSERT_TRUE(gate.admit(from("a"), hello("sampler", 1)).ok());
-  ASSERT_TRUE(gate.admit(from("b"), hello("viewer", 2)).ok());
+  Senders senders;
+  ASSERT_TRUE(senders.admit(from("a"), hello("sampler", 1)).ok());
+  ASSERT_TRUE(senders.admit(from("b"), hello("viewer", 2)).ok());
   const auto all = [&](const std::string& peer, uint64_t id) {
     const InstanceId instance{id};
     std::vector<Status> out;
-    out.push_back(gate.admit(from(peer), wire::StatusReport{instance, {}}));
+    out.push_back(senders.admit(from(peer), wire::StatusReport{instance, {}}));
     wire::MetricRows rows;
     rows.instance = instance;
-    out.push_back(gate.admit(from(peer), rows));
+    out.push_back(senders.admit(from(peer), rows));
     wire::LeaseRequest lease;
     lease.sampler = instance;
-    out.push_back(gate.admit(from(peer), lease));
+    out.push_back(senders.admit(from(peer), lease));
     wire::LeaseExtend extend;
     extend.sampler = instance;
-    out.push_back(gate.admit(from(peer), extend));
+    out.push_back(senders.admit(from(peer), extend));
     wire::SlabReady ready;
     ready.sampler = instance;
-    out.push_back(gate.admit(from(peer), ready));
+    out.push_back(senders.admit(from(peer), ready));
     wire::ViewRequest view;
     view.viewer = instance;
-    out.push_back(gate.admit(from(peer), view));
+    out.push_back(senders.admit(from(peer), view));
     wire::SliceWeights weights;
     weights.data = instance;
-    out.push_back(gate.admit(from(peer), weights));
+    out.push_back(senders.admit(from(peer), weights));
     wire::OrderAnswer answer;
     answer.instance = instance;
-    out.push_back(gate.admit(from(peer), answer));
-    out.push_back(gate.admit(from(peer), wire::Goodbye{instance}));
+    out.push_back(senders.admit(from(peer), answer));
+    out.push_back(senders.admit(from(peer), wire::Goodbye{instance}));
     return out;
   };
   for (const Status& s : all("a", 1)) EXPECT_TRUE(s.ok());
@@ -73,53 +73,53 @@ TEST(Senders, EveryoneSpeaksForThemselves) {
   // What names somebody else's process.
   wire::TileDone done;
   done.sampler = {1};
-  EXPECT_TRUE(gate.admit(from("b"), done).ok());
+  EXPECT_TRUE(senders.admit(from("b"), done).ok());
   wire::LinkReport link;
   link.viewer = {2};
-  EXPECT_TRUE(gate.admit(from("a"), link).ok());
+  EXPECT_TRUE(senders.admit(from("a"), link).ok());
 }
 
 TEST(Senders, AProcessThatComesBackSpeaksOverItsNewConnection) {
-  Senders gate;
+  Senders senders;
   const auto user = [](const char* peer) { return from(peer, "sampler", Role::kSampler); };
-  ASSERT_TRUE(gate.admit(user("a"), hello("sampler", 1)).ok());
-  ASSERT_TRUE(gate.admit(user("b"), hello("sampler", 1)).ok());
-  EXPECT_TRUE(gate.admit(user("b"), wire::StatusReport{{1}, {}}).ok());
-  ASSERT_TRUE(gate.admit(user("b"), hello("sampler", 3)).ok()) << "and it may begin a new life there";
-  EXPECT_FALSE(gate.admit(user("b"), wire::StatusReport{{1}, {}}).ok());
-  EXPECT_TRUE(gate.admit(user("b"), wire::StatusReport{{3}, {}}).ok());
+  ASSERT_TRUE(senders.admit(user("a"), hello("sampler", 1)).ok());
+  ASSERT_TRUE(senders.admit(user("b"), hello("sampler", 1)).ok());
+  EXPECT_TRUE(senders.admit(user("b"), wire::StatusReport{{1}, {}}).ok());
+  ASSERT_TRUE(senders.admit(user("b"), hello("sampler", 3)).ok()) << "and it may begin a new life there";
+  EXPECT_FALSE(senders.admit(user("b"), wire::StatusReport{{1}, {}}).ok());
+  EXPECT_TRUE(senders.admit(user("b"), wire::StatusReport{{3}, {}}).ok());
 }
 
 TEST(Senders, NobodyTakesAProcessOfAnotherKey) {
-  Senders gate;
-  ASSERT_TRUE(gate.admit(from("a", "anna", Role::kViewer), hello("viewer", 1)).ok());
-  const Status refused = gate.admit(from("b", "ben", Role::kViewer), hello("viewer", 1));
+  Senders senders;
+  ASSERT_TRUE(senders.admit(from("a", "anna", Role::kViewer), hello("viewer", 1)).ok());
+  const Status refused = senders.admit(from("b", "ben", Role::kViewer), hello("viewer", 1));
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().text, "the key ben speaks in the name of a process of anna");
-  EXPECT_FALSE(gate.admit(from("c", "ben", Role::kViewer), wire::Goodbye{{1}}).ok());
-  EXPECT_FALSE(gate.admit(from("c", "ben", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
-  EXPECT_TRUE(gate.admit(from("d", "anna", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
-  EXPECT_TRUE(gate.admit(from("d", "anna", Role::kViewer), wire::Goodbye{{1}}).ok()) << "over another connection";
+  EXPECT_FALSE(senders.admit(from("c", "ben", Role::kViewer), wire::Goodbye{{1}}).ok());
+  EXPECT_FALSE(senders.admit(from("c", "ben", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
+  EXPECT_TRUE(senders.admit(from("d", "anna", Role::kViewer), wire::StatusReport{{1}, {}}).ok());
+  EXPECT_TRUE(senders.admit(from("d", "anna", Role::kViewer), wire::Goodbye{{1}}).ok()) << "over another connection";
   wire::SwapReady swap;
   swap.viewer = {1};
-  EXPECT_FALSE(gate.admit(from("e", "ben", Role::kViewer), swap).ok());
-  EXPECT_TRUE(gate.admit(from("f", "anna", Role::kViewer), swap).ok());
+  EXPECT_FALSE(senders.admit(from("e", "ben", Role::kViewer), swap).ok());
+  EXPECT_TRUE(senders.admit(from("f", "anna", Role::kViewer), swap).ok());
 }
 
 TEST(Senders, CommandsNeedTheirRole) {
-  Senders gate;
-  EXPECT_TRUE(gate.admit(from("a", "anna", Role::kViewer), wire::Control{"status", {}}).ok());
-  EXPECT_FALSE(gate.admit(from("a", "anna", Role::kViewer), wire::Control{"stop", {}}).ok());
-  EXPECT_TRUE(gate.admit(from("b", "ben", Role::kOperator), wire::Control{"stop", {}}).ok());
-  EXPECT_TRUE(gate.admit(from("c"), wire::Control{"stop", {}}).ok());
+  Senders senders;
+  EXPECT_TRUE(senders.admit(from("a", "anna", Role::kViewer), wire::Control{"status", {}}).ok());
+  EXPECT_FALSE(senders.admit(from("a", "anna", Role::kViewer), wire::Control{"stop", {}}).ok());
+  EXPECT_TRUE(senders.admit(from("b", "ben", Role::kOperator), wire::Control{"stop", {}}).ok());
+  EXPECT_TRUE(senders.admit(from("c"), wire::Control{"stop", {}}).ok());
 }
 
 TEST(Senders, RemembersSoManyAndNoMore) {
-  Senders gate;
+  Senders senders;
   for (uint64_t i = 1; i <= Senders::kMost + 10; ++i)
-    ASSERT_TRUE(gate.admit(from("p" + std::to_string(i)), hello("viewer", i)).ok());
-  EXPECT_TRUE(gate.admit(from("p1"), wire::StatusReport{{2}, {}}).ok()) << "forgotten: the core asks who it is";
-  EXPECT_FALSE(gate.admit(from("p11"), wire::StatusReport{{2}, {}}).ok());
+    ASSERT_TRUE(senders.admit(from("p" + std::to_string(i)), hello("viewer", i)).ok());
+  EXPECT_TRUE(senders.admit(from("p1"), wire::StatusReport{{2}, {}}).ok()) << "forgotten: the core asks who it is";
+  EXPECT_FALSE(senders.admit(from("p11"), wire::StatusReport{{2}, {}}).ok());
 }
 
 }  // namespace

@@ -44,6 +44,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       {{"control", wire::LeaseExtend::kName}, {kSampler}},
       {{"control", wire::SlabReady::kName}, {kSampler}},
       {{"control", wire::TileDone::kName}, {kPacker}},
+      {{"control", "tile_refused"}, {kPacker}},
       {{"control", wire::Plan::kName}, {kPacker}},
       {{"control", wire::LinkReport::kName}, {kPacker}},
       {{"control", wire::SliceWeights::kName}, {kData}},
