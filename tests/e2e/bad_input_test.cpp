@@ -93,6 +93,19 @@ const Case kCases[] = {
 INSTANTIATE_TEST_SUITE_P(Cases, BadInput, ::testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.name; });
 
+// What a data server says by which it is started by hand.
+TEST(DataServer, AFileThatIsCutOffWhileItIsReadIsNamed) {
+  TemporaryFolder folder;
+  const std::string path = folder / "cut.ply";
+  write_terrain(path, 900);
+  Program data("telesplat-data", {path, "--no-cache", "--report-progress", "--name", "data"}, folder / "data");
+  ASSERT_TRUE(wait_until([&] { return data.out().find("progress reading") != std::string::npos; })) << data.err();
+  fs::resize_file(path, 10'000);
+  EXPECT_EQ(data.wait(60), 2) << data.err();
+  EXPECT_NE(data.err().find("telesplat: " + path + ": was cut off while it was read\n"), std::string::npos)
+      << data.err();
+}
+
 TEST(BadUsage, UnknownFlagsAndAbsentScenesAreRefused) {
   TemporaryFolder folder;
   // It asks for some seconds.
