@@ -29,7 +29,7 @@ void read_cut_off(const std::string& path, int exit_code) {
   _exit(sum_of((*whole)->bytes()) == before ? 102 : 103);
 }
 
-TEST(CutOffFile, EndsItsReaderInOneLineThatNamesIt) {
+TEST(CutOffDeathTest, EndsItsReaderInOneLineThatNamesIt) {
   const TempFolder folder;
   for (const int code : {2, 1}) {
     const std::string path = folder.write("cut.ply", std::string(100'000, 'x'));
@@ -38,7 +38,7 @@ TEST(CutOffFile, EndsItsReaderInOneLineThatNamesIt) {
   }
 }
 
-TEST(CutOffFile, OfALongNameTheEndIsTold) {
+TEST(CutOffDeathTest, OfALongNameTheEndIsTold) {
   const TempFolder folder;
   const std::string name = std::string(200, 'a') + "-end.ply";
   std::filesystem::create_directories(folder / std::string(100, 'b'));
@@ -47,7 +47,7 @@ TEST(CutOffFile, OfALongNameTheEndIsTold) {
 }
 
 // Whatever else is wrong with memory is no file's fault.
-TEST(CutOffFile, OtherBusErrorsEndTheProcessAsBefore) {
+TEST(CutOffDeathTest, OtherBusErrorsEndTheProcessAsBefore) {
   EXPECT_EXIT(
       {
         end_at_cut_off_files(2);
@@ -63,7 +63,7 @@ TEST(CutOffFile, OtherBusErrorsEndTheProcessAsBefore) {
 }
 
 // Places are given back: more files than there are places, one after the other, and all at once.
-TEST(CutOffFile, ManyMappingsHarmNothing) {
+TEST(CutOffDeathTest, ManyMappingsHarmNothing) {
   const TempFolder folder;
   const std::string path = folder.write("a.ply", std::string(5000, 'x')),
                     last = folder.write("b.ply", std::string(100'000, 'x'));
