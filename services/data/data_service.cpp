@@ -10,6 +10,8 @@
 #include "common/core/utf8.h"
 #include "common/metrics/about.h"
 #include "common/net/master_link.h"
+#include "services/data/base/cut_off.h"
+#include "services/data/companions.h"
 #include "services/data/kinds.h"
 #include "services/data/record.h"
 
@@ -147,11 +149,18 @@ int run(const DataServiceOptions& o) {
     return 2;
   }
   const double begin_s = monotonic_s();
+  end_at_cut_off_files(2);
+  if (const Status s = check_companions(o); !s) {
+    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
+    return 2;
+  }
   const auto served = open(o, make_progress(o.report_progress, o.scene));
   if (!served) {
     std::fprintf(stderr, "telesplat: %s\n", served.error().text.c_str());
     return 2;
   }
+  end_at_cut_off_files(
+      1);  // now it is the chunk store or a later step of a series: whoever starts it again may succeed
   net::install_signal_handlers();  // until here a signal ended the process: what was being read is read again next time
   log::info("{}: {}; ready in {:.0f} ms", o.scene, (*served)->summary(), 1e3 * (monotonic_s() - begin_s));
   tell_notes(**served, o.report_progress);

@@ -268,6 +268,7 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
 
 std::vector<std::string> data_arguments(const RunOptions& o, int part) {
   data::DataServiceOptions d = o.data;
+  d.companions = "anywhere";  // the person's own files, for the person alone
   if (o.data_servers > 1) d.volume.part = fmt::format("{}/{}", part, o.data_servers);
   auto out = arguments(d);
   out.push_back("--report-progress");
