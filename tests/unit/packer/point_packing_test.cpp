@@ -218,7 +218,11 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
     digest = mark.digest;
   }
   EXPECT_EQ(told_digests, size_t(10 / PointPacking::kDigestPeriod_s));
-  sample(tile(2, 0), 21), sample(tile(2, 1), 21);
+  for (const int half : {0, 1}) {
+    wire::DepthTile from_elsewhere = tile(2, half);
+    from_elsewhere.lease.camera = test::scene_camera({0, 0.4, 0.7}, 96, 64);
+    sample(from_elsewhere, 21);
+  }
   packing.tick(30);
   EXPECT_NE(decoded<wire::StateMark>(sent.back()).digest, digest);
   EXPECT_EQ(status("digests_told"), double(told_digests + 1));
