@@ -236,9 +236,9 @@ TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
   }
   EXPECT_EQ(told_digests, size_t(10 / PointPacking::kDigestPeriod_s));
   for (const int half : {0, 1}) {
-    wire::DepthTile elsewhere = tile(2, half);
-    elsewhere.lease.camera = test::scene_camera({0.1, 0.1, 0}, 96, 64);
-    sample(elsewhere, 21);
+    wire::DepthTile from_elsewhere = tile(2, half);
+    from_elsewhere.lease.camera = test::scene_camera({0, 0.4, 0.7}, 96, 64);
+    sample(from_elsewhere, 21);
   }
   packing.tick(30);
   EXPECT_NE(decoded<wire::StateMark>(sent.back()).digest, digest);
