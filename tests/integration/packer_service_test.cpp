@@ -162,6 +162,7 @@ TEST_F(PackerServiceTest, AViewerThatReadsNothingCostsNoMoreThanItsWindow) {
     m.lease.camera = geometry::make_camera({{0, 0, 0.6}, {1, 0, 0, 0}}, 60, kSide, kSide);
     m.lease.rect = m.lease.block_rect = {0, 0, kSide, kSide};
     m.image = std::as_bytes(std::span(stream));
+    test::seal_lease(m.lease, {9});
     while (!sampler.send(m)) std::this_thread::yield();
     if (next(master, wire::TileDone::kName)) ++told;
   }

@@ -699,7 +699,8 @@ TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {
                                     {"kind", ""},
                                     {"started_at", "2026-11-22T19:54:26Z"},
                                     {"started_by", "view"},
-                                    {"run_folder", "/data/run"}}));
+                                    {"run_folder", "/data/run"},
+                                    {"keys", ""}}));
   auto data = hello("data", "data", 1);
   data.facts["kind"] = "mesh";
   core.on("d", data, 0);
