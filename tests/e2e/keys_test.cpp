@@ -29,7 +29,7 @@ TEST(KeysOfSessions, ARunWithKeysShowsAndEndsAsEver) {
   PipelineRun run({"--frames", "60", "--samplers", "2", "--keys", keys.path()});
   EXPECT_EQ(run.program().wait(120), 0) << run.program().err();
   const auto s = run.summary();
-  EXPECT_GT(s["updates"]["count"], 0) << s.dump(1);
+  EXPECT_GT(s["updates"], 0) << s.dump(1);
   EXPECT_EQ(s["errors"]["messages_rejected"], 0);
   EXPECT_EQ(s["errors"]["keys_refused"], 0);
   EXPECT_TRUE(run.all_gone());
