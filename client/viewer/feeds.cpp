@@ -19,8 +19,10 @@ bool Feeds::connect(std::span<const Feed> wanted, const wire::Welcome& session) 
   if (open_.size() == wanted.size() && std::all_of(wanted.begin(), wanted.end(), is_open)) return false;
 
   open_.clear();
-  const net::SocketOptions bulk{
-      .high_water_mark = 4096, .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes, .read_ahead = true};
+  const net::SocketOptions bulk{.high_water_mark = 4096,
+                                .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                                .patience_s = net::kBulkPatience_s,
+                                .read_ahead = true};
   for (const Feed& feed : wanted) {
     open_.push_back({feed.endpoint, view.endpoint(feed.endpoint),
                      net::Socket(context_, feed.kind, viewer_ + ":" + feed.endpoint, bulk)});

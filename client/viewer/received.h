@@ -26,8 +26,8 @@ class Received {
   virtual ~Received() = default;
 
   // ---- worker thread ----
-  /// The session as its master tells of it now. Error: it cannot be shown; names the value and its limit. All stays as
-  /// it was then.
+  /// The session as its master tells of it now. What must be received anew closes its feeds, which are to be connected
+  /// after each call. Error: it cannot be shown; names the value and its limit. All stays as it was then.
   virtual Status follow(const wire::Welcome& session) = 0;
   /// Where updates come from.
   virtual std::span<const Feed> feeds() const = 0;

@@ -38,12 +38,25 @@ std::string folder_name(const std::string& name) {
   return out.starts_with("viewer-") ? out : "viewer-" + out;
 }
 
+// A folder that the person names: that of the session, one in it, or one without a record.
+Status check_own(const std::string& directory) {
+  std::error_code error;
+  const fs::path own = fs::absolute(directory, error).lexically_normal();
+  const fs::path named = own.has_filename() ? own : own.parent_path();
+  if (!metrics::folder_id(named).empty() || !metrics::folder_id(named.parent_path()).empty()) return ok_status();
+  const auto files = metrics::recorded_files(named);
+  if (files.empty()) return ok_status();
+  return Error{fmt::format("{}: holds a record already ({}{}); give another --out", directory, files.front(),
+                           files.size() > 1 ? ", ..." : "")};
+}
+
 }  // namespace
 
 Result<std::unique_ptr<SessionRecord>> SessionRecord::open(const Options& options) {
   std::unique_ptr<SessionRecord> out(new SessionRecord(options));
-  if (!options.out.empty())
-    if (const Status s = out->open_in(options.out); !s) return s.error();
+  if (options.out.empty()) return out;
+  if (const Status s = check_own(options.out); !s) return s.error();
+  if (const Status s = out->open_in(options.out); !s) return s.error();
   return out;
 }
 
@@ -60,6 +73,13 @@ Status SessionRecord::open_in(const std::string& directory) {
   directory_ = directory;
   spool_ready_ = spool_.get();
   return ok_status();
+}
+
+uint64_t SessionRecord::files_failed() {
+  if (events_) events_->flush();
+  if (slices_) slices_->flush();
+  return uint64_t(spool_ && spool_->failed() > 0) + uint64_t(events_ && events_->failed()) +
+         uint64_t(slices_ && slices_->failed());
 }
 
 void SessionRecord::follow(const wire::Welcome& session) {

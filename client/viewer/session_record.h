@@ -37,6 +37,9 @@ class SessionRecord {
   FrameSpool* spool() const { return spool_ready_; }
   /// After the session; empty: nothing is kept.
   const std::string& directory() const { return directory_; }
+  /// How many files could not be written to their end, the frames to be counting as one. What is waiting to be written
+  /// of them is, first. Worker's thread; after the session any.
+  uint64_t files_failed();
 
  private:
   explicit SessionRecord(const Options& options) : options_(options) {}

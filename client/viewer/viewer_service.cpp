@@ -33,6 +33,13 @@ int fail(const Error& error) {
   return 1;
 }
 
+// The launcher reads it: this is no reason to end the session for others.
+int not_recorded(const std::string& directory) {
+  if (!isatty(STDOUT_FILENO)) std::printf("record failed\n");
+  std::fflush(stdout);
+  return fail({fmt::format("{}: not all of the record could be written", directory)});
+}
+
 // To the person: on a terminal as it is, else marked so that the launcher passes it on.
 void tell(const std::string& text) {
   std::printf("%s%s\n", isatty(1) ? "" : "note ", text.c_str());
@@ -55,7 +62,7 @@ Result<std::shared_ptr<PoseFeed>> open_poses(const ViewerOptions& o) {
 }
 
 // A window may be given another size than it asked for: the options follow.
-Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net::Via& via,
+Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net::Access& asking,
                                                      const std::shared_ptr<PoseFeed>& poses) {
   if (!o.window) {
     if (const std::string end = end_of_trajectory(o); !end.empty()) log::info("{}", end);
@@ -79,7 +86,7 @@ Result<std::unique_ptr<DisplaySurface>> open_surface(ViewerOptions& o, const net
       .open = o.launched ? std::function<void(const std::string&)>(ask_to_open) : nullptr,
       .begins_empty = o.begins_empty,
       .launcher_fd = o.launched ? STDIN_FILENO : -1};
-  auto opened = WindowSurface::open(options, tell, std::make_unique<ControlDesk>(o.service.master, via));
+  auto opened = WindowSurface::open(options, tell, std::make_unique<ControlDesk>(o.service.master, asking));
   if (!opened) return opened.error();
   o.display.width = (*opened)->width();
   o.display.height = (*opened)->height();
@@ -100,7 +107,7 @@ struct Display {
 };
 
 // A headset wants pictures of another size than the options tell: they follow.
-Result<Display> open_display(ViewerOptions& o, const net::Via& via, const std::shared_ptr<PoseFeed>& poses) {
+Result<Display> open_display(ViewerOptions& o, const net::Access& asking, const std::shared_ptr<PoseFeed>& poses) {
   Display out{nullptr, nullptr, poses};
   if (o.xr) {
     auto headset = XrDevice::open();
@@ -111,7 +118,7 @@ Result<Display> open_display(ViewerOptions& o, const net::Via& via, const std::s
     o.display.height = eye.height;
     return out;
   }
-  auto surface = open_surface(o, via, poses);
+  auto surface = open_surface(o, asking, poses);
   if (!surface) return surface.error();
   out.surface = std::move(*surface);
   return out;
@@ -201,12 +208,13 @@ std::unique_ptr<WallPace> wall_pace(const ViewerOptions& o, net::Context& contex
 struct Served {
   DisplayResult display;
   bool session_ended = false;
+  bool refused = false;  // by the master
 };
 
 // Shows the session until it, the person or the clock ends it.
-Served serve(const ViewerOptions& o, const net::Via& via, const Display& display, Renderers& renderers,
+Served serve(const ViewerOptions& o, const net::Access& access, const Display& display, Renderers& renderers,
              SessionRecord& record) {
-  net::Context context(via);
+  net::Context context(access);
   CouplingGate gate(coupling_state(*coupling_named(o.coupling), o.buffers));
   metrics::TableRecorder frames("frames", frame_columns());
   metrics::SpanRecorder spans;
@@ -239,6 +247,7 @@ Served serve(const ViewerOptions& o, const net::Via& via, const Display& display
     served.display =
         run_display(o.display, *display.surface, make_source, gate, worker, frames, spans, spool, wall.get());
   served.session_ended = worker.shutdown_requested();
+  served.refused = worker.refused();
   return served;
 }
 
@@ -246,6 +255,7 @@ Served serve(const ViewerOptions& o, const net::Via& via, const Display& display
 Status develop(const std::string& directory, FrameSpool& spool) {
   spool.flush();
   if (spool.dropped()) log::warn("{} frames to record were dropped: the disk did not keep up", spool.dropped());
+  if (spool.failed()) log::warn("{} frames to record could not be written", spool.failed());
   // The launcher reads lines, a person one that is rewritten.
   const auto progress = [person = isatty(STDOUT_FILENO) != 0](size_t done, size_t of) {
     if (person)
@@ -266,10 +276,11 @@ Status develop(const std::string& directory, FrameSpool& spool) {
 }
 
 // Ends the session for everyone, if that is this viewer's part. Exit code.
-int farewell(const ViewerOptions& o, const net::Via& via, const Served& served) {
+int farewell(const ViewerOptions& o, const net::Access& asking, const Served& served) {
+  if (served.refused) return 2;
   if (!o.end_session) return 0;
   if (!served.session_ended && !net::stop_requested())
-    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s, {}, via); !answer)
+    if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s, {}, asking); !answer)
       log::warn("the session could not be ended: {}", answer.error().text);
   if (served.display.frames == 0) log::error("the session ended before anything was shown");
   return served.display.frames == 0 ? 1 : 0;
@@ -282,25 +293,31 @@ int run(ViewerOptions o) {
   net::install_signal_handlers();
   net::keep_freed_memory();
   if (const Status s = settle(o); !s) return refuse(s.error());
-  const auto via = net::via_of(o.service);
-  if (!via) return refuse(via.error());
+  const auto access = net::access_of(o.service, {net::Role::kViewer, net::Role::kOperator});
+  if (!access) return refuse(access.error());
+  // Whoever may change the session for everyone may do so at a window, too.
+  const auto asking = net::access_of(o.service, net::asking_roles());
+  if (!asking) return refuse(asking.error());
   const auto poses = open_poses(o);
   if (!poses) return refuse(poses.error());
-  auto display = open_display(o, *via, *poses);  // before the renderers, whose contexts may depend on the window's
+  auto display = open_display(o, *asking, *poses);  // before the renderers, whose contexts may depend on the window's
   if (!display) return refuse(display.error());
   auto renderers = open_renderers(o);
   if (!renderers) return fail(renderers.error());
   auto record = open_record(o);
   if (!record) return refuse(record.error());
 
-  const Served served = serve(o, *via, *display, *renderers, **record);
+  const Served served = serve(o, *access, *display, *renderers, **record);
   if (!served.display.error.empty()) return fail({served.display.error});
   const std::string lost = display->surface ? display->surface->failure() : "";
   display->surface.reset();  // the window goes at once, however much there is to write
-  if (FrameSpool* spool = (*record)->spool())
-    if (const Status s = develop((*record)->directory(), *spool); !s) return fail(s.error());
-  const int code = farewell(o, *via, served);
-  return lost.empty() ? code : fail({lost});
+  FrameSpool* const spool = (*record)->spool();
+  const Status developed = spool ? develop((*record)->directory(), *spool) : ok_status();
+  const int code = farewell(o, *asking, served);
+  if (!lost.empty()) return fail({lost});
+  if (!developed) log::error("{}", developed.error().text);
+  if (code == 0 && (!developed || (*record)->files_failed() > 0)) return not_recorded((*record)->directory());
+  return code;
 }
 
 }  // namespace telesplat::viewer

@@ -8,6 +8,7 @@
 #include "client/viewer/coupling/update_table.h"
 #include "common/core/clock.h"
 #include "common/core/log.h"
+#include "common/metrics/process.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -90,7 +91,11 @@ void ViewerWorker::on_ask(uint64_t ask, const geometry::Camera& camera) {
 }
 
 void ViewerWorker::on_measured(const MeasuredFrame& f) {
-  if (f.previous_s > 0) inter_frame_ms_.add(f.end_s, (f.end_s - f.previous_s) * 1e3);
+  if (f.previous_s > 0) {
+    const double gap_ms = (f.end_s - f.previous_s) * 1e3;
+    inter_frame_ms_.add(f.end_s, gap_ms);
+    if (gap_ms > longest_gap_ms_) longest_gap_ms_ = gap_ms;  // one thread displays
+  }
   update_age_ms_.add(f.end_s, f.update_age_s * 1e3);
 }
 
@@ -169,6 +174,7 @@ void ViewerWorker::receive() {
 void ViewerWorker::receive_control() {
   link_.receive();
   for (auto& answer : orders_.take_answers()) link_.answer(answer.number, answer.ok, std::move(answer.text));
+  if (link_.refused()) refused_ = true;
   if (link_.shutdown_requested()) shutdown_ = true;
 }
 
@@ -177,11 +183,6 @@ void ViewerWorker::follow_session() {
   seen_version_ = link_.version();
   const wire::Welcome& session = *link_.session();
   const scene::SessionView view(session);
-  {
-    auto told = std::make_shared<const wire::Welcome>(session);
-    const std::lock_guard lock(mutex_);
-    session_ = std::move(told);
-  }
   follow_record(session);
   legends_.follow(session);
   const double told = view.setting("viewer.least_sampling", options_.requests.min_scale);
@@ -195,16 +196,23 @@ void ViewerWorker::follow_session() {
   const auto pipeline = view.pipeline();
   if (!pipeline && !view.fact("kind").empty())
     log::error("the session's scene is of the kind \"{}\", which this viewer does not know", view.fact("kind"));
-  if (session.box_room.empty() || !pipeline) return;
-  if (const Status s = follow(*pipeline, session); !s)
-    return log::error("the session as the master at {} tells of it cannot be shown: {}", options_.service.master,
-                      s.error().text);
+  // The display hears of a session when its scene is there to be shown, or cannot be.
+  auto copy = std::make_shared<const wire::Welcome>(session);
+  const bool has_scene = !session.box_room.empty() && pipeline;
+  const Status followed = has_scene ? follow(*pipeline, session) : ok_status();
   {
     const std::lock_guard lock(mutex_);
-    scene_ = view.fact("scene");
-    terms_ = std::make_shared<const SceneTerms>(terms_of(session));
-    shown_scene_ = {session.box_room, *pipeline};
+    session_ = std::move(copy);
+    if (has_scene && followed) {
+      scene_ = view.fact("scene");
+      terms_ = std::make_shared<const SceneTerms>(terms_of(session));
+      shown_scene_ = {session.box_room, *pipeline};
+    }
   }
+  if (!followed)
+    return log::error("the session as the master at {} tells of it cannot be shown: {}", options_.service.master,
+                      followed.error().text);
+  if (!has_scene) return;
   if (feeds_.connect(received_->feeds(), session)) received_->on_connected();
 }
 
@@ -357,6 +365,7 @@ void ViewerWorker::request_views(double now_s) {
     const auto request = requester_.next(to_master_s(now_s));
     if (!request) return;
     link_.socket().send(*request);
+    tell_if_coarser(request->camera);
     {
       const std::lock_guard lock(mutex_);
       sampled_width_ = request->camera.width, sampled_height_ = request->camera.height;
@@ -366,6 +375,15 @@ void ViewerWorker::request_views(double now_s) {
       may_ask = c.waits() && c.may_ask();
     });
   }
+}
+
+// Once: the master samples it coarser than it was asked for.
+void ViewerWorker::tell_if_coarser(const geometry::Camera& camera) {
+  const double most = scene::value_or(link_.session()->settings, "sampling.max_pixels", 0.0);
+  const double pixels = double(camera.width) * double(camera.height);
+  if (most <= 0 || pixels <= most || std::exchange(told_coarser_, true)) return;
+  log::warn("views of {}x{} pixels are sampled coarser: the master's --max-sampling-pixels is {:.0f}", camera.width,
+            camera.height, most);
 }
 
 void ViewerWorker::report(double now_s, bool last) {
@@ -394,6 +412,7 @@ void ViewerWorker::add_recent(net::MasterLink::Values& values) const {
   values["coupling"] = double(coupling.mode);
   values["buffers"] = double(coupling.buffers);
   values["waits_s"] = waits_s_;
+  values["longest_gap_ms"] = longest_gap_ms_;
 }
 
 // How well poses were predicted, means: those of view requests, and those that a tracker's poses were displayed with.
@@ -434,6 +453,7 @@ net::MasterLink::Values ViewerWorker::status() const {
                                  {"sequence", 0},
                                  {"messages_rejected", double(feeds_.rejected())}};
   if (received_) received_->add_status(values);
+  if (options_.record) values[metrics::kRecordFailed] = double(options_.record->files_failed());
   add_recent(values);
   add_prediction(values);
   return values;

@@ -68,6 +68,8 @@ class ViewerWorker {
   /// True once one view update is complete.
   bool first_update_complete() const { return updates_ > 0; }
   bool shutdown_requested() const { return shutdown_; }
+  /// The master does not let it in with its keys.
+  bool refused() const { return refused_; }
   InstanceId instance() const { return link_.instance(); }
   double to_master_s(double local_s) const { return local_s + offset_s_; }
 
@@ -112,6 +114,7 @@ class ViewerWorker {
   void take_sampling();
   void ask_again(double now_s);
   void request_views(double now_s);
+  void tell_if_coarser(const geometry::Camera& camera);
   void report(double now_s, bool last);
   ReceivedLinks links();
   net::MasterLink::Values status() const;
@@ -132,6 +135,7 @@ class ViewerWorker {
   Succession succession_;
   std::map<RequestId, ShownUpdate> complete_;  // where the display waits: those that wait for earlier ones
   int seen_version_ = 0;
+  bool told_coarser_ = false;
   InstanceId master_;
   bool all_again_ = false;  // what is open is to be asked for again
   double started_s_ = 0, last_report_s_ = 0;
@@ -163,8 +167,9 @@ class ViewerWorker {
   int sampled_width_ = 0, sampled_height_ = 0;
 
   std::atomic<uint64_t> updates_{0}, frames_shown_{0}, bytes_received_{0}, epochs_shown_{0}, epoch_shown_{0};
-  std::atomic<bool> shutdown_{false}, stop_{false};
+  std::atomic<bool> shutdown_{false}, refused_{false}, stop_{false};
   std::atomic<double> offset_s_{0}, first_points_s_{0}, waits_s_{0}, horizon_s_{0};
+  std::atomic<double> longest_gap_ms_{0};  // between two displayed frames
   metrics::RecentValues inter_frame_ms_{kRecent_s}, update_age_ms_{kRecent_s}, latencies_ms_{kRecent_s};
   std::thread thread_;
 };

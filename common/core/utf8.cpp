@@ -50,4 +50,26 @@ std::string to_utf8(std::string_view text) {
   return out;
 }
 
+std::string printable(std::string_view text, size_t most) {
+  const bool cut = text.size() > most;
+  const std::string valid = to_utf8(cut ? text.substr(0, most > 3 ? most - 3 : 0) : text);
+  std::string out;
+  for (size_t i = 0; i < valid.size();) {
+    const auto byte = [&](size_t k) { return static_cast<unsigned char>(valid[i + k]); };
+    const size_t bytes = byte(0) < 0x80 ? 1 : byte(0) < 0xe0 ? 2 : byte(0) < 0xf0 ? 3 : 4;
+    const bool control = byte(0) < 0x20 || byte(0) == 0x7f || (byte(0) == 0xc2 && byte(1) < 0xa0);
+    // U+200E, U+200F, U+2028 to U+202E, U+2066 to U+2069
+    const bool turns =
+        bytes == 3 && byte(0) == 0xe2 &&
+        ((byte(1) == 0x80 && (byte(2) == 0x8e || byte(2) == 0x8f || (byte(2) >= 0xa8 && byte(2) <= 0xae))) ||
+         (byte(1) == 0x81 && byte(2) >= 0xa6 && byte(2) <= 0xa9));
+    if (control || turns)
+      out += "\xef\xbf\xbd";
+    else
+      out.append(valid, i, bytes);
+    i += bytes;
+  }
+  return cut ? out + "..." : out;
+}
+
 }  // namespace telesplat

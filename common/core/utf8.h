@@ -14,4 +14,9 @@ bool valid_utf8(std::string_view text);
 /// byte (as Unicode recommends in section 3.9). Text that is valid stays as it is; what it returns is always valid.
 std::string to_utf8(std::string_view text);
 
+/// `text` of somebody else as a line of a log or a terminal takes it: valid UTF-8 with U+FFFD in place of control
+/// characters (C0, DEL, C1, line and paragraph separators, and what turns the direction of text), of `most` bytes at
+/// most, the last of which are then "...".
+std::string printable(std::string_view text, size_t most = 256);
+
 }  // namespace telesplat

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -57,7 +59,16 @@ class Reader {
  private:
   Error wrong(const std::string& what) const { return Error{fmt::format("{}:{}: {}", path_, number_, what)}; }
 
-  bool next_line() { return std::getline(in_, line_) && line_.size() <= kMaxLine; }
+  // A line without end does not fill the memory.
+  bool next_line() {
+    line_.clear();
+    for (char c = 0; in_.get(c);) {
+      if (c == '\n') return true;
+      line_ += c;
+      if (line_.size() > kMaxLine) return false;
+    }
+    return !line_.empty() && !in_.bad();
+  }
 
   Status read_header() {
     std::error_code error;
@@ -194,7 +205,11 @@ Status write_trajectory(const std::string& path, const std::vector<Trajectory::S
                        q.z);
   }
   out.close();
-  return out ? ok_status() : Status(Error{fmt::format("{}: cannot be written", path)});
+  if (out) return ok_status();
+  Error error{fmt::format("{}: cannot be written: {}", path, std::strerror(errno))};
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);  // half of one is none
+  return error;
 }
 
 Pose look_at(const glm::dvec3& eye, const glm::dvec3& target) {

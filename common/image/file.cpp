@@ -5,11 +5,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <limits>
 
 #include "common/geometry/camera.h"
-#include "common/image/background.h"
 #include "common/image/srgb.h"
 
 namespace telesplat::image {
@@ -19,24 +17,6 @@ uint32_t byte_of(float v) { return v > 0 ? static_cast<uint32_t>(std::min(v, 1.0
 
 // OpenImageIO may tell of several errors, one a line.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
-
-// Writes under a temporary name beside `path`, then renames, so that no reader ever sees half a file.
-Status write_whole(const std::string& path, const char* format, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
-                   const void* pixels) {
-  const std::string part = path + ".part";
-  const auto fail = [&](const std::string& why) {
-    std::remove(part.c_str());
-    return Error{fmt::format("cannot write {}: {}", path, why)};
-  };
-  const auto output = OIIO::ImageOutput::create(format);
-  if (!output) return fail(OIIO::geterror());
-  if (!output->open(part, spec)) return fail(output->geterror());
-  const bool written = output->write_image(type, pixels);
-  const bool closed = output->close();
-  if (!written || !closed) return fail(output->geterror());
-  if (std::rename(part.c_str(), path.c_str()) != 0) return fail("renaming " + part + " failed");
-  return ok_status();
-}
 
 // Which channels of a file are red, green, blue and depth; -1 = none.
 struct Channels {
@@ -50,68 +30,6 @@ Channels find_channels(const OIIO::ImageSpec& spec) {
 }
 
 }  // namespace
-
-Status write_png(const std::string& path, const View& view, Alpha alpha) {
-  const bool has_alpha = alpha == Alpha::kCoverage;
-  const size_t channels = has_alpha ? 4 : 3;
-  std::vector<uint8_t> bytes(view.colour.size() * channels);
-  for (size_t i = 0; i < view.colour.size(); ++i) {
-    const uint32_t colour = has_alpha ? straight_colour(view.colour[i]) : view.colour[i];
-    for (int c = 0; c < 3; ++c) bytes[channels * i + c] = static_cast<uint8_t>(colour >> (16 - 8 * c));
-    if (has_alpha) bytes[channels * i + 3] = static_cast<uint8_t>(colour >> 24);
-  }
-  OIIO::ImageSpec spec(view.width, view.height, int(channels), OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:UnassociatedAlpha", 1);  // as it is: PNG has it so
-  // Pictures are recorded while the viewer runs: 117 ms instead of 255 at level 6 (2560x1600), 16 % larger.
-  spec.attribute("png:compressionLevel", 2);
-  return write_whole(path, "png", spec, OIIO::TypeDesc::UINT8, bytes.data());
-}
-
-Status write_exr(const std::string& path, const View& view, Alpha alpha) {
-  CHECK(view.depth_m.size() == view.colour.size());
-  const bool has_alpha = alpha == Alpha::kCoverage;
-  const size_t channels = has_alpha ? 5 : 4;
-  const auto& linear = linear_of_srgb();
-  std::vector<float> values(view.colour.size() * channels);
-  for (size_t i = 0; i < view.colour.size(); ++i) {
-    const uint32_t colour = has_alpha ? straight_colour(view.colour[i]) : view.colour[i];
-    const float covered = has_alpha ? float(colour >> 24) / 255 : 1;
-    float* const out = values.data() + channels * i;
-    for (int c = 0; c < 3; ++c) out[c] = linear[colour >> (16 - 8 * c) & 255] * covered;
-    if (has_alpha) out[3] = covered;
-    out[channels - 1] = view.depth_m[i];
-  }
-  OIIO::ImageSpec spec(view.width, view.height, int(channels), OIIO::TypeDesc::HALF);
-  spec.channelnames = {"R", "G", "B"};
-  if (has_alpha) spec.channelnames.push_back("A");
-  spec.channelnames.push_back("Z");
-  spec.channelformats.assign(channels, OIIO::TypeDesc::HALF);
-  spec.channelformats.back() = OIIO::TypeDesc::FLOAT;
-  spec.alpha_channel = has_alpha ? 3 : -1;
-  spec.z_channel = int(channels) - 1;
-  spec.attribute("compression", "zip");
-  return write_whole(path, "openexr", spec, OIIO::TypeDesc::FLOAT, values.data());
-}
-
-Status write_exr(const std::string& path, const View& view, std::span<const glm::vec3> normals) {
-  constexpr size_t kChannels = 7;
-  CHECK(view.depth_m.size() == view.colour.size() && normals.size() == view.colour.size());
-  const auto& linear = linear_of_srgb();
-  std::vector<float> values(view.colour.size() * kChannels);
-  for (size_t i = 0; i < view.colour.size(); ++i) {
-    float* const out = values.data() + kChannels * i;
-    for (int c = 0; c < 3; ++c) out[c] = linear[view.colour[i] >> (16 - 8 * c) & 255], out[3 + c] = normals[i][c];
-    out[6] = view.depth_m[i];
-  }
-  OIIO::ImageSpec spec(view.width, view.height, int(kChannels), OIIO::TypeDesc::HALF);
-  spec.channelnames = {"R", "G", "B", "N.X", "N.Y", "N.Z", "Z"};
-  spec.channelformats.assign(kChannels, OIIO::TypeDesc::HALF);
-  spec.channelformats.back() = OIIO::TypeDesc::FLOAT;
-  spec.alpha_channel = -1;
-  spec.z_channel = 6;
-  spec.attribute("compression", "zip");
-  return write_whole(path, "openexr", spec, OIIO::TypeDesc::FLOAT, values.data());
-}
 
 Result<std::string> encode_jpeg(const View& view, int quality) {
   std::vector<uint8_t> bytes(view.colour.size() * 3);

@@ -1,6 +1,7 @@
 #include "common/metrics/about.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -20,7 +21,9 @@ ordered_json number_or_null(const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
   if (text.empty() || *end != '\0') return {};
-  if (value == double(int64_t(value))) return int64_t(value);
+  if (!std::isfinite(value)) return {};
+  constexpr double kMostWhole = 9007199254740992;  // 2^53
+  if (std::abs(value) <= kMostWhole && value == std::floor(value)) return int64_t(value);
   return value;
 }
 

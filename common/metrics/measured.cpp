@@ -3,43 +3,148 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
+
+#include "common/metrics/stages.h"
 
 namespace telesplat::metrics {
 namespace {
-constexpr size_t kMaxValues = 50'000'000;
+
+constexpr size_t kMostCouplings = 256, kMostOpenSkews = 1024;
+
+std::string coupling_name(double mode, double buffers) {
+  if (mode == 0) return "async";
+  return mode == 1 ? "sync" : fmt::format("loose({:.0f})", buffers);
 }
 
-std::vector<double> Rows::column(const std::string& name) const {
-  std::vector<double> out;
-  const auto c = std::find(columns.begin(), columns.end(), name);
-  if (c == columns.end()) return out;
-  for (size_t i = size_t(c - columns.begin()); i < values.size(); i += columns.size()) out.push_back(values[i]);
-  return out;
+}  // namespace
+
+/// A row of a table, whose values are found by the names of their columns.
+struct Measured::Row {
+  const std::vector<std::string>& columns;
+  std::span<const double> values;
+
+  std::optional<double> of(const char* name) const {
+    const auto c = std::find(columns.begin(), columns.end(), name);
+    return c == columns.end() ? std::nullopt : std::optional(values[size_t(c - columns.begin())]);
+  }
+  void add_to(Quantiles& quantiles, const char* name) const {
+    if (const auto value = of(name)) quantiles.add(*value);
+  }
+};
+
+double ViewerFigures::per_second(uint64_t count) const {
+  return duration_s > 0 ? double(count) / std::max(duration_s, 1e-9) : 0;
 }
 
-Rows* Measured::table(const std::string& name) {
-  if (name == "frames") return &frames;
-  if (name == "updates") return &updates;
-  if (name == "stages") return &stages;
+Table* Measured::table(const std::string& name) {
+  if (name == "frames") return &frames_;
+  if (name == "updates") return &updates_;
+  if (name == "stages") return &stages_;
   return nullptr;
 }
 
+ViewerFigures& Measured::viewer_of(const std::string& name) {
+  return viewers_[viewers_.size() < kMostViewers || viewers_.contains(name) ? name : "others"];
+}
+
 Status Measured::add(const std::string& viewer, const wire::MetricRows& more) {
-  Rows& rows = *table(more.table);
+  Table& table = *this->table(more.table);
   const size_t width = more.columns.size();
   if (width == 0 || more.values.size() % width)
     return Error{
         fmt::format("table {}: {} values do not fill rows of {} columns", more.table, more.values.size(), width)};
-  if (!rows.columns.empty() && rows.columns != more.columns)
+  if (!table.columns.empty() && table.columns != more.columns)
     return Error{fmt::format("table {}: columns differ from those of its first rows", more.table)};
-  if (rows.values.size() + more.values.size() > kMaxValues)
-    return Error{fmt::format("table {}: more than {} values", more.table, kMaxValues)};
-  rows.columns = more.columns;
-  rows.values.insert(rows.values.end(), more.values.begin(), more.values.end());
-  const auto known = std::find(viewers.begin(), viewers.end(), viewer);
-  rows.viewers.insert(rows.viewers.end(), more.values.size() / width, uint32_t(known - viewers.begin()));
-  if (known == viewers.end()) viewers.push_back(viewer);
+  table.columns = more.columns;
+  table.rows += more.values.size() / width;
+  for (size_t i = 0; i < more.values.size(); i += width) {
+    const Row row{table.columns, std::span(more.values).subspan(i, width)};
+    if (&table == &frames_)
+      add_frame(viewer_of(viewer), row);
+    else if (&table == &updates_)
+      add_update(viewer_of(viewer), row);
+    else
+      add_stages(row);
+  }
   return ok_status();
+}
+
+void Measured::add_frame(ViewerFigures& viewer, const Row& row) {
+  if (const auto t_s = row.of("t_s")) {
+    ++frames_shown;
+    ++viewer.frames;
+    // A viewer that was started again counts its time anew.
+    if (viewer.last_s > -1e300 && *t_s > viewer.last_s) viewer.duration_s += *t_s - viewer.last_s;
+    viewer.last_s = *t_s;
+  }
+  if (const auto ms = row.of("inter_frame_ms"); ms && *ms > 0) {  // a viewer's first frame has none
+    inter_frame_ms.add(*ms);
+    viewer.inter_frame_ms.add(*ms);
+  }
+  row.add_to(construction_ms, "construction_ms");
+  row.add_to(points_drawn, "points_drawn");
+  row.add_to(update_age_ms, "update_age_ms");
+  if (const auto lead_ms = row.of("lead_ms")) {
+    headset = headset || *lead_ms != 0;
+    frames_late += *lead_ms < 0;
+  }
+  refreshes_missed += row.of("missed").value_or(0);
+  const auto mode = row.of("coupling"), buffers = row.of("buffers");
+  if (mode && buffers) {
+    coupled = true;
+    const std::string name = coupling_name(*mode, *buffers);
+    const auto known = std::find_if(frames_by_coupling.begin(), frames_by_coupling.end(),
+                                    [&](const auto& c) { return c.first == name; });
+    if (known != frames_by_coupling.end())
+      ++known->second;
+    else if (frames_by_coupling.size() < kMostCouplings)
+      frames_by_coupling.emplace_back(name, 1);
+    coupling_changes += !viewer.coupling.empty() && viewer.coupling != name;
+    viewer.coupling = name;
+  }
+  const auto number = row.of("wall_frame"), skew = row.of("swap_skew_ms");
+  if (!number || !skew || !(*number > 0) || !(*skew >= 0)) return;
+  if (*number + 2 * kMostOpenSkews < closed_skew_) close_skews();  // another wall, or another master's
+  if (*number <= closed_skew_) return;
+  open_skews_[*number] = *skew;
+  if (open_skews_.size() <= kMostOpenSkews) return;
+  closed_skew_ = open_skews_.begin()->first;
+  skews_.add(open_skews_.begin()->second);
+  open_skews_.erase(open_skews_.begin());
+}
+
+void Measured::close_skews() {
+  skews_ = swap_skew_ms();
+  open_skews_.clear();
+  closed_skew_ = 0;
+}
+
+void Measured::begin_life() {
+  close_skews();
+  tiles_.begin_life();
+}
+
+Quantiles Measured::swap_skew_ms() const {
+  Quantiles out = skews_;
+  for (const auto& [frame, ms] : open_skews_) out.add(ms);
+  return out;
+}
+
+void Measured::add_update(ViewerFigures& viewer, const Row& row) {
+  row.add_to(start_up_ms, "start_up_ms");
+  points_received += row.of("points").value_or(0);
+  const auto ms = row.of("latency_ms");
+  if (!ms || row.of("left_out").value_or(0) != 0) return;
+  ++viewer.updates;
+  latency_ms.add(*ms);
+  viewer.latency_ms.add(*ms);
+}
+
+void Measured::add_stages(const Row& row) {
+  if (const auto ms = row.of("latency_ms")) stages_latency_ms += *ms;
+  for (const auto& stage : kStageColumns) row.add_to(stages_ms[stage.name], stage.name);
+  if (const auto ms = row.of("display_ms"); ms && *ms >= 0) display_ms.add(*ms);  // else no frame showed it
 }
 
 }  // namespace telesplat::metrics

@@ -1,40 +1,94 @@
-// What a run has measured so far, in memory: what its summary is made from.
+// What a run has measured so far, in memory: what its summary is made from. It is bounded, however long the run lasts.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/core/result.h"
-#include "common/metrics/plans/plan_row.h"
+#include "common/metrics/sums/quantiles.h"
+#include "common/metrics/sums/tile_sums.h"
 #include "common/wire/session_messages.h"
-#include "common/wire/tile_messages.h"
 
 namespace telesplat::metrics {
 
-/// Rows of numbers from all viewers, with the columns of the first that sent some.
-struct Rows {
+/// A table that viewers fill: the columns of the first that sent rows, which all have, and how many rows came.
+struct Table {
   std::vector<std::string> columns;
-  std::vector<double> values;     ///< row after row
-  std::vector<uint32_t> viewers;  ///< of each row: whose, in Measured::viewers
-
-  /// All values of one column; none if there is no such column.
-  std::vector<double> column(const std::string& name) const;
+  uint64_t rows = 0;
 };
 
-struct Measured {
-  Rows frames, updates, stages;
-  std::vector<std::string> viewers;  ///< names of those that sent rows
-  std::vector<wire::TileDone> tiles;
-  std::vector<PlanRow> plans;
-  std::map<std::string, double> busy_s;  ///< sample begin to encode end, by sampler
-  size_t epochs = 0;
+/// What one viewer did.
+struct ViewerFigures {
+  uint64_t frames = 0, updates = 0;
+  double duration_s = 0;
+  Quantiles inter_frame_ms, latency_ms;
+  double last_s = -1e300;  ///< of its frames
+  std::string coupling;    ///< of the last one
+
+  double per_second(uint64_t count) const;
+};
+
+class Measured {
+ public:
+  static constexpr size_t kMostViewers = 256;  ///< by name; further ones are "others"
 
   /// "frames", "updates" or "stages"; null for other names.
-  Rows* table(const std::string& name);
+  Table* table(const std::string& name);
   /// Refuses, and keeps nothing of, rows whose shape does not fit. Precondition: table(more.table).
   Status add(const std::string& viewer, const wire::MetricRows& more);
+  void add_epoch() { ++epochs_; }
+  TileSums& tiles() { return tiles_; }
+  /// Another master goes on with the record, and counts frames anew.
+  void begin_life();
+
+  const Table& frames() const { return frames_; }
+  const TileSums& tiles() const { return tiles_; }
+  uint64_t epochs() const { return epochs_; }
+  /// Each by itself: they need not have begun, nor ended, together.
+  const std::map<std::string, ViewerFigures>& viewers() const { return viewers_; }
+
+  // Of all viewers' frames.
+  Quantiles inter_frame_ms, construction_ms, points_drawn, update_age_ms;
+  uint64_t frames_shown = 0;
+  bool headset = false;  ///< some frame had a lead
+  uint64_t frames_late = 0;
+  double refreshes_missed = 0;
+  bool coupled = false;  ///< their couplings are known
+  uint64_t coupling_changes = 0;
+  std::vector<std::pair<std::string, uint64_t>> frames_by_coupling;  ///< in the order in which they came up
+  /// Of each of a wall's frames, whoever told of it.
+  Quantiles swap_skew_ms() const;
+
+  // Of their view updates, without those of which something was left out.
+  Quantiles latency_ms;
+  // Of all.
+  Quantiles start_up_ms;
+  double points_received = 0;
+
+  // Of the stages of updates.
+  std::map<std::string, Quantiles> stages_ms;
+  double stages_latency_ms = 0;  ///< the sum of all
+  Quantiles display_ms;
+
+ private:
+  struct Row;
+  void add_frame(ViewerFigures& viewer, const Row& row);
+  void add_update(ViewerFigures& viewer, const Row& row);
+  void add_stages(const Row& row);
+  void close_skews();
+  ViewerFigures& viewer_of(const std::string& name);
+
+  Table frames_, updates_, stages_;
+  std::map<std::string, ViewerFigures> viewers_;
+  std::map<double, double> open_skews_;  // by the wall's frame: others may tell of these yet
+  double closed_skew_ = 0;               // of frames up to this one nobody does
+  Quantiles skews_;
+  TileSums tiles_;
+  uint64_t epochs_ = 0;
 };
 
 }  // namespace telesplat::metrics

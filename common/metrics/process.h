@@ -7,6 +7,9 @@
 
 namespace telesplat::metrics {
 
+/// Status value by which a process tells how many files of the record it could not write to their end.
+inline constexpr const char* kRecordFailed = "record_failed";
+
 struct Process {
   std::string role, name;
   uint64_t pid = 0;

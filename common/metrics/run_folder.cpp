@@ -10,6 +10,7 @@
 #include <random>
 
 #include "common/core/log.h"
+#include "common/metrics/lives/lives.h"
 
 namespace telesplat::metrics {
 namespace {
@@ -31,8 +32,8 @@ const std::vector<Ours>& ours() {
   static const std::vector<Ours> table{
       {"",
        {"summary.json", "summary.json.part", "frames.csv", "updates.csv", "stages.csv", "tiles.csv", "plans.csv",
-        "epochs.csv", "assignment.csv", "quality.csv", "trace.json", "session.toml", "points.events", "slices.events",
-        "report.html"}},
+        "epochs.csv", "assignment.csv", "quality.csv", "trace.json", "session.toml", "session.toml.part", "lives.csv",
+        ".room", "points.events", "slices.events", "report.html", "report.html.part"}},
       {"images", {"frame-*.png", "frame-*.exr", "verify-*.png", "wall.png", "contact-sheet.png"}},
       {"depth", {"frame-*.depth", "cameras.csv"}},
       {"plans", {"plan-*.png"}},
@@ -40,8 +41,8 @@ const std::vector<Ours>& ours() {
        {"inter-frame-delay.png", "inter-frame-delay-cdf.png", "stages.png", "update-age.png", "view-update-latency.png",
         "timeline.png"}},
       {"spool", {"*.frame", "*.frame.part"}},
-      {"compare", {"contact-sheet.png", "pose-*.png", "compare.csv", "compare.json"}},
-      {"compare-still", {"contact-sheet.png", "pose-*.png", "compare.csv", "compare.json"}},
+      {"compare", {"contact-sheet.png", "pose-*.png", "compare.csv*", "compare.json*"}},
+      {"compare-still", {"contact-sheet.png", "pose-*.png", "compare.csv*", "compare.json*"}},
   };
   return table;
 }
@@ -178,16 +179,34 @@ std::string folder_id(const std::string& directory) {
   return line.starts_with(kIdWord) ? line.substr(kIdWord.size(), 64) : std::string();
 }
 
+bool may_go_on(const std::string& directory) {
+  std::error_code error;
+  return !folder_id(directory).empty() &&
+         fs::symlink_status(directory + "/" + kLivesFile, error).type() == fs::file_type::regular;
+}
+
+Result<std::string> go_on_in_folder(const std::string& directory) {
+  if (const Status s = refuse_links(directory, Logs::kOthers); !s) return s.error();
+  std::error_code error;
+  fs::remove(directory + "/summary.json", error);  // it is not all of the record any more
+  return folder_id(directory);
+}
+
+Status refuse_links(const std::string& directory, Logs logs) {
+  const Found found = look_into(directory, logs);
+  if (found.links.empty()) return ok_status();
+  return Error{
+      fmt::format("{}/{}: is a symbolic link, which a run would write through; remove it, or give another "
+                  "--out",
+                  directory, found.links.front())};
+}
+
 Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs) {
   std::error_code error;
   fs::create_directories(directory, error);
   if (error) return Error{fmt::format("{}: cannot be made a run folder: {}", directory, error.message())};
+  if (const Status s = refuse_links(directory, logs); !s) return s.error();
   const Found found = look_into(directory, logs);
-  if (!found.links.empty())
-    return Error{
-        fmt::format("{}/{}: is a symbolic link, which a run would write through; remove it, or give another "
-                    "--out",
-                    directory, found.links.front())};
   if (!found.files.empty() && !overwrite)
     return Error{fmt::format("{}: holds a record already ({}); give another --out, or --overwrite to replace it",
                              directory, list_of(found.files))};

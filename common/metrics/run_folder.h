@@ -22,6 +22,14 @@ std::vector<std::string> recorded_files(const std::string& directory, Logs logs 
 /// nothing else, are set aside in ".replaced" in the folder: the new record may come to nothing. Folders of ours that
 /// are empty then are removed.
 Result<std::string> begin_folder(const std::string& directory, bool overwrite, Logs logs);
+/// Whether a master that is started again may go on with the record in the folder (RecordOptions::goes_on): it was
+/// begun by one that told its lives.
+bool may_go_on(const std::string& directory);
+/// Goes on with it. Returns its id, which it keeps: viewers that record into the folder know it. Error: a name of ours
+/// is a symbolic link.
+Result<std::string> go_on_in_folder(const std::string& directory);
+/// Error: a name of ours is a symbolic link, through which would be written.
+Status refuse_links(const std::string& directory, Logs logs);
 /// The id in the folder's run.id; empty: there is none.
 std::string folder_id(const std::string& directory);
 

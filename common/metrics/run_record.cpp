@@ -1,16 +1,21 @@
 #include "common/metrics/run_record.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/core/clock.h"
+#include "common/core/log.h"
 #include "common/core/utf8.h"
 #include "common/metrics/columns.h"
+#include "common/metrics/lives/read_back.h"
 #include "common/metrics/recorder.h"
 #include "common/metrics/run_folder.h"
 #include "common/metrics/summary.h"
@@ -35,7 +40,7 @@ constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"frame", [](const TileRow& r) { return whole(r.tile.frame.value); }},
     {"tile", [](const TileRow& r) { return whole(r.tile.tile); }},
     {"lease", [](const TileRow& r) { return whole(r.tile.lease.value); }},
-    {"sampler", [](const TileRow& r) { return r.sampler; }},
+    {"sampler", [](const TileRow& r) { return csv_cell(r.sampler); }},
     {"samples", [](const TileRow& r) { return whole(r.tile.samples); }},
     {"kept", [](const TileRow& r) { return whole(r.tile.kept); }},
     {"bytes_sampled", [](const TileRow& r) { return whole(r.tile.bytes_sampled); }},
@@ -101,35 +106,88 @@ std::vector<std::string> keys(const std::map<std::string, V>& map) {
   return out;
 }
 
+constexpr const char* kTrace = "trace.json";
+constexpr const char* kRoom = ".room";
+constexpr off_t kRoomBytes = 1 << 20;
+
+Error cannot_write(const std::string& path) {
+  return Error{fmt::format("{}: cannot write into it: {}", path, std::strerror(errno))};
+}
+
 void append(std::vector<std::string>& cells, const std::vector<std::string>& more) {
   cells.insert(cells.end(), more.begin(), more.end());
 }
 
 }  // namespace
 
-Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory, const Beginning& begin) {
-  std::unique_ptr<RunRecord> out(new RunRecord);
-  out->directory_ = directory;
+Result<std::unique_ptr<RunRecord>> RunRecord::open(const std::string& directory, const Beginning& begin,
+                                                   const RecordOptions& options) {
+  std::unique_ptr<RunRecord> out(new RunRecord(directory, options));
   out->begin_ = begin;
+  out->lives_.push_back({begin, clock_id()});
   if (directory.empty()) return out;
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error) return Error{fmt::format("{}: cannot be made a run folder: {}", directory, error.message())};
-  if (const Status opened = out->open_files(); !opened) return opened.error();
+  if (const Status opened = options.goes_on ? out->go_on() : out->open_files(); !opened) return opened.error();
+  out->keep_room();
   return out;
 }
 
-Status RunRecord::open_files() {
-  if (!frames_file_.open(directory_ + "/frames.csv") || !updates_file_.open(directory_ + "/updates.csv") ||
-      !stages_file_.open(directory_ + "/stages.csv") || !tiles_file_.open(directory_ + "/tiles.csv") ||
-      !epochs_file_.open(directory_ + "/epochs.csv") || !trace_.open(directory_ + "/trace.json", begin_.monotonic_s))
-    return Error{fmt::format("{}: cannot write into it: {}", directory_, std::strerror(errno))};
-  tiles_file_.write(csv_line(names(kTileColumns)));
-  return ok_status();
+RunRecord::~RunRecord() {
+  if (!directory_.empty()) unlink(path_of(kRoom).c_str());
 }
 
-TextFile& RunRecord::file_of(const std::string& table) {
-  return table == "frames" ? frames_file_ : table == "stages" ? stages_file_ : updates_file_;
+// A disk that is full has room for the summary all the same.
+void RunRecord::keep_room() {
+  const int fd = ::open(path_of(kRoom).c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  if (fd < 0) return;
+  if (posix_fallocate(fd, 0, kRoomBytes) != 0) log::warn("{}: little room is left on its disk", directory_);
+  close(fd);
+}
+
+Status RunRecord::open_files() {
+  for (const Csv csv : {Csv::kFrames, Csv::kUpdates, Csv::kStages, Csv::kTiles, Csv::kEpochs})
+    if (!file(csv).open(path_of(file_of(csv)), options_.table_bytes)) return cannot_write(directory_);
+  if (!trace_.open(path_of(kTrace), begin_.monotonic_s, options_.trace_bytes) || !lives_file_.open(path_of(kLivesFile)))
+    return cannot_write(directory_);
+  file(Csv::kTiles).write(csv_line(names(kTileColumns)));
+  lives_file_.write(lives_header());
+  return begin_life();
+}
+
+// Rows go on behind those that are there, of which the last may be cut off.
+Status RunRecord::go_on() {
+  auto before = read_lives(directory_);
+  if (!before) return before.error();
+  Life now = lives_.back();
+  lives_ = *std::move(before);
+  begin_ = continued(lives_.front(), now);
+  for (size_t i = 0; i < kCsvs; ++i) {
+    const std::string path = path_of(file_of(Csv(i)));
+    now.bytes[i] = whole_rows(path);
+    if (now.bytes[i] == 0 && (Csv(i) == Csv::kPlans || Csv(i) == Csv::kAssignment)) continue;  // there was nothing
+    if (!files_[i].open_behind(path, now.bytes[i], options_.table_bytes)) return cannot_write(directory_);
+  }
+  if (now.bytes[size_t(Csv::kTiles)] == 0) file(Csv::kTiles).write(csv_line(names(kTileColumns)));
+  for (const auto& [csv, table] :
+       {std::pair{Csv::kFrames, "frames"}, {Csv::kUpdates, "updates"}, {Csv::kStages, "stages"}})
+    if (auto columns = header_of(path_of(file_of(csv))); columns.size() > 1)
+      measured_.table(table)->columns.assign(columns.begin() + 1, columns.end());
+  if (auto columns = header_of(path_of(file_of(Csv::kEpochs))); columns.size() >= std::size(kEpochColumns))
+    epoch_columns_.assign(columns.begin() + std::size(kEpochColumns), columns.end());
+  lives_.push_back(now);
+  const std::string trace = path_of(kTrace), lives = path_of(kLivesFile);
+  if (!trace_.open_behind(trace, begin_.monotonic_s, whole_events(trace), lives_.size(), options_.trace_bytes) ||
+      !lives_file_.open_behind(lives, whole_rows(lives)))
+    return cannot_write(directory_);
+  return begin_life();
+}
+
+Status RunRecord::begin_life() {
+  lives_file_.write(life_row(lives_.size(), lives_.back(), begin_));
+  lives_file_.flush();
+  return lives_file_.status();
 }
 
 Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows) {
@@ -137,100 +195,140 @@ Status RunRecord::add_rows(const Process& process, const wire::MetricRows& rows)
     if (rows.values.size() % kSpanWidth)
       return Error{fmt::format("spans hold {} values, not a multiple of {}", rows.values.size(), kSpanWidth)};
     trace_.add(process, rows);
+    flush();
     return ok_status();
   }
-  const Rows* table = measured_.table(rows.table);
+  const Table* table = measured_.table(rows.table);
   if (!table) return Error{fmt::format("metrics table '{}' is unknown", to_utf8(rows.table.substr(0, 32)))};
   const bool first = table->columns.empty();
   if (Status added = measured_.add(process.name, rows); !added) return added;
-  TextFile& file = file_of(rows.table);
-  if (!file.is_open()) return ok_status();
+  TextFile& out = file(rows.table == "frames" ? Csv::kFrames : rows.table == "stages" ? Csv::kStages : Csv::kUpdates);
+  if (!out.is_open()) return ok_status();
   if (first) {
     std::vector<std::string> header{"viewer"};
-    append(header, rows.columns);
-    file.write(csv_line(header));
+    for (const auto& column : rows.columns) header.push_back(csv_cell(column));
+    out.write(csv_line(header));
   }
+  const std::string name = csv_cell(process.name);
   for (size_t i = 0; i < rows.values.size(); i += rows.columns.size()) {
-    std::vector<std::string> cells{process.name};
+    std::vector<std::string> cells{name};
     for (size_t c = 0; c < rows.columns.size(); ++c)
       cells.push_back(cell_of(rows.columns[c], rows.values[i + c], begin_.monotonic_s));
-    file.write(csv_line(cells));
+    out.write(csv_line(cells));
   }
-  file.flush();
+  flush();
   return ok_status();
 }
 
+// Viewers and samplers send rows once a second: what a master that is killed loses is not much more.
+void RunRecord::flush() {
+  for (TextFile& file : files_) file.flush();
+  trace_.file().flush();
+}
+
 void RunRecord::add_tile(const std::string& sampler, const wire::TileDone& tile) {
-  measured_.tiles.push_back(tile);
-  measured_.busy_s[sampler] += std::max(0.0, tile.moments.encode_end_s - tile.moments.sample_begin_s);
+  measured_.tiles().add(sampler, tile);
   trace_.add_lease(sampler, tile);
-  if (tiles_file_.is_open())
-    tiles_file_.write(csv_line(values(kTileColumns, TileRow{sampler, tile, begin_.monotonic_s})));
+  if (file(Csv::kTiles).is_open())
+    file(Csv::kTiles).write(csv_line(values(kTileColumns, TileRow{sampler, tile, begin_.monotonic_s})));
 }
 
 void RunRecord::add_epoch(EpochId epoch, double t_s, const std::map<std::string, double>& parameters,
                           const std::map<std::string, std::string>& texts) {
-  if (measured_.epochs++ == 0) {
+  TextFile& out = file(Csv::kEpochs);
+  const bool first = measured_.epochs() == 0 && lives_.back().bytes[size_t(Csv::kEpochs)] == 0;
+  measured_.add_epoch();
+  if (first) {
     epoch_columns_ = keys(parameters);
-    epoch_texts_ = keys(texts);
+    append(epoch_columns_, keys(texts));
     std::vector<std::string> header = names(kEpochColumns);
-    append(header, epoch_columns_);
-    append(header, epoch_texts_);
-    epochs_file_.write(csv_line(header));
+    for (const auto& column : epoch_columns_) header.push_back(csv_cell(column));
+    out.write(csv_line(header));
   }
   std::vector<std::string> cells = values(kEpochColumns, EpochRow{epoch, t_s - begin_.monotonic_s});
   for (const std::string& name : epoch_columns_) {
-    const auto found = parameters.find(name);
-    cells.push_back(found == parameters.end() ? "" : exact(found->second));  // the frame can be made again from it
+    const auto number = parameters.find(name);
+    const auto text = texts.find(name);
+    if (number != parameters.end())
+      cells.push_back(exact(number->second));  // the frame can be made again from it
+    else
+      cells.push_back(text == texts.end() ? "" : csv_quoted(text->second));
   }
-  for (const std::string& name : epoch_texts_) {
-    const auto found = texts.find(name);
-    cells.push_back(found == texts.end() ? "" : csv_quoted(found->second));
+  out.write(csv_line(cells));
+  out.flush();
+}
+
+// False: it cannot be opened, which counts as a file that could not be written.
+bool RunRecord::open_late(Csv csv, const std::vector<std::string>& columns) {
+  if (file(csv).is_open()) return true;
+  if (!file(csv).open(path_of(file_of(csv)), options_.table_bytes)) {
+    if (std::find(unwritten_.begin(), unwritten_.end(), file_of(csv)) == unwritten_.end()) {
+      unwritten_.push_back(file_of(csv));
+      log::error("{}; the run goes on without it", cannot_write(path_of(file_of(csv))).text);
+    }
+    return false;
   }
-  epochs_file_.write(csv_line(cells));
-  epochs_file_.flush();
+  file(csv).write(csv_line(columns));
+  return true;
 }
 
 void RunRecord::add_assignment(const std::vector<Assignment>& transfers) {
-  if (directory_.empty()) return;
-  if (!assignment_file_.is_open() && assignment_file_.open(directory_ + "/assignment.csv"))
-    assignment_file_.write(csv_line(names(kAssignmentColumns)));
-  for (const Assignment& a : transfers) assignment_file_.write(csv_line(values(kAssignmentColumns, a)));
-  assignment_file_.flush();
+  if (directory_.empty() || !open_late(Csv::kAssignment, names(kAssignmentColumns))) return;
+  for (const Assignment& a : transfers) file(Csv::kAssignment).write(csv_line(values(kAssignmentColumns, a)));
+  file(Csv::kAssignment).flush();
 }
 
 void RunRecord::add_plan(const std::string& viewer, const PlanRow& plan) {
-  // The summary needs no more of it, and a session may last for hours.
-  PlanRow& kept = measured_.plans.emplace_back(plan);
+  measured_.tiles().add(plan);
   trace_.add_plan(viewer, plan);
-  std::erase_if(kept.figures, [](const auto& figure) { return figure.first != "plan_ms"; });
-  if (directory_.empty()) return;
-  if (!plans_file_.is_open() && plans_file_.open(directory_ + "/plans.csv"))
-    plans_file_.write(csv_line(plan_columns()));
-  plans_file_.write(csv_line(plan_cells(viewer, plan, begin_.monotonic_s)));
+  if (directory_.empty() || !open_late(Csv::kPlans, plan_columns())) return;
+  file(Csv::kPlans).write(csv_line(plan_cells(viewer, plan, begin_.monotonic_s)));
+}
+
+RecordLosses RunRecord::losses() const {
+  RecordLosses out{.failed = unwritten_, .lost = {}, .cut = {}};
+  const auto look = [&out](const TextFile& file) {
+    const std::string name = file.path().substr(file.path().rfind('/') + 1);
+    if (!file.status()) out.failed.push_back(name);
+    if (file.rows_lost() > 0) out.lost[name] = file.rows_lost();
+    if (file.rows_cut() > 0) out.cut[name] = file.rows_cut();
+  };
+  for (const TextFile& file : files_) look(file);
+  look(lives_file_);
+  look(trace_.file());
+  return out;
 }
 
 nlohmann::ordered_json RunRecord::summary(const std::vector<Process>& processes,
                                           const std::map<std::string, double>& counters, About about) const {
   about.begin = begin_;
+  about.lives = lives_.size();
+  about.losses = losses();
   return summarise(measured_, processes, counters, about);
+}
+
+Status RunRecord::write_file(const std::string& name, const std::string& text) {
+  if (directory_.empty()) return ok_status();
+  unlink(path_of(kRoom).c_str());
+  Status written = write_whole(path_of(name), text);
+  if (!written) unwritten_.push_back(name);
+  return written;
 }
 
 Status RunRecord::finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
                          const About& about) {
   if (directory_.empty()) return ok_status();
-  tiles_file_.flush();
-  plans_file_.flush();
-  const std::string path = directory_ + "/summary.json";
-  std::ofstream out(path + ".part");
-  out << summary(processes, counters, about).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
-      << "\n";
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(path + ".part", path, error);
-  if (!out || error) return Error{fmt::format("{}: cannot be written", path)};
-  if (!measured_.frames.values.empty()) point_latest(directory_);
-  return ok_status();
+  for (TextFile& file : files_) file.close();
+  trace_.close();
+  if (lives() > 1) measured_ = read_back(directory_, lives_);
+  const auto text =
+      summary(processes, counters, about).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  if (const Status written = write_file("summary.json", text); !written) return written;
+  if (measured_.frames().rows > 0) point_latest(directory_);
+  const auto failed = losses().failed;
+  if (failed.empty()) return ok_status();
+  return Error{fmt::format("{}: not all of the record could be written: {} {} incomplete", directory_,
+                           fmt::join(failed, ", "), failed.size() == 1 ? "is" : "are")};
 }
 
 }  // namespace telesplat::metrics

@@ -1,8 +1,10 @@
 // The record of a run: frames.csv, updates.csv, stages.csv, tiles.csv, plans.csv, epochs.csv, assignment.csv,
-// trace.json and summary.json in one folder (docs/metrics.md tells every column and figure). The master writes it as
-// rows arrive: what was measured survives, however the run ends.
+// trace.json, lives.csv and summary.json in one folder (docs/metrics.md tells every column and figure). The master
+// writes it as rows arrive: what was measured survives, however the run ends. A disk that is full ends nothing, and is
+// told.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -12,6 +14,7 @@
 #include "common/core/ids.h"
 #include "common/core/result.h"
 #include "common/metrics/about.h"
+#include "common/metrics/lives/lives.h"
 #include "common/metrics/measured.h"
 #include "common/metrics/process.h"
 #include "common/metrics/text_file.h"
@@ -27,11 +30,20 @@ struct Assignment {
   uint64_t bytes = 0;           ///< expected
 };
 
+struct RecordOptions {
+  uint64_t table_bytes = 0;  ///< of a table's file at most; 0: no limit
+  uint64_t trace_bytes = 0;  ///< of trace.json
+  bool goes_on = false;      ///< with the record that another master left in the folder
+};
+
 class RunRecord {
  public:
   /// Opens a folder for writing, and makes it if need be. `directory` may be empty: nothing is written, summaries still
-  /// work. begin: from here on count the times of all files, which come on the master's clock.
-  static Result<std::unique_ptr<RunRecord>> open(const std::string& directory, const Beginning& begin = {});
+  /// work. begin: from here on count the times of all files, which come on the master's clock; of a record that goes
+  /// on, from where they did before.
+  static Result<std::unique_ptr<RunRecord>> open(const std::string& directory, const Beginning& begin = {},
+                                                 const RecordOptions& options = {});
+  ~RunRecord();
 
   /// Rows of "frames", "updates", "stages" or "spans" from `process`. Refuses unknown tables and shapes that do not
   /// fit. Columns whose names end in _s are moments of the master's clock; but for t_s, which each viewer counts from
@@ -50,23 +62,40 @@ class RunRecord {
   nlohmann::ordered_json summary(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
                                  About about = {}) const;
 
-  /// Writes summary.json. If something was displayed, runs/latest is this run from now on.
+  /// Another file of the record, written as a whole. Error: it cannot be, which is counted.
+  Status write_file(const std::string& name, const std::string& text);
+
+  /// Writes summary.json. If something was displayed, runs/latest is this run from now on. Error: something could not
+  /// be written, now or before.
   Status finish(const std::vector<Process>& processes, const std::map<std::string, double>& counters,
                 const About& about = {});
   const Beginning& begin() const { return begin_; }
+  /// Masters that wrote it so far, this one included.
+  size_t lives() const { return lives_.size(); }
+  RecordLosses losses() const;
 
  private:
-  RunRecord() = default;
+  explicit RunRecord(std::string directory, const RecordOptions& options)
+      : directory_(std::move(directory)), options_(options) {}
   Status open_files();
-  TextFile& file_of(const std::string& table);
+  Status go_on();
+  Status begin_life();
+  bool open_late(Csv csv, const std::vector<std::string>& columns);
+  std::string path_of(const std::string& name) const { return directory_ + "/" + name; }
+  TextFile& file(Csv csv) { return files_[size_t(csv)]; }
+  void keep_room();
+  void flush();
 
   std::string directory_;
+  RecordOptions options_;
   Beginning begin_;
+  std::vector<Life> lives_;
   Measured measured_;
-  std::vector<std::string> epoch_columns_, epoch_texts_;
-  TextFile frames_file_, updates_file_, stages_file_, tiles_file_, epochs_file_;
-  TextFile assignment_file_, plans_file_;  // opened when there is something to write: the first of volumes alone
+  std::vector<std::string> epoch_columns_;
+  std::array<TextFile, kCsvs> files_;  // plans.csv and assignment.csv are opened when there is something to write
+  TextFile lives_file_;
   TraceFile trace_;
+  std::vector<std::string> unwritten_;  // other files
 };
 
 }  // namespace telesplat::metrics

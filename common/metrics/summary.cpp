@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numeric>
-#include <set>
 
 #include "common/image/depth_image.h"
 #include "common/metrics/roster.h"
@@ -23,97 +22,26 @@ constexpr double kRawBytesPerSlicePixel = 4, kRawBytesPerPoint = 12;
 
 double hundredths(double v) { return std::round(v * 100) / 100; }
 double thousandths(double v) { return std::round(v * 1000) / 1000; }
-uint64_t whole(double v) { return uint64_t(v); }
+/// What others say may be any number.
+uint64_t whole(double v) {
+  constexpr double kMostWhole = 9007199254740992;  // 2^53
+  return v > 0 ? uint64_t(std::min(v, kMostWhole)) : 0;
+}
 
 ordered_json or_null(const std::string& text) { return text.empty() ? ordered_json() : ordered_json(text); }
+/// By file; null: there are none.
+ordered_json rows_of(const std::map<std::string, uint64_t>& rows) {
+  return rows.empty() ? ordered_json() : ordered_json(rows);
+}
 /// A figure that means something only if `measured` is so.
 template <class V>
 ordered_json if_measured(bool measured, V value) {
   return measured ? ordered_json(value) : ordered_json();
 }
 
-/// Of each row of updates.csv: nothing of it is left out.
-std::vector<bool> whole_updates(const Measured& m) {
-  std::vector<bool> out(m.updates.column("latency_ms").size(), true);
-  const auto left_out = m.updates.column("left_out");
-  for (size_t i = 0; i < std::min(out.size(), left_out.size()); ++i) out[i] = left_out[i] == 0;
-  return out;
-}
-
-/// Latencies of those.
-std::vector<double> whole_latencies(const Measured& m) {
-  const auto all = m.updates.column("latency_ms");
-  const auto is_whole = whole_updates(m);
-  std::vector<double> out;
-  for (size_t i = 0; i < all.size(); ++i)
-    if (is_whole[i]) out.push_back(all[i]);
-  return out;
-}
-
-/// What one viewer did.
-struct ViewerFigures {
-  size_t frames = 0, updates = 0;
-  double duration_s = 0;
-  std::vector<double> inter_frame_ms, latency_ms;
-
-  double per_second(size_t count) const { return duration_s > 0 ? double(count) / std::max(duration_s, 1e-9) : 0; }
-  /// Rates need two frames.
-  ordered_json rate(size_t count) const { return if_measured(duration_s > 0, hundredths(per_second(count))); }
-};
-
-/// Each viewer by itself: they need not have begun, nor ended, together.
-std::map<std::string, ViewerFigures> by_viewer(const Measured& m) {
-  std::map<std::string, ViewerFigures> out;
-  const auto whose = [&](const Rows& rows, size_t row) -> ViewerFigures& { return out[m.viewers[rows.viewers[row]]]; };
-  const auto times = m.frames.column("t_s"), delays = m.frames.column("inter_frame_ms");
-  std::map<const ViewerFigures*, double> last_s;
-  for (size_t i = 0; i < times.size(); ++i) {
-    ViewerFigures& v = whose(m.frames, i);
-    // A viewer that was started again counts its time anew.
-    if (const auto last = last_s.find(&v); last != last_s.end() && times[i] > last->second)
-      v.duration_s += times[i] - last->second;
-    last_s[&v] = times[i];
-    ++v.frames;
-    if (i < delays.size() && delays[i] > 0) v.inter_frame_ms.push_back(delays[i]);  // its first frame has none
-  }
-  const auto latencies = m.updates.column("latency_ms");
-  const auto is_whole = whole_updates(m);
-  for (size_t i = 0; i < latencies.size(); ++i) {
-    if (!is_whole[i]) continue;
-    ViewerFigures& v = whose(m.updates, i);
-    ++v.updates;
-    v.latency_ms.push_back(latencies[i]);
-  }
-  return out;
-}
-
-/// How long each frame took. Coarse frames are a part of their view only, and extra ones come after it: they would
-/// flatter these figures.
-struct FrameDurations {
-  std::vector<double> leased_ms, sampling_ms, packing_ms;
-};
-
-FrameDurations frame_durations(const std::vector<wire::TileDone>& tiles) {
-  struct Times {
-    double leased = 1e300, begin = 1e300, end = 0, packing_s = 0;
-  };
-  std::map<uint64_t, Times> frames;
-  for (const wire::TileDone& t : tiles) {
-    if (t.step != 1 || t.extra) continue;
-    Times& f = frames[t.frame.value];
-    const wire::Moments& at = t.moments;
-    f.leased = std::min(f.leased, at.leased_s);
-    f.begin = std::min(f.begin, at.sample_begin_s);
-    f.end = std::max(f.end, at.encode_end_s);
-    f.packing_s += at.packed_s - at.receive_s;
-  }
-  FrameDurations out;
-  for (const auto& [id, f] : frames) {
-    out.leased_ms.push_back((f.end - f.leased) * 1e3);
-    out.sampling_ms.push_back((f.end - f.begin) * 1e3);
-    out.packing_ms.push_back(f.packing_s * 1e3);
-  }
-  return out;
+/// Rates need two frames.
+ordered_json rate(const ViewerFigures& v, uint64_t count) {
+  return if_measured(v.duration_s > 0, hundredths(v.per_second(count)));
 }
 
 /// What samplers made, what was sent of it, what viewers took.
@@ -126,12 +54,8 @@ struct Traffic {
 
 Traffic traffic(const Measured& m, const Roster& roster) {
   Traffic out;
-  double samples = 0, kept = 0;
-  for (const wire::TileDone& t : m.tiles) {
-    out.bytes_sent += double(t.bytes_sent);
-    samples += double(t.samples);
-    kept += double(t.kept);
-  }
+  const double samples = m.tiles().samples(), kept = m.tiles().kept();
+  out.bytes_sent = m.tiles().bytes_sent();
   out.sampled = samples > 0;
   const auto kind = scene::kind_named(roster.fact("data", "kind"));
   out.bytes_consumed = roster.counted("viewer", "points_received") * kRawBytesPerPoint;
@@ -139,7 +63,7 @@ Traffic traffic(const Measured& m, const Roster& roster) {
     // Samples are voxels, and kept are pixels that they made.
     out.eliminates = false;
     out.bytes_raw = kept * kRawBytesPerSlicePixel;
-    for (const double pixels : m.updates.column("points")) out.bytes_consumed += pixels * kRawBytesPerSlicePixel;
+    out.bytes_consumed += m.points_received * kRawBytesPerSlicePixel;
   } else {
     out.bytes_raw = samples * image::kRawBytesPerPixel;
     out.redundancy = samples > 0 ? 1 - kept / samples : 0;
@@ -213,24 +137,16 @@ ordered_json what_was_shown(const std::vector<Process>& processes, const Roster&
 
 /// Where the time of view updates went: each stage's distribution, and its share of the sum of all latencies.
 ordered_json where_time_went(const Measured& m) {
-  const auto latencies = m.stages.column("latency_ms");
-  const double sum = std::accumulate(latencies.begin(), latencies.end(), 0.0);
+  const double sum = m.stages_latency_ms;
   auto out = ordered_json::object();
   for (const std::string& column : names(kStageColumns)) {
-    const auto ms = m.stages.column(column);
-    if (ms.empty()) continue;
+    const auto ms = m.stages_ms.find(column);
+    if (ms == m.stages_ms.end() || ms->second.empty()) continue;
     ordered_json& entry = out[column.substr(0, column.rfind("_ms"))];
-    entry = distribution_json(ms);
-    entry["share"] = sum > 0 ? std::round(std::accumulate(ms.begin(), ms.end(), 0.0) / sum * 1e4) / 1e4 : 0.0;
+    entry = distribution_json(ms->second);
+    entry["share"] = sum > 0 ? std::round(ms->second.sum() / sum * 1e4) / 1e4 : 0.0;
   }
-  return if_measured(!latencies.empty(), out);
-}
-
-/// Completion to the end of the first frame that showed it.
-ordered_json display_latency(const Measured& m) {
-  auto ms = m.stages.column("display_ms");
-  std::erase_if(ms, [](double d) { return d < 0; });  // no frame did
-  return distribution_json(ms);
+  return if_measured(!out.empty(), out);
 }
 
 /// How well the processes' clocks are known: the worst of each.
@@ -262,14 +178,14 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
     each[name] = {{"frames", v.frames},
                   {"updates", v.updates},
                   {"duration_s", thousandths(v.duration_s)},
-                  {"fps", v.rate(v.frames)},
-                  {"updates_per_s", v.rate(v.updates)},
+                  {"fps", rate(v, v.frames)},
+                  {"updates_per_s", rate(v, v.updates)},
                   {"inter_frame_delay_ms", distribution_json(v.inter_frame_ms)},
                   {"view_update_latency_ms", distribution_json(v.latency_ms)}};
   }
-  return {{"epochs", m.epochs},
-          {"frames", m.frames.column("t_s").size()},
-          {"updates", whole_latencies(m).size()},
+  return {{"epochs", m.epochs()},
+          {"frames", m.frames_shown},
+          {"updates", m.latency_ms.count()},
           {"duration_s", if_measured(longest_s(viewers) > 0, thousandths(longest_s(viewers)))},
           {"fps", if_measured(longest_s(viewers) > 0, hundredths(fps))},
           {"updates_per_s", if_measured(longest_s(viewers) > 0, hundredths(updates_per_s))},
@@ -277,56 +193,34 @@ ordered_json how_often(const Measured& m, const std::map<std::string, ViewerFigu
           {"frames_sampled", whole(frames_completed)}};
 }
 
-std::string coupling_name(double mode, double buffers) {
-  if (mode == 0) return "async";
-  return mode == 1 ? "sync" : fmt::format("loose({:.0f})", buffers);
-}
-
 /// Which couplings were in force, and how often a viewer went from one to another.
 ordered_json how_coupled(const Measured& m) {
-  const auto modes = m.frames.column("coupling"), buffers = m.frames.column("buffers");
-  if (modes.empty() || modes.size() != buffers.size())
-    return {{"coupling_changes", nullptr}, {"frames_by_coupling", nullptr}};
-  size_t changes = 0;
+  if (!m.coupled) return {{"coupling_changes", nullptr}, {"frames_by_coupling", nullptr}};
   auto frames = ordered_json::object();
-  std::map<size_t, std::string> before;  // of each viewer
-  for (size_t i = 0; i < modes.size(); ++i) {
-    const std::string name = coupling_name(modes[i], buffers[i]);
-    frames[name] = frames.value(name, size_t{0}) + 1;
-    std::string& last = before[m.frames.viewers[i]];
-    changes += !last.empty() && last != name;
-    last = name;
-  }
-  return {{"coupling_changes", changes}, {"frames_by_coupling", frames}};
+  for (const auto& [name, count] : m.frames_by_coupling) frames[name] = count;
+  return {{"coupling_changes", m.coupling_changes}, {"frames_by_coupling", frames}};
 }
 
 /// How well the displays of a wall kept in step: each of the wall's frames counts once, whoever told of it.
 ordered_json how_together(const Measured& m, double incomplete) {
-  const auto numbers = m.frames.column("wall_frame"), skews = m.frames.column("swap_skew_ms");
-  std::map<double, double> by_frame;
-  for (size_t i = 0; i < numbers.size() && i < skews.size(); ++i)
-    if (numbers[i] > 0 && skews[i] >= 0) by_frame[numbers[i]] = skews[i];
-  std::vector<double> ms;
-  for (const auto& [number, skew] : by_frame) ms.push_back(skew);
+  const Quantiles ms = m.swap_skew_ms();
   return {{"swap_skew_ms", distribution_json(ms)},
-          {"swaps", if_measured(!ms.empty(), ms.size())},
+          {"swaps", if_measured(!ms.empty(), ms.count())},
           {"swaps_incomplete", if_measured(!ms.empty(), whole(incomplete))}};
 }
 
 ordered_json how_long(const Measured& m) {
-  auto delays = m.frames.column("inter_frame_ms");
-  std::erase_if(delays, [](double d) { return d <= 0; });  // the first frame of a viewer has none
-  const FrameDurations durations = frame_durations(m.tiles);
-  return {{"inter_frame_delay_ms", distribution_json(delays)},
-          {"view_construction_ms", distribution_json(m.frames.column("construction_ms"))},
-          {"view_update_latency_ms", distribution_json(whole_latencies(m))},
-          {"start_up_latency_ms", distribution_json(m.updates.column("start_up_ms"))},
+  const FrameDurations durations = m.tiles().durations();
+  return {{"inter_frame_delay_ms", distribution_json(m.inter_frame_ms)},
+          {"view_construction_ms", distribution_json(m.construction_ms)},
+          {"view_update_latency_ms", distribution_json(m.latency_ms)},
+          {"start_up_latency_ms", distribution_json(m.start_up_ms)},
           {"latency_stages_ms", where_time_went(m)},
-          {"display_latency_ms", display_latency(m)},
+          {"display_latency_ms", distribution_json(m.display_ms)},  // completion to the end of the first frame with it
           {"sampling_ms", distribution_json(durations.sampling_ms)},
           {"lease_to_sampled_ms", distribution_json(durations.leased_ms)},
           {"packing_ms", distribution_json(durations.packing_ms)},
-          {"samplers_busy", busy_spread(m.busy_s)}};
+          {"samplers_busy", busy_spread(m.tiles().busy_s())}};
 }
 
 ordered_json how_much(const Traffic& t, double run_s, double viewers) {
@@ -341,44 +235,14 @@ ordered_json how_much(const Traffic& t, double run_s, double viewers) {
 }
 
 /// What steering spared: rays of all tiles, against those of whole views.
-struct Rays {
-  double cast = 0, full = 0;
-};
-
-Rays rays(const Measured& m) {
-  Rays out;
-  std::set<uint64_t> planned;  // frames that have the rays of a plan
-  for (const PlanRow& p : m.plans) {
-    if (p.outcome != PlanRow::Outcome::kTiles && p.outcome != PlanRow::Outcome::kEmpty) continue;
-    planned.insert(p.asked.frame.value);
-    out.full += double(p.rays_full());
-  }
-  for (const wire::TileDone& t : m.tiles) {
-    out.cast += double(t.rays);
-    if (!planned.contains(t.frame.value)) out.full += double(t.rays);
-  }
-  return out;
-}
-
-ordered_json what_was_steered(const Measured& m) {
-  std::vector<double> plan_ms, answer_ms;
-  double late = 0;
-  for (const PlanRow& p : m.plans) {
-    if (p.outcome == PlanRow::Outcome::kLate)
-      ++late;
-    else if (!p.asked.extra)
-      answer_ms.push_back((p.planned_s - p.asked_s) * 1e3);
-    if (const auto ms = p.figures.find("plan_ms"); ms != p.figures.end() && !p.asked.extra)
-      plan_ms.push_back(ms->second);
-  }
-  const Rays r = rays(m);
-  return {{"rays_cast", if_measured(r.full > 0, whole(r.cast))},
-          {"rays_full", if_measured(r.full > 0, whole(r.full))},
-          {"rays_saved", if_measured(r.full > 0, 1 - r.cast / r.full)},
-          {"plans", if_measured(!m.plans.empty(), m.plans.size())},
-          {"plans_late", if_measured(!m.plans.empty(), whole(late))},
-          {"plan_ms", distribution_json(plan_ms)},
-          {"plan_answer_ms", distribution_json(answer_ms)}};
+ordered_json what_was_steered(const TileSums& t) {
+  return {{"rays_cast", if_measured(t.rays_full() > 0, whole(t.rays_cast()))},
+          {"rays_full", if_measured(t.rays_full() > 0, whole(t.rays_full()))},
+          {"rays_saved", if_measured(t.rays_full() > 0, 1 - t.rays_cast() / t.rays_full())},
+          {"plans", if_measured(t.plans() > 0, t.plans())},
+          {"plans_late", if_measured(t.plans() > 0, t.plans_late())},
+          {"plan_ms", distribution_json(t.plan_ms())},
+          {"plan_answer_ms", distribution_json(t.plan_answer_ms())}};
 }
 
 ordered_json what_was_held(const Measured& m, const Roster& roster, double partitions, double viewers) {
@@ -386,8 +250,8 @@ ordered_json what_was_held(const Measured& m, const Roster& roster, double parti
                first_points_s = roster.present("viewer", "first_points_s");
   return {{"points_cached", if_measured(!roster.each("packer", "points").empty(), whole(points))},
           {"bytes_per_cached_point", if_measured(points > 0, roster.present("packer", "model_bytes") / points)},
-          {"points_drawn", distribution_json(m.frames.column("points_drawn"))},
-          {"update_age_ms", distribution_json(m.frames.column("update_age_ms"))},
+          {"points_drawn", distribution_json(m.points_drawn)},
+          {"update_age_ms", distribution_json(m.update_age_ms)},
           {"voxels_fetched", if_measured(!roster.each("data", "voxels_sent").empty(), whole(voxels))},
           {"bytes_per_voxel", if_measured(voxels > 0, roster.counted("data", "bytes_sent") / voxels)},
           {"partitions", if_measured(partitions > 0, whole(partitions))},
@@ -418,11 +282,8 @@ ordered_json predicted(const Roster& roster, const std::string& what) {
 }
 
 ordered_json how_heads_moved(const Measured& m, const Roster& roster) {
-  const auto leads = m.frames.column("lead_ms"), missed = m.frames.column("missed");
-  const bool headset = std::any_of(leads.begin(), leads.end(), [](double ms) { return ms != 0; });
-  const auto late = std::count_if(leads.begin(), leads.end(), [](double ms) { return ms < 0; });
-  return {{"frames_late", if_measured(headset, uint64_t(late))},
-          {"refreshes_missed", if_measured(headset, whole(std::accumulate(missed.begin(), missed.end(), 0.0)))},
+  return {{"frames_late", if_measured(m.headset, m.frames_late)},
+          {"refreshes_missed", if_measured(m.headset, whole(m.refreshes_missed))},
           {"predicted_by", or_null(roster.fact("viewer", "prediction"))},
           {"prediction", predicted(roster, "prediction")},
           {"pose_prediction", predicted(roster, "pose_prediction")}};
@@ -434,10 +295,10 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
                        const std::map<std::string, double>& counters, const About& about) {
   const Roster roster(processes);
   const auto counter = [&](const char* key) { return scene::value_or(counters, key, 0.0); };
-  const auto figures = by_viewer(measured);
+  const auto& figures = measured.viewers();
   const double viewers = std::max<double>(1, double(roster.count("viewer")));
   const double run_s = longest_s(figures);
-  ordered_json out{{"schema", 2}};
+  ordered_json out{{"schema", 2}, {"lives", about.lives}};
   out.update(what_was_done(about, processes));
   out.update(what_was_shown(processes, roster));
   out.update(how_often(measured, figures, counter("frames_completed")));
@@ -447,17 +308,25 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(how_heads_moved(measured, roster));
   out["clock"] = clocks(processes);
   out.update(how_much(traffic(measured, roster), run_s, viewers));
-  out.update(what_was_steered(measured));
+  out.update(what_was_steered(measured.tiles()));
   out.update(what_was_held(measured, roster, counter("partitions"), viewers));
   out.update(ordered_json{{"tiles_released", whole(counter("tiles_released"))},
                           {"leases_backup", whole(counter("leases_backup"))},
                           {"views_overtaken", whole(counter("views_overtaken"))},
+                          {"limits",
+                           {{"views_coarser", whole(counter("limits.views_coarser"))},
+                            {"hellos_refused", whole(counter("limits.hellos_refused"))},
+                            {"messages_refused", whole(counter("limits.messages_refused"))}}},
                           {"quality", nullptr},
                           {"peak_rss_mb", peak_rss(roster)},
                           {"errors",
                            {{"messages_rejected", whole(roster.counted("", "messages_rejected"))},
+                            {"keys_refused", whole(roster.counted("", "keys_refused"))},
                             {"gaps_resynced", whole(roster.counted("viewer", "gaps_resynced"))},
-                            {"leases_expired", whole(counter("leases_expired"))}}}});
+                            {"leases_expired", whole(counter("leases_expired"))},
+                            {"record_failed", about.losses.failed.size() + whole(roster.counted("", kRecordFailed))},
+                            {"record_lost", rows_of(about.losses.lost)},
+                            {"record_cut", rows_of(about.losses.cut)}}}});
   return out;
 }
 

@@ -6,6 +6,11 @@
 
 namespace telesplat::net {
 
+std::string refusal_of_master(const Socket& socket, const std::string& endpoint) {
+  const auto refusal = socket.refusal();
+  return refusal.text.empty() ? std::string() : fmt::format("the master at {} refuses: {}", endpoint, refusal.text);
+}
+
 Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                            double timeout_s, const std::map<std::string, std::string>& arguments) {
   while (socket.receive()) {
@@ -18,6 +23,7 @@ Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& en
       if (message->type != wire::ControlReply::kName) continue;
       if (auto reply = socket.decode<wire::ControlReply>(*message)) return *std::move(reply);
     }
+    if (std::string refusal = refusal_of_master(socket, endpoint); !refusal.empty()) return Error{std::move(refusal)};
     if (socket.failed_connections() != failed_before)
       return Error{fmt::format("no master is at {}: nothing takes connections there", endpoint)};
   }
@@ -33,8 +39,8 @@ Result<std::string> ask_master(Socket& socket, const std::string& endpoint, cons
 }
 
 Result<std::string> ask_master(const std::string& endpoint, const std::string& command, double timeout_s,
-                               const std::map<std::string, std::string>& arguments, const Via& via) {
-  Context context(via);
+                               const std::map<std::string, std::string>& arguments, const Access& access) {
+  Context context(access);
   Socket socket(context, Kind::kDealer, "ctl", kControlSocket);
   if (const Status s = socket.connect(endpoint); !s) return s.error();
   return ask_master(socket, endpoint, command, timeout_s, arguments);

@@ -14,7 +14,8 @@ inline constexpr SocketOptions kControlSocket{
 
 /// Sends a command over `socket`, a DEALER that is connected to the master at `endpoint`, and waits for its answer,
 /// which may be a refusal. Error: it did not answer within `timeout_s`; if the socket has kControlSocket, at once where
-/// nothing takes connections. Answers to earlier commands are dropped.
+/// nothing takes connections, or our keys are not taken. Answers to earlier commands that are there by then are
+/// dropped; one that comes later would be taken for this one's, so after an error the socket is to be given up.
 Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                            double timeout_s, const std::map<std::string, std::string>& arguments = {});
 
@@ -22,8 +23,11 @@ Result<wire::ControlReply> reply_of_master(Socket& socket, const std::string& en
 Result<std::string> ask_master(Socket& socket, const std::string& endpoint, const std::string& command,
                                double timeout_s, const std::map<std::string, std::string>& arguments = {});
 
-/// The same over a socket of its own, through `via`.
+/// Why no answer can come over a socket that has kControlSocket: empty, or a line that names the master.
+std::string refusal_of_master(const Socket& socket, const std::string& endpoint);
+
+/// The same over a socket of its own.
 Result<std::string> ask_master(const std::string& endpoint, const std::string& command, double timeout_s,
-                               const std::map<std::string, std::string>& arguments = {}, const Via& via = {});
+                               const std::map<std::string, std::string>& arguments = {}, const Access& access = {});
 
 }  // namespace telesplat::net

@@ -1,14 +1,27 @@
 // Which endpoints of ZeroMQ stay on this machine.
 #pragma once
 
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <string>
 #include <string_view>
 
 namespace telesplat::net {
 
+/// ipc, inproc, and tcp on a loopback address or localhost. Names that only begin like one are none.
 inline bool is_local(std::string_view endpoint) {
-  for (const char* prefix : {"ipc://", "inproc://", "tcp://127.", "tcp://localhost:", "tcp://[::1]:"})
-    if (endpoint.starts_with(prefix)) return true;
-  return false;
+  if (endpoint.starts_with("ipc://") || endpoint.starts_with("inproc://")) return true;
+  constexpr std::string_view kTcp = "tcp://";
+  if (!endpoint.starts_with(kTcp)) return false;
+  std::string host(endpoint.substr(kTcp.size()));
+  host.resize(std::min(host.size(), host.rfind(':')));
+  if (host == "localhost") return true;
+  in_addr v4{};
+  if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24 == 127;
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  in6_addr v6{};
+  return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
 }
 
 }  // namespace telesplat::net

@@ -50,7 +50,7 @@ std::string master_from_environment() {
 
 MasterSearch find_master(const std::string& master, const std::string& session) {
   if (!master.empty() && master != kTheOneMaster) {
-    if (is_address(master)) return {.address = master, .problem = {}};
+    if (is_address(master)) return {.address = master, .problem = {}, .keys = {}};
     return {.address = {},
             .problem =
                 fmt::format("{} {}: is no address such as tcp://127.0.0.1:7700",
@@ -60,7 +60,7 @@ MasterSearch find_master(const std::string& master, const std::string& session) 
   const auto running = running_sessions();
   auto fitting = running;
   if (!session.empty()) std::erase_if(fitting, [&](const auto& s) { return !is_called(s, session); });
-  if (fitting.size() == 1) return {.address = fitting.front().address, .problem = {}};
+  if (fitting.size() == 1) return {.address = fitting.front().address, .problem = {}, .keys = fitting.front().keys};
   if (running.empty())
     return {.address = {},
             .problem =

@@ -19,6 +19,7 @@ std::string master_from_environment();
 struct MasterSearch {
   std::string address;   ///< empty: there is none
   std::string problem;   ///< then; sessions among which to choose are told in lines of their own
+  std::string keys;      ///< folder of the keys that the session runs with, if it was found here; empty: none are known
   bool several = false;  ///< the person must choose, or gave what is no address: bad usage
   int exit_code() const { return several ? 2 : 1; }
 };

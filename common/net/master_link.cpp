@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <atomic>
+
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
 #include "common/net/process_facts.h"
@@ -12,12 +14,20 @@ constexpr double kHelloPeriod_s = 0.25, kStatusPeriod_s = 1.0;
 // The clock is asked for in quick succession at first: the shortest round trip of some is near the shortest there is.
 constexpr double kClockPeriod_s = 1.0, kFirstClockPeriod_s = 0.05;
 constexpr int kFirstClocks = 8;
+constexpr double kSignPeriod_s = 1.5;  // of signs of life while no reports come
 }  // namespace
+
+struct MasterLink::Life {
+  std::atomic<bool> welcomed{false};
+  std::atomic<double> ticked_s{0}, said_s{0};  // when the owner was last here, and a report or a sign was sent
+};
 
 MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hello hello)
     : hello_(std::move(hello)),
+      life_(std::make_shared<Life>()),
       socket_(context, Kind::kDealer, hello_.name + ":master",
-              {.max_message_bytes = wire::kMaxBulkBytes, .read_ahead = true}) {
+              {.max_message_bytes = wire::kMaxControlBytes, .watch_connecting = true, .read_ahead = true}),
+      endpoint_(endpoint) {
   if (hello_.instance.value == 0) hello_.instance = make_instance_id();
   hello_.facts.merge(process_facts());
   // Names and paths of this machine may be any bytes; messages hold UTF-8.
@@ -25,6 +35,19 @@ MasterLink::MasterLink(Context& context, const std::string& endpoint, wire::Hell
   for (auto& [fact, value] : hello_.facts) value = to_utf8(value);
   hello_.pid = static_cast<uint64_t>(getpid());
   if (const Status s = socket_.connect(endpoint); !s) log::error("{}", s.error().text);
+  socket_.set_due([life = life_, self = hello_.instance]() -> std::optional<std::pair<std::string, std::string>> {
+    const double now_s = monotonic_s();
+    if (!life->welcomed || now_s - life->said_s < kSignPeriod_s || now_s - life->ticked_s > kLongestWork_s)
+      return std::nullopt;
+    life->said_s = now_s;
+    return std::pair(std::string(wire::StatusReport::kName), wire::encode(wire::StatusReport{self, {}}));
+  });
+}
+
+void MasterLink::follow_welcomed(bool welcomed) {
+  welcomed_ = welcomed;
+  life_->said_s = monotonic_s();
+  life_->welcomed = welcomed;
 }
 
 void MasterLink::report(const std::function<Values()>& status, double now_s) {
@@ -38,9 +61,11 @@ void MasterLink::report(const std::function<Values()>& status, double now_s) {
     report.values["master_round_trip_ms"] = clock_.round_trip_s() * 1e3;
   }
   socket_.send(report);
+  life_->said_s = monotonic_s();
 }
 
 void MasterLink::tick(double now_s, const std::function<Values()>& status) {
+  life_->ticked_s = monotonic_s();
   if (!welcomed_ && now_s - last_hello_s_ >= kHelloPeriod_s) {
     hello_.sent_s = monotonic_s();
     socket_.send(hello_);
@@ -51,6 +76,22 @@ void MasterLink::tick(double now_s, const std::function<Values()>& status) {
     last_status_s_ = now_s;
   }
   if (welcomed_) ask_clock(now_s);
+  look_for_refusal();
+}
+
+// What merely breaks off may be a tunnel whose other end is not there yet.
+void MasterLink::look_for_refusal() {
+  if (refused_) return;
+  const auto refusal = socket_.refusal();
+  if (refusal.text.empty()) {
+    warned_ = false;
+  } else if (!refusal.may_pass) {
+    log::error("the master at {} refuses {}: {}", endpoint_, hello_.name, refusal.text);
+    refused_ = shutdown_ = true;
+  } else if (!warned_) {
+    log::warn("the master at {} does not let {} in: {}; trying on", endpoint_, hello_.name, refusal.text);
+    warned_ = true;
+  }
 }
 
 void MasterLink::ask_clock(double now_s) {
@@ -72,12 +113,11 @@ bool MasterLink::handle(const Message& message) {
       const bool another = !session_ || session_->master != welcome->master;
       if (another) clock_.clear(), clock_asked_ = 0;
       session_ = std::move(welcome);
-      welcomed_ = true;
+      if (!welcomed_) follow_welcomed(true);
       ++version_;
       // The hello and its answer are an exchange, too.
       if (another && session_->hello_sent_s != 0)
-        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s,
-                     session_->clock},
+        learn_clock({session_->master, session_->hello_sent_s, session_->master_s, session_->master_s, session_->clock},
                     message.arrived_s);
     }
     return true;
@@ -88,12 +128,15 @@ bool MasterLink::handle(const Message& message) {
   }
   if (message.type == wire::WhoAreYou::kName) {
     if (welcomed_) log::info("the master asks who we are: saying hello again");
-    welcomed_ = false;
+    follow_welcomed(false);
     return true;
   }
   if (message.type == wire::Shutdown::kName) {
     if (const auto shutdown = socket_.decode<wire::Shutdown>(message)) {
-      log::debug("shutdown: {}", shutdown->reason);
+      if (welcomed_ || session_)
+        log::debug("shutdown: {}", shutdown->reason);
+      else
+        log::error("the master refuses this process: {}", printable(shutdown->reason));
       shutdown_ = true;
     }
     return true;
@@ -127,6 +170,7 @@ void MasterLink::tell(const std::string& fact, const std::string& value) {
 
 void MasterLink::leave(const std::function<Values()>& status) {
   report(status, monotonic_s());
+  life_->welcomed = false;  // nothing after the goodbye
   socket_.send(wire::Goodbye{hello_.instance});
 }
 

@@ -1,9 +1,11 @@
 // The client side of the master, the same for data, sampler, packer, viewer and ctl: hello until welcomed, a status
-// report a second, hello again when the master asks, what the master's clock says, shutdown.
+// report a second, hello again when the master asks, what the master's clock says, shutdown. While its owner works and
+// does not tick, the thread that reads the socket says that the process lives.
 #pragma once
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -15,6 +17,8 @@ namespace telesplat::net {
 class MasterLink {
  public:
   using Values = std::map<std::string, double>;
+  /// An owner that does not tick for longer hangs: it is not said to live any more.
+  static constexpr double kLongestWork_s = 60;
 
   /// Connects to the master at `endpoint`; instance, pid and process_facts() are filled in. Nothing is sent before the
   /// first tick().
@@ -43,7 +47,10 @@ class MasterLink {
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
+  /// The session is over for this process: its end was told, or the master does not let it in.
   bool shutdown_requested() const { return shutdown_; }
+  /// The master does not let it in with its keys (why was logged): bad usage, exit code 2.
+  bool refused() const { return refused_; }
   /// This machine's monotonic time on the master's clock.
   double to_master_s(double local_s) const { return local_s + clock_.offset_s(local_s); }
   const ClockEstimate& clock() const { return clock_; }
@@ -57,16 +64,21 @@ class MasterLink {
  private:
   void report(const std::function<Values()>& status, double now_s);
   void ask_clock(double now_s);
+  void look_for_refusal();
   void learn_clock(const wire::ClockReply& reply, double arrived_s);
+  void follow_welcomed(bool welcomed);
 
+  struct Life;
   wire::Hello hello_;
+  std::shared_ptr<Life> life_;  // shared with the socket's thread
   Socket socket_;
   std::optional<wire::Welcome> session_;
   int version_ = 0;
-  bool shutdown_ = false, welcomed_ = false;
+  bool shutdown_ = false, welcomed_ = false, refused_ = false, warned_ = false;
   Obey obey_;
   ClockEstimate clock_;
   int clock_asked_ = 0;  // since the master is known
+  const std::string endpoint_;
   double last_hello_s_ = -1e9, last_status_s_ = -1e9, last_clock_s_ = -1e9;
 };
 

@@ -33,7 +33,7 @@ void lower(int descriptor) {
 
 ReadAhead::ReadAhead(Ends ends, const Limits& limits)
     : ends_(std::move(ends)), limits_(limits), there_(make_eventfd()), woken_(make_eventfd()), thread_([this] {
-        loop();
+        run();
       }) {}
 
 ReadAhead::~ReadAhead() {
@@ -66,8 +66,20 @@ bool ReadAhead::send_waiting() {
   }
 }
 
+// An exception goes to the owner, who asks for messages.
+void ReadAhead::run() {
+  try {
+    loop();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failed_ = std::current_exception();
+    raise(there_);
+  }
+}
+
 void ReadAhead::loop() {
   for (bool stop = false; !stop;) {
+    if (auto due = ends_.due ? ends_.due() : std::nullopt) send(std::move(*due));
     const bool sent = send_waiting();
     bool stalled = false;
     for (;;) {
@@ -100,11 +112,12 @@ std::optional<Message> ReadAhead::receive() {
   std::optional<Message> out;
   {
     const std::lock_guard lock(mutex_);
+    if (received_.empty() && failed_) std::rethrow_exception(failed_);
     if (received_.empty()) return std::nullopt;
     out = std::move(received_.front());
     received_.pop_front();
     bytes_ -= out->body.size();
-    if (received_.empty()) lower(there_);
+    if (received_.empty() && !failed_) lower(there_);
     go_on = stalled_ && !full();
   }
   if (go_on) raise(woken_);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <deque>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -23,6 +24,8 @@ class ReadAhead {
     std::function<std::optional<Message>()> receive;           ///< without waiting
     std::function<bool(Outgoing&)> send;                       ///< without waiting; false: not now, nothing changed
     std::function<void(int descriptor, int timeout_ms)> wait;  ///< for a message, or until `descriptor` is readable
+    /// What is to be said by time alone, however busy the owner is; asked at least every 100 ms. May be empty.
+    std::function<std::optional<Outgoing>()> due = {};
   };
   /// Messages that were not taken yet, at most, and the bytes of their bodies: then nothing more is read, and whoever
   /// sends has to wait. Messages that could not be sent yet: then send() refuses.
@@ -37,7 +40,7 @@ class ReadAhead {
   /// Gives the socket what is left to send, as far as it takes it at once; ends the thread.
   ~ReadAhead();
 
-  /// The next message, without waiting.
+  /// The next message, without waiting. Throws what ended the thread, if something did.
   std::optional<Message> receive();
   /// False: dropped, because too many wait already.
   bool send(Outgoing message);
@@ -45,6 +48,7 @@ class ReadAhead {
   int descriptor() const { return there_; }
 
  private:
+  void run();
   void loop();
   bool send_waiting();
   bool full() const;
@@ -57,6 +61,7 @@ class ReadAhead {
   std::deque<Outgoing> unsent_;
   size_t bytes_ = 0;  // of received_
   bool stalled_ = false, stop_ = false;
+  std::exception_ptr failed_;
   std::thread thread_;
 };
 

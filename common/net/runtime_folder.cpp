@@ -76,14 +76,26 @@ RuntimeFolder::RuntimeFolder(RuntimeFolder&& other) noexcept
     : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)) {}
 
 Status RuntimeFolder::write(const std::string& name, const std::string& text) const {
+  return put(name, text, Place::kReplaces);
+}
+
+Status RuntimeFolder::create(const std::string& name, const std::string& text) const {
+  return put(name, text, Place::kIsNew);
+}
+
+Status RuntimeFolder::put(const std::string& name, const std::string& text, Place place) const {
   const std::string partial = fmt::format(".{}.{}", name, getpid());
   unlinkat(fd_, partial.c_str(), 0);  // of a process of this number that died here
   const int fd = openat(fd_, partial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
   if (fd < 0) return failed(path_ + "/" + name, "cannot be written");
-  const bool written = write_all(fd, text);
-  if (close(fd) == 0 && written && renameat(fd_, partial.c_str(), fd_, name.c_str()) == 0) return ok_status();
+  // A file that must not be lost is on the disk before its name is.
+  const bool is_new = place == Place::kIsNew, written = write_all(fd, text) && (!is_new || fsync(fd) == 0);
+  const bool whole = close(fd) == 0 && written;
+  if (whole && !is_new && renameat(fd_, partial.c_str(), fd_, name.c_str()) == 0) return ok_status();
+  const bool linked = whole && is_new && linkat(fd_, partial.c_str(), fd_, name.c_str(), 0) == 0;
   const Error error = failed(path_ + "/" + name, "cannot be written");
   unlinkat(fd_, partial.c_str(), 0);
+  if (linked) return ok_status();
   return error;
 }
 

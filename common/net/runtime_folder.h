@@ -30,6 +30,8 @@ class RuntimeFolder {
   const std::string& path() const { return path_; }
   /// Readers see the whole text or what was there before.
   Status write(const std::string& name, const std::string& text) const;
+  /// The same of a file that must not be there yet. Error: it is.
+  Status create(const std::string& name, const std::string& text) const;
   void remove(const std::string& name) const;
   /// Of files, unsorted, at most 1000.
   std::vector<std::string> names() const;
@@ -38,6 +40,9 @@ class RuntimeFolder {
 
  private:
   RuntimeFolder(std::string path, int fd) : path_(std::move(path)), fd_(fd) {}
+  enum class Place { kReplaces, kIsNew };
+  Status put(const std::string& name, const std::string& text, Place place) const;
+
   std::string path_;
   int fd_;
 };

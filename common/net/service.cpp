@@ -43,7 +43,9 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
   if (ends != Ends::kConnects)
     out.push_back({.flag = "--bind",
                    .value = &o.bind,
-                   .help = "address to bind to; port * takes a free one",
+                   .help =
+                       "address to bind to; port * takes a free one; a process of several sockets takes this port and "
+                       "those after it",
                    .reach = options::Reach::kHere});
   if (ends == Ends::kBoth)
     out.push_back(
@@ -69,6 +71,7 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                  .value = &o.insecure,
                  .help = "allow addresses other than loopback without encryption",
                  .reach = options::Reach::kHere});
+  out.push_back(keys_row(o.keys));
   out.push_back({.flag = "--log-level",
                  .value = &o.log_level,
                  .help = "trace, debug, info, warn, error or off",
@@ -76,7 +79,19 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
   return out;
 }
 
-Result<Via> via_of(const ServiceOptions& o) { return Via::parse(o.via); }
+options::Row keys_row(std::string& folder) {
+  return {.flag = "--keys",
+          .value = &folder,
+          .help = "folder of keys, made by telesplat keys: encrypts, and lets in only those on its allow-list",
+          .reach = options::Reach::kHere,
+          .environment = kKeysVariable};
+}
+
+Result<Access> access_of(const ServiceOptions& o, const std::vector<Role>& roles, bool binds) {
+  auto via = Via::parse(o.via);
+  if (!via) return via.error();
+  return Access::open(*std::move(via), o.keys, roles, binds);
+}
 
 int settle_master(ServiceOptions& o) {
   MasterSearch search = find_master(o.master);
@@ -85,6 +100,7 @@ int settle_master(ServiceOptions& o) {
     return search.exit_code();
   }
   o.master = std::move(search.address);
+  if (o.keys.empty()) o.keys = std::move(search.keys);
   return 0;
 }
 
@@ -115,7 +131,10 @@ std::string complain_about_host(const std::string& host) {
 }
 
 void end_on_signals() { handle_signals(end_process); }
-void install_signal_handlers() { handle_signals(set_flag); }
+void install_signal_handlers() {
+  handle_signals(set_flag);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of who writes it, like a disk that is full
+}
 bool stop_requested() { return stop_flag; }
 void forget_stop() { stop_flag = false; }
 

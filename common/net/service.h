@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/core/result.h"
-#include "common/net/via.h"
+#include "common/net/keys/access.h"
 #include "common/options/table.h"
 
 namespace telesplat::net {
@@ -17,21 +17,28 @@ struct ServiceOptions {
   std::string bind = "tcp://127.0.0.1:*";  ///< where data and packer bind; `*`: a free port
   std::string advertise;  ///< host that others are told to connect to; empty: as bound, or host_name() for a wildcard
   bool insecure = false;
+  std::string keys;              ///< folder of keys; empty: without
   std::vector<std::string> via;  ///< proxies, as Via::parse() takes them
   std::string link;              ///< what the links through them are like, for the record; empty: they are none
   std::string log_level = "info";
 };
 
-/// Adds --name, --log-level, --insecure; --bind if the program binds, --master (or TELESPLAT_MASTER in the environment)
-/// if it connects to one, --advertise if it does both, --via and --link if it only connects.
+/// Adds --name, --log-level, --insecure, --keys; --bind if the program binds, --master (or TELESPLAT_MASTER in the
+/// environment) if it connects to one, --advertise if it does both, --via and --link if it only connects.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 
-/// What options.via comes to. Error: names the flag and its value.
-Result<Via> via_of(const ServiceOptions& options);
+/// The environment variable that names a folder of keys where --keys is not given.
+inline constexpr const char* kKeysVariable = "TELESPLAT_KEYS";
+/// The row of --keys, of services and of programs that ask a master.
+options::Row keys_row(std::string& folder);
 
-/// Finds the session that --master auto means. Returns 0, or the exit code after a line on stderr that says why there
-/// is none.
+/// What options.via and options.keys come to. roles, binds: as read_keys() takes them. Error: names the flag and its
+/// value.
+Result<Access> access_of(const ServiceOptions& options, const std::vector<Role>& roles, bool binds = false);
+
+/// Finds the session that --master auto means, and the keys that it runs with. Returns 0, or the exit code after a line
+/// on stderr that says why there is none.
 int settle_master(ServiceOptions& options);
 
 /// This machine's name; in a container that of the container.

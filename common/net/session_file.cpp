@@ -70,7 +70,8 @@ Json to_json(const RunningSession& s) {
           {"kind", told(s.kind)},
           {"run_folder", told(s.run_folder)},
           {"started_at_s", s.started_at_s},
-          {"started_by", told(s.started_by)}};
+          {"started_by", told(s.started_by)},
+          {"keys", told(s.keys)}};
 }
 
 struct File {
@@ -111,9 +112,10 @@ std::optional<File> parse(const std::string& text) {
   const auto at = json.find("started_at_s");
   const auto address = text_at(json, "address"), scene = text_at(json, "scene"), kind = text_at(json, "kind"),
              folder = text_at(json, "run_folder"), by = text_at(json, "started_by"), host = text_at(json, "host"),
-             numbers = text_at(json, "numbers"), boot = text_at(json, "boot");
+             numbers = text_at(json, "numbers"), boot = text_at(json, "boot"), keys = text_at(json, "keys");
   if (!pid || !start || at == json.end() || !at->is_number() || !std::isfinite(at->get<double>()) || !address ||
-      !is_address(*address) || !scene || !kind || !folder || !by || !host || !numbers || !boot)
+      !is_address(*address) || !scene || !kind || !folder || !by || !host || !numbers || !boot ||
+      (!keys && json.contains("keys")))
     return std::nullopt;
   return File{.session = {.address = *address,
                           .pid = *pid,
@@ -121,7 +123,8 @@ std::optional<File> parse(const std::string& text) {
                           .kind = *kind,
                           .run_folder = *folder,
                           .started_at_s = at->get<double>(),
-                          .started_by = *by},
+                          .started_by = *by,
+                          .keys = keys.value_or("")},
               .process_start = *start,
               .place = {.host = *host, .numbers = *numbers, .boot = *boot}};
 }

@@ -20,6 +20,7 @@ struct RunningSession {
   std::string run_folder;   ///< absolute; empty: it keeps no record
   double started_at_s = 0;  ///< wall clock, seconds since 1970
   std::string started_by;   ///< "run", "view", "bench"; "hand": a person started the master itself
+  std::string keys;         ///< folder of its keys, absolute; empty: it runs without
   bool operator==(const RunningSession&) const = default;
 };
 

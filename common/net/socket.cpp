@@ -14,6 +14,8 @@
 
 #include "common/core/check.h"
 #include "common/core/clock.h"
+#include "common/core/utf8.h"
+#include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
 #include "common/net/read_ahead.h"
 
@@ -27,6 +29,8 @@ constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads
 constexpr size_t kMaxTypeBytes = 64;
 constexpr double kQuietPusher_s = 1.0;
 constexpr size_t kMaxClosed = 4096;
+// Handshakes that broke off without a word, one after the other: a server that ends breaks off one or two.
+constexpr uint32_t kBrokenOff = 3;
 
 zmq::socket_type zmq_type(Kind kind) {
   switch (kind) {
@@ -63,19 +67,44 @@ bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
   }
 }
 
+// A call of ZeroMQ that a signal may interrupt, until it is done: given up between two parts of a message it would tear
+// the message. It does not wait.
+template <class Call>
+auto undisturbed(const Call& call) {
+  for (;;) {
+    try {
+      return call();
+    } catch (const zmq::error_t& e) {
+      if (e.num() != EINTR) throw;
+    }
+  }
+}
+
 }  // namespace
 
 struct Context::Impl {
   zmq::context_t context{1};
-  Via via;
+  Access access;
+  std::mutex mutex;                        // of the doorkeeper: sockets may be bound by several threads
+  std::unique_ptr<Doorkeeper> doorkeeper;  // from the first socket on that binds with keys
+
+  Status let_in() {
+    const std::lock_guard lock(mutex);
+    if (doorkeeper) return ok_status();
+    auto opened = Doorkeeper::open(context, *access.keys());
+    if (!opened) return opened.error();
+    doorkeeper = *std::move(opened);
+    return ok_status();
+  }
 };
 
-Context::Context(Via via) : impl_(std::make_unique<Impl>()) { impl_->via = std::move(via); }
+Context::Context(Access access) : impl_(std::make_unique<Impl>()) { impl_->access = std::move(access); }
 Context::~Context() = default;
 
 struct Socket::Impl {
-  Impl(zmq::context_t& context, Kind kind, std::string name, const SocketOptions& options, const std::string& proxy)
-      : context(context), kind(kind), name(std::move(name)), options(options), socket(context, zmq_type(kind)) {
+  Impl(Context::Impl& home, Kind kind, std::string name, const SocketOptions& options)
+      : home(home), kind(kind), name(std::move(name)), options(options), socket(home.context, zmq_type(kind)) {
+    const std::string proxy = home.access.via().proxy(std::string(options.toward));
     if (!proxy.empty()) socket.set(zmq::sockopt::socks_proxy, proxy);
     socket.set(zmq::sockopt::sndhwm, options.high_water_mark);
     socket.set(zmq::sockopt::rcvhwm, options.high_water_mark);
@@ -86,32 +115,56 @@ struct Socket::Impl {
     socket.set(zmq::sockopt::reconnect_ivl, 50);
     socket.set(zmq::sockopt::reconnect_ivl_max, 500);
     socket.set(zmq::sockopt::heartbeat_ivl, 2000);
-    socket.set(zmq::sockopt::heartbeat_timeout, 10000);
+    socket.set(zmq::sockopt::heartbeat_timeout, static_cast<int>(options.patience_s * 1e3));
     if (kind == Kind::kSub) socket.set(zmq::sockopt::subscribe, "");
     if (kind == Kind::kRouter) socket.set(zmq::sockopt::router_mandatory, 1);
     if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);
   }
 
+  // ZeroMQ's thread must find someone who takes its events until it stops to make them.
+  ~Impl() {
+    ahead.reset();
+    if (monitor) zmq_socket_monitor(socket.handle(), nullptr, 0);
+  }
+
   // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too
   // much are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed
   // handshake is certain to be told.
-  void watch_connections() { watch(ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED); }
+  void watch_connections() { watch(ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED | (guarded ? kHandshakeFailed : 0)); }
+
+  static constexpr int kHandshakeFailed =
+      ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
+
+  // Of a socket that binds: whoever fails shows no key that fits. Of one that connects: why it is not let in.
+  void note_handshake(uint16_t what) {
+    if (what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
+      broken_off = 0;
+      return;
+    }
+    ++failed_unseen;
+    if (guarded)
+      ++keys_refused;
+    else if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
+      ++broken_off;
+    else
+      turned_away = what;
+  }
 
   void watch(int events) {
     static std::atomic<int> counter{0};
     const std::string address = fmt::format("inproc://monitor-{}", ++counter);
     if (zmq_socket_monitor(socket.handle(), address.c_str(), events) != 0) return;
-    monitor.emplace(context, zmq::socket_type::pair);
+    monitor.emplace(home.context, zmq::socket_type::pair);
     monitor->set(zmq::sockopt::linger, 0);
-    monitor->set(zmq::sockopt::rcvhwm, 10000);
+    monitor->set(zmq::sockopt::rcvhwm, 0);  // a queue that is full would stop ZeroMQ's thread
     monitor->connect(address);
   }
 
   void drain_monitor() {
     if (!monitor) return;
     zmq::message_t event, address;
-    while (monitor->recv(event, zmq::recv_flags::dontwait)) {
-      if (event.more() && monitor->recv(address)) {
+    while (undisturbed([&] { return monitor->recv(event, zmq::recv_flags::dontwait); })) {
+      if (event.more() && undisturbed([&] { return monitor->recv(address); })) {
       }
       if (event.size() < 6) continue;
       uint16_t what = 0;
@@ -119,7 +172,13 @@ struct Socket::Impl {
       std::memcpy(&what, event.data(), 2);
       std::memcpy(&fd, static_cast<const char*>(event.data()) + 2, 4);
       if (what == ZMQ_EVENT_CONNECT_RETRIED) {
-        ++failed_connections;
+        // Somebody is there, who did not let us in.
+        if (failed_unseen > 0)
+          --failed_unseen;
+        else
+          ++failed_connections;
+      } else if (what & (kHandshakeFailed | ZMQ_EVENT_HANDSHAKE_SUCCEEDED)) {
+        note_handshake(what);
       } else if (what == ZMQ_EVENT_ACCEPTED) {
         connections[fd] = {fd, monotonic_s(), false};
       } else if (const auto it = connections.find(fd); it != connections.end()) {
@@ -148,6 +207,10 @@ struct Socket::Impl {
   void judge_closed() {
     for (const Connection& c : closed) {
       if (c.has_spoken || (kind == Kind::kPull && monotonic_s() - c.accepted_s > kQuietPusher_s)) continue;
+      if (failed_unseen > 0) {  // counted as not let in
+        --failed_unseen;
+        continue;
+      }
       ++rejected;
       log_rejection("a connection", "it brought nothing that is a ZeroMQ message");
     }
@@ -160,7 +223,7 @@ struct Socket::Impl {
     drain_monitor();
     for (int n = 0; n < 1000; ++n) {
       try {
-        if (!socket.recv(message, zmq::recv_flags::dontwait)) return judge_closed();
+        if (!undisturbed([&] { return socket.recv(message, zmq::recv_flags::dontwait); })) return judge_closed();
       } catch (const zmq::error_t&) {
         return;
       }
@@ -177,7 +240,7 @@ struct Socket::Impl {
     if (limiter.allow(monotonic_s())) {
       const std::string more =
           limiter.suppressed() ? fmt::format(" ({} more since the last such line)", limiter.suppressed()) : "";
-      log::warn("{}: dropped {}: {}{}", name, what, why, more);
+      log::warn("{}: dropped {}: {}{}", name, telesplat::printable(what), telesplat::printable(why, 512), more);
     }
   }
 
@@ -185,14 +248,16 @@ struct Socket::Impl {
     if (kind == Kind::kPub) drain_subscriptions();
     try {
       using zmq::send_flags;
-      if (kind == Kind::kRouter && !socket.send(zmq::buffer(peer), send_flags::sndmore | send_flags::dontwait))
-        return false;
-      if (!socket.send(zmq::buffer(type), send_flags::sndmore | send_flags::dontwait)) return false;
+      const auto part = [&](std::string_view bytes) {
+        return undisturbed([&] { return socket.send(zmq::buffer(bytes), send_flags::sndmore | send_flags::dontwait); });
+      };
+      if (kind == Kind::kRouter && !part(peer)) return false;
+      if (!part(type)) return false;
       // ZeroMQ takes the body over without copying it.
       auto* owned = new std::string(std::move(body));
       zmq::message_t frame(
           owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
-      return socket.send(frame, send_flags::dontwait).has_value();
+      return undisturbed([&] { return socket.send(frame, send_flags::dontwait); }).has_value();
     } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
       return false;
     }
@@ -210,14 +275,13 @@ struct Socket::Impl {
       try {
         do {
           zmq::message_t frame;
-          if (!socket.recv(frame, zmq::recv_flags::dontwait)) {
+          if (!undisturbed([&] { return socket.recv(frame, zmq::recv_flags::dontwait); })) {
             judge_closed();
             return std::nullopt;
           }
           if (frames.size() < 4) frames.push_back(std::move(frame));
         } while (socket.get(zmq::sockopt::rcvmore));
       } catch (const zmq::error_t& e) {
-        if (e.num() == EINTR) continue;
         log::error("{}: {}", name, e.what());
         return std::nullopt;
       }
@@ -232,6 +296,7 @@ struct Socket::Impl {
       }
       out.type = frames[next].to_string().substr(0, kMaxTypeBytes);
       auto body = std::make_shared<zmq::message_t>(std::move(frames[next + 1]));
+      if (guarded && !admit(out, *body)) continue;
       if (body->size() > options.max_message_bytes) {
         reject(out, fmt::format("{} bytes, limit {}", body->size(), options.max_message_bytes));
         continue;
@@ -241,6 +306,21 @@ struct Socket::Impl {
       return out;
     }
     return std::nullopt;
+  }
+
+  // Who sent it, and whether they may.
+  bool admit(Message& message, zmq::message_t& body) {
+    const char* text = zmq_msg_gets(body.handle(), "User-Id");
+    const auto visitor = visitor_of(text ? text : "");
+    if (visitor) {
+      message.user = visitor->name;
+      message.role = visitor->role;
+      if (may_send(visitor->role, options.serves, message.type)) return true;
+    }
+    const std::string who = visitor ? fmt::format("the key {} is {}'s", visitor->name, described(visitor->role))
+                                    : std::string("nobody knows whose it is");
+    reject(message, fmt::format("not allowed: {}", who));
+    return false;
   }
 
   void reject(const Message& message, const std::string& why) {
@@ -258,7 +338,12 @@ struct Socket::Impl {
         .wait =
             [this](int descriptor, int timeout_ms) {
               poll({{socket.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, descriptor, ZMQ_POLLIN, 0}}, timeout_ms);
-            }};
+            },
+        .due = [this]() -> std::optional<ReadAhead::Outgoing> {
+          auto message = due ? due() : std::nullopt;
+          if (!message) return std::nullopt;
+          return ReadAhead::Outgoing{std::move(message->first), std::move(message->second)};
+        }};
     ahead = std::make_unique<ReadAhead>(ends, ReadAhead::Limits{.unsent = size_t(options.high_water_mark)});
     return true;
   }
@@ -268,7 +353,7 @@ struct Socket::Impl {
     return {socket.handle(), 0, ZMQ_POLLIN, 0};
   }
 
-  zmq::context_t& context;
+  Context::Impl& home;
   Kind kind;
   std::string name;
   SocketOptions options;
@@ -281,24 +366,36 @@ struct Socket::Impl {
   };
   std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
   std::vector<Connection> closed;                   // not judged yet
-  std::atomic<uint64_t> rejected{0}, failed_connections{0};
+  Due due;                                          // what the thread that reads says by itself
+  std::atomic<uint64_t> rejected{0}, failed_connections{0}, keys_refused{0};
+  bool guarded = false;                                 // bound with keys
+  size_t failed_unseen = 0;                             // handshakes whose connection's end was not heard of yet
+  std::atomic<uint32_t> broken_off{0}, turned_away{0};  // of a socket that connects: handshakes; event, 0: none
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
   std::unique_ptr<ReadAhead> ahead;  // with read_ahead, once something was sent or received; it is the first to go
 };
 
 Socket::Socket(Context& context, Kind kind, std::string name, const SocketOptions& options)
-    : impl_(std::make_unique<Impl>(context.impl().context, kind, std::move(name), options,
-                                   context.impl().via.proxy(std::string(options.toward)))) {}
+    : impl_(std::make_unique<Impl>(context.impl(), kind, std::move(name), options)) {}
 Socket::~Socket() = default;
 Socket::Socket(Socket&&) noexcept = default;
 Socket& Socket::operator=(Socket&&) noexcept = default;
 
 Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
   CHECK(!impl_->ahead);
-  if (!insecure && !is_local(endpoint))
-    return Error{fmt::format("{}: {} is not a loopback or ipc address; others need --insecure", impl_->name, endpoint)};
+  const Keys* keys = impl_->home.access.keys();
+  if (!insecure && !keys && !is_local(endpoint))
+    return Error{fmt::format("{}: {} is not a loopback or ipc address; others need --keys, or --insecure", impl_->name,
+                             endpoint)};
   try {
+    if (keys) {
+      if (keys->server_secret.empty() || impl_->options.serves.empty())
+        return Error{fmt::format("{}: its keys are not for binding", impl_->name)};
+      if (const Status s = impl_->home.let_in(); !s) return Error{fmt::format("--keys {}", s.error().text)};
+      guard(impl_->socket, *keys, impl_->options.serves);
+      impl_->guarded = true;
+    }
     impl_->watch_connections();
     impl_->socket.bind(endpoint);
     return impl_->socket.get(zmq::sockopt::last_endpoint);
@@ -310,7 +407,12 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
 Status Socket::connect(const std::string& endpoint) {
   CHECK(!impl_->ahead);
   try {
-    if (impl_->options.watch_connecting && !impl_->monitor) impl_->watch(ZMQ_EVENT_CONNECT_RETRIED);
+    if (impl_->options.watch_connecting && !impl_->monitor)
+      impl_->watch(ZMQ_EVENT_CONNECT_RETRIED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED | Impl::kHandshakeFailed);
+    if (const Keys* keys = impl_->home.access.keys()) {
+      if (!keys->own) return Error{fmt::format("{}: its keys are not for connecting", impl_->name)};
+      identify(impl_->socket, *keys);
+    }
     impl_->socket.connect(endpoint);
     return ok_status();
   } catch (const zmq::error_t& e) {
@@ -321,6 +423,11 @@ Status Socket::connect(const std::string& endpoint) {
 bool Socket::send_frames(std::string_view peer, std::string_view type, std::string body) {
   if (impl_->reads_ahead()) return impl_->ahead->send({std::string(type), std::move(body)});
   return impl_->send(peer, type, body);
+}
+
+void Socket::set_due(Due due) {
+  CHECK(impl_->options.read_ahead && !impl_->ahead);
+  impl_->due = std::move(due);
 }
 
 std::optional<Message> Socket::receive() { return impl_->reads_ahead() ? impl_->ahead->receive() : impl_->receive(); }
@@ -335,6 +442,27 @@ uint64_t Socket::failed_connections() const {
   if (!impl_->ahead) impl_->drain_monitor();
   return impl_->failed_connections;
 }
+uint64_t Socket::keys_refused() const {
+  if (!impl_->ahead) impl_->drain_monitor();
+  return impl_->keys_refused;
+}
+
+Socket::Refusal Socket::refusal() const {
+  if (!impl_->ahead) impl_->drain_monitor();
+  const Keys* keys = impl_->home.access.keys();
+  if (keys && impl_->turned_away == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH)
+    return {.text =
+                fmt::format("the key {} of {} is not let in there", keys->own ? keys->own->name : "", keys->folder)};
+  const bool turned_away = impl_->turned_away != 0, broken_off = impl_->broken_off >= kBrokenOff;
+  if (!turned_away && !broken_off) return {};
+  if (keys)
+    return {.text = fmt::format("it does not take the keys of {}: it has others, or none", keys->folder),
+            .may_pass = !turned_away};
+  return {.text = turned_away ? "it wants a key (--keys DIR)"
+                              : "it breaks off connections, as one that wants a key does (--keys DIR)",
+          .may_pass = !turned_away};
+}
+
 const std::string& Socket::name() const { return impl_->name; }
 
 bool wait_readable(const std::vector<Socket*>& sockets, int timeout_ms) {

@@ -8,11 +8,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/core/log.h"
 #include "common/core/result.h"
-#include "common/net/via.h"
+#include "common/net/keys/access.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::net {
@@ -22,8 +23,9 @@ enum class Kind { kRouter, kDealer, kPush, kPull, kPub, kSub };
 /// One a process: ZeroMQ's I/O threads. Sockets must not outlive it.
 class Context {
  public:
-  /// via: the proxies that connections over TCP go through.
-  explicit Context(Via via = {});
+  /// access: the proxies that connections over TCP go through, and the keys by which its sockets know others and are
+  /// known; without keys nothing is encrypted.
+  explicit Context(Access access = {});
   ~Context();
   struct Impl;
   Impl& impl() { return *impl_; }
@@ -38,7 +40,9 @@ struct Message {
   std::string type;
   wire::Bytes body;
   std::shared_ptr<const void> owner;
-  double arrived_s = 0;  ///< monotonic_s() when it was read off the connection
+  double arrived_s = 0;      ///< monotonic_s() when it was read off the connection
+  std::string user;          ///< of a socket that binds with keys: the name of the sender's key
+  std::optional<Role> role;  ///< and its role; nothing: there are no keys, and anybody may be the sender
 };
 
 struct SocketOptions {
@@ -46,13 +50,20 @@ struct SocketOptions {
   size_t max_message_bytes =
       wire::kMaxControlBytes;     ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
   int linger_ms = 500;            ///< for what is still to be sent when the socket goes
+  double patience_s = 10;         ///< a connection over which not one whole message came for longer is taken for broken
   bool watch_connecting = false;  ///< count attempts to connect that fail
   /// A thread of its own reads messages as they come and sends what is given to it, so that Message::arrived_s tells
   /// the network from the time that a message waited for its reader. For DEALER, PULL and SUB. Addresses must be bound
   /// or connected before the first message is sent or received.
   bool read_ahead = false;
   std::string_view toward;  ///< role of who is connected to, where Via has a proxy of its own for it
+  /// What a socket that binds is for, as the table of roles calls it (keys/roles.h): "control", "tiles" and so on. With
+  /// keys, one that is for nothing cannot be bound.
+  std::string_view serves;
 };
+
+/// SocketOptions::patience_s where messages of megabytes go over links of a megabit a second.
+inline constexpr double kBulkPatience_s = 60;
 
 class Socket {
  public:
@@ -62,7 +73,7 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
 
   /// Binds to tcp://ADDRESS:PORT (PORT may be *), ipc:// or inproc://. Returns the endpoint with its real port. An
-  /// address other than loopback is refused unless `insecure`.
+  /// address other than loopback is refused unless the context has keys, or `insecure`.
   Result<std::string> bind(const std::string& endpoint, bool insecure = false);
   /// Connects; the peer need not exist yet and may come back after being away.
   Status connect(const std::string& endpoint);
@@ -76,8 +87,14 @@ class Socket {
   /// Sends an already encoded message, shared by several receivers.
   bool send_frames(std::string_view peer, std::string_view type, std::string body);
 
+  /// With read_ahead: what the thread that reads is to say by itself, a message's type and body. It is asked at least
+  /// every 100 ms, however busy the owner is. To be set before anything is sent or received.
+  using Due = std::function<std::optional<std::pair<std::string, std::string>>()>;
+  void set_due(Due due);
+
   /// Next message, without waiting (PUB: never one, but viewers' subscriptions are looked at). Messages that are not
-  /// [peer,] type, body within the limits are dropped and counted.
+  /// [peer,] type, body within the limits are dropped and counted; with keys, also those that the sender's role may not
+  /// send here.
   std::optional<Message> receive();
 
   /// Decodes a message of known type; a bad one is counted and logged, naming its peer, and nothing comes back.
@@ -97,6 +114,16 @@ class Socket {
   /// With SocketOptions::watch_connecting: attempts to connect so far that came to nothing, because nobody listens
   /// there or the address is of no machine. ZeroMQ goes on trying.
   uint64_t failed_connections() const;
+  /// Of a socket that binds with keys: connections that were not let in, because they showed no key, another server's,
+  /// or one that is not on the allow-list or is for something else.
+  uint64_t keys_refused() const;
+  /// With SocketOptions::watch_connecting: why it was not let in where it connects to, as far as it was told; empty: it
+  /// was, or nothing is known yet. What is told does not change by waiting, unless `may_pass`.
+  struct Refusal {
+    std::string text;
+    bool may_pass = false;
+  };
+  Refusal refusal() const;
   const std::string& name() const;
 
   struct Impl;

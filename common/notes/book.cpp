@@ -109,6 +109,27 @@ Result<Note> read_note(const Entry& entry) {
   return out;
 }
 
+// What reading it as JSON would cost too much for; before that, for the parser keeps what is deep, and looks through an
+// object's keys for each one that it adds.
+Status complain_about_shape(std::string_view text) {
+  int depth = 0;
+  size_t keys[kMaxDepth + 1] = {};
+  for (size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == '"') {
+      while (++at < text.size() && text[at] != '"') at += text[at] == '\\';
+    } else if (c == '{' || c == '[') {
+      if (depth == kMaxDepth) return Error{fmt::format("lists and objects lie more than {} deep in each other", depth)};
+      keys[++depth] = 0;
+    } else if (c == '}' || c == ']') {
+      if (--depth < 0) return Error{"is no JSON object"};
+    } else if (c == ':' && ++keys[depth] > kMostKeys) {
+      return Error{fmt::format("an object has more than {} keys", kMostKeys)};
+    }
+  }
+  return ok_status();
+}
+
 // Calls read(entry) for each object of a list that may be absent.
 template <class Read>
 Status for_entries(const Json& json, const char* list, const char* name, const Read& read) {
@@ -184,13 +205,8 @@ std::string to_json(const Book& book) {
 
 Result<Book> book_from_json(std::string_view text) {
   if (text.size() > kMaxBytes) return Error{fmt::format("{} bytes, limit {}", text.size(), kMaxBytes)};
-  bool deep = false;  // what lies deeper is not even kept while reading
-  const auto keeps = [&](int depth, Json::parse_event_t, const Json&) {
-    deep = deep || depth > kMaxDepth;
-    return depth <= kMaxDepth;
-  };
-  const Json json = Json::parse(text, keeps, false);
-  if (deep) return Error{fmt::format("lists and objects lie more than {} deep in each other", kMaxDepth)};
+  if (const Status s = complain_about_shape(text); !s) return s.error();
+  const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return Error{"is no JSON object, or is cut off"};
   const auto version = json.find(kMark);
   if (version == json.end() || !version->is_number_integer())

@@ -16,7 +16,8 @@ namespace telesplat::notes {
 inline constexpr size_t kMaxBytes = 4 << 20;   ///< of a book's file
 inline constexpr size_t kMostEntries = 10000;  ///< bookmarks, and notes
 inline constexpr size_t kMaxName = 80, kMaxText = 4000;
-inline constexpr int kMaxDepth = 32;  ///< of lists and objects in each other
+inline constexpr int kMaxDepth = 32;       ///< of lists and objects in each other
+inline constexpr size_t kMostKeys = 1000;  ///< of an object
 
 struct Bookmark {
   std::string name;  ///< one line of UTF-8, not empty; one a book

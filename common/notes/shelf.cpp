@@ -85,14 +85,31 @@ int make_part(const fs::path& folder, mode_t mode, std::string& name) {
   return -1;
 }
 
-// The old file stays until the new one is whole; who may read and write it stays as it is. Returns 0, else errno.
+// Gives a new file owner, group and mode of the one that it is to replace. Only root gives files away: else whoever was
+// its owner, or of its group, must be able to use it all the same. Returns 0, else errno.
+int take_after(int descriptor, const struct stat& before) {
+  struct stat now;
+  if (fstat(descriptor, &now) != 0) return errno;
+  const bool same = now.st_uid == before.st_uid && now.st_gid == before.st_gid;
+  if (!same && fchown(descriptor, before.st_uid, before.st_gid) != 0) [[maybe_unused]]
+    const int group_kept = fchown(descriptor, static_cast<uid_t>(-1), before.st_gid);
+  if (fstat(descriptor, &now) != 0) return errno;
+  const mode_t mode = before.st_mode & 0777, group = (mode >> 3) & 7, others = mode & 7;
+  const bool same_group = now.st_gid == before.st_gid;
+  if (!same_group && (group & ~others) != 0) return EPERM;
+  if (now.st_uid != before.st_uid && ((same_group ? group : others) & 6) != 6) return EPERM;
+  return (now.st_mode & 0777) != mode && fchmod(descriptor, mode) != 0 ? errno : 0;
+}
+
+// The old file stays until the new one is whole; who may read and write it may still. Returns 0, else errno.
 int replace_file(const std::string& path, const std::string& text) {
   struct stat before;
   const bool there = stat(path.c_str(), &before) == 0;
   std::string part;
   const int descriptor = make_part(fs::path(path).parent_path(), there ? 0600 : 0666, part);
   if (descriptor < 0) return errno;
-  int failed = there && fchmod(descriptor, before.st_mode & 0777) != 0 ? errno : write_all(descriptor, text);
+  int failed = there ? take_after(descriptor, before) : 0;
+  if (failed == 0) failed = write_all(descriptor, text);
   if (close(descriptor) != 0 && failed == 0) failed = errno;
   if (failed == 0 && rename(part.c_str(), path.c_str()) != 0) failed = errno;
   if (failed != 0) unlink(part.c_str());
@@ -114,8 +131,11 @@ bool can_write_beside(const std::string& path) {
   return access(folder.c_str(), W_OK | X_OK) == 0 && (!exists(file) || access(file.c_str(), W_OK) == 0);
 }
 
-// A folder may be one where files are written, and this file one that is not.
-bool is_elsewhere(int failed) { return failed == ENAMETOOLONG || failed == EROFS || failed == EACCES; }
+// A folder may be one where files are written, and this file one that is not: in a folder like /tmp another person's
+// file is not replaced (EPERM).
+bool is_elsewhere(int failed) {
+  return failed == ENAMETOOLONG || failed == EROFS || failed == EACCES || failed == EPERM;
+}
 
 std::string read_path(const Shelf& shelf) {
   return exists(shelf.in_cache) || !exists(shelf.beside) ? shelf.in_cache : shelf.beside;

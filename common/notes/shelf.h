@@ -28,8 +28,10 @@ Result<Book> read_book(const Shelf& shelf, std::string* path = nullptr);
 
 /// Reads the book, changes it, and writes it: to a new file that takes the old one's place when it is whole. Beside the
 /// data if that can be written, else in the cache: `change` is called again where that turns out late. Of a link the
-/// file behind it is replaced; who may read and write it stays. Others who do the same wait meanwhile. Error: a book
-/// that cannot be read is left as it is; what `change` says; nowhere to write. path: where it was written.
+/// file behind it is replaced. Group and mode stay, and so does the owner if it is the caller, or the caller is root; a
+/// file that would be taken from its owner or its group is one that cannot be written. Access lists are not kept.
+/// Others who do the same wait meanwhile. Error: a book that cannot be read is left as it is; what `change` says;
+/// nowhere to write. path: where it was written.
 Status change_book(const Shelf& shelf, const std::function<Status(Book&)>& change, std::string* path = nullptr);
 
 }  // namespace telesplat::notes

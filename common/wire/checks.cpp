@@ -71,8 +71,8 @@ std::optional<Error> check(const Lease& m) {
 }
 
 std::optional<Error> check(const PlanRequest& m) {
-  if (m.tile_size >= 32 && m.tile_size <= 4096) return std::nullopt;
-  return Error{fmt::format("tiles of {} pixels, limits 32 and 4096", m.tile_size)};
+  if (m.tile_size >= 32 && m.tile_size <= kMaxTileSide) return std::nullopt;
+  return Error{fmt::format("tiles of {} pixels, limits 32 and {}", m.tile_size, kMaxTileSide)};
 }
 
 // Each tile lies in the frame, has rays, and its mask is there. All together have no more pixels than the frame: a plan

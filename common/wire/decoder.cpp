@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <msgpack/null_visitor.hpp>
+#include <msgpack/parse.hpp>
 #include <msgpack/unpack.hpp>
 
 #include "common/core/utf8.h"
@@ -30,12 +32,41 @@ std::optional<Error> check_version(const msgpack::object& map) {
   return Error{fmt::format("has version {} instead of {}", version->via.u64, kProtocolVersion)};
 }
 
+constexpr int kMaxDepth = 8;
+
+// Adds up what lists and maps claim to hold, without taking memory for it. Beyond the limit it stops.
+struct ElementCounter : msgpack::null_visitor {
+  size_t left = 0;
+  int depth = 0;
+  bool too_many = false;
+  bool take(uint64_t elements) {
+    too_many |= elements > left;
+    if (too_many || ++depth > kMaxDepth) return false;
+    left -= elements;
+    return true;
+  }
+  bool start_array(uint32_t elements) { return take(elements); }
+  bool start_map(uint32_t pairs) { return take(2 * uint64_t{pairs}); }
+  bool end_array() { return --depth, true; }
+  bool end_map() { return --depth, true; }
+};
+
+// An element takes a byte in the message, and 24 of memory once it is read. What is wrong otherwise is for the reader.
+bool has_more(Bytes body, size_t max_elements) {
+  ElementCounter counter;
+  counter.left = max_elements;
+  msgpack::parse(reinterpret_cast<const char*>(body.data()), body.size(), counter);
+  return counter.too_many;
+}
+
 }  // namespace
 
-std::optional<Error> read_map(Bytes body, const std::function<std::optional<Error>(Decoder&)>& read) {
+std::optional<Error> read_map(Bytes body, size_t max_elements,
+                              const std::function<std::optional<Error>(Decoder&)>& read) {
   try {
+    if (has_more(body, max_elements)) return Error{fmt::format("has more than {} elements", max_elements)};
     // Strings and binaries are referenced in place. What lists and maps claim is limited before memory is taken for it.
-    const msgpack::unpack_limit limit(geometry::kMaxChunks, kMaxEntries, kMaxControlBytes, kMaxBulkBytes, 0, 8);
+    const msgpack::unpack_limit limit(geometry::kMaxChunks, kMaxEntries, kMaxControlBytes, kMaxBulkBytes, 0, kMaxDepth);
     size_t offset = 0;
     const msgpack::object_handle handle = msgpack::unpack(
         reinterpret_cast<const char*>(body.data()), body.size(), offset,

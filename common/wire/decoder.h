@@ -82,8 +82,9 @@ class Decoder {
   std::optional<Error> error_;
 };
 
-/// Reads a body: one msgpack map of this protocol's version, whose fields `read` takes. `read` may return an error of
-/// its own. Bulk fields point into `body`.
-std::optional<Error> read_map(Bytes body, const std::function<std::optional<Error>(Decoder&)>& read);
+/// Reads a body: one msgpack map of this protocol's version, whose fields `read` takes, with at most max_elements
+/// elements in all lists and maps. `read` may return an error of its own. Bulk fields point into `body`.
+std::optional<Error> read_map(Bytes body, size_t max_elements,
+                              const std::function<std::optional<Error>(Decoder&)>& read);
 
 }  // namespace telesplat::wire

@@ -1,7 +1,10 @@
 #include "common/wire/encoder.h"
 
+#include <algorithm>
 #include <bit>
 #include <msgpack/pack.hpp>
+
+#include "common/core/utf8.h"
 
 static_assert(std::endian::native == std::endian::little, "bulk fields are little-endian and copied as they are");
 
@@ -19,6 +22,20 @@ class Packer : Appender, public msgpack::packer<Appender> {
   explicit Packer(std::string& out) : Appender{out}, msgpack::packer<Appender>(static_cast<Appender&>(*this)) {}
 };
 
+// Text that is not UTF-8, as receivers take it: to_utf8() of it, which may be three times as long, cut at a character
+// so that it stays within the limit that the text was within.
+std::string presentable(std::string_view text) {
+  std::string out = to_utf8(text);
+  for (const size_t limit : {kMaxString, kMaxFact, kMaxControlBytes}) {
+    if (text.size() > limit) continue;
+    size_t end = std::min(out.size(), limit);
+    while (end < out.size() && end > 0 && (static_cast<unsigned char>(out[end]) & 0xc0) == 0x80) --end;
+    out.resize(end);
+    break;
+  }
+  return out;
+}
+
 }  // namespace
 
 void Encoder::begin_map(uint32_t entries) { Packer(out_).pack_map(entries); }
@@ -34,7 +51,9 @@ void Encoder::numbers(std::span<const double> values) {
   for (const double v : values) put(v);
 }
 
+// Names and paths of a machine may be any bytes, and no receiver takes what is not UTF-8.
 void Encoder::put_text(std::string_view text) {
+  if (!valid_utf8(text)) return put_text(presentable(text));
   Packer packer(out_);
   packer.pack_str(static_cast<uint32_t>(text.size()));
   packer.pack_str_body(text.data(), static_cast<uint32_t>(text.size()));

@@ -77,9 +77,10 @@ struct StateMark {
   EpochId epoch;
   bool answer = false;  ///< true: everything a state_request asked for has been sent
   uint64_t points = 0;  ///< points of the model after that event
+  uint64_t digest = 0;  ///< points::PointModel::digest() of the model after that event; 0: not told
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("answer", m.answer);
-    f("points", m.points);
+    f("points", m.points); f("digest", m.digest);
   }
 };
 

@@ -14,7 +14,7 @@ namespace {
 /// How one message is written and read.
 struct Codec {
   std::string_view name;
-  size_t body_limit;
+  size_t body_limit, element_limit;
   void (*write)(Encoder&, const void*);
   std::optional<Error> (*read)(Decoder&, void*);
 };
@@ -33,7 +33,7 @@ std::optional<Error> read(Decoder& decoder, void* message) {
 
 template <class... M>
 constexpr std::array<Codec, sizeof...(M)> codecs(std::type_identity<std::tuple<M...>>) {
-  return {{{M::kName, kBodyLimit<M>, write<M>, read<M>}...}};
+  return {{{M::kName, kBodyLimit<M>, element_limit<M>(), write<M>, read<M>}...}};
 }
 constexpr auto kCodecs = codecs(std::type_identity<Messages>{});
 
@@ -50,7 +50,7 @@ std::optional<Error> detail::decode(size_t number, Bytes body, void* message) {
   const Codec& codec = kCodecs[number];
   const auto refused = [&](std::string_view why) { return Error{fmt::format("{}: {}", codec.name, why)}; };
   if (body.size() > codec.body_limit) return refused(fmt::format("{} bytes, limit {}", body.size(), codec.body_limit));
-  const auto bad = read_map(body, [&](Decoder& decoder) { return codec.read(decoder, message); });
+  const auto bad = read_map(body, codec.element_limit, [&](Decoder& decoder) { return codec.read(decoder, message); });
   return bad ? std::optional(refused(bad->text)) : std::nullopt;
 }
 

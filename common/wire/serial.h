@@ -30,7 +30,7 @@ std::optional<Error> decode(size_t number, Bytes body, void* message);
 
 }  // namespace detail
 
-/// One msgpack map: "v" and the fields of M.
+/// One msgpack map: "v" and the fields of M. Texts that are not UTF-8 are sent with U+FFFD in place of what is none.
 template <class M>
 std::string encode(const M& message) {
   return detail::encode(detail::number_of<M>(), &message);

@@ -54,11 +54,13 @@ struct Welcome {
   std::map<std::string, std::string> facts;      ///< "scene", "kind", "triangles"
   std::map<std::string, double> parameters;      ///< of the scene in this epoch
   std::map<std::string, double> settings;        ///< packing.* and session.* values
+  std::vector<uint32_t> lease_key;               ///< to the packer alone: kLeaseKeyWords numbers (lease_seal.h)
   template <class F> static void fields(F& f, auto& m) {
     f("master", m.master); f("hello_sent_s", m.hello_sent_s); f("master_s", m.master_s);
     f("clock", m.clock); f("epoch", m.epoch);
     f("octree_depth", m.octree_depth); f("box_room", m.box_room); f("endpoints", m.endpoints);
     f("facts", m.facts, kMaxFact); f("parameters", m.parameters); f("settings", m.settings);
+    f("lease_key", m.lease_key, kLeaseKeyWords);
   }
 };
 

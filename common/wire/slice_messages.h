@@ -99,10 +99,12 @@ struct SliceLease {
   volume::ShearFrame shear;      ///< validated against the session's grid by whoever uses it
   std::vector<SliceView> views;  ///< at least one, at most kMaxViews
   Moments moments;               ///< from the lease on; a sampler sends it back with its own
+  InstanceId master;             ///< which numbers leases and frames
+  std::vector<uint32_t> seal;    ///< as Lease::seal
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("partition", m.partition); f("slab", m.slab);
     f("slabs", m.slabs); f("begin", m.begin); f("end", m.end); f("shear", m.shear); f("views", m.views, kMaxViews);
-    f("moments", m.moments);
+    f("moments", m.moments); f("master", m.master); f("seal", m.seal, kSealWords);
   }
 };
 

@@ -46,11 +46,14 @@ struct Lease {
   std::vector<uint32_t> mask; ///< codec::encode_mask, of rect's size; empty: all pixels. Samplers do not send it back
   double footprint = 0;       ///< as ViewRequest::footprint; 0: of one of camera's pixels, over step
   Moments moments;            ///< as far as the lease; a sampler sends it back with its own
+  InstanceId master;          ///< which numbers leases and frames
+  std::vector<uint32_t> seal; ///< kSealWords numbers, of this master and for this sampler (lease_seal.h)
   template <class F> static void fields(F& f, auto& m) {
     f("lease", m.lease); f("frame", m.frame); f("epoch", m.epoch); f("viewer", m.viewer); f("request", m.request);
     f("tile", m.tile); f("step", m.step); f("block", m.block); f("blocks_in_frame", m.blocks_in_frame);
     f("camera", m.camera); f("rect", m.rect); f("block_rect", m.block_rect); f("extra", m.extra); f("rays", m.rays);
     f("mask", m.mask, kMaxMaskWords); f("footprint", m.footprint); f("moments", m.moments);
+    f("master", m.master); f("seal", m.seal, kSealWords);
   }
 };
 
@@ -82,6 +85,20 @@ struct TileDone {
     f("request", m.request); f("step", m.step);
     f("extra", m.extra); f("rays", m.rays); f("rect", m.rect); f("samples", m.samples); f("kept", m.kept);
     f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent); f("moments", m.moments);
+  }
+};
+
+/// Packer -> master: a tile, or a slab of a volume's frame, that was leased came and cannot be used. Whoever sampled it
+/// made it wrong, or the frame is: the master does not lease it for ever.
+struct TileRefused {
+  static constexpr std::string_view kName = "tile_refused";
+  FrameId frame;
+  uint64_t tile = 0;  ///< Lease::tile, SliceLease::slab
+  LeaseId lease;
+  InstanceId sampler;
+  std::string why;
+  template <class F> static void fields(F& f, auto& m) {
+    f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler); f("why", m.why);
   }
 };
 
@@ -161,6 +178,7 @@ struct ChunkListRequest {
 struct ChunkList {
   static constexpr std::string_view kName = "chunk_list";
   static constexpr bool kBulk = true;
+  static constexpr size_t kElements = 10 * geometry::kMaxChunks;
   EpochId epoch;
   std::vector<geometry::ChunkInfo> chunks;  ///< at most kMaxChunks
   template <class F> static void fields(F& f, auto& m) { f("epoch", m.epoch); f("chunks", m.chunks); }

@@ -173,7 +173,13 @@ Table scene_table(DataOptions& o) {
 }
 
 Table server_table(DataOptions& o) {
-  Table table{{.flag = "scene", .value = &o.scene, .help = scene_help(), .required = true}};
+  Table table{{.flag = "scene", .value = &o.scene, .help = scene_help(), .required = true},
+              {.flag = "--companions",
+               .value = &o.companions,
+               .help = "where files may lie that the scene's files name (voxels of a detached header, materials and "
+                       "textures of an OBJ, buffers and images of a glTF): folder: below the folder of the file that "
+                       "names them, links included; anywhere",
+               .limits = Names{"folder", "anywhere"}}};
   Table volume{
       {.flag = "--part",
        .value = &o.volume.part,

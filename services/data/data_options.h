@@ -16,6 +16,7 @@ struct DataOptions {
   MeshOptions mesh;      ///< its placement counts for all kinds of scene
   VolumeOptions volume;  ///< its `raw` and `series` count for surfaces of volumes, too
   julia::SceneOptions julia;
+  std::string companions = "folder";  ///< where a data server reads files that others name: "folder" or "anywhere"
 
   /// What open_mesh takes.
   MeshOptions mesh_options() const {

@@ -10,6 +10,8 @@
 #include "common/core/utf8.h"
 #include "common/metrics/about.h"
 #include "common/net/master_link.h"
+#include "services/data/base/cut_off.h"
+#include "services/data/companions.h"
 #include "services/data/kinds.h"
 #include "services/data/record.h"
 
@@ -42,7 +44,9 @@ Result<std::string> bind_requests(std::optional<net::Socket>& socket, net::Conte
                                   const Served::Requests& requests, const net::ServiceOptions& o) {
   if (requests.endpoint.empty()) return std::string();
   socket.emplace(context, net::Kind::kRouter, o.name + ":" + std::string(requests.endpoint),
-                 net::SocketOptions{.high_water_mark = requests.high_water_mark});
+                 net::SocketOptions{.high_water_mark = requests.high_water_mark,
+                                    .patience_s = net::kBulkPatience_s,
+                                    .serves = requests.endpoint});
   const auto bound = socket->bind(o.bind, o.insecure);
   if (!bound) return bound.error();
   return net::announced(*bound, o.advertise);
@@ -50,7 +54,10 @@ Result<std::string> bind_requests(std::optional<net::Socket>& socket, net::Conte
 
 net::MasterLink::Values status_of(const Served& served, const std::optional<net::Socket>& requests) {
   net::MasterLink::Values values{{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}};
-  if (requests) values["messages_rejected"] = double(requests->rejected());
+  if (requests) {
+    values["messages_rejected"] = double(requests->rejected());
+    values["keys_refused"] = double(requests->keys_refused());
+  }
   served.add_status(values);
   return values;
 }
@@ -131,21 +138,33 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
     }
   }
   link.leave(status);
-  return 0;
+  return link.refused() ? 2 : 0;
 }
 
 int run(const DataServiceOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
+  const auto access = net::access_of(o.service, {net::Role::kData}, true);
+  if (!access) {
+    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
+    return 2;
+  }
   const double begin_s = monotonic_s();
+  end_at_cut_off_files(2);
+  if (const Status s = check_companions(o); !s) {
+    std::fprintf(stderr, "telesplat: %s\n", s.error().text.c_str());
+    return 2;
+  }
   const auto served = open(o, make_progress(o.report_progress, o.scene));
   if (!served) {
     std::fprintf(stderr, "telesplat: %s\n", served.error().text.c_str());
     return 2;
   }
+  end_at_cut_off_files(
+      1);  // now it is the chunk store or a later step of a series: whoever starts it again may succeed
   net::install_signal_handlers();  // until here a signal ended the process: what was being read is read again next time
   log::info("{}: {}; ready in {:.0f} ms", o.scene, (*served)->summary(), 1e3 * (monotonic_s() - begin_s));
   tell_notes(**served, o.report_progress);
-  net::Context context;
+  net::Context context(*access);
   return serve(
       context, **served, o.service, [] { return false; }, recorded(o, **served));
 }

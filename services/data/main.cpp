@@ -5,7 +5,7 @@
 int main(int argc, char** argv) {
   using namespace telesplat;
   data::DataServiceOptions options;
-  options.service.name = "data";
+  options.service.name = net::unique_name("data");
   return net::service_main(argc, argv, "telesplat-data: reads a data set and serves its blocks to samplers", options,
                            data::table, data::run);
 }

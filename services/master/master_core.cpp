@@ -4,15 +4,19 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "common/core/log.h"
+#include "common/core/utf8.h"
 #include "common/scene/session.h"
+#include "services/master/peers/hello_check.h"
 
 namespace telesplat::master {
 namespace {
 
-constexpr size_t kMaxPeers = 4096;  // remembered processes, the departed included
+constexpr size_t kMaxDeparted = 1024;  // processes that left and are remembered
 constexpr size_t kMaxWalls = 64;
+constexpr double kCatchUp_s = 0.5;      // after this process stood still, until all that has come is read
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
 constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
 
@@ -25,7 +29,15 @@ bool hold_different_parts(const wire::Hello& a, const wire::Hello& b) {
 }  // namespace
 
 MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metrics::RunRecord& record)
-    : options_(options), instance_(instance), record_(record), clipping_(options.clip) {
+    : options_(options),
+      instance_(instance),
+      record_(record),
+      signer_(instance,
+              [this](const std::string& id) {
+                const auto p = peers_.find(id);
+                return p == peers_.end() ? InstanceId{} : p->second.hello.instance;
+              }),
+      clipping_(options.clip) {
   const auto name_of = [this](const std::string& id) {
     const auto p = peers_.find(id);
     return p == peers_.end() ? std::string("?") : p->second.hello.name;
@@ -34,10 +46,12 @@ MasterCore::MasterCore(const MasterOptions& options, InstanceId instance, metric
     const auto id = instances_.find(instance);
     return id == instances_.end() ? std::string("?") : name_of(id->second);
   };
-  const PlanLinks links{
-      .outbox = outbox_, .record = record_, .name_of = name_of, .name_of_instance = name_of_instance, .packer = [this] {
-        return packer();
-      }};
+  const PlanLinks links{.outbox = outbox_,
+                        .signer = signer_,
+                        .record = record_,
+                        .name_of = name_of,
+                        .name_of_instance = name_of_instance,
+                        .packer = [this] { return packer(); }};
   for (const auto kind : scene::kKinds)
     if (auto& plan = plans_[scene::pipeline_of(kind)]; !plan)
       plan = make_plan(scene::pipeline_of(kind), options_, links);
@@ -62,9 +76,27 @@ MasterCore::Peer* MasterCore::known_sampler(const std::string& peer, double now_
 }
 
 std::string MasterCore::packer() const {
-  const auto packer = std::find_if(peers_.begin(), peers_.end(),
-                                   [](const auto& p) { return !p.second.gone && p.second.hello.role == "packer"; });
-  return packer == peers_.end() ? std::string() : packer->first;
+  auto longest = peers_.end();
+  for (auto p = peers_.begin(); p != peers_.end(); ++p)
+    if (!p->second.gone && p->second.hello.role == "packer" &&
+        (longest == peers_.end() || p->second.joined < longest->second.joined))
+      longest = p;
+  return longest == peers_.end() ? std::string() : longest->first;
+}
+
+// Another packer has nothing of what the one before it had.
+void MasterCore::follow_packer() {
+  const std::string now = packer();
+  if (now.empty() || now == leading_packer_) return;
+  leading_packer_ = now;
+  plan_->new_packer();
+}
+
+// One that waited takes the place of one that is gone: everyone is told where.
+void MasterCore::follow_another_packer(double now_s) {
+  const bool gone = leading_packer_.empty();
+  follow_packer();
+  if (gone && !leading_packer_.empty()) announce(now_s);
 }
 
 bool MasterCore::samplers_here() const {
@@ -74,23 +106,55 @@ bool MasterCore::samplers_here() const {
 
 // Forgets someone who left if there are too many. False: all are here.
 bool MasterCore::make_room(const std::string& peer) {
-  if (peers_.size() < kMaxPeers || peers_.contains(peer)) return true;
+  const auto before = peers_.find(peer);
+  if (before != peers_.end() && !before->second.gone) return true;
+  const auto here = size_t(std::count_if(peers_.begin(), peers_.end(), [](const auto& p) { return !p.second.gone; }));
+  if (here >= options_.limits.max_peers) return false;
+  if (before != peers_.end() || peers_.size() < here + kMaxDeparted) return true;
   const auto departed = std::find_if(peers_.begin(), peers_.end(), [](const auto& p) { return p.second.gone; });
-  if (departed == peers_.end()) return false;
-  instances_.erase(departed->second.hello.instance);
+  if (departed == peers_.end()) return true;
+  forget(departed->second, departed->first);
   peers_.erase(departed);
   return true;
 }
 
-// A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet.
-void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m) {
-  for (auto& [id, p] : peers_)
-    if (id != peer && p.hello.role == m.role &&
-        (p.hello.instance == m.instance ||
-         (m.role != "ctl" && p.hello.name == m.name && !hold_different_parts(p.hello, m)))) {
-      if (!p.gone) lose(p, id, "was replaced");
-      p.process.replaced = true;
+void MasterCore::forget(const Peer& p, const std::string& routing_id) {
+  if (const auto by = instances_.find(p.hello.instance); by != instances_.end() && by->second == routing_id)
+    instances_.erase(by);
+  if (p.hello.role != "ctl") departed_.add(p.process);
+}
+
+void MasterCore::forget_departed(double now_s) {
+  std::erase_if(peers_, [&](const auto& entry) {
+    const auto& [id, p] = entry;
+    if (!p.gone || (p.hello.role != "ctl" && now_s - p.seen_s < Departed::kAfter_s)) return false;
+    forget(p, id);
+    return true;
+  });
+}
+
+// A process of the same name in a new life replaces the old one, whose socket may not be known to be dead yet. Two that
+// both live stay: they would replace each other for ever.
+void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s) {
+  const auto before = peers_.find(peer);
+  const bool here = before != peers_.end() && !before->second.gone && before->second.hello.instance == m.instance;
+  const bool lives_on = namesakes_.lives_on(m.instance, now_s);
+  bool told = false;
+  for (auto& [id, p] : peers_) {
+    if (id == peer || p.hello.role != m.role) continue;
+    const bool moved = p.hello.instance == m.instance;  // to another connection
+    if (!moved && (m.role == "ctl" || p.hello.name != m.name || hold_different_parts(p.hello, m))) continue;
+    if (!moved && !p.gone && (here || lives_on)) {
+      if (!here && !std::exchange(told, true))
+        log::warn("two processes of the role {} are called {}: give one another --name", m.role, m.name);
+      continue;
     }
+    if (!p.gone) {
+      lose(p, id, "was replaced");
+      if (!moved) namesakes_.replaced(p.hello.instance, now_s);
+    }
+    p.process.replaced = true;
+  }
 }
 
 MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& m, double now_s) {
@@ -99,6 +163,8 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
     forget_viewer(p.hello);
     p.coupling.reset();
   }
+  if (p.hello.instance != m.instance || p.hello.role != m.role || p.gone)
+    p.joined = ++joined_, p.process.replaced = false;
   live_.set_here(p.hello.role, p.hello.name, false);  // if it has another name now
   instances_.erase(p.hello.instance);
   instances_[m.instance] = peer;
@@ -116,33 +182,65 @@ MasterCore::Peer& MasterCore::enter(const std::string& peer, const wire::Hello& 
   return p;
 }
 
+bool MasterCore::admit(const std::string& peer, double now_s) {
+  const auto p = peers_.find(peer);
+  const bool packer = p != peers_.end() && !p->second.gone && p->second.hello.role == "packer";
+  return packer || gate_.admit(peer, now_s);
+}
+
+// It is told why, and ends: it could do nothing here.
+void MasterCore::refuse(const std::string& peer, const wire::Hello& m, const std::string& why, double now_s) {
+  gate_.refuse_hello();
+  if (gate_.may_log(now_s)) log::warn("{} {} is refused: {}", printable(m.role, 64), printable(m.name, 128), why);
+  outbox_.send(peer, wire::Shutdown{why});
+}
+
 void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s) {
-  if (!make_room(peer)) return;
-  replace_namesakes(peer, m);
+  if (const Status fits = check_hello(m); !fits) return refuse(peer, m, fits.error().text, now_s);
+  if (!make_room(peer))
+    return refuse(peer, m, fmt::format("{} processes take part already (--max-peers)", options_.limits.max_peers),
+                  now_s);
+  if (const auto said = peers_.find(peer); said != peers_.end()) {
+    if (!said->second.hello_pace.allows(now_s)) return void(said->second.put_off = m);
+    said->second.hello_pace.count(now_s);
+    said->second.put_off.reset();
+  }
+  replace_namesakes(peer, m, now_s);
   const auto before = peers_.find(peer);
   const bool changed = before == peers_.end() || before->second.hello.instance != m.instance || before->second.gone ||
                        before->second.hello.endpoints != m.endpoints;
-  if (changed && m.role == "packer") plan_->new_packer();
+  if (changed && peer == leading_packer_) leading_packer_.clear();
   if (changed && m.role == "sampler")
     for (auto& [pipeline, plan] : plans_) plan->release_sampler(peer);  // a new one holds nothing yet
   Peer& p = enter(peer, m, now_s);
-  if (changed && m.role != "ctl") log::info("{} {} joined", m.role, m.name);
+  if (m.role == "packer") follow_packer();
+  if (changed && m.role != "ctl" && gate_.may_log(now_s)) log::info("{} {} joined", m.role, m.name);
+  const EpochId epoch = epoch_;
   if (m.role == "data")
-    if (const Status s = adopt_scene(m, now_s); !s) {
+    if (const Status s = adopt_scene(peer, m, now_s); !s) {
       p.refused = true;
+      if (shows_ == peer) shows_.clear();
       log::error("the scene of {} is refused: {}", m.name, s.error().text);
     }
   wire::Welcome w = welcome(p, now_s);
   w.hello_sent_s = m.sent_s;
   outbox_.send(peer, w);
-  if (changed && (!m.endpoints.empty() || m.role == "data")) announce(now_s);
+  if (changed && epoch == epoch_ && (!m.endpoints.empty() || m.role == "data")) announce_soon(now_s);
   if (m.role == "sampler") join(peer);
   dispatch(now_s);
 }
 
+void MasterCore::take_put_off_hellos(double now_s) {
+  std::vector<std::pair<std::string, wire::Hello>> due;
+  for (const auto& [id, p] : peers_)
+    if (p.put_off && p.hello_pace.allows(now_s)) due.emplace_back(id, *p.put_off);
+  for (const auto& [id, hello] : due)
+    if (const auto p = peers_.find(id); p != peers_.end() && p->second.put_off) on(id, hello, now_s);
+}
+
 void MasterCore::on(const std::string& peer, const wire::StatusReport& m, double now_s) {
   Peer* p = known(peer, now_s);
-  if (!p) return;
+  if (!p || m.values.empty()) return;  // without values it is a sign of life, of a process that works
   p->process.values = m.values;
   p->reports.push_back(m.values);
   if (p->reports.size() > kReports) p->reports.pop_front();
@@ -156,6 +254,7 @@ void MasterCore::on(const std::string& peer, const wire::Goodbye& m, double now_
   if (it == peers_.end() || it->second.gone) return;
   const std::string id = it->first;  // not the other connection's
   lose(it->second, id, "left", true);
+  follow_another_packer(now_s);
   dispatch(now_s);
 }
 
@@ -176,6 +275,8 @@ void MasterCore::forget_viewer(const wire::Hello& hello) {
 
 void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, bool said_goodbye) {
   p.gone = true;
+  p.put_off.reset();
+  if (routing_id == leading_packer_) leading_packer_.clear();
   live_.set_here(p.hello.role, p.hello.name, false);
   idle_.remove(routing_id);
   int leases = 0;
@@ -186,7 +287,7 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
   if (!said_goodbye) leases_expired_ += uint64_t(leases);  // the dead cannot finish: their leases end here
   forget_viewer(p.hello);
   for (const auto& [peer, reply] : errands_.lost(routing_id)) outbox_.send(peer, reply);
-  if (p.hello.role != "ctl") log::info("{} {} {}", p.hello.role, p.hello.name, why);
+  if (p.hello.role != "ctl" && gate_.may_log(now_s_)) log::info("{} {} {}", p.hello.role, p.hello.name, why);
 }
 
 Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double now_s) {
@@ -237,8 +338,8 @@ void MasterCore::on(const std::string& peer, const wire::ViewRequest& m, double 
   Peer* p = known(peer, now_s);
   if (!p || p->hello.role != "viewer" || p->hello.instance != m.viewer) return;
   // The coarse pass looks a little beyond the view's edges, maybe beyond what a lease may.
-  if (!geometry::validate(geometry::subsample(m.camera, kCoarseStep))) return;
-  wire::ViewRequest request = m;
+  wire::ViewRequest request = gate_.admit(m);
+  if (!geometry::validate(geometry::subsample(request.camera, kCoarseStep))) return;
   request.moments = {.requested_s = m.moments.requested_s, .received_s = now_s};
   plan_->views().request_view(request);
   dispatch(now_s);
@@ -259,7 +360,7 @@ void MasterCore::on(const std::string& peer, const wire::LeaseRequest&, double n
 void MasterCore::on(const std::string& peer, const wire::LeaseExtend& m, double now_s) {
   if (!known_sampler(peer, now_s)) return;
   join(peer);
-  plan_->extend(m.lease, now_s);
+  plan_->extend(m.lease, peer, now_s);
 }
 
 void MasterCore::on(const std::string& peer, const wire::SlabReady& m, double now_s) {
@@ -279,6 +380,21 @@ void MasterCore::on(const std::string& peer, const wire::TileDone& m, double now
   const std::string& name = known_sampler ? sampler->second.hello.name : std::string("?");
   record_.add_tile(name, m);
   live_.add_tile(name, m, known_sampler && !sampler->second.gone);
+  dispatch(now_s);
+}
+
+// Refused by whom it was leased to: of a sampler that is gone nothing is known any more, and its leases are back.
+void MasterCore::on(const std::string& peer, const wire::TileRefused& m, double now_s) {
+  const Peer* p = known(peer, now_s);
+  if (!p || p->hello.role != "packer") return;
+  const auto by = instances_.find(m.sampler);
+  if (by == instances_.end()) return;
+  const auto sampler = peers_.find(by->second);
+  if (sampler == peers_.end()) return;
+  plan_->refused(m, sampler->first);
+  if (refused_tiles_.allow(now_s))
+    log::warn("{} cannot use what sampler {} made of tile {} of frame {}: {}", p->hello.name,
+              sampler->second.hello.name, m.tile, m.frame.value, m.why);
   dispatch(now_s);
 }
 
@@ -302,14 +418,24 @@ Status MasterCore::on(const std::string& peer, const wire::Plan& m, double now_s
   return Error{fmt::format("{}: {}", name, taken.error().text)};
 }
 
+void MasterCore::stood_still(double for_s, double now_s) {
+  for (auto& [id, p] : peers_)
+    if (!p.gone) p.seen_s += for_s;
+  leases_rest_until_s_ = now_s + kCatchUp_s;
+}
+
 void MasterCore::tick(double now_s) {
   now_s_ = now_s;
   for (auto& [name, wall] : walls_) wall.tick(now_s);
   send_swaps();
+  take_put_off_hellos(now_s);
   for (auto& [id, p] : peers_)
     if (!p.gone && now_s - p.seen_s > options_.silent_after_s) lose(p, id, "fell silent");
+  forget_departed(now_s);
+  follow_another_packer(now_s);
+  if (announce_due_) announce_soon(now_s);
   for (const auto& [peer, reply] : errands_.overdue(now_s)) outbox_.send(peer, reply);
-  const Ticked ticked = plan_->tick(now_s);
+  const Ticked ticked = now_s < leases_rest_until_s_ ? Ticked{} : plan_->tick(now_s);
   leases_expired_ += uint64_t(ticked.expired);
   // A message to a process that died is undeliverable, which is sooner known than that its lease ran out.
   for (const auto& sampler : ticked.overdue)

@@ -5,17 +5,24 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "common/core/log.h"
 #include "common/metrics/run_record.h"
 #include "common/net/session_file.h"
+#include "services/master/gate/gate.h"
+#include "services/master/leases/lease_signer.h"
 #include "services/master/live/exposition.h"
 #include "services/master/orders/clipping.h"
 #include "services/master/orders/errands.h"
 #include "services/master/outbox.h"
+#include "services/master/peers/departed.h"
+#include "services/master/peers/namesakes.h"
+#include "services/master/peers/pace.h"
 #include "services/master/plan.h"
 #include "services/master/settings.h"
 #include "services/master/wall/swap_barrier.h"
@@ -28,12 +35,15 @@ class MasterCore {
   MasterCore(const MasterCore&) = delete;  // plans refer to it
   MasterCore& operator=(const MasterCore&) = delete;
 
+  /// One more message of this peer may be handed to on(): it does not send more than its part. False: it is dropped.
+  bool admit(const std::string& peer, double now_s);
   void on(const std::string& peer, const wire::Hello& m, double now_s);
   void on(const std::string& peer, const wire::StatusReport& m, double now_s);
   void on(const std::string& peer, const wire::ViewRequest& m, double now_s);
   void on(const std::string& peer, const wire::LeaseRequest& m, double now_s);
   void on(const std::string& peer, const wire::LeaseExtend& m, double now_s);
   void on(const std::string& peer, const wire::TileDone& m, double now_s);
+  void on(const std::string& peer, const wire::TileRefused& m, double now_s);
   void on(const std::string& peer, const wire::Goodbye& m, double now_s);
   void on(const std::string& peer, const wire::Control& m, double now_s);
   void on(const std::string& peer, const wire::SlabReady& m, double now_s);
@@ -50,6 +60,9 @@ class MasterCore {
   void undeliverable(const std::string& peer);
   /// To be called every 50 ms or so: expires leases, notices the dead.
   void tick(double now_s);
+  /// This process did not run for so long: nobody else's silence counts, and leases are given a moment to be told of.
+  /// To be called before what has come meanwhile is taken.
+  void stood_still(double for_s, double now_s);
   /// tick() should come every few ms.
   bool hurried() const { return !idle_.empty() && plan_->hurried(); }
   /// tick() should come then, if nothing comes before: a wall waits for a viewer that may be late. Nothing: none does.
@@ -58,6 +71,9 @@ class MasterCore {
   void shut_down(const std::string& reason);
 
   std::vector<Outgoing> take_outgoing() { return outbox_.take(); }
+  size_t outgoing() const { return outbox_.size(); }
+  /// Processes of which anything is remembered but for the record.
+  size_t remembered() const { return peers_.size(); }
   InstanceId instance() const { return instance_; }
   bool stop_requested() const { return stop_; }
   /// True once everyone who was told to finish has said goodbye.
@@ -70,6 +86,7 @@ class MasterCore {
     run_id_ = run_id;
   }
   const net::RunningSession& session() const { return session_; }
+  const LimitsHit& limits_hit() const { return gate_.hit(); }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
   /// For those who watch; what figures() and live() do not have of it is left to the caller: version, and the master
@@ -77,6 +94,11 @@ class MasterCore {
   LiveSnapshot live_snapshot() const;
   const LiveFigures& live() const { return live_; }
   Figures figures() const;  ///< of all plans together
+  /// What the socket counts, for status.
+  struct Door {
+    uint64_t messages_rejected = 0, keys_refused = 0;
+  };
+  void tell_door(const Door& door) { door_ = door; }
   bool progressive() const { return plan_->progressive(); }
   std::string animation() const { return plan_->animation(); }
   /// As everyone is told them: what was left to the kind of scene is decided.
@@ -89,35 +111,50 @@ class MasterCore {
     metrics::Process process;
     std::deque<std::map<std::string, double>> reports;  ///< the newest few, for rates
     double seen_s = 0;
+    uint64_t joined = 0;  ///< rises with each process that joins, in whichever life
     bool gone = false;
     bool refused = false;                   ///< a data server whose scene cannot be shown
     std::optional<CouplingOrder> coupling;  ///< a viewer's, if it was ordered one
     int leases_at_once = 0;                 ///< a sampler's: Idle::Sampler::at_once
+    Pace hello_pace{8, 4};                  ///< as its facts become known; then as often as one that is not welcomed
+    std::optional<wire::Hello> put_off;     ///< its newest hello, if it says more than the pace allows
     double probed_s = -1e9;                 ///< when it was last asked whether it still is there
   };
   // Who takes part.
   Peer* known(const std::string& peer, double now_s);
   Peer* known_sampler(const std::string& peer, double now_s);
+  /// The packer that has been here for longest: others wait for it to leave.
   std::string packer() const;
+  void follow_packer();
+  void follow_another_packer(double now_s);
   bool samplers_here() const;
   bool make_room(const std::string& peer);
-  void replace_namesakes(const std::string& peer, const wire::Hello& m);
+  void refuse(const std::string& peer, const wire::Hello& m, const std::string& why, double now_s);
+  void forget_departed(double now_s);
+  void forget(const Peer& peer, const std::string& routing_id);
+  void replace_namesakes(const std::string& peer, const wire::Hello& m, double now_s);
+  void take_put_off_hellos(double now_s);
   Peer& enter(const std::string& peer, const wire::Hello& m, double now_s);
   void forget_viewer(const wire::Hello& hello);
   void lose(Peer& peer, const std::string& routing_id, const char* why, bool said_goodbye = false);
 
   // The scene and its epochs.
   Plan& plan_of(const wire::Hello& data);
-  Status adopt_scene(const wire::Hello& data, double now_s);
+  Status adopt_scene(const std::string& peer, const wire::Hello& data, double now_s);
   wire::Welcome scene_as_told() const;
   wire::Welcome welcome(const Peer& to, double now_s) const;
+  void add_endpoints(wire::Welcome& welcome) const;
   void announce(double now_s);
+  void announce_soon(double now_s);
   void next_epoch(double now_s);
   void record_epoch(double now_s);
   Result<std::string> obey(const wire::Control& m, double now_s);
   Result<std::string> order_coupling(const wire::Control& m, double now_s);
   Status pass_on(const std::string& peer, const wire::Control& m, const std::string& role, double now_s);
-  std::string status_json(double now_s) const;
+  /// all: facts are told whole.
+  nlohmann::ordered_json process_json(const std::string& routing_id, const Peer& peer, double now_s, bool all) const;
+  std::string status_json(double now_s, bool all) const;
+  wire::ControlReply health(const wire::Control& m, double now_s) const;
 
   // Walls.
   void send_swaps();
@@ -131,10 +168,13 @@ class MasterCore {
   InstanceId instance_;
   metrics::RunRecord& record_;
   Outbox outbox_;
+  LeaseSigner signer_;
+  Gate gate_{options_.limits};
   net::RunningSession session_;
   std::string run_id_;
+  Door door_;
   std::map<scene::Pipeline, std::unique_ptr<Plan>> plans_;
-  Plan* plan_;                       // of these, the one that leads
+  Plan* plan_;  // of these, the one that leads
   Clipping clipping_;
   Errands errands_;
   std::optional<scene::Kind> kind_;  // of its scene
@@ -142,11 +182,20 @@ class MasterCore {
   EpochId epoch_{1};
   std::map<std::string, Peer> peers_;                      // by routing id
   std::unordered_map<InstanceId, std::string> instances_;  // routing ids
+  Namesakes namesakes_;
+  Departed departed_;
+  std::string shows_;  // the data server that the scene is of
+  uint64_t joined_ = 0;
+  std::string leading_packer_;  // that frames were begun with; empty: none, or it is gone
   Idle idle_;
   LiveFigures live_;
   std::map<std::string, SwapBarrier> walls_;  // by what their viewers call them
   SwapBarrier::Figures swaps_;                // of walls that are gone
   uint64_t leases_expired_ = 0;
+  log::RateLimiter refused_tiles_;  // of lines about them
+  double leases_rest_until_s_ = -1e9;
+  Pace announcements_{8, 20};
+  bool announce_due_ = false;
   double now_s_ = 0;  // of what came last
   bool stop_ = false;
 };

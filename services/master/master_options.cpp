@@ -8,6 +8,7 @@
 
 #include "common/scene/clip_order.h"
 #include "common/volume/shear.h"
+#include "common/wire/limits.h"
 
 namespace telesplat::master {
 namespace {
@@ -111,7 +112,7 @@ options::Table lease_table(MasterOptions& o) {
   return {{.flag = "--tile-size",
            .value = &o.schedule.tile_size,
            .help = "pixels a side of a tile",
-           .limits = options::Range{16, 4096}},
+           .limits = options::Range{16, wire::kMaxTileSide}},
           {.flag = "--frames-in-flight",
            .value = &o.schedule.frames_in_flight,
            .help = "sampling frames begun and not complete",
@@ -120,6 +121,14 @@ options::Table lease_table(MasterOptions& o) {
            .value = &o.schedule.lease_timeout_s,
            .help = "seconds before a lease goes to another sampler",
            .limits = options::Range{0.05, 3600}},
+          {.flag = "--longest-fetch",
+           .value = &o.schedule.longest_fetch_s,
+           .help = "seconds that a sampler may have a lease that it asks to be extended, while it fetches data",
+           .limits = options::Range{1, 3600}},
+          {.flag = "--silent-after",
+           .value = &o.silent_after_s,
+           .help = "seconds after which a process that says nothing is taken for dead",
+           .limits = options::Range{2.0, 600.0}},
           {.flag = "--max-rate",
            .value = &o.schedule.max_rate_mbit,
            .help = "Mbit/s to each viewer at most, as near as updates can be measured out; 0: what its link carries",
@@ -194,6 +203,35 @@ options::Table session_table(MasterServiceOptions& o) {
       {clip_row(o.master)});
 }
 
+options::Table limit_table(MasterServiceOptions& o) {
+  Limits& l = o.master.limits;
+  return {{.flag = "--max-sampling-pixels",
+           .value = &l.max_sampling_pixels,
+           .help = "pixels of a view at most; of one that has more, every second, third, ... of each row and column is "
+                   "sampled",
+           .limits = options::Range{1, 1 << 28}},
+          {.flag = "--max-peers",
+           .value = &l.max_peers,
+           .help = "processes that take part at a time; further ones are refused",
+           .limits = options::Range{1, 4096}},
+          {.flag = "--max-messages",
+           .value = &l.max_messages,
+           .help = "messages of one process a second, the packer's left out; what is beyond is dropped and counted",
+           .limits = options::Range{10.0, 1e6}}};
+}
+
+options::Table record_table(MasterServiceOptions& o) {
+  return {{.flag = "--table-limit-mb",
+           .value = &o.table_limit_mb,
+           .help = "MB that each table of the record has at most (frames.csv, tiles.csv, ...); what is beyond is "
+                   "counted; 0: no limit",
+           .limits = options::Range{0.0, 1e9}},
+          {.flag = "--trace-limit-mb",
+           .value = &o.trace_limit_mb,
+           .help = "MB that the record's trace.json has at most; 0: no limit",
+           .limits = options::Range{0.0, 1e9}}};
+}
+
 options::Row metrics_port_row(MasterServiceOptions& o) {
   return {.flag = "--metrics-port",
           .value = &o.metrics_port,
@@ -207,6 +245,10 @@ options::Table table(MasterServiceOptions& o) {
       {.flag = "--overwrite",
        .value = &o.overwrite,
        .help = "the folder of --out may hold a record already: its files are replaced, others stay",
+       .reach = options::Reach::kHere},
+      {.flag = "--continue",
+       .value = &o.goes_on,
+       .help = "go on with the record that a master before left in the folder of --out, if there is one",
        .reach = options::Reach::kHere},
       {.flag = "--started-by",
        .value = &o.started_by,
@@ -223,7 +265,8 @@ options::Table table(MasterServiceOptions& o) {
        .help = "change a Julia set's parameters with time: c.y=-0.4:0.4:10s, or c.y=@0s:-0.4@5s:0.4@10s:-0.4; several "
                "are separated by \";\"",
        .reach = options::Reach::kHere}};
-  return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own), session_table(o));
+  return options::joined(options::joined(net::service_table(o.service, net::Ends::kBinds), own),
+                         options::joined(options::joined(record_table(o), limit_table(o)), session_table(o)));
 }
 
 }  // namespace telesplat::master

@@ -8,8 +8,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <optional>
+#include <utility>
 
 #include "common/core/clock.h"
 #include "common/core/log.h"
@@ -18,6 +18,7 @@
 #include "common/net/dispatch.h"
 #include "common/net/process_facts.h"
 #include "common/net/session_file.h"
+#include "services/master/gate/senders.h"
 #include "services/master/guarded.h"
 #include "services/master/live/http_endpoint.h"
 #include "services/master/master_core.h"
@@ -28,8 +29,10 @@ namespace {
 
 // How long others may take to say goodbye; less where someone waits for the master itself to end.
 constexpr double kFarewell_s = 3.0, kShortFarewell_s = 1.0;
-constexpr int kMessagesAtOnce = 1000;  // between two ticks
+constexpr int kMessagesAtOnce = 1000;   // between two ticks
+constexpr size_t kMostOutgoing = 2000;  // messages that wait to be sent before more are read
 constexpr double kMetricsPeriod_s = 1;
+constexpr double kStandstill_s = 1;  // the loop comes by every 20 ms; stopped, it does not know that others spoke
 
 Result<MasterOptions> core_options(const MasterServiceOptions& o) {
   MasterOptions out = o.master;
@@ -48,15 +51,17 @@ net::RunningSession introduction(const MasterServiceOptions& o, const std::strin
           .run_folder = net::absolute_path(o.out),
           .started_at_s =
               std::floor(std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count()),
-          .started_by = o.started_by};
+          .started_by = o.started_by,
+          .keys = net::absolute_path(o.service.keys)};
 }
 
 /// The control socket, and the core that answers what comes over it.
 class MasterService {
  public:
   MasterService(const MasterServiceOptions& o, const MasterOptions& core, std::unique_ptr<metrics::RunRecord> record,
-                std::string run_id)
+                std::string run_id, const net::Access& access)
       : options_(o),
+        context_(access),
         record_(std::move(record)),
         run_id_(std::move(run_id)),
         core_(core, net::make_instance_id(), *record_) {}
@@ -89,6 +94,7 @@ class MasterService {
                   net::announced(*endpoint, {}).c_str());
     else
       log::info("listening on {}", *endpoint);  // stdout is read by who started it, and goes nowhere
+    if (!options_.service.keys.empty()) log::info("keys of {}: others need theirs", options_.service.keys);
     std::fflush(stdout);
     return ok_status();
   }
@@ -108,20 +114,24 @@ class MasterService {
 
   Status write_record() {
     auto processes = core_.processes();
-    processes.push_back(
-        {"master",
-         options_.service.name,
-         uint64_t(getpid()),
-         net::process_facts(),
-         {{"peak_rss_mb", net::peak_resident_mb()}, {"messages_rejected", double(control_.rejected())}}});
+    processes.push_back({"master",
+                         options_.service.name,
+                         uint64_t(getpid()),
+                         net::process_facts(),
+                         {{"peak_rss_mb", net::peak_resident_mb()},
+                          {"messages_rejected", double(control_.rejected())},
+                          {"keys_refused", double(control_.keys_refused())}}});
     const metrics::About about{.id = run_id_,
                                .version = version(),
                                .begin = record_->begin(),
                                .end_unix_ns = metrics::begin_now().unix_ns,
                                .settings = core_.settings()};
-    if (!options_.out.empty())
-      std::ofstream(options_.out + "/session.toml") << session_text(options_, core_, about, processes);
-    return record_->finish(processes, core_.counters(), about);
+    // It is among the files that finish() tells of.
+    if (const Status s = record_->write_file("session.toml", session_text(options_, core_, about, processes)); !s)
+      log::error("{}", s.error().text);
+    const Status finished = record_->finish(processes, core_.counters(), about);
+    if (finished && options_.overwrite) metrics::forget_replaced(options_.out);
+    return finished;
   }
 
  private:
@@ -129,12 +139,18 @@ class MasterService {
     double timeout_s = timeout_ms * 1e-3;
     if (const auto due_s = core_.due_s()) timeout_s = std::clamp(*due_s - monotonic_s(), 0.0, timeout_s);
     net::wait_readable_s({&control_}, timeout_s);
-    for (int n = 0; n < kMessagesAtOnce; ++n) {
+    const double now_s = monotonic_s(), passed_s = now_s - std::exchange(served_s_, now_s);
+    if (passed_s > kStandstill_s) {
+      log::warn("the master stood still for {:.1f} s", passed_s);
+      core_.stood_still(passed_s, now_s);
+    }
+    for (int n = 0; n < kMessagesAtOnce && core_.outgoing() < kMostOutgoing; ++n) {
       const auto message = control_.receive();
       if (!message) break;
       guarded(control_, *message, [&] { take(*message, monotonic_s()); });
     }
     core_.tick(monotonic_s());
+    core_.tell_door({control_.rejected(), control_.keys_refused()});
     tell_news();
     publish_metrics(monotonic_s());
     for (auto& out : core_.take_outgoing())
@@ -152,7 +168,8 @@ class MasterService {
                                   .leases = {},
                                   .values = {{"rss_mb", net::resident_mb()},
                                              {"peak_rss_mb", net::peak_resident_mb()},
-                                             {"messages_rejected", double(control_.rejected())}},
+                                             {"messages_rejected", double(control_.rejected())},
+                                             {"keys_refused", double(control_.keys_refused())}},
                                   .rates = {}});
     metrics_->publish(exposition(snapshot, core_.live()));
   }
@@ -172,10 +189,12 @@ class MasterService {
                       message.peer);
       return;
     }
+    if (!core_.admit(message.peer, now_s)) return control_.reject(message, "its peer sends more than --max-messages");
     net::dispatch<wire::Hello, wire::StatusReport, wire::ViewRequest, wire::LeaseRequest, wire::LeaseExtend,
-                  wire::TileDone, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady, wire::LinkReport,
-                  wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
+                  wire::TileDone, wire::TileRefused, wire::Plan, wire::MetricRows, wire::SliceWeights, wire::SlabReady,
+                  wire::LinkReport, wire::SwapReady, wire::OrderAnswer, wire::Goodbye, wire::Control>(
         control_, message, [&](const auto& m) {
+          if (const Status s = senders_.admit(message, m); !s) return refuse(message, m, s.error());
           if constexpr (std::is_void_v<decltype(core_.on(message.peer, m, now_s))>)
             core_.on(message.peer, m, now_s);
           else if (const Status s = core_.on(message.peer, m, now_s); !s)
@@ -183,15 +202,26 @@ class MasterService {
         });
   }
 
+  // Whoever gave a command waits for an answer.
+  void refuse(const net::Message& message, const auto& m, const Error& why) {
+    control_.reject(message, why.text);
+    if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::Control>)
+      control_.send(wire::ControlReply{false, why.text}, message.peer);
+  }
+
   const MasterServiceOptions& options_;
   net::Context context_;
-  net::Socket control_{
-      context_, net::Kind::kRouter, "master", {.high_water_mark = 10000, .max_message_bytes = 16u << 20}};
+  net::Socket control_{context_,
+                       net::Kind::kRouter,
+                       "master",
+                       {.high_water_mark = 10000, .max_message_bytes = 16u << 20, .serves = "control"}};
+  Senders senders_;
   std::unique_ptr<metrics::RunRecord> record_;
   const std::string run_id_;  // empty: no record is written
   MasterCore core_;
   net::RunningSession told_;  // in the file
   std::optional<net::SessionFile> file_;
+  double served_s_ = monotonic_s();        // when the loop came by last
   std::unique_ptr<HttpEndpoint> metrics_;  // null: nobody watches
   double published_s_ = -1e9;
 };
@@ -210,24 +240,35 @@ int run(const MasterServiceOptions& o) {
     std::fprintf(stderr, "telesplat: %s\n", e.text.c_str());
     return 2;
   };
+  const auto access = net::access_of(o.service, {}, true);
+  if (!access) return refuse(access.error());
   const auto options = core_options(o);
   if (!options) return fail(2, options.error());
+  if (o.overwrite && o.goes_on) return refuse({"--continue and --overwrite: the record goes on, or is replaced"});
   std::string run_id;
+  const bool goes_on = o.goes_on && metrics::may_go_on(o.out);
   if (!o.out.empty()) {
     if (const Status s = net::refuse_folder_in_use(o.out); !s) return refuse(s.error());
-    auto begun = metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
+    auto begun =
+        goes_on ? metrics::go_on_in_folder(o.out) : metrics::begin_folder(o.out, o.overwrite, metrics::Logs::kOthers);
     if (!begun) return refuse(begun.error());
-    if (o.overwrite) metrics::forget_replaced(o.out);
     run_id = *std::move(begun);
   }
-  auto record = metrics::RunRecord::open(o.out, metrics::begin_now());
+  const auto bytes = [](double mb) { return uint64_t(mb * 1e6); };
+  auto record = metrics::RunRecord::open(
+      o.out, metrics::begin_now(),
+      {.table_bytes = bytes(o.table_limit_mb), .trace_bytes = bytes(o.trace_limit_mb), .goes_on = goes_on});
   if (!record) return refuse(record.error());
-  MasterService service(o, *options, *std::move(record), std::move(run_id));
+  if (goes_on) log::info("{}: its record goes on; this is master {} of it", o.out, (*record)->lives());
+  MasterService service(o, *options, *std::move(record), std::move(run_id), *access);
   if (const Status s = service.open_metrics(); !s) return refuse(s.error());
   if (const Status s = service.listen(); !s) return fail(2, s.error());
   service.serve();
   service.say_goodbye();
-  if (const Status s = service.write_record(); !s) return fail(1, s.error());
+  if (const Status s = service.write_record(); !s) {
+    if (o.started_by != "hand") std::printf("record failed\n");  // the launcher reads it
+    return fail(1, s.error());
+  }
   return 0;
 }
 

@@ -26,6 +26,7 @@ class RunRecord;
 
 namespace telesplat::master {
 
+class LeaseSigner;
 class Outbox;
 struct MasterOptions;
 
@@ -74,6 +75,7 @@ struct Figures {
   uint64_t frames_completed = 0, frames_in_flight = 0;
   uint64_t released = 0;   ///< leases that were taken back
   uint64_t backups = 0;    ///< leases of what another sampler was slow with
+  uint64_t given_up = 0;   ///< frames that ended without tiles or slabs that cannot be had
   uint64_t overtaken = 0;  ///< views that ended early, because their viewer's link is slow and a newer one waited
   uint64_t viewers = 0;    ///< of whom anything is remembered
 };
@@ -105,8 +107,10 @@ class Schedule {
   virtual Status planned(const wire::Plan& /*plan*/, double /*now_s*/) { return ok_status(); }
   /// Gives out all leases that idle samplers can have of the frames in flight.
   virtual void give_leases(Idle& idle, double now_s) = 0;
-  /// Gives a lease its full time again. Unknown leases are ignored.
-  virtual void extend(LeaseId lease, double now_s) = 0;
+  /// Gives a lease of this sampler its full time again, up to ScheduleOptions::longest_fetch_s. Others are ignored.
+  virtual void extend(LeaseId lease, const std::string& sampler, double now_s) = 0;
+  /// The packer cannot use what this sampler (empty: unknown) made of a tile.
+  virtual void refused(const wire::TileRefused& refused, const std::string& sampler) = 0;
   /// The packer has this tile, from `sampler` (empty: unknown). False: it has it twice, or nobody waits for it any
   /// more.
   virtual bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) = 0;
@@ -141,6 +145,7 @@ class Plan : public Scene, public Schedule {
 /// What plans see of the master. Must outlive them.
 struct PlanLinks {
   Outbox& outbox;
+  const LeaseSigner& signer;
   metrics::RunRecord& record;
   /// For people; "?": it is not known.
   std::function<std::string(const std::string& sampler)> name_of;

@@ -11,6 +11,7 @@
 #include "common/points/point_model.h"
 #include "common/scene/session.h"
 #include "services/master/master_core.h"
+#include "services/master/orders/health.h"
 
 namespace telesplat::master {
 namespace {
@@ -25,7 +26,7 @@ Plan& MasterCore::plan_of(const wire::Hello& data) {
   return *plans_.at(scene::pipeline_of(kind.value_or(scene::Kind::kMesh)));
 }
 
-Status MasterCore::adopt_scene(const wire::Hello& data, double now_s) {
+Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data, double now_s) {
   // As the packer and viewers demand it, for whom an empty box is no scene.
   if (!data.box_room.empty())
     if (Status s = points::validate({.box_room = data.box_room}); !s) return s;
@@ -33,6 +34,7 @@ Status MasterCore::adopt_scene(const wire::Hello& data, double now_s) {
   const auto adopted = plan.adopt(data, now_s);
   if (!adopted) return adopted.error();
   if (!adopted->whole) return ok_status();
+  shows_ = peer;
   const bool other_plan = plan_ != &plan;
   if (other_plan) {
     plan_->put_aside();
@@ -61,20 +63,39 @@ wire::Welcome MasterCore::scene_as_told() const {
   return w;
 }
 
+// Each from the process that has it, whatever others say. Each part of a volume has its own "voxels": samplers get them
+// in their sheets.
+void MasterCore::add_endpoints(wire::Welcome& w) const {
+  const auto add = [&](const std::string& id, std::initializer_list<const char*> names) {
+    const auto p = peers_.find(id);
+    if (p == peers_.end() || p->second.gone) return;
+    for (const char* name : names)
+      if (const auto at = p->second.hello.endpoints.find(name); at != p->second.hello.endpoints.end())
+        w.endpoints.insert(*at);
+  };
+  add(shows_, {"chunks"});
+  // While that one is away another one of the same mesh will do.
+  const std::string hash = scene::value_or(w.facts, "content_hash", std::string());
+  for (const auto& [id, p] : peers_)
+    if (!hash.empty() && p.hello.role == "data" && !p.refused &&
+        scene::value_or(p.hello.facts, "content_hash", std::string()) == hash)
+      add(id, {"chunks"});
+  add(packer(), {"tiles", "patches", "state"});
+}
+
 wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   wire::Welcome w = scene_as_told();
   w.master = instance_;
   w.master_s = now_s;
   w.clock = clock_id();
   w.epoch = epoch_;
-  for (const auto& [id, p] : peers_)
-    if (!p.gone && !p.refused) w.endpoints.insert(p.hello.endpoints.begin(), p.hello.endpoints.end());
+  add_endpoints(w);
   w.facts.erase(metrics::kRecordFact);  // of the master alone
   if (!run_id_.empty()) {
     w.facts["run_folder"] = session_.run_folder;
     w.facts["run_id"] = run_id_;
   }
-  w.endpoints.erase("voxels");  // each part of a volume has its own: samplers get them in their sheets
+  if (to.hello.role == "packer") w.lease_key = signer_.key();
   if (to.coupling) {
     w.settings["viewer.coupling"] = to.coupling->mode;
     w.settings["viewer.buffers"] = to.coupling->buffers;
@@ -82,13 +103,23 @@ wire::Welcome MasterCore::welcome(const Peer& to, double now_s) const {
   return w;
 }
 
+// What changes again and again is told so often at most.
+void MasterCore::announce_soon(double now_s) {
+  announce_due_ = !announcements_.allows(now_s);
+  if (!announce_due_) announce(now_s);
+}
+
 void MasterCore::announce(double now_s) {
+  announcements_.count(now_s);
+  announce_due_ = false;
   const std::string body = wire::encode(welcome({}, now_s));
+  if (!outbox_.fits<wire::Welcome>(body)) return;
   // The packer first: it should know an epoch before tiles of it come.
   for (const bool packer : {true, false})
     for (const auto& [id, p] : peers_)
       if (!p.gone && p.hello.role != "ctl" && (p.hello.role == "packer") == packer)
-        outbox_.send({id, std::string(wire::Welcome::kName), p.coupling ? wire::encode(welcome(p, now_s)) : body});
+        outbox_.send(
+            {id, std::string(wire::Welcome::kName), p.coupling || packer ? wire::encode(welcome(p, now_s)) : body});
 }
 
 void MasterCore::record_epoch(double now_s) {
@@ -116,7 +147,9 @@ Status MasterCore::on(const std::string& peer, const wire::SliceWeights& m, doub
 }
 
 void MasterCore::on(const std::string& peer, const wire::Control& m, double now_s) {
-  if (m.command == "status") return outbox_.send(peer, wire::ControlReply{true, status_json(now_s)});
+  if (m.command == "status")
+    return outbox_.send(peer, wire::ControlReply{true, status_json(now_s, m.arguments.contains("all"))});
+  if (m.command == "health") return outbox_.send(peer, health(m, now_s));
   if (m.command == "stop") {
     outbox_.send(peer, wire::ControlReply{true, "stopping"});
     stop_ = true;
@@ -130,6 +163,14 @@ void MasterCore::on(const std::string& peer, const wire::Control& m, double now_
   const auto done = obey(m, now_s);
   outbox_.send(peer, wire::ControlReply{done.ok(), done ? *done : done.error().text});
   if (done) dispatch(now_s);
+}
+
+wire::ControlReply MasterCore::health(const wire::Control& m, double now_s) const {
+  HealthQuestion question(m);
+  for (const auto& [id, p] : peers_)
+    if (p.hello.role != "ctl") question.look_at(p.hello, p.gone, now_s - p.seen_s);
+  const auto answer = question.answer();
+  return {answer.ok(), answer ? *answer : answer.error().text};
 }
 
 // To the viewer that is named, or the first one; to all data servers of the scene, of which each knows its part. Of
@@ -205,10 +246,10 @@ Result<std::string> MasterCore::obey(const wire::Control& m, double now_s) {
     if (!clipped) return clipped.error();
     obeyed = *std::move(clipped);
   } else if (m.command != "epoch") {
-    return Error{
-        fmt::format("unknown command '{}'; known: status, stop, epoch, set, animate, play, tf, colour, clip, coupling, "
-                    "pick, where, go, overlay, probe",
-                    m.command.substr(0, 64))};
+    return Error{fmt::format(
+        "unknown command '{}'; known: status, health, stop, epoch, set, animate, play, tf, colour, clip, coupling, "
+        "pick, where, go, overlay, probe",
+        m.command.substr(0, 64))};
   }
   if (obeyed.tells_all) announce(now_s);
   if (!obeyed.begins_epoch) return obeyed.answer;

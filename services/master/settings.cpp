@@ -45,6 +45,7 @@ std::map<std::string, double> settings(const MasterOptions& options, std::option
   if (options.schedule.max_rate_mbit > 0) out["packing.max_rate_mbit"] = options.schedule.max_rate_mbit;
   out["packing.keep_redundant"] = keeps_redundant(options, kind);
   out["sampling.steering"] = steers(options, kind);
+  out["sampling.max_pixels"] = double(options.limits.max_sampling_pixels);
   out["viewer.least_sampling"] = policy(kind).least_sampling;
   return out;
 }

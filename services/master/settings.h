@@ -8,6 +8,7 @@
 
 #include "common/julia/timeline.h"
 #include "common/scene/kind.h"
+#include "services/master/gate/gate.h"
 #include "services/master/views.h"
 
 namespace telesplat::master {
@@ -40,6 +41,7 @@ const char* name_of(Steering steering);
 
 struct MasterOptions {
   ScheduleOptions schedule;
+  Limits limits;
   Progressive progressive = Progressive::kAuto;
   Redundancy redundancy = Redundancy::kAuto;
   Steering steering = Steering::kAuto;

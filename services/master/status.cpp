@@ -38,6 +38,16 @@ std::map<std::string, double> rates(const std::deque<std::map<std::string, doubl
   return out;
 }
 
+// Texts from peers may be any bytes: what is not UTF-8 is shown as U+FFFD.
+std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+constexpr size_t kMostBytes = 768u << 10;  // of an answer, whose other fields are few
+constexpr size_t kMostFactBytes = 4096;    // a path is shorter, a transfer function may be longer
+
+std::string shortened(const std::string& fact) {
+  return fact.size() <= kMostFactBytes ? fact : fact.substr(0, kMostFactBytes - 3) + "...";
+}
+
 Json told(const net::RunningSession& s) {
   return {{"address", s.address},
           {"pid", s.pid},
@@ -45,7 +55,8 @@ Json told(const net::RunningSession& s) {
           {"kind", s.kind},
           {"started_at", fmt::format("{:%FT%TZ}", fmt::gmtime(std::time_t(s.started_at_s)))},
           {"started_by", s.started_by},
-          {"run_folder", s.run_folder}};
+          {"run_folder", s.run_folder},
+          {"keys", s.keys}};
 }
 
 }  // namespace
@@ -59,13 +70,14 @@ Figures MasterCore::figures() const {
     out.released += f.released;
     out.backups += f.backups;
     out.overtaken += f.overtaken;
+    out.given_up += f.given_up;
     out.viewers += f.viewers;
   }
   return out;
 }
 
 std::vector<metrics::Process> MasterCore::processes() const {
-  std::vector<metrics::Process> out;
+  std::vector<metrics::Process> out(departed_.kept().begin(), departed_.kept().end());
   for (const auto& [id, p] : peers_)
     if (p.hello.role != "ctl") out.push_back(p.process);
   std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
@@ -74,17 +86,21 @@ std::vector<metrics::Process> MasterCore::processes() const {
 
 std::map<std::string, double> MasterCore::counters() const {
   const Figures f = figures();
-  std::map<std::string, double> out{{"leases_expired", double(leases_expired_)},
-                                    {"tiles_released", double(f.released)},
-                                    {"leases_backup", double(f.backups)},
-                                    {"views_overtaken", double(f.overtaken)},
-                                    {"frames_completed", double(f.frames_completed)}};
+  std::map<std::string, double> out{
+      {"leases_expired", double(leases_expired_)}, {"tiles_released", double(f.released)},
+      {"leases_backup", double(f.backups)},        {"views_overtaken", double(f.overtaken)},
+      {"frames_given_up", double(f.given_up)},     {"frames_completed", double(f.frames_completed)}};
   SwapBarrier::Figures swaps = swaps_;
   for (const auto& [name, wall] : walls_) {
     swaps.frames += wall.figures().frames;
     swaps.incomplete += wall.figures().incomplete;
   }
+  const LimitsHit& hit = gate_.hit();
+  out["limits.views_coarser"] = double(hit.views_coarser);
+  out["limits.hellos_refused"] = double(hit.hellos_refused);
+  out["limits.messages_refused"] = double(hit.messages_refused);
   if (swaps.frames > 0) out["swaps"] = double(swaps.frames), out["swaps_incomplete"] = double(swaps.incomplete);
+  if (departed_.forgotten() > 0) out["processes_forgotten"] = double(departed_.forgotten());
   for (const auto& [pipeline, plan] : plans_) plan->add_counters(out);
   return out;
 }
@@ -102,6 +118,7 @@ LiveSnapshot MasterCore::live_snapshot() const {
                    .leases_expired = double(leases_expired_),
                    .leases_backup = double(f.backups),
                    .views_overtaken = double(f.overtaken),
+                   .frames_given_up = double(f.given_up),
                    .tiles_released = double(f.released),
                    .processes = {}};
   for (const auto& [id, p] : peers_) {
@@ -118,9 +135,27 @@ LiveSnapshot MasterCore::live_snapshot() const {
   return out;
 }
 
-std::string MasterCore::status_json(double now_s) const {
+Json MasterCore::process_json(const std::string& id, const Peer& p, double now_s, bool all) const {
+  Json e{{"role", p.hello.role},
+         {"name", p.hello.name},
+         {"pid", p.hello.pid},
+         {"alive", !p.gone},
+         {"silent_s", std::max(0.0, now_s - p.seen_s)}};
+  if (p.hello.role == "sampler") e["leases"] = plan_->leases_of(id);
+  for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
+  for (const auto& [key, value] : p.hello.facts)
+    if (key != metrics::kRecordFact) e["facts"][key] = all ? value : shortened(value);
+  for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
+  for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e["values"][key] = number(value);
+  e["rates"] = Json(rates(p.reports));
+  return e;
+}
+
+std::string MasterCore::status_json(double now_s, bool all) const {
   const Figures f = figures();
   Json out{{"session", told(session_)},
+           {"messages_rejected", door_.messages_rejected},
+           {"keys_refused", door_.keys_refused},
            {"epoch", epoch_.value},
            {"frames_completed", f.frames_completed},
            {"frames_in_flight", f.frames_in_flight},
@@ -129,30 +164,36 @@ std::string MasterCore::status_json(double now_s) const {
            {"tiles_released", f.released},
            {"leases_backup", f.backups},
            {"views_overtaken", f.overtaken},
+           {"frames_given_up", f.given_up},
+           {"limits",
+            {{"max_sampling_pixels", options_.limits.max_sampling_pixels},
+             {"max_peers", options_.limits.max_peers},
+             {"max_messages", options_.limits.max_messages},
+             {"views_coarser", gate_.hit().views_coarser},
+             {"hellos_refused", gate_.hit().hellos_refused},
+             {"messages_refused", gate_.hit().messages_refused}}},
            {"parameters", Json::object()},
            {"animation", animation()}};
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);
   if (!clipping_.order().empty()) out["clip"] = clipping_.order();
+  if (const auto failed = record_.losses().failed; !failed.empty()) out["record_failed"] = failed;
   plan_->add_status(out);
+  out["departed"] = departed_.count();
+  // Those who are here first: an answer is one message.
   out["processes"] = Json::array();
-  for (const auto& [id, p] : peers_) {
-    if (p.hello.role == "ctl") continue;
-    Json e{{"role", p.hello.role},
-           {"name", p.hello.name},
-           {"pid", p.hello.pid},
-           {"alive", !p.gone},
-           {"silent_s", std::max(0.0, now_s - p.seen_s)}};
-    if (p.hello.role == "sampler") e["leases"] = plan_->leases_of(id);
-    for (const auto& [key, value] : p.hello.endpoints) e["endpoints"][key] = value;
-    for (const auto& [key, value] : p.hello.facts)
-      if (key != metrics::kRecordFact) e["facts"][key] = value;
-    for (const auto& [key, value] : p.process.values) e["values"][key] = number(value);
-    for (const auto& [key, value] : plan_->link_of(p.hello.instance)) e["values"][key] = number(value);
-    e["rates"] = Json(rates(p.reports));
-    out["processes"].push_back(e);
-  }
-  // Texts from peers may be any bytes: what is not UTF-8 is shown as U+FFFD.
-  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+  size_t bytes = dumped(out).size(), left_out = 0;
+  for (const bool gone : {false, true})
+    for (const auto& [id, p] : peers_) {
+      if (p.hello.role == "ctl" || p.gone != gone) continue;
+      Json e = process_json(id, p, now_s, all);
+      bytes += left_out > 0 ? 0 : dumped(e).size() + 1;
+      if (bytes > kMostBytes)
+        ++left_out;
+      else
+        out["processes"].push_back(std::move(e));
+    }
+  if (left_out > 0) out["processes_left_out"] = left_out;
+  return dumped(out);
 }
 
 }  // namespace telesplat::master

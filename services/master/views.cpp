@@ -61,6 +61,12 @@ void Views::complete(FrameId frame, bool whole) {
   completed_ += whole;
 }
 
+bool Views::left(FrameId frame) {
+  const Begun& f = *find(frame);
+  return std::all_of(f.views.begin(), f.views.end(),
+                     [&](const auto& v) { return std::find(f.left.begin(), f.left.end(), v.viewer) != f.left.end(); });
+}
+
 void Views::put_back(FrameId frame) {
   const auto found = find(frame);
   const Begun dropped = std::move(*found);

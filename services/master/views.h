@@ -17,6 +17,7 @@ struct ScheduleOptions {
   int frames_in_flight = 2;  ///< views begun and not complete, at most
   /// Longest time before a lease goes to another sampler; shorter once tile times are known.
   double lease_timeout_s = 2.0;
+  double longest_fetch_s = 30.0;  ///< a sampler that says that it needs longer has a lease no longer than this
   double max_rate_mbit = 0;       ///< to each viewer, wished; 0: as much as its link carries
   double lease_target_s = 0.004;  ///< what a lease of rows should take its sampler
 };
@@ -80,6 +81,8 @@ class Views {
   /// The frame was dropped: its views wait again, except those of viewers that left; of asynchronous viewers only if no
   /// newer request does. Where several are put back, the newest comes first.
   void put_back(FrameId frame);
+  /// All whose views `frame` shows are gone. Precondition: it is in flight.
+  bool left(FrameId frame);
 
  private:
   struct Begun {

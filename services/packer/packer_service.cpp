@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 
 #include "common/core/clock.h"
@@ -10,6 +11,7 @@
 #include "common/net/master_link.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/points/point_packing.h"
+#include "services/packer/ports.h"
 #include "services/packer/slices/slice_packing.h"
 #include "services/packer/spare_time.h"
 
@@ -19,28 +21,40 @@ namespace {
 constexpr double kSpanFlush_s = 1;
 constexpr int kSampledAtOnce = 8;  // then control and viewers get their turn
 constexpr int kStateAtOnce = 64;
+constexpr int kStateQueue = 1 << 16;  // messages that wait for a viewer: more than StateAnswers has under way
 
 class PackerService {
  public:
   PackerService(const PackerOptions& o, net::Context& context)
       : options_(o),
         tiles_(context, net::Kind::kPull, o.service.name + ":tiles",
-               {.high_water_mark = 256,
+               {.high_water_mark = 16,
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
-                .read_ahead = true}),
-        patches_(context, net::Kind::kPub, o.service.name + ":patches", {.high_water_mark = 4096}),
+                .patience_s = net::kBulkPatience_s,
+                .read_ahead = true,
+                .serves = "tiles"}),
+        patches_(context, net::Kind::kPub, o.service.name + ":patches",
+                 {.high_water_mark = 4096, .patience_s = net::kBulkPatience_s, .serves = "patches"}),
         state_(context, net::Kind::kRouter, o.service.name + ":state",
-               {.high_water_mark = 1 << 20, .max_message_bytes = 16u << 20}) {}
+               {.high_water_mark = kStateQueue,
+                .max_message_bytes = 16u << 20,
+                .patience_s = net::kBulkPatience_s,
+                .serves = "state"}) {}
 
   /// Binds the three sockets and says hello with their addresses.
   Status open(net::Context& context) {
     wire::Hello hello;
     hello.role = "packer";
     hello.name = options_.service.name;
-    for (const auto& [socket, key] : {std::pair{&tiles_, "tiles"}, {&patches_, "patches"}, {&state_, "state"}}) {
-      const auto endpoint = socket->bind(options_.service.bind, options_.service.insecure);
+    int n = 0;
+    for (const auto& [socket, key, host] : {std::tuple{&patches_, "patches", for_viewers()},
+                                            {&state_, "state", for_viewers()},
+                                            {&tiles_, "tiles", options_.service.advertise}}) {
+      const auto bind = bind_of(options_.service.bind, n++);
+      if (!bind) return bind.error();
+      const auto endpoint = socket->bind(*bind, options_.service.insecure);
       if (!endpoint) return endpoint.error();
-      hello.endpoints[key] = net::announced(*endpoint, options_.service.advertise);
+      hello.endpoints[key] = net::announced(*endpoint, host);
     }
     if (!options_.record_depth.empty()) {
       auto recorder = DepthRecorder::open(options_.record_depth, options_.record_depth_frames);
@@ -71,7 +85,10 @@ class PackerService {
     }
     flush_spans(1e300);
     link_->leave([&] { return status(); });
-    return 0;
+    if (link_->refused()) return 2;
+    const auto values = status();
+    const auto failed = values.find(metrics::kRecordFailed);
+    return failed != values.end() && failed->second > 0 ? 1 : 0;
   }
 
  private:
@@ -81,6 +98,10 @@ class PackerService {
     net::Message message;
     Take take;
   };
+
+  const std::string& for_viewers() const {
+    return options_.advertise_to_viewers.empty() ? options_.service.advertise : options_.advertise_to_viewers;
+  }
 
   void receive_control() {
     while (const auto message = link_->socket().receive()) {
@@ -145,6 +166,7 @@ class PackerService {
 
   std::unique_ptr<Packing> make_packing(scene::Pipeline pipeline) {
     Outlets outlets{.tell = [this](const wire::TileDone& m) { link_->socket().send(m); },
+                    .refuse = [this](const wire::TileRefused& m) { link_->socket().send(m); },
                     .to_viewers = [this](std::string_view type,
                                          std::string body) { patches_.send_frames({}, type, std::move(body)); },
                     .to_viewer = [this](std::string_view peer, std::string_view type,
@@ -155,6 +177,7 @@ class PackerService {
     if (pipeline == scene::Pipeline::kSlices) return std::make_unique<SlicePacking>(std::move(outlets), spans_);
     const PointPacking::Options options{.threads = options_.threads,
                                         .max_log_bytes = uint64_t(options_.log_limit_mb * 1e6),
+                                        .answers = {.window_bytes = uint64_t(options_.answer_window_mb * 1e6)},
                                         .recorder = recorder_ ? &*recorder_ : nullptr,
                                         .plans = plan_recorder_ ? &*plan_recorder_ : nullptr};
     return std::make_unique<PointPacking>(options, std::move(outlets), spans_);
@@ -177,7 +200,8 @@ class PackerService {
         {"rss_mb", net::resident_mb()},
         {"peak_rss_mb", net::peak_resident_mb()},
         {"bytes_sent", 0},
-        {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())}};
+        {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())},
+        {"keys_refused", double(tiles_.keys_refused() + patches_.keys_refused() + state_.keys_refused())}};
     if (packing_) packing_->add_status(v);
     return v;
   }
@@ -208,7 +232,12 @@ int run(const PackerOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   net::keep_freed_memory();
-  net::Context context;
+  const auto access = net::access_of(o.service, {net::Role::kPacker}, true);
+  if (!access) {
+    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
+    return 2;
+  }
+  net::Context context(*access);
   PackerService service(o, context);
   if (const Status s = service.open(context); !s) {
     log::error("{}", s.error().text);

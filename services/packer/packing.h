@@ -15,6 +15,7 @@ namespace telesplat::packer {
 /// Ways out of a packing. Messages are encoded already.
 struct Outlets {
   std::function<void(const wire::TileDone&)> tell;                          ///< the master
+  std::function<void(const wire::TileRefused&)> refuse;                     ///< the master; null: it is not told
   std::function<void(std::string_view type, std::string body)> to_viewers;  ///< to all of them
   /// To one viewer. False: dropped, because its queue is full or it is gone.
   std::function<bool(std::string_view peer, std::string_view type, std::string body)> to_viewer;

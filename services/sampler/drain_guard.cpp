@@ -12,8 +12,8 @@ namespace {
 constexpr std::chrono::duration<double> kLook{0.2};  // how late a stop is noticed
 }
 
-DrainGuard::DrainGuard(const std::string& master, InstanceId instance, net::Via via)
-    : thread_([this, master, instance, via = std::move(via)] { watch(master, instance, via); }) {}
+DrainGuard::DrainGuard(const std::string& master, InstanceId instance, net::Access access)
+    : thread_([this, master, instance, access = std::move(access)] { watch(master, instance, access); }) {}
 
 DrainGuard::~DrainGuard() {
   {
@@ -24,7 +24,7 @@ DrainGuard::~DrainGuard() {
   thread_.join();
 }
 
-void DrainGuard::watch(const std::string& master, InstanceId instance, const net::Via& via) {
+void DrainGuard::watch(const std::string& master, InstanceId instance, const net::Access& access) {
   std::unique_lock lock(mutex_);
   const auto done = [this] { return done_; };
   while (!net::stop_requested())
@@ -33,7 +33,7 @@ void DrainGuard::watch(const std::string& master, InstanceId instance, const net
   log::warn("told to stop, and a lease takes too long: it is given up");
   {
     // The service's own socket belongs to the thread that is busy.
-    net::Context context(via);
+    net::Context context(access);
     net::Socket socket(context, net::Kind::kDealer, "goodbye");
     if (socket.connect(master)) socket.send(wire::Goodbye{instance});
   }

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "common/core/ids.h"
-#include "common/net/via.h"
+#include "common/net/keys/access.h"
 
 namespace telesplat::sampler {
 
@@ -21,11 +21,11 @@ class DrainGuard {
   /// From then on watches net::stop_requested(). If the process still runs kStop_s after it was told to stop, says
   /// goodbye to the master in the name of `instance`, so that its leases go to others at once, and ends the process
   /// with code 0.
-  DrainGuard(const std::string& master, InstanceId instance, net::Via via = {});
+  DrainGuard(const std::string& master, InstanceId instance, net::Access access = {});
   ~DrainGuard();
 
  private:
-  void watch(const std::string& master, InstanceId instance, const net::Via& via);
+  void watch(const std::string& master, InstanceId instance, const net::Access& access);
 
   std::mutex mutex_;
   std::condition_variable wake_;

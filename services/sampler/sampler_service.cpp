@@ -3,6 +3,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <optional>
 #include <thread>
 
@@ -64,6 +65,7 @@ class SamplerService {
     }
     flush_metrics(1e300);
     link_.leave([&] { return status(); });
+    if (link_.refused()) return 2;
     return failed_ ? 1 : 0;
   }
 
@@ -115,6 +117,7 @@ class SamplerService {
     if (session.master != master_) {  // another master knows nothing of the leases we asked for
       master_ = session.master;
       leases_asked_ = 0;
+      unsent_.reset();
       if (work_) work_->drop_leases();
     }
     const scene::SessionView view(session);
@@ -127,7 +130,7 @@ class SamplerService {
     if (endpoint.empty() || endpoint == tiles_endpoint_) return;
     tiles_endpoint_ = endpoint;
     tiles_.emplace(context_, net::Kind::kPush, options_.service.name + ":tiles",
-                   net::SocketOptions{.high_water_mark = 64});
+                   net::SocketOptions{.high_water_mark = 64, .patience_s = net::kBulkPatience_s});
     if (const Status s = tiles_->connect(endpoint); !s) log::error("{}", s.error().text);
   }
 
@@ -226,9 +229,9 @@ int run(const SamplerOptions& o) {
   log::initialise(o.service.name, o.service.log_level);
   net::install_signal_handlers();
   net::keep_freed_memory();
-  const auto via = net::via_of(o.service);
-  if (!via) {
-    log::error("{}", via.error().text);
+  const auto access = net::access_of(o.service, {net::Role::kSampler});
+  if (!access) {
+    std::fprintf(stderr, "telesplat: %s\n", access.error().text.c_str());
     return 2;
   }
   std::unique_ptr<Sampler> sampler;
@@ -249,8 +252,8 @@ int run(const SamplerOptions& o) {
     sampler = std::move(*made);
   }
   const InstanceId instance = net::make_instance_id();
-  const DrainGuard guard(o.service.master, instance, *via);
-  net::Context context(*via);
+  const DrainGuard guard(o.service.master, instance, *access);
+  net::Context context(*access);
   return SamplerService(o, instance, std::move(sampler), std::move(replay), context).serve();
 }
 

@@ -33,8 +33,9 @@ SKIPPED = {
     r"tools/(demo|test|setup)\b": "it sets up and builds this tree",
     r"(cmake|ctest)\b": "it builds this tree",
     r"(tools/gpu-check|tar -xf gpu-check)\b": "it packs this build for another machine",
-    r"(cp .* compose/files|(\w+=\S+ )*docker|for s in master)\b": "it needs docker; compose/test runs it",
-    r"(apt-get|debootstrap|tar -C)\b": "it needs root and a network",
+    r"(compose/prepare|cp .* compose/files|(\w+=\S+ )*docker|for s in master)\b":
+        "it needs docker; compose/test runs it",
+    r"(apt-get|debootstrap|tar -C|rm -rf /tmp/bookworm)\b": "it needs root and a network",
 }
 SERVICES = {
     f"telesplat-{name}" for name in ("master", "data", "packer", "sampler", "viewer", "wan-relay", "pose-replay")

@@ -93,6 +93,40 @@ const Case kCases[] = {
 INSTANTIATE_TEST_SUITE_P(Cases, BadInput, ::testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.name; });
 
+// What a data server says by which it is started by hand.
+TEST(DataServer, AFileThatIsCutOffWhileItIsReadIsNamed) {
+  TemporaryFolder folder;
+  const std::string path = folder / "cut.ply";
+  write_terrain(path, 900);
+  Program data("telesplat-data", {path, "--no-cache", "--report-progress", "--name", "data"}, folder / "data");
+  ASSERT_TRUE(wait_until([&] { return data.out().find("progress reading") != std::string::npos; })) << data.err();
+  fs::resize_file(path, 10'000);
+  EXPECT_EQ(data.wait(60), 2) << data.err();
+  EXPECT_NE(data.err().find("telesplat: " + path + ": was cut off while it was read\n"), std::string::npos)
+      << data.err();
+}
+
+TEST(DataServer, ReadsWhatAFileNamesBelowItsFolderUnlessItIsTold) {
+  TemporaryFolder folder;
+  fs::create_directories(folder / "data");
+  std::string voxels(16 * 16 * 16, '\0');
+  for (size_t i = 0; i < voxels.size(); ++i) voxels[i] = char(i / 16);
+  std::ofstream(folder / "voxels", std::ios::binary) << voxels;
+  const std::string path = folder / "data/a.nhdr";
+  std::ofstream(path) << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: raw\ndata file: ../voxels\n";
+  Program refuses("telesplat-data", {path, "--name", "data"}, folder / "refuses");
+  EXPECT_EQ(refuses.wait(30), 2);
+  EXPECT_EQ(refuses.err(),
+            "telesplat: " + path + ": names " + folder.path() +
+                "/data/../voxels, which lies outside of its folder; --companions anywhere allows that\n");
+  Program allowed("telesplat-data", {path, "--name", "data", "--companions", "anywhere"}, folder / "allowed");
+  EXPECT_TRUE(wait_until([&] { return allowed.err().find("ready in") != std::string::npos; })) << allowed.err();
+  // The person's own command reads the person's own files.
+  Program run("telesplat", {"run", path, "--duration", "0.5", "--size", "64x40", "--out", folder / "run"},
+              folder / "run-log");
+  EXPECT_EQ(run.wait(60), 0) << run.err();
+}
+
 TEST(BadUsage, UnknownFlagsAndAbsentScenesAreRefused) {
   TemporaryFolder folder;
   // It asks for some seconds.

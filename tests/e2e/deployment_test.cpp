@@ -2,6 +2,8 @@
 // are told to.
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <csignal>
 #include <filesystem>
 
@@ -120,6 +122,33 @@ TEST(Deployment, AddressesAnnouncedCanBeReached) {
         "tcp://" + net::host_name() + ":"));
 }
 
+// Published ports, and tunnels: viewers reach a packer under another name than samplers do, at ports that are known.
+TEST(Deployment, APackersPortsAreKnownBeforeItRuns) {
+  Deployment d;
+  const auto at = [](const std::string& host, int port) { return "tcp://" + host + ":" + std::to_string(port); };
+  nlohmann::json endpoints;
+  int port = 20000 + int(getpid() % 20000);
+  // Others may have taken a port.
+  for (int tries = 0; tries < 20 && !endpoints.is_object(); ++tries, port += 3) {
+    Program packer("telesplat-packer",
+                   {"--bind", at("*", port), "--insecure", "--advertise", "packer", "--advertise-to-viewers", "lab",
+                    "--master", d.master()},
+                   d.folder() / "packer");
+    d.wait_status(
+        [&](const auto& s) { return Deployment::of_role(s, "packer").is_object() || !is_running(packer.pid()); });
+    if (const auto p = Deployment::of_role(d.status(), "packer"); p.is_object()) {
+      endpoints = p["endpoints"];
+      EXPECT_EQ(endpoints,
+                (nlohmann::json{
+                    {"patches", at("lab", port)}, {"state", at("lab", port + 1)}, {"tiles", at("packer", port + 2)}}));
+    }
+  }
+  EXPECT_TRUE(endpoints.is_object());
+  Program refused("telesplat-packer", {"--bind", "tcp://127.0.0.1:65534", "--master", d.master()}, d.folder() / "high");
+  EXPECT_EQ(refused.wait(), 2);
+  EXPECT_NE(refused.err().find("its 3 ports end at 65535"), std::string::npos) << refused.err();
+}
+
 TEST(Deployment, HealthFollowsTheProcess) {
   Deployment d;
   EXPECT_EQ(d.health({}), 0);
@@ -142,6 +171,7 @@ TEST(Deployment, HealthFollowsTheProcess) {
   d.service("master").signal(SIGTERM);
   EXPECT_EQ(d.service("master").wait(), 0);
   EXPECT_EQ(d.health({}), 1) << "no master";
+  EXPECT_EQ(d.health({"--role", "sampler", "--host", "--master-may-be-away"}), 0) << "it waits for its master";
 }
 
 TEST(Deployment, EveryServiceEndsOnASignal) {

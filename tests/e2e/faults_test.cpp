@@ -160,18 +160,26 @@ TEST(Faults, ADataServerKilledIsStartedAgain) {
   EXPECT_TRUE(run.all_gone());
 }
 
-TEST(Faults, TheRunEndsWithItsMaster) {
+// The session goes on with another master at the same address, and so does its record.
+TEST(Faults, AMasterKilledIsStartedAgainAndTheRecordGoesOn) {
   PipelineRun run({"--duration", "0"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();
-  ASSERT_TRUE(wait_until([&] { return !run.master().empty(); }));
-  // The master is in no status answer: it is the launcher's child that listens.
-  const std::string children = read_text("/proc/" + std::to_string(run.program().pid()) + "/task/" +
-                                         std::to_string(run.program().pid()) + "/children");
-  const pid_t master = std::atoi(children.c_str());  // started first
-  ASSERT_NE(read_text("/proc/" + std::to_string(master) + "/cmdline").find("telesplat-master"), std::string::npos);
-  ::kill(master, SIGKILL);
-  EXPECT_EQ(run.program().wait(60), 1) << run.program().err();
-  EXPECT_NE(run.program().err().find("master ended"), std::string::npos);
+  const pid_t victim = run.status()["session"].value("pid", pid_t{0});
+  ASSERT_GT(victim, 0);
+  const auto frames_so_far = [&] { return run.column("frames.csv", "frame").size(); };
+  ASSERT_TRUE(wait_until([&] { return frames_so_far() > 0; }));
+  const size_t before = frames_so_far();
+  ::kill(victim, SIGKILL);
+  ASSERT_TRUE(run.wait_status([&](const auto& s) { return s["session"].value("pid", pid_t{0}) != victim; }))
+      << run.program().err();
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    return pid_of(s, "viewer-1") > 0 && value(s, "viewer-1", "updates") > 0 && pid_of(s, "sampler-1") > 0;
+  }));
+  EXPECT_TRUE(wait_until([&] { return frames_so_far() > before + 20; }));
+  EXPECT_NE(run.program().err().find("master died"), std::string::npos);
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  const auto summary = run.summary();
+  EXPECT_GT(summary["frames"], before) << "both masters' frames";
   EXPECT_TRUE(run.all_gone());
 }
 

@@ -59,6 +59,17 @@ TEST(RecordFolder, ASecondRunIntoItIsRefusedUnlessItMayOverwrite) {
   EXPECT_NE(read_text(out + "/summary.json"), summary);
 }
 
+// Messages hold UTF-8, names of folders any bytes.
+TEST(RecordFolder, APathThatIsNotUtf8RecordsAllTheSame) {
+  const TemporaryFolder folder;
+  small(folder);
+  const std::string out = folder / "caf\xe9";
+  Program run("telesplat", short_run(folder, out, {"--verify", "1", "--viewers", "2"}), folder / "run");
+  ASSERT_EQ(run.wait(90), 0) << run.err();
+  for (const char* file : {"/summary.json", "/frames.csv", "/quality.csv", "/images/frame-000000.png"})
+    EXPECT_TRUE(has(out + file)) << file;
+}
+
 TEST(RecordFolder, WhatIsNoRecordIsNeverRemoved) {
   const TemporaryFolder folder;
   small(folder);

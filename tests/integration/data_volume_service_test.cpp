@@ -9,6 +9,7 @@
 #include "common/net/dispatch.h"
 #include "services/data/data_service.h"
 #include "services/data/kinds.h"
+#include "services/data/mesh/served_mesh.h"
 #include "services/data/volume/served_volume.h"
 #include "tests/support/data_files.h"
 #include "tests/support/volume/samples.h"
@@ -210,6 +211,105 @@ TEST(DataServer, SendsTheChunksOfAMesh) {
   ASSERT_EQ(list->first.chunks.size(), 1u);
   EXPECT_EQ(chunk->first.data.size(), list->first.chunks[0].bytes);
   EXPECT_TRUE(none->first.data.empty());
+}
+
+// One large chunk, of a mesh that nobody looks at.
+class LargeChunk final : public MeshStore {
+ public:
+  static constexpr size_t kBytes = 1 << 20;
+  const MeshStoreInfo& info() const override { return info_; }
+  const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
+  geometry::ChunkBytes chunk(ChunkId) const override { return {*bytes_, bytes_}; }
+
+ private:
+  MeshStoreInfo info_;
+  std::vector<geometry::ChunkInfo> chunks_{{ChunkId{0}, {{0, 0, 0}, {1, 1, 1}}, 1, kBytes}};
+  std::shared_ptr<const std::vector<std::byte>> bytes_ = std::make_shared<std::vector<std::byte>>(kBytes);
+};
+
+TEST(DataServer, AFloodOfChunkRequestsQueuesFew) {
+  DataServiceOptions options;
+  options.service.name = "data-1", options.service.master = "inproc://master";
+  options.service.bind = "tcp://127.0.0.1:*";
+  const auto served = serve_mesh(std::make_shared<LargeChunk>(), "large.ply",
+                                 {.as_begun = std::nullopt, .map = {}, .open = [](const std::string&, const Progress&) {
+                                    return Result<std::shared_ptr<MeshStore>>(Error{"there is none"});
+                                  }});
+  net::Context context;
+  net::Socket master(context, net::Kind::kRouter, "master");
+  ASSERT_TRUE(master.bind("inproc://master"));
+  std::atomic<bool> stop = false;
+  std::thread server([&] { EXPECT_EQ(serve(context, *served, options.service, [&] { return stop.load(); }), 0); });
+  const auto hello = next<wire::Hello>(master);
+  const net::SocketOptions few{.high_water_mark = 4, .max_message_bytes = wire::kMaxBulkBytes};
+  net::Socket flooder(context, net::Kind::kDealer, "flooder", few), other(context, net::Kind::kDealer, "other", few);
+  const std::string endpoint = hello ? hello->first.endpoints.at("chunks") : "inproc://nowhere";
+  EXPECT_TRUE(flooder.connect(endpoint) && other.connect(endpoint));
+  const double before_mb = net::resident_mb();
+  // Nothing of it is read.
+  const double until_s = monotonic_s() + kDeadline_s;
+  for (int sent = 0; sent < 1000 && monotonic_s() < until_s;)
+    if (flooder.send(wire::ChunkRequest{EpochId{3}, ChunkId{0}}))
+      ++sent;
+    else
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_LT(monotonic_s(), until_s);
+  other.send(wire::ChunkRequest{EpochId{3}, ChunkId{0}});
+  EXPECT_TRUE(next<wire::Chunk>(other)) << "others are served";
+  EXPECT_LT(net::resident_mb() - before_mb, 100);
+  stop = true;
+  server.join();
+}
+
+// A store whose memory has run out.
+class NoMemory final : public VolumeStore {
+ public:
+  explicit NoMemory(std::shared_ptr<VolumeStore> store) : store_(std::move(store)) {}
+  const volume::Session& session() const override { return store_->session(); }
+  const volume::Histogram& histogram() const override { return store_->histogram(); }
+  std::string format() const override { return store_->format(); }
+  const scene::Placement& placement() const override { return store_->placement(); }
+  uint64_t content_hash() const override { return store_->content_hash(); }
+  Result<volume::Voxels> voxels(int, int, int, const volume::LevelSet&, const volume::LevelSet&) override {
+    throw std::bad_alloc();
+  }
+  Result<std::optional<double>> value_at(int, const glm::dvec3&) override { throw std::bad_alloc(); }
+  Result<std::vector<uint32_t>> slice_weights(int, const volume::LevelSet&) override { throw std::bad_alloc(); }
+
+ private:
+  std::shared_ptr<VolumeStore> store_;
+};
+
+// main() says it in one line and ends with code 1; so it must come out of the serve loop.
+TEST(DataServer, AnAnswerThatThrowsEndsTheServerInOrder) {
+  DataServiceOptions options;
+  options.service.name = "data-1", options.service.master = "inproc://master";
+  options.service.bind = "inproc://voxels";
+  const auto served = serve_volume(std::make_shared<NoMemory>(open_or_fail(noise(3, {40, 30, 100}))), "noise.raw");
+  net::Context context;
+  net::Socket master(context, net::Kind::kRouter, "master");
+  ASSERT_TRUE(master.bind("inproc://master"));
+  std::atomic<bool> ended = false, threw = false;
+  const double until_s = monotonic_s() + kDeadline_s;
+  std::thread server([&] {
+    try {
+      serve(context, *served, options.service, [&] { return monotonic_s() > until_s; });
+    } catch (const std::bad_alloc&) {
+      threw = true;
+    }
+    ended = true;
+  });
+  const auto hello = next<wire::Hello>(master);
+  if (hello) {
+    wire::Welcome w;
+    w.master = InstanceId{5}, w.epoch = EpochId{1};
+    w.facts = hello->first.facts, w.parameters = hello->first.parameters;
+    master.send(w, hello->second.peer);
+  }
+  while (!ended) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  server.join();
+  EXPECT_TRUE(hello);
+  EXPECT_TRUE(threw);
 }
 
 }  // namespace

@@ -168,5 +168,30 @@ TEST_F(Link, ArrivalsAreStampedWhileNobodyReads) {
   EXPECT_LT(message->arrived_s, after_s - 0.1);
 }
 
+// Whatever the master is: a message of the control plane has at most 1 MiB.
+TEST_F(Link, AControlMessageBeyondItsLimitIsDropped) {
+  FakeMaster master("tcp://127.0.0.1:*", InstanceId{7});
+  MasterLink link = make_link(master.endpoint);
+  ASSERT_TRUE(talk(link, &master, [&] { return link.session().has_value(); }));
+  const int version = link.version();
+  master.socket.send_frames(master.peer, "of any type", std::string(wire::kMaxControlBytes + 1, 'x'));
+  ASSERT_TRUE(talk(link, &master, [&] { return link.socket().rejected() > 0; })) << "nobody was given it";
+  EXPECT_EQ(link.version(), version);
+}
+
+// A sampler may need seconds for a slab: meanwhile nobody calls tick().
+TEST_F(Link, AProcessThatWorksForSecondsIsHeardOf) {
+  FakeMaster master("tcp://127.0.0.1:*", InstanceId{7});
+  MasterLink link = make_link(master.endpoint);
+  ASSERT_TRUE(talk(link, &master, [&] { return !master.reports.empty(); }));
+  master.reports.clear();
+  for (const double until = monotonic_s() + 5; monotonic_s() < until; wait_readable({&master.socket}, 5))
+    master.serve();
+  ASSERT_GE(master.reports.size(), 2u);
+  EXPECT_LE(master.reports.size(), 5u);
+  for (const auto& values : master.reports) EXPECT_TRUE(values.empty());
+  ASSERT_TRUE(talk(link, &master, [&] { return !master.reports.back().empty(); })) << "and it reports again";
+}
+
 }  // namespace
 }  // namespace telesplat::net

@@ -1,7 +1,11 @@
 // Sockets and peers that misbehave: everything bad is dropped and counted, everyone else is served.
 #include <gtest/gtest.h>
 
+#include <pthread.h>
+
 #include <atomic>
+#include <csignal>
+#include <mutex>
 #include <random>
 #include <thread>
 
@@ -250,6 +254,89 @@ TEST(HostilePeers, BytesThatTrickleInMakeAMessage) {
       bound.socket, [&] { return !got.empty(); }, &got));
   EXPECT_TRUE(bound.socket.decode<wire::Goodbye>(got[0]));
   EXPECT_EQ(bound.socket.rejected(), 0u);
+}
+
+// A signal may come between two parts of a message, on either side.
+TEST(HostilePeers, SignalsDoNotTearMessages) {
+  struct sigaction quiet = {}, before = {};
+  quiet.sa_handler = [](int) {};  // without SA_RESTART: calls are interrupted
+  sigaction(SIGUSR1, &quiet, &before);
+  constexpr int kMessages = 100000;
+  Bound bound(Kind::kRouter, {.high_water_mark = 1000});
+  std::atomic<bool> stop{false};
+  const pthread_t receiver = pthread_self();
+  std::thread sender([&] {
+    Context context;
+    Socket socket(context, Kind::kDealer, "sender", {.high_water_mark = 1000});
+    EXPECT_TRUE(socket.connect(bound.endpoint).ok());
+    for (int i = 0; i < kMessages && !stop;)
+      if (socket.send(kGoodbye))
+        ++i;
+      else
+        std::this_thread::yield();
+    while (!stop) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
+  std::thread signaller([&, sends = sender.native_handle()] {
+    while (!stop) {
+      pthread_kill(receiver, SIGUSR1);
+      pthread_kill(sends, SIGUSR1);
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+  });
+  int got = 0;
+  for (const double until = monotonic_s() + 60; got < kMessages && monotonic_s() < until;
+       wait_readable({&bound.socket}, 5))
+    while (const auto m = bound.socket.receive()) got += m->type == wire::Goodbye::kName;
+  stop = true;
+  signaller.join();
+  sender.join();
+  sigaction(SIGUSR1, &before, nullptr);
+  EXPECT_EQ(got, kMessages);
+  EXPECT_EQ(bound.socket.rejected(), 0u);
+}
+
+// ZeroMQ's thread tells of connections; it must not wait for a socket that is about to end, or that nobody reads.
+TEST(HostilePeers, SocketsEndWhilePeersComeAndGo) {
+  std::atomic<bool> stop{false};
+  std::mutex mutex;
+  std::string endpoint;
+  std::vector<std::thread> peers;
+  for (int i = 0; i < 4; ++i)
+    peers.emplace_back([&] {
+      while (!stop) {
+        std::string to;
+        {
+          const std::lock_guard lock(mutex);
+          to = endpoint;
+        }
+        if (!to.empty()) RawPeer(to).send("x");
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    });
+  std::atomic<int> ended{0};
+  std::thread sockets([&] {
+    for (; ended < 200 && !stop; ++ended) {
+      Bound bound(Kind::kRouter);
+      const std::lock_guard lock(mutex);
+      endpoint = bound.endpoint;
+    }
+  });
+  for (const double until = monotonic_s() + 60; ended < 200 && monotonic_s() < until;)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_EQ(ended, 200) << "one did not end";
+  stop = true;
+  sockets.join();
+  for (auto& peer : peers) peer.join();
+}
+
+TEST(HostilePeers, ASocketThatNobodyReadsTakesConnections) {
+  Bound bound(Kind::kRouter);
+  for (int i = 0; i < 6000; ++i) RawPeer(bound.endpoint).send("x");
+  Context context;
+  Socket friendly(context, Kind::kDealer, "friend");
+  ASSERT_TRUE(friendly.connect(bound.endpoint).ok());
+  ASSERT_TRUE(friendly.send(kGoodbye));
+  EXPECT_TRUE(wait_readable({&bound.socket}, 10000));
 }
 
 }  // namespace

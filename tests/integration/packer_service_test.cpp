@@ -4,12 +4,16 @@
 #include <functional>
 #include <glm/gtc/matrix_transform.hpp>
 #include <optional>
+#include <random>
 #include <thread>
 
+#include "common/codec/depth_codec.h"
 #include "common/core/clock.h"
+#include "common/net/service.h"
 #include "common/net/socket.h"
 #include "common/volume/session.h"
 #include "services/packer/packer_service.h"
+#include "tests/support/keys/lease_key.h"
 
 namespace telesplat {
 namespace {
@@ -57,7 +61,7 @@ class PackerServiceTest : public testing::Test {
 
   wire::Welcome mesh() {
     wire::Welcome w;
-    w.master = {1}, w.epoch = {1}, w.octree_depth = 6;
+    w.master = {1}, w.lease_key = test::lease_key(), w.epoch = {1}, w.octree_depth = 6;
     w.hello_sent_s = hello.sent_s;
     w.box_room = {{-1, -1, -1}, {1, 1, 1}};
     w.facts["kind"] = "mesh";
@@ -92,6 +96,7 @@ class PackerServiceTest : public testing::Test {
       lease.end = uint64_t(grid.size[2]);
       lease.shear = *volume::plan_frame(grid, std::span(&camera, 1));
       lease.views = {{{77}, {5}, camera, 0}};
+      test::seal_lease(lease, {9});
       sampler.send(wire::SliceImages{.sampler = {9}, .lease = lease, .voxels = 3});
     });
     if (!message) return std::nullopt;
@@ -130,6 +135,50 @@ TEST_F(PackerServiceTest, FollowsASessionThatChangesFromPointsToSlicesAndBack) {
   ASSERT_TRUE(second);
   EXPECT_EQ(second->epoch.value, 3u);
   EXPECT_NE(second->packer, first->packer) << "viewers start anew";
+}
+
+// Another one must not notice, and memory must not grow.
+TEST_F(PackerServiceTest, AViewerThatReadsNothingCostsNoMoreThanItsWindow) {
+  wire::Welcome session = mesh();
+  session.settings["packing.keep_redundant"] = 1;
+  session.settings["sampling.steering"] = 0;
+  master.send(session, packer_peer);
+  ASSERT_TRUE(ask_for_points());
+  // Pixels of noise: 40 patches of some 300 KB.
+  constexpr int kSide = 256, kPatches = 40;
+  std::minstd_rand random(1);
+  uint64_t told = 0;
+  for (uint64_t frame = 1; frame <= kPatches; ++frame) {
+    image::DepthImage noise(kSide, kSide);
+    for (size_t i = 0; i < noise.pixels(); ++i) {
+      noise.depth[i] = (1u << 20) + uint32_t(random()) % (1u << 20);
+      noise.colour[i] = uint32_t(random()) & 0xffffff;
+      noise.normal[i] = uint16_t(random());
+    }
+    const auto stream = codec::encode(noise);
+    wire::DepthTile m{.sampler = {9}};
+    m.lease.lease = {frame}, m.lease.frame = {frame}, m.lease.epoch = {1}, m.lease.viewer = {77};
+    m.lease.request = {frame}, m.lease.blocks_in_frame = 1;
+    m.lease.camera = geometry::make_camera({{0, 0, 0.6}, {1, 0, 0, 0}}, 60, kSide, kSide);
+    m.lease.rect = m.lease.block_rect = {0, 0, kSide, kSide};
+    m.image = std::as_bytes(std::span(stream));
+    test::seal_lease(m.lease, {9});
+    while (!sampler.send(m)) std::this_thread::yield();
+    if (next(master, wire::TileDone::kName)) ++told;
+  }
+  ASSERT_EQ(told, kPatches);
+  net::Socket idle(context, net::Kind::kDealer, "idle",
+                   {.high_water_mark = 1, .max_message_bytes = wire::kMaxBulkBytes});
+  ASSERT_TRUE(idle.connect(hello.endpoints.at("state")));
+  const double before_mb = net::resident_mb();
+  for (int n = 0; n < 30; ++n) {
+    while (!idle.send(wire::StateRequest{{78}, {}, {}})) std::this_thread::yield();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_LT(net::resident_mb() - before_mb, 64);
+  EXPECT_TRUE(next(viewer, wire::Patch::kName, [this] {
+    viewer.send(wire::StateRequest{{77}, {}, {}});
+  })) << "others are answered";
 }
 
 TEST_F(PackerServiceTest, WhatComesBeforeItsSessionWaitsForIt) {

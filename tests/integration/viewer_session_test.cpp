@@ -329,5 +329,15 @@ TEST(PointSession, AForgottenRequestIsMadeAgain) {
   expect_one_update_a_frame(s);
 }
 
+// What no event explains: it is noticed, counted and mended, and the display goes on.
+TEST(PointSession, AReplicaThatIsNotThePackersIsMadeAnew) {
+  const Shown undisturbed = show({.volume = false}, CouplingMode::kAsync, 60, 60);
+  const Shown s = show({.volume = false, .other_digest_after = 5}, CouplingMode::kAsync, 60, 60);
+  expect_complete(s, 60);
+  EXPECT_EQ(s.status.at("digests_different"), 1);
+  EXPECT_EQ(s.counts.began_anew, undisturbed.counts.began_anew + 1) << "everything was asked for again, once";
+  EXPECT_GT(s.sequence.back(), 20) << "later events are shown";
+}
+
 }  // namespace
 }  // namespace telesplat::viewer

@@ -10,6 +10,7 @@
 #include "services/packer/slices/slice_packing.h"
 #include "services/sampler/volume/shear/slabs.h"
 #include "services/sampler/volume/work.h"
+#include "tests/support/keys/lease_key.h"
 
 namespace telesplat {
 namespace {
@@ -73,6 +74,7 @@ TEST(VolumeFrames, AViewerGetsWhatTheSamplersSplat) {
 
   wire::Welcome welcome;
   welcome.master = {1};
+  welcome.lease_key = test::lease_key();
   welcome.epoch = {1};
   welcome.parameters = volume::to_parameters(s);
   welcome.facts = volume::to_facts(s);
@@ -154,6 +156,7 @@ TEST(VolumeFrames, AViewerGetsWhatTheSamplersSplat) {
         for (int slab = 0; slab < 2; ++slab) {
           lease.lease = {uint64_t(slab) + 1}, lease.slab = uint64_t(slab);
           lease.begin = uint64_t(cut[slab]), lease.end = uint64_t(cut[slab + 1]);
+          test::seal_lease(lease, {uint64_t(slab) + 1});
           tell(*samplers[slab].work, lease);
         }
         leased = true;

@@ -10,8 +10,9 @@ def folders(tree):
     """A folder holds no more files than a person takes in at a glance, its CMake list aside."""
     for folder, names in tree.names.items():
         files = [name for name in names if name != "CMakeLists.txt"]
-        if len(files) > tables.MOST_FILES and not set(folder.split("/")) & set(tables.DATA_FOLDERS):
-            yield Finding(folder or ".", 1, "folders", f"{len(files)} files, more than {tables.MOST_FILES}")
+        most = tables.MORE_FILES.get(folder, tables.MOST_FILES)
+        if len(files) > most and not set(folder.split("/")) & set(tables.DATA_FOLDERS):
+            yield Finding(folder or ".", 1, "folders", f"{len(files)} files, more than {most}")
 
 
 def cmake(tree):

@@ -58,7 +58,33 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
   int patches = 0, forgets = 0, patch_forgets = 0, epochs = 0, gaps = 0, published = 0;
   double now_s = 0;
   std::vector<packer::SampledTile> waiting;
+  // One joins while events go on: it is sent a few at a time, and keeps what is published meanwhile.
+  std::optional<test::Replica> joiner;
+  packer::EventLog::Replay left;
+  std::vector<packer::Event> kept;
+  int joined = 0;
+  const auto bring_up_to_date = [&] {
+    if (!joiner) {
+      if (!chance(0.05)) return;
+      joiner.emplace(config.model);
+      left = core.replay({0});
+      kept.clear();
+    }
+    for (uint64_t n = random() % 4; n > 0; --n) {
+      if (const auto event = core.next(left)) {
+        ASSERT_LE(event->sequence, left.until);
+        joiner->apply(*event);
+        continue;
+      }
+      joiner->skip_to(left.until);
+      for (const auto& event : kept) joiner->apply(event);
+      ASSERT_EQ(joiner->model().digest(), core.model().digest()) << "one that joined in parts";
+      ++joined;
+      return joiner.reset();
+    }
+  };
   const auto publish = [&](const packer::Event& event) {
+    if (joiner) kept.push_back(event);
     ASSERT_EQ(event.sequence.value, ++expected_sequence) << "sequences have no holes when published";
     ++published;
     patches += event.kind == packer::Event::Kind::kPatch;
@@ -110,6 +136,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
       if (event->has_value()) publish(**event);
       for (const auto& forget : core.forget_superseded()) publish(forget);
     }
+    bring_up_to_date();
     if (HasFatalFailure()) return;
     if (step % 100 == 0) {
       test::Replica late(config.model);
@@ -118,6 +145,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
     }
   }
   EXPECT_GT(patches, 100);
+  EXPECT_GT(joined, 2);
   EXPECT_GT(patch_forgets, 10);
   if (keep) {
     EXPECT_EQ(patch_forgets, forgets);

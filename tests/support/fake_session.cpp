@@ -141,6 +141,7 @@ void FakeSession::receive_state() {
       const auto request = state_.decode<wire::StateRequest>(*m);
       if (!request) continue;
       const uint64_t after = request->packer == packer_ ? request->after.value : 0;
+      counts_.began_anew += after == 0;
       for (size_t i = after; i < log_.size(); ++i) state_.send_frames(m->peer, log_[i].first, log_[i].second);
       state_.send(wire::StateMark{packer_, {log_.size()}, epoch_, true, 0}, m->peer);
     }
@@ -269,6 +270,8 @@ void FakeSession::publish_points(const wire::ViewRequest& request) {
   for (int i = 0; i < options_.coarse_patches; ++i)
     publish(geometry::subsample(request.camera, 4), 4, i, options_.coarse_patches);
   for (int i = 0; i < 2; ++i) publish(request.camera, 1, i, 2);
+  if (answers_ == options_.other_digest_after)
+    patches_.send(wire::StateMark{packer_, {sequence_}, epoch_, false, 0, 4711});
 }
 
 }  // namespace telesplat::test

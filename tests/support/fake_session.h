@@ -31,6 +31,8 @@ class FakeSession {
     uint64_t change_every = 0, changes = 2;
     /// After N answers the master tells of a box that no model can have, and another packer begins; 0: never.
     uint64_t strange_after = 0;
+    /// Of points: after N answers a mark tells of a model with other points than were published; 0: never.
+    uint64_t other_digest_after = 0;
     std::map<std::string, double> settings;  ///< of the welcome
     /// The same, instead of these, after so many answers.
     std::map<uint64_t, std::map<std::string, double>> settings_after;
@@ -50,7 +52,8 @@ class FakeSession {
     uint64_t most_open = 0;               ///< requests not answered, at most at any time
     uint64_t most_unacknowledged = 0;     ///< volume frames on their way, at most
     uint64_t introductions = 0, acknowledged = 0;
-    bool rising = true;  ///< acknowledgements came in the order of frames
+    uint64_t began_anew = 0;  ///< state requests for everything
+    bool rising = true;       ///< acknowledgements came in the order of frames
     uint64_t buffers = 0;
     bool in_order = false;
   };

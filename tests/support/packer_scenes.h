@@ -61,6 +61,8 @@ class Replica {
     for (const packer::Event& event : core.events_since(applied_)) apply(event);
     applied_ = core.sequence();
   }
+  /// What was left out up to here changes nothing.
+  void skip_to(Sequence sequence) { applied_ = std::max(applied_, sequence); }
   Sequence applied() const { return applied_; }
   const points::PointModel& model() const { return model_; }
 

@@ -1,6 +1,7 @@
 // telesplat-health: exit code 0 if a session's master answers and, where one is asked for, a process takes part in it;
-// 1 if not.
+// 1 if not. What a container's health check asks.
 #include <cstdio>
+#include <map>
 
 #include "common/core/version.h"
 #include "common/net/control.h"
@@ -8,7 +9,6 @@
 #include "common/net/service.h"
 #include "common/options/parser.h"
 #include "tools/common/complain.h"
-#include "tools/health/health.h"
 
 using namespace telesplat;
 
@@ -16,8 +16,8 @@ namespace {
 
 struct Options {
   std::string master = "tcp://127.0.0.1:7700";
-  health::Subject subject;
-  bool this_host = false, show = false;
+  std::string role, name, keys;
+  bool this_host = false, show = false, may_be_away = false;
   double timeout_s = 1.2;  // the answer to a health check is due within 2 s, ends of sockets included
 };
 
@@ -28,27 +28,47 @@ options::Table table(Options& o) {
        .help = "address of the master; auto: of the one session of yours that runs on this machine",
        .environment = net::kMasterVariable},
       {.flag = "--role",
-       .value = &o.subject.role,
+       .value = &o.role,
        .help = "a process of this role must be well: data, sampler, packer or viewer",
        .limits = options::Names{"data", "sampler", "packer", "viewer"}},
-      {.flag = "--name", .value = &o.subject.name, .help = "a process of this name must be well"},
+      {.flag = "--name", .value = &o.name, .help = "a process of this name must be well"},
       {.flag = "--host", .value = &o.this_host, .help = "it must run on this host (in this container)"},
-      {.flag = "--status", .value = &o.show, .help = "print the master's answer: who takes part and what they count"},
+      {.flag = "--master-may-be-away",
+       .value = &o.may_be_away,
+       .help = "0 as well while no master answers: this process waits for it, and need not be started anew"},
+      {.flag = "--status", .value = &o.show, .help = "print the master's status: who takes part and what they count"},
       {.flag = "--timeout",
        .value = &o.timeout_s,
        .help = "seconds to wait for the master",
-       .limits = options::Range{0.05, 60}}};
+       .limits = options::Range{0.05, 60}},
+      net::keys_row(o.keys)};
 }
 
-int check(Options o) {
+// No answer is an Error, a bad one a refusal.
+Result<wire::ControlReply> ask(const net::Access& access, const std::string& master, const std::string& command,
+                               double timeout_s, const std::map<std::string, std::string>& about = {}) {
+  net::Context context(access);
+  net::Socket socket(context, net::Kind::kDealer, "health", net::kControlSocket);
+  if (const Status s = socket.connect(master); !s) return s.error();
+  return net::reply_of_master(socket, master, command, timeout_s, about);
+}
+
+int check(const Options& o) {
   log::initialise("health", "error");
-  if (o.this_host) o.subject.host = net::host_name();
   const auto master = net::find_master(o.master);
   if (master.address.empty()) return tools::complain({master.problem}, master.exit_code(), "telesplat-health");
-  const auto status = net::ask_master(master.address, "status", o.timeout_s);
-  const Status well = status ? health::check(*status, o.subject) : Status(status.error());
-  if (status && o.show) std::printf("%s\n", status->c_str());
-  return well.ok() ? 0 : tools::complain(well.error(), 1, "telesplat-health");
+  const auto access = net::Access::open({}, o.keys.empty() ? master.keys : o.keys, net::any_role());
+  if (!access) return tools::complain(access.error(), 2, "telesplat-health");
+  std::map<std::string, std::string> about;
+  if (!o.role.empty()) about["role"] = o.role;
+  if (!o.name.empty()) about["name"] = o.name;
+  if (o.this_host) about["host"] = net::host_name();
+  const auto well = ask(*access, master.address, "health", o.timeout_s, about);
+  if (!well) return o.may_be_away ? 0 : tools::complain(well.error(), 1, "telesplat-health");
+  if (o.show)
+    if (const auto status = ask(*access, master.address, "status", o.timeout_s); status)
+      std::printf("%s\n", status->text.c_str());
+  return well->ok ? 0 : tools::complain({well->text}, 1, "telesplat-health");
 }
 
 }  // namespace

@@ -46,6 +46,7 @@ Command cache_command();
 Command presets_command();
 Command autostereo_command();
 Command top_command();
+Command keys_command();
 
 /// `commands`, and two more that tell of all of them: completion and man.
 std::vector<Command> with_manuals(const std::string& about, std::vector<Command> commands);

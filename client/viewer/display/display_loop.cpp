@@ -101,11 +101,20 @@ class Display {
   // The request of what is drawn next, where nothing is waited for.
   RequestId newest_drawn() const { return gate_.waits() ? RequestId{} : Succession::kNewest; }
 
+  // A frame that is on display.
+  struct Shown {
+    geometry::Camera camera;
+    geometry::Pose head;
+    EpochId epoch;
+    EyePair eyes;  // with stereo
+  };
+
   // Of the frame that begins; the surface knows by then what there is to show.
   geometry::Camera next_camera(double now_s, double t_s) {
+    auto session = worker_.session();  // first: so a session's scene is never told after it
     const ShownScene scene = worker_.shown_scene();
     if (!scene.box_room.empty() && scene != scene_) surface_.on_scene(scene_ = scene);
-    if (auto session = worker_.session(); session != session_) surface_.on_session(session_ = std::move(session));
+    if (session != session_) surface_.on_session(session_ = std::move(session));
     if (const auto wish = surface_.take_sampling()) worker_.set_sampling(*wish);
     return surface_.begin_frame(now_s, t_s, look_);
   }
@@ -156,7 +165,7 @@ class Display {
       }
       surface_.present(view_, true);
       if (!drawn.empty) worker_.on_first_points(monotonic_s());
-      carry_out_orders(camera, surface_.head(), drawn.epoch);
+      carry_out_orders({camera, surface_.head(), drawn.epoch, eyes_.pair()});
       surface_.report(live_figures(monotonic_s(), 0, drawn, *source_, worker_));
     }
     return true;
@@ -195,7 +204,7 @@ class Display {
       const geometry::Camera camera = next_camera(now_s, t_s);
       worker_.on_pose(now_s, asked(now_s, t_s, camera, surface_.head()));
       if (source_ && shown_.epoch.value > 0)
-        carry_out_orders(shown_.camera, shown_.head, shown_.epoch);
+        carry_out_orders(shown_);
       else
         refuse_orders();
       if (view_intact_ && surface_.visible()) surface_.present(view_, true);
@@ -216,7 +225,7 @@ class Display {
     worker_.on_waiting(waits_s);
     if (Overlays* overlays = surface_.overlays(); overlays && (waits_s > 0) != overlays->shows("waiting")) {
       if (waits_s > 0)
-        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kLowerRight});
+        overlays->show("waiting", {text_panel({"waiting for a view update"}, 2), Overlay::Corner::kUpperLeft});
       else
         overlays->hide("waiting");
     }
@@ -317,8 +326,7 @@ class Display {
     keep(use, t_s, m, legend);
     ++result_.frames;
     tell_of(m);
-    carry_out_orders(m.camera, m.head, m.drawn.epoch);
-    shown_ = {m.camera, m.head, m.drawn.epoch};
+    carry_out_orders(shown_ = {m.camera, m.head, m.drawn.epoch, eyes_.pair()});
     if (wall_ && !swapped.alone) return;  // the wall has its pace
     if (o_.target_fps > 0)
       sleep_until(next_frame_s(m.begin_s));
@@ -356,23 +364,22 @@ class Display {
     for (const wire::Order& order : worker_.orders().take_orders())
       worker_.orders().answer({order.number, false, order.command + ": nothing is shown yet"});
   }
-  void carry_out_orders(const geometry::Camera& camera, const geometry::Pose& head, EpochId epoch) {
+  void carry_out_orders(const Shown& frame) {
     surface_.on_terms(worker_.terms());
     if (const auto at = surface_.points_at()) {
-      const auto aim = eyes_.aim(camera, *at);
+      const auto aim = eyes_.aim(frame.camera, frame.eyes, *at);
       surface_.on_pick(source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, kPickOpacity));
     }
-    geometry::Camera shown = camera;
-    if (eyes_.on()) shown.width = view_.width, shown.height = view_.height;
+    const geometry::Camera display = eyes_.display(frame.camera);
     const auto pick = [&](double x, double y, double opacity) {
-      const auto aim = eyes_.aim(camera, {x / shown.width, y / shown.height});
+      const auto aim = eyes_.aim(frame.camera, frame.eyes, {x / display.width, y / display.height});
       return source_->pick(aim.camera, aim.at_pix.x, aim.at_pix.y, opacity);
     };
     for (const wire::Order& order : worker_.orders().take_orders()) {
       const auto done = carry_out(
-          order, {.camera = shown,
-                  .head = head,
-                  .epoch = epoch,
+          order, {.camera = display,
+                  .head = frame.head,
+                  .epoch = frame.epoch,
                   .terms = worker_.terms(),
                   .pick = pick,
                   .go = [&](const geometry::Pose& pose) { return surface_.go_to(pose); },
@@ -447,11 +454,7 @@ class Display {
   WallPace* const wall_;  // null: the display is by itself
   std::optional<MeasuredFrame> row_;
   EyePictures eyes_;
-  struct Shown {
-    geometry::Camera camera;
-    geometry::Pose head;
-    EpochId epoch;
-  } shown_;  // last
+  Shown shown_;  // last
   Look look_;
   ShownScene scene_;  // as the surface knows it, and the session too
   std::shared_ptr<const wire::Welcome> session_;

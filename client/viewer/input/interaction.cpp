@@ -110,7 +110,7 @@ void Interaction::take_camera() {
 }
 
 void Interaction::go_to(const geometry::Pose& pose) {
-  playing_ = false;
+  playing_ = plays_path_ = false;
   controls_.set_flying(false);
   controls_.take_over(pose);
 }
@@ -274,6 +274,7 @@ void Interaction::play(geometry::Trajectory path) {
 geometry::Pose Interaction::advance(double now_s, bool playback) {
   const double dt_s = last_s_ ? std::max(0.0, now_s - *last_s_) : 0.0;
   last_s_ = now_s;
+  if (std::exchange(goes_home_, false)) controls_.reset();
   const geometry::Pose pose = next_pose(now_s, dt_s, playback);
   if (records_path_) record_pose(now_s, pose);
   return pose;

@@ -82,8 +82,9 @@ class Interaction {
   void set_scene(scene::Pipeline pipeline, const geometry::Box& box_room, const geometry::Pose& home);
   /// What T plays from now on, unless the person recorded a path.
   void set_recorded(geometry::Trajectory recorded);
-  /// What R does, but whoever has the camera keeps it.
-  void back_to_first_view() { controls_.reset(); }
+  /// What R does, but whoever has the camera keeps it: to the first view of the scene that is told before the next
+  /// advance().
+  void back_to_first_view() { goes_home_ = true; }
   /// T plays this from now on, and it plays at once; then T goes back to who tells where the head is, if somebody does.
   void play(geometry::Trajectory path);
   bool can_play() const { return recorded_.has_value(); }
@@ -156,6 +157,7 @@ class Interaction {
   bool shows_panel_ = false, fullscreen_ = false, open_ = false;
   KeyNames key_names_ = us_name;
   bool records_path_ = false, has_own_path_ = false;
+  bool goes_home_ = false;   // with the next frame
   bool plays_path_ = false;  // although somebody tells where the head is
   double path_from_s_ = 0;
   Path path_, finished_path_;

@@ -23,14 +23,14 @@ struct ControlDesk::Line {
   net::Context context;
   net::Socket socket;
   Status connected;
-  explicit Line(const std::string& master, const net::Via& via)
-      : context(via),
+  explicit Line(const std::string& master, const net::Access& access)
+      : context(access),
         socket(context, net::Kind::kDealer, "panel", net::kControlSocket),
         connected(socket.connect(master)) {}
 };
 
-ControlDesk::ControlDesk(std::string master, net::Via via, double patience_s)
-    : master_(std::move(master)), via_(std::move(via)), patience_s_(patience_s), thread_([this] { loop(); }) {}
+ControlDesk::ControlDesk(std::string master, net::Access access, double patience_s)
+    : master_(std::move(master)), access_(std::move(access)), patience_s_(patience_s), thread_([this] { loop(); }) {}
 
 ControlDesk::~ControlDesk() {
   {
@@ -99,7 +99,7 @@ bool ControlDesk::waits_for_work(std::optional<Order>& order, bool& status) {
 // nullopt: the end came. An answer does not say what it answers: where one may still come, the line is given up.
 std::optional<OrderAnswer> ControlDesk::ask(std::optional<Line>& to, Order order) {
   // A connection over which nothing is said counts at the master as a message that it rejected.
-  if (!to) to.emplace(master_, via_);
+  if (!to) to.emplace(master_, access_);
   Line& line = *to;
   const auto failed = [&](std::string why) {
     to.reset();
@@ -119,6 +119,8 @@ std::optional<OrderAnswer> ControlDesk::ask(std::optional<Line>& to, Order order
       if (const auto reply = line.socket.decode<wire::ControlReply>(*message))
         return OrderAnswer{std::move(order), reply->ok, reply->text};
     }
+    if (std::string refusal = net::refusal_of_master(line.socket, master_); !refusal.empty())
+      return failed(std::move(refusal));
     if (line.socket.failed_connections() != failed_before)
       return failed(fmt::format("no master is at {}: nothing takes connections there", master_));
   }

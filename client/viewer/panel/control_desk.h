@@ -11,7 +11,7 @@
 
 #include "client/viewer/panel/order.h"
 #include "client/viewer/panel/session_status.h"
-#include "common/net/via.h"
+#include "common/net/keys/access.h"
 
 namespace telesplat::viewer {
 
@@ -20,7 +20,8 @@ class ControlDesk {
   static constexpr double kPatience_s = 5;      ///< for an answer
   static constexpr double kStatusPeriod_s = 1;  ///< while somebody watches
 
-  ControlDesk(std::string master, net::Via via, double patience_s = kPatience_s);
+  /// access: orders that change the session for everyone need an operator's key, where there are keys.
+  ControlDesk(std::string master, net::Access access, double patience_s = kPatience_s);
   /// Does not wait for answers that are due.
   ~ControlDesk();
 
@@ -44,7 +45,7 @@ class ControlDesk {
   std::optional<OrderAnswer> ask(std::optional<Line>& to, Order order);
 
   const std::string master_;
-  const net::Via via_;
+  const net::Access access_;
   const double patience_s_;
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -47,6 +47,8 @@ class EventSequencer {
   /// An answer takes too long (a packer that died): ask again.
   void retry();
 
+  /// start() was called: events may have come.
+  bool begun() const { return waiting_ || packer_; }
   bool synchronised() const { return !waiting_ && packer_; }
   bool waiting() const { return waiting_; }
   Sequence applied() const { return applied_; }

@@ -132,7 +132,6 @@ std::vector<points::ClusterKey> ModelCache::summarise(size_t most) {
 }
 
 uint64_t ModelCache::digest() const {
-  const std::lock_guard lock(mutex_);
   return newest_.model ? newest_.model->digest() : 0;
 }
 

@@ -38,7 +38,7 @@ class ModelCache {
   std::vector<points::ClusterKey> summarise(size_t most);
   /// Summaries made so far.
   uint64_t summaries_made() const { return summaries_made_; }
-  /// Digest of the newest replica, for tests of replication.
+  /// Digest of the newest replica; 0: there is none. The display draws meanwhile: it changes no points.
   uint64_t digest() const;
 
   // ---- display thread ----

@@ -41,11 +41,13 @@ Status ReceivedPoints::follow(const wire::Welcome& session) {
   if (const Status s = points::validate(config); !s) return s;
   auto clip = geometry::clip_from_text(scene::SessionView(session).fact(scene::kClipFact));
   if (!clip) return clip.error();
-  if (*clip != *clip_) {
+  if (*clip != *cut_.clip) {
     const std::lock_guard lock(mutex_);
-    clip_ = std::make_shared<const geometry::Clip>(*std::move(clip));
-    ++clip_version_;
+    cut_ = {std::make_shared<const geometry::Clip>(*std::move(clip)), cut_.version + 1, session.epoch};
   }
+  // The packer's first event for another model may have come before this, and a replica of the old one with it. On
+  // another connection nothing comes that was sent to the old one.
+  if (config_ != config && receiver_.begun()) links_.feeds.close();
   config_ = config;
   keeps_redundant_ = keep;
   return ok_status();
@@ -143,6 +145,8 @@ void ReceivedPoints::add_status(net::MasterLink::Values& values) const {
   values["points_received"] = double(received.points_received);
   values["gaps_resynced"] = double(received.gaps);
   values["sequence"] = double(received.sequence.value);
+  values["digests_equal"] = double(received.digests_equal);
+  values["digests_different"] = double(received.digests_different);
   values["messages_rejected"] += double(received.decode_errors);
   if (waits_ || in_step_) return;
   // Where nothing is held back it is the receiver that knows when an epoch is shown.

@@ -43,11 +43,15 @@ class ReceivedPoints final : public Received {
   void on_seen(std::span<const points::ClusterKey> clusters, std::span<const uint32_t> frames);
   /// The session packs without eliminating redundancy: of each cluster the best patches are to be drawn (T4.4.3.3).
   bool keeps_redundant() const { return keeps_redundant_; }
-  /// What the session cuts away now, and a number that changes with it. What is on display may be of an epoch before.
-  std::shared_ptr<const geometry::Clip> clip(uint64_t& version) const {
+  /// What the session cuts away now. What is on display may be of an epoch before.
+  struct Cut {
+    std::shared_ptr<const geometry::Clip> clip = std::make_shared<const geometry::Clip>();
+    uint64_t version = 0;  ///< changes with it
+    EpochId epoch;         ///< the first one that is cut so
+  };
+  Cut cut() const {
     const std::lock_guard lock(mutex_);
-    version = clip_version_;
-    return clip_;
+    return cut_;
   }
 
  private:
@@ -73,8 +77,7 @@ class ReceivedPoints final : public Received {
   mutable std::mutex mutex_;  // guards what both threads use, below
   AccessLog seen_;
   ShownUpdate shown_;
-  std::shared_ptr<const geometry::Clip> clip_ = std::make_shared<const geometry::Clip>();
-  uint64_t clip_version_ = 0;
+  Cut cut_;
 };
 
 }  // namespace telesplat::viewer

@@ -37,11 +37,29 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
     if (!message) return;
     net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(patches, *message, [&](auto& m) {
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
-        sequencer_.on_mark(m);
+        on_published_mark(m);
       else
         sequencer_.on_published({m, message->owner, message->arrived_s});
     });
   }
+}
+
+// Changes that are held for the display are in the cache later: then there is nothing to compare.
+void PointReceiver::on_published_mark(const wire::StateMark& mark) {
+  sequencer_.on_mark(mark);
+  if (mark.digest == 0 || options_.hold || !sequencer_.synchronised() || mark.packer != sequencer_.packer() ||
+      mark.sequence != sequencer_.applied())
+    return;
+  const uint64_t ours = cache_.digest();
+  if (!check_.compare(mark.digest, ours, monotonic_s())) {
+    if (mark.digest != ours)
+      log::warn("after event {} the points are not the packer's: {:016x}, it has {:016x}", mark.sequence.value, ours,
+                mark.digest);
+    return;
+  }
+  log::error("after event {} the points are not the packer's: {:016x}, it has {:016x}; they are asked for anew",
+             mark.sequence.value, ours, mark.digest);
+  sequencer_.start();
 }
 
 void PointReceiver::receive_answers(net::Socket& state, int most) {
@@ -172,8 +190,16 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
 }
 
 PointReceiver::Figures PointReceiver::figures() const {
-  return {points_received_,    decode_errors_,       sequencer_.gaps(),   epochs_shown_,
-          switch_.displayed(), sequencer_.applied(), sequencer_.packer(), bytes_received_};
+  return {.points_received = points_received_,
+          .decode_errors = decode_errors_,
+          .gaps = sequencer_.gaps(),
+          .epochs_shown = epochs_shown_,
+          .epoch = switch_.displayed(),
+          .sequence = sequencer_.applied(),
+          .packer = sequencer_.packer(),
+          .bytes_received = bytes_received_,
+          .digests_equal = check_.equal(),
+          .digests_different = check_.different()};
 }
 
 }  // namespace telesplat::viewer

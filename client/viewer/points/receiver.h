@@ -8,6 +8,7 @@
 #include "client/viewer/points/epoch_switch.h"
 #include "client/viewer/points/event_sequencer.h"
 #include "client/viewer/points/model_cache.h"
+#include "client/viewer/points/replica_check.h"
 #include "client/viewer/points/update_batches.h"
 #include "client/viewer/record/event_record.h"
 #include "client/viewer/render/fine_rays.h"
@@ -42,6 +43,8 @@ class PointReceiver {
   std::optional<ShownUpdate> release();
   /// A packer at another address.
   void start() { sequencer_.start(); }
+  /// start() was called: there may be a replica.
+  bool begun() const { return sequencer_.begun(); }
   void receive_events(net::Socket& patches, int most);
   void receive_answers(net::Socket& state, int most);
   /// What is due by time alone. To be called every few milliseconds.
@@ -51,13 +54,15 @@ class PointReceiver {
     uint64_t points_received = 0, decode_errors = 0, gaps = 0, epochs_shown = 0;
     EpochId epoch;  ///< on display; only where nothing is held
     Sequence sequence;
-    InstanceId packer;            ///< whose sequence it is
-    uint64_t bytes_received = 0;  ///< images of patches
+    InstanceId packer;                                  ///< whose sequence it is
+    uint64_t bytes_received = 0;                        ///< images of patches
+    uint64_t digests_equal = 0, digests_different = 0;  ///< ReplicaCheck
   };
   Figures figures() const;
 
  private:
   void apply(const ModelEvent& event);
+  void on_published_mark(const wire::StateMark& mark);
   void record(const ModelEvent& event);
   /// False if it cannot be decoded.
   bool apply_patch(const wire::Patch& patch, double arrived_s);
@@ -71,6 +76,7 @@ class PointReceiver {
   metrics::SpanRecorder& spans_;
   EventSequencer sequencer_;
   EpochSwitch switch_;
+  ReplicaCheck check_;
   points::ModelConfig config_;  // of the newest replica, and its epoch, held or not; 0: not known yet
   EpochId epoch_;
   image::DepthImage tile_;  // memory that decoding reuses

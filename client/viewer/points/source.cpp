@@ -10,7 +10,6 @@ namespace telesplat::viewer {
 namespace {
 
 // What is left of a frame's time is for whoever else needs the cores: the worker, the sampler of a small machine.
-constexpr double kClipSettles_s = 2;  // by then an epoch is on display that is cut alike
 constexpr double kBudgetShare = 0.85;
 // Of a frame's time, for sub-pixels. The samplers of a small machine need the rest: a head that has just come to rest
 // is when they have the most to do.
@@ -55,11 +54,10 @@ void PointSource::find_coverage(const FrameInput& input, const geometry::Camera&
 
 // For how many frames camera, look and clips have been the same.
 void PointSource::count_same(const FrameInput& input) {
-  const uint64_t clipped_before = clip_version_;
-  clip_ = received_.clip(clip_version_);
-  if (clip_version_ != clipped_before) clipped_s_ = input.begin_s, clipped_ = list_.epoch;
+  const uint64_t cut_before = cut_.version;
+  cut_ = received_.cut();
   const bool same =
-      !input.resting && input.camera == camera_ && same_look(input.look, look_) && clip_version_ == clipped_before;
+      !input.resting && input.camera == camera_ && same_look(input.look, look_) && cut_.version == cut_before;
   same_frames_ = same ? std::min(same_frames_ + 1, kStillFrames) : 0;
   camera_ = input.camera;
   look_ = input.look;
@@ -94,7 +92,7 @@ bool PointSource::stands_still(const FrameInput& input) {
 void PointSource::select(const FrameInput& input, double detail, DrawnFrame& out) {
   options_.selection.detail = float(std::min(detail, input.look.most_detail));
   received_.cache().select(input.camera, options_.selection, list_);
-  clip_list(*clip_, list_);
+  clip_list(*cut_.clip, list_);
   out.chosen_s = seen_s_ = monotonic_s();
   if (!input.resting) received_.on_seen(list_.clusters_seen, list_.frames_seen);
 }
@@ -165,7 +163,7 @@ void PointSource::refine(const FrameInput& input, image::View& view, DrawnFrame&
   const Supersampler::Scene scene{
       [this](const geometry::Camera& camera, const splat::SelectionOptions& selection, splat::DrawList& list) {
         received_.cache().select_part(camera, selection, list);
-        clip_list(*clip_, list);
+        clip_list(*cut_.clip, list);
       },
       options_.selection, input.look.render, *still_shading_, &received_.fine_rays()};
   for (double now_s = begin_s;;) {
@@ -201,7 +199,7 @@ void PointSource::add_figures(DrawnFrame& out) const {
   out.detail = options_.selection.detail;
   out.budget_ms = budget_.budget_ms();
   out.epoch = list_.epoch;
-  out.between_clips = list_.epoch == clipped_ && monotonic_s() - clipped_s_ < kClipSettles_s;
+  out.between_clips = list_.epoch.value < cut_.epoch.value;
 }
 
 // Before anything is drawn: what comes meanwhile may not be in the picture.
@@ -274,7 +272,7 @@ std::optional<Pick> PointSource::pick(const geometry::Camera& camera, double x_p
   selection.eyes.reset();
   splat::DrawList list;
   received_.cache().select_part(pick_camera(camera, x_pix, y_pix), selection, list);
-  clip_list(*clip_, list);
+  clip_list(*cut_.clip, list);
   const auto out = pick_point(list, camera, x_pix, y_pix);
   received_.cache().end_frame();
   return out;

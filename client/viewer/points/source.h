@@ -51,10 +51,7 @@ class PointSource final : public ViewSource {
   splat::SpeedDetail speed_;
   splat::DrawList list_;
   uint64_t drawn_ = 0;  // points of it
-  std::shared_ptr<const geometry::Clip> clip_ = std::make_shared<const geometry::Clip>();
-  uint64_t clip_version_ = 0;
-  double clipped_s_ = -1e9;  // when that changed,
-  EpochId clipped_;          // and of which epoch was what was on display then
+  ReceivedPoints::Cut cut_;
 
   // Since when the camera stands still, and what was drawn since then.
   geometry::Camera camera_;

@@ -28,6 +28,7 @@ class EventRecorder {
   void add_summary(uint64_t number, points::ClusterKey brick);
   /// Everything so far is on disk.
   void flush() { file_.flush(); }
+  bool failed() const { return file_.failed(); }
 
  private:
   explicit EventRecorder(RecordWriter file) : file_(std::move(file)) {}

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -30,7 +31,8 @@ struct FileHeader {
 using FilePtr = std::unique_ptr<FILE, int (*)(FILE*)>;
 FilePtr open_file(const std::string& path, const char* mode) { return {std::fopen(path.c_str(), mode), std::fclose}; }
 
-bool write_frame(const std::string& directory, const SpooledFrame& f) {
+// 0, or errno.
+int write_frame(const std::string& directory, const SpooledFrame& f) {
   FileHeader h;
   const auto& c = f.camera;
   const auto& p = c.pose.position_room;
@@ -51,20 +53,19 @@ bool write_frame(const std::string& directory, const SpooledFrame& f) {
   h.legend_bytes = legend.size();
   constexpr const char* kEyes[] = {"", "-left", "-right"};
   const std::string path = fmt::format("{}/{:08d}{}.frame", directory, f.number, kEyes[f.eye]);
-  const FilePtr out = open_file(path + ".part", "wb");
-  if (!out) return false;
+  FilePtr out = open_file(path + ".part", "wb");
+  if (!out) return errno;
   bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
   ok = ok && std::fwrite(f.view.colour.data(), 4, f.view.colour.size(), out.get()) == f.view.colour.size();
   if (h.has_depth)  // else there is no array to point to
     ok = ok && std::fwrite(f.view.depth_m.data(), 4, f.view.depth_m.size(), out.get()) == f.view.depth_m.size();
   ok = ok && std::fwrite(legend.data(), 1, legend.size(), out.get()) == legend.size();
-  ok = ok && std::fflush(out.get()) == 0;
+  int failed = ok ? 0 : errno;
+  if (std::fclose(out.release()) != 0 && ok) failed = errno;
+  if (failed == 0 && std::rename((path + ".part").c_str(), path.c_str()) != 0) failed = errno;
   std::error_code error;
-  if (ok)
-    fs::rename(path + ".part", path, error);
-  else
-    fs::remove(path + ".part", error);
-  return ok && !error;
+  if (failed != 0) fs::remove(path + ".part", error);
+  return failed;
 }
 
 Status read_legend(FILE* in, const FileHeader& h, SpooledFrame& f) {
@@ -136,14 +137,18 @@ void FrameSpool::write_loop() {
     waiting_.pop_front();
     writing_ = true;
     lock.unlock();
-    const bool ok = write_frame(directory_, frame);
-    if (!ok) log::error("frame {} could not be written to {}", frame.number, directory_);
+    if (const int error = write_frame(directory_, frame)) on_failure(error);
     lock.lock();
     writing_ = false;
-    if (!ok) ++dropped_;
     free_.push_back(std::move(frame.view));
     changed_.notify_all();
   }
+}
+
+// The disk may have room again later.
+void FrameSpool::on_failure(int error) {
+  if (failed_++ == 0)
+    log::error("{}: frames cannot be written: {}; the session goes on without them", directory_, std::strerror(error));
 }
 
 void FrameSpool::flush() {

@@ -2,6 +2,7 @@
 // pictures after the run, so that recording never stalls the display.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -52,11 +53,15 @@ class FrameSpool {
   image::View exchange(SpooledFrame frame);
   /// Waits until everything is on disk.
   void flush();
+  /// Frames that came faster than the disk takes them.
   uint64_t dropped() const { return dropped_; }
+  /// Frames that could not be written, which was logged once.
+  uint64_t failed() const { return failed_; }
 
  private:
   FrameSpool() = default;
   void write_loop();
+  void on_failure(int error);
 
   std::string directory_;
   size_t max_waiting_ = 8;
@@ -65,7 +70,7 @@ class FrameSpool {
   std::deque<SpooledFrame> waiting_;
   std::vector<image::View> free_;
   bool stop_ = false, writing_ = false;
-  uint64_t dropped_ = 0;
+  std::atomic<uint64_t> dropped_ = 0, failed_ = 0;
   std::thread thread_;
 };
 

@@ -9,12 +9,14 @@
 
 #include "common/core/check.h"
 #include "common/core/log.h"
+#include "common/wire/limits.h"
 
 namespace telesplat::viewer {
 namespace {
 
 constexpr size_t kMagicBytes = 8;
 constexpr uint32_t kMaxType = 32;
+constexpr uint64_t kMaxBody = wire::kMaxBulkBytes + wire::kMaxControlBytes;  // a sparse file may claim more
 
 }  // namespace
 
@@ -46,10 +48,16 @@ void RecordWriter::write(std::string_view type, std::string_view body) {
                   std::fwrite(type.data(), 1, type.size(), f) == type.size() &&
                   std::fwrite(body.data(), 1, body.size(), f) == body.size();
   bytes_ += more;
-  if (!ok) {
-    full_ = true;
-    log::warn("{}: cannot be written ({}); the rest is left out", path_, std::strerror(errno));
-  }
+  if (!ok) fail(errno);
+}
+
+void RecordWriter::flush() {
+  if (!failed_ && std::fflush(file_.get()) != 0) fail(errno);
+}
+
+void RecordWriter::fail(int error) {
+  full_ = failed_ = true;
+  log::error("{}: cannot be written: {}; the session goes on without the rest of it", path_, std::strerror(error));
 }
 
 Result<RecordReader> RecordReader::open(const std::string& path, const std::vector<std::string_view>& magics,
@@ -73,7 +81,7 @@ bool RecordReader::next() {
   FILE* f = file_.get();
   if (std::fread(&type_bytes, 4, 1, f) != 1 || std::fread(&body_bytes, 8, 1, f) != 1) return false;
   left_ -= std::min<uint64_t>(left_, 12);
-  if (type_bytes > kMaxType || body_bytes > left_ || type_bytes + body_bytes > left_) return false;
+  if (type_bytes > kMaxType || body_bytes > kMaxBody || type_bytes + body_bytes > left_) return false;
   type_.resize(type_bytes);
   body_.resize(body_bytes);
   left_ -= type_bytes + body_bytes;

@@ -29,15 +29,19 @@ class RecordWriter {
   void write(std::string_view type, std::string_view body);
   /// Nothing more is written: the limit was reached, or the disk is full.
   bool full() const { return full_; }
-  /// Everything so far is on disk.
-  void flush() { std::fflush(file_.get()); }
+  /// Something could not be written, which was logged once; the file ends before it.
+  bool failed() const { return failed_; }
+  /// Everything so far is on disk, unless it failed.
+  void flush();
 
  private:
   RecordFile file_;
   std::string path_;
   const char* what_ = "";
   uint64_t bytes_ = 0, max_bytes_ = 0;
-  bool full_ = false;
+  bool full_ = false, failed_ = false;
+
+  void fail(int error);
 };
 
 class RecordReader {

@@ -26,7 +26,7 @@ bool SliceRecorder::ready() {
   auto file = RecordWriter::open(path_, kMagic, max_bytes_, "slice images");
   failed_ = !file;
   if (failed_)
-    log::warn("{}; slice images are not recorded", file.error().text);
+    log::error("{}; slice images are not recorded", file.error().text);
   else
     file_ = std::move(*file);
   return !failed_;

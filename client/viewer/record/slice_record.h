@@ -25,6 +25,7 @@ class SliceRecorder {
   void add(const volume::Grid& grid, const wire::SliceFrame& frame);
   /// Everything so far is on disk.
   void flush();
+  bool failed() const { return failed_ || (file_ && file_->failed()); }
 
  private:
   bool ready();

@@ -13,6 +13,7 @@ namespace {
 const glm::dvec3 kOnStage(0, 1.1, -1.0);        // a table before who stands in the middle of the stage
 const glm::dvec3 kBeforeHead(0, -0.35, -0.75);  // where the space begins at the eyes
 constexpr double kFar_m = 100;                  // of depth as layers have it; nothing is farther than that
+constexpr double kMostDepthStep_m = 1.5e-3;     // at a metre: coarser ones are seen in pictures that are moved by depth
 constexpr XrPosef kNoOffset{{0, 0, 0, 1}, {0, 0, 0}};
 constexpr XrSpaceLocationFlags kLocated =
     XR_SPACE_LOCATION_POSITION_VALID_BIT | XR_SPACE_LOCATION_ORIENTATION_VALID_BIT;
@@ -82,8 +83,11 @@ Status HeadsetSession::make_chains() {
   const XrResult listed = xrEnumerateSwapchainFormats(session_, count, &count, formats.data());
   if (const Status s = system_.check("xrEnumerateSwapchainFormats", listed); !s) return s;
   const int64_t colour = chosen(formats, {GL_SRGB8_ALPHA8, GL_SRGB8, GL_RGBA8});
-  // Drivers take 16 bits as they are, and work on floats one by one. A metre away they are 0.8 mm apart.
-  const int64_t depth = chosen(formats, {GL_DEPTH_COMPONENT16, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24});
+  // Drivers take 16 bits as they are, and work on floats one by one.
+  const bool few_bits_do = step_of_depth_m(near_m_, kFar_m) <= kMostDepthStep_m;
+  const int64_t depth = few_bits_do
+                            ? chosen(formats, {GL_DEPTH_COMPONENT16, GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24})
+                            : chosen(formats, {GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT16});
   if (colour == 0) return Error{system_.name() + " has no textures of 8 bits a colour"};
   const auto& size = system_.eye_size();
   width_ = scaled(size.width, size.most_width, options_.scale);

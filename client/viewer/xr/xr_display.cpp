@@ -164,7 +164,11 @@ class XrDisplay {
     if (session_->take_recentring()) worker_.on_jump();
     const auto eyes = session_->locate_eyes(begun->display_time);
     if (!eyes) return session_->end_frame(*begun, nullptr);
-    if (!received_) as_pair_ = alike(eyes->cameras);
+    // A pair has another share of a frame's time than two pictures, so its source is another one.
+    if (const bool pair = alike(eyes->cameras); !received_ || (as_pair_ && !pair)) {
+      as_pair_ = pair;
+      received_.reset();
+    }
     if (!follow_scene(begun->period_s)) return session_->end_frame(*begun, nullptr);
     left_ = eyes->cameras[0];
     follow_head(*begun, *eyes, m);
@@ -231,7 +235,7 @@ class XrDisplay {
         std::fill(view.colour.begin(), view.colour.end(), o_.shading.background);
         std::fill(view.depth_m.begin(), view.depth_m.end(), std::numeric_limits<float>::infinity());
       }
-    else if (as_pair_ && alike(eyes.cameras))
+    else if (as_pair_)
       draw_pair(eyes.cameras, counts, m);
     else
       draw_each(eyes.cameras, counts, m);
@@ -252,7 +256,7 @@ class XrDisplay {
     for (size_t eye = 0; eye < 2; ++eye)
       targets[eye] = {views_[eye].width, views_[eye].height, views_[eye].colour.data(), views_[eye].depth_m.data()};
     m.drawn = source_->draw_pair({.begin_s = monotonic_s(),
-                                  .camera = m.camera,
+                                  .camera = between(cameras),  // m.camera stands behind them
                                   .look = look_,
                                   .with_depth = true,
                                   .resting = !counts,
@@ -325,6 +329,7 @@ class XrDisplay {
     spans_.add("display frame", m.begin_master_s, worker_.to_master_s(m.presented_s), 0);
     previous_s_ = m.end_s;
     if (f.discarded) log::debug("the runtime discarded a frame");
+    if (m.drawn.between_clips) use &= ~uint32_t{kVerify};  // there is no epoch that looks like it
     if (use) {
       const double t_s = m.begin_s - start_s_;
       if (use & kPicture) next_picture_s_ = (std::floor(t_s / kPicturePeriod_s) + 1) * kPicturePeriod_s;

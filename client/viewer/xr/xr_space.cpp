@@ -27,6 +27,15 @@ geometry::Camera eye_camera(const XrView& view, const glm::dvec3& origin, int wi
   return out;
 }
 
+geometry::Camera between(const std::array<geometry::Camera, 2>& eyes) {
+  geometry::Camera out = eyes[0];
+  out.pose.position_room = 0.5 * (eyes[0].pose.position_room + eyes[1].pose.position_room);
+  return out;
+}
+
+// Depths are linear in the reciprocal.
+double step_of_depth_m(double near_m, double far_m) { return (1 / near_m - 1 / far_m) / 65535; }
+
 geometry::Camera both_eyes(const std::array<geometry::Camera, 2>& eyes) {
   geometry::Camera out = eyes[0];
   out.pose.orientation = glm::normalize(glm::slerp(eyes[0].pose.orientation, eyes[1].pose.orientation, 0.5));

@@ -25,6 +25,8 @@ const char* lane_name(const std::string& role, int lane) {
 
 constexpr double kMostNumber = 9007199254740992;  // 2^53: peers may say anything
 constexpr int kMostLanes = 16;
+constexpr int kMostProcesses = 10000;  // of a life; further ones are one
+constexpr size_t kMostLives = 100000;
 
 // What of these is known.
 json args_of(double frame, double tile, double request) {
@@ -40,14 +42,27 @@ json args_of(double frame, double tile, double request) {
 
 }  // namespace
 
-bool TraceFile::open(const std::string& path, double begin_s) {
+bool TraceFile::open(const std::string& path, double begin_s, uint64_t limit_bytes) {
   begin_s_ = begin_s;
-  if (!file_.open(path)) return false;
+  if (!file_.open(path, limit_bytes)) return false;
   file_.write("[\n");
   return true;
 }
 
-TraceFile::~TraceFile() { file_.write("\n]\n"); }
+bool TraceFile::open_behind(const std::string& path, double begin_s, uint64_t keep_bytes, size_t life,
+                            uint64_t limit_bytes) {
+  first_number_ = 1 + int(std::min<size_t>(life - 1, kMostLives)) * kMostProcesses;
+  span_ = uint64_t{life - 1} << 40;
+  if (keep_bytes == 0) return open(path, begin_s, limit_bytes);
+  begin_s_ = begin_s;
+  has_events_ = keep_bytes > 2;
+  return file_.open_behind(path, keep_bytes, limit_bytes);
+}
+
+void TraceFile::close() {
+  file_.write_end("\n]\n");
+  file_.close();
+}
 
 void TraceFile::event(const json& event) {
   file_.write((has_events_ ? ",\n" : "") + text_of(event));
@@ -56,7 +71,9 @@ void TraceFile::event(const json& event) {
 
 // Processes of several machines may have the same pid.
 int TraceFile::number_of(const std::string& process, const std::string& role, uint64_t pid) {
-  const auto [known, is_new] = processes_.try_emplace(process, int(processes_.size()) + 1);
+  if (processes_.size() >= size_t(kMostProcesses) - 1 && !processes_.contains(process))
+    return first_number_ + kMostProcesses - 1;
+  const auto [known, is_new] = processes_.try_emplace(process, first_number_ + int(processes_.size()));
   const int number = known->second;
   if (!is_new) return number;
   const auto tell = [&](const char* what, json args) {

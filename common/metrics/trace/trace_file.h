@@ -17,9 +17,12 @@ namespace telesplat::metrics {
 /// A JSON list that grows event by event and ends when this does.
 class TraceFile {
  public:
-  ~TraceFile();
-  /// begin_s: on the master's clock; times in the file count from there.
-  bool open(const std::string& path, double begin_s);
+  ~TraceFile() { close(); }
+  /// begin_s: on the master's clock; times in the file count from there. limit_bytes: as TextFile::open().
+  bool open(const std::string& path, double begin_s, uint64_t limit_bytes = 0);
+  /// The same, but goes on behind the first keep_bytes of what is there (whole_events()). life: of the record, from 2
+  /// on: its processes are told apart from those of lives before.
+  bool open_behind(const std::string& path, double begin_s, uint64_t keep_bytes, size_t life, uint64_t limit_bytes = 0);
   /// Rows of "spans" (recorder.h). Rows whose name is not among the columns are left out. Precondition: kSpanWidth
   /// values a row.
   void add(const Process& process, const wire::MetricRows& rows);
@@ -27,6 +30,10 @@ class TraceFile {
   void add_lease(const std::string& sampler, const wire::TileDone& tile);
   /// And of a plan: from the question to the answer.
   void add_plan(const std::string& viewer, const PlanRow& plan);
+  /// Ends the list.
+  void close();
+  TextFile& file() { return file_; }
+  const TextFile& file() const { return file_; }
 
  private:
   void event(const nlohmann::json& json);
@@ -38,6 +45,7 @@ class TraceFile {
   TextFile file_;
   double begin_s_ = 0;
   bool has_events_ = false;
+  int first_number_ = 1;                  // of this life's processes
   std::map<std::string, int> processes_;  // numbers of those whose names the file has
   std::set<std::pair<int, int>> lanes_;   // that have names
   uint64_t span_ = 0;                     // of those that may overlap: the last one's id

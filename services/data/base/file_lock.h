@@ -21,8 +21,10 @@ class Descriptor {
     std::swap(value_, other.value_);
     return *this;
   }
+  /// A file that may be made is not one that a link leads to.
   static Descriptor open_file(const std::string& path, int flags) {
-    return Descriptor(::open(path.c_str(), flags | O_CLOEXEC, 0644));
+    const int no_links = flags & O_CREAT ? O_NOFOLLOW : 0;
+    return Descriptor(::open(path.c_str(), flags | no_links | O_CLOEXEC, 0644));
   }
 
   int get() const { return value_; }

@@ -21,7 +21,7 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::map(int descriptor, const 
   void* data = mmap(nullptr, size, PROT_READ, MAP_SHARED, descriptor, 0);
   if (data == MAP_FAILED)
     return Error{fmt::format("{}: {} bytes cannot be mapped: {}", name, size, std::strerror(errno))};
-  return std::shared_ptr<const MappedFile>(new MappedFile(static_cast<const std::byte*>(data), size));
+  return std::shared_ptr<const MappedFile>(new MappedFile(static_cast<const std::byte*>(data), size, name));
 }
 
 Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::string& path) {

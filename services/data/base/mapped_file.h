@@ -8,10 +8,12 @@
 #include <string_view>
 
 #include "common/core/result.h"
+#include "services/data/base/cut_off.h"
 
 namespace telesplat::data {
 
-/// The bytes live as long as the object. Move-free: hold it by shared_ptr.
+/// The bytes live as long as the object. Move-free: hold it by shared_ptr. Who reads bytes that somebody has cut off
+/// meanwhile gets SIGBUS (cut_off.h).
 class MappedFile {
  public:
   /// Maps a regular, readable file that is not empty. Errors name the path and say which of these it is not.
@@ -26,9 +28,11 @@ class MappedFile {
   std::string_view text() const { return {reinterpret_cast<const char*>(data_), size_}; }
 
  private:
-  MappedFile(const std::byte* data, size_t size) : data_(data), size_(size) {}
+  MappedFile(const std::byte* data, size_t size, const std::string& name)
+      : data_(data), size_(size), named_(data, size, name) {}
   const std::byte* data_;
   size_t size_;
+  NamedMapping named_;
 };
 
 }  // namespace telesplat::data

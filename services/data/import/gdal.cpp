@@ -23,8 +23,14 @@ struct Close {
 };
 using Dataset = std::unique_ptr<void, Close>;
 
-Result<Dataset> open(const std::string& path, const char* what) {
-  Dataset dataset(GDALOpenEx(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, nullptr, nullptr, nullptr));
+// Formats of elevation. GDAL knows many more, and tells them by what a file holds, whatever its name is: some name
+// other files, on this machine or on others.
+constexpr const char* kElevationDrivers[] = {"GTiff",   "PNG",  "SRTMHGT", "AAIGrid", "GRASSASCIIGrid",
+                                             "USGSDEM", "DTED", "EHdr",    "GSAG",    nullptr};
+
+// drivers: null: all.
+Result<Dataset> open(const std::string& path, const char* what, const char* const* drivers) {
+  Dataset dataset(GDALOpenEx(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers, nullptr, nullptr));
   if (dataset) return dataset;
   std::string why = CPLGetLastErrorMsg();
   why = why.substr(0, std::min(why.find('\n'), size_t{200}));
@@ -62,7 +68,7 @@ Placement placement_of(GDALDatasetH dataset) {
 // The texture's colours where the raster's samples are: by coordinates if both have them, else stretched over the
 // raster.
 Status drape(const std::string& path, const Placement& at, int full_width, int full_height, ElevationRaster& raster) {
-  auto opened = open(path, "an image");
+  auto opened = open(path, "an image", nullptr);
   if (!opened) return opened.error();
   const GDALDatasetH image = opened->get();
   const int bands = GDALGetRasterCount(image), w = GDALGetRasterXSize(image), h = GDALGetRasterYSize(image);
@@ -105,7 +111,7 @@ Status drape(const std::string& path, const Placement& at, int full_width, int f
 Result<ElevationRaster> read_elevation(const std::string& path, const std::string& texture) {
   CPLSetErrorHandler(CPLQuietErrorHandler);
   GDALAllRegister();
-  auto opened = open(path, "an elevation raster");
+  auto opened = open(path, "an elevation raster", kElevationDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH dataset = opened->get();
   const int w = GDALGetRasterXSize(dataset), h = GDALGetRasterYSize(dataset), bands = GDALGetRasterCount(dataset);
@@ -163,7 +169,7 @@ Result<ElevationRaster> read_elevation(const std::string& path, const std::strin
 Result<RasterFacts> read_raster_facts(const std::string& path) {
   const auto raster = read_elevation(path, "");
   if (!raster) return raster.error();
-  auto opened = open(path, "an elevation raster");
+  auto opened = open(path, "an elevation raster", kElevationDrivers);
   if (!opened) return opened.error();
   const GDALDatasetH dataset = opened->get();
   RasterFacts out;

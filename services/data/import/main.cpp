@@ -13,8 +13,10 @@
 #include <fstream>
 #include <new>
 
+#include "services/data/base/cut_off.h"
 #include "services/data/base/elevation.h"
 #include "services/data/import/iso.h"
+#include "services/data/import/process.h"
 #include "services/data/import/raster_facts.h"
 #include "services/data/import/report.h"
 #include "services/data/import/vtk_import.h"
@@ -90,6 +92,7 @@ int main(int argc, char** argv) {
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody waits any more
+  telesplat::data::end_at_cut_off_files(telesplat::data::kCutOffExit);
   const int out = dup(STDOUT_FILENO);
   dup2(STDERR_FILENO, STDOUT_FILENO);  // what VTK prints must not get between
   try {

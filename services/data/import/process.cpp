@@ -61,6 +61,7 @@ Status end_import(pid_t child, const std::string& reader, const std::string& for
                              WTERMSIG(status) == SIGALRM ? "did not end" : "crashed on it")};
   if (WEXITSTATUS(status) == 127)
     return Error{fmt::format("{}: {}, which reads {} files, is missing", path, kImportProgram, format)};
+  if (WEXITSTATUS(status) == kCutOffExit) return Error{fmt::format("{}: was cut off while it was read", path)};
   if (WEXITSTATUS(status) != 0) return Error{fmt::format("{}: is damaged: {} reader gave up on it", path, reader)};
   return ok_status();
 }

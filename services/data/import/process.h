@@ -10,6 +10,9 @@
 
 namespace telesplat::data {
 
+/// Exit code of the program where its file was cut off while it was mapped (base/cut_off.h).
+inline constexpr int kCutOffExit = 3;
+
 /// Runs it with `words` as its arguments, the first being what to read as and the second the file's name, and takes the
 /// mesh or the error that it hands back. reader: who reads, for error texts ("VTK's vtp"). input: a descriptor that it
 /// gets as its standard input; negative: none. Error: what it says; it crashed, did not end, is missing.

@@ -113,6 +113,17 @@ std::string default_cache_folder() {
   return fs::temp_directory_path() / fmt::format("telesplat-{}", getuid());
 }
 
+std::string problem_of_shared_place(const std::string& folder) {
+  std::error_code error;
+  if (fs::path(folder).parent_path() != fs::temp_directory_path(error)) return {};
+  struct stat about {};
+  if (lstat(folder.c_str(), &about) != 0) return std::strerror(errno);
+  if (!S_ISDIR(about.st_mode)) return "is no folder";
+  if (about.st_uid != geteuid()) return fmt::format("belongs to user {}", about.st_uid);
+  if ((about.st_mode & (S_IWGRP | S_IWOTH)) != 0) return "others may write into it";
+  return {};
+}
+
 Result<std::vector<CachedStore>> cached_stores(const std::string& folder) {
   std::vector<CachedStore> out;
   std::error_code error;
@@ -133,7 +144,12 @@ void note_use(const std::string& stem, const std::string& source, const std::str
   std::error_code error;
   std::string path = fs::absolute(source, error).lexically_normal().string();
   std::replace(path.begin(), path.end(), '\n', ' ');
-  std::ofstream(stem + ".used") << path << '\n' << content << '\n';
+  const std::string part = fmt::format("{}.used-{}", stem, getpid());
+  const Descriptor out = Descriptor::open_file(part, O_WRONLY | O_CREAT | O_TRUNC);
+  const std::string text = path + '\n' + content + '\n';
+  const bool written = out.valid() && ::write(out.get(), text.data(), text.size()) == ssize_t(text.size());
+  if (written) fs::rename(part, stem + ".used", error);
+  if (out.valid() && (!written || error)) fs::remove(part, error);
 }
 
 Result<Removal> clear_cache(const std::string& folder) {

@@ -20,6 +20,9 @@ namespace telesplat::data {
 
 /// Where stores are kept unless --cache says otherwise: $XDG_CACHE_HOME/telesplat, else ~/.cache/telesplat.
 std::string default_cache_folder();
+/// What is wrong with a folder among those of all users (in /tmp): it is another's, or others may write into it. Empty:
+/// nothing, or it is elsewhere.
+std::string problem_of_shared_place(const std::string& folder);
 
 struct CachedStore {
   std::string stem;     ///< path without ".mesh"

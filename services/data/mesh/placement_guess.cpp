@@ -64,7 +64,8 @@ UpGuess guess_up(const Mesh& mesh) {
   if (mesh.format == "iso" || mesh.format == "isosurface") return {"z", "the surface of a volume"};
   geometry::DBox box;
   for (uint32_t i : mesh.indices) box.extend(mesh.positions[i]);
-  if (mesh.format == "vtp" || mesh.format == "vtu" || mesh.format == "vtk") return {"z", "VTK's formats hold scans and simulations"};
+  if (mesh.format == "vtp" || mesh.format == "vtu" || mesh.format == "vtk")
+    return {"z", "VTK's formats hold scans and simulations"};
   if (is_height_field(mesh, box.size())) return {"z", "shaped like a terrain"};
   if (is_isosurface(mesh)) return {"z", "its vertices lie on a voxel grid, as a scan's surface does"};
   return {"y", "nothing tells of a terrain or a scan"};

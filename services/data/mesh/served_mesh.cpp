@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
 
+#include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/scene/placement.h"
 #include "common/scene/session.h"
@@ -12,6 +15,33 @@
 
 namespace telesplat::data {
 namespace {
+
+// Answers that wait for a peer: samplers ask for as many chunks at a time as fill their link, and for a list.
+constexpr int kAnswersWaiting = 16;
+constexpr double kListsAtOnce = 4, kLists_s = 1;  // of a peer, and how many more a second
+constexpr size_t kPeers = 1024;                   // whose lists are counted
+
+// Lists are large and quickly asked for: each peer gets a few at once, then one a second.
+class ListLimit {
+ public:
+  bool allow(const std::string& peer, double now_s) {
+    if (peers_.size() >= kPeers && !peers_.contains(peer))
+      std::erase_if(peers_, [&](const auto& p) { return now_s - p.second.at_s > kListsAtOnce / kLists_s; });
+    if (peers_.size() >= kPeers && !peers_.contains(peer)) return false;
+    Left& left = peers_.try_emplace(peer, Left{kListsAtOnce, now_s}).first->second;
+    left.lists = std::min(kListsAtOnce, left.lists + (now_s - left.at_s) * kLists_s);
+    left.at_s = now_s;
+    if (left.lists < 1) return false;
+    left.lists -= 1;
+    return true;
+  }
+
+ private:
+  struct Left {
+    double lists, at_s;
+  };
+  std::map<std::string, Left> peers_;
+};
 
 class ServedMesh final : public Served {
  public:
@@ -50,7 +80,7 @@ class ServedMesh final : public Served {
       hello.facts[scene::kPlacementFact] = scene::to_text(scene::placement_of(*rotation, info.box_data, info.box_room));
     hello.box_room = info.box_room;
   }
-  Requests requests() const override { return {"chunks", 4096}; }
+  Requests requests() const override { return {"chunks", kAnswersWaiting}; }
 
   // The session may want other colours than it began with: by order of the master, or because another data server that
   // was here before had them.
@@ -72,9 +102,11 @@ class ServedMesh final : public Served {
     return ok_status();
   }
 
-  // Who asks for an array that is not there yet asks again.
+  // Who asks for an array that is not there yet asks again, and so does whose answer found the queue full.
   void answer(const net::Message& message, const Outlets& outlets) override {
     net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(outlets.requests, message, [&](const auto& request) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(request)>, wire::ChunkListRequest>)
+        if (!lists_.allow(message.peer, monotonic_s())) return;
       const MeshStore* store = stores_.find(request.array);
       if (store) outlets.requests.send(reply(request, *store), message.peer);
     });
@@ -113,6 +145,7 @@ class ServedMesh final : public Served {
   const std::optional<scene::Colouring> as_begun_;
   const colour::ColourMap map_;
   ArrayStores stores_;
+  ListLimit lists_;
   InstanceId master_;
   std::string order_, shown_, answer_;
 };

@@ -5,10 +5,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <thread>
+#include <utility>
 
+#include "common/core/clock.h"
 #include "common/core/log.h"
 #include "services/data/base/file_lock.h"
 #include "services/data/mesh/cache.h"
@@ -43,9 +47,9 @@ std::shared_ptr<MeshStore> make_store(StoreContent content, const std::string& p
   return std::make_shared<Store>(std::move(content), std::move(use));
 }
 
-// Reads the mesh file and writes its store into the descriptor.
+// Reads the mesh file and writes its store into the descriptor. unwritten: set if that is what failed.
 Status build_store(int descriptor, const std::string& path, const StoreOptions& options, const MeshSource& source,
-                   const Progress& progress, std::vector<std::string>& notes) {
+                   const Progress& progress, std::vector<std::string>& notes, bool* unwritten = nullptr) {
   auto mesh = source.read([&](double fraction) { progress(kReading, fraction); });
   if (!mesh) return mesh.error();
   progress(kReading, 1.0);
@@ -68,7 +72,9 @@ Status build_store(int descriptor, const std::string& path, const StoreOptions& 
   info.box_room = placed->box_room;
   info.up = placed->up;
   info.up_reason = placed->up_reason;
-  return write_store(descriptor, path, *placed, info, progress);
+  Status written = write_store(descriptor, path, *placed, info, progress);
+  if (unwritten) *unwritten = !written;
+  return written;
 }
 
 // Without a cache: a file that has no name and goes away with its last mapping.
@@ -110,21 +116,24 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
                                                const Progress& progress) {
   const std::string name = stem + ".mesh", part = stem + ".part";
   std::vector<std::string> notes;
+  bool unwritten = false;
   {
     const auto out = Descriptor::open_file(part, O_RDWR | O_CREAT | O_TRUNC);
     if (!out.valid()) {
       log::warn("{} cannot be written ({}); going on without a cache", part, std::strerror(errno));
       return open_unnamed(path, options, source, progress);
     }
-    const Status built = build_store(out.get(), path, options, source, progress, notes);
+    const Status built = build_store(out.get(), path, options, source, progress, notes, &unwritten);
     if (!built.ok() || std::rename(part.c_str(), name.c_str()) != 0) {
       const std::string reason =
           built.ok() ? fmt::format("{}: cannot be renamed: {}", part, std::strerror(errno)) : built.error().text;
       std::error_code error;
       fs::remove(part, error);
-      return Error{reason};
+      if (!unwritten) return Error{reason};
+      log::warn("{}; going on without a cache", reason);
     }
   }
+  if (unwritten) return open_unnamed(path, options, source, progress);  // elsewhere, there may be room
   if (std::string told = after_growth(fs::path(stem).parent_path().string()); !told.empty())
     notes.push_back(std::move(told));
   auto store = open_existing(stem, path, false, std::move(notes));
@@ -132,13 +141,24 @@ Result<std::shared_ptr<MeshStore>> make_cached(const std::string& stem, const st
   return Error{fmt::format("{}: was removed as soon as it was made", name)};
 }
 
+constexpr const char* kWaitingForAnother = "waiting for another process that reads it";
+constexpr double kLongestWait_s = 600;
+
 // One process at a time makes a store; others wait for it here and then find it. The lock ends with its holder. Whoever
 // clears the cache removes locks that nobody holds, so the one that was waited for may be gone: then once more.
-Descriptor lock_making(const std::string& stem) {
+Descriptor lock_making(const std::string& stem, const Progress& progress) {
   const std::string name = stem + ".lock";
+  const double begin_s = monotonic_s();
+  bool told = false;
   while (true) {
     auto lock = Descriptor::open_file(name, O_RDWR | O_CREAT);
-    if (!lock.lock(LOCK_EX)) return Descriptor();
+    if (!lock.lock(LOCK_EX | LOCK_NB)) {
+      if (!lock.valid() || errno != EWOULDBLOCK || monotonic_s() - begin_s > kLongestWait_s) return Descriptor();
+      if (!std::exchange(told, true)) log::info("{}: another process makes this chunk store; waiting for it", name);
+      if (progress) progress(kWaitingForAnother, 0);
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      continue;
+    }
     struct stat held {
     }, there{};
     if (fstat(lock.get(), &held) == 0 && stat(name.c_str(), &there) == 0 && held.st_ino == there.st_ino) return lock;
@@ -161,11 +181,14 @@ Result<std::shared_ptr<MeshStore>> MeshStore::make(const std::string& path, cons
   const fs::path folder = options.cache_dir.empty() ? default_cache_folder() : options.cache_dir;
   const std::string stem =
       (folder / fmt::format("{:016x}-{}-{}{}", source.hash, options.up, options.room_size_m, source.variant)).string();
-  if (auto store = open_existing(stem, path, true); store && *store) return store;
-
   std::error_code error;
   fs::create_directories(folder, error);
-  const Descriptor lock = lock_making(stem);
+  if (const std::string problem = problem_of_shared_place(folder.string()); !problem.empty()) {
+    log::warn("cache folder {}: {}; going on without", folder.string(), problem);
+    return open_unnamed(path, options, source, progress);
+  }
+  if (auto store = open_existing(stem, path, true); store && *store) return store;
+  const Descriptor lock = lock_making(stem, progress);
   if (!lock.valid()) {
     log::warn("cache folder {} cannot be written ({}); going on without", folder.string(), std::strerror(errno));
     return open_unnamed(path, options, source, progress);

@@ -19,7 +19,7 @@ inline constexpr size_t kRequestsAPeer = 8;      ///< that wait; a newer one rep
 inline constexpr size_t kRequestsWaiting = 512;  ///< of all peers
 inline constexpr size_t kProbesWaiting = 64;
 inline constexpr int kSlicesAnAnswer = 64;
-inline constexpr uint64_t kVoxelsAnAnswer = 8u << 20;  ///< about 32 MB
+inline constexpr uint64_t kVoxelsAnAnswer = 768u << 10;  ///< about 3 MB: half a minute at a megabit a second
 
 /// follow() and ask() are for the thread of the sockets, work() for another one.
 class VolumeAnswers {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <condition_variable>
+#include <exception>
 #include <filesystem>
 #include <optional>
 #include <thread>
@@ -31,13 +32,26 @@ class Worker {
     const std::lock_guard lock(mutex_);
     return working_ || !done_.empty() || answers_.has_work();
   }
+  /// Throws what ended the thread, if something did.
   std::vector<VolumeAnswers::Reply> take() {
     const std::lock_guard lock(mutex_);
+    if (failed_) std::rethrow_exception(std::exchange(failed_, nullptr));
     return std::exchange(done_, {});
   }
 
  private:
+  // An exception, of memory that is not there, goes to whoever takes the answers.
   void run(const std::stop_token& stop) {
+    try {
+      loop(stop);
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      working_ = false;
+      failed_ = std::current_exception();
+    }
+  }
+
+  void loop(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     while (!stop.stop_requested()) {
       // What is done and not taken yet stays within memory.
@@ -60,6 +74,7 @@ class Worker {
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   bool working_ = false;
+  std::exception_ptr failed_;
   std::vector<VolumeAnswers::Reply> done_;
   std::jthread thread_;  // last: it uses the others
 };

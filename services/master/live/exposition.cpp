@@ -142,6 +142,8 @@ void add_session(Text& text, const LiveSnapshot& s) {
   text.one("leases_backup_total", "counter", "Tiles leased to a second sampler.", s.leases_backup);
   text.one("views_overtaken_total", "counter", "Views that ended early, because a newer one waited.",
            s.views_overtaken);
+  text.one("frames_given_up_total", "counter", "Frames that ended without tiles that cannot be had.",
+           s.frames_given_up);
   text.one("tiles_released_total", "counter", "Leases that were taken back.", s.tiles_released);
 }
 

@@ -118,10 +118,28 @@ std::optional<wire::SliceLease> VolumeSchedule::lease(const std::string& sampler
   return std::nullopt;
 }
 
-void VolumeSchedule::extend(LeaseId lease, double now_s) {
+void VolumeSchedule::extend(LeaseId lease, const std::string& sampler, double now_s) {
   for (Frame& f : frames_)
-    for (SlabState& s : f.slabs)
-      if (s.state == SlabState::State::kLeased && s.lease == lease) s.expires_s = now_s + lease_time_s();
+    for (size_t i = 0; i < f.slabs.size(); ++i) {
+      SlabState& s = f.slabs[i];
+      if (s.state != SlabState::State::kLeased || s.lease != lease || f.partition->slabs[i].sampler != sampler)
+        continue;
+      const double longest_s = std::max(s.leased_s + options().longest_fetch_s, s.expires_s);
+      s.expires_s = std::min(now_s + lease_time_s(), longest_s);
+    }
+}
+
+// Sampled again it would most likely be refused again.
+void VolumeSchedule::refused(const wire::TileRefused& m, const std::string& sampler) {
+  const auto f = std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id == m.frame; });
+  if (f == frames_.end() || m.tile >= f->slabs.size()) return;
+  const SlabState& slab = f->slabs[size_t(m.tile)];
+  if (slab.state != SlabState::State::kLeased || slab.lease != m.lease) return;
+  if (f->partition->slabs[size_t(m.tile)].sampler != sampler) return;
+  complete(f->id, false);
+  walls_.dropped(f->requests);
+  frames_.erase(f);
+  ++given_up_;
 }
 
 bool VolumeSchedule::tile_done(const wire::TileDone& m, double now_s) {

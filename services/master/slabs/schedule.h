@@ -48,8 +48,11 @@ class VolumeSchedule : public Views {
 
   /// The slab of `sampler` in the oldest frame that still needs it. nullopt: there is none.
   std::optional<wire::SliceLease> lease(const std::string& sampler, double now_s);
-  /// Gives a lease its full time again. Unknown leases are ignored.
-  void extend(LeaseId lease, double now_s);
+  /// Gives a lease of this sampler its full time again, until longest_fetch_s after it was leased (a lease without
+  /// extensions if that is longer). Others are ignored.
+  void extend(LeaseId lease, const std::string& sampler, double now_s);
+  /// What this sampler made of its slab cannot be used: the frame ends, and its viewers ask again when they want to.
+  void refused(const wire::TileRefused& refused, const std::string& sampler);
   /// The packer has this slab. True the first time; false for duplicates, slabs never leased and unknown frames.
   bool tile_done(const wire::TileDone& tile, double now_s);
 
@@ -66,6 +69,7 @@ class VolumeSchedule : public Views {
   /// Samplers that have had a lease for longer than three typical ones: worth finding out whether they live.
   std::vector<std::string> overdue(double now_s) const;
   size_t frames_in_flight() const { return frames_.size(); }
+  uint64_t given_up() const { return given_up_; }  ///< frames with slabs that cannot be used
   uint64_t slabs_released() const { return released_; }
   /// Seconds after which a lease expires now: lease_timeout_s, or four typical slab times if that is more; doubled for
   /// each time leases ran out.
@@ -96,7 +100,7 @@ class VolumeSchedule : public Views {
   WallViews walls_;
   RunningMean slab_time_s_{0.1};  // lease -> done
   double patience_ = 1;
-  uint64_t released_ = 0;
+  uint64_t released_ = 0, given_up_ = 0;
 };
 
 }  // namespace telesplat::master

@@ -7,6 +7,7 @@
 
 #include "common/core/log.h"
 #include "common/metrics/run_record.h"
+#include "services/master/leases/lease_signer.h"
 #include "services/master/outbox.h"
 #include "services/master/settings.h"
 #include "services/master/slabs/assignment.h"
@@ -163,11 +164,12 @@ bool SlabPlan::begin(EpochId epoch, bool turns_only, double now_s) {
 
 void SlabPlan::give_leases(Idle& idle, double now_s) {
   for (size_t i = 0; i < idle.size();) {
-    const auto lease = schedule_.lease(idle[i].id, now_s);
+    auto lease = schedule_.lease(idle[i].id, now_s);
     if (!lease) {
       ++i;
       continue;
     }
+    links_.signer.sign(*lease, idle[i].id);
     links_.outbox.send(idle[i].id, *lease);
     idle.served_in_place(i);
   }
@@ -199,7 +201,8 @@ Figures SlabPlan::figures() const {
   return {.frames_completed = schedule_.frames_completed(),
           .frames_in_flight = schedule_.frames_in_flight(),
           .released = schedule_.slabs_released(),
-          .backups = 0};
+          .backups = 0,
+          .given_up = schedule_.given_up()};
 }
 
 void SlabPlan::add_counters(std::map<std::string, double>& counters) const {

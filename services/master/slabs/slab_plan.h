@@ -32,7 +32,12 @@ class SlabPlan final : public Plan {
   bool may_begin(const Idle& idle) override;
   bool begin(EpochId epoch, bool turns_only, double now_s) override;
   void give_leases(Idle& idle, double now_s) override;
-  void extend(LeaseId lease, double now_s) override { schedule_.extend(lease, now_s); }
+  void extend(LeaseId lease, const std::string& sampler, double now_s) override {
+    schedule_.extend(lease, sampler, now_s);
+  }
+  void refused(const wire::TileRefused& refused, const std::string& sampler) override {
+    schedule_.refused(refused, sampler);
+  }
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override;
   /// Views of a wall may be about to begin without one that is late.
   bool hurried() const override { return schedule_.walls_here() && schedule_.view_waiting(); }

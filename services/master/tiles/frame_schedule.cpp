@@ -123,11 +123,34 @@ wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& 
           .moments = leased(f.request.moments, now_s)};
 }
 
-void FrameSchedule::extend(LeaseId lease, double now_s) {
+void FrameSchedule::extend(LeaseId lease, const std::string& sampler, double now_s) {
+  const auto until_s = [&](double leased_s, double expires_s) {
+    const double longest_s = std::max(leased_s + options().longest_fetch_s, expires_s);
+    return std::min(now_s + options().lease_timeout_s, longest_s);
+  };
   for (Frame& f : frames_)
-    if (f.tiles.extend(lease, now_s, now_s + options().lease_timeout_s)) return;
-  if (const auto o = overtaken_.find(lease); o != overtaken_.end())
-    o->second.expires_s = now_s + options().lease_timeout_s;
+    if (const auto* out = f.tiles.out(lease)) {
+      f.tiles.extend(lease, sampler, now_s, until_s(out->leased_s, out->expires_s));
+      return;
+    }
+  if (const auto o = overtaken_.find(lease); o != overtaken_.end() && o->second.sampler == sampler)
+    o->second.expires_s = until_s(o->second.leased_s, o->second.expires_s);
+}
+
+void FrameSchedule::refused(const wire::TileRefused& m, const std::string& sampler) {
+  for (Frame& f : frames_)
+    if (f.id == m.frame && f.tiles.refuse(m.tile, sampler) > 0) break;
+  end_hopeless();
+}
+
+// A frame that waits for a tile that cannot be had holds up its viewer, and one of the few places of frames in flight.
+void FrameSchedule::end_hopeless() {
+  for (Frame& f : frames_)
+    if (!f.tiles.closed() && f.tiles.hopeless(kMostRefused, kMostLost)) {
+      f.tiles.close();
+      ++given_up_;
+    }
+  end_closed();
 }
 
 bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sampler, double now_s) {
@@ -143,7 +166,8 @@ bool FrameSchedule::tile_done(const wire::TileDone& m, const std::string& sample
   std::optional<double> took_s;
   if (const auto* out = f->tiles.out(m.lease); out && out->tile == m.tile) took_s = now_s - out->leased_s;
   for (const LeaseId id : f->tiles.tile(m.tile).leases)
-    if (const auto* out = f->tiles.out(id); out && id != m.lease) overtaken_[id] = {out->sampler, out->expires_s};
+    if (const auto* out = f->tiles.out(id); out && id != m.lease)
+      overtaken_[id] = {out->sampler, out->leased_s, out->expires_s};
   if (!f->tiles.done(m.tile)) return false;
   if (took_s) (f->planned ? planned_time_s_ : tile_time_s_).add(*took_s);
   // A sampler that cannot read a mask casts all.
@@ -161,9 +185,14 @@ std::deque<FrameSchedule::Frame>::iterator FrameSchedule::end_frame(std::deque<F
   const bool view = frame->step == 1 && !frame->extra;
   const PlannedView ended{.frame = frame->id, .epoch = frame->epoch, .view = frame->request};
   if (!view) return frames_.erase(frame);
+  if (left(frame->id)) {  // nobody waits for what is missing
+    frames_.erase(frame);
+    complete(ended.frame, false);
+    return frames_.end();
+  }
   const bool whole = frame->tiles.left() == 0;
   if (!whole) {
-    ++overtaken_views_;
+    overtaken_views_ += !frame->tiles.hopeless(kMostRefused, kMostLost);
     ends_.push_back({.frame = frame->id,
                      .epoch = frame->epoch,
                      .viewer = frame->request.viewer,
@@ -205,7 +234,7 @@ int FrameSchedule::expire(double now_s, const std::function<void(const std::stri
     return true;
   }));
   released_ += uint64_t(count);
-  end_closed();
+  end_hopeless();
   put_back_held(now_s);
   return count;
 }
@@ -216,7 +245,7 @@ int FrameSchedule::release_sampler(const std::string& sampler) {
   for (Frame& f : frames_) count += f.tiles.release(sampler);
   count += int(std::erase_if(overtaken_, [&](const auto& o) { return o.second.sampler == sampler; }));
   released_ += uint64_t(count);
-  end_closed();
+  end_hopeless();
   return count;
 }
 

@@ -43,6 +43,9 @@ inline constexpr double kOvertaken_s = 0.25;
 /// A view that is sampled whole, and of which a link would have to carry so much, arrives coarse first.
 inline constexpr double kCoarseFrom_s = 0.25;
 
+/// A frame ends without a tile that was refused, or whose leases were lost, more often than these.
+inline constexpr int kMostRefused = 2, kMostLost = 7;
+
 /// How the frames of a scene are leased.
 struct Cut {
   bool rows = false;            ///< bands of rows of blocks instead of square tiles
@@ -99,8 +102,11 @@ class FrameSchedule : public Views {
   /// to samplers that hold no other lease, if they take longer than kDearRow_s. even_own: tiles whose lease ran out at
   /// this very sampler, too. idle: it is known to hold none, though the packer may not have said so yet.
   std::optional<wire::Lease> lease(const std::string& sampler, double now_s, bool even_own = true, bool idle = false);
-  /// Gives a lease its full time again. Unknown leases are ignored.
-  void extend(LeaseId lease, double now_s);
+  /// Gives a lease of this sampler its full time again, until longest_fetch_s after it was leased. Others are ignored.
+  void extend(LeaseId lease, const std::string& sampler, double now_s);
+  /// What this sampler made of a tile cannot be used. The tile goes to another; a frame one of whose tiles is refused
+  /// for ever ends without it.
+  void refused(const wire::TileRefused& refused, const std::string& sampler);
   /// The packer has this tile, which `sampler` (empty: unknown) sampled. Returns true the first time, whichever lease
   /// it came from; false for duplicates, tiles never leased and unknown frames. Learns from the tile's times.
   bool tile_done(const wire::TileDone& tile, const std::string& sampler, double now_s);
@@ -123,6 +129,7 @@ class FrameSchedule : public Views {
   size_t frames_in_flight() const { return frames_.size(); }
   uint64_t tiles_released() const { return released_; }
   uint64_t backups() const { return backups_; }
+  uint64_t given_up() const { return given_up_; }          ///< frames that ended without tiles that cannot be had
   uint64_t overtaken() const { return overtaken_views_; }  ///< views that ended early
   size_t viewers_remembered() const { return plans_.viewers(); }
   const SamplingCosts& costs() const { return costs_; }
@@ -150,7 +157,7 @@ class FrameSchedule : public Views {
   // A lease whose tile another sampler delivered first; its own may be dead or slow.
   struct Overtaken {
     std::string sampler;
-    double expires_s;
+    double leased_s, expires_s;
   };
   void begin_frame(const PlannedView& view, FrameId id, int step);
   void begin_whole(const PlannedView& view);
@@ -172,6 +179,7 @@ class FrameSchedule : public Views {
   double target_s() const;
   std::deque<Frame>::iterator end_frame(std::deque<Frame>::iterator frame);
   void end_closed();
+  void end_hopeless();
   wire::Lease lease_tile(Frame& frame, size_t tile, const std::string& sampler, double now_s);
 
   Cut cut_;
@@ -187,7 +195,7 @@ class FrameSchedule : public Views {
   RefiningRays refining_;
   RunningMean tile_time_s_{0.05};     // lease -> done
   RunningMean planned_time_s_{0.05};  // the same of tiles of plans, which have few rays
-  uint64_t released_ = 0, backups_ = 0, overtaken_views_ = 0;
+  uint64_t released_ = 0, backups_ = 0, overtaken_views_ = 0, given_up_ = 0;
 };
 
 }  // namespace telesplat::master

@@ -84,7 +84,8 @@ std::optional<size_t> FrameTiles::take(const std::string& sampler, int rows, boo
 std::optional<size_t> FrameTiles::overdue(double before_s, const std::string* sampler) const {
   for (const auto& [id, out] : out_) {
     if (out.leased_s > before_s) break;  // the later ones are younger
-    if (out.heard_s > before_s || tiles_[out.tile].leases[1].value != 0) continue;
+    const bool heard = out.heard_s > before_s && out.leased_s > before_s - kHeardFor_s;
+    if (heard || tiles_[out.tile].leases[1].value != 0) continue;
     if (!sampler || out.sampler != *sampler) return out.tile;
   }
   return std::nullopt;
@@ -105,9 +106,9 @@ void FrameTiles::lease(size_t i, LeaseId id, const std::string& sampler, double 
   ++held_[sampler];
 }
 
-bool FrameTiles::extend(LeaseId id, double now_s, double expires_s) {
+bool FrameTiles::extend(LeaseId id, const std::string& sampler, double now_s, double expires_s) {
   const auto found = out_.find(id);
-  if (found == out_.end()) return false;
+  if (found == out_.end() || found->second.sampler != sampler) return false;
   found->second.heard_s = now_s;
   found->second.expires_s = expires_s;
   return true;
@@ -129,6 +130,22 @@ bool FrameTiles::done(uint64_t i) {
   t.state = Tile::State::kDone;
   ++done_;
   return true;
+}
+
+int FrameTiles::refuse(uint64_t i, const std::string& sampler) {
+  if (i >= unleased_ || tiles_[i].state == Tile::State::kDone) return 0;
+  tiles_[i].given_up_by = sampler;
+  for (const LeaseId id : tiles_[i].leases)
+    if (const auto lease = out_.find(id); lease != out_.end() && lease->second.sampler == sampler) {
+      take_back(lease);
+      break;
+    }
+  return ++tiles_[i].refused;
+}
+
+bool FrameTiles::hopeless(int most_refused, int most_lost) const {
+  return std::any_of(reopened_.begin(), reopened_.end(),
+                     [&](size_t i) { return tiles_[i].refused > most_refused || tiles_[i].lost > most_lost; });
 }
 
 std::map<LeaseId, FrameTiles::Out>::iterator FrameTiles::take_back(std::map<LeaseId, Out>::iterator lease) {
@@ -157,6 +174,7 @@ int FrameTiles::expire(double now_s, const std::function<void(const std::string&
     }
     lost_sampler(it->second.sampler);
     tiles_[it->second.tile].given_up_by = it->second.sampler;
+    ++tiles_[it->second.tile].lost;
     it = take_back(it);
     ++count;
   }
@@ -167,7 +185,7 @@ int FrameTiles::release(const std::string& sampler) {
   int count = 0;
   for (auto it = out_.begin(); it != out_.end();)
     if (it->second.sampler == sampler)
-      it = take_back(it), ++count;
+      ++tiles_[it->second.tile].lost, it = take_back(it), ++count;
     else
       ++it;
   return count;

@@ -18,6 +18,9 @@
 
 namespace telesplat::master {
 
+/// A sampler that says of a tile that it needs longer keeps it to itself so much longer than others do.
+inline constexpr double kHeardFor_s = 2.0;
+
 /// Cuts a frame into tiles of tile_size, those nearest the centre first (that is where the person looks).
 std::vector<geometry::Rect> cut_tiles(int width, int height, int tile_size);
 
@@ -36,6 +39,8 @@ class FrameTiles {
     enum class State { kOpen, kLeased, kDone } state = State::kOpen;
     std::array<LeaseId, 2> leases;          ///< that are out; 0: none. The second is a backup
     std::string given_up_by;                ///< whose lease ran out
+    int refused = 0;                        ///< so often the packer could not use what came of it
+    int lost = 0;                           ///< so often a lease of it ran out, or its sampler left
     uint64_t rays = 0;                      ///< to be cast
     size_t mask_begin = 0, mask_words = 0;  ///< in masks_; none: all pixels
   };
@@ -72,18 +77,25 @@ class FrameTiles {
   /// whose lease ran out at this very sampler only if even_own. The tile counts as leased from lease() on, which must
   /// follow.
   std::optional<size_t> take(const std::string& sampler, int rows, bool even_own);
-  /// The tile that has been out longest, if nothing was heard of it since before_s, it has no backup and is not with
-  /// `sampler` (nullptr: with whom does not matter).
+  /// The tile that has been out longest, if nothing was heard of it since before_s (or it was leased kHeardFor_s before
+  /// that: its sampler only ever says that it needs longer), it has no backup and is not with `sampler` (nullptr: with
+  /// whom does not matter).
   std::optional<size_t> overdue(double before_s, const std::string* sampler) const;
 
   /// Precondition: the tile came from take() or overdue(). Lease ids rise.
   void lease(size_t tile, LeaseId id, const std::string& sampler, double now_s, double expires_s);
-  /// False: not out.
-  bool extend(LeaseId id, double now_s, double expires_s);
+  /// False: not out with this sampler.
+  bool extend(LeaseId id, const std::string& sampler, double now_s, double expires_s);
   /// nullptr: not out.
   const Out* out(LeaseId id) const;
   /// True the first time; false for what is done, was never leased or is not there. All leases of the tile end.
   bool done(uint64_t tile);
+
+  /// What came of a tile cannot be used: its leases of this sampler are taken back. Returns how often that was so, 0
+  /// for a tile that is done, was never leased or is not there.
+  int refuse(uint64_t tile, const std::string& sampler);
+  /// A tile that is open, and was lost or refused more often than these.
+  bool hopeless(int most_refused, int most_lost) const;
 
   /// Takes back leases; a tile that has none left is open again. Return how many.
   int expire(double now_s, const std::function<void(const std::string&)>& lost_sampler);

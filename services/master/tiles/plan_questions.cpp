@@ -14,7 +14,7 @@ wire::PlanRequest request_of(const PlannedView& view, const PlanLimits& limits) 
           .viewer = view.view.viewer,
           .request = view.view.request,
           .camera = view.view.camera,
-          .tile_size = uint64_t(std::clamp(limits.tile_size, 32, 4096)),
+          .tile_size = uint64_t(std::clamp(limits.tile_size, 32, wire::kMaxTileSide)),
           .tile_rays = limits.tile_rays,
           .moments = view.view.moments};
 }

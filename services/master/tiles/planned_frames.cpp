@@ -73,6 +73,7 @@ void FrameSchedule::take_answer(const wire::Plan& plan, double now_s) {
     if (!plan.full && !plan.tiles.empty()) begin_planned(*asked, plan, now_s);
     return;
   }
+  if (left(asked->view.frame)) return complete(asked->view.frame, false);
   if (plan.full) return begin_whole(planned(asked->view, now_s));
   plans_.known(asked->view);
   if (plan.tiles.empty())
@@ -102,7 +103,11 @@ void FrameSchedule::begin_planned(const PlanQuestions::Asked& asked, const wire:
 void FrameSchedule::give_up_plans(double now_s) {
   for (const PlanQuestions::Asked& asked : plans_.give_up(now_s)) {
     plan_rows_.push_back({.asked = asked.request, .asked_s = asked.asked_s, .planned_s = now_s});
-    if (!asked.request.extra) begin_whole(planned(asked.view, now_s));
+    if (asked.request.extra) continue;
+    if (left(asked.view.frame))
+      complete(asked.view.frame, false);
+    else
+      begin_whole(planned(asked.view, now_s));
   }
 }
 
@@ -136,8 +141,15 @@ void FrameSchedule::end_closed() {
     f = f->tiles.closed() && f->tiles.complete() ? end_frame(f) : std::next(f);
 }
 
+// What is out of its frames may still come; the rest is not sampled.
 void FrameSchedule::forget_viewer(InstanceId viewer) {
   Views::forget_viewer(viewer);
+  for (Frame& f : frames_)
+    if (!f.extra && f.request.viewer == viewer) f.tiles.close();
+  for (size_t before = frames_.size() + 1; frames_.size() < before;) {
+    before = frames_.size();
+    end_closed();
+  }
   plans_.forget_viewer(viewer);
   gate_.forget(viewer);
 }

@@ -6,6 +6,7 @@
 
 #include "common/core/log.h"
 #include "common/metrics/run_record.h"
+#include "services/master/leases/lease_signer.h"
 #include "services/master/outbox.h"
 
 namespace telesplat::master {
@@ -125,8 +126,9 @@ void TilePlan::give_leases(Idle& idle, double now_s) {
 bool TilePlan::give_one(Idle& idle, double now_s) {
   for (const bool even_own : {false, true})
     for (size_t i = 0; i < idle.size(); ++i) {
-      const auto lease = schedule_.lease(idle[i].id, now_s, even_own, idle[i].holds_none());
+      auto lease = schedule_.lease(idle[i].id, now_s, even_own, idle[i].holds_none());
       if (!lease) continue;
+      links_.signer.sign(*lease, idle[i].id);
       links_.outbox.send(idle[i].id, *lease);
       idle.served(i);
       return true;
@@ -146,6 +148,7 @@ Figures TilePlan::figures() const {
           .frames_in_flight = schedule_.frames_in_flight(),
           .released = schedule_.tiles_released(),
           .backups = schedule_.backups(),
+          .given_up = schedule_.given_up(),
           .overtaken = schedule_.overtaken(),
           .viewers = schedule_.viewers_remembered()};
 }

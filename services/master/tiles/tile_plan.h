@@ -35,7 +35,12 @@ class TilePlan final : public Plan {
   void give_leases(Idle& idle, double now_s) override;
   void on_link(const wire::LinkReport& link, double now_s) override { schedule_.on_link(link, now_s); }
   std::map<std::string, double> link_of(InstanceId viewer) const override { return schedule_.links().figures(viewer); }
-  void extend(LeaseId lease, double now_s) override { schedule_.extend(lease, now_s); }
+  void extend(LeaseId lease, const std::string& sampler, double now_s) override {
+    schedule_.extend(lease, sampler, now_s);
+  }
+  void refused(const wire::TileRefused& refused, const std::string& sampler) override {
+    schedule_.refused(refused, sampler);
+  }
   bool done(const wire::TileDone& tile, const std::string& sampler, double now_s) override {
     return schedule_.tile_done(tile, sampler, now_s);
   }

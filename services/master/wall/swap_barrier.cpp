@@ -11,6 +11,7 @@ namespace {
 constexpr size_t kFramesRemembered = 8;  // whose presenting is not told by all yet
 constexpr double kPeriodShare = 0.1;     // of a frame in the mean of their distances
 constexpr double kSourcePatience_s = 1;  // until viewers show another packer's model without the one that lacks it
+constexpr uint64_t kMostFirstFrame = uint64_t{1} << 52;  // wire::check() refuses 2^53 and more
 constexpr double kLeadGrows = 0.5, kLeadShrinks = 0.99;
 
 // Bit n of a mask of frames is the frame n before the newest. The same frames, by another newest one.
@@ -116,8 +117,9 @@ void SwapBarrier::go_on(double now_s) {
   if (!begun_) {
     if (!gathered(now_s)) return;
     begun_ = true;
-    // Viewers that another master led have numbers already.
-    for (const auto& [id, m] : members_) frame_ = std::max(frame_, m.said.frame);
+    // Viewers that another master led have numbers already, of which no wall is near the last: years of frames remain.
+    for (const auto& [id, m] : members_)
+      if (m.said.frame <= kMostFirstFrame) frame_ = std::max(frame_, m.said.frame);
     return swap(now_s);
   }
   if (complete()) return swap(now_s);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -52,13 +54,21 @@ Status DepthRecorder::add(FrameId id, const geometry::Camera& camera, const geom
   const auto stream = codec::encode(frame.image);
   open_.erase(id);
   --left_;
+  std::error_code ignored;
   const std::string path = fmt::format("{}/frame-{:06d}.depth", directory_, id.value);
   std::ofstream out(path, std::ios::binary);
   out.write(reinterpret_cast<const char*>(stream.data()), std::streamsize(stream.size()));
-  std::ofstream cameras(directory_ + "/cameras.csv", std::ios::app);
-  cameras << row_of(id, camera) << std::flush;
-  if (!out || !cameras) return Error{fmt::format("{}: cannot be written", path)};
-  return ok_status();
+  out.close();
+  std::ofstream cameras;
+  if (out) {
+    cameras.open(directory_ + "/cameras.csv", std::ios::app);
+    cameras << row_of(id, camera);
+    cameras.close();
+  }
+  if (out && cameras) return ok_status();
+  Error error{fmt::format("{}: cannot be written: {}", path, std::strerror(errno))};
+  std::filesystem::remove(path, ignored);  // what is there is whole
+  return error;
 }
 
 }  // namespace telesplat::packer

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <tuple>
 
 #include "common/codec/depth_codec.h"
@@ -107,22 +108,44 @@ void EventLog::add_epoch(const Event& event) {
 
 std::vector<Event> EventLog::since(Sequence after) const {
   std::vector<Event> out;
+  Replay all = replay(after, {std::numeric_limits<uint64_t>::max()});
+  while (auto event = next(all)) out.push_back(*std::move(event));
+  return out;
+}
+
+EventLog::Replay EventLog::replay(Sequence after, Sequence until) const {
+  Replay out{.after = after, .until = until, .others = {}, .epoch = {}};
   bool from_nothing = after.value == 0;
   if (epoch_ && after < epoch_->sequence) {
-    out.push_back(*epoch_);
-    after = epoch_->sequence;
+    out.others.push_back(*epoch_);
+    out.after = epoch_->sequence;
     from_nothing = true;
   }
-  std::vector<Event> live;
-  for (auto patch = patches_.upper_bound(after); patch != patches_.end(); ++patch) live.push_back(patch->second.event);
-  // One sequence is of one event, so of one of the three.
-  std::vector<Event> wiping;
+  const auto first = static_cast<ptrdiff_t>(out.others.size());
   for (const bool patches_alone : {false, true}) {
-    const std::vector<Event> more = patches_alone ? patch_forgets(after, from_nothing) : forgets(after, from_nothing);
-    wiping.insert(wiping.end(), more.begin(), more.end());
+    std::vector<Event> more = patches_alone ? patch_forgets(out.after, from_nothing) : forgets(out.after, from_nothing);
+    std::move(more.begin(), more.end(), std::back_inserter(out.others));
   }
-  std::sort(wiping.begin(), wiping.end(), by_sequence);
-  std::merge(live.begin(), live.end(), wiping.begin(), wiping.end(), std::back_inserter(out), by_sequence);
+  std::sort(out.others.begin() + first, out.others.end(), by_sequence);
+  return out;
+}
+
+// One sequence is of one event. A patch that was put among the others, without what it brought, gives way to itself.
+std::optional<Event> EventLog::next(Replay& replay) const {
+  auto patch = patches_.upper_bound(replay.after);
+  if (patch != patches_.end() && patch->first > replay.until) patch = patches_.end();
+  auto& others = replay.others;
+  Event out;
+  if (!others.empty() && (patch == patches_.end() || others.front().sequence < patch->first)) {
+    out = std::move(others.front());
+    others.pop_front();
+  } else if (patch != patches_.end()) {
+    if (!others.empty() && others.front().sequence == patch->first) others.pop_front();
+    out = patch->second.event;
+  } else {
+    return std::nullopt;
+  }
+  replay.after = std::max(replay.after, out.sequence);
   return out;
 }
 
@@ -189,7 +212,7 @@ void Completions::add(const Event& event) {
   }));
 }
 
-void Completions::fill(std::vector<Event>& events, InstanceId viewer, Sequence after) const {
+void Completions::fill(std::deque<Event>& events, InstanceId viewer, Sequence after) const {
   const auto found = of_.find(viewer);
   if (found == of_.end()) return;
   for (const Event& view : found->second) {

@@ -39,6 +39,17 @@ class EventLog {
   /// See PackerCore::events_since.
   std::vector<Event> since(Sequence after) const;
 
+  /// The same event by event, while the log goes on: what is forgotten meanwhile is left out, and whoever applies this
+  /// is told of that by the events that follow `until`.
+  struct Replay {
+    Sequence after, until;     ///< of the patches that are still to come
+    std::deque<Event> others;  ///< forgets, epochs and patches that are not in the log, in order
+    EpochId epoch;             ///< of all of them
+  };
+  Replay replay(Sequence after, Sequence until) const;
+  /// Nothing: that was all.
+  std::optional<Event> next(Replay& replay) const;
+
   struct Patch {
     Event event;
     size_t alive = 0;                             ///< clusters in which it is not forgotten
@@ -81,7 +92,7 @@ class Completions {
   void add(const Event& event);
   /// Puts in, in order, what completed views of this viewer after `after` and is not among the events, as patches
   /// without points. events: those after `after`, in order.
-  void fill(std::vector<Event>& events, InstanceId viewer, Sequence after) const;
+  void fill(std::deque<Event>& events, InstanceId viewer, Sequence after) const;
   void clear() { of_.clear(); }
 
  private:

@@ -358,6 +358,19 @@ std::vector<Event> PackerCore::events_since(Sequence after) const {
   return events;
 }
 
+EventLog::Replay PackerCore::replay(Sequence after) const {
+  CHECK(remembers(after));
+  EventLog::Replay out = impl_->log.replay(after, impl_->sequence);
+  out.epoch = impl_->epoch;
+  return out;
+}
+
+std::optional<Event> PackerCore::next(EventLog::Replay& replay) const {
+  auto event = impl_->log.next(replay);
+  if (event) event->epoch = replay.epoch;
+  return event;
+}
+
 bool PackerCore::remembers(Sequence after) const { return impl_->log.remembers(after); }
 
 Sequence PackerCore::sequence() const { return impl_->sequence; }

@@ -12,6 +12,7 @@
 #include "common/points/point_model.h"
 #include "common/splat/reference_depth.h"
 #include "services/packer/points/event.h"
+#include "services/packer/points/event_log.h"
 #include "services/packer/points/known_reference.h"
 #include "services/packer/points/model_watcher.h"
 #include "services/packer/points/sampled_tile.h"
@@ -125,6 +126,9 @@ class PackerCore {
   /// who applies this list; so sequences rise but may have holes. A replica that has applied the list is as of
   /// sequence(). Precondition: remembers(after).
   std::vector<Event> events_since(Sequence after) const;
+  /// The same event by event, as of now.
+  EventLog::Replay replay(Sequence after) const;
+  std::optional<Event> next(EventLog::Replay& replay) const;
   /// False: it is not known any more what a replica as of `after` would have to forget. It must start anew, from 0.
   bool remembers(Sequence after) const;
 

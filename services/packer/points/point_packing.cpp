@@ -6,6 +6,7 @@
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/net/dispatch.h"
+#include "common/wire/lease_seal.h"
 #include "services/packer/points/plan/blue_noise.h"
 
 namespace telesplat::packer {
@@ -140,6 +141,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   // patches are told apart by their frames, the model starts anew, too.
   const bool another_master = core_ && master_ != session.master;
   master_ = session.master;
+  lease_key_ = session.lease_key;
   if (another_master) {
     core_->forget_frames();
     if (planner_) planner_->forget_frames();
@@ -147,6 +149,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   }
   if (!core_ || model_ != config.model || (another_master && core_->redundancy() == Redundancy::kKeep)) {
     if (core_) instance_ = net::make_instance_id();  // viewers start anew
+    answers_.clear();
     meter_.clear();
     completions_.clear();
     model_ = config.model;
@@ -183,8 +186,14 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   const auto& [from, message, m] = received;
   const wire::Lease& lease = m.lease;
   if (!core_) return;
-  // The announcement of its epoch comes on another socket and may be about to.
-  if (lease.epoch > core_->epoch()) return ahead_.add(received, message.body.size(), since_s);
+  // The announcement of its epoch, or of its master, comes on another socket and may be about to. A tile that an
+  // earlier master leased waits in vain: what it is of, this one may have numbered the same.
+  if (lease.master != master_ || lease.epoch > core_->epoch())
+    return ahead_.add(received, message.body.size(), since_s);
+  if (!wire::is_sealed(lease, m.sampler, lease_key_)) {
+    ++unsealed_;
+    return from->reject(message, "its lease was not given to who says to have sampled it");
+  }
   if (lease.epoch != core_->epoch()) return void(++other_epoch_);
   const double begin_s = outlets_.master_now();
   wire::TileDone done = done_of(m, outlets_.to_master_s(received.message.arrived_s), outlets_.to_master_s(since_s));
@@ -195,7 +204,7 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   }
   const std::span stream(reinterpret_cast<const uint8_t*>(m.image.data()), m.image.size());
   auto gathered = gatherer_.add({block_of(lease), {}}, lease.rect, stream);
-  if (!gathered) return from->reject(message, gathered.error().text);
+  if (!gathered) return refuse(received, gathered.error().text);
   if (!*gathered) return tell_taken(done);
   BlockGatherer::Gathered& got = **gathered;
   done.samples = got.samples;
@@ -206,7 +215,14 @@ void PointPacking::pack(const Received& received, double since_s, double now_s) 
   if (got.is_block) ready = std::make_shared<const std::vector<uint8_t>>(stream.begin(), stream.end());
   const bool whole = lease.rays == 0 || lease.rays == uint64_t(lease.rect.width) * uint64_t(lease.rect.height);
   if (const Status s = pack_block(std::move(*got.block), whole, std::move(ready), done, now_s); !s)
-    from->reject(message, s.error().text);
+    refuse(received, s.error().text);
+}
+
+void PointPacking::refuse(const Received& received, const std::string& why) {
+  const auto& [from, message, m] = received;
+  ++refused_;
+  from->reject(message, why);
+  if (outlets_.refuse) outlets_.refuse({m.lease.frame, m.lease.tile, m.lease.lease, m.sampler, why});
 }
 
 Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<const std::vector<uint8_t>> stream,
@@ -256,7 +272,8 @@ void PointPacking::record_plan() {
   if (!options_.plans) return;
   const Status s = options_.plans->add(planner_->picture());
   if (s) return;
-  log::error("{}", s.error().text);
+  ++records_failed_;
+  log::error("{}; plans are not recorded any more", s.error().text);
   options_.plans = nullptr;
 }
 
@@ -309,7 +326,8 @@ void PointPacking::record(const SampledTile& block) {
   if (!options_.recorder || block.step != 1) return;
   const Status s = options_.recorder->add(block.frame, block.camera, block.rect, block.tiles_in_frame, block.image);
   if (s) return;
-  log::error("{}", s.error().text);
+  ++records_failed_;
+  log::error("{}; depth images are not recorded any more", s.error().text);
   options_.recorder = nullptr;
 }
 
@@ -318,7 +336,7 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
     if (!core_) return;
     using M = std::decay_t<decltype(m)>;
     if constexpr (std::is_same_v<M, wire::Receipt>)
-      on_receipt(m, now_s);
+      on_receipt(m, message.peer, now_s);
     else if constexpr (std::is_same_v<M, wire::AccessReport>)
       core_->accessed(m.clusters, now_s, m.frames);
     else
@@ -330,19 +348,39 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
   const Sequence after = request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
   if (!core_->remembers(after)) {
     // A mark of a packer that the viewer does not know: it then asks for everything.
-    outlets_.send(wire::StateMark{net::make_instance_id(), {}, core_->epoch(), false, 0}, peer);
+    answers_.drop(peer);
+    outlets_.send(wire::StateMark{.packer = net::make_instance_id(), .epoch = core_->epoch()}, peer);
     return log::info("a viewer that stopped after {} starts anew", after.value);
   }
-  auto events = core_->events_since(after);
-  completions_.fill(events, request.viewer, after);
-  for (const auto& e : events) with_message(instance_, e, {}, [&](const auto& m) { outlets_.send(m, peer); });
-  outlets_.send(mark(true), peer);
+  const bool follows = request.packer == instance_ || request.packer.value == 0;
+  if (answers_.goes_on(peer, request.viewer, after, follows)) return;
+  StateAnswers::Answer answer{.viewer = request.viewer, .left = core_->replay(after), .mark = mark(true)};
+  completions_.fill(answer.left.others, request.viewer, after);
+  answers_.begin(peer, after, std::move(answer));
   meter_.replayed(request.viewer);
-  log::info("a viewer caught up: {} events after {}", events.size(), after.value);
+  send_answers();
 }
 
-void PointPacking::on_receipt(const wire::Receipt& receipt, double now_s) {
+// A mark that says less than was sent would leave a viewer with a wrong replica: who misses an event gets none.
+void PointPacking::send_answers() {
+  answers_.pump([&](EventLog::Replay& left) { return core_->next(left); },
+                [&](const std::string& peer, const Event& event) {
+                  bool sent = false;
+                  with_message(instance_, event, {}, [&](const auto& m) { sent = outlets_.send(m, peer); });
+                  return sent;
+                },
+                [&](const std::string& peer, const StateAnswers::Answer& answer) {
+                  if (!outlets_.send(answer.mark, peer)) return false;
+                  meter_.replayed(answer.viewer);
+                  log::info("a viewer caught up: {} events up to {}", answer.events, answer.mark.sequence.value);
+                  return true;
+                },
+                size_on_wire);
+}
+
+void PointPacking::on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s) {
   if (receipt.packer != instance_) return;
+  answers_.received(peer, receipt.newest);
   meter_.received(receipt.viewer, receipt.newest, receipt.viewer_s, now_s);
   const auto f = meter_.figures(receipt.viewer, now_s);
   if (f && outlets_.tell_link)
@@ -356,7 +394,20 @@ void PointPacking::publish(const Event& event, const wire::Moments& moments) {
 }
 
 wire::StateMark PointPacking::mark(bool answer) const {
-  return {instance_, core_->sequence(), core_->epoch(), answer, core_->model().points()};
+  return {.packer = instance_,
+          .sequence = core_->sequence(),
+          .epoch = core_->epoch(),
+          .answer = answer,
+          .points = core_->model().points()};
+}
+
+uint64_t PointPacking::due_digest(double now_s) {
+  if (now_s < next_digest_s_) return 0;
+  const double begin_s = monotonic_s();
+  const uint64_t digest = core_->model().digest();
+  next_digest_s_ = now_s + std::max(kDigestPeriod_s, (monotonic_s() - begin_s) / kDigestShare);
+  digests_told_ += digest != 0;
+  return digest;
 }
 
 // Messages wait meanwhile, so it may take a quarter of the time at most, unless it saves more than it takes.
@@ -374,18 +425,22 @@ void PointPacking::tick(double now_s) {
   ahead_.expire(now_s);
   meter_.expire(now_s);
   if (!core_) return;
+  send_answers();
   if (now_s - last_forget_s_ >= kForgetPeriod_s) {
     last_forget_s_ = now_s;
     for (const auto& event : core_->tick(now_s)) publish(event);
   }
   if (now_s - last_mark_s_ >= kMarkPeriod_s) {
     last_mark_s_ = now_s;
-    outlets_.publish(mark(false));
+    wire::StateMark told = mark(false);
+    told.digest = due_digest(now_s);
+    outlets_.publish(told);
   }
 }
 
 void PointPacking::add_status(net::MasterLink::Values& values) const {
   values["bytes_sent"] += double(bytes_sent_);
+  values[metrics::kRecordFailed] = double(records_failed_);
   if (!core_) return;
   const auto& s = core_->statistics();
   const auto& g = gatherer_.statistics();
@@ -396,13 +451,18 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"tiles", double(g.tiles)},
                  {"tiles_duplicate", double(s.tiles_duplicate + g.tiles_duplicate + duplicates_)},
                  {"tiles_other_epoch", double(s.tiles_other_epoch + other_epoch_ + ahead_.dropped())},
+                 {"tiles_refused", double(refused_)},
+                 {"tiles_unsealed", double(unsealed_)},
                  {"blocks", double(s.tiles)},
                  {"blocks_dropped", double(g.blocks_dropped)},
                  {"frames_complete", double(s.frames_complete)},
                  {"patches_forgotten", double(s.patches_forgotten)},
                  {"points_forgotten", double(s.points_forgotten)},
                  {"points_outside", double(s.points_outside)},
-                 {"plans", double(plans_)}});
+                 {"answers", double(answers_.size())},
+                 {"answer_bytes", double(answers_.bytes_under_way())},
+                 {"plans", double(plans_)},
+                 {"digests_told", double(digests_told_)}});
 }
 
 }  // namespace telesplat::packer

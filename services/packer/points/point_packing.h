@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "common/metrics/process.h"
 #include "common/metrics/recorder.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/packing.h"
@@ -13,23 +14,28 @@
 #include "services/packer/points/link_meter.h"
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
+#include "services/packer/points/state_answers.h"
 
 namespace telesplat::packer {
 
 class PointPacking final : public Packing {
  public:
   static constexpr double kMarkPeriod_s = 0.5;  ///< between two marks, by which viewers notice that they missed events
+  /// Between two marks that tell the model's digest, by which viewers see that they hold the same, at least; and how
+  /// much of the time digests may take.
+  static constexpr double kDigestPeriod_s = 2.0, kDigestShare = 0.002;
   static constexpr double kForgetPeriod_s = 1.0;  ///< between two looks for what is obsolete
 
   struct Options {
     int threads = 1;                    ///< for reference depth maps; 0: all cores
     uint64_t max_log_bytes = 0;         ///< Config::max_log_bytes
+    StateAnswers::Limits answers = {};  ///< to viewers that join or have gaps
     DepthRecorder* recorder = nullptr;  ///< of sampled depth images; null: none are kept
     PlanRecorder* plans = nullptr;      ///< of plans; null: none are kept
   };
   /// Keeps a reference to the spans, and the recorders' addresses.
   PointPacking(const Options& options, Outlets outlets, metrics::SpanRecorder& spans)
-      : options_(options), outlets_(std::move(outlets)), spans_(spans) {}
+      : options_(options), outlets_(std::move(outlets)), spans_(spans), answers_(options.answers) {}
 
   bool follow(const wire::Welcome& session, double now_s) override;
   void take_sampled(net::Socket& from, const net::Message& message, double now_s) override;
@@ -40,6 +46,7 @@ class PointPacking final : public Packing {
   bool hurried(double now_s) const override { return planner_ && planner_->view_under_way(now_s); }
   bool idle(double now_s) override;
   void tick(double now_s) override;
+  std::optional<double> due_s() const override { return answers_.can_go_on() ? std::optional(0.0) : std::nullopt; }
   void add_status(net::MasterLink::Values& values) const override;
   /// Of the model, for tests of replication; 0: there is none yet.
   uint64_t digest() const { return core_ ? core_->model().digest() : 0; }
@@ -54,6 +61,7 @@ class PointPacking final : public Packing {
   void begin_planner(const PlanConfig& config);
   void record_plan();
   void pack(const Received& received, double since_s, double now_s);
+  void refuse(const Received& received, const std::string& why);
   /// A block whose every row is here. stream: of the whole block, if it came as one tile; else null.
   ///   whole: every pixel of it was cast.
   Status pack_block(SampledTile block, bool whole, std::shared_ptr<const std::vector<uint8_t>> stream,
@@ -62,29 +70,37 @@ class PointPacking final : public Packing {
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
   void answer(const wire::StateRequest& request, const std::string& peer);
-  void on_receipt(const wire::Receipt& receipt, double now_s);
+  void send_answers();
+  void on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});
   wire::StateMark mark(bool answer) const;
+  /// The model's digest where one is due; else 0.
+  uint64_t due_digest(double now_s);
 
   Options options_;
   Outlets outlets_;
   metrics::SpanRecorder& spans_;
   InstanceId instance_ = net::make_instance_id(), master_;
-  std::optional<PackerCore> core_;  // none before the data set's box is known
-  std::optional<Planner> planner_;  // of its model; none where redundant points are kept
-  PlanConfig plan_config_;          // that it was made with
+  std::vector<uint32_t> lease_key_;  // of the master
+  std::optional<PackerCore> core_;   // none before the data set's box is known
+  std::optional<Planner> planner_;   // of its model; none where redundant points are kept
+  PlanConfig plan_config_;           // that it was made with
   points::ModelConfig model_;
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;
   LinkMeter meter_;  // of the viewers' links
+  StateAnswers answers_;
   Completions completions_;
-  uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0;
+  uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0, refused_ = 0, unsealed_ = 0;
+  uint64_t records_failed_ = 0;  // of depth images and plans
   uint64_t plans_ = 0;
   FrameId planning_;           // whose extra rays were planned last,
   double planning_s_ = 0;      // and for how long so far
   bool told_of_size_ = false;  // that views are too large for plans
   double next_settle_s_ = 0;
   double last_mark_s_ = -1e9, last_forget_s_ = -1e9;
+  double next_digest_s_ = 0;
+  uint64_t digests_told_ = 0;
 };
 
 }  // namespace telesplat::packer

@@ -196,15 +196,16 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
   if (ack.buffers < 1 || ack.buffers > wire::kMaxBuffers)
     return Error{fmt::format("a viewer with {} buffers, limits 1 and {}", ack.buffers, wire::kMaxBuffers)};
   const auto known = viewers_.find(ack.viewer);
-  const bool begins = known == viewers_.end() || known->second.peer.empty() || ack.frame.value == 0;
+  bool begins = known == viewers_.end() || known->second.peer != peer;
   Viewer& v = viewer(ack.viewer, now_s);
   v.peer = peer;
   v.buffers = ack.buffers;
   v.in_order = ack.in_order;
   v.heard_s = now_s;
+  if (ack.frame.value != 0) v.sent_again = false;
+  if (!begins && ack.frame.value == 0 && seems_lost(v, now_s)) begins = v.sent_again = true;
   if (begins) {
-    // A known viewer says so if it believes that it is not known, or if its connection broke: what was under way is
-    // lost.
+    // What was under way on a connection that broke is lost.
     v.waiting.insert(v.waiting.begin(), v.unacknowledged.begin(), v.unacknowledged.end());
     v.unacknowledged.clear();
     v.pace.lost();
@@ -221,6 +222,16 @@ Status SliceGatherer::acknowledged(const std::string& peer, const wire::SliceAck
   v.waiting.push_back({newest_, own != views.end() ? *own : wire::SliceView{ack.viewer, {}, views.front().camera, 0},
                        own == views.end()});
   return ok_status();
+}
+
+// Of a viewer in order, frames may stay in its buffers for as long as it likes.
+bool SliceGatherer::seems_lost(const Viewer& v, double now_s) {
+  if (v.in_order || v.sent_again || v.unacknowledged.empty()) return false;
+  const double rate = v.pace.rate_bytes_s();
+  double bytes = 0;
+  for (const Waiting& w : v.unacknowledged) bytes += double(w.bytes);
+  return now_s - v.unacknowledged.front().sent_s >
+         std::max(kViewerPatience_s, rate > 0 ? kLostAfter * bytes / rate : 0);
 }
 
 void SliceGatherer::unreachable(const std::string& peer) {
@@ -261,6 +272,8 @@ std::optional<SliceGatherer::Outgoing> SliceGatherer::take_outgoing(double now_s
     v.waiting.pop_front();
     ++statistics_.frames_sent;
     Outgoing out = make(next->first, v, v.unacknowledged.back());
+    v.unacknowledged.back().sent_s = now_s;
+    v.unacknowledged.back().bytes = out.bytes->size();
     v.pace.sent(out.frame.frame, out.bytes->size(), now_s);
     return out;
   }

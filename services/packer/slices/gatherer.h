@@ -22,6 +22,9 @@ inline constexpr size_t kMaxClosedFrames = 256;          ///< complete ones reme
 inline constexpr size_t kMaxSliceViewers = 256;
 /// A viewer that was sent something and acknowledges nothing for this long is forgotten.
 inline constexpr double kViewerPatience_s = 10;
+/// A frame that is not acknowledged for so many times what its link should need, and kViewerPatience_s, seems lost. The
+/// newest frame is sent then, once.
+inline constexpr double kLostAfter = 4;
 /// Images are kept this far beyond a camera's edges, as a part of its width and height.
 inline constexpr double kViewMargin = 0.1;
 
@@ -73,9 +76,10 @@ class SliceGatherer {
   Result<Added> add(Slab slab, double now_s);
   /// The frame that add() has just completed is packed, at this moment of the master's clock.
   void packed(double master_s);
-  /// A viewer is there (frame 0), or has let a frame go. One that was there before gets what was under way to it once
-  /// more. One that comes late gets the newest complete frame, unless it wants its own in order. Error: a number of
-  /// buffers beyond its limits.
+  /// A viewer is there (frame 0), or has let a frame go. One that was there before and now speaks over another
+  /// connection gets what was under way to it once more; over the same one frame 0 is a sign of life, since nothing is
+  /// lost on it. One that comes late gets the newest complete frame, unless it wants its own in order. Error: a number
+  /// of buffers beyond its limits.
   Status acknowledged(const std::string& peer, const wire::SliceAck& ack, double now_s);
   /// It could not be sent to.
   void unreachable(const std::string& peer);
@@ -108,6 +112,8 @@ class SliceGatherer {
     std::shared_ptr<const Frame> frame;
     wire::SliceView view;
     bool whole = false;  // the camera is another viewer's: nothing is left out
+    double sent_s = 0;   // 0: it waits
+    size_t bytes = 0;    // that were sent
   };
   struct Viewer {
     std::string peer;  // empty: frames are made for it, but it did not introduce itself yet
@@ -116,6 +122,7 @@ class SliceGatherer {
     std::deque<Waiting> unacknowledged, waiting;  // in order of frames
     FrameId newest;                               // that ever waited: older ones come too late
     double heard_s = 0;                           // or when it was first sent something since
+    bool sent_again = false;                      // since it acknowledged a frame: one seemed lost
     SlicePace pace;
   };
 
@@ -129,6 +136,7 @@ class SliceGatherer {
   void make_room(size_t bytes);
   void complete(const std::shared_ptr<const Frame>& frame, double now_s);
   Viewer& viewer(InstanceId id, double now_s);
+  static bool seems_lost(const Viewer& viewer, double now_s);
   static bool has_room(const Viewer& viewer);
   static double may_send_s(const Viewer& viewer);
   void queue(Viewer& viewer, Waiting waiting);

@@ -3,6 +3,7 @@
 #include "common/core/log.h"
 #include "common/net/dispatch.h"
 #include "common/volume/session.h"
+#include "common/wire/lease_seal.h"
 
 namespace telesplat::packer {
 
@@ -22,6 +23,7 @@ bool SlicePacking::follow(const wire::Welcome& session, double now_s) {
     master_ = session.master;
     grid_ = read->grid;
   }
+  lease_key_ = session.lease_key;
   gatherer_.set_scene(read->grid, session.epoch);
   gatherer_.set_most(scene::SessionView(session).setting("packing.max_rate_mbit", 0) * 1e6 / 8);
   for (const auto& [received, bytes, since_s] : ahead_.take()) {
@@ -54,13 +56,20 @@ Status SlicePacking::receive(const net::Message& message, const wire::SliceImage
     (void)gatherer_.add({m, message.owner}, now_s);  // which counts it
     return ok_status();
   }
+  if (!wire::is_sealed(m.lease, m.sampler, lease_key_)) {
+    ++unsealed_;
+    return Error{"its lease was not given to who says to have sampled it"};
+  }
   const double receive_s = outlets_.to_master_s(now_s);
   SliceGatherer::Slab slab{m, message.owner};
   wire::Moments& moments = slab.images.lease.moments;
   moments.arrived_s = outlets_.to_master_s(message.arrived_s);
   moments.receive_s = receive_s;
   const auto added = gatherer_.add(slab, now_s);
-  if (!added) return added.error();
+  if (!added) {
+    if (outlets_.refuse) outlets_.refuse({m.lease.frame, m.lease.slab, m.lease.lease, m.sampler, added.error().text});
+    return added.error();
+  }
   bytes_received_ += m.data.size();
   wire::TileDone done{.frame = m.lease.frame,
                       .tile = m.lease.slab,
@@ -122,6 +131,7 @@ void SlicePacking::add_status(net::MasterLink::Values& values) const {
   values["slabs_duplicate"] = double(s.slabs_duplicate);
   values["slabs_other_epoch"] = double(s.slabs_other_epoch + ahead_.dropped());
   values["slabs_refused"] = double(s.slabs_refused);
+  values["slabs_unsealed"] = double(unsealed_);
   values["volume_frames_complete"] = double(s.frames_complete);
   values["volume_frames_dropped"] = double(s.frames_dropped);
   values["volume_frames_sent"] = double(s.frames_sent);

@@ -33,7 +33,7 @@ class SlicePacking final : public Packing {
     wire::SliceImages images;  // its data lie in the message
   };
   bool is_ahead(const wire::SliceImages& images) const {
-    return !gatherer_.ready() || images.lease.epoch > gatherer_.epoch();
+    return !gatherer_.ready() || images.lease.master != master_ || images.lease.epoch > gatherer_.epoch();
   }
   /// first_s: when the first was sent, on the master's clock; stays as it is if nobody takes one now.
   void send_out(double now_s, double* first_s = nullptr);
@@ -44,7 +44,9 @@ class SlicePacking final : public Packing {
   EpochHold<Received> ahead_{{.items = 64, .bytes = 256u << 20}};
   InstanceId instance_ = net::make_instance_id(), master_;
   std::optional<volume::Grid> grid_;
-  uint64_t bytes_received_ = 0, bytes_sent_ = 0, bytes_told_ = 0;  // told: of those sent, the master knows
+  std::vector<uint32_t> lease_key_;  // of the master
+  uint64_t bytes_received_ = 0, bytes_sent_ = 0, bytes_told_ = 0,
+           unsealed_ = 0;  // told: of those sent, the master knows
 };
 
 }  // namespace telesplat::packer

@@ -30,8 +30,18 @@ class ChunkCache {
   size_t waiting_count() const { return waiting_.size(); }
   void mark_waiting(ChunkId id) { waiting_.insert(id); }
   void forget_waiting() { waiting_.clear(); }
-  /// Takes note of a chunk that came. Returns those to remove to stay within the budget; never one the last view needs.
-  std::vector<ChunkId> insert(ChunkId id);
+  /// As the list says.
+  uint64_t bytes_of(ChunkId id) const;
+  uint64_t waiting_bytes() const;
+  /// Takes note of a chunk of this size that came. Returns those to remove to stay within the budget; never one the
+  /// last view needs.
+  std::vector<ChunkId> insert(ChunkId id, uint64_t bytes);
+  /// What came is no chunk. It is missing still, until it was refused kTries times: then views do without it. Returns
+  /// whether it was the last time.
+  static constexpr int kTries = 3;
+  bool refuse(ChunkId id);
+  /// Those that views do without.
+  size_t holes() const { return holes_; }
 
   uint64_t bytes() const { return bytes_; }
   const std::vector<geometry::ChunkInfo>& chunks() const { return chunks_; }
@@ -39,8 +49,14 @@ class ChunkCache {
  private:
   uint64_t budget_bytes_;
   std::vector<geometry::ChunkInfo> chunks_;  // index = id
-  std::map<ChunkId, uint64_t> held_;         // last use
+  struct Held {
+    uint64_t use;  // the last
+    uint64_t bytes;
+  };
+  std::map<ChunkId, Held> held_;  // holes, too: nothing
+  std::map<ChunkId, int> refused_;
   std::set<ChunkId> waiting_;
+  size_t holes_ = 0;
   uint64_t use_ = 0, bytes_ = 0;
 };
 

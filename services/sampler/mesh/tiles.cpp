@@ -1,5 +1,8 @@
 #include "services/sampler/mesh/tiles.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "common/net/dispatch.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/session.h"
@@ -7,9 +10,11 @@
 namespace telesplat::sampler {
 namespace {
 
-constexpr size_t kChunksInFlight = 8;  // requests to the data server not yet answered
-constexpr double kRetry_s = 2.0;       // a data server that does not answer is asked again
-constexpr double kExtend_s = 0.1;      // between two requests for more time
+constexpr size_t kChunksInFlight = 8;         // requests to the data server not yet answered
+constexpr uint64_t kBytesInFlight = 8 << 20;  // of these chunks, or one chunk
+constexpr double kMostListPatience_s = 16;    // an array that is being read may take long
+constexpr double kExtend_s = 0.1;             // between two requests for more time
+constexpr double kPatience_s = 6.0;           // nothing came for so long, or longer than the link needs: no more time
 
 // Chunk bytes must be 4-byte aligned to be used in place; a received field may lie anywhere.
 geometry::ChunkBytes aligned(const net::Message& message, wire::Bytes data) {
@@ -68,9 +73,12 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
   epoch_ = session.epoch;
   if (chunks != endpoint_) {
     endpoint_ = chunks;
-    blocks_.emplace(
-        context_, net::Kind::kDealer, service_name_ + ":chunks",
-        net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes, .toward = "data"});
+    blocks_.emplace(context_, net::Kind::kDealer, service_name_ + ":chunks",
+                    net::SocketOptions{.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                                       .patience_s = net::kBulkPatience_s,
+                                       .watch_connecting = true,
+                                       .toward = "data"});
+    failed_before_ = 0;
     if (const Status s = blocks_->connect(endpoint_); !s) log::error("{}", s.error().text);
   }
   // A restarted data server with the same data has the same chunks: keep what we hold.
@@ -83,8 +91,25 @@ void MeshTiles::on_welcome(const wire::Welcome& session) {
     content_hash_ = hash;
     prefetched_ = false;
   }
+  begin_anew();
+}
+
+// Nothing that was asked for is waited for.
+void MeshTiles::begin_anew() {
   cache_.forget_waiting();
-  last_request_s_ = -1e9;
+  retry_.forget();
+  list_asked_s_ = -1e9;
+  list_patience_s_ = RetryClock::kLeast_s;
+  broken_ = false;
+}
+
+// It is small, or its array is being read: each time it is waited for twice as long.
+void MeshTiles::fetch_list(double now_s) {
+  if (now_s - list_asked_s_ <= (broken_ ? RetryClock::kLeast_s : list_patience_s_)) return;
+  if (list_asked_s_ > 0) list_patience_s_ = std::min(2 * list_patience_s_, kMostListPatience_s);
+  blocks_->send(wire::ChunkListRequest{epoch_, array_});
+  list_asked_s_ = now_s;
+  broken_ = false;
 }
 
 Readiness MeshTiles::readiness(const HeldLease& held, double now_s) {
@@ -105,18 +130,15 @@ Sampled MeshTiles::sample(const HeldLease& held) {
 // Asks for the list of chunks, then for what the next tile needs, then for the rest as far as the budget goes.
 void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
-  if (!cache_.known()) {
-    if (now_s - last_request_s_ > kRetry_s) {
-      blocks_->send(wire::ChunkListRequest{epoch_, array_});
-      last_request_s_ = now_s;
-    }
-    return;
-  }
-  if (cache_.waiting_count() && now_s - last_request_s_ > kRetry_s) cache_.forget_waiting();
+  const uint64_t failed = blocks_->failed_connections();
+  broken_ |= std::exchange(failed_before_, failed) != failed;
+  if (!cache_.known()) return fetch_list(now_s);
+  if (retry_.overdue(now_s, broken_)) begin_anew();
   std::vector<ChunkId> wanted;
   if (next) {
     wanted = cache_.missing(part(next->lease));
-    if (!wanted.empty() && now_s - last_extend_s_ > kExtend_s) {
+    const bool patient = now_s - std::max(progress_s_, next->received_s) < std::max(kPatience_s, retry_.patience_s());
+    if (!wanted.empty() && patient && now_s - last_extend_s_ > kExtend_s) {
       link_.socket().send(wire::LeaseExtend{link_.instance(), next->lease.lease});
       last_extend_s_ = now_s;
     }
@@ -130,11 +152,13 @@ void MeshTiles::fetch(const HeldLease* next, double now_s) {
     }
   }
   for (const ChunkId id : wanted) {
-    if (cache_.waiting_count() >= kChunksInFlight) break;
     if (cache_.waiting(id)) continue;
+    if (cache_.waiting_count() >= kChunksInFlight ||
+        (cache_.waiting_count() > 0 && cache_.waiting_bytes() + cache_.bytes_of(id) > kBytesInFlight))
+      break;
     blocks_->send(wire::ChunkRequest{epoch_, id, array_});
     cache_.mark_waiting(id);
-    last_request_s_ = now_s;
+    retry_.asked(cache_.bytes_of(id), now_s);
   }
 }
 
@@ -150,29 +174,49 @@ std::vector<net::Socket*> MeshTiles::sockets() {
 
 void MeshTiles::receive() {
   if (!blocks_) return;
+  const double now_s = monotonic_s();
   std::vector<std::pair<ChunkId, geometry::ChunkBytes>> batch;
   while (const auto message = blocks_->receive()) {
     net::dispatch<wire::ChunkList, wire::Chunk>(*blocks_, *message, [&](const auto& m) {
       if (m.epoch != epoch_) return;
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::ChunkList>) {
         if (!cache_.known()) cache_.reset(m.chunks);
-      } else if (!m.data.empty() && cache_.waiting(m.chunk)) {
+        progress_s_ = now_s;
+      } else if (cache_.waiting(m.chunk)) {
+        retry_.answered(cache_.bytes_of(m.chunk), m.data.size(), monotonic_s());
+        if (m.data.empty()) return refuse(m.chunk, "there is no such chunk");
         batch.emplace_back(m.chunk, aligned(*message, m.data));
+        progress_s_ = now_s;
       }
     });
     if (batch.size() >= kChunksInFlight) break;
   }
   if (batch.empty()) return;
   const double begin_s = monotonic_s();
-  for (const auto& [id, bytes] : batch)
-    for (const ChunkId old : cache_.insert(id)) sampler_->remove_chunk(old);
-  if (const Status s = sampler_->add_chunks(std::move(batch)); !s)
-    log::warn("a chunk from {} was refused: {}", endpoint_, s.error().text);
+  const bool all_good = sampler_->add_chunks(batch).ok();
+  for (auto& [id, bytes] : batch) {
+    const uint64_t size = bytes.bytes.size();
+    if (!all_good)  // which one is not?
+      if (const Status s = sampler_->add_chunk(id, std::move(bytes)); !s) {
+        refuse(id, s.error().text);
+        continue;
+      }
+    for (const ChunkId old : cache_.insert(id, size)) sampler_->remove_chunk(old);
+  }
   spans_.add("add chunks", link_.to_master_s(begin_s), link_.to_master_s(monotonic_s()));
+}
+
+void MeshTiles::refuse(ChunkId id, const std::string& why) {
+  ++chunks_refused_;
+  if (cache_.refuse(id))
+    log::warn("chunk {} of {} was refused {} times: {}; views do without it", id.value, endpoint_, ChunkCache::kTries,
+              why);
 }
 
 void MeshTiles::add_status(net::MasterLink::Values& values) const {
   values["chunk_mb"] = double(cache_.bytes()) / 1e6;
+  values["chunks_refused"] = double(chunks_refused_);
+  values["chunks_lacking"] = double(cache_.holes());
   values["messages_rejected"] = blocks_ ? double(blocks_->rejected()) : 0.0;
 }
 

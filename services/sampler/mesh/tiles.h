@@ -8,6 +8,7 @@
 #include "services/sampler/epoch_book.h"
 #include "services/sampler/mesh/chunk_cache.h"
 #include "services/sampler/mesh/sampler.h"
+#include "services/sampler/retry_clock.h"
 #include "services/sampler/tiles/tile_source.h"
 
 namespace telesplat::sampler {
@@ -42,6 +43,9 @@ class MeshTiles final : public TileSource {
   };
   void learn_look(const wire::Welcome& session);
   size_t missing_count() const;
+  void begin_anew();
+  void fetch_list(double now_s);
+  void refuse(ChunkId id, const std::string& why);
 
   std::unique_ptr<Sampler> sampler_;
   ChunkCache cache_;
@@ -55,7 +59,13 @@ class MeshTiles final : public TileSource {
   EpochId epoch_;      // the newest
   EpochBook<Look> looks_;
   bool prefetched_ = false;
-  double last_request_s_ = -1e9, last_extend_s_ = -1e9;
+  uint64_t chunks_refused_ = 0;
+  RetryClock retry_;  // of chunks
+  double list_asked_s_ = -1e9, list_patience_s_ = RetryClock::kLeast_s;
+  uint64_t failed_before_ = 0;
+  bool broken_ = false;  // the connection, since something was asked for
+  double last_extend_s_ = -1e9;
+  double progress_s_ = -1e9;  // when something came of the data server
 };
 
 }  // namespace telesplat::sampler

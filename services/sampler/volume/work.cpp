@@ -67,7 +67,7 @@ void VolumeWork::on_welcome(const wire::Welcome& welcome) {
       if (epoch.colours[l].extinction > 0) epoch.shown.add(int(l));
     if (store_.scene() != epoch.scene) {
       store_.set_scene(*epoch.scene);
-      asked_.reset();
+      forget_asked();
       told_ready_ = {};
       forget_servers();
     }
@@ -199,9 +199,21 @@ std::optional<VoxelAsk> VolumeWork::next_ask() {
   return std::nullopt;
 }
 
-void VolumeWork::ask(double now_s) {
-  if (asked_ && now_s - asked_->asked_s < kRetry_s) return;
+bool VolumeWork::overdue(double now_s) const {
+  if (asked_->refused_s > 0 && now_s - asked_->refused_s > RetryClock::kLeast_s) return true;
+  const auto server = servers_.find(asked_->ask.endpoint);
+  const bool broken = server == servers_.end() || server->second.failed_connections() != asked_->failed_before;
+  return retry_.overdue(now_s, broken);
+}
+
+void VolumeWork::forget_asked() {
   asked_.reset();
+  retry_.forget();
+}
+
+void VolumeWork::ask(double now_s) {
+  if (asked_ && !overdue(now_s)) return;
+  forget_asked();
   if (now_s < pause_until_s_) return;
   const auto next = next_ask();
   if (!next) return;
@@ -210,9 +222,11 @@ void VolumeWork::ask(double now_s) {
     if (servers_.size() >= kMaxServers) servers_.clear();
     server =
         servers_
-            .emplace(next->endpoint,
-                     net::Socket(context_, net::Kind::kDealer, service_name_ + ":voxels",
-                                 {.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes, .toward = "data"}))
+            .emplace(next->endpoint, net::Socket(context_, net::Kind::kDealer, service_name_ + ":voxels",
+                                                 {.max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
+                                                  .patience_s = net::kBulkPatience_s,
+                                                  .watch_connecting = true,
+                                                  .toward = "data"}))
             .first;
     if (const Status s = server->second.connect(next->endpoint); !s) log::error("{}", s.error().text);
   }
@@ -220,7 +234,8 @@ void VolumeWork::ask(double now_s) {
                              uint64_t(next->end), next->round,          {}};
   if (!next->have.empty()) request.have = std::as_bytes(next->have.bytes());
   server->second.send(request);
-  asked_ = {*next, now_s};
+  asked_ = {*next, server->second.failed_connections()};
+  retry_.asked(answer_bytes_, now_s);
 }
 
 void VolumeWork::tell_ready() {
@@ -262,7 +277,8 @@ void VolumeWork::fetch(double now_s) {
   tell_ready();
   if (!asked_ && leases_.empty()) arrange_ahead();
   if (leases_.empty() || !asked_ || now_s - last_extend_s_ < kExtend_s) return;
-  if (now_s - std::max(progress_s_, leases_.front().received_s) > kPatience_s) return;
+  const double patience_s = retry_.known() ? std::max(kPatience_s, retry_.patience_s()) : kPatience_s;
+  if (now_s - std::max(progress_s_, leases_.front().received_s) > patience_s) return;
   if (readiness(leases_.front(), now_s).state != Readiness::State::kWaits) return;
   for (const Held& held : leases_) master_.extend({master_.instance, held.lease.lease});
   last_extend_s_ = now_s;
@@ -278,7 +294,7 @@ std::vector<net::Socket*> VolumeWork::sockets() {
 void VolumeWork::forget_servers() {
   std::erase_if(servers_, [&](const auto& server) {
     const bool named = store_.names(server.first);
-    if (!named && asked_ && asked_->ask.endpoint == server.first) asked_.reset();
+    if (!named && asked_ && asked_->ask.endpoint == server.first) forget_asked();
     if (!named) rejected_ += server.second.rejected();
     return !named;
   });
@@ -293,21 +309,22 @@ void VolumeWork::receive(double now_s) {
           return;  // too late: it was asked again, or is not needed any more
         const VoxelAsk ask = asked_->ask;
         if (!data.known || data.begin >= data.end) {
-          asked_.reset();
+          forget_asked();
           pause_until_s_ = now_s + kPause_s;
-          progress_s_ = now_s;
           return;
         }
         const Epoch* epoch = epochs_.find(data.epoch);
-        if (!epoch) return asked_.reset();
+        if (!epoch) return forget_asked();
         const double begin_s = monotonic_s();
         const auto taken = store_.take(ask, data, epoch->shown);
         if (!taken) {
-          // It is asked again when its time is up.
+          asked_->refused_s = now_s;
           return socket.reject(*message, taken.error().text);
         }
         if (!*taken) return;
-        asked_.reset();
+        retry_.answered(answer_bytes_, message->body.size(), now_s);
+        answer_bytes_ = std::max<uint64_t>(message->body.size(), answer_bytes_ / 2);
+        forget_asked();
         progress_s_ = now_s;
         bytes_received_ += message->body.size();
         const Epoch& newest = epochs_.newest();

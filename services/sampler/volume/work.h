@@ -12,6 +12,7 @@
 #include "common/metrics/recorder.h"
 #include "common/volume/session.h"
 #include "services/sampler/epoch_book.h"
+#include "services/sampler/retry_clock.h"
 #include "services/sampler/volume/repeated_views.h"
 #include "services/sampler/volume/slab_store.h"
 #include "services/sampler/work.h"
@@ -20,9 +21,9 @@ namespace telesplat::sampler {
 
 class VolumeWork final : public Work {
  public:
-  static constexpr double kRetry_s = 2;     ///< a data server that does not answer is asked again after this
-  static constexpr double kPause_s = 0.05;  ///< one that does not know the epoch yet is asked again after this
-  static constexpr double kExtend_s = 0.1;  ///< between two requests for more time
+  static constexpr uint64_t kAnswerBytes = 3 << 20;  ///< that an answer has about, before one has come
+  static constexpr double kPause_s = 0.05;           ///< one that does not know the epoch yet is asked again after this
+  static constexpr double kExtend_s = 0.1;           ///< between two requests for more time
   static constexpr double kPatience_s = 6;  ///< a lease whose voxels do not come for longer is extended no more
 
   /// What it says to the master.
@@ -72,7 +73,8 @@ class VolumeWork final : public Work {
   };
   struct Asked {
     VoxelAsk ask;
-    double asked_s = 0;
+    uint64_t failed_before = 0;  // Socket::failed_connections()
+    double refused_s = 0;        // when an answer came that was none; 0: none did
   };
 
   Readiness readiness(const Held& held, double now_s);
@@ -84,6 +86,8 @@ class VolumeWork final : public Work {
   static SlabWant want(EpochId epoch, const Epoch& of, int begin, int end);
   std::optional<VoxelAsk> next_ask();
   void ask(double now_s);
+  bool overdue(double now_s) const;
+  void forget_asked();
   void tell_ready();
   void arrange_ahead();
   void forget_servers();
@@ -100,6 +104,8 @@ class VolumeWork final : public Work {
   std::deque<Held> leases_;
   std::map<std::string, net::Socket> servers_;  // by endpoint
   std::optional<Asked> asked_;
+  RetryClock retry_;
+  uint64_t answer_bytes_ = kAnswerBytes;
   std::pair<uint64_t, EpochId> told_ready_;  // partition and epoch
   uint64_t bytes_received_ = 0, bytes_before_ = 0, rejected_ = 0;
   double pause_until_s_ = 0, last_extend_s_ = -1e9, progress_s_ = -1e9;

@@ -79,5 +79,25 @@ TEST(Utf8, KeepsZeroBytesAndEmptyText) {
   EXPECT_EQ(to_utf8(std::string_view("a\0b", 3)), std::string("a\0b", 3));
 }
 
+TEST(Printable, HasNothingThatSteersATerminal) {
+  EXPECT_EQ(printable("J\xc3\xbcrgen, \"x\" \xe2\x82\xac \xf0\x9f\x98\x80"),
+            "J\xc3\xbcrgen, \"x\" \xe2\x82\xac \xf0\x9f\x98\x80");
+  const std::string gone = "\xef\xbf\xbd";
+  EXPECT_EQ(printable("\x1b[2J"), gone + "[2J");
+  EXPECT_EQ(printable("a\r\nb\x7f"), "a" + gone + gone + "b" + gone);
+  EXPECT_EQ(printable("\xc2\x9b"
+                      "31m"),
+            gone + "31m")
+      << "C1";
+  EXPECT_EQ(printable("\xc2\xa0"), "\xc2\xa0");
+  EXPECT_EQ(printable("\xe2\x80\xae"
+                      "txt\xe2\x81\xa6\xe2\x80\xa8"),
+            gone + "txt" + gone + gone)
+      << "turned round";
+  EXPECT_EQ(printable("\xff"), gone);
+  EXPECT_EQ(printable(std::string(300, 'x')), std::string(253, 'x') + "...");
+  EXPECT_TRUE(valid_utf8(printable("xxxxxx\xc3\xa9xxxxxx", 10)));
+}
+
 }  // namespace
 }  // namespace telesplat

@@ -1,6 +1,7 @@
 // The folder of chunk stores: what it tells, what goes, what stays.
 #include "services/data/mesh/cache.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -172,6 +173,43 @@ TEST_F(CacheFolder, LimitsAreRememberedAndTakenBack) {
   EXPECT_EQ(cache_limit(folder()), std::nullopt);
   std::ofstream(folder() + "/limit") << "much\n";
   EXPECT_EQ(cache_limit(folder()), std::nullopt);
+}
+
+TEST_F(CacheFolder, APlaceThatOthersMayWriteToIsNotUsed) {
+  const fs::path shared = fs::temp_directory_path() / fmt::format("telesplat-test-{}", getpid());
+  fs::create_directory(shared);
+  fs::permissions(shared, fs::perms::owner_all);
+  EXPECT_EQ(problem_of_shared_place(shared), "");
+  fs::permissions(shared, fs::perms::all);
+  EXPECT_EQ(problem_of_shared_place(shared), "others may write into it");
+  MeshOptions options;
+  options.cache_dir = shared;
+  const auto store = open_mesh(mesh("one"), options, {});
+  ASSERT_TRUE(store.ok()) << store.error().text;
+  EXPECT_TRUE(fs::is_empty(shared));
+  fs::remove(shared);
+  fs::create_directory_symlink(root_, shared);
+  EXPECT_EQ(problem_of_shared_place(shared), "is no folder");
+  fs::remove(shared);
+  EXPECT_EQ(problem_of_shared_place(root_ / "cache"), "") << "nobody shares it";
+}
+
+TEST_F(CacheFolder, OneThatWaitsForAnotherMakerTellsAndMayGiveUp) {
+  opened("one");
+  const std::string stem = stores()[0].stem;
+  fs::remove(stem + ".mesh");
+  const auto lock = Descriptor::open_file(stem + ".lock", O_RDWR | O_CREAT);
+  ASSERT_TRUE(lock.lock(LOCK_EX));
+  struct GivenUp {};
+  MeshOptions options;
+  options.cache_dir = folder();
+  int told = 0;
+  const auto tell = [&](const char* stage, double) {
+    if (std::string(stage).find("another process") == std::string::npos) return;
+    if (++told == 3) throw GivenUp();
+  };
+  EXPECT_THROW(open_mesh(mesh("one"), options, tell).ok(), GivenUp);
+  EXPECT_EQ(told, 3) << "again and again, so that it can be given up";
 }
 
 TEST(CacheSizes, AreReadAndWrittenAsPeopleDo) {

@@ -57,5 +57,25 @@ TEST_F(ServedMeshTest, AnotherMastersOrderOfTheSameWordsIsAnsweredToo) {
   EXPECT_EQ(answer(2, "1 heat"), "1");
 }
 
+// Lists are large, and quickly asked for.
+TEST_F(ServedMeshTest, APeerGetsAFewListsAtOnce) {
+  net::Context context;
+  net::Socket requests(context, net::Kind::kRouter, "requests", {}), master(context, net::Kind::kRouter, "master", {});
+  net::Socket asker(context, net::Kind::kDealer, "asker", {}), other(context, net::Kind::kDealer, "other", {});
+  ASSERT_TRUE(requests.bind("inproc://requests"));
+  ASSERT_TRUE(asker.connect("inproc://requests") && other.connect("inproc://requests"));
+  for (int n = 0; n < 100; ++n) asker.send(wire::ChunkListRequest{EpochId{1}, ""});
+  other.send(wire::ChunkListRequest{EpochId{1}, ""});
+  for (int asked = 0; asked < 101; net::wait_readable({&requests}, 100))
+    while (const auto message = requests.receive()) served->answer(*message, {requests, master}), ++asked;
+  const auto lists = [](net::Socket& socket) {
+    int count = 0;
+    while (net::wait_readable({&socket}, 200)) count += socket.receive().has_value();
+    return count;
+  };
+  EXPECT_LE(lists(asker), 5);
+  EXPECT_EQ(lists(other), 1);
+}
+
 }  // namespace
 }  // namespace telesplat::data

@@ -161,6 +161,26 @@ TEST_F(StoreTest, GoesOnWithoutACacheThatCannotBeWritten) {
   EXPECT_EQ(contents_of(*store).triangles.size(), 3200u);
 }
 
+TEST_F(StoreTest, WritesThroughNoLinks) {
+  ASSERT_TRUE(open_or_fail(path_, options_));
+  const std::string stem = store_file().replace_extension("").string();
+  const std::string precious = folder_.write("precious", "mine");
+  for (const char* name : {".part", ".used"}) {
+    fs::remove(stem + name);
+    fs::create_symlink(precious, stem + name);
+  }
+  ASSERT_TRUE(open_or_fail(path_, options_)) << "it is used again";
+  EXPECT_EQ(fs::file_size(precious), 4u);
+  fs::remove(stem + ".mesh");
+  EXPECT_TRUE(open_or_fail(path_, options_)) << "it is made anew, or done without";
+  EXPECT_EQ(fs::file_size(precious), 4u);
+  fs::remove(stem + ".lock");
+  fs::create_symlink(folder_ / "not-there", stem + ".lock");
+  fs::remove(stem + ".mesh");
+  EXPECT_TRUE(open_or_fail(path_, options_));
+  EXPECT_FALSE(fs::exists(folder_ / "not-there"));
+}
+
 TEST_F(StoreTest, MappedChunksOutliveTheStoreAndItsFile) {
   auto store = open_or_fail(path_, options_);
   const geometry::ChunkBytes bytes = store->chunk(ChunkId{0});

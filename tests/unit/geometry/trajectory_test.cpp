@@ -64,6 +64,16 @@ TEST(Trajectory, RefusesFilesThatAreNone) {
   EXPECT_NE(read(std::string(kHeader) + "0,1e7,0,0,1,0,0,0\n").error().text.find("1e6 m"), std::string::npos);
 }
 
+TEST(Trajectory, AnEndlessLineIsRefusedWithoutBeingRead) {
+  const std::string path = testing::TempDir() + "/telesplat-endless.csv";
+  std::ofstream(path) << "t_s,px,py,pz,qw,qx,qy,qz\n0";
+  std::filesystem::resize_file(path, uint64_t{1} << 36);  // a hole
+  const auto read = Trajectory::read_csv(path);
+  std::filesystem::remove(path);
+  ASSERT_FALSE(read.ok());
+  EXPECT_NE(read.error().text.find("longer than"), std::string::npos) << read.error().text;
+}
+
 TEST(Trajectory, FindsItsColumnsInAFramesTable) {
   // Of two viewers, whose rows lie between each other, in another order, with more columns.
   const auto t = read(

@@ -65,7 +65,8 @@ TEST_F(Overwrite, ARecordThatIsBeingWrittenIsRefused) {
                                     .kind = {},
                                     .run_folder = net::absolute_path(options_.out),
                                     .started_at_s = 1.7e9,
-                                    .started_by = "run"};
+                                    .started_by = "run",
+                                    .keys = {}};
   {
     const auto running = net::SessionFile::publish(session);
     ASSERT_TRUE(running.ok()) << running.error().text;

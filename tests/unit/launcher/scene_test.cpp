@@ -83,6 +83,16 @@ TEST_F(Scenes, WhatSessionTomlKeepsMakesTheSameSceneAgain) {
   EXPECT_FALSE(options.mesh.use_cache);
 }
 
+// A run folder may be a stranger's, and what is made anew is written into the cache.
+TEST_F(Scenes, TheCacheOfARecordIsNotUsed) {
+  std::ofstream(file("session.toml"))
+      << "[scene]\nkind = \"mesh\"\nfile = \"a.ply\"\ncache = \"/elsewhere\"\nup = \"z\"\n";
+  const auto scene = recorded_scene(folder_);
+  ASSERT_TRUE(scene.ok()) << scene.error().text;
+  EXPECT_EQ((*scene)->options().mesh.cache_dir, "");
+  EXPECT_EQ((*scene)->options().mesh.up, "z");
+}
+
 TEST_F(Scenes, AJuliaSetIsRecordedWithItsParameters) {
   RunOptions o;
   const auto scene = settled(o, {"julia", "--preset=wings", "--iterations=33", "--room-size=0.5"});

@@ -62,6 +62,26 @@ TEST(StatusText, HasEveryFigureInItsPlace) {
                 "left: sampler-3\n");
 }
 
+TEST(StatusText, LimitsAndAFullDiskAreToldWhereTheyBit) {
+  Json status = volume_status();
+  status["limits"] = {{"max_peers", 512}, {"views_coarser", 3}, {"hellos_refused", 0}, {"messages_refused", 1200}};
+  status["record_failed"] = {"trace.json", "tiles.csv"};
+  const std::string text = status_text(status, 0);
+  EXPECT_NE(text.find("  limits      3 views sampled coarser, 1200 messages dropped\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  disk full   2 files of the record cannot be written\n"), std::string::npos) << text;
+  EXPECT_EQ(status_text(volume_status(), 0).find("limits"), std::string::npos);
+}
+
+TEST(StatusText, NamesDoNotSteerATerminal) {
+  Json status = volume_status();
+  status["session"]["scene"] = "\x1b]0;owned\x07";
+  status["processes"][3]["name"] = "v\x1b[2J\nsampler-7  a";
+  status["processes"][2]["name"] = "gone\r\x9b";
+  const std::string text = status_text(status, 0);
+  for (const char bad : {'\x1b', '\x07', '\r'}) EXPECT_EQ(text.find(bad), std::string::npos) << text;
+  EXPECT_EQ(text.find("\nsampler-7"), std::string::npos) << "no line of its own: " << text;
+}
+
 TEST(StatusText, ParametersOfAJuliaSetTakeAsManyLinesAsTheyNeed) {
   Json status{{"parameters", Json::object()}};
   for (int i = 0; i < 20; ++i) status["parameters"]["parameter-" + std::to_string(i)] = i / 3.0;

@@ -200,7 +200,8 @@ TEST_F(ClipOrders, OfOneNameTheNewLifeIsMeant) {
   now_s = 1.5;
   core.on("a", hello("viewer", "viewer-1", 6), now_s);
   take();
-  EXPECT_FALSE(replies["ctl"].ok) << "the old one is gone";
+  ASSERT_TRUE(replies.contains("ctl")) << "the old one is gone";
+  EXPECT_FALSE(replies["ctl"].ok);
   for (const char* named : {"", "viewer-1"}) {
     control("where",
             *named ? std::map<std::string, std::string>{{"viewer", named}} : std::map<std::string, std::string>());
@@ -208,6 +209,7 @@ TEST_F(ClipOrders, OfOneNameTheNewLifeIsMeant) {
     ASSERT_TRUE(orders.contains("a"));
     core.on("a", wire::OrderAnswer{{6}, orders["a"].number, true, "{}"}, now_s);
     take();
+    ASSERT_TRUE(replies.contains("ctl"));
     EXPECT_TRUE(replies["ctl"].ok);
   }
 }

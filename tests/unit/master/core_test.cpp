@@ -132,6 +132,38 @@ TEST_F(Master, LeasesArePulled) {
   EXPECT_EQ(next[0].request.value, 2u);
 }
 
+TEST_F(Master, SealsLeasesWithAKeyThatThePackerAloneIsTold) {
+  join_all();
+  const auto told = sent<wire::Welcome>("p");
+  ASSERT_FALSE(told.empty());
+  const auto key = told.back().lease_key;
+  EXPECT_EQ(key.size(), wire::kLeaseKeyWords);
+  for (const auto& peer : {"s1", "v", "d"})
+    for (const auto& welcome : sent<wire::Welcome>(peer)) EXPECT_TRUE(welcome.lease_key.empty()) << peer;
+  request(1);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  EXPECT_EQ(leases[0].master.value, 42u);
+  EXPECT_TRUE(wire::is_sealed(leases[0], {3}, key));
+  EXPECT_FALSE(wire::is_sealed(leases[0], {4}, key)) << "it is s1's";
+}
+
+TEST_F(Master, TilesThatThePackerRefusesAreLeasedAgainAtOnce) {
+  join_all();
+  request(1);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  core.on("s2", wire::LeaseRequest{}, 1);
+  EXPECT_TRUE(sent<wire::Lease>("s2").empty());
+  const wire::TileRefused refused{leases[0].frame, leases[0].tile, leases[0].lease, {3}, "no image"};
+  core.on("v", refused, 1.1);
+  EXPECT_TRUE(sent<wire::Lease>("s2").empty()) << "that is the packer's to say";
+  core.on("p", refused, 1.1);
+  EXPECT_EQ(sent<wire::Lease>("s2").size(), 1u);
+}
+
 TEST_F(Master, NothingIsLeasedWithoutAPacker) {
   core.on("s1", hello("sampler", "sampler-1", 3), 0);
   core.on("v", hello("viewer", "viewer-1", 5), 0);
@@ -235,6 +267,45 @@ TEST_F(Master, ASilentSamplerIsTakenForDead) {
   for (const auto& p : now["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << p["name"];
 }
 
+TEST_F(Master, AnEmptyStatusIsASignOfLife) {
+  join_all();
+  wire::StatusReport report;
+  report.values = {{"tiles_sampled", 7}};
+  core.on("s1", report, 1);
+  for (double now_s = 2; now_s <= 30; now_s += 1.5) {
+    core.on("s1", wire::StatusReport{{3}, {}}, now_s);
+    core.tick(now_s);
+  }
+  const auto told = status();
+  for (const auto& p : told["processes"]) {
+    EXPECT_EQ(p["alive"], p["name"] == "sampler-1") << p["name"];
+    if (p["name"] == "sampler-1") {
+      EXPECT_EQ(p["values"]["tiles_sampled"], 7) << "as it said before";
+    }
+  }
+}
+
+// What the others said meanwhile is yet to be read.
+TEST_F(Master, AMasterThatStoodStillTakesNobodyForDead) {
+  join_all();
+  const auto lease = lease_to("s1", 1, 1);
+  core.tick(1.1);
+  core.stood_still(10, 11.1);
+  core.tick(11.1);
+  const auto told = status();
+  for (const auto& p : told["processes"]) EXPECT_EQ(p["alive"], true) << p["name"];
+  EXPECT_EQ(core.counters().at("leases_expired"), 0);
+  done(lease, "p", 11.2);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "its tile had come";
+  const auto next = lease_to("s1", 2, 11.3);
+  core.tick(12);
+  EXPECT_EQ(core.counters().at("leases_expired"), 0);
+  core.on("p", wire::StatusReport{}, 16.3);
+  core.tick(16.5);
+  const auto later = status();
+  for (const auto& p : later["processes"]) EXPECT_EQ(p["alive"], p["name"] == "packer") << "silent since";
+}
+
 TEST_F(Master, ANewPackerStartsWithNewFrames) {
   join_all();
   const auto old = lease_to("s1");
@@ -278,6 +349,50 @@ TEST_F(Master, AReplacedProcessIsMarked) {
     }
   }
   EXPECT_EQ(replaced, 1);
+}
+
+TEST_F(Master, TwoLivingProcessesOfOneNameStay) {
+  join_all();
+  sent<wire::Welcome>("p");
+  core.on("p2", hello("packer", "packer", 20), 1);
+  EXPECT_EQ(status()["processes"].size(), 6u);
+  // The one that was taken for the other's old life lives: it is asked who it is, and says so.
+  core.on("p", wire::StatusReport{}, 1.5);
+  ASSERT_EQ(sent<wire::WhoAreYou>("p").size(), 1u);
+  core.on("p", hello("packer", "packer", 2), 1.6);
+  sent<wire::Welcome>("v");
+  for (double now_s = 2; now_s < 30; now_s += 1) {
+    for (const auto& [peer, instance] : {std::pair{"p", 2}, {"p2", 20}}) {
+      core.on(peer, wire::StatusReport{}, now_s);
+      if (int(now_s) % 7 == 0) core.on(peer, hello("packer", "packer", uint64_t(instance)), now_s);
+      EXPECT_TRUE(sent<wire::WhoAreYou>(peer).empty()) << peer << " at " << now_s;
+    }
+    for (const char* other : {"d", "s1", "s2", "v"}) core.on(other, wire::StatusReport{}, now_s);
+    core.tick(now_s);
+    for (const auto& w : sent<wire::Welcome>("v")) EXPECT_EQ(w.endpoints.at("state"), "spacker");
+  }
+  // The one that packs does so until it leaves.
+  done(lease_to("s1", 1, 30), "p2", 30.1);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "it was there first since the other was taken for dead";
+  core.on("p2", wire::Goodbye{{20}}, 31);
+  EXPECT_FALSE(sent<wire::Welcome>("v").empty()) << "the other one packs now";
+}
+
+// Whatever their names are.
+TEST_F(Master, ASecondPackerWaitsForTheFirstToLeave) {
+  join_all();
+  sent<wire::Welcome>("v");
+  core.on("another", hello("packer", "packer-2", 20), 1);
+  for (const auto& w : sent<wire::Welcome>("v")) EXPECT_EQ(w.endpoints.at("state"), "spacker");
+  const auto kept = lease_to("s1", 1, 1.1);
+  core.on("another", hello("packer", "packer-2", 20), 1.2);
+  done(kept, "p", 1.3);
+  EXPECT_EQ(core.counters().at("frames_completed"), 1) << "nothing was dropped";
+  core.undeliverable("p");
+  core.tick(1.4);
+  const auto welcomes = sent<wire::Welcome>("v");
+  ASSERT_FALSE(welcomes.empty());
+  EXPECT_EQ(welcomes.back().endpoints.at("state"), "spacker-2");
 }
 
 TEST_F(Master, StatusTellsWhoIsWhere) {
@@ -337,6 +452,85 @@ TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {
   EXPECT_FALSE(core.on("v", rows, 1));
 }
 
+TEST_F(Master, AFullHouseIsToldAndCounted) {
+  join_all();
+  const uint64_t most = Limits{}.max_peers;
+  for (uint64_t i = 5; i < most; ++i)
+    core.on("x" + std::to_string(i), hello("viewer", "x" + std::to_string(i), 100 + i), 1);
+  core.on("late", hello("viewer", "late", 99), 1);
+  const auto told = sent<wire::Shutdown>("late");
+  ASSERT_EQ(told.size(), 1u) << "it is not left to wait";
+  EXPECT_NE(told[0].reason.find("--max-peers"), std::string::npos) << told[0].reason;
+  EXPECT_TRUE(sent<wire::Welcome>("late").empty());
+  EXPECT_EQ(status()["limits"]["hellos_refused"], 1);
+  EXPECT_EQ(core.counters().at("limits.hellos_refused"), 1);
+  core.on("v", hello("viewer", "viewer-1", 5), 1);
+  EXPECT_FALSE(sent<wire::Welcome>("v").empty()) << "who is here may say hello again";
+  core.on("x5", wire::Goodbye{{105}}, 1);
+  core.on("late", hello("viewer", "late", 99), 1);
+  EXPECT_EQ(sent<wire::Welcome>("late").size(), 1u) << "somebody left";
+}
+
+TEST_F(Master, HellosOfStrangeRolesAndNamesAreRefused) {
+  const std::pair<const char*, std::string> bad[] = {{"x", "name"},
+                                                     {"master", "name"},
+                                                     {"viewer", ""},
+                                                     {"viewer", "\x1b[2J"},
+                                                     {"viewer", "a\nb"},
+                                                     {"viewer", "a\xc2\x9b"},
+                                                     {"viewer", "a\xe2\x80\xae"},
+                                                     {"viewer", std::string(129, 'x')}};
+  for (const auto& [role, name] : bad) {
+    core.on("x", hello(role, name, 9), 0);
+    EXPECT_EQ(sent<wire::Shutdown>("x").size(), 1u) << role;
+    EXPECT_TRUE(sent<wire::Welcome>("x").empty()) << role;
+  }
+  EXPECT_EQ(core.limits_hit().hellos_refused, std::size(bad));
+  EXPECT_TRUE(core.processes().empty());
+  core.on("v", hello("viewer", "J\xc3\xbcrgen, \"the first\"", 5), 0);
+  EXPECT_EQ(sent<wire::Welcome>("v").size(), 1u) << "anything that can be read is a name";
+}
+
+TEST_F(Master, AFloodOfOnePeerIsDroppedAndOthersAreHeard) {
+  join_all();
+  int heard = 0, others = 0, packers = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    heard += core.admit("v", 1 + 1e-6 * i);
+    if (i % 100 == 0) others += core.admit("s1", 1 + 1e-6 * i);
+    packers += core.admit("p", 1 + 1e-6 * i);
+  }
+  const double most = Limits{}.max_messages;
+  EXPECT_LE(heard, 2.2 * most);
+  EXPECT_GE(heard, 2 * most);
+  EXPECT_EQ(others, 1000);
+  EXPECT_EQ(packers, 100'000) << "it tells of every tile";
+  EXPECT_EQ(status()["limits"]["messages_refused"], 100'000 - heard);
+  EXPECT_TRUE(core.admit("v", 5)) << "later it is heard again";
+  for (int i = 0; i < 20'000; ++i) core.admit("stranger" + std::to_string(i), 6);  // bounded
+  EXPECT_TRUE(core.admit("v", 7));
+}
+
+TEST_F(Master, AViewBeyondTheLimitIsSampledCoarser) {
+  join_all();
+  wire::ViewRequest r;
+  r.viewer = {5};
+  r.request = {1};
+  r.camera.width = r.camera.height = 16384;
+  r.footprint = 1e-4;
+  core.on("v", r, 1);
+  core.on("s1", wire::LeaseRequest{}, 1);
+  const auto leases = sent<wire::Lease>("s1");
+  ASSERT_EQ(leases.size(), 1u);
+  const auto& camera = leases[0].camera;
+  EXPECT_LE(uint64_t(camera.width) * uint64_t(camera.height), Limits{}.max_sampling_pixels);
+  EXPECT_EQ(camera.width, 4096);
+  EXPECT_NEAR(camera.right - camera.left, r.camera.right - r.camera.left, 1e-3) << "all of the view";
+  EXPECT_EQ(leases[0].footprint, 1e-4);
+  EXPECT_EQ(status()["limits"]["views_coarser"], 1);
+  EXPECT_EQ(sent<wire::Welcome>("v").back().settings.at("sampling.max_pixels"), double(Limits{}.max_sampling_pixels))
+      << "so that its viewer can tell";
+}
+
 TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
   join_all();
   for (int i = 0; i < 1000; ++i) core.on("s1", wire::LeaseRequest{}, 1);
@@ -350,6 +544,144 @@ TEST_F(Master, FloodsOfPeersAndRequestsAreBounded) {
   EXPECT_LE(core.processes().size(), 4096u);
 }
 
+// Each may change what everybody is told.
+TEST_F(Master, AFloodOfHellosIsToldOnce) {
+  join_all();
+  core.tick(1);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);
+  wire::Hello m = hello("packer", "flood", 50);
+  for (int i = 0; i < 1000; ++i) {
+    m.endpoints["tiles"] = "tcp://" + std::to_string(i);
+    core.on("f", m, 1 + 0.05 * i / 1000);
+  }
+  core.tick(1.05);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) EXPECT_LE(sent<wire::Welcome>(peer).size(), 9u) << peer;
+  EXPECT_LE(sent<wire::Welcome>("f").size(), 18u) << "answers, and what all are told";
+  // The newest one counts, a little later.
+  for (double now_s = 1.06; now_s < 3; now_s += 0.02) core.tick(now_s);
+  bool there = false;
+  auto told = status();
+  for (auto& p : told["processes"]) there |= p["name"] == "flood" && p["endpoints"]["tiles"] == "tcp://999";
+  EXPECT_TRUE(there);
+  // Many processes, each of which says hello once.
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) sent<wire::Welcome>(peer);
+  for (uint64_t i = 0; i < 1000; ++i)
+    core.on("f" + std::to_string(i), hello("packer", "f" + std::to_string(i), 1000 + i), 3 + 0.05 * double(i) / 1000);
+  core.tick(3.05);
+  for (const char* peer : {"d", "p", "s1", "s2", "v"}) EXPECT_LE(sent<wire::Welcome>(peer).size(), 9u) << peer;
+}
+
+TEST_F(Master, AHelloOfManyEndpointsKeepsNobodyOut) {
+  join_all();
+  wire::Hello m = hello("viewer", "many", 50);
+  for (int i = 0; i < 4095; ++i) m.endpoints["e" + std::to_string(i)] = "tcp://nowhere";
+  core.on("m", m, 1);
+  m = hello("sampler", "large", 51);
+  for (int i = 0; i < 16; ++i) m.facts["f" + std::to_string(i)] = std::string(wire::kMaxFact, 'x');
+  core.on("l", m, 1);
+  m = hello("none", "stranger", 52);
+  core.on("r", m, 1);
+  m = hello("viewer", "nobody", 0);
+  core.on("n", m, 1);
+  m = hello("viewer", std::string(wire::kMaxString, 'n'), 53);
+  core.on("o", m, 1);
+  EXPECT_EQ(core.counters().at("limits.hellos_refused"), 5);
+  for (const char* peer : {"m", "l", "r", "n", "o"}) EXPECT_TRUE(sent<wire::Welcome>(peer).empty()) << peer;
+  core.on("v2", hello("viewer", "viewer-2", 6), 1);
+  ASSERT_EQ(sent<wire::Welcome>("v2").size(), 1u);
+  EXPECT_EQ(status()["limits"]["hellos_refused"], 5);
+}
+
+TEST_F(Master, OnlyThePackerTellsWherePatchesAre) {
+  join_all();
+  for (const char* role : {"viewer", "sampler", "data", "ctl"}) {
+    wire::Hello m = hello(role, "hijacker", 60);
+    m.facts.clear();
+    m.endpoints = {
+        {"patches", "tcp://evil"}, {"state", "tcp://evil"}, {"tiles", "tcp://evil"}, {"chunks", "tcp://evil"}};
+    if (m.role == "data") m.box_room = {{-1e9f, -1, -1}, {1, 1, 1}}, m.endpoints.erase("chunks");
+    core.on("a", m, 1);  // before the others in any order of theirs
+    core.tick(1.1);
+    core.on("v2", hello("viewer", "viewer-2", 6), 1.2);
+    const auto welcomes = sent<wire::Welcome>("v2");
+    ASSERT_FALSE(welcomes.empty());
+    const std::map<std::string, std::string> right{
+        {"tiles", "tpacker"}, {"patches", "ppacker"}, {"state", "spacker"}, {"chunks", "cdata"}};
+    EXPECT_EQ(welcomes.back().endpoints, right) << role;
+  }
+}
+
+TEST_F(Master, StatusFitsAMessageHoweverManyCameAndLeft) {
+  join_all();
+  for (uint64_t i = 0; i < 2000; ++i) {
+    const std::string peer = "x" + std::to_string(i);
+    wire::Hello m = hello("sampler", peer, 1000 + i);
+    m.facts = {{"command", std::string(2000, 'c')}, {"arrays", std::string(60000, 'a')}};
+    core.on(peer, m, 1 + double(i) * 0.01);
+    wire::StatusReport report;
+    for (int k = 0; k < 40; ++k) report.values["value_" + std::to_string(k)] = k + 0.5;
+    core.on(peer, report, 1 + double(i) * 0.01);
+    if (i % 2) core.on(peer, wire::Goodbye{{1000 + i}}, 1 + double(i) * 0.01);
+    if (i % 100 == 0) core.tick(1 + double(i) * 0.01);
+    core.take_outgoing();
+  }
+  core.on("c", wire::Control{"status", {}}, 21);
+  for (const auto& out : core.take_outgoing()) {
+    if (out.type != wire::ControlReply::kName) continue;
+    const auto reply = wire::decode<wire::ControlReply>(std::as_bytes(std::span(out.body)));
+    ASSERT_TRUE(reply) << reply.error().text;
+    const auto json = nlohmann::json::parse(reply->text, nullptr, false);
+    ASSERT_TRUE(json.is_object());
+    EXPECT_EQ(json["processes"][0]["alive"], true) << "those who are here come first";
+    EXPECT_GT(json["processes_left_out"], 0);
+  }
+  core.on("c", wire::Control{"status", {{"all", ""}}}, 21);
+  for (const auto& out : core.take_outgoing())
+    if (out.type == wire::ControlReply::kName) {
+      EXPECT_TRUE(wire::decode<wire::ControlReply>(std::as_bytes(std::span(out.body))));
+    }
+  // Who left a minute ago is told of in the record alone.
+  core.tick(100);
+  const auto later = status();
+  EXPECT_GE(later["departed"].get<int>(), 1000);
+  EXPECT_LE(core.processes().size(), 4096u);
+}
+
+// Containers ask every ten seconds, from a connection of their own each time.
+TEST_F(Master, TenThousandPastHealthChecksCostNothing) {
+  join_all();
+  const auto ask = [&](int i, double now_s) {
+    const std::string peer = "h" + std::to_string(i);
+    if (i % 2) core.on(peer, hello("ctl", "health", 5000 + uint64_t(i)), now_s);
+    core.on(peer, wire::Control{"status", {}}, now_s);
+    if (i % 4 == 1) core.on(peer, wire::Goodbye{{5000 + uint64_t(i)}}, now_s);
+    if (i % 4 == 3) core.undeliverable(peer);
+    core.take_outgoing();
+  };
+  ask(0, 1);
+  const auto before = status();
+  for (int i = 0; i < 10000; ++i) {
+    ask(i, 1 + 0.0001 * i);
+    if (i % 100 == 0) core.tick(1 + 0.0001 * i);
+  }
+  core.tick(2.1);
+  EXPECT_EQ(core.remembered(), 5u) << "those who take part";
+  EXPECT_EQ(status()["processes"].size(), before["processes"].size());
+  EXPECT_EQ(status()["departed"], 0);
+  EXPECT_EQ(core.processes().size(), 5u);
+}
+
+TEST_F(Master, AWelcomeThatNobodyCouldReadIsNotSent) {
+  Outbox outbox;
+  wire::Welcome w;
+  for (int i = 0; i < 17; ++i) w.facts["f" + std::to_string(i)] = std::string(wire::kMaxFact, 'x');
+  outbox.send("v", w);
+  EXPECT_EQ(outbox.size(), 0u);
+  w.facts.erase("f16"), w.facts.erase("f15");
+  outbox.send("v", w);
+  EXPECT_EQ(outbox.size(), 1u);
+}
+
 TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {
   core.introduce({.address = "tcp://127.0.0.1:4711",
                   .pid = 77,
@@ -357,7 +689,8 @@ TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {
                   .kind = {},
                   .run_folder = "/data/run",
                   .started_at_s = 1795377266,
-                  .started_by = "view"});
+                  .started_by = "view",
+                  .keys = {}});
   EXPECT_EQ(core.session().scene, "");
   const auto before = status()["session"];
   EXPECT_EQ(before, (nlohmann::json{{"address", "tcp://127.0.0.1:4711"},
@@ -366,7 +699,8 @@ TEST_F(Master, StatusTellsTheSessionAsSoonAsItIsKnown) {
                                     {"kind", ""},
                                     {"started_at", "2026-11-22T19:54:26Z"},
                                     {"started_by", "view"},
-                                    {"run_folder", "/data/run"}}));
+                                    {"run_folder", "/data/run"},
+                                    {"keys", ""}}));
   auto data = hello("data", "data", 1);
   data.facts["kind"] = "mesh";
   core.on("d", data, 0);

@@ -83,6 +83,35 @@ TEST(FrameSchedule, LeasesEveryTileOnceThenCompletes) {
   EXPECT_FALSE(done(s, frame, 1000, 0.2));
 }
 
+// What nobody waits for any more takes no sampler from those who are here.
+TEST(FrameSchedule, FramesOfAViewerThatLeftEnd) {
+  for (const Cut cut : {Cut{}, Cut{.rows = true}, Cut{.coarse = true}, Cut{.rows = true, .coarse = true}}) {
+    FrameSchedule s({.tile_size = 64, .frames_in_flight = 2});
+    s.set_cut(cut);
+    s.request_view(request(1, 5, 1024, 1024));
+    const auto out = next(s, "a", 0);
+    ASSERT_TRUE(out);
+    s.forget_viewer({1});
+    EXPECT_FALSE(next(s, "b", 0.1)) << "of the view of one that left";
+    s.request_view(request(2, 1));
+    const auto others = next(s, "b", 0.1);
+    ASSERT_TRUE(others);
+    EXPECT_EQ(others->viewer.value, 2u);
+    done(s, out->frame, out->tile, 0.2, out->lease);  // what was out may still come
+    EXPECT_EQ(s.views_in_flight(), 1u) << "the other's";
+    EXPECT_EQ(s.frames_completed(), 0u) << "it was not completed";
+  }
+}
+
+TEST(FrameSchedule, AFrameOfOneThatLeftWithNothingOutEndsAtOnce) {
+  FrameSchedule s({.tile_size = 64, .frames_in_flight = 1});
+  s.request_view(request(1, 5));
+  ASSERT_TRUE(s.begin_view({1}));
+  s.forget_viewer({1});
+  EXPECT_EQ(s.views_in_flight(), 0u);
+  EXPECT_EQ(s.frames_in_flight(), 0u);
+}
+
 TEST(FrameSchedule, LeasesTellThePixelOfTheViewOrOfTheDisplay) {
   FrameSchedule s({.tile_size = 256});
   s.set_cut({.coarse = true});
@@ -108,7 +137,7 @@ TEST(FrameSchedule, ALeaseThatRunsOutGoesToAnother) {
   std::vector<std::string> lost;
   const auto note = [&](const std::string& name) { lost.push_back(name); };
   EXPECT_EQ(s.expire(11.9, note), 0);
-  s.extend(first->lease, 11.9);
+  s.extend(first->lease, "slow", 11.9);
   EXPECT_EQ(s.expire(13.8, note), 0) << "it was extended";
   EXPECT_EQ(s.expire(14, note), 1);
   EXPECT_EQ(lost, std::vector<std::string>{"slow"});
@@ -118,7 +147,7 @@ TEST(FrameSchedule, ALeaseThatRunsOutGoesToAnother) {
   EXPECT_EQ(second->frame, first->frame);
   EXPECT_EQ(second->tile, first->tile);
   EXPECT_NE(second->lease, first->lease);
-  s.extend(first->lease, 100);  // of the lease before: unknown now
+  s.extend(first->lease, "slow", 100);  // of the lease before: unknown now
   EXPECT_EQ(s.expire(17, kNobody), 1);
   // Whoever's tile comes first counts.
   EXPECT_TRUE(done(s, first->frame, first->tile, 17.5));

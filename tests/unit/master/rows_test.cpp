@@ -293,7 +293,7 @@ TEST(Backups, GoToAnotherSamplerOnceATileIsLongOut) {
 TEST(Backups, AreNotForTilesThatWereExtended) {
   auto s = experienced(0.001, true);
   const auto a = s.lease("a", 10), b = s.lease("b", 10);
-  s.extend(a->lease, 10.5);
+  s.extend(a->lease, "a", 10.5);
   EXPECT_EQ(s.lease("c", 10.51)->tile, b->tile);
   EXPECT_FALSE(s.lease("c", 10.51));
   EXPECT_EQ(s.lease("c", 10.6)->tile, a->tile);

@@ -181,8 +181,8 @@ TEST_F(Slabs, LeasesThatRunOutDropTheirFrame) {
   const auto a = s.lease("a", 0), b = s.lease("b", 0);
   s.tile_done(done(*a), 0.1);
   EXPECT_EQ(expire(1.9), 0);
-  s.extend(b->lease, 1.9);
-  s.extend({77}, 1.9);
+  s.extend(b->lease, "b", 1.9);
+  s.extend({77}, "b", 1.9);
   EXPECT_EQ(expire(3.8), 0);
   EXPECT_EQ(expire(4), 1);
   EXPECT_EQ(lost, (std::set<std::string>{"b"}));

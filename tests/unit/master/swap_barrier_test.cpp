@@ -203,6 +203,15 @@ TEST_F(Swaps, AnotherMasterGoesOnWhereTheWallIs) {
   EXPECT_EQ(swaps.begin()->second.frame, 501u);
 }
 
+// Numbers beyond the limit would be refused: a wall that begins there stands still.
+TEST_F(Swaps, OneViewersNumberLeadsNoWallToTheLastFrame) {
+  say(0, uint64_t{1} << 53, 1);
+  for (uint64_t v = 1; v < 4; ++v) say(v, 500, 1);
+  const auto swaps = told();
+  ASSERT_EQ(swaps.size(), 4u);
+  EXPECT_EQ(swaps.begin()->second.frame, 500u);
+}
+
 // The first viewer's head is everyone's; without it the next one's.
 TEST_F(Swaps, TheHeadOfTheNextOneServesWhereTheFirstIsLate) {
   begin();

@@ -120,5 +120,34 @@ TEST(ReadAhead, SendsInOrderAndRefusesWhatIsTooMuch) {
   EXPECT_EQ(socket.taken.back(), "last.") << "what is left goes out when it ends";
 }
 
+TEST(ReadAhead, WhatEndsItsThreadIsTheOwners) {
+  FakeSocket socket;
+  ReadAhead::Ends ends = socket.ends();
+  ends.receive = [next = ends.receive]() -> std::optional<Message> {
+    auto message = next();
+    if (!message) throw std::bad_alloc();
+    return message;
+  };
+  socket.give(1);
+  ReadAhead ahead(ends, {});
+  ASSERT_TRUE(eventually([&] { return readable(ahead); }));
+  EXPECT_TRUE(ahead.receive()) << "what came before is there";
+  ASSERT_TRUE(eventually([&] { return readable(ahead); }));
+  EXPECT_THROW(ahead.receive(), std::bad_alloc);
+  EXPECT_THROW(ahead.receive(), std::bad_alloc) << "and so it stays";
+}
+
+TEST(ReadAhead, SaysWhatIsDueWhileItsOwnerIsAway) {
+  FakeSocket socket;
+  ReadAhead::Ends ends = socket.ends();
+  std::atomic<int> asked{0};
+  ends.due = [&]() -> std::optional<ReadAhead::Outgoing> {
+    if (++asked % 3 != 0) return std::nullopt;
+    return ReadAhead::Outgoing{"due", {}};
+  };
+  const ReadAhead ahead(ends, {});
+  EXPECT_TRUE(eventually([&] { return socket.sent() >= 3; }));
+}
+
 }  // namespace
 }  // namespace telesplat::net

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "common/net/local_endpoint.h"
 #include "common/net/master_address.h"
 #include "common/net/service.h"
 #include "common/options/parser.h"
@@ -70,6 +71,16 @@ TEST(Service, FlagsTakeTheMasterFromTheEnvironment) {
   EXPECT_EQ(parse({"--advertise", "lab"}, Ends::kBoth).advertise, "lab");
   EXPECT_EXIT(parse({"--advertise", "0.0.0.0"}, Ends::kBoth), testing::ExitedWithCode(2), "--advertise 0.0.0.0");
   EXPECT_EXIT(parse({"--advertise", "lab"}, Ends::kConnects), testing::ExitedWithCode(2), "--advertise");
+}
+
+TEST(LocalEndpoints, AreOnesThatOthersCannotReach) {
+  for (const char* local : {"tcp://127.0.0.1:7700", "tcp://127.3.2.1:*", "tcp://localhost:1", "tcp://[::1]:7",
+                            "ipc:///tmp/x", "inproc://x"})
+    EXPECT_TRUE(is_local(local)) << local;
+  for (const char* other :
+       {"tcp://127.evil:1", "tcp://127.0.0.1.example.org:1", "tcp://localhost.evil:1", "tcp://128.0.0.1:1", "tcp://*:1",
+        "tcp://0.0.0.0:1", "tcp://[::]:1", "tcp://", "udp://127.0.0.1:1"})
+    EXPECT_FALSE(is_local(other)) << other;
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ RunningSession session(const std::string& address = "tcp://127.0.0.1:4711") {
           .kind = "mesh",
           .run_folder = "/data/runs/first",
           .started_at_s = 1.7e9,
-          .started_by = "run"};
+          .started_by = "run",
+          .keys = {}};
 }
 
 class SessionFiles : public testing::Test {
@@ -226,6 +227,17 @@ TEST_F(SessionFiles, LeadToTheOneMaster) {
     EXPECT_EQ(find_master("", name).address, session().address) << name;
   EXPECT_EQ(find_master("", "nosuch").exit_code(), 2);
   EXPECT_EQ(find_master("", "").problem, "");
+}
+
+TEST_F(SessionFiles, TellTheKeysThatASessionRunsWith) {
+  RunningSession keyed = session();
+  keyed.keys = "/home/anna/keys";
+  const auto file = SessionFile::publish(keyed);
+  ASSERT_TRUE(file.ok());
+  EXPECT_EQ(running_sessions(), std::vector{keyed});
+  EXPECT_EQ(find_master("auto").keys, "/home/anna/keys");
+  EXPECT_EQ(find_master("", "crater.ply").keys, "/home/anna/keys");
+  EXPECT_EQ(find_master(keyed.address).keys, "") << "an address is taken as it is";
 }
 
 TEST_F(SessionFiles, OfSeveralSessionsOneMustBeChosen) {

@@ -1,8 +1,12 @@
 // Books of notes: what is kept comes back; hostile and broken files are refused and left as they are.
+#include <fmt/format.h>
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -141,6 +145,28 @@ TEST_F(Notes, WhatOtherProgramsKeepStays) {
   EXPECT_FALSE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + std::string(deep.size(), ']') + "}"));
 }
 
+// Reading takes time as the file is long, and not as that squared, whatever other programs keep in it.
+TEST_F(Notes, LongListsOfOthersAreReadAtOnce) {
+  std::string list = "{}";
+  for (int i = 0; i < 200'000; ++i) list += ",{\"a\":1}";
+  const std::clock_t begin = std::clock();
+  const auto book = book_from_json("{\"telesplat_notes\":1,\"x\":[" + list + "]}");
+  ASSERT_TRUE(book) << book.error().text;
+  EXPECT_GT(to_json(*book).size(), list.size());
+  EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 4);
+  std::string keys = "\"a0\":0";
+  for (size_t i = 1; i < kMostKeys; ++i) keys += fmt::format(",\"a{}\":{}", i, i);
+  const auto with = [](const std::string& keys) { return "{\"telesplat_notes\":1,\"x\":{" + keys + "}}"; };
+  EXPECT_TRUE(book_from_json(with(keys)));
+  const auto more = book_from_json(with(keys + ",\"\\\":\":1"));
+  ASSERT_FALSE(more);
+  EXPECT_NE(more.error().text.find("1000 keys"), std::string::npos) << more.error().text;
+  const std::string deep(size_t(kMaxDepth) - 1, '['), up(deep.size(), ']');
+  EXPECT_TRUE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + up + "}"));
+  EXPECT_FALSE(book_from_json("{\"telesplat_notes\":1,\"x\":" + deep + "[]" + up + "}"));
+  EXPECT_TRUE(book_from_json(with("\"x\":\"" + std::string(100, '[') + ":\"")));
+}
+
 TEST_F(Notes, WhoMayReadThemStays) {
   const auto mode = [&] { return fs::status(shelf.beside).permissions(); };
   ASSERT_TRUE(add_note(shelf, "one"));
@@ -150,6 +176,71 @@ TEST_F(Notes, WhoMayReadThemStays) {
   fs::permissions(shelf.beside, fs::perms(0600));
   ASSERT_TRUE(add_note(shelf, "two"));
   EXPECT_EQ(mode(), fs::perms(0600));
+}
+
+constexpr uid_t kAlice = 61001, kBob = 61002;
+constexpr gid_t kLab = 61003;
+
+struct stat facts_of(const std::string& path) {
+  struct stat out {};
+  EXPECT_EQ(stat(path.c_str(), &out), 0) << path;
+  return out;
+}
+
+TEST_F(Notes, WhoseTheyAreStays) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root writes for others";
+  ASSERT_TRUE(add_note(shelf, "one"));
+  ASSERT_EQ(chown(shelf.beside.c_str(), kAlice, kLab), 0);
+  fs::permissions(shelf.beside, fs::perms(0600));
+  const Status added = add_note(shelf, "two");
+  ASSERT_TRUE(added) << added.error().text;
+  const struct stat now = facts_of(shelf.beside);
+  EXPECT_EQ(now.st_uid, kAlice);
+  EXPECT_EQ(now.st_gid, kLab);
+  EXPECT_EQ(now.st_mode & 0777, 0600u);
+}
+
+// Bob writes into what Alice shares with him, and takes nothing from her.
+TEST_F(Notes, WhoWritesForAGroupTakesThemFromNobody) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+  fs::permissions(folder, fs::perms(0755));
+  fs::create_directories(folder + "/cache");
+  ASSERT_EQ(chown((folder + "/cache").c_str(), kBob, kBob), 0);
+  // Exit code of Bob, of these groups: 0: beside the data, 1: in the cache, 2: nowhere.
+  const auto add_as_bob = [&](const std::vector<gid_t>& groups) {
+    const pid_t child = fork();
+    if (child == 0) {
+      std::string path;
+      const bool bob = setgroups(groups.size(), groups.data()) == 0 && setgid(kBob) == 0 && setuid(kBob) == 0;
+      _exit(!bob || !add_note(shelf, "two", &path) ? 2 : path == shelf.in_cache);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  struct Case {
+    const char* name;
+    mode_t folder, file;
+    std::vector<gid_t> groups;
+    int expected;
+  };
+  for (const Case& c : {Case{"a group's folder", 0777, 0660, {kLab}, 0}, Case{"everybody's", 0777, 0666, {}, 0},
+                        Case{"the group could read it no more", 0777, 0676, {}, 1},
+                        Case{"a folder like /tmp", 01777, 0666, {kLab}, 1}}) {
+    fs::remove_all(folder + "/cache/notes");
+    write(shelf.beside, to_json(full_book()));
+    ASSERT_EQ(chown(shelf.beside.c_str(), kAlice, kLab), 0);
+    ASSERT_EQ(chmod(shelf.beside.c_str(), c.file), 0);
+    ASSERT_EQ(chmod((folder + "/data").c_str(), c.folder), 0);
+    EXPECT_EQ(add_as_bob(c.groups), c.expected) << c.name;
+    const struct stat now = facts_of(shelf.beside);
+    EXPECT_EQ(now.st_mode & 0777, c.file) << c.name;
+    if (!c.groups.empty()) EXPECT_EQ(now.st_gid, kLab) << c.name;
+    if (c.expected == 1) EXPECT_EQ(now.st_uid, kAlice) << c.name;
+    const auto book = book_from_json(content(shelf.beside));
+    ASSERT_TRUE(book) << c.name;
+    EXPECT_EQ(book->notes.size(), full_book().notes.size() + (c.expected == 0 ? 1 : 0)) << c.name;
+  }
 }
 
 TEST_F(Notes, ALinkStaysALink) {

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <map>
 
 #include "services/packer/slices/slice_packing.h"
+#include "tests/support/keys/lease_key.h"
 #include "tests/support/packer_scenes.h"
 
 namespace telesplat::packer {
@@ -17,6 +19,7 @@ wire::Welcome welcome(EpochId epoch = test::kEpoch, InstanceId master = {1}) {
   const points::ModelConfig model = test::scene_config();
   wire::Welcome w;
   w.master = master;
+  w.lease_key = test::lease_key();
   w.epoch = epoch;
   w.octree_depth = uint64_t(model.depth);
   w.box_room = model.box_room;
@@ -27,6 +30,7 @@ wire::Welcome welcome(EpochId epoch = test::kEpoch, InstanceId master = {1}) {
 
 class PointPackingTest : public testing::Test {
  protected:
+  explicit PointPackingTest(const PointPacking::Options& options = {}) : packing(options, outlets(), spans) {}
   struct Sent {
     std::string peer;  // empty: to all
     std::string type, body;
@@ -48,7 +52,11 @@ class PointPackingTest : public testing::Test {
     l.moments.leased_s = 2;
     return m;
   }
-  void sample(wire::DepthTile m, double now_s) {
+  void sample(wire::DepthTile m, double now_s, InstanceId master = {1}) {
+    test::seal_lease(m.lease, m.sampler, master);
+    deliver(m, now_s);
+  }
+  void deliver(wire::DepthTile m, double now_s) {
     const auto stream = codec::encode(test::sample_scene(m.lease.camera, m.lease.rect));
     m.image = std::as_bytes(std::span(stream));
     packing.take_sampled(socket, message(m), now_s);
@@ -58,8 +66,11 @@ class PointPackingTest : public testing::Test {
     const auto body = std::make_shared<std::string>(wire::encode(m));
     return {peer, std::string(M::kName), std::as_bytes(std::span(*body)), body};
   }
-  void ask(Sequence after, InstanceId packer, double now_s) {
-    packing.take_state(socket, message(wire::StateRequest{{77}, packer, after}, "peer"), now_s);
+  void ask(Sequence after, InstanceId packer, double now_s, const std::string& peer = "peer", uint64_t viewer = 77) {
+    packing.take_state(socket, message(wire::StateRequest{{viewer}, packer, after}, peer), now_s);
+  }
+  void receipt(Sequence newest, InstanceId packer, double now_s, const std::string& peer = "peer") {
+    packing.take_state(socket, message(wire::Receipt{{77}, packer, newest, now_s}, peer), now_s);
   }
   double status(const std::string& key) {
     net::MasterLink::Values values;
@@ -68,12 +79,14 @@ class PointPackingTest : public testing::Test {
   }
   Outlets outlets() {
     return {.tell = [this](const wire::TileDone& m) { told.push_back(m); },
+            .refuse = [this](const wire::TileRefused& m) { refused.push_back(m); },
             .to_viewers =
                 [this](std::string_view type, std::string body) {
                   sent.push_back({"", std::string(type), std::move(body)});
                 },
             .to_viewer =
                 [this](std::string_view peer, std::string_view type, std::string body) {
+                  if (--takes < 0) return false;
                   sent.push_back({std::string(peer), std::string(type), std::move(body)});
                   return true;
                 },
@@ -84,9 +97,11 @@ class PointPackingTest : public testing::Test {
   net::Context context;
   net::Socket socket{context, net::Kind::kDealer, "from"};
   std::vector<wire::TileDone> told;
+  std::vector<wire::TileRefused> refused;
   std::deque<Sent> sent;
   metrics::SpanRecorder spans;
-  PointPacking packing{{}, outlets(), spans};
+  int takes = 1 << 30;  // messages to one viewer, then no more
+  PointPacking packing;
 };
 
 TEST_F(PointPackingTest, AViewThatNeedsNoRaysIsCompleteWithItsPlan) {
@@ -203,6 +218,35 @@ TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
   EXPECT_EQ(sent.size(), 2u);
 }
 
+TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  for (const int half : {0, 1}) sample(tile(1, half), 1);
+  sent.clear();
+  size_t told_digests = 0;
+  uint64_t digest = 0;
+  for (double now_s = 10; now_s < 20; now_s += PointPacking::kMarkPeriod_s) {
+    packing.tick(now_s);
+    const auto mark = decoded<wire::StateMark>(sent.back());
+    EXPECT_EQ(mark.sequence.value, 1u);
+    if (mark.digest == 0) continue;
+    if (++told_digests > 1) {
+      EXPECT_EQ(mark.digest, digest) << "nothing has changed";
+    }
+    digest = mark.digest;
+  }
+  EXPECT_EQ(told_digests, size_t(10 / PointPacking::kDigestPeriod_s));
+  for (const int half : {0, 1}) {
+    wire::DepthTile from_elsewhere = tile(2, half);
+    from_elsewhere.lease.camera = test::scene_camera({0, 0.4, 0.7}, 96, 64);
+    sample(from_elsewhere, 21);
+  }
+  packing.tick(30);
+  EXPECT_NE(decoded<wire::StateMark>(sent.back()).digest, digest);
+  EXPECT_EQ(status("digests_told"), double(told_digests + 1));
+  ask({}, {}, 31);
+  EXPECT_EQ(decoded<wire::StateMark>(sent.back()).digest, 0u) << "an answer has no time for it";
+}
+
 // Else it would wait until it asked for the view again.
 TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
   wire::Welcome session = welcome();
@@ -234,6 +278,7 @@ TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
       requests.push_back(patch.request.value);
     }
     EXPECT_TRUE(decoded<wire::StateMark>(sent.back()).answer);
+    receipt({8}, packer, 5);  // else what it asks for again is under way
     return requests;
   };
   EXPECT_EQ(told_after({}), (std::vector<uint64_t>{5, 6, 7, 8}));
@@ -281,6 +326,194 @@ TEST_F(PointPackingTest, WhatCameOfAViewThatEndsEarlyIsKnown) {
   EXPECT_LT(rays, 28u * 64) << "the quarter that was left out, and its rim";
 }
 
+TEST_F(PointPackingTest, TilesOfAMasterThatIsGoneAreDropped) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  ASSERT_TRUE(packing.follow(welcome(test::kEpoch, {2}), 1));
+  // The earlier master's frame 1 was seen from elsewhere, and in one tile of two.
+  wire::DepthTile late = tile(1, 0);
+  late.lease.camera = test::scene_camera({0.1, 0.1, 0}, 96, 64);
+  sample(late, 1, {1});
+  EXPECT_TRUE(told.empty());
+  for (const int half : {0, 1}) sample(tile(1, half), 1.1, {2});
+  ASSERT_EQ(told.size(), 2u);
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_TRUE(decoded<wire::Patch>(sent[0]).frame_complete);
+  packing.tick(3);
+  EXPECT_EQ(told.size(), 2u);
+  EXPECT_TRUE(refused.empty()) << "this master did not lease it";
+  EXPECT_EQ(status("tiles_other_epoch"), 1);
+}
+
+TEST_F(PointPackingTest, TilesOfAMasterThatIsNotKnownYetWaitForIt) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  for (const int half : {0, 1}) sample(tile(1, half), 1, {2});
+  EXPECT_TRUE(told.empty());
+  ASSERT_TRUE(packing.follow(welcome(test::kEpoch, {2}), 1.2));
+  EXPECT_EQ(told.size(), 2u);
+}
+
+TEST_F(PointPackingTest, OnlyWhatWasLeasedIsTaken) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  wire::DepthTile made_up = tile(1, 0);
+  made_up.lease.master = {1};
+  deliver(made_up, 1);
+  EXPECT_EQ(socket.rejected(), 1u) << "without a seal";
+  wire::seal(made_up.lease, {8}, test::lease_key());
+  deliver(made_up, 1);
+  EXPECT_EQ(socket.rejected(), 2u) << "of a lease that another sampler was given";
+  wire::seal(made_up.lease, made_up.sampler, test::lease_key());
+  made_up.lease.blocks_in_frame = 2;
+  deliver(made_up, 1);
+  EXPECT_EQ(socket.rejected(), 3u) << "of another frame than was leased";
+  EXPECT_TRUE(told.empty());
+  EXPECT_TRUE(refused.empty()) << "the master has nothing to do with them";
+  EXPECT_EQ(status("tiles_unsealed"), 3);
+  for (const int half : {0, 1}) sample(tile(1, half), 2);
+  EXPECT_EQ(told.size(), 2u);
+}
+
+TEST_F(PointPackingTest, ARefusedTileIsToldTheMaster) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  wire::DepthTile bad = tile(1, 1);
+  test::seal_lease(bad.lease, bad.sampler);
+  const std::string rubbish = "this is no depth image";
+  bad.image = std::as_bytes(std::span(rubbish));
+  packing.take_sampled(socket, message(bad), 1);
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_EQ(refused[0].frame.value, 1u);
+  EXPECT_EQ(refused[0].tile, 1u);
+  EXPECT_EQ(refused[0].lease, bad.lease.lease);
+  EXPECT_EQ(refused[0].sampler.value, 9u);
+  EXPECT_FALSE(refused[0].why.empty());
+  EXPECT_TRUE(told.empty());
+  EXPECT_EQ(status("tiles_refused"), 1);
+}
+
+// Answers of some events at a time, to viewers that join.
+class StateAnswersTest : public PointPackingTest {
+ protected:
+  static constexpr uint64_t kWindow = 60000;
+  StateAnswersTest() : PointPackingTest({.answers = {.window_bytes = kWindow, .bytes_at_once = kWindow / 2}}) {
+    wire::Welcome session = welcome();
+    session.settings["packing.keep_redundant"] = 1;
+    EXPECT_TRUE(packing.follow(session, 0));
+    for (uint64_t frame = 1; frame <= kFrames; ++frame) publish(frame);
+    packer = decoded<wire::Patch>(sent.front()).packer;
+    for (const Sent& s : sent) total_bytes += s.body.size();
+    EXPECT_GT(total_bytes, 4 * kWindow);
+    sent.clear();
+  }
+  void publish(uint64_t frame) {
+    for (const int half : {0, 1}) {
+      auto m = tile(frame, half);
+      m.lease.camera = test::scene_camera({0.7 + 0.05 * double(frame), 0.4, 0}, 96, 64);
+      sample(m, 1);
+    }
+  }
+  // What went to this viewer since the last call: sequences of patches; 0: the mark at the end.
+  std::vector<uint64_t> to(const std::string& peer) {
+    std::vector<uint64_t> out;
+    bytes = 0;
+    for (const Sent& s : sent) {
+      if (s.peer != peer) continue;
+      bytes += s.body.size();
+      if (s.type == wire::StateMark::kName) {
+        const auto mark = decoded<wire::StateMark>(s);
+        EXPECT_TRUE(mark.answer);
+        EXPECT_EQ(mark.sequence.value, kFrames);
+        out.push_back(0);
+      } else {
+        out.push_back(decoded<wire::Patch>(s).sequence.value);
+      }
+    }
+    std::erase_if(sent, [&](const Sent& s) { return s.peer == peer; });
+    return out;
+  }
+
+  static constexpr uint64_t kFrames = 60;
+  InstanceId packer;
+  uint64_t total_bytes = 0, bytes = 0;
+};
+
+TEST_F(StateAnswersTest, AnAnswerGoesOutAsFastAsItIsReceived) {
+  ask({}, {}, 2);
+  double now_s = 2;
+  std::vector<uint64_t> got = to("peer");
+  EXPECT_LE(bytes, kWindow) << "one turn";
+  for (int n = 0; n < 100; ++n) packing.tick(now_s += 0.02);
+  for (const uint64_t more : to("peer")) got.push_back(more);
+  EXPECT_LT(got.size(), kFrames / 2) << "nothing of it was received";
+  EXPECT_GE(got.size(), 2u);
+  EXPECT_NE(got.back(), 0u) << "no mark";
+  EXPECT_GT(status("answer_bytes"), 0);
+  // Packing goes on meanwhile.
+  publish(kFrames + 1);
+  EXPECT_EQ(sent.back().peer, "");
+  for (int n = 0; n < 1000 && got.back() != 0; ++n) {
+    receipt({got.back()}, packer, now_s);
+    packing.tick(now_s += 0.02);
+    for (const uint64_t more : to("peer")) got.push_back(more);
+    EXPECT_LE(bytes, kWindow);
+  }
+  ASSERT_EQ(got.size(), kFrames + 1) << "what is published meanwhile is not part of it";
+  for (uint64_t i = 0; i < kFrames; ++i) EXPECT_EQ(got[i], i + 1);
+  EXPECT_EQ(got.back(), 0u);
+  receipt({kFrames}, packer, now_s);
+  EXPECT_EQ(status("answers"), 0);
+}
+
+TEST_F(StateAnswersTest, RequestsOfOneViewerAreOneAnswer) {
+  for (int n = 0; n < 30; ++n) ask({}, n % 2 ? packer : InstanceId{}, 2);
+  for (int n = 0; n < 100; ++n) packing.tick(2 + 0.02 * n);
+  const auto first = to("peer");
+  EXPECT_LE(bytes, 2 * kWindow);
+  receipt({first.back()}, packer, 5);
+  ask({first.back()}, packer, 5);
+  packing.tick(5.1);
+  EXPECT_EQ(to("peer").front(), first.back() + 1) << "it goes on where it was";
+  // Over another connection nothing is under way; what was left of the old one is not sent.
+  ask({}, {}, 6, "again");
+  EXPECT_EQ(to("again").front(), 1u);
+  packing.tick(6.1);
+  EXPECT_TRUE(to("peer").empty());
+  // It lost what it had.
+  receipt({3}, packer, 7, "again");
+  to("again");
+  ask({}, packer, 7, "again");
+  EXPECT_EQ(to("again").front(), 1u);
+}
+
+TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
+  for (int n = 0; n < 8; ++n) ask({}, {}, 2, "peer" + std::to_string(n), uint64_t(100 + n));
+  double now_s = 2;
+  std::map<std::string, uint64_t> newest;
+  for (int turn = 0; turn < 40; ++turn) {
+    const size_t before = sent.size();
+    packing.tick(now_s += 0.02);
+    uint64_t turn_bytes = 0;
+    for (size_t i = before; i < sent.size(); ++i) turn_bytes += sent[i].peer.empty() ? 0 : sent[i].body.size();
+    EXPECT_LE(turn_bytes, kWindow) << "a turn is short";
+    for (int n = 0; n < 8; ++n) {
+      const std::string peer = "peer" + std::to_string(n);
+      for (const uint64_t sequence : to(peer)) newest[peer] = std::max(newest[peer], sequence);
+      receipt({newest[peer]}, packer, now_s, peer);
+    }
+  }
+  for (int n = 0; n < 8; ++n) EXPECT_GT(newest["peer" + std::to_string(n)], 10u) << "each has its turn";
+}
+
+TEST_F(StateAnswersTest, AnAnswerThatCannotBeSentHasNoMark) {
+  takes = 1;
+  ask({}, {}, 2);
+  for (int n = 0; n < 10; ++n) packing.tick(2.1 + n);
+  const auto got = to("peer");
+  EXPECT_EQ(got, std::vector<uint64_t>{1});
+  EXPECT_EQ(status("answers"), 0);
+  takes = 1 << 30;
+  ask({1}, packer, 20);
+  EXPECT_EQ(to("peer").front(), 2u) << "it asks again";
+}
+
 TEST(Completions, AreBounded) {
   Completions completions;
   Event event;
@@ -290,13 +523,13 @@ TEST(Completions, AreBounded) {
     completions.add(event);
   };
   const auto count = [&](uint64_t viewer) {
-    std::vector<Event> events;
+    std::deque<Event> events;
     completions.fill(events, {viewer}, {});
     return events.size();
   };
   for (int i = 0; i < 20; ++i) add(1);
   EXPECT_EQ(count(1), Completions::kMostViews);
-  std::vector<Event> newest;
+  std::deque<Event> newest;
   completions.fill(newest, {1}, {19});
   ASSERT_EQ(newest.size(), 1u);
   EXPECT_EQ(newest[0].sequence.value, 20u);
@@ -348,6 +581,7 @@ TEST_F(PointPackingTest, TilesThatMakeNoSenseAreRefused) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   auto bad = tile(1, 0);
   bad.image = {};
+  test::seal_lease(bad.lease, bad.sampler);
   packing.take_sampled(socket, message(bad), 1);
   EXPECT_EQ(socket.rejected(), 1u);
   sample(tile(1, 0), 1);

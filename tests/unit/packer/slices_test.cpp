@@ -9,6 +9,7 @@
 
 #include "common/volume/session.h"
 #include "services/packer/slices/slice_packing.h"
+#include "tests/support/keys/lease_key.h"
 
 namespace telesplat::packer {
 namespace {
@@ -267,6 +268,42 @@ TEST(SliceGatherer, WhatWasUnderWayToABrokenConnectionComesAgain) {
   EXPECT_EQ(g.take_outgoing(2)->frame.frame.value, 3u);
 }
 
+// On a link that needs longer for a frame than a viewer is silent, copies would pile up.
+TEST(SliceGatherer, ASignOfLifeOverTheSameConnectionSendsNothingAgain) {
+  auto g = gatherer();
+  const auto sent = [&](double now_s) {
+    std::vector<uint64_t> frames;
+    while (const auto out = g.take_outgoing(now_s)) frames.push_back(out->frame.frame.value);
+    return frames;
+  };
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 0), 0));
+  ASSERT_TRUE(g.add(slab(lease(1, 0, 1, {view(1, 1)})), 0).ok());
+  EXPECT_EQ(sent(0), std::vector<uint64_t>{1});
+  for (double now_s = 2; now_s <= 10; now_s += 2) {
+    ASSERT_TRUE(g.acknowledged("far", ack(1, 0), now_s));
+    EXPECT_TRUE(sent(now_s).empty()) << "it is under way, " << now_s;
+    g.expire(now_s);
+    EXPECT_EQ(g.viewers(), 1u) << "it lives";
+  }
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 0), 12));
+  EXPECT_EQ(sent(12), std::vector<uint64_t>{1}) << "it seems lost";
+  for (double now_s = 14; now_s <= 60; now_s += 2) {
+    ASSERT_TRUE(g.acknowledged("far", ack(1, 0), now_s));
+    EXPECT_TRUE(sent(now_s).empty()) << "once is enough, " << now_s;
+  }
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 1), 61));
+  ASSERT_TRUE(g.acknowledged("far", ack(1, 0), 63));
+  EXPECT_TRUE(sent(63).empty()) << "it has the newest";
+  ASSERT_TRUE(g.acknowledged("again", ack(1, 0), 64));
+  EXPECT_EQ(sent(64), std::vector<uint64_t>{1}) << "what it had on another connection may be lost";
+  // Frames in order may lie in their buffers for long.
+  ASSERT_TRUE(g.acknowledged("ordered", ack(2, 0, 2, true), 0));
+  ASSERT_TRUE(g.add(slab(lease(2, 0, 1, {view(2, 1, 2)})), 65).ok());
+  EXPECT_EQ(sent(65), std::vector<uint64_t>{2});
+  ASSERT_TRUE(g.acknowledged("ordered", ack(2, 0, 2, true), 165));
+  EXPECT_TRUE(sent(165).empty());
+}
+
 TEST(SliceGatherer, ViewersThatDoNotAnswerAreForgottenAndMayComeBack) {
   auto g = gatherer();
   ASSERT_TRUE(g.acknowledged("peer", ack(1, 0, 1), 0));
@@ -400,21 +437,25 @@ class SlicePackingTest : public testing::Test {
     s.transfer.points = {{0, 1, 1, 1, 0.5f}};
     wire::Welcome w;
     w.master = master;
+    w.lease_key = test::lease_key();
     w.epoch = epoch;
     w.facts = volume::to_facts(s);
     w.facts["kind"] = "volume";
     w.parameters = volume::to_parameters(s);
     return w;
   }
-  Status receive(const SliceGatherer::Slab& s, double now) {
+  Status receive(SliceGatherer::Slab s, double now, InstanceId master = {1}) {
+    test::seal_lease(s.images.lease, s.images.sampler, master);
     return packing.receive({"", "slice_images", s.images.data, s.owner}, s.images, now);
   }
   std::vector<wire::TileDone> told;
+  std::vector<wire::TileRefused> refused;
   std::vector<std::pair<wire::SliceFrame, std::string>> sent;
   std::set<std::string> gone;
   std::deque<std::string> bodies;  // which `sent` points into
   metrics::SpanRecorder spans;
   SlicePacking packing{{.tell = [this](const wire::TileDone& m) { told.push_back(m); },
+                        .refuse = [this](const wire::TileRefused& m) { refused.push_back(m); },
                         .to_viewer =
                             [this](std::string_view peer, std::string_view type, std::string body) {
                               if (gone.contains(std::string(peer))) return false;
@@ -487,18 +528,50 @@ TEST_F(SlicePackingTest, OthersFramesAreTakenForOthersAfterAMastersRestart) {
   ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0, 1), 0));
   ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 5)})), 1));
   ASSERT_TRUE(packing.follow(welcome(kEpoch, {2}), 2));
-  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2));
+  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2, {2}));
   ASSERT_EQ(sent.size(), 2u);
   EXPECT_NE(sent[0].first.packer, sent[1].first.packer);
   // A viewer that is gone does not keep others waiting.
   gone.insert("peer");
   ASSERT_TRUE(packing.acknowledged("other", ack(8, 0, 1), 2));
   ASSERT_TRUE(packing.acknowledged("peer", ack(7, 1, 1), 2));
-  ASSERT_TRUE(receive(slab(lease(2, 0, 1, {view(7, 7), view(8, 1)})), 2));
+  ASSERT_TRUE(receive(slab(lease(2, 0, 1, {view(7, 7), view(8, 1)})), 2, {2}));
   net::MasterLink::Values values;
   packing.add_status(values);
   EXPECT_EQ(values["volume_viewers"], 1);
   EXPECT_EQ(values["volume_frames_complete"], 3);
+}
+
+TEST_F(SlicePackingTest, SlabsOfAMasterThatIsGoneCompleteNothing) {
+  ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
+  ASSERT_TRUE(packing.follow(welcome(kEpoch, {2}), 1));
+  ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0, 1), 1));
+  ASSERT_TRUE(receive(slab(lease(50, 0, 1, {view(7, 5)})), 1, {1}));
+  EXPECT_TRUE(told.empty());
+  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2, {2}));
+  ASSERT_EQ(sent.size(), 1u) << "frame 50 of the earlier master keeps nobody from frame 1 of this one";
+  EXPECT_EQ(sent[0].first.request.value, 6u);
+}
+
+TEST_F(SlicePackingTest, AFrameThatNobodyLeasedStarvesNoViewer) {
+  ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
+  ASSERT_TRUE(packing.acknowledged("peer", ack(7, 0, 1), 0));
+  auto made_up = slab(lease(uint64_t{1} << 50, 0, 1, {view(7, 5)}));
+  made_up.images.lease.master = {1};
+  EXPECT_FALSE(packing.receive({"", "slice_images", made_up.images.data, made_up.owner}, made_up.images, 1));
+  ASSERT_TRUE(receive(slab(lease(1, 0, 1, {view(7, 6)})), 2));
+  EXPECT_EQ(sent.size(), 1u);
+}
+
+TEST_F(SlicePackingTest, ARefusedSlabIsToldTheMaster) {
+  ASSERT_TRUE(packing.follow(welcome(kEpoch), 0));
+  auto bad = slab(lease(1, 0, 2, {view(7, 5)}));
+  const std::string rubbish = "no slices";
+  bad.images.data = std::as_bytes(std::span(rubbish));
+  EXPECT_FALSE(receive(bad, 1));
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_EQ(refused[0].lease.value, 100u);
+  EXPECT_EQ(refused[0].sampler.value, 1u);
 }
 
 TEST_F(SlicePackingTest, BadSessionsArePackedByNobody) {

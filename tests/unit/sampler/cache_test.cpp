@@ -35,11 +35,11 @@ TEST(ChunkCache, AsksForWhatTheViewNeedsNearestFirst) {
   cache.mark_waiting({7});
   EXPECT_TRUE(cache.waiting({7}));
   EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 7, 8, 9})) << "waiting is not holding";
-  EXPECT_TRUE(cache.insert({7}).empty());
+  EXPECT_TRUE(cache.insert({7}, 100).empty());
   EXPECT_FALSE(cache.waiting({7}));
   EXPECT_EQ(values(cache.missing(looking_right(6))), (std::vector<uint64_t>{6, 8, 9}));
   EXPECT_EQ(cache.bytes(), 100u);
-  EXPECT_TRUE(cache.insert({7}).empty());
+  EXPECT_TRUE(cache.insert({7}, 100).empty());
   EXPECT_EQ(cache.bytes(), 100u) << "the same chunk twice";
 }
 
@@ -49,15 +49,15 @@ TEST(ChunkCache, LetsGoOfTheLeastRecentlyUsed) {
   const auto view = [&](int first) {
     std::vector<uint64_t> removed;
     for (const ChunkId id : cache.missing(looking_right(first)))
-      for (const ChunkId old : cache.insert(id)) removed.push_back(old.value);
+      for (const ChunkId old : cache.insert(id, 100)) removed.push_back(old.value);
     return removed;
   };
   EXPECT_TRUE(view(8).empty());                                                                     // 8, 9
   EXPECT_TRUE(view(9).empty());                                                                     // uses 9 again
   cache.missing(geometry::make_camera(geometry::look_at({-4.5, 0, 5}, {-4.5, 0, 0}), 10, 64, 64));  // sees chunk 0
-  EXPECT_TRUE(cache.insert({0}).empty());
+  EXPECT_TRUE(cache.insert({0}, 100).empty());
   cache.missing(geometry::make_camera(geometry::look_at({-3.5, 0, 5}, {-3.5, 0, 0}), 10, 64, 64));  // sees chunk 1
-  EXPECT_EQ(values(cache.insert({1})), (std::vector<uint64_t>{8}));
+  EXPECT_EQ(values(cache.insert({1}, 100)), (std::vector<uint64_t>{8}));
   EXPECT_TRUE(cache.held({9}));
   EXPECT_LE(cache.bytes(), 300u);
 }
@@ -65,12 +65,12 @@ TEST(ChunkCache, LetsGoOfTheLeastRecentlyUsed) {
 TEST(ChunkCache, NeverLetsGoOfWhatTheViewNeeds) {
   ChunkCache cache(250);
   cache.reset(row());
-  for (const ChunkId id : cache.missing(looking_right(4))) EXPECT_TRUE(cache.insert(id).empty());
+  for (const ChunkId id : cache.missing(looking_right(4))) EXPECT_TRUE(cache.insert(id, 100).empty());
   EXPECT_EQ(cache.bytes(), 600u) << "over the budget, but all of it is in view";
   EXPECT_TRUE(cache.missing(looking_right(4)).empty());
   // The next view needs few: the rest goes.
   cache.missing(looking_right(9));
-  EXPECT_EQ(cache.insert({9}).size(), 4u);
+  EXPECT_EQ(cache.insert({9}, 100).size(), 4u);
   EXPECT_LE(cache.bytes(), 250u);
 }
 
@@ -78,7 +78,7 @@ TEST(ChunkCache, PrefetchesWithinTheBudget) {
   ChunkCache cache(350);
   cache.reset(row());
   EXPECT_EQ(values(cache.prefetch()), (std::vector<uint64_t>{0, 1, 2}));
-  cache.insert({0});
+  cache.insert({0}, 100);
   EXPECT_EQ(values(cache.prefetch()), (std::vector<uint64_t>{1, 2}));
   cache.mark_waiting({5});
   cache.forget_waiting();
@@ -91,7 +91,36 @@ TEST(ChunkCache, PrefetchesWithinTheBudget) {
 TEST(ChunkCache, SurvivesAnIdThatIsNotInTheList) {
   ChunkCache cache(250);
   cache.reset(row());
-  EXPECT_TRUE(cache.insert({1000}).empty());
+  EXPECT_TRUE(cache.insert({1000}, 100).empty());
+  EXPECT_EQ(cache.bytes_of({1000}), 0u);
+  EXPECT_EQ(cache.bytes(), 100u);
+}
+
+// A list may claim that its chunks are empty: memory is what came.
+TEST(ChunkCache, CountsWhatCame) {
+  ChunkCache cache(300);
+  auto claimed = row();
+  for (auto& c : claimed) c.bytes = 0;
+  cache.reset(claimed);
+  cache.missing(looking_right(0));
+  for (const uint64_t id : {0, 1, 2}) EXPECT_TRUE(cache.insert({id}, 100).empty());
+  EXPECT_EQ(cache.bytes(), 300u);
+  cache.missing(looking_right(9));
+  EXPECT_EQ(cache.insert({9}, 100).size(), 1u) << "over the budget";
+}
+
+TEST(ChunkCache, WhatIsRefusedIsMissingAndInTheEndAHole) {
+  ChunkCache cache(10000);
+  cache.reset(row());
+  cache.mark_waiting({9});
+  EXPECT_EQ(cache.waiting_bytes(), 100u);
+  EXPECT_FALSE(cache.refuse({9}));
+  EXPECT_FALSE(cache.waiting({9}));
+  EXPECT_EQ(values(cache.missing(looking_right(9))), std::vector<uint64_t>{9});
+  EXPECT_FALSE(cache.refuse({9}));
+  EXPECT_TRUE(cache.refuse({9})) << "the third time";
+  EXPECT_TRUE(cache.missing(looking_right(9)).empty()) << "views do without it";
+  EXPECT_EQ(cache.holes(), 1u);
   EXPECT_EQ(cache.bytes(), 0u);
 }
 

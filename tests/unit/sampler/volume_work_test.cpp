@@ -254,9 +254,9 @@ TEST_F(VolumeWorkTest, AsksAgainAfterSilenceAndAfterServersThatDoNotKnow) {
   const auto first = take_request();
   EXPECT_EQ(first.begin, 0u);
   EXPECT_EQ(first.end, 12u);
-  now += VolumeWork::kRetry_s * 0.9;
+  now += RetryClock::kFirst_s * 0.9;
   work.fetch(now);
-  now += VolumeWork::kRetry_s * 0.2;
+  now += RetryClock::kFirst_s * 0.2;
   ASSERT_TRUE(asked(work));
   const auto second = take_request();
   EXPECT_TRUE(data.requests.empty());
@@ -273,6 +273,28 @@ TEST_F(VolumeWorkTest, AsksAgainAfterSilenceAndAfterServersThatDoNotKnow) {
   data.answer(first, 0, 12, shown(s));  // late: dropped
   ASSERT_TRUE(until(work, [&] { return !ready.empty(); }));
   EXPECT_EQ(made.at(0)->voxels, voxels(0, 0, 12, shown(s)));
+}
+
+// What is asked for twice comes twice, and a slow link becomes slower.
+TEST_F(VolumeWorkTest, ASlowAnswerIsAskedForOnce) {
+  auto work = make();
+  const auto s = session(kHigh);
+  work.on_welcome(welcome({1}, s));
+  tell(work, slab(1, 0, 12));
+  for (int begin = 0; begin < 12; begin += 4) {
+    ASSERT_TRUE(asked(work)) << begin;
+    const auto request = take_request();
+    EXPECT_EQ(request.begin, uint64_t(begin));
+    for (int n = 0; n < 24; ++n) {
+      now += 0.5;
+      work.fetch(now);
+    }
+    net::wait_readable({&data.socket}, 50);
+    data.receive();
+    EXPECT_TRUE(data.requests.empty()) << "twelve seconds are not long for a slow link";
+    data.answer(request, uint64_t(begin), uint64_t(begin) + 4, shown(s));
+    ASSERT_TRUE(until(work, [&] { return !ready.empty() || !data.requests.empty(); }));
+  }
 }
 
 TEST_F(VolumeWorkTest, ANewTransferFunctionBringsOnlyWhatIsMissing) {
@@ -312,7 +334,7 @@ TEST_F(VolumeWorkTest, ALeaseWaitsForItsVoxelsAndIsExtendedMeanwhile) {
   for (int n = 0; n < 5; ++n) now += VolumeWork::kExtend_s * 0.6, work.fetch(now);
   EXPECT_GE(extended.size(), 2u);
   EXPECT_LE(extended.size(), 4u);
-  now += VolumeWork::kPatience_s + 3;
+  now += RetryClock::kFirst_s + 1;
   const size_t before = extended.size();
   work.fetch(now);
   EXPECT_EQ(extended.size(), before) << "a server that never answers shall not hold a frame for ever";

@@ -417,6 +417,18 @@ TEST_F(EventRecord, ClaimedLengthsAllocateNothing) {
   }
 }
 
+TEST_F(EventRecord, ASparseFileAllocatesNothing) {
+  std::string content = "TSEVENT3" + replica(-1, 1, 6) + part("patch", "abc");
+  const uint64_t claimed = uint64_t{1} << 40;
+  std::memcpy(content.data() + content.size() - 16, &claimed, 8);
+  std::ofstream(path_, std::ios::binary) << content;
+  fs::resize_file(path_, uint64_t{1} << 41);  // a hole: the claim is within the file
+  auto replay = EventReplay::open(path_);
+  ASSERT_TRUE(replay.ok());
+  EXPECT_TRUE((*replay)->advance(Sequence{100}).ok());
+  EXPECT_TRUE((*replay)->at_end()) << "it ends before that event";
+}
+
 TEST_F(EventRecord, DamagedBytesNeverEndTheProgram) {
   record(published(40, 40));
   const std::string whole = bytes();

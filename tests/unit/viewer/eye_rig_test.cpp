@@ -3,6 +3,7 @@
 
 #include <fstream>
 
+#include "client/viewer/display/eyes/eye_pictures.h"
 #include "client/viewer/display/eyes/eye_rig.h"
 #include "client/viewer/stereo_flags.h"
 #include "client/viewer/viewer_options.h"
@@ -106,6 +107,38 @@ TEST(EyeRig, SwappedEyesSwapTheirPlaces) {
   EXPECT_EQ(out.colour, (std::vector<uint32_t>{1, 1, 2, 2}));
   EyeRig({.mode = stereo::Mode::kSideBySide, .swap_eyes = true}).compose({}, views, false, out);
   EXPECT_EQ(out.colour, (std::vector<uint32_t>{2, 2, 1, 1}));
+}
+
+// Whatever the mode, the middle of the display, or of its left half, is the middle of a picture.
+TEST(EyePictures, APlaceOfTheDisplayIsOneOfItsPicture) {
+  struct Case {
+    stereo::Mode mode;
+    int width, height;
+    glm::dvec2 middle;
+  };
+  for (const Case& c :
+       {Case{stereo::Mode::kQuadBuffer, 640, 400, {320, 200}}, Case{stereo::Mode::kRows, 640, 400, {320, 200}},
+        Case{stereo::Mode::kSideBySide, 1280, 400, {320, 200}}, Case{stereo::Mode::kTopBottom, 640, 800, {320, 200}}}) {
+    EyePictures eyes({.mode = c.mode, .screen_m = 1});
+    eyes.begin(0, head_at(1), head_at(1).pose.orientation, 0, kScene);
+    const geometry::Camera display = eyes.display(head_at(1));
+    EXPECT_EQ(display.width, c.width);
+    EXPECT_EQ(display.height, c.height);
+    const auto aim = eyes.aim(head_at(1), eyes.pair(), {c.middle.x / display.width, c.middle.y / display.height});
+    EXPECT_LT(glm::distance(aim.at_pix, glm::dvec2(320, 200)), 1e-9) << int(c.mode);
+    const bool parted = c.width > 640 || c.height > 400;
+    EXPECT_EQ(aim.camera, parted ? eyes.pair().eyes[0] : eyes.pair().head) << int(c.mode);
+  }
+}
+
+// While the display waits the head moves on, and what is asked about is the frame that is to be seen.
+TEST(EyePictures, APlaceIsThatOfTheFrameOnDisplay) {
+  EyePictures eyes({.mode = stereo::Mode::kSideBySide, .screen_m = 1});
+  eyes.begin(0, head_at(1), head_at(1).pose.orientation, 0, kScene);
+  const EyePair shown = eyes.pair();
+  eyes.begin(1, head_at(0.5), head_at(0.5).pose.orientation, 1, kScene);
+  EXPECT_EQ(eyes.aim(head_at(1), shown, {0.75, 0.5}).camera, shown.eyes[1]);
+  EXPECT_NE(eyes.pair().eyes[1], shown.eyes[1]);
 }
 
 TEST(StereoFlags, WhatCannotBeIsRefused) {

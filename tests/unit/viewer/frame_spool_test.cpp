@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -53,6 +55,32 @@ TEST_F(Spool, FramesComeBackAsTheyWere) {
   EXPECT_TRUE(back->camera == expected.camera);
   EXPECT_EQ(back->view.colour, expected.view.colour);
   EXPECT_EQ(back->view.depth_m, expected.view.depth_m);
+}
+
+TEST_F(Spool, AFullDiskIsSaidOnce) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  auto spool = FrameSpool::open(directory_);
+  ASSERT_TRUE(spool.ok());
+  testing::internal::CaptureStdout();
+  const rlimit small{1000, before.rlim_max};  // no frame fits
+  setrlimit(RLIMIT_FSIZE, &small);
+  for (uint64_t i = 0; i < 20; ++i) {
+    EXPECT_EQ((*spool)->exchange(frame(i, kPicture)).colour.size(), 200u) << "the display goes on";
+    (*spool)->flush();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  (*spool)->exchange(frame(20, kPicture));
+  (*spool)->flush();
+  const std::string said = testing::internal::GetCapturedStdout();
+  EXPECT_EQ((*spool)->failed(), 20u);
+  EXPECT_EQ((*spool)->dropped(), 0u) << "the disk was fast enough";
+  const size_t first = said.find("frames cannot be written");
+  EXPECT_NE(first, std::string::npos) << said;
+  EXPECT_EQ(said.find("frames cannot be written", first + 1), std::string::npos) << "a line, not twenty: " << said;
+  ASSERT_EQ(spooled_frames(directory_).size(), 1u) << "once there is room it goes on";
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory_), {}), 1) << "no halves";
 }
 
 TEST_F(Spool, PicturesAreDevelopedAndOnlyFramesToVerifyStay) {

@@ -484,6 +484,46 @@ TEST_F(InteractionTest, PlaysTheRecordedMovementUntilTheCameraIsTaken) {
   EXPECT_EQ(none.take_notes().size(), 1u);
 }
 
+// Its first view comes with its scene, which is told in the same frame and after the session.
+TEST_F(InteractionTest, AnotherDataSetIsSeenFromItsOwnFirstView) {
+  Interaction i(std::nullopt, look_);
+  const Pose first = geometry::look_at({0, 1, 3}, {0, 0, 0}), other = geometry::look_at({0, 4, 12}, {0, 0, 0});
+  double x = 0.2;
+  i.move(x, 0.2);
+  const auto drag = [&] {
+    i.button(MouseButton::kLeft, true);
+    i.move(x += 0.1, 0.2);
+    i.button(MouseButton::kLeft, false);
+  };
+  i.set_scene(scene::Pipeline::kPoints, box_of(0.4), first);
+  wait(i);
+  drag();
+  wait(i);
+  i.back_to_first_view();
+  drag();  // whose hand is on the mouse at that moment
+  i.set_scene(scene::Pipeline::kPoints, box_of(4), other);
+  expect_same_pose(wait(i, 3), other, 1e-5);
+  // And then the camera is the person's again.
+  drag();
+  const Pose moved = wait(i, 3);
+  EXPECT_GT(glm::distance(moved.position_room, other.position_room), 0.1);
+  i.set_scene(scene::Pipeline::kPoints, box_of(4), first);
+  expect_same_pose(wait(i), moved, 1e-5);
+}
+
+TEST_F(InteractionTest, WhoGoesElsewhereDuringAPathGoesBackToTheTracker) {
+  Interaction i(std::nullopt, look_);
+  const Pose told = geometry::look_at({2, 1, 3}, {0, 0, 0}), elsewhere = geometry::look_at({0, 0, 2}, {0, 0, 0});
+  i.set_tracked([&](double) { return std::optional(told); });
+  expect_same_pose(wait(i), told);
+  i.play(recorded());
+  wait(i, 0.5);
+  i.go_to(elsewhere);
+  expect_same_pose(wait(i), elsewhere, 1e-5);
+  tap(i, Key::kT);
+  expect_same_pose(wait(i), told);
+}
+
 // ---- title, camera, sampling size, screenshots ----
 
 TEST(TitleLine, HasRatesSinceTheLastOne) {

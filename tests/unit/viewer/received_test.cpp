@@ -4,8 +4,10 @@
 
 #include <limits>
 
+#include "client/viewer/points/received_points.h"
 #include "client/viewer/received.h"
 #include "client/viewer/succession.h"
+#include "common/core/clock.h"
 #include "tests/support/points_scenes.h"
 
 namespace telesplat::viewer {
@@ -82,6 +84,48 @@ TEST_F(Receiving, FeedsAreConnectedAnewWhereASessionIsElsewhere) {
   w.endpoints.clear();
   EXPECT_FALSE(feeds.connect(slices->feeds(), w));
   EXPECT_TRUE(feeds.connected()) << "nobody serves it now: what is open stays";
+}
+
+// A packer begins another model as soon as it hears of another box. Its first event comes over another connection than
+// the viewer's welcome.
+TEST_F(Receiving, ABoxThatComesAfterItsPackersFirstEventCounts) {
+  net::Socket patches(context, net::Kind::kPub, "patches"), state(context, net::Kind::kRouter, "state");
+  ASSERT_TRUE(patches.bind("inproc://patches") && state.bind("inproc://state"));
+  wire::Welcome w = session();
+  w.endpoints = {{"patches", "inproc://patches"}, {"state", "inproc://state"}};
+  const auto received = make(scene::Pipeline::kPoints);
+  auto& points = dynamic_cast<ReceivedPoints&>(*received);
+  const auto follow = [&] {
+    EXPECT_TRUE(received->follow(w).ok());
+    if (!feeds.connect(received->feeds(), w)) return false;
+    received->on_connected();
+    return true;
+  };
+  // Answers requests by what this packer has published, until the viewer knows of it.
+  const auto serve = [&](InstanceId packer, const auto& until) {
+    for (const double deadline = monotonic_s() + 20; !until() && monotonic_s() < deadline;) {
+      while (const auto message = state.receive())
+        if (message->type == wire::StateRequest::kName) {
+          state.send(wire::EpochBegin{packer, {1}, {packer.value}}, message->peer);
+          state.send(wire::StateMark{packer, {1}, {packer.value}, true, 0}, message->peer);
+        }
+      patches.receive();
+      patches.send(wire::StateMark{packer, {1}, {packer.value}, false, 0});
+      received->receive(64);
+      received->tick(monotonic_s());
+      net::wait_readable({&state}, 5);
+    }
+    return until();
+  };
+  const auto epoch = [&] { return points.cache().has_replica() ? points.cache().epoch().value : 0; };
+  ASSERT_TRUE(follow());
+  EXPECT_FALSE(follow()) << "nothing has changed";
+  ASSERT_TRUE(serve({1}, [&] { return epoch() == 1; }));
+  ASSERT_TRUE(serve({2}, [&] { return epoch() == 2; }));
+  EXPECT_TRUE(points.cache().config().box_room == session().box_room);
+  w.box_room.hi.x += 1;
+  EXPECT_TRUE(follow()) << "what came before is of another box";
+  ASSERT_TRUE(serve({2}, [&] { return points.cache().config().box_room == w.box_room && epoch() == 2; }));
 }
 
 class Successors : public Receiving {

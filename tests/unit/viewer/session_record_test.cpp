@@ -49,6 +49,29 @@ TEST_F(JoinedRecord, NothingIsWrittenThroughLinks) {
   EXPECT_FALSE(fs::exists(folder_ + "/run/viewer-guest"));
 }
 
+TEST_F(JoinedRecord, AFolderWithARecordIsRefused) {
+  const std::string mine = folder_ + "/mine";
+  fs::create_directories(mine + "/spool");
+  std::ofstream(mine + "/spool/00000001.frame") << "of an earlier run";
+  std::ofstream(mine + "/points.events") << "too";
+  const auto refused = SessionRecord::open({.out = mine, .join = true, .name = "guest", .received_mb = 1});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().text.find("holds a record already"), std::string::npos) << refused.error().text;
+  EXPECT_EQ(fs::file_size(mine + "/points.events"), 3u);
+  EXPECT_TRUE(SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "guest", .received_mb = 1}))
+      << "the session's own";
+}
+
+TEST_F(JoinedRecord, WhatCannotBeWrittenIsCounted) {
+  fs::create_directories(folder_ + "/own");
+  fs::create_symlink("/dev/full", folder_ + "/own/points.events");
+  const auto record = SessionRecord::open({.out = folder_ + "/own", .join = true, .name = "guest", .received_mb = 1});
+  ASSERT_TRUE(record) << record.error().text;
+  (*record)->events()->begin_replica({});
+  EXPECT_EQ((*record)->files_failed(), 1u);
+  EXPECT_TRUE((*record)->events()->failed());
+}
+
 TEST_F(JoinedRecord, AnotherRunsFolderIsLeftAlone) {
   session_.facts["run_id"] = "0123";
   EXPECT_EQ(joined(), "");

@@ -5,6 +5,7 @@
 
 #include "client/viewer/points/source.h"
 #include "common/core/clock.h"
+#include "common/scene/clip_order.h"
 #include "tests/support/still_scene.h"
 
 namespace telesplat::viewer {
@@ -331,6 +332,35 @@ TEST_F(StillSource, AFrameNeverShowsTwoEpochs) {
   EXPECT_EQ(f.epoch, EpochId{2});
   EXPECT_TRUE(f.empty);
   for (const uint32_t c : view_.colour) ASSERT_EQ(c & 0xffffff, options_.shading.background);
+}
+
+// However long the epoch that is cut as the session is takes to come, and whatever is shown meanwhile.
+TEST_F(StillSource, FramesBetweenTwoClipsAreToldUntilTheirEpochIsShown) {
+  EXPECT_FALSE(frame().between_clips);
+  const auto show = [&](uint64_t epoch) {
+    received_.cache().begin_replica(config_, EpochId{epoch});
+    received_.cache().show_newest();
+  };
+  const auto clip = [&](uint64_t epoch, const std::string& planes) {
+    wire::Welcome w;
+    w.octree_depth = 6;
+    w.box_room = config_.box_room;
+    w.epoch = EpochId{epoch};
+    w.facts[scene::kClipFact] = planes;
+    EXPECT_TRUE(received_.follow(w).ok());
+  };
+  clip(3, "1 0 0 0");
+  EXPECT_TRUE(frame().between_clips);
+  show(2);
+  EXPECT_TRUE(frame().between_clips);
+  show(3);
+  EXPECT_FALSE(frame().between_clips);
+  clip(4, "1 0 0 0");  // the epoch is another one, and what it cuts the same
+  EXPECT_FALSE(frame().between_clips);
+  // Points may come before the word for them.
+  show(5);
+  clip(5, "");
+  EXPECT_FALSE(frame().between_clips);
 }
 
 TEST_F(StillSource, WithoutAntialiasingAndWithOneSampleAllFramesAreDrawnAlike) {

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <thread>
 
 #include "common/core/clock.h"
@@ -34,6 +35,7 @@ BenchProcesses::BenchProcesses(const std::string& directory)
 Result<std::unique_ptr<BenchProcesses>> BenchProcesses::start(const std::vector<std::string>& data_arguments,
                                                               const std::vector<std::string>& master_flags,
                                                               const std::string& directory, bool own_machines) {
+  unsetenv(net::kKeysVariable);  // this process has none
   std::unique_ptr<BenchProcesses> p(new BenchProcesses(directory));
   std::vector<std::string> master{"--bind", "tcp://127.0.0.1:*", "--started-by", "bench", "--out", directory};
   master.insert(master.end(), master_flags.begin(), master_flags.end());

@@ -124,7 +124,9 @@ Status write_report(const ScalingReport& report, const std::string& directory) {
     json["kills"].push_back({{"name", k.name}, {"nodes", k.nodes}, {"normal_s", k.normal_s}, {"killed_s", k.killed_s}});
   for (const int n : {1, 2, 4, 8, 16, 32, 40})
     json["thesis"].push_back({{"nodes", n}, {"time_s", *thesis_time_s(n)}, {"efficiency", *thesis_efficiency(n)}});
-  for (const auto& [name, text] : {std::pair{"/scaling.csv", csv}, {"/scaling.json", json.dump(2) + "\n"}}) {
+  for (const auto& [name, text] :
+       {std::pair{"/scaling.csv", csv},
+        {"/scaling.json", json.dump(2, ' ', false, decltype(json)::error_handler_t::replace) + "\n"}}) {
     std::ofstream out(directory + name);
     out << text;
     out.close();

@@ -75,7 +75,10 @@ class Comparison {
   Status write() const {
     if (poses_.empty()) return ok_status();
     if (const Status s = write_text(subject_.out + "/compare.csv", comparison_csv(poses_)); !s) return s;
-    if (const Status s = write_text(subject_.out + "/compare.json", comparison_json(about(), poses_).dump(2) + "\n");
+    if (const Status s = write_text(
+            subject_.out + "/compare.json",
+            comparison_json(about(), poses_).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                "\n");
         !s)
       return s;
     std::vector<std::string> rows{"reference"};

@@ -6,6 +6,7 @@
 
 #include "client/viewer/display/size_text.h"
 #include "common/geometry/trajectory.h"
+#include "common/metrics/run_folder.h"
 #include "tools/telesplat/record/dated_folder.h"
 
 namespace telesplat::launcher {
@@ -68,6 +69,8 @@ Result<CompareSubject> find_run(const CompareOptions& o) {
                       "it is given --record-points 0 (--still samples the poses anew)",
                       s.events)};
   }
+  if (const Status safe = metrics::refuse_links(o.path, metrics::Logs::kOurs); o.out.empty() && !safe)
+    return safe.error();
   run->scene->use_cache_of(o.data);
   if (const Status settled = settle_scene(o, *run->scene); !settled) return settled.error();
   s.octree_depth = run->octree_depth;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/net/master_address.h"
+#include "common/net/service.h"
 #include "tools/common/complain.h"
 
 namespace telesplat::launcher {
@@ -14,7 +15,8 @@ options::Table session_rows(SessionChoice& c) {
            .environment = net::kMasterVariable},
           {.flag = "--session",
            .value = &c.session,
-           .help = "of several sessions on this machine: its PID, scene or run folder, as telesplat ctl list tells"}};
+           .help = "of several sessions on this machine: its PID, scene or run folder, as telesplat ctl list tells"},
+          net::keys_row(c.keys)};
 }
 
 std::unique_ptr<ControlClient> reach(const SessionChoice& c, const options::Given& given, int& exit_code) {
@@ -29,7 +31,12 @@ std::unique_ptr<ControlClient> reach(const SessionChoice& c, const options::Give
     exit_code = tools::complain({search.problem}, search.exit_code());
     return nullptr;
   }
-  return std::make_unique<ControlClient>(search.address);
+  const auto access = net::Access::open({}, c.keys.empty() ? search.keys : c.keys, net::asking_roles());
+  if (!access) {
+    exit_code = tools::complain(access.error());
+    return nullptr;
+  }
+  return std::make_unique<ControlClient>(search.address, *access);
 }
 
 }  // namespace telesplat::launcher

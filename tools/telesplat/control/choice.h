@@ -12,6 +12,7 @@ namespace telesplat::launcher {
 struct SessionChoice {
   std::string master;   ///< --master, or TELESPLAT_MASTER in the environment; empty: the one that runs here
   std::string session;  ///< --session: as net::find_master() takes it
+  std::string keys;     ///< --keys: folder; empty: those that the session's file names, if it runs here
 };
 
 options::Table session_rows(SessionChoice& choice);

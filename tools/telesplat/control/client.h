@@ -1,6 +1,7 @@
 // Asks the master things over its control socket.
 #pragma once
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -8,10 +9,13 @@
 
 namespace telesplat::launcher {
 
+/// An answer does not say what it answers: where one may still come, the connection is given up, and the next question
+/// goes over another one.
 class ControlClient {
  public:
   /// Connects when the first question is asked.
-  explicit ControlClient(const std::string& master_endpoint);
+  explicit ControlClient(const std::string& master_endpoint, const net::Access& access = {});
+  ~ControlClient();
 
   /// Sends a command and waits for its answer. Error: the master refused, or there is no answer.
   Result<std::string> ask(const std::string& command, double timeout_s,
@@ -21,20 +25,21 @@ class ControlClient {
                                    const std::map<std::string, std::string>& arguments = {});
   /// Whether the last question had no answer, so that an error is not of what was asked.
   bool unanswered() const { return unanswered_; }
-  /// Sends "status" without waiting; poll_status() gives the answer once it is there.
+  /// Sends "status" without waiting; poll_status() gives the answer once it is there, unless ask() or order() comes
+  /// before.
   void request_status();
   /// Nobody takes connections at the master's address any more, since the last answer.
-  bool nobody_there() const { return socket_.failed_connections() > failed_before_; }
+  bool nobody_there() const;
   std::optional<nlohmann::json> poll_status();
 
  private:
-  void connect();
+  struct Line;  // to the master
+  Line& line();
 
   std::string endpoint_;
-  net::Context context_;
-  net::Socket socket_;
-  bool connected_ = false, unanswered_ = false;
-  uint64_t failed_before_ = 0;  // attempts to connect, by the last answer
+  net::Access access_;
+  std::unique_ptr<Line> line_;
+  bool unanswered_ = false, nobody_there_ = false;
 };
 
 }  // namespace telesplat::launcher

@@ -52,7 +52,8 @@ Status print_status(ControlClient& client, const StatusOptions& o) {
   const auto json = nlohmann::ordered_json::parse(*answer, nullptr, false);
   if (!json.is_object()) return Error{"the master's answer is not a status"};
   if (o.watch && !o.json) std::printf("\033[H\033[2J");  // from the top of an empty screen
-  const std::string text = o.json ? json.dump(2) + "\n" : status_text(json, double(std::time(nullptr)));
+  const std::string text = o.json ? json.dump(2, ' ', false, decltype(json)::error_handler_t::replace) + "\n"
+                                  : status_text(json, double(std::time(nullptr)));
   std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
   return ok_status();

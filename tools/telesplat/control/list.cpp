@@ -30,7 +30,9 @@ options::Table table(ListOptions& o) {
 
 // nullopt: the master does not answer.
 std::optional<int> viewers_of(const net::RunningSession& session) {
-  ControlClient client(session.address);
+  const auto access = net::Access::open({}, session.keys, net::asking_roles());
+  if (!access) return std::nullopt;
+  ControlClient client(session.address, *access);
   const auto answer = client.ask("status", kListPatience_s);
   const auto status = answer ? Json::parse(*answer, nullptr, false) : Json();
   if (!status.is_object()) return std::nullopt;

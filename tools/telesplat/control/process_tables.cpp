@@ -9,6 +9,7 @@
 #include <set>
 #include <vector>
 
+#include "common/core/utf8.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/control/json_fields.h"
 
@@ -118,14 +119,16 @@ const std::vector<RoleTable>& role_tables() {
 
 std::string table_of(const RoleTable& role, const std::vector<Json>& processes, bool hosts_differ) {
   std::vector<Field> fields{
-      {role.title, [](const Json& p) { return tools::shortened(text(p, "name"), kMostName); }, false}};
+      {role.title, [](const Json& p) { return tools::shortened(printable(text(p, "name")), kMostName); }, false}};
   if (hosts_differ)
-    fields.push_back({"host", [](const Json& p) { return tools::shortened(fact_of(p, "host"), 16); }, false});
+    fields.push_back(
+        {"host", [](const Json& p) { return tools::shortened(printable(fact_of(p, "host")), 16); }, false});
   fields.insert(fields.end(), role.fields.begin(), role.fields.end());
   fields.push_back(value("MB", "values", "rss_mb", 1, 0));
   fields.push_back(value("most MB", "values", "peak_rss_mb", 1, 0));
   fields.push_back(clock_offset());
   fields.push_back(unless_zero(counted("rejected", "messages_rejected")));
+  fields.push_back(unless_zero(counted("keys refused", "keys_refused")));
   fields.push_back({"heard of", heard});
   std::vector<tools::TextTable::Column> columns;
   for (const Field& f : fields) columns.push_back({f.title, f.right});
@@ -148,7 +151,7 @@ std::string process_tables(const Json& processes) {
   for (const auto& p : processes) {
     if (!p.is_object()) continue;
     if (!flag(p, "alive")) {
-      left.push_back(tools::shortened(text(p, "name"), kMostName));
+      left.push_back(tools::shortened(printable(text(p, "name")), kMostName));
       continue;
     }
     hosts.insert(fact_of(p, "host"));

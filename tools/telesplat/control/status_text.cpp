@@ -8,6 +8,7 @@
 #include <ctime>
 #include <vector>
 
+#include "common/core/utf8.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/control/json_fields.h"
 #include "tools/telesplat/control/process_tables.h"
@@ -45,7 +46,7 @@ std::string age(double seconds) {
 std::string started_by(const std::string& who) { return who == "hand" ? "by hand" : "by telesplat " + who; }
 
 std::string title(const Json& session, double now_s) {
-  const std::string scene = text(session, "scene"), kind = text(session, "kind");
+  const std::string scene = printable(text(session, "scene")), kind = printable(text(session, "kind"));
   std::string out = scene.empty() ? "no data server yet" : scene;
   if (!kind.empty() && !scene.starts_with(kind)) out += " (" + kind + ")";
   const double at_s = read_utc(text(session, "started_at"));
@@ -55,6 +56,18 @@ std::string title(const Json& session, double now_s) {
   return out + "\n";
 }
 
+// Those that bit.
+std::string limits(const Json& status) {
+  const auto* told = field(status, "limits");
+  if (!told || !told->is_object()) return {};
+  std::vector<std::string> out;
+  for (const auto& [key, what] : {std::pair{"views_coarser", "views sampled coarser"},
+                                  {"hellos_refused", "processes refused"},
+                                  {"messages_refused", "messages dropped"}})
+    if (const uint64_t n = count(*told, key)) out.push_back(fmt::format("{} {}", n, what));
+  return fmt::format("{}", fmt::join(out, ", "));
+}
+
 std::string head(const Json& status, double now_s) {
   std::string out;
   if (const auto* session = field(status, "session"); session && session->is_object()) {
@@ -62,12 +75,18 @@ std::string head(const Json& status, double now_s) {
     out += line("address", fmt::format("{}, process {}", text(*session, "address"), count(*session, "pid")));
     const std::string folder = text(*session, "run_folder");
     out += line("record", folder.empty() ? "none" : folder);
+    if (const std::string keys = text(*session, "keys"); !keys.empty()) out += line("keys", keys);
   }
+  if (const uint64_t refused = count(status, "keys_refused"); refused > 0)
+    out += line("not let in", fmt::format("{} connections without a key that the master lets in", refused));
   out += line("views", fmt::format("{} complete, {} in flight; epoch {}", count(status, "frames_completed"),
                                    count(status, "frames_in_flight"), count(status, "epoch")));
   out += line("leases", fmt::format("{} expired, {} given to a second sampler; {} tiles taken back",
                                     count(status, "leases_expired"), count(status, "leases_backup"),
                                     count(status, "tiles_released")));
+  if (const std::string bit = limits(status); !bit.empty()) out += line("limits", bit);
+  if (const auto* failed = field(status, "record_failed"); failed && failed->is_array() && !failed->empty())
+    out += line("disk full", fmt::format("{} files of the record cannot be written", failed->size()));
   if (const std::string animation = text(status, "animation"); !animation.empty() && animation != "off")
     out += line("animation", tools::shortened(animation, kColumns - kIndent));
   return out;

@@ -12,7 +12,6 @@
 namespace telesplat::launcher {
 namespace {
 
-constexpr int kMaxRestarts = 5;
 constexpr double kMasterPatience_s = 10, kRelayPatience_s = 5, kAskEvery_s = 0.1;
 // From the start of a wall's viewers to the beginning of their trajectory: they join and receive their first view
 // meanwhile.
@@ -24,6 +23,7 @@ Pipeline::Pipeline(const RunOptions& options, ProcessGroup group) : options_(opt
 
 Result<Pipeline> Pipeline::start(const RunOptions& o) {
   Pipeline p(o, ProcessGroup(o.log_directory.empty() ? o.out + "/logs" : o.log_directory, o.log_level));
+  if (const Status s = p.group_.use_keys(o.keys); !s) return s.error();
   if (!o.join_master.empty())
     p.group_.join(o.join_master);
   else if (const Status s = p.start_servers(); !s)
@@ -72,6 +72,17 @@ Status Pipeline::open(const RunOptions& options) {
   options_.data = options.data;
   options_.data_servers = options.data_servers;
   return start_data();
+}
+
+// Who could not write all of the record says so, or ends with 1.
+void Pipeline::finish() {
+  group_.finish();
+  for (Member& m : group_.members()) {
+    if (!m.process) continue;
+    read(m);
+    const bool records = m.role == "master" || m.role == "packer";
+    record_failed_ |= m.record_failed || (records && m.process->ended() && m.process->exit_code() == 1);
+  }
 }
 
 void Pipeline::tell_viewers(const std::string& line) {
@@ -123,7 +134,7 @@ Status Pipeline::start_viewers(double clock_from_s) {
 // are there.
 Status Pipeline::start_wall() {
   const double now = monotonic_s();
-  if (!control_) control_ = std::make_unique<ControlClient>(group_.endpoint());
+  if (!control_) control_ = std::make_unique<ControlClient>(group_.endpoint(), group_.access());
   if (now - asked_s_ > kAskEvery_s) {
     control_->request_status();
     asked_s_ = now;
@@ -156,21 +167,29 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
     read(m);
     if (m.given_up || !m.process->ended()) continue;
     read(m);  // its last words
-    if (const State state = ended(m, news); state != State::kRunning) return state;
+    const State state = m.again_s ? start_again(m, news) : ended(m, news);
+    if (state != State::kRunning) return state;
   }
   if (progress_ != told_progress_) {
     told_progress_ = progress_;
     tell_viewers(progress_.empty() ? "progress" : "progress " + progress_);
   }
-  return viewing == 0 && has_viewers_ ? State::kFinished : State::kRunning;
+  if (viewing > 0 || !has_viewers_) return State::kRunning;
+  // The record is complete when a master has ended it.
+  if (Member* master = group_.find("master"); master && master->again_s) {
+    master->again_s = 0;
+    return start_again(*master, news);
+  }
+  return State::kFinished;
 }
 
 Consequence consequence_of(const Ended& e) {
   const bool viewer = e.role == "viewer", master = e.role == "master";
   // Told to finish, by `telesplat ctl stop`: the viewers finish too.
   if (e.code == 0) return master ? Consequence::kFinish : Consequence::kNone;
+  if (e.record_failed && e.code == 1) return master ? Consequence::kFinish : Consequence::kNone;  // all else is well
   const bool refused = e.code == 2;
-  if (!refused && !viewer && !master && e.restarts < kMaxRestarts) return Consequence::kRestart;
+  if (!refused && !viewer && e.restarts < Restarts::kMost) return Consequence::kRestart;
   // A window stays, and another data set can be opened in it.
   if (e.role == "data" && e.chosen) return Consequence::kGiveUp;
   return refused ? Consequence::kRefuse : Consequence::kFail;
@@ -178,7 +197,7 @@ Consequence consequence_of(const Ended& e) {
 
 Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
   const int code = m.process->exit_code();
-  const auto follows = consequence_of({m.role, code, m.restarts, chosen_});
+  const auto follows = consequence_of({m.role, code, m.restarts.lately(monotonic_s()), chosen_, m.record_failed});
   if (follows == Consequence::kNone) return State::kRunning;
   if (follows == Consequence::kFinish) return State::kFinished;
   if (follows != Consequence::kRestart) {
@@ -191,14 +210,25 @@ Pipeline::State Pipeline::ended(Member& m, std::vector<std::string>& news) {
     tell_viewers("problem " + news.back());
     return State::kRunning;
   }
-  ++m.restarts;
-  news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again", m.name,
-                             code > 128 ? "signal" : "code", code > 128 ? code - 128 : code));
-  if (const Status s = group_.restart(m); !s) {
-    news.push_back(s.error().text);
-    return State::kFailed;
-  }
-  return State::kRunning;
+  const double now_s = monotonic_s();
+  m.again_s = m.restarts.died(now_s);
+  const std::string when = *m.again_s > now_s ? fmt::format(" in {:.2g} s", *m.again_s - now_s) : "";
+  news.push_back(fmt::format("{} died ({} {}); the run goes on, it is started again{}", m.name,
+                             code > 128 ? "signal" : "code", code > 128 ? code - 128 : code, when));
+  return start_again(m, news);
+}
+
+Pipeline::State Pipeline::start_again(Member& m, std::vector<std::string>& news) {
+  if (monotonic_s() < *m.again_s) return State::kRunning;
+  m.again_s.reset();
+  // The record is the session's, not one master's.
+  auto& told = m.arguments;
+  const auto has = [&](const char* flag) { return std::find(told.begin(), told.end(), flag) != told.end(); };
+  if (m.role == "master" && has("--out") && !has("--continue")) told.push_back("--continue");
+  const Status s = group_.restart(m);
+  if (s) return State::kRunning;
+  news.push_back(s.error().text);
+  return State::kFailed;
 }
 
 // "STAGE 0.430"
@@ -213,6 +243,7 @@ void Pipeline::read_progress(const std::string& member, const std::string& told)
 void Pipeline::read(Member& m) {
   for (const auto& line : m.process->read_lines()) {
     if (line.starts_with("progress ")) read_progress(m.name, line.substr(9));
+    if (line == "record failed") m.record_failed = true;
     if (line.starts_with("note ")) notes_.push_back(line.substr(5));
     if (line.starts_with("open ") && m.told) wishes_.push_back(line.substr(5));
   }

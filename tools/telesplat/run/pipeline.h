@@ -19,9 +19,10 @@ namespace telesplat::launcher {
 /// A process of a session that ended.
 struct Ended {
   std::string role;
-  int code = 0;         ///< exit code; 128 + the signal's number
-  int restarts = 0;     ///< how often it was started again
-  bool chosen = false;  ///< it serves a data set that a person chose at a window
+  int code = 0;                ///< exit code; 128 + the signal's number
+  int restarts = 0;            ///< how often it was started again in the last minute (Restarts::lately)
+  bool chosen = false;         ///< it serves a data set that a person chose at a window
+  bool record_failed = false;  ///< it said that it could not write all of the record, and nothing else was wrong
 };
 enum class Consequence {
   kNone,
@@ -41,13 +42,15 @@ class Pipeline {
   static Result<Pipeline> start(const RunOptions& options);
 
   const std::string& master_endpoint() const { return group_.endpoint(); }
+  /// By which its master is asked.
+  const net::Access& access() const { return group_.access(); }
   /// Names of the viewers that were started.
   std::vector<std::string> viewers();
 
   enum class State { kRunning, kFinished, kFailed, kBadInput };
-  /// Looks after the children; does not wait. Samplers, packer and data that die are restarted (5 times each at most);
-  /// the master's or a viewer's death ends the run, which is finished when all viewers are. A data set that was chosen
-  /// at a window and cannot be served does not end it. `news` gets lines for the person.
+  /// Looks after the children; does not wait. Servers that die are started again, the master at its old address, unless
+  /// they die too often (Restarts); a viewer's death ends the run, which is finished when all viewers are. A data set
+  /// that was chosen at a window and cannot be served does not end it. `news` gets lines for the person.
   State supervise(std::vector<std::string>& news);
   /// "reading a.ply 43 %, 12 s left" and the like, from the children's progress lines; empty: nothing to tell.
   const std::string& progress() const { return progress_; }
@@ -60,7 +63,9 @@ class Pipeline {
   /// The session goes on with the data set of these options: other data servers take the place of those that are there.
   Status open(const RunOptions& options);
   /// Ends everything: viewers first, then a "stop" to the master, then whoever is left.
-  void finish() { group_.finish(); }
+  void finish();
+  /// After that: somebody could not write all of the record.
+  bool record_failed() const { return record_failed_; }
 
  private:
   Pipeline(const RunOptions& options, ProcessGroup group);
@@ -75,6 +80,8 @@ class Pipeline {
   void read_progress(const std::string& member, const std::string& told);
   /// What the end of a process means for the run.
   State ended(Member& member, std::vector<std::string>& news);
+  /// It has died, and its time has come.
+  State start_again(Member& member, std::vector<std::string>& news);
 
   RunOptions options_;
   ProcessGroup group_;
@@ -83,7 +90,7 @@ class Pipeline {
   std::vector<std::string> notes_, wishes_;
   std::string told_progress_;                  // the viewers
   std::map<std::string, std::string> relays_;  // where they listen, by name
-  bool has_viewers_ = false;
+  bool has_viewers_ = false, record_failed_ = false;
   bool chosen_ = false;  // the data set, by a person at a window: one that cannot be read does not end the session
   std::unique_ptr<ControlClient> control_;  // while a wall's viewers wait
   double asked_s_ = -1e9;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/utf8.h"
 #include "common/net/service.h"
 #include "tools/telesplat/control/client.h"
 
@@ -30,11 +32,23 @@ std::string program_directory() {
   return fs::read_symlink("/proc/self/exe", error).parent_path().string();
 }
 
+Status ProcessGroup::use_keys(const std::string& folder) {
+  auto access = net::Access::open({}, folder, net::asking_roles());
+  if (!access) return access.error();
+  access_ = *std::move(access);
+  keys_ = folder;
+  return ok_status();
+}
+
 Status ProcessGroup::start_master(std::vector<std::string> arguments, double patience_s) {
   Member member{.role = "master", .name = "master", .arguments = std::move(arguments)};
   auto listens = start_listener(std::move(member), patience_s);
   if (!listens) return listens.error();
   endpoint_ = std::move(*listens);
+  // Started again, it listens where it did: those who look for it know no other place.
+  auto& told = members_.back().arguments;
+  const auto bind = std::find(told.begin(), told.end(), "--bind");
+  if (bind != told.end() && bind + 1 != told.end()) *(bind + 1) = endpoint_;
   return ok_status();
 }
 
@@ -57,6 +71,7 @@ Status ProcessGroup::start(Member member) {
   fs::create_directories(log_directory_, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder for logs: {}", log_directory_, error.message())};
   member.arguments.insert(member.arguments.end(), {"--name", member.name, "--log-level", log_level_});
+  if (!keys_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--keys", keys_});
   if (!endpoint_.empty() && member.joins) member.arguments.insert(member.arguments.end(), {"--master", endpoint_});
   members_.push_back(std::move(member));
   return restart(members_.back());
@@ -92,7 +107,7 @@ std::string ProcessGroup::last_log_line(const std::string& name) const {
   std::string line, last;
   while (std::getline(in, line))
     if (!line.empty()) last = line;
-  return last.starts_with("telesplat: ") ? last.substr(11) : last;
+  return printable(last.starts_with("telesplat: ") ? last.substr(11) : last, 1000);
 }
 
 void ProcessGroup::finish() {
@@ -108,7 +123,7 @@ void ProcessGroup::finish() {
   end([](const Member& m) { return m.role == "viewer"; }, kViewersFarewell_s);
   Member* master = find("master");
   if (master && master->process && !master->process->ended() && !endpoint_.empty()) {
-    ControlClient control(endpoint_);
+    ControlClient control(endpoint_, access_);
     if (net::stop_requested() || !control.ask("stop", 2)) master->process->signal(SIGTERM);
     for (const double until = monotonic_s() + kSoon_s; !master->process->ended() && monotonic_s() < until;)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "common/net/keys/access.h"
 #include "tools/telesplat/run/child_process.h"
+#include "tools/telesplat/run/children/restarts.h"
 
 namespace telesplat::launcher {
 
@@ -20,10 +22,12 @@ struct Member {
   std::string name;
   std::vector<std::string> arguments;  ///< beside name, log level and the master's address
   int nice = 0;
-  bool joins = true;      ///< is told where the master is
-  bool told = false;      ///< ChildProcess::tell() reaches it
-  bool given_up = false;  ///< it has ended, and nothing follows from that
-  int restarts = 0;
+  bool joins = true;           ///< is told where the master is
+  bool told = false;           ///< ChildProcess::tell() reaches it
+  bool given_up = false;       ///< it has ended, and nothing follows from that
+  bool record_failed = false;  ///< it said that it could not write all of the record
+  Restarts restarts;
+  std::optional<double> again_s;  ///< it has died, and is to be started again then (monotonic_s())
   std::optional<ChildProcess> process;
 };
 
@@ -32,6 +36,12 @@ class ProcessGroup {
   /// stderr of each process goes to LOG_DIRECTORY/NAME.log; the folder is made when the first process starts.
   ProcessGroup(const std::string& log_directory, const std::string& log_level)
       : log_directory_(log_directory), log_level_(log_level) {}
+
+  /// Those that are started from now on are told of this folder of keys, and a master is asked with them. Error: they
+  /// are not good for that.
+  Status use_keys(const std::string& folder);
+  /// By which a master is asked.
+  const net::Access& access() const { return access_; }
 
   /// Starts a master of the group's own and waits until it listens. Error: it ended, said nothing for `patience_s`, or
   /// Ctrl-C came.
@@ -65,7 +75,8 @@ class ProcessGroup {
   void finish();
 
  private:
-  std::string log_directory_, log_level_, endpoint_;
+  std::string log_directory_, log_level_, endpoint_, keys_;
+  net::Access access_;
   std::deque<Member> members_;
 };
 

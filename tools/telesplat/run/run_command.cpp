@@ -25,6 +25,7 @@
 #include "tools/telesplat/run/live_figures.h"
 #include "tools/telesplat/run/overwrite.h"
 #include "tools/telesplat/run/pipeline.h"
+#include "tools/telesplat/run/run_keys.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -82,6 +83,7 @@ class Run {
     const bool stopped = state == State::kRunning;
     if (stopped) net::forget_stop();
     pipeline->finish();
+    record_failed_ = pipeline->record_failed();
     if (!o_.join_master.empty()) ask_for_results(*pipeline);
     if (state != State::kBadInput && !o_.out.empty()) after_.develop_pictures();
     for (const auto& n : pipeline->take_notes()) progress_.line(n);
@@ -111,7 +113,7 @@ class Run {
 
   // Shows what goes on until the pipeline ends or somebody wants it to; kRunning: the latter.
   State watch(Pipeline& pipeline) {
-    ControlClient control(pipeline.master_endpoint());
+    ControlClient control(pipeline.master_endpoint(), pipeline.access());
     SessionFigures figures;
     double asked_s = 0;
     const double begin_s = monotonic_s();
@@ -184,7 +186,7 @@ class Run {
   }
 
   void ask_for_results(Pipeline& pipeline) try {
-    const auto answer = ControlClient(pipeline.master_endpoint()).ask("status", kResultPatience_s);
+    const auto answer = ControlClient(pipeline.master_endpoint(), pipeline.access()).ask("status", kResultPatience_s);
     const auto status = answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
     if (status.is_object()) results_ = viewer_results(status, pipeline.viewers());
   } catch (const nlohmann::json::exception&) {
@@ -253,6 +255,10 @@ class Run {
     const int code = after_.run(stopped, master_folder_);
     if (!net::stop_requested() || code == 0) after_.drop_spools();
     if (code != 0) return code;
+    if (record_failed_)
+      return tools::complain({o_.out + ": not all of the record could be written; errors of summary.json and the logs "
+                                       "tell what is missing"},
+                             1);
     const bool again = net::stop_requested();
     if (again)
       progress_.line("telesplat: interrupted; the record lacks what is made after the run");
@@ -264,7 +270,7 @@ class Run {
   RunOptions o_;
   std::shared_ptr<Scene> scene_;
   std::optional<MoviePlan> movie_;
-  bool folder_existed_ = false;
+  bool folder_existed_ = false, record_failed_ = false;
   std::string master_folder_;         // where the session's record is; empty: not known, or nowhere
   std::vector<std::string> results_;  // of the viewers of a joined session
   PassingFolder logs_;
@@ -278,6 +284,7 @@ int find_session(RunOptions& o) {
   const auto search = net::find_master(o.join_master);
   if (search.address.empty()) return tools::complain({search.problem}, search.exit_code());
   o.join_master = search.address;
+  if (o.keys.empty()) o.keys = search.keys;
   return 0;
 }
 
@@ -288,6 +295,8 @@ int run(RunOptions o, const options::Given& given) {
   auto scene = settle(o, given);
   if (!scene) return tools::complain(scene.error());
   if (const int code = find_session(o)) return code;
+  const auto passing_keys = settle_keys(o);
+  if (!passing_keys) return tools::complain(passing_keys.error());
   if (o.viewer.window && !o.viewer.xr)
     if (const Status s = viewer::check_display(); !s) return tools::complain(s.error());
   if (const std::string end = viewer::end_of_trajectory(o.viewer); !end.empty())

@@ -7,6 +7,7 @@
 
 #include "common/image/measures/reference.h"
 #include "common/net/master_address.h"
+#include "common/net/service.h"
 #include "services/data/kinds.h"
 #include "tools/telesplat/run/wall.h"
 
@@ -43,6 +44,12 @@ Table display_rows(RunOptions& o) {
   return joined(rows, viewer::wall_table(o.viewer));
 }
 
+options::Row keys_row(RunOptions& o) {
+  options::Row out = net::keys_row(o.keys);
+  out.help += "; auto: keys that are made for this run and go with it";
+  return out;
+}
+
 Table own_rows(RunOptions& o) {
   const auto points = scene::Kinds::of(scene::Pipeline::kPoints);
   return {
@@ -62,6 +69,7 @@ Table own_rows(RunOptions& o) {
        .help =
            "join the running session at this address instead of starting one; auto: yours on this machine; default, "
            "where no scene is named: $TELESPLAT_MASTER"},
+      keys_row(o),
       {.flag = "--overwrite",
        .value = &o.overwrite,
        .help = "the folder of --out may hold a record already: its files are replaced, others stay"},
@@ -217,7 +225,9 @@ Table table(RunOptions& o) {
   const Table own = joined(joined(own_rows(o), display_rows(o)), movie_rows(o.movie));
   const Table launcher = joined(own, sampler_rows(o));
   const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
-  return joined(joined(launcher, services), master::session_table(o.master));
+  const Table of_master =
+      joined(joined(master::record_table(o.master), master::limit_table(o.master)), master::session_table(o.master));
+  return joined(joined(launcher, services), of_master);
 }
 
 Result<std::shared_ptr<Scene>> settle(RunOptions& o, const options::Given& given) {
@@ -258,6 +268,7 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
 
 std::vector<std::string> data_arguments(const RunOptions& o, int part) {
   data::DataServiceOptions d = o.data;
+  d.companions = "anywhere";  // the person's own files, for the person alone
   if (o.data_servers > 1) d.volume.part = fmt::format("{}/{}", part, o.data_servers);
   auto out = arguments(d);
   out.push_back("--report-progress");

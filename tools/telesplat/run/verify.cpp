@@ -44,7 +44,7 @@ Status write_summary(const std::string& directory, const std::vector<VerifiedVie
   if (!summary.is_object()) return Error{fmt::format("{}: cannot be read as JSON", path)};
   summary["quality"] = quality_json(views);
   std::ofstream out(path + ".part");
-  out << summary.dump(2) << "\n";
+  out << summary.dump(2, ' ', false, decltype(summary)::error_handler_t::replace) << "\n";
   out.close();
   std::error_code error;
   if (out) fs::rename(path + ".part", path, error);

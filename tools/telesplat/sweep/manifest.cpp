@@ -99,7 +99,7 @@ Status write_manifest(const Manifest& m, const std::string& directory) try {
   for (const auto& [key, outcome] : m.outcomes) j["runs"].push_back(to_json(key, outcome));
   const std::string path = directory + "/" + kManifestFile, part = path + ".part";
   std::ofstream out(part);
-  out << j.dump(2) << "\n";
+  out << j.dump(2, ' ', false, decltype(j)::error_handler_t::replace) << "\n";
   out.close();
   if (!out || std::rename(part.c_str(), path.c_str()) != 0) return Error{fmt::format("{}: cannot be written", path)};
   return ok_status();

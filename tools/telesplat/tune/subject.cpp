@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <set>
 
+#include "client/viewer/coupling/request_options.h"
 #include "common/core/machine.h"
 #include "common/julia/flags.h"
 #include "common/options/parser.h"
@@ -112,7 +113,8 @@ void set_defaults(const Read& read, TuneSubject& out) {
   TuneSettings& d = out.defaults;
   d.samplers = int(read.number("--samplers", 1));
   d.tile_px = int(read.number("--tile-size", 256));
-  d.update_rate_hz = read.number("--update-rate", 20);
+  d.update_rate_hz = read.number("--update-rate", 0);
+  if (d.update_rate_hz <= 0) d.update_rate_hz = viewer::RequestOptions{}.max_rate_hz;  // what a run's viewers take then
   const int depth = int(read.number("--octree-depth", 0));
   d.octree_depth = depth > 0 ? depth : scene::policy_of(out.kind).octree_depth;
   const std::string sampling = read.text("--sampling-size");

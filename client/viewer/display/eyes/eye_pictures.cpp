@@ -83,16 +83,24 @@ DrawnFrame EyePictures::draw(ViewSource& source, FrameInput input, bool spooled,
   return drawn;
 }
 
-EyePictures::Aim EyePictures::aim(const geometry::Camera& head, const glm::dvec2& share) const {
+EyePictures::Aim EyePictures::aim(const geometry::Camera& head, const EyePair& pair, const glm::dvec2& share) const {
   if (!on()) return {head, share * glm::dvec2(head.width, head.height)};
   const auto& o = rig_.options();
   const bool beside = o.mode == stereo::Mode::kSideBySide || o.mode == stereo::Mode::kSideBySideHalf;
   const bool above = o.mode == stereo::Mode::kTopBottom || o.mode == stereo::Mode::kTopBottomHalf;
-  const glm::dvec2 size(pair_.head.width, pair_.head.height);
-  if (!beside && !above) return {pair_.head, share * size};
+  const glm::dvec2 size(pair.head.width, pair.head.height);
+  if (!beside && !above) return {pair.head, share * size};
   const bool second = beside ? share.x >= 0.5 : share.y >= 0.5;
   const glm::dvec2 parts(beside ? 2 : 1, above ? 2 : 1), begin(second && beside, second && above);
-  return {pair_.eyes[second != o.swap_eyes ? 1 : 0], (share * parts - begin) * size};
+  return {pair.eyes[second != o.swap_eyes ? 1 : 0], (share * parts - begin) * size};
+}
+
+geometry::Camera EyePictures::display(const geometry::Camera& head) const {
+  geometry::Camera out = head;
+  if (!on() || rig_.options().mode == stereo::Mode::kQuadBuffer) return out;
+  const stereo::Size size = rig_.composed_size(head.width, head.height);
+  out.width = size.width, out.height = size.height;
+  return out;
 }
 
 void EyePictures::keep(FrameSpool& spool, const SpooledFrame& frame) {

@@ -34,8 +34,12 @@ class EyePictures {
     geometry::Camera camera;
     glm::dvec2 at_pix;
   };
-  /// head: the display's camera. share: of the display's width and height, from its upper left corner.
-  Aim aim(const geometry::Camera& head, const glm::dvec2& share) const;
+  /// head: the display's camera. pair: of the frame that is on display. share: of the display's width and height, from
+  /// its upper left corner.
+  Aim aim(const geometry::Camera& head, const EyePair& pair, const glm::dvec2& share) const;
+  /// The display's camera, of as many pixels as the display has: of quad buffers those of one eye's picture, as each
+  /// fills it.
+  geometry::Camera display(const geometry::Camera& head) const;
   /// Keeps both pictures for verification.
   void keep(FrameSpool& spool, const SpooledFrame& frame);
 

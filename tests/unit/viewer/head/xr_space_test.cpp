@@ -52,6 +52,31 @@ TEST(XrSpace, BothEyesSeeNothingThatTheirCameraDoesNot) {
   }
 }
 
+// Sizes of splats are chosen for it: as far from what is seen as the eyes are.
+TEST(XrSpace, WhatStandsBetweenTheEyesIsAsNearAsThey) {
+  const std::array eyes{eye_camera(eye(-0.032, -50, 42, 0), {}, 800, 820, 0.02),
+                        eye_camera(eye(0.032, -42, 50, 0), {}, 800, 820, 0.02)};
+  const geometry::Camera middle = between(eyes);
+  EXPECT_LT(glm::distance(middle.pose.position_room, glm::dvec3(0, 1.5, 0)), 1e-6);
+  EXPECT_EQ(middle.pose.orientation, eyes[0].pose.orientation);
+  EXPECT_EQ(middle.focal_x(), eyes[0].focal_x());
+  EXPECT_GT(both_eyes(eyes).pose.position_room.z, middle.pose.position_room.z);
+}
+
+// Neighbouring codes of 16 bits at a metre, as the depth is coded that a runtime is handed.
+TEST(XrSpace, StepsOfDepthAreThoseOfSixteenBits) {
+  for (const double near_m : {0.002, 0.02, 0.5}) {
+    const double far_m = 100;
+    const auto depth_of = [&](double code) { return near_m * far_m / (far_m - code / 65535 * (far_m - near_m)); };
+    double code = 0;
+    while (depth_of(code) < 1) ++code;
+    EXPECT_NEAR(step_of_depth_m(near_m, far_m), depth_of(code) - depth_of(code - 1),
+                0.05 * (depth_of(code) - depth_of(code - 1)));
+  }
+  EXPECT_LT(step_of_depth_m(0.02, 100), 0.8e-3);
+  EXPECT_GT(step_of_depth_m(0.002, 100), 7e-3);
+}
+
 TEST(XrSpace, EyesInOnePlaceAreTheirOwnCamera) {
   const auto one = eye_camera(eye(0, -45, 45, 0), {}, 640, 640, 0.02);
   const auto both = both_eyes({one, one});

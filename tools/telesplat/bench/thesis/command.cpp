@@ -71,9 +71,10 @@ Status write_text(const std::string& path, const std::string& text) {
 Status write_progress(const Progress& progress, const std::string& directory) {
   auto done = nlohmann::ordered_json::object();
   for (const auto& [title, step] : progress.done) done[title] = {{"wall_s", step.first}, {"others_cpu", step.second}};
-  return write_text(
-      directory + "/" + kStateFile,
-      nlohmann::ordered_json{{"quick", progress.quick}, {"data", progress.data}, {"done", done}}.dump(2) + "\n");
+  return write_text(directory + "/" + kStateFile,
+                    nlohmann::ordered_json{{"quick", progress.quick}, {"data", progress.data}, {"done", done}}.dump(
+                        2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                        "\n");
 }
 
 class Thesis {

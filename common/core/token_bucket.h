@@ -1,0 +1,27 @@
+// How often something may happen.
+#pragma once
+
+#include <algorithm>
+
+namespace telesplat {
+
+/// Lets through `rate` a second on average, and `burst` at once after a quiet time.
+class TokenBucket {
+ public:
+  TokenBucket(double rate, double burst) : rate_(rate), burst_(burst), tokens_(burst) {}
+
+  /// Whether one more may happen now.
+  bool take(double now_s) {
+    tokens_ = std::min(burst_, tokens_ + std::max(0.0, now_s - last_s_) * rate_);
+    last_s_ = std::max(last_s_, now_s);
+    if (tokens_ < 1) return false;
+    tokens_ -= 1;
+    return true;
+  }
+  double last_s() const { return last_s_; }  ///< when it was asked last
+
+ private:
+  double rate_, burst_, tokens_, last_s_ = -1e300;
+};
+
+}  // namespace telesplat

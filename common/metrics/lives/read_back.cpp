@@ -1,0 +1,149 @@
+#include "common/metrics/lives/read_back.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <span>
+
+#include "common/metrics/text_file.h"
+
+namespace telesplat::metrics {
+namespace {
+
+using Cells = std::vector<std::string>;
+
+double number(const std::string& cell, double none = 0) {
+  char* end = nullptr;
+  const double value = std::strtod(cell.c_str(), &end);
+  return cell.empty() || *end != '\0' ? none : value;
+}
+
+/// The rows of a table, one after the other. Those that are cut off or have another number of cells are left out.
+class Rows {
+ public:
+  Rows(const std::string& directory, Csv csv, const std::vector<Life>& lives)
+      : in_(directory + "/" + file_of(csv)), csv_(csv), lives_(lives) {
+    std::string line;
+    if (!std::getline(in_, line)) return;
+    columns_ = csv_cells(line);
+    at_ = line.size() + 1;
+  }
+
+  bool next() {
+    std::string line;
+    while (std::getline(in_, line) && !in_.eof()) {
+      while (life_ < lives_.size() && at_ >= lives_[life_].bytes[size_t(csv_)]) ++life_;
+      at_ += line.size() + 1;
+      cells_ = csv_cells(line);
+      if (cells_.size() == columns_.size()) return true;
+    }
+    return false;
+  }
+  /// Which master wrote the row; they count from 1.
+  size_t life() const { return life_; }
+  const Cells& columns() const { return columns_; }
+  const Cells& cells() const { return cells_; }
+  const std::string& of(const char* name) const {
+    static const std::string none;
+    const auto c = std::find(columns_.begin(), columns_.end(), name);
+    return c == columns_.end() ? none : cells_[size_t(c - columns_.begin())];
+  }
+  double number_of(const char* name) const { return number(of(name)); }
+  uint64_t whole(const char* name) const { return uint64_t(std::clamp(number_of(name), 0.0, 9007199254740992.0)); }
+
+ private:
+  std::ifstream in_;
+  const Csv csv_;
+  const std::vector<Life>& lives_;
+  Cells columns_, cells_;
+  size_t life_ = 1;
+  uint64_t at_ = 0;
+};
+
+// Of a viewer's table: its name comes first. What is empty did not happen.
+void read_table(Rows rows, const std::string& table, Measured& out) {
+  if (rows.columns().size() < 2) return;
+  wire::MetricRows one{{}, table, {rows.columns().begin() + 1, rows.columns().end()}, {}};
+  while (rows.next()) {
+    one.values.clear();
+    for (const auto& cell : std::span(rows.cells()).subspan(1)) one.values.push_back(number(cell, -1));
+    if (const Status added = out.add(rows.cells()[0], one); !added) return;
+  }
+}
+
+wire::TileDone tile_of(const Rows& row) {
+  wire::TileDone t;
+  t.frame = {row.whole("frame")};
+  t.samples = row.whole("samples");
+  t.kept = row.whole("kept");
+  t.bytes_sent = row.whole("bytes_sent");
+  t.step = row.whole("step");
+  t.rays = row.whole("rays");
+  t.extra = row.whole("extra") != 0;
+  t.moments.leased_s = row.number_of("leased_s");
+  t.moments.sample_begin_s = row.number_of("sample_begin_s");
+  t.moments.encode_end_s = row.number_of("encode_end_s");
+  t.moments.receive_s = row.number_of("receive_s");
+  t.moments.packed_s = row.number_of("packed_s");
+  return t;
+}
+
+PlanRow plan_of(const Rows& row) {
+  PlanRow p;
+  const std::string& outcome = row.of("outcome");
+  p.outcome = outcome == "tiles"   ? PlanRow::Outcome::kTiles
+              : outcome == "empty" ? PlanRow::Outcome::kEmpty
+              : outcome == "full"  ? PlanRow::Outcome::kFull
+                                   : PlanRow::Outcome::kLate;
+  p.asked.frame = {row.whole("frame")};
+  p.asked.extra = row.whole("extra") != 0;
+  p.asked.camera.width = int(std::min<uint64_t>(row.whole("rays_full"), 1u << 30));
+  p.asked.camera.height = 1;
+  p.asked_s = row.number_of("asked_s");
+  p.planned_s = row.number_of("planned_s");
+  if (!row.of("plan_ms").empty()) p.figures["plan_ms"] = row.number_of("plan_ms");
+  return p;
+}
+
+// A frame's plan counts before its tiles do.
+void read_sampled(Rows tiles, Rows plans, Measured& out) {
+  size_t life = 1;
+  const auto reach = [&](size_t reached) {
+    for (; life < reached; ++life) out.begin_life();
+  };
+  bool planned = plans.next();
+  const auto take_plan = [&] {
+    reach(plans.life());
+    out.tiles().add(plan_of(plans));
+    planned = plans.next();
+  };
+  while (tiles.next()) {
+    while (planned && (plans.life() < tiles.life() ||
+                       (plans.life() == tiles.life() && plans.whole("frame") <= tiles.whole("frame"))))
+      take_plan();
+    reach(tiles.life());
+    out.tiles().add(tiles.of("sampler"), tile_of(tiles));
+  }
+  while (planned) take_plan();
+}
+
+}  // namespace
+
+std::vector<std::string> header_of(const std::string& path) {
+  std::ifstream in(path);
+  std::string line;
+  return std::getline(in, line) && !in.eof() ? csv_cells(line) : Cells();
+}
+
+Measured read_back(const std::string& directory, const std::vector<Life>& lives) {
+  Measured out;
+  const auto rows = [&](Csv csv) { return Rows(directory, csv, lives); };
+  read_table(rows(Csv::kFrames), "frames", out);
+  read_table(rows(Csv::kUpdates), "updates", out);
+  read_table(rows(Csv::kStages), "stages", out);
+  read_sampled(rows(Csv::kTiles), rows(Csv::kPlans), out);
+  for (Rows epochs = rows(Csv::kEpochs); epochs.next();) out.add_epoch();
+  return out;
+}
+
+}  // namespace telesplat::metrics

@@ -1,0 +1,39 @@
+// How a process reaches others and is reached: through which proxies, and with which keys.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/net/keys/key_files.h"
+#include "common/net/via.h"
+
+namespace telesplat::net {
+
+class Access {
+ public:
+  /// Without keys: nothing is encrypted, and nobody asks who it is.
+  Access(Via via = {}) : via_(std::move(via)) {}  // NOLINT: implicit on purpose
+  Access(Via via, Keys keys) : via_(std::move(via)), keys_(std::make_shared<const Keys>(std::move(keys))) {}
+
+  /// folder: of keys; empty: without keys. roles, binds: as read_keys() takes them. Error: begins with --keys.
+  static Result<Access> open(Via via, const std::string& folder, const std::vector<Role>& roles, bool binds = false);
+
+  const Via& via() const { return via_; }
+  /// Null: none.
+  const Keys* keys() const { return keys_.get(); }
+
+ private:
+  Via via_;
+  std::shared_ptr<const Keys> keys_;
+};
+
+/// Whose keys programs take that only ask or tell a master, the most wanted first: `telesplat ctl`, a window's panel.
+inline std::vector<Role> asking_roles() { return {Role::kOperator, Role::kViewer}; }
+/// And health checks, which run wherever a service runs.
+inline std::vector<Role> any_role() {
+  return {Role::kOperator, Role::kViewer, Role::kSampler, Role::kPacker, Role::kData, Role::kServer};
+}
+
+}  // namespace telesplat::net

@@ -1,0 +1,79 @@
+#include "services/data/base/cut_off.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdint>
+#include <cstring>
+
+namespace telesplat::data {
+namespace {
+
+constexpr int kPlaces = 1024;
+constexpr size_t kMostName = 240;  // bytes; of longer names the end
+constexpr char kEllipsis[] = "...";
+
+// What a signal handler may look at while other threads map and unmap: a place is `here` only while it is complete.
+struct Place {
+  std::atomic<bool> taken{false}, here{false};
+  std::atomic<uintptr_t> begin{0}, end{0};
+  char name[kMostName + sizeof kEllipsis] = {};
+};
+Place places[kPlaces];
+std::atomic<int> exit_code{1};
+std::atomic<bool> told{false};
+static_assert(std::atomic<uintptr_t>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+
+void say(const char* text) {
+  for (size_t left = std::strlen(text); left > 0;) {
+    const ssize_t n = write(STDERR_FILENO, text, left);
+    if (n <= 0) return;
+    text += n, left -= size_t(n);
+  }
+}
+
+void on_bus_error(int, siginfo_t* info, void*) {
+  const auto at = reinterpret_cast<uintptr_t>(info->si_addr);
+  for (const Place& p : places) {
+    if (!p.here || at < p.begin || at >= p.end) continue;
+    while (told.exchange(true)) pause();  // another thread ends the process
+    say("telesplat: ");
+    say(p.name);
+    say(": was cut off while it was read\n");
+    _exit(exit_code);
+  }
+  signal(SIGBUS, SIG_DFL);  // what failed fails again
+}
+
+}  // namespace
+
+void end_at_cut_off_files(int code) {
+  exit_code = code;
+  struct sigaction action {};
+  action.sa_sigaction = on_bus_error;
+  action.sa_flags = SA_SIGINFO;
+  sigaction(SIGBUS, &action, nullptr);
+}
+
+NamedMapping::NamedMapping(const void* data, size_t bytes, std::string_view name) {
+  for (int i = 0; i < kPlaces && place_ < 0; ++i)
+    if (!places[i].taken.exchange(true)) place_ = i;
+  if (place_ < 0) return;
+  Place& p = places[place_];
+  const bool whole = name.size() <= kMostName;
+  char* to = whole ? p.name : std::copy_n(kEllipsis, sizeof kEllipsis - 1, p.name);
+  *std::copy_n(name.end() - ptrdiff_t(std::min(name.size(), kMostName)), std::min(name.size(), kMostName), to) = '\0';
+  p.begin = reinterpret_cast<uintptr_t>(data);
+  p.end = p.begin + bytes;
+  p.here = true;
+}
+
+NamedMapping::~NamedMapping() {
+  if (place_ < 0) return;
+  places[place_].here = false;
+  places[place_].taken = false;
+}
+
+}  // namespace telesplat::data

@@ -1,0 +1,26 @@
+// Files that others cut off while they are mapped: touching what is gone is SIGBUS, which is to be one line and an end.
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+namespace telesplat::data {
+
+/// From now on SIGBUS in a mapped file ends this process with `exit_code`, after the line "telesplat: FILE: was cut off
+/// while it was read" on standard error; elsewhere it ends it as before. May be called again, with another code.
+void end_at_cut_off_files(int exit_code);
+
+/// Knows a mapping by its file's name as long as it lives. Where very many files are mapped some have no name. Any
+/// thread.
+class NamedMapping {
+ public:
+  NamedMapping(const void* data, size_t bytes, std::string_view name);
+  ~NamedMapping();
+  NamedMapping(const NamedMapping&) = delete;
+  NamedMapping& operator=(const NamedMapping&) = delete;
+
+ private:
+  int place_ = -1;
+};
+
+}  // namespace telesplat::data

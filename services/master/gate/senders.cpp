@@ -1,0 +1,59 @@
+#include "services/master/gate/senders.h"
+
+#include <fmt/format.h>
+
+#include "common/net/keys/roles.h"
+
+namespace telesplat::master {
+
+Status Senders::admit(const net::Message& from, const wire::Hello& m) {
+  if (from.role && !net::may_be(*from.role, m.role))
+    return Error{fmt::format("the key {} is {}'s: its owner cannot be a {}", from.user, net::described(*from.role),
+                             net::as_word(m.role))};
+  if (Status s = is_same_user(from, m.instance); !s) return s;
+  const auto [owner, is_new] = owners_.try_emplace(m.instance);
+  if (is_new) order_.push_back(m.instance);
+  // It came back over another connection: the one before speaks for nobody.
+  if (owner->second.peer != from.peer) {
+    instances_.erase(owner->second.peer);
+    owner->second = {from.peer, from.user};
+  }
+  // Or it is another process from now on.
+  const auto before = instances_.find(from.peer);
+  if (before != instances_.end() && before->second != m.instance) owners_.erase(before->second);
+  instances_[from.peer] = m.instance;
+  while (order_.size() > kMost) {
+    const auto first = owners_.find(order_.front());
+    order_.pop_front();
+    if (first == owners_.end()) continue;
+    instances_.erase(first->second.peer);
+    owners_.erase(first);
+  }
+  return ok_status();
+}
+
+// A process whose own connection is busy says it over another.
+Status Senders::admit(const net::Message& from, const wire::Goodbye& m) { return speaks_for(from, m.instance); }
+
+// Viewers of walls have a connection of its own for this.
+Status Senders::admit(const net::Message& from, const wire::SwapReady& m) { return is_same_user(from, m.viewer); }
+
+Status Senders::admit(const net::Message& from, const wire::Control& m) {
+  if (!from.role || net::may_command(*from.role, m.command)) return ok_status();
+  return Error{net::refused_command(*from.role, from.user, m.command)};
+}
+
+Status Senders::speaks_for(const net::Message& from, InstanceId instance) const {
+  const auto said = instances_.find(from.peer);
+  if (said == instances_.end()) return is_same_user(from, instance);  // over a second connection
+  if (said->second == instance) return ok_status();
+  return Error{"it speaks in the name of another process"};
+}
+
+Status Senders::is_same_user(const net::Message& from, InstanceId instance) const {
+  const auto owner = owners_.find(instance);
+  if (owner == owners_.end() || owner->second.user == from.user) return ok_status();
+  return Error{fmt::format("the key {} speaks in the name of a process of {}", from.user, owner->second.user)};
+}
+
+}  // namespace telesplat::master

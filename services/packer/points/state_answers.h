@@ -1,0 +1,133 @@
+// Brings viewers up to date piece by piece: what a viewer lacks goes out as fast as its receipts come, so that neither
+// memory nor the packer's time is spent on one that joins while others wait. No sockets, no clocks.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <string>
+
+#include "common/wire/point_messages.h"
+#include "services/packer/points/event_log.h"
+
+namespace telesplat::packer {
+
+/// Answers to state requests, one a connection.
+class StateAnswers {
+ public:
+  struct Limits {
+    uint64_t window_bytes = 8u << 20;   ///< sent to a viewer and not received, about
+    uint64_t bytes_at_once = 1u << 20;  ///< to all, in one turn
+    size_t viewers = 256;               ///< beyond, the one that was begun first is dropped: it asks again
+  };
+  struct Answer {
+    InstanceId viewer;
+    EventLog::Replay left;
+    wire::StateMark mark;  ///< at the end
+    uint64_t events = 0;   ///< sent
+  };
+
+  StateAnswers() = default;
+  explicit StateAnswers(const Limits& limits) : limits_(limits) {}
+
+  /// A viewer asks over this connection for what follows `after`. follows: it has what was sent so far, if it has
+  /// received it; false: it begins anew. True: it is being answered already; what it lacks is under way or will be.
+  bool goes_on(const std::string& peer, InstanceId viewer, Sequence after, bool follows) {
+    std::erase_if(answers_, [&](const auto& a) { return a.second.answer.viewer == viewer && a.first != peer; });
+    const auto found = answers_.find(peer);
+    if (found == answers_.end()) return false;
+    if (follows && found->second.answer.viewer == viewer && after >= found->second.received) {
+      received(peer, after);
+      return answers_.contains(peer);
+    }
+    answers_.erase(found);
+    return false;
+  }
+  void begin(const std::string& peer, Sequence after, Answer answer) {
+    if (answers_.size() >= limits_.viewers)
+      answers_.erase(std::min_element(answers_.begin(), answers_.end(),
+                                      [](const auto& a, const auto& b) { return a.second.number < b.second.number; }));
+    answers_[peer] = {.answer = std::move(answer), .received = after, .number = ++begun_};
+  }
+  /// Whoever is at this connection has applied everything up to `newest`.
+  void received(const std::string& peer, Sequence newest) {
+    const auto found = answers_.find(peer);
+    if (found == answers_.end()) return;
+    Entry& a = found->second;
+    a.received = std::max(a.received, newest);
+    for (; !a.under_way.empty() && a.under_way.front().first <= newest; a.under_way.pop_front())
+      a.bytes -= a.under_way.front().second;
+    if (a.all_sent && a.under_way.empty()) answers_.erase(found);
+  }
+  /// What was left for this connection is not sent.
+  void drop(const std::string& peer) { answers_.erase(peer); }
+  void clear() { answers_.clear(); }
+
+  /// Sends some of what is left, in turn. next(Replay&): its next event, if there is one. send(peer, Event) and
+  /// end(peer, Answer), after the last event: false if it could not be sent; who could not be sent to asks again.
+  /// bytes_of(Event): on the wire.
+  template <class Next, class Send, class End, class BytesOf>
+  void pump(const Next& next, const Send& send, const End& end, const BytesOf& bytes_of) {
+    for (uint64_t sent = 0; sent < limits_.bytes_at_once;) {
+      const auto turn = next_turn();
+      if (turn == answers_.end()) return;
+      turn_ = turn->first;
+      Entry& a = turn->second;
+      const auto event = next(a.answer.left);
+      bool there = false;
+      if (event) {
+        const uint64_t bytes = bytes_of(*event) + kMessageBytes;
+        a.under_way.emplace_back(event->sequence, bytes);
+        a.bytes += bytes, sent += bytes, ++a.answer.events;
+        there = send(turn->first, *event);
+      } else {
+        a.all_sent = true;
+        sent += kMessageBytes;
+        there = end(turn->first, a.answer);
+      }
+      if (!there || (a.all_sent && a.under_way.empty())) answers_.erase(turn);
+    }
+  }
+  /// pump() would send something.
+  bool can_go_on() const {
+    return std::any_of(answers_.begin(), answers_.end(), [this](const auto& a) { return may_send(a.second); });
+  }
+
+  size_t size() const { return answers_.size(); }
+  /// Of all viewers.
+  uint64_t bytes_under_way() const {
+    uint64_t out = 0;
+    for (const auto& [peer, a] : answers_) out += a.bytes;
+    return out;
+  }
+
+ private:
+  // What a message takes in queues, beside its bytes.
+  static constexpr uint64_t kMessageBytes = 2048;
+  struct Entry {
+    Answer answer;
+    Sequence received;  // the newest that it is known to have
+    std::deque<std::pair<Sequence, uint64_t>> under_way{};
+    uint64_t bytes = 0;  // of these
+    bool all_sent = false;
+    uint64_t number = 0;  // in the order in which they were begun
+  };
+  bool may_send(const Entry& a) const { return !a.all_sent && a.bytes < limits_.window_bytes; }
+  // The next one after that which was served last.
+  std::map<std::string, Entry>::iterator next_turn() {
+    auto at = answers_.upper_bound(turn_);
+    for (size_t n = 0; n < answers_.size(); ++n, ++at) {
+      if (at == answers_.end()) at = answers_.begin();
+      if (may_send(at->second)) return at;
+    }
+    return answers_.end();
+  }
+
+  Limits limits_;
+  std::map<std::string, Entry> answers_;  // by connection
+  std::string turn_;
+  uint64_t begun_ = 0;
+};
+
+}  // namespace telesplat::packer

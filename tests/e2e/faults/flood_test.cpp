@@ -1,0 +1,169 @@
+// Peers by the thousand, and floods: of messages that make sense, of rubbish, and of one that never ends.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+
+#include "common/core/clock.h"
+#include "common/net/socket.h"
+#include "tests/e2e/faults/fault.h"
+#include "tests/support/raw_peer.h"
+
+namespace telesplat::test {
+namespace {
+
+#ifdef TELESPLAT_LONG_FAULTS
+constexpr double kFlood_s = 10;
+#else
+constexpr double kFlood_s = 3;
+#endif
+
+// All sockets that are bound, by what they are called in a hello; "control" is the master's.
+std::map<std::string, std::string> endpoints_of(PipelineRun& run) {
+  std::map<std::string, std::string> out{{"control", run.master()}};
+  const auto status = run.status();
+  for (const auto& p : status["processes"])
+    if (p.contains("endpoints"))
+      for (const auto& [key, address] : p["endpoints"].items()) out[key] = address;
+  return out;
+}
+
+struct Figures {
+  std::map<std::string, pid_t> pids;
+  std::map<std::string, double> mb;
+  std::map<std::string, int> descriptors;
+};
+Figures figures_of(Fault& fault) {
+  Figures out;
+  for (const char* name : {"master", "packer", "data"}) {
+    const pid_t pid = out.pids[name] = fault.pid_of(name);
+    out.mb[name] = Fault::resident_mb(pid);
+    out.descriptors[name] = Fault::descriptors(pid);
+  }
+  return out;
+}
+void expect_as_before(Fault& fault, const Figures& before, double most_mb) {
+  for (const auto& [name, pid] : before.pids) {
+    EXPECT_EQ(fault.pid_of(name), pid) << name << " had to be started again";
+    EXPECT_LT(Fault::resident_mb(pid), before.mb.at(name) + most_mb) << name << ": MB";
+    EXPECT_TRUE(wait_until([&] { return Fault::descriptors(pid) <= before.descriptors.at(name) + 4; }, 20))
+        << name << " keeps " << Fault::descriptors(pid) << " descriptors, had " << before.descriptors.at(name);
+  }
+}
+
+TEST(Crowd, OfAThousandConnectionsComesAndGoes) {
+  Fault fault("1,000 connects and disconnects at each socket, hellos of 1,000 names");
+  ASSERT_TRUE(fault.showing());
+  const auto endpoints = endpoints_of(fault.run());
+  const Figures before = figures_of(fault);
+  fault.begins();
+  for (int i = 0; i < 1000; ++i)
+    for (const auto& [key, address] : endpoints) {
+      RawPeer peer(address);
+      EXPECT_TRUE(peer.connected()) << key;
+      const bool talks = i % 10 == 0 && key != "patches" && key != "tiles";
+      EXPECT_TRUE(!talks || peer.shake_hands("DEALER")) << key;
+    }
+  {
+    net::Context context;
+    for (int i = 0; i < 1000; ++i) {
+      net::Socket peer(context, net::Kind::kDealer, "guest", {.linger_ms = 0});
+      ASSERT_TRUE(peer.connect(fault.run().master()).ok());
+      wire::Hello hello{.role = "viewer", .name = fmt::format("guest-{}", i), .instance = net::make_instance_id()};
+      peer.send(hello);
+      if (i % 4 == 0) net::wait_readable({&peer}, 200);
+    }
+  }
+  fault.ends();
+  fault.expect_resynchronised();
+  expect_as_before(fault, before, 100);
+  // Whoever comes now is let in.
+  fault.start_guest();
+  fault.finish();
+}
+
+class Flood : public ::testing::TestWithParam<const char*> {
+ protected:
+  // As fast as they are taken.
+  static void valid(const std::map<std::string, std::string>& endpoints) {
+    net::Context context;
+    std::map<std::string, net::Socket> peers;
+    for (const auto& [key, address] : endpoints) {
+      if (key == "patches") continue;
+      auto [peer, made] = peers.try_emplace(key, context, key == "tiles" ? net::Kind::kPush : net::Kind::kDealer,
+                                            "flood", net::SocketOptions{.linger_ms = 0});
+      ASSERT_TRUE(peer->second.connect(address).ok());
+    }
+    const InstanceId own = net::make_instance_id();
+    peers.at("control").send(wire::Hello{.role = "sampler", .name = "flood", .instance = own});
+    uint64_t n = 0;
+    for (const double until = monotonic_s() + kFlood_s; monotonic_s() < until; ++n) {
+      peers.at("control").send(wire::LeaseExtend{own, LeaseId{1 + n % 1000}});
+      peers.at("control").send(wire::StatusReport{own, {{"tiles_sampled", double(n)}}});
+      peers.at("control").send(wire::Control{"status", {}});
+      peers.at("state").send(wire::StateRequest{own, {}, {}});
+      peers.at("state").send(wire::Receipt{own, {}, {}, double(n)});
+      if (const auto chunks = peers.find("chunks"); chunks != peers.end())
+        chunks->second.send(wire::ChunkRequest{EpochId{1}, ChunkId{n % 4}, {}});
+      for (auto& [key, peer] : peers)
+        while (key != "tiles" && peer.receive()) {
+        }
+    }
+  }
+  static void invalid(const std::map<std::string, std::string>& endpoints) {
+    std::mt19937 random(11);
+    net::Context context;
+    std::map<std::string, net::Socket> peers;
+    for (const auto& [key, address] : endpoints) {
+      if (key == "patches") continue;
+      auto [peer, made] = peers.try_emplace(key, context, key == "tiles" ? net::Kind::kPush : net::Kind::kDealer,
+                                            "flood", net::SocketOptions{.linger_ms = 0});
+      ASSERT_TRUE(peer->second.connect(address).ok());
+    }
+    const std::vector<std::string> types{"hello",      "status",        "view_request",  "lease_request",
+                                         "depth_tile", "state_request", "chunk_request", "no_such_type"};
+    for (const double until = monotonic_s() + kFlood_s; monotonic_s() < until;) {
+      std::string body(random() % 3000, '\0');
+      for (char& c : body) c = static_cast<char>(random());
+      for (auto& [key, peer] : peers) peer.send_frames({}, types[random() % types.size()], body);
+      RawPeer(std::next(endpoints.begin(), long(random() % endpoints.size()))->second).send(body);
+    }
+  }
+  // Parts of one message, each with the flag that says that more follow: at most 64 MB a socket.
+  static void endless(const std::map<std::string, std::string>& endpoints) {
+    const std::string part = zmtp_frame(std::string(65536, 'x'), true);
+    std::vector<std::unique_ptr<RawPeer>> peers;
+    for (const auto& [key, address] : endpoints) {
+      if (key == "patches") continue;
+      peers.push_back(std::make_unique<RawPeer>(address));
+      EXPECT_TRUE(peers.back()->shake_hands(key == "tiles" ? "PUSH" : "DEALER")) << key;
+    }
+    const double until = monotonic_s() + kFlood_s;
+    for (int i = 0; i < 1024 && monotonic_s() < until; ++i)
+      for (auto& peer : peers) peer->send(part);  // false: it has been hung up on, and rightly
+  }
+};
+
+TEST_P(Flood, IsSurvived) {
+  const std::string of = GetParam();
+  Fault fault(fmt::format("a flood of {} messages to every socket for {:.0f} s",
+                          of == "endless" ? "never-ending (multi-part)" : of, kFlood_s));
+  ASSERT_TRUE(fault.showing());
+  const auto endpoints = endpoints_of(fault.run());
+  const Figures before = figures_of(fault);
+  fault.begins();
+  if (of == "valid") valid(endpoints);
+  if (of == "invalid") invalid(endpoints);
+  if (of == "endless") endless(endpoints);
+  fault.ends();
+  fault.expect_resynchronised();
+  expect_as_before(fault, before, 300);
+  fault.finish();
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Flood, ::testing::Values("valid", "invalid", "endless"),
+                         [](const auto& info) { return std::string(info.param); });
+
+}  // namespace
+}  // namespace telesplat::test

@@ -1,0 +1,211 @@
+// Sessions with keys, in processes of their own: everybody who should comes in, nobody else does or can do anything.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <filesystem>
+#include <thread>
+
+#include "common/core/clock.h"
+#include "common/net/control.h"
+#include "tests/support/key_folder.h"
+#include "tests/support/pipeline_run.h"
+#include "tools/telesplat/control/client.h"
+
+namespace telesplat::test {
+namespace {
+
+using net::Role;
+
+constexpr double kRefused_s = 3;
+
+Result<std::string> ask(const std::string& master, const net::Access& access, const std::string& command) {
+  return net::ask_master(master, command, 5, {}, access);
+}
+
+TEST(KeysOfSessions, ARunWithKeysShowsAndEndsAsEver) {
+  const KeyFolder keys;
+  PipelineRun run({"--frames", "60", "--samplers", "2", "--keys", keys.path()});
+  EXPECT_EQ(run.program().wait(120), 0) << run.program().err();
+  const auto s = run.summary();
+  EXPECT_GT(s["updates"], 0) << s.dump(1);
+  EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+  EXPECT_EQ(s["errors"]["keys_refused"], 0);
+  EXPECT_TRUE(run.all_gone());
+}
+
+TEST(KeysOfSessions, ThrowAwayKeysGoWithTheRun) {
+  const TemporaryFolder runtime;
+  setenv("TELESPLAT_RUNTIME", runtime.path().c_str(), 1);
+  {
+    PipelineRun run({"--duration", "0", "--keys", "auto"});
+    ASSERT_TRUE(wait_until([&] { return run.program().err().find("session at tcp://") != std::string::npos; }));
+    // The session's file names them, so that the person who started it needs no flag.
+    Program status("telesplat", {"ctl", "status", "--json"}, runtime / "status");
+    EXPECT_EQ(status.wait(), 0) << status.err();
+    EXPECT_NE(status.out().find(runtime.path() + "/keys-"), std::string::npos) << status.out();
+    Program stop("telesplat", {"ctl", "stop"}, runtime / "stop");
+    EXPECT_EQ(stop.wait(), 0) << stop.err();
+    run.program().wait(60);
+  }
+  unsetenv("TELESPLAT_RUNTIME");
+  for (const auto& left : std::filesystem::directory_iterator(runtime.path()))
+    EXPECT_FALSE(left.path().filename().string().starts_with("keys-")) << left.path();
+}
+
+TEST(KeysOfSessions, AViewersKeyCanLookAndNothingElse) {
+  const KeyFolder keys;
+  ASSERT_TRUE(keys.maker().add_person("anna", Role::kViewer).ok());
+  PipelineRun run({"--duration", "0", "--keys", keys.path()});
+  const std::string master = run.master();
+  const net::Access anna = keys.named("anna"), operators = keys.of(Role::kOperator);
+  ASSERT_TRUE(wait_until([&] {
+    const auto status = ask(master, anna, "status");
+    return status && value(nlohmann::json::parse(*status), "viewer-1", "points") > 0;
+  })) << run.program().err();
+  for (const char* command : {"stop", "set", "animate", "tf", "colour", "clip", "play", "epoch", "coupling"}) {
+    const auto answer = ask(master, anna, command);
+    ASSERT_FALSE(answer.ok()) << command;
+    EXPECT_EQ(answer.error().text, std::string("refused: ") + command +
+                                       " changes the session for everyone, which needs an operator's key, and the key "
+                                       "anna is a viewer's");
+  }
+  // Nor does it lease tiles, in its own name or another's, or count as anything but a viewer.
+  net::Context context(anna);
+  net::Socket peer(context, net::Kind::kDealer, "anna", net::kControlSocket);
+  ASSERT_TRUE(peer.connect(master).ok());
+  wire::Hello hello;
+  hello.role = "sampler";
+  hello.name = "sampler-1";
+  hello.instance = {4711};
+  peer.send(hello);
+  peer.send(wire::LeaseRequest{{4711}});
+  peer.send(wire::Shutdown{"now"});
+  std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  EXPECT_FALSE(peer.receive()) << "neither welcome nor lease";
+  const auto now = nlohmann::json::parse(*ask(master, anna, "status"));
+  EXPECT_GE(now["messages_rejected"], 12);
+  EXPECT_FALSE(process(now, "sampler-1").is_null()) << "the sampler of that name is still there";
+  EXPECT_TRUE(wait_until([&] {
+    const auto later = ask(master, anna, "status");
+    return later && value(nlohmann::json::parse(*later), "viewer-1", "updates") > value(now, "viewer-1", "updates");
+  })) << "the session goes on";
+  EXPECT_TRUE(ask(master, operators, "stop").ok());
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+}
+
+TEST(KeysOfSessions, StrangersAreRefusedAtOnceAndCostNothing) {
+  const KeyFolder keys, others;
+  PipelineRun run({"--duration", "0", "--keys", keys.path()});
+  const std::string master = run.master();
+  const net::Access operators = keys.of(Role::kOperator);
+  const auto status = [&] {
+    const auto text = ask(master, operators, "status");
+    return text ? nlohmann::json::parse(*text) : nlohmann::json();
+  };
+  ASSERT_TRUE(wait_until([&] { return value(status(), "viewer-1", "points") > 0; })) << run.program().err();
+  // Without keys, and with others: an error in time, and no hang.
+  const TemporaryFolder folder;
+  for (const std::vector<std::string>& flags : {std::vector<std::string>{}, {"--keys", others.path()}}) {
+    std::vector<std::string> arguments{"ctl", "stop", "--master", master};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    const double begin_s = monotonic_s();
+    Program stranger("telesplat", arguments, folder / "stranger");
+    EXPECT_EQ(stranger.wait(20), 1);
+    EXPECT_LT(monotonic_s() - begin_s, kRefused_s);
+    EXPECT_NE(stranger.err().find("refuses: it "), std::string::npos) << stranger.err();
+    EXPECT_EQ(std::ranges::count(stranger.err(), '\n'), 1) << stranger.err();
+  }
+  {
+    Program sampler("telesplat-sampler", {"--master", master}, folder / "sampler");
+    EXPECT_EQ(sampler.wait(20), 2) << sampler.err();
+    EXPECT_NE(sampler.err().find("it wants a key (--keys DIR)"), std::string::npos) << sampler.err();
+  }
+  const auto before = status();
+  std::vector<std::string> endpoints{master};
+  for (const auto& p : before["processes"])
+    if (p.contains("endpoints"))
+      for (const auto& [key, address] : p["endpoints"].items()) endpoints.push_back(address);
+  const int kStrangers = 200;
+  {
+    net::Context with(others.of(Role::kOperator)), without;
+    std::deque<net::Socket> strangers;
+    for (int i = 0; i < kStrangers; ++i) {
+      strangers.emplace_back(i % 2 ? with : without, net::Kind::kDealer, "stranger",
+                             net::SocketOptions{.linger_ms = 0});
+      ASSERT_TRUE(strangers.back().connect(endpoints[size_t(i) % endpoints.size()]).ok());
+      strangers.back().send_frames({}, "control", "let me in");
+    }
+    EXPECT_TRUE(wait_until([&] { return status()["keys_refused"] >= kStrangers / int(endpoints.size()) - 1; }));
+  }
+  const auto now = status();
+  EXPECT_EQ(now["messages_rejected"], before["messages_rejected"]);
+  EXPECT_TRUE(wait_until([&] {
+    const auto s = status();
+    return value(s, "viewer-1", "frames") > value(now, "viewer-1", "frames") &&
+           value(s, "viewer-1", "updates") > value(now, "viewer-1", "updates");
+  }));
+  EXPECT_TRUE(ask(master, operators, "stop").ok());
+  EXPECT_EQ(run.program().wait(60), 0) << run.program().err();
+  EXPECT_EQ(run.program().err().find("died"), std::string::npos) << run.program().err();
+  EXPECT_GE(run.summary()["errors"]["keys_refused"], kStrangers / 2);
+  EXPECT_EQ(run.summary()["errors"]["messages_rejected"], 0);
+}
+
+TEST(KeysOfSessions, BadFoldersAreRefusedInALine) {
+  const KeyFolder keys;
+  const TemporaryFolder folder;
+  std::filesystem::permissions(keys.path() + "/sampler.key", std::filesystem::perms(0644));
+  for (const auto& [program, arguments, why] :
+       std::vector<std::tuple<std::string, std::vector<std::string>, std::string>>{
+           {"telesplat-sampler", {"--keys", keys.path()}, "others may read this secret key"},
+           {"telesplat-sampler", {"--keys", folder / "none"}, "cannot be opened as a folder of keys"},
+           {"telesplat-master", {"--keys", folder.path(), "--bind", "tcp://127.0.0.1:*"}, "server.key: cannot be read"},
+           {"telesplat", {"run", "julia", "--keys", folder.path(), "--out", folder / "run"}, "server.pub"},
+           {"telesplat", {"ctl", "status", "--master", "tcp://127.0.0.1:9", "--keys", folder.path()}, "server.pub"},
+           {"telesplat-health", {"--keys", folder.path()}, "server.pub"}}) {
+    Program p(program, arguments, folder / "program");
+    EXPECT_EQ(p.wait(20), 2) << program << ": " << p.err();
+    EXPECT_NE(p.err().find(why), std::string::npos) << program << ": " << p.err();
+    EXPECT_EQ(std::ranges::count(p.err(), '\n'), 1) << program << ": " << p.err();
+  }
+}
+
+TEST(KeysCommand, MakesListsHandsOutAndRevokes) {
+  const TemporaryFolder folder;
+  const std::string keys = folder / "keys";
+  const auto run = [&](std::vector<std::string> arguments, int code) {
+    arguments.insert(arguments.begin(), "keys");
+    Program p("telesplat", arguments, folder / "keys-command");
+    EXPECT_EQ(p.wait(20), code) << p.out() << p.err();
+    if (code != 0) {
+      EXPECT_EQ(std::ranges::count(p.err(), '\n'), 1) << p.err();
+    }
+    return p.out() + p.err();
+  };
+  EXPECT_NE(run({keys, "--list"}, 2).find("holds no keys"), std::string::npos);
+  const std::string made = run({keys}, 0);
+  EXPECT_NE(made.find("made keys of server, data, packer, sampler, viewer, operator"), std::string::npos) << made;
+  EXPECT_NE(made.find("server.pub sampler.key"), std::string::npos) << made;
+  EXPECT_EQ(run({keys}, 0).find("made keys"), std::string::npos) << "a second time nothing is made";
+  run({keys, "--person", "anna"}, 0);
+  run({keys, "--person", "anna", "--role", "operator"}, 2);
+  run({keys, "--person", "ben", "--role", "king"}, 2);
+  EXPECT_NE(run({keys, "--list"}, 0).find("anna"), std::string::npos);
+  run({keys, "--bundle", "anna", folder / "laptop"}, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder / "laptop/anna.key"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "laptop/server.pub"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "laptop/server.key"));
+  run({keys, "--bundle", "anna", folder / "laptop"}, 2);
+  run({keys, "--bundle", "nobody", folder / "other"}, 2);
+  run({keys, "--bundle", "anna"}, 2);
+  run({keys, "--revoke", "anna"}, 0);
+  EXPECT_EQ(run({keys, "--list"}, 0).find("anna"), std::string::npos);
+  run({keys, "--revoke", "anna"}, 2);
+  run({keys, "--revoke", "server"}, 2);
+  run({keys, "--person", "ben", "--revoke", "sampler"}, 2);
+}
+
+}  // namespace
+}  // namespace telesplat::test

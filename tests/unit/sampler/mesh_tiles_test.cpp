@@ -1,0 +1,151 @@
+// A mesh's chunks between data server and sampler: each is asked for until it is there, and no more often.
+#include "services/sampler/mesh/tiles.h"
+
+#include <gtest/gtest.h>
+
+#include "common/core/clock.h"
+#include "common/net/dispatch.h"
+
+namespace telesplat::sampler {
+namespace {
+
+constexpr double kDeadline_s = 20;
+constexpr std::byte kBad{0xff};  // the first byte of what is no chunk
+
+// Takes chunks of any bytes but some.
+class Taker final : public Sampler {
+ public:
+  explicit Taker(std::map<ChunkId, int>& taken) : taken_(taken) {}
+  const char* name() const override { return "taker"; }
+  Status add_chunk(ChunkId id, geometry::ChunkBytes chunk) override {
+    if (chunk.bytes.empty() || chunk.bytes[0] == kBad) return Error{"is no chunk"};
+    ++taken_[id];
+    return ok_status();
+  }
+  Status add_chunks(std::vector<std::pair<ChunkId, geometry::ChunkBytes>> chunks) override {
+    Status out = ok_status();
+    for (auto& [id, bytes] : chunks)
+      if (Status s = add_chunk(id, bytes); !s) out = s;
+    return out;
+  }
+  void remove_chunk(ChunkId id) override { taken_.erase(id); }
+  void set_colours(std::shared_ptr<const scene::ColourTable>) override {}
+  void set_clip(const geometry::Clip&) override {}
+  image::DepthImage sample(const geometry::Camera&, const geometry::Rect& tile, const image::PixelMask*) override {
+    return {tile.width, tile.height};
+  }
+
+ private:
+  std::map<ChunkId, int>& taken_;
+};
+
+net::MasterLink make_link(net::Context& context) {
+  const wire::Hello nobody;
+  return net::MasterLink(context, "inproc://nobody", nobody);
+}
+
+class MeshTilesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto bound = data.bind("tcp://127.0.0.1:*");
+    ASSERT_TRUE(bound);
+    wire::Welcome w;
+    w.master = {1}, w.epoch = {1};
+    w.endpoints["chunks"] = *bound;
+    w.facts["content_hash"] = "1";
+    tiles.on_welcome(w);
+  }
+  // Lets messages travel until `done`. Times are those of `now`, which stands still.
+  bool until(const auto& done) {
+    for (const double deadline = monotonic_s() + kDeadline_s; monotonic_s() < deadline;) {
+      tiles.fetch(nullptr, now);
+      while (const auto message = data.receive())
+        net::dispatch<wire::ChunkListRequest, wire::ChunkRequest>(data, *message, [&](const auto& request) {
+          peer = message->peer;
+          if constexpr (std::is_same_v<std::decay_t<decltype(request)>, wire::ChunkRequest>)
+            asked.push_back(request.chunk.value);
+          else
+            ++lists_asked;
+        });
+      if (done()) return true;
+      std::vector<net::Socket*> sockets = tiles.sockets();
+      sockets.push_back(&data);
+      net::wait_readable(sockets, 5);
+      tiles.receive();
+    }
+    return false;
+  }
+  void give_list(size_t chunks, uint64_t bytes) {
+    ASSERT_TRUE(until([&] { return lists_asked > 0; }));
+    wire::ChunkList list{EpochId{1}, {}};
+    for (size_t i = 0; i < chunks; ++i) list.chunks.push_back({ChunkId{i}, {{0, 0, 0}, {1, 1, 1}}, 10, bytes});
+    data.send(list, peer);
+  }
+  void give(uint64_t id, std::byte first, size_t size = 100) {
+    std::vector<std::byte> bytes(size, std::byte{1});
+    if (size > 0) bytes[0] = first;
+    data.send(wire::Chunk{EpochId{1}, ChunkId{id}, bytes}, peer);
+  }
+
+  net::Context context;
+  net::Socket data{context, net::Kind::kRouter, "data"};
+  net::MasterLink link = make_link(context);
+  metrics::SpanRecorder spans;
+  std::map<ChunkId, int> taken;
+  MeshTiles tiles{std::make_unique<Taker>(taken), 1 << 30, "sampler", context, link, spans};
+  std::string peer;
+  int lists_asked = 0;
+  std::vector<uint64_t> asked;
+  double now = monotonic_s();
+};
+
+TEST_F(MeshTilesTest, ARefusedChunkIsAskedForAgain) {
+  give_list(2, 100);
+  ASSERT_TRUE(until([&] { return asked.size() == 2; }));
+  give(0, std::byte{1});
+  give(1, kBad);
+  ASSERT_TRUE(until([&] { return asked.size() == 3; }));
+  EXPECT_EQ(asked.back(), 1u);
+  EXPECT_EQ(taken.size(), 1u) << "the other one is there";
+  give(1, std::byte{1});
+  ASSERT_TRUE(until([&] { return taken.size() == 2; }));
+}
+
+TEST_F(MeshTilesTest, AChunkThatIsNoneInTheEndIsAHole) {
+  give_list(2, 100);
+  ASSERT_TRUE(until([&] { return asked.size() == 2; }));
+  give(0, std::byte{1});
+  for (size_t n = 0; n < ChunkCache::kTries; ++n) {
+    ASSERT_TRUE(until([&] { return asked.size() == 2 + n; })) << n;
+    EXPECT_EQ(asked.back(), 1u);
+    give(1, kBad, n == 1 ? 0 : 100);  // also: there is no such chunk
+  }
+  net::MasterLink::Values values;
+  ASSERT_TRUE(until([&] {
+    values.clear();
+    tiles.add_status(values);
+    return values.at("chunks_lacking") == 1;
+  }));
+  EXPECT_EQ(values.at("chunks_refused"), ChunkCache::kTries);
+  EXPECT_EQ(asked.size(), 4u) << "no more than that";
+}
+
+// What is asked for twice comes twice, and a slow link becomes slower.
+TEST_F(MeshTilesTest, SlowChunksAreAskedForOnceAndFewAtATime) {
+  give_list(40, 3 << 20);
+  ASSERT_TRUE(until([&] { return asked.size() >= 2; }));
+  for (int n = 0; n < 20; ++n) {
+    now += 0.5;
+    tiles.fetch(nullptr, now);
+  }
+  net::wait_readable({&data}, 100);
+  ASSERT_TRUE(until([&] { return true; }));
+  EXPECT_EQ(asked, (std::vector<uint64_t>{0, 1})) << "8 MB of chunks of 3 MB";
+  // Silence is no slow link.
+  now += RetryClock::kFirst_s;
+  ASSERT_TRUE(until([&] { return asked.size() >= 4; }));
+  EXPECT_EQ(asked[2], 0u);
+}
+
+}  // namespace
+}  // namespace telesplat::sampler
