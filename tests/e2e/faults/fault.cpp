@@ -234,7 +234,7 @@ void Fault::measure() {
 
 // record_s: the record's zero.
 void Fault::measure_rate(double record_s) {
-  constexpr double kLeast_s = 1.5;
+  constexpr double kLeast_s = 0.5;
   if (!shown_s_ || !begin_s_ || *begin_s_ - *shown_s_ < kLeast_s || *end_s_ - *begin_s_ < kLeast_s) return;
   int before = 0, during = 0;
   for (const auto& [at_s, ms] : rows_of(run_->out() + "/frames.csv", "viewer-1", "begin_s", "inter_frame_ms")) {

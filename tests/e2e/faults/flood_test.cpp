@@ -8,6 +8,7 @@
 #include "common/core/clock.h"
 #include "common/net/socket.h"
 #include "tests/e2e/faults/fault.h"
+#include "tests/support/key_folder.h"
 #include "tests/support/raw_peer.h"
 
 namespace telesplat::test {
@@ -87,6 +88,42 @@ TEST(Crowd, OfAThousandConnectionsComesAndGoes) {
   expect_as_before(fault, before, 100);
   // Whoever comes now is let in.
   fault.start_guest();
+  fault.finish();
+}
+
+// Without keys, with the keys of others, and without a word.
+TEST(Crowd, OfAThousandStrangersAtASessionWithKeysComesAndGoes) {
+  const KeyFolder keys, others;
+  std::vector<std::string> arguments = kDisplay;
+  arguments.insert(arguments.end(), {"--keys", keys.path()});
+  Fault fault("1,000 strangers at a session with keys: without keys, and with those of others", arguments);
+  fault.run().use_keys(keys.path(), keys.of(net::Role::kOperator));
+  ASSERT_TRUE(fault.showing());
+  const auto endpoints = endpoints_of(fault.run());
+  const Figures before = figures_of(fault);
+  const double refused = fault.run().status().value("keys_refused", 0.0);
+  pass(kUndisturbed_s);
+  fault.expect_rate(kLeastRate);
+  fault.begins();
+  {
+    net::Context with_others(others.of(net::Role::kViewer));
+    std::vector<std::unique_ptr<net::Socket>> strangers;
+    for (int i = 0; i < 1000; ++i)
+      for (const auto& [key, address] : endpoints) {
+        RawPeer peer(address);
+        EXPECT_TRUE(peer.connected()) << key;
+        if (i % 10 == 0) peer.shake_hands("DEALER");
+        if (i % 10 != 5) continue;
+        strangers.push_back(std::make_unique<net::Socket>(with_others, net::Kind::kDealer, "stranger",
+                                                          net::SocketOptions{.linger_ms = 0}));
+        ASSERT_TRUE(strangers.back()->connect(address).ok());
+        strangers.back()->send(wire::Hello{.role = "viewer", .name = "stranger", .instance = net::make_instance_id()});
+      }
+    EXPECT_TRUE(fault.run().wait_status([&](const auto& s) { return s["keys_refused"] >= refused + 100; }));
+  }
+  fault.ends();
+  fault.expect_resynchronised();
+  expect_as_before(fault, before, 100);
   fault.finish();
 }
 
