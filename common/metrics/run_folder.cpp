@@ -152,7 +152,7 @@ Status set_aside(const std::string& directory, const Found& found) {
   if (fs::is_symlink(fs::symlink_status(aside, error))) return Error{aside + ": is a symbolic link; remove it"};
   forget_replaced(directory);
   if (const Status s = move_record(directory, aside, found); !s) {
-    move_record(aside, directory, look_into(aside, Logs::kOurs));
+    (void)move_record(aside, directory, look_into(aside, Logs::kOurs));
     return s;
   }
   return ok_status();

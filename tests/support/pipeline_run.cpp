@@ -171,16 +171,8 @@ PipelineRun::PipelineRun(const std::vector<std::string>& arguments, const std::s
     : out_(folder_ / "run") {
   const std::string terrain = mesh.empty() ? folder_ / "terrain.ply" : mesh;
   if (mesh.empty()) write_terrain(terrain);
-  std::vector<std::string> a{command,
-                             terrain,
-                             "--out",
-                             out_,
-                             "--sampling-size",
-                             "320x200",
-                             "--tile-size",
-                             "64",
-                             "--sampler-threads",
-                             "1"};
+  std::vector<std::string> a{
+      command, terrain, "--out", out_, "--sampling-size", "320x200", "--tile-size", "64", "--sampler-threads", "1"};
   // The screens of a wall that a file describes have their own sizes.
   const auto described = [](const std::string& word) { return word.ends_with(".toml"); };
   if (std::none_of(arguments.begin(), arguments.end(), described)) a.insert(a.end(), {"--size", "480x300"});
@@ -215,9 +207,14 @@ const std::string& PipelineRun::master() {
   return master_;
 }
 
+void PipelineRun::use_keys(const std::string& keys, net::Access operators) {
+  keys_ = keys;
+  access_ = std::move(operators);
+}
+
 nlohmann::json PipelineRun::status() {
   if (master().empty()) return {};
-  if (!control_) control_ = std::make_unique<launcher::ControlClient>(master());
+  if (!control_) control_ = std::make_unique<launcher::ControlClient>(master(), access_);
   const auto answer = control_->ask("status", 2);
   return answer ? nlohmann::json::parse(*answer, nullptr, false) : nlohmann::json();
 }
@@ -237,7 +234,9 @@ bool PipelineRun::wait_showing() {
 }
 
 int PipelineRun::stop() {
-  Program command("telesplat", {"ctl", "stop", "--master", master()}, folder_ / "stop");
+  std::vector<std::string> arguments{"ctl", "stop", "--master", master()};
+  if (!keys_.empty()) arguments.insert(arguments.end(), {"--keys", keys_});
+  Program command("telesplat", arguments, folder_ / "stop");
   return command.wait() == 0 ? program_->wait(60) : -1;
 }
 

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "common/net/keys/access.h"
+
 namespace telesplat::launcher {
 class ControlClient;
 }
@@ -77,6 +79,8 @@ class PipelineRun {
   Program& program() { return *program_; }
   const std::string& out() const { return out_; }
   const TemporaryFolder& folder() const { return folder_; }
+  /// The session has keys: status() and stop() take these. keys: their folder.
+  void use_keys(const std::string& keys, net::Access operators);
   /// The master's address; waits for it.
   const std::string& master();
   /// `telesplat ctl status`; empty if there is no answer.
@@ -96,7 +100,8 @@ class PipelineRun {
 
  private:
   TemporaryFolder folder_;
-  std::string out_, master_;
+  std::string out_, master_, keys_;
+  net::Access access_;
   std::unique_ptr<Program> program_;
   std::unique_ptr<launcher::ControlClient> control_;
 };

@@ -48,10 +48,11 @@ std::vector<std::pair<double, double>> rows_of(const std::string& file, const st
 
 }  // namespace
 
-FaultBounds fault_bounds() {
-  const char* strict = std::getenv("TELESPLAT_FAULTS");
-  return strict && std::string_view(strict) == "strict" ? FaultBounds{500, 3} : FaultBounds{2000, 12};
+static bool is_strict() {
+  const char* set = std::getenv("TELESPLAT_FAULTS");
+  return set && std::string_view(set) == "strict";
 }
+FaultBounds fault_bounds() { return is_strict() ? FaultBounds{500, 3} : FaultBounds{2000, 12}; }
 
 void pass(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
@@ -71,6 +72,7 @@ bool Fault::showing() {
   };
   const bool shown = run_->wait_status(shows, 60);
   EXPECT_TRUE(shown) << run_->program().err();
+  shown_s_ = monotonic_s();
   return shown;
 }
 
@@ -127,16 +129,16 @@ pid_t Fault::signal(const std::string& name, int number) {
 
 bool Fault::stop_with_a_lease(const std::string& sampler) {
   const pid_t pid = pid_of(sampler);
-  for (int attempt = 0; attempt < 10 && pid > 0; ++attempt) {
+  for (int attempt = 0; attempt < 25 && pid > 0; ++attempt) {
     ::kill(pid, SIGSTOP);
     pass(0.5);  // what it had finished is known to be done
     const auto holds = [&](const auto& s) {
       const auto p = process(s, sampler);
       return p.is_object() && p["leases"] > 0;
     };
-    if (run_->wait_status(holds, 2)) return true;
+    if (run_->wait_status(holds, 1)) return true;
     ::kill(pid, SIGCONT);
-    pass(0.1 + 0.037 * attempt);
+    pass(0.1 + 0.037 * (attempt % 10));
   }
   ADD_FAILURE() << sampler << " never held a lease";
   return false;
@@ -217,6 +219,7 @@ void Fault::measure() {
     ::testing::Test::RecordProperty("gap_ms", fmt::format("{:.0f}", gap_ms));
   }
   if (!end_s_) return;
+  if (begin.is_number()) measure_rate(begin.get<double>());
   if (begin.is_number())
     for (const auto& [asked_s, done_s] : rows_of(run_->out() + "/updates.csv", "viewer-1", "requested_s", "complete_s"))
       if (asked_s + begin.get<double>() > *end_s_) {
@@ -227,6 +230,21 @@ void Fault::measure() {
   if (!resync_s_) return;
   EXPECT_LT(*resync_s_, bounds.resync_s) << "new views were displayed too late";
   ::testing::Test::RecordProperty("resync_s", fmt::format("{:.2f}", *resync_s_));
+}
+
+// record_s: the record's zero.
+void Fault::measure_rate(double record_s) {
+  constexpr double kLeast_s = 0.5;
+  if (!shown_s_ || !begin_s_ || *begin_s_ - *shown_s_ < kLeast_s || *end_s_ - *begin_s_ < kLeast_s) return;
+  int before = 0, during = 0;
+  for (const auto& [at_s, ms] : rows_of(run_->out() + "/frames.csv", "viewer-1", "begin_s", "inter_frame_ms")) {
+    const double t = at_s + record_s;
+    before += t >= *shown_s_ && t < *begin_s_;
+    during += t >= *begin_s_ && t < *end_s_;
+  }
+  const double before_fps = before / (*begin_s_ - *shown_s_), during_fps = during / (*end_s_ - *begin_s_);
+  ::testing::Test::RecordProperty("fps", fmt::format("{:.1f}, {:.1f}", before_fps, during_fps));
+  if (is_strict()) EXPECT_GE(during_fps, least_rate_ * before_fps) << "frames a second";
 }
 
 OwnRelay::OwnRelay(Fault& fault, const std::string& link, const std::string& at)

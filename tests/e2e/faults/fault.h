@@ -54,6 +54,9 @@ class Fault {
   void expect_resynchronised(const std::string& viewer = "viewer-1");
   /// The same without the digest: whoever waits for updates of the display is content.
   void expect_updates(const std::string& viewer = "viewer-1");
+  /// Between begins() and ends() the display shows at least this share of the frames a second that it showed before.
+  /// Asked for on quiet machines only (TELESPLAT_FAULTS=strict).
+  void expect_rate(double share) { least_rate_ = share; }
   /// Ends the session, and expects of it an exit code, a display that never stood still since begins(), and that no
   /// process is left behind.
   void finish(int exit_code = 0);
@@ -68,12 +71,14 @@ class Fault {
  private:
   double value_of(const std::string& viewer, const std::string& key);
   void measure();
+  void measure_rate(double record_s);
 
   std::string what_;
   std::unique_ptr<PipelineRun> run_;
   std::unique_ptr<Program> guest_;
   int guests_ = 0;
-  std::optional<double> begin_s_, end_s_;  // monotonic
+  std::optional<double> shown_s_, begin_s_, end_s_;  // monotonic
+  double least_rate_ = 0;
   double gap_before_ms_ = 0, gap_after_ms_ = 0;
   std::optional<double> resync_s_;
 };

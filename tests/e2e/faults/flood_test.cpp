@@ -8,6 +8,7 @@
 #include "common/core/clock.h"
 #include "common/net/socket.h"
 #include "tests/e2e/faults/fault.h"
+#include "tests/support/key_folder.h"
 #include "tests/support/raw_peer.h"
 
 namespace telesplat::test {
@@ -28,6 +29,11 @@ std::map<std::string, std::string> endpoints_of(PipelineRun& run) {
       for (const auto& [key, address] : p["endpoints"].items()) out[key] = address;
   return out;
 }
+
+// Displays like those that people use, and what strangers may cost of their frames a second.
+const std::vector<std::string> kDisplay{"--size", "1280x800", "--target-fps", "60"};
+constexpr double kLeastRate = 0.9;
+constexpr double kUndisturbed_s = 3;
 
 struct Figures {
   std::map<std::string, pid_t> pids;
@@ -53,10 +59,12 @@ void expect_as_before(Fault& fault, const Figures& before, double most_mb) {
 }
 
 TEST(Crowd, OfAThousandConnectionsComesAndGoes) {
-  Fault fault("1,000 connects and disconnects at each socket, hellos of 1,000 names");
+  Fault fault("1,000 connects and disconnects at each socket, hellos of 1,000 names", kDisplay);
   ASSERT_TRUE(fault.showing());
   const auto endpoints = endpoints_of(fault.run());
   const Figures before = figures_of(fault);
+  pass(kUndisturbed_s);
+  fault.expect_rate(kLeastRate);
   fault.begins();
   for (int i = 0; i < 1000; ++i)
     for (const auto& [key, address] : endpoints) {
@@ -80,6 +88,42 @@ TEST(Crowd, OfAThousandConnectionsComesAndGoes) {
   expect_as_before(fault, before, 100);
   // Whoever comes now is let in.
   fault.start_guest();
+  fault.finish();
+}
+
+// Without keys, with the keys of others, and without a word.
+TEST(Crowd, OfAThousandStrangersAtASessionWithKeysComesAndGoes) {
+  const KeyFolder keys, others;
+  std::vector<std::string> arguments = kDisplay;
+  arguments.insert(arguments.end(), {"--keys", keys.path()});
+  Fault fault("1,000 strangers at a session with keys: without keys, and with those of others", arguments);
+  fault.run().use_keys(keys.path(), keys.of(net::Role::kOperator));
+  ASSERT_TRUE(fault.showing());
+  const auto endpoints = endpoints_of(fault.run());
+  const Figures before = figures_of(fault);
+  const double refused = fault.run().status().value("keys_refused", 0.0);
+  pass(kUndisturbed_s);
+  fault.expect_rate(kLeastRate);
+  fault.begins();
+  {
+    net::Context with_others(others.of(net::Role::kViewer));
+    std::vector<std::unique_ptr<net::Socket>> strangers;
+    for (int i = 0; i < 1000; ++i)
+      for (const auto& [key, address] : endpoints) {
+        RawPeer peer(address);
+        EXPECT_TRUE(peer.connected()) << key;
+        if (i % 10 == 0) peer.shake_hands("DEALER");
+        if (i % 10 != 5) continue;
+        strangers.push_back(std::make_unique<net::Socket>(with_others, net::Kind::kDealer, "stranger",
+                                                          net::SocketOptions{.linger_ms = 0}));
+        ASSERT_TRUE(strangers.back()->connect(address).ok());
+        strangers.back()->send(wire::Hello{.role = "viewer", .name = "stranger", .instance = net::make_instance_id()});
+      }
+    EXPECT_TRUE(fault.run().wait_status([&](const auto& s) { return s["keys_refused"] >= refused + 100; }));
+  }
+  fault.ends();
+  fault.expect_resynchronised();
+  expect_as_before(fault, before, 100);
   fault.finish();
 }
 
@@ -148,10 +192,13 @@ class Flood : public ::testing::TestWithParam<const char*> {
 TEST_P(Flood, IsSurvived) {
   const std::string of = GetParam();
   Fault fault(fmt::format("a flood of {} messages to every socket for {:.0f} s",
-                          of == "endless" ? "never-ending (multi-part)" : of, kFlood_s));
+                          of == "endless" ? "never-ending (multi-part)" : of, kFlood_s),
+              kDisplay);
   ASSERT_TRUE(fault.showing());
   const auto endpoints = endpoints_of(fault.run());
   const Figures before = figures_of(fault);
+  pass(kUndisturbed_s);
+  fault.expect_rate(kLeastRate);
   fault.begins();
   if (of == "valid") valid(endpoints);
   if (of == "invalid") invalid(endpoints);

@@ -53,6 +53,8 @@ TEST(AnotherMaster, TilesOfTheOneBeforeThatComeLateDoNoHarm) {
               {"--samplers", "2"});
   ASSERT_TRUE(fault.showing());
   const pid_t late = fault.pid_of("sampler-2"), master = fault.pid_of("master");
+  // The other one would soon sample for it what it has leased.
+  const pid_t other = fault.signal("sampler-1", SIGSTOP);
   ASSERT_TRUE(fault.stop_with_a_lease("sampler-2"));
   const double frames_before = fault.run().status().value("frames_completed", 0.0);
   fault.begins();
@@ -60,6 +62,7 @@ TEST(AnotherMaster, TilesOfTheOneBeforeThatComeLateDoNoHarm) {
   ASSERT_TRUE(fault.wait_new_life("master", master)) << fault.run().program().err();
   ASSERT_TRUE(fault.run().wait_status([](const auto& s) { return process(s, "packer").is_object(); }));
   ::kill(late, SIGCONT);
+  ::kill(other, SIGCONT);
   fault.ends();
   fault.expect_resynchronised();
   // On and on, past the frames that were under way.
