@@ -86,7 +86,8 @@ struct StateMark {
 
 // ---- state: viewer (DEALER) <-> packer (ROUTER) --------------------------------------------------------------------
 
-/// Bring me up to date. after = newest sequence applied, of that packer instance; 0: everything.
+/// Bring me up to date. after = newest sequence applied, of that packer instance; 0: everything. packer = 0: none is
+/// followed yet; one that nobody is: what came over this connection was thrown away.
 struct StateRequest {
   static constexpr std::string_view kName = "state_request";
   InstanceId viewer;

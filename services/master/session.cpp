@@ -38,7 +38,7 @@ Status MasterCore::adopt_scene(const std::string& peer, const wire::Hello& data,
   const bool other_plan = plan_ != &plan;
   if (other_plan) {
     plan_->put_aside();
-    plan.views().take_views(plan_->views().release_views());
+    plan.views().take_over(plan_->views());
     plan_ = &plan;
   }
   std::string problem;

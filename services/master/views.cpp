@@ -25,9 +25,10 @@ void Views::forget_viewer(InstanceId viewer) {
       f.left.push_back(viewer);
 }
 
-ViewQueue Views::release_views() {
-  CHECK(in_flight_.empty());
-  return std::exchange(waiting_, {});
+void Views::take_over(Views& from) {
+  CHECK(from.in_flight_.empty());
+  waiting_ = std::exchange(from.waiting_, {});
+  next_frame_ = from.next_frame_, next_lease_ = from.next_lease_;
 }
 
 FrameId Views::next_frame() { return std::exchange(next_frame_, next_frame_.next()); }

@@ -52,9 +52,9 @@ class Views {
   size_t views_in_flight() const { return in_flight_.size(); }
   uint64_t frames_completed() const { return completed_; }  ///< of whole views
 
-  /// What waits, to go on elsewhere: another plan leads the session. Precondition: no view is in flight.
-  ViewQueue release_views();
-  void take_views(ViewQueue views) { waiting_ = std::move(views); }
+  /// Another plan leads the session from now on: what waits there goes on here, and frames and leases are numbered
+  /// on. Precondition: no view is in flight there.
+  void take_over(Views& from);
 
  protected:
   explicit Views(const ScheduleOptions& options) : options_(options) {}

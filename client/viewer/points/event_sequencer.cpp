@@ -1,5 +1,7 @@
 #include "client/viewer/points/event_sequencer.h"
 
+#include "common/net/socket.h"
+
 namespace telesplat::viewer {
 namespace {
 // More than this is not kept while an answer is awaited; the gap that dropping leaves is asked for afterwards.
@@ -16,6 +18,13 @@ size_t ModelEvent::bytes() const {
 void EventSequencer::start() {
   packer_.reset();
   ask();
+}
+
+// Who names a packer that nobody is follows none of what the packer may still hold to be under way.
+void EventSequencer::start_anew() {
+  packer_.reset();
+  waiting_ = true;
+  callbacks_.request_state(net::make_instance_id(), {});
 }
 
 void EventSequencer::ask() {

@@ -31,6 +31,7 @@ class EventSequencer {
   struct Callbacks {
     std::function<void(const ModelEvent&)> apply;  ///< the next event of the current packer
     std::function<void()> begin_replica;           ///< a packer we have nothing of: start from nothing
+    /// wire::StateRequest.
     std::function<void(InstanceId packer, Sequence after)> request_state;
   };
   explicit EventSequencer(Callbacks callbacks) : callbacks_(std::move(callbacks)) {}
@@ -38,6 +39,8 @@ class EventSequencer {
   /// Forgets which packer was followed. Asks the one that is there for everything: at the start, or when its endpoint
   /// changes.
   void start();
+  /// What came is thrown away: everything again, over the same connection.
+  void start_anew();
   /// An event from the publisher.
   void on_published(ModelEvent event);
   /// An event that answers request_state; they come in order and may skip what has been forgotten since.

@@ -59,7 +59,7 @@ void PointReceiver::on_published_mark(const wire::StateMark& mark) {
   }
   log::error("after event {} the points are not the packer's: {:016x}, it has {:016x}; they are asked for anew",
              mark.sequence.value, ours, mark.digest);
-  sequencer_.start();
+  sequencer_.start_anew();
 }
 
 void PointReceiver::receive_answers(net::Socket& state, int most) {

@@ -169,7 +169,7 @@ class MasterPlay {
   }
 
   void something_else(const std::string& peer) {
-    switch (dice_.below(9)) {
+    switch (dice_.below(11)) {
       case 0:
         return from_any<wire::StatusReport>(peer);
       case 1:
@@ -184,6 +184,10 @@ class MasterPlay {
         return from_any<wire::Goodbye>(peer);
       case 6:
         return core_.undeliverable(peer);
+      case 7:
+        return from_any<wire::TileRefused>(packer_.empty() ? peer : packer_);
+      case 8:
+        return refuse_a_tile();
       default:
         return from_any<wire::Control>(peer);
     }
@@ -197,7 +201,11 @@ class MasterPlay {
   void on(const std::string& peer, const M& m) {
     if constexpr (std::is_same_v<M, wire::Hello>)
       if (m.role == "sampler") said_sampler_.insert(peer);
-    (void)core_.on(peer, m, now_s_);
+    // Who says too much is not heard, as the service does it.
+    if (core_.admit(peer, now_s_))
+      (void)core_.on(peer, m, now_s_);
+    else
+      ++reached_["not admitted"];
   }
 
   InstanceId instance(const std::string& peer) {
@@ -254,6 +262,11 @@ class MasterPlay {
     if (dice_.chance(10)) done.lease = {dice_.below(40)};
     on(packer_.empty() || dice_.chance(10) ? peer : packer_, done);
   }
+  void refuse_a_tile() {
+    if (leases_.empty()) return;
+    const wire::Lease& l = dice_.pick(leases_);
+    on(packer_.empty() ? "b" : packer_, wire::TileRefused{l.frame, l.tile, l.lease, instance("c"), "why"});
+  }
   void plan_a_view(const std::string& peer) {
     if (plans_.empty()) return;
     const wire::PlanRequest& asked = dice_.pick(plans_);
@@ -282,7 +295,9 @@ class MasterPlay {
   }
   void time_goes_by() {
     constexpr std::array<double, 6> kSteps{0.02, 0.05, 0.3, 1, 4, 12};
-    now_s_ += dice_.pick(kSteps);
+    const double step_s = dice_.pick(kSteps);
+    now_s_ += step_s;
+    if (dice_.chance(10)) core_.stood_still(step_s, now_s_);
     core_.tick(now_s_);
   }
 

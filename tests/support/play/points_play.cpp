@@ -7,6 +7,7 @@
 #include "common/codec/mask_stream.h"
 #include "common/core/log.h"
 #include "services/packer/points/point_packing.h"
+#include "tests/support/keys/lease_key.h"
 #include "tests/support/play/any_message.h"
 #include "tests/support/play/play.h"
 #include "tests/support/play/viewer_part.h"
@@ -48,6 +49,7 @@ wire::Welcome welcome(Dice& dice, EpochId epoch, InstanceId master) {
   const points::ModelConfig model = scene_config(int(3 + dice.below(3)));
   wire::Welcome w;
   w.master = master, w.epoch = epoch;
+  w.lease_key = lease_key();
   w.octree_depth = uint64_t(model.depth);
   w.box_room = model.box_room;
   if (dice.chance(20)) w.box_room = {w.box_room.lo * 2.f, w.box_room.hi * 2.f};
@@ -79,6 +81,7 @@ class PointsPlay {
     for (size_t step = 0; step < kMostSteps && !dice_.over() && !complaint_; ++step) {
       now_s_ += 0.01 * double(dice_.below(20));
       act();
+      look_at_the_replicas();
     }
     if (!complaint_) in_the_end();
     return complaint_;
@@ -92,9 +95,10 @@ class PointsPlay {
   struct Viewer {
     Viewer(PointsPlay& play, size_t number)
         : id{101 + number},
-          peer(fmt::format("peer-{}", number)),
+          peer(fmt::format("peer-{}-0", number)),
+          config(play.config()),
           part(
-              id, pipes(number), [&play] { return play.config(); },
+              id, pipes(number), [this] { return config; },
               [&play, this](InstanceId packer, Sequence after) {
                 requests.push_back({id, packer, after});
               }) {}
@@ -106,6 +110,9 @@ class PointsPlay {
     }
     InstanceId id;
     std::string peer;
+    points::ModelConfig config;  // as its newest welcome tells
+    bool heard_late = false;     // its replica may be one of another configuration's
+    viewer::PointReceiver::Figures figures;
     std::deque<wire::StateRequest> requests;  // on their way to the packer
     std::deque<Sent> events, answers;         // on their way from it
     ViewerPart part;
@@ -126,6 +133,7 @@ class PointsPlay {
   }
   packer::Outlets outlets() {
     return {.tell = [](const wire::TileDone&) {},
+            .refuse = [this](const wire::TileRefused&) { ++reached_["tiles refused"]; },
             .to_viewers =
                 [this](std::string_view type, std::string body) {
                   ++reached_[std::string(type)];
@@ -149,13 +157,13 @@ class PointsPlay {
       case 0:
         return change_the_session();
       case 1:
-        return from_any<wire::DepthTile>(true);
+        return any_tile();
       case 2:
-        return from_any<wire::StateRequest>(false);
+        return from_any<wire::StateRequest>();
       case 3:
-        return from_any<wire::AccessReport>(false);
+        return from_any<wire::AccessReport>();
       case 4:
-        return from_any<wire::Receipt>(false);
+        return from_any<wire::Receipt>();
       case 5:
         return plan();
       case 6:
@@ -167,6 +175,7 @@ class PointsPlay {
       case 9:
         return lose(v);
       case 10:
+        if (dice_.chance(50)) return hear(v);
         return v.part.tick();
       case 11:
         return v.part.hold(dice_.chance(30));
@@ -197,13 +206,19 @@ class PointsPlay {
     }
   }
   template <class M>
-  void from_any(bool sampled) {
+  void from_any() {
     const auto m = any_.make<M>();
-    if (!m) return;
-    if (sampled)
-      packing_->take_sampled(socket_, message(*m, "s"), now_s_);
-    else
-      packing_->take_state(socket_, message(*m, dice_.chance(50) ? "stranger" : viewers_[0]->peer), now_s_);
+    if (m) packing_->take_state(socket_, message(*m, dice_.chance(50) ? "stranger" : viewers_[0]->peer), now_s_);
+  }
+  void any_tile() {
+    wire::DepthTile m;
+    any_.fill(m);
+    deliver(m);
+  }
+  // Most leases are the master's, so that what is behind their seals is played with, too.
+  void deliver(wire::DepthTile& m) {
+    if (dice_.chance(90)) seal_lease(m.lease, m.sampler, dice_.chance(95) ? master_ : InstanceId{1 + dice_.below(3)});
+    if (const auto arrived = over_the_wire(m)) packing_->take_sampled(socket_, message(*arrived, "s"), now_s_);
   }
   template <class M>
   static net::Message message(const Arrived<M>& m, const std::string& from) {
@@ -233,7 +248,7 @@ class PointsPlay {
     const auto& stream = streams().of(dice_.chance(95) ? camera : 0, l.rect);
     if (dice_.chance(6)) any_.fill(l);
     m.image = std::as_bytes(std::span(stream));
-    if (const auto arrived = over_the_wire(m)) packing_->take_sampled(socket_, message(*arrived, "s"), now_s_);
+    deliver(m);
   }
   void plan() {
     wire::PlanRequest r;
@@ -262,17 +277,42 @@ class PointsPlay {
     for (uint64_t n = dice_.below(10); n-- > 0;) r.clusters.push_back(uint32_t(dice_.below(300)));
     if (dice_.chance(50)) r.frames.assign(r.clusters.size(), uint32_t(dice_.below(frame_ + 1)));
     if (const auto m = over_the_wire(r)) packing_->take_state(socket_, message(*m, v.peer), now_s_);
+    tell_what_came(v);
+  }
+  void tell_what_came(Viewer& v) {
     const auto f = v.part.figures();
     if (const auto m = over_the_wire(wire::Receipt{v.id, f.packer, f.sequence, now_s_}))
       packing_->take_state(socket_, message(*m, v.peer), now_s_);
   }
 
   void lose(Viewer& v) {
-    if (dice_.chance(20)) {  // the link breaks
-      v.events.clear(), v.answers.clear(), v.requests.clear();
-      return;
-    }
+    if (dice_.chance(20)) return connect(v);
     for (uint64_t n = dice_.below(4); n-- > 0 && !v.events.empty();) v.events.pop_front();
+  }
+  // Who knows the model's configuration has the packer's points after each event.
+  void look_at_the_replicas() {
+    for (auto& v : viewers_) {
+      v->heard_late |= v->config != config();
+      const auto now = v->part.figures(), before = std::exchange(v->figures, now);
+      if (v->heard_late || complaint_) continue;
+      if (now.digests_different != before.digests_different)
+        complaint_ = fmt::format("viewer {} holds other points after event {}", v->id.value, before.sequence.value);
+      if (now.decode_errors != before.decode_errors)
+        complaint_ = fmt::format("viewer {} cannot apply what follows event {}", v->id.value, before.sequence.value);
+    }
+  }
+  // The link breaks, or is left: on another one nothing comes that was sent over the old one.
+  void connect(Viewer& v) {
+    v.events.clear(), v.answers.clear(), v.requests.clear();
+    v.peer = fmt::format("{}-{}", v.peer.substr(0, v.peer.rfind('-')), ++connections_);
+  }
+  // A welcome reaches the viewer, some time after the packer has got its own.
+  void hear(Viewer& v) {
+    if (v.config == config()) return;
+    v.config = config();
+    connect(v);
+    v.part.start();
+    v.heard_late = false;
   }
   // Events and answers come over two connections: either may be the faster one.
   void carry(Viewer& v, uint64_t most) {
@@ -295,11 +335,14 @@ class PointsPlay {
 
   // Nothing is lost any more, and nobody does anything new.
   void in_the_end() {
-    for (auto& v : viewers_) v->part.hold(false);
+    for (auto& v : viewers_) v->part.hold(false), hear(*v);
     for (int round = 0; round < 12; ++round) {
       packing_->tick(now_s_ += 1);
       for (auto& v : viewers_)
-        while (!v->requests.empty() || !v->answers.empty() || !v->events.empty()) carry_all(*v);
+        while (!v->requests.empty() || !v->answers.empty() || !v->events.empty()) {
+          carry_all(*v);
+          tell_what_came(*v);
+        }
       for (auto& v : viewers_) v->part.tick();
     }
     for (const auto& v : viewers_) reached_["gaps"] += v->part.figures().gaps;
@@ -336,7 +379,7 @@ class PointsPlay {
   EpochId epoch_{1};
   InstanceId master_{1};
   wire::Welcome session_;
-  uint64_t frame_ = 1, max_log_bytes_ = 0;
+  uint64_t frame_ = 1, max_log_bytes_ = 0, connections_ = kViewers;
   metrics::SpanRecorder spans_;
   std::vector<std::unique_ptr<Viewer>> viewers_;
   std::optional<packer::PointPacking> packing_;

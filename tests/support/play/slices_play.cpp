@@ -6,6 +6,7 @@
 #include "common/core/log.h"
 #include "common/volume/session.h"
 #include "services/packer/slices/slice_packing.h"
+#include "tests/support/keys/lease_key.h"
 #include "tests/support/play/any_message.h"
 #include "tests/support/play/play.h"
 
@@ -25,6 +26,7 @@ volume::Session scene() {
 wire::Welcome welcome(EpochId epoch, InstanceId master) {
   wire::Welcome w;
   w.master = master, w.epoch = epoch;
+  w.lease_key = lease_key();
   w.facts = volume::to_facts(scene());
   w.facts["kind"] = "volume";
   w.parameters = volume::to_parameters(scene());
@@ -86,7 +88,7 @@ class SlicesPlay {
   void act() {
     switch (dice_.below(12)) {
       case 0:
-        return images(any_.make<wire::SliceImages>());
+        return any_images();
       case 1:
         return acknowledge(any_.make<wire::SliceAck>(), peer());
       case 2:
@@ -142,6 +144,16 @@ class SlicesPlay {
     if (dice_.chance(10)) l.epoch = {1 + dice_.below(4)};
     if (dice_.chance(5)) any_.fill(l);
     wire::SliceImages m{.sampler = {9}, .lease = l, .voxels = dice_.below(100), .data = std::as_bytes(std::span(data))};
+    deliver(m);
+  }
+  void any_images() {
+    wire::SliceImages m;
+    any_.fill(m);
+    deliver(m);
+  }
+  // Most leases are the master's, so that what is behind their seals is played with, too.
+  void deliver(wire::SliceImages& m) {
+    if (dice_.chance(90)) seal_lease(m.lease, m.sampler, dice_.chance(95) ? master_ : InstanceId{1 + dice_.below(2)});
     images(over_the_wire(m));
   }
   void images(std::optional<Arrived<wire::SliceImages>> m) {
@@ -210,6 +222,7 @@ class SlicesPlay {
     l.views = {{viewer, {1}, scenery().cameras[0], 0}};
     const std::string data = images_of(l);
     came_.clear();
+    seal_lease(l, {9}, master_);
     images(over_the_wire(
         wire::SliceImages{.sampler = {9}, .lease = l, .voxels = 1, .data = std::as_bytes(std::span(data))}));
     time_goes_by(5);
@@ -248,6 +261,7 @@ class SlicesPlay {
   Reached reached_;
   metrics::SpanRecorder spans_;
   packer::SlicePacking packing_{{.tell = [](const wire::TileDone&) {},
+                                 .refuse = [this](const wire::TileRefused&) { ++reached_["slabs told as refused"]; },
                                  .to_viewers = [](std::string_view, std::string) {},
                                  .to_viewer = [this](std::string_view peer, std::string_view type,
                                                      std::string body) { return deliver(peer, type, body); },

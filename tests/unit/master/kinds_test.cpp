@@ -128,6 +128,8 @@ TEST_F(KindsOfScenes, FromAMeshToAVolumeAndBackViewsStayAndEpochsBegin) {
   ASSERT_EQ(slab.size(), 1u);
   EXPECT_EQ(slab[0].epoch.value, 2u);
   EXPECT_EQ(slab[0].views[0].request.value, 1u) << "the view that was in flight waits again, before the others";
+  EXPECT_GT(slab[0].frame, tile[0].frame) << "one record has both";
+  EXPECT_NE(slab[0].lease, tile[0].lease);
 
   core.on("data2", wire::Goodbye{{2}}, now);
   hello(data(3, "mesh"));
