@@ -69,8 +69,8 @@ void TokenWriter::start(size_t count, bool plain_colour) {
 }
 
 void TokenWriter::add(const Residuals& residuals, size_t n) {
-  HWY_DYNAMIC_DISPATCH(PutNumbers)(residuals.depth.data(), n, &depth_[done_], depth_bits_.sink);
-  HWY_DYNAMIC_DISPATCH(PutNormals)(residuals.normal.data(), n, &normal_[done_], normal_bits_.sink);
+  HWY_DYNAMIC_DISPATCH(PutNumbers)(residuals.depth.data(), n, depth_.data() + done_, depth_bits_.sink);
+  HWY_DYNAMIC_DISPATCH(PutNormals)(residuals.normal.data(), n, normal_.data() + done_, normal_bits_.sink);
   if (plain_colour_) {
     for (size_t i = 0; i < n; ++i) {
       const uint32_t difference = static_cast<uint32_t>(unfold_bytes(residuals.colour[i])),
@@ -88,7 +88,7 @@ void TokenWriter::add(const Residuals& residuals, size_t n) {
   if (any_colour == 0) {
     std::fill_n(colour_[0].begin() + static_cast<ptrdiff_t>(done_), n, uint8_t{0});
   } else {
-    HWY_DYNAMIC_DISPATCH(PutColours)(residuals.colour.data(), n, &colour_[0][done_], colour_bits_.sink);
+    HWY_DYNAMIC_DISPATCH(PutColours)(residuals.colour.data(), n, colour_[0].data() + done_, colour_bits_.sink);
   }
   done_ += n;
 }
@@ -127,8 +127,8 @@ bool TokenReader::take(JoinedRow& residuals, size_t n) {
   uint8_t largest = 0, any_colour = 0;
   for (size_t i = 0; i < n; ++i) largest = std::max(largest, depth_[done_ + i]);
   if (largest >= NumberToken::kCount) return false;
-  HWY_DYNAMIC_DISPATCH(GetNumbers)(&depth_[done_], n, depth_bits_.source, residuals.depth.data());
-  HWY_DYNAMIC_DISPATCH(GetNormals)(&normal_[done_], n, normal_bits_.source, residuals.attributes.data());
+  HWY_DYNAMIC_DISPATCH(GetNumbers)(depth_.data() + done_, n, depth_bits_.source, residuals.depth.data());
+  HWY_DYNAMIC_DISPATCH(GetNormals)(normal_.data() + done_, n, normal_bits_.source, residuals.attributes.data());
   if (plain_colour_) {
     for (size_t i = 0; i < n; ++i) {
       const uint32_t green_z = colour_[0][done_ + i], green = static_cast<uint32_t>(unfold_bytes(green_z)) & 255;
@@ -138,7 +138,7 @@ bool TokenReader::take(JoinedRow& residuals, size_t n) {
   } else {
     for (size_t i = 0; i < n; ++i) any_colour |= colour_[0][done_ + i];
     if (any_colour != 0)
-      HWY_DYNAMIC_DISPATCH(GetColours)(&colour_[0][done_], n, colour_bits_.source, residuals.attributes.data());
+      HWY_DYNAMIC_DISPATCH(GetColours)(colour_[0].data() + done_, n, colour_bits_.source, residuals.attributes.data());
   }
   done_ += n;
   return !depth_bits_.overrun() && !normal_bits_.overrun() && !colour_bits_.overrun();

@@ -54,6 +54,22 @@ struct Session {
   }
 };
 
+// The packer cannot take it for the request that it is answering.
+TEST(EventSequencer, WhoBeginsAnewNamesAPackerThatNobodyIs) {
+  std::vector<std::pair<InstanceId, uint64_t>> asked;
+  EventSequencer sequencer(
+      {[](const ModelEvent&) {}, [] {}, [&](InstanceId of, Sequence after) { asked.emplace_back(of, after.value); }});
+  sequencer.on_published(event(kPacker, 1));
+  sequencer.start_anew();
+  ASSERT_EQ(asked.size(), 1u);
+  EXPECT_NE(asked[0].first, InstanceId{});
+  EXPECT_NE(asked[0].first, kPacker);
+  EXPECT_EQ(asked[0].second, 0u);
+  EXPECT_TRUE(sequencer.waiting());
+  sequencer.retry();
+  EXPECT_EQ(asked.back(), std::pair(InstanceId{}, uint64_t{0})) << "what it asked for then may be under way";
+}
+
 TEST(EventSequencer, LostAndRepeatedEventsEndInTheSameOrderEverywhere) {
   for (uint32_t seed = 0; seed < 200; ++seed) {
     std::mt19937 random(seed);

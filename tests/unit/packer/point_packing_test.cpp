@@ -483,6 +483,14 @@ TEST_F(StateAnswersTest, RequestsOfOneViewerAreOneAnswer) {
   EXPECT_EQ(to("again").front(), 1u);
 }
 
+// It had received the answer, and told of none of it yet.
+TEST_F(StateAnswersTest, WhoThrewItAwayGetsItAgainOverTheSameConnection) {
+  ask({}, {}, 2);
+  EXPECT_EQ(to("peer").front(), 1u);
+  ask({}, InstanceId{packer.value + 1}, 2.1);
+  EXPECT_EQ(to("peer").front(), 1u);
+}
+
 TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
   for (int n = 0; n < 8; ++n) ask({}, {}, 2, "peer" + std::to_string(n), uint64_t(100 + n));
   double now_s = 2;
