@@ -131,12 +131,12 @@ bool Fault::stop_with_a_lease(const std::string& sampler) {
   const pid_t pid = pid_of(sampler);
   for (int attempt = 0; attempt < 25 && pid > 0; ++attempt) {
     ::kill(pid, SIGSTOP);
-    pass(0.5);  // what it had finished is known to be done
+    pass(0.12);  // what it had finished is known to be done; soon it is taken back
     const auto holds = [&](const auto& s) {
       const auto p = process(s, sampler);
       return p.is_object() && p["leases"] > 0;
     };
-    if (run_->wait_status(holds, 1)) return true;
+    if (run_->wait_status(holds, 0.2)) return true;
     ::kill(pid, SIGCONT);
     pass(0.1 + 0.037 * (attempt % 10));
   }
