@@ -39,7 +39,7 @@ Status read_options(const std::string& path, const toml::table& scene, data::Dat
     const auto row =
         std::find_if(table.begin(), table.end(), [&](const auto& r) { return options::key_of(r) == key.str(); });
     if (row == table.end() || !node.is_value()) continue;
-    if (key.str() == "cache") continue;  // a record may be anybody's: it does not say where this machine writes
+    if (!row->not_in_scene.empty()) continue;  // a record may be anybody's: it does not say where this machine writes
     if (const Status s = options::set(*row, text_of(node)); !s)
       return Error{
           fmt::format("{}:{}: key {} of [scene]: {}", path, node.source().begin.line, key.str(), s.error().text)};

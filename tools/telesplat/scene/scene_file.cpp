@@ -58,7 +58,10 @@ class SceneReader {
   Error wrong(const toml::node& node, const std::string& what) const {
     return Error{fmt::format("{}:{}: {}", path_, node.source().begin.line, what)};
   }
-  std::string beside(const std::string& file) const { return (fs::path(path_).parent_path() / file).string(); }
+  std::string beside(const std::string& file) const {
+    const std::string out = (fs::path(path_).parent_path() / file).string();
+    return out.starts_with('-') ? "./" + out : out;  // a file, not a flag
+  }
 
   static std::string names_of_kinds() {
     std::string out;
@@ -117,6 +120,9 @@ class SceneReader {
     const bool off = node.is_boolean() && !**node.as_boolean();
     if (!row && off) return ok_status();  // a flag of another command, and not wanted
     if (!row) return wrong(node, fmt::format("key {} is none: there is no flag {}{}", name, flag, meant(group, name)));
+    if (!row->not_in_scene.empty())
+      return wrong(node, fmt::format("key {}: a scene file does not say {}; give {} on the command line", name,
+                                     row->not_in_scene, flag));
     return read_flag(*row, flag, name, node);
   }
 
@@ -125,6 +131,7 @@ class SceneReader {
     std::vector<std::string> known;
     if (group != "packing") known.emplace_back("file");
     for (const options::Row& row : table_) {
+      if (!row.not_in_scene.empty()) continue;
       const std::string key = options::key_of(row);
       if (group != "packing")
         known.push_back(key);
