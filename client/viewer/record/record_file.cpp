@@ -64,12 +64,12 @@ Result<RecordReader> RecordReader::open(const std::string& path, const std::vect
                                         const char* what) {
   RecordReader out;
   out.path_ = path;
-  out.file_.reset(std::fopen(path.c_str(), "rb"));
+  std::error_code error;
+  if (std::filesystem::is_regular_file(path, error)) out.file_.reset(std::fopen(path.c_str(), "rb"));
   char magic[kMagicBytes];
   const bool read = out.file_ && std::fread(magic, 1, sizeof magic, out.file_.get()) == sizeof magic;
   if (!read || std::find(magics.begin(), magics.end(), std::string_view(magic, sizeof magic)) == magics.end())
     return Error{fmt::format("{}: is not {}", path, what)};
-  std::error_code error;
   out.left_ = std::filesystem::file_size(path, error) - sizeof magic;
   if (error) return Error{fmt::format("{}: {}", path, error.message())};
   return out;

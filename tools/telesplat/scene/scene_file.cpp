@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <optional>
 
+#include "common/core/whole_file.h"
 #include "common/options/suggest.h"
 #include "tools/telesplat/scene/scene.h"
 #include "tools/telesplat/scene/scene_keys.h"
+#include "tools/telesplat/scene/toml_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -182,12 +184,9 @@ std::string flag_text(const toml::node& node) {
 }
 
 Result<std::vector<std::string>> read_scene_file(const std::string& path, const options::Table& table) {
-  try {
-    const toml::table file = toml::parse_file(path);
-    return SceneReader(path, table).read(file);
-  } catch (const toml::parse_error& e) {
-    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
-  }
+  const auto file = read_toml(path, kMostDescriptionBytes);
+  if (!file) return file.error();
+  return SceneReader(path, table).read(*file);
 }
 
 Result<std::vector<std::string>> expand_scene_file(std::vector<std::string> arguments, const options::Table& table) {
