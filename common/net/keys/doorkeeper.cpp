@@ -119,7 +119,13 @@ struct Doorkeeper::Impl {
     const auto q = hear();
     if (!q) return;
     std::string why;
-    const auto visitor = look_up(*q, why);
+    std::optional<Visitor> visitor;
+    // Whoever is not answered is not let in; an answer must follow every question.
+    try {
+      visitor = look_up(*q, why);
+    } catch (const std::exception& e) {
+      why = e.what();
+    }
     const std::string who = visitor ? text_of(*visitor) : std::string();
     const std::string_view frames[] = {kVersion, q->request, visitor ? kYes : kNo, visitor ? "" : "refused", who, ""};
     for (size_t i = 0; i < std::size(frames); ++i)
@@ -142,6 +148,8 @@ struct Doorkeeper::Impl {
       } catch (const zmq::error_t& e) {
         if (e.num() != EINTR) log::error("keys: {}", e.what());
         if (e.num() == ETERM) return;
+      } catch (const std::exception& e) {
+        if (limiter.allow(monotonic_s())) log::error("keys: {}", e.what());
       }
     }
   }
