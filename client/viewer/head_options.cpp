@@ -51,7 +51,8 @@ Table head_source_table(ViewerOptions& o) {
        .value = &o.poses,
        .help = "poses of a tracker move the head: tcp://HOST:PORT or ipc://PATH of any ZeroMQ publisher of pose "
                "messages (docs/tracking.md)",
-       .limits = options::Check(complain_about_publisher)},
+       .limits = options::Check(complain_about_publisher),
+       .not_in_scene = "whom a viewer listens to"},
       {.flag = "--pose-horizon",
        .value = &o.pose_horizon_s,
        .help = "--poses: what is displayed is predicted so many seconds ahead; 0: as long as a frame takes",

@@ -15,6 +15,7 @@
 namespace telesplat::viewer {
 namespace {
 
+constexpr const char* kWhatIsKept = "what a run keeps";
 constexpr double kLeastUpdateRate_hz = 0.1, kHeadsetUpdateRate_hz = 10;
 
 using options::Names;
@@ -204,12 +205,14 @@ Table record_table(ViewerOptions& o) {
   return {
       {.flag = "--record-every",
        .value = &d.picture_every,
-       .help = "record every N-th frame as a PNG; 0: one every 2.5 s and the last"},
+       .help = "record every N-th frame as a PNG; 0: one every 2.5 s and the last",
+       .not_in_scene = kWhatIsKept},
       {.flag = "--record-points",
        .value = &o.record_points_mb,
        .help = "keep what was received in OUT, MiB at most, for telesplat compare and movie: the point model's events "
                "in points.events, a volume's slice images in slices.events; 0: do not",
-       .limits = Range{0, 1 << 20}},
+       .limits = Range{0, 1 << 20},
+       .not_in_scene = kWhatIsKept},
       {.flag = "--exr", .value = &d.exr, .help = "record pictures as EXR with depth too"},
       {.flag = "--verify",
        .value = &d.verify_every,

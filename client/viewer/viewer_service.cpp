@@ -209,6 +209,7 @@ struct Served {
   DisplayResult display;
   bool session_ended = false;
   bool refused = false;  // by the master
+  bool failed = false;   // nothing came any more
 };
 
 // Shows the session until it, the person or the clock ends it.
@@ -248,6 +249,7 @@ Served serve(const ViewerOptions& o, const net::Access& access, const Display& d
         run_display(o.display, *display.surface, make_source, gate, worker, frames, spans, spool, wall.get());
   served.session_ended = worker.shutdown_requested();
   served.refused = worker.refused();
+  served.failed = worker.failed();
   return served;
 }
 
@@ -278,12 +280,13 @@ Status develop(const std::string& directory, FrameSpool& spool) {
 // Ends the session for everyone, if that is this viewer's part. Exit code.
 int farewell(const ViewerOptions& o, const net::Access& asking, const Served& served) {
   if (served.refused) return 2;
-  if (!o.end_session) return 0;
+  const int otherwise = served.failed ? 1 : 0;
+  if (!o.end_session) return otherwise;
   if (!served.session_ended && !net::stop_requested())
     if (const auto answer = net::ask_master(o.service.master, "stop", kMasterPatience_s, {}, asking); !answer)
       log::warn("the session could not be ended: {}", answer.error().text);
   if (served.display.frames == 0) log::error("the session ended before anything was shown");
-  return served.display.frames == 0 ? 1 : 0;
+  return served.display.frames == 0 ? 1 : otherwise;
 }
 
 }  // namespace

@@ -160,6 +160,7 @@ void ViewerWorker::loop() {
     link_.leave([this] { return status(); });
   } catch (const std::exception& e) {
     log::error("the viewer's worker failed: {}", e.what());
+    failed_ = true;
     shutdown_ = true;
   }
 }

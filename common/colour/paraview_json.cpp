@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "common/colour/spaces.h"
 #include "common/core/nearest.h"
+#include "common/core/whole_file.h"
 
 namespace telesplat::colour {
 namespace {
@@ -181,16 +181,7 @@ Result<ParaviewMap> read_map(const Json& map, const std::string& path) {
 
 }  // namespace
 
-Result<std::string> read_map_file(const std::string& path) {
-  std::ifstream file{path, std::ios::binary};
-  if (!file) return Error{fmt::format("{}: cannot be opened", path)};
-  std::string content(kMaxFileBytes + 1, '\0');
-  file.read(content.data(), std::streamsize(content.size()));
-  content.resize(size_t(file.gcount()));
-  if (content.size() > kMaxFileBytes)
-    return Error{fmt::format("{}: more than {} bytes, too much for a colour map", path, kMaxFileBytes)};
-  return content;
-}
+Result<std::string> read_map_file(const std::string& path) { return read_whole(path, kMaxFileBytes); }
 
 Result<ParaviewMap> parse_paraview_map(std::string_view content, const std::string& path, std::string_view wanted) {
   int deepest = 0;

@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "common/core/utf8.h"
+#include "common/core/whole_file.h"
 #include "common/geometry/trajectory_file.h"
 
 namespace telesplat::geometry {
@@ -44,7 +45,7 @@ bool comes_before(std::string_view a, std::string_view b) { return a.size() != b
 
 class Reader {
  public:
-  explicit Reader(const std::string& path) : path_(path), in_(path) {}
+  explicit Reader(const std::string& path) : path_(path) {}
 
   Result<std::vector<Trajectory::Sample>> read() {
     if (const Status s = read_header(); !s) return s.error();
@@ -75,6 +76,8 @@ class Reader {
     if (!std::filesystem::exists(path_, error))
       return Error{fmt::format("{}: no such file (orbit and still are built in; else a CSV file with the columns {})",
                                path_, kWanted)};
+    if (const Status s = check_readable(path_, kMostTableBytes); !s) return s;
+    in_.open(path_);
     if (!in_ || !next_line())
       return Error{fmt::format("{}: cannot be read as a trajectory, a CSV file with the columns {}", path_, kWanted)};
     std::string_view header = line_;

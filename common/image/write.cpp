@@ -15,6 +15,7 @@
 #include <memory>
 
 #include "common/core/check.h"
+#include "common/core/whole_file.h"
 #include "common/image/background.h"
 #include "common/image/file.h"
 #include "common/image/srgb.h"
@@ -22,14 +23,16 @@
 namespace telesplat::image {
 namespace {
 
-// Writes under a temporary name beside `path`, then renames, so that no reader ever sees half a file.
+// Writes under a temporary name beside `path`, then renames: no reader ever sees half a file, and nothing is written
+// through a link.
 // write: writes all of the file; what is wrong, if something is.
-Status write_whole(const std::string& path, const std::function<std::string(const std::string& part)>& write) {
-  const std::string part = path + ".part";
-  std::string why = write(part);
-  if (why.empty() && std::rename(part.c_str(), path.c_str()) != 0) why = "renaming " + part + " failed";
+Status write_picture(const std::string& path, const std::function<std::string(const std::string& part)>& write) {
+  const auto part = new_part(path);
+  if (!part) return part.error();
+  std::string why = write(*part);
+  if (why.empty() && std::rename(part->c_str(), path.c_str()) != 0) why = "renaming " + *part + " failed";
   if (why.empty()) return ok_status();
-  std::remove(part.c_str());
+  std::remove(part->c_str());
   return Error{fmt::format("cannot write {}: {}", path, why)};
 }
 
@@ -92,7 +95,7 @@ std::string write_png_file(const std::string& path, const View& view, int channe
 // Channels of an EXR file: half floats, `names.size()` a pixel beside each other, and Z.
 Status write_exr_file(const std::string& path, const View& view, const std::vector<const char*>& names,
                       const std::vector<Imath::half>& values) {
-  return write_whole(path, [&](const std::string& part) -> std::string {
+  return write_picture(path, [&](const std::string& part) -> std::string {
     try {
       Imf::Header header(view.width, view.height);
       header.compression() = Imf::ZIP_COMPRESSION;
@@ -127,8 +130,8 @@ Status write_png(const std::string& path, const View& view, Alpha alpha) {
     for (int c = 0; c < 3; ++c) bytes[channels * i + size_t(c)] = static_cast<uint8_t>(colour >> (16 - 8 * c));
     if (has_alpha) bytes[channels * i + 3] = static_cast<uint8_t>(colour >> 24);
   }
-  return write_whole(path,
-                     [&](const std::string& part) { return write_png_file(part, view, int(channels), bytes.data()); });
+  return write_picture(
+      path, [&](const std::string& part) { return write_png_file(part, view, int(channels), bytes.data()); });
 }
 
 Status write_exr(const std::string& path, const View& view, Alpha alpha) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "common/metrics/roster.h"
 #include "common/scene/session.h"
@@ -90,17 +89,6 @@ ordered_json asked_of(const Roster& roster) {
 }
 
 }  // namespace
-
-bool is_record_text(const std::string& text) {
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    const auto control = [](unsigned char c) { return c < 0x20 && c != '\t'; };
-    if (std::any_of(line.begin(), line.end(), control)) return false;
-    const bool heading = line.starts_with('[') && line.ends_with(']');
-    if (!line.empty() && !heading && line.find(" = ") == line.npos) return false;
-  }
-  return true;
-}
 
 ordered_json what_was_done(const About& about, const std::vector<Process>& processes) {
   const Roster roster(processes);

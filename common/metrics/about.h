@@ -29,12 +29,8 @@ struct About {
   RecordLosses losses;
 };
 
-/// Facts by which processes tell the record what the figures do not: lines of session.toml, "\n[table]\nkey = value\n".
+/// Facts by which processes tell the record what the figures do not: tables of session.toml, "\n[table]\nkey = ...\n".
 inline constexpr const char* kRecordFact = "record";
-
-/// Whether `text` is lines of session.toml, as far as can be told without a parser: headings and key = value, no
-/// control characters. It comes from other processes, and stands in the file as it is.
-bool is_record_text(const std::string& text);
 
 /// The keys of summary.json that say what was done: version, begin, machines, command, data, trajectory, ... Nothing is
 /// measured; what nobody told is null.

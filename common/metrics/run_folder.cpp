@@ -10,6 +10,7 @@
 #include <random>
 
 #include "common/core/log.h"
+#include "common/core/whole_file.h"
 #include "common/metrics/lives/lives.h"
 
 namespace telesplat::metrics {
@@ -19,6 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kIdFile = "run.id";
 constexpr std::string_view kIdWord = "telesplat-run ";
+constexpr uint64_t kMostIdBytes = 4096;
 constexpr const char* kLatest = "latest";
 constexpr const char* kReplaced = ".replaced";
 
@@ -31,9 +33,9 @@ struct Ours {
 const std::vector<Ours>& ours() {
   static const std::vector<Ours> table{
       {"",
-       {"summary.json", "summary.json.part", "frames.csv", "updates.csv", "stages.csv", "tiles.csv", "plans.csv",
-        "epochs.csv", "assignment.csv", "quality.csv", "trace.json", "session.toml", "session.toml.part", "lives.csv",
-        ".room", "points.events", "slices.events", "report.html", "report.html.part"}},
+       {"summary.json", "summary.json*.part", "frames.csv", "updates.csv", "stages.csv", "tiles.csv", "plans.csv",
+        "epochs.csv", "assignment.csv", "quality.csv", "trace.json", "session.toml", "session.toml*.part", "lives.csv",
+        ".room", "points.events", "slices.events", "report.html", "report.html*.part"}},
       {"images", {"frame-*.png", "frame-*.exr", "verify-*.png", "wall.png", "contact-sheet.png"}},
       {"depth", {"frame-*.depth", "cameras.csv"}},
       {"plans", {"plan-*.png"}},
@@ -173,9 +175,8 @@ std::string folder_id(const std::string& directory) {
   const std::string path = directory + "/" + kIdFile;
   std::error_code error;
   if (fs::symlink_status(path, error).type() != fs::file_type::regular) return {};
-  std::ifstream in(path);
-  std::string line;
-  std::getline(in, line);
+  const auto text = read_whole(path, kMostIdBytes);
+  const std::string line = text ? text->substr(0, text->find('\n')) : std::string();
   return line.starts_with(kIdWord) ? line.substr(kIdWord.size(), 64) : std::string();
 }
 

@@ -14,6 +14,7 @@
 #include "common/core/clock.h"
 #include "common/core/log.h"
 #include "common/core/utf8.h"
+#include "common/core/whole_file.h"
 #include "common/metrics/columns.h"
 #include "common/metrics/lives/read_back.h"
 #include "common/metrics/recorder.h"

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <utility>
 
 #include "common/core/log.h"
@@ -113,19 +111,6 @@ void TextFile::close() {
   if (::close(std::exchange(fd_, -1)) == 0 || !status_) return;
   status_ = Error{fmt::format("{}: cannot be written: {}", path_, std::strerror(errno))};
   log::error("{}", status_.error().text);
-}
-
-Status write_whole(const std::string& path, std::string_view text) {
-  const std::string part = path + ".part";
-  std::error_code error;
-  std::ofstream out(part, std::ios::binary);
-  out << text;
-  out.close();
-  if (out) std::filesystem::rename(part, path, error);
-  if (out && !error) return ok_status();
-  const std::string why = error ? error.message() : std::strerror(errno);
-  std::filesystem::remove(part, error);
-  return Error{fmt::format("{}: cannot be written: {}", path, why)};
 }
 
 std::string csv_line(const std::vector<std::string>& cells) {

@@ -50,9 +50,6 @@ class TextFile {
   Status status_ = ok_status();
 };
 
-/// Writes a file as a whole: whoever looks sees the one before, or all of it. Error: it cannot be written.
-Status write_whole(const std::string& path, std::string_view text);
-
 /// A line of CSV, with its end.
 std::string csv_line(const std::vector<std::string>& cells);
 /// A text as CSV has it (RFC 4180). Line ends become spaces, so that a row is a line.

@@ -1,6 +1,7 @@
 #include "common/net/socket.h"
 
 #include <fmt/format.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <atomic>
@@ -8,6 +9,7 @@
 #include <cstring>
 #include <mutex>
 #include <random>
+#include <set>
 #include <thread>
 #include <unordered_map>
 #include <zmq.hpp>
@@ -180,12 +182,27 @@ struct Socket::Impl {
       } else if (what & (kHandshakeFailed | ZMQ_EVENT_HANDSHAKE_SUCCEEDED)) {
         note_handshake(what);
       } else if (what == ZMQ_EVENT_ACCEPTED) {
-        connections[fd] = {fd, monotonic_s(), false};
+        connections[fd] = {.fd = fd, .accepted_s = monotonic_s()};
       } else if (const auto it = connections.find(fd); it != connections.end()) {
         closed.push_back(it->second);
         connections.erase(it);
         if (closed.size() >= kMaxClosed) judge_closed();
       }
+    }
+    if (guarded) close_revoked();
+  }
+
+  // Whoever came in by a key that is on the list no more goes. ZeroMQ's thread, which owns the connections, hears of
+  // their end as if the other side had closed them; who comes again is asked for the key.
+  void close_revoked() {
+    const auto now = home.doorkeeper->may_stay();
+    if (now == may_stay) return;
+    may_stay = now;
+    for (const auto& [fd, c] : connections) {
+      if (c.user.empty() || now->contains(c.user)) continue;
+      ::shutdown(fd, SHUT_RDWR);
+      log::warn("{}: a connection is closed: the key {} is on the allow-list no more", name,
+                visitor_of(c.user).value_or(Visitor{}).name);
     }
   }
 
@@ -193,12 +210,15 @@ struct Socket::Impl {
     if (!monitor) return;
     drain_monitor();  // its connection's acceptance came first
     const int fd = zmq_msg_get(message.handle(), ZMQ_SRCFD);
+    const char* user = guarded ? zmq_msg_gets(message.handle(), "User-Id") : nullptr;
     const auto gone =
         std::find_if(closed.begin(), closed.end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
     if (gone != closed.end())
       gone->has_spoken = true;
-    else if (const auto it = connections.find(fd); it != connections.end())
+    else if (const auto it = connections.find(fd); it != connections.end()) {
       it->second.has_spoken = true;
+      if (user && it->second.user.empty()) it->second.user = user;
+    }
   }
 
   // A connection that ends without ever having brought a whole message counts as one rejected: everyone of ours speaks
@@ -315,6 +335,10 @@ struct Socket::Impl {
     if (visitor) {
       message.user = visitor->name;
       message.role = visitor->role;
+      if (!home.doorkeeper->may_stay()->contains(text)) {
+        reject(message, fmt::format("the key {} is on the allow-list no more", visitor->name));
+        return false;
+      }
       if (may_send(visitor->role, options.serves, message.type)) return true;
     }
     const std::string who = visitor ? fmt::format("the key {} is {}'s", visitor->name, described(visitor->role))
@@ -363,14 +387,16 @@ struct Socket::Impl {
     int fd = -1;
     double accepted_s = 0;
     bool has_spoken = false;
+    std::string user = {};  // of one that binds with keys: whose it is, once it has spoken
   };
   std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
   std::vector<Connection> closed;                   // not judged yet
   Due due;                                          // what the thread that reads says by itself
   std::atomic<uint64_t> rejected{0}, failed_connections{0}, keys_refused{0};
-  bool guarded = false;                                 // bound with keys
-  size_t failed_unseen = 0;                             // handshakes whose connection's end was not heard of yet
-  std::atomic<uint32_t> broken_off{0}, turned_away{0};  // of a socket that connects: handshakes; event, 0: none
+  bool guarded = false;                                   // bound with keys
+  std::shared_ptr<const std::set<std::string>> may_stay;  // what the doorkeeper said last
+  size_t failed_unseen = 0;                               // handshakes whose connection's end was not heard of yet
+  std::atomic<uint32_t> broken_off{0}, turned_away{0};    // of a socket that connects: handshakes; event, 0: none
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
   std::unique_ptr<ReadAhead> ahead;  // with read_ahead, once something was sent or received; it is the first to go

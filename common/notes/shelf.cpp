@@ -12,9 +12,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
+
+#include "common/core/whole_file.h"
 
 namespace telesplat::notes {
 namespace {
@@ -31,15 +31,9 @@ bool exists(const std::string& path) {
 // Nothing: there is no such file.
 Result<std::optional<Book>> read_file(const std::string& path) {
   if (!exists(path)) return std::optional<Book>();
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) return Error{path + ": is no file"};
-  const uintmax_t bytes = fs::file_size(path, error);
-  if (error) return Error{fmt::format("{}: {}", path, error.message())};
-  if (bytes > kMaxBytes) return Error{fmt::format("{}: {} bytes, limit {}", path, bytes, kMaxBytes)};
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return Error{fmt::format("{}: {}", path, std::strerror(errno))};
-  const std::string text((std::istreambuf_iterator<char>(in)), {});
-  auto book = book_from_json(text);
+  const auto text = read_whole(path, kMaxBytes);
+  if (!text) return text.error();
+  auto book = book_from_json(*text);
   if (!book) return Error{path + ": " + book.error().text};
   return std::optional(*std::move(book));
 }

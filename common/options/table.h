@@ -61,7 +61,8 @@ struct Row {
   bool on_off = false;            ///< of a bool: takes on or off
   bool is_file = false;           ///< a file, beside the scene file that names it
   bool required = false;
-  std::string environment = {};  ///< variable that is looked at where the flag is not given
+  std::string environment = {};   ///< variable that is looked at where the flag is not given
+  std::string not_in_scene = {};  ///< what a scene file, which may be a stranger's, does not say; empty: it may set it
 };
 
 using Table = std::vector<Row>;

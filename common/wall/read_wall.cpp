@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <glm/geometric.hpp>
 #include <set>
-#include <sstream>
 
+#include "common/core/whole_file.h"
 #include "common/wall/arrange.h"
 #include "common/wall/keys.h"
 #include "common/wall/screen_camera.h"
@@ -19,7 +18,6 @@ namespace {
 
 constexpr double kFarthest_m = 1e3, kLeastSide_m = 0.01, kMostSide_m = 50, kMostBezel_m = 1, kMostTurn_deg = 360;
 constexpr int kLeastPixels = 16, kMostAcross = 64;
-constexpr uintmax_t kMostBytes = 1u << 20;
 
 glm::dvec3 point(Keys& keys, const char* key, const std::array<double, 3>& fallback = {0, 0, 0}) {
   const auto v = keys.numbers<3>(key, fallback, -kFarthest_m, kFarthest_m);
@@ -231,15 +229,8 @@ Result<Wall> parse_wall(const std::string& text, const std::string& path) {
 }
 
 Result<Wall> read_wall(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return Error{path + ": is no file"};
-  if (std::filesystem::file_size(path, error) > kMostBytes)
-    return Error{fmt::format("{}: is larger than a wall's description may be, limit {} bytes", path, kMostBytes)};
-  std::ifstream in(path);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) return Error{path + ": cannot be read"};
-  return parse_wall(text.str(), path);
+  const auto text = read_whole(path, kMostDescriptionBytes);
+  return text ? parse_wall(*text, path) : text.error();
 }
 
 Wall scaled(Wall wall, double scale) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/core/guarded.h"
 #include "services/data/volume/volume.h"
 
 namespace telesplat::data {
@@ -64,7 +65,11 @@ BackgroundHash::BackgroundHash(std::vector<std::string> files)
     : thread_([this, files = std::move(files)] {
         net::lower_thread_priority(kPolite);
         if (files.empty()) return;
-        if (const auto hash = hash_of_files(files, [this] { return !stop_; })) hash_ = *hash;
+        // Without a hash the record says that it was not measured.
+        const Status done = guarded("hashing the data", [&] {
+          if (const auto hash = hash_of_files(files, [this] { return !stop_; })) hash_ = *hash;
+        });
+        if (!done) hash_.reset();
         done_ = true;
       }) {}
 

@@ -16,6 +16,9 @@ namespace {
 using scene::Kinds;
 using scene::Pipeline;
 
+constexpr const char* kWhatIsKept = "what a run keeps";
+constexpr const char* kWhoComes = "who takes part, and how much";
+
 // A row whose value is one of the names that name_of() has for `values`.
 template <class Enum, size_t n>
 options::Row named(options::Row row, Enum& value, const Enum (&values)[n]) {
@@ -213,11 +216,13 @@ options::Table limit_table(MasterServiceOptions& o) {
           {.flag = "--max-peers",
            .value = &l.max_peers,
            .help = "processes that take part at a time; further ones are refused",
-           .limits = options::Range{1, 4096}},
+           .limits = options::Range{1, 4096},
+           .not_in_scene = kWhoComes},
           {.flag = "--max-messages",
            .value = &l.max_messages,
            .help = "messages of one process a second, the packer's left out; what is beyond is dropped and counted",
-           .limits = options::Range{10.0, 1e6}}};
+           .limits = options::Range{10.0, 1e6},
+           .not_in_scene = kWhoComes}};
 }
 
 options::Table record_table(MasterServiceOptions& o) {
@@ -225,11 +230,13 @@ options::Table record_table(MasterServiceOptions& o) {
            .value = &o.table_limit_mb,
            .help = "MB that each table of the record has at most (frames.csv, tiles.csv, ...); what is beyond is "
                    "counted; 0: no limit",
-           .limits = options::Range{0.0, 1e9}},
+           .limits = options::Range{0.0, 1e9},
+           .not_in_scene = kWhatIsKept},
           {.flag = "--trace-limit-mb",
            .value = &o.trace_limit_mb,
            .help = "MB that the record's trace.json has at most; 0: no limit",
-           .limits = options::Range{0.0, 1e9}}};
+           .limits = options::Range{0.0, 1e9},
+           .not_in_scene = kWhatIsKept}};
 }
 
 options::Row metrics_port_row(MasterServiceOptions& o) {

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "common/core/log.h"
 #include "common/metrics/roster.h"
 #include "common/scene/session.h"
+#include "services/master/peers/told_tables.h"
 
 namespace telesplat::master {
 namespace {
@@ -37,9 +39,11 @@ std::string session_table(const MasterServiceOptions& o, const MasterCore& core)
 
 std::string process_table(const metrics::Process& p) {
   std::string out = fmt::format("\n[[process]]\nrole = {}\nname = {}\n", quoted(p.role), quoted(p.name));
+  // A key twice would make the file unreadable. [run] has launched_by.
+  std::set<std::string> written{quoted("role"), quoted("name"), quoted(metrics::kRecordFact), quoted("launched_by")};
   for (const auto& [key, value] : p.facts)
-    if (key != metrics::kRecordFact && key != "launched_by")  // [run] has the latter
-      out += fmt::format("{} = {}\n", quoted(key), quoted(value));
+    if (const std::string name = quoted(key); written.insert(name).second)
+      out += fmt::format("{} = {}\n", name, quoted(value));
   return out;
 }
 
@@ -51,10 +55,11 @@ std::string told_by(const Processes& processes, const std::string& role) {
     if (!found || scene::value_or(p.facts, "records_in", std::string()) == ".") found = &p;
   }
   if (!found) return {};
-  const std::string& text = found->facts.at(metrics::kRecordFact);
-  if (metrics::is_record_text(text)) return text;
-  log::warn("{} {} tells session.toml what is no table of it", found->role, found->name);
-  return {};
+  const auto told = checked(role, found->facts.at(metrics::kRecordFact));
+  if (!told || told->left_out > 0)
+    log::warn("{} {} tells session.toml what is no {} of it: {}", found->role, found->name, told ? "key" : "table",
+              told ? fmt::format("{} left out", told->left_out) : told.error().text);
+  return told ? told->text : std::string();
 }
 
 }  // namespace

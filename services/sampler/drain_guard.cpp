@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "common/core/guarded.h"
 #include "common/net/service.h"
 #include "common/net/socket.h"
 
@@ -31,13 +32,13 @@ void DrainGuard::watch(const std::string& master, InstanceId instance, const net
     if (wake_.wait_for(lock, kLook, done)) return;
   if (wake_.wait_for(lock, std::chrono::duration<double>(kStop_s), done)) return;
   log::warn("told to stop, and a lease takes too long: it is given up");
-  {
+  const Status told = guarded("saying goodbye", [&] {
     // The service's own socket belongs to the thread that is busy.
     net::Context context(access);
     net::Socket socket(context, net::Kind::kDealer, "goodbye");
     if (socket.connect(master)) socket.send(wire::Goodbye{instance});
-  }
-  std::_Exit(0);
+  });
+  std::_Exit(told ? 0 : 1);
 }
 
 }  // namespace telesplat::sampler

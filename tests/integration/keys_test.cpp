@@ -147,6 +147,63 @@ TEST(Keys, ARevokedKeyDoesNotComeInAgainWhileTheServerRuns) {
   EXPECT_EQ(got->user, "ben");
 }
 
+// Whoever is in when the key is revoked, at any socket, goes; others stay.
+TEST(Keys, WhoIsInWhenTheKeyIsRevokedHasToGo) {
+  const KeyFolder keys;
+  ASSERT_TRUE(keys.maker().add_person("anna", Role::kViewer).ok());
+  ASSERT_TRUE(keys.maker().add_person("ben", Role::kViewer).ok());
+  Bound master(keys, Kind::kRouter, "control"), packer(keys, Kind::kPub, "patches");
+  Peer anna(keys.named("anna"), master.endpoint), ben(keys.named("ben"), master.endpoint);
+  Peer hears(keys.named("anna"), packer.endpoint, Kind::kSub), stays(keys.named("ben"), packer.endpoint, Kind::kSub);
+  const auto publish_until = [&](auto&& done, double deadline_s) {
+    for (const double until_s = monotonic_s() + deadline_s; !done() && monotonic_s() < until_s;) {
+      packer.socket.send(wire::Shutdown{"news"});
+      while (master.socket.receive()) {
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return done();
+  };
+  int to_anna = 0, to_ben = 0;
+  const auto count = [](Socket& socket, int& n) {
+    while (socket.receive()) ++n;
+  };
+  ASSERT_TRUE(
+      publish_until([&] { return count(hears.socket, to_anna), count(stays.socket, to_ben), to_anna && to_ben; }, 10));
+  ASSERT_TRUE(anna.socket.send(kGoodbye) && ben.socket.send(kGoodbye));
+  for (int n = 0; n < 2; ++n) ASSERT_TRUE(master.next());
+
+  ASSERT_TRUE(keys.maker().revoke("anna").ok());
+  ASSERT_TRUE(keys.maker().add_person("anna", Role::kViewer).ok()) << "another key of the same name";
+  const auto turned_away = [&] {
+    anna.socket.send(kGoodbye);
+    hears.socket.receive();
+    return !anna.socket.refusal().text.empty() && !hears.socket.refusal().text.empty();
+  };
+  EXPECT_TRUE(publish_until(turned_away, 10));
+  EXPECT_NE(anna.socket.refusal().text.find("the key anna of "), std::string::npos) << anna.socket.refusal().text;
+  count(hears.socket, to_anna), count(stays.socket, to_ben);
+  const int before = std::exchange(to_anna, 0);
+  to_ben = 0;
+  EXPECT_GT(before, 0);
+  ASSERT_TRUE(ben.socket.send(kGoodbye));
+  bool heard = false;
+  for (const double until_s = monotonic_s() + 5; !heard && monotonic_s() < until_s;) {
+    packer.socket.send(wire::Shutdown{"news"});
+    anna.socket.send(kGoodbye);
+    while (const auto message = master.socket.receive()) {
+      EXPECT_EQ(message->user, "ben");
+      heard = heard || message->user == "ben";
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    count(hears.socket, to_anna), count(stays.socket, to_ben);
+  }
+  EXPECT_TRUE(heard);
+  EXPECT_GT(to_ben, 0);
+  EXPECT_EQ(to_anna, 0);
+  EXPECT_EQ(ben.socket.refusal().text, "");
+}
+
 TEST(Keys, AnotherServersKeysAreRefusedAndToldSo) {
   const KeyFolder keys, others;
   Bound master(keys, Kind::kRouter, "control");

@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
+#include <filesystem>
+
+#include "common/core/whole_file.h"
 
 namespace telesplat::tools {
 namespace {
-
-constexpr uintmax_t kMaxBytes = uintmax_t{4} << 30;
 
 // Calls take(text) for each field; a quoted one comes without its quotes. take returns whether to go on. False: a quote
 // that does not end, or text after one.
@@ -67,12 +66,12 @@ std::optional<std::vector<std::string>> csv_fields(std::string_view line) {
 Result<CsvTable> CsvTable::read(const std::string& path, const Limits& limits) {
   CsvTable out;
   out.path_ = path;
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  if (!in || in.tellg() <= 0) return Error{fmt::format("{}: is not there or is empty", path)};
-  if (uintmax_t(in.tellg()) > kMaxBytes) return Error{fmt::format("{}: has more than {} bytes", path, kMaxBytes)};
-  out.bytes_.resize(size_t(in.tellg()));
-  in.seekg(0);
-  if (!in.read(out.bytes_.data(), std::streamsize(out.bytes_.size()))) return Error{path + ": cannot be read"};
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return Error{fmt::format("{}: is not there", path)};
+  auto content = read_whole(path, kMostTableBytes);
+  if (!content) return content.error();
+  if (content->empty()) return Error{fmt::format("{}: is empty", path)};
+  out.bytes_ = *std::move(content);
 
   size_t number = 0;
   for (size_t begin = 0; begin < out.bytes_.size();) {

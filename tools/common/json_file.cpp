@@ -1,19 +1,32 @@
 #include "tools/common/json_file.h"
 
-#include <filesystem>
-#include <fstream>
+#include <fmt/format.h>
+
+#include "common/core/whole_file.h"
 
 namespace telesplat::tools {
+namespace {
 
-nlohmann::ordered_json read_json_file(const std::string& path) {
-  using nlohmann::ordered_json;
-  std::error_code error;
-  const bool sane = std::filesystem::is_regular_file(path, error) &&
-                    std::filesystem::file_size(path, error) <= kMostJsonBytes && !error;
-  std::ifstream in(path, std::ios::binary);
-  if (!sane || !in) return ordered_json(ordered_json::value_t::discarded);
+using nlohmann::ordered_json;
+
+ordered_json parse(const std::string& text) {
   const auto shallow = [](int depth, ordered_json::parse_event_t, ordered_json&) { return depth < kDeepestJson; };
-  return ordered_json::parse(in, shallow, false);
+  return ordered_json::parse(text, shallow, false);
+}
+
+}  // namespace
+
+Result<ordered_json> read_json_object(const std::string& path) {
+  const auto text = read_whole(path, kMostJsonBytes);
+  if (!text) return text.error();
+  auto out = parse(*text);
+  if (!out.is_object()) return Error{fmt::format("{}: is no JSON object", path)};
+  return out;
+}
+
+ordered_json read_json_file(const std::string& path) {
+  const auto text = read_whole(path, kMostJsonBytes);
+  return text ? parse(*text) : ordered_json(ordered_json::value_t::discarded);
 }
 
 }  // namespace telesplat::tools

@@ -6,6 +6,8 @@
 #include <ctime>
 #include <utility>
 
+#include "common/core/guarded.h"
+
 namespace telesplat::viewer {
 namespace {
 
@@ -55,7 +57,8 @@ void Bookmarks::run() {
     const Task task = std::move(tasks_.front());
     tasks_.pop_front();
     lock.unlock();
-    task.pose ? keep_now(task) : find_now(task);
+    if (const Status s = guarded("bookmarks", [&] { task.pose ? keep_now(task) : find_now(task); }); !s)
+      tell_("bookmarks: " + s.error().text);
     lock.lock();
   }
 }

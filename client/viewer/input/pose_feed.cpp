@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/guarded.h"
 #include "common/core/log.h"
 
 namespace telesplat::viewer {
@@ -38,7 +39,10 @@ Result<std::unique_ptr<PoseFeed>> PoseFeed::open(const Options& options) {
 }
 
 PoseFeed::PoseFeed(const Options& options, std::unique_ptr<net::PlainSubscriber> socket)
-    : options_(options), socket_(std::move(socket)), head_(options.prediction), thread_([this] { listen(); }) {}
+    : options_(options), socket_(std::move(socket)), head_(options.prediction), thread_([this] {
+        const Status heard = guarded("listening to poses", [this] { listen(); });
+        if (!heard) failed_ = true;
+      }) {}
 
 PoseFeed::~PoseFeed() {
   stop_ = true;
@@ -93,6 +97,7 @@ std::optional<std::string> PoseFeed::take_news(double now_s) {
   const auto named = [&](const std::string& text) { return fmt::format("{}: {}", options_.endpoint, text); };
   if (flooded_ && !std::exchange(flood_told_, true))
     return named(fmt::format("more than {} messages a second; what is too much is dropped", kMost_s));
+  if (failed_ && !std::exchange(failure_told_, true)) return named("poses are listened to no more");
   const std::lock_guard lock(mutex_);
   const auto news = head_.take_news(now_s);
   return news ? std::optional(named(*news)) : std::nullopt;

@@ -54,8 +54,8 @@ class PoseFeed {
   TrackedHead head_;
   std::optional<geometry::Pose> shown_;
   double began_s_ = 0, frame_s_ = 0;  // the frame at hand; how long frames take until they are on display
-  std::atomic<bool> flooded_{false}, stop_{false};
-  bool flood_told_ = false;
+  std::atomic<bool> flooded_{false}, failed_{false}, stop_{false};
+  bool flood_told_ = false, failure_told_ = false;
   std::thread thread_;
 };
 

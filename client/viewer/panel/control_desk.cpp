@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/guarded.h"
 #include "common/net/control.h"
 #include "common/net/service.h"
 
@@ -134,7 +135,12 @@ void ControlDesk::loop() {
     std::optional<Order> order;
     bool status = false;
     if (!waits_for_work(order, status)) return;
-    auto answer = ask(line, order ? *std::move(order) : Order{"status", {}, {}});
+    const Order asked = order ? *std::move(order) : Order{"status", {}, {}};
+    std::optional<OrderAnswer> answer;
+    if (const Status s = guarded("asking the master", [&] { answer = ask(line, asked); }); !s) {
+      line.reset();
+      answer = OrderAnswer{asked, false, s.error().text};
+    }
     if (!answer) return;
     const std::lock_guard lock(mutex_);
     if (!status) {

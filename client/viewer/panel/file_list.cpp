@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "client/viewer/panel/recent_files.h"
+#include "common/core/guarded.h"
 
 namespace telesplat::viewer {
 
@@ -55,7 +56,10 @@ void FileList::go(const std::string& folder) {
     number = ++shared_->asked;
   }
   std::thread([shared = shared_, folder, number] {
-    auto listing = std::make_shared<const Listing>(read_folder(folder));
+    std::shared_ptr<const Listing> listing;
+    const Status read =
+        guarded("reading a folder", [&] { listing = std::make_shared<const Listing>(read_folder(folder)); });
+    if (!read) listing = std::make_shared<const Listing>(Listing{.folder = folder, .problem = read.error().text});
     const std::lock_guard lock(shared->mutex);
     if (number < shared->read) return;  // a later one is there already
     shared->read = number;

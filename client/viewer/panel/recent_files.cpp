@@ -6,6 +6,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
+
+#include "common/core/whole_file.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -27,7 +30,8 @@ std::string recent_files_path() {
 
 std::vector<std::string> read_recent(const std::string& list) {
   std::vector<std::string> out;
-  std::ifstream in(list);
+  const auto text = read_whole(list, kMostDescriptionBytes);
+  std::istringstream in(text ? *text : std::string());
   for (std::string line; out.size() < kMostRecent && std::getline(in, line);)
     if (!line.empty() && line.size() <= kLongestPath && std::find(out.begin(), out.end(), line) == out.end())
       out.push_back(line);

@@ -1,12 +1,15 @@
 #include "client/viewer/record/frame_spool.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 
+#include "common/core/guarded.h"
 #include "common/core/log.h"
 #include "common/net/service.h"
 
@@ -53,7 +56,8 @@ int write_frame(const std::string& directory, const SpooledFrame& f) {
   h.legend_bytes = legend.size();
   constexpr const char* kEyes[] = {"", "-left", "-right"};
   const std::string path = fmt::format("{}/{:08d}{}.frame", directory, f.number, kEyes[f.eye]);
-  FilePtr out = open_file(path + ".part", "wb");
+  unlink((path + ".part").c_str());
+  FilePtr out = open_file(path + ".part", "wbx");  // never through a link
   if (!out) return errno;
   bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
   ok = ok && std::fwrite(f.view.colour.data(), 4, f.view.colour.size(), out.get()) == f.view.colour.size();
@@ -137,7 +141,10 @@ void FrameSpool::write_loop() {
     waiting_.pop_front();
     writing_ = true;
     lock.unlock();
-    if (const int error = write_frame(directory_, frame)) on_failure(error);
+    int error = 0;
+    const Status wrote = guarded("writing a frame", [&] { error = write_frame(directory_, frame); });
+    if (!wrote) error = ENOMEM;
+    if (error != 0) on_failure(error);
     lock.lock();
     writing_ = false;
     free_.push_back(std::move(frame.view));
@@ -166,7 +173,8 @@ std::vector<std::string> spooled_frames(const std::string& directory) {
 }
 
 Result<SpooledFrame> read_spooled_frame(const std::string& path) {
-  const FilePtr in = open_file(path, "rb");
+  std::error_code error;
+  const FilePtr in = fs::is_regular_file(path, error) ? open_file(path, "rb") : FilePtr{nullptr, std::fclose};
   FileHeader h;
   const bool read = in && std::fread(&h, sizeof h, 1, in.get()) == 1;
   // The last letter of the magic is the version.
@@ -182,7 +190,6 @@ Result<SpooledFrame> read_spooled_frame(const std::string& path) {
       {{c[0], c[1], c[2]}, glm::dquat(c[3], c[4], c[5], c[6])}, c[7], c[8], c[9], c[10], c[11], h.width, h.height};
   if (const Status s = geometry::validate(f.camera); !s) return Error{fmt::format("{}: {}", path, s.error().text)};
   const size_t pixels = size_t(h.width) * size_t(h.height);
-  std::error_code error;
   if (h.legend_bytes > image::kMaxLegendText ||
       fs::file_size(path, error) != sizeof h + pixels * (h.has_depth ? 8 : 4) + h.legend_bytes)
     return Error{fmt::format("{}: its size does not fit {}x{} pixels", path, h.width, h.height)};

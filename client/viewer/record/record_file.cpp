@@ -1,5 +1,6 @@
 #include "client/viewer/record/record_file.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +25,8 @@ Result<RecordWriter> RecordWriter::open(const std::string& path, std::string_vie
                                         const char* what) {
   CHECK(magic.size() == kMagicBytes);
   RecordWriter out;
-  out.file_.reset(std::fopen(path.c_str(), "wb"));
+  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (fd >= 0) out.file_.reset(fdopen(fd, "wb"));
   if (!out.file_ || std::fwrite(magic.data(), 1, magic.size(), out.file_.get()) != magic.size())
     return Error{fmt::format("{}: cannot be written: {}", path, std::strerror(errno))};
   out.path_ = path;
@@ -64,12 +66,12 @@ Result<RecordReader> RecordReader::open(const std::string& path, const std::vect
                                         const char* what) {
   RecordReader out;
   out.path_ = path;
-  out.file_.reset(std::fopen(path.c_str(), "rb"));
+  std::error_code error;
+  if (std::filesystem::is_regular_file(path, error)) out.file_.reset(std::fopen(path.c_str(), "rb"));
   char magic[kMagicBytes];
   const bool read = out.file_ && std::fread(magic, 1, sizeof magic, out.file_.get()) == sizeof magic;
   if (!read || std::find(magics.begin(), magics.end(), std::string_view(magic, sizeof magic)) == magics.end())
     return Error{fmt::format("{}: is not {}", path, what)};
-  std::error_code error;
   out.left_ = std::filesystem::file_size(path, error) - sizeof magic;
   if (error) return Error{fmt::format("{}: {}", path, error.message())};
   return out;

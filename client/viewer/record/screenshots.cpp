@@ -5,6 +5,8 @@
 #include <ctime>
 #include <filesystem>
 
+#include "common/core/guarded.h"
+
 namespace telesplat::viewer {
 
 namespace fs = std::filesystem;
@@ -33,10 +35,13 @@ void Screenshots::take(const image::View& view, image::Alpha alpha, bool exr) {
   writing_ = std::async(std::launch::async, [this, alpha, exr, path = next_path(exr ? "exr" : "png"),
                                              before = std::move(writing_), copy = std::move(copy)]() {
     if (before.valid()) before.wait();
-    std::error_code error;
-    fs::create_directories(directory_, error);
-    const Status written = exr ? image::write_exr(path, copy, alpha) : image::write_png(path, copy, alpha);
-    tell_(written ? "screenshot: " + path : written.error().text);
+    const Status done = guarded("a screenshot", [&] {
+      std::error_code error;
+      fs::create_directories(directory_, error);
+      const Status written = exr ? image::write_exr(path, copy, alpha) : image::write_png(path, copy, alpha);
+      tell_(written ? "screenshot: " + path : written.error().text);
+    });
+    if (!done) tell_(path + ": " + done.error().text);
   });
 }
 

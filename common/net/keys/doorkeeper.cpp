@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <mutex>
 #include <thread>
 #include <tuple>
 #include <unordered_map>
@@ -22,7 +23,8 @@ namespace telesplat::net {
 namespace {
 
 constexpr const char* kQuestions = "inproc://zeromq.zap.01";
-constexpr int kGreeting_ms = 5000;  // a connection that has not shown its key by then is dropped
+constexpr auto kLook = std::chrono::milliseconds(1000);  // at the list, while nobody comes
+constexpr int kGreeting_ms = 5000;                       // a connection that has not shown its key by then is dropped
 constexpr size_t kMostFrames = 16, kMostAddress = 64;
 // What ZAP's answers are made of.
 constexpr std::string_view kVersion = "1.0", kCurve = "CURVE", kYes = "200", kNo = "400";
@@ -42,18 +44,19 @@ struct Question {
 
 }  // namespace
 
-std::string text_of(const Visitor& v) { return fmt::format("{} {}", name_of(v.role), v.name); }
+std::string text_of(const Visitor& v) { return fmt::format("{} {} {}", name_of(v.role), v.name, v.key); }
 
 std::optional<Visitor> visitor_of(std::string_view text) {
-  const size_t space = text.find(' ');
-  const auto role = role_named(text.substr(0, space));
-  if (!role || space == text.npos) return std::nullopt;
-  return Visitor{*role, text.substr(space + 1)};
+  const size_t name = text.find(' '), key = text.rfind(' ');
+  const auto role = role_named(text.substr(0, name));
+  if (!role || name == text.npos || key == name) return std::nullopt;
+  return Visitor{*role, text.substr(name + 1, key - name - 1), text.substr(key + 1)};
 }
 
 struct Doorkeeper::Impl {
   Impl(zmq::context_t& context, const Keys& keys)
       : folder(keys.folder),
+        server_key(keys.server),
         server(key_bytes(keys.server)),
         questions(context, zmq::socket_type::rep),
         told(context, zmq::socket_type::pair),
@@ -72,9 +75,18 @@ struct Doorkeeper::Impl {
     visitors.clear();
     const auto list = read_allow_list(folder);
     if (!list) return list.error();
-    for (const Allowed& a : list->entries()) visitors[key_bytes(a.key)] = {a.role, a.name};
+    auto now = std::make_shared<std::set<std::string>>();
+    now->insert(text_of(server_visitor()));
+    for (const Allowed& a : list->entries()) {
+      visitors[key_bytes(a.key)] = a;
+      now->insert(text_of({a.role, a.name, a.key}));
+    }
+    const std::lock_guard lock(mutex);
+    may_stay = std::move(now);
     return ok_status();
   }
+
+  Visitor server_visitor() const { return {Role::kServer, name_of(Role::kServer), server_key}; }
 
   void follow_list() {
     if (stamp == stamp_of(folder + "/" + kAllowedFile)) return;
@@ -98,7 +110,6 @@ struct Doorkeeper::Impl {
 
   // Who asks; nothing: nobody who may come in, and `why`.
   std::optional<Visitor> look_up(const Question& q, std::string& why) {
-    follow_list();
     if (q.version != kVersion || q.mechanism != kCurve) {
       why = "it shows no key";
       return std::nullopt;
@@ -108,8 +119,8 @@ struct Doorkeeper::Impl {
       why = "its key is not on the allow-list";
       return std::nullopt;
     }
-    const Visitor out = found == visitors.end() ? Visitor{Role::kServer, name_of(Role::kServer)}
-                                                : Visitor{found->second.first, found->second.second};
+    const Visitor out =
+        found == visitors.end() ? server_visitor() : Visitor{found->second.role, found->second.name, found->second.key};
     if (may_connect(out.role, q.domain)) return out;
     why = fmt::format("the key {} is {}'s", out.name, described(out.role));
     return std::nullopt;
@@ -119,7 +130,13 @@ struct Doorkeeper::Impl {
     const auto q = hear();
     if (!q) return;
     std::string why;
-    const auto visitor = look_up(*q, why);
+    std::optional<Visitor> visitor;
+    // Whoever is not answered is not let in; an answer must follow every question.
+    try {
+      visitor = look_up(*q, why);
+    } catch (const std::exception& e) {
+      why = e.what();
+    }
     const std::string who = visitor ? text_of(*visitor) : std::string();
     const std::string_view frames[] = {kVersion, q->request, visitor ? kYes : kNo, visitor ? "" : "refused", who, ""};
     for (size_t i = 0; i < std::size(frames); ++i)
@@ -136,20 +153,25 @@ struct Doorkeeper::Impl {
     for (;;) {
       try {
         zmq::pollitem_t items[] = {{questions.handle(), 0, ZMQ_POLLIN, 0}, {told.handle(), 0, ZMQ_POLLIN, 0}};
-        zmq::poll(items, std::size(items), std::chrono::milliseconds(-1));
+        zmq::poll(items, std::size(items), kLook);
         if (items[1].revents) return;
+        follow_list();
         if (items[0].revents) answer();
       } catch (const zmq::error_t& e) {
         if (e.num() != EINTR) log::error("keys: {}", e.what());
         if (e.num() == ETERM) return;
+      } catch (const std::exception& e) {
+        if (limiter.allow(monotonic_s())) log::error("keys: {}", e.what());
       }
     }
   }
 
-  const std::string folder, server;
+  const std::string folder, server_key, server;  // server: the key's bytes
   zmq::socket_t questions, told, tell;
   Stamp stamp;
-  std::unordered_map<std::string, std::pair<Role, std::string>> visitors;  // by the bytes of their keys
+  std::unordered_map<std::string, Allowed> visitors;  // by the bytes of their keys
+  mutable std::mutex mutex;                           // of what others ask for
+  std::shared_ptr<const std::set<std::string>> may_stay;
   log::RateLimiter limiter;
   std::thread thread;
 };
@@ -167,6 +189,11 @@ Result<std::unique_ptr<Doorkeeper>> Doorkeeper::open(zmq::context_t& context, co
 Doorkeeper::~Doorkeeper() {
   impl_->tell.send(zmq::message_t(), zmq::send_flags::dontwait);
   impl_->thread.join();
+}
+
+std::shared_ptr<const std::set<std::string>> Doorkeeper::may_stay() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->may_stay;
 }
 
 void guard(zmq::socket_t& socket, const Keys& keys, std::string_view serves) {

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -25,6 +26,10 @@ class Doorkeeper {
   static Result<std::unique_ptr<Doorkeeper>> open(zmq::context_t& context, const Keys& keys);
   ~Doorkeeper();
 
+  /// Who may be in now, as text_of(Visitor), by the newest list that could be read: it is looked at once a second. Any
+  /// thread; the same pointer as long as the list has not changed.
+  std::shared_ptr<const std::set<std::string>> may_stay() const;
+
  private:
   struct Impl;
   explicit Doorkeeper(std::unique_ptr<Impl> impl);
@@ -34,7 +39,7 @@ class Doorkeeper {
 /// Who sent a message, as the doorkeeper wrote it into what ZeroMQ knows of the connection.
 struct Visitor {
   Role role = Role::kViewer;
-  std::string_view name;
+  std::string_view name, key;
 };
 std::string text_of(const Visitor& visitor);
 /// Nothing: it is no such text.

@@ -8,6 +8,8 @@
 #include <functional>
 #include <map>
 
+#include "common/core/whole_file.h"
+
 namespace telesplat::stereo {
 namespace {
 
@@ -85,8 +87,10 @@ Status read_tables(const std::string& path, const toml::table& file, Panel& pane
 }  // namespace
 
 Result<Panel> read_panel(const std::string& path) {
+  const auto text = read_whole(path, kMostDescriptionBytes);
+  if (!text) return text.error();
   try {
-    const toml::table file = toml::parse_file(path);
+    const toml::table file = toml::parse(*text, path);
     Panel panel;
     if (const Status s = read_tables(path, file, panel); !s) return s.error();
     if (const Status s = validate(panel); !s) return Error{fmt::format("{}: {}", path, s.error().text)};

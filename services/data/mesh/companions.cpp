@@ -17,6 +17,7 @@ constexpr size_t kMaxCompanions = 1024;
 // The uris of buffers and images, as VTK looks for them: without undoing %20 and its like.
 std::vector<std::string> gltf_uris(std::string_view content) {
   std::vector<std::string> names;
+  if (!gltf_json_fits(content)) return names;  // check_gltf() refuses it
   const nlohmann::json document = nlohmann::json::parse(gltf_json(content), nullptr, false);
   if (!document.is_object()) return names;
   for (const char* kind : {"buffers", "images"}) {

@@ -35,6 +35,10 @@ std::string_view glb_binary(std::string_view content) {
   return content.substr(at + kChunkHeader, word_at(content, at));
 }
 
+Json parse(std::string_view content) {
+  return gltf_json_fits(content) ? Json::parse(gltf_json(content), nullptr, false) : Json(Json::value_t::discarded);
+}
+
 const Json& member(const Json& of, const char* key) {
   static const Json kNothing;
   const auto found = of.is_object() ? of.find(key) : of.end();
@@ -157,9 +161,23 @@ std::string_view gltf_json(std::string_view content) {
   return content.substr(kGlbHeader + kChunkHeader, bytes);
 }
 
+bool gltf_json_fits(std::string_view content) {
+  const std::string_view json = gltf_json(content);
+  if (json.size() <= kMostGltfJson) return true;
+  uint64_t outside = 0;
+  for (size_t at = 0; at < json.size() && outside <= kMostGltfJson;) {
+    const size_t quote = std::min(json.find('"', at), json.size());
+    outside += quote - at + 2;
+    for (at = quote + 1; at < json.size() && json[at] != '"'; ++at)
+      if (json[at] == '\\') ++at;
+    ++at;
+  }
+  return outside <= kMostGltfJson;
+}
+
 std::vector<std::string> gltf_picture_files(std::string_view content, const std::string& path) {
   std::vector<std::string> out;
-  const Json document = Json::parse(gltf_json(content), nullptr, false);
+  const Json document = parse(content);
   const Json& images = member(document, "images");
   for (size_t i = 0; images.is_array() && i < std::min(images.size(), kMaxPictures); ++i)
     if (const std::string uri = text(images[i], "uri"); !uri.empty() && !uri.starts_with("data:"))
@@ -169,7 +187,7 @@ std::vector<std::string> gltf_picture_files(std::string_view content, const std:
 
 Result<GltfTextures> read_gltf_textures(std::string_view content, const std::string& path) {
   GltfTextures out;
-  const Json document = Json::parse(gltf_json(content), nullptr, false);
+  const Json document = parse(content);
   uint64_t room = kMaxTexels;
   for (const size_t t : base_colours(document)) {
     const Json& texture = element(document, "textures", t);

@@ -2,6 +2,7 @@
 // 4.4, 5.18, 5.26, 5.29.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -14,6 +15,11 @@ namespace telesplat::data {
 /// The JSON text of a .gltf file (all of it) or a .glb file (its first chunk); empty if a .glb is too short for what it
 /// claims.
 std::string_view gltf_json(std::string_view content);
+
+/// Of that text what stands outside of its own texts, in which buffers may stand: each byte may take 20 of memory.
+inline constexpr uint64_t kMostGltfJson = uint64_t{64} << 20;
+/// Whether that text keeps to kMostGltfJson. One that does not is not read.
+bool gltf_json_fits(std::string_view content);
 
 /// Paths of the pictures that lie beside the file.
 std::vector<std::string> gltf_picture_files(std::string_view content, const std::string& path);

@@ -13,6 +13,8 @@
 #include <optional>
 #include <thread>
 
+#include "common/core/clock.h"
+#include "common/core/log.h"
 #include "common/net/service.h"
 
 namespace telesplat::master {
@@ -106,6 +108,7 @@ struct HttpEndpoint::Impl {
   tcp::acceptor acceptor{io};
   asio::steady_timer again{io};
   std::string url;
+  log::RateLimiter limiter;  // the thread's alone
   std::thread thread;
 
   void accept() {
@@ -117,9 +120,20 @@ struct HttpEndpoint::Impl {
           if (!stopped) accept();
         });
       }
-      if (shared.connections < kMostConnections) std::make_shared<Connection>(std::move(socket), shared)->begin();
+      if (shared.connections < kMostConnections)
+        guard([&] { std::make_shared<Connection>(std::move(socket), shared)->begin(); });
       accept();
     });
+  }
+
+  // A connection for which there is no memory is closed; the others go on.
+  template <class Work>
+  void guard(Work&& work) {
+    try {
+      work();
+    } catch (const std::exception& e) {
+      if (limiter.allow(monotonic_s())) log::error("an answer about the session's figures failed: {}", e.what());
+    }
   }
 
   // Signals are for the master's loop.
@@ -129,8 +143,8 @@ struct HttpEndpoint::Impl {
     pthread_sigmask(SIG_SETMASK, &all, &before);
     thread = std::thread([this] {
       net::lower_thread_priority(5);
-      accept();
-      io.run();
+      guard([this] { accept(); });
+      while (!io.stopped()) guard([this] { io.run(); });
     });
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
   }

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "common/codec/depth_codec.h"
+#include "common/core/whole_file.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -27,12 +27,9 @@ Status write_replay(const std::string& path, const Replay& replay) {
 }
 
 Result<Replay> read_replay(const std::string& path) {
-  std::error_code error;
-  const uint64_t bytes = std::filesystem::file_size(path, error);
-  if (error) return Error{fmt::format("{}: {}", path, error.message())};
-  if (bytes > kMaxBytes) return Error{fmt::format("{}: {} bytes, limit {}", path, bytes, kMaxBytes)};
-  std::ifstream in(path, std::ios::binary);
-  std::string all(std::istreambuf_iterator<char>(in), {});
+  const auto content = read_whole(path, kMaxBytes);
+  if (!content) return content.error();
+  const std::string& all = *content;
   const size_t end = all.find('\n');
   const auto head = nlohmann::json::parse(all.substr(0, end == all.npos ? 0 : end), nullptr, false);
   if (!head.is_object() || !head.contains("width") || !head.contains("height") || !head.contains("row_cost_s") ||

@@ -3,7 +3,9 @@
 #include <unistd.h>
 
 #include "services/data/inspect.h"
+#include "services/data/mesh/formats/gltf_header.h"
 #include "services/data/mesh/reader.h"
+#include "services/data/texture/gltf_textures.h"
 #include "tests/support/data_files.h"
 
 namespace telesplat::data::test {
@@ -201,6 +203,20 @@ TEST(Truncation, AtEveryLengthOfEachTextFormat) {
   try_all(off, read_off);
   try_all(stl, read_stl);
   EXPECT_GT(refused, 300u);
+}
+
+// Its buffers may stand in it as texts; everything else takes many times its size of memory.
+TEST(GltfJson, IsNoLargerThanItsLimitBesideTexts) {
+  const std::string begin = R"({"asset":{"version":"2.0"},"x":")", end = R"("})";
+  const std::string text = begin + std::string(kMostGltfJson, 'A') + R"(\"x)" + end;
+  EXPECT_TRUE(gltf_json_fits(text));
+  EXPECT_TRUE(check_gltf(text, text.size(), "a.gltf").ok());
+  const std::string numbers = R"({"asset":{"version":"2.0"},"x":[)" + std::string(kMostGltfJson, ' ') + "1]}";
+  const Status refused = check_gltf(numbers, numbers.size(), "a.gltf");
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().text, "a.gltf: its glTF JSON has more than 67108864 bytes outside of texts");
+  EXPECT_TRUE(gltf_picture_files(numbers, "a.gltf").empty());
+  EXPECT_TRUE(companion_files(numbers, "gltf", "a.gltf").empty());
 }
 
 }  // namespace

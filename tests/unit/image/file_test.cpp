@@ -49,6 +49,18 @@ TEST_F(ImageFile, PngKeepsEveryColour) {
   EXPECT_EQ(files(), 1u);  // nothing else is left behind
 }
 
+TEST_F(ImageFile, PicturesAreNotWrittenThroughLinks) {
+  const View v = all_values();
+  std::ofstream(folder_ / "precious") << "precious";
+  for (const char* name : {"a.png", "a.png.part", "a.exr", "a.exr.part"})
+    std::filesystem::create_symlink(folder_ / "precious", folder_ / name);
+  ASSERT_TRUE(write_png(path("a.png"), v).ok());
+  ASSERT_TRUE(write_exr(path("a.exr"), v).ok());
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "precious"), 8u);
+  EXPECT_TRUE(read_view(path("a.png")).ok() && read_view(path("a.exr")).ok());
+  EXPECT_EQ(files(), 5u);
+}
+
 TEST_F(ImageFile, ExrKeepsEveryColourAndEveryDepthBit) {
   const View v = all_values();
   ASSERT_TRUE(write_exr(path("a.exr"), v).ok());

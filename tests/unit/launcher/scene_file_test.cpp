@@ -70,6 +70,51 @@ TEST_F(SceneFile, TheCommandLineComesAfterTheFile) {
   EXPECT_NE(second, arguments->end());
 }
 
+// A scene file may be a stranger's.
+TEST_F(SceneFile, KeysThatWouldWriteElsewhereOrLetOthersInAreRefused) {
+  for (const char* key : {"out = \"/tmp/elsewhere\"",
+                          "overwrite = true",
+                          "master = \"tcp://elsewhere:7700\"",
+                          "movie = \"a.mp4\"",
+                          "keys = \"auto\"",
+                          "cache = \"/tmp/elsewhere\"",
+                          "report = true",
+                          "record_every = 1",
+                          "record_points = 9",
+                          "record_depth = true",
+                          "record_plan = true",
+                          "log_level = \"trace\"",
+                          "link = \"10mbit\"",
+                          "metrics_port = 9000",
+                          "max_peers = 4096",
+                          "max_messages = 1e6",
+                          "table_limit_mb = 0",
+                          "trace_limit_mb = 0",
+                          "poses = \"tcp://elsewhere:7800\"",
+                          "overwrite = false"}) {
+    const std::string name = std::string(key).substr(0, std::string(key).find(' '));
+    for (const char* table : {"", "[view]\n"}) {
+      const auto flags = read_scene_file(write(std::string("file = \"a.ply\"\n") + table + key + "\n"));
+      ASSERT_FALSE(flags.ok()) << key;
+      for (const std::string& said : {path_, "key " + name + ": ", std::string(" on the command line")})
+        EXPECT_NE(flags.error().text.find(said), std::string::npos) << flags.error().text;
+    }
+  }
+  for (const char* none : {"bind = \"tcp://*:7700\"", "insecure = true", "companions = \"anywhere\""})
+    EXPECT_FALSE(read_scene_file(write(std::string("file = \"a.ply\"\n") + none + "\n")).ok()) << none;
+}
+
+TEST_F(SceneFile, AFileIsNoFlag) {
+  const std::string scene = write("file = \"--out=elsewhere\"\ntexture = \"-t.png\"\n");
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(std::filesystem::path(scene).parent_path());
+  const auto flags = read_scene_file(std::filesystem::path(scene).filename().string());
+  std::filesystem::current_path(before);
+  ASSERT_TRUE(flags.ok()) << flags.error().text;
+  EXPECT_EQ(flags->back(), "./--out=elsewhere");
+  EXPECT_EQ(flags->front(), "--texture=./-t.png");
+}
+
 TEST_F(SceneFile, ErrorsNameFileAndPlace) {
   for (const char* text : {"file = ", "up = \"z\"", "[scene]\nfile = \"a.ply\"\n[scene.deeper]\nx = 1\n",
                            "file = \"a.ply\"\nsize = [1, 2]\n"}) {

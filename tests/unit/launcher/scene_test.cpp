@@ -9,6 +9,7 @@
 #include "common/options/parser.h"
 #include "services/data/kinds.h"
 #include "services/data/record.h"
+#include "services/master/peers/told_tables.h"
 #include "tools/telesplat/run/run_options.h"
 
 namespace telesplat::launcher {
@@ -91,6 +92,21 @@ TEST_F(Scenes, TheCacheOfARecordIsNotUsed) {
   ASSERT_TRUE(scene.ok()) << scene.error().text;
   EXPECT_EQ((*scene)->options().mesh.cache_dir, "");
   EXPECT_EQ((*scene)->options().mesh.up, "z");
+}
+
+// The master lets nobody tell session.toml what it does not know.
+TEST(ToldKeys, AreAllThatDataServersAndViewersRecord) {
+  const auto is_told = [](const std::string& role, const std::string& key) {
+    for (const auto& table : master::told_tables(role))
+      if (std::find(table.keys.begin(), table.keys.end(), key) != table.keys.end()) return true;
+    return false;
+  };
+  data::DataOptions data;
+  viewer::ViewerOptions viewer;
+  for (const auto& [role, table] : {std::pair("data", data::scene_table(data)), {"viewer", viewer::view_table(viewer)}})
+    for (const options::Row& row : table)
+      if (row.reach == options::Reach::kRecorded)
+        EXPECT_TRUE(is_told(role, options::key_of(row))) << role << ": " << options::name_of(row);
 }
 
 TEST_F(Scenes, AJuliaSetIsRecordedWithItsParameters) {

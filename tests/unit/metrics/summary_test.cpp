@@ -402,13 +402,6 @@ TEST_F(Record, TheSummarySaysWhatWasDone) {
   EXPECT_EQ(record->summary({sampler}, {})["command"], nlohmann::json({{"sampler-1", "s 'x y'"}}));
 }
 
-TEST(RecordText, IsLinesOfSessionToml) {
-  EXPECT_TRUE(is_record_text("\n[scene]\nkind = \"mesh\"\n\n[display]\nfov = 90.0\n"));
-  EXPECT_TRUE(is_record_text(""));
-  EXPECT_FALSE(is_record_text("no table"));
-  EXPECT_FALSE(is_record_text("a = 1\r\nb = \x1b[2J"));
-}
-
 TEST_F(Record, TheSummaryIsUtf8WhateverNamesAre) {
   const Process data{"data", "data", 1, {{"scene", "caf\xe9.ply"}, {"kind", "\xff"}}, {}};
   viewer.name = "viewer \xff";

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
@@ -9,6 +10,7 @@
 
 #include "client/viewer/record/frame_spool.h"
 #include "client/viewer/viewer_options.h"
+#include "common/core/log.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -55,6 +57,32 @@ TEST_F(Spool, FramesComeBackAsTheyWere) {
   EXPECT_TRUE(back->camera == expected.camera);
   EXPECT_EQ(back->view.colour, expected.view.colour);
   EXPECT_EQ(back->view.depth_m, expected.view.depth_m);
+}
+
+// An exception in the thread that writes: there is no memory for what it writes.
+TEST_F(Spool, AFrameThatCannotBeMadeIsCountedAndOthersFollow) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need the memory that is taken away here";
+#endif
+  const auto write = [&] {
+    log::initialise("viewer", "info");
+    auto spool = FrameSpool::open(directory_);
+    SpooledFrame large = frame(1, kPicture);
+    auto legend = std::make_shared<image::Legend>();
+    legend->title = std::string(size_t{512} << 20, 'x');
+    large.legend = legend;
+    rlimit few{};
+    getrlimit(RLIMIT_AS, &few);
+    long pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    few.rlim_cur = rlim_t(pages) * rlim_t(sysconf(_SC_PAGESIZE)) + (size_t{256} << 20);
+    setrlimit(RLIMIT_AS, &few);
+    (*spool)->exchange(std::move(large));
+    (*spool)->exchange(frame(2, kPicture));
+    (*spool)->flush();
+    std::_Exit((*spool)->failed() == 1 && spooled_frames(directory_).size() == 1 ? 0 : 1);
+  };
+  EXPECT_EXIT(write(), testing::ExitedWithCode(0), "writing a frame failed: ");
 }
 
 TEST_F(Spool, AFullDiskIsSaidOnce) {

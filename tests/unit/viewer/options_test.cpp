@@ -33,8 +33,7 @@ TEST(ViewerFlags, WhatAPictureDependsOnIsRecorded) {
   const auto recorded =
       names_of(view_table(o), [](const options::Row& r) { return r.reach == options::Reach::kRecorded; });
   EXPECT_EQ(recorded, (Texts{"--size", "--fov", "--near", "--background", "--shading", "--legend", "--stereo",
-                             "--eye-separation", "--screen-distance", "--swap-eyes", "--barrier",
-                             "--stereo-pattern"}));
+                             "--eye-separation", "--screen-distance", "--swap-eyes", "--barrier", "--stereo-pattern"}));
 }
 
 TEST(ViewerFlags, StillPicturesHaveOneFourOrSixteenSamples) {
@@ -147,7 +146,7 @@ TEST(Wall, AHeadStandsBeforeAWallThatStandsInTheRoom) {
 TEST(Wall, WhatIsNoDescriptionIsToldByFileAndKey) {
   ViewerOptions o;
   o.wall = testing::TempDir() + "/none.toml";
-  EXPECT_NE(settle(o).error().text.find("none.toml: is no file"), std::string::npos);
+  EXPECT_NE(settle(o).error().text.find("none.toml: cannot be read"), std::string::npos);
   o.wall = "2by1";
   EXPECT_NE(settle(o).error().text.find("neither a file NAME.toml nor COLUMNSxROWS"), std::string::npos);
 }

@@ -116,7 +116,7 @@ TEST(ReadWall, MistakesAreToldWithFileKeyValueAndLimit) {
     EXPECT_NE(told.find(c.told), std::string::npos) << c.text << "-> " << told;
     EXPECT_EQ(told.find("lab.toml"), 0u) << told;
   }
-  EXPECT_NE(read_wall("/none/such.toml").error().text.find("/none/such.toml: is no file"), std::string::npos);
+  EXPECT_NE(read_wall("/none/such.toml").error().text.find("/none/such.toml: cannot be read"), std::string::npos);
 }
 
 TEST(ReadWall, IsScaledInPixelsAlone) {

@@ -8,6 +8,7 @@
 
 #include "client/viewer/viewer_service.h"
 #include "common/core/log.h"
+#include "common/core/whole_file.h"
 #include "common/geometry/fit.h"
 #include "tools/common/complain.h"
 #include "tools/common/progress_line.h"
@@ -74,8 +75,8 @@ class Comparison {
 
   Status write() const {
     if (poses_.empty()) return ok_status();
-    if (const Status s = write_text(subject_.out + "/compare.csv", comparison_csv(poses_)); !s) return s;
-    if (const Status s = write_text(
+    if (const Status s = write_whole(subject_.out + "/compare.csv", comparison_csv(poses_)); !s) return s;
+    if (const Status s = write_whole(
             subject_.out + "/compare.json",
             comparison_json(about(), poses_).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
                 "\n");

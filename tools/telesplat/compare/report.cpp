@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
-#include <fstream>
 #include <functional>
 
 #include "common/metrics/statistics.h"
@@ -130,16 +128,6 @@ std::string median_label(const std::vector<ComparedPose>& poses, size_t i) {
   return fmt::format("{} {}  PSNR {:.2f} dB  SSIM {:.4f}  FLIP {:.4f}  holes {:.2f} %  {:.2f} ms",
                      splat::kernel_name(c.kernel), c.renderer, value("psnr_db"), value("ssim"), value("flip"),
                      100 * value("hole_fraction"), value("frame_ms"));
-}
-
-Status write_text(const std::string& path, const std::string& text) {
-  std::ofstream out(path + ".part", std::ios::binary);
-  out << text;
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(path + ".part", path, error);
-  if (!out || error) return Error{fmt::format("{}: cannot be written", path)};
-  return ok_status();
 }
 
 }  // namespace telesplat::launcher

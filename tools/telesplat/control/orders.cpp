@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
+#include "common/core/whole_file.h"
 #include "common/julia/flags.h"
 #include "common/scene/clip_order.h"
 #include "common/scene/colouring.h"
@@ -52,12 +52,8 @@ Result<std::string> read_map(const std::string& word, ControlClient& client) {
   const size_t named = word.find(".json:");
   const std::string path = word.substr(0, named == std::string::npos ? named : named + 5);
   const std::string name = path.size() < word.size() ? word.substr(path.size() + 1) : "";
-  std::error_code error;
-  const uintmax_t bytes = fs::file_size(path, error);
-  if (error) return Error{fmt::format("{}: {}", path, error.message())};
-  if (bytes > kMaxMapBytes) return Error{fmt::format("{}: {} bytes, limit {}", path, bytes, kMaxMapBytes)};
-  std::ifstream in(path, std::ios::binary);
-  const std::string content((std::istreambuf_iterator<char>(in)), {});
+  const auto content = read_whole(path, kMaxMapBytes);
+  if (!content) return content.error();
   const auto answer = client.ask("status", kPatience_s);
   if (!answer) return answer.error();
   const auto status = nlohmann::json::parse(*answer, nullptr, false);
@@ -68,7 +64,7 @@ Result<std::string> read_map(const std::string& word, ControlClient& client) {
   const volume::TransferFunction any{{{}}};
   const auto session = volume::read_session(parameters, {{"transfer", volume::to_text(any)}});
   if (!session) return Error{fmt::format("ctl tf {}: the session shows no volume: {}", path, session.error().text)};
-  const auto transfer = volume::parse_paraview_json(content, path, session->range, name);
+  const auto transfer = volume::parse_paraview_json(*content, path, session->range, name);
   if (!transfer) return transfer.error();
   return volume::to_text(*transfer);
 }

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <bit>
-#include <cstdio>
-#include <fstream>
 
 #include "common/core/check.h"
+#include "common/core/whole_file.h"
 
 namespace telesplat::launcher {
 
@@ -19,22 +18,9 @@ Status write_npy(const std::string& path, std::span<const float> values, int row
   header += '\n';
   const std::string prefix{'\x93', 'N', 'U', 'M', 'P', 'Y', 1, 0, char(header.size() & 255), char(header.size() >> 8)};
 
-  const std::string part = path + ".part";
-  {
-    std::ofstream out(part, std::ios::binary);
-    out << prefix << header;
-    out.write(reinterpret_cast<const char*>(values.data()), std::streamsize(values.size_bytes()));
-    out.close();
-    if (!out) {
-      std::remove(part.c_str());
-      return Error{fmt::format("cannot write {}", path)};
-    }
-  }
-  if (std::rename(part.c_str(), path.c_str()) != 0) {
-    std::remove(part.c_str());
-    return Error{fmt::format("cannot write {}: renaming {} failed", path, part)};
-  }
-  return ok_status();
+  std::string all = prefix + header;
+  all.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+  return write_whole(path, all);
 }
 
 }  // namespace telesplat::launcher

@@ -6,11 +6,11 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 
 #include "client/viewer/record/frame_spool.h"
 #include "common/codec/depth_codec.h"
+#include "common/core/whole_file.h"
 #include "common/image/normal.h"
 #include "services/data/inspect.h"
 #include "tools/common/csv_table.h"
@@ -69,15 +69,9 @@ data::Description begin(const std::string& what, const std::string& title, const
 }
 
 Result<std::vector<uint8_t>> read_limited(const std::string& path) {
-  std::error_code error;
-  const uintmax_t bytes = fs::file_size(path, error);
-  if (error) return Error{fmt::format("{}: {}", path, error.message())};
-  if (bytes > kMaxDepthImageBytes)
-    return Error{fmt::format("{}: {} bytes, limit {}", path, bytes, kMaxDepthImageBytes)};
-  std::ifstream in(path, std::ios::binary);
-  std::vector<uint8_t> out((std::istreambuf_iterator<char>(in)), {});
-  if (in.bad()) return Error{fmt::format("{}: cannot be read", path)};
-  return out;
+  const auto bytes = read_whole(path, kMaxDepthImageBytes);
+  if (!bytes) return bytes.error();
+  return std::vector<uint8_t>(bytes->begin(), bytes->end());
 }
 
 // "frame-000012.depth" -> 12

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <sstream>
 
+#include "tools/common/json_file.h"
 #include "tools/telesplat/run/run_report.h"
 #include "tools/telesplat/scene/scene.h"
 
@@ -74,16 +74,15 @@ void describe_files(const std::string& directory, data::Description& out) {
 }  // namespace
 
 Result<data::Description> inspect_run(const std::string& directory) {
-  std::ifstream in(directory + "/summary.json");
-  auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
-  if (!summary.is_object())
+  auto summary = tools::read_json_object(directory + "/summary.json");
+  if (!summary)
     return Error{
         fmt::format("{}: is a folder without a readable summary.json, so it is not a finished run, and it "
-                    "holds no volume either",
-                    directory)};
+                    "holds no volume either ({})",
+                    directory, summary.error().text)};
   data::Description out("run", fmt::format("{}: a run", directory));
   out.json["path"] = directory;
-  out.json["summary"] = std::move(summary);
+  out.json["summary"] = *std::move(summary);
   if (const auto report = read_report(directory)) {
     out.row("shown", report->head);
     for (const auto& [what, value] : report->lines) out.row(what, value);

@@ -14,7 +14,8 @@ options::Table movie_rows(MovieOptions& o) {
       {.flag = "--movie",
        .value = &o.file,
        .help = "after the run make a movie of the frames that were displayed: FILE.mp4 (or .mov, .mkv, .avi, .webm, "
-               ".gif, through ffmpeg), a folder/ or folder/%06d.png of pictures, FILE.png for a contact sheet"},
+               ".gif, through ffmpeg), a folder/ or folder/%06d.png of pictures, FILE.png for a contact sheet",
+       .not_in_scene = "where a run writes"},
       {.flag = "--movie-fps", .value = &o.fps, .help = "frames a second of the movie", .limits = kFps},
       {.flag = "--movie-size", .value = &o.size, .help = "pixels of the movie, WxH; default: the display's"}};
 }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <toml++/toml.h>
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -11,8 +10,10 @@
 #include <map>
 
 #include "client/viewer/stereo_flags.h"
+#include "common/core/whole_file.h"
 #include "common/image/background.h"
 #include "tools/common/csv_table.h"
+#include "tools/telesplat/scene/toml_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -20,15 +21,11 @@ namespace {
 constexpr double kMaxPixels = 64 << 20;  // a comparison keeps some dozen bytes a pixel
 constexpr tools::CsvTable::Limits kFrames{.rows = 10'000'000, .line_bytes = 1 << 16};
 
-Result<toml::table> read_toml(const std::string& path) {
+Result<toml::table> read_session(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error))
+  if (!std::filesystem::exists(path, error))
     return Error{fmt::format("{}: is not there, so its folder is not that of a finished run", path)};
-  try {
-    return toml::parse_file(path);
-  } catch (const toml::parse_error& e) {
-    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
-  }
+  return read_toml(path, kMostSessionBytes);
 }
 
 // A finite number that may stand as text: the facts of processes are.
@@ -383,7 +380,7 @@ geometry::Camera RecordedRun::camera_at(const geometry::Pose& pose, int width_px
 
 Result<RecordedRun> read_recorded_run(const std::string& directory) {
   const std::string path = directory + "/session.toml";
-  const auto session = read_toml(path);
+  const auto session = read_session(path);
   if (!session) return session.error();
   const toml::table* viewer = own_viewer(*session);
   if (!viewer) return Error{fmt::format("{}: names no viewer, so no frame of that run was displayed", path)};
@@ -392,7 +389,7 @@ Result<RecordedRun> read_recorded_run(const std::string& directory) {
 
 Result<std::vector<RecordedRun>> read_recorded_displays(const std::string& directory) {
   const std::string path = directory + "/session.toml";
-  const auto session = read_toml(path);
+  const auto session = read_session(path);
   if (!session) return session.error();
   const toml::table* own = own_viewer(*session);
   if (!own) return Error{fmt::format("{}: names no viewer, so no frame of that run was displayed", path)};

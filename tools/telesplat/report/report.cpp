@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <set>
 
 #include "common/core/utf8.h"
 #include "common/core/version.h"
+#include "common/core/whole_file.h"
 #include "common/metrics/run_folder.h"
 #include "tools/telesplat/report/about_part.h"
 #include "tools/telesplat/report/page.h"
@@ -59,24 +59,8 @@ std::vector<std::string> names_of(const std::vector<std::string>& runs) {
 }
 
 ordered_json config_of(const std::string& directory, const PageLimits& limits) {
-  std::ifstream in(directory + "/session.toml", std::ios::binary);
-  if (!in) return nullptr;
-  std::string text(limits.text_bytes, '\0');
-  in.read(text.data(), std::streamsize(text.size()));
-  text.resize(size_t(in.gcount()));
-  return to_utf8(text);
-}
-
-Status write_whole(const std::string& path, const std::string& text) {
-  const std::string part = path + ".part";
-  std::ofstream out(part, std::ios::binary);
-  out << text;
-  out.close();
-  std::error_code error;
-  if (out) fs::rename(part, path, error);
-  if (out && !error) return ok_status();
-  fs::remove(part, error);
-  return Error{fmt::format("{}: cannot be written", path)};
+  const auto text = read_whole(directory + "/session.toml", kMostSessionBytes);
+  return text ? ordered_json(to_utf8(text->substr(0, limits.text_bytes))) : ordered_json();
 }
 
 std::string kind_of(const ordered_json& summary) {

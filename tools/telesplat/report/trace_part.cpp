@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 namespace telesplat::launcher {
@@ -78,8 +79,10 @@ ordered_json trace_json(const Trace& trace, double origin_s, double begin_s, dou
 }
 
 ordered_json trace_part(const std::string& directory, const RunTables& tables, size_t share, size_t windows) {
-  std::ifstream in(directory + "/trace.json", std::ios::binary);
-  if (!in) return {{"why", "trace.json is not there"}};
+  const std::string path = directory + "/trace.json";
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return {{"why", "trace.json is not there"}};
+  std::ifstream in(path, std::ios::binary);
   const Trace trace = read_trace(in);
   if (trace.events.empty()) return {{"why", "trace.json holds no spans"}};
   double begin_s = tables.origin_s, end_s = tables.end_s;

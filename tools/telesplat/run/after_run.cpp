@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "client/viewer/record/frame_spool.h"
 #include "common/metrics/run_folder.h"
 #include "common/net/service.h"
 #include "tools/common/complain.h"
+#include "tools/common/json_file.h"
 #include "tools/telesplat/report/report.h"
 #include "tools/telesplat/run/run_report.h"
 #include "tools/telesplat/run/verify.h"
@@ -46,8 +46,7 @@ bool AfterRun::displayed() const {
     const auto files = metrics::recorded_files(o_.out);
     return std::any_of(files.begin(), files.end(), [](const auto& f) { return f.find("frame") != f.npos; });
   }
-  std::ifstream in(o_.out + "/summary.json");
-  const auto summary = nlohmann::json::parse(in, nullptr, false);
+  const auto summary = tools::read_json_file(o_.out + "/summary.json");
   return summary.is_object() && summary.value("frames", uint64_t{0}) > 0;
 }
 

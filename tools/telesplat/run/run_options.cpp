@@ -20,10 +20,15 @@ using options::Table;
 // The tiles of a wall are compared where the head stands still.
 constexpr double kWallHold_s = 2;
 
+constexpr const char* kWhatIsKept = "what a run keeps";
+
 // Either `run`'s or `view`'s.
 Table display_rows(RunOptions& o) {
   if (o.viewer.window)
-    return joined({{.flag = "--out", .value = &o.out, .help = "run folder; without it nothing is recorded"},
+    return joined({{.flag = "--out",
+                    .value = &o.out,
+                    .help = "run folder; without it nothing is recorded",
+                    .not_in_scene = "where a run writes"},
                    {.flag = "--fullscreen", .value = &o.viewer.fullscreen, .help = "the window fills the screen"},
                    {.flag = "--panel",
                     .value = &o.viewer.panel,
@@ -31,7 +36,10 @@ Table display_rows(RunOptions& o) {
                     .on_off = true}},
                   viewer::xr_table(o.viewer));
   const Table rows{
-      {.flag = "--out", .value = &o.out, .help = "run folder; default: runs/DATE-TIME"},
+      {.flag = "--out",
+       .value = &o.out,
+       .help = "run folder; default: runs/DATE-TIME",
+       .not_in_scene = "where a run writes"},
       {.flag = "--viewers",
        .value = &o.viewers,
        .help = "viewers, each of which follows the trajectory; the first one is verified",
@@ -44,9 +52,16 @@ Table display_rows(RunOptions& o) {
   return joined(rows, viewer::wall_table(o.viewer));
 }
 
+options::Row metrics_port_row(RunOptions& o) {
+  options::Row out = master::metrics_port_row(o.master);
+  out.not_in_scene = "whom a session answers";
+  return out;
+}
+
 options::Row keys_row(RunOptions& o) {
   options::Row out = net::keys_row(o.keys);
   out.help += "; auto: keys that are made for this run and go with it";
+  out.not_in_scene = "who is let in";
   return out;
 }
 
@@ -68,31 +83,37 @@ Table own_rows(RunOptions& o) {
        .value = &o.join_master,
        .help =
            "join the running session at this address instead of starting one; auto: yours on this machine; default, "
-           "where no scene is named: $TELESPLAT_MASTER"},
+           "where no scene is named: $TELESPLAT_MASTER",
+       .not_in_scene = "which session is joined"},
       keys_row(o),
       {.flag = "--overwrite",
        .value = &o.overwrite,
-       .help = "the folder of --out may hold a record already: its files are replaced, others stay"},
-      master::metrics_port_row(o.master),
+       .help = "the folder of --out may hold a record already: its files are replaced, others stay",
+       .not_in_scene = "what a run replaces"},
+      metrics_port_row(o),
       {.flag = "--link",
        .value = &o.link_texts,
        .help = "simulate a link of a network: [PLACE:]rtt=40ms,rate=100mbit,jitter=5ms,stall=2s/30s, or shorter "
                "50ms:100mbit, 20mbit, local; PLACE is viewer (default: between each viewer and the rest), sampler "
-               "(each sampler and the rest) or data (samplers and data servers)"},
+               "(each sampler and the rest) or data (samplers and data servers)",
+       .not_in_scene = "through what network a session runs"},
       {.flag = "!--same-priority",
        .value = &o.background_servers,
        .help = "run samplers, packer and data at the viewer's priority"},
       {.flag = "--record-depth",
        .value = &o.record_depth,
        .help = "keep the first 50 sampled depth images (telesplat inspect reads them)",
-       .fits = points},
+       .fits = points,
+       .not_in_scene = kWhatIsKept},
       {.flag = "--record-plan",
        .value = &o.record_plan,
        .help = "keep pictures of the first 50 plans: which rays of a view are cast, and why",
-       .fits = points},
+       .fits = points,
+       .not_in_scene = kWhatIsKept},
       {.flag = "--report",
        .value = &o.report,
-       .help = "at the end make a page about the run, report.html in the run folder, and plots (telesplat report)"},
+       .help = "at the end make a page about the run, report.html in the run folder, and plots (telesplat report)",
+       .not_in_scene = kWhatIsKept},
       {.flag = "--verify-samples",
        .value = &o.verify_samples,
        .help = "rays a pixel of the direct rendering that --verify compares with, a square number; volumes have 1",
@@ -101,7 +122,8 @@ Table own_rows(RunOptions& o) {
       {.flag = "--log-level",
        .value = &o.log_level,
        .help = "trace, debug, info, warn, error or off",
-       .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}}};
+       .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"},
+       .not_in_scene = "what is logged"}};
 }
 
 // --sampler alone: threads and memory of samplers are the launcher's business.

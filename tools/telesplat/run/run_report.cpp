@@ -4,10 +4,10 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "tools/common/json_file.h"
 #include "tools/telesplat/movie/movie_target.h"
 #include "tools/telesplat/scene/scene.h"
 
@@ -187,9 +187,9 @@ void print_next(const std::string& directory) {
 
 Result<RunReport> read_report(const std::string& directory) {
   const std::string path = directory + "/summary.json";
-  std::ifstream in(path);
-  const auto s = json::parse(in, nullptr, false);
-  if (!s.is_object()) return Error{path + ": is not there, or no summary"};
+  const auto read = tools::read_json_object(path);
+  if (!read) return read.error();
+  const json s = *read;
   try {
     RunReport out{head_of(directory, s), {}};
     add_links(s, out);

@@ -10,6 +10,8 @@
 #include <optional>
 
 #include "client/viewer/record/frame_spool.h"
+#include "common/core/whole_file.h"
+#include "tools/common/json_file.h"
 #include "tools/telesplat/run/quality_record.h"
 
 namespace telesplat::launcher {
@@ -39,17 +41,10 @@ image::View side_by_side(const image::View& a, const image::View& b) {
 // Changes summary.json.
 Status write_summary(const std::string& directory, const std::vector<VerifiedView>& views) {
   const std::string path = directory + "/summary.json";
-  std::ifstream in(path);
-  auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
-  if (!summary.is_object()) return Error{fmt::format("{}: cannot be read as JSON", path)};
-  summary["quality"] = quality_json(views);
-  std::ofstream out(path + ".part");
-  out << summary.dump(2, ' ', false, decltype(summary)::error_handler_t::replace) << "\n";
-  out.close();
-  std::error_code error;
-  if (out) fs::rename(path + ".part", path, error);
-  if (!out || error) return Error{fmt::format("{}: cannot be written", path)};
-  return ok_status();
+  auto summary = tools::read_json_object(path);
+  if (!summary) return summary.error();
+  (*summary)["quality"] = quality_json(views);
+  return write_whole(path, summary->dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
 class Verification {

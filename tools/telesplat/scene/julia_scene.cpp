@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <toml++/toml.h>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
+#include "common/core/whole_file.h"
 #include "services/sampler/julia/sampler.h"
 #include "tools/common/csv_table.h"
+#include "tools/telesplat/scene/toml_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -70,25 +71,23 @@ Result<glm::vec3> corner(const std::string& path, toml::table& table, const char
 }
 
 Status read_session(const std::string& path, JuliaScene::Record& out) {
-  try {
-    toml::table table = toml::parse_file(path);
-    out.title = table["scene"]["title"].value_or(std::string(julia::kSceneWord));
-    auto begin = julia::from_map(numbers_of(table["julia"]));
-    if (begin)
-      if (const Status s = julia::validate(*begin); !s) begin = s.error();
-    if (!begin) return Error{fmt::format("{}: {}", path, begin.error().text)};
-    out.begin = *begin;
-    const auto lo = corner(path, table, "lo"), hi = corner(path, table, "hi");
-    if (!lo) return lo.error();
-    if (!hi) return hi.error();
-    const auto placement = julia::placement_from_map(numbers_of(table["placement"]), {*lo, *hi});
-    if (!placement) return Error{fmt::format("{}: {}", path, placement.error().text)};
-    if (placement->box_room.empty())
-      return Error{fmt::format("{}: the box of [placement] is empty: lo is not below hi", path)};
-    out.placement = *placement;
-  } catch (const toml::parse_error& e) {
-    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
-  }
+  auto file = read_toml(path, kMostSessionBytes);
+  if (!file) return file.error();
+  toml::table& table = *file;
+  out.title = table["scene"]["title"].value_or(std::string(julia::kSceneWord));
+  auto begin = julia::from_map(numbers_of(table["julia"]));
+  if (begin)
+    if (const Status s = julia::validate(*begin); !s) begin = s.error();
+  if (!begin) return Error{fmt::format("{}: {}", path, begin.error().text)};
+  out.begin = *begin;
+  const auto lo = corner(path, table, "lo"), hi = corner(path, table, "hi");
+  if (!lo) return lo.error();
+  if (!hi) return hi.error();
+  const auto placement = julia::placement_from_map(numbers_of(table["placement"]), {*lo, *hi});
+  if (!placement) return Error{fmt::format("{}: {}", path, placement.error().text)};
+  if (placement->box_room.empty())
+    return Error{fmt::format("{}: the box of [placement] is empty: lo is not below hi", path)};
+  out.placement = *placement;
   return ok_status();
 }
 

@@ -2,14 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <toml++/toml.h>
 #include <algorithm>
 #include <filesystem>
 
+#include "common/core/whole_file.h"
 #include "services/data/kinds.h"
 #include "tools/telesplat/scene/julia_keys.h"
 #include "tools/telesplat/scene/julia_scene.h"
 #include "tools/telesplat/scene/mesh_scene.h"
+#include "tools/telesplat/scene/toml_file.h"
 #include "tools/telesplat/scene/volume_scene.h"
 
 namespace telesplat::launcher {
@@ -39,7 +40,7 @@ Status read_options(const std::string& path, const toml::table& scene, data::Dat
     const auto row =
         std::find_if(table.begin(), table.end(), [&](const auto& r) { return options::key_of(r) == key.str(); });
     if (row == table.end() || !node.is_value()) continue;
-    if (key.str() == "cache") continue;  // a record may be anybody's: it does not say where this machine writes
+    if (!row->not_in_scene.empty()) continue;  // a record may be anybody's: it does not say where this machine writes
     if (const Status s = options::set(*row, text_of(node)); !s)
       return Error{
           fmt::format("{}:{}: key {} of [scene]: {}", path, node.source().begin.line, key.str(), s.error().text)};
@@ -87,22 +88,19 @@ Result<std::unique_ptr<Scene>> scene_of(const data::DataOptions& options) {
 
 Result<std::unique_ptr<Scene>> recorded_scene(const std::string& run_directory) {
   const std::string path = run_directory + "/session.toml";
-  try {
-    const toml::table session = toml::parse_file(path);
-    const toml::table nothing;
-    const auto* table = session["scene"].as_table();
-    // Runs of meshes did not tell their kind once.
-    const std::string name = session["scene"]["kind"].value_or(std::string("mesh"));
-    const auto kind = scene::kind_named(name);
-    if (!kind) return Error{fmt::format("{}: kind of [scene] is \"{}\", which is unknown", path, name.substr(0, 40))};
-    data::DataOptions options;
-    if (const Status s = read_options(path, table ? *table : nothing, options); !s) return s.error();
-    auto scene = row_of(*kind).make(std::move(options));
-    if (const Status s = scene->read_record(run_directory); !s) return s.error();
-    return scene;
-  } catch (const toml::parse_error& e) {
-    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
-  }
+  const auto session = read_toml(path, kMostSessionBytes);
+  if (!session) return session.error();
+  const toml::table nothing;
+  const auto* table = (*session)["scene"].as_table();
+  // Runs of meshes did not tell their kind once.
+  const std::string name = (*session)["scene"]["kind"].value_or(std::string("mesh"));
+  const auto kind = scene::kind_named(name);
+  if (!kind) return Error{fmt::format("{}: kind of [scene] is \"{}\", which is unknown", path, name.substr(0, 40))};
+  data::DataOptions options;
+  if (const Status s = read_options(path, table ? *table : nothing, options); !s) return s.error();
+  auto scene = row_of(*kind).make(std::move(options));
+  if (const Status s = scene->read_record(run_directory); !s) return s.error();
+  return scene;
 }
 
 }  // namespace telesplat::launcher

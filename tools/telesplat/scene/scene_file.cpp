@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <optional>
 
+#include "common/core/whole_file.h"
 #include "common/options/suggest.h"
 #include "tools/telesplat/scene/scene.h"
 #include "tools/telesplat/scene/scene_keys.h"
+#include "tools/telesplat/scene/toml_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -58,7 +60,10 @@ class SceneReader {
   Error wrong(const toml::node& node, const std::string& what) const {
     return Error{fmt::format("{}:{}: {}", path_, node.source().begin.line, what)};
   }
-  std::string beside(const std::string& file) const { return (fs::path(path_).parent_path() / file).string(); }
+  std::string beside(const std::string& file) const {
+    const std::string out = (fs::path(path_).parent_path() / file).string();
+    return out.starts_with('-') ? "./" + out : out;  // a file, not a flag
+  }
 
   static std::string names_of_kinds() {
     std::string out;
@@ -117,6 +122,9 @@ class SceneReader {
     const bool off = node.is_boolean() && !**node.as_boolean();
     if (!row && off) return ok_status();  // a flag of another command, and not wanted
     if (!row) return wrong(node, fmt::format("key {} is none: there is no flag {}{}", name, flag, meant(group, name)));
+    if (!row->not_in_scene.empty())
+      return wrong(node, fmt::format("key {}: a scene file does not say {}; give {} on the command line", name,
+                                     row->not_in_scene, flag));
     return read_flag(*row, flag, name, node);
   }
 
@@ -125,6 +133,7 @@ class SceneReader {
     std::vector<std::string> known;
     if (group != "packing") known.emplace_back("file");
     for (const options::Row& row : table_) {
+      if (!row.not_in_scene.empty()) continue;
       const std::string key = options::key_of(row);
       if (group != "packing")
         known.push_back(key);
@@ -175,12 +184,9 @@ std::string flag_text(const toml::node& node) {
 }
 
 Result<std::vector<std::string>> read_scene_file(const std::string& path, const options::Table& table) {
-  try {
-    const toml::table file = toml::parse_file(path);
-    return SceneReader(path, table).read(file);
-  } catch (const toml::parse_error& e) {
-    return Error{fmt::format("{}:{}: {}", path, e.source().begin.line, e.description())};
-  }
+  const auto file = read_toml(path, kMostDescriptionBytes);
+  if (!file) return file.error();
+  return SceneReader(path, table).read(*file);
 }
 
 Result<std::vector<std::string>> expand_scene_file(std::vector<std::string> arguments, const options::Table& table) {

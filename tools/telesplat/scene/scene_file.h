@@ -22,6 +22,7 @@ namespace telesplat::launcher {
 /// beside the scene file:
 ///   [scene]  file = "head.nrrd"  tf = "skin"  lighting = false  data_servers = 2
 ///   [view]  wall = "2x1"  coupling = "loose"  buffers = 2
+/// A scene file may be a stranger's: flags whose row has a text in not_in_scene are none of its keys.
 /// Returns the flags with their values, then the data file or "julia". table: the flags of the command that reads it.
 /// Errors name the file and the line or key; a key that is no flag is one.
 Result<std::vector<std::string>> read_scene_file(const std::string& path, const options::Table& table);

@@ -7,11 +7,11 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 
 #include "common/core/log.h"
 #include "common/core/machine.h"
 #include "common/core/version.h"
+#include "common/core/whole_file.h"
 #include "common/net/service.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
@@ -57,13 +57,6 @@ class Claim {
   Claim() = default;
   int file_ = -1;
 };
-
-Status write_text(const std::string& path, const std::string& text) {
-  std::ofstream out(path);
-  out << text;
-  out.close();
-  return out ? ok_status() : Status(Error{fmt::format("{}: cannot be written", path)});
-}
 
 bool asks_for_nothing(const SweepOptions& o) { return o.scene.empty() && o.vary.empty() && o.flags.empty(); }
 
@@ -116,8 +109,8 @@ void list(const Sweep& sweep) {
 // Writes and prints what is there; the exit code that follows from it.
 Result<int> conclude(const Sweep& sweep, const std::string& directory) {
   const SweepRecord record = read_record(sweep.manifest(), directory);
-  if (const Status s = write_text(directory + "/sweep.csv", to_csv(record)); !s) return s.error();
-  if (const Status s = write_text(directory + "/sweep.html", to_html(record, sweep.manifest(), directory)); !s)
+  if (const Status s = write_whole(directory + "/sweep.csv", to_csv(record)); !s) return s.error();
+  if (const Status s = write_whole(directory + "/sweep.html", to_html(record, sweep.manifest(), directory)); !s)
     return s.error();
   std::printf("%s", to_text(record).c_str());
   for (const Noise& n : noises(record)) std::printf("! %s\n", sentence(record, n).c_str());

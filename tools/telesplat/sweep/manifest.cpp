@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "common/core/utf8.h"
+#include "common/core/whole_file.h"
 #include "tools/common/json_file.h"
 
 namespace telesplat::launcher {
@@ -97,12 +96,8 @@ Status write_manifest(const Manifest& m, const std::string& directory) try {
     j["configurations"].push_back({{"name", c.name}, {"values", c.values}});
   j["runs"] = ordered_json::array();
   for (const auto& [key, outcome] : m.outcomes) j["runs"].push_back(to_json(key, outcome));
-  const std::string path = directory + "/" + kManifestFile, part = path + ".part";
-  std::ofstream out(part);
-  out << j.dump(2, ' ', false, decltype(j)::error_handler_t::replace) << "\n";
-  out.close();
-  if (!out || std::rename(part.c_str(), path.c_str()) != 0) return Error{fmt::format("{}: cannot be written", path)};
-  return ok_status();
+  return write_whole(directory + "/" + kManifestFile,
+                     j.dump(2, ' ', false, decltype(j)::error_handler_t::replace) + "\n");
 } catch (const nlohmann::json::exception&) {
   return Error{"a flag or a file's name is not UTF-8, so the sweep cannot be recorded"};
 }

@@ -4,10 +4,10 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 
 #include "common/core/log.h"
 #include "common/core/machine.h"
+#include "common/core/whole_file.h"
 #include "common/net/service.h"
 #include "tools/common/complain.h"
 #include "tools/telesplat/command.h"
@@ -64,13 +64,6 @@ void list(const Tune& tune) {
               shell_line(run_words(tune.subject(), tune.subject().defaults, "RUNS/defaults/1", true)).c_str());
 }
 
-Status write_scene(const std::string& path, const std::string& text) {
-  std::ofstream out(path);
-  out << text;
-  out.close();
-  return out ? ok_status() : Status(Error{fmt::format("{}: cannot be written", path)});
-}
-
 int carry_out(Tune& tune, const TuneOptions& o) {
   tools::ProgressLine progress;
   const auto end = tune.carry_out(progress);
@@ -87,7 +80,7 @@ int carry_out(Tune& tune, const TuneOptions& o) {
     if (i != tune.choice().chosen)
       std::printf("  %s: %s\n", tune.checked()[i].measured.name.c_str(), reasons[i].c_str());
   const std::string text = scene_text(tune.subject(), tune.costs(), tune.checked(), tune.choice());
-  if (const Status s = write_scene(o.out, text); !s) return tools::complain(s.error(), 1);
+  if (const Status s = write_whole(o.out, text); !s) return tools::complain(s.error(), 1);
   if (const auto taken = check_run({o.out}); !taken) return tools::complain(taken.error(), 1);
   std::printf("scene file: %s\nruns: %s\n", o.out.c_str(), o.runs.c_str());
   std::fflush(stdout);

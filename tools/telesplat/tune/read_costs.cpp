@@ -2,10 +2,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "tools/common/json_file.h"
 #include "tools/telesplat/report/reading/loose_table.h"
 #include "tools/telesplat/sweep/figures.h"
 #include "tools/telesplat/tune/costs.h"
@@ -120,10 +120,9 @@ void read_updates(const std::string& path, double display_width, CostSamples& ou
 }  // namespace
 
 Result<CostSamples> read_costs(const std::string& directory, bool slices) {
-  std::ifstream file(directory + "/summary.json");
-  const auto summary = nlohmann::ordered_json::parse(file, nullptr, false);
-  if (!summary.is_object()) return Error{fmt::format("{}/summary.json: is not there, or no JSON", directory)};
-  const Figures figures = flatten(summary);
+  const auto summary = tools::read_json_object(directory + "/summary.json");
+  if (!summary) return summary.error();
+  const Figures figures = flatten(*summary);
   const auto figure = [&](const char* name) {
     const double* found = find(figures, name);
     return found ? *found : 0.0;

@@ -25,10 +25,8 @@ constexpr double kVerifiedFrames = 4;  // of a run, and the last
 constexpr int kLargestSamplers = 64;   // of --samplers
 
 // What a scene file is not to say: what a measuring run is told.
-const std::set<std::string> kMeasuring{
-    "--duration",     "--frames",       "--verify",      "--verify-samples", "--verify-consecutive", "--record-points",
-    "--record-every", "--record-depth", "--record-plan", "--report",         "--log-level",          "--metrics-port",
-    "--link",         "scene"};
+const std::set<std::string> kMeasuring{"--duration",           "--frames", "--verify", "--verify-samples",
+                                       "--verify-consecutive", "scene"};
 
 // A command line of `telesplat run`, read.
 struct Read {
@@ -97,6 +95,7 @@ void keep_keys(const Read& read, const Read& file, TuneSubject& out) {
   for (const std::string& flag : read.given) {
     const options::Row* row = options::find(read.flags, flag);
     if (!row) continue;
+    if (!row->not_in_scene.empty()) continue;
     if (kMeasuring.contains(options::name_of(*row)) && !file.gives(flag)) continue;
     if (std::holds_alternative<std::vector<std::string>*>(row->value) || flag == "scene") continue;
     const auto [group, key] = place_of(*row);

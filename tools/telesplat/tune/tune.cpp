@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+
+#include "tools/common/json_file.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -18,10 +19,9 @@ constexpr TuneFigures kNoFigures{kNaN, kNaN, kNaN, kNaN, kNaN};  // of a run tha
 constexpr double kLimitTimes = 10, kLimitMore_s = 600;
 
 Result<TuneFigures> read_figures(const std::string& folder) {
-  std::ifstream in(folder + "/summary.json");
-  const auto summary = nlohmann::ordered_json::parse(in, nullptr, false);
-  if (!summary.is_object()) return Error{fmt::format("{}/summary.json: is not there, or no JSON", folder)};
-  return tune_figures(flatten(summary));
+  const auto summary = tools::read_json_object(folder + "/summary.json");
+  if (!summary) return summary.error();
+  return tune_figures(flatten(*summary));
 }
 
 }  // namespace

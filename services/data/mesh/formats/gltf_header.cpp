@@ -33,6 +33,8 @@ Status check_gltf(std::string_view content, uint64_t data_bytes, const std::stri
       return Error{fmt::format("{}: its JSON chunk claims {} bytes, the file has {}", name,
                                word_at(content, kGlbHeader), content.size())};
   }
+  if (!gltf_json_fits(content))
+    return Error{fmt::format("{}: its glTF JSON has more than {} bytes outside of texts", name, kMostGltfJson)};
   const nlohmann::json document = nlohmann::json::parse(gltf_json(content), nullptr, false);
   if (!document.is_object()) return Error{name + ": its glTF JSON is damaged"};
   const auto accessors = document.find("accessors");

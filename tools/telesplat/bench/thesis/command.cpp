@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 
@@ -14,6 +13,7 @@
 #include "common/core/machine.h"
 #include "common/core/utf8.h"
 #include "common/core/version.h"
+#include "common/core/whole_file.h"
 #include "common/net/service.h"
 #include "tools/common/complain.h"
 #include "tools/common/json_file.h"
@@ -61,20 +61,13 @@ Result<std::optional<Progress>> read_progress(const std::string& directory) try 
   return Error{fmt::format("{}/{}: is no record of bench thesis", directory, kStateFile)};
 }
 
-Status write_text(const std::string& path, const std::string& text) {
-  std::ofstream(path + ".part") << text;
-  std::error_code error;
-  fs::rename(path + ".part", path, error);
-  return error ? Status(Error{path + ": cannot be written"}) : ok_status();
-}
-
 Status write_progress(const Progress& progress, const std::string& directory) {
   auto done = nlohmann::ordered_json::object();
   for (const auto& [title, step] : progress.done) done[title] = {{"wall_s", step.first}, {"others_cpu", step.second}};
-  return write_text(directory + "/" + kStateFile,
-                    nlohmann::ordered_json{{"quick", progress.quick}, {"data", progress.data}, {"done", done}}.dump(
-                        2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                        "\n");
+  return write_whole(directory + "/" + kStateFile,
+                     nlohmann::ordered_json{{"quick", progress.quick}, {"data", progress.data}, {"done", done}}.dump(
+                         2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                         "\n");
 }
 
 class Thesis {
@@ -175,9 +168,9 @@ Status report(const Progress& state, const std::vector<std::string>& parts, cons
   found.about = about(state, directory);
   for (const ThesisFigure& figure : found.figures)
     if (!figure.svg.empty())
-      if (const Status s = write_text(directory + "/" + figure.file, figure.svg); !s) return s;
+      if (const Status s = write_whole(directory + "/" + figure.file, figure.svg); !s) return s;
   for (const auto& [file, text] : {std::pair{"/thesis.md", to_markdown(found)}, {"/thesis.html", to_html(found)}})
-    if (const Status s = write_text(directory + file, text); !s) return s;
+    if (const Status s = write_whole(directory + file, text); !s) return s;
   std::printf("%s\nreport: %s/thesis.html, %s/thesis.md\n", to_text(found).c_str(), directory.c_str(),
               directory.c_str());
   return ok_status();

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "common/core/whole_file.h"
 #include "common/metrics/statistics.h"
 #include "tools/common/text_table.h"
 #include "tools/telesplat/report/reading/trace_reader.h"
@@ -87,8 +88,8 @@ Legend legend(const std::set<std::string>& names, double y) {
 }  // namespace
 
 Result<std::vector<TimelineLane>> read_timeline(const std::string& path) {
+  if (const Status s = check_readable(path, kMostTableBytes); !s) return s.error();
   std::ifstream in(path, std::ios::binary);
-  if (!in) return Error{fmt::format("{}: cannot be read", path)};
   const Trace trace = read_trace(in);
   if (!trace.whole) return Error{fmt::format("{}: is no trace", path)};
   std::vector<TimelineLane> out;

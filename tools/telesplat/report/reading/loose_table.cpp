@@ -5,18 +5,19 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 
 #include "common/core/check.h"
 #include "common/core/utf8.h"
+#include "common/core/whole_file.h"
 #include "tools/common/csv_table.h"
 #include "tools/common/line_reader.h"
 
 namespace telesplat::launcher {
 namespace {
 
-constexpr uintmax_t kMaxBytes = uintmax_t{4} << 30;
 constexpr size_t kLongestText = 200, kLongestLine = size_t{64} << 10;
 constexpr double kMost = 1e12;  // beyond it nothing was measured: no moment, size or number that a run can have
 
@@ -60,10 +61,11 @@ void read_header(std::string_view line, std::vector<std::string>& out) {
 
 Result<LooseTable> LooseTable::read(const std::string& path, const std::vector<std::string>& numbers,
                                     const std::vector<std::string>& texts) {
-  std::ifstream in(path, std::ios::binary | std::ios::ate);
-  if (!in || in.tellg() <= 0) return Error{fmt::format("{}: is not there or is empty", path)};
-  if (uintmax_t(in.tellg()) > kMaxBytes) return Error{fmt::format("{}: has more than {} bytes", path, kMaxBytes)};
-  in.seekg(0);
+  std::error_code error;
+  if (!std::filesystem::exists(path, error) || std::filesystem::is_empty(path, error))
+    return Error{fmt::format("{}: is not there or is empty", path)};
+  if (const Status s = check_readable(path, kMostTableBytes); !s) return s.error();
+  std::ifstream in(path, std::ios::binary);
 
   LooseTable out;
   std::vector<std::pair<size_t, std::vector<double>*>> number_columns;
