@@ -60,6 +60,7 @@ struct SocketOptions {
   /// What a socket that binds is for, as the table of roles calls it (keys/roles.h): "control", "tiles" and so on. With
   /// keys, one that is for nothing cannot be bound.
   std::string_view serves;
+  size_t most_connections = 1024;  ///< of a socket that binds, at a time; further ones are hung up on
 };
 
 /// SocketOptions::patience_s where messages of megabytes go over links of a megabit a second.
@@ -117,6 +118,8 @@ class Socket {
   /// Of a socket that binds with keys: connections that were not let in, because they showed no key, another server's,
   /// or one that is not on the allow-list or is for something else.
   uint64_t keys_refused() const;
+  /// Of a socket that binds: connections that were hung up on because there were SocketOptions::most_connections.
+  uint64_t connections_refused() const;
   /// With SocketOptions::watch_connecting: why it was not let in where it connects to, as far as it was told; empty: it
   /// was, or nothing is known yet. What is told does not change by waiting, unless `may_pass`.
   struct Refusal {

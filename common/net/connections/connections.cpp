@@ -1,0 +1,179 @@
+#include "common/net/connections/connections.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/core/clock.h"
+
+namespace telesplat::net {
+namespace {
+
+constexpr size_t kMostEnded = 4096;  // before they are judged, whatever may still come of them
+constexpr int kFailed =
+    ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
+
+}  // namespace
+
+// Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too much
+// are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed handshake is
+// certain to be told.
+Connections::Connections(zmq::context_t& context, zmq::socket_t& socket, Options options)
+    : options_(std::move(options)),
+      monitor_(context, socket, ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED | (options_.guarded ? kFailed : 0)),
+      blank_(eventfd(0, EFD_CLOEXEC)),
+      spare_(fcntl(blank_, F_DUPFD_CLOEXEC, 0)) {}
+
+Connections::~Connections() {
+  ::close(spare_);
+  ::close(blank_);
+}
+
+int Connections::descriptor() { return monitor_.descriptor(); }
+
+void Connections::look() {
+  const std::lock_guard lock(mutex_);
+  drain();
+  keep_to_limit();
+}
+
+void Connections::keep_to_limit() {
+  while (open_.size() - refused_open_ > options_.most) hang_up_on_one();
+}
+
+void Connections::drain() {
+  const double now_s = monotonic_s();
+  while (const auto event = monitor_.next()) take(*event, now_s);
+}
+
+// What ends a connection is told by one thread, at once: that its handshake broke off, and then that it ended.
+void Connections::take(const Monitor::Event& event, double now_s) {
+  if (event.what & kFailed) {
+    ++failed_unseen_;
+    ++counts_.keys_refused;
+  } else if (event.what == ZMQ_EVENT_ACCEPTED) {
+    open_[event.value] = {.fd = event.value, .number = ++accepted_, .accepted_s = now_s};
+    while (!young_.empty() && !may_shake_hands(young_.front(), now_s)) young_.pop_front();
+    young_.emplace_back(event.value, accepted_);
+  } else {
+    ended(event.value);
+  }
+  broke_off_ = event.what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL;
+}
+
+void Connections::ended(int fd) {
+  const auto it = open_.find(fd);
+  if (it == open_.end()) return;
+  if (!it->second.refused) {
+    ended_.push_back(it->second);
+  } else {
+    --refused_open_;
+    if (broke_off_) --failed_unseen_, --counts_.keys_refused;  // by us
+  }
+  open_.erase(it);
+  if (ended_.size() + to_judge_.size() < kMostEnded) return;
+  counts_.silent += silent_among(std::exchange(to_judge_, {})) + silent_among(std::exchange(ended_, {}));
+}
+
+bool Connections::is_open(const Name& name) const {
+  const auto found = open_.find(name.first);
+  return found != open_.end() && found->second.number == name.second && !found->second.refused;
+}
+
+bool Connections::may_shake_hands(const Name& name, double now_s) const {
+  if (!is_open(name)) return false;
+  const Connection& c = open_.at(name.first);
+  return !c.has_spoken && now_s - c.accepted_s <= kHandshake_s;
+}
+
+// The one that came first of those who may still be about to say who they are, so that whoever holds places without a
+// word does not keep others out; where there is none, the one that came last.
+void Connections::hang_up_on_one() {
+  const double now_s = monotonic_s();
+  while (!young_.empty()) {
+    const Name first = young_.front();
+    young_.pop_front();
+    if (may_shake_hands(first, now_s)) return hang_up(first);
+  }
+  const Connection* last = nullptr;
+  for (const auto& [fd, c] : open_)
+    if (!c.refused && (!last || c.number > last->number)) last = &c;
+  hang_up({last->fd, last->number});
+}
+
+// The number may be of another file by now. ZeroMQ tells of an end before it closes the file: as long as nothing was
+// told after the number was looked at, it was the connection's.
+void Connections::hang_up(const Name& name) {
+  const bool looked = dup3(name.first, spare_, O_CLOEXEC) >= 0;
+  drain();
+  if (!is_open(name)) {
+    dup3(blank_, spare_, O_CLOEXEC);
+    return;
+  }
+  if (looked) shutdown(spare_, SHUT_RDWR);
+  dup3(blank_, spare_, O_CLOEXEC);
+  open_.at(name.first).refused = true;
+  ++refused_open_;
+  ++counts_.refused;
+  if (!limiter_.allow(monotonic_s())) return;
+  const std::string more =
+      limiter_.suppressed() ? fmt::format(" ({} more since the last such line)", limiter_.suppressed()) : "";
+  log::warn("{}: {} connections are open (--max-connections): one more is refused{}", options_.name, options_.most,
+            more);
+}
+
+void Connections::spoke(int fd) {
+  const std::lock_guard lock(mutex_);
+  drain();  // its acceptance was told before its message came
+  for (auto* gone : {&to_judge_, &ended_}) {
+    const auto found =
+        std::find_if(gone->begin(), gone->end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
+    if (found == gone->end()) continue;
+    found->has_spoken = true;
+    return;
+  }
+  if (const auto it = open_.find(fd); it != open_.end()) it->second.has_spoken = true;
+  keep_to_limit();
+}
+
+void Connections::begin_reading() {
+  look();
+  const std::lock_guard lock(mutex_);
+  to_judge_.insert(to_judge_.end(), ended_.begin(), ended_.end());
+  ended_.clear();
+}
+
+uint64_t Connections::judge() {
+  const std::lock_guard lock(mutex_);
+  const uint64_t out = silent_among(std::exchange(to_judge_, {}));
+  counts_.silent += out;
+  return out;
+}
+
+// Everyone of ours speaks as soon as it is connected, but for samplers, who push no tile before they have one.
+uint64_t Connections::silent_among(const std::vector<Connection>& gone) {
+  uint64_t out = 0;
+  for (const Connection& c : gone) {
+    if (c.has_spoken || monotonic_s() - c.accepted_s > options_.quiet_s) continue;
+    if (failed_unseen_ > 0)
+      --failed_unseen_;  // counted as not let in
+    else
+      ++out;
+  }
+  return out;
+}
+
+Connections::Counts Connections::counts() {
+  look();
+  const std::lock_guard lock(mutex_);
+  Counts out = counts_;
+  out.open = open_.size();
+  return out;
+}
+
+}  // namespace telesplat::net
