@@ -19,6 +19,7 @@
 #include "common/net/connections/lookout.h"
 #include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
+#include "common/net/queued_bytes.h"
 #include "common/net/read_ahead.h"
 
 namespace telesplat::net {
@@ -151,6 +152,7 @@ struct Socket::Impl {
                                       Connections::Options{.name = name,
                                                            .most = options.most_connections,
                                                            .guarded = guarded,
+                                                           .publishes = kind == Kind::kPub,
                                                            .quiet_s = kind == Kind::kPull ? kQuietPusher_s : 1e300});
     home.watch().add(*connections);
   }
@@ -200,8 +202,32 @@ struct Socket::Impl {
     }
   }
 
+  bool counts_queued() const { return kind == Kind::kRouter || kind == Kind::kPub; }
+
+  // What is published is shared: no subscriber waits for more than for all messages together that are not sent yet to
+  // everyone.
+  bool make_room(std::string_view peer, std::string_view type, size_t bytes) {
+    if (kind == Kind::kPub && connections) {
+      connections->published(wire_bytes(type.size()) + wire_bytes(bytes));
+      if (!queued.has_room(peer, bytes)) queue_refused += connections->hang_up_on_late(options.most_queued_bytes / 2);
+      return true;
+    }
+    if (queued.has_room(peer, bytes)) return true;
+    ++queue_refused;
+    log_rejection(fmt::format("message '{}' to peer '{}'", printable(type), printable(peer)),
+                  fmt::format("{} bytes wait for it already (--queue-limit-mb)", queued.of(peer)));
+    return false;
+  }
+  // Of a frame, with what ZMTP and CURVE add.
+  uint64_t wire_bytes(size_t bytes) const {
+    const uint64_t sent = bytes + (guarded ? 33 : 0);
+    return sent + (sent > 255 ? 9 : 2);
+  }
+
   bool send(std::string_view peer, std::string_view type, std::string& body) {
     if (kind == Kind::kPub) drain_subscriptions();
+    const size_t bytes = body.size();
+    if (counts_queued() && !make_room(peer, type, bytes)) return false;
     try {
       using zmq::send_flags;
       const auto part = [&](std::string_view bytes) {
@@ -210,9 +236,14 @@ struct Socket::Impl {
       if (kind == Kind::kRouter && !part(peer)) return false;
       if (!part(type)) return false;
       // ZeroMQ takes the body over without copying it.
-      auto* owned = new std::string(std::move(body));
+      struct Owned {
+        std::string body;
+        QueuedBytes::Ticket ticket;
+      };
+      auto* owned =
+          counts_queued() ? new Owned{std::move(body), queued.add(peer, bytes)} : new Owned{std::move(body), {}};
       zmq::message_t frame(
-          owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
+          owned->body.data(), owned->body.size(), [](void*, void* hint) { delete static_cast<Owned*>(hint); }, owned);
       return undisturbed([&] { return socket.send(frame, send_flags::dontwait); }).has_value();
     } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
       return false;
@@ -317,7 +348,8 @@ struct Socket::Impl {
   std::unique_ptr<Connections> connections;  // of a socket that binds
   std::optional<Monitor> attempts;           // of one that connects, with watch_connecting
   Due due;                                   // what the thread that reads says by itself
-  std::atomic<uint64_t> rejected{0}, failed_connections{0};
+  std::atomic<uint64_t> rejected{0}, failed_connections{0}, queue_refused{0};
+  QueuedBytes queued{options.most_queued_bytes};
   bool guarded = false;                                 // bound with keys
   size_t failed_unseen = 0;                             // handshakes whose attempt's end was not heard of yet
   std::atomic<uint32_t> broken_off{0}, turned_away{0};  // of a socket that connects: handshakes; event, 0: none
@@ -395,6 +427,7 @@ uint64_t Socket::failed_connections() const {
   return impl_->failed_connections;
 }
 uint64_t Socket::keys_refused() const { return impl_->counts().keys_refused; }
+uint64_t Socket::queue_refused() const { return impl_->queue_refused; }
 uint64_t Socket::connections_refused() const { return impl_->counts().refused; }
 
 Socket::Refusal Socket::refusal() const {

@@ -2,11 +2,14 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/tcp.h>
+#include <netinet/in.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <utility>
 
 #include "common/core/clock.h"
@@ -15,6 +18,8 @@ namespace telesplat::net {
 namespace {
 
 constexpr size_t kMostEnded = 4096;  // before they are judged, whatever may still come of them
+constexpr double kLatePeriod_s = 0.1;
+constexpr uint64_t kNobodyKnows = ~uint64_t(0);  // not over TCP
 constexpr int kFailed =
     ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
@@ -106,25 +111,62 @@ void Connections::hang_up_on_one() {
   hang_up({last->fd, last->number});
 }
 
-// The number may be of another file by now. ZeroMQ tells of an end before it closes the file: as long as nothing was
-// told after the number was looked at, it was the connection's.
 void Connections::hang_up(const Name& name) {
-  const bool looked = dup3(name.first, spare_, O_CLOEXEC) >= 0;
-  drain();
-  if (!is_open(name)) {
-    dup3(blank_, spare_, O_CLOEXEC);
-    return;
-  }
-  if (looked) shutdown(spare_, SHUT_RDWR);
-  dup3(blank_, spare_, O_CLOEXEC);
-  open_.at(name.first).refused = true;
-  ++refused_open_;
+  if (!shut_down(name)) return;
   ++counts_.refused;
   if (!limiter_.allow(monotonic_s())) return;
   const std::string more =
       limiter_.suppressed() ? fmt::format(" ({} more since the last such line)", limiter_.suppressed()) : "";
   log::warn("{}: {} connections are open (--max-connections): one more is refused{}", options_.name, options_.most,
             more);
+}
+
+// The number may be of another file by now. ZeroMQ tells of an end before it closes the file: as long as nothing was
+// told after the number was looked at, it was the connection's.
+bool Connections::shut_down(const Name& name) {
+  const bool looks = looks_at(name.first);
+  drain();
+  const bool there = is_open(name);
+  if (there && looks) shutdown(spare_, SHUT_RDWR);
+  if (there) open_.at(name.first).refused = true, ++refused_open_;
+  look_away();
+  return there;
+}
+
+bool Connections::looks_at(int fd) { return dup3(fd, spare_, O_CLOEXEC) >= 0; }
+void Connections::look_away() { dup3(blank_, spare_, O_CLOEXEC); }
+
+// Where the number is of another file, it is told nothing, or too little: who is hung up on is looked at again.
+uint64_t Connections::taken_by(int fd) {
+  tcp_info about{};
+  socklen_t size = sizeof about;
+  const bool told = getsockopt(fd, IPPROTO_TCP, TCP_INFO, &about, &size) == 0 &&
+                    size >= offsetof(tcp_info, tcpi_bytes_acked) + sizeof about.tcpi_bytes_acked;
+  return told ? about.tcpi_bytes_acked : kNobodyKnows;
+}
+
+void Connections::published(uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  published_ += bytes;
+}
+
+size_t Connections::hang_up_on_late(uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  const double now_s = monotonic_s();
+  if (now_s - looked_for_late_s_ < kLatePeriod_s) return 0;
+  looked_for_late_s_ = now_s;
+  drain();
+  std::vector<Name> late;
+  for (const auto& [fd, c] : open_) {
+    const uint64_t taken = c.has_spoken && !c.refused ? taken_by(fd) : kNobodyKnows;
+    if (taken == kNobodyKnows || c.taken == kNobodyKnows) continue;
+    if (published_ - c.published > taken - c.taken + bytes) late.emplace_back(fd, c.number);
+  }
+  const auto gone = std::count_if(late.begin(), late.end(), [&](const Name& name) { return shut_down(name); });
+  if (gone > 0)
+    log::warn("{}: {} subscribers are hung up on, because more than {:.0f} MB wait for each (--queue-limit-mb)",
+              options_.name, gone, double(bytes) / 1e6);
+  return size_t(gone);
 }
 
 void Connections::spoke(int fd) {
@@ -137,7 +179,11 @@ void Connections::spoke(int fd) {
     found->has_spoken = true;
     return;
   }
-  if (const auto it = open_.find(fd); it != open_.end()) it->second.has_spoken = true;
+  if (const auto it = open_.find(fd); it != open_.end() && !it->second.has_spoken) {
+    it->second.has_spoken = true;
+    it->second.published = published_;
+    if (options_.publishes) it->second.taken = taken_by(fd);
+  }
   keep_to_limit();
 }
 

@@ -22,9 +22,10 @@ inline constexpr double kHandshake_s = 5;
 class Connections {
  public:
   struct Options {
-    std::string name;       ///< of the socket, for the log
-    size_t most = 1024;     ///< open at a time; further ones are hung up on
-    bool guarded = false;   ///< handshakes that fail are of those who show no key that fits
+    std::string name;      ///< of the socket, for the log
+    size_t most = 1024;    ///< open at a time; further ones are hung up on
+    bool guarded = false;  ///< handshakes that fail are of those who show no key that fits
+    bool publishes = false;
     double quiet_s = 1e30;  ///< who came longer ago and said nothing is no stranger: there was nothing to say
   };
   struct Counts {
@@ -43,8 +44,13 @@ class Connections {
   void look();
   /// Becomes readable when look() has something to do.
   int descriptor();
-  /// A message of this connection was read.
+  /// A message of this connection was read. Of a publisher: from now on it gets what is published.
   void spoke(int fd);
+  /// So many bytes more go to all who spoke.
+  void published(uint64_t bytes);
+  /// Hangs up on those who have not taken more than `bytes` of what was published for them, as their machines tell us,
+  /// over TCP. At most every 100 ms. Returns on how many.
+  size_t hang_up_on_late(uint64_t bytes);
   Counts counts();
 
   /// look(); to be called before messages are read until there is none.
@@ -59,6 +65,8 @@ class Connections {
     uint64_t number = 0;  // in the order in which they came
     double accepted_s = 0;
     bool has_spoken = false, refused = false;
+    uint64_t published = 0,
+             taken = 0;  // bytes that were published, and that its machine had taken, when it spoke first
   };
   using Name = std::pair<int, uint64_t>;  // file descriptor, and number: descriptors are used again
   void drain();
@@ -69,6 +77,10 @@ class Connections {
   void keep_to_limit();
   void hang_up_on_one();
   void hang_up(const Name& name);
+  bool shut_down(const Name& name);
+  uint64_t taken_by(int fd);
+  bool looks_at(int fd);
+  void look_away();
   uint64_t silent_among(const std::vector<Connection>& gone);
 
   const Options options_;
@@ -81,7 +93,8 @@ class Connections {
   size_t refused_open_ = 0;                   // of open_: hung up on, but not gone yet
   size_t failed_unseen_ = 0;                  // handshakes whose connection's end was not heard of yet
   bool broke_off_ = false;                    // the event before was of a handshake that broke off
-  uint64_t accepted_ = 0;
+  uint64_t accepted_ = 0, published_ = 0;
+  double looked_for_late_s_ = -1e300;
   Counts counts_;
   log::RateLimiter limiter_;
 };
