@@ -311,8 +311,8 @@ TEST_F(OneChunkService, AnswersThatNobodyReadsAreDroppedAndCounted) {
   start(1'000'000);
   telesplat::test::RawPeer deaf(endpoint);
   ASSERT_TRUE(deaf.shake_hands("DEALER"));
-  const std::string ask =
-      test::zmtp_frame(wire::ChunkRequest::kName, true) + telesplat::test::zmtp_frame(wire::encode(kAsk), false);
+  const std::string ask = telesplat::test::zmtp_frame(wire::ChunkRequest::kName, true) +
+                          telesplat::test::zmtp_frame(wire::encode(kAsk), false);
   for (int n = 0; n < 100; ++n) ASSERT_TRUE(deaf.send(ask));
   double refused = 0;
   for (const double until_s = monotonic_s() + kDeadline_s; refused < 70 && monotonic_s() < until_s;)
