@@ -310,23 +310,26 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(how_much(traffic(measured, roster), run_s, viewers));
   out.update(what_was_steered(measured.tiles()));
   out.update(what_was_held(measured, roster, counter("partitions"), viewers));
-  out.update(ordered_json{{"tiles_released", whole(counter("tiles_released"))},
-                          {"leases_backup", whole(counter("leases_backup"))},
-                          {"views_overtaken", whole(counter("views_overtaken"))},
-                          {"limits",
-                           {{"views_coarser", whole(counter("limits.views_coarser"))},
-                            {"hellos_refused", whole(counter("limits.hellos_refused"))},
-                            {"messages_refused", whole(counter("limits.messages_refused"))}}},
-                          {"quality", nullptr},
-                          {"peak_rss_mb", peak_rss(roster)},
-                          {"errors",
-                           {{"messages_rejected", whole(roster.counted("", "messages_rejected"))},
-                            {"keys_refused", whole(roster.counted("", "keys_refused"))},
-                            {"gaps_resynced", whole(roster.counted("viewer", "gaps_resynced"))},
-                            {"leases_expired", whole(counter("leases_expired"))},
-                            {"record_failed", about.losses.failed.size() + whole(roster.counted("", kRecordFailed))},
-                            {"record_lost", rows_of(about.losses.lost)},
-                            {"record_cut", rows_of(about.losses.cut)}}}});
+  out.update(ordered_json{
+      {"tiles_released", whole(counter("tiles_released"))},
+      {"leases_backup", whole(counter("leases_backup"))},
+      {"views_overtaken", whole(counter("views_overtaken"))},
+      {"limits",
+       {{"views_coarser", whole(counter("limits.views_coarser"))},
+        {"hellos_refused", whole(counter("limits.hellos_refused"))},
+        {"messages_refused", whole(counter("limits.messages_refused") + roster.counted("", "messages_refused"))},
+        {"connections_refused", whole(roster.counted("", "connections_refused"))},
+        {"queue_refused", whole(roster.counted("", "queue_refused"))}}},
+      {"quality", nullptr},
+      {"peak_rss_mb", peak_rss(roster)},
+      {"errors",
+       {{"messages_rejected", whole(roster.counted("", "messages_rejected"))},
+        {"keys_refused", whole(roster.counted("", "keys_refused"))},
+        {"gaps_resynced", whole(roster.counted("viewer", "gaps_resynced"))},
+        {"leases_expired", whole(counter("leases_expired"))},
+        {"record_failed", about.losses.failed.size() + whole(roster.counted("", kRecordFailed))},
+        {"record_lost", rows_of(about.losses.lost)},
+        {"record_cut", rows_of(about.losses.cut)}}}});
   return out;
 }
 

@@ -15,6 +15,8 @@
 
 namespace telesplat::net {
 namespace {
+
+constexpr const char* kWhoComes = "who takes part, and how much";
 std::atomic<bool> stop_flag{false};
 void set_flag(int) { stop_flag = true; }
 void end_process(int) { _exit(0); }
@@ -47,6 +49,12 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                        "address to bind to; port * takes a free one; a process of several sockets takes this port and "
                        "those after it",
                    .reach = options::Reach::kHere});
+  if (ends != Ends::kConnects) out = options::joined(std::move(out), peer_limit_table(o));
+  if (ends == Ends::kBoth)
+    out.push_back({.flag = "--max-messages",
+                   .value = &o.max_messages,
+                   .help = "requests of one peer a second; what is beyond is dropped and counted",
+                   .limits = options::Range{10.0, 1e6}});
   if (ends == Ends::kBoth)
     out.push_back(
         {.flag = "--advertise",
@@ -77,6 +85,19 @@ options::Table service_table(ServiceOptions& o, Ends ends) {
                  .help = "trace, debug, info, warn, error or off",
                  .limits = options::Names{"trace", "debug", "info", "warn", "error", "off"}});
   return out;
+}
+
+options::Table peer_limit_table(ServiceOptions& o) {
+  return {{.flag = "--max-connections",
+           .value = &o.max_connections,
+           .help = "connections to each socket at a time; further ones are refused until there is room",
+           .limits = options::Range{1, 1 << 20},
+           .not_in_scene = kWhoComes},
+          {.flag = "--queue-limit-mb",
+           .value = &o.queue_limit_mb,
+           .help = "MB that wait for one peer who does not read them; what is beyond is dropped and counted",
+           .limits = options::Range{1.0, 1e6},
+           .not_in_scene = kWhoComes}};
 }
 
 options::Row keys_row(std::string& folder) {
@@ -143,6 +164,13 @@ void keep_freed_memory() {
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 128 << 20);
 #endif
+}
+
+uint64_t raise_file_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return 0;
+  const rlimit raised{limit.rlim_max, limit.rlim_max};
+  return setrlimit(RLIMIT_NOFILE, &raised) == 0 ? raised.rlim_cur : limit.rlim_cur;
 }
 
 void lower_thread_priority(int levels) {

@@ -1,6 +1,7 @@
 // What all service programs share: common flags, signals, process figures.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -21,13 +22,19 @@ struct ServiceOptions {
   std::vector<std::string> via;  ///< proxies, as Via::parse() takes them
   std::string link;              ///< what the links through them are like, for the record; empty: they are none
   std::string log_level = "info";
+  uint64_t max_connections = 1024;  ///< of each socket that is bound, at a time
+  double queue_limit_mb = 256;      ///< that wait for one peer to read them, 10^6 bytes
+  double max_messages = 20000;      ///< requests of one peer, a second
+  uint64_t queue_limit_bytes() const { return uint64_t(queue_limit_mb * 1e6); }
 };
 
-/// Adds --name, --log-level, --insecure, --keys; --bind if the program binds, --master (or TELESPLAT_MASTER in the
-/// environment) if it connects to one, --advertise if it does both, --via and --link if it only connects.
+/// Adds --name, --log-level, --insecure, --keys; --bind, --max-connections and --queue-limit-mb if the program binds, --master (or TELESPLAT_MASTER in the
+/// environment) if it connects to one, --advertise and --max-messages if it does both, --via and --link if it only connects.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 
+/// --max-connections and --queue-limit-mb, of services that bind and of who starts them.
+options::Table peer_limit_table(ServiceOptions& options);
 /// The environment variable that names a folder of keys where --keys is not given.
 inline constexpr const char* kKeysVariable = "TELESPLAT_KEYS";
 /// The row of --keys, of services and of programs that ask a master.
@@ -61,6 +68,9 @@ void install_signal_handlers();
 bool stop_requested();
 /// What was asked for has been done; another signal asks anew.
 void forget_stop();
+
+/// From now on this process may have as many files and connections open as it may ask for. Returns how many.
+uint64_t raise_file_limit();
 
 /// Lowers the calling thread's priority by `levels` of nice: for work that must not take the processor from a display.
 void lower_thread_priority(int levels);

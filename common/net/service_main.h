@@ -13,6 +13,7 @@ template <class Options>
 int service_main(int argc, char** argv, const char* about, Options options,
                  telesplat::options::Table (*table)(Options&), auto run) {
   end_on_signals();  // until run() looks at the flag
+  raise_file_limit();
   return guarded_main([&] {
     telesplat::options::Parser parser{about};
     parser.add(table(options));

@@ -17,8 +17,11 @@
 #include "common/core/check.h"
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
+#include "common/net/connections/connections.h"
+#include "common/net/connections/lookout.h"
 #include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
+#include "common/net/queued_bytes.h"
 #include "common/net/read_ahead.h"
 
 namespace telesplat::net {
@@ -30,7 +33,6 @@ constexpr int64_t kOversizedBytes = 16 << 20;
 constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads; handshakes fit
 constexpr size_t kMaxTypeBytes = 64;
 constexpr double kQuietPusher_s = 1.0;
-constexpr size_t kMaxClosed = 4096;
 // Handshakes that broke off without a word, one after the other: a server that ends breaks off one or two.
 constexpr uint32_t kBrokenOff = 3;
 
@@ -69,26 +71,14 @@ bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
   }
 }
 
-// A call of ZeroMQ that a signal may interrupt, until it is done: given up between two parts of a message it would tear
-// the message. It does not wait.
-template <class Call>
-auto undisturbed(const Call& call) {
-  for (;;) {
-    try {
-      return call();
-    } catch (const zmq::error_t& e) {
-      if (e.num() != EINTR) throw;
-    }
-  }
-}
-
 }  // namespace
 
 struct Context::Impl {
   zmq::context_t context{1};
   Access access;
-  std::mutex mutex;                        // of the doorkeeper: sockets may be bound by several threads
+  std::mutex mutex;                        // of what follows: sockets may be bound by several threads
   std::unique_ptr<Doorkeeper> doorkeeper;  // from the first socket on that binds with keys
+  std::unique_ptr<Lookout> lookout;        // from the first socket on that binds
 
   Status let_in() {
     const std::lock_guard lock(mutex);
@@ -97,6 +87,12 @@ struct Context::Impl {
     if (!opened) return opened.error();
     doorkeeper = *std::move(opened);
     return ok_status();
+  }
+
+  Lookout& watch() {
+    const std::lock_guard lock(mutex);
+    if (!lookout) lookout = std::make_unique<Lookout>();
+    return *lookout;
   }
 };
 
@@ -123,127 +119,84 @@ struct Socket::Impl {
     if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);
   }
 
-  // ZeroMQ's thread must find someone who takes its events until it stops to make them.
   ~Impl() {
     ahead.reset();
-    if (monitor) zmq_socket_monitor(socket.handle(), nullptr, 0);
+    if (connections) home.watch().remove(*connections);
   }
 
-  // Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too
-  // much are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed
-  // handshake is certain to be told.
-  void watch_connections() { watch(ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED | (guarded ? kHandshakeFailed : 0)); }
-
+  // Of a socket that connects: why it is not let in.
   static constexpr int kHandshakeFailed =
       ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
-  // Of a socket that binds: whoever fails shows no key that fits. Of one that connects: why it is not let in.
-  void note_handshake(uint16_t what) {
+  void note_attempt(uint16_t what) {
     if (what == ZMQ_EVENT_HANDSHAKE_SUCCEEDED) {
       broken_off = 0;
-      return;
+    } else if (what & kHandshakeFailed) {
+      ++failed_unseen;
+      if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
+        ++broken_off;
+      else
+        turned_away = what;
+    } else if (failed_unseen > 0) {  // somebody is there, who did not let us in
+      --failed_unseen;
+    } else {
+      ++failed_connections;
     }
-    ++failed_unseen;
-    if (guarded)
-      ++keys_refused;
-    else if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
-      ++broken_off;
-    else
-      turned_away = what;
+  }
+  void look_at_attempts() {
+    while (const auto event = attempts ? attempts->next() : std::nullopt) note_attempt(event->what);
   }
 
-  void watch(int events) {
-    static std::atomic<int> counter{0};
-    const std::string address = fmt::format("inproc://monitor-{}", ++counter);
-    if (zmq_socket_monitor(socket.handle(), address.c_str(), events) != 0) return;
-    monitor.emplace(home.context, zmq::socket_type::pair);
-    monitor->set(zmq::sockopt::linger, 0);
-    monitor->set(zmq::sockopt::rcvhwm, 0);  // a queue that is full would stop ZeroMQ's thread
-    monitor->connect(address);
+  void watch_connections() {
+    if (connections) return;
+    connections =
+        std::make_unique<Connections>(home.context, socket,
+                                      Connections::Options{.name = name,
+                                                           .most = options.most_connections,
+                                                           .guarded = guarded,
+                                                           .publishes = kind == Kind::kPub,
+                                                           .quiet_s = kind == Kind::kPull ? kQuietPusher_s : 1e300});
+    home.watch().add(*connections);
   }
+  Connections::Counts counts() const { return connections ? connections->counts() : Connections::Counts{}; }
 
-  void drain_monitor() {
-    if (!monitor) return;
-    zmq::message_t event, address;
-    while (undisturbed([&] { return monitor->recv(event, zmq::recv_flags::dontwait); })) {
-      if (event.more() && undisturbed([&] { return monitor->recv(address); })) {
-      }
-      if (event.size() < 6) continue;
-      uint16_t what = 0;
-      int32_t fd = -1;
-      std::memcpy(&what, event.data(), 2);
-      std::memcpy(&fd, static_cast<const char*>(event.data()) + 2, 4);
-      if (what == ZMQ_EVENT_CONNECT_RETRIED) {
-        // Somebody is there, who did not let us in.
-        if (failed_unseen > 0)
-          --failed_unseen;
-        else
-          ++failed_connections;
-      } else if (what & (kHandshakeFailed | ZMQ_EVENT_HANDSHAKE_SUCCEEDED)) {
-        note_handshake(what);
-      } else if (what == ZMQ_EVENT_ACCEPTED) {
-        connections[fd] = {.fd = fd, .accepted_s = monotonic_s()};
-      } else if (const auto it = connections.find(fd); it != connections.end()) {
-        closed.push_back(it->second);
-        connections.erase(it);
-        if (closed.size() >= kMaxClosed) judge_closed();
-      }
-    }
-    if (guarded) close_revoked();
-  }
-
-  // Whoever came in by a key that is on the list no more goes. ZeroMQ's thread, which owns the connections, hears of
-  // their end as if the other side had closed them; who comes again is asked for the key.
+  // Whoever came in by a key that is on the list no more goes; who comes again is asked for the key.
   void close_revoked() {
     const auto now = home.doorkeeper->may_stay();
     if (now == may_stay) return;
     may_stay = now;
-    for (const auto& [fd, c] : connections) {
-      if (c.user.empty() || now->contains(c.user)) continue;
-      ::shutdown(fd, SHUT_RDWR);
+    for (const std::string& user : connections->keep_only(*now))
       log::warn("{}: a connection is closed: the key {} is on the allow-list no more", name,
-                visitor_of(c.user).value_or(Visitor{}).name);
-    }
+                visitor_of(user).value_or(Visitor{}).name);
+  }
+
+  // To be called before messages are read until there is none.
+  void begin_reading() {
+    if (connections) connections->begin_reading();
+    if (connections && guarded) close_revoked();
+    look_at_attempts();
   }
 
   void note_spoken(zmq::message_t& message) {
-    if (!monitor) return;
-    drain_monitor();  // its connection's acceptance came first
-    const int fd = zmq_msg_get(message.handle(), ZMQ_SRCFD);
+    if (!connections) return;
     const char* user = guarded ? zmq_msg_gets(message.handle(), "User-Id") : nullptr;
-    const auto gone =
-        std::find_if(closed.begin(), closed.end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
-    if (gone != closed.end())
-      gone->has_spoken = true;
-    else if (const auto it = connections.find(fd); it != connections.end()) {
-      it->second.has_spoken = true;
-      if (user && it->second.user.empty()) it->second.user = user;
-    }
+    connections->spoke(zmq_msg_get(message.handle(), ZMQ_SRCFD), user ? user : "");
   }
 
-  // A connection that ends without ever having brought a whole message counts as one rejected: everyone of ours speaks
-  // as soon as it is connected, but for samplers, who push no tile before they have one. To be called when all messages
-  // of `closed` are received.
-  void judge_closed() {
-    for (const Connection& c : closed) {
-      if (c.has_spoken || (kind == Kind::kPull && monotonic_s() - c.accepted_s > kQuietPusher_s)) continue;
-      if (failed_unseen > 0) {  // counted as not let in
-        --failed_unseen;
-        continue;
-      }
-      ++rejected;
+  // A connection that ends without ever having brought a whole message counts as one rejected. To be called when there
+  // is no message any more.
+  void end_reading() {
+    if (connections && connections->judge() > 0)
       log_rejection("a connection", "it brought nothing that is a ZeroMQ message");
-    }
-    closed.clear();
   }
 
   // What viewers send to a publisher: that they want everything, or no longer do.
   void drain_subscriptions() {
     zmq::message_t message;
-    drain_monitor();
+    begin_reading();
     for (int n = 0; n < 1000; ++n) {
       try {
-        if (!undisturbed([&] { return socket.recv(message, zmq::recv_flags::dontwait); })) return judge_closed();
+        if (!undisturbed([&] { return socket.recv(message, zmq::recv_flags::dontwait); })) return end_reading();
       } catch (const zmq::error_t&) {
         return;
       }
@@ -264,19 +217,50 @@ struct Socket::Impl {
     }
   }
 
+  bool counts_queued() const { return kind == Kind::kRouter || kind == Kind::kPub; }
+
+  // What is published is shared: no subscriber waits for more than for all messages together that are not sent yet to
+  // everyone.
+  bool make_room(std::string_view peer, std::string_view type, size_t bytes) {
+    if (kind == Kind::kPub && connections) {
+      connections->published(wire_bytes(type.size()) + wire_bytes(bytes));
+      if (!queued.has_room(peer, bytes)) queue_refused += connections->hang_up_on_late(options.most_queued_bytes / 2);
+      return true;
+    }
+    if (queued.has_room(peer, bytes)) return true;
+    ++queue_refused;
+    log_rejection(fmt::format("message '{}' to peer '{}'", printable(type), printable(peer)),
+                  fmt::format("{} bytes wait for it already (--queue-limit-mb)", queued.of(peer)));
+    return false;
+  }
+  // Of a frame, with what ZMTP and CURVE add.
+  uint64_t wire_bytes(size_t bytes) const {
+    const uint64_t sent = bytes + (guarded ? 33 : 0);
+    return sent + (sent > 255 ? 9 : 2);
+  }
+
   bool send(std::string_view peer, std::string_view type, std::string& body) {
     if (kind == Kind::kPub) drain_subscriptions();
+    const size_t bytes = body.size();
+    if (counts_queued() && !make_room(peer, type, bytes)) return false;
     try {
       using zmq::send_flags;
       const auto part = [&](std::string_view bytes) {
         return undisturbed([&] { return socket.send(zmq::buffer(bytes), send_flags::sndmore | send_flags::dontwait); });
       };
-      if (kind == Kind::kRouter && !part(peer)) return false;
+      // What a fast peer has read is known to ZeroMQ's thread at once, to this one only when it looks.
+      const auto look = [&] { return socket.get(zmq::sockopt::events) >= 0; };
+      if (kind == Kind::kRouter && !part(peer) && look() && !part(peer)) return false;
       if (!part(type)) return false;
       // ZeroMQ takes the body over without copying it.
-      auto* owned = new std::string(std::move(body));
+      struct Owned {
+        std::string body;
+        QueuedBytes::Ticket ticket;
+      };
+      auto* owned =
+          counts_queued() ? new Owned{std::move(body), queued.add(peer, bytes)} : new Owned{std::move(body), {}};
       zmq::message_t frame(
-          owned->data(), owned->size(), [](void*, void* hint) { delete static_cast<std::string*>(hint); }, owned);
+          owned->body.data(), owned->body.size(), [](void*, void* hint) { delete static_cast<Owned*>(hint); }, owned);
       return undisturbed([&] { return socket.send(frame, send_flags::dontwait); }).has_value();
     } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
       return false;
@@ -288,7 +272,7 @@ struct Socket::Impl {
       drain_subscriptions();
       return std::nullopt;
     }
-    drain_monitor();
+    begin_reading();
     // A flood of bad messages must not keep the caller from its other sockets.
     for (int bad = 0; bad < 100; ++bad) {
       std::vector<zmq::message_t> frames;
@@ -296,7 +280,7 @@ struct Socket::Impl {
         do {
           zmq::message_t frame;
           if (!undisturbed([&] { return socket.recv(frame, zmq::recv_flags::dontwait); })) {
-            judge_closed();
+            end_reading();
             return std::nullopt;
           }
           if (frames.size() < 4) frames.push_back(std::move(frame));
@@ -382,20 +366,14 @@ struct Socket::Impl {
   std::string name;
   SocketOptions options;
   zmq::socket_t socket;
-  std::optional<zmq::socket_t> monitor;
-  struct Connection {
-    int fd = -1;
-    double accepted_s = 0;
-    bool has_spoken = false;
-    std::string user = {};  // of one that binds with keys: whose it is, once it has spoken
-  };
-  std::unordered_map<int, Connection> connections;  // accepted and open, by file descriptor
-  std::vector<Connection> closed;                   // not judged yet
-  Due due;                                          // what the thread that reads says by itself
-  std::atomic<uint64_t> rejected{0}, failed_connections{0}, keys_refused{0};
+  std::unique_ptr<Connections> connections;  // of a socket that binds
+  std::optional<Monitor> attempts;           // of one that connects, with watch_connecting
+  Due due;                                   // what the thread that reads says by itself
+  std::atomic<uint64_t> rejected{0}, failed_connections{0}, queue_refused{0};
+  QueuedBytes queued{options.most_queued_bytes};
   bool guarded = false;                                   // bound with keys
   std::shared_ptr<const std::set<std::string>> may_stay;  // what the doorkeeper said last
-  size_t failed_unseen = 0;                               // handshakes whose connection's end was not heard of yet
+  size_t failed_unseen = 0;                               // handshakes whose attempt's end was not heard of yet
   std::atomic<uint32_t> broken_off{0}, turned_away{0};    // of a socket that connects: handshakes; event, 0: none
   std::mutex log_mutex;  // of the limiter: with read_ahead two threads may refuse messages
   log::RateLimiter limiter;
@@ -423,6 +401,7 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
       impl_->guarded = true;
     }
     impl_->watch_connections();
+    impl_->socket.set(zmq::sockopt::handshake_ivl, int(kHandshake_s * 1e3));
     impl_->socket.bind(endpoint);
     return impl_->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& e) {
@@ -433,8 +412,9 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
 Status Socket::connect(const std::string& endpoint) {
   CHECK(!impl_->ahead);
   try {
-    if (impl_->options.watch_connecting && !impl_->monitor)
-      impl_->watch(ZMQ_EVENT_CONNECT_RETRIED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED | Impl::kHandshakeFailed);
+    if (impl_->options.watch_connecting && !impl_->attempts && !impl_->connections)
+      impl_->attempts.emplace(impl_->home.context, impl_->socket,
+                              ZMQ_EVENT_CONNECT_RETRIED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED | Impl::kHandshakeFailed);
     if (const Keys* keys = impl_->home.access.keys()) {
       if (!keys->own) return Error{fmt::format("{}: its keys are not for connecting", impl_->name)};
       identify(impl_->socket, *keys);
@@ -462,19 +442,18 @@ void Socket::reject(const Message& message, const std::string& why) { impl_->rej
 
 uint64_t Socket::rejected() const {
   if (impl_->kind == Kind::kPub) impl_->drain_subscriptions();
-  return impl_->rejected;
+  return impl_->rejected + impl_->counts().silent;
 }
 uint64_t Socket::failed_connections() const {
-  if (!impl_->ahead) impl_->drain_monitor();
+  if (!impl_->ahead) impl_->look_at_attempts();
   return impl_->failed_connections;
 }
-uint64_t Socket::keys_refused() const {
-  if (!impl_->ahead) impl_->drain_monitor();
-  return impl_->keys_refused;
-}
+uint64_t Socket::keys_refused() const { return impl_->counts().keys_refused; }
+uint64_t Socket::queue_refused() const { return impl_->queue_refused; }
+uint64_t Socket::connections_refused() const { return impl_->counts().refused; }
 
 Socket::Refusal Socket::refusal() const {
-  if (!impl_->ahead) impl_->drain_monitor();
+  if (!impl_->ahead) impl_->look_at_attempts();
   const Keys* keys = impl_->home.access.keys();
   if (keys && impl_->turned_away == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH)
     return {.text =
@@ -485,7 +464,8 @@ Socket::Refusal Socket::refusal() const {
     return {.text = fmt::format("it does not take the keys of {}: it has others, or none", keys->folder),
             .may_pass = !turned_away};
   return {.text = turned_away ? "it wants a key (--keys DIR)"
-                              : "it breaks off connections, as one that wants a key does (--keys DIR)",
+                              : "it breaks off connections, as one that wants a key does (--keys DIR), or that has as "
+                                "many as it takes (--max-connections)",
           .may_pass = !turned_away};
 }
 

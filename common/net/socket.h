@@ -60,6 +60,10 @@ struct SocketOptions {
   /// What a socket that binds is for, as the table of roles calls it (keys/roles.h): "control", "tiles" and so on. With
   /// keys, one that is for nothing cannot be bound.
   std::string_view serves;
+  size_t most_connections = 1024;  ///< of a socket that binds, at a time; further ones are hung up on
+  /// Of a ROUTER or PUB, bytes that wait for one peer, who may have one message of any size all the same. What is
+  /// beyond is dropped for a peer of a ROUTER, as beyond the high-water mark; a subscriber is hung up on.
+  uint64_t most_queued_bytes = uint64_t(256) << 20;
 };
 
 /// SocketOptions::patience_s where messages of megabytes go over links of a megabit a second.
@@ -78,8 +82,8 @@ class Socket {
   /// Connects; the peer need not exist yet and may come back after being away.
   Status connect(const std::string& endpoint);
 
-  /// Queues a message without waiting (ROUTER: for `peer`). False: dropped, because the queue is full or the peer is
-  /// gone.
+  /// Queues a message without waiting (ROUTER: for `peer`). False: dropped, because too much waits already or the peer
+  /// is gone.
   template <class M>
   bool send(const M& message, std::string_view peer = {}) {
     return send_frames(peer, M::kName, wire::encode(message));
@@ -117,6 +121,10 @@ class Socket {
   /// Of a socket that binds with keys: connections that were not let in, because they showed no key, another server's,
   /// or one that is not on the allow-list or is for something else.
   uint64_t keys_refused() const;
+  /// Of a socket that binds: connections that were hung up on because there were SocketOptions::most_connections.
+  uint64_t connections_refused() const;
+  /// Messages dropped and subscribers hung up on because of SocketOptions::most_queued_bytes.
+  uint64_t queue_refused() const;
   /// With SocketOptions::watch_connecting: why it was not let in where it connects to, as far as it was told; empty: it
   /// was, or nothing is known yet. What is told does not change by waiting, unless `may_pass`.
   struct Refusal {

@@ -10,6 +10,7 @@
 #include "common/core/utf8.h"
 #include "common/metrics/about.h"
 #include "common/net/master_link.h"
+#include "common/net/peer_rates.h"
 #include "services/data/base/cut_off.h"
 #include "services/data/companions.h"
 #include "services/data/kinds.h"
@@ -46,17 +47,23 @@ Result<std::string> bind_requests(std::optional<net::Socket>& socket, net::Conte
   socket.emplace(context, net::Kind::kRouter, o.name + ":" + std::string(requests.endpoint),
                  net::SocketOptions{.high_water_mark = requests.high_water_mark,
                                     .patience_s = net::kBulkPatience_s,
-                                    .serves = requests.endpoint});
+                                    .serves = requests.endpoint,
+                                    .most_connections = o.max_connections,
+                                    .most_queued_bytes = o.queue_limit_bytes()});
   const auto bound = socket->bind(o.bind, o.insecure);
   if (!bound) return bound.error();
   return net::announced(*bound, o.advertise);
 }
 
-net::MasterLink::Values status_of(const Served& served, const std::optional<net::Socket>& requests) {
+net::MasterLink::Values status_of(const Served& served, const std::optional<net::Socket>& requests,
+                                  const net::PeerRates& rates) {
   net::MasterLink::Values values{{"rss_mb", net::resident_mb()}, {"peak_rss_mb", net::peak_resident_mb()}};
   if (requests) {
     values["messages_rejected"] = double(requests->rejected());
     values["keys_refused"] = double(requests->keys_refused());
+    values["connections_refused"] = double(requests->connections_refused());
+    values["messages_refused"] = double(rates.refused());
+    values["queue_refused"] = double(requests->queue_refused());
   }
   served.add_status(values);
   return values;
@@ -80,11 +87,14 @@ void tell_notes(const Served& served, bool to_stdout) {
   std::fflush(stdout);
 }
 
-void answer_some(Served& served, const Outlets& outlets) {
+void answer_some(Served& served, const Outlets& outlets, net::PeerRates& rates) {
   for (int n = 0; n < kRequestsATurn; ++n) {
     const auto message = outlets.requests.receive();
     if (!message) break;
-    served.answer(*message, outlets);
+    if (rates.admit(message->peer, monotonic_s()))
+      served.answer(*message, outlets);
+    else
+      outlets.requests.reject(*message, "its peer sends more than --max-messages");
   }
   served.send_finished(outlets);
 }
@@ -117,7 +127,8 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
   link.on_order([&](const wire::Order& order) {
     if (const auto why = served.refuse(order)) link.answer(order.number, false, *why);
   });
-  const auto status = [&] { return status_of(served, requests); };
+  net::PeerRates rates(o.max_messages);
+  const auto status = [&] { return status_of(served, requests, rates); };
   std::vector<net::Socket*> sockets{&link.socket()};
   if (requests) sockets.push_back(&*requests);
 
@@ -130,7 +141,7 @@ int serve(net::Context& context, Served& served, const net::ServiceOptions& o, c
       version = link.version();
       if (const Status s = served.follow(*link.session()); !s) log::warn("{}", s.error().text);
     }
-    if (requests) answer_some(served, {*requests, link.socket()});
+    if (requests) answer_some(served, {*requests, link.socket()}, rates);
     for (const auto& [fact, value] : served.news()) link.tell(fact, value);
     if (const auto known = hash.take()) {
       link.tell("data_bytes", std::to_string(known->bytes));

@@ -86,7 +86,7 @@ class MasterCore {
     run_id_ = run_id;
   }
   const net::RunningSession& session() const { return session_; }
-  const LimitsHit& limits_hit() const { return gate_.hit(); }
+  LimitsHit limits_hit() const { return gate_.hit(); }
   std::vector<metrics::Process> processes() const;
   std::map<std::string, double> counters() const;
   /// For those who watch; what figures() and live() do not have of it is left to the caller: version, and the master
@@ -96,7 +96,9 @@ class MasterCore {
   Figures figures() const;  ///< of all plans together
   /// What the socket counts, for status.
   struct Door {
-    uint64_t messages_rejected = 0, keys_refused = 0;
+    uint64_t messages_rejected = 0, keys_refused = 0, connections_refused = 0, queue_refused = 0;
+    uint64_t max_connections = 0;  ///< its limits
+    double queue_limit_mb = 0;
   };
   void tell_door(const Door& door) { door_ = door; }
   bool progressive() const { return plan_->progressive(); }

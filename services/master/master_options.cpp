@@ -220,7 +220,8 @@ options::Table limit_table(MasterServiceOptions& o) {
            .not_in_scene = kWhoComes},
           {.flag = "--max-messages",
            .value = &l.max_messages,
-           .help = "messages of one process a second, the packer's left out; what is beyond is dropped and counted",
+           .help = "messages of one process a second, the packer's left out; what is beyond is dropped and counted; of "
+                   "telesplat run also to packer and data servers, which take 20000 unless it is given",
            .limits = options::Range{10.0, 1e6},
            .not_in_scene = kWhoComes}};
 }

@@ -120,7 +120,9 @@ class MasterService {
                          net::process_facts(),
                          {{"peak_rss_mb", net::peak_resident_mb()},
                           {"messages_rejected", double(control_.rejected())},
-                          {"keys_refused", double(control_.keys_refused())}}});
+                          {"keys_refused", double(control_.keys_refused())},
+                          {"connections_refused", double(control_.connections_refused())},
+                          {"queue_refused", double(control_.queue_refused())}}});
     const metrics::About about{.id = run_id_,
                                .version = version(),
                                .begin = record_->begin(),
@@ -150,7 +152,12 @@ class MasterService {
       guarded(control_, *message, [&] { take(*message, monotonic_s()); });
     }
     core_.tick(monotonic_s());
-    core_.tell_door({control_.rejected(), control_.keys_refused()});
+    core_.tell_door({.messages_rejected = control_.rejected(),
+                     .keys_refused = control_.keys_refused(),
+                     .connections_refused = control_.connections_refused(),
+                     .queue_refused = control_.queue_refused(),
+                     .max_connections = options_.service.max_connections,
+                     .queue_limit_mb = options_.service.queue_limit_mb});
     tell_news();
     publish_metrics(monotonic_s());
     for (auto& out : core_.take_outgoing())
@@ -214,7 +221,11 @@ class MasterService {
   net::Socket control_{context_,
                        net::Kind::kRouter,
                        "master",
-                       {.high_water_mark = 10000, .max_message_bytes = 16u << 20, .serves = "control"}};
+                       {.high_water_mark = 10000,
+                        .max_message_bytes = 16u << 20,
+                        .serves = "control",
+                        .most_connections = options_.service.max_connections,
+                        .most_queued_bytes = options_.service.queue_limit_bytes()}};
   Senders senders_;
   std::unique_ptr<metrics::RunRecord> record_;
   const std::string run_id_;  // empty: no record is written

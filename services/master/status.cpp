@@ -6,6 +6,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "common/scene/session.h"
 #include "services/master/master_core.h"
 
 namespace telesplat::master {
@@ -95,7 +96,7 @@ std::map<std::string, double> MasterCore::counters() const {
     swaps.frames += wall.figures().frames;
     swaps.incomplete += wall.figures().incomplete;
   }
-  const LimitsHit& hit = gate_.hit();
+  const LimitsHit hit = gate_.hit();
   out["limits.views_coarser"] = double(hit.views_coarser);
   out["limits.hellos_refused"] = double(hit.hellos_refused);
   out["limits.messages_refused"] = double(hit.messages_refused);
@@ -153,6 +154,17 @@ Json MasterCore::process_json(const std::string& id, const Peer& p, double now_s
 
 std::string MasterCore::status_json(double now_s, bool all) const {
   const Figures f = figures();
+  const LimitsHit hit = gate_.hit();
+  // With what everyone else counted.
+  const auto of_all = [&](uint64_t own, const char* key) {
+    double sum = double(own);
+    const auto add = [&](const metrics::Process& p) {
+      if (const double n = scene::value_or(p.values, key, 0.0); n > 0 && n < 1e15) sum += n;
+    };
+    for (const auto& p : departed_.kept()) add(p);
+    for (const auto& [id, p] : peers_) add(p.process);
+    return number(sum);
+  };
   Json out{{"session", told(session_)},
            {"messages_rejected", door_.messages_rejected},
            {"keys_refused", door_.keys_refused},
@@ -169,9 +181,13 @@ std::string MasterCore::status_json(double now_s, bool all) const {
             {{"max_sampling_pixels", options_.limits.max_sampling_pixels},
              {"max_peers", options_.limits.max_peers},
              {"max_messages", options_.limits.max_messages},
-             {"views_coarser", gate_.hit().views_coarser},
-             {"hellos_refused", gate_.hit().hellos_refused},
-             {"messages_refused", gate_.hit().messages_refused}}},
+             {"max_connections", door_.max_connections},
+             {"queue_limit_mb", number(door_.queue_limit_mb)},
+             {"views_coarser", hit.views_coarser},
+             {"hellos_refused", hit.hellos_refused},
+             {"messages_refused", of_all(hit.messages_refused, "messages_refused")},
+             {"connections_refused", of_all(door_.connections_refused, "connections_refused")},
+             {"queue_refused", of_all(door_.queue_refused, "queue_refused")}}},
            {"parameters", Json::object()},
            {"animation", animation()}};
   for (const auto& [name, value] : scene_as_told().parameters) out["parameters"][name] = number(value);

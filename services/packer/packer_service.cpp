@@ -9,6 +9,7 @@
 #include "common/metrics/recorder.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
+#include "common/net/peer_rates.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/points/point_packing.h"
 #include "services/packer/ports.h"
@@ -32,14 +33,22 @@ class PackerService {
                 .max_message_bytes = wire::kMaxBulkBytes + wire::kMaxControlBytes,
                 .patience_s = net::kBulkPatience_s,
                 .read_ahead = true,
-                .serves = "tiles"}),
+                .serves = "tiles",
+                .most_connections = o.service.max_connections}),
         patches_(context, net::Kind::kPub, o.service.name + ":patches",
-                 {.high_water_mark = 4096, .patience_s = net::kBulkPatience_s, .serves = "patches"}),
+                 {.high_water_mark = 4096,
+                  .patience_s = net::kBulkPatience_s,
+                  .serves = "patches",
+                  .most_connections = o.service.max_connections,
+                  .most_queued_bytes = o.service.queue_limit_bytes()}),
         state_(context, net::Kind::kRouter, o.service.name + ":state",
                {.high_water_mark = kStateQueue,
                 .max_message_bytes = 16u << 20,
                 .patience_s = net::kBulkPatience_s,
-                .serves = "state"}) {}
+                .serves = "state",
+                .most_connections = o.service.max_connections,
+                .most_queued_bytes = o.service.queue_limit_bytes()}),
+        rates_(o.service.max_messages) {}
 
   /// Binds the three sockets and says hello with their addresses.
   Status open(net::Context& context) {
@@ -187,6 +196,11 @@ class PackerService {
     for (int n = 0; n < most; ++n) {
       const auto message = from.receive();
       if (!message) return;
+      // Samplers are held up by what is not read yet; viewers ask.
+      if (&from == &state_ && !rates_.admit(message->peer, monotonic_s())) {
+        from.reject(*message, "its peer sends more than --max-messages");
+        continue;
+      }
       receive_control();  // what came on another socket at the same time may tell of its epoch
       if (packing_)
         ((*packing_).*take)(from, *message, monotonic_s());
@@ -201,7 +215,11 @@ class PackerService {
         {"peak_rss_mb", net::peak_resident_mb()},
         {"bytes_sent", 0},
         {"messages_rejected", double(tiles_.rejected() + patches_.rejected() + state_.rejected())},
-        {"keys_refused", double(tiles_.keys_refused() + patches_.keys_refused() + state_.keys_refused())}};
+        {"keys_refused", double(tiles_.keys_refused() + patches_.keys_refused() + state_.keys_refused())},
+        {"connections_refused",
+         double(tiles_.connections_refused() + patches_.connections_refused() + state_.connections_refused())},
+        {"messages_refused", double(rates_.refused())},
+        {"queue_refused", double(patches_.queue_refused() + state_.queue_refused())}};
     if (packing_) packing_->add_status(v);
     return v;
   }
@@ -214,6 +232,7 @@ class PackerService {
 
   const PackerOptions& options_;
   net::Socket tiles_, patches_, state_;
+  net::PeerRates rates_;  // of viewers
   std::optional<net::MasterLink> link_;
   std::optional<DepthRecorder> recorder_;
   std::optional<PlanRecorder> plan_recorder_;

@@ -12,6 +12,7 @@
 #include "services/data/mesh/served_mesh.h"
 #include "services/data/volume/served_volume.h"
 #include "tests/support/data_files.h"
+#include "tests/support/raw_peer.h"
 #include "tests/support/volume/samples.h"
 
 namespace telesplat::data {
@@ -213,25 +214,118 @@ TEST(DataServer, SendsTheChunksOfAMesh) {
   EXPECT_TRUE(none->first.data.empty());
 }
 
-// One large chunk, of a mesh that nobody looks at.
-class LargeChunk final : public MeshStore {
+// One chunk, of a mesh that nobody looks at.
+class OneChunk final : public MeshStore {
  public:
-  static constexpr size_t kBytes = 1 << 20;
+  explicit OneChunk(size_t bytes)
+      : chunks_{{ChunkId{0}, {{0, 0, 0}, {1, 1, 1}}, 1, bytes}},
+        bytes_(std::make_shared<std::vector<std::byte>>(bytes)) {}
   const MeshStoreInfo& info() const override { return info_; }
   const std::vector<geometry::ChunkInfo>& chunks() const override { return chunks_; }
   geometry::ChunkBytes chunk(ChunkId) const override { return {*bytes_, bytes_}; }
 
  private:
   MeshStoreInfo info_;
-  std::vector<geometry::ChunkInfo> chunks_{{ChunkId{0}, {{0, 0, 0}, {1, 1, 1}}, 1, kBytes}};
-  std::shared_ptr<const std::vector<std::byte>> bytes_ = std::make_shared<std::vector<std::byte>>(kBytes);
+  std::vector<geometry::ChunkInfo> chunks_;
+  std::shared_ptr<const std::vector<std::byte>> bytes_;
 };
+
+// Its data server, and the master that it talks to.
+class OneChunkService : public testing::Test {
+ protected:
+  void start(size_t bytes) {
+    options.service.name = "data-1", options.service.master = "inproc://master";
+    options.service.bind = "tcp://127.0.0.1:*";
+    served = serve_mesh(std::make_shared<OneChunk>(bytes), "one.ply",
+                        {.as_begun = std::nullopt, .map = {}, .open = [](const std::string&, const Progress&) {
+                           return Result<std::shared_ptr<MeshStore>>(Error{"there is none"});
+                         }});
+    ASSERT_TRUE(master.bind("inproc://master"));
+    server =
+        std::thread([this] { EXPECT_EQ(serve(context, *served, options.service, [this] { return stop.load(); }), 0); });
+    const auto hello = next<wire::Hello>(master);
+    ASSERT_TRUE(hello);
+    peer = hello->second.peer;
+    endpoint = hello->first.endpoints.at("chunks");
+  }
+  void TearDown() override {
+    stop = true;
+    if (server.joinable()) server.join();
+  }
+  // The newest report, of a server that is welcome.
+  double reported(const std::string& key) {
+    master.send(wire::Welcome{.master = InstanceId{5}, .epoch = EpochId{3}}, peer);
+    const auto report = next<wire::StatusReport>(master);
+    return report && report->first.values.contains(key) ? report->first.values.at(key) : -1;
+  }
+
+  net::Context context;
+  net::Socket master{context, net::Kind::kRouter, "master"};
+  DataServiceOptions options;
+  std::unique_ptr<Served> served;
+  std::string peer, endpoint;
+  std::atomic<bool> stop = false;
+  std::thread server;
+};
+
+const wire::ChunkRequest kAsk{EpochId{3}, ChunkId{0}};
+
+TEST_F(OneChunkService, AFloodOfRequestsIsDroppedAndCountedAndOthersAreServed) {
+  options.service.max_messages = 100;
+  start(100);
+  net::Socket flooder(context, net::Kind::kDealer, "flooder"), other(context, net::Kind::kDealer, "other");
+  ASSERT_TRUE(flooder.connect(endpoint) && other.connect(endpoint));
+  constexpr int kFlood = 3000;
+  const double begin_s = monotonic_s();
+  for (int n = 0; n < kFlood; ++n)
+    while (!flooder.send(kAsk)) std::this_thread::yield();
+  other.send(kAsk);
+  EXPECT_TRUE(next<wire::Chunk>(other)) << "others are served";
+  double refused = 0;
+  while (refused < kFlood - 200 - 100 * (monotonic_s() - begin_s) && monotonic_s() < begin_s + kDeadline_s)
+    refused = reported("messages_refused");
+  EXPECT_GE(refused, kFlood - 200 - 100 * (monotonic_s() - begin_s));
+  EXPECT_LE(refused, kFlood - 200);
+}
+
+// As many at a time as samplers ask for, as fast as they are answered.
+TEST_F(OneChunkService, ASamplerAtFullSpeedLosesNoRequest) {
+  start(20'000);
+  net::Socket sampler(context, net::Kind::kDealer, "sampler");
+  ASSERT_TRUE(sampler.connect(endpoint));
+  constexpr int kChunks = 30'000, kAtOnce = 8;
+  const double until_s = monotonic_s() + kDeadline_s;
+  int asked = 0, got = 0;
+  for (; got < kChunks && monotonic_s() < until_s; net::wait_readable({&sampler}, 5)) {
+    while (const auto m = sampler.receive()) got += m->type == wire::Chunk::kName;
+    for (; asked < std::min(got + kAtOnce, kChunks); ++asked) ASSERT_TRUE(sampler.send(kAsk));
+  }
+  EXPECT_EQ(got, kChunks);
+  EXPECT_EQ(reported("messages_refused"), 0);
+  EXPECT_EQ(reported("queue_refused"), 0);
+}
+
+// Not many megabytes wait for who reads none, however many messages that are.
+TEST_F(OneChunkService, AnswersThatNobodyReadsAreDroppedAndCounted) {
+  options.service.queue_limit_mb = 4;
+  start(1'000'000);
+  telesplat::test::RawPeer deaf(endpoint);
+  ASSERT_TRUE(deaf.shake_hands("DEALER"));
+  const std::string ask = telesplat::test::zmtp_frame(wire::ChunkRequest::kName, true) +
+                          telesplat::test::zmtp_frame(wire::encode(kAsk), false);
+  for (int n = 0; n < 100; ++n) ASSERT_TRUE(deaf.send(ask));
+  double refused = 0;
+  for (const double until_s = monotonic_s() + kDeadline_s; refused < 70 && monotonic_s() < until_s;)
+    refused = reported("queue_refused");
+  EXPECT_GE(refused, 70) << "4 MB wait, and what kernels keep for a connection";
+  EXPECT_LE(refused, 96);
+}
 
 TEST(DataServer, AFloodOfChunkRequestsQueuesFew) {
   DataServiceOptions options;
   options.service.name = "data-1", options.service.master = "inproc://master";
   options.service.bind = "tcp://127.0.0.1:*";
-  const auto served = serve_mesh(std::make_shared<LargeChunk>(), "large.ply",
+  const auto served = serve_mesh(std::make_shared<OneChunk>(1 << 20), "large.ply",
                                  {.as_begun = std::nullopt, .map = {}, .open = [](const std::string&, const Progress&) {
                                     return Result<std::shared_ptr<MeshStore>>(Error{"there is none"});
                                   }});

@@ -14,6 +14,7 @@
 #include "common/volume/session.h"
 #include "services/packer/packer_service.h"
 #include "tests/support/keys/lease_key.h"
+#include "tests/support/raw_peer.h"
 
 namespace telesplat {
 namespace {
@@ -188,6 +189,48 @@ TEST_F(PackerServiceTest, WhatComesBeforeItsSessionWaitsForIt) {
   master.send(mesh(), packer_peer);
   const auto message = next(viewer, wire::StateMark::kName);
   ASSERT_TRUE(message) << "it was asked for once";
+}
+
+// The value that the packer reports, once it is what is expected.
+class PackerLimits : public PackerServiceTest {
+ protected:
+  PackerLimits() {
+    options.service.max_messages = 100;
+    options.service.max_connections = 4;
+  }
+  bool reports(const std::string& key, const std::function<bool(double)>& expected) {
+    for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
+      const auto message = next(master, wire::StatusReport::kName);
+      const auto report = message ? master.decode<wire::StatusReport>(*message) : std::nullopt;
+      if (report && report->values.contains(key) && expected(report->values.at(key))) return true;
+    }
+    return false;
+  }
+};
+
+TEST_F(PackerLimits, AFloodOfRequestsIsDroppedAndCountedAndOthersAreAnswered) {
+  master.send(mesh(), packer_peer);
+  ASSERT_TRUE(ask_for_points());
+  net::Socket flood(context, net::Kind::kDealer, "flood");
+  ASSERT_TRUE(flood.connect(hello.endpoints.at("state")));
+  constexpr int kFlood = 3000;
+  const double begin_s = monotonic_s();
+  for (int n = 0; n < kFlood; ++n)
+    while (!flood.send(wire::Receipt{{78}, {}, {}, 0})) std::this_thread::yield();
+  const auto message = next(viewer, wire::StateMark::kName, [this] { viewer.send(wire::StateRequest{{77}, {}, {}}); });
+  EXPECT_TRUE(message) << "others are answered";
+  EXPECT_TRUE(reports("messages_refused", [&](double n) {
+    return n >= kFlood - 200 - 100 * (monotonic_s() - begin_s) && n <= kFlood - 200;
+  }));
+}
+
+TEST_F(PackerLimits, ConnectionsBeyondTheLimitAreCounted) {
+  master.send(mesh(), packer_peer);
+  ASSERT_TRUE(ask_for_points());
+  std::vector<std::unique_ptr<test::RawPeer>> strangers;
+  for (int i = 0; i < 20; ++i) strangers.push_back(std::make_unique<test::RawPeer>(hello.endpoints.at("state")));
+  EXPECT_TRUE(reports("connections_refused", [](double n) { return n >= 17; }));
+  EXPECT_TRUE(ask_for_points()) << "friends stay";
 }
 
 }  // namespace

@@ -24,7 +24,6 @@ namespace {
 
 constexpr const char* kQuestions = "inproc://zeromq.zap.01";
 constexpr auto kLook = std::chrono::milliseconds(1000);  // at the list, while nobody comes
-constexpr int kGreeting_ms = 5000;                       // a connection that has not shown its key by then is dropped
 constexpr size_t kMostFrames = 16, kMostAddress = 64;
 // What ZAP's answers are made of.
 constexpr std::string_view kVersion = "1.0", kCurve = "CURVE", kYes = "200", kNo = "400";
@@ -201,7 +200,6 @@ void guard(zmq::socket_t& socket, const Keys& keys, std::string_view serves) {
   socket.set(zmq::sockopt::zap_domain, std::string(serves));
   socket.set(zmq::sockopt::curve_server, true);
   socket.set(zmq::sockopt::curve_secretkey, keys.server_secret);
-  socket.set(zmq::sockopt::handshake_ivl, kGreeting_ms);
 }
 
 void identify(zmq::socket_t& socket, const Keys& keys) {

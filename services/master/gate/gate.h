@@ -3,12 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <string>
-#include <unordered_map>
 
 #include "common/core/result.h"
 #include "common/core/token_bucket.h"
+#include "common/net/peer_rates.h"
 #include "common/wire/session_messages.h"
 #include "common/wire/tile_messages.h"
 
@@ -27,10 +26,10 @@ struct LimitsHit {
 
 class Gate {
  public:
-  explicit Gate(const Limits& limits) : limits_(limits) {}
+  explicit Gate(const Limits& limits) : limits_(limits), rates_(limits.max_messages) {}
 
   /// One more message of this peer may be looked at.
-  bool admit(const std::string& peer, double now_s);
+  bool admit(const std::string& peer, double now_s) { return rates_.admit(peer, now_s); }
   /// The view as it is sampled: where it has more pixels than the limit, every k-th of every k-th row.
   wire::ViewRequest admit(const wire::ViewRequest& view);
   /// Counts a hello that is refused.
@@ -38,16 +37,17 @@ class Gate {
   /// A line of the log about who comes and goes: not more often than a person reads.
   bool may_log(double now_s) { return log_.take(now_s); }
   const Limits& limits() const { return limits_; }
-  const LimitsHit& hit() const { return hit_; }
+  LimitsHit hit() const {
+    LimitsHit out = hit_;
+    out.messages_refused = rates_.refused();
+    return out;
+  }
 
  private:
-  void forget_idle(double now_s);
-
   const Limits limits_;
   LimitsHit hit_;
-  std::unordered_map<std::string, TokenBucket> peers_;  // by routing id
+  net::PeerRates rates_;
   TokenBucket log_{10, 200};
-  double forgot_s_ = -1e300;
 };
 
 }  // namespace telesplat::master

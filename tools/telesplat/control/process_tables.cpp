@@ -129,6 +129,9 @@ std::string table_of(const RoleTable& role, const std::vector<Json>& processes, 
   fields.push_back(clock_offset());
   fields.push_back(unless_zero(counted("rejected", "messages_rejected")));
   fields.push_back(unless_zero(counted("keys refused", "keys_refused")));
+  fields.push_back(unless_zero(counted("connections refused", "connections_refused")));
+  fields.push_back(unless_zero(counted("requests dropped", "messages_refused")));
+  fields.push_back(unless_zero(counted("answers dropped", "queue_refused")));
   fields.push_back({"heard of", heard});
   std::vector<tools::TextTable::Column> columns;
   for (const Field& f : fields) columns.push_back({f.title, f.right});

@@ -63,7 +63,9 @@ std::string limits(const Json& status) {
   std::vector<std::string> out;
   for (const auto& [key, what] : {std::pair{"views_coarser", "views sampled coarser"},
                                   {"hellos_refused", "processes refused"},
-                                  {"messages_refused", "messages dropped"}})
+                                  {"messages_refused", "messages dropped"},
+                                  {"connections_refused", "connections refused"},
+                                  {"queue_refused", "answers dropped that nobody read"}})
     if (const uint64_t n = count(*told, key)) out.push_back(fmt::format("{} {}", n, what));
   return fmt::format("{}", fmt::join(out, ", "));
 }

@@ -21,6 +21,13 @@ using options::Table;
 constexpr double kWallHold_s = 2;
 
 constexpr const char* kWhatIsKept = "what a run keeps";
+// The limits that are the master's are everybody's who binds.
+void limit_peers(net::ServiceOptions& service, const RunOptions& o) {
+  const double messages = o.master.master.limits.max_messages;
+  service.max_connections = o.master.service.max_connections;
+  service.queue_limit_mb = o.master.service.queue_limit_mb;
+  if (messages != master::Limits{}.max_messages) service.max_messages = messages;
+}
 
 // Either `run`'s or `view`'s.
 Table display_rows(RunOptions& o) {
@@ -247,8 +254,8 @@ Table table(RunOptions& o) {
   const Table own = joined(joined(own_rows(o), display_rows(o)), movie_rows(o.movie));
   const Table launcher = joined(own, sampler_rows(o));
   const Table services = joined(data::scene_table(o.data), viewer::view_table(o.viewer));
-  const Table of_master =
-      joined(joined(master::record_table(o.master), master::limit_table(o.master)), master::session_table(o.master));
+  const Table limits = joined(master::limit_table(o.master), net::peer_limit_table(o.master.service));
+  const Table of_master = joined(joined(master::record_table(o.master), limits), master::session_table(o.master));
   return joined(joined(launcher, services), of_master);
 }
 
@@ -291,6 +298,7 @@ std::vector<std::string> master_arguments(const RunOptions& o) {
 std::vector<std::string> data_arguments(const RunOptions& o, int part) {
   data::DataServiceOptions d = o.data;
   d.companions = "anywhere";  // the person's own files, for the person alone
+  limit_peers(d.service, o);
   if (o.data_servers > 1) d.volume.part = fmt::format("{}/{}", part, o.data_servers);
   auto out = arguments(d);
   out.push_back("--report-progress");
@@ -299,6 +307,7 @@ std::vector<std::string> data_arguments(const RunOptions& o, int part) {
 
 std::vector<std::string> packer_arguments(const RunOptions& o) {
   packer::PackerOptions p = o.packer;
+  limit_peers(p.service, o);
   if (o.record_depth) p.record_depth = o.out + "/depth";
   if (o.record_plan) p.record_plan = o.out + "/plans";
   return arguments(p);

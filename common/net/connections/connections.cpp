@@ -1,0 +1,238 @@
+#include "common/net/connections/connections.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <linux/tcp.h>
+#include <netinet/in.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+#include "common/core/clock.h"
+
+namespace telesplat::net {
+namespace {
+
+constexpr size_t kMostEnded = 4096;  // before they are judged, whatever may still come of them
+constexpr double kLatePeriod_s = 0.1;
+constexpr uint64_t kNobodyKnows = ~uint64_t(0);  // not over TCP
+constexpr int kFailed =
+    ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
+
+}  // namespace
+
+// Peers that fail their handshake (random bytes, another protocol) or are disconnected for a frame that claims too much
+// are seen by a monitor only; ZeroMQ reads unknown bytes as its oldest protocol, so that not even a failed handshake is
+// certain to be told.
+Connections::Connections(zmq::context_t& context, zmq::socket_t& socket, Options options)
+    : options_(std::move(options)),
+      monitor_(context, socket, ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED | (options_.guarded ? kFailed : 0)),
+      blank_(eventfd(0, EFD_CLOEXEC)),
+      spare_(fcntl(blank_, F_DUPFD_CLOEXEC, 0)) {}
+
+Connections::~Connections() {
+  ::close(spare_);
+  ::close(blank_);
+}
+
+int Connections::descriptor() { return monitor_.descriptor(); }
+
+void Connections::look() {
+  const std::lock_guard lock(mutex_);
+  drain();
+  keep_to_limit();
+}
+
+void Connections::keep_to_limit() {
+  while (open_.size() - refused_open_ > options_.most) hang_up_on_one();
+}
+
+void Connections::drain() {
+  const double now_s = monotonic_s();
+  while (const auto event = monitor_.next()) take(*event, now_s);
+}
+
+// What ends a connection is told by one thread, at once: that its handshake broke off, and then that it ended.
+void Connections::take(const Monitor::Event& event, double now_s) {
+  if (event.what & kFailed) {
+    ++failed_unseen_;
+    ++counts_.keys_refused;
+  } else if (event.what == ZMQ_EVENT_ACCEPTED) {
+    open_[event.value] = {.fd = event.value, .number = ++accepted_, .accepted_s = now_s};
+    while (!young_.empty() && !may_shake_hands(young_.front(), now_s)) young_.pop_front();
+    young_.emplace_back(event.value, accepted_);
+  } else {
+    ended(event.value);
+  }
+  broke_off_ = event.what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL;
+}
+
+void Connections::ended(int fd) {
+  const auto it = open_.find(fd);
+  if (it == open_.end()) return;
+  if (!it->second.refused) {
+    ended_.push_back(it->second);
+  } else {
+    --refused_open_;
+    if (broke_off_) --failed_unseen_, --counts_.keys_refused;  // by us
+  }
+  open_.erase(it);
+  if (ended_.size() + to_judge_.size() < kMostEnded) return;
+  counts_.silent += silent_among(std::exchange(to_judge_, {})) + silent_among(std::exchange(ended_, {}));
+}
+
+bool Connections::is_open(const Name& name) const {
+  const auto found = open_.find(name.first);
+  return found != open_.end() && found->second.number == name.second && !found->second.refused;
+}
+
+bool Connections::may_shake_hands(const Name& name, double now_s) const {
+  if (!is_open(name)) return false;
+  const Connection& c = open_.at(name.first);
+  return !c.has_spoken && now_s - c.accepted_s <= kHandshake_s;
+}
+
+// The one that came first of those who may still be about to say who they are, so that whoever holds places without a
+// word does not keep others out; where there is none, the one that came last.
+void Connections::hang_up_on_one() {
+  const double now_s = monotonic_s();
+  while (!young_.empty()) {
+    const Name first = young_.front();
+    young_.pop_front();
+    if (may_shake_hands(first, now_s)) return hang_up(first);
+  }
+  const Connection* last = nullptr;
+  for (const auto& [fd, c] : open_)
+    if (!c.refused && (!last || c.number > last->number)) last = &c;
+  hang_up({last->fd, last->number});
+}
+
+void Connections::hang_up(const Name& name) {
+  if (!shut_down(name)) return;
+  ++counts_.refused;
+  if (!limiter_.allow(monotonic_s())) return;
+  const std::string more =
+      limiter_.suppressed() ? fmt::format(" ({} more since the last such line)", limiter_.suppressed()) : "";
+  log::warn("{}: {} connections are open (--max-connections): one more is refused{}", options_.name, options_.most,
+            more);
+}
+
+// The number may be of another file by now. ZeroMQ tells of an end before it closes the file: as long as nothing was
+// told after the number was looked at, it was the connection's.
+bool Connections::shut_down(const Name& name) {
+  const bool looks = looks_at(name.first);
+  drain();
+  const bool there = is_open(name);
+  if (there && looks) shutdown(spare_, SHUT_RDWR);
+  if (there) open_.at(name.first).refused = true, ++refused_open_;
+  look_away();
+  return there;
+}
+
+bool Connections::looks_at(int fd) { return dup3(fd, spare_, O_CLOEXEC) >= 0; }
+void Connections::look_away() { dup3(blank_, spare_, O_CLOEXEC); }
+
+// Where the number is of another file, it is told nothing, or too little: who is hung up on is looked at again.
+uint64_t Connections::taken_by(int fd) {
+  tcp_info about{};
+  socklen_t size = sizeof about;
+  const bool told = getsockopt(fd, IPPROTO_TCP, TCP_INFO, &about, &size) == 0 &&
+                    size >= offsetof(tcp_info, tcpi_bytes_acked) + sizeof about.tcpi_bytes_acked;
+  return told ? about.tcpi_bytes_acked : kNobodyKnows;
+}
+
+void Connections::published(uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  published_ += bytes;
+}
+
+size_t Connections::hang_up_on_late(uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  const double now_s = monotonic_s();
+  if (now_s - looked_for_late_s_ < kLatePeriod_s) return 0;
+  looked_for_late_s_ = now_s;
+  drain();
+  std::vector<Name> late;
+  for (const auto& [fd, c] : open_) {
+    const uint64_t taken = c.has_spoken && !c.refused ? taken_by(fd) : kNobodyKnows;
+    if (taken == kNobodyKnows || c.taken == kNobodyKnows) continue;
+    if (published_ - c.published > taken - c.taken + bytes) late.emplace_back(fd, c.number);
+  }
+  const auto gone = std::count_if(late.begin(), late.end(), [&](const Name& name) { return shut_down(name); });
+  if (gone > 0)
+    log::warn("{}: {} subscribers are hung up on, because more than {:.0f} MB wait for each (--queue-limit-mb)",
+              options_.name, gone, double(bytes) / 1e6);
+  return size_t(gone);
+}
+
+void Connections::spoke(int fd, std::string_view user) {
+  const std::lock_guard lock(mutex_);
+  drain();  // its acceptance was told before its message came
+  for (auto* gone : {&to_judge_, &ended_}) {
+    const auto found =
+        std::find_if(gone->begin(), gone->end(), [&](const Connection& c) { return c.fd == fd && !c.has_spoken; });
+    if (found == gone->end()) continue;
+    found->has_spoken = true;
+    return;
+  }
+  if (const auto it = open_.find(fd); it != open_.end() && !it->second.has_spoken) {
+    it->second.has_spoken = true;
+    it->second.user = user;
+    it->second.published = published_;
+    if (options_.publishes) it->second.taken = taken_by(fd);
+  }
+  keep_to_limit();
+}
+
+std::vector<std::string> Connections::keep_only(const std::set<std::string>& users) {
+  const std::lock_guard lock(mutex_);
+  drain();
+  std::vector<std::pair<Name, std::string>> others;
+  for (const auto& [fd, c] : open_)
+    if (!c.refused && !c.user.empty() && !users.contains(c.user)) others.push_back({{fd, c.number}, c.user});
+  std::vector<std::string> out;
+  for (auto& [name, user] : others)
+    if (shut_down(name)) out.push_back(std::move(user));
+  return out;
+}
+
+void Connections::begin_reading() {
+  look();
+  const std::lock_guard lock(mutex_);
+  to_judge_.insert(to_judge_.end(), ended_.begin(), ended_.end());
+  ended_.clear();
+}
+
+uint64_t Connections::judge() {
+  const std::lock_guard lock(mutex_);
+  const uint64_t out = silent_among(std::exchange(to_judge_, {}));
+  counts_.silent += out;
+  return out;
+}
+
+// Everyone of ours speaks as soon as it is connected, but for samplers, who push no tile before they have one.
+uint64_t Connections::silent_among(const std::vector<Connection>& gone) {
+  uint64_t out = 0;
+  for (const Connection& c : gone) {
+    if (c.has_spoken || monotonic_s() - c.accepted_s > options_.quiet_s) continue;
+    if (failed_unseen_ > 0)
+      --failed_unseen_;  // counted as not let in
+    else
+      ++out;
+  }
+  return out;
+}
+
+Connections::Counts Connections::counts() {
+  look();
+  const std::lock_guard lock(mutex_);
+  Counts out = counts_;
+  out.open = open_.size();
+  return out;
+}
+
+}  // namespace telesplat::net

@@ -1,0 +1,31 @@
+#include "common/net/peer_rates.h"
+
+namespace telesplat::net {
+namespace {
+
+constexpr size_t kMostBuckets = 4096;
+constexpr double kBurst_s = 2;  // of the rate
+constexpr double kIdle_s = 5;
+
+}  // namespace
+
+bool PeerRates::admit(const std::string& peer, double now_s) {
+  auto bucket = peers_.find(peer);
+  if (bucket == peers_.end()) {
+    if (peers_.size() >= kMostBuckets) forget_idle(now_s);
+    // Where there are that many, the rest has one together.
+    const std::string& whose = peers_.size() < kMostBuckets ? peer : std::string();
+    bucket = peers_.try_emplace(whose, rate_, kBurst_s * rate_).first;
+  }
+  if (bucket->second.take(now_s)) return true;
+  ++refused_;
+  return false;
+}
+
+void PeerRates::forget_idle(double now_s) {
+  if (now_s - forgot_s_ < 1) return;
+  forgot_s_ = now_s;
+  std::erase_if(peers_, [&](const auto& p) { return now_s - p.second.last_s() > kIdle_s; });
+}
+
+}  // namespace telesplat::net

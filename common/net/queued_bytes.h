@@ -1,0 +1,66 @@
+// How many bytes wait to be sent to whom: ZeroMQ's own limits count messages, which may have a byte or hundreds of
+// megabytes. No sockets.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+
+namespace telesplat::net {
+
+class QueuedBytes {
+ public:
+  using Count = std::shared_ptr<std::atomic<uint64_t>>;
+  /// A message on its way: its bytes are counted until it is gone, in whatever thread.
+  class Ticket {
+   public:
+    Ticket() = default;
+    Ticket(Count count, uint64_t bytes) : count_(std::move(count)), bytes_(bytes) { *count_ += bytes_; }
+    ~Ticket() {
+      if (count_) *count_ -= bytes_;
+    }
+    Ticket(Ticket&& other) noexcept : count_(std::move(other.count_)), bytes_(other.bytes_) {}
+    Ticket& operator=(Ticket&&) = delete;
+
+   private:
+    Count count_;
+    uint64_t bytes_ = 0;
+  };
+
+  /// most: to a peer, in bytes.
+  explicit QueuedBytes(uint64_t most) : most_(most) {}
+
+  /// One more message for this peer. A peer for whom nothing waits may have one of any size.
+  bool has_room(std::string_view peer, uint64_t bytes) {
+    const auto found = peers_.find(std::string(peer));
+    return found == peers_.end() || fits(*found->second, bytes);
+  }
+  Ticket add(std::string_view peer, uint64_t bytes) {
+    if (peers_.size() >= most_peers_) forget_idle();
+    Count& count = peers_[std::string(peer)];
+    if (!count) count = std::make_shared<std::atomic<uint64_t>>(0);
+    return {count, bytes};
+  }
+  uint64_t of(std::string_view peer) const {
+    const auto found = peers_.find(std::string(peer));
+    return found == peers_.end() ? 0 : found->second->load();
+  }
+  uint64_t most() const { return most_; }
+
+ private:
+  bool fits(uint64_t queued, uint64_t bytes) const { return queued == 0 || queued + bytes <= most_; }
+  void forget_idle() {
+    std::erase_if(peers_, [](const auto& p) { return *p.second == 0; });
+    most_peers_ = 2 * peers_.size() + 256;
+  }
+
+  const uint64_t most_;
+  size_t most_peers_ = 256;                       // then those for whom nothing waits are forgotten
+  std::unordered_map<std::string, Count> peers_;  // by routing id
+};
+
+}  // namespace telesplat::net

@@ -1,0 +1,73 @@
+// What one peer may have of a socket: messages a second, and bytes that wait for it.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "common/net/peer_rates.h"
+#include "common/net/queued_bytes.h"
+#include "common/net/service.h"
+
+namespace telesplat::net {
+namespace {
+
+TEST(PeerRates, OneThatFloodsIsNoOthersBusiness) {
+  PeerRates rates(1000);
+  int heard = 0, others = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    heard += rates.admit("flood", 1 + 1e-5 * i);
+    if (i % 200 == 0) others += rates.admit("other", 1 + 1e-5 * i);
+  }
+  EXPECT_GE(heard, 2999) << "two seconds' worth at once, and a second's";
+  EXPECT_LE(heard, 3001);
+  EXPECT_EQ(others, 500);
+  EXPECT_EQ(rates.refused(), 100'000u - uint64_t(heard));
+  EXPECT_TRUE(rates.admit("flood", 3)) << "later it is heard again";
+}
+
+TEST(PeerRates, RemembersOnlySoManyPeers) {
+  PeerRates rates(10);
+  int heard = 0;
+  for (int i = 0; i < 20'000; ++i) heard += rates.admit("stranger " + std::to_string(i), 1);
+  EXPECT_LT(heard, 4200) << "those beyond share one";
+}
+
+TEST(QueuedBytes, CountsWhatIsUnderWayToEachPeer) {
+  QueuedBytes queued(100);
+  EXPECT_TRUE(queued.has_room("a", 1000)) << "one message of any size";
+  {
+    const auto large = queued.add("a", 1000);
+    EXPECT_EQ(queued.of("a"), 1000u);
+    EXPECT_FALSE(queued.has_room("a", 1));
+    EXPECT_TRUE(queued.has_room("b", 60));
+    const auto of_b = queued.add("b", 60);
+    EXPECT_TRUE(queued.has_room("b", 40));
+    EXPECT_FALSE(queued.has_room("b", 41));
+  }
+  EXPECT_EQ(queued.of("a"), 0u);
+  EXPECT_TRUE(queued.has_room("a", 100));
+}
+
+// A message may outlast the peer, and the socket that sent it.
+TEST(QueuedBytes, TicketsOutlastTheirPeers) {
+  auto queued = std::make_unique<QueuedBytes>(100);
+  auto ticket = std::make_unique<QueuedBytes::Ticket>(queued->add("a", 80));
+  for (int i = 0; i < 5000; ++i) queued->add("guest " + std::to_string(i), 1);
+  EXPECT_EQ(queued->of("a"), 80u) << "only those for whom nothing waits are forgotten";
+  EXPECT_EQ(queued->of("guest 0"), 0u);
+  queued.reset();
+  ticket.reset();
+}
+
+TEST(Service, OpensAsManyFilesAsItMay) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+  const rlimit few{256, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
+  EXPECT_EQ(raise_file_limit(), before.rlim_max);
+  rlimit now{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &now), 0);
+  EXPECT_EQ(now.rlim_cur, before.rlim_max);
+  setrlimit(RLIMIT_NOFILE, &before);
+}
+
+}  // namespace
+}  // namespace telesplat::net
