@@ -28,8 +28,9 @@ struct ServiceOptions {
   uint64_t queue_limit_bytes() const { return uint64_t(queue_limit_mb * 1e6); }
 };
 
-/// Adds --name, --log-level, --insecure, --keys; --bind, --max-connections and --queue-limit-mb if the program binds, --master (or TELESPLAT_MASTER in the
-/// environment) if it connects to one, --advertise and --max-messages if it does both, --via and --link if it only connects.
+/// Adds --name, --log-level, --insecure, --keys; --bind, --max-connections and --queue-limit-mb if the program binds,
+/// --master (or TELESPLAT_MASTER in the environment) if it connects to one, --advertise and --max-messages if it does
+/// both, --via and --link if it only connects.
 enum class Ends { kConnects, kBinds, kBoth };
 options::Table service_table(ServiceOptions& options, Ends ends);
 

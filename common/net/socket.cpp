@@ -19,9 +19,9 @@
 #include "common/core/utf8.h"
 #include "common/net/connections/connections.h"
 #include "common/net/connections/lookout.h"
+#include "common/net/connections/queued_bytes.h"
 #include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
-#include "common/net/queued_bytes.h"
 #include "common/net/read_ahead.h"
 
 namespace telesplat::net {
@@ -249,7 +249,7 @@ struct Socket::Impl {
         return undisturbed([&] { return socket.send(zmq::buffer(bytes), send_flags::sndmore | send_flags::dontwait); });
       };
       // What a fast peer has read is known to ZeroMQ's thread at once, to this one only when it looks.
-      const auto look = [&] { return socket.get(zmq::sockopt::events) >= 0; };
+      const auto look = [&] { return undisturbed([&] { return socket.get(zmq::sockopt::events) >= 0; }); };
       if (kind == Kind::kRouter && !part(peer) && look() && !part(peer)) return false;
       if (!part(type)) return false;
       // ZeroMQ takes the body over without copying it.

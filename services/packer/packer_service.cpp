@@ -7,9 +7,9 @@
 
 #include "common/core/clock.h"
 #include "common/metrics/recorder.h"
+#include "common/net/connections/peer_rates.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
-#include "common/net/peer_rates.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/points/point_packing.h"
 #include "services/packer/ports.h"

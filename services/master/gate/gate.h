@@ -7,7 +7,7 @@
 
 #include "common/core/result.h"
 #include "common/core/token_bucket.h"
-#include "common/net/peer_rates.h"
+#include "common/net/connections/peer_rates.h"
 #include "common/wire/session_messages.h"
 #include "common/wire/tile_messages.h"
 

@@ -1,7 +1,10 @@
 // Peers that send rubbish to every socket of a running pipeline: dropped, counted, the run goes on.
 #include <gtest/gtest.h>
 
+#include <map>
+#include <memory>
 #include <random>
+#include <vector>
 
 #include "common/net/socket.h"
 #include "tests/support/pipeline_run.h"
@@ -81,6 +84,37 @@ TEST(Hostile, RubbishOnEverySocketIsCountedAndTheRunGoesOn) {
   EXPECT_EQ(run.program().err().find("died"), std::string::npos) << run.program().err();
   EXPECT_GE(run.summary()["errors"]["messages_rejected"], 5 * kPerSocket);
   EXPECT_TRUE(run.all_gone());
+}
+
+TEST(Hostile, ConnectionsBeyondTheLimitAreRefusedAndTold) {
+  constexpr int kMost = 10, kStrangers = 40;
+  PipelineRun run({"--duration", "0", "--max-connections", std::to_string(kMost)});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  const auto before = run.status();
+  EXPECT_EQ(before["limits"]["max_connections"], kMost);
+  EXPECT_EQ(before["limits"]["connections_refused"], 0);
+  std::vector<std::string> endpoints{run.master()};
+  for (const auto& p : before["processes"])
+    if (p.contains("endpoints"))
+      for (const auto& [key, address] : p["endpoints"].items()) endpoints.push_back(address);
+  ASSERT_EQ(endpoints.size(), 5u) << before.dump(1);
+  std::vector<std::unique_ptr<RawPeer>> strangers;
+  for (const auto& endpoint : endpoints)
+    for (int i = 0; i < kStrangers; ++i) strangers.push_back(std::make_unique<RawPeer>(endpoint));
+  const double refused = kStrangers - kMost;  // of each socket, at least
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    return value(s, "data", "connections_refused") >= refused &&
+           value(s, "packer", "connections_refused") >= 3 * refused &&
+           s["limits"]["connections_refused"].template get<double>() >= 5 * refused;
+  })) << run.status().dump(1);
+  const auto now = run.status();
+  EXPECT_TRUE(run.wait_status([&](const auto& s) {
+    return value(s, "viewer-1", "frames") > value(now, "viewer-1", "frames") &&
+           value(s, "viewer-1", "updates") > value(now, "viewer-1", "updates");
+  })) << "those who are known stay";
+  EXPECT_EQ(run.stop(), 0) << run.program().err();
+  EXPECT_EQ(run.program().err().find("died"), std::string::npos) << run.program().err();
+  EXPECT_GE(run.summary()["limits"]["connections_refused"], 5 * refused);
 }
 
 }  // namespace

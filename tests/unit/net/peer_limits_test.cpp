@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "common/net/peer_rates.h"
-#include "common/net/queued_bytes.h"
+#include "common/net/connections/peer_rates.h"
+#include "common/net/connections/queued_bytes.h"
 #include "common/net/service.h"
 
 namespace telesplat::net {

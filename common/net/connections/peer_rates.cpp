@@ -1,4 +1,4 @@
-#include "common/net/peer_rates.h"
+#include "common/net/connections/peer_rates.h"
 
 namespace telesplat::net {
 namespace {
