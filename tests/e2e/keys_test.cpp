@@ -9,7 +9,7 @@
 
 #include "common/core/clock.h"
 #include "common/net/control.h"
-#include "tests/support/key_folder.h"
+#include "tests/support/keys/key_folder.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/telesplat/control/client.h"
 

@@ -8,7 +8,7 @@
 #include "common/core/clock.h"
 #include "common/net/control.h"
 #include "common/net/master_link.h"
-#include "tests/support/key_folder.h"
+#include "tests/support/keys/key_folder.h"
 #include "tests/support/raw_peer.h"
 
 namespace telesplat::net {

@@ -10,7 +10,7 @@
 #include "common/core/clock.h"
 #include "common/net/socket.h"
 #include "common/wire/messages.h"
-#include "tests/support/key_folder.h"
+#include "tests/support/keys/key_folder.h"
 #include "tests/support/raw_peer.h"
 
 namespace telesplat::net {

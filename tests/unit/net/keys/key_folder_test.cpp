@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "common/net/keys/key_files.h"
-#include "tests/support/key_folder.h"
+#include "tests/support/keys/key_folder.h"
 
 namespace telesplat::net {
 namespace {
