@@ -1,6 +1,8 @@
 #include "client/viewer/record/frame_spool.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -54,7 +56,8 @@ int write_frame(const std::string& directory, const SpooledFrame& f) {
   h.legend_bytes = legend.size();
   constexpr const char* kEyes[] = {"", "-left", "-right"};
   const std::string path = fmt::format("{}/{:08d}{}.frame", directory, f.number, kEyes[f.eye]);
-  FilePtr out = open_file(path + ".part", "wb");
+  unlink((path + ".part").c_str());
+  FilePtr out = open_file(path + ".part", "wbx");  // never through a link
   if (!out) return errno;
   bool ok = std::fwrite(&h, sizeof h, 1, out.get()) == 1;
   ok = ok && std::fwrite(f.view.colour.data(), 4, f.view.colour.size(), out.get()) == f.view.colour.size();

@@ -53,6 +53,18 @@ Result<std::vector<std::string>> draw(const std::string& python, const std::stri
   return out;
 }
 
+// The run may be a stranger's.
+Status refuse_links(const std::string& folder) {
+  const auto refuse = [](const fs::path& path) {
+    return Error{fmt::format("{}: is a symbolic link, which plots would be written through; remove it", path.string())};
+  };
+  std::error_code error;
+  if (fs::is_symlink(fs::symlink_status(folder, error))) return refuse(folder);
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (fs::is_symlink(entry->symlink_status(error))) return refuse(entry->path());
+  return ok_status();
+}
+
 }  // namespace
 
 Result<std::vector<std::string>> make_plots(const ordered_json& data, const std::string& folder,
@@ -60,6 +72,7 @@ Result<std::vector<std::string>> make_plots(const ordered_json& data, const std:
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return Error{fmt::format("{}: cannot be made a folder: {}", folder, error.message())};
+  if (const Status s = refuse_links(folder); !s) return s.error();
   const std::string text = for_plots(data).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   Result<std::vector<std::string>> out = Error{"python3 is not installed"};
   for (const std::string& python : pythons()) {
