@@ -171,7 +171,9 @@ TEST(Keys, WhoIsInWhenTheKeyIsRevokedHasToGo) {
   ASSERT_TRUE(
       publish_until([&] { return count(hears.socket, to_anna), count(stays.socket, to_ben), to_anna && to_ben; }, 10));
   ASSERT_TRUE(anna.socket.send(kGoodbye) && ben.socket.send(kGoodbye));
-  for (int n = 0; n < 2; ++n) ASSERT_TRUE(master.next());
+  std::vector<Message> got;
+  ASSERT_TRUE(receive_until(
+      master.socket, [&] { return got.size() == 2; }, &got));
 
   ASSERT_TRUE(keys.maker().revoke("anna").ok());
   ASSERT_TRUE(keys.maker().add_person("anna", Role::kViewer).ok()) << "another key of the same name";
