@@ -1,6 +1,7 @@
 // The master without sockets and clocks: who is told what.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "services/master/master_core.h"
