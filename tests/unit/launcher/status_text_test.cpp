@@ -64,10 +64,14 @@ TEST(StatusText, HasEveryFigureInItsPlace) {
 
 TEST(StatusText, LimitsAndAFullDiskAreToldWhereTheyBit) {
   Json status = volume_status();
-  status["limits"] = {{"max_peers", 512}, {"views_coarser", 3}, {"hellos_refused", 0}, {"messages_refused", 1200}};
+  status["limits"] = {{"max_peers", 512},         {"views_coarser", 3},       {"hellos_refused", 0},
+                      {"messages_refused", 1200}, {"connections_refused", 7}, {"queue_refused", 2}};
   status["record_failed"] = {"trace.json", "tiles.csv"};
   const std::string text = status_text(status, 0);
-  EXPECT_NE(text.find("  limits      3 views sampled coarser, 1200 messages dropped\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("  limits      3 views sampled coarser, 1200 messages dropped, 7 connections refused, "
+                      "2 answers dropped that nobody read\n"),
+            std::string::npos)
+      << text;
   EXPECT_NE(text.find("  disk full   2 files of the record cannot be written\n"), std::string::npos) << text;
   EXPECT_EQ(status_text(volume_status(), 0).find("limits"), std::string::npos);
 }

@@ -1,6 +1,7 @@
 // The master without sockets and clocks: who is told what.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "services/master/master_core.h"
@@ -508,6 +509,21 @@ TEST_F(Master, AFloodOfOnePeerIsDroppedAndOthersAreHeard) {
   EXPECT_TRUE(core.admit("v", 5)) << "later it is heard again";
   for (int i = 0; i < 20'000; ++i) core.admit("stranger" + std::to_string(i), 6);  // bounded
   EXPECT_TRUE(core.admit("v", 7));
+}
+
+TEST_F(Master, LimitsAreCountedOverAllProcesses) {
+  join_all();
+  core.tell_door({.connections_refused = 3, .queue_refused = 1, .max_connections = 64, .queue_limit_mb = 32});
+  core.on("p", wire::StatusReport{{2}, {{"connections_refused", 20}, {"messages_refused", 5}, {"queue_refused", 2}}},
+          1);
+  core.on("d", wire::StatusReport{{1}, {{"connections_refused", 100}, {"messages_refused", 1e300}}}, 1);
+  core.on("s1", wire::StatusReport{{3}, {{"connections_refused", std::nan("")}, {"queue_refused", -7}}}, 1);
+  const auto limits = status()["limits"];
+  EXPECT_EQ(limits["max_connections"], 64);
+  EXPECT_EQ(limits["queue_limit_mb"], 32);
+  EXPECT_EQ(limits["connections_refused"], 123);
+  EXPECT_EQ(limits["messages_refused"], 5) << "a number that nobody can have counted to";
+  EXPECT_EQ(limits["queue_refused"], 3);
 }
 
 TEST_F(Master, AViewBeyondTheLimitIsSampledCoarser) {

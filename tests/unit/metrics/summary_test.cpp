@@ -20,8 +20,16 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
                "data",
                1,
                {{"scene", "hill.ply"}, {"kind", "mesh"}, {"triangles", "1234"}},
-               {{"peak_rss_mb", 10}, {"messages_rejected", 2}}};
-  Process old_packer{"packer", "packer", 2, {}, {{"points", 900}, {"model_bytes", 9000}, {"messages_rejected", 3}},
+               {{"peak_rss_mb", 10}, {"messages_rejected", 2}, {"connections_refused", 4}, {"queue_refused", 1}}};
+  Process old_packer{"packer",
+                     "packer",
+                     2,
+                     {},
+                     {{"points", 900},
+                      {"model_bytes", 9000},
+                      {"messages_rejected", 3},
+                      {"connections_refused", 6},
+                      {"messages_refused", 8}},
                      true};
   Process packer{"packer", "packer", 3, {}, {{"points", 1000}, {"model_bytes", 20000}, {"peak_rss_mb", 30}}};
   Process sampler{"sampler", "sampler-1", 4, {}, {{"peak_rss_mb", 40}}};
@@ -90,6 +98,9 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
   EXPECT_EQ(s["bytes_per_cached_point"], 20);
   EXPECT_EQ(s["tiles_released"], 6);
   EXPECT_EQ(s["errors"]["messages_rejected"], 5) << "what it counted stays counted";
+  EXPECT_EQ(s["limits"]["connections_refused"], 10);
+  EXPECT_EQ(s["limits"]["messages_refused"], 8);
+  EXPECT_EQ(s["limits"]["queue_refused"], 1);
   EXPECT_EQ(s["errors"]["leases_expired"], 4);
   EXPECT_EQ(s["peak_rss_mb"]["sampler"], nlohmann::json::array({40.0}));
   const std::string tiles = text("tiles.csv");
