@@ -141,17 +141,13 @@ class MasterService {
     double timeout_s = timeout_ms * 1e-3;
     if (const auto due_s = core_.due_s()) timeout_s = std::clamp(*due_s - monotonic_s(), 0.0, timeout_s);
     net::wait_readable_s({&control_}, timeout_s);
-    const double now_s = monotonic_s(), passed_s = now_s - std::exchange(served_s_, now_s);
-    if (passed_s > kStandstill_s) {
-      log::warn("the master stood still for {:.1f} s", passed_s);
-      core_.stood_still(passed_s, now_s);
-    }
+    look_at_the_clock();
     for (int n = 0; n < kMessagesAtOnce && core_.outgoing() < kMostOutgoing; ++n) {
       const auto message = control_.receive();
       if (!message) break;
-      guarded(control_, *message, [&] { take(*message, monotonic_s()); });
+      guarded(control_, *message, [&] { take(*message, look_at_the_clock()); });
     }
-    core_.tick(monotonic_s());
+    core_.tick(look_at_the_clock());
     core_.tell_door({.messages_rejected = control_.rejected(),
                      .keys_refused = control_.keys_refused(),
                      .connections_refused = control_.connections_refused(),
@@ -162,6 +158,16 @@ class MasterService {
     publish_metrics(monotonic_s());
     for (auto& out : core_.take_outgoing())
       if (!control_.send_frames(out.peer, out.type, std::move(out.body))) core_.undeliverable(out.peer);
+  }
+
+  // A process may be stopped anywhere: before anyone is found to be silent, or late, it is known how long it was.
+  double look_at_the_clock() {
+    const double now_s = monotonic_s(), passed_s = now_s - std::exchange(looked_s_, now_s);
+    if (passed_s > kStandstill_s) {
+      log::warn("the master stood still for {:.1f} s", passed_s);
+      core_.stood_still(passed_s, now_s);
+    }
+    return now_s;
   }
 
   void publish_metrics(double now_s) {
@@ -232,7 +238,7 @@ class MasterService {
   MasterCore core_;
   net::RunningSession told_;  // in the file
   std::optional<net::SessionFile> file_;
-  double served_s_ = monotonic_s();        // when the loop came by last
+  double looked_s_ = monotonic_s();        // when it was looked at the clock last
   std::unique_ptr<HttpEndpoint> metrics_;  // null: nobody watches
   double published_s_ = -1e9;
 };
