@@ -29,9 +29,9 @@ void expect_no_complaint(Play play, uint64_t seeds, const std::vector<std::strin
 }
 
 TEST(Play, TheMasterServesTheHonestWhateverOthersSay) {
-  expect_no_complaint(play_master, 100,
-                      {"welcome", "lease", "plan_request", "control_reply", "order", "swap", "slab_assignment",
-                       "frames completed"});
+  expect_no_complaint(
+      play_master, 100,
+      {"welcome", "lease", "plan_request", "control_reply", "order", "swap", "slab_assignment", "frames completed"});
 }
 TEST(Play, ReplicasOfPointsEqualTheirPackersModel) {
   expect_no_complaint(play_points, 30,
