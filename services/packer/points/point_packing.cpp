@@ -462,6 +462,7 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"answers", double(answers_.size())},
                  {"answer_bytes", double(answers_.bytes_under_way())},
                  {"plans", double(plans_)},
+                 {"planned_frames", planner_ ? double(planner_->frames()) : 0},
                  {"digests_told", double(digests_told_)}});
 }
 

@@ -67,6 +67,19 @@ TEST_F(PlannedTiles, AreComparedWithWhatThePlanHasSeen) {
   EXPECT_LT(kept, samples);
 }
 
+// Their sampler died, or a newer view went first.
+TEST_F(PlannedTiles, OfFramesThatAreGivenUpAreNotRemembered) {
+  const auto tiles = sample(plan({2}));
+  ASSERT_GT(tiles.size(), 1u);
+  EXPECT_EQ(planner.frames(), 1u);
+  planner.take(tiles[0], false, 1);
+  planner.plan(with.model(), with.sequence(), request({3}), 5);
+  EXPECT_TRUE(planner.reference(tiles[1]).has_value()) << "it may still come";
+  planner.plan(with.model(), with.sequence(), request({4}), 12);
+  EXPECT_FALSE(planner.reference(tiles[1]).has_value());
+  EXPECT_EQ(planner.frames(), 2u);
+}
+
 TEST_F(PlannedTiles, AreComparedWithTheModelWhereThePlanDoesNotKnow) {
   const wire::Plan planned = plan({2});
   auto tiles = sample(planned);

@@ -63,6 +63,11 @@ class FrameShelf {
   const std::deque<PlannedFrame>& frames() const { return frames_; }
   /// What a frame takes, as pixels of whole frames and of maps, which are the most of it.
   static size_t held(const PlannedFrame& frame);
+  /// Tiles of it have not come for so long that nobody waits for them: most links and samplers are sooner.
+  static bool given_up(const PlannedFrame& frame, double now_s) {
+    constexpr double kPatience_s = 10;
+    return !frame.complete() && now_s - frame.planned_s > kPatience_s;
+  }
 
  private:
   std::deque<PlannedFrame> frames_;  // oldest first

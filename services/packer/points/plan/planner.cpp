@@ -229,6 +229,7 @@ std::optional<KnownReference> Planner::reference(const SampledTile& tile) const 
 image::PixelMask Planner::missed(const SampledTile& tile) const { return impl_->missed(tile); }
 void Planner::learn(const points::PointModel& model) { impl_->known_empty.add(model); }
 bool Planner::settle() { return impl_->settle(); }
+size_t Planner::frames() const { return impl_->shelf.frames().size(); }
 bool Planner::settles_soon() const { return tells_much(impl_->shelf); }
 bool Planner::view_under_way(double now_s) const { return packer::view_under_way(impl_->shelf, now_s); }
 

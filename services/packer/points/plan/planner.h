@@ -72,6 +72,8 @@ class Planner final : public ModelWatcher {
   bool settle();
   /// settle() should not wait: else a view's rays into empty space are cast again.
   bool settles_soon() const;
+  /// Planned, and not forgotten yet: their maps are most of what planning keeps in memory.
+  size_t frames() const;
 
   /// A view was planned, or began to come, a moment ago, and is not complete.
   bool view_under_way(double now_s) const;

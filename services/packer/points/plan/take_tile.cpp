@@ -175,11 +175,16 @@ bool Planner::Impl::settle() {
 }
 
 // Whole frames tell most, so the next plan waits for them. Others that found no time are forgotten: where they saw
-// nothing rays are cast once more.
+// nothing rays are cast once more. So are those whose tiles do not come: their samplers died, or a newer view went
+// first. What comes all the same is compared with the model.
 void Planner::Impl::settle_old(double now_s) {
   constexpr double kOld_s = 1;
   for (size_t i = shelf.frames().size(); i-- > 0;) {
     const PlannedFrame& frame = shelf.frames()[i];
+    if (FrameShelf::given_up(frame, now_s)) {
+      shelf.drop(FrameId(frame.id));
+      continue;
+    }
     if (!frame.complete() || (!frame.whole && now_s - frame.planned_s < kOld_s)) continue;
     if (frame.whole) settle(frame);
     shelf.drop(FrameId(frame.id));
