@@ -105,8 +105,8 @@ void VolumeSlices::classify(const std::vector<Level>& levels, int k, const std::
       buffer.i[n] = uint16_t(i), buffer.level[n] = from[i];
       n += wanted[from[i]];
     }
-    std::copy_n(buffer.i, n, &out.i[at]);
-    std::copy_n(buffer.level, n, &out.level[at]);
+    std::copy_n(buffer.i, n, out.i.data() + at);
+    std::copy_n(buffer.level, n, out.level.data() + at);
     if (lit_) {
       const Neighbours y = neighbours(j, size_[1], ptrdiff_t(size_x));
       for (size_t r = 0; r < n; ++r) {

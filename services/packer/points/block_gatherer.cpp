@@ -134,9 +134,9 @@ std::optional<BlockGatherer::Gathered> BlockGatherer::take(Frame& frame, Block& 
     block.has_row[row] = true;
     --block.rows_left;
     const size_t from = static_cast<size_t>(y) * width, to = row * width;
-    std::copy_n(&tile_.depth[from], width, &image.depth[to]);
-    std::copy_n(&tile_.colour[from], width, &image.colour[to]);
-    std::copy_n(&tile_.normal[from], width, &image.normal[to]);
+    std::copy_n(tile_.depth.data() + from, width, image.depth.data() + to);
+    std::copy_n(tile_.colour.data() + from, width, image.colour.data() + to);
+    std::copy_n(tile_.normal.data() + from, width, image.normal.data() + to);
     out.samples += covered(image, to, width);
   }
   if (block.rows_left > 0) return out;

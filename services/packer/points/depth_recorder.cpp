@@ -43,9 +43,9 @@ Status DepthRecorder::add(FrameId id, const geometry::Camera& camera, const geom
   if (frame.image.width != camera.width || frame.image.height != camera.height) return ok_status();
   for (int y = 0; y < rect.height; ++y) {
     const auto from = size_t(y) * rect.width, to = size_t(rect.y + y) * camera.width + rect.x;
-    std::copy_n(&tile.depth[from], rect.width, &frame.image.depth[to]);
-    std::copy_n(&tile.colour[from], rect.width, &frame.image.colour[to]);
-    std::copy_n(&tile.normal[from], rect.width, &frame.image.normal[to]);
+    std::copy_n(tile.depth.data() + from, rect.width, frame.image.depth.data() + to);
+    std::copy_n(tile.colour.data() + from, rect.width, frame.image.colour.data() + to);
+    std::copy_n(tile.normal.data() + from, rect.width, frame.image.normal.data() + to);
   }
   if (++frame.tiles < tiles_in_frame) {
     if (open_.size() > kMaxOpen) open_.erase(open_.begin());

@@ -56,9 +56,9 @@ void crop_to_kept(SampledTile& tile) {
   for (int y = 0; y < kept.height; ++y) {
     const size_t from = static_cast<size_t>(kept.y + y) * tile.rect.width + kept.x;
     const size_t to = static_cast<size_t>(y) * kept.width;
-    std::copy_n(&tile.image.depth[from], kept.width, &part.depth[to]);
-    std::copy_n(&tile.image.colour[from], kept.width, &part.colour[to]);
-    std::copy_n(&tile.image.normal[from], kept.width, &part.normal[to]);
+    std::copy_n(tile.image.depth.data() + from, kept.width, part.depth.data() + to);
+    std::copy_n(tile.image.colour.data() + from, kept.width, part.colour.data() + to);
+    std::copy_n(tile.image.normal.data() + from, kept.width, part.normal.data() + to);
   }
   tile.image = std::move(part);
   tile.rect = {tile.rect.x + kept.x, tile.rect.y + kept.y, kept.width, kept.height};

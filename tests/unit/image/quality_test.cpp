@@ -20,14 +20,14 @@ View flat(int width, int height, uint32_t colour, float depth_m) {
 // Smooth patterns with noise and background here and there.
 View pattern(int width, int height, uint32_t seed, double noise) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> gauss(0, noise);
+  std::normal_distribution<double> gauss(0, 1);
   View v = flat(width, height, 0x141820, kNothing);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       if ((x / 9 + y / 7) % 4 == 0) continue;
       uint32_t colour = 0;
       for (int c = 0; c < 3; ++c) {
-        const double value = 128 + 90 * std::sin(0.2 * x + c) * std::cos(0.15 * y - c) + gauss(random);
+        const double value = 128 + 90 * std::sin(0.2 * x + c) * std::cos(0.15 * y - c) + noise * gauss(random);
         colour = colour << 8 | static_cast<uint32_t>(std::clamp(value, 0.0, 255.0));
       }
       v.colour[size_t(y) * width + x] = colour;

@@ -2,7 +2,9 @@
 #include "client/viewer/session_record.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -64,10 +66,16 @@ TEST_F(JoinedRecord, AFolderWithARecordIsRefused) {
 
 TEST_F(JoinedRecord, WhatCannotBeWrittenIsCounted) {
   fs::create_directories(folder_ + "/own");
-  fs::create_symlink("/dev/full", folder_ + "/own/points.events");
   const auto record = SessionRecord::open({.out = folder_ + "/own", .join = true, .name = "guest", .received_mb = 1});
   ASSERT_TRUE(record) << record.error().text;
+  // As on a disk that is full.
+  signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit none{0, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &none);
   (*record)->events()->begin_replica({});
+  setrlimit(RLIMIT_FSIZE, &before);
   EXPECT_EQ((*record)->files_failed(), 1u);
   EXPECT_TRUE((*record)->events()->failed());
 }

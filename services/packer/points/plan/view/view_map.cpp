@@ -79,10 +79,10 @@ bool PixelJudge::has_sample_near(const splat::ViewKeys::Tile& tile, int x, int y
 static void clear_planes(const geometry::Rect& r, ViewMap& map) {
   for (int y = r.y; y < r.y + r.height; ++y) {
     const size_t first = static_cast<size_t>(y) * map.covered.width() + r.x;
-    std::fill_n(&map.depth_m[first], r.width, kInfinity);
-    std::fill_n(&map.colour[first], r.width, 0u);
-    std::fill_n(&map.normal[first], r.width, uint16_t{0});
-    std::fill_n(&map.nearest_m[first], r.width, kInfinity);
+    std::fill_n(map.depth_m.data() + first, r.width, kInfinity);
+    std::fill_n(map.colour.data() + first, r.width, 0u);
+    std::fill_n(map.normal.data() + first, r.width, uint16_t{0});
+    std::fill_n(map.nearest_m.data() + first, r.width, kInfinity);
   }
 }
 
@@ -111,8 +111,8 @@ void PixelJudge::judge(const splat::ViewKeys::Tile& tile, int x, int y, ViewMap&
     compare_rows(at.code - 1, at, next, at.code + 2, -1, width, rows.beside());
     if (planes) {
       const size_t first = static_cast<size_t>(y + row) * map.covered.width() + x;
-      write_row(at, near_m_, width, &map.depth_m[first], &map.colour[first], &map.normal[first]);
-      std::memcpy(&map.nearest_m[first], tile.depth_row(row), static_cast<size_t>(width) * sizeof(float));
+      write_row(at, near_m_, width, map.depth_m.data() + first, map.colour.data() + first, map.normal.data() + first);
+      std::memcpy(map.nearest_m.data() + first, tile.depth_row(row), static_cast<size_t>(width) * sizeof(float));
     }
     for (int x0 = 0; x0 < width; x0 += 64)
       judge_64(tile, rows, x0, row, static_cast<size_t>(x + x0) >> 6, y + row, map);
