@@ -75,8 +75,9 @@ TEST_F(JoinedRecord, WhatCannotBeWrittenIsCounted) {
   const rlimit none{0, before.rlim_max};
   setrlimit(RLIMIT_FSIZE, &none);
   (*record)->events()->begin_replica({});
+  const uint64_t failed = (*record)->files_failed();
   setrlimit(RLIMIT_FSIZE, &before);
-  EXPECT_EQ((*record)->files_failed(), 1u);
+  EXPECT_EQ(failed, 1u);
   EXPECT_TRUE((*record)->events()->failed());
 }
 
