@@ -47,6 +47,7 @@ class TextInput : public ::testing::TestWithParam<Case> {
       if (a == "RUN") a = run;
       arguments.push_back(std::move(a));
     }
+    if (arguments[0] == "run") arguments.insert(arguments.end(), {"--out", folder / "out"});
     Program program("telesplat", arguments, folder / "telesplat");
     EXPECT_EQ(program.wait(10), 2) << what << ": " << program.err();
     const std::string err = program.complaint();
