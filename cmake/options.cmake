@@ -17,7 +17,8 @@ option(TELESPLAT_ASSERTIONS "Check what the standard library can check at little
 option(TELESPLAT_HARDEN "What compiler and linker can do against what is exploited: checked copies, guarded stacks" ON)
 
 # -ffp-contract=off: packer and viewers must compute identical points, whatever instruction set they dispatch to.
-add_compile_options(-Wall -Wextra -Wno-missing-field-initializers -Wno-restrict -ffp-contract=off -fno-math-errno)
+add_compile_options(-Wall -Wextra -Wno-missing-field-initializers $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
+  -ffp-contract=off -fno-math-errno)
 include(cmake/hardening.cmake)
 if(TELESPLAT_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link)
