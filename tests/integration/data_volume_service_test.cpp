@@ -11,7 +11,8 @@
 #include "services/data/kinds.h"
 #include "services/data/mesh/served_mesh.h"
 #include "services/data/volume/served_volume.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
+#include "tests/support/files/own_folder.h"
 #include "tests/support/raw_peer.h"
 #include "tests/support/volume/samples.h"
 
@@ -159,7 +160,7 @@ TEST(DataServer, RefusesAVolumesFlagsWhereThereIsNoVolume) {
     EXPECT_EQ(run(o), 2);
     return testing::internal::GetCapturedStderr();
   };
-  const std::string mesh = testing::TempDir() + "triangle.off";
+  const std::string mesh = tests::own_folder() + "triangle.off";
   std::ofstream(mesh) << "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
   DataServiceOptions julia, file, surface;
   julia.scene = "julia", julia.volume.transfer = "bone";

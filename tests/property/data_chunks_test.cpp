@@ -4,7 +4,7 @@
 
 #include "common/geometry/mesh_chunk.h"
 #include "services/data/mesh/chunker.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -57,7 +57,8 @@ void WallViews::begun(const std::vector<wire::ViewRequest>& views) {
   if (wall.begun || wall.ask != views.front().ask) return;
   wall.begun = wall.under_way = true;
   for (auto& [viewer, member] : wall.members) {
-    const bool in_time = std::any_of(views.begin(), views.end(), [&](const auto& v) { return v.viewer == viewer; });
+    const bool in_time =
+        std::any_of(views.begin(), views.end(), [&name = viewer](const auto& v) { return v.viewer == name; });
     member.in_time = in_time ? member.in_time + 1 : 0;
     member.waited_for = in_time && (member.waited_for || member.in_time >= kInTime);
   }

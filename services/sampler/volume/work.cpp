@@ -303,34 +303,35 @@ void VolumeWork::forget_servers() {
 void VolumeWork::receive(double now_s) {
   for (auto& [endpoint, socket] : servers_)
     while (const auto message = socket.receive()) {
-      net::dispatch<wire::VoxelData>(socket, *message, [&](const wire::VoxelData& data) {
-        if (!asked_ || asked_->ask.endpoint != endpoint || data.epoch != asked_->ask.epoch ||
-            data.step != uint64_t(asked_->ask.step))
-          return;  // too late: it was asked again, or is not needed any more
-        const VoxelAsk ask = asked_->ask;
-        if (!data.known || data.begin >= data.end) {
-          forget_asked();
-          pause_until_s_ = now_s + kPause_s;
-          return;
-        }
-        const Epoch* epoch = epochs_.find(data.epoch);
-        if (!epoch) return forget_asked();
-        const double begin_s = monotonic_s();
-        const auto taken = store_.take(ask, data, epoch->shown);
-        if (!taken) {
-          asked_->refused_s = now_s;
-          return socket.reject(*message, taken.error().text);
-        }
-        if (!*taken) return;
-        retry_.answered(answer_bytes_, message->body.size(), now_s);
-        answer_bytes_ = std::max<uint64_t>(message->body.size(), answer_bytes_ / 2);
-        forget_asked();
-        progress_s_ = now_s;
-        bytes_received_ += message->body.size();
-        const Epoch& newest = epochs_.newest();
-        store_.trim(newest.step, newest.shown);
-        spans_.add("add voxels", master_.to_master_s(begin_s), master_.to_master_s(monotonic_s()));
-      });
+      net::dispatch<wire::VoxelData>(
+          socket, *message, [&, &from = endpoint, &socket = socket](const wire::VoxelData& data) {
+            if (!asked_ || asked_->ask.endpoint != from || data.epoch != asked_->ask.epoch ||
+                data.step != uint64_t(asked_->ask.step))
+              return;  // too late: it was asked again, or is not needed any more
+            const VoxelAsk ask = asked_->ask;
+            if (!data.known || data.begin >= data.end) {
+              forget_asked();
+              pause_until_s_ = now_s + kPause_s;
+              return;
+            }
+            const Epoch* epoch = epochs_.find(data.epoch);
+            if (!epoch) return forget_asked();
+            const double begin_s = monotonic_s();
+            const auto taken = store_.take(ask, data, epoch->shown);
+            if (!taken) {
+              asked_->refused_s = now_s;
+              return socket.reject(*message, taken.error().text);
+            }
+            if (!*taken) return;
+            retry_.answered(answer_bytes_, message->body.size(), now_s);
+            answer_bytes_ = std::max<uint64_t>(message->body.size(), answer_bytes_ / 2);
+            forget_asked();
+            progress_s_ = now_s;
+            bytes_received_ += message->body.size();
+            const Epoch& newest = epochs_.newest();
+            store_.trim(newest.step, newest.shown);
+            spans_.add("add voxels", master_.to_master_s(begin_s), master_.to_master_s(monotonic_s()));
+          });
     }
 }
 

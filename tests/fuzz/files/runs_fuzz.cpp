@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "common/core/log.h"
-#include "tests/support/memory_file.h"
+#include "tests/support/files/memory_file.h"
 #include "tools/common/csv_table.h"
 #include "tools/telesplat/bench/thesis/timeline.h"
 #include "tools/telesplat/record/recorded_run.h"

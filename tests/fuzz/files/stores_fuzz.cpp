@@ -12,7 +12,7 @@
 #include "services/data/volume/formats/import_stream.h"
 #include "services/data/volume/formats/payload.h"
 #include "services/data/volume/volume.h"
-#include "tests/support/memory_file.h"
+#include "tests/support/files/memory_file.h"
 
 namespace telesplat::data {
 namespace {

@@ -20,7 +20,7 @@
 #include "common/volume/transfer/function.h"
 #include "common/wall/wall.h"
 #include "common/wire/head_pose.h"
-#include "tests/support/memory_file.h"
+#include "tests/support/files/memory_file.h"
 
 namespace telesplat {
 namespace {

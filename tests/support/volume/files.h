@@ -9,7 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "services/data/volume/volume.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "common/colour/paraview_json.h"
+#include "tests/support/files/own_folder.h"
 
 namespace telesplat::colour {
 namespace {
@@ -149,7 +150,7 @@ TEST(ColourMapJson, ColourSpacesBendTheWayBetweenPoints) {
 TEST(ColourMapJson, TheNamedOneOfSeveralIsTaken) {
   const std::string two = R"([{"Name": "first", "RGBPoints": [0, 0, 0, 0, 1, 0, 0, 1]},
                               {"Name": "second", "RGBPoints": [0, 0, 0, 0, 1, 1, 0, 0]}])";
-  const auto path = std::filesystem::path(testing::TempDir()) / fmt::format("maps-{}.json", getpid());
+  const auto path = std::filesystem::path(tests::own_folder()) / fmt::format("maps-{}.json", getpid());
   std::ofstream(path) << two;
   EXPECT_EQ(resolve_colour_map(path.string())->at(1), 0x0000ffu);
   EXPECT_EQ(resolve_colour_map(path.string() + ":second")->at(1), 0xff0000u);

@@ -5,7 +5,7 @@
 
 #include "common/scene/colouring.h"
 #include "services/data/mesh/reader.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -6,7 +6,7 @@
 #include "services/data/mesh/formats/gltf_header.h"
 #include "services/data/mesh/reader.h"
 #include "services/data/texture/gltf_textures.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

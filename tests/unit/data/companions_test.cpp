@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "services/data/base/mapped_file.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -1,6 +1,6 @@
 // Each format, as its writers write it, comes out as the same mesh.
 #include "services/data/mesh/reader.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

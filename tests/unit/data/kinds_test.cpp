@@ -7,7 +7,7 @@
 #include "common/options/parser.h"
 #include "services/data/data_service.h"
 #include "services/data/served.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <glm/matrix.hpp>
 
 #include "services/data/mesh/placement.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

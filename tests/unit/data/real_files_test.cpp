@@ -1,7 +1,7 @@
 // Real meshes of every format, where they are present.
 #include <cstdlib>
 
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -2,7 +2,7 @@
 #include <thread>
 
 #include "services/data/inspect.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

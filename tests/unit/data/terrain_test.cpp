@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::terrain {
 namespace {

@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include "services/data/volume/volume.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 
 namespace telesplat::data::test {
 namespace {

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "common/geometry/trajectory.h"
+#include "tests/support/files/own_folder.h"
 
 namespace telesplat::geometry {
 namespace {
@@ -65,7 +66,7 @@ TEST(Trajectory, RefusesFilesThatAreNone) {
 }
 
 TEST(Trajectory, AnEndlessLineIsRefusedWithoutBeingRead) {
-  const std::string path = testing::TempDir() + "/telesplat-endless.csv";
+  const std::string path = tests::own_folder() + "telesplat-endless.csv";
   std::ofstream(path) << "t_s,px,py,pz,qw,qx,qy,qz\n0";
   std::filesystem::resize_file(path, uint64_t{1} << 31);  // a hole
   const auto read = Trajectory::read_csv(path);

@@ -7,8 +7,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "common/net/session_file.h"
+#include "tests/support/files/own_folder.h"
+#include "tools/telesplat/record/dated_folder.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -73,6 +76,20 @@ TEST_F(Overwrite, ARecordThatIsBeingWrittenIsRefused) {
     EXPECT_NE(refusal().find("the session at tcp://127.0.0.1:4711"), std::string::npos) << refusal();
   }
   EXPECT_EQ(refusal(), "") << "it has ended";
+}
+
+TEST(DatedFolder, ASecondOneOfTheSameSecondHasItsOwnName) {
+  const fs::path before = fs::current_path();
+  fs::current_path(tests::own_folder());
+  std::set<std::string> names;
+  for (int i = 0; i < 5; ++i) {
+    const std::string name = dated_folder("tune-");
+    EXPECT_TRUE(name.starts_with("runs/tune-2")) << name;
+    EXPECT_TRUE(fs::create_directories(name)) << name;
+    names.insert(name);
+  }
+  EXPECT_EQ(names.size(), 5u);
+  fs::current_path(before);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "client/viewer/record/frame_spool.h"
-#include "tests/support/data_files.h"
+#include "tests/support/files/data_files.h"
 #include "tools/telesplat/run/quality_record.h"
 
 namespace telesplat::launcher {

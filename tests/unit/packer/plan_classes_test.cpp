@@ -8,6 +8,7 @@
 #include "services/packer/points/plan/plan_picture.h"
 #include "services/packer/points/plan/ray_tiles.h"
 #include "services/packer/points/plan/view/view_map.h"
+#include "tests/support/files/own_folder.h"
 #include "tests/support/points_scenes.h"
 
 namespace telesplat::packer {
@@ -265,7 +266,7 @@ TEST(PlanPicture, ShowsEachClassInItsColourAndIsWritten) {
   EXPECT_EQ(view.colour[3 * 70 + 64], view.colour[3 * 70 + 69]);
   EXPECT_NE(view.colour[3 * 70 + 64], view.colour[3 * 70 + 63]);
   EXPECT_NE(view.colour[0], view.colour[3 * 70 + 64]);
-  const std::string folder = testing::TempDir() + "plans";
+  const std::string folder = tests::own_folder() + "plans";
   auto recorder = PlanRecorder::open(folder, 1);
   ASSERT_TRUE(recorder.ok());
   EXPECT_TRUE(recorder->add(picture));

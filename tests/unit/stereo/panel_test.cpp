@@ -6,6 +6,7 @@
 #include "common/stereo/autostereo/interleaver.h"
 #include "common/stereo/autostereo/panel_file.h"
 #include "common/stereo/autostereo/sight.h"
+#include "tests/support/files/own_folder.h"
 
 namespace telesplat::stereo {
 namespace {
@@ -18,7 +19,7 @@ Panel small_panel() {
 }
 
 Result<Panel> read(const std::string& text) {
-  const std::string path = ::testing::TempDir() + "/panel.toml";
+  const std::string path = tests::own_folder() + "panel.toml";
   std::ofstream(path) << text;
   return read_panel(path);
 }

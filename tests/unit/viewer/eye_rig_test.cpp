@@ -8,6 +8,7 @@
 #include "client/viewer/stereo_flags.h"
 #include "client/viewer/viewer_options.h"
 #include "common/geometry/stereo.h"
+#include "tests/support/files/own_folder.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -156,7 +157,7 @@ TEST(StereoFlags, WhatCannotBeIsRefused) {
 }
 
 TEST(StereoFlags, APanelSetsSizeAndFieldOfView) {
-  const std::string path = ::testing::TempDir() + "/panel.toml";
+  const std::string path = tests::own_folder() + "panel.toml";
   std::ofstream(path) << "[panel]\npixels = [400, 300]\npixel_mm = 1\ndistance_m = 0.4\neye = [200, 150]\n"
                          "[lines]\npitch_mm = 2\nthickness_mm = 3\n";
   ViewerOptions o;

@@ -8,6 +8,7 @@
 #include "client/viewer/coupling/update_table.h"
 #include "client/viewer/display/frame_table.h"
 #include "client/viewer/viewer_options.h"
+#include "tests/support/files/own_folder.h"
 
 namespace telesplat::viewer {
 namespace {
@@ -102,7 +103,7 @@ TEST(ViewerFlags, AreSettledOrRefused) {
 
 // Written into a folder of the test's.
 std::string description(const std::string& anchor) {
-  const std::string path = testing::TempDir() + "/" + anchor + ".toml";
+  const std::string path = tests::own_folder() + anchor + ".toml";
   std::ofstream(path) << "[wall]\nanchor = \"" << anchor
                       << "\"\n[head]\nposition = [0, 0.5, 1]\n[[planar]]\ncolumns = 2\nsize = [0.4, 0.3]\n"
                          "resolution = [400, 300]\nsampling = [200, 150]\n";
@@ -145,7 +146,7 @@ TEST(Wall, AHeadStandsBeforeAWallThatStandsInTheRoom) {
 
 TEST(Wall, WhatIsNoDescriptionIsToldByFileAndKey) {
   ViewerOptions o;
-  o.wall = testing::TempDir() + "/none.toml";
+  o.wall = tests::own_folder() + "none.toml";
   EXPECT_NE(settle(o).error().text.find("none.toml: cannot be read"), std::string::npos);
   o.wall = "2by1";
   EXPECT_NE(settle(o).error().text.find("neither a file NAME.toml nor COLUMNSxROWS"), std::string::npos);

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "common/volume/transfer/function.h"
+#include "tests/support/files/own_folder.h"
 
 namespace telesplat::volume {
 namespace {
@@ -128,7 +129,7 @@ TEST(VolumeTransfer, PresetsAreValidFitTheDataAndTravel) {
 TEST(VolumeTransfer, ResolvesNamesPointsAndFiles) {
   EXPECT_EQ(*resolve_transfer("fire", kBytes), *transfer_preset("fire", kBytes));
   EXPECT_EQ(*resolve_transfer("0:#ffffff:1", kBytes), parse_or_fail("0:#ffffff:1"));
-  const auto path = std::filesystem::path(testing::TempDir()) / fmt::format("transfer-{}.json", getpid());
+  const auto path = std::filesystem::path(tests::own_folder()) / fmt::format("transfer-{}.json", getpid());
   std::ofstream(path) << R"({"RGBPoints": [0, 0, 0, 0, 255, 1, 1, 1]})";
   const auto f = resolve_transfer(path.string(), kBytes);
   std::filesystem::remove(path);
