@@ -88,7 +88,9 @@ class FrameSchedule : public Views {
   std::vector<metrics::PlanRow> take_plan_rows() { return std::exchange(plan_rows_, {}); }
   bool steered(double now_s) const { return plans_.on(now_s); }
   /// There is another packer.
-  void trust_packer() { plans_.trust(), gate_.clear(); }
+  void trust_packer() { plans_.trust(), forget_links(); }
+  /// Nothing is under way to any viewer.
+  void forget_links() { gate_.clear(); }
   void forget_viewer(InstanceId viewer) override;
 
   /// How a viewer's link does: its views begin, and their tiles are leased, only when its queue is short.

@@ -77,6 +77,12 @@ void TilePlan::new_packer() {
   schedule_.drop_frames();
 }
 
+// The packer forgets what it published of this plan's scene, so nobody will hear that it arrived.
+void TilePlan::put_aside() {
+  schedule_.forget_links();
+  schedule_.drop_frames();
+}
+
 void TilePlan::prepare(double now_s) {
   schedule_.give_up_plans(now_s);
   record_plans();

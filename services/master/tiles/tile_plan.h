@@ -25,6 +25,7 @@ class TilePlan final : public Plan {
   Views& views() override { return schedule_; }
   void drop_frames() override { schedule_.drop_frames(); }
   void new_packer() override;
+  void put_aside() override;
   /// Views whose plans are late are sampled without; views that a newer one overtook end.
   void prepare(double now_s) override;
   bool may_begin(const Idle&) override { return schedule_.view_waiting(); }

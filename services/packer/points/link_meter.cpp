@@ -48,7 +48,9 @@ void LinkMeter::learn_rate(Viewer& v, const Receipt& now, double published_s) {
 }
 
 void LinkMeter::received(InstanceId viewer, Sequence newest, double viewer_s, double now_s) {
-  if (published_.empty() || newest > published_.back().sequence || !std::isfinite(viewer_s)) return;
+  // A model without events, such as another data set's, leaves nobody behind; that is worth telling, too.
+  const Sequence last = published_.empty() ? Sequence{} : published_.back().sequence;
+  if (newest > last || !std::isfinite(viewer_s)) return;
   const auto event = find(newest);  // none: it has nothing that is remembered
   const Receipt receipt{newest, event == published_.end() ? forgotten_bytes_ : event->bytes_so_far, viewer_s, now_s};
   const double rtt_s = event == published_.end() ? 0 : now_s - event->at_s;

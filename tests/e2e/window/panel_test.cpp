@@ -288,7 +288,8 @@ TEST_F(PanelTest, AFileThatIsDroppedIsOpenedInTheSameWindow) {
   ASSERT_TRUE(display_->drop_file(window, folder_ / "first.ply"));
   EXPECT_EQ(live_window(view, "first.ply - "), window) << view.err();
   EXPECT_TRUE(wait_until([&] { return display_->title(window).find("points drawn") != std::string::npos; }, 60))
-      << display_->title(window);
+      << display_->title(window) << "\n"
+      << view.err();
 
   // A path plays at once.
   std::ofstream(folder_ / "path.csv") << "t_s,px,py,pz,qw,qx,qy,qz\n0,0,0.3,1,1,0,0,0\n60,0.2,0.3,1,1,0,0,0\n";

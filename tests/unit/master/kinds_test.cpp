@@ -147,6 +147,21 @@ TEST_F(KindsOfScenes, FromAMeshToAVolumeAndBackViewsStayAndEpochsBegin) {
   EXPECT_EQ(sent<wire::SlabAssignment>("sampler1").size(), 1u) << "its slab was let go";
 }
 
+TEST_F(KindsOfScenes, WhatWasOnItsWayToAViewerOfTheMeshBeforeHoldsNoViewUp) {
+  hello(data(1, "mesh"));
+  join();
+  core.on("packer10", wire::LinkReport{.viewer = {20}, .rate_bytes_s = 1e6, .backlog_bytes = 100'000'000}, now);
+  view(1, 1);
+  ask();
+  EXPECT_TRUE(sent<wire::Lease>("sampler1").empty()) << "its link is busy";
+  hello(volume_part(2, 12, 0, 1));
+  ASSERT_TRUE(weigh(2, 0, 12));
+  core.on("data2", wire::Goodbye{{2}}, now);
+  hello(data(3, "mesh"));
+  ask();
+  EXPECT_EQ(sent<wire::Lease>("sampler1").size(), 1u) << "the packer has a new model, of which nothing is under way";
+}
+
 TEST_F(KindsOfScenes, AMeshIsShownUntilAllPartsOfAVolumeAreThere) {
   hello(data(1, "mesh"));
   join();

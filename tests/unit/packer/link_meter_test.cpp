@@ -123,6 +123,19 @@ TEST(LinkMeter, AViewerThatHasNothingYetWaitsForAll) {
   EXPECT_EQ(meter.figures(kViewer, 2)->rtt_s, 0);
 }
 
+// Who is not told so goes on waiting for what was on its way of the model before.
+TEST(LinkMeter, OfANewModelNothingIsUnderWay) {
+  LinkMeter meter;
+  for (uint64_t i = 1; i < 5; ++i) meter.published(Sequence{i}, 1000, 1);
+  meter.received(kViewer, Sequence{2}, 1, 1.1);
+  EXPECT_EQ(meter.figures(kViewer, 2)->backlog_bytes, 2000u);
+  meter.clear();
+  EXPECT_FALSE(meter.figures(kViewer, 2));
+  meter.received(kViewer, {}, 2, 2.1);
+  ASSERT_TRUE(meter.figures(kViewer, 3));
+  EXPECT_EQ(meter.figures(kViewer, 3)->backlog_bytes, 0u);
+}
+
 TEST(LinkMeter, LatenessIsNotTakenForASlowLink) {
   LinkMeter meter;
   // Small events, each of which the viewer looks at 60 ms late.
