@@ -26,6 +26,9 @@ endif()
 
 # Cases are run once: optimising them takes longer than it saves. What they test is optimised.
 set(TELESPLAT_TEST_FLAGS -O1)
+if(TELESPLAT_SANITIZE)
+  set(TELESPLAT_TEST_FLAGS -O0)  # what tests call is optimised, they themselves need not be
+endif()
 
 find_program(CCACHE ccache)
 if(CCACHE)

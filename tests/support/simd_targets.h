@@ -21,6 +21,13 @@ class OnTarget {
   }
 };
 
+/// How many there are at least: sanitized programs are compiled for one.
+#if defined(HWY_COMPILE_ONLY_STATIC)
+inline constexpr size_t kLeastTargets = 1;
+#else
+inline constexpr size_t kLeastTargets = 2;
+#endif
+
 /// Every instruction set that was compiled and that this machine has.
 inline std::vector<int64_t> simd_targets() { return hwy::SupportedAndGeneratedTargets(); }
 

@@ -37,8 +37,8 @@ std::string text_of(const toml::node& node) {
 Status read_options(const std::string& path, const toml::table& scene, data::DataOptions& o) {
   const options::Table table = data::scene_table(o);
   for (const auto& [key, node] : scene) {
-    const auto row =
-        std::find_if(table.begin(), table.end(), [&](const auto& r) { return options::key_of(r) == key.str(); });
+    const auto row = std::find_if(table.begin(), table.end(),
+                                  [&name = key](const auto& r) { return options::key_of(r) == name.str(); });
     if (row == table.end() || !node.is_value()) continue;
     if (!row->not_in_scene.empty()) continue;  // a record may be anybody's: it does not say where this machine writes
     if (const Status s = options::set(*row, text_of(node)); !s)
