@@ -105,10 +105,11 @@ void add_scatter(File& file, const image::DepthImage& image, const Mask& mask) {
     predictor.add(x, y, pixel, {});
     return true;
   });
-  image::for_each_set(mask, [&](int x, int y) {
-    put(places, static_cast<uint16_t>(x));
-    put(places, static_cast<uint16_t>(y));
-  });
+  for (int y = 0; y < image.height; ++y)
+    image::for_each_set(mask.row(y), mask.words_per_row(), [&](size_t x) {
+      put(places, static_cast<uint16_t>(x));
+      put(places, static_cast<uint16_t>(y));
+    });
   append(out, places);
   append(out, bits.bytes());
   file.add(Kind::kScatter, out, digest.value());

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/codec/depth_codec.h"
 
@@ -88,30 +89,45 @@ Status CodecMeasure::add_tile(const image::DepthImage& tile, double focal_px, Co
   const size_t covered = covered_pixels(tile);
   ++report_.tiles;
   report_.covered += covered;
-  if (tile.width != kTile || tile.height != kTile || covered != tile.pixels()) return ok_status();
-  ++report_.full_tiles;
-  if (timed_.size() < kMostTimed) timed_.push_back(tile);
+  if (tile.width == kTile && tile.height == kTile) keep_to_time(tile, covered);
   return ok_status();
+}
+
+// The fullest ones, of those that are as full those that came first.
+void CodecMeasure::keep_to_time(const image::DepthImage& tile, size_t covered) {
+  report_.full_tiles += covered == tile.pixels();
+  if (2 * covered < tile.pixels() || options_.seconds <= 0) return;
+  const auto fuller = [](size_t c, const Timed& t) { return c > t.covered; };
+  timed_.insert(std::upper_bound(timed_.begin(), timed_.end(), covered, fuller), {covered, tile});
+  if (timed_.size() > kMostTimed) timed_.pop_back();
+}
+
+void CodecMeasure::measure_speeds_of_kept() {
+  if (timed_.empty()) return;
+  if (report_.full_tiles > 0) std::erase_if(timed_, [](const Timed& t) { return t.covered != t.tile.pixels(); });
+  size_t covered = 0, pixels = 0, kept = 0;  // kept: so that nothing is left out
+  std::vector<std::vector<uint8_t>> streams;
+  for (const Timed& t : timed_) {
+    streams.push_back(encode(t.tile));
+    covered += t.covered, pixels += t.tile.pixels();
+  }
+  report_.timed_tiles = timed_.size();
+  report_.timed_covered = double(covered) / double(pixels);
+  image::DepthImage decoded;
+  report_.speeds = measure_speeds(
+      covered, options_.seconds,
+      [&] {
+        for (const Timed& t : timed_) kept += encode(t.tile).size();
+      },
+      [&] {
+        for (const auto& stream : streams) kept += size_t(decode(decoded, stream).ok());
+      });
+  timed_.clear();
 }
 
 CodecReport CodecMeasure::finish(std::string name) {
   report_.name = std::move(name);
-  report_.timed_tiles = timed_.size();
-  if (!timed_.empty() && options_.seconds > 0) {
-    std::vector<std::vector<uint8_t>> streams;
-    for (const auto& tile : timed_) streams.push_back(encode(tile));
-    image::DepthImage decoded;
-    size_t kept = 0;  // so that nothing is left out
-    report_.speeds = measure_speeds(
-        timed_.size() * size_t{kTile} * kTile, options_.seconds,
-        [&] {
-          for (const auto& tile : timed_) kept += encode(tile).size();
-        },
-        [&] {
-          for (const auto& stream : streams) kept += size_t(decode(decoded, stream).ok());
-        });
-  }
-  timed_.clear();
+  measure_speeds_of_kept();
   return std::exchange(report_, {});
 }
 

@@ -34,7 +34,9 @@ struct CodecReport {
   size_t frames = 0, tiles = 0, full_tiles = 0, pixels = 0, covered = 0;
   StreamBits bits;
   std::vector<BaselineReport> baselines;
-  size_t timed_tiles = 0;  ///< speeds are of these; 0: none is full
+  size_t timed_tiles =
+      0;  ///< speeds are of these: full tiles, or where none is, those of which half or more is covered
+  double timed_covered = 0;  ///< part of their pixels; speeds are of covered pixels
   std::vector<TargetSpeed> speeds;
   CodecErrors errors;
 };
@@ -66,7 +68,14 @@ class CodecMeasure {
 
   MeasureOptions options_;
   CodecReport report_;
-  std::vector<image::DepthImage> timed_;
+  struct Timed {
+    size_t covered = 0;
+    image::DepthImage tile;
+  };
+  void keep_to_time(const image::DepthImage& tile, size_t covered);
+  void measure_speeds_of_kept();
+
+  std::vector<Timed> timed_;  // the fullest first
   std::optional<image::View> worst_;
   double worst_error_ = -1;
 };

@@ -82,9 +82,11 @@ std::string to_markdown(const CodecReport& r) {
                                 r.frames, double(r.pixels) * 1e-6, double(r.covered) * 1e-6, r.tiles, r.full_tiles);
   out += size_table(r) + "\n";
   if (!r.speeds.empty())
-    out += speed_table(r.speeds, fmt::format("Mpx/s, {} full tiles", r.timed_tiles)) + "\n";
-  else if (r.timed_tiles == 0)
-    out += "no tile is full, so speeds are not measured\n";
+    out +=
+        speed_table(r.speeds, fmt::format("Mpx/s, {} tiles, {:.0f} % covered", r.timed_tiles, 100 * r.timed_covered)) +
+        "\n";
+  else
+    out += "speeds are not measured: no tile is half covered, or --seconds is 0\n";
   return out + error_line(r.errors);
 }
 
@@ -125,6 +127,8 @@ nlohmann::json to_json(const CodecReport& r) {
           {"pixels", r.pixels},
           {"covered_pixels", r.covered},
           {"bits_per_pixel", coders},
+          {"timed_tiles", r.timed_tiles},
+          {"timed_covered", r.timed_covered},
           {"speeds", speeds_json(r.speeds)},
           {"errors",
            {{"uncovered", e.uncovered},
