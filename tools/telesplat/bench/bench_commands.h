@@ -8,6 +8,7 @@ namespace telesplat::launcher {
 Command bench_scaling_command();
 Command bench_volume_command();
 Command bench_cache_command();
+Command bench_codec_command();
 Command bench_steering_command();
 Command bench_thesis_command();
 Command bench_tracking_command();

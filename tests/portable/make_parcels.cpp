@@ -1,0 +1,151 @@
+// Writes parcels (parcels.h) of made-up data with the codec as this machine runs it: make_parcels FILE.
+#include <cstdio>
+#include <fstream>
+#include <random>
+
+#include "common/codec/depth_codec.h"
+#include "common/codec/golomb.h"
+#include "common/codec/tokens.h"
+#include "tests/portable/parcels.h"
+#include "tests/support/depth_images.h"
+#include "tests/support/masks.h"
+
+namespace telesplat::portable {
+namespace {
+
+using namespace codec::detail;
+using Bytes = std::vector<uint8_t>;
+
+class File {
+ public:
+  explicit File(const char* path) : out_(path, std::ios::binary) {}
+  void add(Kind kind, const Bytes& bytes, uint64_t digest) {
+    Bytes all;
+    put(all, kind);
+    put(all, static_cast<uint32_t>(bytes.size()));
+    all.insert(all.end(), bytes.begin(), bytes.end());
+    put(all, digest);
+    out_.write(reinterpret_cast<const char*>(all.data()), static_cast<std::streamsize>(all.size()));
+  }
+  bool close() { return out_.close(), !out_.fail(); }
+
+ private:
+  std::ofstream out_;
+};
+
+void append(Bytes& out, std::span<const uint8_t> more) { out.insert(out.end(), more.begin(), more.end()); }
+
+void add_golomb(File& file, std::mt19937& random) {
+  constexpr uint32_t kCount = 20'000, kExpected = 40;
+  BitWriter bits;
+  bits.start(size_t{kCount} * GolombContext::kMostBits);
+  GolombContext context;
+  context.start(kExpected);
+  Digest digest;
+  for (uint32_t i = 0; i < kCount; ++i) {
+    const int residual = static_cast<int>(random() >> (8 + random() % 24)) * (random() % 2 ? 1 : -1);
+    context.put(residual, bits.sink);
+    digest.add(static_cast<uint32_t>(residual));
+  }
+  Bytes out;
+  put(out, kCount);
+  put(out, kExpected);
+  append(out, bits.bytes());
+  file.add(Kind::kGolomb, out, digest.value());
+}
+
+void add_tokens(File& file, std::mt19937& random) {
+  constexpr uint32_t kCount = 10'000;
+  Bytes number(kCount), normal(kCount), colour(kCount);
+  BitWriter bits;
+  bits.start(size_t{kCount} * (NumberToken::kMaxBits + NormalToken::kMaxBits + ColourToken::kMaxBits));
+  Digest digest;
+  for (uint32_t i = 0; i < kCount; ++i) {
+    const uint32_t n = static_cast<uint32_t>(random()) >> (8 + random() % 24);
+    const auto z = static_cast<uint16_t>(random() & (random() % 2 ? 0x0707 : 0xFFFF));
+    const uint32_t c = static_cast<uint32_t>(random()) & (random() % 2 ? 0x030303 : 0xFFFFFF);
+    NumberToken::put(n, &number[i], bits.sink);
+    NormalToken::put(z, &normal[i], bits.sink);
+    ColourToken::put(c, &colour[i], bits.sink);
+    for (const uint32_t v : {n, uint32_t{z}, c}) digest.add(v);
+  }
+  Bytes out;
+  put(out, kCount);
+  for (const Bytes* part : {&number, &normal, &colour}) append(out, *part);
+  append(out, bits.bytes());
+  file.add(Kind::kTokens, out, digest.value());
+}
+
+Pixel at(const image::DepthImage& image, int x, int y) {
+  const size_t i = static_cast<size_t>(y) * static_cast<size_t>(image.width) + static_cast<size_t>(x);
+  return {image.depth[i], image.colour[i], image.normal[i]};
+}
+
+void add_scatter(File& file, const image::DepthImage& image, const Mask& mask) {
+  const auto count = static_cast<uint32_t>(mask.count());
+  Bytes out, places;
+  for (const int n : {image.width, image.height, static_cast<int>(count)}) put(out, static_cast<uint32_t>(n));
+  BitWriter bits;
+  bits.start(size_t{count} * kParts * GolombContext::kMostBits);
+  GolombContext context;
+  context.start(100);
+  ScatterWalk walk;
+  ScatterPredictor predictor;
+  predictor.start({});
+  Digest digest;
+  walk(mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
+    const Pixel pixel = at(image, x, y);
+    int parts[kParts], guessed[kParts];
+    parts_of(pixel, parts);
+    parts_of(predictor.predict(x, y, neighbours).pixel, guessed);
+    for (int i = 0; i < kParts; ++i) {
+      context.put(parts[i] - guessed[i], bits.sink);
+      digest.add(static_cast<uint32_t>(parts[i]));
+    }
+    predictor.add(x, y, pixel, {});
+    return true;
+  });
+  for (int y = 0; y < image.height; ++y)
+    image::for_each_set(mask.row(y), mask.words_per_row(), [&](size_t x) {
+      put(places, static_cast<uint16_t>(x));
+      put(places, static_cast<uint16_t>(y));
+    });
+  append(out, places);
+  append(out, bits.bytes());
+  file.add(Kind::kScatter, out, digest.value());
+}
+
+void add_depth(File& file, const image::DepthImage& image) {
+  Digest digest;
+  for (const int n : {image.width, image.height}) digest.add(static_cast<uint32_t>(n));
+  for (size_t i = 0; i < image.pixels(); ++i)
+    for (const uint32_t v : {image.depth[i], image.colour[i], uint32_t{image.normal[i]}}) digest.add(v);
+  file.add(Kind::kDepth, codec::encode(image), digest.value());
+}
+
+bool write(const char* path) {
+  File file(path);
+  std::mt19937 random(7);
+  for (int round = 0; round < 3; ++round) {
+    add_golomb(file, random);
+    add_tokens(file, random);
+  }
+  for (const bool rough : {false, true}) {
+    const auto image = test::render({.width = 256, .height = 200, .rough = rough});
+    add_scatter(file, image, test::spread_mask(image.width, image.height, 32, 7));
+    add_depth(file, image);
+    add_depth(file, test::masked(image, test::spread_mask(image.width, image.height, 32, 7)));
+    add_depth(file, test::masked(image, test::band_mask(image.width, image.height, 3)));
+  }
+  add_depth(file, test::render({.width = 300, .height = 280, .covers_all = false}));
+  return file.close();
+}
+
+}  // namespace
+}  // namespace telesplat::portable
+
+int main(int argc, char** argv) {
+  if (argc == 2 && telesplat::portable::write(argv[1])) return 0;
+  std::fprintf(stderr, argc == 2 ? "%s cannot be written\n" : "usage: make_parcels FILE\n", argv[argc - 1]);
+  return 2;
+}

@@ -1,0 +1,134 @@
+#include "tools/telesplat/bench/codec/measure.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/codec/depth_codec.h"
+
+namespace telesplat::launcher {
+namespace {
+
+constexpr size_t kMostTimed = 32;  // tiles; they and their streams are far more than caches hold
+constexpr int kTile = 256;
+
+size_t covered_pixels(const image::DepthImage& image) {
+  return image.pixels() - size_t(std::count(image.depth.begin(), image.depth.end(), 0u));
+}
+
+Status add_stream(std::span<const uint8_t> stream, StreamBits& to) {
+  const auto info = codec::inspect(stream);
+  if (!info) return info.error();
+  const size_t parts =
+      info->depth_bytes + info->normal_bytes + info->colour_bytes + info->mask_bytes + info->sparse_bytes;
+  to.depth += 8 * info->depth_bytes;
+  to.normal += 8 * info->normal_bytes;
+  to.colour += 8 * info->colour_bytes;
+  to.mask += 8 * info->mask_bytes;
+  to.sparse += 8 * info->sparse_bytes;
+  to.header += 8 * (stream.size() - std::min(parts, stream.size()));
+  return ok_status();
+}
+
+// Which of two sets of errors is the worse to look at.
+double severity(const CodecErrors& e) {
+  return double(e.uncovered) * 1e6 + e.depth_px.largest + e.normal_codes.largest + e.colour_codes.largest;
+}
+
+image::DepthImage through_codec(const image::DepthImage& image) {
+  image::DepthImage out;
+  return CodecMeasure::decode(out, CodecMeasure::encode(image)) ? out : image::DepthImage(image.width, image.height);
+}
+
+}  // namespace
+
+std::vector<uint8_t> CodecMeasure::encode(const image::DepthImage& tile) { return codec::encode(tile); }
+
+Status CodecMeasure::decode(image::DepthImage& tile, std::span<const uint8_t> stream) {
+  return codec::decode_into(tile, stream);
+}
+
+Status CodecMeasure::add(const DepthFrame& frame) {
+  if (report_.frames == 0) {
+    worst_.reset(), worst_error_ = -1;
+    for (const Baseline* coder : options_.coders) report_.baselines.push_back({coder, {}, coder->missing()});
+  }
+  ++report_.frames;
+  report_.pixels += frame.image.pixels();
+  CodecErrors errors;
+  for (const auto& tile : tiles_of(frame.image))
+    if (const Status s = add_tile(tile, frame.focal_px, errors); !s) return s;
+  if (options_.error_maps && severity(errors) > worst_error_) {
+    worst_error_ = severity(errors);
+    worst_ = error_maps(frame.image, through_codec(frame.image), frame.focal_px);
+  }
+  report_.errors.merge(errors);
+  return ok_status();
+}
+
+Status CodecMeasure::add_tile(const image::DepthImage& tile, double focal_px, CodecErrors& errors) {
+  const auto stream = encode(tile);
+  if (const Status s = add_stream(stream, report_.bits); !s) return s;
+  image::DepthImage decoded;
+  if (const Status s = decode(decoded, stream); !s)
+    return Error{fmt::format("what was encoded is not decoded: {}", s.error().text)};
+  if (decoded.width != tile.width || decoded.height != tile.height)
+    return Error{fmt::format("a tile of {} x {} pixels came back as {} x {}", tile.width, tile.height, decoded.width,
+                             decoded.height)};
+  add_errors(tile, decoded, focal_px, errors);
+  for (BaselineReport& b : report_.baselines) {
+    if (!b.missing.empty()) continue;
+    const auto bits = b.coder->bits(tile);
+    if (!bits) {
+      b.missing = bits.error().text;
+      continue;
+    }
+    b.bits.depth += bits->depth, b.bits.colour += bits->colour, b.bits.normal += bits->normal;
+  }
+  const size_t covered = covered_pixels(tile);
+  ++report_.tiles;
+  report_.covered += covered;
+  if (tile.width == kTile && tile.height == kTile) keep_to_time(tile, covered);
+  return ok_status();
+}
+
+// The fullest ones, of those that are as full those that came first.
+void CodecMeasure::keep_to_time(const image::DepthImage& tile, size_t covered) {
+  report_.full_tiles += covered == tile.pixels();
+  if (2 * covered < tile.pixels() || options_.seconds <= 0) return;
+  const auto fuller = [](size_t c, const Timed& t) { return c > t.covered; };
+  timed_.insert(std::upper_bound(timed_.begin(), timed_.end(), covered, fuller), {covered, tile});
+  if (timed_.size() > kMostTimed) timed_.pop_back();
+}
+
+void CodecMeasure::measure_speeds_of_kept() {
+  if (timed_.empty()) return;
+  if (report_.full_tiles > 0) std::erase_if(timed_, [](const Timed& t) { return t.covered != t.tile.pixels(); });
+  size_t covered = 0, pixels = 0, kept = 0;  // kept: so that nothing is left out
+  std::vector<std::vector<uint8_t>> streams;
+  for (const Timed& t : timed_) {
+    streams.push_back(encode(t.tile));
+    covered += t.covered, pixels += t.tile.pixels();
+  }
+  report_.timed_tiles = timed_.size();
+  report_.timed_covered = double(covered) / double(pixels);
+  image::DepthImage decoded;
+  report_.speeds = measure_speeds(
+      covered, options_.seconds,
+      [&] {
+        for (const Timed& t : timed_) kept += encode(t.tile).size();
+      },
+      [&] {
+        for (const auto& stream : streams) kept += size_t(decode(decoded, stream).ok());
+      });
+  timed_.clear();
+}
+
+CodecReport CodecMeasure::finish(std::string name) {
+  report_.name = std::move(name);
+  measure_speeds_of_kept();
+  return std::exchange(report_, {});
+}
+
+}  // namespace telesplat::launcher

@@ -1,0 +1,83 @@
+// What the depth-image codec needs, how fast it is and what it changes, over a set of images.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/core/result.h"
+#include "tools/telesplat/bench/codec/baselines.h"
+#include "tools/telesplat/bench/codec/errors.h"
+#include "tools/telesplat/bench/codec/frames.h"
+#include "tools/telesplat/bench/codec/speed.h"
+
+namespace telesplat::launcher {
+
+/// Bits of the parts of streams.
+struct StreamBits {
+  size_t depth = 0, normal = 0, colour = 0, mask = 0;
+  size_t sparse = 0;  ///< tiles of few pixels, whose parts are coded in one
+  size_t header = 0;  ///< what is left
+  size_t all() const { return depth + normal + colour + mask + sparse + header; }
+};
+
+struct BaselineReport {
+  const Baseline* coder = nullptr;
+  PlaneBits bits;
+  std::string missing;  ///< why it was not measured
+};
+
+struct CodecReport {
+  std::string name;
+  size_t frames = 0, tiles = 0, full_tiles = 0, pixels = 0, covered = 0;
+  StreamBits bits;
+  std::vector<BaselineReport> baselines;
+  size_t timed_tiles =
+      0;  ///< speeds are of these: full tiles, or where none is, those of which half or more is covered
+  double timed_covered = 0;  ///< part of their pixels; speeds are of covered pixels
+  std::vector<TargetSpeed> speeds;
+  CodecErrors errors;
+};
+
+struct MeasureOptions {
+  std::vector<const Baseline*> coders;
+  double seconds = 0.5;     ///< of each instruction set and direction; 0: speeds are not measured
+  bool error_maps = false;  ///< keep those of the worst image
+};
+
+class CodecMeasure {
+ public:
+  explicit CodecMeasure(MeasureOptions options) : options_(std::move(options)) {}
+
+  /// The one place that says how tiles are encoded, and with which options.
+  static std::vector<uint8_t> encode(const image::DepthImage& tile);
+  static Status decode(image::DepthImage& tile, std::span<const uint8_t> stream);
+
+  /// Images of a set come one at a time.
+  Status add(const DepthFrame& frame);
+  /// Measures speeds, which takes most of the time, and ends the set.
+  CodecReport finish(std::string name);
+
+  /// Of the set that was finished last.
+  const std::optional<image::View>& worst_maps() const { return worst_; }
+
+ private:
+  Status add_tile(const image::DepthImage& tile, double focal_px, CodecErrors& errors);
+
+  MeasureOptions options_;
+  CodecReport report_;
+  struct Timed {
+    size_t covered = 0;
+    image::DepthImage tile;
+  };
+  void keep_to_time(const image::DepthImage& tile, size_t covered);
+  void measure_speeds_of_kept();
+
+  std::vector<Timed> timed_;  // the fullest first
+  std::optional<image::View> worst_;
+  double worst_error_ = -1;
+};
+
+}  // namespace telesplat::launcher
