@@ -1,0 +1,46 @@
+// Colours of a dense tile: one for all, a palette, or three channels.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/codec/dense/depth.h"
+#include "common/codec/dense/guided.h"
+
+namespace telesplat::codec::detail {
+
+struct ColourPlanes {
+  enum Mode : uint8_t { kPlain = 0, kPalette = 1, kChannels = 2, kDifferences = 3 };  ///< of red and blue to green
+  static constexpr size_t kMostColours = 256;
+
+  /// colours: row by row in all the tile's width, of covered pixels; `base`: of the first.
+  void encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base);
+  size_t planes() const { return mode == kPlain ? 0 : mode == kPalette ? 1 : 3; }
+  SymbolPlane& symbols(size_t i) { return mode == kPalette ? index.symbols : channel[i].symbols; }
+  void put_header(BitSink& bits) const;
+  size_t most_header_bits() const { return 64 + 3 * 9 * kMostColours + 8 * 51 * kMostColours + GuidedPlane::kMostWeightBits; }
+  [[nodiscard]] bool decode_header(const TileShape& shape, BitReader& bits);
+  /// Row y from its symbols, into colours of all its pixels; false where an index has no colour.
+  [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t* colours);
+
+  Mode mode = kPlain;
+
+ private:
+  struct Channel {
+    Plane<uint8_t> values;
+    SymbolPlane symbols;
+  };
+  bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
+  void sort_palette();
+  void encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
+  void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
+  void begin_planes(const TileShape& shape);
+
+  std::vector<uint32_t> palette_;
+  GuidedPlane index;
+  std::array<Channel, 3> channel;  // green, red, blue
+  Samples samples_;
+};
+
+}  // namespace telesplat::codec::detail

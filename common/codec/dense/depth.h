@@ -1,0 +1,25 @@
+// Depth of a dense tile: predicted as L + U - UL, which is exact on planes.
+#pragma once
+
+#include <cstdint>
+
+#include "common/codec/dense/symbols.h"
+
+namespace telesplat::codec::detail {
+
+/// Depths of a tile with the rows and columns around it, and their symbols.
+struct DepthPlane {
+  Plane<uint32_t> depth;
+  SymbolPlane symbols;
+
+  /// What lies above and to the left of the first pixel is `base`.
+  void reset(const TileShape& shape, uint32_t base);
+  /// depth -> symbols, once all rows were set. Gives pixels that are not covered their predictions.
+  void encode(const TileShape& shape, uint32_t base);
+  /// The next row from its symbols. False where a covered depth would be 0.
+  [[nodiscard]] bool decode_row(const TileShape& shape, size_t y);
+  /// Continues slopes beyond the tile's edges, as geometry needs it, once all rows are known.
+  void extend(const TileShape& shape);
+};
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,163 @@
+// Loops that compilers turn into vectors by themselves. Included once for every instruction set, in its namespace.
+// No include guard: that is meant.
+
+// fold: 0, -1, 1, -2, ... -> 0, 1, 2, 3, ...
+static inline uint32_t Fold24(uint32_t difference) {
+  const uint32_t v = difference << 8;
+  return ((v << 1) ^ static_cast<uint32_t>(static_cast<int32_t>(v) >> 31)) >> 8;
+}
+
+static inline uint16_t Least(uint16_t a, uint16_t b) { return a < b ? a : b; }
+
+// token_of() of z < 256: the least of the lines of which the logarithm's approximation is made.
+static inline uint8_t ByteToken(uint8_t z) {
+  const uint16_t v = static_cast<uint16_t>(z + 8);
+  uint16_t token = z;
+  token = Least(token, static_cast<uint16_t>(v >> 1));
+  token = Least(token, static_cast<uint16_t>((v >> 2) + 8));
+  token = Least(token, static_cast<uint16_t>((v >> 3) + 16));
+  token = Least(token, static_cast<uint16_t>((v >> 4) + 24));
+  return static_cast<uint8_t>(Least(token, static_cast<uint16_t>((v >> 5) + 32)));
+}
+
+static void DepthResiduals(const uint32_t* RESTRICT above, const uint32_t* RESTRICT row, size_t n, uint32_t* RESTRICT z,
+                           uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    const uint32_t folded = Fold24(row[x] - row[x - 1] - above[x] + above[x - 1]);
+    z[x] = folded;
+    const float v = static_cast<float>(static_cast<int32_t>(folded + 8));
+    tokens[x] = static_cast<uint8_t>((std::bit_cast<uint32_t>(v) >> 20) - 1040);
+  }
+}
+
+static void DepthRows(const uint32_t* RESTRICT above, const uint32_t* RESTRICT z, size_t n, uint32_t* RESTRICT row) {
+  uint32_t difference = row[-1] - above[-1];
+  for (size_t x = 0; x < n; ++x) {
+    difference += (z[x] >> 1) ^ (0 - (z[x] & 1));
+    row[x] = (above[x] + difference) & 0xFFFFFF;
+  }
+}
+
+static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* RESTRICT contexts) {
+  const uint8_t *RESTRICT a = rows.above, *RESTRICT b = rows.above2, *RESTRICT o = rows.other;
+  const int16_t bias = static_cast<int16_t>(scale.bias);
+  const int shift = scale.shift;
+  const auto one = [&](int sum) {
+    int16_t c = static_cast<int16_t>(static_cast<int16_t>(sum - bias) >> shift);
+    c = c < 0 ? int16_t{0} : c;
+    return static_cast<uint8_t>(c > 15 ? int16_t{15} : c);
+  };
+  if (o == nullptr)
+    for (size_t x = 0; x < n; ++x)
+      contexts[x] = one(static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x]));
+  else
+    for (size_t x = 0; x < n; ++x)
+      contexts[x] = one(static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] + 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]));
+}
+
+static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRICT row, size_t n, uint8_t* RESTRICT z,
+                            uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    const uint8_t left = row[x - 1], up = above[x], corner = above[x - 1];
+    const uint8_t low = left < up ? left : up, high = left < up ? up : left;
+    const uint8_t raised = corner < low ? low : corner, clamped = raised > high ? high : raised;
+    const uint8_t r = static_cast<uint8_t>(row[x] - static_cast<uint8_t>(left + up - clamped));
+    const uint8_t folded = static_cast<uint8_t>((r << 1) ^ (r & 0x80 ? 0xFF : 0));
+    z[x] = folded;
+    tokens[x] = ByteToken(folded);
+  }
+}
+
+static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums) {
+  const int16_t *RESTRICT up = rows.above, *RESTRICT g0 = rows.guide[0], *RESTRICT g1 = rows.guide[1],
+                *RESTRICT g2 = rows.guide[2], *RESTRICT other = rows.residual;
+  int32_t w[kGuidedTerms];
+  for (int i = 0; i < kGuidedTerms; ++i) w[i] = rows.weights[i];
+  const int32_t constant = rows.constant;
+  for (size_t x = 0; x < n; ++x)
+    sums[x] = constant + w[1] * up[x] + w[2] * up[x - 1] + w[3] * up[x + 1] + w[4] * g0[x - 1] + w[5] * g0[x] +
+              w[6] * g0[x + 1] + w[7] * g1[x - 1] + w[8] * g1[x] + w[9] * g1[x + 1] + w[10] * g2[x - 1] +
+              w[11] * g2[x] + w[12] * g2[x + 1];
+  if (other != nullptr)
+    for (size_t x = 0; x < n; ++x) sums[x] += w[13] * other[x];
+}
+
+static inline int32_t Guess(int32_t sum) {  // 2^-19 -> 0..254
+  const int32_t p = (sum + (1 << 18)) >> 19;
+  return p < 0 ? 0 : p > 254 ? 254 : p;
+}
+
+static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT z, uint8_t* RESTRICT tokens,
+                            int16_t* RESTRICT residual) {
+  constexpr size_t kPart = 256;
+  int32_t sums[kPart];
+  for (size_t begin = 0; begin < n; begin += kPart) {
+    const size_t count = n - begin < kPart ? n - begin : kPart;
+    GuidedRows part = rows;
+    part.own += begin, part.above += begin;
+    for (auto& g : part.guide) g += begin;
+    if (part.residual != nullptr) part.residual += begin;
+    GuidedSums(part, count, sums);
+    const int16_t* RESTRICT own = part.own;
+    const int32_t left = part.weights[0];
+    uint8_t *RESTRICT zp = z + begin, *RESTRICT tp = tokens + begin;
+    int16_t* RESTRICT rp = residual + begin;
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t guess = Guess(sums[x] + left * own[x - 1]);
+      const int8_t r = static_cast<int8_t>((own[x] >> 6) - guess);
+      rp[x] = static_cast<int16_t>(r * 64);
+      const uint8_t folded = static_cast<uint8_t>((r << 1) ^ (r >> 7));
+      zp[x] = folded;
+      tp[x] = ByteToken(folded);
+    }
+  }
+}
+
+// Slopes of the reciprocal depth at a pixel, and what it would be at the tile's centre, are linear in the surface's
+// normal, whatever the camera (codec.md: "geometry"). 31-bit integers; the quotient by Newton's method.
+static inline int32_t Within16(int32_t v) { return v < -32767 ? -32767 : v > 32767 ? 32767 : v; }
+
+static void Geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
+                     int16_t* RESTRICT gx, int16_t* RESTRICT gy) {
+  const uint32_t *RESTRICT above = depth[0], *RESTRICT here = depth[1], *RESTRICT below = depth[2];
+  int32_t a[3][3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) a[i][j] = model.matrix[i][j];
+  const int slope_shift = model.slope_shift, height_shift = model.height_shift;
+  for (size_t x = 0; x < n; ++x) {
+    const int32_t u = Within16(static_cast<int32_t>(here[x + 1] - here[x - 1]) >> slope_shift),
+                  v = Within16(static_cast<int32_t>(below[x] - above[x]) >> slope_shift);
+    const uint32_t px = static_cast<uint32_t>(x0 + static_cast<int>(x)), py = static_cast<uint32_t>(y);
+    const int32_t height = static_cast<int32_t>((here[x] << 1 >> slope_shift) - px * static_cast<uint32_t>(u) -
+                                                py * static_cast<uint32_t>(v));
+    const int32_t h = Within16(height >> height_shift);
+    const int32_t mx = a[0][0] * u + a[0][1] * v + a[0][2] * h, my = a[1][0] * u + a[1][1] * v + a[1][2] * h,
+                  mz = a[2][0] * u + a[2][1] * v + a[2][2] * h;
+    const int32_t absx = mx < 0 ? -mx : mx, absy = my < 0 ? -my : my, absz = mz < 0 ? -mz : mz;
+    const int32_t s = absx + absy + absz;
+    const float f = static_cast<float>(s >> 6 | 1);  // below 2^24, so exact: its exponent is wanted
+    const int32_t up = 24 - static_cast<int32_t>((std::bit_cast<uint32_t>(f) >> 23) - 127);
+    const int32_t d = static_cast<int32_t>(static_cast<uint32_t>(s) << up >> 16 | 0x4000);
+    int32_t r = 46260 - (d * 30840 >> 15);
+    r = (r * (32768 - (d * r >> 15))) >> 14;
+    r = (r * (32768 - (d * r >> 15))) >> 14;
+    const int32_t nx = static_cast<int32_t>(static_cast<uint32_t>(mx) << up) >> 16,
+                  ny = static_cast<int32_t>(static_cast<uint32_t>(my) << up) >> 16;
+    int32_t qx = (nx * r >> 15) * 127 >> 8, qy = (ny * r >> 15) * 127 >> 8;
+    const int32_t ax = qx < 0 ? -qx : qx, ay = qy < 0 ? -qy : qy;
+    const int32_t fx = qx < 0 ? ay - 8128 : 8128 - ay, fy = qy < 0 ? ax - 8128 : 8128 - ax;
+    qx = mz < 0 ? fx : qx, qy = mz < 0 ? fy : qy;
+    gx[x] = static_cast<int16_t>(qx + 8128);
+    gy[x] = static_cast<int16_t>(qy + 8128);
+  }
+}
+
+static void Activity(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    const auto far = [&](int a, int b) { return a < b ? b - a : a - b; };
+    const int sum = far(gx[1][x + 1], gx[1][x - 1]) + far(gx[2][x], gx[0][x]) + far(gy[1][x + 1], gy[1][x - 1]) +
+                    far(gy[2][x], gy[0][x]);
+    const float v = static_cast<float>((sum >> 3) + 8);
+    tokens[x] = static_cast<uint8_t>((std::bit_cast<uint32_t>(v) >> 20) - 1040);
+  }
+}
