@@ -16,7 +16,7 @@ class ColourTable {
   ColourTable() { slots_.fill({kNone, 0}); }
   // The place of `colour`, which is entered if it is new.
   uint32_t& operator[](uint32_t colour) {
-    size_t at = (colour * 0x9E3779B1u) >> 22;
+    size_t at = (colour * 0x9E3779B1u) >> 20;
     while (slots_[at].first != colour && slots_[at].first != kNone) at = (at + 1) % slots_.size();
     if (slots_[at].first == kNone) slots_[at] = {colour, kNone}, ++count_;
     return slots_[at].second;
@@ -25,18 +25,9 @@ class ColourTable {
   static constexpr uint32_t kNone = 0xFFFFFFFF;
 
  private:
-  std::array<std::pair<uint32_t, uint32_t>, 1024> slots_;
+  std::array<std::pair<uint32_t, uint32_t>, 4096> slots_;
   size_t count_ = 0;
 };
-
-int distance(uint32_t a, uint32_t b) {
-  int sum = 0;
-  for (const int shift : kShifts) {
-    const int d = int(a >> shift & 255) - int(b >> shift & 255);
-    sum += d * d;
-  }
-  return sum;
-}
 
 int8_t difference(uint32_t a, uint32_t b) { return static_cast<int8_t>(static_cast<uint8_t>(a - b)); }
 
@@ -69,11 +60,44 @@ bool follows_green(const TileShape& shape, const std::vector<uint32_t>& colours)
   return together < apart;
 }
 
+constexpr int kAxisBits = 28;
+
+void put_height(const HeightModel& height, BitSink& bits) {
+  for (const int32_t e : {height.a, height.b, height.c})
+    bits.put(static_cast<uint32_t>(e + (1 << (kAxisBits - 1))), kAxisBits);
+  bits.put(static_cast<uint32_t>(height.low + 32768), 16);
+  bits.put(static_cast<uint32_t>(height.scale), 16);
+  GolombContext context;
+  context.start(64);
+  int before = 0, step = 0;
+  for (const int16_t knot : height.knots) {
+    context.put(knot - before - step, bits);
+    step = knot - before, before = knot;
+  }
+}
+
+bool get_height(HeightModel& height, BitReader& bits) {
+  for (int32_t* e : {&height.a, &height.b, &height.c})
+    *e = static_cast<int32_t>(bits.source.take(kAxisBits)) - (1 << (kAxisBits - 1));
+  height.low = static_cast<int32_t>(bits.source.take(16)) - 32768;
+  height.scale = static_cast<int32_t>(bits.source.take(16));
+  GolombContext context;
+  context.start(64);
+  int before = 0, step = 0;
+  for (int16_t& knot : height.knots) {
+    const int next = before + step + context.get(bits.source);
+    if (next < 0 || next > 16383 || bits.overrun()) return false;
+    knot = static_cast<int16_t>(next);
+    step = next - before, before = next;
+  }
+  return true;
+}
+
 }  // namespace
 
 bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32_t>& colours) {
   ColourTable table;
-  palette_.clear();
+  palette_.clear(), first_.clear();
   uint32_t last = ColourTable::kNone;
   for (size_t y = 0; y < shape.height; ++y)
     for (size_t x = 0; x < shape.width; ++x) {
@@ -84,32 +108,54 @@ bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32
       if (place != ColourTable::kNone) continue;
       if (palette_.size() == kMostColours) return false;
       place = 0, palette_.push_back(colour);
+      first_.push_back({static_cast<float>(x), static_cast<float>(y), 0, colour});
     }
   return true;
 }
 
-// Each colour beside the one most like it, from one end of the ramp.
-void ColourPlanes::sort_palette() {
-  std::sort(palette_.begin(), palette_.end());
-  size_t next = 0;
-  for (size_t i = 1; i < palette_.size(); ++i)
-    if (distance(palette_[i], palette_[0]) > distance(palette_[next], palette_[0])) next = i;
-  for (size_t done = 0; done < palette_.size(); ++done) {
-    std::swap(palette_[done], palette_[next]);
-    next = done + 1;
-    for (size_t i = done + 2; i < palette_.size(); ++i)
-      if (distance(palette_[i], palette_[done]) < distance(palette_[next], palette_[done])) next = i;
+// By height where that explains the colours, else by brightness.
+void ColourPlanes::sort_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth,
+                                const GeometryModel* geometry) {
+  const float x0 = static_cast<float>(shape.width / 2), y0 = static_cast<float>(shape.height / 2);
+  const auto code_at = [&](float x, float y) {
+    return static_cast<float>(depth.depth.row(static_cast<ptrdiff_t>(y))[static_cast<size_t>(x)]);
+  };
+  double rays[3][3];
+  has_height_ = false;
+  if (geometry != nullptr && rays_of(*geometry, rays)) {
+    ColourTable table;
+    for (uint32_t i = 0; i < palette_.size(); ++i) table[palette_[i]] = i;
+    for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
+    height_samples_.clear();
+    for (const auto p : samples_.places) {
+      const auto x = static_cast<float>(p.x), y = static_cast<float>(p.y);
+      const uint32_t colour = colours[static_cast<size_t>(p.y) * shape.width + static_cast<size_t>(p.x)];
+      height_samples_.push_back({x - x0, y - y0, code_at(x, y), colour, table[colour]});
+    }
+    has_height_ = fit_height(rays, height_samples_, first_, palette_, height_);
   }
+  if (has_height_) return;
+  std::sort(palette_.begin(), palette_.end(), [](uint32_t a, uint32_t b) {
+    const auto brightness = [](uint32_t c) { return (c >> 16 & 255) + 2 * (c >> 8 & 255) + (c & 255); };
+    return brightness(a) != brightness(b) ? brightness(a) < brightness(b) : a < b;
+  });
 }
 
-void ColourPlanes::begin_planes(const TileShape& shape) {
-  if (mode == kPalette) {
-    index.reset(shape);
-    for (size_t y = 0; y < shape.height; ++y)
-      std::fill_n(index.guide.row(static_cast<ptrdiff_t>(y)), shape.width, int16_t{127 * 64});
+void ColourPlanes::begin_index(const TileShape& shape, const DepthPlane& depth) {
+    const int last = static_cast<int>(palette_.size()) - 1;
+    index.reset(shape, 4, last);
+    for (size_t y = 0; y < shape.height; ++y) {
+      const auto r = static_cast<ptrdiff_t>(y);
+      if (has_height_)
+        kernels().heights(depth.depth.row(r), shape.width, -static_cast<int>(shape.width / 2),
+                          static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r));
+      else
+        std::fill_n(index.guide.row(r), shape.width, static_cast<int16_t>(last * 8));
+    }
     index.begin(shape);
-    return;
-  }
+}
+
+void ColourPlanes::begin_channels(const TileShape& shape) {
   for (size_t c = 0; c < 3; ++c) {
     channel[c].values.reset(shape.width, shape.height);
     channel[c].values.fill_row(-1, 0);
@@ -118,19 +164,18 @@ void ColourPlanes::begin_planes(const TileShape& shape) {
   }
 }
 
-void ColourPlanes::encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours) {
-  sort_palette();
+void ColourPlanes::encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours,
+                                  const DepthPlane& depth) {
   ColourTable table;
   for (uint32_t i = 0; i < palette_.size(); ++i) table[palette_[i]] = i;
-  samples_.choose(shape, 1100);
-  begin_planes(shape);
+  begin_index(shape, depth);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t* const row = index.values.row(static_cast<ptrdiff_t>(y));
     uint32_t last = palette_[0];
     auto value = static_cast<int16_t>(0);
     for (size_t x = 0; x < shape.width; ++x) {
       const uint32_t colour = colours[y * shape.width + x];
-      if (colour != last && shape.at(x, y)) last = colour, value = static_cast<int16_t>(table[colour] * 64);
+      if (colour != last && shape.at(x, y)) last = colour, value = static_cast<int16_t>(table[colour] * 16);
       row[x] = value;
     }
     index.finish_row(shape, y);
@@ -139,7 +184,7 @@ void ColourPlanes::encode_palette(const TileShape& shape, const std::vector<uint
 }
 
 void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours) {
-  begin_planes(shape);
+  begin_channels(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const uint32_t* const from = colours.data() + y * shape.width;
@@ -157,12 +202,15 @@ void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uin
   }
 }
 
-void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base) {
+void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
+                          const DepthPlane& depth, const GeometryModel* geometry) {
   if (all_same(shape, colours, base)) {
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;
-    encode_palette(shape, colours);
+    samples_.choose(shape, 1100);
+    sort_palette(shape, colours, depth, geometry);
+    encode_palette(shape, colours, depth);
   } else {
     mode = follows_green(shape, colours) ? kDifferences : kChannels;
     encode_channels(shape, colours);
@@ -171,7 +219,9 @@ void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& c
 
 void ColourPlanes::put_header(BitSink& bits) const {
   if (mode != kPalette) return;
-  bits.put(palette_.size() - 1, 8);
+  bits.put(palette_.size() - 1, 10);
+  bits.put(has_height_, 1);
+  if (has_height_) put_height(height_, bits);
   uint32_t before = 0;
   GolombContext contexts[3];
   for (GolombContext& c : contexts) c.start(8);
@@ -182,11 +232,16 @@ void ColourPlanes::put_header(BitSink& bits) const {
   index.put_weights(bits);
 }
 
-bool ColourPlanes::decode_header(const TileShape& shape, BitReader& bits) {
+bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits) {
   if (mode == kPlain) return true;
-  begin_planes(shape);
-  if (mode != kPalette) return true;
-  palette_.resize(bits.source.take(8) + 1);
+  if (mode != kPalette) {
+    begin_channels(shape);
+    return true;
+  }
+  palette_.resize(bits.source.take(10) + 1);
+  has_height_ = bits.source.take(1) != 0;
+  if (has_height_ && !get_height(height_, bits)) return false;
+  begin_index(shape, depth);
   uint32_t before = 0;
   GolombContext contexts[3];
   for (GolombContext& c : contexts) c.start(8);
@@ -208,7 +263,7 @@ bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colour
     const int16_t* const row = index.values.row(r);
     int most = 0;
     for (size_t x = 0; x < shape.width; ++x) {
-      const int i = row[x] >> 6;
+      const int i = row[x] >> 4;
       if (shape.at(x, y)) most = std::max(most, i);
       colours[x] = palette_[std::min(static_cast<size_t>(i), palette_.size() - 1)];
     }

@@ -78,7 +78,7 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
 
-  colours_.encode(shape_, colour_rows_, base.colour);
+  colours_.encode(shape_, colour_rows_, base.colour, depth_, normals_.geometry());
   writer_.start(colours_.most_header_bits() + 3 * PlaneEncoder::kMostBits);
   colours_.put_header(writer_.sink);
   for (size_t i = 0; i < colours_.planes(); ++i)
@@ -212,7 +212,7 @@ bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const
 bool DenseCoder::get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
   begin_part(parts, 2);
   colours_.mode = parts.colour_mode;
-  if (!colours_.decode_header(shape_, reader_)) return false;
+  if (!colours_.decode_header(shape_, depth_, reader_)) return false;
   for (size_t i = 0; i < colours_.planes(); ++i)
     if (!decoders_[3 + i].prepare(colours_.symbols(i), reader_)) return false;
   if (!reader_.finished()) return false;

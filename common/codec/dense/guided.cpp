@@ -8,25 +8,28 @@ namespace {
 
 constexpr int kConstantBits = 28;
 
-int16_t nearest_value(int16_t guide) { return static_cast<int16_t>(std::clamp((guide + 32) & ~63, 0, 254 * 64)); }
-
-// Values of one plane, each from the one to its left.
+// Values of one plane, each from the one to its left. Bytes are 64ths and mod 256.
+template <bool kByte>
 struct Chain {
-  explicit Chain(GuidedPlane& plane, size_t y)
-      : value(plane.values.row(static_cast<ptrdiff_t>(y))),
+  Chain(GuidedPlane& guided, size_t y)
+      : plane(guided),
+        value(guided.values.row(static_cast<ptrdiff_t>(y))),
         residual(plane.residuals.row(static_cast<ptrdiff_t>(y))),
         guide(plane.guide.row(static_cast<ptrdiff_t>(y))),
         sums(plane.sums.data()),
-        weight(plane.weights[0] * 64),
-        left(value[-1] >> 6) {}
+        weight(plane.weights[0] * (1 << plane.bits)),
+        left(value[-1] >> plane.bits) {}
   void step(size_t x) {
-    const int32_t p = (sums[x] + weight * left + (1 << 18)) >> 19;
-    left = (std::clamp(p, 0, 254) + (residual[x] >> 6)) & 255;
-    value[x] = static_cast<int16_t>(left * 64);
+    const int bits = kByte ? 6 : plane.bits;
+    const int32_t p = (sums[x] + weight * left + (1 << (bits + 12))) >> (bits + 13);
+    left = std::clamp(p, 0, kByte ? 254 : plane.most) + (residual[x] >> bits);
+    left = kByte ? left & 255 : std::clamp(left, 0, plane.most);
+    value[x] = static_cast<int16_t>(left << bits);
   }
-  void hole(size_t x) { value[x] = nearest_value(guide[x]), left = value[x] >> 6; }
+  void hole(size_t x) { value[x] = plane.nearest_value(guide[x]), left = value[x] >> plane.bits; }
 
-  int16_t *const value;
+  const GuidedPlane& plane;
+  int16_t* const value;
   const int16_t *const residual, *const guide;
   const int32_t *const sums, weight;
   int32_t left;
@@ -34,9 +37,14 @@ struct Chain {
 
 }  // namespace
 
-void GuidedPlane::reset(const TileShape& shape) {
+int16_t GuidedPlane::nearest_value(int16_t by) const {
+  return static_cast<int16_t>(std::clamp((by + (1 << bits >> 1)) >> bits, 0, most) << bits);
+}
+
+void GuidedPlane::reset(const TileShape& shape, int fraction, int largest) {
+  bits = fraction, most = largest;
   for (Plane<int16_t>* plane : {&values, &guide, &residuals}) plane->reset(shape.width, shape.height);
-  symbols.reset(shape, false);
+  symbols.reset(shape, bits != 6);
   sums.resize(std::max(sums.size(), shape.width + 64));
 }
 
@@ -46,7 +54,8 @@ void GuidedPlane::begin(const TileShape& shape) {
   for (ptrdiff_t y = 0; y < h; ++y) guide.row(y)[-1] = guide.row(y)[0], guide.row(y)[w] = guide.row(y)[w - 1];
   std::copy_n(guide.row(0) - 1, w + 2, guide.row(-1) - 1);
   std::copy_n(guide.row(h - 1) - 1, w + 2, guide.row(h) - 1);
-  std::transform(guide.row(0) - 1, guide.row(0) + w + 1, values.row(-1) - 1, nearest_value);
+  std::transform(guide.row(0) - 1, guide.row(0) + w + 1, values.row(-1) - 1,
+                 [&](int16_t by) { return nearest_value(by); });
 }
 
 void GuidedPlane::finish_row(const TileShape& shape, size_t y) {
@@ -59,7 +68,7 @@ void GuidedPlane::finish_row(const TileShape& shape, size_t y) {
 GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
   const auto r = static_cast<ptrdiff_t>(y);
   GuidedRows rows{values.row(r),  values.row(r - 1), {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
-                  before != nullptr ? before->residuals.row(r) : nullptr, {}, constant};
+                  before != nullptr ? before->residuals.row(r) : nullptr, {}, constant, bits, most};
   std::copy_n(weights, kGuidedTerms, rows.weights);
   return rows;
 }
@@ -68,8 +77,12 @@ void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const G
   fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    kernels().guided_residuals(rows_around(y, before), shape.width, symbols.narrow.row(r), symbols.tokens.row(r),
-                               residuals.row(r));
+    if (bits == 6)
+      kernels().guided_residuals(rows_around(y, before), shape.width, symbols.narrow.row(r), symbols.tokens.row(r),
+                                 residuals.row(r));
+    else
+      kernels().guided_residuals_wide(rows_around(y, before), shape.width, symbols.wide.row(r), symbols.tokens.row(r),
+                                      residuals.row(r));
     shape.for_each_hole(y, [&](size_t x) { residuals.row(r)[x] = 0; });
     finish_tokens(symbols, shape, y);
   }
@@ -92,16 +105,21 @@ bool GuidedPlane::get_weights(BitReader& bits) {
 
 void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
   const auto r = static_cast<ptrdiff_t>(y);
-  const uint8_t* const z = symbols.narrow.row(r);
   int16_t* const out = residuals.row(r);
-  for (size_t x = 0; x < shape.width; ++x)
-    out[x] = static_cast<int16_t>(((z[x] >> 1) ^ -(z[x] & 1)) * 64);
+  const auto unfold = [&](const auto* z) {
+    for (size_t x = 0; x < shape.width; ++x)
+      out[x] = static_cast<int16_t>((static_cast<int>(z[x] >> 1) ^ -static_cast<int>(z[x] & 1)) * (1 << bits));
+  };
+  if (bits == 6)
+    unfold(symbols.narrow.row(r));
+  else
+    unfold(symbols.wide.row(r));
   values.row(r)[-1] = nearest_value(guide.row(r)[-1]);
   kernels().guided_sums(rows_around(y, before), shape.width, sums.data());
 }
 
 void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_t y) {
-  Chain first(a, y), second(b, y);
+  Chain<true> first(a, y), second(b, y);
   if (shape.full(y)) {
     for (size_t x = 0; x < shape.width; ++x) first.step(x), second.step(x);
   } else {
@@ -112,7 +130,7 @@ void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_
 }
 
 void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y) {
-  Chain chain(plane, y);
+  Chain<false> chain(plane, y);
   for (size_t x = 0; x < shape.width; ++x) shape.at(x, y) ? chain.step(x) : chain.hole(x);
   plane.finish_row(shape, y);
 }

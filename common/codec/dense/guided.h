@@ -9,9 +9,11 @@
 
 namespace telesplat::codec::detail {
 
-/// Values, their guide and residuals, in 64ths; symbols of the residuals.
+/// Values, their guide and residuals, in 64ths, or as others are configured; symbols of the residuals.
 struct GuidedPlane {
-  void reset(const TileShape& shape);
+  /// fraction: bits of a value below 1; most: the largest one. Six and 254: residuals are mod 256.
+  void reset(const TileShape& shape, int fraction = 6, int most = 254);
+  int16_t nearest_value(int16_t guide) const;
   /// Borders of the guide, once its rows are known; and of the values above the first row.
   void begin(const TileShape& shape);
   /// Values of pixels that are not covered, and borders, of row y. They are the guide's.
@@ -30,6 +32,7 @@ struct GuidedPlane {
   int16_t weights[kGuidedTerms] = {};
   int32_t constant = 0;
   std::vector<int32_t> sums;
+  int bits = 6, most = 254;
 
  private:
   GuidedRows rows_around(size_t y, const GuidedPlane* before) const;

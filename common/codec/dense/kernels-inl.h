@@ -68,6 +68,8 @@ static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRI
   }
 }
 
+static inline int32_t Within16(int32_t v) { return v < -32767 ? -32767 : v > 32767 ? 32767 : v; }
+
 static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums) {
   const int16_t *RESTRICT up = rows.above, *RESTRICT g0 = rows.guide[0], *RESTRICT g1 = rows.guide[1],
                 *RESTRICT g2 = rows.guide[2], *RESTRICT other = rows.residual;
@@ -82,28 +84,34 @@ static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums)
     for (size_t x = 0; x < n; ++x) sums[x] += w[13] * other[x];
 }
 
-static inline int32_t Guess(int32_t sum) {  // 2^-19 -> 0..254
-  const int32_t p = (sum + (1 << 18)) >> 19;
-  return p < 0 ? 0 : p > 254 ? 254 : p;
+static inline int32_t Guess(int32_t sum, int bits, int32_t most) {
+  const int32_t p = (sum + (1 << (bits + 12))) >> (bits + 13);
+  return p < 0 ? 0 : p > most ? most : p;
+}
+
+static constexpr size_t kPart = 256;
+
+static GuidedRows PartOf(const GuidedRows& rows, size_t begin) {
+  GuidedRows part = rows;
+  part.own += begin, part.above += begin;
+  for (auto& g : part.guide) g += begin;
+  if (part.residual != nullptr) part.residual += begin;
+  return part;
 }
 
 static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT z, uint8_t* RESTRICT tokens,
                             int16_t* RESTRICT residual) {
-  constexpr size_t kPart = 256;
   int32_t sums[kPart];
   for (size_t begin = 0; begin < n; begin += kPart) {
     const size_t count = n - begin < kPart ? n - begin : kPart;
-    GuidedRows part = rows;
-    part.own += begin, part.above += begin;
-    for (auto& g : part.guide) g += begin;
-    if (part.residual != nullptr) part.residual += begin;
+    const GuidedRows part = PartOf(rows, begin);
     GuidedSums(part, count, sums);
     const int16_t* RESTRICT own = part.own;
     const int32_t left = part.weights[0];
     uint8_t *RESTRICT zp = z + begin, *RESTRICT tp = tokens + begin;
     int16_t* RESTRICT rp = residual + begin;
     for (size_t x = 0; x < count; ++x) {
-      const int32_t guess = Guess(sums[x] + left * own[x - 1]);
+      const int32_t guess = Guess(sums[x] + left * own[x - 1], 6, 254);
       const int8_t r = static_cast<int8_t>((own[x] >> 6) - guess);
       rp[x] = static_cast<int16_t>(r * 64);
       const uint8_t folded = static_cast<uint8_t>((r << 1) ^ (r >> 7));
@@ -113,10 +121,63 @@ static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT 
   }
 }
 
+static void GuidedResidualsWide(const GuidedRows& rows, size_t n, uint32_t* RESTRICT z, uint8_t* RESTRICT tokens,
+                                int16_t* RESTRICT residual) {
+  int32_t sums[kPart];
+  for (size_t begin = 0; begin < n; begin += kPart) {
+    const size_t count = n - begin < kPart ? n - begin : kPart;
+    const GuidedRows part = PartOf(rows, begin);
+    GuidedSums(part, count, sums);
+    const int16_t* RESTRICT own = part.own;
+    const int32_t left = part.weights[0], most = part.most;
+    const int bits = part.bits;
+    uint32_t* RESTRICT zp = z + begin;
+    uint8_t* RESTRICT tp = tokens + begin;
+    int16_t* RESTRICT rp = residual + begin;
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t r = (own[x] >> bits) - Guess(sums[x] + left * own[x - 1], bits, most);
+      rp[x] = static_cast<int16_t>(r * (1 << bits));
+      zp[x] = static_cast<uint32_t>((r << 1) ^ (r >> 31));
+      const float v = static_cast<float>(static_cast<int32_t>(zp[x] + 8));
+      tp[x] = static_cast<uint8_t>((std::bit_cast<uint32_t>(v) >> 20) - 1040);
+    }
+  }
+}
+
+// A quotient below 1 in 2^-14, of a numerator and a depth code.
+static void Heights(const uint32_t* RESTRICT depth, size_t n, int x0, int y, const HeightModel& model,
+                    int16_t* RESTRICT out) {
+  const uint32_t row = static_cast<uint32_t>(model.b) * static_cast<uint32_t>(y) + static_cast<uint32_t>(model.c);
+  const int32_t low = model.low, scale = model.scale;
+  int32_t at[kPart];
+  for (size_t begin = 0; begin < n; begin += kPart) {
+    const size_t count = n - begin < kPart ? n - begin : kPart;
+    const uint32_t* RESTRICT from = depth + begin;
+    const uint32_t first = row + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0 + static_cast<int>(begin));
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t code = static_cast<int32_t>(from[x] & 0xFFFFFF);
+      const int32_t sum = static_cast<int32_t>(first + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x));
+      int32_t size = sum < 0 ? ~sum : sum;
+      size = size < code ? size : code;
+      const int32_t up = 23 - static_cast<int32_t>((std::bit_cast<uint32_t>(static_cast<float>(code | 1)) >> 23) - 127);
+      const int32_t d = static_cast<int32_t>(static_cast<uint32_t>(code) << up >> 9 | 0x4000);
+      int32_t r = 46260 - (d * 30840 >> 15);
+      r = (r * (32768 - (d * r >> 15))) >> 14;
+      r = (r * (32768 - (d * r >> 15))) >> 14;
+      const uint32_t quotient = (static_cast<uint32_t>(size) << up >> 8) * static_cast<uint32_t>(r) >> 16;
+      const int32_t height = sum < 0 ? -static_cast<int32_t>(quotient) : static_cast<int32_t>(quotient);
+      const int32_t t = (Within16(height - low) * scale) >> 12;
+      at[x] = t < 0 ? 0 : t > 16383 ? 16383 : t;
+    }
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t i = at[x] >> 8, a = model.knots[i], b = model.knots[i + 1];
+      out[begin + x] = static_cast<int16_t>(a + ((b - a) * (at[x] & 255) >> 8));
+    }
+  }
+}
+
 // Slopes of the reciprocal depth at a pixel, and what it would be at the tile's centre, are linear in the surface's
 // normal, whatever the camera (codec.md: "geometry"). 31-bit integers; the quotient by Newton's method.
-static inline int32_t Within16(int32_t v) { return v < -32767 ? -32767 : v > 32767 ? 32767 : v; }
-
 static void Geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
                      int16_t* RESTRICT gx, int16_t* RESTRICT gy) {
   const uint32_t *RESTRICT above = depth[0], *RESTRICT here = depth[1], *RESTRICT below = depth[2];
@@ -128,7 +189,7 @@ static void Geometry(const uint32_t* const depth[3], size_t n, int x0, int y, co
     const int32_t u = Within16(static_cast<int32_t>(here[x + 1] - here[x - 1]) >> slope_shift),
                   v = Within16(static_cast<int32_t>(below[x] - above[x]) >> slope_shift);
     const uint32_t px = static_cast<uint32_t>(x0 + static_cast<int>(x)), py = static_cast<uint32_t>(y);
-    const int32_t height = static_cast<int32_t>((here[x] << 1 >> slope_shift) - px * static_cast<uint32_t>(u) -
+    const int32_t height = static_cast<int32_t>(static_cast<uint32_t>(static_cast<int32_t>(here[x] << 1) >> slope_shift) - px * static_cast<uint32_t>(u) -
                                                 py * static_cast<uint32_t>(v));
     const int32_t h = Within16(height >> height_shift);
     const int32_t mx = a[0][0] * u + a[0][1] * v + a[0][2] * h, my = a[1][0] * u + a[1][1] * v + a[1][2] * h,

@@ -29,7 +29,18 @@ struct GuidedRows {
   const int16_t* guide[3];         ///< the guide's rows above, here, below
   const int16_t* residual;         ///< of another plane's same row, in 64ths; null: none
   int16_t weights[kGuidedTerms];   ///< in 2^-13: L, U, UL, UR; the guide's 3 x 3; the residual
-  int32_t constant;                ///< in 2^-19
+  int32_t constant;                ///< in 2^-13 of the plane's unit
+  int bits = 6;                    ///< of a value's fraction: what 64ths have
+  int32_t most = 254;              ///< the largest value that is predicted
+};
+
+/// Where a plane of room space cuts a pixel's ray: ((a x + b y + c) / depth code - low) * scale, and what a table of
+/// kKnots points makes of it. See codec.md: "height".
+struct HeightModel {
+  static constexpr int kKnots = 65;
+  int32_t a = 0, b = 0, c = 0;
+  int32_t low = 0, scale = 0;
+  int16_t knots[kKnots] = {};
 };
 
 /// A matrix that turns what depth says of a surface into the direction of its normal. See geometry().
@@ -49,11 +60,15 @@ struct Kernels {
   void (*median_residuals)(const uint8_t* above, const uint8_t* row, size_t n, uint8_t* z, uint8_t* tokens);
   /// Residuals of a plane of 64ths by guided prediction, folded mod 256, their tokens; and as 64ths of -128..127.
   void (*guided_residuals)(const GuidedRows& rows, size_t n, uint8_t* z, uint8_t* tokens, int16_t* residual);
-  /// All terms of guided prediction but that of the left neighbour, in 2^-19.
+  /// The same for values that take more than a byte: not mod 256.
+  void (*guided_residuals_wide)(const GuidedRows& rows, size_t n, uint32_t* z, uint8_t* tokens, int16_t* residual);
+  /// All terms of guided prediction but that of the left neighbour, 
   void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums);
   /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.
   void (*geometry)(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,
                    int16_t* gy);
+  /// Indices that heights stand for, in 16ths.
+  void (*heights)(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out);
   /// How much the guide varies around each pixel, as tokens.
   void (*activity)(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
   /// Appends the row's symbols, the last one first, at `out`, which must have room for 6 bytes a symbol and 64 more.

@@ -14,8 +14,8 @@ namespace {
 }  // namespace
 
 const Kernels& plain_kernels() {
-  static constexpr Kernels all{DepthResiduals, DepthRows, Contexts, MedianResiduals, GuidedResiduals, GuidedSums,
-                               Geometry,       Activity,  PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{DepthResiduals, DepthRows, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+                               Geometry, Heights, Activity,  PlainPutSymbols, PlainGetSymbols};
   return all;
 }
 

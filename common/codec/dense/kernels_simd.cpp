@@ -37,8 +37,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 #if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals, DepthRows, Contexts, MedianResiduals, GuidedResiduals, GuidedSums,
-                               Geometry,       Activity,  PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{DepthResiduals, DepthRows, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+                               Geometry, Heights, Activity,  PlainPutSymbols, PlainGetSymbols};
   return &all;
 }
 
@@ -238,8 +238,8 @@ static void DepthRowsVector(const uint32_t* HWY_RESTRICT above, const uint32_t* 
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals, DepthRowsVector, Contexts, MedianResiduals, GuidedResiduals, GuidedSums,
-                               Geometry,       Activity,        PutSymbols, GetSymbols};
+  static constexpr Kernels all{DepthResiduals, DepthRowsVector, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+                               Geometry, Heights, Activity,        PutSymbols, GetSymbols};
   return &all;
 }
 

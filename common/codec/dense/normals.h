@@ -26,6 +26,9 @@ struct NormalPlanes {
   /// Row y from its symbols, into codes of all its pixels.
   void decode_row(const TileShape& shape, size_t y, uint16_t* codes);
 
+  /// What encode() fitted; null: nothing.
+  const GeometryModel* geometry() const { return has_geometry_ ? &geometry_ : nullptr; }
+
   GuidedPlane plane[2];
   Plane<uint8_t> activity;
   std::vector<uint16_t> codes;  ///< of the tile's covered pixels, row by row in all its width
