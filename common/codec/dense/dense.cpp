@@ -69,6 +69,7 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   std::vector<uint8_t> headers;
   writer_.start(PlaneEncoder::kMostBits);
   depth_.encode(shape_, base.depth);
+  writer_.sink.put(depth_.by_planes, 1);
   encoders_[0].prepare(depth_.symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
   depth_.extend(shape_);
@@ -183,6 +184,7 @@ void DenseCoder::store(const T* row, size_t y, std::vector<T>& out, const TileRe
 bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
   begin_part(parts, 0);
   depth_.reset(shape_, base.depth);
+  depth_.begin_decoding(shape_, reader_.source.take(1) != 0);
   if (!decoders_[0].prepare(depth_.symbols, reader_) || !reader_.finished()) return false;
   for (size_t y = 0; y < shape_.height; ++y) {
     if (!decoders_[0].get_row(depth_.symbols, shape_, y, source_) || !depth_.decode_row(shape_, y)) return false;

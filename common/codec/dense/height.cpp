@@ -125,8 +125,8 @@ bool quantise(const Axis& axis, const Curve& curve, const std::vector<HeightSamp
   const double unit = 0.99 / std::max(most, 1e-12);  // quotients lie within 1
   const double limit = static_cast<double>(1 << 26);
   const double terms[3] = {axis.a * unit, axis.b * unit, axis.c * unit};
-  for (const double t : terms)
-    if (!(std::abs(t) * far < limit)) return false;
+  if (!(std::abs(terms[0]) * far < limit && std::abs(terms[1]) * far < limit && std::abs(terms[2]) < limit))
+    return false;
   model.a = static_cast<int32_t>(std::lround(terms[0]));
   model.b = static_cast<int32_t>(std::lround(terms[1]));
   model.c = static_cast<int32_t>(std::lround(terms[2]));

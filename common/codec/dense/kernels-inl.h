@@ -38,6 +38,53 @@ static void DepthRows(const uint32_t* RESTRICT above, const uint32_t* RESTRICT z
   }
 }
 
+// Planes, in the order in which they are tried; deltas to the left neighbour, slopes, and values.
+#define PLANES_OF(c, above2, above, x)                             \
+  const uint32_t up = above[x], corner = above[x - 1];             \
+  const uint32_t by_left[3] = {up - corner, above[x + 1] - up, corner - above[x - 2]}; \
+  const uint32_t by_row[4] = {2 * up - above2[x], up + above[x + 1] - above2[x + 1], up + corner - above2[x - 1], \
+                              2 * above[x + 1] - above2[x + 2]}
+
+static void PlaneResiduals(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above,
+                           const uint32_t* RESTRICT row, size_t n, uint32_t* RESTRICT z, uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    PLANES_OF(c, above2, above, x);
+    const uint32_t left = row[x - 1], v = row[x] + 2;
+    const uint32_t folded = Fold24(row[x] - left - by_left[0]);
+    z[x] = folded;
+    const float f = static_cast<float>(static_cast<int32_t>(folded + 8));
+    uint32_t token = (std::bit_cast<uint32_t>(f) >> 20) - 1040 + kHits;
+    const auto look = [&](uint32_t k, uint32_t plane) {
+      const uint32_t off = (v - plane) & 0xFFFFFF;
+      token = off < 5 ? 5 * k + off : token;
+    };
+    look(7, by_row[3]), look(6, by_row[2]), look(5, by_row[1]), look(4, left + by_left[2]), look(3, by_row[0]);
+    look(2, left + by_left[1]), look(1, 2 * left - row[x - 2]), look(0, left + by_left[0]);
+    tokens[x] = static_cast<uint8_t>(token);
+  }
+}
+
+static void PlaneTerms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above, const uint32_t* RESTRICT z,
+                       const uint8_t* RESTRICT tokens, size_t n, uint32_t* RESTRICT terms,
+                       uint32_t* RESTRICT take_left, uint32_t* RESTRICT take_slope) {
+  for (size_t x = 0; x < n; ++x) {
+    PLANES_OF(c, above2, above, x);
+    const uint32_t token = tokens[x], k = token * 52 >> 8, off = token - 5 * k - 2;
+    const uint32_t missed = (z[x] >> 1) ^ (0 - (z[x] & 1));
+    uint32_t term = by_left[0] + (token < kHits ? off : missed);
+    term = k == 1 ? off : term;
+    term = k == 2 ? by_left[1] + off : term;
+    term = k == 3 ? by_row[0] + off : term;
+    term = k == 4 ? by_left[2] + off : term;
+    term = k == 5 ? by_row[1] + off : term;
+    term = k == 6 ? by_row[2] + off : term;
+    term = k == 7 ? by_row[3] + off : term;
+    terms[x] = term;
+    take_left[x] = (k == 3) | ((k >= 5) & (k < 8)) ? 0 : ~0u;
+    take_slope[x] = k == 1 ? ~0u : 0;
+  }
+}
+
 static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* RESTRICT contexts) {
   const uint8_t *RESTRICT a = rows.above, *RESTRICT b = rows.above2, *RESTRICT o = rows.other;
   const int16_t bias = static_cast<int16_t>(scale.bias);

@@ -21,6 +21,8 @@ struct ContextRows {
   const uint8_t* other;   ///< of the same row of what is already known; null: nothing is
 };
 
+inline constexpr unsigned kHits = 40;  ///< eight planes, five distances: -2 to 2
+
 inline constexpr int kGuidedTerms = 14;  ///< of guided prediction: 4 neighbours, 9 of the guide, 1 of another residual
 
 /// What predicts a row of a plane of 64ths: its own rows, a guide, and residuals that are known.
@@ -54,6 +56,13 @@ struct Kernels {
   void (*depth_residuals)(const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z, uint8_t* tokens);
   /// The inverse: row from z; row[-1] and above[-1] are known. All mod 2^24.
   void (*depth_rows)(const uint32_t* above, const uint32_t* z, size_t n, uint32_t* row);
+  /// The same where surfaces are flat and small: tokens below kHits say in which of eight planes through known pixels
+  /// a pixel lies, and how far off; others are kHits + those of z.
+  void (*plane_residuals)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
+                          uint8_t* tokens);
+  /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]).
+  void (*plane_terms)(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens, size_t n,
+                      uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
   /// Contexts of n tokens.
   void (*contexts)(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
   /// Residuals of bytes by the median predictor, folded, and their tokens.

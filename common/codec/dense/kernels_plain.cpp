@@ -14,7 +14,7 @@ namespace {
 }  // namespace
 
 const Kernels& plain_kernels() {
-  static constexpr Kernels all{DepthResiduals, DepthRows, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+  static constexpr Kernels all{DepthResiduals, DepthRows, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
                                Geometry, Heights, Activity,  PlainPutSymbols, PlainGetSymbols};
   return all;
 }

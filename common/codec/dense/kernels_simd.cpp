@@ -37,7 +37,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 #if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals, DepthRows, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+  static constexpr Kernels all{DepthResiduals, DepthRows, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
                                Geometry, Heights, Activity,  PlainPutSymbols, PlainGetSymbols};
   return &all;
 }
@@ -238,7 +238,7 @@ static void DepthRowsVector(const uint32_t* HWY_RESTRICT above, const uint32_t* 
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals, DepthRowsVector, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+  static constexpr Kernels all{DepthResiduals, DepthRowsVector, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
                                Geometry, Heights, Activity,        PutSymbols, GetSymbols};
   return &all;
 }
