@@ -1,7 +1,7 @@
 #include "common/codec/dense/depth.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
 
 #include "common/image/depth_image.h"
 
@@ -20,9 +20,6 @@ void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
   const uint32_t slope = width > 1 ? row[width - 1] - row[width - 2] : 0;
   row[width] = row[width - 1] + slope, row[width + 1] = row[width] + slope;
 }
-
-// Bits of z beyond its token's first three.
-uint32_t size_of(uint32_t z) { return static_cast<uint32_t>(std::bit_width(z)); }
 
 }  // namespace
 
@@ -55,10 +52,11 @@ void DepthPlane::encode(const TileShape& shape, uint32_t base) {
   }
 }
 
-// Tries every eighth row: whether those that lie in a plane spare more bits than it takes to say in which.
+// Tries every eighth row: which tokens take fewer bits.
 bool DepthPlane::choose_planes(const TileShape& shape) {
   symbols.reset(shape, true, kHits);
-  uint64_t linear = 0, planes = 0;
+  std::array<uint32_t, kSymbols> linear{}, planes{};
+  uint64_t linear_bits = 0, plane_bits = 0;
   for (size_t y = 2; y < shape.height; y += 8) {
     const auto r = static_cast<ptrdiff_t>(y);
     const uint32_t* const z = symbols.wide.row(r);
@@ -67,12 +65,12 @@ bool DepthPlane::choose_planes(const TileShape& shape) {
                               symbols.tokens.row(r));
     for (size_t x = 0; x < shape.width; ++x) {
       if (!shape.at(x, y)) continue;
-      const uint32_t size = 2 * size_of(z[x]);
-      linear += size;
-      planes += tokens[x] < kHits ? 4 + tokens[x] / 5 : 6 + size;
+      const uint32_t token = token_of(z[x]);
+      ++linear[token], linear_bits += token >> 3;
+      ++planes[tokens[x]], plane_bits += tokens[x] < kHits ? 0 : token >> 3;
     }
   }
-  return planes < linear;
+  return static_cast<double>(plane_bits) + bits_of(planes, kSymbols) < static_cast<double>(linear_bits) + bits_of(linear, kSymbols);
 }
 
 void DepthPlane::begin_decoding(const TileShape& shape, bool planes) {

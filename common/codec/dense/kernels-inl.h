@@ -88,11 +88,11 @@ static void PlaneTerms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT
 static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* RESTRICT contexts) {
   const uint8_t *RESTRICT a = rows.above, *RESTRICT b = rows.above2, *RESTRICT o = rows.other;
   const int16_t bias = static_cast<int16_t>(scale.bias);
-  const int shift = scale.shift;
+  const int shift = scale.shift, merges = scale.merges;
   const auto one = [&](int sum) {
     int16_t c = static_cast<int16_t>(static_cast<int16_t>(sum - bias) >> shift);
     c = c < 0 ? int16_t{0} : c;
-    return static_cast<uint8_t>(c > 15 ? int16_t{15} : c);
+    return static_cast<uint8_t>((c > 15 ? int16_t{15} : c) >> merges);
   };
   if (o == nullptr)
     for (size_t x = 0; x < n; ++x)

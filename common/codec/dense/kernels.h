@@ -9,9 +9,9 @@
 
 namespace telesplat::codec::detail {
 
-/// How a sum of tokens becomes one of kContexts classes: clamp((sum - bias) >> shift). See contexts().
+/// How a sum of tokens becomes one of kContexts classes: clamp((sum - bias) >> shift) >> merges. See contexts().
 struct ContextScale {
-  int bias = 0, shift = 0;
+  int bias = 0, shift = 0, merges = 0;
 };
 
 /// Rows of tokens around those whose contexts are wanted. Each may be read one element beyond both ends.

@@ -10,7 +10,8 @@ constexpr unsigned kBiasBits = 13, kShiftBits = 4;
 
 ContextRows rows_around(const SymbolPlane& plane, size_t y) {
   const auto row = static_cast<ptrdiff_t>(y);
-  return {plane.tokens.row(row - 1), plane.tokens.row(row - 2), plane.other != nullptr ? plane.other->row(row) : nullptr};
+  const Plane<uint8_t>& sizes = plane.first != 0 ? plane.sizes : plane.tokens;
+  return {sizes.row(row - 1), sizes.row(row - 2), plane.other != nullptr ? plane.other->row(row) : nullptr};
 }
 
 }  // namespace
@@ -39,6 +40,9 @@ void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_nu
   else
     narrow.reset(shape.width, shape.height);
   tokens.fill_row(-1, 0), tokens.fill_row(-2, 0);
+  if (first == 0) return;
+  sizes.reset(shape.width, shape.height);
+  sizes.fill_row(-1, 0), sizes.fill_row(-2, 0);
 }
 
 SymbolRow SymbolPlane::row(const TileShape& shape, size_t y) const {
@@ -52,6 +56,13 @@ void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
   const uint8_t* const above = plane.tokens.row(static_cast<ptrdiff_t>(y) - 1);
   shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
   row[-1] = row[0], row[shape.width] = row[shape.width - 1];
+  if (plane.first == 0) return;
+  uint8_t* const sizes = plane.sizes.row(static_cast<ptrdiff_t>(y)) - 1;
+  static const int VA = getenv("VA") ? atoi(getenv("VA")) : 4, VB = getenv("VB") ? atoi(getenv("VB")) : 3;
+  for (size_t i = 0; i < shape.width + 2; ++i) {
+    const int t = row[static_cast<ptrdiff_t>(i) - 1];
+    sizes[i] = static_cast<uint8_t>(t < 40 ? t / 5 * VA + (VA>4? t%5!=2:0) : 8*VA + (t - 40 >> VB));
+  }
 }
 
 // The finest classes that nearly all sums fit into.
@@ -89,9 +100,16 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
     for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
                  [&](size_t x) { ++counts_[contexts[x]][tokens[x]]; });
   }
+  plane.scale.merges = merge_contexts(counts_, plane.alphabet);
+  if (plane.scale.merges != 0)
+    for (size_t y = 0; y < shape.height; ++y) {
+      uint8_t* const contexts = plane.contexts.row(static_cast<ptrdiff_t>(y));
+      for (size_t x = 0; x < shape.width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> plane.scale.merges);
+    }
   choose_levels(counts_, plane.alphabet, levels_);
   bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);
   bits.put(static_cast<uint64_t>(plane.scale.shift), kShiftBits);
+  bits.put(static_cast<uint64_t>(plane.scale.merges), 3);
   put_levels(bits, levels_);
   make_encode_tables(levels_, tables_);
 }
@@ -121,8 +139,9 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
 bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
   plane.scale.bias = static_cast<int>(bits.source.take(kBiasBits));
   plane.scale.shift = static_cast<int>(bits.source.take(kShiftBits));
+  plane.scale.merges = static_cast<int>(bits.source.take(3));
   levels_.alphabet = plane.alphabet;
-  if (bits.overrun() || plane.scale.shift > 14 || !get_levels(bits, levels_)) return false;
+  if (bits.overrun() || plane.scale.shift > 14 || plane.scale.merges > 4 || !get_levels(bits, levels_)) return false;
   make_decode_tables(levels_, tables_);
   return true;
 }

@@ -68,22 +68,87 @@ bool for_each_level(TokenLevels& levels, Code code) {
   return true;
 }
 
+// The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
+int choose_level(uint32_t count, uint64_t total, int expected, bool last) {
+  const auto rate = [&](int level) { return 1.5f * static_cast<float>(std::min(std::abs(level - expected), 6)); };
+  const float n = static_cast<float>(count);
+  int best = 0, ideal = 0;
+  float least = 1e30f;
+  if (count != 0) {
+    const uint64_t share = uint64_t{count} * kFrequencyOne * 256 / total;  // of a frequency, in 256ths
+    ideal = static_cast<int>(level_of(share < 256 ? 0 : static_cast<uint32_t>(share - 256)));
+    const int low = std::max(1, std::min(ideal, expected)), high = std::max({1, ideal, expected});
+    for (int level = low; level <= high; ++level) {
+      const float off = static_cast<float>(level - ideal), cost = 0.0216f * n * off * off + rate(level);
+      if (cost < least) least = cost, best = level;
+    }
+    return best;
+  }
+  for (int level = last ? 1 : 0; level <= std::min(expected, 12); ++level) {
+    const float weight = level == 0 ? 0 : 1 + static_cast<float>(weight_of(static_cast<unsigned>(level))) / 256;
+    const float cost = weight * static_cast<float>(total) * (1.44f / kFrequencyOne) + rate(level);
+    if (cost < least) least = cost, best = level;
+  }
+  return best;
+}
+
+constexpr double kTokenCost = 3;  // bits of a level
+
+double log2_of(uint32_t n) {
+  static const auto table = [] {
+    std::array<float, 4096> out{};
+    for (uint32_t i = 1; i < out.size(); ++i) out[i] = static_cast<float>(std::log2(static_cast<double>(i)));
+    return out;
+  }();
+  const int shift = std::max(0, static_cast<int>(std::bit_width(n)) - 12);
+  return static_cast<double>(table[n >> shift]) + shift;
+}
+
 }  // namespace
+
+double bits_of(const std::array<uint32_t, kSymbols>& counts, unsigned alphabet) {
+  double sum = 0;
+  uint32_t total = 0, present = 0;
+  for (unsigned t = 0; t < alphabet; ++t)
+    if (const uint32_t n = counts[t]; n != 0) total += n, ++present, sum -= n * log2_of(n);
+  return total == 0 ? 0 : sum + total * log2_of(total) + kTokenCost * present;
+}
+
+int merge_contexts(TokenCounts& counts, unsigned alphabet) {
+  double best = 0;
+  for (const auto& c : counts) best += bits_of(c, alphabet);
+  TokenCounts merged = counts;
+  int merges = 0;
+  for (int tried = 1; tried <= 4; ++tried) {
+    double bits = 0;
+    for (size_t c = 0; c < kContexts >> tried; ++c) {
+      for (unsigned t = 0; t < alphabet; ++t) merged[c][t] = merged[2 * c][t] + merged[2 * c + 1][t];
+      bits += bits_of(merged[c], alphabet);
+    }
+    for (size_t c = kContexts >> tried; c < kContexts; ++c) merged[c].fill(0);
+    if (bits < best) best = bits, merges = tried, counts = merged;
+  }
+  return merges;
+}
 
 void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& levels) {
   levels.alphabet = alphabet;
+  const std::array<uint8_t, kSymbols>* before = nullptr;
   for (size_t c = 0; c < kContexts; ++c) {
+    auto& of = levels.of[c];
+    of.fill(0);
     uint64_t total = 0;
-    uint32_t present = 0;
-    for (unsigned t = 0; t < alphabet; ++t) total += counts[c][t], present += counts[c][t] != 0;
-    levels.of[c].fill(0);
+    unsigned present = 0, end = 0;
+    for (unsigned t = 0; t < alphabet; ++t)
+      if (counts[c][t] != 0) total += counts[c][t], ++present, end = t + 1;
     if (total == 0) continue;
-    for (unsigned t = 0; t < alphabet; ++t) {
-      if (counts[c][t] == 0) continue;
-      const uint64_t share = uint64_t{counts[c][t]} * kFrequencyOne * 256 / total;  // of a frequency, in 256ths
-      levels.of[c][t] = static_cast<uint8_t>(level_of(share < 256 ? 0 : static_cast<uint32_t>(share - 256)));
+    Expected expected{before};
+    for (unsigned t = 0; t < end; ++t) {
+      of[t] = static_cast<uint8_t>(present == 1 ? (counts[c][t] != 0 ? 2 : 0)
+                                                : choose_level(counts[c][t], total, expected(t), t + 1 == end));
+      expected.next(of[t]);
     }
-    if (present == 1) std::replace_if(levels.of[c].begin(), levels.of[c].end(), [](uint8_t l) { return l != 0; }, 2);
+    before = &of;
   }
 }
 

@@ -24,7 +24,13 @@ struct TokenLevels {
 /// How often each token came.
 using TokenCounts = std::array<std::array<uint32_t, kSymbols>, kContexts>;
 
-/// The levels that suit `counts` best.
+/// Bits that tokens take at best which come that often, and roughly what their table takes.
+double bits_of(const std::array<uint32_t, kSymbols>& counts, unsigned alphabet);
+/// How many times neighbouring contexts should share tables: adds their counts up, so that 16 >> merges contexts are
+/// left.
+int merge_contexts(TokenCounts& counts, unsigned alphabet);
+
+/// The levels that suit `counts` best, what it takes to send them included.
 void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& levels);
 
 /// Appends levels; at most kMostLevelBits follow.
