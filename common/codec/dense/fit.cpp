@@ -201,56 +201,93 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   return quantise(m, shifted, model);
 }
 
-void fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
-                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
-  constexpr int kTerms = 16;  // 13 differences from the guide at the pixel, the residual, 1, and what is wanted
+namespace {
+
+constexpr int kTerms = 16;  // 13 differences from the guide at the pixel, the residual, 1, and what is wanted
+constexpr int kUnknown = 14, kWanted = 14;
+
+struct alignas(64) Features {
+  float of[kTerms];
+};
+
+Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, const Plane<int16_t>* residual, int x,
+                     int y) {
+  const int16_t *row = own.row(y) + x, *up = own.row(y - 1) + x;
+  const int16_t *g0 = guide.row(y - 1) + x, *g1 = guide.row(y) + x, *g2 = guide.row(y + 1) + x;
+  const int c = g1[0];
+  const int raw[kTerms] = {row[-1] - c, up[0] - c, up[-1] - c, up[1] - c, g0[-1] - c, g0[0] - c,
+                           g0[1] - c,   g1[-1] - c, g1[1] - c, g2[-1] - c, g2[0] - c, g2[1] - c,
+                           residual != nullptr ? residual->row(y)[x] : 0, 64, row[0] - c, 0};
+  Features out;
+  for (int i = 0; i < kTerms; ++i) out.of[i] = static_cast<float>(raw[i]);
+  return out;
+}
+
+// Weighted least squares; false where the system is singular.
+bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, double solution[kUnknown]) {
   alignas(64) float sums[kTerms][kTerms] = {};
-  for (const auto p : samples.places) {
-    const int16_t *row = own.row(p.y), *up = own.row(p.y - 1);
-    const int16_t *g0 = guide.row(p.y - 1), *g1 = guide.row(p.y), *g2 = guide.row(p.y + 1);
-    const int x = p.x, c = g1[x];
-    const int near = std::abs(row[x] - row[x - 1]) + std::abs(row[x] - up[x]) + std::abs(row[x] - c) / 4;
-    const float weight = 1.0f / (64.0f + static_cast<float>(near));
-    const int raw[kTerms] = {row[x - 1] - c, up[x] - c,     up[x - 1] - c, up[x + 1] - c, g0[x - 1] - c, g0[x] - c,
-                             g0[x + 1] - c,  g1[x - 1] - c, g1[x + 1] - c, g2[x - 1] - c, g2[x] - c,     g2[x + 1] - c,
-                             residual != nullptr ? residual->row(p.y)[x] : 0, 64, row[x] - c, 0};
+  for (size_t s = 0; s < all.size(); ++s) {
     alignas(64) float f[kTerms];
-    for (int i = 0; i < kTerms; ++i) f[i] = static_cast<float>(raw[i]) * weight;
+    for (int i = 0; i < kTerms; ++i) f[i] = all[s].of[i] * weights[s];
     for (int i = 0; i < kTerms; ++i)
-      for (int j = 0; j < kTerms; ++j) sums[i][j] += f[i] * f[j];
+      for (int j = 0; j < kTerms; ++j) sums[i][j] += f[i] * all[s].of[j];
   }
-  constexpr int kUnknown = 14, kWanted = 14;
   Cholesky<kUnknown> system{};
-  double trace = 0, solution[kUnknown];
+  double trace = 0;
   for (int i = 0; i < kUnknown; ++i) trace += static_cast<double>(sums[i][i]);
   for (int i = 0; i < kUnknown; ++i) {
     for (int j = 0; j < kUnknown; ++j) system.a[i][j] = static_cast<double>(sums[i][j]);
-    system.a[i][i] += trace * 1e-5 + 1e-3;
+    system.a[i][i] += trace * 1e-6 + 1e-9;
     solution[i] = static_cast<double>(sums[i][kWanted]);
+  }
+  if (!system.factor()) return false;
+  system.solve(solution);
+  return true;
+}
+
+// The differences' weights as those of the values themselves; false where they are too large.
+bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTerms], int32_t& constant) {
+  static constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, 13};
+  int total = 0, sum = 0;
+  for (int i = 0; i < 13; ++i) {
+    if (!(std::abs(solution[i]) < 3.9)) return false;
+    weights[kPlaces[i]] = static_cast<int16_t>(std::lround(solution[i] * 8192));
+    total += std::abs(weights[kPlaces[i]]);
+    if (i < 12) sum += weights[kPlaces[i]];
+  }
+  if (total + std::abs(8192 - sum) > kMostWeight || std::abs(8192 - sum) > 32767) return false;
+  weights[8] = static_cast<int16_t>(8192 - sum);
+  constant = static_cast<int32_t>(std::lround(std::clamp(solution[13], -3.0, 3.0) * 64 * 8192));
+  return true;
+}
+
+}  // namespace
+
+void fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
+                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
+  std::vector<Features> all;
+  std::vector<float> shares;
+  for (const auto p : samples.places) {
+    all.push_back(features_at(own, guide, residual, p.x, p.y));
+    const float* const f = all.back().of;
+    const float off = std::min(std::abs(f[kWanted] - f[0]), std::abs(f[kWanted] - f[1])) + std::abs(f[kWanted]) / 2;
+    shares.push_back(1 / (256 + off));
+  }
+  double solution[kUnknown];
+  bool solved = all.size() >= 64 && solve_weighted(all, shares, solution);
+  for (int round = 0; solved && round < 2; ++round) {  // towards the median
+    for (size_t s = 0; s < all.size(); ++s) {
+      float off = -all[s].of[kWanted];
+      for (int i = 0; i < kUnknown; ++i) off += static_cast<float>(solution[i]) * all[s].of[i];
+      shares[s] = 1 / (24 + std::abs(off));
+    }
+    solved = solve_weighted(all, shares, solution);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   constant = 0;
-  const bool solved = samples.places.size() >= 64 && system.factor();
-  int total = 0, sum = 0;
-  if (solved) {
-    system.solve(solution);
-    static constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, 13};
-    for (int i = 0; i < 13; ++i) {
-      const double w = std::clamp(solution[i], -3.9, 3.9) * 8192;
-      weights[kPlaces[i]] = static_cast<int16_t>(std::lround(w));
-      total += std::abs(weights[kPlaces[i]]);
-      if (i < 12) sum += weights[kPlaces[i]];
-    }
-    constant = static_cast<int32_t>(std::lround(std::clamp(solution[13], -3.0, 3.0) * 64 * 8192));
-    total += std::abs(8192 - sum);
-  }
-  if (!solved || total > 100000 || std::abs(8192 - sum) > 32000) {
-    std::fill_n(weights, kGuidedTerms, int16_t{0});
-    weights[0] = weights[1] = 4096;
-    constant = 0;
-    return;
-  }
-  weights[8] = static_cast<int16_t>(8192 - sum);
+  if (solved && quantise_weights(solution, weights, constant)) return;
+  std::fill_n(weights, kGuidedTerms, int16_t{0});
+  weights[0] = weights[1] = 4096;
 }
 
 }  // namespace telesplat::codec::detail

@@ -107,7 +107,7 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth) {
 }
 
 void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, BitSink& bits) {
-  samples.choose(shape, 1100);
+  samples.choose(shape, std::min<size_t>(1100, shape.total / 16));
   pole_ = choose_pole(shape);
   const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, false);
   for (size_t y = 0; y < shape.height; ++y) {

@@ -58,10 +58,9 @@ void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
   row[-1] = row[0], row[shape.width] = row[shape.width - 1];
   if (plane.first == 0) return;
   uint8_t* const sizes = plane.sizes.row(static_cast<ptrdiff_t>(y)) - 1;
-  static const int VA = getenv("VA") ? atoi(getenv("VA")) : 4, VB = getenv("VB") ? atoi(getenv("VB")) : 3;
   for (size_t i = 0; i < shape.width + 2; ++i) {
-    const int t = row[static_cast<ptrdiff_t>(i) - 1];
-    sizes[i] = static_cast<uint8_t>(t < 40 ? t / 5 * VA + (VA>4? t%5!=2:0) : 8*VA + (t - 40 >> VB));
+    const unsigned t = row[static_cast<ptrdiff_t>(i) - 1];
+    sizes[i] = static_cast<uint8_t>(t < kHits ? t / 5 * 4 : 32 + ((t - kHits) >> 3));
   }
 }
 
