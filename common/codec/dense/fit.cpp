@@ -188,7 +188,7 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   const std::vector<double> even = weights;
   Vector9 m;
   if (!best_matrix(slopes, weights, m)) return false;
-  for (int round = 0; round < 2; ++round) {  // once more, without those that disagree
+  for (int round = 0; round < (getenv("RN")?atoi(getenv("RN")):2); ++round) {  // once more, without those that disagree
     if (agreement(slopes, m, dots) < 0)
       for (double& e : m) e = -e;
     agreement(slopes, m, dots);
@@ -203,10 +203,11 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
 
 namespace {
 
-constexpr int kTerms = 16;  // 13 differences from the guide at the pixel, the residual, 1, and what is wanted
+constexpr int kTerms = kFeatures;  // 13 differences from the guide at the pixel, the residual, 1, and what is wanted
 constexpr int kUnknown = 14, kWanted = 14;
+constexpr int kRounds = 3;
 
-struct alignas(64) Features {
+struct Features {
   float of[kTerms];
 };
 
@@ -225,13 +226,8 @@ Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, con
 
 // Weighted least squares; false where the system is singular.
 bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, double solution[kUnknown]) {
-  alignas(64) float sums[kTerms][kTerms] = {};
-  for (size_t s = 0; s < all.size(); ++s) {
-    alignas(64) float f[kTerms];
-    for (int i = 0; i < kTerms; ++i) f[i] = all[s].of[i] * weights[s];
-    for (int i = 0; i < kTerms; ++i)
-      for (int j = 0; j < kTerms; ++j) sums[i][j] += f[i] * all[s].of[j];
-  }
+  alignas(64) float sums[kTerms][kTerms];
+  kernels().normal_equations(&all[0].of, weights.data(), all.size(), sums);
   Cholesky<kUnknown> system{};
   double trace = 0;
   for (int i = 0; i < kUnknown; ++i) trace += static_cast<double>(sums[i][i]);
@@ -270,16 +266,17 @@ void fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
   for (const auto p : samples.places) {
     all.push_back(features_at(own, guide, residual, p.x, p.y));
     const float* const f = all.back().of;
-    const float off = std::min(std::abs(f[kWanted] - f[0]), std::abs(f[kWanted] - f[1])) + std::abs(f[kWanted]) / 2;
-    shares.push_back(1 / (256 + off));
+    const float near = 64 + std::abs(f[kWanted] - f[0]) + std::abs(f[kWanted] - f[1]) + std::abs(f[kWanted]) / 4;
+    shares.push_back(1 / (near * near));
   }
   double solution[kUnknown];
   bool solved = all.size() >= 64 && solve_weighted(all, shares, solution);
-  for (int round = 0; solved && round < 2; ++round) {  // towards the median
+  for (int round = 0; solved && round < kRounds; ++round) {  // towards the median, at last beyond it
     for (size_t s = 0; s < all.size(); ++s) {
       float off = -all[s].of[kWanted];
       for (int i = 0; i < kUnknown; ++i) off += static_cast<float>(solution[i]) * all[s].of[i];
-      shares[s] = 1 / (24 + std::abs(off));
+      const float size = (round + 1 < kRounds ? 24 : 64) + std::abs(off);
+      shares[s] = 1 / (round + 1 < kRounds ? size : size * size);
     }
     solved = solve_weighted(all, shares, solution);
   }

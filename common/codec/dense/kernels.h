@@ -23,6 +23,7 @@ struct ContextRows {
 
 inline constexpr unsigned kHits = 40;  ///< eight planes, five distances: -2 to 2
 
+inline constexpr int kFeatures = 16;     ///< of what least squares sum up
 inline constexpr int kGuidedTerms = 14;  ///< of guided prediction: 4 neighbours, 9 of the guide, 1 of another residual
 
 /// What predicts a row of a plane of 64ths: its own rows, a guide, and residuals that are known.
@@ -80,6 +81,9 @@ struct Kernels {
   void (*heights)(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out);
   /// How much the guide varies around each pixel, as tokens.
   void (*activity)(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
+  /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order.
+  void (*normal_equations)(const float (*features)[kFeatures], const float* weights, size_t n,
+                           float (*sums)[kFeatures]);
   /// Appends the row's symbols, the last one first, at `out`, which must have room for 6 bytes a symbol and 64 more.
   uint8_t* (*put_symbols)(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out);
   /// Takes symbols from the bytes [begin, end), the last ones first; returns what is left of them, or null where

@@ -15,7 +15,7 @@ namespace {
 
 const Kernels& plain_kernels() {
   static constexpr Kernels all{DepthResiduals, DepthRows, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry, Heights, Activity,  PlainPutSymbols, PlainGetSymbols};
+                               Geometry, Heights, Activity, NormalEquations,  PlainPutSymbols, PlainGetSymbols};
   return all;
 }
 

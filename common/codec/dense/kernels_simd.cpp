@@ -38,7 +38,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 static const Kernels* Set() {
   static constexpr Kernels all{DepthResiduals, DepthRows, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry, Heights, Activity,  PlainPutSymbols, PlainGetSymbols};
+                               Geometry, Heights, Activity, NormalEquations,  PlainPutSymbols, PlainGetSymbols};
   return &all;
 }
 
@@ -239,7 +239,7 @@ static void DepthRowsVector(const uint32_t* HWY_RESTRICT above, const uint32_t* 
 
 static const Kernels* Set() {
   static constexpr Kernels all{DepthResiduals, DepthRowsVector, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry, Heights, Activity,        PutSymbols, GetSymbols};
+                               Geometry, Heights, Activity, NormalEquations,        PutSymbols, GetSymbols};
   return &all;
 }
 
