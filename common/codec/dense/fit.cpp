@@ -232,9 +232,9 @@ bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& 
   double trace = 0;
   for (int i = 0; i < kUnknown; ++i) trace += static_cast<double>(sums[i][i]);
   for (int i = 0; i < kUnknown; ++i) {
-    for (int j = 0; j < kUnknown; ++j) system.a[i][j] = static_cast<double>(sums[i][j]);
+    for (int j = 0; j < kUnknown; ++j) system.a[i][j] = static_cast<double>(sums[std::max(i, j)][std::min(i, j)]);
     system.a[i][i] += trace * 1e-6 + 1e-9;
-    solution[i] = static_cast<double>(sums[i][kWanted]);
+    solution[i] = static_cast<double>(sums[kWanted][i]);
   }
   if (!system.factor()) return false;
   system.solve(solution);

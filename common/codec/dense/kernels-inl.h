@@ -269,17 +269,3 @@ static void Activity(const int16_t* const gx[3], const int16_t* const gy[3], siz
     tokens[x] = static_cast<uint8_t>((std::bit_cast<uint32_t>(v) >> 20) - 1040);
   }
 }
-
-static void NormalEquations(const float (*features)[kFeatures], const float* RESTRICT weights, size_t n,
-                            float (*RESTRICT sums)[kFeatures]) {
-  for (int i = 0; i < kFeatures; ++i)
-    for (int j = 0; j < kFeatures; ++j) sums[i][j] = 0;
-  for (size_t s = 0; s < n; ++s) {
-    const float* const f = features[s];
-    for (int i = 0; i < kFeatures; ++i) {
-      const float w = f[i] * weights[s];
-      float* RESTRICT row = sums[i];
-      for (int j = 0; j < kFeatures; ++j) row[j] += w * f[j];
-    }
-  }
-}

@@ -11,6 +11,16 @@ namespace {
 #include "common/codec/dense/kernels-inl.h"
 #include "common/codec/dense/rans-inl.h"
 
+static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
+                            float (*sums)[kFeatures]) {
+  for (int i = 0; i < kFeatures; ++i)
+    for (int j = 0; j <= i; ++j) {
+      float sum = 0;
+      for (size_t s = 0; s < n; ++s) sum += features[s][i] * weights[s] * features[s][j];
+      sums[i][j] = sum;
+    }
+}
+
 }  // namespace
 
 const Kernels& plain_kernels() {

@@ -16,6 +16,16 @@ struct Ranks {
   }
 };
 inline constexpr Ranks kRanks;
+/// Places of the bits that are set in a byte.
+struct Places {
+  alignas(32) int32_t of[256][8] = {};
+  constexpr Places() {
+    for (int bits = 0; bits < 256; ++bits)
+      for (int i = 0, n = 0; i < 8; ++i)
+        if (bits >> i & 1) of[bits][n++] = i;
+  }
+};
+inline constexpr Places kPlaces;
 }  // namespace telesplat::codec::detail
 #endif
 
@@ -36,6 +46,16 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
 
+static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
+                            float (*sums)[kFeatures]) {
+  for (int i = 0; i < kFeatures; ++i)
+    for (int j = 0; j <= i; ++j) {
+      float sum = 0;
+      for (size_t s = 0; s < n; ++s) sum += features[s][i] * weights[s] * features[s][j];
+      sums[i][j] = sum;
+    }
+}
+
 static const Kernels* Set() {
   static constexpr Kernels all{DepthResiduals, DepthRows, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
                                Geometry, Heights, Activity, NormalEquations,  PlainPutSymbols, PlainGetSymbols};
@@ -52,9 +72,20 @@ constexpr size_t kN = hn::MaxLanes(D()), kVectors = kLanes / kN;
 constexpr hn::Rebind<uint16_t, D> kD16;
 constexpr hn::Rebind<uint8_t, D> kD8;
 
+// The elements of v where `from` is set, in order, first. (Highway 1.0.3 copies its tables to the stack each time.)
+HWY_INLINE V Gathered(V v, M from) {
+#if HWY_TARGET <= HWY_AVX3
+  return V{_mm512_maskz_compress_epi32(from.raw, v.raw)};
+#else
+  uint8_t bits[8] = {};
+  hn::StoreMaskBits(kD, from, bits);
+  return hn::TableLookupLanes(v, hn::SetTableIndices(kD, kPlaces.of[bits[0]]));
+#endif
+}
+
 // Writes the lower halves of the states that `full` names, and shifts them out.
 HWY_INLINE V Spill(V x, M full, uint8_t*& out) {
-  const auto words = hn::TruncateTo(kD16, hn::Compress(hn::And(x, hn::Set(kD, 0xFFFFu)), full));
+  const auto words = hn::TruncateTo(kD16, Gathered(hn::And(x, hn::Set(kD, 0xFFFFu)), full));
   hn::StoreU(words, kD16, reinterpret_cast<uint16_t*>(out));
   out += 2 * hn::CountTrue(kD, full);
   return hn::IfThenElse(full, hn::ShiftRight<16>(x), x);
@@ -235,6 +266,25 @@ static void DepthRowsVector(const uint32_t* HWY_RESTRICT above, const uint32_t* 
     before = hn::Broadcast<3>(sum);
     hn::StoreU(hn::And(hn::Add(hn::LoadU(d, above + x), sum), most), d, row + x);
   }
+}
+
+// Eight rows by one vector at a time, which fit into registers.
+static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
+                            float (*sums)[kFeatures]) {
+  const hn::CappedTag<float, 8> d;
+  for (int i = 0; i < kFeatures; i += 8)
+    for (int j = 0; j <= i + 7; j += static_cast<int>(hn::Lanes(d))) {
+      auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
+      for (size_t s = 0; s < n; ++s) {
+        const float *const f = features[s] + i, w = weights[s];
+        const auto v = hn::LoadU(d, features[s] + j);
+        const auto add = [&](auto& sum, int k) HWY_ATTR { sum = hn::Add(sum, hn::Mul(hn::Set(d, f[k] * w), v)); };
+        add(s0, 0), add(s1, 1), add(s2, 2), add(s3, 3), add(s4, 4), add(s5, 5), add(s6, 6), add(s7, 7);
+      }
+      hn::StoreU(s0, d, sums[i] + j), hn::StoreU(s1, d, sums[i + 1] + j), hn::StoreU(s2, d, sums[i + 2] + j);
+      hn::StoreU(s3, d, sums[i + 3] + j), hn::StoreU(s4, d, sums[i + 4] + j), hn::StoreU(s5, d, sums[i + 5] + j);
+      hn::StoreU(s6, d, sums[i + 6] + j), hn::StoreU(s7, d, sums[i + 7] + j);
+    }
 }
 
 static const Kernels* Set() {
