@@ -7,14 +7,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-enum Kind : uint8_t {
-  kEmpty = 0,
-  kDense = 1,
-  kSparse = 2,
-  kPredictorBits = 3,
-  kMasked = 4,
-  kKnownBits = 7
-};
+enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kKnownBits = 7 };
 
 TileScratch& scratch() {
   static thread_local TileScratch s;

@@ -142,17 +142,17 @@ void ColourPlanes::sort_palette(const TileShape& shape, const std::vector<uint32
 }
 
 void ColourPlanes::begin_index(const TileShape& shape, const DepthPlane& depth) {
-    const int last = static_cast<int>(palette_.size()) - 1;
-    index.reset(shape, 4, last);
-    for (size_t y = 0; y < shape.height; ++y) {
-      const auto r = static_cast<ptrdiff_t>(y);
-      if (has_height_)
-        kernels().heights(depth.depth.row(r), shape.width, -static_cast<int>(shape.width / 2),
-                          static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r));
-      else
-        std::fill_n(index.guide.row(r), shape.width, static_cast<int16_t>(last * 8));
-    }
-    index.begin(shape);
+  const int last = static_cast<int>(palette_.size()) - 1;
+  index.reset(shape, 4, last);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    if (has_height_)
+      kernels().heights(depth.depth.row(r), shape.width, -static_cast<int>(shape.width / 2),
+                        static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r));
+    else
+      std::fill_n(index.guide.row(r), shape.width, static_cast<int16_t>(last * 8));
+  }
+  index.begin(shape);
 }
 
 void ColourPlanes::begin_channels(const TileShape& shape) {
@@ -283,7 +283,7 @@ bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colour
     }
   }
   const uint8_t *const g = channel[0].values.row(r), *const red = channel[1].values.row(r),
-                      *const blue = channel[2].values.row(r);
+                       *const blue = channel[2].values.row(r);
   const uint32_t add = mode == kDifferences ? 0xFF : 0;
   for (size_t x = 0; x < shape.width; ++x)
     colours[x] = ((red[x] + (g[x] & add)) & 255) << 16 | uint32_t{g[x]} << 8 | ((blue[x] + (g[x] & add)) & 255);

@@ -6,7 +6,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr int kNarrow = 16;  // pixels: tiles that are not as wide are coded as one row
+constexpr int kNarrow = 16;          // pixels: tiles that are not as wide are coded as one row
 constexpr size_t kUnchecked = 1024;  // bits of a header between two looks at its end
 
 // A header's bits as a block of their own.
@@ -75,15 +75,14 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   depth_.extend(shape_);
 
   writer_.start(NormalPlanes::kMostBits + 2 * PlaneEncoder::kMostBits);
-  normals_.encode(shape_, depth_, writer_.sink);
+  normals_.encode(shape_, depth_, base.normal, writer_.sink);
   for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
 
   colours_.encode(shape_, colour_rows_, base.colour, depth_, normals_.geometry());
   writer_.start(colours_.most_header_bits() + 3 * PlaneEncoder::kMostBits);
   colours_.put_header(writer_.sink);
-  for (size_t i = 0; i < colours_.planes(); ++i)
-    encoders_[3 + i].prepare(colours_.symbols(i), shape_, writer_.sink);
+  for (size_t i = 0; i < colours_.planes(); ++i) encoders_[3 + i].prepare(colours_.symbols(i), shape_, writer_.sink);
   put_bits(headers, writer_);
   out.push_back(colours_.mode);
   out.insert(out.end(), headers.begin(), headers.end());
@@ -154,7 +153,7 @@ bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect,
   for (const uint32_t x : source_.states)
     if (x < kStateLow || x >= kStateLow << 16) return false;
   source_.end = parts->words.data() + parts->words.size();
-  if (!get_depth(*parts, image, rect, base) || !get_normals(*parts, image, rect) ||
+  if (!get_depth(*parts, image, rect, base) || !get_normals(*parts, image, rect, base) ||
       !get_colours(*parts, image, rect, base))
     return false;
   return std::all_of(source_.states, source_.states + kLanes, [](uint32_t x) { return x == kStateLow; });
@@ -194,10 +193,10 @@ bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const T
   return source_.end == source_.begin;
 }
 
-bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect) {
+bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
   begin_part(parts, 1);
   normals_.reset(shape_);
-  if (!normals_.decode_header(shape_, depth_, reader_)) return false;
+  if (!normals_.decode_header(shape_, depth_, base.normal, reader_)) return false;
   for (size_t i = 0; i < 2; ++i)
     if (!decoders_[1 + i].prepare(normals_.plane[i].symbols, reader_)) return false;
   if (!reader_.finished()) return false;
@@ -230,11 +229,13 @@ bool DenseCoder::get_colours(const Parts& parts, image::DepthImage& image, const
 }
 
 bool DenseCoder::skip(Reader& in, StreamInfo& info) {
+  const size_t before = in.left();
   const auto parts = get_parts(in);
   if (!parts) return false;
-  size_t* const totals[kPartCount] = {&info.depth_bytes, &info.normal_bytes, &info.colour_bytes};
-  for (size_t i = 0; i < kPartCount; ++i) *totals[i] += parts->headers[i].size() + parts->word_bytes[i];
-  info.depth_bytes += parts->states.size() + 8;
+  const size_t normals = parts->headers[1].size() + parts->word_bytes[1],
+               colours = parts->headers[2].size() + parts->word_bytes[2];
+  info.normal_bytes += normals, info.colour_bytes += colours;
+  info.depth_bytes += before - in.left() - normals - colours;  // with what belongs to all: states, sizes
   return true;
 }
 

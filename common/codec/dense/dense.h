@@ -41,9 +41,8 @@ class DenseCoder {
   void put_words(std::vector<uint8_t>& out);
   void begin_part(const Parts& parts, size_t part);
   [[nodiscard]] bool get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base);
-  [[nodiscard]] bool get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect);
-  [[nodiscard]] bool get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect,
-                                 const Pixel& base);
+  [[nodiscard]] bool get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base);
+  [[nodiscard]] bool get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base);
   template <class T>
   void store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const;
 

@@ -70,7 +70,8 @@ bool DepthPlane::choose_planes(const TileShape& shape) {
       ++planes[tokens[x]], plane_bits += tokens[x] < kHits ? 0 : token >> 3;
     }
   }
-  return static_cast<double>(plane_bits) + bits_of(planes, kSymbols) < static_cast<double>(linear_bits) + bits_of(linear, kSymbols);
+  return static_cast<double>(plane_bits) + bits_of(planes, kSymbols) <
+         static_cast<double>(linear_bits) + bits_of(linear, kSymbols);
 }
 
 void DepthPlane::begin_decoding(const TileShape& shape, bool planes) {

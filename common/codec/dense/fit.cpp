@@ -113,6 +113,12 @@ double agreement(const std::vector<Slope>& slopes, const Vector9 m, std::vector<
   return sum;
 }
 
+bool all_same(const Samples& samples, const Plane<int16_t>& plane) {
+  const int16_t value = plane.row(samples.places[0].y)[samples.places[0].x];
+  return std::all_of(samples.places.begin(), samples.places.end(),
+                     [&](const Samples::Place& p) { return plane.row(p.y)[p.x] == value; });
+}
+
 int shift_for(double size, double most) {
   int shift = 0;
   while (size > most && shift < 15) size /= 2, ++shift;
@@ -136,21 +142,22 @@ void Samples::choose(const TileShape& shape, size_t about) {
   const int w = static_cast<int>(shape.width), h = static_cast<int>(shape.height);
   const double area = static_cast<double>(shape.total);
   const int step = std::max(1, static_cast<int>(std::sqrt(area / static_cast<double>(about))));
-  const auto inside = [&](int x, int y) { return x < 0 || y < 0 || x >= w || y >= h || shape.at(size_t(x), size_t(y)); };
+  const auto inside = [&](int x, int y) {
+    return x < 0 || y < 0 || x >= w || y >= h || shape.at(size_t(x), size_t(y));
+  };
   for (int y = 0, row = 0; y < h; y += step, ++row)
     for (int x = row * 7 % step; x < w; x += step)
-      if (shape.mask == nullptr || (inside(x, y) && inside(x - 1, y) && inside(x + 1, y) && inside(x, y - 1) && inside(x, y + 1)))
+      if (shape.mask == nullptr ||
+          (inside(x, y) && inside(x - 1, y) && inside(x + 1, y) && inside(x, y - 1) && inside(x, y + 1)))
         places.push_back({x, y});
 }
 
-bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0, int y0,
-                  GeometryModel& model) {
-  if (samples.places.size() < 32) return false;
+bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
+                  int y0, GeometryModel& model) {
+  if (samples.places.size() < 32 || (all_same(samples, *normal[0]) && all_same(samples, *normal[1]))) return false;
   // Nine of ten slopes fit.
   std::vector<double> sizes;
   for (const auto p : samples.places) {
-    double h[3];
-    if (slope_at(depth, p.x, p.y, x0, y0, 15, h)) {}
     const uint32_t* const row = depth.row(p.y);
     sizes.push_back(std::max(std::abs(double(static_cast<int>(row[p.x + 1] - row[p.x - 1]))),
                              std::abs(double(static_cast<int>(depth.row(p.y + 1)[p.x] - depth.row(p.y - 1)[p.x])))));
@@ -188,7 +195,8 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   const std::vector<double> even = weights;
   Vector9 m;
   if (!best_matrix(slopes, weights, m)) return false;
-  for (int round = 0; round < (getenv("RN")?atoi(getenv("RN")):2); ++round) {  // once more, without those that disagree
+  for (int round = 0; round < (getenv("RN") ? atoi(getenv("RN")) : 2);
+       ++round) {  // once more, without those that disagree
     if (agreement(slopes, m, dots) < 0)
       for (double& e : m) e = -e;
     agreement(slopes, m, dots);
@@ -216,9 +224,22 @@ Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, con
   const int16_t *row = own.row(y) + x, *up = own.row(y - 1) + x;
   const int16_t *g0 = guide.row(y - 1) + x, *g1 = guide.row(y) + x, *g2 = guide.row(y + 1) + x;
   const int c = g1[0];
-  const int raw[kTerms] = {row[-1] - c, up[0] - c, up[-1] - c, up[1] - c, g0[-1] - c, g0[0] - c,
-                           g0[1] - c,   g1[-1] - c, g1[1] - c, g2[-1] - c, g2[0] - c, g2[1] - c,
-                           residual != nullptr ? residual->row(y)[x] : 0, 64, row[0] - c, 0};
+  const int raw[kTerms] = {row[-1] - c,
+                           up[0] - c,
+                           up[-1] - c,
+                           up[1] - c,
+                           g0[-1] - c,
+                           g0[0] - c,
+                           g0[1] - c,
+                           g1[-1] - c,
+                           g1[1] - c,
+                           g2[-1] - c,
+                           g2[0] - c,
+                           g2[1] - c,
+                           residual != nullptr ? residual->row(y)[x] : 0,
+                           64,
+                           row[0] - c,
+                           0};
   Features out;
   for (int i = 0; i < kTerms; ++i) out.of[i] = static_cast<float>(raw[i]);
   return out;
@@ -259,10 +280,11 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
 
 }  // namespace
 
-void fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
+bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
   std::vector<Features> all;
   std::vector<float> shares;
+  if (samples.places.size() < 64 || all_same(samples, own)) return false;
   for (const auto p : samples.places) {
     all.push_back(features_at(own, guide, residual, p.x, p.y));
     const float* const f = all.back().of;
@@ -270,7 +292,7 @@ void fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
     shares.push_back(1 / (near * near));
   }
   double solution[kUnknown];
-  bool solved = all.size() >= 64 && solve_weighted(all, shares, solution);
+  bool solved = solve_weighted(all, shares, solution);
   for (int round = 0; solved && round < kRounds; ++round) {  // towards the median, at last beyond it
     for (size_t s = 0; s < all.size(); ++s) {
       float off = -all[s].of[kWanted];
@@ -281,10 +303,7 @@ void fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
     solved = solve_weighted(all, shares, solution);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
-  constant = 0;
-  if (solved && quantise_weights(solution, weights, constant)) return;
-  std::fill_n(weights, kGuidedTerms, int16_t{0});
-  weights[0] = weights[1] = 4096;
+  return solved && quantise_weights(solution, weights, constant);
 }
 
 }  // namespace telesplat::codec::detail

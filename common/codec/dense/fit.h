@@ -20,11 +20,12 @@ struct Samples {
 
 /// The matrix by which slopes of `depth` become the normals' lattice vectors. x0, y0: coordinates of the tile's first
 /// pixel. False where none does.
-bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0, int y0,
-                  GeometryModel& model);
+bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
+                  int y0, GeometryModel& model);
 
-/// Weights for the plane `own` (64ths) by least squares. residual: null, or of another plane.
-void fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
+/// Weights for the plane `own` by least squares. residual: null, or of another plane. False where there is nothing to be
+/// fitted.
+bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant);
 
 /// No sum of weights of this size leaves 32 bits.

@@ -67,14 +67,21 @@ void GuidedPlane::finish_row(const TileShape& shape, size_t y) {
 
 GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
   const auto r = static_cast<ptrdiff_t>(y);
-  GuidedRows rows{values.row(r),  values.row(r - 1), {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
-                  before != nullptr ? before->residuals.row(r) : nullptr, {}, constant, bits, most};
+  GuidedRows rows{values.row(r),
+                  values.row(r - 1),
+                  {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
+                  before != nullptr ? before->residuals.row(r) : nullptr,
+                  {},
+                  constant,
+                  bits,
+                  most};
   std::copy_n(weights, kGuidedTerms, rows.weights);
   return rows;
 }
 
 void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
-  fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant);
+  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant))
+    set_plain_weights();
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     if (bits == 6)
@@ -88,12 +95,30 @@ void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const G
   }
 }
 
+void GuidedPlane::set_plain_weights() {
+  std::fill_n(weights, kGuidedTerms, int16_t{0});
+  weights[0] = weights[1] = 4096;
+  constant = 0;
+}
+
+bool GuidedPlane::has_plain_weights() const {
+  return weights[0] == 4096 && weights[1] == 4096 && constant == 0 &&
+         std::all_of(weights + 2, weights + kGuidedTerms, [](int16_t w) { return w == 0; });
+}
+
 void GuidedPlane::put_weights(BitSink& bits) const {
+  const bool plain = has_plain_weights();
+  bits.put(plain, 1);
+  if (plain) return;
   for (const int16_t w : weights) bits.put(static_cast<uint16_t>(w), 16);
   bits.put(static_cast<uint32_t>(constant + (1 << (kConstantBits - 1))), kConstantBits);
 }
 
 bool GuidedPlane::get_weights(BitReader& bits) {
+  if (bits.source.take(1) != 0) {
+    set_plain_weights();
+    return !bits.overrun();
+  }
   int total = 0;
   for (int16_t& w : weights) {
     w = static_cast<int16_t>(bits.source.take(16));

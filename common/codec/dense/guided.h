@@ -35,6 +35,9 @@ struct GuidedPlane {
   int bits = 6, most = 254;
 
  private:
+  /// Half of L and of U: where there is nothing to be fitted.
+  void set_plain_weights();
+  bool has_plain_weights() const;
   GuidedRows rows_around(size_t y, const GuidedPlane* before) const;
 };
 

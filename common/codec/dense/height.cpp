@@ -12,9 +12,7 @@ constexpr int kBins = HeightModel::kKnots - 1;
 
 struct Axis {
   double a, b, c;
-  double of(const HeightSample& s) const {
-    return (a * double{s.x} + b * double{s.y} + c) / double{s.code};
-  }
+  double of(const HeightSample& s) const { return (a * double{s.x} + b * double{s.y} + c) / double{s.code}; }
 };
 
 // Changes of colour from one sample to the next one up the axis; every fourth is enough.
@@ -132,11 +130,12 @@ bool quantise(const Axis& axis, const Curve& curve, const std::vector<HeightSamp
   model.c = static_cast<int32_t>(std::lround(terms[2]));
   const double low = curve.low * unit * 16384, range = curve.step * kBins * unit * 16384;
   model.low = static_cast<int32_t>(std::floor(low));
-  model.scale = static_cast<int32_t>(std::clamp(std::floor(16383 * 4096.0 / std::max(range + 1, 1025.0)), 1.0, 65535.0));
+  model.scale =
+      static_cast<int32_t>(std::clamp(std::floor(16383 * 4096.0 / std::max(range + 1, 1025.0)), 1.0, 65535.0));
   for (int i = 0; i < HeightModel::kKnots; ++i) {
     const double s = (model.low + i * 256 * 4096.0 / model.scale) / 16384 / unit;
-    model.knots[i] = static_cast<int16_t>(
-        std::lround(std::clamp(curve.at(s), 0.0, static_cast<double>(colours - 1)) * 16));
+    model.knots[i] =
+        static_cast<int16_t>(std::lround(std::clamp(curve.at(s), 0.0, static_cast<double>(colours - 1)) * 16));
   }
   return true;
 }

@@ -39,9 +39,9 @@ static void DepthRows(const uint32_t* RESTRICT above, const uint32_t* RESTRICT z
 }
 
 // Planes, in the order in which they are tried; deltas to the left neighbour, slopes, and values.
-#define PLANES_OF(c, above2, above, x)                             \
-  const uint32_t up = above[x], corner = above[x - 1];             \
-  const uint32_t by_left[3] = {up - corner, above[x + 1] - up, corner - above[x - 2]}; \
+#define PLANES_OF(c, above2, above, x)                                                                            \
+  const uint32_t up = above[x], corner = above[x - 1];                                                            \
+  const uint32_t by_left[3] = {up - corner, above[x + 1] - up, corner - above[x - 2]};                            \
   const uint32_t by_row[4] = {2 * up - above2[x], up + above[x + 1] - above2[x + 1], up + corner - above2[x - 1], \
                               2 * above[x + 1] - above2[x + 2]}
 
@@ -65,8 +65,8 @@ static void PlaneResiduals(const uint32_t* RESTRICT above2, const uint32_t* REST
 }
 
 static void PlaneTerms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above, const uint32_t* RESTRICT z,
-                       const uint8_t* RESTRICT tokens, size_t n, uint32_t* RESTRICT terms,
-                       uint32_t* RESTRICT take_left, uint32_t* RESTRICT take_slope) {
+                       const uint8_t* RESTRICT tokens, size_t n, uint32_t* RESTRICT terms, uint32_t* RESTRICT take_left,
+                       uint32_t* RESTRICT take_slope) {
   for (size_t x = 0; x < n; ++x) {
     PLANES_OF(c, above2, above, x);
     const uint32_t token = tokens[x], k = token * 52 >> 8, off = token - 5 * k - 2;
@@ -99,7 +99,8 @@ static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint
       contexts[x] = one(static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x]));
   else
     for (size_t x = 0; x < n; ++x)
-      contexts[x] = one(static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] + 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]));
+      contexts[x] = one(
+          static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] + 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]));
 }
 
 static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRICT row, size_t n, uint8_t* RESTRICT z,
@@ -119,7 +120,7 @@ static inline int32_t Within16(int32_t v) { return v < -32767 ? -32767 : v > 327
 
 static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums) {
   const int16_t *RESTRICT up = rows.above, *RESTRICT g0 = rows.guide[0], *RESTRICT g1 = rows.guide[1],
-                *RESTRICT g2 = rows.guide[2], *RESTRICT other = rows.residual;
+                          *RESTRICT g2 = rows.guide[2], *RESTRICT other = rows.residual;
   int32_t w[kGuidedTerms];
   for (int i = 0; i < kGuidedTerms; ++i) w[i] = rows.weights[i];
   const int32_t constant = rows.constant;
@@ -236,8 +237,9 @@ static void Geometry(const uint32_t* const depth[3], size_t n, int x0, int y, co
     const int32_t u = Within16(static_cast<int32_t>(here[x + 1] - here[x - 1]) >> slope_shift),
                   v = Within16(static_cast<int32_t>(below[x] - above[x]) >> slope_shift);
     const uint32_t px = static_cast<uint32_t>(x0 + static_cast<int>(x)), py = static_cast<uint32_t>(y);
-    const int32_t height = static_cast<int32_t>(static_cast<uint32_t>(static_cast<int32_t>(here[x] << 1) >> slope_shift) - px * static_cast<uint32_t>(u) -
-                                                py * static_cast<uint32_t>(v));
+    const int32_t height =
+        static_cast<int32_t>(static_cast<uint32_t>(static_cast<int32_t>(here[x] << 1) >> slope_shift) -
+                             px * static_cast<uint32_t>(u) - py * static_cast<uint32_t>(v));
     const int32_t h = Within16(height >> height_shift);
     const int32_t mx = a[0][0] * u + a[0][1] * v + a[0][2] * h, my = a[1][0] * u + a[1][1] * v + a[1][2] * h,
                   mz = a[2][0] * u + a[2][1] * v + a[2][2] * h;

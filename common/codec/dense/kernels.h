@@ -28,13 +28,13 @@ inline constexpr int kGuidedTerms = 14;  ///< of guided prediction: 4 neighbours
 
 /// What predicts a row of a plane of 64ths: its own rows, a guide, and residuals that are known.
 struct GuidedRows {
-  const int16_t *own, *above;      ///< the plane's row, of which only the left neighbour is used, and the one above
-  const int16_t* guide[3];         ///< the guide's rows above, here, below
-  const int16_t* residual;         ///< of another plane's same row, in 64ths; null: none
-  int16_t weights[kGuidedTerms];   ///< in 2^-13: L, U, UL, UR; the guide's 3 x 3; the residual
-  int32_t constant;                ///< in 2^-13 of the plane's unit
-  int bits = 6;                    ///< of a value's fraction: what 64ths have
-  int32_t most = 254;              ///< the largest value that is predicted
+  const int16_t *own, *above;     ///< the plane's row, of which only the left neighbour is used, and the one above
+  const int16_t* guide[3];        ///< the guide's rows above, here, below
+  const int16_t* residual;        ///< of another plane's same row, in 64ths; null: none
+  int16_t weights[kGuidedTerms];  ///< in 2^-13: L, U, UL, UR; the guide's 3 x 3; the residual
+  int32_t constant;               ///< in 2^-13 of the plane's unit
+  int bits = 6;                   ///< of a value's fraction: what 64ths have
+  int32_t most = 254;             ///< the largest value that is predicted
 };
 
 /// Where a plane of room space cuts a pixel's ray: ((a x + b y + c) / depth code - low) * scale, and what a table of
@@ -72,7 +72,7 @@ struct Kernels {
   void (*guided_residuals)(const GuidedRows& rows, size_t n, uint8_t* z, uint8_t* tokens, int16_t* residual);
   /// The same for values that take more than a byte: not mod 256.
   void (*guided_residuals_wide)(const GuidedRows& rows, size_t n, uint32_t* z, uint8_t* tokens, int16_t* residual);
-  /// All terms of guided prediction but that of the left neighbour, 
+  /// All terms of guided prediction but that of the left neighbour,
   void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums);
   /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.
   void (*geometry)(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,

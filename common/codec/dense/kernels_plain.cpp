@@ -24,8 +24,9 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }  // namespace
 
 const Kernels& plain_kernels() {
-  static constexpr Kernels all{DepthResiduals, DepthRows, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry, Heights, Activity, NormalEquations,  PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,      Contexts,
+                               MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,      Geometry,
+                               Heights,         Activity,        NormalEquations,     PlainPutSymbols, PlainGetSymbols};
   return all;
 }
 

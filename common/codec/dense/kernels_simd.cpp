@@ -57,8 +57,9 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals, DepthRows, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry, Heights, Activity, NormalEquations,  PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,      Contexts,
+                               MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,      Geometry,
+                               Heights,         Activity,        NormalEquations,     PlainPutSymbols, PlainGetSymbols};
   return &all;
 }
 
@@ -112,8 +113,8 @@ HWY_INLINE V LoadZ(const SymbolRow& row, size_t at) {
 }
 
 template <bool kWide>
-HWY_INLINE uint8_t* PutGroup(const SymbolRow& row, size_t begin, const EncodeEntry* tables, V (&x)[kVectors],
-                             size_t n, uint8_t* out) {
+HWY_INLINE uint8_t* PutGroup(const SymbolRow& row, size_t begin, const EncodeEntry* tables, V (&x)[kVectors], size_t n,
+                             uint8_t* out) {
   const auto one = hn::Set(kD, 1u), first = hn::Set(kD, row.first), fifteen = hn::Set(kD, 15u);
   V tokens[kVectors], bits[kVectors], z[kVectors];
   auto widest = hn::Zero(kD);
@@ -200,8 +201,8 @@ HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, const ui
   V kept[kVectors], bits[kVectors];
   auto widest = hn::Zero(kD);
   for (size_t i = kVectors; i-- > 0;) {
-    const V index = hn::Or(hn::ShiftLeft<12>(Load8(row.contexts + begin + i * kN)),
-                           hn::And(x[i], hn::Set(kD, kFrequencyOne - 1)));
+    const V index =
+        hn::Or(hn::ShiftLeft<12>(Load8(row.contexts + begin + i * kN)), hn::And(x[i], hn::Set(kD, kFrequencyOne - 1)));
     const V entry = hn::GatherIndex(kD, tables, hn::BitCast(s, index));
     const V token = hn::ShiftRight<24>(entry);
     hn::StoreU(hn::TruncateTo(kD8, token), kD8, row.tokens + begin + i * kN);
@@ -232,8 +233,8 @@ HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, const ui
 }
 
 template <bool kWide>
-HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, uint32_t* states,
-                                 const uint8_t* begin, const uint8_t* end) {
+HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, uint32_t* states, const uint8_t* begin,
+                                 const uint8_t* end) {
   V x[kVectors];
   for (size_t i = 0; i < kVectors; ++i) x[i] = hn::LoadU(kD, states + i * kN);
   size_t at = 0;
@@ -245,8 +246,8 @@ HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, 
   return end;
 }
 
-static const uint8_t* GetSymbols(const DecodedRow& row, const uint32_t* tables, uint32_t* states,
-                                 const uint8_t* begin, const uint8_t* end) {
+static const uint8_t* GetSymbols(const DecodedRow& row, const uint32_t* tables, uint32_t* states, const uint8_t* begin,
+                                 const uint8_t* end) {
   return row.wide != nullptr ? GetAll<true>(row, tables, states, begin, end)
                              : GetAll<false>(row, tables, states, begin, end);
 }
@@ -288,8 +289,9 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals, DepthRowsVector, PlaneResiduals, PlaneTerms, Contexts, MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry, Heights, Activity, NormalEquations,        PutSymbols, GetSymbols};
+  static constexpr Kernels all{DepthResiduals,  DepthRowsVector, PlaneResiduals,      PlaneTerms, Contexts,
+                               MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums, Geometry,
+                               Heights,         Activity,        NormalEquations,     PutSymbols, GetSymbols};
   return &all;
 }
 

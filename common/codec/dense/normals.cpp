@@ -69,7 +69,8 @@ int NormalPlanes::choose_pole(const TileShape& shape) const {
     if (shape.full(y))
       for (size_t x = 0; x < shape.width; ++x) look(first + x);
     else
-      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), [&](size_t x) { look(first + x); });
+      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
+                   [&](size_t x) { look(first + x); });
   }
   if (others != 0) return kRaw;
   for (const auto p : samples.places) {
@@ -82,7 +83,9 @@ int NormalPlanes::choose_pole(const TileShape& shape) const {
   return 2 * axis + (sum[axis] < 0 ? 1 : 0);
 }
 
-void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth) {
+// Without geometry it is the first pixel's normal everywhere.
+void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base) {
+  const uint16_t turned = turn_normal(base, pole_);
   const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
@@ -91,7 +94,8 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth) {
       kernels().geometry(rows, shape.width, x0, y0 + static_cast<int>(y), geometry_, plane[0].guide.row(r),
                          plane[1].guide.row(r));
     else
-      for (GuidedPlane& p : plane) std::fill_n(p.guide.row(r), shape.width, int16_t{127 * 64});
+      for (int i = 0; i < 2; ++i)
+        std::fill_n(plane[i].guide.row(r), shape.width, static_cast<int16_t>((turned >> 8 * i & 255) * 64));
   }
   for (GuidedPlane& p : plane) p.begin(shape);
   for (size_t y = 0; y < shape.height; ++y) {
@@ -106,13 +110,13 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth) {
   plane[1].symbols.other = &plane[0].symbols.tokens;
 }
 
-void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, BitSink& bits) {
+void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits) {
   samples.choose(shape, std::min<size_t>(1100, shape.total / 16));
   pole_ = choose_pole(shape);
   const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, false);
   for (size_t y = 0; y < shape.height; ++y) {
-    int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)),
-                   *const y_row = plane[1].values.row(static_cast<ptrdiff_t>(y));
+    int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
+                                                                               static_cast<ptrdiff_t>(y));
     const uint16_t* const from = codes.data() + y * shape.width;
     for (size_t x = 0; x < shape.width; ++x) {
       const uint16_t code = turned == nullptr ? from[x] : (*turned)[from[x]];
@@ -122,7 +126,7 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, BitSi
   const Plane<int16_t>* const values[2] = {&plane[0].values, &plane[1].values};
   has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
                                                 -static_cast<int>(shape.height / 2), geometry_);
-  make_guide(shape, depth);
+  make_guide(shape, depth, base);
   for (GuidedPlane& p : plane)
     for (size_t y = 0; y < shape.height; ++y) p.finish_row(shape, y);
   plane[0].encode(shape, samples, nullptr);
@@ -138,7 +142,7 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, BitSi
   for (const GuidedPlane& p : plane) p.put_weights(bits);
 }
 
-bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits) {
+bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits) {
   pole_ = static_cast<int>(bits.source.take(3));
   has_geometry_ = bits.source.take(1) != 0;
   if (pole_ > kRaw) return false;
@@ -152,7 +156,7 @@ bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   }
   for (GuidedPlane& p : plane)
     if (!p.get_weights(bits)) return false;
-  make_guide(shape, depth);
+  make_guide(shape, depth, base);
   return true;
 }
 
@@ -160,8 +164,8 @@ void NormalPlanes::decode_row(const TileShape& shape, size_t y, uint16_t* out) {
   plane[0].decode_sums(shape, y, nullptr);
   plane[1].decode_sums(shape, y, &plane[0]);
   decode_values(plane[0], plane[1], shape, y);
-  const int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)),
-                       *const y_row = plane[1].values.row(static_cast<ptrdiff_t>(y));
+  const int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
+                                                                                   static_cast<ptrdiff_t>(y));
   const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, true);
   for (size_t x = 0; x < shape.width; ++x) {
     const auto code = static_cast<uint16_t>(x_row[x] >> 6 | y_row[x] << 2);

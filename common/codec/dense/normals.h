@@ -17,12 +17,10 @@ uint16_t turn_back(uint16_t code, int pole);
 
 struct NormalPlanes {
   void reset(const TileShape& shape);
-  /// codes(y): the first code of row y. `depth` must be extended.
-  template <class Codes>
-  void load(const TileShape& shape, Codes codes);
-  void encode(const TileShape& shape, const DepthPlane& depth, BitSink& bits);
+  /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code.
+  void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits);
   static constexpr size_t kMostBits = 256 + 2 * GuidedPlane::kMostWeightBits;
-  [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits);
+  [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
   /// Row y from its symbols, into codes of all its pixels.
   void decode_row(const TileShape& shape, size_t y, uint16_t* codes);
 
@@ -35,7 +33,7 @@ struct NormalPlanes {
   Samples samples;
 
  private:
-  void make_guide(const TileShape& shape, const DepthPlane& depth);
+  void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
   int choose_pole(const TileShape& shape) const;
   int pole_ = kRaw;
   bool has_geometry_ = false;

@@ -89,7 +89,7 @@ static const uint8_t* PlainGetGroup(const DecodedRow& row, size_t first, size_t 
 static const uint8_t* PlainGetSymbols(const DecodedRow& row, const uint32_t* tables, uint32_t* states,
                                       const uint8_t* begin, const uint8_t* end) {
   for (size_t first = 0; first < row.count && end != nullptr; first += kLanes)
-    end = PlainGetGroup(row, first, row.count - first < kLanes ? row.count - first : kLanes, tables, states, begin,
-                        end);
+    end =
+        PlainGetGroup(row, first, row.count - first < kLanes ? row.count - first : kLanes, tables, states, begin, end);
   return end;
 }

@@ -47,8 +47,12 @@ void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_nu
 
 SymbolRow SymbolPlane::row(const TileShape& shape, size_t y) const {
   const auto r = static_cast<ptrdiff_t>(y);
-  return {tokens.row(r), contexts.row(r), is_wide ? wide.row(r) : nullptr, is_wide ? nullptr : narrow.row(r),
-          shape.covered[y], first};
+  return {tokens.row(r),
+          contexts.row(r),
+          is_wide ? wide.row(r) : nullptr,
+          is_wide ? nullptr : narrow.row(r),
+          shape.covered[y],
+          first};
 }
 
 void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
@@ -120,7 +124,8 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
   static thread_local std::vector<uint32_t> wide;
   const SymbolRow row = plane.row(shape, y);
   const size_t needed = row.count + Plane<uint8_t>::kTail;
-  if (tokens.size() < needed) tokens.resize(needed), contexts.resize(needed), narrow.resize(needed), wide.resize(needed);
+  if (tokens.size() < needed)
+    tokens.resize(needed), contexts.resize(needed), narrow.resize(needed), wide.resize(needed);
   size_t n = 0;
   for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), [&](size_t x) {
     tokens[n] = row.tokens[x], contexts[n] = row.contexts[x];
@@ -130,9 +135,9 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
       narrow[n] = row.narrow[x];
     ++n;
   });
-  return kernels().put_symbols({tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr,
-                                narrow.data(), n, row.first},
-                               tables_.data(), states, out);
+  return kernels().put_symbols(
+      {tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr, narrow.data(), n, row.first},
+      tables_.data(), states, out);
 }
 
 bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
@@ -159,16 +164,17 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   }
   const size_t needed = shape.width + Plane<uint8_t>::kTail;
   if (packed_tokens_.size() < needed)
-    packed_tokens_.resize(needed), packed_contexts_.resize(needed), packed_narrow_.resize(needed), packed_wide_.resize(needed);
+    packed_tokens_.resize(needed), packed_contexts_.resize(needed), packed_narrow_.resize(needed),
+        packed_wide_.resize(needed);
   const auto for_each_covered = [&](auto f) {
     for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), f);
   };
   size_t n = 0;
   for_each_covered([&](size_t x) { packed_contexts_[n++] = contexts[x]; });
-  source.end = kernels().get_symbols(
-      {packed_contexts_.data(), packed_tokens_.data(), wide != nullptr ? packed_wide_.data() : nullptr,
-       packed_narrow_.data(), n, plane.first},
-      tables_.data(), source.states, source.begin, source.end);
+  source.end =
+      kernels().get_symbols({packed_contexts_.data(), packed_tokens_.data(),
+                             wide != nullptr ? packed_wide_.data() : nullptr, packed_narrow_.data(), n, plane.first},
+                            tables_.data(), source.states, source.begin, source.end);
   if (source.end == nullptr) return false;
   if (wide != nullptr)
     std::fill_n(wide, shape.width, 0u);

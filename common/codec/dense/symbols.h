@@ -16,7 +16,7 @@ namespace telesplat::codec::detail {
 /// Which pixels of a tile are coded.
 struct TileShape {
   size_t width = 0, height = 0;
-  const Mask* mask = nullptr;  ///< null: all pixels are covered
+  const Mask* mask = nullptr;     ///< null: all pixels are covered
   std::vector<uint32_t> covered;  ///< pixels of each row
   size_t total = 0;
 

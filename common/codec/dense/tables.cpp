@@ -32,7 +32,9 @@ struct Expected {
   int left = 0, left2 = 0;
   int operator()(unsigned token) const {
     if (before == nullptr) return token < 8 ? left : (left + left2 + 1) / 2;
-    const int slope = token == 0 ? (*before)[0] : (*before)[token] - (*before)[token - 1] / 2 - (token > 1 ? (*before)[token - 2] / 2 : (*before)[token - 1] / 2);
+    const int slope = token == 0 ? (*before)[0]
+                                 : (*before)[token] - (*before)[token - 1] / 2 -
+                                       (token > 1 ? (*before)[token - 2] / 2 : (*before)[token - 1] / 2);
     const int base = token == 0 ? 0 : token == 1 ? left : (left + left2) / 2;
     return std::clamp((base + slope + (token == 0 ? 0 : (*before)[token])) / (token == 0 ? 1 : 2), 0, kLevels - 1);
   }
@@ -154,14 +156,17 @@ void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& le
 
 void put_levels(BitSink& bits, const TokenLevels& levels) {
   TokenLevels copy = levels;
-  for_each_level(copy, [&](int difference, GolombContext& context) { return context.put(difference, bits), difference; });
+  for_each_level(copy,
+                 [&](int difference, GolombContext& context) { return context.put(difference, bits), difference; });
 }
 
 bool get_levels(BitReader& bits, TokenLevels& levels) {
   for (auto& of : levels.of) of.fill(0);
-  return for_each_level(levels, [&](int, GolombContext& context) {
-    return bits.overrun() ? int{kSymbols} * 8 : context.get(bits.source);
-  }) && !bits.overrun();
+  return for_each_level(levels,
+                        [&](int, GolombContext& context) {
+                          return bits.overrun() ? int{kSymbols} * 8 : context.get(bits.source);
+                        }) &&
+         !bits.overrun();
 }
 
 void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphabet,
