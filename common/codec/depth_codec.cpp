@@ -50,8 +50,9 @@ using detail::Reader;
 using detail::TileGrid;
 using image::DepthImage;
 
-// stream = magic, version, varint width, varint height, tiles of TileGrid row by row (tile.h); nothing after them.
-constexpr uint8_t kMagic = 0xD7, kVersion = 3;
+// stream = magic, version, flags, varint width, varint height, tiles of TileGrid row by row (tile.h); nothing after
+// them. Flags: none is known yet; bounds of error will have one, and what they are follows the height.
+constexpr uint8_t kMagic = 0xD7, kVersion = 4, kKnownFlags = 0;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 
@@ -66,6 +67,8 @@ Result<Size> read_header(Reader& in) {
   if (!version) return damaged("shorter than its header");
   if (*magic != kMagic) return damaged(fmt::format("begins with {:#04x}, not {:#04x}", *magic, kMagic));
   if (*version != kVersion) return damaged(fmt::format("version {}, expected {}", *version, kVersion));
+  const auto flags = in.u8();
+  if (flags && *flags & ~kKnownFlags) return damaged(fmt::format("flags {:#04x}, known {:#04x}", *flags, kKnownFlags));
   const auto width = in.varint(), height = in.varint();
   if (!height) return damaged("shorter than its header");
   if (*width == 0 || *height == 0 || *width > kMaxPixels || *height > kMaxPixels ||
@@ -97,7 +100,7 @@ std::vector<uint8_t> encode(const DepthImage& image) {
   CHECK(image.colour.size() == image.pixels() && image.normal.size() == image.pixels());
   std::vector<uint8_t> out;
   out.reserve(64 + image.pixels() / 8);
-  out.assign({kMagic, kVersion});
+  out.assign({kMagic, kVersion, 0});
   detail::put_varint(out, static_cast<uint32_t>(image.width));
   detail::put_varint(out, static_cast<uint32_t>(image.height));
   const TileGrid grid(image.width, image.height);

@@ -1,4 +1,4 @@
-// The entropy stage: byte streams through zstd's Huffman coder, and raw bits beside them.
+// What masks and sparse tiles are made of: fields, raw bits, and bytes coded by how often their bits came before.
 #pragma once
 
 #include <bit>
@@ -27,8 +27,7 @@ class Reader {
 
 void put_varint(std::vector<uint8_t>& out, uint32_t value);
 
-/// Appends `raw` as one self-delimiting block: constant, stored or zstd, whichever is shorter. Looks for repeated
-/// strings only where one byte value is so frequent that a Huffman code, of a bit at least, would waste much on it.
+/// Appends `raw` as one self-delimiting block: constant, stored or coded by adaptive bits, whichever is shorter.
 void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);
 /// Appends `raw` as a stored block: for bits known to be random.
 void put_stored_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw);

@@ -15,14 +15,10 @@
 #include <vector>
 
 #include "common/codec/mask.h"
-#include "common/codec/predict.h"
+#include "common/codec/tile_rect.h"
+#include "common/image/depth_image.h"
 
 namespace telesplat::codec::detail {
-
-struct Pixel {
-  uint32_t depth = 0, colour = 0;
-  uint16_t normal = 0;
-};
 
 /// Walks a tile's covered pixels, fewer than 65536, from coarse to fine.
 class ScatterWalk {

@@ -7,15 +7,7 @@
 namespace telesplat::codec::detail {
 namespace {
 
-enum Kind : uint8_t {
-  kEmpty = 0,
-  kDense = 1,
-  kSparse = 2,
-  kPredictorBits = 3,
-  kMasked = 4,
-  kPlainColour = 8,
-  kKnownBits = 15
-};
+enum Kind : uint8_t { kEmpty = 0, kDense = 1, kSparse = 2, kPredictorBits = 3, kMasked = 4, kKnownBits = 7 };
 
 TileScratch& scratch() {
   static thread_local TileScratch s;
@@ -53,21 +45,6 @@ bool is_sparse(size_t covered, size_t runs, size_t pixels) {
   return covered * 8 < pixels || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
-// Smooth colour goes into joint tokens, rough colour into a stream per component. Judged by neighbours in a few rows.
-bool is_rough(const image::DepthImage& image, const TileRect& rect) {
-  size_t pairs = 0, rough = 0;
-  for (int y = 0; y < rect.height; y += 8) {
-    const size_t first = rect.first + rect.stride * static_cast<size_t>(y);
-    for (size_t i = first + 1; i < first + static_cast<size_t>(rect.width); i += 2) {
-      if (image.depth[i] == 0 || image.depth[i - 1] == 0) continue;
-      const uint32_t z = fold_bytes(image.colour[i], image.colour[i - 1]);
-      ++pairs;
-      rough += (z & 0xF8F8F8) != 0;
-    }
-  }
-  return rough * 10 > pairs * 3;
-}
-
 }  // namespace
 
 TileGrid::TileGrid(int width, int height) : width(width), height(height) {
@@ -100,9 +77,8 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
     out.push_back(kEmpty);
     return 0;
   }
-  const bool full = covered == pixels, sparse = !full && is_sparse(covered, s.mask.runs(), pixels),
-             rough = !sparse && is_rough(image, rect);
-  out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked) | (rough ? kPlainColour : 0)));
+  const bool full = covered == pixels, sparse = !full && is_sparse(covered, s.mask.runs(), pixels);
+  out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked)));
 
   size_t first = rect.first;  // of the covered pixels
   for (int y = 0; y < rect.height; ++y) {
@@ -120,10 +96,7 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
     s.scatter_encoder.finish(out);
     return covered;
   }
-  s.reset(static_cast<size_t>(rect.width));
-  s.writer.start(covered, rough);
-  encode_dense(s, image, rect, base, full);
-  s.writer.finish(out);
+  s.dense.put(out, image, rect, full ? nullptr : &s.mask, base);
   return covered;
 }
 
@@ -136,7 +109,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   if (!kind || *kind & ~kKnownBits) return std::nullopt;
   const int predictor = *kind & kPredictorBits;
   const bool full = !(*kind & kMasked), sparse = predictor == kSparse;
-  if ((!sparse && predictor != kDense) || (sparse && (full || *kind & kPlainColour))) return std::nullopt;
+  if ((!sparse && predictor != kDense) || (sparse && full)) return std::nullopt;
 
   TileScratch& s = scratch();
   const auto base = get_base(in);
@@ -154,10 +127,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
     if (!decode_sparse(s, image, rect, *base) || !s.scatter_decoder.finished()) return std::nullopt;
     return covered;
   }
-  s.reset(static_cast<size_t>(rect.width));
-  if (!s.reader.start(in, covered, static_cast<size_t>(rect.width), *kind & kPlainColour)) return std::nullopt;
-  const bool good = full ? decode_full(s, image, rect, *base) : decode_masked(s, image, rect, *base);
-  if (!good || !s.reader.finished()) return std::nullopt;
+  if (covered == 0 || !s.dense.get(in, image, rect, full ? nullptr : &s.mask, *base)) return std::nullopt;
   return covered;
 }
 
@@ -183,8 +153,7 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
     return true;
   };
   if ((*kind & kPredictorBits) == kSparse) return skip(info.sparse_bytes, 2);
-  return skip(info.depth_bytes, 2) && skip(info.normal_bytes, 2) &&
-         skip(info.colour_bytes, *kind & kPlainColour ? 3 : 2);
+  return DenseCoder::skip(in, info);
 }
 
 }  // namespace telesplat::codec::detail

@@ -36,12 +36,20 @@ inline uint32_t quantise(float v, uint32_t levels) {  // [-1, 1] -> 0..levels
 
 }  // namespace detail
 
+/// The one of several codes of a direction that encoders write. On the map's border two codes mean the same direction,
+/// and its four corners one: of these the one with larger coordinates. Coordinates of 255 mean 254.
+inline uint16_t canonical_normal16(uint16_t code) {
+  const int x = std::min(code & 255, 254), y = std::min(code >> 8, 254);
+  const bool side = x == 0 || x == 254, end = y == 0 || y == 254;
+  return static_cast<uint16_t>((end ? std::max(x, 254 - x) : x) | (side ? std::max(y, 254 - y) : y) << 8);
+}
+
 /// Two 8-bit coordinates, x in the low byte. Largest error about 1 degree. n need not be normalised; (0,0,0) becomes
-/// +z.
+/// +z. The code is canonical.
 inline uint16_t encode_normal16(const glm::vec3& n) {
   float x = 0, y = 0;
   if (glm::dot(n, n) > 0) detail::to_octahedron(n, x, y);
-  return static_cast<uint16_t>(detail::quantise(x, 254) | detail::quantise(y, 254) << 8);
+  return canonical_normal16(static_cast<uint16_t>(detail::quantise(x, 254) | detail::quantise(y, 254) << 8));
 }
 inline glm::vec3 decode_normal16(uint16_t code) {
   const auto at = [](uint32_t c) { return static_cast<float>(c) / 127.0f - 1.0f; };

@@ -7,7 +7,7 @@
 //     varint size, block  lengths of the runs less 1 (varints)
 //     block  levels, low bytes; [block  high bytes]      differences from the predicted ones, zigzag
 //     [block  normals, x; block  normals, y]             differences from the predicted ones
-// Blocks are those of codec/entropy.h. A voxel is predicted from its neighbours to the left and above, as far as there
+// Blocks are those of blocks.h. A voxel is predicted from its neighbours to the left and above, as far as there
 // are any (figures in tests/bench/volume_data_bench.cpp).
 #include "common/volume/voxels.h"
 
@@ -17,12 +17,11 @@
 
 #include "common/codec/entropy.h"
 #include "common/core/check.h"
+#include "common/volume/blocks.h"
 
 namespace telesplat::volume {
 namespace {
 
-using codec::detail::get_block;
-using codec::detail::put_block;
 using codec::detail::put_varint;
 using codec::detail::Reader;
 using Plane = std::vector<uint8_t>;

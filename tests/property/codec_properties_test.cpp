@@ -106,7 +106,7 @@ TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
 TEST(CodecProperties, RandomBytesAfterAGoodHeader) {
   std::mt19937 random(12);
   for (int trial = 0; trial < 20000; ++trial) {
-    std::vector<uint8_t> bytes{0xD7, 3, static_cast<uint8_t>(1 + random() % 100),
+    std::vector<uint8_t> bytes{0xD7, 4, 0, static_cast<uint8_t>(1 + random() % 100),
                                static_cast<uint8_t>(1 + random() % 100)};
     for (uint32_t n = random() % 80; n > 0; --n)
       bytes.push_back(static_cast<uint8_t>(random() % (random() % 2 != 0 ? 256 : 16)));

@@ -57,7 +57,13 @@ HWY_INLINE VU encode16(const V3& n) {
   const VF x = hn::Mul(n.x, scale), y = hn::Mul(n.y, scale);
   const auto below = hn::Lt(n.z, hn::Zero(f));
   const VF fx = hn::CopySign(hn::Sub(one, hn::Abs(y)), x), fy = hn::CopySign(hn::Sub(one, hn::Abs(x)), y);
-  return hn::Or(quantise(hn::IfThenElse(below, fx, x)), hn::ShiftLeft<8>(quantise(hn::IfThenElse(below, fy, y))));
+  const VU qx = quantise(hn::IfThenElse(below, fx, x)), qy = quantise(hn::IfThenElse(below, fy, y));
+  // image/normal.h: canonical_normal16
+  const VU most = hn::Set(un, 254);
+  const auto at_border = [&](VU q) HWY_ATTR { return hn::Or(hn::Eq(q, hn::Zero(un)), hn::Eq(q, most)); };
+  const auto upper = [&](VU q) HWY_ATTR { return hn::Max(q, hn::Sub(most, q)); };
+  return hn::Or(hn::IfThenElse(at_border(qy), upper(qx), qx),
+                hn::ShiftLeft<8>(hn::IfThenElse(at_border(qx), upper(qy), qy)));
 }
 
 // The scalars' colours; scalars that are not a number have the last one.

@@ -52,8 +52,9 @@ vec3 decode_normal32(uint code) {
 uint encode_normal16(vec3 n) {
   vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
   if (n.z < 0) p = vec2((1 - abs(p.y)) * (p.x >= 0 ? 1 : -1), (1 - abs(p.x)) * (p.y >= 0 ? 1 : -1));
-  uvec2 q = uvec2(clamp((p * 0.5 + 0.5) * 254.0 + 0.5, 0.0, 254.0));
-  return q.x | q.y << 8;
+  uvec2 q = uvec2(clamp((p * 0.5 + 0.5) * 254.0 + 0.5, 0.0, 254.0)), upper = max(q, 254u - q);
+  uint x = q.y == 0u || q.y == 254u ? upper.x : q.x, y = q.x == 0u || q.x == 254u ? upper.y : q.y;
+  return x | y << 8;
 }
 vec3 albedo(uint v) {
   uint c = words[16u + 4u * vertices + v];

@@ -144,7 +144,7 @@ TEST(CodecRoundTrip, InspectAddsUp) {
   EXPECT_GE(parts + 9 * 6 + 8, bytes.size()) << "six tiles of a kind and a base, and a header";
 }
 
-// A change of the format changes its version, docs/protocol.md and these bytes.
+// A change of the format changes its version, docs/codec.md, docs/protocol.md and these bytes.
 TEST(CodecFormat, GoldenBytes) {
   DepthImage image(4, 3);
   const uint32_t depth[] = {1000, 1010, 1020, 0, 1100, 1110, 1125, 0, 1200, 1210, 1220, 1231};
@@ -154,9 +154,16 @@ TEST(CodecFormat, GoldenBytes) {
       image.colour[i] = 0x102030 + static_cast<uint32_t>(i % 4) * 0x010203;
       image.normal[i] = static_cast<uint16_t>(0x8040 + i);
     }
-  const std::vector<uint8_t> golden{215, 3,  4,  3, 5, 232, 3, 0,   48,  32, 16, 64, 128, 2, 13, 7,   0, 8,  41, 0,
-                                    14,  14, 37, 0, 9, 37,  0, 8,   15,  9,  0,  8,  41,  0, 2,  2,   8, 2,  2,  8,
-                                    2,   2,  2,  5, 0, 41,  0, 100, 100, 0,  0,  0,  0,   0, 0,  100, 9, 34, 2};
+  const std::vector<uint8_t> golden{
+      215, 4,   0,   4,   3,   5,   232, 3,   0,   48,  32,  16,  64,  128, 2,   13,  7,   0,   8,   1,   46,
+      0,   0,   224, 39,  252, 97,  203, 0,   0,   0,   0,   0,   0,   0,   248, 72,  240, 130, 115, 235, 53,
+      0,   0,   0,   0,   0,   0,   0,   159, 244, 200, 213, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149,
+      149, 149, 149, 21,  37,  52,  0,   0,   60,  251, 195, 150, 79,  184, 0,   0,   78,  184, 0,   24,  2,
+      86,  163, 23,  23,  101, 89,  150, 101, 89,  150, 101, 89,  150, 37,  0,   24,  114, 84,  173, 170, 42,
+      27,  3,   248, 248, 227, 31,  135, 136, 65,  196, 32,  98,  1,   0,   96,  252, 177, 215, 76,  3,   221,
+      221, 221, 221, 221, 221, 221, 13,  2,   0,   0,   12,  120, 155, 92,  219, 242, 112, 21,  1,   210, 55,
+      10,  0,   210, 55,  10,  0,   223, 239, 3,   0,   68,  71,  10,  0,   190, 138, 97,  0,   225, 221, 153,
+      34,  250, 136, 20,  0,   250, 136, 20,  0,   135, 106, 1,   0,   0,   128, 0,   0,   0,   128, 0,   0};
   EXPECT_EQ(encode(image), golden);
   const auto back = decode(golden);
   ASSERT_TRUE(back.ok()) << back.error().text;
@@ -172,10 +179,10 @@ TEST(CodecFormat, GoldenBytesOfASparseTile) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((250 + 2 * x) % 256 | (100 - y) << 8);
   }
-  const std::vector<uint8_t> golden{215, 3,   9,   8,   6,  32,  161, 7,   96,  80,  64,  250, 100, 1,   65,
-                                    17,  0,   0,   1,   0,  0,   34,  0,   128, 0,   0,   0,   4,   0,   8,
-                                    1,   9,   245, 1,   93, 248, 255, 215, 120, 252, 190, 223, 251, 225, 179,
-                                    136, 170, 3,   129, 94, 51,  136, 130, 11,  134, 128, 1,   0};
+  const std::vector<uint8_t> golden{215, 4,   0,   9,   8,   6,   32,  161, 7,   96,  80,  64,  250, 100, 1,
+                                    58,  16,  255, 248, 39,  136, 246, 80,  144, 0,   65,  254, 113, 170, 0,
+                                    9,   245, 1,   93,  248, 255, 215, 120, 252, 190, 223, 251, 225, 179, 136,
+                                    170, 3,   129, 94,  51,  136, 130, 11,  134, 128, 1,   0};
   EXPECT_EQ(encode(image), golden);
   const auto back = decode(golden);
   ASSERT_TRUE(back.ok()) << back.error().text;

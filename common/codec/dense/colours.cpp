@@ -1,0 +1,293 @@
+#include "common/codec/dense/colours.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "common/codec/golomb.h"
+
+namespace telesplat::codec::detail {
+namespace {
+
+constexpr int kShifts[3] = {8, 16, 0};  // green, red, blue
+
+// Colours seen, by open addressing.
+class ColourTable {
+ public:
+  ColourTable() { slots_.fill({kNone, 0}); }
+  // The place of `colour`, which is entered if it is new.
+  uint32_t& operator[](uint32_t colour) {
+    size_t at = (colour * 0x9E3779B1u) >> 20;
+    while (slots_[at].first != colour && slots_[at].first != kNone) at = (at + 1) % slots_.size();
+    if (slots_[at].first == kNone) slots_[at] = {colour, kNone}, ++count_;
+    return slots_[at].second;
+  }
+  size_t count() const { return count_; }
+  static constexpr uint32_t kNone = 0xFFFFFFFF;
+
+ private:
+  std::array<std::pair<uint32_t, uint32_t>, 4096> slots_;
+  size_t count_ = 0;
+};
+
+int8_t difference(uint32_t a, uint32_t b) { return static_cast<int8_t>(static_cast<uint8_t>(a - b)); }
+
+bool all_same(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base) {
+  for (size_t y = 0; y < shape.height; ++y) {
+    const uint32_t* const row = colours.data() + y * shape.width;
+    uint32_t other = 0;
+    if (shape.full(y))
+      for (size_t x = 0; x < shape.width; ++x) other |= row[x] ^ base;
+    else
+      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
+                   [&](size_t x) { other |= row[x] ^ base; });
+    if (other != 0) return false;
+  }
+  return true;
+}
+
+// Whether green says much of red and blue: judged by what neighbours differ by, in a few rows.
+bool follows_green(const TileShape& shape, const std::vector<uint32_t>& colours) {
+  uint64_t apart = 0, together = 0;
+  for (size_t y = 0; y < shape.height; y += 8)
+    for (size_t x = 1; x < shape.width; x += 2) {
+      if (!shape.at(x, y) || !shape.at(x - 1, y)) continue;
+      const uint32_t a = colours[y * shape.width + x], b = colours[y * shape.width + x - 1];
+      int d[3];
+      for (int c = 0; c < 3; ++c) d[c] = difference(a >> kShifts[c], b >> kShifts[c]);
+      for (int c = 1; c < 3; ++c)
+        apart += static_cast<uint64_t>(std::abs(d[c])), together += static_cast<uint64_t>(std::abs(d[c] - d[0]));
+    }
+  return together < apart;
+}
+
+constexpr int kAxisBits = 28;
+
+void put_height(const HeightModel& height, BitSink& bits) {
+  for (const int32_t e : {height.a, height.b, height.c})
+    bits.put(static_cast<uint32_t>(e + (1 << (kAxisBits - 1))), kAxisBits);
+  bits.put(static_cast<uint32_t>(height.low + 32768), 16);
+  bits.put(static_cast<uint32_t>(height.scale), 16);
+  GolombContext context;
+  context.start(64);
+  int before = 0, step = 0;
+  for (const int16_t knot : height.knots) {
+    context.put(knot - before - step, bits);
+    step = knot - before, before = knot;
+  }
+}
+
+bool get_height(HeightModel& height, BitReader& bits) {
+  for (int32_t* e : {&height.a, &height.b, &height.c})
+    *e = static_cast<int32_t>(bits.source.take(kAxisBits)) - (1 << (kAxisBits - 1));
+  height.low = static_cast<int32_t>(bits.source.take(16)) - 32768;
+  height.scale = static_cast<int32_t>(bits.source.take(16));
+  GolombContext context;
+  context.start(64);
+  int before = 0, step = 0;
+  for (int16_t& knot : height.knots) {
+    const int next = before + step + context.get(bits.source);
+    if (next < 0 || next > 16383 || bits.overrun()) return false;
+    knot = static_cast<int16_t>(next);
+    step = next - before, before = next;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32_t>& colours) {
+  ColourTable table;
+  palette_.clear(), first_.clear();
+  uint32_t last = ColourTable::kNone;
+  for (size_t y = 0; y < shape.height; ++y)
+    for (size_t x = 0; x < shape.width; ++x) {
+      const uint32_t colour = colours[y * shape.width + x];
+      if (colour == last || !shape.at(x, y)) continue;
+      last = colour;
+      uint32_t& place = table[colour];
+      if (place != ColourTable::kNone) continue;
+      if (palette_.size() == kMostColours) return false;
+      place = 0, palette_.push_back(colour);
+      first_.push_back({static_cast<float>(x), static_cast<float>(y), 0, colour});
+    }
+  return true;
+}
+
+// By height where that explains the colours, else by brightness.
+void ColourPlanes::sort_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth,
+                                const GeometryModel* geometry) {
+  const float x0 = static_cast<float>(shape.width / 2), y0 = static_cast<float>(shape.height / 2);
+  const auto code_at = [&](float x, float y) {
+    return static_cast<float>(depth.depth.row(static_cast<ptrdiff_t>(y))[static_cast<size_t>(x)]);
+  };
+  double rays[3][3];
+  has_height_ = false;
+  if (geometry != nullptr && rays_of(*geometry, rays)) {
+    ColourTable table;
+    for (uint32_t i = 0; i < palette_.size(); ++i) table[palette_[i]] = i;
+    for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
+    height_samples_.clear();
+    for (const auto p : samples_.places) {
+      const auto x = static_cast<float>(p.x), y = static_cast<float>(p.y);
+      const uint32_t colour = colours[static_cast<size_t>(p.y) * shape.width + static_cast<size_t>(p.x)];
+      height_samples_.push_back({x - x0, y - y0, code_at(x, y), colour, table[colour]});
+    }
+    has_height_ = fit_height(rays, height_samples_, first_, palette_, height_);
+  }
+  if (has_height_) return;
+  std::sort(palette_.begin(), palette_.end(), [](uint32_t a, uint32_t b) {
+    const auto brightness = [](uint32_t c) { return (c >> 16 & 255) + 2 * (c >> 8 & 255) + (c & 255); };
+    return brightness(a) != brightness(b) ? brightness(a) < brightness(b) : a < b;
+  });
+}
+
+void ColourPlanes::begin_index(const TileShape& shape, const DepthPlane& depth) {
+  const int last = static_cast<int>(palette_.size()) - 1;
+  index.reset(shape, 4, last);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    if (has_height_)
+      kernels().heights(depth.depth.row(r), shape.width, -static_cast<int>(shape.width / 2),
+                        static_cast<int>(y) - static_cast<int>(shape.height / 2), height_, index.guide.row(r));
+    else
+      std::fill_n(index.guide.row(r), shape.width, static_cast<int16_t>(last * 8));
+  }
+  index.begin(shape);
+}
+
+void ColourPlanes::begin_channels(const TileShape& shape) {
+  for (size_t c = 0; c < 3; ++c) {
+    channel[c].values.reset(shape.width, shape.height);
+    channel[c].values.fill_row(-1, 0);
+    channel[c].symbols.reset(shape, false);
+    if (c > 0) channel[c].symbols.other = &channel[c - 1].symbols.tokens;
+  }
+}
+
+void ColourPlanes::encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours,
+                                  const DepthPlane& depth) {
+  ColourTable table;
+  for (uint32_t i = 0; i < palette_.size(); ++i) table[palette_[i]] = i;
+  begin_index(shape, depth);
+  for (size_t y = 0; y < shape.height; ++y) {
+    int16_t* const row = index.values.row(static_cast<ptrdiff_t>(y));
+    uint32_t last = palette_[0];
+    auto value = static_cast<int16_t>(0);
+    for (size_t x = 0; x < shape.width; ++x) {
+      const uint32_t colour = colours[y * shape.width + x];
+      if (colour != last && shape.at(x, y)) last = colour, value = static_cast<int16_t>(table[colour] * 16);
+      row[x] = value;
+    }
+    index.finish_row(shape, y);
+  }
+  index.encode(shape, samples_, nullptr);
+}
+
+void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours) {
+  begin_channels(shape);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const uint32_t* const from = colours.data() + y * shape.width;
+    for (size_t c = 0; c < 3; ++c) {
+      uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
+      for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(from[x] >> kShifts[c]);
+      if (c > 0 && mode == kDifferences)
+        for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(row[x] - (from[x] >> 8));
+      shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
+      above[-1] = row[-1] = above[0];
+      kernels().median_residuals(above, row, shape.width, channel[c].symbols.narrow.row(r),
+                                 channel[c].symbols.tokens.row(r));
+      finish_tokens(channel[c].symbols, shape, y);
+    }
+  }
+}
+
+void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
+                          const DepthPlane& depth, const GeometryModel* geometry) {
+  if (all_same(shape, colours, base)) {
+    mode = kPlain;
+  } else if (make_palette(shape, colours)) {
+    mode = kPalette;
+    samples_.choose(shape, std::min<size_t>(1100, shape.total / 16));
+    sort_palette(shape, colours, depth, geometry);
+    encode_palette(shape, colours, depth);
+  } else {
+    mode = follows_green(shape, colours) ? kDifferences : kChannels;
+    encode_channels(shape, colours);
+  }
+}
+
+void ColourPlanes::put_header(BitSink& bits) const {
+  if (mode != kPalette) return;
+  bits.put(palette_.size() - 1, 10);
+  bits.put(has_height_, 1);
+  if (has_height_) put_height(height_, bits);
+  uint32_t before = 0;
+  GolombContext contexts[3];
+  for (GolombContext& c : contexts) c.start(8);
+  for (const uint32_t colour : palette_) {
+    for (int c = 0; c < 3; ++c) contexts[c].put(difference(colour >> kShifts[c], before >> kShifts[c]), bits);
+    before = colour;
+  }
+  index.put_weights(bits);
+}
+
+bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits) {
+  if (mode == kPlain) return true;
+  if (mode != kPalette) {
+    begin_channels(shape);
+    return true;
+  }
+  palette_.resize(bits.source.take(10) + 1);
+  has_height_ = bits.source.take(1) != 0;
+  if (has_height_ && !get_height(height_, bits)) return false;
+  begin_index(shape, depth);
+  uint32_t before = 0;
+  GolombContext contexts[3];
+  for (GolombContext& c : contexts) c.start(8);
+  for (uint32_t& colour : palette_) {
+    colour = 0;
+    for (int c = 0; c < 3; ++c)
+      colour |= ((static_cast<uint32_t>(contexts[c].get(bits.source)) + (before >> kShifts[c])) & 255) << kShifts[c];
+    before = colour;
+    if (bits.overrun()) return false;
+  }
+  return index.get_weights(bits);
+}
+
+bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colours) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  if (mode == kPalette) {
+    index.decode_sums(shape, y, nullptr);
+    decode_values(index, shape, y);
+    const int16_t* const row = index.values.row(r);
+    int most = 0;
+    for (size_t x = 0; x < shape.width; ++x) {
+      const int i = row[x] >> 4;
+      if (shape.at(x, y)) most = std::max(most, i);
+      colours[x] = palette_[std::min(static_cast<size_t>(i), palette_.size() - 1)];
+    }
+    return static_cast<size_t>(most) < palette_.size();
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
+    const uint8_t* const z = channel[c].symbols.narrow.row(r);
+    above[-1] = row[-1] = above[0];
+    int left = row[-1], corner = left;
+    for (size_t x = 0; x < shape.width; ++x) {
+      const int up = above[x], low = std::min(left, up), high = std::max(left, up);
+      const int guess = left + up - std::clamp(corner, low, high);
+      corner = up;
+      left = shape.at(x, y) ? (guess + ((z[x] >> 1) ^ -(z[x] & 1))) & 255 : up;
+      row[x] = static_cast<uint8_t>(left);
+    }
+  }
+  const uint8_t *const g = channel[0].values.row(r), *const red = channel[1].values.row(r),
+                       *const blue = channel[2].values.row(r);
+  const uint32_t add = mode == kDifferences ? 0xFF : 0;
+  for (size_t x = 0; x < shape.width; ++x)
+    colours[x] = ((red[x] + (g[x] & add)) & 255) << 16 | uint32_t{g[x]} << 8 | ((blue[x] + (g[x] & add)) & 255);
+  return true;
+}
+
+}  // namespace telesplat::codec::detail

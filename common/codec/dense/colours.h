@@ -1,0 +1,54 @@
+// Colours of a dense tile: one for all, a palette, or three channels.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/codec/dense/depth.h"
+#include "common/codec/dense/guided.h"
+#include "common/codec/dense/height.h"
+
+namespace telesplat::codec::detail {
+
+struct ColourPlanes {
+  enum Mode : uint8_t { kPlain = 0, kPalette = 1, kChannels = 2, kDifferences = 3 };  ///< of red and blue to green
+  static constexpr size_t kMostColours = 1024;
+
+  /// colours: row by row in all the tile's width, of covered pixels; `base`: of the first.
+  /// geometry: of the normals; null: none.
+  void encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base, const DepthPlane& depth,
+              const GeometryModel* geometry);
+  size_t planes() const { return mode == kPlain ? 0 : mode == kPalette ? 1 : 3; }
+  SymbolPlane& symbols(size_t i) { return mode == kPalette ? index.symbols : channel[i].symbols; }
+  void put_header(BitSink& bits) const;
+  size_t most_header_bits() const { return 4096 + 3 * 51 * kMostColours + GuidedPlane::kMostWeightBits; }
+  [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits);
+  /// Row y from its symbols, into colours of all its pixels; false where an index has no colour.
+  [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t* colours);
+
+  Mode mode = kPlain;
+
+ private:
+  struct Channel {
+    Plane<uint8_t> values;
+    SymbolPlane symbols;
+  };
+  bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
+  void sort_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth,
+                    const GeometryModel* geometry);
+  void encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth);
+  void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
+  void begin_index(const TileShape& shape, const DepthPlane& depth);
+  void begin_channels(const TileShape& shape);
+
+  std::vector<uint32_t> palette_;
+  std::vector<HeightSample> first_, height_samples_;  ///< first_: a pixel of each colour
+  bool has_height_ = false;
+  HeightModel height_;
+  GuidedPlane index;
+  std::array<Channel, 3> channel;  // green, red, blue
+  Samples samples_;
+};
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,242 @@
+#include "common/codec/dense/dense.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace telesplat::codec::detail {
+namespace {
+
+constexpr int kNarrow = 16;          // pixels: tiles that are not as wide are coded as one row
+constexpr size_t kUnchecked = 1024;  // bits of a header between two looks at its end
+
+// A header's bits as a block of their own.
+void put_bits(std::vector<uint8_t>& out, const BitWriter& writer) {
+  const auto bytes = writer.bytes();
+  put_varint(out, static_cast<uint32_t>(bytes.size()));
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+std::optional<std::span<const uint8_t>> get_bits(Reader& in) {
+  const auto size = in.varint();
+  return size ? in.bytes(*size) : std::nullopt;
+}
+
+// f(flat index of the first pixel, row of the shape, column, count) for the rows of `rect`.
+template <class F>
+void for_each_segment(const TileRect& rect, const TileShape& shape, F f) {
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t flat = static_cast<size_t>(y) * static_cast<size_t>(rect.width);
+    f(rect.index(0, y), flat / shape.width, flat % shape.width, static_cast<size_t>(rect.width));
+  }
+}
+
+// As masks have rows of whole words, one of another width is made anew.
+void join_rows(const Mask& mask, Mask& line) {
+  line.reset(mask.width() * mask.height(), 1);
+  for (int y = 0; y < mask.height(); ++y)
+    for_each_set(mask.row(y), mask.words_per_row(),
+                 [&](size_t x) { line.set(y * mask.width() + static_cast<int>(x), 0); });
+}
+
+}  // namespace
+
+void DenseCoder::begin(const TileRect& rect, const Mask* mask) {
+  if (rect.width >= kNarrow) {
+    shape_.reset(static_cast<size_t>(rect.width), static_cast<size_t>(rect.height), mask);
+  } else {
+    if (mask != nullptr) join_rows(*mask, line_mask_);
+    shape_.reset(static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height), 1,
+                 mask != nullptr ? &line_mask_ : nullptr);
+  }
+}
+
+void DenseCoder::load(const image::DepthImage& image, const TileRect& rect) {
+  const size_t pixels = shape_.width * shape_.height;
+  if (colour_rows_.size() < pixels + 64) colour_rows_.resize(pixels + 64), normals_.codes.resize(pixels + 64);
+  for_each_segment(rect, shape_, [&](size_t from, size_t row, size_t column, size_t count) {
+    std::copy_n(image.depth.data() + from, count, depth_.depth.row(static_cast<ptrdiff_t>(row)) + column);
+    std::copy_n(image.colour.data() + from, count, colour_rows_.data() + row * shape_.width + column);
+    std::copy_n(image.normal.data() + from, count, normals_.codes.data() + row * shape_.width + column);
+  });
+}
+
+void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
+                     const Pixel& base) {
+  begin(rect, mask);
+  depth_.reset(shape_, base.depth);
+  normals_.reset(shape_);
+  load(image, rect);
+  std::vector<uint8_t> headers;
+  writer_.start(PlaneEncoder::kMostBits);
+  depth_.encode(shape_, base.depth);
+  writer_.sink.put(depth_.by_planes, 1);
+  encoders_[0].prepare(depth_.symbols, shape_, writer_.sink);
+  put_bits(headers, writer_);
+  depth_.extend(shape_);
+
+  writer_.start(NormalPlanes::kMostBits + 2 * PlaneEncoder::kMostBits);
+  normals_.encode(shape_, depth_, base.normal, writer_.sink);
+  for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
+  put_bits(headers, writer_);
+
+  colours_.encode(shape_, colour_rows_, base.colour, depth_, normals_.geometry());
+  writer_.start(colours_.most_header_bits() + 3 * PlaneEncoder::kMostBits);
+  colours_.put_header(writer_.sink);
+  for (size_t i = 0; i < colours_.planes(); ++i) encoders_[3 + i].prepare(colours_.symbols(i), shape_, writer_.sink);
+  put_bits(headers, writer_);
+  out.push_back(colours_.mode);
+  out.insert(out.end(), headers.begin(), headers.end());
+  put_words(out);
+}
+
+// Symbols in the reverse of the order in which they are decoded.
+void DenseCoder::put_words(std::vector<uint8_t>& out) {
+  const size_t planes = 3 + colours_.planes();
+  if (words_.size() < shape_.total * planes * 6 + 256) words_.resize(shape_.total * planes * 6 + 256);
+  alignas(64) uint32_t states[kLanes];
+  std::fill_n(states, kLanes, kStateLow);
+  uint8_t* at = words_.data();
+  const uint8_t* ends[kPartCount];
+  for (size_t y = shape_.height; y-- > 0;)
+    for (size_t i = colours_.planes(); i-- > 0;)
+      at = encoders_[3 + i].put_row(colours_.symbols(i), shape_, y, states, at);
+  ends[2] = at;
+  for (size_t y = shape_.height; y-- > 0;)
+    for (size_t i = 2; i-- > 0;) at = encoders_[1 + i].put_row(normals_.plane[i].symbols, shape_, y, states, at);
+  ends[1] = at;
+  for (size_t y = shape_.height; y-- > 0;) at = encoders_[0].put_row(depth_.symbols, shape_, y, states, at);
+  ends[0] = at;
+  put_varint(out, static_cast<uint32_t>(ends[0] - ends[1]) / 2);
+  put_varint(out, static_cast<uint32_t>(ends[1] - ends[2]) / 2);
+  put_varint(out, static_cast<uint32_t>(ends[2] - words_.data()) / 2);
+  const bool any = std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
+  const size_t lanes = any ? std::min(kLanes, shape_.width) : 0;
+  out.push_back(static_cast<uint8_t>(lanes));
+  const size_t end = out.size();
+  out.resize(end + static_cast<size_t>(at - words_.data()) + 4 * lanes);
+  std::memcpy(out.data() + end, words_.data(), static_cast<size_t>(at - words_.data()));
+  std::memcpy(out.data() + out.size() - 4 * lanes, states, 4 * lanes);
+}
+
+std::optional<DenseCoder::Parts> DenseCoder::get_parts(Reader& in) {
+  Parts parts;
+  const auto mode = in.u8();
+  if (!mode || *mode > ColourPlanes::kDifferences) return std::nullopt;
+  parts.colour_mode = static_cast<ColourPlanes::Mode>(*mode);
+  uint64_t words = 0;
+  for (auto& header : parts.headers) {
+    const auto bytes = get_bits(in);
+    if (!bytes) return std::nullopt;
+    header = *bytes;
+  }
+  for (size_t& size : parts.word_bytes) {
+    const auto count = in.varint();
+    if (!count) return std::nullopt;
+    size = size_t{*count} * 2, words += size;
+  }
+  const auto lanes = in.u8();
+  if (!lanes || *lanes > kLanes) return std::nullopt;
+  const auto bytes = in.bytes(words + size_t{*lanes} * 4);
+  if (!bytes) return std::nullopt;
+  parts.words = bytes->first(words), parts.states = bytes->subspan(words);
+  return parts;
+}
+
+bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask, const Pixel& base) {
+  begin(rect, mask);
+  const auto parts = get_parts(in);
+  if (!parts) return false;
+  const size_t lanes = parts->states.size() / 4;
+  if (lanes != 0 && lanes != std::min(kLanes, shape_.width)) return false;
+  std::fill_n(source_.states, kLanes, kStateLow);
+  if (lanes != 0) std::memcpy(source_.states, parts->states.data(), 4 * lanes);
+  for (const uint32_t x : source_.states)
+    if (x < kStateLow || x >= kStateLow << 16) return false;
+  source_.end = parts->words.data() + parts->words.size();
+  if (!get_depth(*parts, image, rect, base) || !get_normals(*parts, image, rect, base) ||
+      !get_colours(*parts, image, rect, base))
+    return false;
+  return std::all_of(source_.states, source_.states + kLanes, [](uint32_t x) { return x == kStateLow; });
+}
+
+void DenseCoder::begin_part(const Parts& parts, size_t part) {
+  reader_.start(parts.headers[part], kUnchecked);
+  source_.begin = source_.end - parts.word_bytes[part];
+}
+
+// row -> image, where it is covered.
+template <class T>
+void DenseCoder::store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const {
+  const size_t width = static_cast<size_t>(rect.width);
+  for (size_t begin = 0; begin < shape_.width; begin += width) {
+    const size_t flat = y * shape_.width + begin;
+    T* const to = out.data() + rect.index(0, static_cast<int>(flat / width));
+    if (shape_.mask == nullptr || shape_.full(y)) {
+      std::copy_n(row + begin, width, to);
+      continue;
+    }
+    for (size_t x = 0; x < width; ++x)
+      if (shape_.at(begin + x, y)) to[x] = row[begin + x];
+  }
+}
+
+bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+  begin_part(parts, 0);
+  depth_.reset(shape_, base.depth);
+  depth_.begin_decoding(shape_, reader_.source.take(1) != 0);
+  if (!decoders_[0].prepare(depth_.symbols, reader_) || !reader_.finished()) return false;
+  for (size_t y = 0; y < shape_.height; ++y) {
+    if (!decoders_[0].get_row(depth_.symbols, shape_, y, source_) || !depth_.decode_row(shape_, y)) return false;
+    store(depth_.depth.row(static_cast<ptrdiff_t>(y)), y, image.depth, rect);
+  }
+  depth_.extend(shape_);
+  return source_.end == source_.begin;
+}
+
+bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+  begin_part(parts, 1);
+  normals_.reset(shape_);
+  if (!normals_.decode_header(shape_, depth_, base.normal, reader_)) return false;
+  for (size_t i = 0; i < 2; ++i)
+    if (!decoders_[1 + i].prepare(normals_.plane[i].symbols, reader_)) return false;
+  if (!reader_.finished()) return false;
+  if (row_codes_.size() < shape_.width) row_codes_.resize(shape_.width);
+  for (size_t y = 0; y < shape_.height; ++y) {
+    for (size_t i = 0; i < 2; ++i)
+      if (!decoders_[1 + i].get_row(normals_.plane[i].symbols, shape_, y, source_)) return false;
+    normals_.decode_row(shape_, y, row_codes_.data());
+    store(row_codes_.data(), y, image.normal, rect);
+  }
+  return source_.end == source_.begin;
+}
+
+bool DenseCoder::get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+  begin_part(parts, 2);
+  colours_.mode = parts.colour_mode;
+  if (!colours_.decode_header(shape_, depth_, reader_)) return false;
+  for (size_t i = 0; i < colours_.planes(); ++i)
+    if (!decoders_[3 + i].prepare(colours_.symbols(i), reader_)) return false;
+  if (!reader_.finished()) return false;
+  if (colour_rows_.size() < shape_.width) colour_rows_.resize(shape_.width);
+  std::fill_n(colour_rows_.begin(), shape_.width, base.colour);
+  for (size_t y = 0; y < shape_.height; ++y) {
+    for (size_t i = 0; i < colours_.planes(); ++i)
+      if (!decoders_[3 + i].get_row(colours_.symbols(i), shape_, y, source_)) return false;
+    if (colours_.planes() != 0 && !colours_.decode_row(shape_, y, colour_rows_.data())) return false;
+    store(colour_rows_.data(), y, image.colour, rect);
+  }
+  return source_.end == source_.begin;
+}
+
+bool DenseCoder::skip(Reader& in, StreamInfo& info) {
+  const size_t before = in.left();
+  const auto parts = get_parts(in);
+  if (!parts) return false;
+  const size_t normals = parts->headers[1].size() + parts->word_bytes[1],
+               colours = parts->headers[2].size() + parts->word_bytes[2];
+  info.normal_bytes += normals, info.colour_bytes += colours;
+  info.depth_bytes += before - in.left() - normals - colours;  // with what belongs to all: states, sizes
+  return true;
+}
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,134 @@
+#include "common/codec/dense/depth.h"
+
+#include <algorithm>
+#include <array>
+
+#include "common/image/depth_image.h"
+
+namespace telesplat::codec::detail {
+namespace {
+
+// What L and UL of a row's first pixel are: so it is predicted from the two above it.
+void begin_row(Plane<uint32_t>& depth, size_t y) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  depth.row(r)[-1] = depth.row(r)[-2] = depth.row(r - 1)[0];
+}
+
+// What UR of a row's last pixels is.
+void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
+  uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
+  const uint32_t slope = width > 1 ? row[width - 1] - row[width - 2] : 0;
+  row[width] = row[width - 1] + slope, row[width + 1] = row[width] + slope;
+}
+
+}  // namespace
+
+void DepthPlane::reset(const TileShape& shape, uint32_t base) {
+  depth.reset(shape.width, shape.height);
+  depth.fill_row(-1, base), depth.fill_row(-2, base);
+  symbols.reset(shape, true);
+}
+
+void DepthPlane::encode(const TileShape& shape, uint32_t base) {
+  depth.fill_row(-1, base), depth.fill_row(-2, base);
+  for (size_t y = 0; y < shape.height; ++y) {
+    begin_row(depth, y);
+    uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
+    const uint32_t* const above = depth.row(static_cast<ptrdiff_t>(y) - 1);
+    shape.for_each_hole(y, [&](size_t x) { row[x] = (row[x - 1] + above[x] - above[x - 1]) & image::kMaxDepthCode; });
+    end_row(depth, y, shape.width);
+  }
+  by_planes = choose_planes(shape);
+  symbols.reset(shape, true, by_planes ? kHits : 0);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    if (by_planes)
+      kernels().plane_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
+                                symbols.tokens.row(r));
+    else
+      kernels().depth_residuals(depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
+                                symbols.tokens.row(r));
+    finish_tokens(symbols, shape, y);
+  }
+}
+
+// Tries every eighth row: which tokens take fewer bits.
+bool DepthPlane::choose_planes(const TileShape& shape) {
+  symbols.reset(shape, true, kHits);
+  std::array<uint32_t, kSymbols> linear{}, planes{};
+  uint64_t linear_bits = 0, plane_bits = 0;
+  for (size_t y = 2; y < shape.height; y += 8) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const uint32_t* const z = symbols.wide.row(r);
+    const uint8_t* const tokens = symbols.tokens.row(r);
+    kernels().plane_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
+                              symbols.tokens.row(r));
+    for (size_t x = 0; x < shape.width; ++x) {
+      if (!shape.at(x, y)) continue;
+      const uint32_t token = token_of(z[x]);
+      ++linear[token], linear_bits += token >> 3;
+      ++planes[tokens[x]], plane_bits += tokens[x] < kHits ? 0 : token >> 3;
+    }
+  }
+  return static_cast<double>(plane_bits) + bits_of(planes, kSymbols) <
+         static_cast<double>(linear_bits) + bits_of(linear, kSymbols);
+}
+
+void DepthPlane::begin_decoding(const TileShape& shape, bool planes) {
+  by_planes = planes;
+  symbols.reset(shape, true, by_planes ? kHits : 0);
+}
+
+void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
+  const size_t width = shape.width;
+  const auto r = static_cast<ptrdiff_t>(y);
+  for (auto& terms : terms_)
+    if (terms.size() < width + 64) terms.resize(width + 64);
+  uint32_t *const terms = terms_[0].data(), *const take_left = terms_[1].data(), *const take_slope = terms_[2].data();
+  kernels().plane_terms(depth.row(r - 2), depth.row(r - 1), symbols.wide.row(r), symbols.tokens.row(r), width, terms,
+                        take_left, take_slope);
+  uint32_t* const row = depth.row(r);
+  const uint32_t* const above = depth.row(r - 1);
+  shape.for_each_hole(y, [&](size_t x) { terms[x] = above[x] - above[x - 1], take_left[x] = ~0u, take_slope[x] = 0; });
+  uint32_t left = row[-1], slope = 0;
+  for (size_t x = 0; x < width; ++x) {
+    const uint32_t next = (terms[x] + (left & take_left[x]) + (slope & take_slope[x])) & image::kMaxDepthCode;
+    slope = next - left, left = next;
+    row[x] = next;
+  }
+}
+
+bool DepthPlane::decode_row(const TileShape& shape, size_t y) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  begin_row(depth, y);
+  uint32_t* const row = depth.row(r);
+  if (by_planes) {
+    decode_by_planes(shape, y);
+  } else {
+    kernels().depth_rows(depth.row(r - 1), symbols.wide.row(r), shape.width, row);
+  }
+  end_row(depth, y, shape.width);
+  uint32_t least = 1;
+  if (shape.full(y))
+    for (size_t x = 0; x < shape.width; ++x) least = std::min(least, row[x]);
+  else
+    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
+                 [&](size_t x) { least = std::min(least, row[x]); });
+  return least != 0;
+}
+
+void DepthPlane::extend(const TileShape& shape) {
+  const size_t w = shape.width;
+  const auto h = static_cast<ptrdiff_t>(shape.height);
+  for (ptrdiff_t y = 0; y < h; ++y) {
+    uint32_t* const row = depth.row(y);
+    row[-1] = w > 1 ? 2 * row[0] - row[1] : row[0];
+    row[w] = w > 1 ? 2 * row[w - 1] - row[w - 2] : row[w - 1];
+  }
+  for (size_t x = 0; x < w; ++x) {
+    depth.row(-1)[x] = h > 1 ? 2 * depth.row(0)[x] - depth.row(1)[x] : depth.row(0)[x];
+    depth.row(h)[x] = h > 1 ? 2 * depth.row(h - 1)[x] - depth.row(h - 2)[x] : depth.row(h - 1)[x];
+  }
+}
+
+}  // namespace telesplat::codec::detail

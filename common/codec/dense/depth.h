@@ -1,0 +1,35 @@
+// Depth of a dense tile: predicted as L + U - UL, which is exact on planes. Where triangles are as small as a few pixels,
+// so that most pixels lie in the plane of some neighbours, but not of those three, by which plane it is.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/codec/dense/symbols.h"
+
+namespace telesplat::codec::detail {
+
+/// Depths of a tile with the rows and columns around it, and their symbols.
+struct DepthPlane {
+  Plane<uint32_t> depth;
+  SymbolPlane symbols;
+  bool by_planes = false;
+
+  /// What lies above and to the left of the first pixel is `base`.
+  void reset(const TileShape& shape, uint32_t base);
+  /// depth -> symbols, once all rows were set. Gives pixels that are not covered their predictions.
+  void encode(const TileShape& shape, uint32_t base);
+  /// Before the first decode_row().
+  void begin_decoding(const TileShape& shape, bool planes);
+  /// The next row from its symbols. False where a covered depth would be 0.
+  [[nodiscard]] bool decode_row(const TileShape& shape, size_t y);
+  /// Continues slopes beyond the tile's edges, as geometry needs it, once all rows are known.
+  void extend(const TileShape& shape);
+
+ private:
+  bool choose_planes(const TileShape& shape);
+  void decode_by_planes(const TileShape& shape, size_t y);
+  std::vector<uint32_t> terms_[3];
+};
+
+}  // namespace telesplat::codec::detail

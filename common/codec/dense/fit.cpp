@@ -1,0 +1,309 @@
+#include "common/codec/dense/fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace telesplat::codec::detail {
+namespace {
+
+// A x = b for symmetric positive A of n x n, in place; false where it is singular. Cholesky's method.
+template <int kN>
+struct Cholesky {
+  double a[kN][kN];
+  int n = kN;
+  bool factor() {
+    for (int j = 0; j < n; ++j) {
+      double d = a[j][j];
+      for (int k = 0; k < j; ++k) d -= a[j][k] * a[j][k];
+      if (!(d > 0)) return false;
+      a[j][j] = std::sqrt(d);
+      for (int i = j + 1; i < n; ++i) {
+        double s = a[i][j];
+        for (int k = 0; k < j; ++k) s -= a[i][k] * a[j][k];
+        a[i][j] = s / a[j][j];
+      }
+    }
+    return true;
+  }
+  void solve(double* b) const {
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < i; ++k) b[i] -= a[i][k] * b[k];
+      b[i] /= a[i][i];
+    }
+    for (int i = n; i-- > 0;) {
+      for (int k = i + 1; k < n; ++k) b[i] -= a[k][i] * b[k];
+      b[i] /= a[i][i];
+    }
+  }
+};
+
+struct Slope {
+  double h[3];  // slopes and height, as geometry() has them
+  double n[3];  // unit normal
+};
+
+// The same numbers as in geometry(), but for the last shift.
+bool slope_at(const Plane<uint32_t>& depth, int x, int y, int x0, int y0, int shift, double h[3]) {
+  const uint32_t* const row = depth.row(y);
+  const int u = static_cast<int>(row[x + 1] - row[x - 1]) >> shift,
+            v = static_cast<int>(depth.row(y + 1)[x] - depth.row(y - 1)[x]) >> shift;
+  if (std::abs(u) > 32767 || std::abs(v) > 32767) return false;
+  h[0] = u, h[1] = v;
+  h[2] = static_cast<double>(static_cast<int>(row[x] << 1) >> shift) - double(x + x0) * u - double(y + y0) * v;
+  return true;
+}
+
+using Vector9 = double[9];
+
+// The matrix, as a vector, that maximises how much of A h lies along n against how much lies across.
+bool best_matrix(const std::vector<Slope>& slopes, const std::vector<double>& weights, Vector9 out) {
+  double along[9][9] = {}, all[3][3] = {}, across_scale = 0;
+  Cholesky<9> across{};
+  for (size_t s = 0; s < slopes.size(); ++s) {
+    const Slope& k = slopes[s];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j <= i; ++j) {
+        const double hh = weights[s] * k.h[i] * k.h[j];
+        all[i][j] += hh;
+        for (int a = 0; a < 3; ++a)
+          for (int b = 0; b < 3; ++b) along[3 * a + i][3 * b + j] += hh * k.n[a] * k.n[b];
+      }
+  }
+  for (int a = 0; a < 9; ++a)
+    for (int b = 0; b < 9; ++b) {
+      const int i = a % 3, j = b % 3;
+      if (i < j) along[a][b] = along[b / 3 * 0 + (a / 3) * 3 + j][(b / 3) * 3 + i];
+    }
+  for (int a = 0; a < 9; ++a)
+    for (int b = 0; b < 9; ++b) {
+      const int i = a % 3, j = b % 3;
+      across.a[a][b] = (a / 3 == b / 3 ? all[std::max(i, j)][std::min(i, j)] : 0) - along[a][b];
+      if (a == b) across_scale += across.a[a][b];
+    }
+  for (int a = 0; a < 9; ++a) across.a[a][a] += across_scale * 1e-7 + 1e-12;
+  if (!across.factor()) return false;
+  Vector9 v = {1, 0.3, 0.2, 0.1, 1, 0.4, 0.2, 0.3, 1};
+  for (int round = 0; round < 12; ++round) {
+    Vector9 next = {};
+    for (int a = 0; a < 9; ++a)
+      for (int b = 0; b < 9; ++b) next[a] += along[a][b] * v[b];
+    across.solve(next);
+    double size = 0;
+    for (const double e : next) size += e * e;
+    if (!(size > 0) || !std::isfinite(size)) return false;
+    for (int a = 0; a < 9; ++a) v[a] = next[a] / std::sqrt(size);
+  }
+  std::copy_n(v, 9, out);
+  return true;
+}
+
+// n . A h / |A h| of each; its sum.
+double agreement(const std::vector<Slope>& slopes, const Vector9 m, std::vector<double>& out) {
+  double sum = 0;
+  out.resize(slopes.size());
+  for (size_t s = 0; s < slopes.size(); ++s) {
+    double dot = 0, square = 1e-30;
+    for (int a = 0; a < 3; ++a) {
+      const double e = m[3 * a] * slopes[s].h[0] + m[3 * a + 1] * slopes[s].h[1] + m[3 * a + 2] * slopes[s].h[2];
+      dot += e * slopes[s].n[a], square += e * e;
+    }
+    sum += out[s] = dot / std::sqrt(square);
+  }
+  return sum;
+}
+
+bool all_same(const Samples& samples, const Plane<int16_t>& plane) {
+  const int16_t value = plane.row(samples.places[0].y)[samples.places[0].x];
+  return std::all_of(samples.places.begin(), samples.places.end(),
+                     [&](const Samples::Place& p) { return plane.row(p.y)[p.x] == value; });
+}
+
+int shift_for(double size, double most) {
+  int shift = 0;
+  while (size > most && shift < 15) size /= 2, ++shift;
+  return shift;
+}
+
+// Doubles -> integers of the sum that geometry() allows.
+bool quantise(const Vector9 m, const double scale[3], GeometryModel& model) {
+  double total = 0, value[9];
+  for (int a = 0; a < 9; ++a) total += std::abs(value[a] = m[a] / scale[a % 3]);
+  if (!(total > 0) || !std::isfinite(total)) return false;
+  for (int a = 0; a < 9; ++a)
+    model.matrix[a / 3][a % 3] = static_cast<int16_t>(std::lround(value[a] * (kMostMatrix - 16) / total));
+  return true;
+}
+
+}  // namespace
+
+void Samples::choose(const TileShape& shape, size_t about) {
+  places.clear();
+  const int w = static_cast<int>(shape.width), h = static_cast<int>(shape.height);
+  const double area = static_cast<double>(shape.total);
+  const int step = std::max(1, static_cast<int>(std::sqrt(area / static_cast<double>(about))));
+  const auto inside = [&](int x, int y) {
+    return x < 0 || y < 0 || x >= w || y >= h || shape.at(size_t(x), size_t(y));
+  };
+  for (int y = 0, row = 0; y < h; y += step, ++row)
+    for (int x = row * 7 % step; x < w; x += step)
+      if (shape.mask == nullptr ||
+          (inside(x, y) && inside(x - 1, y) && inside(x + 1, y) && inside(x, y - 1) && inside(x, y + 1)))
+        places.push_back({x, y});
+}
+
+bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
+                  int y0, GeometryModel& model) {
+  if (samples.places.size() < 32 || (all_same(samples, *normal[0]) && all_same(samples, *normal[1]))) return false;
+  // Nine of ten slopes fit.
+  std::vector<double> sizes;
+  for (const auto p : samples.places) {
+    const uint32_t* const row = depth.row(p.y);
+    sizes.push_back(std::max(std::abs(double(static_cast<int>(row[p.x + 1] - row[p.x - 1]))),
+                             std::abs(double(static_cast<int>(depth.row(p.y + 1)[p.x] - depth.row(p.y - 1)[p.x])))));
+  }
+  std::nth_element(sizes.begin(), sizes.begin() + static_cast<ptrdiff_t>(sizes.size() * 9 / 10), sizes.end());
+  model.slope_shift = shift_for(sizes[sizes.size() * 9 / 10] * 2, 32767);
+  std::vector<Slope> slopes;
+  double most[3] = {1, 1, 1};
+  for (const auto p : samples.places) {
+    Slope s;
+    if (!slope_at(depth, p.x, p.y, x0, y0, model.slope_shift, s.h)) continue;
+    const int cx = normal[0]->row(p.y)[p.x] / 64 - 127, cy = normal[1]->row(p.y)[p.x] / 64 - 127;
+    const int cz = 127 - std::abs(cx) - std::abs(cy), fold = std::max(-cz, 0);
+    const double x = cx + (cx >= 0 ? -fold : fold), y = cy + (cy >= 0 ? -fold : fold), z = cz;
+    const double length = std::sqrt(x * x + y * y + z * z);
+    s.n[0] = x / length, s.n[1] = y / length, s.n[2] = z / length;
+    slopes.push_back(s);
+  }
+  if (slopes.size() < 32) return false;
+  double scale[3];
+  for (int i = 0; i < 3; ++i) {
+    sizes.clear();
+    for (const Slope& s : slopes) sizes.push_back(std::abs(s.h[i]));
+    std::nth_element(sizes.begin(), sizes.begin() + static_cast<ptrdiff_t>(sizes.size() * 9 / 10), sizes.end());
+    most[i] = std::max(1.0, sizes[sizes.size() * 9 / 10]);
+    scale[i] = most[i];
+  }
+  model.height_shift = shift_for(most[2] * 2, 32767);
+  std::vector<double> weights(slopes.size()), dots;
+  for (size_t i = 0; i < slopes.size(); ++i) {
+    double square = 0;
+    for (int j = 0; j < 3; ++j) slopes[i].h[j] /= scale[j], square += slopes[i].h[j] * slopes[i].h[j];
+    weights[i] = 1 / (square + 1e-3);
+  }
+  const std::vector<double> even = weights;
+  Vector9 m;
+  if (!best_matrix(slopes, weights, m)) return false;
+  for (int round = 0; round < (getenv("RN") ? atoi(getenv("RN")) : 2);
+       ++round) {  // once more, without those that disagree
+    if (agreement(slopes, m, dots) < 0)
+      for (double& e : m) e = -e;
+    agreement(slopes, m, dots);
+    for (size_t i = 0; i < slopes.size(); ++i) weights[i] = even[i] / (1 + 400 * std::max(0.0, 1 - dots[i]));
+    if (!best_matrix(slopes, weights, m)) return false;
+  }
+  if (agreement(slopes, m, dots) < 0)
+    for (double& e : m) e = -e;
+  const double shifted[3] = {scale[0], scale[1], scale[2] / std::pow(2.0, model.height_shift)};
+  return quantise(m, shifted, model);
+}
+
+namespace {
+
+constexpr int kTerms = kFeatures;  // 13 differences from the guide at the pixel, the residual, 1, and what is wanted
+constexpr int kUnknown = 14, kWanted = 14;
+constexpr int kRounds = 3;
+
+struct Features {
+  float of[kTerms];
+};
+
+Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, const Plane<int16_t>* residual, int x,
+                     int y) {
+  const int16_t *row = own.row(y) + x, *up = own.row(y - 1) + x;
+  const int16_t *g0 = guide.row(y - 1) + x, *g1 = guide.row(y) + x, *g2 = guide.row(y + 1) + x;
+  const int c = g1[0];
+  const int raw[kTerms] = {row[-1] - c,
+                           up[0] - c,
+                           up[-1] - c,
+                           up[1] - c,
+                           g0[-1] - c,
+                           g0[0] - c,
+                           g0[1] - c,
+                           g1[-1] - c,
+                           g1[1] - c,
+                           g2[-1] - c,
+                           g2[0] - c,
+                           g2[1] - c,
+                           residual != nullptr ? residual->row(y)[x] : 0,
+                           64,
+                           row[0] - c,
+                           0};
+  Features out;
+  for (int i = 0; i < kTerms; ++i) out.of[i] = static_cast<float>(raw[i]);
+  return out;
+}
+
+// Weighted least squares; false where the system is singular.
+bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, double solution[kUnknown]) {
+  alignas(64) float sums[kTerms][kTerms];
+  kernels().normal_equations(&all[0].of, weights.data(), all.size(), sums);
+  Cholesky<kUnknown> system{};
+  double trace = 0;
+  for (int i = 0; i < kUnknown; ++i) trace += static_cast<double>(sums[i][i]);
+  for (int i = 0; i < kUnknown; ++i) {
+    for (int j = 0; j < kUnknown; ++j) system.a[i][j] = static_cast<double>(sums[std::max(i, j)][std::min(i, j)]);
+    system.a[i][i] += trace * 1e-6 + 1e-9;
+    solution[i] = static_cast<double>(sums[kWanted][i]);
+  }
+  if (!system.factor()) return false;
+  system.solve(solution);
+  return true;
+}
+
+// The differences' weights as those of the values themselves; false where they are too large.
+bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTerms], int32_t& constant) {
+  static constexpr int kPlaces[13] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, 13};
+  int total = 0, sum = 0;
+  for (int i = 0; i < 13; ++i) {
+    if (!(std::abs(solution[i]) < 3.9)) return false;
+    weights[kPlaces[i]] = static_cast<int16_t>(std::lround(solution[i] * 8192));
+    total += std::abs(weights[kPlaces[i]]);
+    if (i < 12) sum += weights[kPlaces[i]];
+  }
+  if (total + std::abs(8192 - sum) > kMostWeight || std::abs(8192 - sum) > 32767) return false;
+  weights[8] = static_cast<int16_t>(8192 - sum);
+  constant = static_cast<int32_t>(std::lround(std::clamp(solution[13], -3.0, 3.0) * 64 * 8192));
+  return true;
+}
+
+}  // namespace
+
+bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
+                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
+  std::vector<Features> all;
+  std::vector<float> shares;
+  if (samples.places.size() < 64 || all_same(samples, own)) return false;
+  for (const auto p : samples.places) {
+    all.push_back(features_at(own, guide, residual, p.x, p.y));
+    const float* const f = all.back().of;
+    const float near = 64 + std::abs(f[kWanted] - f[0]) + std::abs(f[kWanted] - f[1]) + std::abs(f[kWanted]) / 4;
+    shares.push_back(1 / (near * near));
+  }
+  double solution[kUnknown];
+  bool solved = solve_weighted(all, shares, solution);
+  for (int round = 0; solved && round < kRounds; ++round) {  // towards the median, at last beyond it
+    for (size_t s = 0; s < all.size(); ++s) {
+      float off = -all[s].of[kWanted];
+      for (int i = 0; i < kUnknown; ++i) off += static_cast<float>(solution[i]) * all[s].of[i];
+      const float size = (round + 1 < kRounds ? 24 : 64) + std::abs(off);
+      shares[s] = 1 / (round + 1 < kRounds ? size : size * size);
+    }
+    solved = solve_weighted(all, shares, solution);
+  }
+  std::fill_n(weights, kGuidedTerms, int16_t{0});
+  return solved && quantise_weights(solution, weights, constant);
+}
+
+}  // namespace telesplat::codec::detail

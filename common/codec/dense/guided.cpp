@@ -1,0 +1,163 @@
+#include "common/codec/dense/guided.h"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace telesplat::codec::detail {
+namespace {
+
+constexpr int kConstantBits = 28;
+
+// Values of one plane, each from the one to its left. Bytes are 64ths and mod 256.
+template <bool kByte>
+struct Chain {
+  Chain(GuidedPlane& guided, size_t y)
+      : plane(guided),
+        value(guided.values.row(static_cast<ptrdiff_t>(y))),
+        residual(plane.residuals.row(static_cast<ptrdiff_t>(y))),
+        guide(plane.guide.row(static_cast<ptrdiff_t>(y))),
+        sums(plane.sums.data()),
+        weight(plane.weights[0] * (1 << plane.bits)),
+        left(value[-1] >> plane.bits) {}
+  void step(size_t x) {
+    const int bits = kByte ? 6 : plane.bits;
+    const int32_t p = (sums[x] + weight * left + (1 << (bits + 12))) >> (bits + 13);
+    left = std::clamp(p, 0, kByte ? 254 : plane.most) + (residual[x] >> bits);
+    left = kByte ? left & 255 : std::clamp(left, 0, plane.most);
+    value[x] = static_cast<int16_t>(left << bits);
+  }
+  void hole(size_t x) { value[x] = plane.nearest_value(guide[x]), left = value[x] >> plane.bits; }
+
+  const GuidedPlane& plane;
+  int16_t* const value;
+  const int16_t *const residual, *const guide;
+  const int32_t *const sums, weight;
+  int32_t left;
+};
+
+}  // namespace
+
+int16_t GuidedPlane::nearest_value(int16_t by) const {
+  return static_cast<int16_t>(std::clamp((by + (1 << bits >> 1)) >> bits, 0, most) << bits);
+}
+
+void GuidedPlane::reset(const TileShape& shape, int fraction, int largest) {
+  bits = fraction, most = largest;
+  for (Plane<int16_t>* plane : {&values, &guide, &residuals}) plane->reset(shape.width, shape.height);
+  symbols.reset(shape, bits != 6);
+  sums.resize(std::max(sums.size(), shape.width + 64));
+}
+
+void GuidedPlane::begin(const TileShape& shape) {
+  const size_t w = shape.width;
+  const auto h = static_cast<ptrdiff_t>(shape.height);
+  for (ptrdiff_t y = 0; y < h; ++y) guide.row(y)[-1] = guide.row(y)[0], guide.row(y)[w] = guide.row(y)[w - 1];
+  std::copy_n(guide.row(0) - 1, w + 2, guide.row(-1) - 1);
+  std::copy_n(guide.row(h - 1) - 1, w + 2, guide.row(h) - 1);
+  std::transform(guide.row(0) - 1, guide.row(0) + w + 1, values.row(-1) - 1,
+                 [&](int16_t by) { return nearest_value(by); });
+}
+
+void GuidedPlane::finish_row(const TileShape& shape, size_t y) {
+  int16_t* const row = values.row(static_cast<ptrdiff_t>(y));
+  const int16_t* const by = guide.row(static_cast<ptrdiff_t>(y));
+  shape.for_each_hole(y, [&](size_t x) { row[x] = nearest_value(by[x]); });
+  row[-1] = nearest_value(by[-1]), row[shape.width] = nearest_value(by[shape.width]);
+}
+
+GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
+  const auto r = static_cast<ptrdiff_t>(y);
+  GuidedRows rows{values.row(r),
+                  values.row(r - 1),
+                  {guide.row(r - 1), guide.row(r), guide.row(r + 1)},
+                  before != nullptr ? before->residuals.row(r) : nullptr,
+                  {},
+                  constant,
+                  bits,
+                  most};
+  std::copy_n(weights, kGuidedTerms, rows.weights);
+  return rows;
+}
+
+void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
+  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant))
+    set_plain_weights();
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    if (bits == 6)
+      kernels().guided_residuals(rows_around(y, before), shape.width, symbols.narrow.row(r), symbols.tokens.row(r),
+                                 residuals.row(r));
+    else
+      kernels().guided_residuals_wide(rows_around(y, before), shape.width, symbols.wide.row(r), symbols.tokens.row(r),
+                                      residuals.row(r));
+    shape.for_each_hole(y, [&](size_t x) { residuals.row(r)[x] = 0; });
+    finish_tokens(symbols, shape, y);
+  }
+}
+
+void GuidedPlane::set_plain_weights() {
+  std::fill_n(weights, kGuidedTerms, int16_t{0});
+  weights[0] = weights[1] = 4096;
+  constant = 0;
+}
+
+bool GuidedPlane::has_plain_weights() const {
+  return weights[0] == 4096 && weights[1] == 4096 && constant == 0 &&
+         std::all_of(weights + 2, weights + kGuidedTerms, [](int16_t w) { return w == 0; });
+}
+
+void GuidedPlane::put_weights(BitSink& bits) const {
+  const bool plain = has_plain_weights();
+  bits.put(plain, 1);
+  if (plain) return;
+  for (const int16_t w : weights) bits.put(static_cast<uint16_t>(w), 16);
+  bits.put(static_cast<uint32_t>(constant + (1 << (kConstantBits - 1))), kConstantBits);
+}
+
+bool GuidedPlane::get_weights(BitReader& bits) {
+  if (bits.source.take(1) != 0) {
+    set_plain_weights();
+    return !bits.overrun();
+  }
+  int total = 0;
+  for (int16_t& w : weights) {
+    w = static_cast<int16_t>(bits.source.take(16));
+    total += std::abs(int{w});
+  }
+  constant = static_cast<int32_t>(bits.source.take(kConstantBits)) - (1 << (kConstantBits - 1));
+  return !bits.overrun() && total <= kMostWeight && std::abs(constant) <= kMostConstant;
+}
+
+void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  int16_t* const out = residuals.row(r);
+  const auto unfold = [&](const auto* z) {
+    for (size_t x = 0; x < shape.width; ++x)
+      out[x] = static_cast<int16_t>((static_cast<int>(z[x] >> 1) ^ -static_cast<int>(z[x] & 1)) * (1 << bits));
+  };
+  if (bits == 6)
+    unfold(symbols.narrow.row(r));
+  else
+    unfold(symbols.wide.row(r));
+  values.row(r)[-1] = nearest_value(guide.row(r)[-1]);
+  kernels().guided_sums(rows_around(y, before), shape.width, sums.data());
+}
+
+void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_t y) {
+  Chain<true> first(a, y), second(b, y);
+  if (shape.full(y)) {
+    for (size_t x = 0; x < shape.width; ++x) first.step(x), second.step(x);
+  } else {
+    for (size_t x = 0; x < shape.width; ++x)
+      shape.at(x, y) ? (first.step(x), second.step(x)) : (first.hole(x), second.hole(x));
+  }
+  a.finish_row(shape, y), b.finish_row(shape, y);
+}
+
+void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y) {
+  Chain<false> chain(plane, y);
+  for (size_t x = 0; x < shape.width; ++x) shape.at(x, y) ? chain.step(x) : chain.hole(x);
+  plane.finish_row(shape, y);
+}
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,48 @@
+// A plane predicted from its neighbours, weighted, and from a guide that is known: normals from those of depth's
+// slopes.
+#pragma once
+
+#include <cstdint>
+
+#include "common/codec/dense/fit.h"
+#include "common/codec/dense/symbols.h"
+
+namespace telesplat::codec::detail {
+
+/// Values, their guide and residuals, in 64ths, or as others are configured; symbols of the residuals.
+struct GuidedPlane {
+  /// fraction: bits of a value below 1; most: the largest one. Six and 254: residuals are mod 256.
+  void reset(const TileShape& shape, int fraction = 6, int most = 254);
+  int16_t nearest_value(int16_t guide) const;
+  /// Borders of the guide, once its rows are known; and of the values above the first row.
+  void begin(const TileShape& shape);
+  /// Values of pixels that are not covered, and borders, of row y. They are the guide's.
+  void finish_row(const TileShape& shape, size_t y);
+
+  /// Chooses weights; values -> symbols. `before`: whose residuals are known; null: none's.
+  void encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before);
+  void put_weights(BitSink& bits) const;
+  static constexpr size_t kMostWeightBits = 16 * kGuidedTerms + 32;
+  [[nodiscard]] bool get_weights(BitReader& bits);
+  /// What is known of row y before its left neighbours are, into sums; its residuals from its symbols.
+  void decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before);
+
+  Plane<int16_t> values, guide, residuals;
+  SymbolPlane symbols;
+  int16_t weights[kGuidedTerms] = {};
+  int32_t constant = 0;
+  std::vector<int32_t> sums;
+  int bits = 6, most = 254;
+
+ private:
+  /// Half of L and of U: where there is nothing to be fitted.
+  void set_plain_weights();
+  bool has_plain_weights() const;
+  GuidedRows rows_around(size_t y, const GuidedPlane* before) const;
+};
+
+/// Values of row y of both planes, whose sums are known.
+void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_t y);
+void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y);
+
+}  // namespace telesplat::codec::detail

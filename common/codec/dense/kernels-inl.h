@@ -1,0 +1,273 @@
+// Loops that compilers turn into vectors by themselves. Included once for every instruction set, in its namespace.
+// No include guard: that is meant.
+
+// fold: 0, -1, 1, -2, ... -> 0, 1, 2, 3, ...
+static inline uint32_t Fold24(uint32_t difference) {
+  const uint32_t v = difference << 8;
+  return ((v << 1) ^ static_cast<uint32_t>(static_cast<int32_t>(v) >> 31)) >> 8;
+}
+
+static inline uint16_t Least(uint16_t a, uint16_t b) { return a < b ? a : b; }
+
+// token_of() of z < 256: the least of the lines of which the logarithm's approximation is made.
+static inline uint8_t ByteToken(uint8_t z) {
+  const uint16_t v = static_cast<uint16_t>(z + 8);
+  uint16_t token = z;
+  token = Least(token, static_cast<uint16_t>(v >> 1));
+  token = Least(token, static_cast<uint16_t>((v >> 2) + 8));
+  token = Least(token, static_cast<uint16_t>((v >> 3) + 16));
+  token = Least(token, static_cast<uint16_t>((v >> 4) + 24));
+  return static_cast<uint8_t>(Least(token, static_cast<uint16_t>((v >> 5) + 32)));
+}
+
+static void DepthResiduals(const uint32_t* RESTRICT above, const uint32_t* RESTRICT row, size_t n, uint32_t* RESTRICT z,
+                           uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    const uint32_t folded = Fold24(row[x] - row[x - 1] - above[x] + above[x - 1]);
+    z[x] = folded;
+    const float v = static_cast<float>(static_cast<int32_t>(folded + 8));
+    tokens[x] = static_cast<uint8_t>((std::bit_cast<uint32_t>(v) >> 20) - 1040);
+  }
+}
+
+static void DepthRows(const uint32_t* RESTRICT above, const uint32_t* RESTRICT z, size_t n, uint32_t* RESTRICT row) {
+  uint32_t difference = row[-1] - above[-1];
+  for (size_t x = 0; x < n; ++x) {
+    difference += (z[x] >> 1) ^ (0 - (z[x] & 1));
+    row[x] = (above[x] + difference) & 0xFFFFFF;
+  }
+}
+
+// Planes, in the order in which they are tried; deltas to the left neighbour, slopes, and values.
+#define PLANES_OF(c, above2, above, x)                                                                            \
+  const uint32_t up = above[x], corner = above[x - 1];                                                            \
+  const uint32_t by_left[3] = {up - corner, above[x + 1] - up, corner - above[x - 2]};                            \
+  const uint32_t by_row[4] = {2 * up - above2[x], up + above[x + 1] - above2[x + 1], up + corner - above2[x - 1], \
+                              2 * above[x + 1] - above2[x + 2]}
+
+static void PlaneResiduals(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above,
+                           const uint32_t* RESTRICT row, size_t n, uint32_t* RESTRICT z, uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    PLANES_OF(c, above2, above, x);
+    const uint32_t left = row[x - 1], v = row[x] + 2;
+    const uint32_t folded = Fold24(row[x] - left - by_left[0]);
+    z[x] = folded;
+    const float f = static_cast<float>(static_cast<int32_t>(folded + 8));
+    uint32_t token = (std::bit_cast<uint32_t>(f) >> 20) - 1040 + kHits;
+    const auto look = [&](uint32_t k, uint32_t plane) {
+      const uint32_t off = (v - plane) & 0xFFFFFF;
+      token = off < 5 ? 5 * k + off : token;
+    };
+    look(7, by_row[3]), look(6, by_row[2]), look(5, by_row[1]), look(4, left + by_left[2]), look(3, by_row[0]);
+    look(2, left + by_left[1]), look(1, 2 * left - row[x - 2]), look(0, left + by_left[0]);
+    tokens[x] = static_cast<uint8_t>(token);
+  }
+}
+
+static void PlaneTerms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above, const uint32_t* RESTRICT z,
+                       const uint8_t* RESTRICT tokens, size_t n, uint32_t* RESTRICT terms, uint32_t* RESTRICT take_left,
+                       uint32_t* RESTRICT take_slope) {
+  for (size_t x = 0; x < n; ++x) {
+    PLANES_OF(c, above2, above, x);
+    const uint32_t token = tokens[x], k = token * 52 >> 8, off = token - 5 * k - 2;
+    const uint32_t missed = (z[x] >> 1) ^ (0 - (z[x] & 1));
+    uint32_t term = by_left[0] + (token < kHits ? off : missed);
+    term = k == 1 ? off : term;
+    term = k == 2 ? by_left[1] + off : term;
+    term = k == 3 ? by_row[0] + off : term;
+    term = k == 4 ? by_left[2] + off : term;
+    term = k == 5 ? by_row[1] + off : term;
+    term = k == 6 ? by_row[2] + off : term;
+    term = k == 7 ? by_row[3] + off : term;
+    terms[x] = term;
+    take_left[x] = (k == 3) | ((k >= 5) & (k < 8)) ? 0 : ~0u;
+    take_slope[x] = k == 1 ? ~0u : 0;
+  }
+}
+
+static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* RESTRICT contexts) {
+  const uint8_t *RESTRICT a = rows.above, *RESTRICT b = rows.above2, *RESTRICT o = rows.other;
+  const int16_t bias = static_cast<int16_t>(scale.bias);
+  const int shift = scale.shift, merges = scale.merges;
+  const auto one = [&](int sum) {
+    int16_t c = static_cast<int16_t>(static_cast<int16_t>(sum - bias) >> shift);
+    c = c < 0 ? int16_t{0} : c;
+    return static_cast<uint8_t>((c > 15 ? int16_t{15} : c) >> merges);
+  };
+  if (o == nullptr)
+    for (size_t x = 0; x < n; ++x)
+      contexts[x] = one(static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x]));
+  else
+    for (size_t x = 0; x < n; ++x)
+      contexts[x] = one(
+          static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] + 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]));
+}
+
+static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRICT row, size_t n, uint8_t* RESTRICT z,
+                            uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    const uint8_t left = row[x - 1], up = above[x], corner = above[x - 1];
+    const uint8_t low = left < up ? left : up, high = left < up ? up : left;
+    const uint8_t raised = corner < low ? low : corner, clamped = raised > high ? high : raised;
+    const uint8_t r = static_cast<uint8_t>(row[x] - static_cast<uint8_t>(left + up - clamped));
+    const uint8_t folded = static_cast<uint8_t>((r << 1) ^ (r & 0x80 ? 0xFF : 0));
+    z[x] = folded;
+    tokens[x] = ByteToken(folded);
+  }
+}
+
+static inline int32_t Within16(int32_t v) { return v < -32767 ? -32767 : v > 32767 ? 32767 : v; }
+
+static void GuidedSums(const GuidedRows& rows, size_t n, int32_t* RESTRICT sums) {
+  const int16_t *RESTRICT up = rows.above, *RESTRICT g0 = rows.guide[0], *RESTRICT g1 = rows.guide[1],
+                          *RESTRICT g2 = rows.guide[2], *RESTRICT other = rows.residual;
+  int32_t w[kGuidedTerms];
+  for (int i = 0; i < kGuidedTerms; ++i) w[i] = rows.weights[i];
+  const int32_t constant = rows.constant;
+  for (size_t x = 0; x < n; ++x)
+    sums[x] = constant + w[1] * up[x] + w[2] * up[x - 1] + w[3] * up[x + 1] + w[4] * g0[x - 1] + w[5] * g0[x] +
+              w[6] * g0[x + 1] + w[7] * g1[x - 1] + w[8] * g1[x] + w[9] * g1[x + 1] + w[10] * g2[x - 1] +
+              w[11] * g2[x] + w[12] * g2[x + 1];
+  if (other != nullptr)
+    for (size_t x = 0; x < n; ++x) sums[x] += w[13] * other[x];
+}
+
+static inline int32_t Guess(int32_t sum, int bits, int32_t most) {
+  const int32_t p = (sum + (1 << (bits + 12))) >> (bits + 13);
+  return p < 0 ? 0 : p > most ? most : p;
+}
+
+static constexpr size_t kPart = 256;
+
+static GuidedRows PartOf(const GuidedRows& rows, size_t begin) {
+  GuidedRows part = rows;
+  part.own += begin, part.above += begin;
+  for (auto& g : part.guide) g += begin;
+  if (part.residual != nullptr) part.residual += begin;
+  return part;
+}
+
+static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT z, uint8_t* RESTRICT tokens,
+                            int16_t* RESTRICT residual) {
+  int32_t sums[kPart];
+  for (size_t begin = 0; begin < n; begin += kPart) {
+    const size_t count = n - begin < kPart ? n - begin : kPart;
+    const GuidedRows part = PartOf(rows, begin);
+    GuidedSums(part, count, sums);
+    const int16_t* RESTRICT own = part.own;
+    const int32_t left = part.weights[0];
+    uint8_t *RESTRICT zp = z + begin, *RESTRICT tp = tokens + begin;
+    int16_t* RESTRICT rp = residual + begin;
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t guess = Guess(sums[x] + left * own[x - 1], 6, 254);
+      const int8_t r = static_cast<int8_t>((own[x] >> 6) - guess);
+      rp[x] = static_cast<int16_t>(r * 64);
+      const uint8_t folded = static_cast<uint8_t>((r << 1) ^ (r >> 7));
+      zp[x] = folded;
+      tp[x] = ByteToken(folded);
+    }
+  }
+}
+
+static void GuidedResidualsWide(const GuidedRows& rows, size_t n, uint32_t* RESTRICT z, uint8_t* RESTRICT tokens,
+                                int16_t* RESTRICT residual) {
+  int32_t sums[kPart];
+  for (size_t begin = 0; begin < n; begin += kPart) {
+    const size_t count = n - begin < kPart ? n - begin : kPart;
+    const GuidedRows part = PartOf(rows, begin);
+    GuidedSums(part, count, sums);
+    const int16_t* RESTRICT own = part.own;
+    const int32_t left = part.weights[0], most = part.most;
+    const int bits = part.bits;
+    uint32_t* RESTRICT zp = z + begin;
+    uint8_t* RESTRICT tp = tokens + begin;
+    int16_t* RESTRICT rp = residual + begin;
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t r = (own[x] >> bits) - Guess(sums[x] + left * own[x - 1], bits, most);
+      rp[x] = static_cast<int16_t>(r * (1 << bits));
+      zp[x] = static_cast<uint32_t>((r << 1) ^ (r >> 31));
+      const float v = static_cast<float>(static_cast<int32_t>(zp[x] + 8));
+      tp[x] = static_cast<uint8_t>((std::bit_cast<uint32_t>(v) >> 20) - 1040);
+    }
+  }
+}
+
+// A quotient below 1 in 2^-14, of a numerator and a depth code.
+static void Heights(const uint32_t* RESTRICT depth, size_t n, int x0, int y, const HeightModel& model,
+                    int16_t* RESTRICT out) {
+  const uint32_t row = static_cast<uint32_t>(model.b) * static_cast<uint32_t>(y) + static_cast<uint32_t>(model.c);
+  const int32_t low = model.low, scale = model.scale;
+  int32_t at[kPart];
+  for (size_t begin = 0; begin < n; begin += kPart) {
+    const size_t count = n - begin < kPart ? n - begin : kPart;
+    const uint32_t* RESTRICT from = depth + begin;
+    const uint32_t first = row + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0 + static_cast<int>(begin));
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t code = static_cast<int32_t>(from[x] & 0xFFFFFF);
+      const int32_t sum = static_cast<int32_t>(first + static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x));
+      int32_t size = sum < 0 ? ~sum : sum;
+      size = size < code ? size : code;
+      const int32_t up = 23 - static_cast<int32_t>((std::bit_cast<uint32_t>(static_cast<float>(code | 1)) >> 23) - 127);
+      const int32_t d = static_cast<int32_t>(static_cast<uint32_t>(code) << up >> 9 | 0x4000);
+      int32_t r = 46260 - (d * 30840 >> 15);
+      r = (r * (32768 - (d * r >> 15))) >> 14;
+      r = (r * (32768 - (d * r >> 15))) >> 14;
+      const uint32_t quotient = (static_cast<uint32_t>(size) << up >> 8) * static_cast<uint32_t>(r) >> 16;
+      const int32_t height = sum < 0 ? -static_cast<int32_t>(quotient) : static_cast<int32_t>(quotient);
+      const int32_t t = (Within16(height - low) * scale) >> 12;
+      at[x] = t < 0 ? 0 : t > 16383 ? 16383 : t;
+    }
+    for (size_t x = 0; x < count; ++x) {
+      const int32_t i = at[x] >> 8, a = model.knots[i], b = model.knots[i + 1];
+      out[begin + x] = static_cast<int16_t>(a + ((b - a) * (at[x] & 255) >> 8));
+    }
+  }
+}
+
+// Slopes of the reciprocal depth at a pixel, and what it would be at the tile's centre, are linear in the surface's
+// normal, whatever the camera (codec.md: "geometry"). 31-bit integers; the quotient by Newton's method.
+static void Geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
+                     int16_t* RESTRICT gx, int16_t* RESTRICT gy) {
+  const uint32_t *RESTRICT above = depth[0], *RESTRICT here = depth[1], *RESTRICT below = depth[2];
+  int32_t a[3][3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) a[i][j] = model.matrix[i][j];
+  const int slope_shift = model.slope_shift, height_shift = model.height_shift;
+  for (size_t x = 0; x < n; ++x) {
+    const int32_t u = Within16(static_cast<int32_t>(here[x + 1] - here[x - 1]) >> slope_shift),
+                  v = Within16(static_cast<int32_t>(below[x] - above[x]) >> slope_shift);
+    const uint32_t px = static_cast<uint32_t>(x0 + static_cast<int>(x)), py = static_cast<uint32_t>(y);
+    const int32_t height =
+        static_cast<int32_t>(static_cast<uint32_t>(static_cast<int32_t>(here[x] << 1) >> slope_shift) -
+                             px * static_cast<uint32_t>(u) - py * static_cast<uint32_t>(v));
+    const int32_t h = Within16(height >> height_shift);
+    const int32_t mx = a[0][0] * u + a[0][1] * v + a[0][2] * h, my = a[1][0] * u + a[1][1] * v + a[1][2] * h,
+                  mz = a[2][0] * u + a[2][1] * v + a[2][2] * h;
+    const int32_t absx = mx < 0 ? -mx : mx, absy = my < 0 ? -my : my, absz = mz < 0 ? -mz : mz;
+    const int32_t s = absx + absy + absz;
+    const float f = static_cast<float>(s >> 6 | 1);  // below 2^24, so exact: its exponent is wanted
+    const int32_t up = 24 - static_cast<int32_t>((std::bit_cast<uint32_t>(f) >> 23) - 127);
+    const int32_t d = static_cast<int32_t>(static_cast<uint32_t>(s) << up >> 16 | 0x4000);
+    int32_t r = 46260 - (d * 30840 >> 15);
+    r = (r * (32768 - (d * r >> 15))) >> 14;
+    r = (r * (32768 - (d * r >> 15))) >> 14;
+    const int32_t nx = static_cast<int32_t>(static_cast<uint32_t>(mx) << up) >> 16,
+                  ny = static_cast<int32_t>(static_cast<uint32_t>(my) << up) >> 16;
+    int32_t qx = (nx * r >> 15) * 127 >> 8, qy = (ny * r >> 15) * 127 >> 8;
+    const int32_t ax = qx < 0 ? -qx : qx, ay = qy < 0 ? -qy : qy;
+    const int32_t fx = qx < 0 ? ay - 8128 : 8128 - ay, fy = qy < 0 ? ax - 8128 : 8128 - ax;
+    qx = mz < 0 ? fx : qx, qy = mz < 0 ? fy : qy;
+    gx[x] = static_cast<int16_t>(qx + 8128);
+    gy[x] = static_cast<int16_t>(qy + 8128);
+  }
+}
+
+static void Activity(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* RESTRICT tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    const auto far = [&](int a, int b) { return a < b ? b - a : a - b; };
+    const int sum = far(gx[1][x + 1], gx[1][x - 1]) + far(gx[2][x], gx[0][x]) + far(gy[1][x + 1], gy[1][x - 1]) +
+                    far(gy[2][x], gy[0][x]);
+    const float v = static_cast<float>((sum >> 3) + 8);
+    tokens[x] = static_cast<uint8_t>((std::bit_cast<uint32_t>(v) >> 20) - 1040);
+  }
+}

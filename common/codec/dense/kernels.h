@@ -1,0 +1,101 @@
+// The loops over pixels and symbols, of which there is one set for each instruction set, and a plain one.
+// All sets give the same results to the bit: integers only. The plain set is standard C++20 and needs nothing else.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "common/codec/dense/rans.h"
+
+namespace telesplat::codec::detail {
+
+/// How a sum of tokens becomes one of kContexts classes: clamp((sum - bias) >> shift) >> merges. See contexts().
+struct ContextScale {
+  int bias = 0, shift = 0, merges = 0;
+};
+
+/// Rows of tokens around those whose contexts are wanted. Each may be read one element beyond both ends.
+struct ContextRows {
+  const uint8_t* above;   ///< of the same plane
+  const uint8_t* above2;  ///< the row above that
+  const uint8_t* other;   ///< of the same row of what is already known; null: nothing is
+};
+
+inline constexpr unsigned kHits = 40;  ///< eight planes, five distances: -2 to 2
+
+inline constexpr int kFeatures = 16;     ///< of what least squares sum up
+inline constexpr int kGuidedTerms = 14;  ///< of guided prediction: 4 neighbours, 9 of the guide, 1 of another residual
+
+/// What predicts a row of a plane of 64ths: its own rows, a guide, and residuals that are known.
+struct GuidedRows {
+  const int16_t *own, *above;     ///< the plane's row, of which only the left neighbour is used, and the one above
+  const int16_t* guide[3];        ///< the guide's rows above, here, below
+  const int16_t* residual;        ///< of another plane's same row, in 64ths; null: none
+  int16_t weights[kGuidedTerms];  ///< in 2^-13: L, U, UL, UR; the guide's 3 x 3; the residual
+  int32_t constant;               ///< in 2^-13 of the plane's unit
+  int bits = 6;                   ///< of a value's fraction: what 64ths have
+  int32_t most = 254;             ///< the largest value that is predicted
+};
+
+/// Where a plane of room space cuts a pixel's ray: ((a x + b y + c) / depth code - low) * scale, and what a table of
+/// kKnots points makes of it. See codec.md: "height".
+struct HeightModel {
+  static constexpr int kKnots = 65;
+  int32_t a = 0, b = 0, c = 0;
+  int32_t low = 0, scale = 0;
+  int16_t knots[kKnots] = {};
+};
+
+/// A matrix that turns what depth says of a surface into the direction of its normal. See geometry().
+struct GeometryModel {
+  int16_t matrix[3][3] = {};
+  int slope_shift = 0, height_shift = 0;
+};
+
+struct Kernels {
+  /// z = fold(row - (left + above - above_left)) mod 2^24 and its tokens.
+  void (*depth_residuals)(const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z, uint8_t* tokens);
+  /// The inverse: row from z; row[-1] and above[-1] are known. All mod 2^24.
+  void (*depth_rows)(const uint32_t* above, const uint32_t* z, size_t n, uint32_t* row);
+  /// The same where surfaces are flat and small: tokens below kHits say in which of eight planes through known pixels
+  /// a pixel lies, and how far off; others are kHits + those of z.
+  void (*plane_residuals)(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
+                          uint8_t* tokens);
+  /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]).
+  void (*plane_terms)(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens, size_t n,
+                      uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
+  /// Contexts of n tokens.
+  void (*contexts)(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
+  /// Residuals of bytes by the median predictor, folded, and their tokens.
+  void (*median_residuals)(const uint8_t* above, const uint8_t* row, size_t n, uint8_t* z, uint8_t* tokens);
+  /// Residuals of a plane of 64ths by guided prediction, folded mod 256, their tokens; and as 64ths of -128..127.
+  void (*guided_residuals)(const GuidedRows& rows, size_t n, uint8_t* z, uint8_t* tokens, int16_t* residual);
+  /// The same for values that take more than a byte: not mod 256.
+  void (*guided_residuals_wide)(const GuidedRows& rows, size_t n, uint32_t* z, uint8_t* tokens, int16_t* residual);
+  /// All terms of guided prediction but that of the left neighbour,
+  void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums);
+  /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.
+  void (*geometry)(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model, int16_t* gx,
+                   int16_t* gy);
+  /// Indices that heights stand for, in 16ths.
+  void (*heights)(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out);
+  /// How much the guide varies around each pixel, as tokens.
+  void (*activity)(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
+  /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order; for j <= i, others
+  /// are not set.
+  void (*normal_equations)(const float (*features)[kFeatures], const float* weights, size_t n,
+                           float (*sums)[kFeatures]);
+  /// Appends the row's symbols, the last one first, at `out`, which must have room for 6 bytes a symbol and 64 more.
+  uint8_t* (*put_symbols)(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out);
+  /// Takes symbols from the bytes [begin, end), the last ones first; returns what is left of them, or null where
+  /// they are too few. 64 bytes at `end` must be readable.
+  const uint8_t* (*get_symbols)(const DecodedRow& row, const uint32_t* tables, uint32_t* states, const uint8_t* begin,
+                                const uint8_t* end);
+};
+
+/// The fastest set for this machine.
+const Kernels& kernels();
+/// Standard C++ alone.
+const Kernels& plain_kernels();
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,176 @@
+#include "common/codec/dense/normals.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <memory>
+
+#include "common/image/normal.h"
+
+namespace telesplat::codec::detail {
+namespace {
+
+struct Point {
+  int x, y, z;
+};
+
+Point point_of(uint16_t code) {
+  const int x = std::min(code & 255, 254) - 127, y = std::min(code >> 8, 254) - 127;
+  const int z = 127 - std::abs(x) - std::abs(y), fold = std::max(-z, 0);
+  return {x + (x >= 0 ? -fold : fold), y + (y >= 0 ? -fold : fold), z};
+}
+
+uint16_t code_of(const Point& p) {
+  int x = p.x, y = p.y;
+  if (p.z < 0) x = (127 - std::abs(p.y)) * (p.x >= 0 ? 1 : -1), y = (127 - std::abs(p.x)) * (p.y >= 0 ? 1 : -1);
+  return static_cast<uint16_t>((x + 127) | (y + 127) << 8);
+}
+
+Point turn(const Point& p, int pole) {
+  const Point q = pole / 2 == 0 ? Point{p.y, p.z, p.x} : pole / 2 == 1 ? Point{p.z, p.x, p.y} : p;
+  return pole % 2 == 0 ? q : Point{q.x, q.y, -q.z};
+}
+Point unturn(const Point& p, int pole) {
+  const Point q = pole % 2 == 0 ? p : Point{p.x, p.y, -p.z};
+  return pole / 2 == 0 ? Point{q.z, q.x, q.y} : pole / 2 == 1 ? Point{q.y, q.z, q.x} : q;
+}
+
+using Table = std::array<uint16_t, 65536>;
+const Table& table(int pole, bool back) {
+  static const auto tables = [] {
+    auto all = std::make_unique<std::array<std::array<Table, kPoles>, 2>>();
+    for (unsigned code = 0; code < 65536; ++code)
+      for (int p = 0; p < kPoles; ++p) {
+        (*all)[0][size_t(p)][code] = code_of(turn(point_of(uint16_t(code)), p));
+        (*all)[1][size_t(p)][code] = code_of(unturn(point_of(uint16_t(code)), p));
+      }
+    return all;
+  }();
+  return (*tables)[back][static_cast<size_t>(pole)];
+}
+
+}  // namespace
+
+uint16_t turn_normal(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, false)[code]; }
+uint16_t turn_back(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, true)[code]; }
+
+void NormalPlanes::reset(const TileShape& shape) {
+  for (GuidedPlane& p : plane) p.reset(shape);
+  activity.reset(shape.width, shape.height);
+}
+
+int NormalPlanes::choose_pole(const TileShape& shape) const {
+  int64_t sum[3] = {};
+  const Table& canonical = table(4, false);  // the pole as it is
+  uint32_t others = 0;
+  const auto look = [&](size_t i) { others += canonical[codes[i]] != codes[i]; };
+  for (size_t y = 0; y < shape.height; ++y) {
+    const size_t first = y * shape.width;
+    if (shape.full(y))
+      for (size_t x = 0; x < shape.width; ++x) look(first + x);
+    else
+      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
+                   [&](size_t x) { look(first + x); });
+  }
+  if (others != 0) return kRaw;
+  for (const auto p : samples.places) {
+    const Point q = point_of(codes[static_cast<size_t>(p.y) * shape.width + static_cast<size_t>(p.x)]);
+    sum[0] += q.x, sum[1] += q.y, sum[2] += q.z;
+  }
+  int axis = 2;
+  for (int a = 0; a < 2; ++a)
+    if (std::abs(sum[a]) > std::abs(sum[axis])) axis = a;
+  return 2 * axis + (sum[axis] < 0 ? 1 : 0);
+}
+
+// Without geometry it is the first pixel's normal everywhere.
+void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base) {
+  const uint16_t turned = turn_normal(base, pole_);
+  const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const uint32_t* const rows[3] = {depth.depth.row(r - 1), depth.depth.row(r), depth.depth.row(r + 1)};
+    if (has_geometry_)
+      kernels().geometry(rows, shape.width, x0, y0 + static_cast<int>(y), geometry_, plane[0].guide.row(r),
+                         plane[1].guide.row(r));
+    else
+      for (int i = 0; i < 2; ++i)
+        std::fill_n(plane[i].guide.row(r), shape.width, static_cast<int16_t>((turned >> 8 * i & 255) * 64));
+  }
+  for (GuidedPlane& p : plane) p.begin(shape);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const auto rows = [&](const GuidedPlane& p) {
+      return std::array<const int16_t*, 3>{p.guide.row(r - 1), p.guide.row(r), p.guide.row(r + 1)};
+    };
+    kernels().activity(rows(plane[0]).data(), rows(plane[1]).data(), shape.width, activity.row(r));
+    activity.row(r)[-1] = activity.row(r)[0], activity.row(r)[shape.width] = activity.row(r)[shape.width - 1];
+  }
+  plane[0].symbols.other = &activity;
+  plane[1].symbols.other = &plane[0].symbols.tokens;
+}
+
+void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits) {
+  samples.choose(shape, std::min<size_t>(1100, shape.total / 16));
+  pole_ = choose_pole(shape);
+  const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, false);
+  for (size_t y = 0; y < shape.height; ++y) {
+    int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
+                                                                               static_cast<ptrdiff_t>(y));
+    const uint16_t* const from = codes.data() + y * shape.width;
+    for (size_t x = 0; x < shape.width; ++x) {
+      const uint16_t code = turned == nullptr ? from[x] : (*turned)[from[x]];
+      x_row[x] = static_cast<int16_t>((code & 255) * 64), y_row[x] = static_cast<int16_t>((code >> 8) * 64);
+    }
+  }
+  const Plane<int16_t>* const values[2] = {&plane[0].values, &plane[1].values};
+  has_geometry_ = pole_ != kRaw && fit_geometry(samples, depth.depth, values, -static_cast<int>(shape.width / 2),
+                                                -static_cast<int>(shape.height / 2), geometry_);
+  make_guide(shape, depth, base);
+  for (GuidedPlane& p : plane)
+    for (size_t y = 0; y < shape.height; ++y) p.finish_row(shape, y);
+  plane[0].encode(shape, samples, nullptr);
+  plane[1].encode(shape, samples, &plane[0]);
+  bits.put(static_cast<uint64_t>(pole_), 3);
+  bits.put(has_geometry_, 1);
+  if (has_geometry_) {
+    for (const auto& row : geometry_.matrix)
+      for (const int16_t e : row) bits.put(static_cast<uint16_t>(e), 16);
+    bits.put(static_cast<uint64_t>(geometry_.slope_shift), 4);
+    bits.put(static_cast<uint64_t>(geometry_.height_shift), 4);
+  }
+  for (const GuidedPlane& p : plane) p.put_weights(bits);
+}
+
+bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits) {
+  pole_ = static_cast<int>(bits.source.take(3));
+  has_geometry_ = bits.source.take(1) != 0;
+  if (pole_ > kRaw) return false;
+  if (has_geometry_) {
+    int total = 0;
+    for (auto& row : geometry_.matrix)
+      for (int16_t& e : row) total += std::abs(int{e = static_cast<int16_t>(bits.source.take(16))});
+    geometry_.slope_shift = static_cast<int>(bits.source.take(4));
+    geometry_.height_shift = static_cast<int>(bits.source.take(4));
+    if (total > kMostMatrix) return false;
+  }
+  for (GuidedPlane& p : plane)
+    if (!p.get_weights(bits)) return false;
+  make_guide(shape, depth, base);
+  return true;
+}
+
+void NormalPlanes::decode_row(const TileShape& shape, size_t y, uint16_t* out) {
+  plane[0].decode_sums(shape, y, nullptr);
+  plane[1].decode_sums(shape, y, &plane[0]);
+  decode_values(plane[0], plane[1], shape, y);
+  const int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
+                                                                                   static_cast<ptrdiff_t>(y));
+  const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, true);
+  for (size_t x = 0; x < shape.width; ++x) {
+    const auto code = static_cast<uint16_t>(x_row[x] >> 6 | y_row[x] << 2);
+    out[x] = turned == nullptr ? code : (*turned)[code];
+  }
+}
+
+}  // namespace telesplat::codec::detail

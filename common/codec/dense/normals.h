@@ -1,0 +1,43 @@
+// Normals of a dense tile, after its depth: the octahedron turned so that its seam is far away, predicted from
+// neighbours and from depth's slopes.
+#pragma once
+
+#include <cstdint>
+
+#include "common/codec/dense/depth.h"
+#include "common/codec/dense/guided.h"
+
+namespace telesplat::codec::detail {
+
+/// Octahedral codes with another axis of the lattice as the pole: 0 to 5 of kPoles; kRaw: as they are.
+/// A permutation of the canonical codes; the lattice's points stay what they are.
+inline constexpr int kPoles = 6, kRaw = 6;
+uint16_t turn_normal(uint16_t code, int pole);
+uint16_t turn_back(uint16_t code, int pole);
+
+struct NormalPlanes {
+  void reset(const TileShape& shape);
+  /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code.
+  void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits);
+  static constexpr size_t kMostBits = 256 + 2 * GuidedPlane::kMostWeightBits;
+  [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitReader& bits);
+  /// Row y from its symbols, into codes of all its pixels.
+  void decode_row(const TileShape& shape, size_t y, uint16_t* codes);
+
+  /// What encode() fitted; null: nothing.
+  const GeometryModel* geometry() const { return has_geometry_ ? &geometry_ : nullptr; }
+
+  GuidedPlane plane[2];
+  Plane<uint8_t> activity;
+  std::vector<uint16_t> codes;  ///< of the tile's covered pixels, row by row in all its width
+  Samples samples;
+
+ private:
+  void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
+  int choose_pole(const TileShape& shape) const;
+  int pole_ = kRaw;
+  bool has_geometry_ = false;
+  GeometryModel geometry_;
+};
+
+}  // namespace telesplat::codec::detail

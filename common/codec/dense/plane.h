@@ -1,0 +1,36 @@
+// Rows of a tile with borders around them, so that kernels need no special cases at edges.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace telesplat::codec::detail {
+
+/// width x height elements, two rows more above and two below, kLead elements more to the left and kTail to the right
+/// of each row. Kernels may read and write to the end of a vector.
+template <class T>
+class Plane {
+ public:
+  static constexpr size_t kLead = 32, kTail = 64;
+  static constexpr ptrdiff_t kRows = 2;
+  /// What the elements hold afterwards is not said.
+  void reset(size_t width, size_t height) {
+    stride_ = (width + kLead + kTail + 31) / 32 * 32;
+    const size_t needed = stride_ * (height + 2 * kRows);
+    if (elements_.size() < needed) elements_.resize(needed);
+  }
+  T* row(ptrdiff_t y) { return elements_.data() + stride_ * static_cast<size_t>(y + kRows) + kLead; }
+  const T* row(ptrdiff_t y) const { return elements_.data() + stride_ * static_cast<size_t>(y + kRows) + kLead; }
+  /// Elements [-kLead, width + kTail) of row y.
+  void fill_row(ptrdiff_t y, T value) {
+    T* const first = row(y) - kLead;
+    for (size_t i = 0; i < stride_; ++i) first[i] = value;
+  }
+
+ private:
+  size_t stride_ = 0;
+  std::vector<T> elements_;
+};
+
+}  // namespace telesplat::codec::detail

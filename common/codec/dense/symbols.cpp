@@ -1,0 +1,196 @@
+#include "common/codec/dense/symbols.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace telesplat::codec::detail {
+namespace {
+
+constexpr unsigned kBiasBits = 13, kShiftBits = 4;
+
+ContextRows rows_around(const SymbolPlane& plane, size_t y) {
+  const auto row = static_cast<ptrdiff_t>(y);
+  const Plane<uint8_t>& sizes = plane.first != 0 ? plane.sizes : plane.tokens;
+  return {sizes.row(row - 1), sizes.row(row - 2), plane.other != nullptr ? plane.other->row(row) : nullptr};
+}
+
+}  // namespace
+
+void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_mask) {
+  width = tile_width, height = tile_height, mask = tile_mask;
+  covered.assign(height, static_cast<uint32_t>(width));
+  total = width * height;
+  if (mask == nullptr) return;
+  total = 0;
+  for (size_t y = 0; y < height; ++y) {
+    const uint64_t* const words = mask->row(static_cast<int>(y));
+    uint32_t n = 0;
+    for (size_t w = 0; w < mask->words_per_row(); ++w) n += static_cast<uint32_t>(std::popcount(words[w]));
+    covered[y] = n, total += n;
+  }
+}
+
+void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_number) {
+  is_wide = are_wide, first = first_number, other = nullptr, scale = {};
+  alphabet = first + (is_wide ? kNumberTokens : kByteTokens);
+  tokens.reset(shape.width, shape.height);
+  contexts.reset(shape.width, shape.height);
+  if (is_wide)
+    wide.reset(shape.width, shape.height);
+  else
+    narrow.reset(shape.width, shape.height);
+  tokens.fill_row(-1, 0), tokens.fill_row(-2, 0);
+  if (first == 0) return;
+  sizes.reset(shape.width, shape.height);
+  sizes.fill_row(-1, 0), sizes.fill_row(-2, 0);
+}
+
+SymbolRow SymbolPlane::row(const TileShape& shape, size_t y) const {
+  const auto r = static_cast<ptrdiff_t>(y);
+  return {tokens.row(r),
+          contexts.row(r),
+          is_wide ? wide.row(r) : nullptr,
+          is_wide ? nullptr : narrow.row(r),
+          shape.covered[y],
+          first};
+}
+
+void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
+  uint8_t* const row = plane.tokens.row(static_cast<ptrdiff_t>(y));
+  const uint8_t* const above = plane.tokens.row(static_cast<ptrdiff_t>(y) - 1);
+  shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
+  row[-1] = row[0], row[shape.width] = row[shape.width - 1];
+  if (plane.first == 0) return;
+  uint8_t* const sizes = plane.sizes.row(static_cast<ptrdiff_t>(y)) - 1;
+  for (size_t i = 0; i < shape.width + 2; ++i) {
+    const unsigned t = row[static_cast<ptrdiff_t>(i) - 1];
+    sizes[i] = static_cast<uint8_t>(t < kHits ? t / 5 * 4 : 32 + ((t - kHits) >> 3));
+  }
+}
+
+// The finest classes that nearly all sums fit into.
+void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
+  std::array<uint32_t, 1 << kBiasBits> histogram{};
+  uint32_t total = 0;
+  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 3) {
+    const ContextRows rows = rows_around(plane, y);
+    const uint8_t *a = rows.above, *b = rows.above2, *o = rows.other;
+    for (size_t x = y % 2; x < shape.width; x += 3, ++total)
+      ++histogram[static_cast<size_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] +
+                                      (o == nullptr ? 0 : 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]))];
+  }
+  size_t low = 0, high = histogram.size() - 1;
+  for (uint32_t seen = 0; low < high && seen + histogram[low] <= total / 32; ++low) seen += histogram[low];
+  for (uint32_t seen = 0; high > low && seen + histogram[high] <= total / 32; --high) seen += histogram[high];
+  int shift = 0;
+  while ((high - low + 1) >> shift > kContexts) ++shift;
+  plane.scale = {static_cast<int>(low) - (1 << shift >> 1), shift};
+  plane.scale.bias = std::max(plane.scale.bias, 0);
+}
+
+void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits) {
+  choose_scale(plane, shape);
+  for (size_t y = 0; y < shape.height; ++y)
+    kernels().contexts(rows_around(plane, y), shape.width, plane.scale, plane.contexts.row(static_cast<ptrdiff_t>(y)));
+  for (auto& counts : counts_) counts.fill(0);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const uint8_t *tokens = plane.tokens.row(r), *contexts = plane.contexts.row(r);
+    if (shape.full(y)) {
+      for (size_t x = 0; x < shape.width; ++x) ++counts_[contexts[x]][tokens[x]];
+      continue;
+    }
+    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
+                 [&](size_t x) { ++counts_[contexts[x]][tokens[x]]; });
+  }
+  plane.scale.merges = merge_contexts(counts_, plane.alphabet);
+  if (plane.scale.merges != 0)
+    for (size_t y = 0; y < shape.height; ++y) {
+      uint8_t* const contexts = plane.contexts.row(static_cast<ptrdiff_t>(y));
+      for (size_t x = 0; x < shape.width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> plane.scale.merges);
+    }
+  choose_levels(counts_, plane.alphabet, levels_);
+  bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);
+  bits.put(static_cast<uint64_t>(plane.scale.shift), kShiftBits);
+  bits.put(static_cast<uint64_t>(plane.scale.merges), 3);
+  put_levels(bits, levels_);
+  make_encode_tables(levels_, tables_);
+}
+
+uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, uint32_t* states,
+                               uint8_t* out) const {
+  if (shape.full(y)) return kernels().put_symbols(plane.row(shape, y), tables_.data(), states, out);
+  static thread_local std::vector<uint8_t> tokens, contexts, narrow;
+  static thread_local std::vector<uint32_t> wide;
+  const SymbolRow row = plane.row(shape, y);
+  const size_t needed = row.count + Plane<uint8_t>::kTail;
+  if (tokens.size() < needed)
+    tokens.resize(needed), contexts.resize(needed), narrow.resize(needed), wide.resize(needed);
+  size_t n = 0;
+  for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), [&](size_t x) {
+    tokens[n] = row.tokens[x], contexts[n] = row.contexts[x];
+    if (row.wide != nullptr)
+      wide[n] = row.wide[x];
+    else
+      narrow[n] = row.narrow[x];
+    ++n;
+  });
+  return kernels().put_symbols(
+      {tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr, narrow.data(), n, row.first},
+      tables_.data(), states, out);
+}
+
+bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
+  plane.scale.bias = static_cast<int>(bits.source.take(kBiasBits));
+  plane.scale.shift = static_cast<int>(bits.source.take(kShiftBits));
+  plane.scale.merges = static_cast<int>(bits.source.take(3));
+  levels_.alphabet = plane.alphabet;
+  if (bits.overrun() || plane.scale.shift > 14 || plane.scale.merges > 4 || !get_levels(bits, levels_)) return false;
+  make_decode_tables(levels_, tables_);
+  return true;
+}
+
+bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y, WordSource& source) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  uint8_t *const contexts = plane.contexts.row(r), *const tokens = plane.tokens.row(r);
+  uint32_t* const wide = plane.is_wide ? plane.wide.row(r) : nullptr;
+  uint8_t* const narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
+  kernels().contexts(rows_around(plane, y), shape.width, plane.scale, contexts);
+  if (shape.full(y)) {
+    source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first}, tables_.data(),
+                                       source.states, source.begin, source.end);
+    finish_tokens(plane, shape, y);
+    return source.end != nullptr;
+  }
+  const size_t needed = shape.width + Plane<uint8_t>::kTail;
+  if (packed_tokens_.size() < needed)
+    packed_tokens_.resize(needed), packed_contexts_.resize(needed), packed_narrow_.resize(needed),
+        packed_wide_.resize(needed);
+  const auto for_each_covered = [&](auto f) {
+    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), f);
+  };
+  size_t n = 0;
+  for_each_covered([&](size_t x) { packed_contexts_[n++] = contexts[x]; });
+  source.end =
+      kernels().get_symbols({packed_contexts_.data(), packed_tokens_.data(),
+                             wide != nullptr ? packed_wide_.data() : nullptr, packed_narrow_.data(), n, plane.first},
+                            tables_.data(), source.states, source.begin, source.end);
+  if (source.end == nullptr) return false;
+  if (wide != nullptr)
+    std::fill_n(wide, shape.width, 0u);
+  else
+    std::fill_n(narrow, shape.width, uint8_t{0});
+  n = 0;
+  for_each_covered([&](size_t x) {
+    tokens[x] = packed_tokens_[n];
+    if (wide != nullptr)
+      wide[x] = packed_wide_[n];
+    else
+      narrow[x] = packed_narrow_[n];
+    ++n;
+  });
+  finish_tokens(plane, shape, y);
+  return true;
+}
+
+}  // namespace telesplat::codec::detail

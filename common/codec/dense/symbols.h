@@ -1,0 +1,90 @@
+// Planes of symbols of one dense tile, and their way to bytes and back: contexts, tables, the coder's words.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/codec/dense/kernels.h"
+#include "common/codec/dense/plane.h"
+#include "common/codec/dense/tables.h"
+#include "common/codec/mask.h"
+
+namespace telesplat::codec::detail {
+
+/// Which pixels of a tile are coded.
+struct TileShape {
+  size_t width = 0, height = 0;
+  const Mask* mask = nullptr;     ///< null: all pixels are covered
+  std::vector<uint32_t> covered;  ///< pixels of each row
+  size_t total = 0;
+
+  void reset(size_t tile_width, size_t tile_height, const Mask* tile_mask);
+  bool full(size_t y) const { return covered[y] == width; }
+  bool at(size_t x, size_t y) const { return mask == nullptr || mask->at(static_cast<int>(x), static_cast<int>(y)); }
+  /// Calls f(x) for the pixels of row y that are not covered.
+  template <class F>
+  void for_each_hole(size_t y, F f) const {
+    if (full(y)) return;
+    const uint64_t* const words = mask->row(static_cast<int>(y));
+    for (size_t w = 0; w * 64 < width; ++w) {
+      uint64_t holes = ~words[w];
+      if (width - w * 64 < 64) holes &= (uint64_t{1} << (width - w * 64)) - 1;
+      for_each_set(&holes, 1, [&](size_t bit) { f(w * 64 + bit); });
+    }
+  }
+};
+
+/// Symbols of one plane: tokens, their contexts, and the numbers that they stand for.
+struct SymbolPlane {
+  /// wide: numbers below 2^24, else below 256.
+  void reset(const TileShape& shape, bool wide, unsigned first = 0);
+  SymbolRow row(const TileShape& shape, size_t y) const;
+
+  Plane<uint8_t> tokens, contexts, narrow;
+  Plane<uint8_t> sizes;  ///< where there are tokens without raw bits: what contexts take for tokens
+  Plane<uint32_t> wide;
+  bool is_wide = false;
+  unsigned first = 0, alphabet = 0;
+  const Plane<uint8_t>* other = nullptr;  ///< tokens of the same pixels that are known before
+  ContextScale scale;
+};
+
+/// Gives pixels that are not covered the tokens above them, and borders those beside them.
+void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y);
+
+/// Of one plane: chooses contexts and tables, and puts them into `bits`. Leaves the plane packed: covered pixels only.
+class PlaneEncoder {
+ public:
+  void prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits);
+  uint8_t* put_row(const SymbolPlane& plane, const TileShape& shape, size_t y, uint32_t* states, uint8_t* out) const;
+  static constexpr size_t kMostBits = 32 + kMostLevelBits;
+
+ private:
+  void choose_scale(SymbolPlane& plane, const TileShape& shape);
+  TokenLevels levels_;
+  TokenCounts counts_;
+  std::vector<EncodeEntry> tables_;
+};
+
+/// Words and states from which all planes of a tile are decoded.
+struct WordSource {
+  const uint8_t *begin = nullptr, *end = nullptr;
+  alignas(64) uint32_t states[kLanes];
+};
+
+class PlaneDecoder {
+ public:
+  [[nodiscard]] bool prepare(SymbolPlane& plane, BitReader& bits);
+  /// Row y of the plane's tokens and numbers, those before being known. False where words are missing.
+  [[nodiscard]] bool get_row(SymbolPlane& plane, const TileShape& shape, size_t y, WordSource& source);
+
+ private:
+  TokenLevels levels_;
+  std::vector<uint32_t> tables_;
+  std::vector<uint8_t> packed_contexts_, packed_tokens_, packed_narrow_;
+  std::vector<uint32_t> packed_wide_;
+};
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,217 @@
+#include "common/codec/dense/tables.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "common/codec/golomb.h"
+
+namespace telesplat::codec::detail {
+namespace {
+
+// In 256ths of a frequency, beyond the 1 that every token has.
+uint32_t weight_of(unsigned level) {
+  static constexpr uint32_t kSteps[4] = {64, 76, 91, 108};
+  return level < 2 ? 0 : kSteps[(level - 2) & 3] << ((level - 2) >> 2);
+}
+
+// The level whose weight is nearest, by ratio.
+unsigned level_of(uint32_t weight) {
+  if (weight < 32) return 1;
+  const int octave = static_cast<int>(std::bit_width(weight)) - 7;  // of 64 and more: 0 and more
+  unsigned level = octave < 0 ? 2 : 2 + 4 * static_cast<unsigned>(octave);
+  while (level + 1 < kLevels &&
+         uint64_t{weight} * weight >= uint64_t{weight_of(level)} * weight_of(level + 1))  // above their geometric mean
+    ++level;
+  return level;
+}
+
+// What a level is expected to be: from the token before and, but for the first context, what that context has.
+struct Expected {
+  const std::array<uint8_t, kSymbols>* before;
+  int left = 0, left2 = 0;
+  int operator()(unsigned token) const {
+    if (before == nullptr) return token < 8 ? left : (left + left2 + 1) / 2;
+    const int slope = token == 0 ? (*before)[0]
+                                 : (*before)[token] - (*before)[token - 1] / 2 -
+                                       (token > 1 ? (*before)[token - 2] / 2 : (*before)[token - 1] / 2);
+    const int base = token == 0 ? 0 : token == 1 ? left : (left + left2) / 2;
+    return std::clamp((base + slope + (token == 0 ? 0 : (*before)[token])) / (token == 0 ? 1 : 2), 0, kLevels - 1);
+  }
+  void next(int level) { left2 = left, left = level; }
+};
+
+constexpr uint32_t kFirstMean = 4;
+
+// Walks the levels alike for both directions: code(difference, context) -> difference; false ends it.
+template <class Code>
+bool for_each_level(TokenLevels& levels, Code code) {
+  GolombContext lengths, first, later;
+  lengths.start(8), first.start(kFirstMean), later.start(kFirstMean);
+  const std::array<uint8_t, kSymbols>* before = nullptr;
+  int length = 0;  // tokens up to the last one that has a level
+  for (auto& of : levels.of) {
+    int own = static_cast<int>(levels.alphabet);
+    while (own > 0 && of[static_cast<size_t>(own - 1)] == 0) --own;
+    own = length + code(own - length, lengths);
+    if (own < 0 || own > static_cast<int>(levels.alphabet)) return false;
+    Expected expected{before};
+    for (int t = 0; t < own; ++t) {
+      const int guess = expected(static_cast<unsigned>(t));
+      const int level = guess + code(int{of[static_cast<size_t>(t)]} - guess, before == nullptr ? first : later);
+      if (level < 0 || level >= kLevels) return false;
+      of[static_cast<size_t>(t)] = static_cast<uint8_t>(level);
+      expected.next(level);
+    }
+    if (own == 0) continue;
+    if (of[static_cast<size_t>(own - 1)] == 0) return false;
+    length = own, before = &of;
+  }
+  return true;
+}
+
+// The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
+int choose_level(uint32_t count, uint64_t total, int expected, bool last) {
+  const auto rate = [&](int level) { return 1.5f * static_cast<float>(std::min(std::abs(level - expected), 6)); };
+  const float n = static_cast<float>(count);
+  int best = 0, ideal = 0;
+  float least = 1e30f;
+  if (count != 0) {
+    const uint64_t share = uint64_t{count} * kFrequencyOne * 256 / total;  // of a frequency, in 256ths
+    ideal = static_cast<int>(level_of(share < 256 ? 0 : static_cast<uint32_t>(share - 256)));
+    const int low = std::max(1, std::min(ideal, expected)), high = std::max({1, ideal, expected});
+    for (int level = low; level <= high; ++level) {
+      const float off = static_cast<float>(level - ideal), cost = 0.0216f * n * off * off + rate(level);
+      if (cost < least) least = cost, best = level;
+    }
+    return best;
+  }
+  for (int level = last ? 1 : 0; level <= std::min(expected, 12); ++level) {
+    const float weight = level == 0 ? 0 : 1 + static_cast<float>(weight_of(static_cast<unsigned>(level))) / 256;
+    const float cost = weight * static_cast<float>(total) * (1.44f / kFrequencyOne) + rate(level);
+    if (cost < least) least = cost, best = level;
+  }
+  return best;
+}
+
+constexpr double kTokenCost = 3;  // bits of a level
+
+double log2_of(uint32_t n) {
+  static const auto table = [] {
+    std::array<float, 4096> out{};
+    for (uint32_t i = 1; i < out.size(); ++i) out[i] = static_cast<float>(std::log2(static_cast<double>(i)));
+    return out;
+  }();
+  const int shift = std::max(0, static_cast<int>(std::bit_width(n)) - 12);
+  return static_cast<double>(table[n >> shift]) + shift;
+}
+
+}  // namespace
+
+double bits_of(const std::array<uint32_t, kSymbols>& counts, unsigned alphabet) {
+  double sum = 0;
+  uint32_t total = 0, present = 0;
+  for (unsigned t = 0; t < alphabet; ++t)
+    if (const uint32_t n = counts[t]; n != 0) total += n, ++present, sum -= n * log2_of(n);
+  return total == 0 ? 0 : sum + total * log2_of(total) + kTokenCost * present;
+}
+
+int merge_contexts(TokenCounts& counts, unsigned alphabet) {
+  double best = 0;
+  for (const auto& c : counts) best += bits_of(c, alphabet);
+  TokenCounts merged = counts;
+  int merges = 0;
+  for (int tried = 1; tried <= 4; ++tried) {
+    double bits = 0;
+    for (size_t c = 0; c < kContexts >> tried; ++c) {
+      for (unsigned t = 0; t < alphabet; ++t) merged[c][t] = merged[2 * c][t] + merged[2 * c + 1][t];
+      bits += bits_of(merged[c], alphabet);
+    }
+    for (size_t c = kContexts >> tried; c < kContexts; ++c) merged[c].fill(0);
+    if (bits < best) best = bits, merges = tried, counts = merged;
+  }
+  return merges;
+}
+
+void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& levels) {
+  levels.alphabet = alphabet;
+  const std::array<uint8_t, kSymbols>* before = nullptr;
+  for (size_t c = 0; c < kContexts; ++c) {
+    auto& of = levels.of[c];
+    of.fill(0);
+    uint64_t total = 0;
+    unsigned present = 0, end = 0;
+    for (unsigned t = 0; t < alphabet; ++t)
+      if (counts[c][t] != 0) total += counts[c][t], ++present, end = t + 1;
+    if (total == 0) continue;
+    Expected expected{before};
+    for (unsigned t = 0; t < end; ++t) {
+      of[t] = static_cast<uint8_t>(present == 1 ? (counts[c][t] != 0 ? 2 : 0)
+                                                : choose_level(counts[c][t], total, expected(t), t + 1 == end));
+      expected.next(of[t]);
+    }
+    before = &of;
+  }
+}
+
+void put_levels(BitSink& bits, const TokenLevels& levels) {
+  TokenLevels copy = levels;
+  for_each_level(copy,
+                 [&](int difference, GolombContext& context) { return context.put(difference, bits), difference; });
+}
+
+bool get_levels(BitReader& bits, TokenLevels& levels) {
+  for (auto& of : levels.of) of.fill(0);
+  return for_each_level(levels,
+                        [&](int, GolombContext& context) {
+                          return bits.overrun() ? int{kSymbols} * 8 : context.get(bits.source);
+                        }) &&
+         !bits.overrun();
+}
+
+void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphabet,
+                    std::array<uint16_t, kSymbols>& out) {
+  out.fill(0);
+  uint64_t total = 0;
+  uint32_t present = 0;
+  unsigned last = 0;
+  for (unsigned t = 0; t < alphabet; ++t)
+    if (levels[t] != 0) total += weight_of(levels[t]), ++present, last = t;
+  if (present == 0) return;
+  const uint64_t free = kFrequencyOne - present;
+  uint64_t sum = 0, given = 0;
+  for (unsigned t = 0; t < alphabet; ++t) {
+    if (levels[t] == 0) continue;
+    sum += weight_of(levels[t]);
+    const uint64_t upto = total == 0 ? 0 : sum * free / total;
+    out[t] = static_cast<uint16_t>(1 + upto - given);
+    given = upto;
+  }
+  out[last] = static_cast<uint16_t>(out[last] + free - given);  // where all weigh nothing
+}
+
+void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out) {
+  out.resize(kContexts * kSymbols);
+  std::array<uint16_t, kSymbols> frequencies;
+  for (size_t c = 0; c < kContexts; ++c) {
+    frequencies_of(levels.of[c], levels.alphabet, frequencies);
+    uint32_t start = 0;
+    for (unsigned t = 0; t < levels.alphabet; start += frequencies[t++])
+      out[c * kSymbols + t] = EncodeEntry::of(start, frequencies[t]);
+  }
+}
+
+void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out) {
+  out.resize(kContexts * kFrequencyOne);
+  std::array<uint16_t, kSymbols> frequencies;
+  for (size_t c = 0; c < kContexts; ++c) {
+    frequencies_of(levels.of[c], levels.alphabet, frequencies);
+    uint32_t* at = out.data() + c * kFrequencyOne;
+    uint32_t* const end = at + kFrequencyOne;
+    for (unsigned t = 0; t < levels.alphabet; ++t)
+      for (uint32_t i = 0, f = frequencies[t]; i < f; ++i) *at++ = t << 24 | (f - 1) << 12 | i;
+    for (uint32_t i = 0; at != end; ++i) *at++ = (kFrequencyOne - 1) << 12 | i;  // a context without tokens
+  }
+}
+
+}  // namespace telesplat::codec::detail

@@ -1,0 +1,147 @@
+// Dense tiles: every way to code a plane is taken by some image, and comes back.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "common/codec/dense/normals.h"
+#include "common/codec/depth_codec.h"
+#include "common/image/normal.h"
+#include "tests/support/depth_images.h"
+#include "tests/support/masks.h"
+
+namespace telesplat::codec {
+namespace {
+
+using image::DepthImage;
+
+StreamInfo expect_round_trip(const DepthImage& image) {
+  const auto bytes = encode(image);
+  const auto back = decode(bytes);
+  EXPECT_TRUE(back.ok());
+  if (back.ok()) {
+    EXPECT_TRUE(*back == image) << image.width << " x " << image.height;
+  }
+  return inspect(bytes).value();
+}
+
+double bits_per_pixel(size_t bytes, const DepthImage& image) {
+  return 8.0 * static_cast<double>(bytes) / static_cast<double>(image.pixels());
+}
+
+// A surface of triangles a few pixels wide: squares of four pixels, two planes each.
+DepthImage facets(int width, int height, uint32_t seed) {
+  std::mt19937 random(seed);
+  DepthImage image = test::plane(width, height, 0, 0);
+  const int columns = width / 5 + 2;
+  std::vector<double> corner(static_cast<size_t>(columns * (height / 5 + 2)));
+  for (double& c : corner) c = 4e6 + static_cast<double>(random() % 60000);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double u = x % 5 / 5.0, v = y % 5 / 5.0;
+      const auto at = [&](int i, int j) { return corner[static_cast<size_t>((y / 5 + j) * columns + x / 5 + i)]; };
+      const double d = u + v < 1 ? at(0, 0) + u * (at(1, 0) - at(0, 0)) + v * (at(0, 1) - at(0, 0))
+                                 : at(1, 1) + (1 - u) * (at(0, 1) - at(1, 1)) + (1 - v) * (at(1, 0) - at(1, 1));
+      image.depth[static_cast<size_t>(y * width + x)] = static_cast<uint32_t>(d);
+    }
+  return image;
+}
+
+TEST(Dense, SmallTrianglesAreCodedByTheirPlanes) {
+  const DepthImage image = facets(256, 200, 3);
+  const StreamInfo info = expect_round_trip(image);
+  EXPECT_LT(bits_per_pixel(info.depth_bytes, image), 11.5) << "their corners alone take 15 bits of noise";
+  expect_round_trip(test::masked(image, test::random_mask(256, 200, 0.7, 2)));
+}
+
+TEST(Dense, NormalsFollowFromDepth) {
+  const DepthImage image = test::render({.width = 256, .height = 200});
+  const StreamInfo info = expect_round_trip(image);
+  EXPECT_LT(bits_per_pixel(info.normal_bytes, image), 4.2) << "5.9 without depth";
+}
+
+TEST(Dense, NormalsThatAreNotCanonicalComeBack) {
+  DepthImage image = test::render({.width = 120, .height = 90});
+  image.normal[5000] = 0xFFFF;
+  expect_round_trip(image);
+  image.normal[5000] = static_cast<uint16_t>(254 | 30 << 8);  // on the map's border: canonical is 254, 224
+  expect_round_trip(image);
+}
+
+TEST(Dense, PalettesComeBack) {
+  std::mt19937 random(4);
+  for (const uint32_t count : {2u, 3u, 200u, 256u, 257u, 1023u, 1024u, 1025u}) {
+    DepthImage image = test::plane(200, 150, 30, 20);
+    for (uint32_t& c : image.colour) c = random() % count * 0x3051 & 0xFFFFFF;
+    expect_round_trip(image);
+    expect_round_trip(test::masked(image, test::random_mask(200, 150, 0.5, count)));
+  }
+}
+
+TEST(Dense, ColoursByHeightCostLittle) {
+  DepthImage image = test::render({.width = 256, .height = 200, .seed = 4});
+  const double pitch = -50 * 3.14159265358979323846 / 180;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const size_t i = static_cast<size_t>(y * image.width + x);
+      const double f = image.width / 2 / std::tan(55 * 3.14159265358979323846 / 360);
+      const double depth = image::decode_depth(image.depth[i], 0.02);
+      const double up = -(y + 0.5 - image.height / 2.0) / f;
+      const double height = depth * (up * std::cos(pitch) + std::sin(pitch) * 1.0);  // of the point below the eye
+      const auto step = static_cast<uint32_t>(std::clamp((height + 1.2) * 500, 0.0, 900.0));
+      image.colour[i] = 0x204020 + step % 256 * 0x000100 + step / 256 * 0x300000;
+    }
+  const StreamInfo info = expect_round_trip(image);
+  EXPECT_LT(bits_per_pixel(info.colour_bytes, image), 3.0);
+}
+
+TEST(Dense, RoughColoursGrowLittle) {
+  std::mt19937 random(6);
+  DepthImage image = test::plane(256, 200, 30, 20);
+  for (uint32_t& c : image.colour) c = random() & 0xFFFFFF;
+  EXPECT_LT(bits_per_pixel(expect_round_trip(image).colour_bytes, image), 24.5);
+}
+
+TEST(Dense, NarrowTilesComeBack) {
+  for (const int width : {1, 2, 3, 15, 16, 17, 31, 32, 33}) {
+    expect_round_trip(test::render({.width = width, .height = 300}));
+    expect_round_trip(test::random_pixels(width, 200, 0.6, static_cast<uint32_t>(width)));
+    expect_round_trip(test::random_pixels(200, width, 0.6, static_cast<uint32_t>(width)));
+  }
+}
+
+TEST(Dense, TurnedNormalsAreAPermutationOfCanonicalCodes) {
+  for (int pole = 0; pole < detail::kPoles; ++pole) {
+    std::vector<bool> seen(65536);
+    for (uint32_t code = 0; code < 65536; ++code) {
+      const auto c = static_cast<uint16_t>(code);
+      if (image::canonical_normal16(c) != c) continue;
+      const uint16_t turned = detail::turn_normal(c, pole);
+      ASSERT_EQ(image::canonical_normal16(turned), turned);
+      ASSERT_EQ(detail::turn_back(turned, pole), c);
+      ASSERT_FALSE(seen[turned]);
+      seen[turned] = true;
+    }
+  }
+}
+
+TEST(Dense, CanonicalNormalsMeanTheSame) {
+  int others = 0;
+  for (uint32_t code = 0; code < 65536; ++code) {
+    const auto c = static_cast<uint16_t>(code), canonical = image::canonical_normal16(c);
+    ASSERT_EQ(image::octahedral16(canonical), image::octahedral16(c)) << code;
+    ASSERT_EQ(image::canonical_normal16(canonical), canonical) << code;
+    others += canonical != c;
+  }
+  EXPECT_EQ(others, 511 + 504 + 3) << "coordinates of 255, the border's other halves, three of its corners";
+  std::mt19937 random(1);
+  for (int i = 0; i < 100000; ++i) {
+    const auto part = [&] { return static_cast<float>(static_cast<int>(random() % 41) - 20); };
+    const uint16_t code = image::encode_normal16({part(), part(), part()});
+    ASSERT_EQ(image::canonical_normal16(code), code);
+  }
+}
+
+}  // namespace
+}  // namespace telesplat::codec
