@@ -195,8 +195,7 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   const std::vector<double> even = weights;
   Vector9 m;
   if (!best_matrix(slopes, weights, m)) return false;
-  for (int round = 0; round < (getenv("RN") ? atoi(getenv("RN")) : 2);
-       ++round) {  // once more, without those that disagree
+  for (int round = 0; round < 2; ++round) {  // once more, without those that disagree
     if (agreement(slopes, m, dots) < 0)
       for (double& e : m) e = -e;
     agreement(slopes, m, dots);

@@ -8,13 +8,14 @@
 #include "common/volume/grid.h"
 #include "common/volume/shear.h"
 #include "common/volume/slices/block.h"
+#include "common/volume/slices/coded_block.h"
 
 namespace telesplat::volume {
 namespace {
 
 static_assert(kBlockSide == kSliceBlock);
 static_assert(kMaxRasterSide / kSliceBlock <= 256 && kMaxBlockBytes <= 0xffff);
-constexpr size_t kSliceHead = 8, kBlockHead = 4;
+constexpr size_t kSliceHead = 10, kBlockHead = 4;
 
 void put_u16(std::vector<uint8_t>& out, size_t value) {
   out.push_back(uint8_t(value));
@@ -22,8 +23,10 @@ void put_u16(std::vector<uint8_t>& out, size_t value) {
 }
 size_t get_u16(std::span<const uint8_t> bytes, size_t at) { return bytes[at] | size_t{bytes[at + 1]} << 8; }
 
-void put_head(std::vector<uint8_t>& out, int layer, int k_begin, int k_end, size_t blocks) {
-  for (const size_t v : {size_t(layer), size_t(k_begin), size_t(k_end), blocks}) put_u16(out, v);
+void put_head(std::vector<uint8_t>& out, const EncodedSlice& slice, size_t blocks) {
+  for (const size_t v : {size_t(slice.layer), size_t(slice.k_begin), size_t(slice.k_end), blocks, slice.tables.size()})
+    put_u16(out, v);
+  out.insert(out.end(), slice.tables.begin(), slice.tables.end());
 }
 
 int blocks_across(int pixels) { return (pixels + kSliceBlock - 1) / kSliceBlock; }
@@ -63,28 +66,41 @@ void encode_slice(const SliceImage& image, std::vector<uint8_t>& out) {
   const auto& r = image.rect;
   struct Place {
     int x, y;
-    size_t bytes;
+    std::vector<uint8_t> bytes;
   };
   std::vector<Place> places;
-  std::vector<uint8_t> payload;
-  size_t size = 0;
+  static thread_local BlockCoder coder;
+  coder.start();
   alignas(64) uint32_t block[kBlockPixels];
+  uint8_t packed[kMaxBlockBytes];
   for (int y = r.y / kSliceBlock; y < blocks_across(r.y + r.height); ++y)
     for (int x = r.x / kSliceBlock; x < blocks_across(r.x + r.width); ++x) {
       if (!cut_out(image, x, y, block)) continue;
-      if (payload.size() < size + kMaxBlockBytes) payload.resize(2 * payload.size() + kMaxBlockBytes);
-      const size_t bytes = encode_block(block, payload.data() + size);
-      places.push_back({x, y, bytes});
-      size += bytes;
+      places.push_back({x, y, {packed, packed + encode_block(block, packed)}});
+      coder.add(block);
     }
   if (places.empty()) return;
-  out.reserve(out.size() + kSliceHead + kBlockHead * places.size() + size);
-  put_head(out, image.layer, image.k_begin, image.k_end, places.size());
+  // Tables pay if what is coded with them is as much smaller.
+  std::vector<uint8_t> tables, coded;
+  coder.put_tables(tables);
+  size_t saved = 0;
+  std::vector<std::vector<uint8_t>> all(places.size());
+  for (size_t n = 0; n < places.size(); ++n) {
+    coder.put(n, all[n]);
+    if (all[n].size() < places[n].bytes.size()) saved += places[n].bytes.size() - all[n].size();
+  }
+  EncodedSlice slice{image.layer, image.k_begin, image.k_end, {}, {}};
+  if (saved > tables.size() && tables.size() <= kMaxTableBytes) {
+    slice.tables = tables;
+    for (size_t n = 0; n < places.size(); ++n)
+      if (all[n].size() < places[n].bytes.size()) places[n].bytes = std::move(all[n]);
+  }
+  put_head(out, slice, places.size());
   for (const auto& p : places) {
     out.push_back(uint8_t(p.x)), out.push_back(uint8_t(p.y));
-    put_u16(out, p.bytes);
+    put_u16(out, p.bytes.size());
   }
-  out.insert(out.end(), payload.begin(), payload.begin() + std::ptrdiff_t(size));
+  for (const auto& p : places) out.insert(out.end(), p.bytes.begin(), p.bytes.end());
 }
 
 std::vector<uint8_t> encode_slice(const SliceImage& image) {
@@ -100,9 +116,13 @@ Result<std::vector<EncodedSlice>> parse_slices(std::span<const uint8_t> bytes, i
   while (!bytes.empty()) {
     if (out.size() == kMaxSlices) return Error{fmt::format("more than {} slices", kMaxSlices)};
     if (bytes.size() < kSliceHead) return Error{fmt::format("slice {} ends in its head", out.size())};
-    EncodedSlice slice{int(get_u16(bytes, 0)), int(get_u16(bytes, 2)), int(get_u16(bytes, 4)), {}};
-    const size_t count = get_u16(bytes, 6);
+    EncodedSlice slice{int(get_u16(bytes, 0)), int(get_u16(bytes, 2)), int(get_u16(bytes, 4)), {}, {}};
+    const size_t count = get_u16(bytes, 6), table_bytes = get_u16(bytes, 8);
     bytes = bytes.subspan(kSliceHead);
+    if (bytes.size() < table_bytes)
+      return Error{fmt::format("slice {}: {} bytes left for {} of tables", out.size(), bytes.size(), table_bytes)};
+    slice.tables = bytes.first(table_bytes);
+    bytes = bytes.subspan(table_bytes);
     if (slice.layer >= layers) return Error{fmt::format("a slice of layer {} of {}", slice.layer, layers)};
     if (slice.k_begin >= slice.k_end || slice.k_end > kMaxSide)
       return Error{fmt::format("a slice of the slab {} to {}, limit {}", slice.k_begin, slice.k_end, kMaxSide)};
@@ -132,14 +152,14 @@ Result<std::vector<EncodedSlice>> parse_slices(std::span<const uint8_t> bytes, i
 std::vector<uint8_t> join_slices(std::span<const EncodedSlice> slices) {
   size_t size = 0;
   for (const auto& s : slices) {
-    size += kSliceHead;
+    size += kSliceHead + s.tables.size();
     for (const auto& b : s.blocks) size += kBlockHead + b.bytes.size();
   }
   std::vector<uint8_t> out;
   out.reserve(size);
   for (const auto& s : slices) {
     if (s.blocks.empty()) continue;
-    put_head(out, s.layer, s.k_begin, s.k_end, s.blocks.size());
+    put_head(out, s, s.blocks.size());
     for (const auto& b : s.blocks) {
       out.push_back(uint8_t(b.x)), out.push_back(uint8_t(b.y));
       put_u16(out, b.bytes.size());
@@ -156,8 +176,13 @@ Status decode_slice_into(SliceImage& image, const EncodedSlice& slice, int raste
   const auto& r = image.rect;
   image.pixels.assign(size_t(r.width) * size_t(r.height), 0);
   alignas(64) uint32_t block[kBlockPixels];
+  static thread_local BlockDecoder decoder;
+  if (!slice.tables.empty())
+    if (const Status s = decoder.set_tables(slice.tables); !s)
+      return Error{fmt::format("layer {}: {}", slice.layer, s.error().text)};
   for (const auto& b : slice.blocks) {
-    if (const Status s = decode_block(b.bytes, block); !s)
+    const bool coded = !slice.tables.empty() && !b.bytes.empty() && b.bytes[0] == kCoded;
+    if (const Status s = coded ? decoder.decode(b.bytes, block) : decode_block(b.bytes, block); !s)
       return Error{fmt::format("layer {}, block {}, {}: {}", slice.layer, b.x, b.y, s.error().text)};
     const int x0 = b.x * kSliceBlock, y0 = b.y * kSliceBlock;
     const int width = std::min(kSliceBlock, raster_width - x0), height = std::min(kSliceBlock, raster_height - y0);

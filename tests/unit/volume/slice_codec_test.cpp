@@ -206,16 +206,92 @@ TEST(SliceCodec, RefusalsSayWhy) {
     ASSERT_FALSE(r.ok()) << why;
     EXPECT_NE(r.error().text.find(why), std::string::npos) << r.error().text;
   };
+  const size_t blocks = 10 + (bytes[8] | size_t{bytes[9]} << 8);  // after head and tables
   refused(0, 4, "layer 4 of 4");
   refused(2, 20, "slab 20 to 20");
   refused(5, 0x20, "limit 4096");
   refused(6, 0, "without blocks");
   refused(7, 0xff, "blocks");
-  refused(8, 2, "in a raster of 128 x 128");
-  refused(13, 200, "in a raster");
-  refused(12, 0, "after one at 0, 0");
-  refused(11, 0xff, "are left");
+  refused(9, 0xff, "of tables");
+  refused(blocks, 2, "in a raster of 128 x 128");
+  refused(blocks + 5, 200, "in a raster");
+  refused(blocks + 4, 0, "after one at 0, 0");
+  refused(blocks + 3, 0xff, "are left");
   refused(0, 3, "in a raster of 64 x 128", 64);
+}
+
+// A volume's slice: soft, and without anything that repeats.
+SliceImage soft(Random& random) {
+  SliceImage image{0, 0, 1, {0, 0, 256, 192}, std::vector<uint32_t>(256 * 192)};
+  for (int y = 0; y < 192; ++y)
+    for (int x = 0; x < 256; ++x) {
+      const double f = std::sin(x * 0.031) * std::cos(y * 0.023) + 0.3 * std::sin(0.11 * (x + 2 * y));
+      const double alpha = std::clamp(f, 0.0, 1.0) * 0.7;
+      const auto channel = [&](double c) { return uint32_t(alpha * c * 255 + double(random() % 3) * alpha); };
+      image.pixels[size_t(y) * 256 + size_t(x)] =
+          uint32_t(alpha * 255) << 24 | channel(0.9) << 16 | channel(0.7) << 8 | channel(0.5);
+    }
+  return image;
+}
+
+TEST(SliceCodec, SoftImagesAreCodedAndNoiseIsPacked) {
+  Random random(9);
+  const auto image = soft(random);
+  const auto bytes = encode_slice(image);
+  const auto slices = parse_slices(bytes, 256, 192, 1);
+  ASSERT_TRUE(slices.ok());
+  EXPECT_FALSE(slices->front().tables.empty());
+  size_t packed = 0;
+  std::vector<uint8_t> room(kMaxBlockBytes);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 4; ++x) {
+      std::vector<uint32_t> block(kBlockPixels);
+      for (int i = 0; i < 64; ++i)
+        std::copy_n(&image.pixels[size_t(y * 64 + i) * 256 + size_t(x) * 64], 64, block.begin() + i * 64);
+      packed += encode_block(block.data(), room.data());
+    }
+  EXPECT_LT(double(bytes.size()), 0.8 * double(packed));
+  SliceImage noise = image;
+  for (auto& p : noise.pixels) p = uint32_t(random());
+  const auto of_noise = encode_slice(noise);
+  const auto again = parse_slices(of_noise, 256, 192, 1);
+  ASSERT_TRUE(again.ok());
+  EXPECT_TRUE(again->front().tables.empty()) << "they would only cost";
+  EXPECT_LE(of_noise.size(), 12 * kMaxBlockBytes + 64);
+}
+
+TEST(SliceCodec, EveryInstructionSetCodesAlike) {
+  Random random(10);
+  const auto image = soft(random);
+  const auto bytes = encode_slice(image);
+  for (const int64_t target : testing::simd_targets()) {
+    const testing::OnTarget on(target);
+    EXPECT_EQ(encode_slice(image), bytes);
+    const auto slices = parse_slices(bytes, 256, 192, 1);
+    ASSERT_TRUE(slices.ok());
+    const auto back = decode_slice(slices->front(), 256, 192);
+    ASSERT_TRUE(back.ok()) << back.error().text;
+    expect_same(image, *back, 256, 192);
+  }
+}
+
+TEST(SliceCodec, DamagedTablesAndCodedBlocksAreRefusedOrGiveAnImage) {
+  Random random(11);
+  const auto bytes = encode_slice(soft(random));
+  auto slices = parse_slices(bytes, 256, 192, 1);
+  ASSERT_TRUE(slices.ok());
+  EncodedSlice without = slices->front();
+  without.tables = {};
+  EXPECT_FALSE(decode_slice(without, 256, 192).ok()) << "coded blocks need tables";
+  int refused = 0;
+  for (int n = 0; n < 400; ++n) {
+    auto bad = bytes;
+    const size_t tables = bytes[8] | size_t{bytes[9]} << 8;
+    bad[10 + random() % (n % 2 ? tables : bytes.size() - 10)] ^= uint8_t(1 + random() % 255);
+    const auto parsed = parse_slices(bad, 256, 192, 1);
+    if (!parsed.ok() || !decode_slice(parsed->front(), 256, 192).ok()) ++refused;
+  }
+  EXPECT_GT(refused, 300) << "states that do not come back to where they began tell nearly all damage";
 }
 
 TEST(SliceCodec, MutationsNeverDoHarm) {
