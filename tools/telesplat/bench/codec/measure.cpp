@@ -11,6 +11,7 @@ namespace telesplat::launcher {
 namespace {
 
 constexpr size_t kMostTimed = 32;  // tiles; they and their streams are far more than caches hold
+constexpr size_t kFewFull = 4;     // of fewer the caches would hold all
 constexpr int kTile = 256;
 
 size_t covered_pixels(const image::DepthImage& image) {
@@ -104,7 +105,8 @@ void CodecMeasure::keep_to_time(const image::DepthImage& tile, size_t covered) {
 
 void CodecMeasure::measure_speeds_of_kept() {
   if (timed_.empty()) return;
-  if (report_.full_tiles > 0) std::erase_if(timed_, [](const Timed& t) { return t.covered != t.tile.pixels(); });
+  if (report_.full_tiles >= kFewFull)
+    std::erase_if(timed_, [](const Timed& t) { return t.covered != t.tile.pixels(); });
   size_t covered = 0, pixels = 0, kept = 0;  // kept: so that nothing is left out
   std::vector<std::vector<uint8_t>> streams;
   for (const Timed& t : timed_) {

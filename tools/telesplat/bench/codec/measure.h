@@ -34,8 +34,7 @@ struct CodecReport {
   size_t frames = 0, tiles = 0, full_tiles = 0, pixels = 0, covered = 0;
   StreamBits bits;
   std::vector<BaselineReport> baselines;
-  size_t timed_tiles =
-      0;  ///< speeds are of these: full tiles, or where none is, those of which half or more is covered
+  size_t timed_tiles = 0;    ///< speeds are of these: full tiles, or where few are, those of which half is covered
   double timed_covered = 0;  ///< part of their pixels; speeds are of covered pixels
   std::vector<TargetSpeed> speeds;
   CodecErrors errors;
