@@ -38,7 +38,7 @@ struct GuidedRows {
 };
 
 /// Where a plane of room space cuts a pixel's ray: ((a x + b y + c) / depth code - low) * scale, and what a table of
-/// kKnots points makes of it. See codec.md: "height".
+/// kKnots points makes of it. See docs/codec.md, "Colours".
 struct HeightModel {
   static constexpr int kKnots = 65;
   int32_t a = 0, b = 0, c = 0;
@@ -81,7 +81,8 @@ struct Kernels {
   void (*heights)(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out);
   /// How much the guide varies around each pixel, as tokens.
   void (*activity)(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
-  /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order; for j <= i, others
+  /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order; for j <= i,
+  /// others
   /// are not set.
   void (*normal_equations)(const float (*features)[kFeatures], const float* weights, size_t n,
                            float (*sums)[kFeatures]);

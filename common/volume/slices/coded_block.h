@@ -1,8 +1,8 @@
 // Blocks of a slice image as symbols of the depth codec's coder (codec/dense/rans.h), whose tables all blocks of an
 // image share: about three fifths of the bytes of packed blocks (block.h), at some twenty times their time.
 //
-// Tables of an image: for each plane (alpha, green, blue, red) bias (13 bits) and shift (4 bits) of its contexts, levels
-// of its tokens (codec/dense/tables.h); little-endian, padded to a byte.
+// Tables of an image: for each plane (alpha, green, blue, red) bias (13 bits) and shift (4 bits) of its contexts, then
+// levels of its tokens (codec/dense/tables.h); little-endian, padded to a byte.
 // Block: u8 kCoded; u64 mask, as in block.h; 32 u32, the coder's states; words of 16 bits.
 //
 // Residuals are those of block.h with predictor 2, less green, zigzagged; of the groups in the mask alone, elsewhere
