@@ -75,7 +75,7 @@ void append(std::vector<uint8_t>& out, uint32_t kind, std::span<const uint8_t> b
 
 }  // namespace
 
-void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
+void put_zstd_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
   if (raw.size() < 2) return append(out, kStored, raw);
   if (std::memcmp(raw.data(), raw.data() + 1, raw.size() - 1) == 0) return append(out, kConstant, raw.first(1));
   if (raw.size() < kTooShort) return append(out, kStored, raw);
@@ -90,7 +90,7 @@ void put_block(std::vector<uint8_t>& out, std::span<const uint8_t> raw) {
     append(out, kStored, raw);
 }
 
-bool get_block(Reader& in, std::span<uint8_t> raw) {
+bool get_zstd_block(Reader& in, std::span<uint8_t> raw) {
   const auto block = next_block(in);
   if (!block) return false;
   switch (block->kind) {

@@ -79,7 +79,7 @@ class Predictor {
 
 void put_sized_block(std::vector<uint8_t>& out, const Plane& plane) {
   put_varint(out, uint32_t(plane.size()));
-  put_block(out, plane);
+  put_zstd_block(out, plane);
 }
 
 // Occupancy and samples of the rows [begin, end) of a set.
@@ -108,13 +108,13 @@ class GroupEncoder {
       }
       counts_low_.push_back(uint8_t(runs)), counts_high_.push_back(uint8_t(runs >> 8));
     }
-    put_block(out, counts_low_);
-    put_block(out, counts_high_);
+    put_zstd_block(out, counts_low_);
+    put_zstd_block(out, counts_high_);
     put_sized_block(out, gaps_);
     put_sized_block(out, lengths_);
-    put_block(out, level_low_);
-    if (wide_) put_block(out, level_high_);
-    if (lit_) put_block(out, x_), put_block(out, y_);
+    put_zstd_block(out, level_low_);
+    if (wide_) put_zstd_block(out, level_high_);
+    if (lit_) put_zstd_block(out, x_), put_zstd_block(out, y_);
   }
 
  private:
@@ -151,7 +151,7 @@ class GroupDecoder {
 
   bool decode(Reader& in, size_t rows) {
     counts_low_.resize(rows), counts_high_.resize(rows);
-    if (!get_block(in, counts_low_) || !get_block(in, counts_high_)) return false;
+    if (!get_zstd_block(in, counts_low_) || !get_zstd_block(in, counts_high_)) return false;
     uint64_t runs = 0;
     for (size_t r = 0; r < rows; ++r) runs += count(r);
     if (runs > kMaxVoxelsCoded || !get_varints(in, runs, gaps_) || !get_varints(in, runs, lengths_)) return false;
@@ -161,8 +161,8 @@ class GroupDecoder {
     if (first + voxels > kMaxVoxelsCoded || !place_runs(rows)) return false;
 
     for (Plane* plane : {&level_low_, &level_high_, &x_, &y_}) plane->resize(size_t(voxels));
-    if (!get_block(in, level_low_) || (wide_ && !get_block(in, level_high_))) return false;
-    if (lit_ && (!get_block(in, x_) || !get_block(in, y_))) return false;
+    if (!get_zstd_block(in, level_low_) || (wide_ && !get_zstd_block(in, level_high_))) return false;
+    if (lit_ && (!get_zstd_block(in, x_) || !get_zstd_block(in, y_))) return false;
     voxels_.i.resize(first + size_t(voxels));
     voxels_.level.resize(first + size_t(voxels));
     if (lit_) voxels_.normal.resize(first + size_t(voxels));
@@ -177,7 +177,7 @@ class GroupDecoder {
     const auto bytes = in.varint();
     if (!bytes || *bytes < how_many || *bytes > 2 * how_many) return false;
     packed_.resize(*bytes);
-    if (!get_block(in, packed_)) return false;
+    if (!get_zstd_block(in, packed_)) return false;
     out.resize(size_t(how_many));
     size_t at = 0;
     for (uint16_t& value : out) {
