@@ -38,7 +38,7 @@ struct GuidedRows {
 };
 
 /// Where a plane of room space cuts a pixel's ray: ((a x + b y + c) / depth code - low) * scale, and what a table of
-/// kKnots points makes of it. See codec.md: "height".
+/// kKnots points makes of it. See docs/codec.md.
 struct HeightModel {
   static constexpr int kKnots = 65;
   int32_t a = 0, b = 0, c = 0;
@@ -53,6 +53,8 @@ struct GeometryModel {
 };
 
 struct Kernels {
+  /// Bit x of `words` = depth[x] != 0; bits at and beyond n of the last word are 0.
+  void (*covered_bits)(const uint32_t* depth, size_t n, uint64_t* words);
   /// z = fold(row - (left + above - above_left)) mod 2^24 and its tokens.
   void (*depth_residuals)(const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z, uint8_t* tokens);
   /// The inverse: row from z; row[-1] and above[-1] are known. All mod 2^24.
