@@ -1,29 +1,17 @@
-// The stages, each in its own file: tiles of about 256 x 256 (tile), their coverage masks (mask), prediction in rows
-// (predict, walk), residuals -> tokens + raw bits (tokens, streams), tokens -> Huffman codes by zstd (entropy). Where
-// few pixels are covered: prediction from coarse to fine (scatter), residuals -> adaptive Golomb codes (scatter_coder,
-// golomb).
+// The stages, each in its own file: tiles of about 256 x 256 (tile), their coverage masks (mask), and dense tiles
+// (dense/): depth first (depth), normals by what depth says of them (normals, guided), colours by a palette and by
+// height (colours, height); residuals -> tokens by context -> words (symbols, tables, rans). Where few pixels are
+// covered: prediction from coarse to fine (scatter), residuals -> adaptive Golomb codes (scatter_coder, golomb).
 //
-// Candidates, measured on one core of a 2.45 GHz EPYC (Zen 3); B/px are bytes per covered pixel. Terrains of 2.9M
-// and 5.8M triangles at 1280 x 800 ("real"), and telesplat-bench --benchmark_filter=codec/ ("full_*", "patch_*").
-//  - Depth: L + U - UL 7.4, (3L + 3U - 2UL) / 4 7.4, median 7.6, left 7.7, up 8.3 bits a pixel on the real terrain with
-//  the most
-//    noise; 6.7, 7.1, 7.4, 8.0, 8.6 on the closer one.
-//  - Normals, colour: median best or within 5 % of the best of 13 fixed predictors on all; the gradient takes 3 to 20 %
-//  more.
-//  - Byte planes of residuals + zstd level 1 (the first version): six to eight symbols a pixel to code instead of
-//  three, and
-//    a bit at least for each of three colours. Joint tokens brought constant and smooth colour below a bit a pixel.
-//  - zstd at level 1 on the tokens instead of its Huffman coder alone: from 1 % fewer to 7 % more bytes, and 13 to 40 %
-//  more
-//    time (see entropy.cpp for where it is used).
-//  - Simulated: 4 or 8 Huffman tables chosen by the activity of blocks or of neighbours, 2 to 7 % fewer bytes; normals
-//  predicted
-//    by least squares from their neighbours and the slopes of depth, 7 to 11 % off the normals. Neither seemed worth
-//    its time.
-// Kept, full_smooth / full_rough: 1.31 / 2.85 B/px, encoding 74 / 73 Mpx/s, decoding 115 / 105 Mpx/s. LZW (TIFF,
-// predictor): 2.69 / 4.25 B/px at 8 Mpx/s; PNG 2.22 / 3.57; zstd level 3 2.43 / 4.01. Constant albedo: 1.00 / 2.34
-// against LZW's 2.37 / 3.67. Real terrains take 0.58 to 0.65, bones and heads 0.37 to 0.41 of LZW: where triangles are
-// smaller than pixels, what remains is noise, which no predictor tried removes.
+// Bits a covered pixel of 256 x 256 tiles of frames of 1280 x 800, outlines, masks and sparse tiles included; LZW is
+// that of TIFF, with its predictor:
+//                        terrain 5.8M  terrain 2.9M  head 4.1M  bone 0.7M triangles
+//   LZW                  27.4          36.9          24.6       37.8
+//   the format before    18.0          24.0          13.1       17.6
+//   this one             14.0          19.4          11.7       16.3
+// Tried: Huffman codes, joint tokens of a normal's parts (the format before); normals before depth, 0.5 to 1.2 bits
+// more; contexts that never share tables, 0.1 to 0.2 more; least squares without a second look at what they miss, 0.3
+// bits more of normals.
 //
 // Sparse tiles, of 4 frames of 1280 x 800 along a recorded walk: bits a covered pixel with its mask, in brackets how
 // many times those of full tiles, and the bits with the nearest pixel as prediction and Huffman codes.

@@ -1,11 +1,8 @@
-// One tile's pixels <-> bytes: mask, prediction, tokens, blocks.
-//   tile    = u8 kind, and unless it is empty: base, [mask], and depth, normal, colour, or of a sparse tile scatter
-//   kind    = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered, + kPlainColour
-//   base    = depth (3 bytes), colour (3), normal (2) of the first covered pixel
-//   scatter = two blocks (scatter_coder.h)
-//   depth   = block of NumberTokens, block of raw bits;  normal = block of NormalTokens, block of raw bits
-//   colour  = block of ColourTokens, block of raw bits; or, plain: blocks of residuals of green, red - green, blue -
-//   green
+// One tile's pixels <-> bytes. docs/codec.md describes them.
+//   tile = u8 kind, and unless it is empty: base, [mask], and a dense tile (dense/dense.h) or a sparse one
+//          (scatter_coder.h)
+//   kind = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered
+//   base = depth (3 bytes), colour (3), normal (2) of the first covered pixel
 #pragma once
 
 #include <cstddef>
