@@ -1,7 +1,17 @@
-// The stages, each in its own file: tiles of about 256 x 256 (tile), their coverage masks (mask), dense tiles
-// (dense/dense: depth, normals, colours as planes of symbols, coded by dense/rans). Where few pixels are covered:
-// prediction from coarse to fine (scatter), residuals -> adaptive Golomb codes (scatter_coder, golomb). docs/codec.md
-// describes the streams; docs/codec-bench.md tells how they are measured.
+// The stages, each in its own file: tiles of about 256 x 256 (tile), their coverage masks (mask), and dense tiles
+// (dense/): depth first (depth), normals by what depth says of them (normals, guided), colours by a palette and by
+// height (colours, height); residuals -> tokens by context -> words (symbols, tables, rans). Where few pixels are
+// covered: prediction from coarse to fine (scatter), residuals -> adaptive Golomb codes (scatter_coder, golomb).
+//
+// Bits a covered pixel of 256 x 256 tiles of frames of 1280 x 800, outlines, masks and sparse tiles included; LZW is
+// that of TIFF, with its predictor:
+//                        terrain 5.8M  terrain 2.9M  head 4.1M  bone 0.7M triangles
+//   LZW                  27.4          36.9          24.6       37.8
+//   the format before    18.0          24.0          13.1       17.6
+//   this one             14.0          19.4          11.7       16.3
+// Tried: Huffman codes, joint tokens of a normal's parts (the format before); normals before depth, 0.5 to 1.2 bits
+// more; contexts that never share tables, 0.1 to 0.2 more; least squares without a second look at what they miss, 0.3
+// bits more of normals.
 //
 // Sparse tiles, of 4 frames of 1280 x 800 along a recorded walk: bits a covered pixel with its mask, in brackets how
 // many times those of full tiles, and the bits with the nearest pixel as prediction and Huffman codes.

@@ -1,6 +1,5 @@
 // Residuals as bits whose number follows the residuals before: Golomb's codes (S. Golomb, 1966) with a parameter that
-// adapts as in LOCO-I (M. Weinberger, G. Seroussi, G. Sapiro, 2000), and Elias' gamma code for what is much larger
-// than the rest.
+// adapts as in LOCO-I (M. Weinberger et al., 2000), and Elias' gamma code for what is much larger than the rest.
 //   z = zigzag-folded residual, q = z >> k.  q = 0, 1: as many ones, a zero.  q >= 2: 2 + e ones, a zero, and the lower
 //   e bits of q - 1, e of which are below its highest.  Then the lower k bits of z.
 // No tables: a tile of a hundred pixels costs no more a pixel than one of ten thousand. Within 1 % of adaptive

@@ -2,40 +2,9 @@
 
 #include <algorithm>
 
+#include "common/codec/dense/kernels.h"
 #include "common/codec/tokens.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "common/codec/mask.cpp"
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
-
-HWY_BEFORE_NAMESPACE();
-namespace telesplat::codec::detail::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-// Bit x of `words` = depth[x] != 0.
-void CoveredBits(const uint32_t* HWY_RESTRICT depth, size_t count, uint64_t* HWY_RESTRICT words) {
-  [[maybe_unused]] const hn::CappedTag<uint32_t, 16> d;
-  for (size_t x = 0; x < count; x += 64) {
-    const size_t bits = HWY_MIN(size_t{64}, count - x);
-    uint64_t word = 0;
-    size_t i = 0;
-#if HWY_TARGET != HWY_SCALAR
-    for (; i + hn::Lanes(d) <= bits; i += hn::Lanes(d)) {
-      uint8_t part[8] = {};  // as StoreMaskBits wants
-      hn::StoreMaskBits(d, hn::Ne(hn::LoadU(d, depth + x + i), hn::Zero(d)), part);
-      word |= (uint64_t{part[0]} | uint64_t{part[1]} << 8) << i;
-    }
-#endif
-    for (; i < bits; ++i) word |= uint64_t{depth[x + i] != 0} << i;
-    words[x / 64] = word;
-  }
-}
-
-}  // namespace telesplat::codec::detail::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
 namespace telesplat::codec::detail {
 namespace {
 
@@ -154,10 +123,7 @@ bool get_bytes(Reader& in, Mask& mask, bool above, Scratch& s) {
 
 }  // namespace
 
-HWY_EXPORT(CoveredBits);
-void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) {
-  HWY_DYNAMIC_DISPATCH(CoveredBits)(depth, count, words);
-}
+void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) { kernels().covered_bits(depth, count, words); }
 
 namespace {
 
@@ -292,4 +258,3 @@ bool get_mask(Reader& in, Mask& mask) {
 }
 
 }  // namespace telesplat::codec::detail
-#endif  // HWY_ONCE

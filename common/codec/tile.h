@@ -1,8 +1,8 @@
-// One tile's pixels <-> bytes: mask, prediction, tokens, blocks.
-//   tile    = u8 kind, and unless it is empty: base, [mask], and dense, or of a sparse tile scatter
-//   base    = depth (3 bytes), colour (3), normal (2) of the first covered pixel
-//   scatter = two blocks (scatter_coder.h)
-//   dense   = dense/dense.h
+// One tile's pixels <-> bytes. docs/codec.md describes them.
+//   tile = u8 kind, and unless it is empty: base, [mask], and a dense tile (dense/dense.h) or a sparse one
+//          (scatter_coder.h)
+//   kind = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered
+//   base = depth (3 bytes), colour (3), normal (2) of the first covered pixel
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,5 @@
 // Depth of a dense tile: predicted as L + U - UL, which is exact on planes. Where triangles are as small as a few
-// pixels,
-// so that most pixels lie in the plane of some neighbours, but not of those three, by which plane it is.
+// pixels, most pixels lie in the plane of some neighbours, but not of those three: there it is said of which.
 #pragma once
 
 #include <cstdint>

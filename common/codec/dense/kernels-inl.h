@@ -225,7 +225,7 @@ static void Heights(const uint32_t* RESTRICT depth, size_t n, int x0, int y, con
 }
 
 // Slopes of the reciprocal depth at a pixel, and what it would be at the tile's centre, are linear in the surface's
-// normal, whatever the camera (docs/codec.md, "Normals"). 31-bit integers; the quotient by Newton's method.
+// normal, whatever the camera (docs/codec.md). 31-bit integers; the quotient by Newton's method.
 static void Geometry(const uint32_t* const depth[3], size_t n, int x0, int y, const GeometryModel& model,
                      int16_t* RESTRICT gx, int16_t* RESTRICT gy) {
   const uint32_t *RESTRICT above = depth[0], *RESTRICT here = depth[1], *RESTRICT below = depth[2];

@@ -38,7 +38,7 @@ struct GuidedRows {
 };
 
 /// Where a plane of room space cuts a pixel's ray: ((a x + b y + c) / depth code - low) * scale, and what a table of
-/// kKnots points makes of it. See docs/codec.md, "Colours".
+/// kKnots points makes of it. See docs/codec.md.
 struct HeightModel {
   static constexpr int kKnots = 65;
   int32_t a = 0, b = 0, c = 0;
@@ -53,6 +53,8 @@ struct GeometryModel {
 };
 
 struct Kernels {
+  /// Bit x of `words` = depth[x] != 0; bits at and beyond n of the last word are 0.
+  void (*covered_bits)(const uint32_t* depth, size_t n, uint64_t* words);
   /// z = fold(row - (left + above - above_left)) mod 2^24 and its tokens.
   void (*depth_residuals)(const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z, uint8_t* tokens);
   /// The inverse: row from z; row[-1] and above[-1] are known. All mod 2^24.
@@ -81,9 +83,7 @@ struct Kernels {
   void (*heights)(const uint32_t* depth, size_t n, int x0, int y, const HeightModel& model, int16_t* out);
   /// How much the guide varies around each pixel, as tokens.
   void (*activity)(const int16_t* const gx[3], const int16_t* const gy[3], size_t n, uint8_t* tokens);
-  /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order; for j <= i,
-  /// others
-  /// are not set.
+  /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order; for j <= i.
   void (*normal_equations)(const float (*features)[kFeatures], const float* weights, size_t n,
                            float (*sums)[kFeatures]);
   /// Appends the row's symbols, the last one first, at `out`, which must have room for 6 bytes a symbol and 64 more.

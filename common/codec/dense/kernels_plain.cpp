@@ -11,6 +11,14 @@ namespace {
 #include "common/codec/dense/kernels-inl.h"
 #include "common/codec/dense/rans-inl.h"
 
+static void CoveredBits(const uint32_t* depth, size_t n, uint64_t* words) {
+  for (size_t x = 0; x < n; x += 64) {
+    uint64_t word = 0;
+    for (size_t i = 0; i < 64 && x + i < n; ++i) word |= uint64_t{depth[x + i] != 0} << i;
+    words[x / 64] = word;
+  }
+}
+
 static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
                             float (*sums)[kFeatures]) {
   for (int i = 0; i < kFeatures; ++i)
@@ -24,9 +32,10 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }  // namespace
 
 const Kernels& plain_kernels() {
-  static constexpr Kernels all{DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,      Contexts,
-                               MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,      Geometry,
-                               Heights,         Activity,        NormalEquations,     PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{CoveredBits,    DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,
+                               Contexts,       MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+                               Geometry,       Heights,         Activity,        NormalEquations,     PlainPutSymbols,
+                               PlainGetSymbols};
   return all;
 }
 

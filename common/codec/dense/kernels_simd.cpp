@@ -46,6 +46,14 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR || HWY_HAVE_SCALABLE
 
+static void CoveredBits(const uint32_t* depth, size_t n, uint64_t* words) {
+  for (size_t x = 0; x < n; x += 64) {
+    uint64_t word = 0;
+    for (size_t i = 0; i < 64 && x + i < n; ++i) word |= uint64_t{depth[x + i] != 0} << i;
+    words[x / 64] = word;
+  }
+}
+
 static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
                             float (*sums)[kFeatures]) {
   for (int i = 0; i < kFeatures; ++i)
@@ -57,9 +65,10 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,      Contexts,
-                               MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,      Geometry,
-                               Heights,         Activity,        NormalEquations,     PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{CoveredBits,    DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,
+                               Contexts,       MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+                               Geometry,       Heights,         Activity,        NormalEquations,     PlainPutSymbols,
+                               PlainGetSymbols};
   return &all;
 }
 
@@ -82,6 +91,21 @@ HWY_INLINE V Gathered(V v, M from) {
   hn::StoreMaskBits(kD, from, bits);
   return hn::TableLookupLanes(v, hn::SetTableIndices(kD, kPlaces.of[bits[0]]));
 #endif
+}
+
+static void CoveredBits(const uint32_t* HWY_RESTRICT depth, size_t n, uint64_t* HWY_RESTRICT words) {
+  for (size_t x = 0; x < n; x += 64) {
+    const size_t bits = HWY_MIN(size_t{64}, n - x);
+    uint64_t word = 0;
+    size_t i = 0;
+    for (; i + kN <= bits; i += kN) {
+      uint8_t part[8] = {};  // as StoreMaskBits wants
+      hn::StoreMaskBits(kD, hn::Ne(hn::LoadU(kD, depth + x + i), hn::Zero(kD)), part);
+      word |= (uint64_t{part[0]} | uint64_t{part[1]} << 8) << i;
+    }
+    for (; i < bits; ++i) word |= uint64_t{depth[x + i] != 0} << i;
+    words[x / 64] = word;
+  }
 }
 
 // Writes the lower halves of the states that `full` names, and shifts them out.
@@ -289,9 +313,10 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{DepthResiduals,  DepthRowsVector, PlaneResiduals,      PlaneTerms, Contexts,
-                               MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums, Geometry,
-                               Heights,         Activity,        NormalEquations,     PutSymbols, GetSymbols};
+  static constexpr Kernels all{CoveredBits, DepthResiduals,  DepthRowsVector, PlaneResiduals,      PlaneTerms,
+                               Contexts,    MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
+                               Geometry,    Heights,         Activity,        NormalEquations,     PutSymbols,
+                               GetSymbols};
   return &all;
 }
 
