@@ -5,7 +5,6 @@
 
 #include "common/codec/depth_codec.h"
 #include "common/codec/golomb.h"
-#include "common/codec/tokens.h"
 #include "tests/portable/parcels.h"
 #include "tests/support/depth_images.h"
 #include "tests/support/masks.h"
@@ -52,28 +51,6 @@ void add_golomb(File& file, std::mt19937& random) {
   put(out, kExpected);
   append(out, bits.bytes());
   file.add(Kind::kGolomb, out, digest.value());
-}
-
-void add_tokens(File& file, std::mt19937& random) {
-  constexpr uint32_t kCount = 10'000;
-  Bytes number(kCount), normal(kCount), colour(kCount);
-  BitWriter bits;
-  bits.start(size_t{kCount} * (NumberToken::kMaxBits + NormalToken::kMaxBits + ColourToken::kMaxBits));
-  Digest digest;
-  for (uint32_t i = 0; i < kCount; ++i) {
-    const uint32_t n = static_cast<uint32_t>(random()) >> (8 + random() % 24);
-    const auto z = static_cast<uint16_t>(random() & (random() % 2 ? 0x0707 : 0xFFFF));
-    const uint32_t c = static_cast<uint32_t>(random()) & (random() % 2 ? 0x030303 : 0xFFFFFF);
-    NumberToken::put(n, &number[i], bits.sink);
-    NormalToken::put(z, &normal[i], bits.sink);
-    ColourToken::put(c, &colour[i], bits.sink);
-    for (const uint32_t v : {n, uint32_t{z}, c}) digest.add(v);
-  }
-  Bytes out;
-  put(out, kCount);
-  for (const Bytes* part : {&number, &normal, &colour}) append(out, *part);
-  append(out, bits.bytes());
-  file.add(Kind::kTokens, out, digest.value());
 }
 
 Pixel at(const image::DepthImage& image, int x, int y) {
@@ -126,10 +103,7 @@ void add_depth(File& file, const image::DepthImage& image) {
 bool write(const char* path) {
   File file(path);
   std::mt19937 random(7);
-  for (int round = 0; round < 3; ++round) {
-    add_golomb(file, random);
-    add_tokens(file, random);
-  }
+  for (int round = 0; round < 3; ++round) add_golomb(file, random);
   for (const bool rough : {false, true}) {
     const auto image = test::render({.width = 256, .height = 200, .rough = rough});
     add_scatter(file, image, test::spread_mask(image.width, image.height, 32, 7));

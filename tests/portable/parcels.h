@@ -13,7 +13,6 @@ namespace telesplat::portable {
 
 enum class Kind : uint8_t {
   kGolomb = 1,  ///< u32 count, u32 expected; bits of GolombContext
-  kTokens = 2,  ///< u32 count; count bytes each of number, normal and colour tokens; their bits, in turn
   kScatter =
       3,      ///< u32 width, height, count; u16 x, y of each pixel; residuals of ScatterPredictor, by one GolombContext
   kDepth = 4  ///< a stream of codec::encode
