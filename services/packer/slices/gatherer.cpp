@@ -287,7 +287,7 @@ SliceGatherer::Outgoing SliceGatherer::make(InstanceId id, const Viewer& v, cons
   for (const auto& slab : frame.slices)
     for (const auto& slice : slab) {
       volume::EncodedSlice& part = seen.emplace_back();
-      part.layer = slice.layer, part.k_begin = slice.k_begin, part.k_end = slice.k_end;
+      part.layer = slice.layer, part.k_begin = slice.k_begin, part.k_end = slice.k_end, part.tables = slice.tables;
       std::copy_if(slice.blocks.begin(), slice.blocks.end(), std::back_inserter(part.blocks),
                    [&](const auto& b) { return waiting.whole || view.may_see(slice.layer, b.x, b.y); });
     }
