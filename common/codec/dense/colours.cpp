@@ -208,7 +208,7 @@ void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& c
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;
-    samples_.choose(shape, std::min<size_t>(1100, shape.total / 16));
+    samples_.choose(shape, std::min<size_t>(2 * kMostSamples, shape.total / 12));
     sort_palette(shape, colours, depth, geometry);
     encode_palette(shape, colours, depth);
   } else {

@@ -38,6 +38,8 @@ struct Cholesky {
   }
 };
 
+constexpr size_t kSlopes = 400;  // that are looked at
+
 struct Slope {
   double h[3];  // slopes and height, as geometry() has them
   double n[3];  // unit normal
@@ -166,7 +168,9 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   model.slope_shift = shift_for(sizes[sizes.size() * 9 / 10] * 2, 32767);
   std::vector<Slope> slopes;
   double most[3] = {1, 1, 1};
-  for (const auto p : samples.places) {
+  const size_t every = std::max<size_t>(1, samples.places.size() / kSlopes);
+  for (size_t i = 0; i < samples.places.size(); i += every) {
+    const auto p = samples.places[i];
     Slope s;
     if (!slope_at(depth, p.x, p.y, x0, y0, model.slope_shift, s.h)) continue;
     const int cx = normal[0]->row(p.y)[p.x] / 64 - 127, cy = normal[1]->row(p.y)[p.x] / 64 - 127;

@@ -38,28 +38,31 @@ static void DepthRows(const uint32_t* RESTRICT above, const uint32_t* RESTRICT z
   }
 }
 
-// Planes, in the order in which they are tried; deltas to the left neighbour, slopes, and values.
-#define PLANES_OF(c, above2, above, x)                                                                            \
-  const uint32_t up = above[x], corner = above[x - 1];                                                            \
-  const uint32_t by_left[3] = {up - corner, above[x + 1] - up, corner - above[x - 2]};                            \
-  const uint32_t by_row[4] = {2 * up - above2[x], up + above[x + 1] - above2[x + 1], up + corner - above2[x - 1], \
-                              2 * above[x + 1] - above2[x + 2]}
+// A token if `off`, two more than how far a pixel lies from plane k, says that it lies there; else the one before.
+static inline uint32_t Hit(uint32_t before, uint32_t k, uint32_t off) {
+  const uint32_t near = off & 0xFFFFFF;
+  const uint32_t hit = 0 - static_cast<uint32_t>(near < 5);
+  return (before & ~hit) | ((5 * k + near) & hit);
+}
 
+// Planes are tried from the first to the last, so the other way round.
 static void PlaneResiduals(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT above,
                            const uint32_t* RESTRICT row, size_t n, uint32_t* RESTRICT z, uint8_t* RESTRICT tokens) {
   for (size_t x = 0; x < n; ++x) {
-    PLANES_OF(c, above2, above, x);
-    const uint32_t left = row[x - 1], v = row[x] + 2;
-    const uint32_t folded = Fold24(row[x] - left - by_left[0]);
-    z[x] = folded;
+    const uint32_t up = above[x], corner = above[x - 1], right = above[x + 1];
+    const uint32_t left = row[x - 1], v = row[x] + 2, past_left = v - left, past_up = v - up;
+    const uint32_t folded = Fold24(past_left - up + corner - 2);
     const float f = static_cast<float>(static_cast<int32_t>(folded + 8));
     uint32_t token = (std::bit_cast<uint32_t>(f) >> 20) - 1040 + kHits;
-    const auto look = [&](uint32_t k, uint32_t plane) {
-      const uint32_t off = (v - plane) & 0xFFFFFF;
-      token = off < 5 ? 5 * k + off : token;
-    };
-    look(7, by_row[3]), look(6, by_row[2]), look(5, by_row[1]), look(4, left + by_left[2]), look(3, by_row[0]);
-    look(2, left + by_left[1]), look(1, 2 * left - row[x - 2]), look(0, left + by_left[0]);
+    token = Hit(token, 7, v - 2 * right + above2[x + 2]);
+    token = Hit(token, 6, past_up - corner + above2[x - 1]);
+    token = Hit(token, 5, past_up - right + above2[x + 1]);
+    token = Hit(token, 4, past_left - corner + above[x - 2]);
+    token = Hit(token, 3, past_up - up + above2[x]);
+    token = Hit(token, 2, past_left - right + up);
+    token = Hit(token, 1, past_left - left + row[x - 2]);
+    token = Hit(token, 0, past_left - up + corner);
+    z[x] = folded;
     tokens[x] = static_cast<uint8_t>(token);
   }
 }
@@ -68,20 +71,31 @@ static void PlaneTerms(const uint32_t* RESTRICT above2, const uint32_t* RESTRICT
                        const uint8_t* RESTRICT tokens, size_t n, uint32_t* RESTRICT terms, uint32_t* RESTRICT take_left,
                        uint32_t* RESTRICT take_slope) {
   for (size_t x = 0; x < n; ++x) {
-    PLANES_OF(c, above2, above, x);
+    const uint32_t up = above[x], corner = above[x - 1], right = above[x + 1];
     const uint32_t token = tokens[x], k = token * 52 >> 8, off = token - 5 * k - 2;
     const uint32_t missed = (z[x] >> 1) ^ (0 - (z[x] & 1));
-    uint32_t term = by_left[0] + (token < kHits ? off : missed);
+    uint32_t term = up - corner + missed;
+    term = k == 0 ? up - corner + off : term;
     term = k == 1 ? off : term;
-    term = k == 2 ? by_left[1] + off : term;
-    term = k == 3 ? by_row[0] + off : term;
-    term = k == 4 ? by_left[2] + off : term;
-    term = k == 5 ? by_row[1] + off : term;
-    term = k == 6 ? by_row[2] + off : term;
-    term = k == 7 ? by_row[3] + off : term;
+    term = k == 2 ? right - up + off : term;
+    term = k == 3 ? 2 * up - above2[x] + off : term;
+    term = k == 4 ? corner - above[x - 2] + off : term;
+    term = k == 5 ? up + right - above2[x + 1] + off : term;
+    term = k == 6 ? up + corner - above2[x - 1] + off : term;
+    term = k == 7 ? 2 * right - above2[x + 2] + off : term;
     terms[x] = term;
-    take_left[x] = (k == 3) | ((k >= 5) & (k < 8)) ? 0 : ~0u;
-    take_slope[x] = k == 1 ? ~0u : 0;
+    const uint32_t by_row = k == 3 ? ~0u : 0u, later = k - 5 < 3 ? ~0u : 0u;
+    take_left[x] = ~(by_row | later);
+    take_slope[x] = k == 1 ? ~0u : 0u;
+  }
+}
+
+// What contexts take for tokens of planes.
+static void PlaneSizes(const uint8_t* RESTRICT tokens, size_t n, uint8_t* RESTRICT sizes) {
+  for (size_t x = 0; x < n; ++x) {
+    const uint16_t t = tokens[x];
+    const uint16_t hit = static_cast<uint16_t>((t * 52 >> 8) * 4), missed = static_cast<uint16_t>(27 + (t >> 3));
+    sizes[x] = static_cast<uint8_t>(t < kHits ? hit : missed);
   }
 }
 
@@ -101,6 +115,16 @@ static void Contexts(const ContextRows& rows, size_t n, ContextScale scale, uint
     for (size_t x = 0; x < n; ++x)
       contexts[x] = one(
           static_cast<int16_t>(3 * a[x] + 2 * a[x - 1] + 2 * a[x + 1] + b[x] + 4 * o[x] + 2 * o[x - 1] + 2 * o[x + 1]));
+}
+
+static uint32_t OtherNormals(const uint16_t* RESTRICT codes, size_t n) {
+  uint16_t any = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const uint16_t x = codes[i] & 255, y = codes[i] >> 8;
+    const uint16_t side = (x == 0) | (x == 254), end = (y == 0) | (y == 254);
+    any |= static_cast<uint16_t>((x == 255) | (y == 255) | (side & (y < 127)) | (end & (x < 127)));
+  }
+  return any;
 }
 
 static void MedianResiduals(const uint8_t* RESTRICT above, const uint8_t* RESTRICT row, size_t n, uint8_t* RESTRICT z,

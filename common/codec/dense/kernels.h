@@ -66,8 +66,12 @@ struct Kernels {
   /// What each pixel of a row is: terms[x] + (left & take_left[x]) + (left - the one before & take_slope[x]).
   void (*plane_terms)(const uint32_t* above2, const uint32_t* above, const uint32_t* z, const uint8_t* tokens, size_t n,
                       uint32_t* terms, uint32_t* take_left, uint32_t* take_slope);
+  /// What contexts take for such tokens: 4 (token / 5), or 32 + (token - kHits) / 8.
+  void (*plane_sizes)(const uint8_t* tokens, size_t n, uint8_t* sizes);
   /// Contexts of n tokens.
   void (*contexts)(const ContextRows& rows, size_t n, ContextScale scale, uint8_t* contexts);
+  /// 0 if all of n normals are canonical (image/normal.h).
+  uint32_t (*other_normals)(const uint16_t* codes, size_t n);
   /// Residuals of bytes by the median predictor, folded, and their tokens.
   void (*median_residuals)(const uint8_t* above, const uint8_t* row, size_t n, uint8_t* z, uint8_t* tokens);
   /// Residuals of a plane of 64ths by guided prediction, folded mod 256, their tokens; and as 64ths of -128..127.

@@ -32,10 +32,10 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }  // namespace
 
 const Kernels& plain_kernels() {
-  static constexpr Kernels all{CoveredBits,    DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,
-                               Contexts,       MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry,       Heights,         Activity,        NormalEquations,     PlainPutSymbols,
-                               PlainGetSymbols};
+  static constexpr Kernels all{CoveredBits,         DepthResiduals,  DepthRows,      PlaneResiduals,  PlaneTerms,
+                               PlaneSizes,          Contexts,        OtherNormals,   MedianResiduals, GuidedResiduals,
+                               GuidedResidualsWide, GuidedSums,      Geometry,       Heights,         Activity,
+                               NormalEquations,     PlainPutSymbols, PlainGetSymbols};
   return all;
 }
 

@@ -65,10 +65,10 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{CoveredBits,    DepthResiduals,  DepthRows,       PlaneResiduals,      PlaneTerms,
-                               Contexts,       MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry,       Heights,         Activity,        NormalEquations,     PlainPutSymbols,
-                               PlainGetSymbols};
+  static constexpr Kernels all{CoveredBits,         DepthResiduals,  DepthRows,      PlaneResiduals,  PlaneTerms,
+                               PlaneSizes,          Contexts,        OtherNormals,   MedianResiduals, GuidedResiduals,
+                               GuidedResidualsWide, GuidedSums,      Geometry,       Heights,         Activity,
+                               NormalEquations,     PlainPutSymbols, PlainGetSymbols};
   return &all;
 }
 
@@ -313,10 +313,10 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }
 
 static const Kernels* Set() {
-  static constexpr Kernels all{CoveredBits, DepthResiduals,  DepthRowsVector, PlaneResiduals,      PlaneTerms,
-                               Contexts,    MedianResiduals, GuidedResiduals, GuidedResidualsWide, GuidedSums,
-                               Geometry,    Heights,         Activity,        NormalEquations,     PutSymbols,
-                               GetSymbols};
+  static constexpr Kernels all{CoveredBits,         DepthResiduals, DepthRowsVector, PlaneResiduals,  PlaneTerms,
+                               PlaneSizes,          Contexts,       OtherNormals,    MedianResiduals, GuidedResiduals,
+                               GuidedResidualsWide, GuidedSums,     Geometry,        Heights,         Activity,
+                               NormalEquations,     PutSymbols,     GetSymbols};
   return &all;
 }
 

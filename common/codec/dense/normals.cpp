@@ -61,16 +61,14 @@ void NormalPlanes::reset(const TileShape& shape) {
 
 int NormalPlanes::choose_pole(const TileShape& shape) const {
   int64_t sum[3] = {};
-  const Table& canonical = table(4, false);  // the pole as it is
   uint32_t others = 0;
-  const auto look = [&](size_t i) { others += canonical[codes[i]] != codes[i]; };
   for (size_t y = 0; y < shape.height; ++y) {
-    const size_t first = y * shape.width;
+    const uint16_t* const row = codes.data() + y * shape.width;
     if (shape.full(y))
-      for (size_t x = 0; x < shape.width; ++x) look(first + x);
+      others |= kernels().other_normals(row, shape.width);
     else
       for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                   [&](size_t x) { look(first + x); });
+                   [&](size_t x) { others |= image::canonical_normal16(row[x]) != row[x]; });
   }
   if (others != 0) return kRaw;
   for (const auto p : samples.places) {
@@ -111,7 +109,7 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
 }
 
 void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits) {
-  samples.choose(shape, std::min<size_t>(1100, shape.total / 16));
+  samples.choose(shape, std::min<size_t>(kMostSamples, shape.total / 16));
   pole_ = choose_pole(shape);
   const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, false);
   for (size_t y = 0; y < shape.height; ++y) {

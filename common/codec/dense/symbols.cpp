@@ -61,11 +61,7 @@ void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
   shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
   row[-1] = row[0], row[shape.width] = row[shape.width - 1];
   if (plane.first == 0) return;
-  uint8_t* const sizes = plane.sizes.row(static_cast<ptrdiff_t>(y)) - 1;
-  for (size_t i = 0; i < shape.width + 2; ++i) {
-    const unsigned t = row[static_cast<ptrdiff_t>(i) - 1];
-    sizes[i] = static_cast<uint8_t>(t < kHits ? t / 5 * 4 : 32 + ((t - kHits) >> 3));
-  }
+  kernels().plane_sizes(row - 1, shape.width + 2, plane.sizes.row(static_cast<ptrdiff_t>(y)) - 1);
 }
 
 // The finest classes that nearly all sums fit into.
