@@ -68,6 +68,9 @@ constexpr Column<TileRow, std::string> kTileColumns[] = {
     {"lease_arrived_s", [](const TileRow& r) { return r.moment(r.tile.moments.lease_arrived_s); }},
     {"fetch_ms", [](const TileRow& r) { return exact(r.tile.moments.fetch_s * 1e3); }},
     {"arrived_s", [](const TileRow& r) { return r.moment(r.tile.moments.arrived_s); }},
+    {"depth_error_m", [](const TileRow& r) { return exact(r.tile.depth_error_m); }},
+    {"normal_error_deg", [](const TileRow& r) { return exact(r.tile.normal_error_deg); }},
+    {"colour_error", [](const TileRow& r) { return exact(r.tile.colour_error); }},
 };
 
 bool is_time(const std::string& column) { return column.ends_with("_s"); }

@@ -234,6 +234,19 @@ ordered_json how_much(const Traffic& t, double run_s, double viewers) {
           {"redundancy_eliminated", if_measured(t.sampled && t.eliminates, t.redundancy)}};
 }
 
+/// How far from what was sampled points were published, at most, and what of that was made exact.
+ordered_json how_exact(const TileSums& t, const Roster& roster) {
+  const bool any = t.bounded() > 0;
+  return {{"errors_allowed",
+           if_measured(any, ordered_json{{"tiles", t.bounded()},
+                                         {"depth_m", t.depth_error_m()},
+                                         {"normal_deg", t.normal_error_deg()},
+                                         {"colour", t.colour_error()},
+                                         {"patches", whole(roster.counted("packer", "patches_bounded"))},
+                                         {"patches_refined", whole(roster.counted("packer", "patches_refined"))},
+                                         {"bytes_refined", whole(roster.counted("packer", "bytes_refined"))}})}};
+}
+
 /// What steering spared: rays of all tiles, against those of whole views.
 ordered_json what_was_steered(const TileSums& t) {
   return {{"rays_cast", if_measured(t.rays_full() > 0, whole(t.rays_cast()))},
@@ -308,6 +321,7 @@ ordered_json summarise(const Measured& measured, const std::vector<Process>& pro
   out.update(how_heads_moved(measured, roster));
   out["clock"] = clocks(processes);
   out.update(how_much(traffic(measured, roster), run_s, viewers));
+  out.update(how_exact(measured.tiles(), roster));
   out.update(what_was_steered(measured.tiles()));
   out.update(what_was_held(measured, roster, counter("partitions"), viewers));
   out.update(ordered_json{

@@ -343,6 +343,19 @@ Mosaic merge_mosaics(const std::vector<const Mosaic*>& parts, Sequence sequence)
   return build(p, sequence, FrameId{parts.back()->frame_tag()});
 }
 
+Mosaic with_points(const Mosaic& mosaic, const std::vector<std::pair<uint32_t, LeafPoint>>& points) {
+  PointSet& p = scratch.points;
+  p.clear();
+  p.add(mosaic);
+  for (const auto& [i, point] : points) {
+    CHECK(i < p.size());
+    p.x[i] = point.x, p.y[i] = point.y, p.z[i] = point.z;
+    p.normal[i] = point.normal;
+    p.colour[i] = point.colour;
+  }
+  return build(p, mosaic.sequence(), FrameId{mosaic.frame_tag()});
+}
+
 Mosaic merge_levels(const std::vector<PlacedLevel>& parts, int shift, float pixel_range, Sequence sequence) {
   gather(parts, shift, pixel_range, scratch.points);
   return build(scratch.points, sequence, {});

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "common/points/point_model.h"
@@ -52,6 +53,10 @@ Merge plan_merge(const std::vector<Mosaic>& mosaics, Mosaic fresh);
 ///   Points that a level adds come in two halves, of cells like the black and the white fields of a board: so every
 ///   prefix covers the cluster evenly.
 Mosaic merge_mosaics(const std::vector<const Mosaic*>& parts, Sequence sequence);
+
+/// The mosaic with other points in the places of some, by their numbers at level 0, and with levels as a merge makes
+/// them. Sequence and frame stay. Precondition: every number is below count(0).
+Mosaic with_points(const Mosaic& mosaic, const std::vector<std::pair<uint32_t, LeafPoint>>& points);
 
 /// A level of a mosaic, and where its leaf lies in a cube of 2^shift leaves a side.
 struct PlacedLevel {

@@ -83,7 +83,7 @@ Insertion PointModel::plan(PreparedPatch patch) const {
   Insertion out{patch.sequence, {}};
   out.changes.reserve(patch.mosaics.size());
   for (auto& [key, mosaic] : patch.mosaics) {
-    Insertion::Change& change = out.changes.emplace_back(Insertion::Change{key, {}, {}});
+    Insertion::Change& change = out.changes.emplace_back(Insertion::Change{key, {}, {}, {}});
     const Cluster* cluster = config_.compact ? find(key) : nullptr;
     if (!cluster) {
       change.added.push_back(std::move(mosaic));
@@ -113,6 +113,11 @@ std::vector<Mosaic> PointModel::commit(Insertion insertion) {
     }
     std::vector<Mosaic>& mosaics = cluster->mosaics;
     cluster_bytes_ -= header_bytes(mosaics);
+    for (auto& [at, mosaic] : change.renewed) {
+      cluster_bytes_ += mosaic.bytes() - mosaics[at].bytes();
+      std::swap(mosaics[at], mosaic);
+      replaced.push_back(std::move(mosaic));
+    }
     if (!change.replaced.empty()) {
       // What stays closes up.
       auto next = change.replaced.begin();

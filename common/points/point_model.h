@@ -12,6 +12,7 @@
 #include <memory>
 #include <span>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "common/core/ids.h"
@@ -121,6 +122,14 @@ class Mosaic {
   uint16_t direction_to_eye_ = 0;
 };
 
+/// A point as a mosaic holds it.
+struct LeafPoint {
+  uint16_t x, y, z;  ///< fractions of the leaf, as in Mosaic
+  uint16_t normal;
+  uint32_t colour;
+  bool operator==(const LeafPoint&) const = default;
+};
+
 struct Cluster {
   ClusterKey key = 0;
   geometry::Box leaf_room;      ///< the leaf's cube
@@ -163,12 +172,14 @@ PreparedPatch prepare_patch(const ModelConfig& config, Sequence sequence, const 
 /// Projected pixels across a leaf's cube: leaf_size * focal_x / depth of its centre (of half a leaf where it is less).
 float pixel_range(const geometry::Camera& camera, const glm::dvec3& leaf_centre_room, double leaf_size_m);
 
-/// What inserting a patch does to each of its clusters.
+/// What inserting a patch, or a refinement (refinement.h), does to each of its clusters.
 struct Insertion {
   struct Change {
     ClusterKey key;
     std::vector<uint32_t> replaced;  ///< of the cluster's mosaics, ascending
     std::vector<Mosaic> added;       ///< follow those that stay
+    /// Take the places of these ones, ascending, and have as many points; then the other two are empty.
+    std::vector<std::pair<uint32_t, Mosaic>> renewed = {};
   };
   Sequence sequence;
   std::vector<Change> changes;  ///< ascending keys

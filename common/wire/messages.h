@@ -22,7 +22,7 @@ namespace telesplat::wire {
 using Messages = std::tuple<Hello, Welcome, WhoAreYou, ClockRequest, ClockReply, ViewRequest, LeaseRequest, Lease,
                             LeaseExtend, TileDone, TileRefused, PlanRequest, Plan, FrameEnd, StatusReport, MetricRows,
                             Control, ControlReply, Shutdown, Goodbye, ChunkListRequest, ChunkList, ChunkRequest, Chunk,
-                            DepthTile, Patch, Forget, EpochBegin, StateMark, StateRequest, AccessReport, SliceWeights,
+                            DepthTile, Patch, Forget, Refine, EpochBegin, StateMark, StateRequest, AccessReport, SliceWeights,
                             SlabAssignment, SlabReady, SliceLease, VoxelRequest, VoxelData, SliceImages, SliceFrame,
                             SliceAck, Receipt, LinkReport, SwapReady, Swap, Order, OrderAnswer>;
 

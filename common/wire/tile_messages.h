@@ -79,12 +79,17 @@ struct TileDone {
   geometry::Rect rect;                         ///< Lease::rect
   uint64_t samples = 0, kept = 0;              ///< covered pixels before and after redundancy elimination
   uint64_t bytes_sampled = 0, bytes_sent = 0;  ///< encoded tile as received, as published
+  /// How far what was published may be from what was sampled: depth, m; angles of normals, degrees; each channel of
+  /// colour, of 255. 0: it is exact.
+  double depth_error_m = 0, normal_error_deg = 0, colour_error = 0;
   Moments moments;
   template <class F> static void fields(F& f, auto& m) {
     f("frame", m.frame); f("tile", m.tile); f("lease", m.lease); f("sampler", m.sampler);
     f("request", m.request); f("step", m.step);
     f("extra", m.extra); f("rays", m.rays); f("rect", m.rect); f("samples", m.samples); f("kept", m.kept);
-    f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent); f("moments", m.moments);
+    f("bytes_sampled", m.bytes_sampled); f("bytes_sent", m.bytes_sent);
+    f("depth_error_m", m.depth_error_m); f("normal_error_deg", m.normal_error_deg);
+    f("colour_error", m.colour_error); f("moments", m.moments);
   }
 };
 

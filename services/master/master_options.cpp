@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <iterator>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -157,6 +159,50 @@ options::Table lease_table(MasterOptions& o) {
            .fits = Kinds::of(Pipeline::kSlices)}};
 }
 
+// "1/32", "0.03" or "2".
+std::optional<double> number_or_fraction(const std::string& text) {
+  const char* const end = text.data() + text.size();
+  double value = 0, divisor = 1;
+  auto read = std::from_chars(text.data(), end, value);
+  if (read.ec == std::errc() && read.ptr != end && *read.ptr == '/') read = std::from_chars(read.ptr + 1, end, divisor);
+  if (read.ec != std::errc() || read.ptr != end || !(divisor > 0)) return std::nullopt;
+  return value / divisor;
+}
+
+// How far from what was sampled points may be: -1 is auto, 0 off.
+options::Row error_row(MasterOptions& o, const std::string& flag, const std::string& name, double most, bool whole,
+                       const char* help) {
+  double& value = o.settings.try_emplace(name, -1).first->second;
+  options::Row row{.flag = flag, .value = {}, .help = help, .fits = Kinds::of(Pipeline::kPoints)};
+  row.value =
+      options::Text{.read =
+                        [&value, most, whole](const std::string& text) {
+                          if (text == "auto") return value = -1, ok_status();
+                          if (text == "off") return value = 0, ok_status();
+                          const auto number = number_or_fraction(text);
+                          if (!number || *number < 0 || *number > most || (whole && *number != std::floor(*number)))
+                            return Status(Error{fmt::format("is not auto, off or a {}number from 0 to {}{}",
+                                                            whole ? "whole " : "", most, whole ? "" : ", such as 1/32")});
+                          value = *number;
+                          return ok_status();
+                        },
+                    .write =
+                        [&value] {
+                          return value < 0 ? "auto" : value == 0 ? "off" : options::number_text(value);
+                        }};
+  return row;
+}
+
+options::Table error_table(MasterOptions& o) {
+  return {error_row(o, "--depth-error", "packing.depth_error", 1, false,
+                    "how far points may be from where they were sampled, in pixels' footprints at their depth; auto: "
+                    "1/32 behind slow links, else off; what stands still becomes exact"),
+          error_row(o, "--normal-error", "packing.normal_error", 3, true,
+                    "likewise normals, in codes; auto: 1 behind slow links (docs/links.md has degrees)"),
+          error_row(o, "--colour-error", "packing.colour_error", 15, true,
+                    "likewise each channel of colours, of 255; auto: 1 behind slow links")};
+}
+
 // The numbers are what the wire and session.toml say: -1 auto, 0 eliminate, 1 keep.
 options::Row redundancy_row(MasterOptions& o) {
   options::Row row = named(
@@ -202,7 +248,8 @@ options::Table packing_table(MasterOptions& o) {
 
 options::Table session_table(MasterServiceOptions& o) {
   return options::joined(
-      options::joined(options::joined(lease_table(o.master), steering_table(o.master)), packing_table(o.master)),
+      options::joined(options::joined(lease_table(o.master), steering_table(o.master)),
+                      options::joined(packing_table(o.master), error_table(o.master))),
       {clip_row(o.master)});
 }
 

@@ -28,7 +28,7 @@ FLOORS = {
         ["common/notes"],
         ["common/image", "common/gl", "common/wall", "common/tracking"],
         ["common/codec", "common/points", "common/stereo"],
-        [("common/volume", "common/volume/transfer"), "common/splat"],
+        [("common/volume", "common/volume/transfer"), "common/splat", "common/refinement"],
         ["common/volume/slices"],
         ["common/volume/warp"],
         ["common/wire"],

@@ -55,7 +55,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
   // One hears everything, one misses events now and then and asks for them, one joins anew each time.
   test::Replica steady(config.model), gappy(config.model);
   uint64_t next_frame = 1, expected_sequence = 0;
-  int patches = 0, forgets = 0, patch_forgets = 0, epochs = 0, gaps = 0, published = 0;
+  int patches = 0, forgets = 0, patch_forgets = 0, epochs = 0, gaps = 0, published = 0, refinements = 0;
   double now_s = 0;
   std::vector<packer::SampledTile> waiting;
   // One joins while events go on: it is sent a few at a time, and keeps what is published meanwhile.
@@ -91,6 +91,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
     forgets += event.kind == packer::Event::Kind::kForget;
     patch_forgets += !event.frames.empty();
     epochs += event.kind == packer::Event::Kind::kEpoch;
+    refinements += event.kind == packer::Event::Kind::kRefine;
     steady.apply(event);
     const bool lost = chance(0.15);
     if (lost) return;
@@ -106,8 +107,12 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
   for (int step = 0; published < 2000 || forgets < 3 || epochs < 1 || gaps < 3; ++step) {
     ASSERT_LT(step, 50000);
     now_s += 0.2;
+    if (chance(0.05)) core.set_tolerance(chance(0.6) ? packer::Tolerance{1.0 / 8, 1, 2} : packer::Tolerance{});
     if (chance(0.01) && step > 20) {
       if (const auto event = core.begin_epoch({core.epoch().value + 1})) publish(*event);
+    } else if (chance(0.15)) {
+      for (uint64_t n = 1 + random() % 8; n > 0; --n)
+        if (const auto event = core.refine(now_s - 10)) publish(*event);
     } else if (chance(0.2)) {
       std::vector<points::ClusterKey> seen;
       std::vector<uint32_t> frames;  // not told every other time
@@ -147,6 +152,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
   EXPECT_GT(patches, 100);
   EXPECT_GT(joined, 2);
   EXPECT_GT(patch_forgets, 10);
+  EXPECT_GT(refinements, 50);
   if (keep) {
     EXPECT_EQ(patch_forgets, forgets);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "common/codec/depth_codec.h"
+#include "common/refinement/bounded_patches.h"
 #include "services/packer/points/packer_core.h"
 #include "tests/support/points_scenes.h"
 
@@ -42,7 +43,12 @@ class Replica {
   void apply(const packer::Event& event) {
     CHECK(applied_ < event.sequence);
     applied_ = event.sequence;
-    if (event.kind == packer::Event::Kind::kEpoch) model_.clear();
+    if (event.kind == packer::Event::Kind::kEpoch) model_.clear(), bounded_.clear();
+    if (event.kind == packer::Event::Kind::kRefine) {
+      const auto refinement = bounded_.refine(model_.config(), event.sequence, event.refines, *event.blob);
+      CHECK(refinement.ok());
+      if (*refinement) model_.commit(points::plan_refinement(model_, **refinement));
+    }
     if (event.kind == packer::Event::Kind::kForget) {
       if (event.frames.empty())
         model_.forget(event.clusters);
@@ -52,6 +58,7 @@ class Replica {
     if (event.kind == packer::Event::Kind::kPatch) {
       const auto image = codec::decode(*event.blob, event.rect.width, event.rect.height);
       CHECK(image.ok());
+      if (event.refinable) bounded_.add(event.sequence, event.camera, event.rect, *event.blob);
       model_.insert(points::prepare_patch(model_.config(), event.sequence, event.camera, event.rect, *image,
                                           points::tagged(event.frame, event.step)));
     }
@@ -68,6 +75,7 @@ class Replica {
 
  private:
   points::PointModel model_;
+  refinement::BoundedPatches bounded_;
   Sequence applied_;
 };
 

@@ -11,7 +11,9 @@ constexpr size_t kMaxKeptEvents = 8192, kMaxKeptBytes = 256u << 20;
 size_t ModelEvent::bytes() const {
   const auto* patch = std::get_if<wire::Patch>(&body);
   const auto* forget = std::get_if<wire::Forget>(&body);
-  return 512 + (patch ? patch->image.size() + patch->missed.size() * sizeof patch->missed[0] : 0) +
+  const auto* refine = std::get_if<wire::Refine>(&body);
+  return 512 + (refine ? refine->image.size() : 0) +
+         (patch ? patch->image.size() + patch->missed.size() * sizeof patch->missed[0] : 0) +
          (forget ? (forget->clusters.size() + forget->frames.size()) * sizeof(uint32_t) : 0);
 }
 

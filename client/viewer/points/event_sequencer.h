@@ -14,7 +14,7 @@ namespace telesplat::viewer {
 
 /// A received event; bulk fields point into what `owner` keeps alive.
 struct ModelEvent {
-  std::variant<wire::Patch, wire::Forget, wire::EpochBegin> body;
+  std::variant<wire::Patch, wire::Forget, wire::Refine, wire::EpochBegin> body;
   std::shared_ptr<const void> owner;
   double arrived_s = 0;  ///< monotonic_s()
   InstanceId packer() const {

@@ -61,12 +61,22 @@ void ModelCache::insert(points::PreparedPatch patch, EpochId epoch) {
   const std::lock_guard lock(mutex_);
   CHECK(newest_.epoch == epoch || newest_.epoch.value == 0);
   newest_.epoch = epoch;
+  commit(std::move(insertion));
+  ++patches_;
+}
+
+void ModelCache::commit(points::Insertion insertion) {
   newest_.applied = insertion.sequence;
   changes_.any = true;
   for (const auto& change : insertion.changes) note_change(change.key);
   auto replaced = newest_.model->commit(std::move(insertion));
   move_to_end(replaced, dropped_of(newest_.model.get()).mosaics);
-  ++patches_;
+}
+
+void ModelCache::refine(const points::PreparedRefinement& refinement) {
+  points::Insertion insertion = points::plan_refinement(*newest_.model, refinement);
+  const std::lock_guard lock(mutex_);
+  commit(std::move(insertion));
 }
 
 void ModelCache::forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames) {

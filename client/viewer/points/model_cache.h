@@ -7,7 +7,7 @@
 #include <mutex>
 #include <vector>
 
-#include "common/points/point_model.h"
+#include "common/points/refinement.h"
 #include "common/splat/select/view_selection.h"
 
 namespace telesplat::viewer {
@@ -26,6 +26,8 @@ class ModelCache {
   /// Precondition: `epoch` is the newest replica's, or that is not known yet. Only one thread at a time may change the
   /// cache: mosaics are merged while the display draws.
   void insert(points::PreparedPatch patch, EpochId epoch);
+  /// Likewise, of patches that are in the newest replica.
+  void refine(const points::PreparedRefinement& refinement);
   /// frames: empty, or one a key: then only the mosaics with that frame tag (PointModel::forget).
   void forget(Sequence sequence, std::span<const points::ClusterKey> keys, std::span<const uint32_t> frames = {});
   /// Replaces the older replica on display by the newest. No effect if it is displayed already.
@@ -87,6 +89,7 @@ class ModelCache {
   Dropped& dropped_of(const points::PointModel* model) { return model == drawn_ ? parked_ : free_; }
   void drop(Replica& replica);
   void select_displayed(const geometry::Camera& camera, const splat::SelectionOptions& options, splat::DrawList& out);
+  void commit(points::Insertion insertion);  // mutex_ is held
   void note_change(points::ClusterKey key);
   void note_change(const geometry::Box& box);
   void note_replica();

@@ -35,7 +35,7 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = patches.receive();
     if (!message) return;
-    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(patches, *message, [&](auto& m) {
+    net::dispatch<wire::Patch, wire::Forget, wire::Refine, wire::EpochBegin, wire::StateMark>(patches, *message, [&](auto& m) {
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
         on_published_mark(m);
       else
@@ -67,7 +67,7 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
     const auto message = state.receive();
     if (!message) return;
     asked_s_ = monotonic_s();  // an answer that is coming in is not late
-    net::dispatch<wire::Patch, wire::Forget, wire::EpochBegin, wire::StateMark>(state, *message, [&](auto& m) {
+    net::dispatch<wire::Patch, wire::Forget, wire::Refine, wire::EpochBegin, wire::StateMark>(state, *message, [&](auto& m) {
       if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
         sequencer_.on_mark(m);
       else
@@ -102,6 +102,8 @@ void PointReceiver::apply(const ModelEvent& event) {
         using E = std::decay_t<decltype(e)>;
         if constexpr (std::is_same_v<E, wire::Patch>) {
           return apply_patch(e, event.arrived_s);
+        } else if constexpr (std::is_same_v<E, wire::Refine>) {
+          return apply_refinement(e);
         } else if constexpr (std::is_same_v<E, wire::Forget>) {
           if (options_.hold)
             batches_.add(UpdateBatches::Forget{e.sequence, {e.clusters.begin(), e.clusters.end()}, e.frames}, cache_,
@@ -132,6 +134,7 @@ void PointReceiver::begin_replica(const points::ModelConfig& config, EpochId epo
   config_ = config;
   epoch_ = epoch;
   rays_.clear();
+  bounded_.clear();
   if (options_.hold)
     batches_.add(UpdateBatches::Begin{config, epoch, sequence}, cache_, sequencer_.packer());
   else
@@ -164,6 +167,7 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   }
   const double decoded = monotonic_s();
   epoch_ = patch.epoch;
+  if (patch.refinable) bounded_.add(patch.sequence, patch.camera, patch.rect, bytes);
   auto prepared = points::prepare_patch(config_, patch.sequence, patch.camera, patch.rect, tile_,
                                         points::tagged(patch.frame, patch.step));
   if (options_.hold)
@@ -189,6 +193,28 @@ bool PointReceiver::apply_patch(const wire::Patch& patch, double arrived_s) {
   return true;
 }
 
+// What a patch left out of which nothing is held is not needed either.
+bool PointReceiver::apply_refinement(const wire::Refine& refine) {
+  const double begin = monotonic_s();
+  const auto bytes = std::span(reinterpret_cast<const uint8_t*>(refine.image.data()), refine.image.size());
+  auto refinement = bounded_.refine(config_, refine.sequence, refine.patch, bytes);
+  if (!refinement) {
+    ++decode_errors_;
+    log::warn("refinement {} of patch {} cannot be decoded: {}", refine.sequence.value, refine.patch.value,
+              refinement.error().text);
+    return false;
+  }
+  if (!*refinement) *refinement = points::PreparedRefinement{refine.sequence, refine.patch, {}};
+  if (options_.hold)
+    batches_.add(UpdateBatches::Refine{**std::move(refinement)}, cache_, sequencer_.packer());
+  else
+    cache_.refine(**refinement);
+  ++patches_refined_;
+  bytes_received_ += refine.image.size();
+  spans_.add("refine", links_.to_master_s(begin), links_.to_master_s(monotonic_s()), 1);
+  return true;
+}
+
 PointReceiver::Figures PointReceiver::figures() const {
   return {.points_received = points_received_,
           .decode_errors = decode_errors_,
@@ -198,6 +224,7 @@ PointReceiver::Figures PointReceiver::figures() const {
           .sequence = sequencer_.applied(),
           .packer = sequencer_.packer(),
           .bytes_received = bytes_received_,
+          .patches_refined = patches_refined_,
           .digests_equal = check_.equal(),
           .digests_different = check_.different()};
 }

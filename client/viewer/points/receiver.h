@@ -15,6 +15,7 @@
 #include "common/image/depth_image.h"
 #include "common/metrics/recorder.h"
 #include "common/net/socket.h"
+#include "common/refinement/bounded_patches.h"
 
 namespace telesplat::viewer {
 
@@ -55,7 +56,8 @@ class PointReceiver {
     EpochId epoch;  ///< on display; only where nothing is held
     Sequence sequence;
     InstanceId packer;                                  ///< whose sequence it is
-    uint64_t bytes_received = 0;                        ///< images of patches
+    uint64_t bytes_received = 0;                        ///< images of patches, and what made them exact
+    uint64_t patches_refined = 0;
     uint64_t digests_equal = 0, digests_different = 0;  ///< ReplicaCheck
   };
   Figures figures() const;
@@ -66,6 +68,7 @@ class PointReceiver {
   void record(const ModelEvent& event);
   /// False if it cannot be decoded.
   bool apply_patch(const wire::Patch& patch, double arrived_s);
+  bool apply_refinement(const wire::Refine& refine);
   void begin_replica(const points::ModelConfig& config, EpochId epoch, Sequence sequence);
 
   Options options_;
@@ -80,8 +83,10 @@ class PointReceiver {
   points::ModelConfig config_;  // of the newest replica, and its epoch, held or not; 0: not known yet
   EpochId epoch_;
   image::DepthImage tile_;  // memory that decoding reuses
+  refinement::BoundedPatches bounded_;
   double asked_s_ = 0;
-  uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0;
+  uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0,
+           patches_refined_ = 0;
 };
 
 }  // namespace telesplat::viewer

@@ -14,6 +14,8 @@ uint64_t sequence_of(const UpdateBatches::Change& change) {
       [](const auto& c) {
         if constexpr (requires { c.patch; })
           return c.patch.sequence.value;
+        else if constexpr (requires { c.refinement; })
+          return c.refinement.sequence.value;
         else
           return c.sequence.value;
       },
@@ -62,6 +64,8 @@ bool UpdateBatches::apply_front(ModelCache& cache) {
           cache.insert(std::move(c.patch), c.epoch);
         } else if constexpr (std::is_same_v<C, Forget>) {
           cache.forget(c.sequence, c.clusters, c.frames);
+        } else if constexpr (std::is_same_v<C, Refine>) {
+          cache.refine(c.refinement);
         } else {
           applied_ = {changes_.front().packer, c.sequence.value, c.sequence.value + 1};
           held = cache.begin_replica(c.config, c.epoch, c.sequence);

@@ -31,12 +31,15 @@ class UpdateBatches {
     std::vector<points::ClusterKey> clusters;
     std::vector<uint32_t> frames;
   };
+  struct Refine {
+    points::PreparedRefinement refinement;
+  };
   struct Begin {
     points::ModelConfig config;
     EpochId epoch;
     Sequence sequence;
   };
-  using Change = std::variant<Insert, Forget, Begin>;
+  using Change = std::variant<Insert, Forget, Refine, Begin>;
 
   // ---- worker ----
   /// packer: whose event it is.

@@ -6,12 +6,13 @@
 
 #include "client/viewer/points/patch_rays.h"
 #include "common/codec/depth_codec.h"
+#include "common/refinement/bounded_patches.h"
 #include "common/wire/serial.h"
 
 namespace telesplat::viewer {
 namespace {
 
-constexpr std::string_view kMagic = "TSEVENT3", kWithoutSummaries = "TSEVENT2";
+constexpr std::string_view kMagic = "TSEVENT4", kUnrefined = "TSEVENT3", kWithoutSummaries = "TSEVENT2";
 constexpr std::string_view kReplica = "replica", kSummary = "summary";
 
 struct ReplicaBody {
@@ -71,6 +72,7 @@ struct EventReplay::Impl {
   bool pending = false;     // the file's record was read but not applied
   bool has_events = false;  // of the replica at hand
   image::DepthImage tile;
+  refinement::BoundedPatches bounded;
 
   const std::string& type() const { return file.type(); }
   const std::string& body() const { return file.body(); }
@@ -94,6 +96,7 @@ struct EventReplay::Impl {
     model = std::make_unique<points::PointModel>(config);
     summaries.clear();
     rays.clear();
+    bounded.clear();
     applied = {};
     has_events = false;
     return ok_status();
@@ -103,6 +106,7 @@ struct EventReplay::Impl {
     const std::span bytes(reinterpret_cast<const uint8_t*>(p.image.data()), p.image.size());
     if (const Status s = codec::decode_into(tile, bytes, p.rect.width, p.rect.height); !s) return wrong(s.error().text);
     if (const Status s = add_rays(p, tile, rays); !s) return wrong(s.error().text);
+    if (p.refinable) bounded.add(p.sequence, p.camera, p.rect, bytes);
     model->insert(
         points::prepare_patch(model->config(), p.sequence, p.camera, p.rect, tile, points::tagged(p.frame, p.step)));
     return ok_status();
@@ -116,7 +120,15 @@ struct EventReplay::Impl {
       if (const auto brick = points::brick_key(key); !model->bricks().contains(brick)) summaries.erase(brick);
     return ok_status();
   }
+  Status apply(const wire::Refine& r) {
+    const std::span bytes(reinterpret_cast<const uint8_t*>(r.image.data()), r.image.size());
+    const auto refinement = bounded.refine(model->config(), r.sequence, r.patch, bytes);
+    if (!refinement) return wrong(refinement.error().text);
+    if (*refinement) model->commit(points::plan_refinement(*model, **refinement));
+    return ok_status();
+  }
   Status apply(const wire::EpochBegin&) {
+    bounded.clear();
     model->clear();
     summaries.clear();
     rays.clear();
@@ -156,7 +168,7 @@ EventReplay::EventReplay(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 EventReplay::~EventReplay() = default;
 
 Result<std::unique_ptr<EventReplay>> EventReplay::open(const std::string& path, bool with_summaries) {
-  auto file = RecordReader::open(path, {kMagic, kWithoutSummaries}, "a record of point-model events");
+  auto file = RecordReader::open(path, {kMagic, kUnrefined, kWithoutSummaries}, "a record of point-model events");
   if (!file) return file.error();
   return std::unique_ptr<EventReplay>(new EventReplay(std::make_unique<Impl>(std::move(*file), with_summaries)));
 }
@@ -175,6 +187,8 @@ Status EventReplay::advance(const Moment& moment) {
       applied = i.apply_as<wire::Patch>(moment.sequence);
     } else if (i.type() == wire::Forget::kName) {
       applied = i.apply_as<wire::Forget>(moment.sequence);
+    } else if (i.type() == wire::Refine::kName) {
+      applied = i.apply_as<wire::Refine>(moment.sequence);
     } else if (i.type() == wire::EpochBegin::kName) {
       applied = i.apply_as<wire::EpochBegin>(moment.sequence);
     } else {

@@ -77,6 +77,9 @@ wire::TileDone tile_of(const Rows& row) {
   t.samples = row.whole("samples");
   t.kept = row.whole("kept");
   t.bytes_sent = row.whole("bytes_sent");
+  t.depth_error_m = row.number_of("depth_error_m");
+  t.normal_error_deg = row.number_of("normal_error_deg");
+  t.colour_error = row.number_of("colour_error");
   t.step = row.whole("step");
   t.rays = row.whole("rays");
   t.extra = row.whole("extra") != 0;

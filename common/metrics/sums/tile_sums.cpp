@@ -13,6 +13,10 @@ void TileSums::add(const std::string& sampler, const wire::TileDone& tile) {
   samples_ += double(tile.samples);
   kept_ += double(tile.kept);
   bytes_sent_ += double(tile.bytes_sent);
+  bounded_ += tile.depth_error_m > 0 || tile.normal_error_deg > 0 || tile.colour_error > 0;
+  depth_error_m_ = std::max(depth_error_m_, tile.depth_error_m);
+  normal_error_deg_ = std::max(normal_error_deg_, tile.normal_error_deg);
+  colour_error_ = std::max(colour_error_, tile.colour_error);
   rays_cast_ += double(tile.rays);
   if (!planned_.contains(tile.frame.value)) rays_full_ += double(tile.rays);
   const bool room = busy_s_.size() < kMostSamplers || busy_s_.contains(sampler);

@@ -31,6 +31,11 @@ class TileSums {
   double samples() const { return samples_; }
   double kept() const { return kept_; }
   double bytes_sent() const { return bytes_sent_; }
+  /// Tiles that were published with an error, and the largest of each (wire::TileDone).
+  uint64_t bounded() const { return bounded_; }
+  double depth_error_m() const { return depth_error_m_; }
+  double normal_error_deg() const { return normal_error_deg_; }
+  double colour_error() const { return colour_error_; }
   double rays_cast() const { return rays_cast_; }
   double rays_full() const { return rays_full_; }  ///< without plans
   /// Sample begin to encode end, s, by sampler.
@@ -49,6 +54,8 @@ class TileSums {
   void time(const wire::TileDone& tile);
 
   double samples_ = 0, kept_ = 0, bytes_sent_ = 0, rays_cast_ = 0, rays_full_ = 0;
+  uint64_t bounded_ = 0;
+  double depth_error_m_ = 0, normal_error_deg_ = 0, colour_error_ = 0;
   std::map<std::string, double> busy_s_;
   std::map<uint64_t, Times> open_;  // frames that may have further tiles
   uint64_t closed_ = 0;             // frames up to this one have none

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/codec/error_bounds.h"
 #include "common/points/point_model.h"
 #include "services/packer/points/frame_part.h"
 
@@ -14,15 +15,19 @@ inline constexpr size_t kMaxForgetKeys = 1u << 16;
 
 /// Its FramePart is a patch's; of other events only the epoch counts.
 struct Event : FramePart {
-  enum class Kind { kPatch, kForget, kEpoch };
+  enum class Kind { kPatch, kForget, kEpoch, kRefine };
 
   Sequence sequence;
   Kind kind = Kind::kPatch;
 
   // kPatch
   bool frame_complete = false;  ///< the last tile of its frame to be packed
-  /// Codec stream of the tile; eliminated pixels are not covered.
+  /// Codec stream of the tile; eliminated pixels are not covered. kRefine: what that of an earlier patch left out.
   std::shared_ptr<const std::vector<uint8_t>> blob;
+  /// What the tile may differ by from what was sampled, and how far its farthest point lies, m; 0: it has none.
+  codec::ErrorBounds bounds;
+  double farthest_m = 0;
+  bool refinable = false;  ///< a kRefine of it may come
   /// Of rays finer than a view's: those that met nothing (codec::encode_mask), and where they lie; else none.
   std::vector<uint32_t> missed;
   geometry::Rect missed_rect{0, 0, 1, 1};
@@ -34,6 +39,9 @@ struct Event : FramePart {
   // kForget
   std::vector<points::ClusterKey> clusters;  ///< ascending, at most kMaxForgetKeys
   std::vector<uint32_t> frames;              ///< empty: whole clusters; else one a cluster: its mosaics with this tag
+
+  // kRefine
+  Sequence refines;  ///< the patch that becomes exact
 };
 
 }  // namespace telesplat::packer

@@ -31,6 +31,7 @@ Event bare(const Event& event) {
 
 uint64_t EventLog::Patch::bytes() const {
   return sizeof(Patch) + kNodeBytes + alive * sizeof(Sequence) + event.blob->capacity() +
+         (refinement ? refinement->capacity() : 0) +
          event.missed.capacity() * sizeof event.missed[0] + forgotten.capacity() * sizeof forgotten[0] +
          patch_forgotten.capacity() * sizeof patch_forgotten[0];
 }
@@ -92,6 +93,20 @@ void EventLog::add_patch_forget(const Event& event, std::span<const points::Clus
   }
 }
 
+bool EventLog::is_whole(Sequence patch) const {
+  const auto found = patches_.find(patch);
+  return found != patches_.end() && found->second.forgotten.empty() && found->second.patch_forgotten.empty();
+}
+
+void EventLog::add_refinement(const Event& event) {
+  CHECK(is_whole(event.refines));
+  Patch& patch = patches_.at(event.refines);
+  patch_bytes_ -= patch.bytes();
+  patch.refined = event.sequence;
+  patch.refinement = event.blob;
+  patch_bytes_ += patch.bytes();
+}
+
 bool EventLog::remembers(Sequence after) const {
   return after.value == 0 || after >= horizon_ || (epoch_ && after < epoch_->sequence);
 }
@@ -126,6 +141,8 @@ EventLog::Replay EventLog::replay(Sequence after, Sequence until) const {
     std::vector<Event> more = patches_alone ? patch_forgets(out.after, from_nothing) : forgets(out.after, from_nothing);
     std::move(more.begin(), more.end(), std::back_inserter(out.others));
   }
+  std::vector<Event> refined = refinements(out.after);
+  std::move(refined.begin(), refined.end(), std::back_inserter(out.others));
   std::sort(out.others.begin() + first, out.others.end(), by_sequence);
   return out;
 }
@@ -196,6 +213,19 @@ std::vector<Event> EventLog::patch_forgets(Sequence after, bool from_nothing) co
     }
     out.back().clusters.push_back(key);
     out.back().frames.push_back(frame);
+  }
+  return out;
+}
+
+std::vector<Event> EventLog::refinements(Sequence after) const {
+  std::vector<Event> out;
+  for (const auto& [sequence, patch] : patches_) {
+    if (patch.refined <= after) continue;
+    Event& event = out.emplace_back();
+    event.sequence = patch.refined;
+    event.kind = Event::Kind::kRefine;
+    event.refines = sequence;
+    event.blob = patch.refinement;
   }
   return out;
 }

@@ -33,6 +33,10 @@ class EventLog {
   /// published.
   void add_patch_forget(const Event& event, std::span<const points::Cluster> dropped);
   void add_epoch(const Event& event);
+  /// A patch became exact: who gets the patch gets this, too. Precondition: is_whole(event.refines).
+  void add_refinement(const Event& event);
+  /// True if the patch is kept and nothing of it was forgotten.
+  bool is_whole(Sequence patch) const;
 
   /// False: it is not known any more what a replica as of `after` would have to forget.
   bool remembers(Sequence after) const;
@@ -43,7 +47,8 @@ class EventLog {
   /// is told of that by the events that follow `until`.
   struct Replay {
     Sequence after, until;     ///< of the patches that are still to come
-    std::deque<Event> others;  ///< forgets, epochs and patches that are not in the log, in order
+    /// forgets, epochs, refinements and patches that are not in the log, in order
+    std::deque<Event> others;
     EpochId epoch;             ///< of all of them
   };
   Replay replay(Sequence after, Sequence until) const;
@@ -55,6 +60,8 @@ class EventLog {
     size_t alive = 0;                             ///< clusters in which it is not forgotten
     std::vector<points::ClusterKey> forgotten{};  ///< where else it was, if whole clusters were forgotten
     std::vector<std::pair<Sequence, points::ClusterKey>> patch_forgotten{};  ///< if this patch of them was, and when
+    Sequence refined;  ///< by which event; 0: it was not
+    std::shared_ptr<const std::vector<uint8_t>> refinement{};  ///< its blob
     uint64_t bytes() const;  ///< with its places in patches_of_clusters()
   };
   const std::map<Sequence, Patch>& patches() const { return patches_; }
@@ -69,6 +76,7 @@ class EventLog {
   void drop_part(Sequence patch, points::ClusterKey key, Sequence sequence, bool patch_alone);
   std::vector<Event> forgets(Sequence after, bool from_nothing) const;
   std::vector<Event> patch_forgets(Sequence after, bool from_nothing) const;
+  std::vector<Event> refinements(Sequence after) const;
 
   const size_t max_patches_;
   std::map<Sequence, Patch> patches_;

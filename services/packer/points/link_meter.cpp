@@ -100,6 +100,20 @@ void LinkMeter::clear() {
   bytes_ = forgotten_bytes_ = 0;
 }
 
+double LinkMeter::slowest_bytes_s() const {
+  double out = 0;
+  for (const auto& [id, v] : viewers_)
+    if (v.busy_s > 0 && (out == 0 || v.busy_bytes / v.busy_s < out)) out = v.busy_bytes / v.busy_s;
+  return out;
+}
+
+bool LinkMeter::all_free(double most_s, uint64_t least, double now_s) const {
+  return std::all_of(viewers_.begin(), viewers_.end(), [&](const auto& v) {
+    const auto f = figures(v.first, now_s);
+    return !f || f->backlog_bytes <= std::max(least, static_cast<uint64_t>(most_s * f->rate_bytes_s));
+  });
+}
+
 std::optional<LinkFigures> LinkMeter::figures(InstanceId viewer, double now_s) const {
   const auto found = viewers_.find(viewer);
   if (found == viewers_.end()) return std::nullopt;

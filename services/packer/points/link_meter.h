@@ -45,6 +45,10 @@ class LinkMeter {
   /// nullopt: it has said nothing.
   std::optional<LinkFigures> figures(InstanceId viewer, double now_s) const;
   size_t viewers() const { return viewers_.size(); }
+  /// Of the slowest link, as far as is known; 0: of none.
+  double slowest_bytes_s() const;
+  /// No link has more on its way than it carries in `most_s`, or `least` bytes. Of one whose rate is not known: `least`.
+  bool all_free(double most_s, uint64_t least, double now_s) const;
 
  private:
   struct Published {

@@ -15,6 +15,11 @@ class Obsolescence {
   void forgotten(points::ClusterKey key) { access_s_.erase(key); }
   void clear() { access_s_.clear(); }
   bool knows(points::ClusterKey key) const { return access_s_.count(key) != 0; }
+  /// It was drawn, or got points, at that time or later.
+  bool accessed_since(points::ClusterKey key, double since_s) const {
+    const auto found = access_s_.find(key);
+    return found != access_s_.end() && found->second >= since_s;
+  }
 
   /// Clusters not accessed for more than `after_s`, and then, if what is left has more than max_points points (0 = no
   /// limit), the least recently accessed ones (of equals, the lowest keys) until at most 90 % of that is left.

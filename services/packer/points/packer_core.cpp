@@ -9,6 +9,7 @@
 
 #include "common/codec/depth_codec.h"
 #include "common/codec/mask_stream.h"
+#include "common/refinement/bounded_patches.h"
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/frame_book.h"
 #include "services/packer/points/obsolescence.h"
@@ -86,6 +87,12 @@ struct PackerCore::Impl {
     RequestId request;
     std::vector<PatchKey> patches;
   };
+  struct Refinable {
+    std::shared_ptr<const std::vector<uint8_t>> stream;  // of the refinement
+    std::vector<points::ClusterKey> clusters;
+  };
+  Tolerance tolerance;
+  refinement::RefinableBook<Refinable> refinables;
   std::deque<CoarsePass> coarse;     // coarse frames whose complete ones are not there yet, oldest first
   std::vector<PatchKey> superseded;  // what complete frames made superfluous
 
@@ -147,6 +154,52 @@ struct PackerCore::Impl {
     }
   }
 
+  // The event's stream of the tile, which becomes what decoders make of it. stream: of the exact tile, or null.
+  // Returns the tile as it was sampled, if a refinement can tell viewers of it.
+  image::DepthImage code(Event& event, SampledTile& tile, Stream stream) {
+    event.bounds = event.kept > 0 ? bounds_of(tolerance, tile.camera) : codec::ErrorBounds{};
+    uint32_t farthest = image::kMaxDepthCode;
+    for (const uint32_t code : tile.image.depth)
+      if (code != 0) farthest = std::min(farthest, code);
+    if (event.kept > 0) event.farthest_m = image::decode_depth(farthest, tile.camera.near_m);
+    if (event.bounds.exact()) {
+      event.blob = stream ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
+      return {};
+    }
+    image::DepthImage decoded;
+    event.blob = std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image, event.bounds, &decoded));
+    // What stands in for a frame that is coming is soon forgotten.
+    event.refinable = tile.step == 1;
+    ++statistics.patches_bounded;
+    return std::exchange(tile.image, std::move(decoded));
+  }
+
+  std::optional<Event> refine(double drawn_since_s) {
+    // What was forgotten may have come again, alike: that is not this patch's.
+    auto next = refinables.take_newest([&](Sequence of, const Refinable& r) {
+      if (!log.is_whole(of)) return false;
+      return keeps() || std::any_of(r.clusters.begin(), r.clusters.end(), [&](points::ClusterKey key) {
+               return obsolescence.accessed_since(key, drawn_since_s);
+             });
+    });
+    if (!next) return std::nullopt;
+    const Sequence of = next->first;
+    const Event& patch = log.patches().at(of).event;
+    const auto bounded = codec::decode(*patch.blob, patch.rect.width, patch.rect.height);
+    CHECK(bounded.ok());
+    const auto exact = codec::decode_refinement(*next->second.stream, *bounded);
+    CHECK(exact.ok());
+    Event event = next_event(Event::Kind::kRefine);
+    event.refines = of;
+    event.blob = std::move(next->second.stream);
+    model.commit(points::plan_refinement(
+        model, points::prepare_refinement(config.model, event.sequence, of, patch.camera, patch.rect, *bounded, *exact)));
+    log.add_refinement(event);
+    ++statistics.patches_refined;
+    statistics.bytes_refined += event.blob->size();
+    return event;
+  }
+
   Event pack(SampledTile& tile, double now_s, Stream stream, const std::function<void(const Event&)>& publish,
              const std::optional<KnownReference>& known) {
     const splat::Elimination elimination = eliminate(tile, known);
@@ -158,9 +211,7 @@ struct PackerCore::Impl {
     event.frame_complete = frame.tiles_left == 0;
     event.samples = elimination.samples, event.kept = elimination.kept;
     event.frame_samples = frame.samples, event.frame_kept = frame.kept;
-    const bool as_it_came = stream && keeps();
-    event.blob =
-        as_it_came ? std::move(stream) : std::make_shared<const std::vector<uint8_t>>(codec::encode(tile.image));
+    const image::DepthImage exact = code(event, tile, keeps() ? std::move(stream) : nullptr);
     if (publish) publish(event);
 
     points::PreparedPatch patch = points::prepare_patch(config.model, event.sequence, tile.camera, tile.rect,
@@ -175,6 +226,10 @@ struct PackerCore::Impl {
     }
     note_pass(event, patch);
     log.add_patch(event, clusters_of_patch);
+    if (event.refinable && !clusters_of_patch.empty())
+      refinables.add(event.sequence, event.blob->size(),
+                     {std::make_shared<const std::vector<uint8_t>>(codec::encode_refinement(exact, tile.image)),
+                      clusters_of_patch});
     statistics.points_outside += patch.outside;
     if (watcher) watcher->inserted(patch);
     model.insert(std::move(patch));
@@ -287,6 +342,10 @@ std::vector<Event> PackerCore::forget(std::span<const points::ClusterKey> cluste
   return out;
 }
 
+void PackerCore::set_tolerance(const Tolerance& tolerance) { impl_->tolerance = tolerance; }
+const Tolerance& PackerCore::tolerance() const { return impl_->tolerance; }
+std::optional<Event> PackerCore::refine(double drawn_since_s) { return impl_->refine(drawn_since_s); }
+
 bool PackerCore::has(FrameId frame, uint32_t tile) const { return impl_->frames.has(frame, tile); }
 
 void PackerCore::accessed(std::span<const points::ClusterKey> clusters, double now_s,
@@ -346,6 +405,7 @@ std::optional<Event> PackerCore::begin_epoch(EpochId epoch) {
   i.patch_obsolescence.clear();
   i.coarse.clear();
   i.superseded.clear();
+  i.refinables.clear();
   i.log.add_epoch(event);
   if (i.watcher) i.watcher->cleared();
   return event;

@@ -16,6 +16,7 @@
 #include "services/packer/points/known_reference.h"
 #include "services/packer/points/model_watcher.h"
 #include "services/packer/points/sampled_tile.h"
+#include "services/packer/points/tolerance.h"
 
 namespace telesplat::packer {
 
@@ -52,6 +53,8 @@ struct Statistics {
   uint64_t samples = 0, kept = 0;  ///< covered pixels before and after elimination
   uint64_t points_outside = 0;     ///< kept samples outside the octree's cube
   uint64_t clusters_forgotten = 0, patches_forgotten = 0, points_forgotten = 0;
+  uint64_t patches_bounded = 0, patches_refined = 0;  ///< packed with an error; exact now
+  uint64_t bytes_refined = 0;                         ///< what that took
 };
 
 class PackerCore {
@@ -85,6 +88,13 @@ class PackerCore {
                                       std::shared_ptr<const std::vector<uint8_t>> stream = {},
                                       const std::function<void(const Event&)>& publish = {},
                                       const std::optional<KnownReference>& reference = {});
+
+  /// What comes from now on may differ by so much from what was sampled, in the model and in its replicas.
+  void set_tolerance(const Tolerance& tolerance);
+  const Tolerance& tolerance() const;
+  /// Makes the newest patch exact that is not yet, of those that were drawn since `drawn_since_s`: the event to publish.
+  /// Nothing: there is none, or it was packed too long ago (refinement::RefinableBook).
+  std::optional<Event> refine(double drawn_since_s);
 
   /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.
   bool has(FrameId frame, uint32_t tile) const;

@@ -110,9 +110,12 @@ void with_message(InstanceId packer, const Event& e, const wire::Moments& moment
                               .camera = e.camera,
                               .rect = e.rect,
                               .image = std::as_bytes(std::span(*e.blob)),
+                              .refinable = e.refinable,
                               .missed = e.missed,
                               .missed_rect = e.missed_rect,
                               .moments = moments});
+    case Event::Kind::kRefine:
+      return send(wire::Refine{packer, e.sequence, e.epoch, e.refines, std::as_bytes(std::span(*e.blob))});
     case Event::Kind::kForget:
       return send(wire::Forget{packer, e.sequence, e.epoch, e.clusters, e.frames});
     case Event::Kind::kEpoch:
@@ -160,6 +163,10 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
     publish(*event);
     gatherer_.clear();
   }
+  const scene::SessionView view(session);
+  errors_ = {view.setting("packing.depth_error", -1), view.setting("packing.normal_error", -1),
+             view.setting("packing.colour_error", -1)};
+  choose_tolerance();
   PlanConfig plan_config = plan_config_of(session, config);
   plan_config.pictures = options_.plans != nullptr;
   begin_planner(plan_config);
@@ -229,6 +236,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
                                 wire::TileDone& done, double now_s) {
   const double begin_s = outlets_.master_now();
   record(block);
+  if (!block.extra) heads_.seen(block.viewer, block.camera.pose, now_s);
   if (planner_) planner_->take(block, whole, now_s), block.missed = planner_->missed(block);
   const auto reference = planner_ ? planner_->reference(block) : std::nullopt;
   // What a block gives is counted to the tile that completed it.
@@ -237,6 +245,9 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
     done.moments.packed_s = done.moments.published_s = outlets_.master_now();
     publish(event, done.moments);
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
+    done.depth_error_m = event.bounds.depth / 4294967296.0 * event.farthest_m;
+    done.normal_error_deg = codec::normal_error_degrees(event.bounds.normal);
+    done.colour_error = event.bounds.colour;
     done.bytes_sent = event.blob->size() + event.missed.size() * sizeof event.missed[0];
     bytes_sent_ += done.bytes_sent;
     outlets_.tell(done);
@@ -283,6 +294,7 @@ wire::Plan PointPacking::plan(const wire::PlanRequest& request, double now_s) {
 }
 
 std::optional<wire::Plan> PointPacking::plan_piece(const wire::PlanRequest& request, double now_s) {
+  if (!request.extra) heads_.seen(request.viewer, request.camera.pose, now_s);
   if (!core_ || !planner_ || request.epoch != core_->epoch()) return all_rays(request);
   const double begin_s = monotonic_s(), begin_master_s = outlets_.master_now();
   auto piece = planner_->plan_piece(core_->model(), core_->sequence(), request, now_s);
@@ -421,11 +433,40 @@ bool PointPacking::idle(double now_s) {
   return true;
 }
 
+void PointPacking::choose_tolerance() {
+  if (!core_) return;
+  const double rate = meter_.slowest_bytes_s();
+  slow_ = rate > 0 && rate < (slow_ ? 1.125 : 1) * kSlowLink_bytes_s;
+  const Tolerance automatic = slow_ ? kSlowTolerance : Tolerance{};
+  const auto said = [](double value, auto otherwise) { return value < 0 ? otherwise : decltype(otherwise)(value); };
+  core_->set_tolerance({said(errors_[0], automatic.depth_pixels), said(errors_[1], automatic.normal),
+                        said(errors_[2], automatic.colour)});
+}
+
+bool PointPacking::refine(double now_s) {
+  if (now_s < next_refine_s_ || !heads_.still(now_s)) return false;
+  const double begin_s = outlets_.master_now();
+  uint64_t bytes = 0;
+  bool more = true;
+  while (more && bytes < kRefineStep && meter_.all_free(kRefineBacklog_s, kRefineBytes, now_s)) {
+    const auto event = core_->refine(now_s - kDrawnLately_s);
+    if (!(more = event.has_value())) break;
+    bytes += event->blob->size();
+    publish(*event);
+  }
+  if (!more) next_refine_s_ = now_s + kRefinePause_s;
+  bytes_sent_ += bytes;
+  if (bytes > 0) spans_.add("refine", begin_s, outlets_.master_now());
+  return bytes >= kRefineStep;
+}
+
 void PointPacking::tick(double now_s) {
   ahead_.expire(now_s);
   meter_.expire(now_s);
   if (!core_) return;
   send_answers();
+  choose_tolerance();
+  refining_ = refine(now_s);
   if (now_s - last_forget_s_ >= kForgetPeriod_s) {
     last_forget_s_ = now_s;
     for (const auto& event : core_->tick(now_s)) publish(event);
@@ -459,6 +500,9 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"patches_forgotten", double(s.patches_forgotten)},
                  {"points_forgotten", double(s.points_forgotten)},
                  {"points_outside", double(s.points_outside)},
+                 {"patches_bounded", double(s.patches_bounded)},
+                 {"patches_refined", double(s.patches_refined)},
+                 {"bytes_refined", double(s.bytes_refined)},
                  {"answers", double(answers_.size())},
                  {"answer_bytes", double(answers_.bytes_under_way())},
                  {"plans", double(plans_)},

@@ -2,6 +2,7 @@
 // date.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "common/metrics/process.h"
@@ -15,6 +16,7 @@
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
 #include "services/packer/points/state_answers.h"
+#include "services/packer/points/still_heads.h"
 
 namespace telesplat::packer {
 
@@ -25,6 +27,15 @@ class PointPacking final : public Packing {
   /// much of the time digests may take.
   static constexpr double kDigestPeriod_s = 2.0, kDigestShare = 0.002;
   static constexpr double kForgetPeriod_s = 1.0;  ///< between two looks for what is obsolete
+  /// Of links that carry less, --depth-error and the others are auto's; an eighth more, and they are not any more.
+  static constexpr double kSlowLink_bytes_s = 5e6;
+  /// What auto stands for behind slow links.
+  static constexpr Tolerance kSlowTolerance{1.0 / 32, 1, 1};
+  /// What stands still becomes exact where it was drawn lately, as long as no link has more to carry than it can in
+  /// kRefineBacklog_s, or kRefineBytes; so many bytes at a time, since messages wait meanwhile. Viewers tell what they
+  /// draw once a second.
+  static constexpr double kDrawnLately_s = 3, kRefineBacklog_s = 0.05, kRefinePause_s = 1;
+  static constexpr uint64_t kRefineBytes = 32 << 10, kRefineStep = 16 << 10;
 
   struct Options {
     int threads = 1;                    ///< for reference depth maps; 0: all cores
@@ -46,7 +57,9 @@ class PointPacking final : public Packing {
   bool hurried(double now_s) const override { return planner_ && planner_->view_under_way(now_s); }
   bool idle(double now_s) override;
   void tick(double now_s) override;
-  std::optional<double> due_s() const override { return answers_.can_go_on() ? std::optional(0.0) : std::nullopt; }
+  std::optional<double> due_s() const override {
+    return answers_.can_go_on() || refining_ ? std::optional(0.0) : std::nullopt;
+  }
   void add_status(net::MasterLink::Values& values) const override;
   /// Of the model, for tests of replication; 0: there is none yet.
   uint64_t digest() const { return core_ ? core_->model().digest() : 0; }
@@ -73,6 +86,10 @@ class PointPacking final : public Packing {
   void send_answers();
   void on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});
+  /// As the session and the links have it.
+  void choose_tolerance();
+  /// Makes exact what stands still. Returns whether there is more to do at once.
+  bool refine(double now_s);
   wire::StateMark mark(bool answer) const;
   /// The model's digest where one is due; else 0.
   uint64_t due_digest(double now_s);
@@ -86,6 +103,11 @@ class PointPacking final : public Packing {
   std::optional<Planner> planner_;   // of its model; none where redundant points are kept
   PlanConfig plan_config_;           // that it was made with
   points::ModelConfig model_;
+  std::array<double, 3> errors_{-1, -1, -1};  // of depth, normals, colours, as the session has them; -1: auto
+  bool slow_ = false;                         // a link is
+  StillHeads heads_;
+  double next_refine_s_ = 0;
+  bool refining_ = false;  // there is more to do at once
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;
   LinkMeter meter_;  // of the viewers' links

@@ -59,6 +59,8 @@ wire::Welcome welcome(Dice& dice, EpochId epoch, InstanceId master) {
   w.settings["packing.obsolete_after_s"] = dice.chance(30) ? 5 : 0;
   w.settings["packing.patches_per_cluster"] = double(dice.below(4));
   w.settings["sampling.validation"] = double(dice.below(3));
+  w.settings["packing.depth_error"] = dice.chance(50) ? 1.0 / 8 : -1;
+  w.settings["packing.normal_error"] = double(dice.below(3)) - 1;
   return w;
 }
 

@@ -20,6 +20,7 @@ struct Tiles {
     geometry::Camera camera;
     geometry::Rect rect;
     std::vector<uint8_t> stream;
+    std::vector<uint8_t> bounded, refinement;  // the same with errors, and what makes it exact
   };
   std::vector<Tile> all;
   Tiles() {
@@ -27,8 +28,17 @@ struct Tiles {
       const auto camera = scene_camera(eye, kWidth, kHeight);
       for (const geometry::Rect rect :
            {geometry::Rect{0, 0, 24, 32}, geometry::Rect{24, 0, 24, 32}, geometry::Rect{8, 8, 16, 16}})
-        all.push_back({camera, rect, codec::encode(sample_scene(camera, rect))});
+        add(camera, rect);
     }
+  }
+
+ private:
+  void add(const geometry::Camera& camera, const geometry::Rect& rect) {
+    const image::DepthImage exact = sample_scene(camera, rect);
+    image::DepthImage decoded;
+    const auto bounds = codec::error_bounds(1.0 / 4, 1 / camera.focal_x(), 1, 2);
+    auto bounded = codec::encode(exact, bounds, &decoded);
+    all.push_back({camera, rect, codec::encode(exact), std::move(bounded), codec::encode_refinement(exact, decoded)});
   }
 };
 const Tiles& tiles() {
@@ -56,7 +66,7 @@ class ReceiverPlay {
 
  private:
   void act() {
-    switch (dice_.below(14)) {
+    switch (dice_.below(16)) {
       case 0:
         return send(any_.make<wire::Patch>());
       case 1:
@@ -87,6 +97,8 @@ class ReceiverPlay {
         if (dice_.chance(40)) m.frames.assign(m.clusters.size(), uint32_t(dice_.below(6)));
         return send(over_the_wire(m));
       }
+      case 11:
+        return refine();
       default:
         return patch();
     }
@@ -106,13 +118,23 @@ class ReceiverPlay {
     p.extra = dice_.chance(30), p.frame_complete = dice_.chance(50), p.left_out = dice_.below(3) / 2;
     p.camera = tile.camera, p.rect = tile.rect;
     p.samples = p.kept = 100;
-    const auto& stream = dice_.chance(90) ? tile.stream : dice_.pick(tiles().all).stream;
+    p.refinable = dice_.chance(40);
+    const auto& stream = !dice_.chance(90) ? dice_.pick(tiles().all).stream : p.refinable ? tile.bounded : tile.stream;
     p.image = std::as_bytes(std::span(stream));
+    if (p.refinable) refinable_ = {p.sequence, &tile};
     if (dice_.chance(15)) {
       p.missed_rect = {0, 0, int(1 + dice_.below(kWidth)), int(1 + dice_.below(kHeight))};
       for (uint64_t n = 1 + dice_.below(6); n-- > 0;) p.missed.push_back(uint32_t(dice_.below(256)) * 0x01010101u);
     }
     send(over_the_wire(p));
+  }
+  // Most often of the patch that may be refined, and with what belongs to it.
+  void refine() {
+    wire::Refine r{packer_, {sequence()}, epoch(), dice_.chance(80) ? refinable_.first : Sequence{sequence_}, {}};
+    const auto& tile = refinable_.second && dice_.chance(80) ? *refinable_.second : dice_.pick(tiles().all);
+    r.image = std::as_bytes(std::span(tile.refinement));
+    if (dice_.chance(10)) r.image = r.image.first(dice_.below(r.image.size()));
+    send(over_the_wire(r));
   }
   template <class M>
   void send(std::optional<Arrived<M>> m) {
@@ -129,6 +151,7 @@ class ReceiverPlay {
     reached_["gaps"] += viewer_.figures().gaps;
     reached_["epochs shown"] += viewer_.figures().epochs_shown;
     reached_["decode errors"] += viewer_.figures().decode_errors;
+    reached_["patches refined"] += viewer_.figures().patches_refined;
     config_ = scene_config(4);
     packer::Config config;
     config.model = config_;
@@ -164,6 +187,7 @@ class ReceiverPlay {
   InstanceId packer_{1};
   EpochId epoch_{1};
   uint64_t sequence_ = 0;
+  std::pair<Sequence, const Tiles::Tile*> refinable_{};
   Reached reached_;
   ViewerPart viewer_{kViewer, pipes(), [this] { return config_; }, [](InstanceId, Sequence) {}};
 };

@@ -70,6 +70,7 @@ TEST_F(Record, TheSummaryIsCompleteAndTrue) {
                           "bytes_sent",
                           "compression_ratio",
                           "redundancy_eliminated",
+                          "errors_allowed",
                           "rays_cast",
                           "rays_full",
                           "rays_saved",

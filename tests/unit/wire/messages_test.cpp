@@ -18,7 +18,7 @@ using namespace telesplat::test;
 // Those that may be larger than kMaxControlBytes.
 constexpr std::string_view kBulkMessages[] = {"metric_rows",  "chunk_list",  "chunk",         "depth_tile",
                                               "patch",        "forget",      "access_report", "voxel_data",
-                                              "slice_images", "slice_frame", "plan"};
+                                              "slice_images", "slice_frame", "plan",          "refine"};
 
 size_t body_limit(const MessageSample& sample) {
   const bool bulk = std::ranges::find(kBulkMessages, sample.name) != std::end(kBulkMessages);
@@ -172,12 +172,12 @@ std::string hex(const std::string& bytes) {
 }
 TEST(GoldenBytes, OfAMark) {
   EXPECT_EQ(hex(encode(StateMark{InstanceId{0x1234567890}, Sequence{300}, EpochId{1}, true, 70000, 5})),
-            "87a17608a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
+            "87a17609a67061636b6572cf0000001234567890a873657175656e6365cd012ca565706f636801a6616e73776572c3a6706f696e74"
             "73ce00011170a664696765737405");
 }
 TEST(GoldenBytes, OfALease) {
   EXPECT_EQ(hex(encode(sample_message<Lease>())),
-            "de0014a17608a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6"
+            "de0014a17609a56c65617365cf0000010000000001a56672616d65cf0000010000000002a565706f6368cf0000010000000003a6"
             "766965776572cf0000010000000004a772657175657374cf0000010000000005a474696c6505a47374657004a5626c6f636b03af"
             "626c6f636b735f696e5f6672616d6508a663616d6572619ecb3fb999999999999acb3fc999999999999acb3fd3333333333333cb"
             "3fe333333333333300cb3fe999999999999a00ff01cbbfe0000000000000cb3fe8000000000000cb3f847ae147ae147bcd0140cc"

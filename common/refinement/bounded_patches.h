@@ -1,0 +1,93 @@
+// What those keep who apply refinements: patches that came with bounded errors, until what they left out follows.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "common/core/result.h"
+#include "common/points/refinement.h"
+
+namespace telesplat::refinement {
+
+/// The newest bounded patches, of which a refinement may come. The packer refines what its book holds; a viewer's book
+/// holds all of that, because it has seen no more since.
+/// T: what is kept of a patch.
+template <class T>
+class RefinableBook {
+ public:
+  /// After that many bytes of later patches, or so many of them, a patch is not refined any more.
+  static constexpr uint64_t kMostBytes = 64u << 20;
+  static constexpr uint64_t kMostPatches = 8192;
+
+  /// bytes: of its image, coded. Sequences rise.
+  void add(Sequence sequence, uint64_t bytes, T what) {
+    bytes_ += bytes;
+    ++patches_;
+    entries_.push_back({sequence, bytes_, patches_, std::move(what)});
+    while (bytes_ - entries_.front().bytes > kMostBytes || patches_ - entries_.front().patches >= kMostPatches)
+      entries_.pop_front();
+  }
+  /// The newest one that is wanted, which goes. Nothing: there is none.
+  std::optional<std::pair<Sequence, T>> take_newest(const auto& wanted) {
+    for (auto e = entries_.end(); e != entries_.begin();) {
+      if (!wanted((--e)->sequence, e->what)) continue;
+      std::pair<Sequence, T> out{e->sequence, std::move(e->what)};
+      entries_.erase(e);
+      return out;
+    }
+    return std::nullopt;
+  }
+  /// The one with that sequence, which goes. Nothing: it is not here.
+  std::optional<T> take(Sequence sequence) {
+    const auto found = std::lower_bound(entries_.begin(), entries_.end(), sequence,
+                                        [](const Entry& e, Sequence s) { return e.sequence < s; });
+    if (found == entries_.end() || found->sequence != sequence) return std::nullopt;
+    T out = std::move(found->what);
+    entries_.erase(found);
+    return out;
+  }
+  void clear() { entries_.clear(); }
+  size_t size() const { return entries_.size(); }
+
+ private:
+  struct Entry {
+    Sequence sequence;
+    uint64_t bytes, patches;  // so far, this one included
+    T what;
+  };
+  std::deque<Entry> entries_;  // oldest first
+  uint64_t bytes_ = 0, patches_ = 0;
+};
+
+/// A bounded patch, as it was published.
+struct BoundedPatch {
+  geometry::Camera camera;  ///< of the whole frame
+  geometry::Rect rect;      ///< the patch in it
+  std::vector<uint8_t> stream;
+};
+
+/// Book of those who follow the packer.
+class BoundedPatches {
+ public:
+  /// Precondition: the stream was decoded, so it is good.
+  void add(Sequence sequence, const geometry::Camera& camera, const geometry::Rect& rect,
+           std::span<const uint8_t> stream) {
+    book_.add(sequence, stream.size(), {camera, rect, {stream.begin(), stream.end()}});
+  }
+  /// What event `sequence` with that stream makes of patch `of`. Nothing: that patch is not here; then all of its points
+  /// were forgotten. Error: the stream does not fit it.
+  Result<std::optional<points::PreparedRefinement>> refine(const points::ModelConfig& config, Sequence sequence,
+                                                           Sequence of, std::span<const uint8_t> stream);
+  void clear() { book_.clear(); }
+
+ private:
+  RefinableBook<BoundedPatch> book_;
+};
+
+}  // namespace telesplat::refinement
