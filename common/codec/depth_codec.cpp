@@ -29,7 +29,9 @@
 
 #include <fmt/format.h>
 
+#include "common/codec/lattice.h"
 #include "common/codec/tile.h"
+#include "common/image/normal.h"
 
 namespace telesplat::codec {
 namespace {
@@ -38,19 +40,35 @@ using detail::Reader;
 using detail::TileGrid;
 using image::DepthImage;
 
-// stream = magic, version, flags, varint width, varint height, tiles of TileGrid row by row (tile.h); nothing after
-// them. Flags: none is known yet; bounds of error will have one, and what they are follows the height.
-constexpr uint8_t kMagic = 0xD7, kVersion = 4, kKnownFlags = 0;
+// stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
+// after them. bounds = varint depth, u8 normal, u8 colour
+constexpr uint8_t kMagic = 0xD7, kVersion = 5, kBounded = 1, kKnownFlags = kBounded;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 
-struct Size {
+bool is_valid(const ErrorBounds& b) {
+  return b.depth <= ErrorBounds::kMostDepth && b.normal >= 0 && b.normal <= ErrorBounds::kMostNormal && b.colour >= 0 &&
+         b.colour <= ErrorBounds::kMostColour;
+}
+
+struct Header {
   int width, height;
+  ErrorBounds bounds;
 };
+
+// Nothing where they are not what encode() writes.
+std::optional<ErrorBounds> read_bounds(Reader& in) {
+  const auto depth = in.varint();
+  const auto normal = in.u8(), colour = in.u8();
+  if (!colour) return std::nullopt;
+  const ErrorBounds bounds{*depth, *normal, *colour};
+  const bool known = is_valid(bounds) && !bounds.exact();
+  return known && (*depth == 0 || *depth >= ErrorBounds::kLeastDepth) ? std::optional(bounds) : std::nullopt;
+}
 
 // Refuses sizes that the rest of the stream cannot hold: every tile, of at most kMaxTilePixels pixels, takes a byte or
 // more.
-Result<Size> read_header(Reader& in) {
+Result<Header> read_header(Reader& in) {
   const auto magic = in.u8(), version = in.u8();
   if (!version) return damaged("shorter than its header");
   if (*magic != kMagic) return damaged(fmt::format("begins with {:#04x}, not {:#04x}", *magic, kMagic));
@@ -62,13 +80,18 @@ Result<Size> read_header(Reader& in) {
   if (*width == 0 || *height == 0 || *width > kMaxPixels || *height > kMaxPixels ||
       uint64_t{*width} * *height > kMaxPixels)
     return damaged(fmt::format("{} x {} pixels, limit {} in all and at least 1 x 1", *width, *height, kMaxPixels));
-  const Size size{static_cast<int>(*width), static_cast<int>(*height)};
-  const TileGrid grid(size.width, size.height);
+  Header header{static_cast<int>(*width), static_cast<int>(*height), {}};
+  if (*flags & kBounded) {
+    const auto bounds = read_bounds(in);
+    if (!bounds) return damaged("bounds of error that nobody writes");
+    header.bounds = *bounds;
+  }
+  const TileGrid grid(header.width, header.height);
   const size_t tiles = static_cast<size_t>(grid.columns) * static_cast<size_t>(grid.rows);
   if (in.left() < tiles)
     return damaged(
         fmt::format("{} bytes left for {} x {} pixels, which take {} or more", in.left(), *width, *height, tiles));
-  return size;
+  return header;
 }
 
 // f(column, row) -> bool for every tile in order, until one is false.
@@ -80,19 +103,50 @@ bool for_each_tile(const TileGrid& grid, F f) {
   return true;
 }
 
+DepthImage coarse(const DepthImage& image, const ErrorBounds& bounds) {
+  DepthImage out = image;
+  const auto depth = bounds.depth != 0 ? detail::DepthLattice::of(bounds.depth) : nullptr;
+  const detail::NormalLattice normal(bounds.normal);
+  const detail::ColourLattice colour(bounds.colour);
+  for (size_t i = 0; i < out.pixels(); ++i) {
+    if (out.depth[i] == 0) continue;
+    if (depth) out.depth[i] = depth->code(depth->index(out.depth[i]));
+    if (bounds.normal != 0) {
+      const uint16_t n = image::canonical_normal16(out.normal[i]);
+      out.normal[i] = static_cast<uint16_t>(normal.nearest(n & 255) | normal.nearest(n >> 8) << 8);
+    }
+    uint32_t c = 0;
+    for (int shift = 0; shift < 24; shift += 8)
+      c |= static_cast<uint32_t>(colour.value(colour.index(static_cast<int>(out.colour[i] >> shift & 255)))) << shift;
+    out.colour[i] = c;
+  }
+  return out;
+}
+
 }  // namespace
 
-std::vector<uint8_t> encode(const DepthImage& image) {
+std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, DepthImage* decoded) {
   CHECK(image.width > 0 && image.height > 0 && image.pixels() <= kMaxPixels);
   CHECK(image.pixels() == static_cast<size_t>(image.width) * static_cast<size_t>(image.height));
   CHECK(image.colour.size() == image.pixels() && image.normal.size() == image.pixels());
+  CHECK(is_valid(given));
+  ErrorBounds bounds = given;
+  if (bounds.depth < ErrorBounds::kLeastDepth) bounds.depth = 0;
+  const bool bounded = !bounds.exact();
   std::vector<uint8_t> out;
   out.reserve(64 + image.pixels() / 8);
-  out.assign({kMagic, kVersion, 0});
+  out.assign({kMagic, kVersion, bounded ? kBounded : uint8_t{0}});
   detail::put_varint(out, static_cast<uint32_t>(image.width));
   detail::put_varint(out, static_cast<uint32_t>(image.height));
+  if (bounded) {
+    detail::put_varint(out, bounds.depth);
+    out.push_back(static_cast<uint8_t>(bounds.normal));
+    out.push_back(static_cast<uint8_t>(bounds.colour));
+  }
+  const DepthImage what = bounded ? coarse(image, bounds) : image;
   const TileGrid grid(image.width, image.height);
-  for_each_tile(grid, [&](int column, int row) { return detail::put_tile(out, image, grid.rect(column, row)), true; });
+  for_each_tile(grid, [&](int column, int row) { return detail::put_tile(out, what, grid.rect(column, row)), true; });
+  if (decoded != nullptr) *decoded = what;
   return out;
 }
 
@@ -138,7 +192,7 @@ Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {
   Reader in(bytes);
   const auto size = read_header(in);
   if (!size) return size.error();
-  StreamInfo info{size->width, size->height};
+  StreamInfo info{.width = size->width, .height = size->height, .bounds = size->bounds};
   const TileGrid grid(info.width, info.height);
   if (!for_each_tile(grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info); }))
     return damaged("damaged or cut off");

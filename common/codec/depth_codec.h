@@ -1,4 +1,5 @@
-// Lossless codec for depth images, a tile at a time: depth, colour, normal and coverage mask.
+// Codec for depth images, a tile at a time: depth, colour, normal and coverage mask. Lossless, or within bounds of
+// error; a refinement makes what is within bounds exact.
 #pragma once
 
 #include <cstddef>
@@ -6,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "common/codec/error_bounds.h"
 #include "common/core/result.h"
 #include "common/image/depth_image.h"
 
@@ -16,13 +18,17 @@ inline constexpr size_t kMaxPixels = size_t{1} << 24;
 
 /// Encodes a canonical depth image (image/depth_image.h) of 1..kMaxPixels pixels. Fully and sparsely covered images are
 /// both coded well: a patch after redundancy elimination is a depth image with most pixels masked out.
-/// Deterministic: the same image gives the same bytes. Thread-safe.
-std::vector<uint8_t> encode(const image::DepthImage& image);
+/// Deterministic: the same image and bounds give the same bytes. Thread-safe.
+/// bounds: how far what is decoded may be from `image`, within the limits of ErrorBounds. decoded: unless it is null,
+/// it becomes what decode() gives.
+std::vector<uint8_t> encode(const image::DepthImage& image, const ErrorBounds& bounds = {},
+                            image::DepthImage* decoded = nullptr);
 
-/// Decodes what encode() made: decode(encode(x)) == x. Any other bytes give an error or some canonical image, never
-/// more than kMaxPixels pixels, never a read or write out of bounds; memory stays proportional to the pixels of the
-/// stream's header, which must be plausible for the stream's length. `expected_width`/`expected_height`: refuse other
-/// sizes (0 = any).
+/// Decodes what encode() made: decode(encode(x)) == x, and decode(encode(x, bounds)) is within the bounds of x. Any
+/// other bytes give an error or some canonical image, never more than kMaxPixels pixels, never a read or write out of
+/// bounds; memory stays proportional to the pixels of the stream's header, which must be plausible for the stream's
+/// length, and a table for the bounds that takes 4 MiB at most. `expected_width`/`expected_height`: refuse other sizes
+/// (0 = any).
 Result<image::DepthImage> decode(std::span<const uint8_t> bytes, int expected_width = 0, int expected_height = 0);
 
 /// The same into `image`, reusing its memory: several hundred kilobytes a tile, whose page faults would cost about as
@@ -30,12 +36,23 @@ Result<image::DepthImage> decode(std::span<const uint8_t> bytes, int expected_wi
 Status decode_into(image::DepthImage& image, std::span<const uint8_t> bytes, int expected_width = 0,
                    int expected_height = 0);
 
+/// What a bounded stream left out: decode_refinement(encode_refinement(exact, bounded), bounded) == exact, bit for bit.
+/// `bounded` is what was decoded, or any image of the same size that covers the same pixels; both must be canonical.
+/// The nearer they are to each other, the fewer bytes there are. Deterministic, thread-safe.
+std::vector<uint8_t> encode_refinement(const image::DepthImage& exact, const image::DepthImage& bounded);
+
+/// The exact image. Any other bytes give an error or some canonical image that covers the same pixels, with the same
+/// promises as decode(). A refinement of another image is not always told from that of `bounded`: whoever sends both
+/// says what belongs together.
+Result<image::DepthImage> decode_refinement(std::span<const uint8_t> bytes, const image::DepthImage& bounded);
+
 /// For `telesplat inspect`: size and parts of a stream without decoding its pixels.
 struct StreamInfo {
   int width = 0, height = 0;
   size_t covered_pixels = 0;
   size_t mask_bytes = 0, depth_bytes = 0, colour_bytes = 0, normal_bytes = 0;
   size_t sparse_bytes = 0;  ///< of sparse tiles: depth, colour and normal in one
+  ErrorBounds bounds;       ///< of what is decoded
 };
 Result<StreamInfo> inspect(std::span<const uint8_t> bytes);
 

@@ -6,50 +6,18 @@
 #include <random>
 
 #include "common/codec/depth_codec.h"
+#include "tests/support/codec_images.h"
 #include "tests/support/depth_images.h"
-#include "tests/support/masks.h"
 #include "tests/support/simd_targets.h"
 
 namespace telesplat::codec {
 namespace {
 
 using image::DepthImage;
-using image::PixelMask;
-
-// One image of each kind there is, small enough to try many.
-std::vector<DepthImage> images(uint32_t seed) {
-  std::mt19937 random(seed);
-  const auto side = [&] { return 1 + static_cast<int>(random() % 90); };
-  std::vector<DepthImage> all;
-  all.push_back(test::plane(side(), side(), static_cast<double>(random() % 2000) - 1000,
-                            static_cast<double>(random() % 2000) - 1000));
-  for (const bool rough : {false, true})
-    for (const bool constant : {false, true})
-      all.push_back(test::render({.width = side(),
-                                  .height = side(),
-                                  .seed = seed,
-                                  .rough = rough,
-                                  .constant_albedo = constant,
-                                  .covers_all = (seed & 1) != 0}));
-  for (const double density : {0.001, 0.01, 0.1, 0.3, 0.6, 0.9, 1.0}) {
-    all.push_back(test::random_pixels(side(), side(), density, seed));
-    all.push_back(test::render({.width = side(), .height = side(), .seed = seed}));
-    test::keep_random(all.back(), density, seed);
-  }
-  all.push_back(test::render({.width = side(), .height = side(), .seed = seed, .covers_all = false}));
-  test::keep_outlines(all.back());
-  all.push_back(test::render({.width = side(), .height = side(), .seed = seed, .rough = true}));
-  all.back() = test::masked(all.back(), test::band_mask(all.back().width, all.back().height, 1 + int(seed % 3)));
-  all.push_back(test::render({.width = side() + 64, .height = side() + 64, .seed = seed}));
-  PixelMask picks = test::spread_mask(all.back().width, all.back().height, 32, seed);
-  for (int y = 64; y < picks.height(); ++y) *picks.row(y) = *picks.row(y - 64);  // a pattern that repeats
-  all.back() = test::masked(all.back(), picks);
-  return all;
-}
 
 TEST(CodecProperties, RoundTrip) {
   for (uint32_t seed = 1; seed <= 15; ++seed)
-    for (const DepthImage& image : images(seed)) {
+    for (const DepthImage& image : test::codec_images(seed)) {
       ASSERT_TRUE(test::is_canonical(image));
       const auto back = decode(encode(image), image.width, image.height);
       ASSERT_TRUE(back.ok()) << back.error().text;
@@ -72,7 +40,7 @@ TEST(CodecProperties, RoundTripOfSeveralTiles) {
 
 TEST(CodecProperties, EveryTruncationIsAnError) {
   for (uint32_t seed = 1; seed <= 2; ++seed)
-    for (const DepthImage& image : images(seed)) {
+    for (const DepthImage& image : test::codec_images(seed)) {
       const auto bytes = encode(image);
       for (size_t length = 0; length < bytes.size(); ++length) {
         const std::vector<uint8_t> part(
@@ -86,7 +54,7 @@ TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
   std::mt19937 random(11);
   size_t refused = 0, accepted = 0;
   for (uint32_t seed = 1; seed <= 10; ++seed)
-    for (const DepthImage& image : images(seed)) {
+    for (const DepthImage& image : test::codec_images(seed)) {
       const auto bytes = encode(image);
       for (int trial = 0; trial < 60; ++trial) {
         auto bad = bytes;
@@ -106,7 +74,7 @@ TEST(CodecProperties, FlippedBitsGiveAnErrorOrACanonicalImage) {
 TEST(CodecProperties, RandomBytesAfterAGoodHeader) {
   std::mt19937 random(12);
   for (int trial = 0; trial < 20000; ++trial) {
-    std::vector<uint8_t> bytes{0xD7, 4, 0, static_cast<uint8_t>(1 + random() % 100),
+    std::vector<uint8_t> bytes{0xD7, 5, 0, static_cast<uint8_t>(1 + random() % 100),
                                static_cast<uint8_t>(1 + random() % 100)};
     for (uint32_t n = random() % 80; n > 0; --n)
       bytes.push_back(static_cast<uint8_t>(random() % (random() % 2 != 0 ? 256 : 16)));

@@ -1,0 +1,84 @@
+// What bounds of error leave of depths, normals and colours: the values that a decoder can give. Integers alone, the
+// same on every machine.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/codec/error_bounds.h"
+#include "common/image/depth_image.h"
+
+namespace telesplat::codec::detail {
+
+/// Depth codes that stand for those around them, in equal steps of their logarithm. Code m stands for those that are at
+/// most reach(m) = floor(m * depth / 2^32) away. If a is the first code of an interval, m is the largest one with
+/// m - reach(m) <= a, which is floor(a * 2^32 / (2^32 - depth)); the next interval begins behind m + reach(m). Code 0
+/// is an interval of its own; where codes are small, all are.
+class DepthLattice {
+ public:
+  /// ErrorBounds::kLeastDepth <= depth <= kMostDepth. Up to 1.2 million codes, fewer for larger bounds.
+  explicit DepthLattice(uint32_t depth);
+  /// The same, made once for several images: each thread keeps its last two.
+  static std::shared_ptr<const DepthLattice> of(uint32_t depth);
+
+  uint32_t depth() const { return depth_; }
+  uint32_t last() const { return static_cast<uint32_t>(codes_.size() - 1); }
+  /// The code of interval `index`, or of the last one.
+  uint32_t code(uint32_t index) const { return codes_[std::min(index, last())]; }
+  const uint32_t* codes() const { return codes_.data(); }
+  uint32_t reach(uint32_t code) const { return static_cast<uint32_t>(uint64_t{code} * depth_ >> 32); }
+  /// The interval that `code` lies in. Precondition: code <= kMaxDepthCode.
+  uint32_t index(uint32_t code) const {
+    const Line& line = lines_[place(code)];
+    uint32_t i = line.index + static_cast<uint32_t>(uint64_t{code - line.code} * line.slope >> 32);
+    while (codes_[i] + reach(codes_[i]) < code) ++i;
+    while (code + reach(codes_[i]) < codes_[i]) --i;
+    return i;
+  }
+
+ private:
+  // Between two codes that have the upper bits of their logarithms in common, indices lie on a line, nearly.
+  struct Line {
+    uint32_t code = 0, index = 0;  // of its first
+    uint32_t slope = 0;            // in 2^-32 indices a code
+  };
+  static constexpr unsigned kFraction = 8;  // bits
+  static size_t place(uint32_t code);
+
+  uint32_t depth_;
+  std::vector<uint32_t> codes_;
+  std::vector<Line> lines_;
+};
+
+/// Coordinates on a normal's map, 0 to 254, in steps of 2 * reach + 1 around its centre: none of them on the map's rim.
+class NormalLattice {
+ public:
+  explicit NormalLattice(int reach) : step_(2 * reach + 1), half_(reach == 0 ? 127 : (126 + reach) / step_) {}
+  int most() const { return 2 * half_; }  ///< the largest index
+  int value(int index) const { return 127 + (index - half_) * step_; }
+  int index(int value) const {
+    const int up = value - 127 + step_ * half_ + step_ / 2;
+    return std::clamp(up < 0 ? 0 : up / step_, 0, most());
+  }
+  int nearest(int v) const { return value(index(v)); }
+  int step() const { return step_; }
+
+ private:
+  int step_, half_;
+};
+
+/// Values of a channel in steps of 2 * reach + 1, from 0; above the last one 255.
+class ColourLattice {
+ public:
+  explicit ColourLattice(int reach) : reach_(reach), step_(2 * reach + 1) {}
+  int index(int value) const { return (value + reach_) / step_; }
+  int value(int index) const { return std::min(index * step_, 255); }
+
+ private:
+  int reach_, step_;
+};
+
+}  // namespace telesplat::codec::detail
