@@ -36,7 +36,8 @@ class RefinableBook {
   /// The newest one that is wanted, which goes. Nothing: there is none.
   std::optional<std::pair<Sequence, T>> take_newest(const auto& wanted) {
     for (auto e = entries_.end(); e != entries_.begin();) {
-      if (!wanted((--e)->sequence, e->what)) continue;
+      --e;
+      if (!wanted(e->sequence, e->what)) continue;
       std::pair<Sequence, T> out{e->sequence, std::move(e->what)};
       entries_.erase(e);
       return out;

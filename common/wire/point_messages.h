@@ -35,18 +35,18 @@ struct Patch {
   geometry::Camera camera;  ///< of the whole frame
   geometry::Rect rect;      ///< the tile in it
   Bytes image;              ///< codec stream; eliminated pixels are not covered
-  bool refinable = false;   ///< what its image leaves out may follow: Refine
   /// Of rays finer than a view's: those that met nothing (codec::encode_mask), and where they lie; else empty.
   std::vector<uint32_t> missed;
   geometry::Rect missed_rect{0, 0, 1, 1};
   Moments moments;                        ///< of the tile that completed it; none where it is sent again later
+  bool refinable = false;                 ///< what its image leaves out may follow: Refine
   template <class F> static void fields(F& f, auto& m) {
     f("packer", m.packer); f("sequence", m.sequence); f("epoch", m.epoch); f("frame", m.frame); f("viewer", m.viewer);
     f("request", m.request); f("tile", m.tile); f("tiles_in_frame", m.tiles_in_frame); f("step", m.step);
     f("extra", m.extra); f("frame_complete", m.frame_complete); f("left_out", m.left_out); f("samples", m.samples); f("kept", m.kept);
     f("camera", m.camera); f("rect", m.rect); f("image", m.image, kMaxBulkBytes);
-    f("refinable", m.refinable);
     f("missed", m.missed, kMaxMaskWords); f("missed_rect", m.missed_rect); f("moments", m.moments);
+    f("refinable", m.refinable);
   }
 };
 struct Forget {

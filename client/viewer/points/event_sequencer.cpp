@@ -74,6 +74,8 @@ void EventSequencer::on_published(ModelEvent event) {
 }
 
 void EventSequencer::on_replayed(const ModelEvent& event) {
+  // An answer leaves out what was forgotten by now. Who has gone on since they asked may hold some of that.
+  if (!waiting_) return;
   if (event.packer() != packer_) follow(event.packer());
   if (event.sequence() <= applied_) return;
   callbacks_.apply(event);

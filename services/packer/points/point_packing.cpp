@@ -110,10 +110,10 @@ void with_message(InstanceId packer, const Event& e, const wire::Moments& moment
                               .camera = e.camera,
                               .rect = e.rect,
                               .image = std::as_bytes(std::span(*e.blob)),
-                              .refinable = e.refinable,
                               .missed = e.missed,
                               .missed_rect = e.missed_rect,
-                              .moments = moments});
+                              .moments = moments,
+                              .refinable = e.refinable});
     case Event::Kind::kRefine:
       return send(wire::Refine{packer, e.sequence, e.epoch, e.refines, std::as_bytes(std::span(*e.blob))});
     case Event::Kind::kForget:

@@ -61,6 +61,7 @@ class PointPacking final : public Packing {
     return answers_.can_go_on() || refining_ ? std::optional(0.0) : std::nullopt;
   }
   void add_status(net::MasterLink::Values& values) const override;
+  uint64_t points() const { return core_ ? core_->model().points() : 0; }
   /// Of the model, for tests of replication; 0: there is none yet.
   uint64_t digest() const { return core_ ? core_->model().digest() : 0; }
 

@@ -348,7 +348,7 @@ class PointsPlay {
       for (auto& v : viewers_) v->part.tick();
     }
     for (const auto& v : viewers_) reached_["gaps"] += v->part.figures().gaps;
-    reached_["models with points"] += packing_->digest() != 0;
+    reached_["models with points"] += packing_->points() > 0;
     for (const auto& v : viewers_)
       if (v->part.digest() != packing_->digest()) {
         complaint_ =
