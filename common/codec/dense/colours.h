@@ -35,9 +35,8 @@ struct ColourPlanes {
     SymbolPlane symbols;
   };
   bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
-  void sort_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth,
-                    const GeometryModel* geometry);
-  void encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth);
+  void sort_palette(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry);
+  void encode_palette(const TileShape& shape, const DepthPlane& depth);
   void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
   void begin_index(const TileShape& shape, const DepthPlane& depth);
   void begin_channels(const TileShape& shape);

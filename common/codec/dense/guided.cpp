@@ -8,7 +8,9 @@ namespace {
 
 constexpr int kConstantBits = 28;
 
-// Values of one plane, each from the one to its left. Bytes are 64ths and mod 256.
+// Values of one plane, each from the one to its left: the longest chain of a decoder. So what is nearly never needed,
+// the bounds of predictions and values, stands beside it, where a processor guesses that it is not. Bytes are 64ths and
+// mod 256.
 template <bool kByte>
 struct Chain {
   Chain(GuidedPlane& guided, size_t y)
@@ -18,21 +20,33 @@ struct Chain {
         guide(plane.guide.row(static_cast<ptrdiff_t>(y))),
         sums(plane.sums.data()),
         weight(plane.weights[0] * (1 << plane.bits)),
+        bits(kByte ? 6 : plane.bits),
+        most(kByte ? 254 : plane.most),
         left(value[-1] >> plane.bits) {}
   void step(size_t x) {
-    const int bits = kByte ? 6 : plane.bits;
-    const int32_t p = (sums[x] + weight * left + (1 << (bits + 12))) >> (bits + 13);
-    left = std::clamp(p, 0, kByte ? 254 : plane.most) + (residual[x] >> bits);
-    left = kByte ? left & 255 : std::clamp(left, 0, plane.most);
+    const int64_t sum = sums[x] + (int64_t{1} << (bits + 12)) + weight * left;
+    const int64_t off = int64_t{residual[x]} * (1 << 13);
+    const int64_t next = (sum + off) >> (bits + 13);
+    const bool plain = static_cast<uint64_t>(sum) < static_cast<uint64_t>(most + 1) << (bits + 13) &&
+                       static_cast<uint64_t>(next) <= static_cast<uint64_t>(kByte ? 255 : most);
+    left = next;
+    if (!plain) [[unlikely]]
+      left = bounded(sum, residual[x]);
     value[x] = static_cast<int16_t>(left << bits);
   }
   void hole(size_t x) { value[x] = plane.nearest_value(guide[x]), left = value[x] >> plane.bits; }
+  int64_t bounded(int64_t sum, int16_t off) const {
+    const int64_t next = std::clamp<int64_t>(sum >> (bits + 13), 0, most) + (off >> bits);
+    return kByte ? next & 255 : std::clamp<int64_t>(next, 0, most);
+  }
 
   const GuidedPlane& plane;
   int16_t* const value;
   const int16_t *const residual, *const guide;
-  const int32_t *const sums, weight;
-  int32_t left;
+  const int32_t* const sums;
+  const int64_t weight;
+  const int bits, most;
+  int64_t left;
 };
 
 }  // namespace
