@@ -178,13 +178,59 @@ void ColourPlanes::begin_channels(const TileShape& shape) {
   }
 }
 
+// Colours beside each other become one, as long as it is near enough to all of them. Returns where each of them is then.
+std::vector<int16_t> ColourPlanes::join_palette(int reach) {
+  std::vector<int16_t> to(palette_.size());
+  std::vector<uint32_t> joined;
+  std::vector<size_t> begins;
+  const auto channel = [](uint32_t colour, int c) { return static_cast<int>(colour >> kShifts[c] & 255); };
+  for (size_t i = 0; i < palette_.size();) {
+    int low[3], high[3];
+    for (int c = 0; c < 3; ++c) low[c] = high[c] = channel(palette_[i], c);
+    const size_t first = i;
+    for (; i < palette_.size(); ++i) {
+      bool near = true;
+      for (int c = 0; c < 3; ++c) {
+        const int v = channel(palette_[i], c);
+        near &= std::max(high[c], v) - std::min(low[c], v) <= 2 * reach;
+      }
+      if (!near) break;
+      for (int c = 0; c < 3; ++c)
+        low[c] = std::min(low[c], channel(palette_[i], c)), high[c] = std::max(high[c], channel(palette_[i], c));
+      to[i] = static_cast<int16_t>(joined.size());
+    }
+    begins.push_back(first);
+    uint32_t middle = 0;
+    for (int c = 0; c < 3; ++c) middle |= static_cast<uint32_t>((low[c] + high[c]) / 2) << kShifts[c];
+    joined.push_back(middle);
+  }
+  begins.push_back(palette_.size());
+  // What a height stood for: the same part of the way through its colours.
+  if (has_height_)
+    for (int16_t& knot : height_.knots) {
+      const int old = std::clamp(knot + 8, 0, static_cast<int>(palette_.size()) * 16 - 1);  // 16ths, from its lower end
+      const int16_t place = to[static_cast<size_t>(old / 16)];
+      const int first = static_cast<int>(begins[static_cast<size_t>(place)]),
+                end = static_cast<int>(begins[static_cast<size_t>(place) + 1]);
+      knot = static_cast<int16_t>(place * 16 + (old - first * 16) / (end - first) - 8);
+      knot = std::max(knot, int16_t{0});
+    }
+  palette_ = std::move(joined);
+  return to;
+}
+
 // index.values: places in the palette before it was sorted.
-void ColourPlanes::encode_palette(const TileShape& shape, const DepthPlane& depth) {
+void ColourPlanes::encode_palette(const TileShape& shape, const DepthPlane& depth, int reach) {
   ColourTable table;
   for (size_t i = 0; i < palette_.size(); ++i) table.enter(table.find(palette_[i]), palette_[i], i);
   int16_t values[kMostColours];
   for (size_t i = 0; i < palette_.size(); ++i)
     values[i] = static_cast<int16_t>(table.place(table.find(first_[i].colour)) * 16);
+  if (reach > 0) {
+    const std::vector<int16_t> to = join_palette(reach);
+    for (size_t i = 0; i < first_.size(); ++i)
+      values[i] = static_cast<int16_t>(to[static_cast<size_t>(values[i] / 16)] * 16);
+  }
   begin_index(shape, depth);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t* const row = index.values.row(static_cast<ptrdiff_t>(y));
@@ -196,14 +242,16 @@ void ColourPlanes::encode_palette(const TileShape& shape, const DepthPlane& dept
 
 void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours) {
   begin_channels(shape);
+  uint8_t indices[256];
+  for (int v = 0; v < 256; ++v) indices[v] = static_cast<uint8_t>(lattice_.index(v));
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const uint32_t* const from = colours.data() + y * shape.width;
     for (size_t c = 0; c < 3; ++c) {
       uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
-      for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(from[x] >> kShifts[c]);
+      for (size_t x = 0; x < shape.width; ++x) row[x] = indices[from[x] >> kShifts[c] & 255];
       if (c > 0 && mode == kDifferences)
-        for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(row[x] - (from[x] >> 8));
+        for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(row[x] - indices[from[x] >> 8 & 255]);
       shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
       above[-1] = row[-1] = above[0];
       kernels().median_residuals(above, row, shape.width, channel[c].symbols.narrow.row(r),
@@ -214,14 +262,15 @@ void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uin
 }
 
 void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
-                          const DepthPlane& depth, const GeometryModel* geometry) {
+                          const DepthPlane& depth, const GeometryModel* geometry, int reach) {
+  lattice_ = ColourLattice(reach);
   if (all_same(shape, colours, base)) {
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;
     samples_.choose(shape, std::min<size_t>(2 * kMostSamples, shape.total / 12));
     sort_palette(shape, depth, geometry);
-    encode_palette(shape, depth);
+    encode_palette(shape, depth, reach);
   } else {
     mode = follows_green(shape, colours) ? kDifferences : kChannels;
     encode_channels(shape, colours);
@@ -243,7 +292,8 @@ void ColourPlanes::put_header(BitSink& bits) const {
   index.put_weights(bits);
 }
 
-bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits) {
+bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, int reach, BitReader& bits) {
+  lattice_ = ColourLattice(reach);
   if (mode == kPlain) return true;
   if (mode != kPalette) {
     begin_channels(shape);
@@ -292,8 +342,16 @@ bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colour
   const uint8_t *const g = channel[0].values.row(r), *const red = channel[1].values.row(r),
                        *const blue = channel[2].values.row(r);
   const uint32_t add = mode == kDifferences ? 0xFF : 0;
+  if (lattice_.step() == 1) {
+    for (size_t x = 0; x < shape.width; ++x)
+      colours[x] = ((red[x] + (g[x] & add)) & 255) << 16 | uint32_t{g[x]} << 8 | ((blue[x] + (g[x] & add)) & 255);
+    return true;
+  }
+  uint32_t values[256];
+  for (int i = 0; i < 256; ++i) values[i] = static_cast<uint32_t>(lattice_.value(i));
   for (size_t x = 0; x < shape.width; ++x)
-    colours[x] = ((red[x] + (g[x] & add)) & 255) << 16 | uint32_t{g[x]} << 8 | ((blue[x] + (g[x] & add)) & 255);
+    colours[x] =
+        values[(red[x] + (g[x] & add)) & 255] << 16 | values[g[x]] << 8 | values[(blue[x] + (g[x] & add)) & 255];
   return true;
 }
 

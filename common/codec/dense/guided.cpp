@@ -21,7 +21,7 @@ struct Chain {
         sums(plane.sums.data()),
         weight(plane.weights[0] * (1 << plane.bits)),
         bits(kByte ? 6 : plane.bits),
-        most(kByte ? 254 : plane.most),
+        most(plane.most),
         left(value[-1] >> plane.bits) {}
   void step(size_t x) {
     const int64_t sum = sums[x] + (int64_t{1} << (bits + 12)) + weight * left;
