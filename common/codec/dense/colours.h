@@ -23,6 +23,8 @@ struct ColourPlanes {
   size_t planes() const { return mode == kPlain ? 0 : mode == kPalette ? 1 : 3; }
   SymbolPlane& symbols(size_t i) { return mode == kPalette ? index.symbols : channel[i].symbols; }
   void put_header(BitSink& bits) const;
+  /// About what the header takes.
+  size_t header_bits() const { return mode == kPalette ? 10 * palette_.size() + (has_height_ ? 400 : 0) : 24; }
   size_t most_header_bits() const { return 4096 + 3 * 51 * kMostColours + GuidedPlane::kMostWeightBits; }
   [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, int reach, BitReader& bits);
   /// Row y from its symbols, into colours of all its pixels; false where an index has no colour.

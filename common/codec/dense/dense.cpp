@@ -111,7 +111,8 @@ void DenseCoder::put_words(std::vector<uint8_t>& out) {
   put_varint(out, static_cast<uint32_t>(ends[0] - ends[1]) / 2);
   put_varint(out, static_cast<uint32_t>(ends[1] - ends[2]) / 2);
   put_varint(out, static_cast<uint32_t>(ends[2] - words_.data()) / 2);
-  const bool any = std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
+  // Where there are words states follow them: kernels read beyond a word's end.
+  const bool any = at != words_.data() || std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
   const size_t lanes = any ? std::min(kLanes, shape_.width) : 0;
   out.push_back(static_cast<uint8_t>(lanes));
   const size_t end = out.size();
@@ -150,7 +151,7 @@ bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect,
   const auto parts = get_parts(in);
   if (!parts) return false;
   const size_t lanes = parts->states.size() / 4;
-  if (lanes != 0 && lanes != std::min(kLanes, shape_.width)) return false;
+  if (lanes != (lanes != 0 || !parts->words.empty() ? std::min(kLanes, shape_.width) : 0)) return false;
   std::fill_n(source_.states, kLanes, kStateLow);
   if (lanes != 0) std::memcpy(source_.states, parts->states.data(), 4 * lanes);
   for (const uint32_t x : source_.states)

@@ -222,12 +222,12 @@ struct Features {
   float of[kTerms];
 };
 
-Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, const Plane<int16_t>* residual, int x,
-                     int y) {
+Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& left, const Plane<int16_t>& guide,
+                     const Plane<int16_t>* residual, int x, int y) {
   const int16_t *row = own.row(y) + x, *up = own.row(y - 1) + x;
   const int16_t *g0 = guide.row(y - 1) + x, *g1 = guide.row(y) + x, *g2 = guide.row(y + 1) + x;
   const int c = g1[0];
-  const int raw[kTerms] = {row[-1] - c,
+  const int raw[kTerms] = {left.row(y)[x - 1] - c,
                            up[0] - c,
                            up[-1] - c,
                            up[1] - c,
@@ -284,12 +284,13 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
 }  // namespace
 
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
-                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
+                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant,
+                const Plane<int16_t>* left) {
   std::vector<Features> all;
   std::vector<float> shares;
   if (samples.places.size() < 64 || all_same(samples, own)) return false;
   for (const auto p : samples.places) {
-    all.push_back(features_at(own, guide, residual, p.x, p.y));
+    all.push_back(features_at(own, left != nullptr ? *left : own, guide, residual, p.x, p.y));
     const float* const f = all.back().of;
     const float near = 64 + std::abs(f[kWanted] - f[0]) + std::abs(f[kWanted] - f[1]) + std::abs(f[kWanted]) / 4;
     shares.push_back(1 / (near * near));

@@ -93,9 +93,13 @@ GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
   return rows;
 }
 
-void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
-  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant))
+void GuidedPlane::fit(const Samples& samples, const GuidedPlane* before, const Plane<int16_t>* left) {
+  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant, left))
     set_plain_weights();
+}
+
+void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
+  fit(samples, before);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     if (bits == 6)
@@ -154,6 +158,10 @@ void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlan
   else
     unfold(symbols.wide.row(r));
   values.row(r)[-1] = nearest_value(guide.row(r)[-1]);
+  make_sums(shape, y, before);
+}
+
+void GuidedPlane::make_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
   kernels().guided_sums(rows_around(y, before), shape.width, sums.data());
 }
 

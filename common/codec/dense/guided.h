@@ -19,12 +19,16 @@ struct GuidedPlane {
   /// Values of pixels that are not covered, and borders, of row y. They are the guide's.
   void finish_row(const TileShape& shape, size_t y);
 
-  /// Chooses weights; values -> symbols. `before`: whose residuals are known; null: none's.
+  /// Chooses weights. `before`: whose residuals are known; null: none's. left: as fit_guided() has it.
+  void fit(const Samples& samples, const GuidedPlane* before, const Plane<int16_t>* left = nullptr);
+  /// Chooses weights; values -> symbols.
   void encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before);
   void put_weights(BitSink& bits) const;
   static constexpr size_t kMostWeightBits = 16 * kGuidedTerms + 32;
   [[nodiscard]] bool get_weights(BitReader& bits);
-  /// What is known of row y before its left neighbours are, into sums; its residuals from its symbols.
+  /// What is known of row y before its left neighbours are, into sums.
+  void make_sums(const TileShape& shape, size_t y, const GuidedPlane* before);
+  /// The same, and its residuals from its symbols.
   void decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before);
 
   Plane<int16_t> values, guide, residuals;

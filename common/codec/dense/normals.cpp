@@ -54,6 +54,37 @@ const Table& table(int pole, bool back) {
 uint16_t turn_normal(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, false)[code]; }
 uint16_t turn_back(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, true)[code]; }
 
+void make_geometry_guide(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry, uint16_t base,
+                         Plane<int16_t>& x_guide, Plane<int16_t>& y_guide) {
+  const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    if (geometry == nullptr) {
+      std::fill_n(x_guide.row(r), shape.width, static_cast<int16_t>((base & 255) * 64));
+      std::fill_n(y_guide.row(r), shape.width, static_cast<int16_t>((base >> 8) * 64));
+      continue;
+    }
+    const uint32_t* const rows[3] = {depth.depth.row(r - 1), depth.depth.row(r), depth.depth.row(r + 1)};
+    kernels().geometry(rows, shape.width, x0, y0 + static_cast<int>(y), *geometry, x_guide.row(r), y_guide.row(r));
+  }
+}
+
+void put_geometry(BitSink& bits, const GeometryModel& geometry) {
+  for (const auto& row : geometry.matrix)
+    for (const int16_t e : row) bits.put(static_cast<uint16_t>(e), 16);
+  bits.put(static_cast<uint64_t>(geometry.slope_shift), 4);
+  bits.put(static_cast<uint64_t>(geometry.height_shift), 4);
+}
+
+bool get_geometry(BitReader& bits, GeometryModel& geometry) {
+  int total = 0;
+  for (auto& row : geometry.matrix)
+    for (int16_t& e : row) total += std::abs(int{e = static_cast<int16_t>(bits.source.take(16))});
+  geometry.slope_shift = static_cast<int>(bits.source.take(4));
+  geometry.height_shift = static_cast<int>(bits.source.take(4));
+  return total <= kMostMatrix;
+}
+
 void PoleChoice::add(uint16_t code) {
   const Point p = point_of(code);
   sum_[0] += p.x, sum_[1] += p.y, sum_[2] += p.z;
@@ -104,18 +135,7 @@ void NormalPlanes::to_lattice(const TileShape& shape) {
 
 // Without geometry it is the first pixel's normal everywhere.
 void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base) {
-  const uint16_t turned = turn_normal(base, pole_);
-  const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
-  for (size_t y = 0; y < shape.height; ++y) {
-    const auto r = static_cast<ptrdiff_t>(y);
-    const uint32_t* const rows[3] = {depth.depth.row(r - 1), depth.depth.row(r), depth.depth.row(r + 1)};
-    if (has_geometry_)
-      kernels().geometry(rows, shape.width, x0, y0 + static_cast<int>(y), geometry_, plane[0].guide.row(r),
-                         plane[1].guide.row(r));
-    else
-      for (int i = 0; i < 2; ++i)
-        std::fill_n(plane[i].guide.row(r), shape.width, static_cast<int16_t>((turned >> 8 * i & 255) * 64));
-  }
+  make_geometry_guide(shape, depth, geometry(), turn_normal(base, pole_), plane[0].guide, plane[1].guide);
   for (GuidedPlane& p : plane) p.begin(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
@@ -158,12 +178,7 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
   plane[1].encode(shape, samples, &plane[0]);
   bits.put(static_cast<uint64_t>(pole_), 3);
   bits.put(has_geometry_, 1);
-  if (has_geometry_) {
-    for (const auto& row : geometry_.matrix)
-      for (const int16_t e : row) bits.put(static_cast<uint16_t>(e), 16);
-    bits.put(static_cast<uint64_t>(geometry_.slope_shift), 4);
-    bits.put(static_cast<uint64_t>(geometry_.height_shift), 4);
-  }
+  if (has_geometry_) put_geometry(bits, geometry_);
   for (const GuidedPlane& p : plane) p.put_weights(bits);
 }
 
@@ -171,14 +186,7 @@ bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   pole_ = static_cast<int>(bits.source.take(3));
   has_geometry_ = bits.source.take(1) != 0;
   if (pole_ > kRaw) return false;
-  if (has_geometry_) {
-    int total = 0;
-    for (auto& row : geometry_.matrix)
-      for (int16_t& e : row) total += std::abs(int{e = static_cast<int16_t>(bits.source.take(16))});
-    geometry_.slope_shift = static_cast<int>(bits.source.take(4));
-    geometry_.height_shift = static_cast<int>(bits.source.take(4));
-    if (total > kMostMatrix) return false;
-  }
+  if (has_geometry_ && !get_geometry(bits, geometry_)) return false;
   for (GuidedPlane& p : plane)
     if (!p.get_weights(bits)) return false;
   make_guide(shape, depth, base);

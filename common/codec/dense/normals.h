@@ -15,6 +15,13 @@ inline constexpr int kPoles = 6, kRaw = 6;
 uint16_t turn_normal(uint16_t code, int pole);
 uint16_t turn_back(uint16_t code, int pole);
 
+/// Guides of both coordinates, in 64ths of a code: what the geometry says, or `base` everywhere if it is null.
+void make_geometry_guide(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry, uint16_t base,
+                         Plane<int16_t>& x_guide, Plane<int16_t>& y_guide);
+void put_geometry(BitSink& bits, const GeometryModel& geometry);
+inline constexpr size_t kGeometryBits = 9 * 16 + 8;
+[[nodiscard]] bool get_geometry(BitReader& bits, GeometryModel& geometry);
+
 /// Finds the pole that is nearest to many normals.
 class PoleChoice {
  public:

@@ -31,7 +31,7 @@ void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_ma
 }
 
 void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_number) {
-  is_wide = are_wide, first = first_number, other = nullptr, scale = {};
+  is_wide = are_wide, first = first_number, other = nullptr, scale = {}, has_contexts = false;
   alphabet = first + (is_wide ? kNumberTokens : kByteTokens);
   tokens.reset(shape.width, shape.height);
   contexts.reset(shape.width, shape.height);
@@ -85,8 +85,8 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
 }
 
 void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits) {
-  choose_scale(plane, shape);
-  for (size_t y = 0; y < shape.height; ++y)
+  if (!plane.has_contexts) choose_scale(plane, shape);
+  for (size_t y = 0; y < shape.height && !plane.has_contexts; ++y)
     kernels().contexts(rows_around(plane, y), shape.width, plane.scale, plane.contexts.row(static_cast<ptrdiff_t>(y)));
   for (auto& counts : counts_) counts.fill(0);
   for (size_t y = 0; y < shape.height; ++y) {
@@ -99,7 +99,7 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
     for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
                  [&](size_t x) { ++counts_[contexts[x]][tokens[x]]; });
   }
-  plane.scale.merges = merge_contexts(counts_, plane.alphabet);
+  if (!plane.has_contexts) plane.scale.merges = merge_contexts(counts_, plane.alphabet);
   if (plane.scale.merges != 0)
     for (size_t y = 0; y < shape.height; ++y) {
       uint8_t* const contexts = plane.contexts.row(static_cast<ptrdiff_t>(y));
@@ -151,7 +151,7 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   uint8_t *const contexts = plane.contexts.row(r), *const tokens = plane.tokens.row(r);
   uint32_t* const wide = plane.is_wide ? plane.wide.row(r) : nullptr;
   uint8_t* const narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
-  kernels().contexts(rows_around(plane, y), shape.width, plane.scale, contexts);
+  if (!plane.has_contexts) kernels().contexts(rows_around(plane, y), shape.width, plane.scale, contexts);
   if (shape.full(y)) {
     source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first}, tables_.data(),
                                        source.states, source.begin, source.end);
