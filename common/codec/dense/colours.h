@@ -36,6 +36,7 @@ struct ColourPlanes {
   };
   bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
   void sort_palette(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry);
+  void sort_by_height(const TileShape& shape, const DepthPlane& depth);
   void encode_palette(const TileShape& shape, const DepthPlane& depth);
   void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
   void begin_index(const TileShape& shape, const DepthPlane& depth);
