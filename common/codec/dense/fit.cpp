@@ -222,8 +222,8 @@ struct Features {
   float of[kTerms];
 };
 
-Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, const Plane<int16_t>* residual, int x,
-                     int y) {
+void set_features(Features& out, const Plane<int16_t>& own, const Plane<int16_t>& guide, const Plane<int16_t>* residual,
+                  int x, int y) {
   const int16_t *row = own.row(y) + x, *up = own.row(y - 1) + x;
   const int16_t *g0 = guide.row(y - 1) + x, *g1 = guide.row(y) + x, *g2 = guide.row(y + 1) + x;
   const int c = g1[0];
@@ -243,9 +243,15 @@ Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, con
                            64,
                            row[0] - c,
                            0};
-  Features out;
   for (int i = 0; i < kTerms; ++i) out.of[i] = static_cast<float>(raw[i]);
-  return out;
+}
+
+// What the solution, whose last terms are -1 and 0, makes of a sample: how far off. In four parts, as vectors have them.
+float miss(const Features& f, const float solution[kTerms]) {
+  float parts[4] = {};
+  for (int i = 0; i < kTerms; i += 4)
+    for (int k = 0; k < 4; ++k) parts[k] += solution[i + k] * f.of[i + k];
+  return (parts[0] + parts[1]) + (parts[2] + parts[3]);
 }
 
 // Weighted least squares; false where the system is singular.
@@ -285,23 +291,27 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
 
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
-  std::vector<Features> all;
-  std::vector<float> shares;
-  if (samples.places.size() < 64 || all_same(samples, own)) return false;
-  for (const auto p : samples.places) {
-    all.push_back(features_at(own, guide, residual, p.x, p.y));
-    const float* const f = all.back().of;
+  const size_t n = samples.places.size();
+  if (n < 64 || all_same(samples, own)) return false;
+  std::vector<Features> all(n);
+  std::vector<float> shares(n);
+  for (size_t s = 0; s < n; ++s) {
+    const auto p = samples.places[s];
+    set_features(all[s], own, guide, residual, p.x, p.y);
+    const float* const f = all[s].of;
     const float near = 64 + std::abs(f[kWanted] - f[0]) + std::abs(f[kWanted] - f[1]) + std::abs(f[kWanted]) / 4;
-    shares.push_back(1 / (near * near));
+    shares[s] = 1 / (near * near);
   }
   double solution[kUnknown];
   bool solved = solve_weighted(all, shares, solution);
   for (int round = 0; solved && round < kRounds; ++round) {  // towards the median, at last beyond it
-    for (size_t s = 0; s < all.size(); ++s) {
-      float off = -all[s].of[kWanted];
-      for (int i = 0; i < kUnknown; ++i) off += static_cast<float>(solution[i]) * all[s].of[i];
-      const float size = (round + 1 < kRounds ? 24 : 64) + std::abs(off);
-      shares[s] = 1 / (round + 1 < kRounds ? size : size * size);
+    float terms[kTerms] = {};
+    for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
+    terms[kWanted] = -1;
+    const bool last = round + 1 == kRounds;
+    for (size_t s = 0; s < n; ++s) {
+      const float size = (last ? 64 : 24) + std::abs(miss(all[s], terms));
+      shares[s] = 1 / (last ? size * size : size);
     }
     solved = solve_weighted(all, shares, solution);
   }

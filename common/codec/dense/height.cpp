@@ -48,22 +48,26 @@ double roughness(const Axis& axis, const std::vector<HeightSample>& samples) {
   return sum;
 }
 
-// The axis by which one channel of the colours changes most evenly: least squares. False where there is none.
-bool even_axis(const std::vector<HeightSample>& samples, int shift, Axis& axis) {
+// The axes by which the colours' channels change most evenly, by least squares; false where there are none.
+bool even_axes(const std::vector<HeightSample>& samples, Axis axes[3]) {
   double unit = 0;
   for (const HeightSample& s : samples) unit += double{s.code};
   unit /= static_cast<double>(samples.size());
-  double m[4][5] = {};
+  double sums[4][7] = {};
   for (const HeightSample& s : samples) {
     const double k = unit / double{s.code};
-    const double f[5] = {k * double{s.x}, k * double{s.y}, k, 1, static_cast<double>(s.colour >> shift & 255)};
+    double f[7] = {k * double{s.x}, k * double{s.y}, k, 1};
+    for (int c = 0; c < 3; ++c) f[4 + c] = static_cast<double>(s.colour >> 8 * c & 255);
     for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 5; ++j) m[i][j] += f[i] * f[j];
+      for (int j = 0; j < 7; ++j) sums[i][j] += f[i] * f[j];
   }
-  double out[4];
-  if (!solve_system<4>(m, 1e-12, out)) return false;
-  axis = {out[0] * unit, out[1] * unit, out[2] * unit};
-  return std::abs(axis.a) + std::abs(axis.b) + std::abs(axis.c) > 0;
+  for (int c = 0; c < 3; ++c) {
+    double m[4][5], out[4];
+    for (int i = 0; i < 4; ++i) std::copy_n(sums[i], 4, m[i]), m[i][4] = sums[i][4 + c];
+    if (!solve_system<4>(m, 1e-12, out)) return false;
+    axes[c] = {out[0] * unit, out[1] * unit, out[2] * unit};
+  }
+  return true;
 }
 
 // Each colour's place in the order of its colours' mean heights.
@@ -203,8 +207,7 @@ bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const
     if (rough < least) least = rough, best = axis;
   };
   for (int i = 0; i < 3 && rays != nullptr; ++i) consider({rays[i][0], rays[i][1], rays[i][2]});
-  for (int shift = 0; shift < 24; shift += 8)
-    if (Axis axis; even_axis(samples, shift, axis)) consider(axis);
+  if (Axis even[3]; even_axes(samples, even)) std::for_each_n(even, 3, consider);
   if (!(least < 1e300)) return false;
   std::vector<uint32_t> rank;
   const auto order = [&] {
