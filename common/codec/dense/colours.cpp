@@ -141,7 +141,8 @@ void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth,
   const bool has_rays = geometry != nullptr && rays_of(*geometry, rays);
   for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
   height_samples_.clear();
-  for (const auto p : samples_.places) {
+  for (size_t i = 0; i < samples_.places.size(); i += 2) {
+    const auto p = samples_.places[i];
     const auto x = static_cast<float>(p.x), y = static_cast<float>(p.y);
     const auto place = static_cast<uint32_t>(index.values.row(p.y)[p.x]);
     height_samples_.push_back({x - x0, y - y0, code_at(x, y), palette_[place], place});

@@ -199,7 +199,7 @@ bool rays_of(const GeometryModel& g, double rays[3][3]) {
 
 bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
               HeightModel& model) {
-  if (samples.size() < 256 || first.size() < 8) return false;
+  if (samples.size() < 128 || first.size() < 8) return false;
   Axis best{};
   double least = 1e300;
   const auto consider = [&](const Axis& axis) {

@@ -331,6 +331,20 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
     }
 }
 
+// table[i] of each i below 64.
+HWY_INLINE hn::VFromD<hn::RebindToSigned<D> > Knots(const int32_t* table, hn::VFromD<hn::RebindToSigned<D> > i) {
+  const hn::RebindToSigned<D> d;
+#if HWY_TARGET <= HWY_AVX3  // tables in registers: gathers take longer
+  const auto part = [&](int k) HWY_ATTR { return hn::Load(d, table + 16 * k).raw; };
+  const __m512i low = _mm512_permutex2var_epi32(part(0), i.raw, part(1)),
+                high = _mm512_permutex2var_epi32(part(2), i.raw, part(3));
+  const __mmask16 upper = _mm512_test_epi32_mask(i.raw, _mm512_set1_epi32(32));
+  return hn::VFromD<decltype(d)>{_mm512_mask_mov_epi32(low, upper, high)};
+#else
+  return hn::GatherIndex(d, table, i);
+#endif
+}
+
 // As Heights(). Both knots of a pixel are gathered at once.
 static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, int y, const HeightModel& model,
                           int16_t* HWY_RESTRICT out) {
@@ -363,7 +377,7 @@ static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, 
     const auto height = hn::Sub(hn::Xor(quotient, negative), negative);
     const auto off = hn::Min(hn::Max(hn::Sub(height, hn::Set(d, model.low)), hn::Set(d, -32767)), hn::Set(d, 32767));
     const auto at = hn::Min(hn::Max(hn::ShiftRight<12>(hn::Mul(off, hn::Set(d, model.scale))), hn::Zero(d)), ends);
-    const auto both = hn::GatherIndex(d, knots, hn::ShiftRight<8>(at));
+    const auto both = Knots(knots, hn::ShiftRight<8>(at));
     const auto a = hn::ShiftRight<16>(hn::ShiftLeft<16>(both)), b = hn::ShiftRight<16>(both);
     const auto between = hn::ShiftRight<8>(hn::Mul(hn::Sub(b, a), hn::And(at, hn::Set(d, 255))));
     hn::StoreU(hn::DemoteTo(d16, hn::Add(a, between)), d16, out + x);
@@ -373,7 +387,7 @@ static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, 
 static const Kernels* Set() {
   static constexpr Kernels all{CoveredBits,         DepthResiduals, DepthRowsVector, PlaneResiduals,  PlaneTerms,
                                PlaneSizes,          Contexts,       OtherNormals,    MedianResiduals, GuidedResiduals,
-                               GuidedResidualsWide, GuidedSums,     Geometry,        Heights,         Activity,
+                               GuidedResidualsWide, GuidedSums,     Geometry,        HeightsVector,   Activity,
                                NormalEquations,     PutSymbols,     GetSymbols};
   return &all;
 }

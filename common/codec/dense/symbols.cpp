@@ -113,10 +113,10 @@ void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& 
     kernels().contexts(rows_around(plane, y), shape.width, plane.scale, plane.contexts.row(static_cast<ptrdiff_t>(y)));
   count(plane, shape);
   plane.scale.merges = merge_contexts(counts_, plane.alphabet);
-  if (plane.scale.merges != 0)
+  if (const int merges = plane.scale.merges; merges != 0)
     for (size_t y = 0; y < shape.height; ++y) {
       uint8_t* const contexts = plane.contexts.row(static_cast<ptrdiff_t>(y));
-      for (size_t x = 0; x < shape.width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> plane.scale.merges);
+      for (size_t x = 0, width = shape.width; x < width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> merges);
     }
   choose_levels(counts_, plane.alphabet, levels_);
   bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);
