@@ -216,7 +216,7 @@ namespace {
 
 constexpr int kTerms = kFeatures;  // 13 differences from the guide at the pixel, the residual, 1, and what is wanted
 constexpr int kUnknown = 14, kWanted = 14;
-constexpr int kRounds = 3;
+constexpr int kRounds = 3, kRoughRounds = 1;  // of which the first, and what comes before, take half of the samples
 
 struct Features {
   float of[kTerms];
@@ -255,9 +255,10 @@ float miss(const Features& f, const float solution[kTerms]) {
 }
 
 // Weighted least squares; false where the system is singular.
-bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, double solution[kUnknown]) {
+bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, size_t n,
+                    double solution[kUnknown]) {
   alignas(64) float sums[kTerms][kTerms];
-  kernels().normal_equations(&all[0].of, weights.data(), all.size(), sums);
+  kernels().normal_equations(&all[0].of, weights.data(), n, sums);
   Cholesky<kUnknown> system{};
   double trace = 0;
   for (int i = 0; i < kUnknown; ++i) trace += static_cast<double>(sums[i][i]);
@@ -295,25 +296,27 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
   if (n < 64 || all_same(samples, own)) return false;
   std::vector<Features> all(n);
   std::vector<float> shares(n);
+  const size_t few = n / 2;  // the first rounds need not be exact
   for (size_t s = 0; s < n; ++s) {
-    const auto p = samples.places[s];
+    const auto p = samples.places[s < few ? 2 * s : std::min(2 * (s - few) + 1, n - 1)];
     set_features(all[s], own, guide, residual, p.x, p.y);
     const float* const f = all[s].of;
     const float near = 64 + std::abs(f[kWanted] - f[0]) + std::abs(f[kWanted] - f[1]) + std::abs(f[kWanted]) / 4;
     shares[s] = 1 / (near * near);
   }
   double solution[kUnknown];
-  bool solved = solve_weighted(all, shares, solution);
+  bool solved = solve_weighted(all, shares, few, solution);
   for (int round = 0; solved && round < kRounds; ++round) {  // towards the median, at last beyond it
     float terms[kTerms] = {};
     for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
     terms[kWanted] = -1;
     const bool last = round + 1 == kRounds;
-    for (size_t s = 0; s < n; ++s) {
+    const size_t count = round < kRoughRounds ? few : n;
+    for (size_t s = 0; s < count; ++s) {
       const float size = (last ? 64 : 24) + std::abs(miss(all[s], terms));
       shares[s] = 1 / (last ? size * size : size);
     }
-    solved = solve_weighted(all, shares, solution);
+    solved = solve_weighted(all, shares, count, solution);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   return solved && quantise_weights(solution, weights, constant);
