@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numeric>
 
 #include "common/codec/golomb.h"
 
@@ -137,22 +138,48 @@ void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth,
     return static_cast<float>(depth.depth.row(static_cast<ptrdiff_t>(y))[static_cast<size_t>(x)]);
   };
   double rays[3][3];
-  has_height_ = false;
-  if (geometry != nullptr && rays_of(*geometry, rays)) {
-    for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
-    height_samples_.clear();
-    for (const auto p : samples_.places) {
-      const auto x = static_cast<float>(p.x), y = static_cast<float>(p.y);
-      const auto place = static_cast<uint32_t>(index.values.row(p.y)[p.x]);
-      height_samples_.push_back({x - x0, y - y0, code_at(x, y), palette_[place], place});
-    }
-    has_height_ = fit_height(rays, height_samples_, first_, palette_, height_);
+  const bool has_rays = geometry != nullptr && rays_of(*geometry, rays);
+  for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
+  height_samples_.clear();
+  for (size_t i = 0; i < samples_.places.size(); i += 2) {
+    const auto p = samples_.places[i];
+    const auto x = static_cast<float>(p.x), y = static_cast<float>(p.y);
+    const auto place = static_cast<uint32_t>(index.values.row(p.y)[p.x]);
+    height_samples_.push_back({x - x0, y - y0, code_at(x, y), palette_[place], place});
   }
-  if (has_height_) return;
+  has_height_ = fit_axis(has_rays ? rays : nullptr, height_samples_, first_, height_);
+  if (has_height_) return sort_by_height(shape, depth);
   std::sort(palette_.begin(), palette_.end(), [](uint32_t a, uint32_t b) {
     const auto brightness = [](uint32_t c) { return (c >> 16 & 255) + 2 * (c >> 8 & 255) + (c & 255); };
     return brightness(a) != brightness(b) ? brightness(a) < brightness(b) : a < b;
   });
+}
+
+// All pixels say at which height a colour lies: few would sort colours badly that have few of them.
+void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& depth) {
+  std::vector<ColourHeight> heights(palette_.size());
+  begin_index(shape, depth);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const int16_t *const places = index.values.row(r), *const height = index.guide.row(r);
+    ColourHeight* const at = heights.data();
+    const auto add = [&](size_t x) { at[places[x]].sum += static_cast<uint32_t>(height[x]), ++at[places[x]].pixels; };
+    if (shape.full(y))
+      for (size_t x = 0; x < shape.width; ++x) add(x);
+    else
+      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), add);
+  }
+  std::vector<uint32_t> order(palette_.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) {
+    const double a = heights[i].mean(), b = heights[j].mean();
+    return a != b ? a < b : palette_[i] < palette_[j];
+  });
+  std::vector<uint32_t> palette(order.size());
+  std::vector<ColourHeight> sorted(order.size());
+  for (size_t i = 0; i < order.size(); ++i) palette[i] = palette_[order[i]], sorted[i] = heights[order[i]];
+  palette_ = palette;
+  fit_knots(sorted, height_);
 }
 
 void ColourPlanes::begin_index(const TileShape& shape, const DepthPlane& depth) {
@@ -268,7 +295,7 @@ void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& c
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;
-    samples_.choose(shape, std::min<size_t>(2 * kMostSamples, shape.total / 12));
+    samples_.choose(shape, std::min<size_t>(kMostSamples, shape.total / 12));
     sort_palette(shape, depth, geometry);
     encode_palette(shape, depth, reach);
   } else {

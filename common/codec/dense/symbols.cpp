@@ -84,26 +84,39 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   plane.scale.bias = std::max(plane.scale.bias, 0);
 }
 
+// In two tables, so that equal symbols side by side need not wait for each other.
+void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
+  for (TokenCounts* counts : {&counts_, &more_counts_})
+    for (auto& of : *counts) of.fill(0);
+  uint32_t *const a = counts_[0].data(), *const b = more_counts_[0].data();
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const uint8_t *const tokens = plane.tokens.row(r), *const contexts = plane.contexts.row(r);
+    if (shape.full(y)) {
+      size_t x = 0;
+      for (; x + 2 <= shape.width; x += 2) {
+        ++a[contexts[x] * kSymbols + tokens[x]];
+        ++b[contexts[x + 1] * kSymbols + tokens[x + 1]];
+      }
+      if (x < shape.width) ++a[contexts[x] * kSymbols + tokens[x]];
+      continue;
+    }
+    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
+                 [&](size_t x) { ++a[contexts[x] * kSymbols + tokens[x]]; });
+  }
+  for (size_t i = 0; i < kContexts * kSymbols; ++i) a[i] += b[i];
+}
+
 void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits) {
   if (!plane.has_contexts) choose_scale(plane, shape);
   for (size_t y = 0; y < shape.height && !plane.has_contexts; ++y)
     kernels().contexts(rows_around(plane, y), shape.width, plane.scale, plane.contexts.row(static_cast<ptrdiff_t>(y)));
-  for (auto& counts : counts_) counts.fill(0);
-  for (size_t y = 0; y < shape.height; ++y) {
-    const auto r = static_cast<ptrdiff_t>(y);
-    const uint8_t *tokens = plane.tokens.row(r), *contexts = plane.contexts.row(r);
-    if (shape.full(y)) {
-      for (size_t x = 0; x < shape.width; ++x) ++counts_[contexts[x]][tokens[x]];
-      continue;
-    }
-    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                 [&](size_t x) { ++counts_[contexts[x]][tokens[x]]; });
-  }
+  count(plane, shape);
   if (!plane.has_contexts) plane.scale.merges = merge_contexts(counts_, plane.alphabet);
-  if (plane.scale.merges != 0)
+  if (const int merges = plane.scale.merges; merges != 0)
     for (size_t y = 0; y < shape.height; ++y) {
       uint8_t* const contexts = plane.contexts.row(static_cast<ptrdiff_t>(y));
-      for (size_t x = 0; x < shape.width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> plane.scale.merges);
+      for (size_t x = 0, width = shape.width; x < width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> merges);
     }
   choose_levels(counts_, plane.alphabet, levels_);
   bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);

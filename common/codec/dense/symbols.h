@@ -64,8 +64,9 @@ class PlaneEncoder {
 
  private:
   void choose_scale(SymbolPlane& plane, const TileShape& shape);
+  void count(const SymbolPlane& plane, const TileShape& shape);
   TokenLevels levels_;
-  TokenCounts counts_;
+  TokenCounts counts_, more_counts_;
   std::vector<EncodeEntry> tables_;
 };
 
