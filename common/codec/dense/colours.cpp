@@ -205,7 +205,7 @@ void ColourPlanes::begin_channels(const TileShape& shape) {
   }
 }
 
-// Colours beside each other become one, as long as it is near enough to all of them. Returns where each of them is then.
+// Colours beside each other become one, as long as it is near enough to all of them. Returns where each is then.
 std::vector<int16_t> ColourPlanes::join_palette(int reach) {
   std::vector<int16_t> to(palette_.size());
   std::vector<uint32_t> joined;

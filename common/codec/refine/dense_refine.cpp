@@ -1,4 +1,4 @@
-#include "common/codec/dense/refine.h"
+#include "common/codec/refine/dense_refine.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // What bounded streams leave out.
 //   refinement = magic, version, varint width, varint height; of each tile in which something is: u8 kind, and
 //     kSame: nothing, all pixels are as they are known
-//     kDense, kScattered: reach (varint depth, u8 pole + 8 * normal, u8 colour), and dense/refine.h or scattered pixels
+//     kDense, kScattered: reach (varint depth, u8 pole + 8 * normal, u8 colour), and dense_refine.h or scattered pixels
 //     kAnew: the tile as in a lossless stream
 //   scattered = of the pixels row by row: stored block of bits (depth), [block of bytes (normals)], [3 blocks of bytes
 //     (green, red, blue)]
@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "common/codec/dense/refine.h"
+#include "common/codec/refine/dense_refine.h"
 #include "common/codec/depth_codec.h"
 #include "common/codec/entropy.h"
 #include "common/codec/tile.h"
