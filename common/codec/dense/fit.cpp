@@ -1,8 +1,11 @@
 #include "common/codec/dense/fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
+
+#include "common/codec/dense/tables.h"
 
 namespace telesplat::codec::detail {
 namespace {
@@ -288,10 +291,23 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
   return true;
 }
 
+// Bits that what the weights leave takes, roughly: what tokens of the samples' residuals do.
+double bits_left(const std::vector<Features>& all, const float solution[kTerms], float unit) {
+  std::array<uint32_t, kSymbols> tokens{};
+  uint32_t raw = 0;
+  for (const Features& f : all) {
+    const auto off = static_cast<uint32_t>(std::min(std::abs(miss(f, solution)) / unit + 0.5f, 1e6f));
+    const uint32_t token = token_of(2 * off);
+    ++tokens[token], raw += token >> 3;
+  }
+  return bits_of(tokens, kSymbols) + raw;
+}
+
 }  // namespace
 
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
-                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
+                const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant) {
+  const auto unit = static_cast<float>(1 << bits);
   const size_t n = samples.places.size();
   if (n < 64 || all_same(samples, own)) return false;
   std::vector<Features> all(n);
@@ -317,6 +333,12 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
       shares[s] = 1 / (last ? size * size : size);
     }
     solved = solve_weighted(all, shares, count, solution);
+  }
+  if (solved) {
+    float fitted[kTerms] = {}, plain[kTerms] = {0.5f, 0.5f};
+    for (int i = 0; i < kUnknown; ++i) fitted[i] = static_cast<float>(solution[i]);
+    fitted[kWanted] = plain[kWanted] = -1;
+    solved = bits_left(all, fitted, unit) < bits_left(all, plain, unit);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   return solved && quantise_weights(solution, weights, constant);

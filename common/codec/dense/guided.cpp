@@ -94,7 +94,8 @@ GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
 }
 
 void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
-  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant))
+  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, bits, weights,
+                  constant))
     set_plain_weights();
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
