@@ -40,7 +40,7 @@ using image::DepthImage;
 
 // stream = magic, version, flags, varint width, varint height, tiles of TileGrid row by row (tile.h); nothing after
 // them. Flags: none is known yet; bounds of error will have one, and what they are follows the height.
-constexpr uint8_t kMagic = 0xD7, kVersion = 4, kKnownFlags = 0;
+constexpr uint8_t kMagic = 0xD7, kVersion = 5, kKnownFlags = 0;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 

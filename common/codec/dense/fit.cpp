@@ -291,23 +291,29 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
   return true;
 }
 
-// Bits that what the weights leave takes, roughly: what tokens of the samples' residuals do.
-double bits_left(const std::vector<Features>& all, const float solution[kTerms], float unit) {
+// Bits that predictions leave, roughly: what tokens of the samples' residuals take. miss(f): how far one is off.
+template <class Miss>
+double bits_left(const std::vector<Features>& all, int bits, Miss miss) {
+  const float scale = 1 / static_cast<float>(1 << bits);
   std::array<uint32_t, kSymbols> tokens{};
   uint32_t raw = 0;
   for (const Features& f : all) {
-    const auto off = static_cast<uint32_t>(std::min(std::abs(miss(f, solution)) / unit + 0.5f, 1e6f));
+    const auto off = static_cast<uint32_t>(std::min(std::abs(miss(f)) * scale + 0.5f, 1e6f));
     const uint32_t token = token_of(2 * off);
     ++tokens[token], raw += token >> 3;
   }
   return bits_of(tokens, kSymbols) + raw;
 }
 
+float median_miss(const Features& f) {
+  const float low = std::min(f.of[0], f.of[1]), high = std::max(f.of[0], f.of[1]);
+  return std::clamp(f.of[0] + f.of[1] - f.of[2], low, high) - f.of[kWanted];
+}
+
 }  // namespace
 
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant) {
-  const auto unit = static_cast<float>(1 << bits);
   const size_t n = samples.places.size();
   if (n < 64 || all_same(samples, own)) return false;
   std::vector<Features> all(n);
@@ -335,10 +341,11 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
     solved = solve_weighted(all, shares, count, solution);
   }
   if (solved) {
-    float fitted[kTerms] = {}, plain[kTerms] = {0.5f, 0.5f};
-    for (int i = 0; i < kUnknown; ++i) fitted[i] = static_cast<float>(solution[i]);
-    fitted[kWanted] = plain[kWanted] = -1;
-    solved = bits_left(all, fitted, unit) < bits_left(all, plain, unit);
+    float terms[kTerms] = {};
+    for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
+    terms[kWanted] = -1;
+    solved =
+        bits_left(all, bits, [&](const Features& f) { return miss(f, terms); }) < bits_left(all, bits, median_miss);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   return solved && quantise_weights(solution, weights, constant);
