@@ -1,8 +1,11 @@
 #include "common/codec/dense/fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
+
+#include "common/codec/dense/tables.h"
 
 namespace telesplat::codec::detail {
 namespace {
@@ -288,10 +291,29 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
   return true;
 }
 
+// Bits that predictions leave, roughly: what tokens of the samples' residuals take. miss(f): how far one is off.
+template <class Miss>
+double bits_left(const std::vector<Features>& all, int bits, Miss miss) {
+  const float scale = 1 / static_cast<float>(1 << bits);
+  std::array<uint32_t, kSymbols> tokens{};
+  uint32_t raw = 0;
+  for (const Features& f : all) {
+    const auto off = static_cast<uint32_t>(std::min(std::abs(miss(f)) * scale + 0.5f, 1e6f));
+    const uint32_t token = token_of(2 * off);
+    ++tokens[token], raw += token >> 3;
+  }
+  return bits_of(tokens, kSymbols) + raw;
+}
+
+float median_miss(const Features& f) {
+  const float low = std::min(f.of[0], f.of[1]), high = std::max(f.of[0], f.of[1]);
+  return std::clamp(f.of[0] + f.of[1] - f.of[2], low, high) - f.of[kWanted];
+}
+
 }  // namespace
 
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
-                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant,
+                const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant,
                 const Plane<int16_t>* left) {
   const size_t n = samples.places.size();
   if (n < 64 || all_same(samples, own)) return false;
@@ -318,6 +340,13 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
       shares[s] = 1 / (last ? size * size : size);
     }
     solved = solve_weighted(all, shares, count, solution);
+  }
+  if (solved && left == nullptr) {
+    float terms[kTerms] = {};
+    for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
+    terms[kWanted] = -1;
+    solved =
+        bits_left(all, bits, [&](const Features& f) { return miss(f, terms); }) < bits_left(all, bits, median_miss);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   return solved && quantise_weights(solution, weights, constant);

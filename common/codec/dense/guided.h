@@ -37,11 +37,13 @@ struct GuidedPlane {
   int32_t constant = 0;
   std::vector<int32_t> sums;
   int bits = 6, most = 254;
+  bool median = false;  ///< predicted by the median of L, U and L + U - UL; weights are plain ones then
 
  private:
   /// Half of L and of U: where there is nothing to be fitted.
   void set_plain_weights();
   bool has_plain_weights() const;
+  void encode_by_median(const TileShape& shape);
   GuidedRows rows_around(size_t y, const GuidedPlane* before) const;
 };
 

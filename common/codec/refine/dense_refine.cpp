@@ -289,7 +289,7 @@ bool RefinementCoder::decode_normals(const Reach& reach, WordSource& source) {
   if (has_geometry_ && !get_geometry(reader_, geometry_)) return false;
   begin_normals();
   for (NearPlane& p : normal_)
-    if (!p.exact.get_weights(reader_)) return false;
+    if (!p.exact.get_weights(reader_) || p.exact.median) return false;
   for (size_t c = 0; c < 2; ++c)
     if (!decoders_[1 + c].prepare(normal_[c].exact.symbols, reader_)) return false;
   bool good = true;
