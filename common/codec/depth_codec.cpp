@@ -31,7 +31,6 @@
 
 #include "common/codec/lattice.h"
 #include "common/codec/tile.h"
-#include "common/image/normal.h"
 
 namespace telesplat::codec {
 namespace {
@@ -103,26 +102,6 @@ bool for_each_tile(const TileGrid& grid, F f) {
   return true;
 }
 
-DepthImage coarse(const DepthImage& image, const ErrorBounds& bounds) {
-  DepthImage out = image;
-  const auto depth = bounds.depth != 0 ? detail::DepthLattice::of(bounds.depth) : nullptr;
-  const detail::NormalLattice normal(bounds.normal);
-  const detail::ColourLattice colour(bounds.colour);
-  for (size_t i = 0; i < out.pixels(); ++i) {
-    if (out.depth[i] == 0) continue;
-    if (depth) out.depth[i] = depth->code(depth->index(out.depth[i]));
-    if (bounds.normal != 0) {
-      const uint16_t n = image::canonical_normal16(out.normal[i]);
-      out.normal[i] = static_cast<uint16_t>(normal.nearest(n & 255) | normal.nearest(n >> 8) << 8);
-    }
-    uint32_t c = 0;
-    for (int shift = 0; shift < 24; shift += 8)
-      c |= static_cast<uint32_t>(colour.value(colour.index(static_cast<int>(out.colour[i] >> shift & 255)))) << shift;
-    out.colour[i] = c;
-  }
-  return out;
-}
-
 }  // namespace
 
 std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, DepthImage* decoded) {
@@ -143,10 +122,12 @@ std::vector<uint8_t> encode(const DepthImage& image, const ErrorBounds& given, D
     out.push_back(static_cast<uint8_t>(bounds.normal));
     out.push_back(static_cast<uint8_t>(bounds.colour));
   }
-  const DepthImage what = bounded ? coarse(image, bounds) : image;
+  const detail::TileBounds tile_bounds(bounds);
   const TileGrid grid(image.width, image.height);
-  for_each_tile(grid, [&](int column, int row) { return detail::put_tile(out, what, grid.rect(column, row)), true; });
-  if (decoded != nullptr) *decoded = what;
+  for_each_tile(grid, [&](int column, int row) {
+    return detail::put_tile(out, image, grid.rect(column, row), tile_bounds), true;
+  });
+  if (decoded != nullptr) CHECK(decode_into(*decoded, out).ok());
   return out;
 }
 
@@ -177,9 +158,10 @@ Status decode_into(DepthImage& image, std::span<const uint8_t> bytes, int expect
   image.colour.resize(pixels);
   image.normal.resize(pixels);
   const TileGrid grid(image.width, image.height);
+  const detail::TileBounds bounds(size->bounds);
   std::string problem;
   const bool good = for_each_tile(grid, [&](int column, int row) {
-    if (detail::get_tile(in, image, grid.rect(column, row))) return true;
+    if (detail::get_tile(in, image, grid.rect(column, row), bounds)) return true;
     problem = fmt::format("damaged or cut off in tile {}, {} of {} x {}", column, row, grid.columns, grid.rows);
     return false;
   });
@@ -194,7 +176,8 @@ Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {
   if (!size) return size.error();
   StreamInfo info{.width = size->width, .height = size->height, .bounds = size->bounds};
   const TileGrid grid(info.width, info.height);
-  if (!for_each_tile(grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info); }))
+  if (!for_each_tile(
+          grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info.bounds, info); }))
     return damaged("damaged or cut off");
   if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
   return info;

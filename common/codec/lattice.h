@@ -53,27 +53,48 @@ class DepthLattice {
   std::vector<Line> lines_;
 };
 
-/// Coordinates on a normal's map, 0 to 254, in steps of 2 * reach + 1 around its centre: none of them on the map's rim.
+/// Bounds of error as the coders of tiles take them.
+struct TileBounds {
+  explicit TileBounds(const ErrorBounds& bounds)
+      : kept(bounds.depth != 0 ? DepthLattice::of(bounds.depth) : nullptr),
+        depth(kept.get()),
+        normal(bounds.normal),
+        colour(bounds.colour) {}
+  std::shared_ptr<const DepthLattice> kept;
+  const DepthLattice* depth;  ///< null: depths are exact
+  int normal, colour;
+};
+
+/// Coordinates on a normal's map, 0 to 254, in steps of 2 * reach + 1 around its centre: none of them on the map's rim,
+/// unless reach is 0. 0 <= reach <= 3.
 class NormalLattice {
  public:
-  explicit NormalLattice(int reach) : step_(2 * reach + 1), half_(reach == 0 ? 127 : (126 + reach) / step_) {}
-  int most() const { return 2 * half_; }  ///< the largest index
-  int value(int index) const { return 127 + (index - half_) * step_; }
-  int index(int value) const {
-    const int up = value - 127 + step_ * half_ + step_ / 2;
-    return std::clamp(up < 0 ? 0 : up / step_, 0, most());
-  }
-  int nearest(int v) const { return value(index(v)); }
+  explicit NormalLattice(int reach)
+      : step_(2 * reach + 1),
+        half_(reach == 0 ? 127 : (126 + reach) / step_),
+        share_((1u << kShare) / static_cast<uint32_t>(step_) + 1) {}
   int step() const { return step_; }
+  int most() const { return 2 * half_; }  ///< the largest index
+  int value(int index) const { return 127 + (std::min(index, most()) - half_) * step_; }
+  int index(int value) const { return divided(value - 127 + step_ * half_ + step_ / 2); }
+  int nearest(int v) const { return value(index(v)); }
+  /// 64ths of a coordinate, 0 to 254 * 64 -> 64ths of a step.
+  int16_t index64(int v) const { return static_cast<int16_t>(divided(v - 64 * 127 + 64 * half_ * step_ + step_ / 2)); }
 
  private:
+  // By the step, rounded down, not below 0. As a product: exact for what coordinates can be.
+  static constexpr int kShare = 18;
+  int divided(int v) const { return static_cast<int>(static_cast<uint32_t>(std::max(v, 0)) * share_ >> kShare); }
+
   int step_, half_;
+  uint32_t share_;
 };
 
 /// Values of a channel in steps of 2 * reach + 1, from 0; above the last one 255.
 class ColourLattice {
  public:
   explicit ColourLattice(int reach) : reach_(reach), step_(2 * reach + 1) {}
+  int step() const { return step_; }
   int index(int value) const { return (value + reach_) / step_; }
   int value(int index) const { return std::min(index * step_, 255); }
 

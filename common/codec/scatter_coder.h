@@ -2,6 +2,8 @@
 // neighbours were.
 //   scatter = block of flags, one bit a pixel: its colour is as predicted; stored block of bits. These are of each
 //   pixel depth, the normal's bytes, and unless its flag is set green, blue - green, red - green.
+// Within bounds (lattice.h) residuals are steps from where the prediction lies, and a colour is as predicted if it is
+// near enough. Normals are turned by a pole of the tile's, which scatter begins with.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "common/codec/golomb.h"
+#include "common/codec/lattice.h"
 #include "common/codec/scatter.h"
 
 namespace telesplat::codec::detail {
@@ -24,13 +27,15 @@ struct ScatterContexts {
 
 class ScatterEncoder {
  public:
-  /// `count` pixels follow.
-  void start(size_t count);
-  Magnitudes put(const Pixel& pixel, const Guess& guess);
+  /// `count` pixels follow. `bounds` must outlive them.
+  void start(size_t count, const TileBounds& bounds);
+  /// `pixel` becomes what is decoded.
+  Magnitudes put(Pixel& pixel, const Guess& guess);
   void finish(std::vector<uint8_t>& out);
 
  private:
   ScatterContexts contexts_;
+  const TileBounds* bounds_ = nullptr;
   std::vector<uint8_t> plain_;
   BitWriter bits_;
   size_t done_ = 0;
@@ -39,7 +44,7 @@ class ScatterEncoder {
 class ScatterDecoder {
  public:
   /// Reads what `count` pixels are made of; false where it is damaged.
-  [[nodiscard]] bool start(Reader& in, size_t count);
+  [[nodiscard]] bool start(Reader& in, size_t count, const TileBounds& bounds);
   /// Nothing where the stream is damaged.
   std::optional<Pixel> get(const Guess& guess, Magnitudes& magnitudes);
   /// All bits were taken.
@@ -47,6 +52,7 @@ class ScatterDecoder {
 
  private:
   ScatterContexts contexts_;
+  const TileBounds* bounds_ = nullptr;
   std::vector<uint8_t> plain_;
   BitReader bits_;
   size_t done_ = 0;

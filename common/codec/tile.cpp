@@ -45,6 +45,15 @@ bool is_sparse(size_t covered, size_t runs, size_t pixels) {
   return covered * 8 < pixels || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
+// The one of the sparse tile's normals.
+int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& mask) {
+  PoleChoice choice;
+  for (int y = 0; y < rect.height; ++y)
+    for_each_set(mask.row(y), mask.words_per_row(),
+                 [&](size_t x) { choice.add(image.normal[rect.index(static_cast<int>(x), y)]); });
+  return choice.best();
+}
+
 }  // namespace
 
 TileGrid::TileGrid(int width, int height) : width(width), height(height) {
@@ -66,7 +75,8 @@ TileRect TileGrid::rect(int column, int row) const {
           std::min(tile_width, width - x), std::min(tile_height, height - y)};
 }
 
-size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect) {
+size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect,
+                const TileBounds& bounds) {
   TileScratch& s = scratch();
   s.mask.reset(rect.width, rect.height);
   for (int y = 0; y < rect.height; ++y)
@@ -86,21 +96,28 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
     for (first = row; first < end && image.depth[first] == 0;) ++first;
     if (first < end) break;
   }
-  const Pixel base{image.depth[first], image.colour[first], image.normal[first]};
+  Pixel base{image.depth[first], image.colour[first], image.normal[first]};
+  if (bounds.depth != nullptr) base.depth = bounds.depth->index(base.depth);
   put_base(out, base);
   if (!full) put_mask(out, s.mask);
 
   if (sparse) {
-    s.scatter_encoder.start(covered);
-    encode_sparse(s, image, rect, base);
+    if (bounds.depth != nullptr) base.depth = bounds.depth->code(base.depth);
+    int pole = kRaw;
+    if (bounds.normal != 0) {
+      pole = pole_of(image, rect, s.mask);
+      out.push_back(static_cast<uint8_t>(pole));
+    }
+    s.scatter_encoder.start(covered, bounds);
+    encode_sparse(s, image, rect, base, pole);
     s.scatter_encoder.finish(out);
     return covered;
   }
-  s.dense.put(out, image, rect, full ? nullptr : &s.mask, base);
+  s.dense.put(out, image, rect, full ? nullptr : &s.mask, base, bounds);
   return covered;
 }
 
-std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect) {
+std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect, const TileBounds& bounds) {
   const auto kind = in.u8();
   if (kind == kEmpty) {
     clear(image, rect);
@@ -123,15 +140,20 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
     clear(image, rect);
   }
   if (sparse) {
-    if (!may_be_sparse(covered, pixels) || !s.scatter_decoder.start(in, covered)) return std::nullopt;
-    if (!decode_sparse(s, image, rect, *base) || !s.scatter_decoder.finished()) return std::nullopt;
+    if (!may_be_sparse(covered, pixels)) return std::nullopt;
+    const auto pole = bounds.normal != 0 ? in.u8() : std::optional<uint8_t>(kRaw);
+    if (!pole || (bounds.normal != 0 && *pole >= kPoles) || !s.scatter_decoder.start(in, covered, bounds))
+      return std::nullopt;
+    const Pixel first{bounds.depth != nullptr ? bounds.depth->code(base->depth) : base->depth, base->colour,
+                      base->normal};
+    if (!decode_sparse(s, image, rect, first, *pole) || !s.scatter_decoder.finished()) return std::nullopt;
     return covered;
   }
-  if (covered == 0 || !s.dense.get(in, image, rect, full ? nullptr : &s.mask, *base)) return std::nullopt;
+  if (covered == 0 || !s.dense.get(in, image, rect, full ? nullptr : &s.mask, *base, bounds)) return std::nullopt;
   return covered;
 }
 
-bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
+bool skip_tile(Reader& in, const TileRect& rect, const ErrorBounds& bounds, StreamInfo& info) {
   const auto kind = in.u8();
   if (kind == kEmpty) return true;
   if (!kind || *kind & ~kKnownBits || !get_base(in)) return false;
@@ -152,7 +174,10 @@ bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
     total += before - in.left();
     return true;
   };
-  if ((*kind & kPredictorBits) == kSparse) return skip(info.sparse_bytes, 2);
+  if ((*kind & kPredictorBits) == kSparse) {
+    if (bounds.normal != 0 && !in.u8()) return false;
+    return skip(info.sparse_bytes, 2);
+  }
   return DenseCoder::skip(in, info);
 }
 

@@ -2,7 +2,7 @@
 //   tile = u8 kind, and unless it is empty: base, [mask], and a dense tile (dense/dense.h) or a sparse one
 //          (scatter_coder.h)
 //   kind = kEmpty | kDense | kSparse, + kMasked unless all pixels are covered
-//   base = depth (3 bytes), colour (3), normal (2) of the first covered pixel
+//   base = depth (3 bytes; within bounds its index), colour (3), normal (2) of the first covered pixel
 #pragma once
 
 #include <cstddef>
@@ -29,10 +29,11 @@ struct TileGrid {
 };
 
 /// Appends the pixels of `rect`; returns the number of covered ones.
-size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect);
+size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect,
+                const TileBounds& bounds);
 /// Writes all pixels of `rect`; returns the number of covered ones, or nothing where the stream is damaged.
-std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect);
+std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect, const TileBounds& bounds);
 /// Adds the covered pixels and the bytes of a tile of the size of `rect` to `info`; false where the stream is damaged.
-[[nodiscard]] bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info);
+[[nodiscard]] bool skip_tile(Reader& in, const TileRect& rect, const ErrorBounds& bounds, StreamInfo& info);
 
 }  // namespace telesplat::codec::detail

@@ -1,5 +1,7 @@
 #include "common/codec/walk.h"
 
+#include "common/image/normal.h"
+
 namespace telesplat::codec::detail {
 namespace {
 
@@ -7,24 +9,25 @@ Pixel at(const image::DepthImage& image, size_t i) { return {image.depth[i], ima
 
 }  // namespace
 
-void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base) {
-  s.predictor.start(base);
+void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole) {
+  s.predictor.start({base.depth, base.colour, turn_normal(base.normal, pole)});
   s.scatter_walk(s.mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
-    const Pixel pixel = at(image, rect.index(x, y));
+    Pixel pixel = at(image, rect.index(x, y));
+    if (pole != kRaw) pixel.normal = turn_normal(image::canonical_normal16(pixel.normal), pole);
     const Magnitudes size = s.scatter_encoder.put(pixel, s.predictor.predict(x, y, neighbours));
     s.predictor.add(x, y, pixel, size);
     return true;
   });
 }
 
-bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
-  s.predictor.start(base);
+bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole) {
+  s.predictor.start({base.depth, base.colour, turn_normal(base.normal, pole)});
   return s.scatter_walk(s.mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
     Magnitudes size;
     const auto pixel = s.scatter_decoder.get(s.predictor.predict(x, y, neighbours), size);
     if (!pixel) return false;
     const size_t i = rect.index(x, y);
-    image.depth[i] = pixel->depth, image.colour[i] = pixel->colour, image.normal[i] = pixel->normal;
+    image.depth[i] = pixel->depth, image.colour[i] = pixel->colour, image.normal[i] = turn_back(pixel->normal, pole);
     s.predictor.add(x, y, *pixel, size);
     return true;
   });

@@ -22,10 +22,11 @@ struct TileScratch {
 };
 
 /// Pixels of a sparse tile that s.mask covers -> s.scatter_encoder, which was started. `base`: what predicts the first
-/// pixel.
-void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base);
+/// pixel. pole: by which normals are turned; kRaw: they are coded as they are.
+void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRect& rect, const Pixel& base, int pole);
 /// s.scatter_decoder, which was started -> pixels covered by s.mask; others are left alone (they are zero). False where
 /// the stream is damaged.
-[[nodiscard]] bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base);
+[[nodiscard]] bool decode_sparse(TileScratch& s, image::DepthImage& image, const TileRect& rect, const Pixel& base,
+                                 int pole);
 
 }  // namespace telesplat::codec::detail

@@ -1,4 +1,5 @@
-// Any bytes through the depth-image decoder: an error, or a canonical image that survives another round trip.
+// Any bytes through the depth-image decoder: an error, or a canonical image that survives another round trip, and one
+// within the same bounds, whose refinement makes it exact.
 #include <cstdlib>
 
 #include "common/codec/depth_codec.h"
@@ -18,5 +19,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (covered != info->covered_pixels || !test::is_canonical(*image)) std::abort();
   const auto again = codec::decode(codec::encode(*image), image->width, image->height);
   if (!again.ok() || !(*again == *image)) std::abort();
+  if (info->bounds.exact()) return 0;
+  const auto bounded = codec::decode(codec::encode(*image, info->bounds), image->width, image->height);
+  if (!bounded.ok() || !test::is_canonical(*bounded)) std::abort();
+  const auto exact = codec::decode_refinement(codec::encode_refinement(*image, *bounded), *bounded);
+  if (!exact.ok() || !(*exact == *image)) std::abort();
   return 0;
 }

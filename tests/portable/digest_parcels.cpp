@@ -56,8 +56,7 @@ uint64_t scatter(const Parcel& p) {
   return bits.finished() ? digest.value() : 0;
 }
 
-uint64_t depth(const Parcel& p) {
-  const auto image = codec::decode({p.begin, p.end});
+uint64_t digest_of(const Result<image::DepthImage>& image) {
   if (!image.ok()) return 0;
   Digest digest;
   for (const int n : {image->width, image->height}) digest.add(static_cast<uint32_t>(n));
@@ -66,13 +65,24 @@ uint64_t depth(const Parcel& p) {
   return digest.value();
 }
 
+uint64_t depth(const Parcel& p) { return digest_of(codec::decode({p.begin, p.end})); }
+
+uint64_t refinement(const Parcel& p) {
+  const uint8_t* at = p.begin;
+  const auto bytes = take<uint32_t>(at);
+  const auto bounded = codec::decode({at, bytes});
+  return bounded.ok() ? digest_of(codec::decode_refinement({at + bytes, p.end}, *bounded)) : 0;
+}
+
 struct Row {
   Kind kind;
   const char* name;
   uint64_t (*decode)(const Parcel&);
 };
-constexpr Row kRows[] = {
-    {Kind::kGolomb, "golomb", golomb}, {Kind::kScatter, "scatter", scatter}, {Kind::kDepth, "depth", depth}};
+constexpr Row kRows[] = {{Kind::kGolomb, "golomb", golomb},
+                         {Kind::kScatter, "scatter", scatter},
+                         {Kind::kDepth, "depth", depth},
+                         {Kind::kRefinement, "refinement", refinement}};
 
 // Whether it came out as it went in.
 bool tell(int number, const Parcel& p) {

@@ -92,12 +92,25 @@ void add_scatter(File& file, const image::DepthImage& image, const Mask& mask) {
   file.add(Kind::kScatter, out, digest.value());
 }
 
-void add_depth(File& file, const image::DepthImage& image) {
+uint64_t digest_of(const image::DepthImage& image) {
   Digest digest;
   for (const int n : {image.width, image.height}) digest.add(static_cast<uint32_t>(n));
   for (size_t i = 0; i < image.pixels(); ++i)
     for (const uint32_t v : {image.depth[i], image.colour[i], uint32_t{image.normal[i]}}) digest.add(v);
-  file.add(Kind::kDepth, codec::encode(image), digest.value());
+  return digest.value();
+}
+
+// Exact, within bounds, and what makes that exact.
+void add_depth(File& file, const image::DepthImage& image) {
+  file.add(Kind::kDepth, codec::encode(image), digest_of(image));
+  image::DepthImage bounded;
+  const auto stream = codec::encode(image, codec::error_bounds(1 / 32.0, 2 / 1280.0, 1, 1), &bounded);
+  file.add(Kind::kDepth, stream, digest_of(bounded));
+  Bytes out;
+  put(out, static_cast<uint32_t>(stream.size()));
+  append(out, stream);
+  append(out, codec::encode_refinement(image, bounded));
+  file.add(Kind::kRefinement, out, digest_of(image));
 }
 
 bool write(const char* path) {

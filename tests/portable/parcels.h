@@ -14,8 +14,9 @@ namespace telesplat::portable {
 enum class Kind : uint8_t {
   kGolomb = 1,  ///< u32 count, u32 expected; bits of GolombContext
   kScatter =
-      3,      ///< u32 width, height, count; u16 x, y of each pixel; residuals of ScatterPredictor, by one GolombContext
-  kDepth = 4  ///< a stream of codec::encode
+      3,  ///< u32 width, height, count; u16 x, y of each pixel; residuals of ScatterPredictor, by one GolombContext
+  kDepth = 4,      ///< a stream of codec::encode
+  kRefinement = 5  ///< u32 bytes of a stream of codec::encode, the stream; one of codec::encode_refinement
 };
 
 /// FNV-1a, 64 bit, of 32-bit numbers.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numeric>
 
 #include "common/codec/golomb.h"
 
@@ -10,23 +11,27 @@ namespace {
 
 constexpr int kShifts[3] = {8, 16, 0};  // green, red, blue
 
-// Colours seen, by open addressing.
+// Colours seen, by open addressing, and what stands for each.
 class ColourTable {
  public:
-  ColourTable() { slots_.fill({kNone, 0}); }
-  // The place of `colour`, which is entered if it is new.
-  uint32_t& operator[](uint32_t colour) {
+  ColourTable() { std::fill_n(colours_, kSlots, kNone); }
+  // The slot of `colour`, or the one that it should enter.
+  size_t find(uint32_t colour) const {
     size_t at = (colour * 0x9E3779B1u) >> 20;
-    while (slots_[at].first != colour && slots_[at].first != kNone) at = (at + 1) % slots_.size();
-    if (slots_[at].first == kNone) slots_[at] = {colour, kNone}, ++count_;
-    return slots_[at].second;
+    while (colours_[at] != colour && colours_[at] != kNone) at = (at + 1) % kSlots;
+    return at;
   }
-  size_t count() const { return count_; }
-  static constexpr uint32_t kNone = 0xFFFFFFFF;
+  bool has(size_t slot) const { return colours_[slot] != kNone; }
+  void enter(size_t slot, uint32_t colour, size_t place) {
+    colours_[slot] = colour, places_[slot] = static_cast<uint16_t>(place);
+  }
+  uint16_t place(size_t slot) const { return places_[slot]; }
 
  private:
-  std::array<std::pair<uint32_t, uint32_t>, 4096> slots_;
-  size_t count_ = 0;
+  static constexpr uint32_t kNone = 0xFFFFFFFF;
+  static constexpr size_t kSlots = 4096;
+  uint32_t colours_[kSlots];
+  uint16_t places_[kSlots];
 };
 
 int8_t difference(uint32_t a, uint32_t b) { return static_cast<int8_t>(static_cast<uint8_t>(a - b)); }
@@ -95,55 +100,91 @@ bool get_height(HeightModel& height, BitReader& bits) {
 
 }  // namespace
 
+// The colours in the order in which they come, and the place of each pixel's. False where they are too many.
 bool ColourPlanes::make_palette(const TileShape& shape, const std::vector<uint32_t>& colours) {
   ColourTable table;
   palette_.clear(), first_.clear();
-  uint32_t last = ColourTable::kNone;
-  for (size_t y = 0; y < shape.height; ++y)
-    for (size_t x = 0; x < shape.width; ++x) {
-      const uint32_t colour = colours[y * shape.width + x];
-      if (colour == last || !shape.at(x, y)) continue;
-      last = colour;
-      uint32_t& place = table[colour];
-      if (place != ColourTable::kNone) continue;
-      if (palette_.size() == kMostColours) return false;
-      place = 0, palette_.push_back(colour);
-      first_.push_back({static_cast<float>(x), static_cast<float>(y), 0, colour});
+  index.reset(shape, 4, 254);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const uint32_t* const from = colours.data() + y * shape.width;
+    int16_t* const places = index.values.row(static_cast<ptrdiff_t>(y));
+    const auto look_up = [&](size_t x) {
+      const uint32_t colour = from[x];
+      const size_t slot = table.find(colour);
+      if (!table.has(slot)) [[unlikely]] {
+        table.enter(slot, colour, palette_.size());
+        palette_.push_back(colour);
+        first_.push_back({static_cast<float>(x), static_cast<float>(y), 0, colour});
+      }
+      places[x] = static_cast<int16_t>(table.place(slot));
+    };
+    if (shape.full(y)) {
+      for (size_t x = 0; x < shape.width && palette_.size() <= kMostColours; ++x) look_up(x);
+    } else {
+      std::fill_n(places, shape.width, int16_t{0});
+      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), [&](size_t x) {
+        if (palette_.size() <= kMostColours) look_up(x);
+      });
     }
+    if (palette_.size() > kMostColours) return false;
+  }
   return true;
 }
 
 // By height where that explains the colours, else by brightness.
-void ColourPlanes::sort_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth,
-                                const GeometryModel* geometry) {
+void ColourPlanes::sort_palette(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry) {
   const float x0 = static_cast<float>(shape.width / 2), y0 = static_cast<float>(shape.height / 2);
   const auto code_at = [&](float x, float y) {
     return static_cast<float>(depth.depth.row(static_cast<ptrdiff_t>(y))[static_cast<size_t>(x)]);
   };
   double rays[3][3];
-  has_height_ = false;
-  if (geometry != nullptr && rays_of(*geometry, rays)) {
-    ColourTable table;
-    for (uint32_t i = 0; i < palette_.size(); ++i) table[palette_[i]] = i;
-    for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
-    height_samples_.clear();
-    for (const auto p : samples_.places) {
-      const auto x = static_cast<float>(p.x), y = static_cast<float>(p.y);
-      const uint32_t colour = colours[static_cast<size_t>(p.y) * shape.width + static_cast<size_t>(p.x)];
-      height_samples_.push_back({x - x0, y - y0, code_at(x, y), colour, table[colour]});
-    }
-    has_height_ = fit_height(rays, height_samples_, first_, palette_, height_);
+  const bool has_rays = geometry != nullptr && rays_of(*geometry, rays);
+  for (HeightSample& s : first_) s.code = code_at(s.x, s.y), s.x -= x0, s.y -= y0;
+  height_samples_.clear();
+  for (size_t i = 0; i < samples_.places.size(); i += 2) {
+    const auto p = samples_.places[i];
+    const auto x = static_cast<float>(p.x), y = static_cast<float>(p.y);
+    const auto place = static_cast<uint32_t>(index.values.row(p.y)[p.x]);
+    height_samples_.push_back({x - x0, y - y0, code_at(x, y), palette_[place], place});
   }
-  if (has_height_) return;
+  has_height_ = fit_axis(has_rays ? rays : nullptr, height_samples_, first_, height_);
+  if (has_height_) return sort_by_height(shape, depth);
   std::sort(palette_.begin(), palette_.end(), [](uint32_t a, uint32_t b) {
     const auto brightness = [](uint32_t c) { return (c >> 16 & 255) + 2 * (c >> 8 & 255) + (c & 255); };
     return brightness(a) != brightness(b) ? brightness(a) < brightness(b) : a < b;
   });
 }
 
+// All pixels say at which height a colour lies: few would sort colours badly that have few of them.
+void ColourPlanes::sort_by_height(const TileShape& shape, const DepthPlane& depth) {
+  std::vector<ColourHeight> heights(palette_.size());
+  begin_index(shape, depth);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const int16_t *const places = index.values.row(r), *const height = index.guide.row(r);
+    ColourHeight* const at = heights.data();
+    const auto add = [&](size_t x) { at[places[x]].sum += static_cast<uint32_t>(height[x]), ++at[places[x]].pixels; };
+    if (shape.full(y))
+      for (size_t x = 0; x < shape.width; ++x) add(x);
+    else
+      for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), add);
+  }
+  std::vector<uint32_t> order(palette_.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) {
+    const double a = heights[i].mean(), b = heights[j].mean();
+    return a != b ? a < b : palette_[i] < palette_[j];
+  });
+  std::vector<uint32_t> palette(order.size());
+  std::vector<ColourHeight> sorted(order.size());
+  for (size_t i = 0; i < order.size(); ++i) palette[i] = palette_[order[i]], sorted[i] = heights[order[i]];
+  palette_ = palette;
+  fit_knots(sorted, height_);
+}
+
 void ColourPlanes::begin_index(const TileShape& shape, const DepthPlane& depth) {
   const int last = static_cast<int>(palette_.size()) - 1;
-  index.reset(shape, 4, last);
+  index.reset(shape, 4, last);  // keeps the values
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     if (has_height_)
@@ -164,20 +205,63 @@ void ColourPlanes::begin_channels(const TileShape& shape) {
   }
 }
 
-void ColourPlanes::encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours,
-                                  const DepthPlane& depth) {
+// Colours beside each other become one, as long as it is near enough to all of them. Returns where each is then.
+std::vector<int16_t> ColourPlanes::join_palette(int reach) {
+  std::vector<int16_t> to(palette_.size());
+  std::vector<uint32_t> joined;
+  std::vector<size_t> begins;
+  const auto channel = [](uint32_t colour, int c) { return static_cast<int>(colour >> kShifts[c] & 255); };
+  for (size_t i = 0; i < palette_.size();) {
+    int low[3], high[3];
+    for (int c = 0; c < 3; ++c) low[c] = high[c] = channel(palette_[i], c);
+    const size_t first = i;
+    for (; i < palette_.size(); ++i) {
+      bool near = true;
+      for (int c = 0; c < 3; ++c) {
+        const int v = channel(palette_[i], c);
+        near &= std::max(high[c], v) - std::min(low[c], v) <= 2 * reach;
+      }
+      if (!near) break;
+      for (int c = 0; c < 3; ++c)
+        low[c] = std::min(low[c], channel(palette_[i], c)), high[c] = std::max(high[c], channel(palette_[i], c));
+      to[i] = static_cast<int16_t>(joined.size());
+    }
+    begins.push_back(first);
+    uint32_t middle = 0;
+    for (int c = 0; c < 3; ++c) middle |= static_cast<uint32_t>((low[c] + high[c]) / 2) << kShifts[c];
+    joined.push_back(middle);
+  }
+  begins.push_back(palette_.size());
+  // What a height stood for: the same part of the way through its colours.
+  if (has_height_)
+    for (int16_t& knot : height_.knots) {
+      const int old = std::clamp(knot + 8, 0, static_cast<int>(palette_.size()) * 16 - 1);  // 16ths, from its lower end
+      const int16_t place = to[static_cast<size_t>(old / 16)];
+      const int first = static_cast<int>(begins[static_cast<size_t>(place)]),
+                end = static_cast<int>(begins[static_cast<size_t>(place) + 1]);
+      knot = static_cast<int16_t>(place * 16 + (old - first * 16) / (end - first) - 8);
+      knot = std::max(knot, int16_t{0});
+    }
+  palette_ = std::move(joined);
+  return to;
+}
+
+// index.values: places in the palette before it was sorted.
+void ColourPlanes::encode_palette(const TileShape& shape, const DepthPlane& depth, int reach) {
   ColourTable table;
-  for (uint32_t i = 0; i < palette_.size(); ++i) table[palette_[i]] = i;
+  for (size_t i = 0; i < palette_.size(); ++i) table.enter(table.find(palette_[i]), palette_[i], i);
+  int16_t values[kMostColours];
+  for (size_t i = 0; i < palette_.size(); ++i)
+    values[i] = static_cast<int16_t>(table.place(table.find(first_[i].colour)) * 16);
+  if (reach > 0) {
+    const std::vector<int16_t> to = join_palette(reach);
+    for (size_t i = 0; i < first_.size(); ++i)
+      values[i] = static_cast<int16_t>(to[static_cast<size_t>(values[i] / 16)] * 16);
+  }
   begin_index(shape, depth);
   for (size_t y = 0; y < shape.height; ++y) {
     int16_t* const row = index.values.row(static_cast<ptrdiff_t>(y));
-    uint32_t last = palette_[0];
-    auto value = static_cast<int16_t>(0);
-    for (size_t x = 0; x < shape.width; ++x) {
-      const uint32_t colour = colours[y * shape.width + x];
-      if (colour != last && shape.at(x, y)) last = colour, value = static_cast<int16_t>(table[colour] * 16);
-      row[x] = value;
-    }
+    for (size_t x = 0; x < shape.width; ++x) row[x] = values[row[x]];
     index.finish_row(shape, y);
   }
   index.encode(shape, samples_, nullptr);
@@ -185,14 +269,16 @@ void ColourPlanes::encode_palette(const TileShape& shape, const std::vector<uint
 
 void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours) {
   begin_channels(shape);
+  uint8_t indices[256];
+  for (int v = 0; v < 256; ++v) indices[v] = static_cast<uint8_t>(lattice_.index(v));
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const uint32_t* const from = colours.data() + y * shape.width;
     for (size_t c = 0; c < 3; ++c) {
       uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
-      for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(from[x] >> kShifts[c]);
+      for (size_t x = 0; x < shape.width; ++x) row[x] = indices[from[x] >> kShifts[c] & 255];
       if (c > 0 && mode == kDifferences)
-        for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(row[x] - (from[x] >> 8));
+        for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<uint8_t>(row[x] - indices[from[x] >> 8 & 255]);
       shape.for_each_hole(y, [&](size_t x) { row[x] = above[x]; });
       above[-1] = row[-1] = above[0];
       kernels().median_residuals(above, row, shape.width, channel[c].symbols.narrow.row(r),
@@ -203,14 +289,15 @@ void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uin
 }
 
 void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
-                          const DepthPlane& depth, const GeometryModel* geometry) {
+                          const DepthPlane& depth, const GeometryModel* geometry, int reach) {
+  lattice_ = ColourLattice(reach);
   if (all_same(shape, colours, base)) {
     mode = kPlain;
   } else if (make_palette(shape, colours)) {
     mode = kPalette;
-    samples_.choose(shape, std::min<size_t>(2 * kMostSamples, shape.total / 12));
-    sort_palette(shape, colours, depth, geometry);
-    encode_palette(shape, colours, depth);
+    samples_.choose(shape, std::min<size_t>(kMostSamples, shape.total / 12));
+    sort_palette(shape, depth, geometry);
+    encode_palette(shape, depth, reach);
   } else {
     mode = follows_green(shape, colours) ? kDifferences : kChannels;
     encode_channels(shape, colours);
@@ -232,7 +319,8 @@ void ColourPlanes::put_header(BitSink& bits) const {
   index.put_weights(bits);
 }
 
-bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits) {
+bool ColourPlanes::decode_header(const TileShape& shape, const DepthPlane& depth, int reach, BitReader& bits) {
+  lattice_ = ColourLattice(reach);
   if (mode == kPlain) return true;
   if (mode != kPalette) {
     begin_channels(shape);
@@ -260,14 +348,10 @@ bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colour
   if (mode == kPalette) {
     index.decode_sums(shape, y, nullptr);
     decode_values(index, shape, y);
-    const int16_t* const row = index.values.row(r);
-    int most = 0;
-    for (size_t x = 0; x < shape.width; ++x) {
-      const int i = row[x] >> 4;
-      if (shape.at(x, y)) most = std::max(most, i);
-      colours[x] = palette_[std::min(static_cast<size_t>(i), palette_.size() - 1)];
-    }
-    return static_cast<size_t>(most) < palette_.size();
+    const int16_t* const row = index.values.row(r);  // none is beyond the last colour: decode_values() sees to that
+    const uint32_t* const palette = palette_.data();
+    for (size_t x = 0; x < shape.width; ++x) colours[x] = palette[row[x] >> 4];
+    return true;
   }
   for (size_t c = 0; c < 3; ++c) {
     uint8_t *const row = channel[c].values.row(r), *const above = channel[c].values.row(r - 1);
@@ -285,8 +369,16 @@ bool ColourPlanes::decode_row(const TileShape& shape, size_t y, uint32_t* colour
   const uint8_t *const g = channel[0].values.row(r), *const red = channel[1].values.row(r),
                        *const blue = channel[2].values.row(r);
   const uint32_t add = mode == kDifferences ? 0xFF : 0;
+  if (lattice_.step() == 1) {
+    for (size_t x = 0; x < shape.width; ++x)
+      colours[x] = ((red[x] + (g[x] & add)) & 255) << 16 | uint32_t{g[x]} << 8 | ((blue[x] + (g[x] & add)) & 255);
+    return true;
+  }
+  uint32_t values[256];
+  for (int i = 0; i < 256; ++i) values[i] = static_cast<uint32_t>(lattice_.value(i));
   for (size_t x = 0; x < shape.width; ++x)
-    colours[x] = ((red[x] + (g[x] & add)) & 255) << 16 | uint32_t{g[x]} << 8 | ((blue[x] + (g[x] & add)) & 255);
+    colours[x] =
+        values[(red[x] + (g[x] & add)) & 255] << 16 | values[g[x]] << 8 | values[(blue[x] + (g[x] & add)) & 255];
   return true;
 }
 

@@ -8,6 +8,7 @@
 #include "common/codec/dense/depth.h"
 #include "common/codec/dense/guided.h"
 #include "common/codec/dense/height.h"
+#include "common/codec/lattice.h"
 
 namespace telesplat::codec::detail {
 
@@ -16,14 +17,16 @@ struct ColourPlanes {
   static constexpr size_t kMostColours = 1024;
 
   /// colours: row by row in all the tile's width, of covered pixels; `base`: of the first.
-  /// geometry: of the normals; null: none.
+  /// geometry: of the normals; null: none. reach: how far a channel may be off.
   void encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base, const DepthPlane& depth,
-              const GeometryModel* geometry);
+              const GeometryModel* geometry, int reach);
   size_t planes() const { return mode == kPlain ? 0 : mode == kPalette ? 1 : 3; }
   SymbolPlane& symbols(size_t i) { return mode == kPalette ? index.symbols : channel[i].symbols; }
   void put_header(BitSink& bits) const;
+  /// About what the header takes.
+  size_t header_bits() const { return mode == kPalette ? 10 * palette_.size() + (has_height_ ? 400 : 0) : 24; }
   size_t most_header_bits() const { return 4096 + 3 * 51 * kMostColours + GuidedPlane::kMostWeightBits; }
-  [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, BitReader& bits);
+  [[nodiscard]] bool decode_header(const TileShape& shape, const DepthPlane& depth, int reach, BitReader& bits);
   /// Row y from its symbols, into colours of all its pixels; false where an index has no colour.
   [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t* colours);
 
@@ -35,15 +38,17 @@ struct ColourPlanes {
     SymbolPlane symbols;
   };
   bool make_palette(const TileShape& shape, const std::vector<uint32_t>& colours);
-  void sort_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth,
-                    const GeometryModel* geometry);
-  void encode_palette(const TileShape& shape, const std::vector<uint32_t>& colours, const DepthPlane& depth);
+  void sort_palette(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry);
+  std::vector<int16_t> join_palette(int reach);
+  void encode_palette(const TileShape& shape, const DepthPlane& depth, int reach);
+  void sort_by_height(const TileShape& shape, const DepthPlane& depth);
   void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
   void begin_index(const TileShape& shape, const DepthPlane& depth);
   void begin_channels(const TileShape& shape);
 
   std::vector<uint32_t> palette_;
   std::vector<HeightSample> first_, height_samples_;  ///< first_: a pixel of each colour
+  ColourLattice lattice_{0};                          ///< of channels
   bool has_height_ = false;
   HeightModel height_;
   GuidedPlane index;

@@ -61,17 +61,19 @@ void DenseCoder::load(const image::DepthImage& image, const TileRect& rect) {
 }
 
 void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
-                     const Pixel& base) {
+                     const Pixel& base, const TileBounds& bounds) {
   begin(rect, mask);
   depth_.reset(shape_, base.depth);
-  normals_.reset(shape_);
+  normals_.reset(shape_, bounds.normal);
   load(image, rect);
+  if (bounds.depth != nullptr) depth_.to_indices(shape_, *bounds.depth);
   std::vector<uint8_t> headers;
   writer_.start(PlaneEncoder::kMostBits);
   depth_.encode(shape_, base.depth);
   writer_.sink.put(depth_.by_planes, 1);
   encoders_[0].prepare(depth_.symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
+  if (bounds.depth != nullptr) depth_.to_codes(shape_, *bounds.depth);
   depth_.extend(shape_);
 
   writer_.start(NormalPlanes::kMostBits + 2 * PlaneEncoder::kMostBits);
@@ -79,7 +81,7 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   for (size_t i = 0; i < 2; ++i) encoders_[1 + i].prepare(normals_.plane[i].symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
 
-  colours_.encode(shape_, colour_rows_, base.colour, depth_, normals_.geometry());
+  colours_.encode(shape_, colour_rows_, base.colour, depth_, normals_.geometry(), bounds.colour);
   writer_.start(colours_.most_header_bits() + 3 * PlaneEncoder::kMostBits);
   colours_.put_header(writer_.sink);
   for (size_t i = 0; i < colours_.planes(); ++i) encoders_[3 + i].prepare(colours_.symbols(i), shape_, writer_.sink);
@@ -109,7 +111,8 @@ void DenseCoder::put_words(std::vector<uint8_t>& out) {
   put_varint(out, static_cast<uint32_t>(ends[0] - ends[1]) / 2);
   put_varint(out, static_cast<uint32_t>(ends[1] - ends[2]) / 2);
   put_varint(out, static_cast<uint32_t>(ends[2] - words_.data()) / 2);
-  const bool any = std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
+  // Where there are words states follow them: kernels read beyond a word's end.
+  const bool any = at != words_.data() || std::any_of(states, states + kLanes, [](uint32_t x) { return x != kStateLow; });
   const size_t lanes = any ? std::min(kLanes, shape_.width) : 0;
   out.push_back(static_cast<uint8_t>(lanes));
   const size_t end = out.size();
@@ -142,19 +145,20 @@ std::optional<DenseCoder::Parts> DenseCoder::get_parts(Reader& in) {
   return parts;
 }
 
-bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask, const Pixel& base) {
+bool DenseCoder::get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask, const Pixel& base,
+                     const TileBounds& bounds) {
   begin(rect, mask);
   const auto parts = get_parts(in);
   if (!parts) return false;
   const size_t lanes = parts->states.size() / 4;
-  if (lanes != 0 && lanes != std::min(kLanes, shape_.width)) return false;
+  if (lanes != (lanes != 0 || !parts->words.empty() ? std::min(kLanes, shape_.width) : 0)) return false;
   std::fill_n(source_.states, kLanes, kStateLow);
   if (lanes != 0) std::memcpy(source_.states, parts->states.data(), 4 * lanes);
   for (const uint32_t x : source_.states)
     if (x < kStateLow || x >= kStateLow << 16) return false;
   source_.end = parts->words.data() + parts->words.size();
-  if (!get_depth(*parts, image, rect, base) || !get_normals(*parts, image, rect, base) ||
-      !get_colours(*parts, image, rect, base))
+  if (!get_depth(*parts, image, rect, base, bounds.depth) || !get_normals(*parts, image, rect, base, bounds.normal) ||
+      !get_colours(*parts, image, rect, base, bounds.colour))
     return false;
   return std::all_of(source_.states, source_.states + kLanes, [](uint32_t x) { return x == kStateLow; });
 }
@@ -180,22 +184,25 @@ void DenseCoder::store(const T* row, size_t y, std::vector<T>& out, const TileRe
   }
 }
 
-bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
+                           const DepthLattice* lattice) {
   begin_part(parts, 0);
   depth_.reset(shape_, base.depth);
   depth_.begin_decoding(shape_, reader_.source.take(1) != 0);
   if (!decoders_[0].prepare(depth_.symbols, reader_) || !reader_.finished()) return false;
-  for (size_t y = 0; y < shape_.height; ++y) {
-    if (!decoders_[0].get_row(depth_.symbols, shape_, y, source_) || !depth_.decode_row(shape_, y)) return false;
-    store(depth_.depth.row(static_cast<ptrdiff_t>(y)), y, image.depth, rect);
-  }
+  const uint32_t most = lattice != nullptr ? lattice->last() : image::kMaxDepthCode;
+  for (size_t y = 0; y < shape_.height; ++y)
+    if (!decoders_[0].get_row(depth_.symbols, shape_, y, source_) || !depth_.decode_row(shape_, y, most)) return false;
+  if (lattice != nullptr) depth_.to_codes(shape_, *lattice);
+  for (size_t y = 0; y < shape_.height; ++y) store(depth_.depth.row(static_cast<ptrdiff_t>(y)), y, image.depth, rect);
   depth_.extend(shape_);
   return source_.end == source_.begin;
 }
 
-bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
+                             int reach) {
   begin_part(parts, 1);
-  normals_.reset(shape_);
+  normals_.reset(shape_, reach);
   if (!normals_.decode_header(shape_, depth_, base.normal, reader_)) return false;
   for (size_t i = 0; i < 2; ++i)
     if (!decoders_[1 + i].prepare(normals_.plane[i].symbols, reader_)) return false;
@@ -210,10 +217,11 @@ bool DenseCoder::get_normals(const Parts& parts, image::DepthImage& image, const
   return source_.end == source_.begin;
 }
 
-bool DenseCoder::get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base) {
+bool DenseCoder::get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
+                             int reach) {
   begin_part(parts, 2);
   colours_.mode = parts.colour_mode;
-  if (!colours_.decode_header(shape_, depth_, reader_)) return false;
+  if (!colours_.decode_header(shape_, depth_, reach, reader_)) return false;
   for (size_t i = 0; i < colours_.planes(); ++i)
     if (!decoders_[3 + i].prepare(colours_.symbols(i), reader_)) return false;
   if (!reader_.finished()) return false;

@@ -19,12 +19,13 @@ namespace telesplat::codec::detail {
 /// What codes dense tiles. One a thread: it keeps its memory.
 class DenseCoder {
  public:
-  /// Appends the pixels of `rect`, all of them or those that `mask` covers. `base`: the first of them.
+  /// Appends the pixels of `rect`, all of them or those that `mask` covers. `base`: the first of them; its depth is an
+  /// index of the bounds' lattice, if there is one.
   void put(std::vector<uint8_t>& out, const image::DepthImage& image, const TileRect& rect, const Mask* mask,
-           const Pixel& base);
+           const Pixel& base, const TileBounds& bounds);
   /// Writes the covered pixels of `rect`; false where the stream is damaged.
   [[nodiscard]] bool get(Reader& in, image::DepthImage& image, const TileRect& rect, const Mask* mask,
-                         const Pixel& base);
+                         const Pixel& base, const TileBounds& bounds);
   /// Adds the bytes of a tile with `covered` pixels to `info`; false where the stream is cut off.
   [[nodiscard]] static bool skip(Reader& in, StreamInfo& info);
 
@@ -40,9 +41,12 @@ class DenseCoder {
   void load(const image::DepthImage& image, const TileRect& rect);
   void put_words(std::vector<uint8_t>& out);
   void begin_part(const Parts& parts, size_t part);
-  [[nodiscard]] bool get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base);
-  [[nodiscard]] bool get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base);
-  [[nodiscard]] bool get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base);
+  [[nodiscard]] bool get_depth(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
+                               const DepthLattice* lattice);
+  [[nodiscard]] bool get_normals(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
+                                 int reach);
+  [[nodiscard]] bool get_colours(const Parts& parts, image::DepthImage& image, const TileRect& rect, const Pixel& base,
+                                 int reach);
   template <class T>
   void store(const T* row, size_t y, std::vector<T>& out, const TileRect& rect) const;
 

@@ -52,6 +52,23 @@ void DepthPlane::encode(const TileShape& shape, uint32_t base) {
   }
 }
 
+void DepthPlane::to_indices(const TileShape& shape, const DepthLattice& lattice) {
+  for (size_t y = 0; y < shape.height; ++y) {
+    uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
+    for (size_t x = 0; x < shape.width; ++x) row[x] = lattice.index(row[x]);  // 0, nothing, is an index of its own
+  }
+}
+
+// What is predicted of pixels that are not covered may be no index: the last one.
+void DepthPlane::to_codes(const TileShape& shape, const DepthLattice& lattice) {
+  const uint32_t* const codes = lattice.codes();
+  const uint32_t last = lattice.last();
+  for (size_t y = 0; y < shape.height; ++y) {
+    uint32_t* const row = depth.row(static_cast<ptrdiff_t>(y));
+    for (size_t x = 0; x < shape.width; ++x) row[x] = codes[std::min(row[x], last)];
+  }
+}
+
 // Tries every eighth row: which tokens take fewer bits.
 bool DepthPlane::choose_planes(const TileShape& shape) {
   symbols.reset(shape, true, kHits);
@@ -98,7 +115,7 @@ void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
   }
 }
 
-bool DepthPlane::decode_row(const TileShape& shape, size_t y) {
+bool DepthPlane::decode_row(const TileShape& shape, size_t y, uint32_t most) {
   const auto r = static_cast<ptrdiff_t>(y);
   begin_row(depth, y);
   uint32_t* const row = depth.row(r);
@@ -108,13 +125,13 @@ bool DepthPlane::decode_row(const TileShape& shape, size_t y) {
     kernels().depth_rows(depth.row(r - 1), symbols.wide.row(r), shape.width, row);
   }
   end_row(depth, y, shape.width);
-  uint32_t least = 1;
+  uint32_t largest = 0;  // of what is 1 less: 0 becomes the largest number
   if (shape.full(y))
-    for (size_t x = 0; x < shape.width; ++x) least = std::min(least, row[x]);
+    for (size_t x = 0; x < shape.width; ++x) largest = std::max(largest, row[x] - 1);
   else
     for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                 [&](size_t x) { least = std::min(least, row[x]); });
-  return least != 0;
+                 [&](size_t x) { largest = std::max(largest, row[x] - 1); });
+  return largest < most;
 }
 
 void DepthPlane::extend(const TileShape& shape) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/codec/dense/symbols.h"
+#include "common/codec/lattice.h"
 
 namespace telesplat::codec::detail {
 
@@ -21,8 +22,12 @@ struct DepthPlane {
   void encode(const TileShape& shape, uint32_t base);
   /// Before the first decode_row().
   void begin_decoding(const TileShape& shape, bool planes);
-  /// The next row from its symbols. False where a covered depth would be 0.
-  [[nodiscard]] bool decode_row(const TileShape& shape, size_t y);
+  /// Indices of `lattice` <-> the codes that they stand for, for all pixels, or those that are covered. What is coded
+  /// within bounds are indices.
+  void to_indices(const TileShape& shape, const DepthLattice& lattice);
+  void to_codes(const TileShape& shape, const DepthLattice& lattice);
+  /// The next row from its symbols. False where a covered depth would be 0, or above `most`.
+  [[nodiscard]] bool decode_row(const TileShape& shape, size_t y, uint32_t most);
   /// Continues slopes beyond the tile's edges, as geometry needs it, once all rows are known.
   void extend(const TileShape& shape);
 

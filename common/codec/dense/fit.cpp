@@ -1,8 +1,11 @@
 #include "common/codec/dense/fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
+
+#include "common/codec/dense/tables.h"
 
 namespace telesplat::codec::detail {
 namespace {
@@ -216,18 +219,18 @@ namespace {
 
 constexpr int kTerms = kFeatures;  // 13 differences from the guide at the pixel, the residual, 1, and what is wanted
 constexpr int kUnknown = 14, kWanted = 14;
-constexpr int kRounds = 3;
+constexpr int kRounds = 3, kRoughRounds = 1;  // of which the first, and what comes before, take half of the samples
 
 struct Features {
   float of[kTerms];
 };
 
-Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, const Plane<int16_t>* residual, int x,
-                     int y) {
+void set_features(Features& out, const Plane<int16_t>& own, const Plane<int16_t>& left, const Plane<int16_t>& guide,
+                  const Plane<int16_t>* residual, int x, int y) {
   const int16_t *row = own.row(y) + x, *up = own.row(y - 1) + x;
   const int16_t *g0 = guide.row(y - 1) + x, *g1 = guide.row(y) + x, *g2 = guide.row(y + 1) + x;
   const int c = g1[0];
-  const int raw[kTerms] = {row[-1] - c,
+  const int raw[kTerms] = {left.row(y)[x - 1] - c,
                            up[0] - c,
                            up[-1] - c,
                            up[1] - c,
@@ -243,15 +246,22 @@ Features features_at(const Plane<int16_t>& own, const Plane<int16_t>& guide, con
                            64,
                            row[0] - c,
                            0};
-  Features out;
   for (int i = 0; i < kTerms; ++i) out.of[i] = static_cast<float>(raw[i]);
-  return out;
+}
+
+// What the solution, whose last terms are -1 and 0, makes of a sample: how far off. In four parts, as vectors have them.
+float miss(const Features& f, const float solution[kTerms]) {
+  float parts[4] = {};
+  for (int i = 0; i < kTerms; i += 4)
+    for (int k = 0; k < 4; ++k) parts[k] += solution[i + k] * f.of[i + k];
+  return (parts[0] + parts[1]) + (parts[2] + parts[3]);
 }
 
 // Weighted least squares; false where the system is singular.
-bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, double solution[kUnknown]) {
+bool solve_weighted(const std::vector<Features>& all, const std::vector<float>& weights, size_t n,
+                    double solution[kUnknown]) {
   alignas(64) float sums[kTerms][kTerms];
-  kernels().normal_equations(&all[0].of, weights.data(), all.size(), sums);
+  kernels().normal_equations(&all[0].of, weights.data(), n, sums);
   Cholesky<kUnknown> system{};
   double trace = 0;
   for (int i = 0; i < kUnknown; ++i) trace += static_cast<double>(sums[i][i]);
@@ -281,29 +291,62 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
   return true;
 }
 
+// Bits that predictions leave, roughly: what tokens of the samples' residuals take. miss(f): how far one is off.
+template <class Miss>
+double bits_left(const std::vector<Features>& all, int bits, Miss miss) {
+  const float scale = 1 / static_cast<float>(1 << bits);
+  std::array<uint32_t, kSymbols> tokens{};
+  uint32_t raw = 0;
+  for (const Features& f : all) {
+    const auto off = static_cast<uint32_t>(std::min(std::abs(miss(f)) * scale + 0.5f, 1e6f));
+    const uint32_t token = token_of(2 * off);
+    ++tokens[token], raw += token >> 3;
+  }
+  return bits_of(tokens, kSymbols) + raw;
+}
+
+float median_miss(const Features& f) {
+  const float low = std::min(f.of[0], f.of[1]), high = std::max(f.of[0], f.of[1]);
+  return std::clamp(f.of[0] + f.of[1] - f.of[2], low, high) - f.of[kWanted];
+}
+
 }  // namespace
 
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
-                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant) {
-  std::vector<Features> all;
-  std::vector<float> shares;
-  if (samples.places.size() < 64 || all_same(samples, own)) return false;
-  for (const auto p : samples.places) {
-    all.push_back(features_at(own, guide, residual, p.x, p.y));
-    const float* const f = all.back().of;
+                const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant,
+                const Plane<int16_t>* left) {
+  const size_t n = samples.places.size();
+  if (n < 64 || all_same(samples, own)) return false;
+  std::vector<Features> all(n);
+  std::vector<float> shares(n);
+  const size_t few = n / 2;  // the first rounds need not be exact
+  for (size_t s = 0; s < n; ++s) {
+    const auto p = samples.places[s < few ? 2 * s : std::min(2 * (s - few) + 1, n - 1)];
+    set_features(all[s], own, left != nullptr ? *left : own, guide, residual, p.x, p.y);
+    const float* const f = all[s].of;
     const float near = 64 + std::abs(f[kWanted] - f[0]) + std::abs(f[kWanted] - f[1]) + std::abs(f[kWanted]) / 4;
-    shares.push_back(1 / (near * near));
+    shares[s] = 1 / (near * near);
   }
   double solution[kUnknown];
-  bool solved = solve_weighted(all, shares, solution);
+  bool solved = solve_weighted(all, shares, few, solution);
   for (int round = 0; solved && round < kRounds; ++round) {  // towards the median, at last beyond it
-    for (size_t s = 0; s < all.size(); ++s) {
-      float off = -all[s].of[kWanted];
-      for (int i = 0; i < kUnknown; ++i) off += static_cast<float>(solution[i]) * all[s].of[i];
-      const float size = (round + 1 < kRounds ? 24 : 64) + std::abs(off);
-      shares[s] = 1 / (round + 1 < kRounds ? size : size * size);
+    float terms[kTerms] = {};
+    for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
+    terms[kWanted] = -1;
+    const bool last = round + 1 == kRounds;
+    const size_t count = round < kRoughRounds ? few : n;
+    for (size_t s = 0; s < count; ++s) {
+      const float size = (last ? 64 : 24) + std::abs(miss(all[s], terms));
+      shares[s] = 1 / (last ? size * size : size);
     }
-    solved = solve_weighted(all, shares, solution);
+    solved = solve_weighted(all, shares, count, solution);
+  }
+  if (solved && left == nullptr) {
+    float terms[kTerms] = {};
+    for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
+    terms[kWanted] = -1;
+    solved =
+        bits_left(all, bits, [&](const Features& f) { return miss(f, terms); }) < bits_left(all, bits, median_miss);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   return solved && quantise_weights(solution, weights, constant);

@@ -23,10 +23,13 @@ struct Samples {
 bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Plane<int16_t>* const normal[2], int x0,
                   int y0, GeometryModel& model);
 
-/// Weights for the plane `own` by least squares. residual: null, or of another plane. False where there is nothing to
-/// be fitted.
+/// Weights for the plane `own`, whose values have so many `bits` of fraction, by least squares. residual: null, or of
+/// another plane. False where there is nothing to be fitted, or where the median predictor does better: on facets,
+/// whose pixels all have one normal, which no guide meets as well. left: null, or another plane of which the left
+/// neighbour is; the median predicts nothing then.
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
-                const Plane<int16_t>* residual, int16_t weights[kGuidedTerms], int32_t& constant);
+                const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant,
+                const Plane<int16_t>* left = nullptr);
 
 inline constexpr size_t kMostSamples = 700;  ///< of a tile: twice as many bring 0.01 to 0.03 bits
 

@@ -8,7 +8,13 @@ namespace {
 
 constexpr int kConstantBits = 28;
 
-// Values of one plane, each from the one to its left. Bytes are 64ths and mod 256.
+int median_of(int left, int up, int corner) {
+  return left + up - std::clamp(corner, std::min(left, up), std::max(left, up));
+}
+
+// Values of one plane, each from the one to its left: the longest chain of a decoder. So what is nearly never needed,
+// the bounds of predictions and values, stands beside it, where a processor guesses that it is not. Bytes are 64ths and
+// mod 256.
 template <bool kByte>
 struct Chain {
   Chain(GuidedPlane& guided, size_t y)
@@ -18,22 +24,75 @@ struct Chain {
         guide(plane.guide.row(static_cast<ptrdiff_t>(y))),
         sums(plane.sums.data()),
         weight(plane.weights[0] * (1 << plane.bits)),
+        bits(kByte ? 6 : plane.bits),
+        most(plane.most),
         left(value[-1] >> plane.bits) {}
   void step(size_t x) {
-    const int bits = kByte ? 6 : plane.bits;
-    const int32_t p = (sums[x] + weight * left + (1 << (bits + 12))) >> (bits + 13);
-    left = std::clamp(p, 0, kByte ? 254 : plane.most) + (residual[x] >> bits);
-    left = kByte ? left & 255 : std::clamp(left, 0, plane.most);
+    const int64_t sum = sums[x] + (int64_t{1} << (bits + 12)) + weight * left;
+    const int64_t off = int64_t{residual[x]} * (1 << 13);
+    const int64_t next = (sum + off) >> (bits + 13);
+    const bool plain = static_cast<uint64_t>(sum) < static_cast<uint64_t>(most + 1) << (bits + 13) &&
+                       static_cast<uint64_t>(next) <= static_cast<uint64_t>(kByte ? 255 : most);
+    left = next;
+    if (!plain) [[unlikely]]
+      left = bounded(sum, residual[x]);
     value[x] = static_cast<int16_t>(left << bits);
   }
   void hole(size_t x) { value[x] = plane.nearest_value(guide[x]), left = value[x] >> plane.bits; }
+  int64_t bounded(int64_t sum, int16_t off) const {
+    const int64_t next = std::clamp<int64_t>(sum >> (bits + 13), 0, most) + (off >> bits);
+    return kByte ? next & 255 : std::clamp<int64_t>(next, 0, most);
+  }
 
   const GuidedPlane& plane;
   int16_t* const value;
   const int16_t *const residual, *const guide;
-  const int32_t *const sums, weight;
-  int32_t left;
+  const int32_t* const sums;
+  const int64_t weight;
+  const int bits, most;
+  int64_t left;
 };
+
+// Values of a plane that the median predicts: of those to the left, above and between, which is exact where two facets
+// meet.
+template <bool kByte>
+struct MedianChain {
+  MedianChain(GuidedPlane& guided, size_t y)
+      : plane(guided),
+        value(guided.values.row(static_cast<ptrdiff_t>(y))),
+        above(guided.values.row(static_cast<ptrdiff_t>(y) - 1)),
+        residual(guided.residuals.row(static_cast<ptrdiff_t>(y))),
+        guide(guided.guide.row(static_cast<ptrdiff_t>(y))),
+        left(value[-1]) {}
+  void step(size_t x) {
+    const int next = median_of(left, above[x], above[x - 1]) + residual[x];
+    left = kByte ? next & 255 * 64 : std::clamp(next, 0, plane.most << plane.bits);
+    value[x] = static_cast<int16_t>(left);
+  }
+  void hole(size_t x) {
+    value[x] = plane.nearest_value(guide[x]);
+    left = value[x];
+  }
+
+  const GuidedPlane& plane;
+  int16_t* const value;
+  const int16_t *const above, *const residual, *const guide;
+  int left;
+};
+
+template <class Chain>
+void run(Chain chain, const TileShape& shape, size_t y) {
+  for (size_t x = 0; x < shape.width; ++x) shape.at(x, y) ? chain.step(x) : chain.hole(x);
+}
+
+template <bool kByte>
+void decode_alone(GuidedPlane& plane, const TileShape& shape, size_t y) {
+  if (plane.median)
+    run(MedianChain<kByte>(plane, y), shape, y);
+  else
+    run(Chain<kByte>(plane, y), shape, y);
+  plane.finish_row(shape, y);
+}
 
 }  // namespace
 
@@ -79,9 +138,17 @@ GuidedRows GuidedPlane::rows_around(size_t y, const GuidedPlane* before) const {
   return rows;
 }
 
-void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
-  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, weights, constant))
+void GuidedPlane::fit(const Samples& samples, const GuidedPlane* before, const Plane<int16_t>* left) {
+  median = false;
+  if (!fit_guided(samples, values, guide, before != nullptr ? &before->residuals : nullptr, bits, weights, constant,
+                  left))
     set_plain_weights();
+}
+
+void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before) {
+  fit(samples, before);
+  median = has_plain_weights();
+  if (median) return encode_by_median(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     if (bits == 6)
@@ -91,6 +158,29 @@ void GuidedPlane::encode(const TileShape& shape, const Samples& samples, const G
       kernels().guided_residuals_wide(rows_around(y, before), shape.width, symbols.wide.row(r), symbols.tokens.row(r),
                                       residuals.row(r));
     shape.for_each_hole(y, [&](size_t x) { residuals.row(r)[x] = 0; });
+    finish_tokens(symbols, shape, y);
+  }
+}
+
+void GuidedPlane::encode_by_median(const TileShape& shape) {
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    const int16_t *const row = values.row(r), *const above = values.row(r - 1);
+    int16_t* const out = residuals.row(r);
+    uint8_t *const tokens = symbols.tokens.row(r), *const narrow = bits == 6 ? symbols.narrow.row(r) : nullptr;
+    uint32_t* const wide = bits == 6 ? nullptr : symbols.wide.row(r);
+    for (size_t x = 0; x < shape.width; ++x) {
+      int off = (row[x] - median_of(row[x - 1], above[x], above[x - 1])) >> bits;
+      if (bits == 6) off = static_cast<int8_t>(off);
+      const auto z = static_cast<uint32_t>((off * 2) ^ (off < 0 ? -1 : 0));
+      out[x] = static_cast<int16_t>(off * (1 << bits));
+      tokens[x] = static_cast<uint8_t>(token_of(z));
+      if (bits == 6)
+        narrow[x] = static_cast<uint8_t>(z);
+      else
+        wide[x] = z;
+    }
+    shape.for_each_hole(y, [&](size_t x) { out[x] = 0; });
     finish_tokens(symbols, shape, y);
   }
 }
@@ -109,6 +199,7 @@ bool GuidedPlane::has_plain_weights() const {
 void GuidedPlane::put_weights(BitSink& bits) const {
   const bool plain = has_plain_weights();
   bits.put(plain, 1);
+  if (plain) bits.put(median, 1);
   if (plain) return;
   for (const int16_t w : weights) bits.put(static_cast<uint16_t>(w), 16);
   bits.put(static_cast<uint32_t>(constant + (1 << (kConstantBits - 1))), kConstantBits);
@@ -117,8 +208,10 @@ void GuidedPlane::put_weights(BitSink& bits) const {
 bool GuidedPlane::get_weights(BitReader& bits) {
   if (bits.source.take(1) != 0) {
     set_plain_weights();
+    median = bits.source.take(1) != 0;
     return !bits.overrun();
   }
+  median = false;
   int total = 0;
   for (int16_t& w : weights) {
     w = static_cast<int16_t>(bits.source.take(16));
@@ -140,10 +233,18 @@ void GuidedPlane::decode_sums(const TileShape& shape, size_t y, const GuidedPlan
   else
     unfold(symbols.wide.row(r));
   values.row(r)[-1] = nearest_value(guide.row(r)[-1]);
+  if (!median) make_sums(shape, y, before);
+}
+
+void GuidedPlane::make_sums(const TileShape& shape, size_t y, const GuidedPlane* before) {
   kernels().guided_sums(rows_around(y, before), shape.width, sums.data());
 }
 
 void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_t y) {
+  if (a.median || b.median) {
+    decode_alone<true>(a, shape, y), decode_alone<true>(b, shape, y);
+    return;
+  }
   Chain<true> first(a, y), second(b, y);
   if (shape.full(y)) {
     for (size_t x = 0; x < shape.width; ++x) first.step(x), second.step(x);
@@ -154,10 +255,6 @@ void decode_values(GuidedPlane& a, GuidedPlane& b, const TileShape& shape, size_
   a.finish_row(shape, y), b.finish_row(shape, y);
 }
 
-void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y) {
-  Chain<false> chain(plane, y);
-  for (size_t x = 0; x < shape.width; ++x) shape.at(x, y) ? chain.step(x) : chain.hole(x);
-  plane.finish_row(shape, y);
-}
+void decode_values(GuidedPlane& plane, const TileShape& shape, size_t y) { decode_alone<false>(plane, shape, y); }
 
 }  // namespace telesplat::codec::detail

@@ -19,12 +19,16 @@ struct GuidedPlane {
   /// Values of pixels that are not covered, and borders, of row y. They are the guide's.
   void finish_row(const TileShape& shape, size_t y);
 
-  /// Chooses weights; values -> symbols. `before`: whose residuals are known; null: none's.
+  /// Chooses weights. `before`: whose residuals are known; null: none's. left: as fit_guided() has it.
+  void fit(const Samples& samples, const GuidedPlane* before, const Plane<int16_t>* left = nullptr);
+  /// Chooses weights; values -> symbols.
   void encode(const TileShape& shape, const Samples& samples, const GuidedPlane* before);
   void put_weights(BitSink& bits) const;
   static constexpr size_t kMostWeightBits = 16 * kGuidedTerms + 32;
   [[nodiscard]] bool get_weights(BitReader& bits);
-  /// What is known of row y before its left neighbours are, into sums; its residuals from its symbols.
+  /// What is known of row y before its left neighbours are, into sums.
+  void make_sums(const TileShape& shape, size_t y, const GuidedPlane* before);
+  /// The same, and its residuals from its symbols.
   void decode_sums(const TileShape& shape, size_t y, const GuidedPlane* before);
 
   Plane<int16_t> values, guide, residuals;
@@ -33,11 +37,13 @@ struct GuidedPlane {
   int32_t constant = 0;
   std::vector<int32_t> sums;
   int bits = 6, most = 254;
+  bool median = false;  ///< predicted by the median of L, U and L + U - UL; weights are plain ones then
 
  private:
   /// Half of L and of U: where there is nothing to be fitted.
   void set_plain_weights();
   bool has_plain_weights() const;
+  void encode_by_median(const TileShape& shape);
   GuidedRows rows_around(size_t y, const GuidedPlane* before) const;
 };
 

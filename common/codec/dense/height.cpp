@@ -15,6 +15,27 @@ struct Axis {
   double of(const HeightSample& s) const { return (a * double{s.x} + b * double{s.y} + c) / double{s.code}; }
 };
 
+// The solution of n equations, whose right sides are the last column; the diagonal grows by `more` of itself. False
+// where there is none.
+template <int kN>
+bool solve_system(double m[kN][kN + 1], double more, double out[kN]) {
+  for (int i = 0; i < kN; ++i) m[i][i] *= 1 + more;
+  for (int i = 0; i < kN; ++i) {
+    if (!(std::abs(m[i][i]) > 0)) return false;
+    for (int k = i + 1; k < kN; ++k) {
+      const double f = m[k][i] / m[i][i];
+      for (int j = i; j <= kN; ++j) m[k][j] -= f * m[i][j];
+    }
+  }
+  for (int i = kN; i-- > 0;) {
+    out[i] = m[i][kN];
+    for (int j = i + 1; j < kN; ++j) out[i] -= m[i][j] * out[j];
+    out[i] /= m[i][i];
+    if (!std::isfinite(out[i])) return false;
+  }
+  return true;
+}
+
 // Changes of colour from one sample to the next one up the axis; every fourth is enough.
 double roughness(const Axis& axis, const std::vector<HeightSample>& samples) {
   std::vector<std::pair<double, uint32_t>> order;
@@ -27,23 +48,69 @@ double roughness(const Axis& axis, const std::vector<HeightSample>& samples) {
   return sum;
 }
 
-// The palette in the order of its colours' heights.
-void sort_palette(const Axis& axis, const std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
-                  std::vector<uint32_t>& palette, std::vector<uint32_t>& place) {
-  std::vector<double> sum(palette.size()), count(palette.size(), 1);
-  for (size_t i = 0; i < palette.size(); ++i) sum[i] = axis.of(first[i]);
-  for (const HeightSample& s : samples) sum[s.index] += axis.of(s), count[s.index] += 1;
-  std::vector<uint32_t> order(palette.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) {
-    const double a = sum[i] / count[i], b = sum[j] / count[j];
-    return a != b ? a < b : palette[i] < palette[j];
-  });
-  std::vector<uint32_t> sorted(palette.size());
-  place.resize(palette.size());
-  for (size_t i = 0; i < order.size(); ++i) sorted[i] = palette[order[i]], place[order[i]] = static_cast<uint32_t>(i);
-  palette = sorted;
+// The axes by which the colours' channels change most evenly, by least squares; false where there are none.
+bool even_axes(const std::vector<HeightSample>& samples, Axis axes[3]) {
+  double unit = 0;
+  for (const HeightSample& s : samples) unit += double{s.code};
+  unit /= static_cast<double>(samples.size());
+  double sums[4][7] = {};
+  for (const HeightSample& s : samples) {
+    const double k = unit / double{s.code};
+    double f[7] = {k * double{s.x}, k * double{s.y}, k, 1};
+    for (int c = 0; c < 3; ++c) f[4 + c] = static_cast<double>(s.colour >> 8 * c & 255);
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 7; ++j) sums[i][j] += f[i] * f[j];
+  }
+  for (int c = 0; c < 3; ++c) {
+    double m[4][5], out[4];
+    for (int i = 0; i < 4; ++i) std::copy_n(sums[i], 4, m[i]), m[i][4] = sums[i][4 + c];
+    if (!solve_system<4>(m, 1e-12, out)) return false;
+    axes[c] = {out[0] * unit, out[1] * unit, out[2] * unit};
+  }
+  return true;
 }
+
+// Each colour's place in the order of its colours' mean heights.
+void rank_colours(const Axis& axis, const std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
+                  std::vector<uint32_t>& rank) {
+  std::vector<double> mean(first.size());
+  std::vector<float> count(first.size(), 1);
+  for (size_t i = 0; i < first.size(); ++i) mean[i] = axis.of(first[i]);
+  for (const HeightSample& s : samples) mean[s.place] += axis.of(s), count[s.place] += 1;
+  for (size_t i = 0; i < mean.size(); ++i) mean[i] /= double{count[i]};
+  std::vector<uint32_t> order(first.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t i, uint32_t j) { return mean[i] != mean[j] ? mean[i] < mean[j] : i < j; });
+  rank.resize(first.size());
+  for (uint32_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
+}
+
+// Least squares of hat functions: a tridiagonal system, which a little smoothness makes regular.
+class HatFunctions {
+ public:
+  HatFunctions() { std::fill_n(diagonal_, HeightModel::kKnots, 1e-6); }
+  // t: 0 to kBins.
+  void add(double t, double value, double weight) {
+    t = std::clamp(t, 0.0, kBins - 1e-9);
+    const int i = static_cast<int>(t);
+    const double f = t - i, g = 1 - f;
+    diagonal_[i] += weight * g * g, diagonal_[i + 1] += weight * f * f, side_[i] += weight * f * g;
+    right_[i] += weight * g * value, right_[i + 1] += weight * f * value;
+  }
+  void solve(double smoothness, double knots[HeightModel::kKnots]) {
+    for (int i = 0; i < kBins; ++i) diagonal_[i] += smoothness, diagonal_[i + 1] += smoothness, side_[i] -= smoothness;
+    for (int i = 1; i < HeightModel::kKnots; ++i) {
+      const double f = side_[i - 1] / diagonal_[i - 1];
+      diagonal_[i] -= f * side_[i - 1], right_[i] -= f * right_[i - 1];
+    }
+    for (int i = HeightModel::kKnots; i-- > 0;)
+      knots[i] = (right_[i] - (i + 1 < HeightModel::kKnots ? side_[i] * knots[i + 1] : 0)) / diagonal_[i];
+  }
+
+ private:
+  double diagonal_[HeightModel::kKnots], side_[HeightModel::kKnots] = {}, right_[HeightModel::kKnots] = {};
+};
 
 struct Curve {
   double low = 0, step = 1;
@@ -63,23 +130,9 @@ Curve fit_curve(const Axis& axis, const std::vector<HeightSample>& samples) {
   for (const HeightSample& s : samples) heights.push_back(axis.of(s));
   const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
   curve.low = *low, curve.step = std::max((*high - *low) / kBins, 1e-12);
-  // Least squares of hat functions: a tridiagonal system, which a little smoothness makes regular.
-  double diagonal[HeightModel::kKnots], side[HeightModel::kKnots] = {}, right[HeightModel::kKnots] = {};
-  std::fill_n(diagonal, HeightModel::kKnots, 1e-6);
-  for (size_t n = 0; n < samples.size(); ++n) {
-    const double t = std::clamp((heights[n] - curve.low) / curve.step, 0.0, kBins - 1e-9);
-    const int i = static_cast<int>(t);
-    const double f = t - i, value = samples[n].index;
-    diagonal[i] += (1 - f) * (1 - f), diagonal[i + 1] += f * f, side[i] += f * (1 - f);
-    right[i] += (1 - f) * value, right[i + 1] += f * value;
-  }
-  for (int i = 0; i < kBins; ++i) diagonal[i] += 0.05, diagonal[i + 1] += 0.05, side[i] -= 0.05;
-  for (int i = 1; i < HeightModel::kKnots; ++i) {
-    const double f = side[i - 1] / diagonal[i - 1];
-    diagonal[i] -= f * side[i - 1], right[i] -= f * right[i - 1];
-  }
-  for (int i = HeightModel::kKnots; i-- > 0;)
-    curve.knots[i] = (right[i] - (i + 1 < HeightModel::kKnots ? side[i] * curve.knots[i + 1] : 0)) / diagonal[i];
+  HatFunctions hats;
+  for (size_t n = 0; n < samples.size(); ++n) hats.add((heights[n] - curve.low) / curve.step, samples[n].index, 1);
+  hats.solve(0.05, curve.knots);
   return curve;
 }
 
@@ -94,30 +147,18 @@ void improve(Axis& axis, const Curve& curve, const std::vector<HeightSample>& sa
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 4; ++j) m[i][j] += weight * f[i] * f[j];
   }
-  for (int i = 0; i < 3; ++i) m[i][i] *= 1 + 1e-4;
-  for (int i = 0; i < 3; ++i) {
-    if (!(std::abs(m[i][i]) > 0)) return;
-    for (int k = i + 1; k < 3; ++k) {
-      const double f = m[k][i] / m[i][i];
-      for (int j = i; j < 4; ++j) m[k][j] -= f * m[i][j];
-    }
-  }
   double d[3];
-  for (int i = 3; i-- > 0;) {
-    d[i] = m[i][3];
-    for (int j = i + 1; j < 3; ++j) d[i] -= m[i][j] * d[j];
-    d[i] /= m[i][i];
-    if (!std::isfinite(d[i])) return;
-  }
+  if (!solve_system<3>(m, 1e-4, d)) return;
   axis.a += d[0], axis.b += d[1], axis.c += d[2];
 }
 
-// The axis and the curve in the integers of heights().
-bool quantise(const Axis& axis, const Curve& curve, const std::vector<HeightSample>& samples, size_t colours,
-              HeightModel& model) {
-  double most = 0, far = 1;
+// The axis in the integers of heights(). Knots are such that its results are heights themselves, 0 to 16383.
+bool quantise(const Axis& axis, const std::vector<HeightSample>& samples, HeightModel& model) {
+  double most = 0, far = 1, low = 1e300, high = -1e300;
   for (const HeightSample& s : samples) {
-    most = std::max(most, std::abs(axis.of(s)));
+    const double height = axis.of(s);
+    low = std::min(low, height), high = std::max(high, height);
+    most = std::max(most, std::abs(height));
     far = std::max(far, std::abs(double{s.x}) + std::abs(double{s.y}));
   }
   const double unit = 0.99 / std::max(most, 1e-12);  // quotients lie within 1
@@ -128,15 +169,11 @@ bool quantise(const Axis& axis, const Curve& curve, const std::vector<HeightSamp
   model.a = static_cast<int32_t>(std::lround(terms[0]));
   model.b = static_cast<int32_t>(std::lround(terms[1]));
   model.c = static_cast<int32_t>(std::lround(terms[2]));
-  const double low = curve.low * unit * 16384, range = curve.step * kBins * unit * 16384;
-  model.low = static_cast<int32_t>(std::floor(low));
+  const double range = (high - low) * unit * 16384;
+  model.low = static_cast<int32_t>(std::floor(low * unit * 16384));
   model.scale =
       static_cast<int32_t>(std::clamp(std::floor(16383 * 4096.0 / std::max(range + 1, 1025.0)), 1.0, 65535.0));
-  for (int i = 0; i < HeightModel::kKnots; ++i) {
-    const double s = (model.low + i * 256 * 4096.0 / model.scale) / 16384 / unit;
-    model.knots[i] =
-        static_cast<int16_t>(std::lround(std::clamp(curve.at(s), 0.0, static_cast<double>(colours - 1)) * 16));
-  }
+  for (int i = 0; i < HeightModel::kKnots; ++i) model.knots[i] = static_cast<int16_t>(std::min(i * 256, 16383));
   return true;
 }
 
@@ -160,37 +197,46 @@ bool rays_of(const GeometryModel& g, double rays[3][3]) {
   return true;
 }
 
-bool fit_height(const double rays[3][3], std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
-                std::vector<uint32_t>& palette, HeightModel& model) {
-  if (samples.size() < 256 || palette.size() < 8) return false;
+bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
+              HeightModel& model) {
+  if (samples.size() < 128 || first.size() < 8) return false;
   Axis best{};
   double least = 1e300;
-  for (int i = 0; i < 3; ++i) {
-    const Axis axis{rays[i][0], rays[i][1], rays[i][2]};
+  const auto consider = [&](const Axis& axis) {
     const double rough = roughness(axis, samples);
     if (rough < least) least = rough, best = axis;
-  }
-  const std::vector<uint32_t> unsorted = palette;
-  std::vector<uint32_t> place;
+  };
+  for (int i = 0; i < 3 && rays != nullptr; ++i) consider({rays[i][0], rays[i][1], rays[i][2]});
+  if (Axis even[3]; even_axes(samples, even)) std::for_each_n(even, 3, consider);
+  if (!(least < 1e300)) return false;
+  std::vector<uint32_t> rank;
+  const auto order = [&] {
+    rank_colours(best, samples, first, rank);
+    for (HeightSample& s : samples) s.index = rank[s.place];
+  };
   for (int round = 0; round < 2; ++round) {
-    sort_palette(best, samples, first, palette, place);
-    for (HeightSample& s : samples) s.index = place[s.index];
-    improve(best, fit_curve(best, samples), samples);
-    improve(best, fit_curve(best, samples), samples);
-    std::vector<uint32_t> back(place.size());  // to the order of `first`
-    for (uint32_t i = 0; i < place.size(); ++i) back[place[i]] = i;
-    for (HeightSample& s : samples) s.index = back[s.index];
-    palette = unsorted;
+    order();
+    for (int step = 0; step < 2; ++step) improve(best, fit_curve(best, samples), samples);
   }
-  sort_palette(best, samples, first, palette, place);
-  for (HeightSample& s : samples) s.index = place[s.index];
+  order();
   const Curve curve = fit_curve(best, samples);
   double error = 0, spread = 0;
   for (const HeightSample& s : samples) {
     error += std::abs(curve.at(best.of(s)) - s.index);
-    spread += std::abs(static_cast<double>(palette.size()) / 2 - s.index);
+    spread += std::abs(static_cast<double>(first.size()) / 2 - s.index);
   }
-  return error * 4 < spread && quantise(best, curve, samples, palette.size(), model);
+  return error * 4 < spread && quantise(best, samples, model);
+}
+
+void fit_knots(const std::vector<ColourHeight>& sorted, HeightModel& model) {
+  HatFunctions hats;
+  for (size_t i = 0; i < sorted.size(); ++i)
+    hats.add(sorted[i].mean() / 256, static_cast<double>(i), static_cast<double>(sorted[i].pixels));
+  double knots[HeightModel::kKnots];
+  hats.solve(0.05, knots);
+  for (int i = 0; i < HeightModel::kKnots; ++i)
+    model.knots[i] =
+        static_cast<int16_t>(std::lround(std::clamp(knots[i], 0.0, static_cast<double>(sorted.size() - 1)) * 16));
 }
 
 }  // namespace telesplat::codec::detail

@@ -179,11 +179,11 @@ static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT 
     const GuidedRows part = PartOf(rows, begin);
     GuidedSums(part, count, sums);
     const int16_t* RESTRICT own = part.own;
-    const int32_t left = part.weights[0];
+    const int32_t left = part.weights[0], most = part.most;
     uint8_t *RESTRICT zp = z + begin, *RESTRICT tp = tokens + begin;
     int16_t* RESTRICT rp = residual + begin;
     for (size_t x = 0; x < count; ++x) {
-      const int32_t guess = Guess(sums[x] + left * own[x - 1], 6, 254);
+      const int32_t guess = Guess(sums[x] + left * own[x - 1], 6, most);
       const int8_t r = static_cast<int8_t>((own[x] >> 6) - guess);
       rp[x] = static_cast<int16_t>(r * 64);
       const uint8_t folded = static_cast<uint8_t>((r << 1) ^ (r >> 7));

@@ -130,6 +130,28 @@ HWY_INLINE M Exceeds(V a, V b) {  // both below 2^31
 
 HWY_INLINE V Load8(const uint8_t* p) { return hn::PromoteTo(kD, hn::LoadU(kD8, p)); }
 
+// Both halves of the entries at `index`: gathered at once, since a gather takes as long as it has elements.
+HWY_INLINE void GatherEntries(const EncodeEntry* tables, V index, V& reciprocal, V& packed) {
+#if HWY_TARGET <= HWY_AVX3
+  const __m512i low = _mm512_i32gather_epi64(_mm512_castsi512_si256(index.raw), tables, 8),
+                high = _mm512_i32gather_epi64(_mm512_extracti64x4_epi64(index.raw, 1), tables, 8);
+  const __m512i even = _mm512_set_epi32(30, 28, 26, 24, 22, 20, 18, 16, 14, 12, 10, 8, 6, 4, 2, 0);
+  reciprocal = V{_mm512_permutex2var_epi32(low, even, high)};
+  packed = V{_mm512_permutex2var_epi32(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high)};
+#elif HWY_TARGET == HWY_AVX2
+  const auto* const words = reinterpret_cast<const long long*>(tables);
+  const __m256 low = _mm256_castsi256_ps(_mm256_i32gather_epi64(words, _mm256_castsi256_si128(index.raw), 8)),
+               high = _mm256_castsi256_ps(_mm256_i32gather_epi64(words, _mm256_extracti128_si256(index.raw, 1), 8));
+  reciprocal = V{_mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0x88)), 0xD8)};
+  packed = V{_mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0xDD)), 0xD8)};
+#else
+  const hn::RebindToSigned<D> s;
+  const auto* const words = reinterpret_cast<const uint32_t*>(tables);
+  const auto at = hn::BitCast(s, hn::Add(index, index));
+  reciprocal = hn::GatherIndex(kD, words, at), packed = hn::GatherIndex(kD, words + 1, at);
+#endif
+}
+
 template <bool kWide>
 HWY_INLINE V LoadZ(const SymbolRow& row, size_t at) {
   if constexpr (kWide) return hn::LoadU(kD, row.wide + at);
@@ -160,15 +182,12 @@ HWY_INLINE uint8_t* PutGroup(const SymbolRow& row, size_t begin, const EncodeEnt
       x[i] = Spill(x[i], Exceeds(x[i], limit), out);
       x[i] = hn::Or(hn::Shl(x[i], high), hn::And(hn::ShiftRight<15>(z[i]), hn::Sub(hn::Shl(one, high), one)));
     }
-  const hn::RebindToSigned<D> s;
-  const auto* const words = reinterpret_cast<const uint32_t*>(tables);
   for (size_t i = 0; i < kVectors; ++i) {
     const size_t left = n > i * kN ? n - i * kN : 0;
     const M valid = hn::FirstN(kD, left);
     const V contexts = hn::IfThenElseZero(valid, Load8(row.contexts + begin + i * kN));
-    const V index = hn::Add(hn::Add(tokens[i], tokens[i]), hn::ShiftLeft<9>(contexts));
-    const V reciprocal = hn::GatherIndex(kD, words, hn::BitCast(s, index)),
-            packed = hn::GatherIndex(kD, words + 1, hn::BitCast(s, index));
+    V reciprocal, packed;
+    GatherEntries(tables, hn::Add(tokens[i], hn::ShiftLeft<8>(contexts)), reciprocal, packed);
     const V complement = hn::And(hn::ShiftRight<13>(packed), hn::Set(kD, 0xFFFu));
     const V limit = hn::Sub(hn::ShiftLeft<19>(hn::Sub(hn::Set(kD, kFrequencyOne), complement)), one);
     V y = Spill(x[i], hn::And(valid, Exceeds(x[i], limit)), out);
@@ -296,7 +315,7 @@ static void DepthRowsVector(const uint32_t* HWY_RESTRICT above, const uint32_t* 
 // Eight rows by one vector at a time, which fit into registers.
 static void NormalEquations(const float (*features)[kFeatures], const float* weights, size_t n,
                             float (*sums)[kFeatures]) {
-  const hn::CappedTag<float, 8> d;
+  const hn::CappedTag<float, 16> d;
   for (int i = 0; i < kFeatures; i += 8)
     for (int j = 0; j <= i + 7; j += static_cast<int>(hn::Lanes(d))) {
       auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0, s4 = s0, s5 = s0, s6 = s0, s7 = s0;
@@ -312,10 +331,63 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
     }
 }
 
+// table[i] of each i below 64.
+HWY_INLINE hn::VFromD<hn::RebindToSigned<D> > Knots(const int32_t* table, hn::VFromD<hn::RebindToSigned<D> > i) {
+  const hn::RebindToSigned<D> d;
+#if HWY_TARGET <= HWY_AVX3  // tables in registers: gathers take longer
+  const auto part = [&](int k) HWY_ATTR { return hn::Load(d, table + 16 * k).raw; };
+  const __m512i low = _mm512_permutex2var_epi32(part(0), i.raw, part(1)),
+                high = _mm512_permutex2var_epi32(part(2), i.raw, part(3));
+  const __mmask16 upper = _mm512_test_epi32_mask(i.raw, _mm512_set1_epi32(32));
+  return hn::VFromD<decltype(d)>{_mm512_mask_mov_epi32(low, upper, high)};
+#else
+  return hn::GatherIndex(d, table, i);
+#endif
+}
+
+// As Heights(). Both knots of a pixel are gathered at once.
+static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, int y, const HeightModel& model,
+                          int16_t* HWY_RESTRICT out) {
+  const hn::RebindToSigned<D> d;
+  const hn::Rebind<float, D> f;
+  const hn::Rebind<int16_t, D> d16;
+  HWY_ALIGN int32_t knots[HeightModel::kKnots + 15];
+  for (int i = 0; i + 1 < HeightModel::kKnots; ++i)
+    knots[i] = static_cast<int32_t>(static_cast<uint16_t>(model.knots[i]) |
+                                    static_cast<uint32_t>(static_cast<uint16_t>(model.knots[i + 1])) << 16);
+  const auto one = hn::Set(kD, 1u);
+  const auto ends = hn::Set(d, 16383), turn = hn::Set(d, 32768);
+  const auto step = hn::Set(kD, static_cast<uint32_t>(model.a) * static_cast<uint32_t>(kN));
+  auto sums =
+      hn::Add(hn::Mul(hn::Iota(kD, 0), hn::Set(kD, static_cast<uint32_t>(model.a))),
+              hn::Set(kD, static_cast<uint32_t>(model.b) * static_cast<uint32_t>(y) + static_cast<uint32_t>(model.c) +
+                              static_cast<uint32_t>(model.a) * static_cast<uint32_t>(x0)));
+  for (size_t x = 0; x < n; x += kN, sums = hn::Add(sums, step)) {
+    const auto code = hn::And(hn::LoadU(kD, depth + x), hn::Set(kD, 0xFFFFFFu));
+    const auto negative = hn::ShiftRight<31>(hn::BitCast(d, sums));
+    const auto size = hn::BitCast(kD, hn::Min(hn::Xor(hn::BitCast(d, sums), negative), hn::BitCast(d, code)));
+    const auto exponent = hn::ShiftRight<23>(hn::BitCast(kD, hn::ConvertTo(f, hn::BitCast(d, hn::Or(code, one)))));
+    const auto up = hn::Sub(hn::Set(kD, 150u), exponent);
+    const auto divisor = hn::BitCast(d, hn::Or(hn::ShiftRight<9>(hn::Shl(code, up)), hn::Set(kD, 0x4000u)));
+    auto r = hn::Sub(hn::Set(d, 46260), hn::ShiftRight<15>(hn::Mul(divisor, hn::Set(d, 30840))));
+    r = hn::ShiftRight<14>(hn::Mul(r, hn::Sub(turn, hn::ShiftRight<15>(hn::Mul(divisor, r)))));
+    r = hn::ShiftRight<14>(hn::Mul(r, hn::Sub(turn, hn::ShiftRight<15>(hn::Mul(divisor, r)))));
+    const auto quotient =
+        hn::BitCast(d, hn::ShiftRight<16>(hn::Mul(hn::ShiftRight<8>(hn::Shl(size, up)), hn::BitCast(kD, r))));
+    const auto height = hn::Sub(hn::Xor(quotient, negative), negative);
+    const auto off = hn::Min(hn::Max(hn::Sub(height, hn::Set(d, model.low)), hn::Set(d, -32767)), hn::Set(d, 32767));
+    const auto at = hn::Min(hn::Max(hn::ShiftRight<12>(hn::Mul(off, hn::Set(d, model.scale))), hn::Zero(d)), ends);
+    const auto both = Knots(knots, hn::ShiftRight<8>(at));
+    const auto a = hn::ShiftRight<16>(hn::ShiftLeft<16>(both)), b = hn::ShiftRight<16>(both);
+    const auto between = hn::ShiftRight<8>(hn::Mul(hn::Sub(b, a), hn::And(at, hn::Set(d, 255))));
+    hn::StoreU(hn::DemoteTo(d16, hn::Add(a, between)), d16, out + x);
+  }
+}
+
 static const Kernels* Set() {
   static constexpr Kernels all{CoveredBits,         DepthResiduals, DepthRowsVector, PlaneResiduals,  PlaneTerms,
                                PlaneSizes,          Contexts,       OtherNormals,    MedianResiduals, GuidedResiduals,
-                               GuidedResidualsWide, GuidedSums,     Geometry,        Heights,         Activity,
+                               GuidedResidualsWide, GuidedSums,     Geometry,        HeightsVector,   Activity,
                                NormalEquations,     PutSymbols,     GetSymbols};
   return &all;
 }

@@ -54,47 +54,88 @@ const Table& table(int pole, bool back) {
 uint16_t turn_normal(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, false)[code]; }
 uint16_t turn_back(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, true)[code]; }
 
-void NormalPlanes::reset(const TileShape& shape) {
-  for (GuidedPlane& p : plane) p.reset(shape);
+void make_geometry_guide(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry, uint16_t base,
+                         Plane<int16_t>& x_guide, Plane<int16_t>& y_guide) {
+  const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
+  for (size_t y = 0; y < shape.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    if (geometry == nullptr) {
+      std::fill_n(x_guide.row(r), shape.width, static_cast<int16_t>((base & 255) * 64));
+      std::fill_n(y_guide.row(r), shape.width, static_cast<int16_t>((base >> 8) * 64));
+      continue;
+    }
+    const uint32_t* const rows[3] = {depth.depth.row(r - 1), depth.depth.row(r), depth.depth.row(r + 1)};
+    kernels().geometry(rows, shape.width, x0, y0 + static_cast<int>(y), *geometry, x_guide.row(r), y_guide.row(r));
+  }
+}
+
+void put_geometry(BitSink& bits, const GeometryModel& geometry) {
+  for (const auto& row : geometry.matrix)
+    for (const int16_t e : row) bits.put(static_cast<uint16_t>(e), 16);
+  bits.put(static_cast<uint64_t>(geometry.slope_shift), 4);
+  bits.put(static_cast<uint64_t>(geometry.height_shift), 4);
+}
+
+bool get_geometry(BitReader& bits, GeometryModel& geometry) {
+  int total = 0;
+  for (auto& row : geometry.matrix)
+    for (int16_t& e : row) total += std::abs(int{e = static_cast<int16_t>(bits.source.take(16))});
+  geometry.slope_shift = static_cast<int>(bits.source.take(4));
+  geometry.height_shift = static_cast<int>(bits.source.take(4));
+  return total <= kMostMatrix;
+}
+
+void PoleChoice::add(uint16_t code) {
+  const Point p = point_of(code);
+  sum_[0] += p.x, sum_[1] += p.y, sum_[2] += p.z;
+}
+
+int PoleChoice::best() const {
+  int axis = 2;
+  for (int a = 0; a < 2; ++a)
+    if (std::abs(sum_[a]) > std::abs(sum_[axis])) axis = a;
+  return 2 * axis + (sum_[axis] < 0 ? 1 : 0);
+}
+
+void NormalPlanes::reset(const TileShape& shape, int reach) {
+  lattice_ = NormalLattice(reach);
+  for (GuidedPlane& p : plane) p.reset(shape, 6, lattice_.most());
   activity.reset(shape.width, shape.height);
 }
 
-int NormalPlanes::choose_pole(const TileShape& shape) const {
-  int64_t sum[3] = {};
+int NormalPlanes::choose_pole(const TileShape& shape) {
   uint32_t others = 0;
   for (size_t y = 0; y < shape.height; ++y) {
-    const uint16_t* const row = codes.data() + y * shape.width;
-    if (shape.full(y))
+    uint16_t* const row = codes.data() + y * shape.width;
+    if (lattice_.step() != 1)  // within bounds another code of the same direction is as good
+      for (size_t x = 0; x < shape.width; ++x) row[x] = image::canonical_normal16(row[x]);
+    else if (shape.full(y))
       others |= kernels().other_normals(row, shape.width);
     else
       for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
                    [&](size_t x) { others |= image::canonical_normal16(row[x]) != row[x]; });
   }
   if (others != 0) return kRaw;
-  for (const auto p : samples.places) {
-    const Point q = point_of(codes[static_cast<size_t>(p.y) * shape.width + static_cast<size_t>(p.x)]);
-    sum[0] += q.x, sum[1] += q.y, sum[2] += q.z;
+  PoleChoice choice;
+  for (const auto p : samples.places)
+    choice.add(codes[static_cast<size_t>(p.y) * shape.width + static_cast<size_t>(p.x)]);
+  return choice.best();
+}
+
+// The guide in 64ths of a code -> of the lattice's steps.
+void NormalPlanes::to_lattice(const TileShape& shape) {
+  for (GuidedPlane& p : plane) {
+    for (size_t y = 0; y < shape.height; ++y) {
+      int16_t* const row = p.guide.row(static_cast<ptrdiff_t>(y));
+      for (size_t x = 0; x < shape.width; ++x) row[x] = lattice_.index64(row[x]);
+    }
+    p.begin(shape);
   }
-  int axis = 2;
-  for (int a = 0; a < 2; ++a)
-    if (std::abs(sum[a]) > std::abs(sum[axis])) axis = a;
-  return 2 * axis + (sum[axis] < 0 ? 1 : 0);
 }
 
 // Without geometry it is the first pixel's normal everywhere.
 void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base) {
-  const uint16_t turned = turn_normal(base, pole_);
-  const int x0 = -static_cast<int>(shape.width / 2), y0 = -static_cast<int>(shape.height / 2);
-  for (size_t y = 0; y < shape.height; ++y) {
-    const auto r = static_cast<ptrdiff_t>(y);
-    const uint32_t* const rows[3] = {depth.depth.row(r - 1), depth.depth.row(r), depth.depth.row(r + 1)};
-    if (has_geometry_)
-      kernels().geometry(rows, shape.width, x0, y0 + static_cast<int>(y), geometry_, plane[0].guide.row(r),
-                         plane[1].guide.row(r));
-    else
-      for (int i = 0; i < 2; ++i)
-        std::fill_n(plane[i].guide.row(r), shape.width, static_cast<int16_t>((turned >> 8 * i & 255) * 64));
-  }
+  make_geometry_guide(shape, depth, geometry(), turn_normal(base, pole_), plane[0].guide, plane[1].guide);
   for (GuidedPlane& p : plane) p.begin(shape);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
@@ -104,6 +145,7 @@ void NormalPlanes::make_guide(const TileShape& shape, const DepthPlane& depth, u
     kernels().activity(rows(plane[0]).data(), rows(plane[1]).data(), shape.width, activity.row(r));
     activity.row(r)[-1] = activity.row(r)[0], activity.row(r)[shape.width] = activity.row(r)[shape.width - 1];
   }
+  if (lattice_.step() != 1) to_lattice(shape);
   plane[0].symbols.other = &activity;
   plane[1].symbols.other = &plane[0].symbols.tokens;
 }
@@ -126,17 +168,17 @@ void NormalPlanes::encode(const TileShape& shape, const DepthPlane& depth, uint1
                                                 -static_cast<int>(shape.height / 2), geometry_);
   make_guide(shape, depth, base);
   for (GuidedPlane& p : plane)
-    for (size_t y = 0; y < shape.height; ++y) p.finish_row(shape, y);
+    for (size_t y = 0; y < shape.height; ++y) {
+      int16_t* const row = p.values.row(static_cast<ptrdiff_t>(y));
+      if (lattice_.step() != 1)
+        for (size_t x = 0; x < shape.width; ++x) row[x] = static_cast<int16_t>(lattice_.index(row[x] >> 6) * 64);
+      p.finish_row(shape, y);
+    }
   plane[0].encode(shape, samples, nullptr);
   plane[1].encode(shape, samples, &plane[0]);
   bits.put(static_cast<uint64_t>(pole_), 3);
   bits.put(has_geometry_, 1);
-  if (has_geometry_) {
-    for (const auto& row : geometry_.matrix)
-      for (const int16_t e : row) bits.put(static_cast<uint16_t>(e), 16);
-    bits.put(static_cast<uint64_t>(geometry_.slope_shift), 4);
-    bits.put(static_cast<uint64_t>(geometry_.height_shift), 4);
-  }
+  if (has_geometry_) put_geometry(bits, geometry_);
   for (const GuidedPlane& p : plane) p.put_weights(bits);
 }
 
@@ -144,14 +186,7 @@ bool NormalPlanes::decode_header(const TileShape& shape, const DepthPlane& depth
   pole_ = static_cast<int>(bits.source.take(3));
   has_geometry_ = bits.source.take(1) != 0;
   if (pole_ > kRaw) return false;
-  if (has_geometry_) {
-    int total = 0;
-    for (auto& row : geometry_.matrix)
-      for (int16_t& e : row) total += std::abs(int{e = static_cast<int16_t>(bits.source.take(16))});
-    geometry_.slope_shift = static_cast<int>(bits.source.take(4));
-    geometry_.height_shift = static_cast<int>(bits.source.take(4));
-    if (total > kMostMatrix) return false;
-  }
+  if (has_geometry_ && !get_geometry(bits, geometry_)) return false;
   for (GuidedPlane& p : plane)
     if (!p.get_weights(bits)) return false;
   make_guide(shape, depth, base);
@@ -165,10 +200,13 @@ void NormalPlanes::decode_row(const TileShape& shape, size_t y, uint16_t* out) {
   const int16_t *const x_row = plane[0].values.row(static_cast<ptrdiff_t>(y)), *const y_row = plane[1].values.row(
                                                                                    static_cast<ptrdiff_t>(y));
   const Table* const turned = pole_ == kRaw ? nullptr : &table(pole_, true);
-  for (size_t x = 0; x < shape.width; ++x) {
-    const auto code = static_cast<uint16_t>(x_row[x] >> 6 | y_row[x] << 2);
-    out[x] = turned == nullptr ? code : (*turned)[code];
-  }
+  if (lattice_.step() == 1)
+    for (size_t x = 0; x < shape.width; ++x) out[x] = static_cast<uint16_t>(x_row[x] >> 6 | y_row[x] << 2);
+  else
+    for (size_t x = 0; x < shape.width; ++x)
+      out[x] = static_cast<uint16_t>(lattice_.value(x_row[x] >> 6) | lattice_.value(y_row[x] >> 6) << 8);
+  if (turned != nullptr)
+    for (size_t x = 0; x < shape.width; ++x) out[x] = (*turned)[out[x]];
 }
 
 }  // namespace telesplat::codec::detail

@@ -15,8 +15,26 @@ inline constexpr int kPoles = 6, kRaw = 6;
 uint16_t turn_normal(uint16_t code, int pole);
 uint16_t turn_back(uint16_t code, int pole);
 
+/// Guides of both coordinates, in 64ths of a code: what the geometry says, or `base` everywhere if it is null.
+void make_geometry_guide(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry, uint16_t base,
+                         Plane<int16_t>& x_guide, Plane<int16_t>& y_guide);
+void put_geometry(BitSink& bits, const GeometryModel& geometry);
+inline constexpr size_t kGeometryBits = 9 * 16 + 8;
+[[nodiscard]] bool get_geometry(BitReader& bits, GeometryModel& geometry);
+
+/// Finds the pole that is nearest to many normals.
+class PoleChoice {
+ public:
+  void add(uint16_t code);
+  int best() const;
+
+ private:
+  int64_t sum_[3] = {};
+};
+
 struct NormalPlanes {
-  void reset(const TileShape& shape);
+  /// reach: of a NormalLattice; 0: all codes.
+  void reset(const TileShape& shape, int reach);
   /// codes -> symbols, and a header. `depth` must be extended. base: the first pixel's code.
   void encode(const TileShape& shape, const DepthPlane& depth, uint16_t base, BitSink& bits);
   static constexpr size_t kMostBits = 256 + 2 * GuidedPlane::kMostWeightBits;
@@ -33,8 +51,10 @@ struct NormalPlanes {
   Samples samples;
 
  private:
+  void to_lattice(const TileShape& shape);
   void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
-  int choose_pole(const TileShape& shape) const;
+  int choose_pole(const TileShape& shape);
+  NormalLattice lattice_{0};
   int pole_ = kRaw;
   bool has_geometry_ = false;
   GeometryModel geometry_;

@@ -31,7 +31,7 @@ void TileShape::reset(size_t tile_width, size_t tile_height, const Mask* tile_ma
 }
 
 void SymbolPlane::reset(const TileShape& shape, bool are_wide, unsigned first_number) {
-  is_wide = are_wide, first = first_number, other = nullptr, scale = {};
+  is_wide = are_wide, first = first_number, other = nullptr, scale = {}, has_contexts = false;
   alphabet = first + (is_wide ? kNumberTokens : kByteTokens);
   tokens.reset(shape.width, shape.height);
   contexts.reset(shape.width, shape.height);
@@ -84,26 +84,39 @@ void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   plane.scale.bias = std::max(plane.scale.bias, 0);
 }
 
-void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits) {
-  choose_scale(plane, shape);
-  for (size_t y = 0; y < shape.height; ++y)
-    kernels().contexts(rows_around(plane, y), shape.width, plane.scale, plane.contexts.row(static_cast<ptrdiff_t>(y)));
-  for (auto& counts : counts_) counts.fill(0);
+// In two tables, so that equal symbols side by side need not wait for each other.
+void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
+  for (TokenCounts* counts : {&counts_, &more_counts_})
+    for (auto& of : *counts) of.fill(0);
+  uint32_t *const a = counts_[0].data(), *const b = more_counts_[0].data();
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    const uint8_t *tokens = plane.tokens.row(r), *contexts = plane.contexts.row(r);
+    const uint8_t *const tokens = plane.tokens.row(r), *const contexts = plane.contexts.row(r);
     if (shape.full(y)) {
-      for (size_t x = 0; x < shape.width; ++x) ++counts_[contexts[x]][tokens[x]];
+      size_t x = 0;
+      for (; x + 2 <= shape.width; x += 2) {
+        ++a[contexts[x] * kSymbols + tokens[x]];
+        ++b[contexts[x + 1] * kSymbols + tokens[x + 1]];
+      }
+      if (x < shape.width) ++a[contexts[x] * kSymbols + tokens[x]];
       continue;
     }
     for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                 [&](size_t x) { ++counts_[contexts[x]][tokens[x]]; });
+                 [&](size_t x) { ++a[contexts[x] * kSymbols + tokens[x]]; });
   }
-  plane.scale.merges = merge_contexts(counts_, plane.alphabet);
-  if (plane.scale.merges != 0)
+  for (size_t i = 0; i < kContexts * kSymbols; ++i) a[i] += b[i];
+}
+
+void PlaneEncoder::prepare(SymbolPlane& plane, const TileShape& shape, BitSink& bits) {
+  if (!plane.has_contexts) choose_scale(plane, shape);
+  for (size_t y = 0; y < shape.height && !plane.has_contexts; ++y)
+    kernels().contexts(rows_around(plane, y), shape.width, plane.scale, plane.contexts.row(static_cast<ptrdiff_t>(y)));
+  count(plane, shape);
+  if (!plane.has_contexts) plane.scale.merges = merge_contexts(counts_, plane.alphabet);
+  if (const int merges = plane.scale.merges; merges != 0)
     for (size_t y = 0; y < shape.height; ++y) {
       uint8_t* const contexts = plane.contexts.row(static_cast<ptrdiff_t>(y));
-      for (size_t x = 0; x < shape.width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> plane.scale.merges);
+      for (size_t x = 0, width = shape.width; x < width; ++x) contexts[x] = static_cast<uint8_t>(contexts[x] >> merges);
     }
   choose_levels(counts_, plane.alphabet, levels_);
   bits.put(static_cast<uint64_t>(plane.scale.bias), kBiasBits);
@@ -151,7 +164,7 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   uint8_t *const contexts = plane.contexts.row(r), *const tokens = plane.tokens.row(r);
   uint32_t* const wide = plane.is_wide ? plane.wide.row(r) : nullptr;
   uint8_t* const narrow = plane.is_wide ? nullptr : plane.narrow.row(r);
-  kernels().contexts(rows_around(plane, y), shape.width, plane.scale, contexts);
+  if (!plane.has_contexts) kernels().contexts(rows_around(plane, y), shape.width, plane.scale, contexts);
   if (shape.full(y)) {
     source.end = kernels().get_symbols({contexts, tokens, wide, narrow, shape.width, plane.first}, tables_.data(),
                                        source.states, source.begin, source.end);

@@ -48,6 +48,7 @@ struct SymbolPlane {
   bool is_wide = false;
   unsigned first = 0, alphabet = 0;
   const Plane<uint8_t>* other = nullptr;  ///< tokens of the same pixels that are known before
+  bool has_contexts = false;              ///< `contexts` hold what its owner says, instead of what tokens around say
   ContextScale scale;
 };
 
@@ -63,8 +64,9 @@ class PlaneEncoder {
 
  private:
   void choose_scale(SymbolPlane& plane, const TileShape& shape);
+  void count(const SymbolPlane& plane, const TileShape& shape);
   TokenLevels levels_;
-  TokenCounts counts_;
+  TokenCounts counts_, more_counts_;
   std::vector<EncodeEntry> tables_;
 };
 

@@ -1,5 +1,6 @@
 // What bounds of error promise, in every pixel of many images; and refinements, which give the exact image back.
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -10,6 +11,7 @@
 #include "common/image/normal.h"
 #include "tests/support/codec_images.h"
 #include "tests/support/depth_images.h"
+#include "tests/support/simd_targets.h"
 
 namespace telesplat::codec {
 namespace {
@@ -81,6 +83,92 @@ TEST(CodecBounds, HoldInEveryPixelAndRefinementsAreExact) {
         ASSERT_TRUE(exact.ok()) << exact.error().text;
         ASSERT_TRUE(*exact == image);
       }
+}
+
+// Of a stream and of what refines it: every length, and bits that are other ones.
+template <class Decode>
+void expect_damage_is_found(const std::vector<uint8_t>& bytes, std::mt19937& random, Decode decoded, size_t& refused) {
+  for (size_t length = 0; length < bytes.size(); ++length) {
+    const std::vector<uint8_t> part(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(length));
+    ASSERT_FALSE(decoded(part).ok()) << length << " of " << bytes.size();
+  }
+  for (int trial = 0; trial < 100; ++trial) {
+    auto bad = bytes;
+    for (uint32_t flips = 1 + random() % 3; flips > 0; --flips)
+      bad[random() % bad.size()] ^= static_cast<uint8_t>(1u << random() % 8);
+    const auto image = decoded(bad);
+    refused += !image.ok();
+    if (image.ok()) {
+      ASSERT_TRUE(test::is_canonical(*image));
+    }
+  }
+}
+
+TEST(CodecBounds, DamageIsAnErrorOrACanonicalImage) {
+  std::mt19937 random(11);
+  size_t refused = 0;
+  for (const DepthImage& image : test::codec_images(3)) {
+    const auto bytes = encode(image, error_bounds(1 / 32.0, 2 / 1280.0, 1, 1));
+    expect_damage_is_found(
+        bytes, random, [](const auto& b) { return decode(b); }, refused);
+    const DepthImage bounded = decode(bytes).value();
+    const auto refine = [&](const auto& b) {
+      auto exact = decode_refinement(b, bounded);
+      for (size_t i = 0; exact.ok() && i < bounded.pixels(); ++i)
+        EXPECT_EQ(exact->depth[i] == 0, bounded.depth[i] == 0) << "a refinement changes no mask";
+      return exact;
+    };
+    expect_damage_is_found(encode_refinement(image, bounded), random, refine, refused);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(refused, 500u);
+}
+
+TEST(CodecBounds, EveryInstructionSetGivesTheSame) {
+  const ErrorBounds bounds = error_bounds(1 / 32.0, 2 / 1280.0, 1, 1);
+  struct Made {
+    DepthImage image, bounded;
+    std::vector<uint8_t> bytes, refinement;
+  };
+  std::vector<Made> all;
+  for (int width = 1; width <= 70; ++width)
+    for (const double density : {0.05, 0.7, 1.0}) {
+      Made m{test::render({.width = width, .height = 11, .seed = static_cast<uint32_t>(width), .rough = true})};
+      test::keep_random(m.image, density, 5);
+      m.bytes = encode(m.image, bounds, &m.bounded);
+      m.refinement = encode_refinement(m.image, m.bounded);
+      all.push_back(std::move(m));
+    }
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    for (const Made& m : all) {
+      EXPECT_EQ(encode(m.image, bounds), m.bytes) << hwy::TargetName(target) << ", " << m.image.width;
+      EXPECT_TRUE(decode(m.bytes).value() == m.bounded) << hwy::TargetName(target) << ", " << m.image.width;
+      EXPECT_EQ(encode_refinement(m.image, m.bounded), m.refinement)
+          << hwy::TargetName(target) << ", " << m.image.width;
+      EXPECT_TRUE(decode_refinement(m.refinement, m.bounded).value() == m.image)
+          << hwy::TargetName(target) << ", " << m.image.width;
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(CodecBounds, SeveralTilesAndNarrowOnes) {
+  const ErrorBounds bounds = error_bounds(1 / 32.0, 2 / 1280.0, 1, 1);
+  for (const double density : {0.02, 0.15, 0.7, 1.0})
+    for (const auto& [width, height] :
+         {std::pair{700, 300}, {513, 257}, {20, 3000}, {3000, 20}, {9000, 1}, {1, 9000}}) {
+      DepthImage image = test::plane(width, height, 40, 90);
+      test::keep_random(image, density, 3);
+      DepthImage bounded;
+      encode(image, bounds, &bounded);
+      expect_within(bounds, image, bounded);
+      const auto exact = decode_refinement(encode_refinement(image, bounded), bounded);
+      ASSERT_TRUE(exact.ok()) << exact.error().text;
+      ASSERT_TRUE(*exact == image) << density << ", " << width << " x " << height;
+    }
 }
 
 TEST(CodecBounds, NoErrorIsTheLosslessStream) {

@@ -75,8 +75,9 @@ std::vector<uint8_t> as_sparse(const image::DepthImage& image, const image::Pixe
   detail::put_mask(out, mask);
   detail::TileScratch s;
   s.mask = mask;
-  s.scatter_encoder.start(mask.count());
-  encode_sparse(s, image, rect, {1, 0, 0});
+  const detail::TileBounds exact({});
+  s.scatter_encoder.start(mask.count(), exact);
+  encode_sparse(s, image, rect, {1, 0, 0}, detail::kRaw);
   s.scatter_encoder.finish(out);
   return out;
 }

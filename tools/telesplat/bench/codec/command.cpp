@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -28,7 +29,8 @@ struct CodecBenchOptions {
   std::vector<std::string> files;
   data::DataOptions data;  ///< how scenes are read; its own scene is none
   ViewOptions views;
-  std::string coders = "all";
+  std::string coders = "all", depth_error = "0";
+  int normal_error = 0, colour_error = 0;
   double seconds = 0.5;
   std::string errors, json;
 };
@@ -47,6 +49,18 @@ options::Table measure_table(CodecBenchOptions& o) {
        .value = &o.seconds,
        .help = "for each instruction set, encoding and decoding are timed so long; 0: not at all",
        .limits = Range{0, 60}},
+      {.flag = "--depth-error",
+       .value = &o.depth_error,
+       .help = "with this or the other bounds of error, images are coded within bounds, too, and refined: of a pixel's "
+               "size at its depth, a number or a quotient such as 1/32, up to 16"},
+      {.flag = "--normal-error",
+       .value = &o.normal_error,
+       .help = "codes of both coordinates of normals",
+       .limits = Range{0, codec::ErrorBounds::kMostNormal}},
+      {.flag = "--colour-error",
+       .value = &o.colour_error,
+       .help = "codes of each channel of colours",
+       .limits = Range{0, codec::ErrorBounds::kMostColour}},
       {.flag = "--errors",
        .value = &o.errors,
        .help = "PNG for error maps, 8 times: for each file the image that has the largest errors"},
@@ -93,10 +107,28 @@ Result<std::vector<const Baseline*>> named_coders(const std::string& names) {
   return out;
 }
 
+// "0.03", "1/32"
+Result<double> pixels_of(const std::string& text) {
+  constexpr double kMost = 16;
+  double parts[2] = {0, 1};
+  const char *at = text.data(), *const end = at + text.size();
+  for (double& part : parts) {
+    const auto [stop, error] = std::from_chars(at, end, part);
+    if (error != std::errc() || (stop != end && (*stop != '/' || &part == &parts[1]))) break;
+    if (stop == end) {
+      const double pixels = parts[0] / parts[1];
+      if (pixels >= 0 && pixels <= kMost) return pixels;
+      break;
+    }
+    at = stop + 1;
+  }
+  return Error{fmt::format("--depth-error {}: expected pixels, 0 to {}, such as 1/32", text, kMost)};
+}
+
 class CodecBench {
  public:
-  CodecBench(CodecBenchOptions& o, std::vector<const Baseline*> coders)
-      : o_(o), measure_({std::move(coders), o.seconds, !o.errors.empty()}) {}
+  CodecBench(CodecBenchOptions& o, std::vector<const Baseline*> coders, const ErrorWish& wish)
+      : o_(o), measure_({std::move(coders), o.seconds, !o.errors.empty(), wish}) {}
 
   Status recorded(const FrameSet& set) {
     for (size_t i = 0; i < set.files.size(); ++i) {
@@ -174,7 +206,9 @@ int bench_codec(CodecBenchOptions o, const options::Given&) {
     if (!subject) return tools::complain(subject.error());
     subjects.push_back(*subject);
   }
-  CodecBench bench(o, std::move(*coders));
+  const auto depth_error = pixels_of(o.depth_error);
+  if (!depth_error) return tools::complain(depth_error.error());
+  CodecBench bench(o, std::move(*coders), {*depth_error, o.normal_error, o.colour_error});
   const auto ended = [&](const Status& s) {
     return net::stop_requested() ? tools::complain({"interrupted"}, 130) : tools::complain(s.error());
   };

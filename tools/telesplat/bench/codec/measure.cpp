@@ -37,22 +37,17 @@ double severity(const CodecErrors& e) {
   return double(e.uncovered) * 1e6 + e.depth_px.largest + e.normal_codes.largest + e.colour_codes.largest;
 }
 
-image::DepthImage through_codec(const image::DepthImage& image) {
+image::DepthImage through_codec(const image::DepthImage& image, const codec::ErrorBounds& bounds) {
   image::DepthImage out;
-  return CodecMeasure::decode(out, CodecMeasure::encode(image)) ? out : image::DepthImage(image.width, image.height);
+  return codec::decode_into(out, codec::encode(image, bounds)) ? out : image::DepthImage(image.width, image.height);
 }
 
 }  // namespace
 
-std::vector<uint8_t> CodecMeasure::encode(const image::DepthImage& tile) { return codec::encode(tile); }
-
-Status CodecMeasure::decode(image::DepthImage& tile, std::span<const uint8_t> stream) {
-  return codec::decode_into(tile, stream);
-}
-
 Status CodecMeasure::add(const DepthFrame& frame) {
   if (report_.frames == 0) {
     worst_.reset(), worst_error_ = -1;
+    report_.wish = options_.wish;
     for (const Baseline* coder : options_.coders) report_.baselines.push_back({coder, {}, coder->missing()});
   }
   ++report_.frames;
@@ -62,22 +57,26 @@ Status CodecMeasure::add(const DepthFrame& frame) {
     if (const Status s = add_tile(tile, frame.focal_px, errors); !s) return s;
   if (options_.error_maps && severity(errors) > worst_error_) {
     worst_error_ = severity(errors);
-    worst_ = error_maps(frame.image, through_codec(frame.image), frame.focal_px);
+    worst_ = error_maps(frame.image, through_codec(frame.image, options_.wish.bounds(frame.focal_px)), frame.focal_px);
   }
   report_.errors.merge(errors);
   return ok_status();
 }
 
 Status CodecMeasure::add_tile(const image::DepthImage& tile, double focal_px, CodecErrors& errors) {
-  const auto stream = encode(tile);
+  const auto stream = codec::encode(tile);
   if (const Status s = add_stream(stream, report_.bits); !s) return s;
   image::DepthImage decoded;
-  if (const Status s = decode(decoded, stream); !s)
+  if (const Status s = codec::decode_into(decoded, stream); !s)
     return Error{fmt::format("what was encoded is not decoded: {}", s.error().text)};
   if (decoded.width != tile.width || decoded.height != tile.height)
     return Error{fmt::format("a tile of {} x {} pixels came back as {} x {}", tile.width, tile.height, decoded.width,
                              decoded.height)};
-  add_errors(tile, decoded, focal_px, errors);
+  const codec::ErrorBounds bounds = options_.wish.bounds(focal_px);
+  if (bounds.exact())
+    add_errors(tile, decoded, focal_px, errors);
+  else if (const Status s = add_bounded(tile, bounds, errors, focal_px); !s)
+    return s;
   for (BaselineReport& b : report_.baselines) {
     if (!b.missing.empty()) continue;
     const auto bits = b.coder->bits(tile);
@@ -90,16 +89,32 @@ Status CodecMeasure::add_tile(const image::DepthImage& tile, double focal_px, Co
   const size_t covered = covered_pixels(tile);
   ++report_.tiles;
   report_.covered += covered;
-  if (tile.width == kTile && tile.height == kTile) keep_to_time(tile, covered);
+  if (tile.width == kTile && tile.height == kTile) keep_to_time(tile, covered, bounds);
+  return ok_status();
+}
+
+Status CodecMeasure::add_bounded(const image::DepthImage& tile, const codec::ErrorBounds& bounds, CodecErrors& errors,
+                                 double focal_px) {
+  image::DepthImage bounded;
+  const auto stream = codec::encode(tile, bounds);
+  if (const Status s = add_stream(stream, report_.bounded); !s) return s;
+  if (const Status s = codec::decode_into(bounded, stream); !s)
+    return Error{fmt::format("what was encoded within bounds is not decoded: {}", s.error().text)};
+  add_errors(tile, bounded, focal_px, errors);
+  const auto refinement = codec::encode_refinement(tile, bounded);
+  report_.refinement += 8 * refinement.size();
+  const auto exact = codec::decode_refinement(refinement, bounded);
+  if (!exact) return Error{fmt::format("what refines is not decoded: {}", exact.error().text)};
+  if (*exact != tile) return Error{"a refined tile is not exact"};
   return ok_status();
 }
 
 // The fullest ones, of those that are as full those that came first.
-void CodecMeasure::keep_to_time(const image::DepthImage& tile, size_t covered) {
+void CodecMeasure::keep_to_time(const image::DepthImage& tile, size_t covered, const codec::ErrorBounds& bounds) {
   report_.full_tiles += covered == tile.pixels();
   if (2 * covered < tile.pixels() || options_.seconds <= 0) return;
   const auto fuller = [](size_t c, const Timed& t) { return c > t.covered; };
-  timed_.insert(std::upper_bound(timed_.begin(), timed_.end(), covered, fuller), {covered, tile});
+  timed_.insert(std::upper_bound(timed_.begin(), timed_.end(), covered, fuller), {covered, tile, bounds});
   if (timed_.size() > kMostTimed) timed_.pop_back();
 }
 
@@ -110,7 +125,7 @@ void CodecMeasure::measure_speeds_of_kept() {
   size_t covered = 0, pixels = 0, kept = 0;  // kept: so that nothing is left out
   std::vector<std::vector<uint8_t>> streams;
   for (const Timed& t : timed_) {
-    streams.push_back(encode(t.tile));
+    streams.push_back(codec::encode(t.tile));
     covered += t.covered, pixels += t.tile.pixels();
   }
   report_.timed_tiles = timed_.size();
@@ -119,12 +134,41 @@ void CodecMeasure::measure_speeds_of_kept() {
   report_.speeds = measure_speeds(
       covered, options_.seconds,
       [&] {
-        for (const Timed& t : timed_) kept += encode(t.tile).size();
+        for (const Timed& t : timed_) kept += codec::encode(t.tile).size();
       },
       [&] {
-        for (const auto& stream : streams) kept += size_t(decode(decoded, stream).ok());
+        for (const auto& stream : streams) kept += size_t(codec::decode_into(decoded, stream).ok());
       });
+  if (!options_.wish.exact()) measure_bounded_speeds(covered);
   timed_.clear();
+}
+
+void CodecMeasure::measure_bounded_speeds(size_t covered) {
+  std::vector<std::vector<uint8_t>> streams, refinements;
+  std::vector<image::DepthImage> bounded(timed_.size());
+  size_t kept = 0;
+  for (size_t i = 0; i < timed_.size(); ++i) {
+    streams.push_back(codec::encode(timed_[i].tile, timed_[i].bounds, &bounded[i]));
+    refinements.push_back(codec::encode_refinement(timed_[i].tile, bounded[i]));
+  }
+  image::DepthImage decoded;
+  report_.bounded_speeds = measure_speeds(
+      covered, options_.seconds,
+      [&] {
+        for (const Timed& t : timed_) kept += codec::encode(t.tile, t.bounds).size();
+      },
+      [&] {
+        for (const auto& stream : streams) kept += size_t(codec::decode_into(decoded, stream).ok());
+      });
+  report_.refinement_speeds = measure_speeds(
+      covered, options_.seconds,
+      [&] {
+        for (size_t i = 0; i < timed_.size(); ++i) kept += codec::encode_refinement(timed_[i].tile, bounded[i]).size();
+      },
+      [&] {
+        for (size_t i = 0; i < timed_.size(); ++i)
+          kept += size_t(codec::decode_refinement(refinements[i], bounded[i]).ok());
+      });
 }
 
 CodecReport CodecMeasure::finish(std::string name) {

@@ -35,10 +35,17 @@ std::string size_table(const CodecReport& r) {
   std::string out =
       "| bits a covered pixel | depth | normal | colour | mask | sparse tiles | headers | all | of LZW | of TIFF |\n"
       "|---|---|---|---|---|---|---|---|---|---|\n";
-  const StreamBits& s = r.bits;
-  out += fmt::format("| telesplat | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", bits(s.depth), bits(s.normal),
-                     bits(s.colour), bits(s.mask), bits(s.sparse), bits(s.header), bits(s.all()),
-                     share(s.all(), bits_of(r, "lzw")), share(s.all(), bits_of(r, "tiff")));
+  const auto row = [&](const std::string& name, const StreamBits& s) {
+    out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", name, bits(s.depth), bits(s.normal),
+                       bits(s.colour), bits(s.mask), bits(s.sparse), bits(s.header), bits(s.all()),
+                       share(s.all(), bits_of(r, "lzw")), share(s.all(), bits_of(r, "tiff")));
+  };
+  row("telesplat", r.bits);
+  if (!r.wish.exact()) {
+    row("within bounds", r.bounded);
+    out += fmt::format("| refinement | - | - | - | - | - | - | {} | {} | {} |\n", bits(r.refinement),
+                       share(r.refinement, bits_of(r, "lzw")), share(r.refinement, bits_of(r, "tiff")));
+  }
   for (const BaselineReport& b : r.baselines) out += baseline_row(r, b);
   return out;
 }
@@ -87,6 +94,11 @@ std::string to_markdown(const CodecReport& r) {
         "\n";
   else
     out += "speeds are not measured: no tile is half covered, or --seconds is 0\n";
+  if (!r.bounded_speeds.empty()) out += speed_table(r.bounded_speeds, "Mpx/s within bounds") + "\n";
+  if (!r.refinement_speeds.empty()) out += speed_table(r.refinement_speeds, "Mpx/s of refinements") + "\n";
+  if (!r.wish.exact())
+    out += fmt::format("bounds: depth {:.4f} px; normals {} codes, {:.2f} degrees; colours {} codes\n", r.wish.depth_px,
+                       r.wish.normal, codec::normal_error_degrees(r.wish.normal), r.wish.colour);
   return out + error_line(r.errors);
 }
 
@@ -107,6 +119,13 @@ nlohmann::json to_json(const CodecReport& r) {
   coders["telesplat"] = {{"depth", bits(s.depth)}, {"normal", bits(s.normal)}, {"colour", bits(s.colour)},
                          {"mask", bits(s.mask)},   {"sparse", bits(s.sparse)}, {"header", bits(s.header)},
                          {"all", bits(s.all())},   {"bytes", s.all() / 8}};
+  if (!r.wish.exact()) {
+    const StreamBits& b = r.bounded;
+    coders["bounded"] = {{"depth", bits(b.depth)}, {"normal", bits(b.normal)}, {"colour", bits(b.colour)},
+                         {"mask", bits(b.mask)},   {"sparse", bits(b.sparse)}, {"header", bits(b.header)},
+                         {"all", bits(b.all())},   {"bytes", b.all() / 8}};
+    coders["refinement"] = {{"all", bits(r.refinement)}, {"bytes", r.refinement / 8}};
+  }
   for (const BaselineReport& b : r.baselines) {
     nlohmann::json& to = coders[b.coder->name];
     if (!b.missing.empty()) {
@@ -130,6 +149,9 @@ nlohmann::json to_json(const CodecReport& r) {
           {"timed_tiles", r.timed_tiles},
           {"timed_covered", r.timed_covered},
           {"speeds", speeds_json(r.speeds)},
+          {"bounded_speeds", speeds_json(r.bounded_speeds)},
+          {"refinement_speeds", speeds_json(r.refinement_speeds)},
+          {"bounds", {{"depth_px", r.wish.depth_px}, {"normal", r.wish.normal}, {"colour", r.wish.colour}}},
           {"errors",
            {{"uncovered", e.uncovered},
             {"depth_px", figure_json(e.depth_px, e.pixels)},

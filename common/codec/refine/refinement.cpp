@@ -1,0 +1,304 @@
+// What bounded streams leave out.
+//   refinement = magic, version, varint width, varint height; of each tile in which something is: u8 kind, and
+//     kSame: nothing, all pixels are as they are known
+//     kDense, kScattered: reach (varint depth, u8 pole + 8 * normal, u8 colour), and dense_refine.h or scattered pixels
+//     kAnew: the tile as in a lossless stream
+//   scattered = of the pixels row by row: stored block of bits (depth), [block of bytes (normals)], [3 blocks of bytes
+//     (green, red, blue)]
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "common/codec/refine/dense_refine.h"
+#include "common/codec/depth_codec.h"
+#include "common/codec/entropy.h"
+#include "common/codec/tile.h"
+#include "common/image/normal.h"
+
+namespace telesplat::codec {
+namespace {
+
+using detail::Mask;
+using detail::Reach;
+using detail::Reader;
+using detail::TileBounds;
+using detail::TileGrid;
+using detail::TileRect;
+using image::DepthImage;
+
+constexpr uint8_t kMagic = 0xD8, kVersion = 5;
+enum Kind : uint8_t { kSame = 0, kDense = 1, kScattered = 2, kAnew = 3 };
+constexpr int kNarrow = 16;              // pixels: tiles that are not as wide are coded as scattered ones
+constexpr int kShifts[3] = {8, 16, 0};   // green, red, blue
+constexpr unsigned kMostDepthBits = 25;  // of a scattered pixel
+
+Error damaged(std::string_view what) { return Error{fmt::format("depth image refinement: {}", what)}; }
+
+bool same_mask(const DepthImage& a, const DepthImage& b) {
+  if (a.width != b.width || a.height != b.height || a.pixels() != b.pixels()) return false;
+  for (size_t i = 0; i < a.pixels(); ++i)
+    if ((a.depth[i] == 0) != (b.depth[i] == 0)) return false;
+  return true;
+}
+
+struct Scratch {
+  Mask mask;
+  size_t covered = 0;
+  detail::RefinementCoder dense;
+  detail::BitWriter writer;
+  detail::BitReader reader;
+  std::vector<uint8_t> bytes;
+};
+Scratch& scratch() {
+  static thread_local Scratch s;
+  return s;
+}
+
+// What is covered, into s.mask and s.covered.
+void look_at_mask(Scratch& s, const DepthImage& image, const TileRect& rect) {
+  s.mask.reset(rect.width, rect.height);
+  for (int y = 0; y < rect.height; ++y)
+    detail::covered_bits(image.depth.data() + rect.index(0, y), static_cast<size_t>(rect.width), s.mask.row(y));
+  s.covered = s.mask.count();
+}
+
+// f(index) of each covered pixel, row by row.
+template <class F>
+void for_each_covered(const Scratch& s, const TileRect& rect, F f) {
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t row = rect.index(0, y);
+    detail::for_each_set(s.mask.row(y), s.mask.words_per_row(), [&](size_t x) { f(row + x); });
+  }
+}
+
+bool is_full(const Scratch& s, const TileRect& rect) {
+  return s.covered == static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
+}
+
+// As codecs of normals see them: how far two of them are on the turned map.
+int normal_distance(uint16_t a, uint16_t b, int pole) {
+  const uint16_t p = detail::turn_normal(a, pole), q = detail::turn_normal(b, pole);
+  return std::max(std::abs((p & 255) - (q & 255)), std::abs((p >> 8) - (q >> 8)));
+}
+
+// Nothing where normals are too far from each other on each map, or not canonical.
+bool reach_of_normals(const Scratch& s, const TileRect& rect, const DepthImage& exact, const DepthImage& known,
+                      Reach& reach) {
+  bool differ = false, canonical = true;
+  size_t n = 0;
+  int most[detail::kPoles] = {};
+  for_each_covered(s, rect, [&](size_t i) {
+    const uint16_t a = exact.normal[i], b = image::canonical_normal16(known.normal[i]);
+    differ |= a != known.normal[i];
+    canonical &= image::canonical_normal16(a) == a;
+    if (n++ % 16 == 0)
+      for (int p = 0; p < detail::kPoles; ++p)
+        most[p] = std::max(most[p], normal_distance(image::canonical_normal16(a), b, p));
+  });
+  if (!differ) return true;
+  if (!canonical) return false;
+  reach.pole = static_cast<int>(std::min_element(most, most + detail::kPoles) - most);
+  for_each_covered(s, rect, [&](size_t i) {
+    reach.normal = std::max(reach.normal,
+                            normal_distance(exact.normal[i], image::canonical_normal16(known.normal[i]), reach.pole));
+  });
+  return reach.normal <= ErrorBounds::kMostNormal;
+}
+
+// False where the exact tile is so far from what is known that this says little.
+bool reach_of(const Scratch& s, const TileRect& rect, const DepthImage& exact, const DepthImage& known, Reach& reach) {
+  double share = 0;
+  int colour = 0;
+  for_each_covered(s, rect, [&](size_t i) {
+    const auto a = static_cast<int32_t>(exact.depth[i]), b = static_cast<int32_t>(known.depth[i]);
+    share = std::max(share, std::abs(a - b) / static_cast<double>(b));
+    for (const int shift : kShifts)
+      colour = std::max(colour, std::abs(static_cast<int>(exact.colour[i] >> shift & 255) -
+                                         static_cast<int>(known.colour[i] >> shift & 255)));
+  });
+  reach.colour = colour;
+  share *= 4294967296.0;
+  if (share > ErrorBounds::kMostDepth || colour > ErrorBounds::kMostColour) return false;
+  reach.depth = share > 0 ? static_cast<uint32_t>(share) + 1 : 0;
+  return reach_of_normals(s, rect, exact, known, reach);
+}
+
+// A number of `count`, which all are as likely: with two lengths that differ by a bit.
+struct Even {
+  explicit Even(uint32_t count)
+      : bits(static_cast<unsigned>(std::bit_width(count)) - 1), short_ones((2u << bits) - count) {}
+  void put(detail::BitSink& sink, uint32_t v) const {
+    if (v < short_ones) {
+      sink.put(v, bits);
+    } else {
+      sink.put((v + short_ones) >> 1, bits);
+      sink.put((v + short_ones) & 1, 1);
+    }
+  }
+  uint32_t get(detail::BitSource& source) const {
+    const uint32_t v = source.take(bits);
+    return v < short_ones ? v : 2 * v + source.take(1) - short_ones;
+  }
+  unsigned bits;
+  uint32_t short_ones;
+};
+
+void put_scattered(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exact, const DepthImage& known,
+                   const TileRect& rect, const Reach& reach) {
+  s.writer.start(s.covered * kMostDepthBits);
+  for_each_covered(s, rect, [&](size_t i) {
+    const uint32_t low = reach.lowest(known.depth[i]), high = reach.highest(known.depth[i]);
+    Even(high - low + 1).put(s.writer.sink, exact.depth[i] - low);
+  });
+  detail::put_stored_block(out, s.writer.bytes());
+  const auto put_bytes = [&](auto byte_of) {
+    s.bytes.clear();
+    for_each_covered(s, rect, [&](size_t i) { s.bytes.push_back(static_cast<uint8_t>(byte_of(i))); });
+    detail::put_block(out, s.bytes);
+  };
+  if (reach.normal != 0)
+    put_bytes([&](size_t i) {
+      const uint16_t a = detail::turn_normal(exact.normal[i], reach.pole),
+                     b = detail::turn_normal(image::canonical_normal16(known.normal[i]), reach.pole);
+      return (a & 255) - (b & 255) + reach.normal + (2 * reach.normal + 1) * ((a >> 8) - (b >> 8) + reach.normal);
+    });
+  if (reach.colour != 0)
+    for (const int shift : kShifts)
+      put_bytes([&](size_t i) { return (exact.colour[i] >> shift) - (known.colour[i] >> shift); });
+}
+
+bool get_scattered(Scratch& s, Reader& in, DepthImage& image, const TileRect& rect, const Reach& reach) {
+  const auto bits = detail::get_stored_block(in);
+  if (!bits || bits->size() > (s.covered * kMostDepthBits + 7) / 8) return false;
+  s.reader.start(*bits, s.covered * kMostDepthBits);
+  bool good = true;
+  for_each_covered(s, rect, [&](size_t i) {
+    const uint32_t low = reach.lowest(image.depth[i]), high = reach.highest(image.depth[i]);
+    const uint32_t v = Even(high - low + 1).get(s.reader.source);
+    good &= v <= high - low;
+    image.depth[i] = std::min(low + v, high);
+  });
+  if (!good || !s.reader.finished()) return false;
+  s.bytes.resize(s.covered);
+  if (reach.normal != 0) {
+    if (!detail::get_block(in, s.bytes)) return false;
+    const int step = 2 * reach.normal + 1;
+    const uint8_t* at = s.bytes.data();
+    for_each_covered(s, rect, [&](size_t i) {
+      const int v = *at++;
+      const uint16_t b = detail::turn_normal(image::canonical_normal16(image.normal[i]), reach.pole);
+      const int x = (b & 255) + v % step - reach.normal, y = (b >> 8) + v / step - reach.normal;
+      good &= v < step * step && x >= 0 && x <= 254 && y >= 0 && y <= 254;
+      image.normal[i] = detail::turn_back(static_cast<uint16_t>((x & 255) | (y & 255) << 8), reach.pole);
+    });
+  }
+  for (int c = 0; good && c < 3 && reach.colour != 0; ++c) {
+    if (!detail::get_block(in, s.bytes)) return false;
+    const uint8_t* at = s.bytes.data();
+    const int shift = kShifts[c];
+    for_each_covered(s, rect, [&](size_t i) {
+      const uint32_t v = ((image.colour[i] >> shift) + *at++) & 255;
+      image.colour[i] = (image.colour[i] & ~(255u << shift)) | v << shift;
+    });
+  }
+  return good;
+}
+
+void put_tile(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exact, const DepthImage& known,
+              const TileRect& rect) {
+  look_at_mask(s, known, rect);
+  if (s.covered == 0) return;
+  Reach reach;
+  if (!reach_of(s, rect, exact, known, reach)) {
+    out.push_back(kAnew);
+    detail::put_tile(out, exact, rect, TileBounds({}));
+    return;
+  }
+  if (reach.none()) {
+    out.push_back(kSame);
+    return;
+  }
+  const bool full = is_full(s, rect);
+  const bool scattered =
+      rect.width < kNarrow || s.covered * 4 < static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
+  out.push_back(scattered ? kScattered : kDense);
+  detail::put_varint(out, reach.depth);
+  out.push_back(static_cast<uint8_t>(reach.pole + 8 * reach.normal));
+  out.push_back(static_cast<uint8_t>(reach.colour));
+  if (scattered)
+    put_scattered(s, out, exact, known, rect, reach);
+  else
+    s.dense.put(out, exact, known, rect, full ? nullptr : &s.mask, reach);
+}
+
+std::optional<Reach> get_reach(Reader& in) {
+  const auto depth = in.varint();
+  const auto normal = in.u8(), colour = in.u8();
+  if (!colour) return std::nullopt;
+  const Reach reach{*depth, *normal % 8, *normal / 8, *colour};
+  // A share that is rounded up may be one more than a bound.
+  const bool known = reach.depth <= ErrorBounds::kMostDepth + 1 && reach.pole < detail::kPoles &&
+                     reach.normal <= ErrorBounds::kMostNormal && reach.colour <= ErrorBounds::kMostColour;
+  return known && !reach.none() ? std::optional(reach) : std::nullopt;
+}
+
+bool get_anew(Scratch& s, Reader& in, DepthImage& image, const TileRect& rect) {
+  const Mask mask = s.mask;
+  if (!detail::get_tile(in, image, rect, TileBounds({}))) return false;
+  look_at_mask(s, image, rect);
+  return s.mask == mask;
+}
+
+bool get_tile(Scratch& s, Reader& in, DepthImage& image, const TileRect& rect) {
+  look_at_mask(s, image, rect);
+  if (s.covered == 0) return true;
+  const auto kind = in.u8();
+  if (!kind || *kind > kAnew) return false;
+  if (*kind == kSame) return true;
+  if (*kind == kAnew) return get_anew(s, in, image, rect);
+  const auto reach = get_reach(in);
+  if (!reach) return false;
+  if (*kind == kScattered) return get_scattered(s, in, image, rect, *reach);
+  return rect.width >= kNarrow && s.dense.get(in, image, rect, is_full(s, rect) ? nullptr : &s.mask, *reach);
+}
+
+}  // namespace
+
+std::vector<uint8_t> encode_refinement(const DepthImage& exact, const DepthImage& bounded) {
+  CHECK(exact.width > 0 && exact.height > 0 && exact.pixels() <= kMaxPixels);
+  CHECK(same_mask(exact, bounded));
+  std::vector<uint8_t> out{kMagic, kVersion};
+  detail::put_varint(out, static_cast<uint32_t>(exact.width));
+  detail::put_varint(out, static_cast<uint32_t>(exact.height));
+  const TileGrid grid(exact.width, exact.height);
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column)
+      put_tile(scratch(), out, exact, bounded, grid.rect(column, row));
+  return out;
+}
+
+Result<DepthImage> decode_refinement(std::span<const uint8_t> bytes, const DepthImage& bounded) {
+  CHECK(bounded.width > 0 && bounded.height > 0 && bounded.pixels() <= kMaxPixels);
+  Reader in(bytes);
+  const auto magic = in.u8(), version = in.u8();
+  if (!version) return damaged("shorter than its header");
+  if (*magic != kMagic) return damaged(fmt::format("begins with {:#04x}, not {:#04x}", *magic, kMagic));
+  if (*version != kVersion) return damaged(fmt::format("version {}, expected {}", *version, kVersion));
+  const auto width = in.varint(), height = in.varint();
+  if (!height) return damaged("shorter than its header");
+  if (*width != static_cast<uint32_t>(bounded.width) || *height != static_cast<uint32_t>(bounded.height))
+    return damaged(fmt::format("{} x {} pixels, expected {} x {}", *width, *height, bounded.width, bounded.height));
+  DepthImage image = bounded;
+  const TileGrid grid(image.width, image.height);
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column)
+      if (!get_tile(scratch(), in, image, grid.rect(column, row)))
+        return damaged(
+            fmt::format("damaged or cut off in tile {}, {} of {} x {}", column, row, grid.columns, grid.rows));
+  if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
+  return image;
+}
+
+}  // namespace telesplat::codec
