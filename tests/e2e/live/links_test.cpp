@@ -269,6 +269,37 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
   EXPECT_LT(latency[latency.size() / 2], 2000);
 }
 
+// Errors within bounds, and none of them where the head has come to rest.
+TEST(Links, BehindASlowOnePointsHaveErrorsUntilTheHeadRests) {
+  for (const bool said : {false, true}) {
+    std::vector<std::string> flags{"--duration", "2", "--hold", "6", "--size", "640x400", "--link"};
+    flags.push_back(said ? "20ms" : "rtt=20ms,rate=2mbit");
+    if (said) flags.insert(flags.end(), {"--depth-error", "1/16", "--normal-error", "2", "--colour-error", "off"});
+    PipelineRun run(flags);
+    ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+    EXPECT_TRUE(run.all_gone());
+    const auto s = run.summary();
+    ASSERT_TRUE(s.is_object());
+    const auto errors = s["errors_allowed"];
+    ASSERT_TRUE(errors.is_object()) << said;
+    EXPECT_GT(errors["patches"], 0);
+    EXPECT_GT(errors["patches_refined"], 0);
+    EXPECT_GT(errors["depth_m"], 0);
+    EXPECT_LT(errors["depth_m"], 1e-3);
+    EXPECT_GT(errors["normal_deg"], 0);
+    EXPECT_EQ(errors["colour"] == 0, said);
+    EXPECT_EQ(s["errors"]["messages_rejected"], 0);
+    const auto depth = run.column("tiles.csv", "depth_error_m");
+    EXPECT_EQ(*std::max_element(depth.begin(), depth.end()), double(errors["depth_m"]));
+  }
+}
+
+TEST(Links, ErrorsAreOffWhereLinksAreFast) {
+  PipelineRun run({"--duration", "2"});
+  ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
+  EXPECT_TRUE(run.summary()["errors_allowed"].is_null());
+}
+
 TEST(Links, BadOnesAreRefused) {
   for (const auto& [link, why] :
        {std::pair{"rate=0",

@@ -20,7 +20,10 @@ TEST(MasterFlags, SettingsHaveTheirUsualValues) {
   MasterServiceOptions o;
   table(o);
   EXPECT_EQ(o.master.settings, (std::map<std::string, double>{{"packing.age_weight", 1},
+                                                              {"packing.colour_error", -1},
+                                                              {"packing.depth_error", -1},
                                                               {"packing.epsilon", 0.004},
+                                                              {"packing.normal_error", -1},
                                                               {"packing.obsolete_after_s", 0},
                                                               {"packing.patches_per_cluster", 6},
                                                               {"packing.rate_weight", 4},
@@ -32,6 +35,28 @@ TEST(MasterFlags, SettingsHaveTheirUsualValues) {
   EXPECT_EQ(o.master.progressive, Progressive::kAuto);
   EXPECT_EQ(o.master.redundancy, Redundancy::kAuto);
   EXPECT_EQ(o.master.steering, Steering::kAuto);
+}
+
+TEST(MasterFlags, ErrorsAreFractionsNumbersAutoOrOff) {
+  MasterServiceOptions o;
+  const auto text = [&](const std::string& flag) {
+    const auto t = table(o);
+    return options::text_of(*options::find(t, flag));
+  };
+  EXPECT_EQ(text("--depth-error"), "auto");
+  EXPECT_TRUE(give(o, "--depth-error", "1/32"));
+  EXPECT_EQ(o.master.settings.at("packing.depth_error"), 1.0 / 32);
+  EXPECT_EQ(text("--depth-error"), "0.03125") << "as children are told it";
+  EXPECT_TRUE(give(o, "--depth-error", "off"));
+  EXPECT_EQ(o.master.settings.at("packing.depth_error"), 0);
+  EXPECT_TRUE(give(o, "--depth-error", "auto"));
+  EXPECT_EQ(o.master.settings.at("packing.depth_error"), -1);
+  EXPECT_TRUE(give(o, "--normal-error", "3"));
+  EXPECT_TRUE(give(o, "--colour-error", "15"));
+  for (const char* bad : {"-1", "1/0", "1/", "/32", "1/-32", "1.5", "nan", "inf", "1 /32", "", "on"})
+    EXPECT_FALSE(give(o, "--depth-error", bad)) << bad;
+  for (const char* bad : {"4", "0.5", "1/2", "-1", "nan"}) EXPECT_FALSE(give(o, "--normal-error", bad)) << bad;
+  EXPECT_FALSE(give(o, "--colour-error", "16"));
 }
 
 TEST(MasterFlags, AreReadUnderBothTheirNames) {

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
+#include <tuple>
 
 #include "tests/support/packer_scenes.h"
 
@@ -69,6 +72,70 @@ TEST(PackerCore, AFrameBecomesEventsOfEveryTile) {
   EXPECT_EQ(core.model().points(), core.statistics().kept);
   EXPECT_EQ(core.statistics().frames_complete, 1u);
   EXPECT_EQ(core.sequence().value, tiles.size());
+}
+
+// All points, wherever they are.
+std::multiset<std::tuple<points::ClusterKey, uint16_t, uint16_t, uint16_t, uint16_t, uint32_t>> points_of(
+    const points::PointModel& model) {
+  std::multiset<std::tuple<points::ClusterKey, uint16_t, uint16_t, uint16_t, uint16_t, uint32_t>> out;
+  for (const auto& [key, cluster] : model.clusters())
+    for (const points::Mosaic& m : cluster->mosaics) {
+      const auto l = m.level(0);
+      for (uint32_t i = 0; i < l.count; ++i) out.insert({key, l.x[i], l.y[i], l.z[i], l.normal[i], l.colour[i]});
+    }
+  return out;
+}
+
+TEST(PackerCore, WhatHasErrorsBecomesExact) {
+  Config config = packer_config();
+  config.model.compact = true;
+  PackerCore exact(config, kEpoch), bounded(config, kEpoch);
+  bounded.set_tolerance({1.0 / 16, 1, 2});
+  test::Replica replica(config.model);
+  submit_all(exact, sampled_frame({1}, camera(), 64), 1);
+  const auto events = submit_all(bounded, sampled_frame({1}, camera(), 64), 1);
+  size_t refinable = 0, bytes = 0, exact_bytes = 0;
+  for (const Event& e : events) {
+    replica.apply(e);
+    refinable += e.refinable;
+    EXPECT_EQ(e.refinable, e.kept > 0);
+    EXPECT_EQ(e.bounds.exact(), e.kept == 0);
+    bytes += e.blob->size();
+  }
+  for (const Event& e : exact.events_since({0})) exact_bytes += e.blob->size();
+  EXPECT_LT(bytes, exact_bytes * 8 / 10);
+  EXPECT_EQ(bounded.model().points(), exact.model().points());
+  EXPECT_FALSE(points_of(bounded.model()) == points_of(exact.model()));
+
+  EXPECT_FALSE(bounded.refine(2)) << "nobody has drawn it since";
+  size_t refined = 0;
+  Sequence before;
+  while (const auto event = bounded.refine(0)) {
+    EXPECT_EQ(event->kind, Event::Kind::kRefine);
+    if (before.value > 0) EXPECT_LT(event->refines, before) << "the newest first";
+    before = event->refines;
+    replica.apply(*event);
+    ++refined;
+  }
+  EXPECT_EQ(refined, refinable);
+  EXPECT_EQ(bounded.statistics().patches_refined, refined);
+  EXPECT_EQ(replica.model().digest(), bounded.model().digest());
+  const auto got = points_of(bounded.model()), wanted = points_of(exact.model());
+  std::vector<decltype(got)::value_type> others;
+  std::set_difference(got.begin(), got.end(), wanted.begin(), wanted.end(), std::back_inserter(others));
+  EXPECT_LT(others.size(), wanted.size() / 200) << "but for those at the sides of leaves";
+
+  test::Replica late(config.model);
+  late.catch_up(bounded);
+  EXPECT_EQ(late.model().digest(), bounded.model().digest());
+}
+
+TEST(PackerCore, WhatWasForgottenInPartStaysAsItCame) {
+  PackerCore core(packer_config(), kEpoch);
+  core.set_tolerance({1.0 / 16, 1, 2});
+  submit_all(core, sampled_frame({1}, camera(), 320), 1);
+  core.forget(std::vector{keys_of(core.model()).front()});
+  EXPECT_FALSE(core.refine(0)) << "one tile brought it all";
 }
 
 TEST(PackerCore, DuplicateTilesAreDroppedAndCounted) {

@@ -55,6 +55,19 @@ TEST(LinkMeter, MeasuresABusyLink) {
   EXPECT_LE(link.figures(2).rtt_s, 0.04 + 0.03 + 0.01) << "at most a receipt late";
 }
 
+TEST(LinkMeter, TellsTheSlowestLinkAndWhetherAllAreFree) {
+  SimulatedLink link(2.5e6, 0.04);
+  EXPECT_EQ(link.meter.slowest_bytes_s(), 0) << "nothing is known";
+  EXPECT_TRUE(link.meter.all_free(0.05, 1000, 0)) << "nobody waits";
+  for (int i = 0; i < 200; ++i) link.publish(10000, 1);  // 0.8 s
+  link.run_until(1.5);
+  EXPECT_NEAR(link.meter.slowest_bytes_s(), 2.5e6, 0.1e6);
+  EXPECT_FALSE(link.meter.all_free(0.05, 1000, 1.5));
+  EXPECT_TRUE(link.meter.all_free(0.05, 2000000, 1.5)) << "so much may wait anyway";
+  link.run_until(1.81);
+  EXPECT_TRUE(link.meter.all_free(0.1, 1000, 1.81)) << "it carries the rest in less";
+}
+
 TEST(LinkMeter, ALinkWithLittleToDoIsNotTakenForASlowOne) {
   SimulatedLink link(12.5e6, 0.02);
   for (int i = 0; i < 40; ++i) link.publish(50000, 1);

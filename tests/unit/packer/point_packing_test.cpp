@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <deque>
 #include <map>
 
@@ -103,6 +104,69 @@ class PointPackingTest : public testing::Test {
   int takes = 1 << 30;  // messages to one viewer, then no more
   PointPacking packing;
 };
+
+TEST_F(PointPackingTest, ErrorsAreToldAndWhatStandsStillBecomesExact) {
+  wire::Welcome session = welcome();
+  session.settings["packing.depth_error"] = 1.0 / 32;
+  session.settings["packing.normal_error"] = 1;
+  session.settings["packing.colour_error"] = 2;
+  ASSERT_TRUE(packing.follow(session, 0));
+  sample(tile(1, 0), 10);
+  sample(tile(1, 1), 10);
+  ASSERT_EQ(told.size(), 2u);
+  const wire::TileDone& done = told.back();
+  // A 32nd of a pixel of 96 in 60 degrees, at no more than 2 m.
+  EXPECT_GT(done.depth_error_m, 0.2 * 1.1547 / 96 / 32);
+  EXPECT_LE(done.depth_error_m, 2.0 * 1.1547 / 96 / 32);
+  EXPECT_EQ(done.normal_error_deg, codec::normal_error_degrees(1));
+  EXPECT_EQ(done.colour_error, 2);
+  const auto patch = decoded<wire::Patch>(sent.back());
+  EXPECT_TRUE(patch.refinable);
+  sent.clear();
+  packing.tick(10.2);
+  const auto refinements = [&] {
+    return std::count_if(sent.begin(), sent.end(), [](const Sent& s) { return s.type == wire::Refine::kName; });
+  };
+  EXPECT_EQ(refinements(), 0) << "the head has not stood still for long";
+  packing.tick(10.4);
+  ASSERT_EQ(refinements(), 1);
+  EXPECT_EQ(status("patches_bounded"), 1);
+  EXPECT_EQ(status("patches_refined"), 1);
+  EXPECT_GT(status("bytes_refined"), 0);
+  packing.tick(20);
+  EXPECT_EQ(refinements(), 1) << "once";
+}
+
+TEST_F(PointPackingTest, WithoutAWordErrorsAreForSlowLinks) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  sample(tile(1, 0), 10);
+  sample(tile(1, 1), 10);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told.back().depth_error_m, 0);
+  EXPECT_FALSE(decoded<wire::Patch>(sent.back()).refinable);
+}
+
+TEST(StillHeads, AreThoseThatDoNotMove) {
+  StillHeads heads;
+  EXPECT_TRUE(heads.still(0)) << "nobody looks";
+  geometry::Pose pose;
+  heads.seen({1}, pose, 0);
+  EXPECT_FALSE(heads.still(0.2));
+  EXPECT_TRUE(heads.still(0.31));
+  pose.position_room.x += 1e-3;
+  heads.seen({1}, pose, 0.4);
+  EXPECT_TRUE(heads.still(0.4)) << "trackers tremble";
+  pose.position_room.x += 2e-3;
+  heads.seen({1}, pose, 0.5);
+  EXPECT_FALSE(heads.still(0.5)) << "slow is not still";
+  EXPECT_TRUE(heads.still(0.81));
+  pose.orientation = glm::angleAxis(0.01, glm::dvec3(0, 1, 0));
+  heads.seen({1}, pose, 0.9);
+  EXPECT_FALSE(heads.still(1.1));
+  heads.seen({2}, {}, 1.15);
+  EXPECT_FALSE(heads.still(1.3)) << "another one has just come";
+  EXPECT_TRUE(heads.still(1.46));
+}
 
 TEST_F(PointPackingTest, AViewThatNeedsNoRaysIsCompleteWithItsPlan) {
   wire::Welcome session = welcome();

@@ -27,6 +27,8 @@ ModelEvent as_received(const packer::Event& e) {
       return {wire::Forget{{5}, e.sequence, e.epoch, e.clusters, e.frames}, nullptr};
     case packer::Event::Kind::kEpoch:
       return {wire::EpochBegin{{5}, e.sequence, e.epoch}, nullptr};
+    case packer::Event::Kind::kRefine:
+      return {wire::Refine{{5}, e.sequence, e.epoch, e.refines, std::as_bytes(std::span(*e.blob))}, e.blob};
     case packer::Event::Kind::kPatch:
       break;
   }
@@ -48,7 +50,9 @@ ModelEvent as_received(const packer::Event& e) {
                       e.rect,
                       std::as_bytes(std::span(*e.blob)),
                       e.missed,
-                      e.missed_rect},
+                      e.missed_rect,
+                      {},
+                      e.refinable},
           e.blob};
 }
 
@@ -67,7 +71,11 @@ std::vector<packer::Event> published(int width, int tile) {
     }
   };
   sample(1, {0, 0.3, 0.8}, test::kEpoch);
+  core.set_tolerance({1.0 / 8, 1, 2});
   sample(2, {0.5, 0.3, 0.6}, test::kEpoch);
+  const auto refined = core.refine(0);
+  CHECK(refined.has_value());
+  out.push_back(*refined);
   std::vector<points::ClusterKey> drawn;
   for (const auto& [key, cluster] : core.model().clusters())
     if (key % 3) drawn.push_back(key);
