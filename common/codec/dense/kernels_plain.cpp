@@ -32,10 +32,24 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
 }  // namespace
 
 const Kernels& plain_kernels() {
-  static constexpr Kernels all{CoveredBits,         DepthResiduals,  DepthRows,      PlaneResiduals,  PlaneTerms,
-                               PlaneSizes,          Contexts,        OtherNormals,   MedianResiduals, GuidedResiduals,
-                               GuidedResidualsWide, GuidedSums,      Geometry,       Heights,         Activity,
-                               NormalEquations,     PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{CoveredBits,
+                               DepthResiduals,
+                               DepthRows,
+                               PlaneResiduals,
+                               PlaneTerms,
+                               PlaneSizes,
+                               Contexts,
+                               OtherNormals,
+                               MedianResiduals,
+                               GuidedResiduals<GuidedSums>,
+                               GuidedResidualsWide<GuidedSums>,
+                               GuidedSums,
+                               Geometry,
+                               Heights,
+                               Activity,
+                               NormalEquations,
+                               PlainPutSymbols,
+                               PlainGetSymbols};
   return all;
 }
 
