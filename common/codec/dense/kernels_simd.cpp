@@ -64,6 +64,16 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
     }
 }
 
+static void SampleShares(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
+                         float* shares) {
+  for (size_t s = 0; s < (n + 3) / 4 * 4; ++s) {
+    float parts[4] = {};
+    for (int i = 0; i < kFeatures; ++i) parts[i % 4] = parts[i % 4] + terms[i] * features[s][i];
+    const float off = (parts[0] + parts[1]) + (parts[2] + parts[3]), size = least + (off < 0 ? -off : off);
+    shares[s] = 1 / (squared ? size * size : size);
+  }
+}
+
 static const Kernels* Set() {
   static constexpr Kernels all{CoveredBits,
                                DepthResiduals,
@@ -81,6 +91,7 @@ static const Kernels* Set() {
                                Heights,
                                Activity,
                                NormalEquations,
+                               SampleShares,
                                PlainPutSymbols,
                                PlainGetSymbols};
   return &all;
@@ -446,6 +457,26 @@ static void PairedSums(const GuidedRows& rows, size_t n, int32_t* HWY_RESTRICT s
 constexpr SumsOf PairedSums = GuidedSums;
 #endif
 
+static void SampleShares(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
+                         float* shares) {
+  const hn::FixedTag<float, 4> d;
+  const auto t0 = hn::LoadU(d, terms), t1 = hn::LoadU(d, terms + 4), t2 = hn::LoadU(d, terms + 8),
+             t3 = hn::LoadU(d, terms + 12);
+  const auto parts = [&](const float* f) HWY_ATTR {
+    auto sum = hn::Mul(t0, hn::LoadU(d, f));
+    sum = hn::Add(sum, hn::Mul(t1, hn::LoadU(d, f + 4)));
+    sum = hn::Add(sum, hn::Mul(t2, hn::LoadU(d, f + 8)));
+    return hn::Add(sum, hn::Mul(t3, hn::LoadU(d, f + 12)));
+  };
+  const auto pairs = [&](auto a, auto b) HWY_ATTR { return hn::Add(hn::ConcatEven(d, b, a), hn::ConcatOdd(d, b, a)); };
+  for (size_t s = 0; s < n; s += 4) {
+    const auto off =
+        pairs(pairs(parts(features[s]), parts(features[s + 1])), pairs(parts(features[s + 2]), parts(features[s + 3])));
+    const auto size = hn::Add(hn::Set(d, least), hn::Abs(off));
+    hn::StoreU(hn::Div(hn::Set(d, 1.0f), squared ? hn::Mul(size, size) : size), d, shares + s);
+  }
+}
+
 static const Kernels* Set() {
   static constexpr Kernels all{CoveredBits,
                                DepthResiduals,
@@ -463,6 +494,7 @@ static const Kernels* Set() {
                                HeightsVector,
                                Activity,
                                NormalEquations,
+                               SampleShares,
                                PutSymbols,
                                GetSymbols};
   return &all;

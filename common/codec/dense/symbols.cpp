@@ -68,7 +68,7 @@ void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
 void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   std::array<uint32_t, 1 << kBiasBits> histogram{};
   uint32_t total = 0;
-  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 3) {
+  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 6) {
     const ContextRows rows = rows_around(plane, y);
     const uint8_t *a = rows.above, *b = rows.above2, *o = rows.other;
     for (size_t x = y % 2; x < shape.width; x += 3, ++total)
