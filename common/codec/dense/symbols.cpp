@@ -82,7 +82,7 @@ double rough_bits(const SymbolPlane& plane, const TileShape& shape) {
 void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   std::array<uint32_t, 1 << kBiasBits> histogram{};
   uint32_t total = 0;
-  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 3) {
+  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 6) {
     const ContextRows rows = rows_around(plane, y);
     const uint8_t *a = rows.above, *b = rows.above2, *o = rows.other;
     for (size_t x = y % 2; x < shape.width; x += 3, ++total)
@@ -169,7 +169,7 @@ bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
   plane.scale.merges = static_cast<int>(bits.source.take(3));
   levels_.alphabet = plane.alphabet;
   if (bits.overrun() || plane.scale.shift > 14 || plane.scale.merges > 4 || !get_levels(bits, levels_)) return false;
-  make_decode_tables(levels_, tables_);
+  make_decode_tables(levels_, tables_, kContexts >> plane.scale.merges);
   return true;
 }
 
