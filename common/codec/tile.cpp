@@ -41,8 +41,9 @@ bool may_be_sparse(size_t covered, size_t pixels) { return covered * 4 < pixels;
 
 // Filled rows predict better where runs are long. Elsewhere sparse tiles take fewer bits up to any density (a tenth
 // less at a third), but ten times longer a pixel than full ones do: bench codec/patch* and codec/sparse*.
-bool is_sparse(size_t covered, size_t runs, size_t pixels) {
-  return covered * 8 < pixels || (may_be_sparse(covered, pixels) && covered < runs * 4);
+// Within bounds, where tokens are few, full ones pay from a 24th on.
+bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
+  return covered * (bounded ? 24 : 8) < pixels || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
 // The one of the sparse tile's normals.
@@ -87,7 +88,8 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
     out.push_back(kEmpty);
     return 0;
   }
-  const bool full = covered == pixels, sparse = !full && is_sparse(covered, s.mask.runs(), pixels);
+  const bool full = covered == pixels,
+             sparse = !full && is_sparse(covered, s.mask.runs(), pixels, bounds.depth != nullptr);
   out.push_back(static_cast<uint8_t>((sparse ? kSparse : kDense) | (full ? 0 : kMasked)));
 
   size_t first = rect.first;  // of the covered pixels

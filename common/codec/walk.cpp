@@ -1,7 +1,5 @@
 #include "common/codec/walk.h"
 
-#include "common/image/normal.h"
-
 namespace telesplat::codec::detail {
 namespace {
 
@@ -13,7 +11,7 @@ void encode_sparse(TileScratch& s, const image::DepthImage& image, const TileRec
   s.predictor.start({base.depth, base.colour, turn_normal(base.normal, pole)});
   s.scatter_walk(s.mask, [&](int x, int y, std::span<const uint16_t> neighbours) {
     Pixel pixel = at(image, rect.index(x, y));
-    if (pole != kRaw) pixel.normal = turn_normal(image::canonical_normal16(pixel.normal), pole);
+    pixel.normal = turn_normal(pixel.normal, pole);
     const Magnitudes size = s.scatter_encoder.put(pixel, s.predictor.predict(x, y, neighbours));
     s.predictor.add(x, y, pixel, size);
     return true;

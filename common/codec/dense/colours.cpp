@@ -288,6 +288,16 @@ void ColourPlanes::encode_channels(const TileShape& shape, const std::vector<uin
   }
 }
 
+// Steps of channels may be less than what a palette without height keeps.
+void ColourPlanes::try_channels(const TileShape& shape, const std::vector<uint32_t>& colours) {
+  const double by_index = rough_bits(index.symbols, shape) + static_cast<double>(header_bits()) / 4;
+  mode = follows_green(shape, colours) ? kDifferences : kChannels;
+  encode_channels(shape, colours);
+  double by_channels = 0;
+  for (const Channel& c : channel) by_channels += rough_bits(c.symbols, shape);
+  if (by_index <= by_channels) mode = kPalette;
+}
+
 void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& colours, uint32_t base,
                           const DepthPlane& depth, const GeometryModel* geometry, int reach) {
   lattice_ = ColourLattice(reach);
@@ -298,6 +308,7 @@ void ColourPlanes::encode(const TileShape& shape, const std::vector<uint32_t>& c
     samples_.choose(shape, std::min<size_t>(kMostSamples, shape.total / 12));
     sort_palette(shape, depth, geometry);
     encode_palette(shape, depth, reach);
+    if (reach > 0 && !has_height_) try_channels(shape, colours);
   } else {
     mode = follows_green(shape, colours) ? kDifferences : kChannels;
     encode_channels(shape, colours);

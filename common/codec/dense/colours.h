@@ -42,6 +42,7 @@ struct ColourPlanes {
   std::vector<int16_t> join_palette(int reach);
   void encode_palette(const TileShape& shape, const DepthPlane& depth, int reach);
   void sort_by_height(const TileShape& shape, const DepthPlane& depth);
+  void try_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
   void encode_channels(const TileShape& shape, const std::vector<uint32_t>& colours);
   void begin_index(const TileShape& shape, const DepthPlane& depth);
   void begin_channels(const TileShape& shape);

@@ -69,8 +69,8 @@ void DenseCoder::put(std::vector<uint8_t>& out, const image::DepthImage& image, 
   if (bounds.depth != nullptr) depth_.to_indices(shape_, *bounds.depth);
   std::vector<uint8_t> headers;
   writer_.start(PlaneEncoder::kMostBits);
-  depth_.encode(shape_, base.depth);
-  writer_.sink.put(depth_.by_planes, 1);
+  depth_.encode(shape_, base.depth, bounds.depth != nullptr);
+  depth_.put_way(writer_.sink, bounds.depth != nullptr);
   encoders_[0].prepare(depth_.symbols, shape_, writer_.sink);
   put_bits(headers, writer_);
   if (bounds.depth != nullptr) depth_.to_codes(shape_, *bounds.depth);
@@ -188,7 +188,7 @@ bool DenseCoder::get_depth(const Parts& parts, image::DepthImage& image, const T
                            const DepthLattice* lattice) {
   begin_part(parts, 0);
   depth_.reset(shape_, base.depth);
-  depth_.begin_decoding(shape_, reader_.source.take(1) != 0);
+  if (!depth_.begin_decoding(shape_, lattice != nullptr, reader_)) return false;
   if (!decoders_[0].prepare(depth_.symbols, reader_) || !reader_.finished()) return false;
   const uint32_t most = lattice != nullptr ? lattice->last() : image::kMaxDepthCode;
   for (size_t y = 0; y < shape_.height; ++y)

@@ -21,6 +21,27 @@ void end_row(Plane<uint32_t>& depth, size_t y, size_t width) {
   row[width] = row[width - 1] + slope, row[width + 1] = row[width] + slope;
 }
 
+// Four times the mean of L + U - UL, 2 L - LL, 2 U - UU and L + UR - U, all but the terms of L and LL, and 2.
+uint32_t mean_terms(const uint32_t* above2, const uint32_t* above, size_t x) {
+  return 2 * above[x] - above[x - 1] - above2[x] + above[x + 1] + 2;
+}
+
+// The mean is rounded down from half: where it was the other way, a pixel lies rather above than below it, and signs are
+// turned, so that what is likelier has the smaller number.
+constexpr uint32_t kAbove = 3;
+
+void mean_residuals(const uint32_t* above2, const uint32_t* above, const uint32_t* row, size_t n, uint32_t* z,
+                    uint8_t* tokens) {
+  for (size_t x = 0; x < n; ++x) {
+    const uint32_t sum = 4 * row[x - 1] - row[x - 2] + mean_terms(above2, above, x);
+    const uint32_t turned = 0 - static_cast<uint32_t>((sum & 3) == kAbove);
+    const uint32_t off = (row[x] - static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2)) << 8;
+    const uint32_t v = (off ^ turned) - turned;
+    z[x] = ((v << 1) ^ static_cast<uint32_t>(static_cast<int32_t>(v) >> 31)) >> 8;
+    tokens[x] = static_cast<uint8_t>(token_of(z[x]));
+  }
+}
+
 }  // namespace
 
 void DepthPlane::reset(const TileShape& shape, uint32_t base) {
@@ -29,7 +50,7 @@ void DepthPlane::reset(const TileShape& shape, uint32_t base) {
   symbols.reset(shape, true);
 }
 
-void DepthPlane::encode(const TileShape& shape, uint32_t base) {
+void DepthPlane::encode(const TileShape& shape, uint32_t base, bool may_mean) {
   depth.fill_row(-1, base), depth.fill_row(-2, base);
   for (size_t y = 0; y < shape.height; ++y) {
     begin_row(depth, y);
@@ -38,11 +59,14 @@ void DepthPlane::encode(const TileShape& shape, uint32_t base) {
     shape.for_each_hole(y, [&](size_t x) { row[x] = (row[x - 1] + above[x] - above[x - 1]) & image::kMaxDepthCode; });
     end_row(depth, y, shape.width);
   }
-  by_planes = choose_planes(shape);
-  symbols.reset(shape, true, by_planes ? kHits : 0);
+  way = choose_way(shape, may_mean);
+  symbols.reset(shape, true, way == kPlanes ? kHits : 0);
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
-    if (by_planes)
+    if (way == kMean)
+      mean_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
+                     symbols.tokens.row(r));
+    else if (way == kPlanes)
       kernels().plane_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
                                 symbols.tokens.row(r));
     else
@@ -70,10 +94,10 @@ void DepthPlane::to_codes(const TileShape& shape, const DepthLattice& lattice) {
 }
 
 // Tries every eighth row: which tokens take fewer bits.
-bool DepthPlane::choose_planes(const TileShape& shape) {
+DepthPlane::Way DepthPlane::choose_way(const TileShape& shape, bool may_mean) {
   symbols.reset(shape, true, kHits);
-  std::array<uint32_t, kSymbols> linear{}, planes{};
-  uint64_t linear_bits = 0, plane_bits = 0;
+  std::array<uint32_t, kSymbols> linear{}, planes{}, means{};
+  uint64_t linear_bits = 0, plane_bits = 0, mean_bits = 0;
   for (size_t y = 2; y < shape.height; y += 8) {
     const auto r = static_cast<ptrdiff_t>(y);
     const uint32_t* const z = symbols.wide.row(r);
@@ -86,14 +110,42 @@ bool DepthPlane::choose_planes(const TileShape& shape) {
       ++linear[token], linear_bits += token >> 3;
       ++planes[tokens[x]], plane_bits += tokens[x] < kHits ? 0 : token >> 3;
     }
+    if (!may_mean) continue;
+    mean_residuals(depth.row(r - 2), depth.row(r - 1), depth.row(r), shape.width, symbols.wide.row(r),
+                   symbols.tokens.row(r));
+    for (size_t x = 0; x < shape.width; ++x)
+      if (shape.at(x, y)) ++means[tokens[x]], mean_bits += tokens[x] >> 3;
   }
-  return static_cast<double>(plane_bits) + bits_of(planes, kSymbols) <
-         static_cast<double>(linear_bits) + bits_of(linear, kSymbols);
+  const double by_line = static_cast<double>(linear_bits) + bits_of(linear, kSymbols),
+               by_planes = static_cast<double>(plane_bits) + bits_of(planes, kSymbols),
+               by_mean = static_cast<double>(mean_bits) + bits_of(means, kSymbols);
+  if (may_mean && by_mean < std::min(by_line, by_planes)) return kMean;
+  return by_planes < by_line ? kPlanes : kLinear;
 }
 
-void DepthPlane::begin_decoding(const TileShape& shape, bool planes) {
-  by_planes = planes;
-  symbols.reset(shape, true, by_planes ? kHits : 0);
+void DepthPlane::put_way(BitSink& bits, bool may_mean) const { bits.put(way, may_mean ? 2 : 1); }
+
+bool DepthPlane::begin_decoding(const TileShape& shape, bool may_mean, BitReader& bits) {
+  way = static_cast<Way>(bits.source.take(may_mean ? 2 : 1));
+  symbols.reset(shape, true, way == kPlanes ? kHits : 0);
+  return way <= kMean;
+}
+
+void DepthPlane::decode_by_mean(const TileShape& shape, size_t y) {
+  const auto r = static_cast<ptrdiff_t>(y);
+  uint32_t* const row = depth.row(r);
+  const uint32_t *const above = depth.row(r - 1), *const above2 = depth.row(r - 2);
+  const uint32_t* const z = symbols.wide.row(r);
+  uint32_t past = row[-2], left = row[-1];
+  for (size_t x = 0; x < shape.width; ++x) {
+    const uint32_t sum = 4 * left - past + mean_terms(above2, above, x);
+    const uint32_t turned = 0 - static_cast<uint32_t>((sum & 3) == kAbove);
+    const uint32_t off = (z[x] >> 1) ^ (0 - (z[x] & 1));
+    uint32_t next = static_cast<uint32_t>(static_cast<int32_t>(sum) >> 2) + ((off ^ turned) - turned);
+    if (!shape.at(x, y)) next = left + above[x] - above[x - 1];
+    past = left, left = next & image::kMaxDepthCode;
+    row[x] = left;
+  }
 }
 
 void DepthPlane::decode_by_planes(const TileShape& shape, size_t y) {
@@ -119,7 +171,9 @@ bool DepthPlane::decode_row(const TileShape& shape, size_t y, uint32_t most) {
   const auto r = static_cast<ptrdiff_t>(y);
   begin_row(depth, y);
   uint32_t* const row = depth.row(r);
-  if (by_planes) {
+  if (way == kMean) {
+    decode_by_mean(shape, y);
+  } else if (way == kPlanes) {
     decode_by_planes(shape, y);
   } else {
     kernels().depth_rows(depth.row(r - 1), symbols.wide.row(r), shape.width, row);

@@ -1,5 +1,6 @@
 // Depth of a dense tile: predicted as L + U - UL, which is exact on planes. Where triangles are as small as a few
-// pixels, most pixels lie in the plane of some neighbours, but not of those three: there it is said of which.
+// pixels, most pixels lie in the plane of some neighbours, but not of those three: there it is said of which. Within
+// bounds, where steps are larger than what surfaces are rough, a mean of four such planes adds up less of the steps.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +15,17 @@ namespace telesplat::codec::detail {
 struct DepthPlane {
   Plane<uint32_t> depth;
   SymbolPlane symbols;
-  bool by_planes = false;
+  enum Way : uint8_t { kLinear = 0, kPlanes = 1, kMean = 2 };
+  Way way = kLinear;
 
   /// What lies above and to the left of the first pixel is `base`.
   void reset(const TileShape& shape, uint32_t base);
   /// depth -> symbols, once all rows were set. Gives pixels that are not covered their predictions.
-  void encode(const TileShape& shape, uint32_t base);
+  /// may_mean: kMean may be chosen.
+  void encode(const TileShape& shape, uint32_t base, bool may_mean);
+  void put_way(BitSink& bits, bool may_mean) const;
   /// Before the first decode_row().
-  void begin_decoding(const TileShape& shape, bool planes);
+  [[nodiscard]] bool begin_decoding(const TileShape& shape, bool may_mean, BitReader& bits);
   /// Indices of `lattice` <-> the codes that they stand for, for all pixels, or those that are covered. What is coded
   /// within bounds are indices.
   void to_indices(const TileShape& shape, const DepthLattice& lattice);
@@ -32,8 +36,9 @@ struct DepthPlane {
   void extend(const TileShape& shape);
 
  private:
-  bool choose_planes(const TileShape& shape);
+  Way choose_way(const TileShape& shape, bool may_mean);
   void decode_by_planes(const TileShape& shape, size_t y);
+  void decode_by_mean(const TileShape& shape, size_t y);
   std::vector<uint32_t> terms_[3];
 };
 

@@ -1,11 +1,8 @@
 #include "common/codec/dense/fit.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
-
-#include "common/codec/dense/tables.h"
 
 namespace telesplat::codec::detail {
 namespace {
@@ -62,10 +59,10 @@ bool slope_at(const Plane<uint32_t>& depth, int x, int y, int x0, int y0, int sh
 using Vector9 = double[9];
 
 // The matrix, as a vector, that maximises how much of A h lies along n against how much lies across.
-bool best_matrix(const std::vector<Slope>& slopes, const std::vector<double>& weights, Vector9 out) {
+bool best_matrix(const std::vector<Slope>& slopes, const std::vector<double>& weights, size_t every, Vector9 out) {
   double along[9][9] = {}, all[3][3] = {}, across_scale = 0;
   Cholesky<9> across{};
-  for (size_t s = 0; s < slopes.size(); ++s) {
+  for (size_t s = 0; s < slopes.size(); s += every) {
     const Slope& k = slopes[s];
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j <= i; ++j) {
@@ -201,13 +198,13 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
   }
   const std::vector<double> even = weights;
   Vector9 m;
-  if (!best_matrix(slopes, weights, m)) return false;
+  if (!best_matrix(slopes, weights, 2, m)) return false;
   for (int round = 0; round < 2; ++round) {  // once more, without those that disagree
     if (agreement(slopes, m, dots) < 0)
       for (double& e : m) e = -e;
     agreement(slopes, m, dots);
     for (size_t i = 0; i < slopes.size(); ++i) weights[i] = even[i] / (1 + 400 * std::max(0.0, 1 - dots[i]));
-    if (!best_matrix(slopes, weights, m)) return false;
+    if (!best_matrix(slopes, weights, round == 0 ? 2 : 1, m)) return false;
   }
   if (agreement(slopes, m, dots) < 0)
     for (double& e : m) e = -e;
@@ -291,21 +288,17 @@ bool quantise_weights(const double solution[kUnknown], int16_t weights[kGuidedTe
   return true;
 }
 
-// Bits that predictions leave, roughly: what tokens of the samples' residuals take. miss(f): how far one is off.
-template <class Miss>
-double bits_left(const std::vector<Features>& all, int bits, Miss miss) {
-  const float scale = 1 / static_cast<float>(1 << bits);
-  std::array<uint32_t, kSymbols> tokens{};
-  uint32_t raw = 0;
-  for (const Features& f : all) {
-    const auto off = static_cast<uint32_t>(std::min(std::abs(miss(f)) * scale + 0.5f, 1e6f));
-    const uint32_t token = token_of(2 * off);
-    ++tokens[token], raw += token >> 3;
-  }
-  return bits_of(tokens, kSymbols) + raw;
+// How much predictions leave: the sum of some samples' tokens, which grow as bits do. off(f): how far one is off.
+template <class Off>
+uint64_t tokens_left(const std::vector<Features>& all, size_t n, int bits, Off off) {
+  const float scale = 2 / static_cast<float>(1 << bits);
+  uint64_t sum = 0;
+  for (size_t s = 0; s < n; s += 3)
+    sum += token_of(static_cast<uint32_t>(std::min(std::abs(off(all[s])) * scale, 1e6f)));
+  return sum;
 }
 
-float median_miss(const Features& f) {
+float median_off(const Features& f) {
   const float low = std::min(f.of[0], f.of[1]), high = std::max(f.of[0], f.of[1]);
   return std::clamp(f.of[0] + f.of[1] - f.of[2], low, high) - f.of[kWanted];
 }
@@ -317,8 +310,8 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
                 const Plane<int16_t>* left) {
   const size_t n = samples.places.size();
   if (n < 64 || all_same(samples, own)) return false;
-  std::vector<Features> all(n);
-  std::vector<float> shares(n);
+  std::vector<Features> all(n + 3);  // to a multiple of four
+  std::vector<float> shares(n + 3);
   const size_t few = n / 2;  // the first rounds need not be exact
   for (size_t s = 0; s < n; ++s) {
     const auto p = samples.places[s < few ? 2 * s : std::min(2 * (s - few) + 1, n - 1)];
@@ -335,18 +328,15 @@ bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<i
     terms[kWanted] = -1;
     const bool last = round + 1 == kRounds;
     const size_t count = round < kRoughRounds ? few : n;
-    for (size_t s = 0; s < count; ++s) {
-      const float size = (last ? 64 : 24) + std::abs(miss(all[s], terms));
-      shares[s] = 1 / (last ? size * size : size);
-    }
+    kernels().sample_shares(&all[0].of, terms, count, last ? 64 : 24, last, shares.data());
     solved = solve_weighted(all, shares, count, solution);
   }
   if (solved && left == nullptr) {
     float terms[kTerms] = {};
     for (int i = 0; i < kUnknown; ++i) terms[i] = static_cast<float>(solution[i]);
     terms[kWanted] = -1;
-    solved =
-        bits_left(all, bits, [&](const Features& f) { return miss(f, terms); }) < bits_left(all, bits, median_miss);
+    solved = tokens_left(all, n, bits, [&](const Features& f) { return miss(f, terms); }) <
+             tokens_left(all, n, bits, median_off);
   }
   std::fill_n(weights, kGuidedTerms, int16_t{0});
   return solved && quantise_weights(solution, weights, constant);

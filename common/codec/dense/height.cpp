@@ -214,9 +214,9 @@ bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const
     rank_colours(best, samples, first, rank);
     for (HeightSample& s : samples) s.index = rank[s.place];
   };
-  for (int round = 0; round < 2; ++round) {
+  for (int round = 0; round < 1; ++round) {
     order();
-    for (int step = 0; step < 2; ++step) improve(best, fit_curve(best, samples), samples);
+    for (int step = 0; step < 3; ++step) improve(best, fit_curve(best, samples), samples);
   }
   order();
   const Curve curve = fit_curve(best, samples);

@@ -171,13 +171,16 @@ static GuidedRows PartOf(const GuidedRows& rows, size_t begin) {
   return part;
 }
 
+using SumsOf = void (*)(const GuidedRows& rows, size_t n, int32_t* sums);
+
+template <SumsOf kSums>
 static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT z, uint8_t* RESTRICT tokens,
                             int16_t* RESTRICT residual) {
-  int32_t sums[kPart];
+  int32_t sums[kPart + 32];  // to the end of a vector
   for (size_t begin = 0; begin < n; begin += kPart) {
     const size_t count = n - begin < kPart ? n - begin : kPart;
     const GuidedRows part = PartOf(rows, begin);
-    GuidedSums(part, count, sums);
+    kSums(part, count, sums);
     const int16_t* RESTRICT own = part.own;
     const int32_t left = part.weights[0], most = part.most;
     uint8_t *RESTRICT zp = z + begin, *RESTRICT tp = tokens + begin;
@@ -193,13 +196,14 @@ static void GuidedResiduals(const GuidedRows& rows, size_t n, uint8_t* RESTRICT 
   }
 }
 
+template <SumsOf kSums>
 static void GuidedResidualsWide(const GuidedRows& rows, size_t n, uint32_t* RESTRICT z, uint8_t* RESTRICT tokens,
                                 int16_t* RESTRICT residual) {
-  int32_t sums[kPart];
+  int32_t sums[kPart + 32];  // to the end of a vector
   for (size_t begin = 0; begin < n; begin += kPart) {
     const size_t count = n - begin < kPart ? n - begin : kPart;
     const GuidedRows part = PartOf(rows, begin);
-    GuidedSums(part, count, sums);
+    kSums(part, count, sums);
     const int16_t* RESTRICT own = part.own;
     const int32_t left = part.weights[0], most = part.most;
     const int bits = part.bits;

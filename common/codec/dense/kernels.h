@@ -90,6 +90,10 @@ struct Kernels {
   /// sums[i][j] = sum of weights[s] * features[s][i] * features[s][j] over n samples, in their order; for j <= i.
   void (*normal_equations)(const float (*features)[kFeatures], const float* weights, size_t n,
                            float (*sums)[kFeatures]);
+  /// shares[s] = 1 / (least + |sum of terms * features[s]|), or of its square; up to the next multiple of four. The sum
+  /// is (a + b) + (c + d), where a adds up every fourth product from the first on, b from the second on, ...
+  void (*sample_shares)(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
+                        float* shares);
   /// Appends the row's symbols, the last one first, at `out`, which must have room for 6 bytes a symbol and 64 more.
   uint8_t* (*put_symbols)(const SymbolRow& row, const EncodeEntry* tables, uint32_t* states, uint8_t* out);
   /// Takes symbols from the bytes [begin, end), the last ones first; returns what is left of them, or null where

@@ -29,13 +29,38 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
     }
 }
 
+static void SampleShares(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
+                         float* shares) {
+  for (size_t s = 0; s < (n + 3) / 4 * 4; ++s) {
+    float parts[4] = {};
+    for (int i = 0; i < kFeatures; ++i) parts[i % 4] = parts[i % 4] + terms[i] * features[s][i];
+    const float off = (parts[0] + parts[1]) + (parts[2] + parts[3]), size = least + (off < 0 ? -off : off);
+    shares[s] = 1 / (squared ? size * size : size);
+  }
+}
+
 }  // namespace
 
 const Kernels& plain_kernels() {
-  static constexpr Kernels all{CoveredBits,         DepthResiduals,  DepthRows,      PlaneResiduals,  PlaneTerms,
-                               PlaneSizes,          Contexts,        OtherNormals,   MedianResiduals, GuidedResiduals,
-                               GuidedResidualsWide, GuidedSums,      Geometry,       Heights,         Activity,
-                               NormalEquations,     PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{CoveredBits,
+                               DepthResiduals,
+                               DepthRows,
+                               PlaneResiduals,
+                               PlaneTerms,
+                               PlaneSizes,
+                               Contexts,
+                               OtherNormals,
+                               MedianResiduals,
+                               GuidedResiduals<GuidedSums>,
+                               GuidedResidualsWide<GuidedSums>,
+                               GuidedSums,
+                               Geometry,
+                               Heights,
+                               Activity,
+                               NormalEquations,
+                               SampleShares,
+                               PlainPutSymbols,
+                               PlainGetSymbols};
   return all;
 }
 

@@ -64,11 +64,36 @@ static void NormalEquations(const float (*features)[kFeatures], const float* wei
     }
 }
 
+static void SampleShares(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
+                         float* shares) {
+  for (size_t s = 0; s < (n + 3) / 4 * 4; ++s) {
+    float parts[4] = {};
+    for (int i = 0; i < kFeatures; ++i) parts[i % 4] = parts[i % 4] + terms[i] * features[s][i];
+    const float off = (parts[0] + parts[1]) + (parts[2] + parts[3]), size = least + (off < 0 ? -off : off);
+    shares[s] = 1 / (squared ? size * size : size);
+  }
+}
+
 static const Kernels* Set() {
-  static constexpr Kernels all{CoveredBits,         DepthResiduals,  DepthRows,      PlaneResiduals,  PlaneTerms,
-                               PlaneSizes,          Contexts,        OtherNormals,   MedianResiduals, GuidedResiduals,
-                               GuidedResidualsWide, GuidedSums,      Geometry,       Heights,         Activity,
-                               NormalEquations,     PlainPutSymbols, PlainGetSymbols};
+  static constexpr Kernels all{CoveredBits,
+                               DepthResiduals,
+                               DepthRows,
+                               PlaneResiduals,
+                               PlaneTerms,
+                               PlaneSizes,
+                               Contexts,
+                               OtherNormals,
+                               MedianResiduals,
+                               GuidedResiduals<GuidedSums>,
+                               GuidedResidualsWide<GuidedSums>,
+                               GuidedSums,
+                               Geometry,
+                               Heights,
+                               Activity,
+                               NormalEquations,
+                               SampleShares,
+                               PlainPutSymbols,
+                               PlainGetSymbols};
   return &all;
 }
 
@@ -384,11 +409,94 @@ static void HeightsVector(const uint32_t* HWY_RESTRICT depth, size_t n, int x0, 
   }
 }
 
+#if HWY_TARGET <= HWY_AVX2
+
+// As GuidedSums(): products of 16 bits, two at a time, which halves their number.
+static void PairedSums(const GuidedRows& rows, size_t n, int32_t* HWY_RESTRICT sums) {
+  const hn::CappedTag<int16_t, 32> d16;
+  const hn::Repartition<int32_t, decltype(d16)> d32;
+  using V16 = hn::VFromD<decltype(d16)>;
+  using V32 = hn::VFromD<decltype(d32)>;
+  const int16_t *const up = rows.above, *const g0 = rows.guide[0], *const g1 = rows.guide[1], *const g2 = rows.guide[2];
+  const int16_t* const terms[12] = {up, up - 1, up + 1, g0 - 1, g0, g0 + 1, g1 - 1, g1, g1 + 1, g2 - 1, g2, g2 + 1};
+  V32 weights[7];
+  for (int i = 0; i < 7; ++i) {
+    const auto low = static_cast<uint16_t>(rows.weights[1 + 2 * i]),
+               high = static_cast<uint16_t>(i < 6 ? rows.weights[2 + 2 * i] : 0);
+    weights[i] = hn::Set(d32, static_cast<int32_t>(low | static_cast<uint32_t>(high) << 16));
+  }
+  const V32 constant = hn::Set(d32, rows.constant);
+  const auto products = [](V16 pairs, V32 w) HWY_ATTR {
+#if HWY_TARGET <= HWY_AVX3
+    return V32{_mm512_madd_epi16(pairs.raw, w.raw)};
+#else
+    return V32{_mm256_madd_epi16(pairs.raw, w.raw)};
+#endif
+  };
+  for (size_t x = 0; x < n; x += hn::Lanes(d16)) {
+    V32 low = constant, high = constant;  // of each block of eight pixels, the first and the last four
+    const auto add = [&](V16 a, V16 b, V32 w) HWY_ATTR {
+      low = hn::Add(low, products(hn::InterleaveLower(d16, a, b), w));
+      high = hn::Add(high, products(hn::InterleaveUpper(d16, a, b), w));
+    };
+    for (int i = 0; i < 6; ++i) add(hn::LoadU(d16, terms[2 * i] + x), hn::LoadU(d16, terms[2 * i + 1] + x), weights[i]);
+    if (rows.residual != nullptr) add(hn::LoadU(d16, rows.residual + x), hn::Zero(d16), weights[6]);
+#if HWY_TARGET <= HWY_AVX3
+    const __m512i first = _mm512_set_epi64(11, 10, 3, 2, 9, 8, 1, 0),
+                  last = _mm512_set_epi64(15, 14, 7, 6, 13, 12, 5, 4);
+    hn::StoreU(V32{_mm512_permutex2var_epi64(low.raw, first, high.raw)}, d32, sums + x);
+    hn::StoreU(V32{_mm512_permutex2var_epi64(low.raw, last, high.raw)}, d32, sums + x + 16);
+#else
+    hn::StoreU(V32{_mm256_permute2x128_si256(low.raw, high.raw, 0x20)}, d32, sums + x);
+    hn::StoreU(V32{_mm256_permute2x128_si256(low.raw, high.raw, 0x31)}, d32, sums + x + 8);
+#endif
+  }
+}
+
+#else
+constexpr SumsOf PairedSums = GuidedSums;
+#endif
+
+static void SampleShares(const float (*features)[kFeatures], const float* terms, size_t n, float least, bool squared,
+                         float* shares) {
+  const hn::FixedTag<float, 4> d;
+  const auto t0 = hn::LoadU(d, terms), t1 = hn::LoadU(d, terms + 4), t2 = hn::LoadU(d, terms + 8),
+             t3 = hn::LoadU(d, terms + 12);
+  const auto parts = [&](const float* f) HWY_ATTR {
+    auto sum = hn::Mul(t0, hn::LoadU(d, f));
+    sum = hn::Add(sum, hn::Mul(t1, hn::LoadU(d, f + 4)));
+    sum = hn::Add(sum, hn::Mul(t2, hn::LoadU(d, f + 8)));
+    return hn::Add(sum, hn::Mul(t3, hn::LoadU(d, f + 12)));
+  };
+  const auto pairs = [&](auto a, auto b) HWY_ATTR { return hn::Add(hn::ConcatEven(d, b, a), hn::ConcatOdd(d, b, a)); };
+  for (size_t s = 0; s < n; s += 4) {
+    const auto off =
+        pairs(pairs(parts(features[s]), parts(features[s + 1])), pairs(parts(features[s + 2]), parts(features[s + 3])));
+    const auto size = hn::Add(hn::Set(d, least), hn::Abs(off));
+    hn::StoreU(hn::Div(hn::Set(d, 1.0f), squared ? hn::Mul(size, size) : size), d, shares + s);
+  }
+}
+
 static const Kernels* Set() {
-  static constexpr Kernels all{CoveredBits,         DepthResiduals, DepthRowsVector, PlaneResiduals,  PlaneTerms,
-                               PlaneSizes,          Contexts,       OtherNormals,    MedianResiduals, GuidedResiduals,
-                               GuidedResidualsWide, GuidedSums,     Geometry,        HeightsVector,   Activity,
-                               NormalEquations,     PutSymbols,     GetSymbols};
+  static constexpr Kernels all{CoveredBits,
+                               DepthResiduals,
+                               DepthRowsVector,
+                               PlaneResiduals,
+                               PlaneTerms,
+                               PlaneSizes,
+                               Contexts,
+                               OtherNormals,
+                               MedianResiduals,
+                               GuidedResiduals<PairedSums>,
+                               GuidedResidualsWide<PairedSums>,
+                               PairedSums,
+                               Geometry,
+                               HeightsVector,
+                               Activity,
+                               NormalEquations,
+                               SampleShares,
+                               PutSymbols,
+                               GetSymbols};
   return &all;
 }
 

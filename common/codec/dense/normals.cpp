@@ -52,6 +52,7 @@ const Table& table(int pole, bool back) {
 }  // namespace
 
 uint16_t turn_normal(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, false)[code]; }
+const uint16_t* turn_table(int pole) { return table(pole, false).data(); }
 uint16_t turn_back(uint16_t code, int pole) { return pole == kRaw ? code : table(pole, true)[code]; }
 
 void make_geometry_guide(const TileShape& shape, const DepthPlane& depth, const GeometryModel* geometry, uint16_t base,
@@ -103,13 +104,12 @@ void NormalPlanes::reset(const TileShape& shape, int reach) {
   activity.reset(shape.width, shape.height);
 }
 
-int NormalPlanes::choose_pole(const TileShape& shape) {
+int NormalPlanes::choose_pole(const TileShape& shape) const {
   uint32_t others = 0;
   for (size_t y = 0; y < shape.height; ++y) {
-    uint16_t* const row = codes.data() + y * shape.width;
-    if (lattice_.step() != 1)  // within bounds another code of the same direction is as good
-      for (size_t x = 0; x < shape.width; ++x) row[x] = image::canonical_normal16(row[x]);
-    else if (shape.full(y))
+    if (lattice_.step() != 1) break;  // within bounds another code of the same direction is as good
+    const uint16_t* const row = codes.data() + y * shape.width;
+    if (shape.full(y))
       others |= kernels().other_normals(row, shape.width);
     else
       for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),

@@ -12,7 +12,10 @@ namespace telesplat::codec::detail {
 /// Octahedral codes with another axis of the lattice as the pole: 0 to 5 of kPoles; kRaw: as they are.
 /// A permutation of the canonical codes; the lattice's points stay what they are.
 inline constexpr int kPoles = 6, kRaw = 6;
+/// Of several codes of a direction all become the canonical one, unless the pole is kRaw.
 uint16_t turn_normal(uint16_t code, int pole);
+/// turn_normal() of all codes. Precondition: pole < kPoles.
+const uint16_t* turn_table(int pole);
 uint16_t turn_back(uint16_t code, int pole);
 
 /// Guides of both coordinates, in 64ths of a code: what the geometry says, or `base` everywhere if it is null.
@@ -53,7 +56,7 @@ struct NormalPlanes {
  private:
   void to_lattice(const TileShape& shape);
   void make_guide(const TileShape& shape, const DepthPlane& depth, uint16_t base);
-  int choose_pole(const TileShape& shape);
+  int choose_pole(const TileShape& shape) const;
   NormalLattice lattice_{0};
   int pole_ = kRaw;
   bool has_geometry_ = false;

@@ -64,11 +64,25 @@ void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y) {
   kernels().plane_sizes(row - 1, shape.width + 2, plane.sizes.row(static_cast<ptrdiff_t>(y)) - 1);
 }
 
+double rough_bits(const SymbolPlane& plane, const TileShape& shape) {
+  std::array<uint32_t, kSymbols> counts{};
+  uint64_t raw = 0;
+  for (size_t y = 0; y < shape.height; y += 4) {
+    const uint8_t* const tokens = plane.tokens.row(static_cast<ptrdiff_t>(y));
+    for (size_t x = 0; x < shape.width; ++x) {
+      if (!shape.at(x, y)) continue;
+      ++counts[tokens[x]];
+      raw += tokens[x] < plane.first ? 0 : (tokens[x] - plane.first) >> 3;
+    }
+  }
+  return static_cast<double>(raw) + bits_of(counts, kSymbols);
+}
+
 // The finest classes that nearly all sums fit into.
 void PlaneEncoder::choose_scale(SymbolPlane& plane, const TileShape& shape) {
   std::array<uint32_t, 1 << kBiasBits> histogram{};
   uint32_t total = 0;
-  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 3) {
+  for (size_t y = shape.height > 1 ? 1 : 0; y < shape.height; y += 6) {
     const ContextRows rows = rows_around(plane, y);
     const uint8_t *a = rows.above, *b = rows.above2, *o = rows.other;
     for (size_t x = y % 2; x < shape.width; x += 3, ++total)
@@ -155,7 +169,7 @@ bool PlaneDecoder::prepare(SymbolPlane& plane, BitReader& bits) {
   plane.scale.merges = static_cast<int>(bits.source.take(3));
   levels_.alphabet = plane.alphabet;
   if (bits.overrun() || plane.scale.shift > 14 || plane.scale.merges > 4 || !get_levels(bits, levels_)) return false;
-  make_decode_tables(levels_, tables_);
+  make_decode_tables(levels_, tables_, kContexts >> plane.scale.merges);
   return true;
 }
 

@@ -55,6 +55,9 @@ struct SymbolPlane {
 /// Gives pixels that are not covered the tokens above them, and borders those beside them.
 void finish_tokens(SymbolPlane& plane, const TileShape& shape, size_t y);
 
+/// About what the symbols of every fourth row take in bits, without contexts.
+double rough_bits(const SymbolPlane& plane, const TileShape& shape);
+
 /// Of one plane: chooses contexts and tables, and puts them into `bits`. Leaves the plane packed: covered pixels only.
 class PlaneEncoder {
  public:

@@ -71,14 +71,15 @@ bool for_each_level(TokenLevels& levels, Code code) {
 }
 
 // The level of a token that comes `count` times of `total`: near to what is expected where few bits depend on it.
-int choose_level(uint32_t count, uint64_t total, int expected, bool last) {
+// share_of_one: of a count of 1, in 256ths of a frequency.
+int choose_level(uint32_t count, uint64_t total, double share_of_one, int expected, bool last) {
   const auto rate = [&](int level) { return 1.5f * static_cast<float>(std::min(std::abs(level - expected), 6)); };
   const float n = static_cast<float>(count);
   int best = 0, ideal = 0;
   float least = 1e30f;
   if (count != 0) {
-    const uint64_t share = uint64_t{count} * kFrequencyOne * 256 / total;  // of a frequency, in 256ths
-    ideal = static_cast<int>(level_of(share < 256 ? 0 : static_cast<uint32_t>(share - 256)));
+    const auto share = static_cast<uint32_t>(count * share_of_one);
+    ideal = static_cast<int>(level_of(share < 256 ? 0 : share - 256));
     const int low = std::max(1, std::min(ideal, expected)), high = std::max({1, ideal, expected});
     for (int level = low; level <= high; ++level) {
       const float off = static_cast<float>(level - ideal), cost = 0.0216f * n * off * off + rate(level);
@@ -145,9 +146,10 @@ void choose_levels(const TokenCounts& counts, unsigned alphabet, TokenLevels& le
       if (counts[c][t] != 0) total += counts[c][t], ++present, end = t + 1;
     if (total == 0) continue;
     Expected expected{before};
+    const double share = kFrequencyOne * 256.0 / static_cast<double>(total);
     for (unsigned t = 0; t < end; ++t) {
       of[t] = static_cast<uint8_t>(present == 1 ? (counts[c][t] != 0 ? 2 : 0)
-                                                : choose_level(counts[c][t], total, expected(t), t + 1 == end));
+                                                : choose_level(counts[c][t], total, share, expected(t), t + 1 == end));
       expected.next(of[t]);
     }
     before = &of;
@@ -201,16 +203,22 @@ void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out
   }
 }
 
-void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out) {
-  out.resize(kContexts * kFrequencyOne);
+void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out, size_t contexts) {
+  constexpr uint32_t kStep = 8;  // entries that are written at once: what is too much is written over afterwards
+  out.resize(kContexts * kFrequencyOne + kStep);
   std::array<uint16_t, kSymbols> frequencies;
-  for (size_t c = 0; c < kContexts; ++c) {
+  for (size_t c = 0; c < contexts; ++c) {
     frequencies_of(levels.of[c], levels.alphabet, frequencies);
     uint32_t* at = out.data() + c * kFrequencyOne;
-    uint32_t* const end = at + kFrequencyOne;
+    const auto fill = [&](uint32_t first, uint32_t count) {
+      for (uint32_t i = 0; i < count; i += kStep)
+        for (uint32_t k = 0; k < kStep; ++k) at[i + k] = first + i + k;
+      at += count;
+    };
+    const uint32_t* const begin = at;
     for (unsigned t = 0; t < levels.alphabet; ++t)
-      for (uint32_t i = 0, f = frequencies[t]; i < f; ++i) *at++ = t << 24 | (f - 1) << 12 | i;
-    for (uint32_t i = 0; at != end; ++i) *at++ = (kFrequencyOne - 1) << 12 | i;  // a context without tokens
+      if (const uint32_t f = frequencies[t]; f != 0) fill(t << 24 | (f - 1) << 12, f);
+    if (at == begin) fill((kFrequencyOne - 1) << 12, kFrequencyOne);  // a context without tokens
   }
 }
 

@@ -45,8 +45,8 @@ void frequencies_of(const std::array<uint8_t, kSymbols>& levels, unsigned alphab
 
 /// kContexts x kSymbols entries.
 void make_encode_tables(const TokenLevels& levels, std::vector<EncodeEntry>& out);
-/// kContexts x kFrequencyOne entries: token << 24 | (frequency - 1) << 12 | offset. Contexts without tokens give
-/// token 0.
-void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out);
+/// kFrequencyOne entries for each of the first `contexts`: token << 24 | (frequency - 1) << 12 | offset. Contexts
+/// without tokens give token 0.
+void make_decode_tables(const TokenLevels& levels, std::vector<uint32_t>& out, size_t contexts = kContexts);
 
 }  // namespace telesplat::codec::detail

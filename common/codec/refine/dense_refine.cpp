@@ -1,11 +1,8 @@
 #include "common/codec/refine/dense_refine.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <cstring>
-
-#include "common/image/normal.h"
 
 namespace telesplat::codec::detail {
 namespace {
@@ -37,21 +34,6 @@ uint8_t class_of(int guess, int known, int reach) {
 template <class F>
 void for_each_row(const TileRect& rect, F f) {
   for (int y = 0; y < rect.height; ++y) f(rect.index(0, y), static_cast<size_t>(y) * static_cast<size_t>(rect.width));
-}
-
-// About what the symbols of every fourth row take in bits, without contexts.
-double estimated_bits(const SymbolPlane& plane, const TileShape& shape) {
-  std::array<uint32_t, kSymbols> counts{};
-  uint64_t raw = 0;
-  for (size_t y = 0; y < shape.height; y += 4) {
-    const uint8_t* const tokens = plane.tokens.row(static_cast<ptrdiff_t>(y));
-    for (size_t x = 0; x < shape.width; ++x) {
-      if (!shape.at(x, y)) continue;
-      ++counts[tokens[x]];
-      raw += tokens[x] < plane.first ? 0 : (tokens[x] - plane.first) >> 3;
-    }
-  }
-  return static_cast<double>(raw) + bits_of(counts, kSymbols);
 }
 
 }  // namespace
@@ -156,16 +138,16 @@ bool RefinementCoder::decode_near_row(const Reach& reach, size_t y) {
 void RefinementCoder::encode_depth(const Reach& reach, BitSink& bits) {
   const uint32_t base = depth_.depth.row(-1)[0];
   encode_near_depth(reach);
-  const double near_bits = estimated_bits(near_symbols_, shape_);
+  const double near_bits = rough_bits(near_symbols_, shape_);
   // As if nothing were known gives pixels that are not covered other depths: it comes first, and again if need be.
-  depth_.encode(shape_, base);
-  near_depth_ = near_bits <= estimated_bits(depth_.symbols, shape_);
-  if (near_depth_) {
+  depth_.encode(shape_, base, false);
+  near_depth_ = near_bits <= rough_bits(depth_.symbols, shape_);
+  if (near_depth_ && shape_.mask != nullptr) {
     depth_.depth.fill_row(-1, base);
     encode_near_depth(reach);
   }
   bits.put(near_depth_, 1);
-  if (!near_depth_) bits.put(depth_.by_planes, 1);
+  if (!near_depth_) depth_.put_way(bits, false);
   add_plane(near_depth_ ? near_symbols_ : depth_.symbols);
   end_group(bits);
   depth_.extend(shape_);
@@ -175,8 +157,8 @@ bool RefinementCoder::decode_depth(const Reach& reach, WordSource& source) {
   near_depth_ = reader_.source.take(1) != 0;
   if (near_depth_)
     near_symbols_.reset(shape_, true);
-  else
-    depth_.begin_decoding(shape_, reader_.source.take(1) != 0);
+  else if (!depth_.begin_decoding(shape_, false, reader_))
+    return false;
   SymbolPlane& symbols = near_depth_ ? near_symbols_ : depth_.symbols;
   if (!decoders_[0].prepare(symbols, reader_)) return false;
   for (size_t y = 0; y < shape_.height; ++y) {
@@ -194,16 +176,19 @@ void RefinementCoder::load_normals(const Reach& reach, bool with_exact) {
     p.known.reset(shape_.width, shape_.height);
     p.exact.symbols.has_contexts = true;
   }
-  const auto turned = [&](uint16_t code) { return turn_normal(image::canonical_normal16(code), reach.pole); };
-  for (size_t y = 0; y < shape_.height; ++y)
+  const uint16_t* const turned = turn_table(reach.pole);
+  const auto load = [&](const uint16_t* codes, int16_t* a, int16_t* b) {
     for (size_t x = 0; x < shape_.width; ++x) {
-      const size_t i = y * shape_.width + x;
-      const uint16_t known = turned(known_normals_[i]), exact = with_exact ? turned(exact_normals_[i]) : known;
-      for (int c = 0; c < 2; ++c) {
-        normal_[c].known.row(static_cast<ptrdiff_t>(y))[x] = static_cast<int16_t>((known >> 8 * c & 255) * 64);
-        normal_[c].exact.values.row(static_cast<ptrdiff_t>(y))[x] = static_cast<int16_t>((exact >> 8 * c & 255) * 64);
-      }
+      const uint16_t code = turned[codes[x]];
+      a[x] = static_cast<int16_t>((code & 255) * 64), b[x] = static_cast<int16_t>((code >> 8) * 64);
     }
+  };
+  for (size_t y = 0; y < shape_.height; ++y) {
+    const auto r = static_cast<ptrdiff_t>(y);
+    load(known_normals_.data() + y * shape_.width, normal_[0].known.row(r), normal_[1].known.row(r));
+    if (with_exact)
+      load(exact_normals_.data() + y * shape_.width, normal_[0].exact.values.row(r), normal_[1].exact.values.row(r));
+  }
 }
 
 void RefinementCoder::begin_normals() {
@@ -347,11 +332,11 @@ void RefinementCoder::encode_colours(const Reach& reach, BitSink& bits) {
   begin_near_colours();
   encode_near_colours();
   double near_bits = 0, other_bits = 0;
-  for (const SymbolPlane& plane : near_channel_) near_bits += estimated_bits(plane, shape_);
+  for (const SymbolPlane& plane : near_channel_) near_bits += rough_bits(plane, shape_);
   size_t first = 0;
   while (known_depth_[first] == 0) ++first;
   colours_.encode(shape_, exact_colours_, exact_colours_[first], depth_, has_geometry_ ? &geometry_ : nullptr, 0);
-  for (size_t i = 0; i < colours_.planes(); ++i) other_bits += estimated_bits(colours_.symbols(i), shape_);
+  for (size_t i = 0; i < colours_.planes(); ++i) other_bits += rough_bits(colours_.symbols(i), shape_);
   near_colours_ = near_bits <= other_bits + static_cast<double>(colours_.header_bits()) / 4;
   bits.put(near_colours_, 1);
   const size_t count = near_colours_ ? 3 : colours_.planes();

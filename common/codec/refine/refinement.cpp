@@ -8,12 +8,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <cstdlib>
 
-#include "common/codec/refine/dense_refine.h"
 #include "common/codec/depth_codec.h"
 #include "common/codec/entropy.h"
+#include "common/codec/refine/dense_refine.h"
 #include "common/codec/tile.h"
 #include "common/image/normal.h"
 
@@ -77,51 +77,65 @@ bool is_full(const Scratch& s, const TileRect& rect) {
   return s.covered == static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
 }
 
-// As codecs of normals see them: how far two of them are on the turned map.
-int normal_distance(uint16_t a, uint16_t b, int pole) {
-  const uint16_t p = detail::turn_normal(a, pole), q = detail::turn_normal(b, pole);
+// How far two normals, both turned, are from each other.
+int distance(uint16_t p, uint16_t q) {
   return std::max(std::abs((p & 255) - (q & 255)), std::abs((p >> 8) - (q >> 8)));
 }
 
 // Nothing where normals are too far from each other on each map, or not canonical.
 bool reach_of_normals(const Scratch& s, const TileRect& rect, const DepthImage& exact, const DepthImage& known,
                       Reach& reach) {
-  bool differ = false, canonical = true;
-  size_t n = 0;
+  uint32_t differ = 0;
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t row = rect.index(0, y);
+    for (size_t x = 0; x < static_cast<size_t>(rect.width); ++x)
+      differ |= static_cast<uint32_t>(exact.normal[row + x] ^ known.normal[row + x]);
+  }
+  if (differ == 0) return true;
   int most[detail::kPoles] = {};
+  size_t n = 0;
+  bool canonical = true;
   for_each_covered(s, rect, [&](size_t i) {
-    const uint16_t a = exact.normal[i], b = image::canonical_normal16(known.normal[i]);
-    differ |= a != known.normal[i];
+    const uint16_t a = exact.normal[i], b = known.normal[i];
     canonical &= image::canonical_normal16(a) == a;
     if (n++ % 16 == 0)
       for (int p = 0; p < detail::kPoles; ++p)
-        most[p] = std::max(most[p], normal_distance(image::canonical_normal16(a), b, p));
+        most[p] = std::max(most[p], distance(detail::turn_table(p)[a], detail::turn_table(p)[b]));
   });
-  if (!differ) return true;
   if (!canonical) return false;
   reach.pole = static_cast<int>(std::min_element(most, most + detail::kPoles) - most);
-  for_each_covered(s, rect, [&](size_t i) {
-    reach.normal = std::max(reach.normal,
-                            normal_distance(exact.normal[i], image::canonical_normal16(known.normal[i]), reach.pole));
-  });
-  return reach.normal <= ErrorBounds::kMostNormal;
+  const uint16_t* const turned = detail::turn_table(reach.pole);
+  int largest = 0;
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t row = rect.index(0, y);  // what is not covered is alike
+    for (size_t x = 0; x < static_cast<size_t>(rect.width); ++x)
+      largest = std::max(largest, distance(turned[exact.normal[row + x]], turned[known.normal[row + x]]));
+  }
+  reach.normal = largest;
+  return largest <= ErrorBounds::kMostNormal;
 }
 
 // False where the exact tile is so far from what is known that this says little.
 bool reach_of(const Scratch& s, const TileRect& rect, const DepthImage& exact, const DepthImage& known, Reach& reach) {
-  double share = 0;
-  int colour = 0;
-  for_each_covered(s, rect, [&](size_t i) {
-    const auto a = static_cast<int32_t>(exact.depth[i]), b = static_cast<int32_t>(known.depth[i]);
-    share = std::max(share, std::abs(a - b) / static_cast<double>(b));
-    for (const int shift : kShifts)
-      colour = std::max(colour, std::abs(static_cast<int>(exact.colour[i] >> shift & 255) -
-                                         static_cast<int>(known.colour[i] >> shift & 255)));
-  });
+  int32_t share_bits = 0, colour = 0;  // numbers that are not negative have the order of their bits
+  for (int y = 0; y < rect.height; ++y) {
+    const size_t row = rect.index(0, y);  // what is not covered is alike
+    const uint32_t *const a = exact.depth.data() + row, *const b = known.depth.data() + row;
+    const uint32_t *const p = exact.colour.data() + row, *const q = known.colour.data() + row;
+    for (size_t x = 0; x < static_cast<size_t>(rect.width); ++x) {
+      const auto c = static_cast<int32_t>(a[x]), d = static_cast<int32_t>(b[x]);
+      const float share = static_cast<float>(std::abs(c - d)) / static_cast<float>(std::max(d, 1));
+      share_bits = std::max(share_bits, std::bit_cast<int32_t>(share));
+      for (const int shift : kShifts)
+        colour =
+            std::max(colour, std::abs(static_cast<int>(p[x] >> shift & 255) - static_cast<int>(q[x] >> shift & 255)));
+    }
+  }
   reach.colour = colour;
-  share *= 4294967296.0;
-  if (share > ErrorBounds::kMostDepth || colour > ErrorBounds::kMostColour) return false;
-  reach.depth = share > 0 ? static_cast<uint32_t>(share) + 1 : 0;
+  const auto share = static_cast<double>(std::bit_cast<float>(share_bits));
+  if (share * 4294967296.0 >= ErrorBounds::kMostDepth || colour > ErrorBounds::kMostColour) return false;
+  if (share > 0)
+    reach.depth = static_cast<uint32_t>(share * 4294967296.0 * (1 + 1e-6)) + 1;  // not less: shares are rounded
   return reach_of_normals(s, rect, exact, known, reach);
 }
 
@@ -161,7 +175,7 @@ void put_scattered(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exac
   if (reach.normal != 0)
     put_bytes([&](size_t i) {
       const uint16_t a = detail::turn_normal(exact.normal[i], reach.pole),
-                     b = detail::turn_normal(image::canonical_normal16(known.normal[i]), reach.pole);
+                     b = detail::turn_normal(known.normal[i], reach.pole);
       return (a & 255) - (b & 255) + reach.normal + (2 * reach.normal + 1) * ((a >> 8) - (b >> 8) + reach.normal);
     });
   if (reach.colour != 0)
@@ -188,7 +202,7 @@ bool get_scattered(Scratch& s, Reader& in, DepthImage& image, const TileRect& re
     const uint8_t* at = s.bytes.data();
     for_each_covered(s, rect, [&](size_t i) {
       const int v = *at++;
-      const uint16_t b = detail::turn_normal(image::canonical_normal16(image.normal[i]), reach.pole);
+      const uint16_t b = detail::turn_normal(image.normal[i], reach.pole);
       const int x = (b & 255) + v % step - reach.normal, y = (b >> 8) + v / step - reach.normal;
       good &= v < step * step && x >= 0 && x <= 254 && y >= 0 && y <= 254;
       image.normal[i] = detail::turn_back(static_cast<uint16_t>((x & 255) | (y & 255) << 8), reach.pole);
@@ -238,8 +252,8 @@ std::optional<Reach> get_reach(Reader& in) {
   const auto normal = in.u8(), colour = in.u8();
   if (!colour) return std::nullopt;
   const Reach reach{*depth, *normal % 8, *normal / 8, *colour};
-  // A share that is rounded up may be one more than a bound.
-  const bool known = reach.depth <= ErrorBounds::kMostDepth + 1 && reach.pole < detail::kPoles &&
+  // A share that is rounded up may be a little more than a bound.
+  const bool known = reach.depth <= 2 * ErrorBounds::kMostDepth && reach.pole < detail::kPoles &&
                      reach.normal <= ErrorBounds::kMostNormal && reach.colour <= ErrorBounds::kMostColour;
   return known && !reach.none() ? std::optional(reach) : std::nullopt;
 }

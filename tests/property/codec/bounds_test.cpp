@@ -62,9 +62,9 @@ TEST(CodecBounds, HoldInEveryPixelAndRefinementsAreExact) {
   for (uint32_t seed = 1; seed <= 4; ++seed)
     for (const DepthImage& image : test::codec_images(seed))
       for (const ErrorBounds& bounds : many_bounds()) {
-        SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << image.width << " x " << image.height << ", depth "
-                                        << bounds.depth << ", normal " << bounds.normal << ", colour "
-                                        << bounds.colour);
+        SCOPED_TRACE(::testing::Message()
+                     << "seed " << seed << ", " << image.width << " x " << image.height << ", depth " << bounds.depth
+                     << ", normal " << bounds.normal << ", colour " << bounds.colour);
         DepthImage told;
         const auto bytes = encode(image, bounds, &told);
         EXPECT_EQ(encode(image, bounds), bytes) << "not deterministic";
