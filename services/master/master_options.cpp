@@ -180,7 +180,7 @@ options::Row error_row(MasterOptions& o, const std::string& flag, const std::str
                           if (text == "auto") return value = -1, ok_status();
                           if (text == "off") return value = 0, ok_status();
                           const auto number = number_or_fraction(text);
-                          if (!number || *number < 0 || *number > most || (whole && *number != std::floor(*number)))
+                          if (!number || !(*number >= 0 && *number <= most) || (whole && *number != std::floor(*number)))
                             return Status(Error{fmt::format("is not auto, off or a {}number from 0 to {}{}",
                                                             whole ? "whole " : "", most, whole ? "" : ", such as 1/32")});
                           value = *number;

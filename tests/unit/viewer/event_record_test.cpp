@@ -321,6 +321,7 @@ TEST_F(EventRecord, SummariesAreMadeAgainAtTheirPlace) {
   std::vector<Shown> shown;
   const auto far = test::scene_camera({0.4, 0.5, 2.5}, 160, 120);
   splat::DrawList list;
+  refinement::BoundedPatches bounded;
   {
     auto recorder = EventRecorder::open(path_, 1u << 30);
     (*recorder)->begin_replica(test::scene_config());
@@ -329,7 +330,12 @@ TEST_F(EventRecord, SummariesAreMadeAgainAtTheirPlace) {
       if (e.kind == packer::Event::Kind::kEpoch) break;
       if (e.kind == packer::Event::Kind::kForget) {
         cache.forget(e.sequence, e.clusters, e.frames);
+      } else if (e.kind == packer::Event::Kind::kRefine) {
+        auto refinement = bounded.refine(test::scene_config(), e.sequence, e.refines, *e.blob);
+        ASSERT_TRUE(refinement.ok() && refinement->has_value());
+        cache.refine(**refinement);
       } else {
+        if (e.refinable) bounded.add(e.sequence, e.camera, e.rect, *e.blob);
         auto tile = codec::decode(*e.blob);
         ASSERT_TRUE(tile.ok());
         cache.insert(points::prepare_patch(test::scene_config(), e.sequence, e.camera, e.rect, *tile, e.frame),
