@@ -244,6 +244,7 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
     // Taken before it is sent: a viewer may have it in its replica before the send returns.
     done.moments.packed_s = done.moments.published_s = outlets_.master_now();
     publish(event, done.moments);
+    if (event.kept > 0) points_came_s_ = now_s;
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
     done.depth_error_m = event.bounds.depth / 4294967296.0 * event.farthest_m;
     done.normal_error_deg = codec::normal_error_degrees(event.bounds.normal);
@@ -445,6 +446,7 @@ void PointPacking::choose_tolerance() {
 
 bool PointPacking::refine(double now_s) {
   if (now_s < next_refine_s_ || !heads_.still(now_s)) return false;
+  if (now_s - points_came_s_ < kQuiet_s && heads_.still_s(now_s) < kLongStill_s) return false;
   const double begin_s = outlets_.master_now();
   uint64_t bytes = 0;
   bool more = true;

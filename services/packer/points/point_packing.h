@@ -35,6 +35,9 @@ class PointPacking final : public Packing {
   /// kRefineBacklog_s, or kRefineBytes; so many bytes at a time, since messages wait meanwhile. Viewers tell what they
   /// draw once a second.
   static constexpr double kDrawnLately_s = 3, kRefineBacklog_s = 0.05, kRefinePause_s = 1;
+  /// Rays that views lack go first: nothing becomes exact until none has come for kQuiet_s, or heads have stood still
+  /// for kLongStill_s.
+  static constexpr double kQuiet_s = 0.3, kLongStill_s = 10;
   static constexpr uint64_t kRefineBytes = 32 << 10, kRefineStep = 16 << 10;
 
   struct Options {
@@ -107,7 +110,7 @@ class PointPacking final : public Packing {
   std::array<double, 3> errors_{-1, -1, -1};  // of depth, normals, colours, as the session has them; -1: auto
   bool slow_ = false;                         // a link is
   StillHeads heads_;
-  double next_refine_s_ = 0;
+  double next_refine_s_ = 0, points_came_s_ = -1e9;
   bool refining_ = false;  // there is more to do at once
   BlockGatherer gatherer_;
   EpochHold<Received> ahead_;

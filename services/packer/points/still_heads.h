@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "common/core/ids.h"
@@ -28,11 +29,14 @@ class StillHeads {
       return;
     head.pose = pose, head.moved_s = now_s;
   }
-  bool still(double now_s) {
+  /// For how long nobody has moved, s; nobody looks: for ever.
+  double still_s(double now_s) {
     std::erase_if(heads_, [&](const auto& h) { return now_s - h.second.seen_s > kSilence_s; });
-    return std::all_of(heads_.begin(), heads_.end(),
-                       [&](const auto& h) { return now_s - h.second.moved_s >= kStill_s; });
+    double out = std::numeric_limits<double>::infinity();
+    for (const auto& [viewer, head] : heads_) out = std::min(out, now_s - head.moved_s);
+    return out;
   }
+  bool still(double now_s) { return still_s(now_s) >= kStill_s; }
 
  private:
   struct Head {

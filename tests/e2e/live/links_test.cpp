@@ -272,7 +272,7 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
 // Errors within bounds, and none of them where the head has come to rest.
 TEST(Links, BehindASlowOnePointsHaveErrorsUntilTheHeadRests) {
   for (const bool said : {false, true}) {
-    std::vector<std::string> flags{"--duration", "2", "--hold", "6", "--size", "640x400", "--link"};
+    std::vector<std::string> flags{"--duration", "14", "--hold", "12", "--size", "640x400", "--link"};
     flags.push_back(said ? "20ms" : "rtt=20ms,rate=2mbit");
     if (said) flags.insert(flags.end(), {"--depth-error", "1/16", "--normal-error", "2", "--colour-error", "off"});
     PipelineRun run(flags);

@@ -123,12 +123,12 @@ TEST_F(PointPackingTest, ErrorsAreToldAndWhatStandsStillBecomesExact) {
   const auto patch = decoded<wire::Patch>(sent.back());
   EXPECT_TRUE(patch.refinable);
   sent.clear();
-  packing.tick(10.2);
+  packing.tick(10.29);
   const auto refinements = [&] {
     return std::count_if(sent.begin(), sent.end(), [](const Sent& s) { return s.type == wire::Refine::kName; });
   };
   EXPECT_EQ(refinements(), 0) << "the head has not stood still for long";
-  packing.tick(10.4);
+  packing.tick(10.31);
   ASSERT_EQ(refinements(), 1);
   EXPECT_EQ(status("patches_bounded"), 1);
   EXPECT_EQ(status("patches_refined"), 1);
