@@ -27,8 +27,8 @@ struct PreparedRefinement {
   uint64_t points() const;
 };
 
-/// camera, tile: of the patch, as prepare_patch() takes them. bounded, exact: the patch's image as it was published, and
-/// as it was sampled; pixels that only one of them covers are left out.
+/// camera, tile: of the patch, as prepare_patch() takes them. bounded, exact: the patch's image as it was published,
+/// and as it was sampled; pixels that only one of them covers are left out.
 /// Preconditions: as prepare_patch(); both images of the tile's size.
 PreparedRefinement prepare_refinement(const ModelConfig& config, Sequence sequence, Sequence of,
                                       const geometry::Camera& camera, const geometry::Rect& tile,

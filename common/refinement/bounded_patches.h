@@ -81,8 +81,8 @@ class BoundedPatches {
            std::span<const uint8_t> stream) {
     book_.add(sequence, stream.size(), {camera, rect, {stream.begin(), stream.end()}});
   }
-  /// What event `sequence` with that stream makes of patch `of`. Nothing: that patch is not here; then all of its points
-  /// were forgotten. Error: the stream does not fit it.
+  /// What event `sequence` with that stream makes of patch `of`. Nothing: that patch is not here; then all of its
+  /// points were forgotten. Error: the stream does not fit it.
   Result<std::optional<points::PreparedRefinement>> refine(const points::ModelConfig& config, Sequence sequence,
                                                            Sequence of, std::span<const uint8_t> stream);
   void clear() { book_.clear(); }

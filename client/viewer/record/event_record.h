@@ -2,10 +2,10 @@
 // frame's model again: a replica is its packer's events in their order ("Replication" in docs/architecture.md).
 //
 // File (record_file.h): "TSEVENT4". Types: "replica" (six floats: the box in room space, lo then hi; u32: octree depth;
-// u32: 1 if mosaics are merged) where a replica begins, the wire's "patch", "forget", "refine", "epoch_begin", and "summary"
-// (u64: its number, u32: key of its brick) where the viewer made a summary of a brick (common/points/summary.h) from
-// the model as it was then. "TSEVENT3", of earlier versions, has nothing
-// refined, and "TSEVENT2" no summaries.
+// u32: 1 if mosaics are merged) where a replica begins, the wire's "patch", "forget", "refine", "epoch_begin", and
+// "summary" (u64: its number, u32: key of its brick) where the viewer made a summary of a brick
+// (common/points/summary.h) from the model as it was then. "TSEVENT3", of earlier versions, has no refinements, and
+// "TSEVENT2" no summaries either.
 #pragma once
 
 #include <memory>

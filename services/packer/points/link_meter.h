@@ -47,7 +47,7 @@ class LinkMeter {
   size_t viewers() const { return viewers_.size(); }
   /// Of the slowest link, as far as is known; 0: of none.
   double slowest_bytes_s() const;
-  /// No link has more on its way than it carries in `most_s`, or `least` bytes. Of one whose rate is not known: `least`.
+  /// No link has more on its way than it carries in `most_s`, or `least` bytes; where its rate is not known, `least`.
   bool all_free(double most_s, uint64_t least, double now_s) const;
 
  private:

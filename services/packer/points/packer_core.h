@@ -16,7 +16,7 @@
 #include "services/packer/points/known_reference.h"
 #include "services/packer/points/model_watcher.h"
 #include "services/packer/points/sampled_tile.h"
-#include "services/packer/points/tolerance.h"
+#include "services/packer/points/errors/tolerance.h"
 
 namespace telesplat::packer {
 
@@ -92,8 +92,8 @@ class PackerCore {
   /// What comes from now on may differ by so much from what was sampled, in the model and in its replicas.
   void set_tolerance(const Tolerance& tolerance);
   const Tolerance& tolerance() const;
-  /// Makes the newest patch exact that is not yet, of those that were drawn since `drawn_since_s`: the event to publish.
-  /// Nothing: there is none, or it was packed too long ago (refinement::RefinableBook).
+  /// Makes the newest patch exact that is not yet, of those that were drawn since `drawn_since_s`: the event to
+  /// publish. Nothing: there is none, or it was packed too long ago (refinement::RefinableBook).
   std::optional<Event> refine(double drawn_since_s);
 
   /// True if that tile of that frame was packed already, as far back as is remembered: frame_book.h.

@@ -16,7 +16,7 @@
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
 #include "services/packer/points/state_answers.h"
-#include "services/packer/points/still_heads.h"
+#include "services/packer/points/errors/still_heads.h"
 
 namespace telesplat::packer {
 
