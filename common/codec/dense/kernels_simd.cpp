@@ -102,7 +102,7 @@ static const Kernels* Set() {
 
 using D = hn::CappedTag<uint32_t, 16>;
 using V = hn::VFromD<D>;
-using M = hn::MFromD<D>;
+using M = hn::Mask<D>;
 constexpr D kD;
 constexpr size_t kN = hn::MaxLanes(D()), kVectors = kLanes / kN;
 constexpr hn::Rebind<uint16_t, D> kD16;
