@@ -24,8 +24,8 @@ bool fit_geometry(const Samples& samples, const Plane<uint32_t>& depth, const Pl
                   int y0, GeometryModel& model);
 
 /// Weights for the plane `own`, whose values have so many `bits` of fraction, by least squares. residual: null, or of
-/// another plane. False where there is nothing to be fitted, or where the median predictor does better: on facets, whose
-/// pixels all have one normal, which no guide meets as well.
+/// another plane. False where there is nothing to be fitted, or where the median predictor does better: on facets,
+/// whose pixels all have one normal, which no guide meets as well.
 bool fit_guided(const Samples& samples, const Plane<int16_t>& own, const Plane<int16_t>& guide,
                 const Plane<int16_t>* residual, int bits, int16_t weights[kGuidedTerms], int32_t& constant);
 
