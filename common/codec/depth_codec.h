@@ -27,7 +27,7 @@ std::vector<uint8_t> encode(const image::DepthImage& image, const ErrorBounds& b
 /// Decodes what encode() made: decode(encode(x)) == x, and decode(encode(x, bounds)) is within the bounds of x. Any
 /// other bytes give an error or some canonical image, never more than kMaxPixels pixels, never a read or write out of
 /// bounds; memory stays proportional to the pixels of the stream's header, which must be plausible for the stream's
-/// length, and a table for the bounds that takes 4 MiB at most. `expected_width`/`expected_height`: refuse other sizes
+/// length, and a table for the bounds that takes 8 MiB at most. `expected_width`/`expected_height`: refuse other sizes
 /// (0 = any).
 Result<image::DepthImage> decode(std::span<const uint8_t> bytes, int expected_width = 0, int expected_height = 0);
 

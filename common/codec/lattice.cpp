@@ -1,19 +1,13 @@
 #include "common/codec/lattice.h"
 
-#include <bit>
-
 #include "common/core/check.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr size_t kKept = 2;  // lattices of a thread; of the smallest bound one takes 4 MiB
+constexpr size_t kKept = 2;  // lattices of a thread; of the smallest bound one takes 8 MiB
 
 }  // namespace
-
-size_t DepthLattice::place(uint32_t code) {
-  return (std::bit_cast<uint32_t>(static_cast<float>(code + 1)) >> (23 - kFraction)) - (127u << kFraction);
-}
 
 DepthLattice::DepthLattice(uint32_t depth) : depth_(depth) {
   CHECK(depth >= ErrorBounds::kLeastDepth && depth <= ErrorBounds::kMostDepth);
@@ -21,7 +15,8 @@ DepthLattice::DepthLattice(uint32_t depth) : depth_(depth) {
   for (uint64_t first = 0; first <= image::kMaxDepthCode;) {
     const auto m = static_cast<uint32_t>(std::min<uint64_t>((first << 32) / rest, image::kMaxDepthCode));
     codes_.push_back(m);
-    first = uint64_t{m} + reach(m) + 1;
+    ends_.push_back(m + reach(m));
+    first = uint64_t{ends_.back()} + 1;
   }
   lines_.resize(place(image::kMaxDepthCode) + 1);
   uint32_t index = 0;
@@ -29,7 +24,7 @@ DepthLattice::DepthLattice(uint32_t depth) : depth_(depth) {
     const uint64_t mantissa = (uint64_t{1} << kFraction) + i % (1u << kFraction), scaled = mantissa << (i >> kFraction);
     const uint64_t first = (scaled + (1u << kFraction) - 1) >> kFraction;
     const auto code = static_cast<uint32_t>(std::min<uint64_t>(first - 1, image::kMaxDepthCode));
-    while (codes_[index] + reach(codes_[index]) < code) ++index;
+    while (ends_[index] < code) ++index;
     lines_[i] = {code, index, 0};
     if (i == 0 || lines_[i - 1].code == code) continue;
     Line& before = lines_[i - 1];

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -33,10 +34,12 @@ class DepthLattice {
   /// The interval that `code` lies in. Precondition: code <= kMaxDepthCode.
   uint32_t index(uint32_t code) const {
     const Line& line = lines_[place(code)];
-    uint32_t i = line.index + static_cast<uint32_t>(uint64_t{code - line.code} * line.slope >> 32);
-    while (codes_[i] + reach(codes_[i]) < code) ++i;
-    while (code + reach(codes_[i]) < codes_[i]) --i;
-    return i;
+    const uint32_t* end = ends_.data() + line.index + (uint64_t{code - line.code} * line.slope >> 32);
+    end += *end < code;  // the line lies below, by less than 2 nearly always: two steps that nobody has to guess
+    end += *end < code;
+    while (*end < code) ++end;
+    while (end != ends_.data() && end[-1] >= code) --end;
+    return static_cast<uint32_t>(end - ends_.data());
   }
 
  private:
@@ -45,11 +48,13 @@ class DepthLattice {
     uint32_t code = 0, index = 0;  // of its first
     uint32_t slope = 0;            // in 2^-32 indices a code
   };
-  static constexpr unsigned kFraction = 8;  // bits
-  static size_t place(uint32_t code);
+  static constexpr unsigned kFraction = 7;  // bits
+  static size_t place(uint32_t code) {
+    return (std::bit_cast<uint32_t>(static_cast<float>(code + 1)) >> (23 - kFraction)) - (127u << kFraction);
+  }
 
   uint32_t depth_;
-  std::vector<uint32_t> codes_;
+  std::vector<uint32_t> codes_, ends_;  // of each interval: what stands for it, and the last code
   std::vector<Line> lines_;
 };
 

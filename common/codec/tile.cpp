@@ -39,11 +39,14 @@ void clear(image::DepthImage& image, const TileRect& rect) {
 // No other tile is coded as a sparse one: so nobody makes a decoder take that time for all pixels.
 bool may_be_sparse(size_t covered, size_t pixels) { return covered * 4 < pixels; }
 
+constexpr size_t kFewWithinBounds = 4000;  // bench codec on whole views: 2700 to 8000 are alike
+
 // Filled rows predict better where runs are long. Elsewhere sparse tiles take fewer bits up to any density (a tenth
 // less at a third), but ten times longer a pixel than full ones do: bench codec/patch* and codec/sparse*.
-// Within bounds, where tokens are few, full ones pay from a 24th on.
+// Within bounds filled rows' tables are smaller, and pay from a few thousand pixels on.
 bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
-  return covered * (bounded ? 24 : 8) < pixels || (may_be_sparse(covered, pixels) && covered < runs * 4);
+  const bool few = covered * 8 < pixels && (!bounded || covered < kFewWithinBounds);
+  return few || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
 // The one of the sparse tile's normals.

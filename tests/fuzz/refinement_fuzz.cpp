@@ -1,11 +1,10 @@
 // Any bytes as the refinement of one of a few images: an error, or a canonical image that covers the same pixels and
 // survives another round trip. The first byte says of which image.
-#include <array>
 #include <cstdlib>
 
 #include "common/codec/depth_codec.h"
+#include "tests/support/codec_images.h"
 #include "tests/support/depth_images.h"
-#include "tests/support/refined_images.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace telesplat;

@@ -179,6 +179,10 @@ void DenseCoder::store(const T* row, size_t y, std::vector<T>& out, const TileRe
       std::copy_n(row + begin, width, to);
       continue;
     }
+    if (shape_.width == width) {
+      shape_.for_each_run(y, [&](size_t x, size_t end) { std::copy_n(row + x, end - x, to + x); });
+      continue;
+    }
     for (size_t x = 0; x < width; ++x)
       if (shape_.at(begin + x, y)) to[x] = row[begin + x];
   }

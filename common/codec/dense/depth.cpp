@@ -26,7 +26,7 @@ uint32_t mean_terms(const uint32_t* above2, const uint32_t* above, size_t x) {
   return 2 * above[x] - above[x - 1] - above2[x] + above[x + 1] + 2;
 }
 
-// The mean is rounded down from half: where it was the other way, a pixel lies rather above than below it, and signs are
+// The mean is rounded up from half. Where it was rounded down, a pixel lies rather above than below it: there signs are
 // turned, so that what is likelier has the smaller number.
 constexpr uint32_t kAbove = 3;
 

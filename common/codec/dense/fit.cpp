@@ -246,7 +246,7 @@ void set_features(Features& out, const Plane<int16_t>& own, const Plane<int16_t>
   for (int i = 0; i < kTerms; ++i) out.of[i] = static_cast<float>(raw[i]);
 }
 
-// What the solution, whose last terms are -1 and 0, makes of a sample: how far off. In four parts, as vectors have them.
+// How far off a solution is, whose last terms are -1 and 0, in one sample. In four parts, as vectors have them.
 float miss(const Features& f, const float solution[kTerms]) {
   float parts[4] = {};
   for (int i = 0; i < kTerms; i += 4)

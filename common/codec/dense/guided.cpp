@@ -167,18 +167,17 @@ void GuidedPlane::encode_by_median(const TileShape& shape) {
     const auto r = static_cast<ptrdiff_t>(y);
     const int16_t *const row = values.row(r), *const above = values.row(r - 1);
     int16_t* const out = residuals.row(r);
-    uint8_t *const tokens = symbols.tokens.row(r), *const narrow = bits == 6 ? symbols.narrow.row(r) : nullptr;
-    uint32_t* const wide = bits == 6 ? nullptr : symbols.wide.row(r);
-    for (size_t x = 0; x < shape.width; ++x) {
-      int off = (row[x] - median_of(row[x - 1], above[x], above[x - 1])) >> bits;
-      if (bits == 6) off = static_cast<int8_t>(off);
-      const auto z = static_cast<uint32_t>((off * 2) ^ (off < 0 ? -1 : 0));
-      out[x] = static_cast<int16_t>(off * (1 << bits));
-      tokens[x] = static_cast<uint8_t>(token_of(z));
-      if (bits == 6)
-        narrow[x] = static_cast<uint8_t>(z);
-      else
-        wide[x] = z;
+    uint8_t* const tokens = symbols.tokens.row(r);
+    if (bits == 6) {
+      kernels().median_values(above, row, shape.width, symbols.narrow.row(r), tokens, out);
+    } else {
+      uint32_t* const wide = symbols.wide.row(r);
+      for (size_t x = 0; x < shape.width; ++x) {
+        const int off = (row[x] - median_of(row[x - 1], above[x], above[x - 1])) >> bits;
+        wide[x] = static_cast<uint32_t>((off * 2) ^ (off < 0 ? -1 : 0));
+        out[x] = static_cast<int16_t>(off * (1 << bits));
+        tokens[x] = static_cast<uint8_t>(token_of(wide[x]));
+      }
     }
     shape.for_each_hole(y, [&](size_t x) { out[x] = 0; });
     finish_tokens(symbols, shape, y);

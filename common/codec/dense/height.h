@@ -18,8 +18,9 @@ struct HeightSample {
 };
 
 /// Finds the axis of room space along which colours change least, for heights(): with the knots that it sets these are
-/// heights from 0 to 16383. `rays`: what turns (x, y, 1) into three coordinates times the depth code, or null. `first`: a pixel
-/// of each colour of the palette, in its order. Sets the samples' indices; false where no axis explains the colours.
+/// heights from 0 to 16383. `rays`: what turns (x, y, 1) into three coordinates times the depth code, or null.
+/// `first`: a pixel of each colour of the palette, in its order. Sets the samples' indices; false where no axis
+/// explains the colours.
 bool fit_axis(const double rays[3][3], std::vector<HeightSample>& samples, const std::vector<HeightSample>& first,
               HeightModel& model);
 

@@ -220,6 +220,21 @@ static void GuidedResidualsWide(const GuidedRows& rows, size_t n, uint32_t* REST
   }
 }
 
+static void MedianValues(const int16_t* RESTRICT above, const int16_t* RESTRICT row, size_t n, uint8_t* RESTRICT z,
+                         uint8_t* RESTRICT tokens, int16_t* RESTRICT residual) {
+  for (size_t x = 0; x < n; ++x) {
+    const int16_t left = row[x - 1], up = above[x], corner = above[x - 1];
+    const int16_t low = left < up ? left : up, high = left < up ? up : left;
+    const int16_t raised = corner < low ? low : corner, clamped = raised > high ? high : raised;
+    // 64ths mod 256: the upper two bits fall out.
+    const int16_t off = static_cast<int16_t>(static_cast<uint16_t>(row[x] - left - up + clamped) << 2);
+    residual[x] = static_cast<int16_t>(off >> 2);
+    const uint8_t folded = static_cast<uint8_t>((off >> 7) ^ (off >> 15));
+    z[x] = folded;
+    tokens[x] = ByteToken(folded);
+  }
+}
+
 // A quotient below 1 in 2^-14, of a numerator and a depth code.
 static void Heights(const uint32_t* RESTRICT depth, size_t n, int x0, int y, const HeightModel& model,
                     int16_t* RESTRICT out) {

@@ -78,6 +78,9 @@ struct Kernels {
   void (*guided_residuals)(const GuidedRows& rows, size_t n, uint8_t* z, uint8_t* tokens, int16_t* residual);
   /// The same for values that take more than a byte: not mod 256.
   void (*guided_residuals_wide)(const GuidedRows& rows, size_t n, uint32_t* z, uint8_t* tokens, int16_t* residual);
+  /// The same as guided_residuals() by the median of L, U and L + U - UL.
+  void (*median_values)(const int16_t* above, const int16_t* row, size_t n, uint8_t* z, uint8_t* tokens,
+                        int16_t* residual);
   /// All terms of guided prediction but that of the left neighbour,
   void (*guided_sums)(const GuidedRows& rows, size_t n, int32_t* sums);
   /// The turned octahedral coordinates, in 64ths, of the surface through each depth: rows above, here and below.

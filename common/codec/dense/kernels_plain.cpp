@@ -53,6 +53,7 @@ const Kernels& plain_kernels() {
                                MedianResiduals,
                                GuidedResiduals<GuidedSums>,
                                GuidedResidualsWide<GuidedSums>,
+                               MedianValues,
                                GuidedSums,
                                Geometry,
                                Heights,

@@ -86,6 +86,7 @@ static const Kernels* Set() {
                                MedianResiduals,
                                GuidedResiduals<GuidedSums>,
                                GuidedResidualsWide<GuidedSums>,
+                               MedianValues,
                                GuidedSums,
                                Geometry,
                                Heights,
@@ -101,7 +102,7 @@ static const Kernels* Set() {
 
 using D = hn::CappedTag<uint32_t, 16>;
 using V = hn::VFromD<D>;
-using M = hn::MFromD<D>;
+using M = hn::Mask<D>;
 constexpr D kD;
 constexpr size_t kN = hn::MaxLanes(D()), kVectors = kLanes / kN;
 constexpr hn::Rebind<uint16_t, D> kD16;
@@ -260,24 +261,27 @@ HWY_INLINE V Refill(V x, const uint8_t*& end) {
   return hn::IfThenElse(low, hn::Or(hn::ShiftLeft<16>(x), Spread(words, low)), x);
 }
 
-// kLanes symbols; there must be 3 kLanes words before `end`.
-template <bool kWide>
-HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, const uint32_t* tables, V (&x)[kVectors],
-                                   const uint8_t* end) {
+// n symbols, at most kLanes; there must be 3 kLanes words before `end`. Writes kLanes of them.
+template <bool kWhole, bool kWide>
+HWY_INLINE const uint8_t* GetGroup(const DecodedRow& row, size_t begin, size_t n, const uint32_t* tables,
+                                   V (&x)[kVectors], const uint8_t* end) {
   const hn::RebindToSigned<D> s;
   const auto one = hn::Set(kD, 1u), first = hn::Set(kD, row.first), fifteen = hn::Set(kD, 15u);
   V kept[kVectors], bits[kVectors];
   auto widest = hn::Zero(kD);
   for (size_t i = kVectors; i-- > 0;) {
-    const V index =
-        hn::Or(hn::ShiftLeft<12>(Load8(row.contexts + begin + i * kN)), hn::And(x[i], hn::Set(kD, kFrequencyOne - 1)));
+    const M valid = hn::FirstN(kD, kWhole ? kN : n > i * kN ? n - i * kN : 0);
+    V contexts = Load8(row.contexts + begin + i * kN);
+    if constexpr (!kWhole) contexts = hn::IfThenElseZero(valid, contexts);
+    const V index = hn::Or(hn::ShiftLeft<12>(contexts), hn::And(x[i], hn::Set(kD, kFrequencyOne - 1)));
     const V entry = hn::GatherIndex(kD, tables, hn::BitCast(s, index));
     const V token = hn::ShiftRight<24>(entry);
     hn::StoreU(hn::TruncateTo(kD8, token), kD8, row.tokens + begin + i * kN);
     const V frequency = hn::Add(hn::And(hn::ShiftRight<12>(entry), hn::Set(kD, 0xFFFu)), one);
-    x[i] = hn::Add(hn::Mul(frequency, hn::ShiftRight<12>(x[i])), hn::And(entry, hn::Set(kD, 0xFFFu)));
-    x[i] = Refill(x[i], end);
-    const V over = hn::Sub(hn::Max(token, first), first);
+    const V next = hn::Add(hn::Mul(frequency, hn::ShiftRight<12>(x[i])), hn::And(entry, hn::Set(kD, 0xFFFu)));
+    x[i] = Refill(kWhole ? next : hn::IfThenElse(valid, next, x[i]), end);
+    V over = hn::Sub(hn::Max(token, first), first);
+    if constexpr (!kWhole) over = hn::IfThenElseZero(valid, over);
     bits[i] = hn::ShiftRight<3>(over);
     kept[i] = hn::Shl(hn::Add(hn::And(over, hn::Set(kD, 7u)), hn::Set(kD, 8u)), bits[i]);
     widest = hn::Max(widest, bits[i]);
@@ -307,7 +311,20 @@ HWY_INLINE const uint8_t* GetAll(const DecodedRow& row, const uint32_t* tables, 
   for (size_t i = 0; i < kVectors; ++i) x[i] = hn::LoadU(kD, states + i * kN);
   size_t at = 0;
   for (; at + kLanes <= row.count && static_cast<size_t>(end - begin) >= 6 * kLanes; at += kLanes)
-    end = GetGroup<kWide>(row, at, tables, x, end);
+    end = GetGroup<true, kWide>(row, at, kLanes, tables, x, end);
+  if (at < row.count && row.count - at < kLanes && static_cast<size_t>(end - begin) >= 6 * kLanes) {
+    const size_t n = row.count - at;
+    HWY_ALIGN uint8_t contexts[kLanes] = {}, tokens[kLanes], narrow[kLanes];
+    HWY_ALIGN uint32_t wide[kLanes];
+    std::memcpy(contexts, row.contexts + at, n);
+    end = GetGroup<false, kWide>({contexts, tokens, wide, narrow, n, row.first}, 0, n, tables, x, end);
+    std::memcpy(row.tokens + at, tokens, n);
+    if constexpr (kWide)
+      std::memcpy(row.wide + at, wide, 4 * n);
+    else
+      std::memcpy(row.narrow + at, narrow, n);
+    at = row.count;
+  }
   for (size_t i = 0; i < kVectors; ++i) hn::StoreU(x[i], kD, states + i * kN);
   for (; at < row.count && end != nullptr; at += kLanes)
     end = PlainGetGroup(row, at, row.count - at < kLanes ? row.count - at : kLanes, tables, states, begin, end);
@@ -489,6 +506,7 @@ static const Kernels* Set() {
                                MedianResiduals,
                                GuidedResiduals<PairedSums>,
                                GuidedResidualsWide<PairedSums>,
+                               MedianValues,
                                PairedSums,
                                Geometry,
                                HeightsVector,

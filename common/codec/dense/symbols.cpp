@@ -106,17 +106,13 @@ void PlaneEncoder::count(const SymbolPlane& plane, const TileShape& shape) {
   for (size_t y = 0; y < shape.height; ++y) {
     const auto r = static_cast<ptrdiff_t>(y);
     const uint8_t *const tokens = plane.tokens.row(r), *const contexts = plane.contexts.row(r);
-    if (shape.full(y)) {
-      size_t x = 0;
-      for (; x + 2 <= shape.width; x += 2) {
+    shape.for_each_run(y, [&](size_t x, size_t end) {
+      for (; x + 2 <= end; x += 2) {
         ++a[contexts[x] * kSymbols + tokens[x]];
         ++b[contexts[x + 1] * kSymbols + tokens[x + 1]];
       }
-      if (x < shape.width) ++a[contexts[x] * kSymbols + tokens[x]];
-      continue;
-    }
-    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(),
-                 [&](size_t x) { ++a[contexts[x] * kSymbols + tokens[x]]; });
+      if (x < end) ++a[contexts[x] * kSymbols + tokens[x]];
+    });
   }
   for (size_t i = 0; i < kContexts * kSymbols; ++i) a[i] += b[i];
 }
@@ -150,13 +146,15 @@ uint8_t* PlaneEncoder::put_row(const SymbolPlane& plane, const TileShape& shape,
   if (tokens.size() < needed)
     tokens.resize(needed), contexts.resize(needed), narrow.resize(needed), wide.resize(needed);
   size_t n = 0;
-  for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), [&](size_t x) {
-    tokens[n] = row.tokens[x], contexts[n] = row.contexts[x];
+  shape.for_each_run(y, [&](size_t begin, size_t end) {
+    const size_t count = end - begin;
+    std::copy_n(row.tokens + begin, count, tokens.data() + n);
+    std::copy_n(row.contexts + begin, count, contexts.data() + n);
     if (row.wide != nullptr)
-      wide[n] = row.wide[x];
+      std::copy_n(row.wide + begin, count, wide.data() + n);
     else
-      narrow[n] = row.narrow[x];
-    ++n;
+      std::copy_n(row.narrow + begin, count, narrow.data() + n);
+    n += count;
   });
   return kernels().put_symbols(
       {tokens.data(), contexts.data(), row.wide != nullptr ? wide.data() : nullptr, narrow.data(), n, row.first},
@@ -189,11 +187,11 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   if (packed_tokens_.size() < needed)
     packed_tokens_.resize(needed), packed_contexts_.resize(needed), packed_narrow_.resize(needed),
         packed_wide_.resize(needed);
-  const auto for_each_covered = [&](auto f) {
-    for_each_set(shape.mask->row(static_cast<int>(y)), shape.mask->words_per_row(), f);
-  };
   size_t n = 0;
-  for_each_covered([&](size_t x) { packed_contexts_[n++] = contexts[x]; });
+  shape.for_each_run(y, [&](size_t begin, size_t end) {
+    std::copy_n(contexts + begin, end - begin, packed_contexts_.data() + n);
+    n += end - begin;
+  });
   source.end =
       kernels().get_symbols({packed_contexts_.data(), packed_tokens_.data(),
                              wide != nullptr ? packed_wide_.data() : nullptr, packed_narrow_.data(), n, plane.first},
@@ -204,13 +202,14 @@ bool PlaneDecoder::get_row(SymbolPlane& plane, const TileShape& shape, size_t y,
   else
     std::fill_n(narrow, shape.width, uint8_t{0});
   n = 0;
-  for_each_covered([&](size_t x) {
-    tokens[x] = packed_tokens_[n];
+  shape.for_each_run(y, [&](size_t begin, size_t end) {
+    const size_t count = end - begin;
+    std::copy_n(packed_tokens_.data() + n, count, tokens + begin);
     if (wide != nullptr)
-      wide[x] = packed_wide_[n];
+      std::copy_n(packed_wide_.data() + n, count, wide + begin);
     else
-      narrow[x] = packed_narrow_[n];
-    ++n;
+      std::copy_n(packed_narrow_.data() + n, count, narrow + begin);
+    n += count;
   });
   finish_tokens(plane, shape, y);
   return true;

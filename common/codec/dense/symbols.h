@@ -1,6 +1,7 @@
 // Planes of symbols of one dense tile, and their way to bytes and back: contexts, tables, the coder's words.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,6 +24,25 @@ struct TileShape {
   void reset(size_t tile_width, size_t tile_height, const Mask* tile_mask);
   bool full(size_t y) const { return covered[y] == width; }
   bool at(size_t x, size_t y) const { return mask == nullptr || mask->at(static_cast<int>(x), static_cast<int>(y)); }
+  /// Calls f(begin, end) for the runs of pixels of row y that are covered.
+  template <class F>
+  void for_each_run(size_t y, F f) const {
+    if (full(y)) return f(size_t{0}, width);
+    if (covered[y] == 0) return;
+    const uint64_t* const words = mask->row(static_cast<int>(y));
+    size_t begin = width;  // of the run that has not ended
+    for (size_t at = 0; at < width; at += 64) {
+      uint64_t changes = words[at / 64] ^ (words[at / 64] << 1 | uint64_t{begin != width});
+      for (; changes != 0; changes &= changes - 1) {
+        const size_t x = at + static_cast<size_t>(std::countr_zero(changes));
+        if (begin == width)
+          begin = x;
+        else
+          f(begin, x), begin = width;
+      }
+    }
+    if (begin != width) f(begin, width);
+  }
   /// Calls f(x) for the pixels of row y that are not covered.
   template <class F>
   void for_each_hole(size_t y, F f) const {

@@ -77,8 +77,9 @@ namespace {
 struct Possible {
   int32_t guess, down, up;
 };
-Possible possible(const uint32_t* row, const uint32_t* above, uint32_t known, size_t x, const Reach& reach) {
-  const auto low = static_cast<int32_t>(reach.lowest(known)), high = static_cast<int32_t>(reach.highest(known));
+inline Possible possible(const uint32_t* row, const uint32_t* above, uint32_t known, size_t x, const Reach& reach) {
+  const Reach::Codes codes = reach.around(known);
+  const auto low = static_cast<int32_t>(codes.low), high = static_cast<int32_t>(codes.high);
   const auto plane = static_cast<int32_t>(row[x - 1] + above[x] - above[x - 1]);
   const int32_t guess = std::clamp(plane, low, high);
   return {guess, guess - low, high - guess};

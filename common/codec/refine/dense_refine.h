@@ -22,11 +22,13 @@ struct Reach {
   bool none() const { return depth == 0 && normal == 0 && colour == 0; }
 
   /// Between which codes the exact one lies.
-  uint32_t lowest(uint32_t known) const { return known - std::min(by(known), known - 1); }
-  uint32_t highest(uint32_t known) const { return known + std::min(by(known), image::kMaxDepthCode - known); }
-
- private:
-  uint32_t by(uint32_t known) const { return static_cast<uint32_t>(uint64_t{known} * depth >> 32); }
+  struct Codes {
+    uint32_t low, high;
+  };
+  Codes around(uint32_t known) const {
+    const auto by = static_cast<uint32_t>(uint64_t{known} * depth >> 32);
+    return {known - std::min(by, known - 1), std::min(known + by, image::kMaxDepthCode)};
+  }
 };
 
 /// What codes dense tiles of refinements. One a thread: it keeps its memory.

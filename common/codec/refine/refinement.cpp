@@ -33,6 +33,7 @@ enum Kind : uint8_t { kSame = 0, kDense = 1, kScattered = 2, kAnew = 3 };
 constexpr int kNarrow = 16;              // pixels: tiles that are not as wide are coded as scattered ones
 constexpr int kShifts[3] = {8, 16, 0};   // green, red, blue
 constexpr unsigned kMostDepthBits = 25;  // of a scattered pixel
+constexpr size_t kPlentyBits = 16;       // a pixel, from which on a tile is tried anew
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image refinement: {}", what)}; }
 
@@ -163,7 +164,7 @@ void put_scattered(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exac
                    const TileRect& rect, const Reach& reach) {
   s.writer.start(s.covered * kMostDepthBits);
   for_each_covered(s, rect, [&](size_t i) {
-    const uint32_t low = reach.lowest(known.depth[i]), high = reach.highest(known.depth[i]);
+    const auto [low, high] = reach.around(known.depth[i]);
     Even(high - low + 1).put(s.writer.sink, exact.depth[i] - low);
   });
   detail::put_stored_block(out, s.writer.bytes());
@@ -189,7 +190,7 @@ bool get_scattered(Scratch& s, Reader& in, DepthImage& image, const TileRect& re
   s.reader.start(*bits, s.covered * kMostDepthBits);
   bool good = true;
   for_each_covered(s, rect, [&](size_t i) {
-    const uint32_t low = reach.lowest(image.depth[i]), high = reach.highest(image.depth[i]);
+    const auto [low, high] = reach.around(image.depth[i]);
     const uint32_t v = Even(high - low + 1).get(s.reader.source);
     good &= v <= high - low;
     image.depth[i] = std::min(low + v, high);
@@ -237,6 +238,7 @@ void put_tile(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exact, co
   const bool full = is_full(s, rect);
   const bool scattered =
       rect.width < kNarrow || s.covered * 4 < static_cast<size_t>(rect.width) * static_cast<size_t>(rect.height);
+  const size_t begin = out.size();
   out.push_back(scattered ? kScattered : kDense);
   detail::put_varint(out, reach.depth);
   out.push_back(static_cast<uint8_t>(reach.pole + 8 * reach.normal));
@@ -245,6 +247,13 @@ void put_tile(Scratch& s, std::vector<uint8_t>& out, const DepthImage& exact, co
     put_scattered(s, out, exact, known, rect, reach);
   else
     s.dense.put(out, exact, known, rect, full ? nullptr : &s.mask, reach);
+  // Wide bounds may leave so much that neighbours say more.
+  if (8 * (out.size() - begin) <= kPlentyBits * s.covered) return;
+  std::vector<uint8_t> anew{kAnew};
+  detail::put_tile(anew, exact, rect, TileBounds({}));
+  if (anew.size() >= out.size() - begin) return;
+  out.resize(begin);
+  out.insert(out.end(), anew.begin(), anew.end());
 }
 
 std::optional<Reach> get_reach(Reader& in) {

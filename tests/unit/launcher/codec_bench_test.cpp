@@ -198,5 +198,29 @@ TEST(CodecBenchMeasure, AddsUpToTheStreams) {
   EXPECT_NE(text.find("lossless"), std::string::npos);
 }
 
+TEST(CodecBenchMeasure, WithinBoundsErrorsReachAndKeepThem) {
+  const DepthFrame frame{test::render({.width = 300, .height = 280}), 640};
+  CodecMeasure measure({.coders = {}, .seconds = 1e-3, .error_maps = true, .wish = {1 / 32.0, 1, 1}});
+  ASSERT_TRUE(measure.add(frame));
+  const CodecReport report = measure.finish("made");
+  EXPECT_LT(report.bounded.all(), report.bits.all());
+  EXPECT_GT(report.refinement, 0u);
+  EXPECT_LT(report.refinement, report.bits.all());
+  EXPECT_LE(report.errors.depth_px.largest, 1 / 32.0);
+  EXPECT_GT(report.errors.depth_px.largest, 0.8 / 32);
+  EXPECT_LE(report.errors.normal_deg.largest, codec::normal_error_degrees(1));
+  EXPECT_GT(report.errors.normal_codes.largest, 0);
+  EXPECT_EQ(report.errors.colour_codes.largest, 1);
+  EXPECT_EQ(report.errors.uncovered, 0u);
+  ASSERT_FALSE(report.bounded_speeds.empty());
+  EXPECT_GT(report.bounded_speeds[0].encode, 0);
+  EXPECT_GT(report.refinement_speeds[0].decode, 0);
+  const std::string text = to_markdown(report);
+  EXPECT_NE(text.find("| within bounds |"), std::string::npos);
+  EXPECT_NE(text.find("| refinement |"), std::string::npos);
+  EXPECT_NE(text.find("bounds: depth 0.0312 px; normals 1 codes, 1.91 degrees"), std::string::npos);
+  EXPECT_EQ(to_json(report)["bits_per_pixel"]["refinement"]["bytes"], report.refinement / 8);
+}
+
 }  // namespace
 }  // namespace telesplat::launcher
