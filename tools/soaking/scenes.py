@@ -68,14 +68,28 @@ def write_fence(path, side=140, poles=240, seed=5):
             out.write(struct.pack("<Biii", 3, *face))
 
 
+def write_circles_and_rests(path, circle_s=12, rest_s=4):
+    """A head that goes once around the room's centre, looking at it, and then rests."""
+    with open(path, "w") as out:
+        out.write("t_s,px,py,pz,qw,qx,qy,qz\n")
+        steps = 10 * circle_s
+        for i in [*range(steps + 1), steps + 10 * rest_s]:
+            turn = 2 * math.pi * min(i, steps) / steps
+            out.write(f"{i / 10:.3f},{0.7 * math.sin(turn):.6f},0.25,{0.7 * math.cos(turn):.6f},"
+                      f"{math.cos(turn / 2):.6f},0,{math.sin(turn / 2):.6f},0\n")
+
+
 def mesh(options):
-    path = os.path.join(options.out, "fence.ply")
+    path, heads = os.path.join(options.out, "fence.ply"), os.path.join(options.out, "heads.csv")
     write_fence(path)
+    write_circles_and_rests(heads)
 
     def change(chance):
         return chance.choice((clip, lambda c: ("colour", "map", c.choice(("viridis", "plasma", "turbo", "grey"))),
                               lambda c: ("epoch",)))(chance)
-    return Scene("mesh", [path, "--colour-by", "height", "--cache", os.path.join(options.out, "cache")], change, True)
+    # Points have errors, and become exact when heads rest.
+    return Scene("mesh", [path, "--colour-by", "height", "--cache", os.path.join(options.out, "cache"), "--trajectory", heads, "--loop",
+                          "--depth-error", "1/32", "--normal-error", "1", "--colour-error", "1"], change, True)
 
 
 def julia(options):
