@@ -88,8 +88,9 @@ def mesh(options):
         return chance.choice((clip, lambda c: ("colour", "map", c.choice(("viridis", "plasma", "turbo", "grey"))),
                               lambda c: ("epoch",)))(chance)
     # Points have errors, and become exact when heads rest.
-    return Scene("mesh", [path, "--colour-by", "height", "--cache", os.path.join(options.out, "cache"), "--trajectory", heads, "--loop",
-                          "--depth-error", "1/32", "--normal-error", "1", "--colour-error", "1"], change, True)
+    errors = ["--depth-error", "1/32", "--normal-error", "1", "--colour-error", "1"]
+    arguments = [path, "--colour-by", "height", "--cache", os.path.join(options.out, "cache")]
+    return Scene("mesh", [*arguments, "--trajectory", heads, "--loop", *errors], change, True)
 
 
 def julia(options):
