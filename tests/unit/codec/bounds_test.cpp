@@ -220,5 +220,64 @@ TEST(Refinement, CostsLessThanTheImageAnew) {
   EXPECT_LT(refinement.size() * 10, encode(image).size() * 8);
 }
 
+// A change of the format changes its version, docs/codec.md, docs/protocol.md and these bytes.
+void expect_bytes(const DepthImage& image, const std::vector<uint8_t>& bytes, const std::vector<uint8_t>& refinement) {
+  DepthImage bounded;
+  EXPECT_EQ(encode(image, error_bounds(1 / 32.0, 2 / 1280.0, 1, 1), &bounded), bytes);
+  EXPECT_EQ(encode_refinement(image, bounded), refinement);
+  const auto decoded = decode(bytes);
+  ASSERT_TRUE(decoded.ok()) << decoded.error().text;
+  EXPECT_TRUE(*decoded == bounded);
+  const auto exact = decode_refinement(refinement, bounded);
+  ASSERT_TRUE(exact.ok()) << exact.error().text;
+  EXPECT_TRUE(*exact == image);
+}
+
+TEST(CodecFormat, GoldenBytesOfASparseTileWithinBounds) {
+  DepthImage image(9, 8);
+  for (const auto& [x, y] : {std::pair{0, 0}, {4, 0}, {8, 1}, {1, 3}, {5, 3}, {7, 4}, {2, 6}, {3, 7}, {8, 7}}) {
+    const size_t i = static_cast<size_t>(y * 9 + x);
+    image.depth[i] = static_cast<uint32_t>(500000 + 1234 * x - 777 * y + x * x * y);
+    image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
+    image.normal[i] = static_cast<uint16_t>((150 + 2 * x) % 256 | (100 - y) << 8);
+  }
+  expect_bytes(image, {215, 5,  1,   9,   8,   179, 230, 12,  1,  1,   6,  87,  206, 0,   96,  80, 64, 150, 100,
+                       1,   58, 16,  255, 248, 39,  136, 246, 80, 144, 0,  65,  254, 113, 170, 0,  4,  9,   197,
+                       1,   65, 248, 95,  221, 23,  95,  124, 76, 136, 27, 213, 153, 80,  76,  64, 0,  0},
+               {216, 5,  9,   8,   2,   182, 162, 7,  16, 1,  25,  155, 38,  193, 151, 46,  0,  37,
+                17,  7,  6,   7,   12,  1,   12,  11, 6,  30, 0,   0,   111, 126, 189, 10,  0,  30,
+                0,   25, 151, 240, 171, 249, 121, 37, 0,  0,  255, 255, 0,   1,   255, 255, 255});
+}
+
+TEST(CodecFormat, GoldenBytesOfADenseTileWithinBounds) {
+  DepthImage image(17, 3);
+  for (size_t i = 0; i < image.pixels(); ++i) {
+    const int x = static_cast<int>(i % 17), y = static_cast<int>(i / 17);
+    image.depth[i] = static_cast<uint32_t>(600000 + 900 * x - 700 * y + x * x * y);
+    image.colour[i] = 0x102030 + static_cast<uint32_t>(i % 4) * 0x010203;
+    image.normal[i] = static_cast<uint16_t>(0x8040 + x * y);
+  }
+  expect_bytes(
+      image, {215, 5,   1,   17,  3,   179, 230, 12,  1,   1,   1,   163, 213, 0,   48,  32,  16,  64,  128, 1,   29,
+              76,  1,   209, 39,  254, 76,  0,   120, 23,  0,   0,   0,   0,   0,   0,   124, 194, 245, 201, 217, 170,
+              7,   165, 148, 82,  85,  85,  85,  85,  25,  244, 0,   0,   144, 127, 240, 69,  7,   84,  21,  254, 94,
+              160, 95,  70,  84,  85,  5,   0,   64,  142, 170, 85,  85,  5,   30,  3,   248, 248, 227, 31,  135, 136,
+              65,  196, 32,  98,  59,  0,   224, 1,   255, 222, 229, 213, 71,  237, 214, 90,  107, 173, 181, 214, 90,
+              107, 13,  1,   0,   0,   17,  101, 69,  9,   227, 2,   0,   52,  108, 114, 2,   83,  189, 98,  23,  177,
+              29,  239, 4,   188, 191, 122, 16,  107, 61,  13,  8,   157, 27,  238, 4,   106, 141, 238, 4,   136, 191,
+              97,  78,  229, 220, 174, 1,   157, 27,  238, 4,   158, 14,  116, 23,  165, 207, 118, 16,  118, 76,  174,
+              1,   124, 173, 99,  23,  116, 173, 239, 4,   78,  223, 214, 94},
+      {216, 5,   17,  3,   1,   239, 207, 12,  16,  0,   132, 1,   82,  0,   194, 159, 18,  224, 223, 249, 189, 207,
+       189, 245, 22,  124, 192, 237, 6,   124, 222, 141, 27,  0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,
+       0,   0,   0,   0,   128, 127, 199, 251, 247, 0,   0,   0,   0,   0,   0,   0,   0,   0,   252, 59,  174, 113,
+       141, 107, 44,  7,   248, 103, 226, 55,  152, 44,  0,   132, 195, 225, 0,   0,   128, 195, 33,  0,   226, 0,
+       64,  1,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   0,   184, 87,  80,  0,   0,   0,   0,   111,
+       184, 240, 239, 124, 66,  0,   188, 233, 241, 24,  0,   15,  123, 66,  0,   188, 235, 2,   240, 160, 7,   28,
+       2,   0,   0,   0,   46,  247, 192, 57,  231, 156, 115, 0,   0,   17,  112, 31,  99,  102, 233, 79,  42,  83,
+       244, 0,   161, 0,   148, 98,  98,  0,   196, 128, 82,  0,   103, 133, 41,  0,   40,  80,  141, 0,   156, 18,
+       170, 0,   15,  64,  165, 0,   40,  80,  141, 0,   156, 18,  170, 0,   15,  64,  165, 0,   40,  80,  141, 0,
+       156, 18,  170, 0,   15,  64,  165, 0,   40,  80,  141, 0,   156, 18,  170, 0});
+}
+
 }  // namespace
 }  // namespace telesplat::codec
