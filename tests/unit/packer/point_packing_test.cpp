@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <deque>
 #include <map>
+#include <set>
 
 #include "services/packer/slices/slice_packing.h"
 #include "tests/support/keys/lease_key.h"
@@ -144,6 +145,22 @@ TEST_F(PointPackingTest, WithoutAWordErrorsAreForSlowLinks) {
   ASSERT_EQ(told.size(), 2u);
   EXPECT_EQ(told.back().depth_error_m, 0);
   EXPECT_FALSE(decoded<wire::Patch>(sent.back()).refinable);
+}
+
+TEST(Tolerance, IsOfThePixelAndRoundedDown) {
+  EXPECT_TRUE(bounds_of({}, kCamera).exact());
+  std::set<uint32_t> depths;
+  for (int width = 640; width < 1280; ++width) {
+    const auto camera = test::scene_camera({0.7, 0.4, 0}, width, width * 5 / 8);
+    const double wanted = 4294967296.0 / 32 / std::max(camera.focal_x(), camera.focal_y());
+    const auto bounds = bounds_of({1.0 / 32, 1, 2}, camera);
+    EXPECT_LE(bounds.depth, wanted);
+    EXPECT_GT(bounds.depth, wanted * 15 / 16);
+    EXPECT_EQ(bounds.normal, 1);
+    EXPECT_EQ(bounds.colour, 2);
+    depths.insert(bounds.depth);
+  }
+  EXPECT_LE(depths.size(), 17u);
 }
 
 TEST(StillHeads, AreThoseThatDoNotMove) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 
 #include "common/codec/error_bounds.h"
 #include "common/geometry/camera.h"
@@ -17,11 +18,15 @@ struct Tolerance {
   bool operator==(const Tolerance&) const = default;
 };
 
-/// The same for the pixels of one camera, those of the finer axis.
+/// The same for the pixels of one camera, those of the finer axis. Frusta are wider the faster a head moves: bounds of
+/// depth are rounded down to one of 16 an octave, so that coders, which keep tables by bound, do not make one a frame.
 inline codec::ErrorBounds bounds_of(const Tolerance& tolerance, const geometry::Camera& camera) {
   if (tolerance.exact()) return {};
-  return codec::error_bounds(tolerance.depth_pixels, 1 / std::max(camera.focal_x(), camera.focal_y()), tolerance.normal,
-                             tolerance.colour);
+  constexpr int kBits = 5;
+  auto out = codec::error_bounds(tolerance.depth_pixels, 1 / std::max(camera.focal_x(), camera.focal_y()),
+                                 tolerance.normal, tolerance.colour);
+  if (const int below = std::bit_width(out.depth) - kBits; below > 0) out.depth = out.depth >> below << below;
+  return out;
 }
 
 }  // namespace telesplat::packer
