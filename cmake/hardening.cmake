@@ -27,18 +27,19 @@ elseif(TELESPLAT_HARDEN)
   add_link_options($<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:-pie>)
 endif()
 
-# telesplat_lighten(sources...)   the checks of vector kernels that cost most to compile, and that others make up for
-#   Loads and stores of vectors take any address, and AddressSanitizer sees where pointers lead.
-function(telesplat_lighten)
-  if(NOT TELESPLAT_SANITIZE MATCHES undefined)
+# telesplat_kernels(sources...)   gives those of these sources that are vector kernels an instruction set, in sanitized builds
+#   Compiled for the oldest x86 alone, Highway would emulate vectors by loops, which take minutes to compile.
+function(telesplat_kernels)
+  if(NOT TELESPLAT_SANITIZE OR NOT CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     return()
   endif()
   foreach(source ${ARGN})
     cmake_path(ABSOLUTE_PATH source OUTPUT_VARIABLE path)
     if(EXISTS ${path} AND NOT IS_DIRECTORY ${path})
       file(STRINGS ${path} kernels REGEX "hwy/foreach_target.h" LIMIT_COUNT 1)
-      if(kernels)
-        set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS -fno-sanitize=alignment,pointer-overflow)
+      if(kernels)  # a precompiled header is of another instruction set
+        set_property(SOURCE ${source} APPEND PROPERTY COMPILE_OPTIONS -msse4.2 -maes -mpclmul)
+        set_property(SOURCE ${source} PROPERTY SKIP_PRECOMPILE_HEADERS ON)
       endif()
     endif()
   endforeach()
