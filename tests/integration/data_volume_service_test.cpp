@@ -20,7 +20,7 @@
 namespace telesplat::data {
 namespace {
 
-constexpr double kDeadline_s = test::patient(30);
+constexpr double kDeadline_s = telesplat::test::patient(30);
 
 // The next message of type M that a peer sends; others are passed over.
 template <class M>

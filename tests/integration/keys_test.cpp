@@ -102,7 +102,7 @@ TEST(Keys, WithoutAKeyNobodyComesIn) {
   peer.socket.send(kGoodbye);
   ASSERT_TRUE(master.refuses(1));
   ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }, nullptr, kRefused_s));
+      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_NE(peer.socket.refusal().text.find("wants a key"), std::string::npos) << peer.socket.refusal().text;
   EXPECT_FALSE(master.socket.receive());
   EXPECT_EQ(master.socket.rejected(), 0u);
@@ -118,7 +118,7 @@ TEST(Keys, AKeyThatIsNotOnTheListIsRefused) {
   peer.socket.send(kGoodbye);
   ASSERT_TRUE(master.refuses(1));
   ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }, nullptr, kRefused_s));
+      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_EQ(peer.socket.refusal().text, "the key anna of " + keys.path() + " is not let in there");
   EXPECT_FALSE(master.socket.receive());
   EXPECT_EQ(master.socket.rejected(), 0u);
@@ -214,7 +214,7 @@ TEST(Keys, AnotherServersKeysAreRefusedAndToldSo) {
   peer.socket.send(kGoodbye);
   ASSERT_TRUE(master.refuses(1));
   ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }, nullptr, kRefused_s));
+      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_EQ(peer.socket.refusal().text, "it does not take the keys of " + others.path() + ": it has others, or none");
   EXPECT_TRUE(peer.socket.refusal().may_pass);
   EXPECT_FALSE(master.socket.receive());
@@ -229,7 +229,7 @@ TEST(Keys, WhoHasKeysTalksToNobodyWithout) {
   Peer peer(keys.of(Role::kViewer), *endpoint);
   peer.socket.send(kGoodbye);
   ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }, nullptr, kRefused_s));
+      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_EQ(peer.socket.refusal().text, "it does not take the keys of " + keys.path() + ": it has others, or none");
   EXPECT_FALSE(open.receive());
 }
@@ -383,7 +383,7 @@ TEST(Keys, AProcessThatTheMasterRefusesEnds) {
   wire::Hello hello;
   hello.role = "sampler";
   MasterLink link(context, master.endpoint, hello);
-  for (const double until = monotonic_s() + kRefused_s; !link.shutdown_requested() && monotonic_s() < until;) {
+  for (const double until = monotonic_s() + kDeadline_s; !link.shutdown_requested() && monotonic_s() < until;) {
     link.tick(monotonic_s(), [] { return MasterLink::Values(); });
     wait_readable({&link.socket()}, 20);
     link.receive();
