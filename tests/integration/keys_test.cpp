@@ -101,8 +101,7 @@ TEST(Keys, WithoutAKeyNobodyComesIn) {
   Peer peer({}, master.endpoint);
   peer.socket.send(kGoodbye);
   ASSERT_TRUE(master.refuses(1));
-  ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
+  ASSERT_TRUE(receive_until(peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_NE(peer.socket.refusal().text.find("wants a key"), std::string::npos) << peer.socket.refusal().text;
   EXPECT_FALSE(master.socket.receive());
   EXPECT_EQ(master.socket.rejected(), 0u);
@@ -117,8 +116,7 @@ TEST(Keys, AKeyThatIsNotOnTheListIsRefused) {
   Peer peer(anna, master.endpoint);
   peer.socket.send(kGoodbye);
   ASSERT_TRUE(master.refuses(1));
-  ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
+  ASSERT_TRUE(receive_until(peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_EQ(peer.socket.refusal().text, "the key anna of " + keys.path() + " is not let in there");
   EXPECT_FALSE(master.socket.receive());
   EXPECT_EQ(master.socket.rejected(), 0u);
@@ -213,8 +211,7 @@ TEST(Keys, AnotherServersKeysAreRefusedAndToldSo) {
   Peer peer(others.of(Role::kOperator), master.endpoint);
   peer.socket.send(kGoodbye);
   ASSERT_TRUE(master.refuses(1));
-  ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
+  ASSERT_TRUE(receive_until(peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_EQ(peer.socket.refusal().text, "it does not take the keys of " + others.path() + ": it has others, or none");
   EXPECT_TRUE(peer.socket.refusal().may_pass);
   EXPECT_FALSE(master.socket.receive());
@@ -228,8 +225,7 @@ TEST(Keys, WhoHasKeysTalksToNobodyWithout) {
   ASSERT_TRUE(endpoint.ok());
   Peer peer(keys.of(Role::kViewer), *endpoint);
   peer.socket.send(kGoodbye);
-  ASSERT_TRUE(receive_until(
-      peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
+  ASSERT_TRUE(receive_until(peer.socket, [&] { return !peer.socket.refusal().text.empty(); }));
   EXPECT_EQ(peer.socket.refusal().text, "it does not take the keys of " + keys.path() + ": it has others, or none");
   EXPECT_FALSE(open.receive());
 }
