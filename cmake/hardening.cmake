@@ -28,7 +28,7 @@ elseif(TELESPLAT_HARDEN)
 endif()
 
 # telesplat_kernels(sources...)   in sanitized builds, gives those of these sources that are vector kernels SSE4.2
-#   Compiled for the oldest x86 alone, Highway would emulate vectors by loops: a kernel took 200 s to compile, and takes 5 s.
+#   Compiled for the oldest x86 alone, Highway emulates vectors by loops: a kernel took 200 s to compile, now 5 s.
 function(telesplat_kernels)
   if(NOT TELESPLAT_SANITIZE OR NOT CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     return()
