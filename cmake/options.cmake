@@ -20,8 +20,8 @@ option(TELESPLAT_HARDEN "What compiler and linker can do against what is exploit
 add_compile_options(-Wall -Wextra -Wno-missing-field-initializers $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
   -ffp-contract=off -fno-math-errno)
 include(cmake/hardening.cmake)
-if(TELESPLAT_FUZZ)
-  add_compile_options(-fsanitize=fuzzer-no-link)
+if(TELESPLAT_FUZZ AND NOT CMAKE_CXX_COMPILER_ID MATCHES Clang)
+  message(FATAL_ERROR "TELESPLAT_FUZZ needs clang: tools/setup --developer")
 endif()
 
 # Cases are run once: optimising them takes longer than it saves. What they test is optimised.
@@ -35,6 +35,8 @@ if(CCACHE)
   # With precompiled headers ccache must be told that macros and times in them do not matter.
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
   add_compile_options($<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fpch-preprocess>)
+  # clang writes the headers' times into a precompiled header, so that no two are equal.
+  add_compile_options("$<$<COMPILE_LANG_AND_ID:CXX,Clang>:SHELL:-Xclang -fno-pch-timestamp>")
 endif()
 
 # A faster linker, where it is installed.

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "common/core/clock.h"
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -15,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kAtOnce_s = 3;  // on a busy machine; a master that does not answer is waited for longer
+constexpr double kAtOnce_s = test::patient(3);  // on a busy machine; a master that does not answer is waited for longer
 
 class Sessions : public testing::Test {
  protected:

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <thread>
 
-#include "common/core/clock.h"
 #include "common/net/control.h"
 #include "tests/support/keys/key_folder.h"
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tools/telesplat/control/client.h"
 
@@ -18,10 +18,8 @@ namespace {
 
 using net::Role;
 
-constexpr double kRefused_s = 3;
-
 Result<std::string> ask(const std::string& master, const net::Access& access, const std::string& command) {
-  return net::ask_master(master, command, 5, {}, access);
+  return net::ask_master(master, command, patient(5), {}, access);
 }
 
 TEST(KeysOfSessions, ARunWithKeysShowsAndEndsAsEver) {
@@ -110,10 +108,9 @@ TEST(KeysOfSessions, StrangersAreRefusedAtOnceAndCostNothing) {
   for (const std::vector<std::string>& flags : {std::vector<std::string>{}, {"--keys", others.path()}}) {
     std::vector<std::string> arguments{"ctl", "stop", "--master", master};
     arguments.insert(arguments.end(), flags.begin(), flags.end());
-    const double begin_s = monotonic_s();
     Program stranger("telesplat", arguments, folder / "stranger");
     EXPECT_EQ(stranger.wait(20), 1);
-    EXPECT_LT(monotonic_s() - begin_s, kRefused_s);
+    // Had it waited in vain, it would say that nobody answers.
     EXPECT_NE(stranger.err().find("refuses: it "), std::string::npos) << stranger.err();
     EXPECT_EQ(std::ranges::count(stranger.err(), '\n'), 1) << stranger.err();
   }

@@ -13,13 +13,14 @@
 #include "services/data/volume/served_volume.h"
 #include "tests/support/files/data_files.h"
 #include "tests/support/files/own_folder.h"
+#include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
 #include "tests/support/volume/samples.h"
 
 namespace telesplat::data {
 namespace {
 
-constexpr double kDeadline_s = 30;
+constexpr double kDeadline_s = telesplat::test::patient(30);
 
 // The next message of type M that a peer sends; others are passed over.
 template <class M>

@@ -8,11 +8,12 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/net/master_link.h"
+#include "tests/support/patience.h"
 
 namespace telesplat::net {
 namespace {
 
-constexpr double kDeadline_s = 20;
+constexpr double kDeadline_s = test::patient(20);
 
 // A master's socket and what a process said to it.
 struct FakeMaster {

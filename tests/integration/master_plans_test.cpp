@@ -14,11 +14,12 @@
 #include "common/net/socket.h"
 #include "services/master/master_options.h"
 #include "services/master/master_service.h"
+#include "tests/support/patience.h"
 
 namespace telesplat {
 namespace {
 
-constexpr double kDeadline_s = 20;
+constexpr double kDeadline_s = test::patient(20);
 
 struct Peer {
   Peer(net::Context& context, const std::string& role, uint64_t number, const std::string& master)

@@ -11,6 +11,7 @@
 #include "common/net/socket.h"
 #include "common/wire/messages.h"
 #include "tests/support/keys/key_folder.h"
+#include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
 
 namespace telesplat::net {
@@ -21,7 +22,7 @@ using test::RawPeer;
 using test::zmtp_frame;
 using test::zmtp_opening;
 
-constexpr double kDeadline_s = 20;
+constexpr double kDeadline_s = test::patient(20);
 constexpr size_t kMost = 8;
 const wire::Goodbye kGoodbye{InstanceId{7}};
 

@@ -12,6 +12,7 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/net/service.h"
+#include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
 
 namespace telesplat::net {
@@ -22,7 +23,7 @@ using test::zmtp_claim;
 using test::zmtp_frame;
 using test::zmtp_opening;
 
-constexpr double kDeadline_s = 20;
+constexpr double kDeadline_s = test::patient(20);
 
 // Receives until `done` holds; what is received goes to `got`.
 template <class Done>

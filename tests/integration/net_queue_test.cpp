@@ -8,6 +8,7 @@
 #include "common/net/socket.h"
 #include "common/wire/messages.h"
 #include "tests/support/keys/key_folder.h"
+#include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
 
 namespace telesplat::net {
@@ -17,7 +18,7 @@ using test::KeyFolder;
 using test::RawPeer;
 using test::zmtp_frame;
 
-constexpr double kDeadline_s = 30;
+constexpr double kDeadline_s = test::patient(30);
 constexpr size_t kBody = 1 << 16, kLimit = 4 << 20, kKernel = 16 << 20;  // what kernels keep for a connection at most
 const wire::Goodbye kGoodbye{InstanceId{7}};
 

@@ -11,11 +11,12 @@
 #include "services/sampler/volume/shear/slabs.h"
 #include "services/sampler/volume/work.h"
 #include "tests/support/keys/lease_key.h"
+#include "tests/support/patience.h"
 
 namespace telesplat {
 namespace {
 
-constexpr double kDeadline_s = 30;
+constexpr double kDeadline_s = test::patient(30);
 constexpr int kSide = 32;
 
 volume::Session session() {

@@ -58,7 +58,7 @@ std::vector<Sample> decimate(const std::vector<Sample>& fine, int l) {
         (s.key == first.key && ratio > 0.98 - 1e-9 && ratio < 1.02 + 1e-9 ? group : left).push_back(s);
       }
       Sample nearest = group.front();
-      const auto distance = [&](const Sample& s) {
+      const auto distance = [&, &at = at](const Sample& s) {
         return std::hypot(s.x + 0.5 - (at.second + 0.5) * side, s.y + 0.5 - (at.first + 0.5) * side);
       };
       uint32_t sum[3] = {};

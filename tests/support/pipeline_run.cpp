@@ -18,6 +18,7 @@
 
 #include "common/core/clock.h"
 #include "common/image/file.h"
+#include "tests/support/patience.h"
 #include "tools/common/csv_table.h"
 #include "tools/telesplat/control/client.h"
 
@@ -108,7 +109,7 @@ std::string read_text(const std::string& path) try {
 }
 
 bool wait_until(const std::function<bool()>& condition, double deadline_s) {
-  for (const double until = monotonic_s() + deadline_s;;) {
+  for (const double until = monotonic_s() + patient(deadline_s);;) {
     if (condition()) return true;
     if (monotonic_s() > until) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));  // between two looks, never instead of one

@@ -40,7 +40,8 @@ void write_volume(const std::string& path, int side = 40, double turn = 0);
 
 std::string read_text(const std::string& path);
 
-/// Asks `condition` until it holds. False: it did not within `deadline_s`.
+/// Asks `condition` until it holds. False: it did not within `deadline_s`, which like all deadlines here is that of
+/// ordinary builds (patience.h).
 bool wait_until(const std::function<bool()>& condition, double deadline_s = 30);
 
 /// Whether a process runs (a zombie does not).

@@ -52,7 +52,7 @@ class Eroder {
       queue.pop();
       rank_[cell] = static_cast<int>(order_.size());
       order_.push_back(cell);
-      neighbours(cell, [&](int next, int) {
+      neighbours(cell, [&, height = height](int next, int) {
         if (rank_[next] >= 0) return;
         rank_[next] = 0;
         map_.height_m[next] = std::max(map_.height_m[next], height + 0.02f);

@@ -143,7 +143,7 @@ void Samples::choose(const TileShape& shape, size_t about) {
   places.clear();
   const int w = static_cast<int>(shape.width), h = static_cast<int>(shape.height);
   const double area = static_cast<double>(shape.total);
-  const int step = std::max(1, static_cast<int>(std::sqrt(area / static_cast<double>(about))));
+  const int step = about == 0 ? 1 : std::max(1, static_cast<int>(std::sqrt(area / static_cast<double>(about))));
   const auto inside = [&](int x, int y) {
     return x < 0 || y < 0 || x >= w || y >= h || shape.at(size_t(x), size_t(y));
   };

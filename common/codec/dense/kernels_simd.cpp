@@ -102,7 +102,7 @@ static const Kernels* Set() {
 
 using D = hn::CappedTag<uint32_t, 16>;
 using V = hn::VFromD<D>;
-using M = hn::Mask<D>;
+using M = hn::Mask<D>;  // Highway 1.0.3 emulates no MFromD
 constexpr D kD;
 constexpr size_t kN = hn::MaxLanes(D()), kVectors = kLanes / kN;
 constexpr hn::Rebind<uint16_t, D> kD16;

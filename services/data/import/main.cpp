@@ -31,7 +31,7 @@ void limit_time(uint64_t bytes) { alarm(static_cast<unsigned>(60 + bytes / 1'000
 // A reader may take what this process has mapped already, a gigabyte, and `more`. Sanitizers map terabytes of shadow,
 // so there the limit is left out.
 void limit_memory(uint64_t more) {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#ifndef TELESPLAT_SANITIZED
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
   const rlim_t bytes = pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + (uint64_t{1} << 30) + more;

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "common/core/clock.h"
+#include "tests/support/patience.h"
 
 namespace telesplat::test {
 namespace {
@@ -52,7 +53,9 @@ static bool is_strict() {
   const char* set = std::getenv("TELESPLAT_FAULTS");
   return set && std::string_view(set) == "strict";
 }
-FaultBounds fault_bounds() { return is_strict() ? FaultBounds{500, 3} : FaultBounds{2000, 12}; }
+FaultBounds fault_bounds() {
+  return is_strict() ? FaultBounds{500, 3} : FaultBounds{test::patient(2000), test::patient(12)};
+}
 
 void pass(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 

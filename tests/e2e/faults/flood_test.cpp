@@ -53,7 +53,8 @@ void expect_as_before(Fault& fault, const Figures& before, double most_mb) {
   for (const auto& [name, pid] : before.pids) {
     EXPECT_EQ(fault.pid_of(name), pid) << name << " had to be started again";
     EXPECT_LT(Fault::resident_mb(pid), before.mb.at(name) + most_mb) << name << ": MB";
-    EXPECT_TRUE(wait_until([&] { return Fault::descriptors(pid) <= before.descriptors.at(name) + 4; }, 20))
+    EXPECT_TRUE(wait_until(
+        [&, &name = name, &pid = pid] { return Fault::descriptors(pid) <= before.descriptors.at(name) + 4; }, 20))
         << name << " keeps " << Fault::descriptors(pid) << " descriptors, had " << before.descriptors.at(name);
   }
 }

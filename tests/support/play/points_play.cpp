@@ -101,7 +101,7 @@ class PointsPlay {
           config(play.config()),
           part(
               id, pipes(number), [this] { return config; },
-              [&play, this](InstanceId packer, Sequence after) {
+              [this](InstanceId packer, Sequence after) {
                 requests.push_back({id, packer, after});
               }) {}
     static ViewerPart::Pipes& pipes(size_t number) {

@@ -48,6 +48,20 @@ TEST(CodecRoundTrip, SinglePixels) {
   }
 }
 
+// Too few for any to be looked at when something is fitted.
+TEST(CodecRoundTrip, FewPixels) {
+  for (int height = 1; height <= 4; ++height)
+    for (int width = 1; width <= 5; ++width) {
+      DepthImage image(width, height);
+      for (uint32_t i = 0; i < image.pixels(); ++i) {
+        image.depth[i] = 0x10000 + 977 * i * i;
+        image.colour[i] = 0x0f1e2d * (i % 3 + 1);
+        image.normal[i] = static_cast<uint16_t>(0x4040 + 0x0311 * i);
+      }
+      expect_round_trip(image);
+    }
+}
+
 TEST(CodecRoundTrip, LinesOfPixels) {
   for (const int n : {2, 3, 7, 8, 9, 63, 64, 65, 255, 256, 257, 1000, 70000}) {
     expect_round_trip(test::random_pixels(n, 1, 1, static_cast<uint32_t>(n)));

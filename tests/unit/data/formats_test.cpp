@@ -42,8 +42,8 @@ TEST_P(Ply, ReadsPositionsNormalsColoursAndFaces) {
       "element edge 1\nproperty int a\nproperty int b\nend_header\n",
       encoding, real, real, real, index);
   const auto put = [&](auto value) { file += ascii ? fmt::format("{} ", +value) : raw(value, big); };
-  const auto put_real = [&](double v) { real == "double" ? put(v) : put(static_cast<float>(v)); };
-  const auto put_index = [&](uint32_t v) {
+  const auto put_real = [&, &real = real](double v) { real == "double" ? put(v) : put(static_cast<float>(v)); };
+  const auto put_index = [&, &index = index](uint32_t v) {
     if (index == "uchar")
       put(static_cast<uint8_t>(v));
     else if (index == "ushort")

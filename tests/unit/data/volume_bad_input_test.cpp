@@ -18,7 +18,7 @@ long peak_rss_kb() {
   return usage.ru_maxrss;
 }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef TELESPLAT_SANITIZED
 constexpr long kMostTaken_kb = 256 * 1024;  // with the shadow of the memory, and what is held back when it is freed
 #else
 constexpr long kMostTaken_kb = 64 * 1024;

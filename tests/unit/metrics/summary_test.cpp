@@ -411,7 +411,7 @@ TEST_F(Record, TheSummarySaysWhatWasDone) {
   EXPECT_EQ(s["asked"]["verify_every"], 30);
   EXPECT_EQ(s["settings"]["packing.epsilon"], 0.004);
   // Started by hand: everyone's own command line.
-  EXPECT_EQ(record->summary({sampler}, {})["command"], nlohmann::json({{"sampler-1", "s 'x y'"}}));
+  EXPECT_EQ(record->summary({sampler}, {})["command"], nlohmann::ordered_json({{"sampler-1", "s 'x y'"}}));
 }
 
 TEST_F(Record, TheSummaryIsUtf8WhateverNamesAre) {

@@ -9,11 +9,12 @@
 #include <thread>
 
 #include "common/core/clock.h"
+#include "tests/support/patience.h"
 
 namespace telesplat::net {
 namespace {
 
-constexpr double kDeadline_s = 20;
+constexpr double kDeadline_s = test::patient(20);
 
 // A socket made of queues: `given` are the messages that come, `taken` those that were sent.
 struct FakeSocket {

@@ -5,11 +5,12 @@
 
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
+#include "tests/support/patience.h"
 
 namespace telesplat::sampler {
 namespace {
 
-constexpr double kDeadline_s = 20;
+constexpr double kDeadline_s = test::patient(20);
 constexpr std::byte kBad{0xff};  // the first byte of what is no chunk
 
 // Takes chunks of any bytes but some.

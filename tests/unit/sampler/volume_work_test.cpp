@@ -10,6 +10,7 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "services/sampler/volume/work.h"
+#include "tests/support/patience.h"
 
 namespace telesplat::sampler {
 namespace {
@@ -18,7 +19,7 @@ using volume::LevelSet;
 using volume::Voxels;
 using State = Readiness::State;
 
-constexpr double kDeadline_s = 20;
+constexpr double kDeadline_s = test::patient(20);
 constexpr int kSize[3] = {20, 16, 12};
 
 int level_at(int step, int i, int j, int k) { return (i * 7 + j * 5 + k * 3 + step * 11) % 16; }

@@ -8,6 +8,7 @@
 #include "client/viewer/received.h"
 #include "client/viewer/succession.h"
 #include "common/core/clock.h"
+#include "tests/support/patience.h"
 #include "tests/support/points_scenes.h"
 
 namespace telesplat::viewer {
@@ -103,7 +104,7 @@ TEST_F(Receiving, ABoxThatComesAfterItsPackersFirstEventCounts) {
   };
   // Answers requests by what this packer has published, until the viewer knows of it.
   const auto serve = [&](InstanceId packer, const auto& until) {
-    for (const double deadline = monotonic_s() + 20; !until() && monotonic_s() < deadline;) {
+    for (const double deadline = monotonic_s() + test::patient(20); !until() && monotonic_s() < deadline;) {
       while (const auto message = state.receive())
         if (message->type == wire::StateRequest::kName) {
           state.send(wire::EpochBegin{packer, {1}, {packer.value}}, message->peer);

@@ -147,9 +147,8 @@ class PointReplay final : public FrameReplay {
 
 class SliceFrameReplay final : public FrameReplay {
  public:
-  SliceFrameReplay(const RecordedRun& run, std::unique_ptr<viewer::SliceReplay> slices,
-                   std::unique_ptr<viewer::VolumeRenderer> renderer)
-      : run_(run), slices_(std::move(slices)), renderer_(std::move(renderer)) {}
+  SliceFrameReplay(std::unique_ptr<viewer::SliceReplay> slices, std::unique_ptr<viewer::VolumeRenderer> renderer)
+      : slices_(std::move(slices)), renderer_(std::move(renderer)) {}
 
   Result<bool> draw(const DisplayedFrame& frame, const geometry::Camera& camera, image::View& view) override {
     const auto there = slices_->advance({frame.sequence.value}, frame.replica);
@@ -173,7 +172,6 @@ class SliceFrameReplay final : public FrameReplay {
                       {camera.width, camera.height, view.colour.data(), nullptr});
   }
 
-  const RecordedRun& run_;
   std::unique_ptr<viewer::SliceReplay> slices_;
   std::unique_ptr<viewer::VolumeRenderer> renderer_;
 };
@@ -191,7 +189,7 @@ Result<std::unique_ptr<FrameReplay>> replay_slices(const RecordedRun& run, const
   if (!slices) return slices.error();
   auto drawn_by = viewer::make_volume_renderer(renderer, threads);
   if (!drawn_by) return drawn_by.error();
-  return std::unique_ptr<FrameReplay>(new SliceFrameReplay(run, std::move(*slices), std::move(*drawn_by)));
+  return std::unique_ptr<FrameReplay>(new SliceFrameReplay(std::move(*slices), std::move(*drawn_by)));
 }
 
 }  // namespace
