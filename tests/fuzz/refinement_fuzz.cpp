@@ -3,7 +3,7 @@
 #include <cstdlib>
 
 #include "common/codec/depth_codec.h"
-#include "tests/support/codec_images.h"
+#include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

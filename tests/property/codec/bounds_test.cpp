@@ -9,7 +9,7 @@
 
 #include "common/codec/depth_codec.h"
 #include "common/image/normal.h"
-#include "tests/support/codec_images.h"
+#include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
 #include "tests/support/simd_targets.h"
 

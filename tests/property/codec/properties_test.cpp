@@ -6,7 +6,7 @@
 #include <random>
 
 #include "common/codec/depth_codec.h"
-#include "tests/support/codec_images.h"
+#include "tests/support/codec/codec_images.h"
 #include "tests/support/depth_images.h"
 #include "tests/support/simd_targets.h"
 

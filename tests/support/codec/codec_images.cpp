@@ -1,4 +1,4 @@
-#include "tests/support/codec_images.h"
+#include "tests/support/codec/codec_images.h"
 
 #include <random>
 
