@@ -47,8 +47,6 @@ class MasterLink {
   /// The newest session, once there is one; version() rises with each.
   const std::optional<wire::Welcome>& session() const { return session_; }
   int version() const { return version_; }
-  /// The master answered the hello, and has not asked since who this is: session() is of the master that is there.
-  bool welcomed() const { return welcomed_; }
   /// The session is over for this process: its end was told, or the master does not let it in.
   bool shutdown_requested() const { return shutdown_; }
   /// The master does not let it in with its keys (why was logged): bad usage, exit code 2.

@@ -137,7 +137,7 @@ class PackerService {
   void on(const wire::PlanRequest& request, double now_s) {
     if (request.extra && packing_) return spare_.keep(request);
     if (!request.extra) spare_.follow(request);
-    tell_master(packing_ ? packing_->plan(request, now_s) : all_rays(request));
+    link_->socket().send(packing_ ? packing_->plan(request, now_s) : all_rays(request));
   }
 
   // Until something is due that no message tells of.
@@ -157,7 +157,7 @@ class PackerService {
     if (!question) return false;
     const double begin_s = monotonic_s();
     const auto plan = packing_->plan_piece(*question, now_s);
-    if (plan) tell_master(*plan);
+    if (plan) link_->socket().send(*plan);
     spare_.worked(begin_s, monotonic_s(), plan.has_value());
     return true;
   }
@@ -173,16 +173,9 @@ class PackerService {
       ((*packing_).*early.take)(*early.from, early.message, now_s);
   }
 
-  // What became of a frame. Between its hello and the welcome a packer does not know which master it talks to: another
-  // one numbers its own frames as the one before did. What is lost is asked for, or sampled, again.
-  template <class M>
-  void tell_master(const M& message) {
-    if (link_->welcomed()) link_->socket().send(message);
-  }
-
   std::unique_ptr<Packing> make_packing(scene::Pipeline pipeline) {
-    Outlets outlets{.tell = [this](const wire::TileDone& m) { tell_master(m); },
-                    .refuse = [this](const wire::TileRefused& m) { tell_master(m); },
+    Outlets outlets{.tell = [this](const wire::TileDone& m) { link_->socket().send(m); },
+                    .refuse = [this](const wire::TileRefused& m) { link_->socket().send(m); },
                     .to_viewers = [this](std::string_view type,
                                          std::string body) { patches_.send_frames({}, type, std::move(body)); },
                     .to_viewer = [this](std::string_view peer, std::string_view type,

@@ -105,26 +105,6 @@ class PackerServiceTest : public testing::Test {
     return viewer.decode<wire::SliceFrame>(*message);
   }
 
-  // The only tile of a frame that the first master leased: `side`^2 pixels of noise.
-  void deliver_noise(uint64_t frame, int side) {
-    image::DepthImage noise(side, side);
-    for (size_t i = 0; i < noise.pixels(); ++i) {
-      noise.depth[i] = (1u << 20) + uint32_t(random()) % (1u << 20);
-      noise.colour[i] = uint32_t(random()) & 0xffffff;
-      noise.normal[i] = uint16_t(random());
-    }
-    const auto stream = codec::encode(noise);
-    wire::DepthTile m{.sampler = {9}};
-    m.lease.lease = {frame}, m.lease.frame = {frame}, m.lease.epoch = {1}, m.lease.viewer = {77};
-    m.lease.request = {frame}, m.lease.blocks_in_frame = 1;
-    m.lease.camera = geometry::make_camera({{0, 0, 0.6}, {1, 0, 0, 0}}, 60, side, side);
-    m.lease.rect = m.lease.block_rect = {0, 0, side, side};
-    m.image = std::as_bytes(std::span(stream));
-    test::seal_lease(m.lease, {9});
-    while (!sampler.send(m)) std::this_thread::yield();
-  }
-
-  std::minstd_rand random{1};
   const volume::Grid grid{{16, 16, 16}, glm::scale(glm::translate(glm::dmat4(1), glm::dvec3(-0.08)), glm::dvec3(0.01))};
   net::Context context;
   net::Socket master{context, net::Kind::kRouter, "master"};
@@ -167,10 +147,25 @@ TEST_F(PackerServiceTest, AViewerThatReadsNothingCostsNoMoreThanItsWindow) {
   master.send(session, packer_peer);
   ASSERT_TRUE(ask_for_points());
   // Pixels of noise: 40 patches of some 300 KB.
-  constexpr uint64_t kPatches = 40;
+  constexpr int kSide = 256, kPatches = 40;
+  std::minstd_rand random(1);
   uint64_t told = 0;
   for (uint64_t frame = 1; frame <= kPatches; ++frame) {
-    deliver_noise(frame, 256);
+    image::DepthImage noise(kSide, kSide);
+    for (size_t i = 0; i < noise.pixels(); ++i) {
+      noise.depth[i] = (1u << 20) + uint32_t(random()) % (1u << 20);
+      noise.colour[i] = uint32_t(random()) & 0xffffff;
+      noise.normal[i] = uint16_t(random());
+    }
+    const auto stream = codec::encode(noise);
+    wire::DepthTile m{.sampler = {9}};
+    m.lease.lease = {frame}, m.lease.frame = {frame}, m.lease.epoch = {1}, m.lease.viewer = {77};
+    m.lease.request = {frame}, m.lease.blocks_in_frame = 1;
+    m.lease.camera = geometry::make_camera({{0, 0, 0.6}, {1, 0, 0, 0}}, 60, kSide, kSide);
+    m.lease.rect = m.lease.block_rect = {0, 0, kSide, kSide};
+    m.image = std::as_bytes(std::span(stream));
+    test::seal_lease(m.lease, {9});
+    while (!sampler.send(m)) std::this_thread::yield();
     if (next(master, wire::TileDone::kName)) ++told;
   }
   ASSERT_EQ(told, kPatches);
@@ -186,41 +181,6 @@ TEST_F(PackerServiceTest, AViewerThatReadsNothingCostsNoMoreThanItsWindow) {
   EXPECT_TRUE(next(viewer, wire::Patch::kName, [this] {
     viewer.send(wire::StateRequest{{77}, {}, {}});
   })) << "others are answered";
-}
-
-// Its frames have the numbers of the next one's, who would take them for its own.
-TEST_F(PackerServiceTest, WhatAnEarlierMasterLeasedIsNotToldToTheNext) {
-  wire::Welcome session = mesh();
-  session.settings["packing.keep_redundant"] = 1;
-  session.settings["sampling.steering"] = 0;
-  master.send(session, packer_peer);
-  ASSERT_TRUE(ask_for_points());
-  deliver_noise(1, 32);
-  ASSERT_TRUE(next(master, wire::TileDone::kName)) << "its own master is told";
-  const auto before = ask_for_points();
-  ASSERT_TRUE(before);
-  master.send(wire::WhoAreYou{{2}}, packer_peer);
-  ASSERT_TRUE(next(master, wire::Hello::kName));
-  deliver_noise(2, 32);
-  // The tile is packed, and a hello comes behind whatever was told of it.
-  bool packed = false, hello_after = false, told = false;
-  double asked_s = -1e9;
-  for (const double until = monotonic_s() + kDeadline_s; !hello_after && monotonic_s() < until;) {
-    if (monotonic_s() - asked_s > 0.2) viewer.send(wire::StateRequest{{77}, {}, {}}), asked_s = monotonic_s();
-    net::wait_readable({&viewer, &master}, 20);
-    while (const auto message = master.receive()) {
-      told = told || message->type == wire::TileDone::kName;
-      hello_after = hello_after || (packed && message->type == wire::Hello::kName);
-    }
-    while (const auto message = viewer.receive()) {
-      if (message->type != wire::StateMark::kName) continue;
-      const auto mark = viewer.decode<wire::StateMark>(*message);
-      packed = packed || (mark && mark->sequence > before->sequence);
-    }
-  }
-  EXPECT_TRUE(packed);
-  EXPECT_TRUE(hello_after);
-  EXPECT_FALSE(told);
 }
 
 TEST_F(PackerServiceTest, WhatComesBeforeItsSessionWaitsForIt) {

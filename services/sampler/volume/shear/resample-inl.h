@@ -78,9 +78,9 @@ HWY_INLINE void MagnifyBlock(const TileColumns& c, const DenseRow& dense, int bl
     hn::Store(hn::ConvertTo(di, floor), di, index + l);
     hn::Store(hn::Sub(at, floor), d, weight + l);
   }
-  const float* base = dense.at + 4 * (c.base + kMargin);
+  // A tile may begin far beside the volume, so that only the sum leads into the row.
   const auto pixel = [&](int n) HWY_ATTR {
-    const float* p = base + 4 * index[n];
+    const float* p = dense.at + 4 * (c.base + kMargin + index[n]);
     const auto a = LoadQuad(p), b = LoadQuad(p + 4);
     return Add(a, Mul(Sub(b, a), QuadOf(weight[n])));
   };
