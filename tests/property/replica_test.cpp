@@ -107,7 +107,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
   for (int step = 0; published < 2000 || forgets < 3 || epochs < 1 || gaps < 3; ++step) {
     ASSERT_LT(step, 50000);
     now_s += 0.2;
-    if (chance(0.05)) core.set_tolerance(chance(0.6) ? packer::Tolerance{1.0 / 8, 1, 2} : packer::Tolerance{});
+    if (chance(0.05)) core.allow_errors(chance(0.6) ? packer::AllowedErrors{1.0 / 8, 1, 2} : packer::AllowedErrors{});
     if (chance(0.01) && step > 20) {
       if (const auto event = core.begin_epoch({core.epoch().value + 1})) publish(*event);
     } else if (chance(0.15)) {

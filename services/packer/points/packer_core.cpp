@@ -91,7 +91,7 @@ struct PackerCore::Impl {
     std::shared_ptr<const std::vector<uint8_t>> stream;  // of the refinement
     std::vector<points::ClusterKey> clusters;
   };
-  Tolerance tolerance;
+  AllowedErrors allowed;
   refinement::RefinableBook<Refinable> refinables;
   std::deque<CoarsePass> coarse;     // coarse frames whose complete ones are not there yet, oldest first
   std::vector<PatchKey> superseded;  // what complete frames made superfluous
@@ -157,7 +157,7 @@ struct PackerCore::Impl {
   // The event's stream of the tile, which becomes what decoders make of it. stream: of the exact tile, or null.
   // Returns the tile as it was sampled, if a refinement can tell viewers of it.
   image::DepthImage code(Event& event, SampledTile& tile, Stream stream) {
-    event.bounds = event.kept > 0 ? bounds_of(tolerance, tile.camera) : codec::ErrorBounds{};
+    event.bounds = event.kept > 0 ? bounds_of(allowed, tile.camera) : codec::ErrorBounds{};
     uint32_t farthest = image::kMaxDepthCode;
     for (const uint32_t code : tile.image.depth)
       if (code != 0) farthest = std::min(farthest, code);
@@ -342,8 +342,8 @@ std::vector<Event> PackerCore::forget(std::span<const points::ClusterKey> cluste
   return out;
 }
 
-void PackerCore::set_tolerance(const Tolerance& tolerance) { impl_->tolerance = tolerance; }
-const Tolerance& PackerCore::tolerance() const { return impl_->tolerance; }
+void PackerCore::allow_errors(const AllowedErrors& allowed) { impl_->allowed = allowed; }
+const AllowedErrors& PackerCore::allowed_errors() const { return impl_->allowed; }
 std::optional<Event> PackerCore::refine(double drawn_since_s) { return impl_->refine(drawn_since_s); }
 
 bool PackerCore::has(FrameId frame, uint32_t tile) const { return impl_->frames.has(frame, tile); }

@@ -16,7 +16,7 @@
 #include "services/packer/points/known_reference.h"
 #include "services/packer/points/model_watcher.h"
 #include "services/packer/points/sampled_tile.h"
-#include "services/packer/points/errors/tolerance.h"
+#include "services/packer/points/errors/allowed_errors.h"
 
 namespace telesplat::packer {
 
@@ -90,8 +90,8 @@ class PackerCore {
                                       const std::optional<KnownReference>& reference = {});
 
   /// What comes from now on may differ by so much from what was sampled, in the model and in its replicas.
-  void set_tolerance(const Tolerance& tolerance);
-  const Tolerance& tolerance() const;
+  void allow_errors(const AllowedErrors& allowed);
+  const AllowedErrors& allowed_errors() const;
   /// Makes the newest patch exact that is not yet, of those that were drawn since `drawn_since_s`: the event to
   /// publish. Nothing: there is none, or it was packed too long ago (refinement::RefinableBook).
   std::optional<Event> refine(double drawn_since_s);

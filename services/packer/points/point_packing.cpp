@@ -166,7 +166,7 @@ void PointPacking::begin(const Config& config, const wire::Welcome& session) {
   const scene::SessionView view(session);
   errors_ = {view.setting("packing.depth_error", -1), view.setting("packing.normal_error", -1),
              view.setting("packing.colour_error", -1)};
-  choose_tolerance();
+  choose_errors();
   PlanConfig plan_config = plan_config_of(session, config);
   plan_config.pictures = options_.plans != nullptr;
   begin_planner(plan_config);
@@ -434,13 +434,13 @@ bool PointPacking::idle(double now_s) {
   return true;
 }
 
-void PointPacking::choose_tolerance() {
+void PointPacking::choose_errors() {
   if (!core_) return;
   const double rate = meter_.slowest_bytes_s();
   slow_ = rate > 0 && rate < (slow_ ? 1.125 : 1) * kSlowLink_bytes_s;
-  const Tolerance automatic = slow_ ? kSlowTolerance : Tolerance{};
+  const AllowedErrors automatic = slow_ ? kSlowErrors : AllowedErrors{};
   const auto said = [](double value, auto otherwise) { return value < 0 ? otherwise : decltype(otherwise)(value); };
-  core_->set_tolerance({said(errors_[0], automatic.depth_pixels), said(errors_[1], automatic.normal),
+  core_->allow_errors({said(errors_[0], automatic.depth_pixels), said(errors_[1], automatic.normal),
                         said(errors_[2], automatic.colour)});
 }
 
@@ -467,7 +467,7 @@ void PointPacking::tick(double now_s) {
   meter_.expire(now_s);
   if (!core_) return;
   send_answers();
-  choose_tolerance();
+  choose_errors();
   refining_ = refine(now_s);
   if (now_s - last_forget_s_ >= kForgetPeriod_s) {
     last_forget_s_ = now_s;

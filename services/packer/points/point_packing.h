@@ -30,7 +30,7 @@ class PointPacking final : public Packing {
   /// Of links that carry less, --depth-error and the others are auto's; an eighth more, and they are not any more.
   static constexpr double kSlowLink_bytes_s = 5e6;
   /// What auto stands for behind slow links.
-  static constexpr Tolerance kSlowTolerance{1.0 / 32, 1, 1};
+  static constexpr AllowedErrors kSlowErrors{1.0 / 32, 1, 1};
   /// What stands still becomes exact where it was drawn lately, as long as no link has more to carry than it can in
   /// kRefineBacklog_s, or kRefineBytes; so many bytes at a time, since messages wait meanwhile. Viewers tell what they
   /// draw once a second.
@@ -91,7 +91,7 @@ class PointPacking final : public Packing {
   void on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});
   /// As the session and the links have it.
-  void choose_tolerance();
+  void choose_errors();
   /// Makes exact what stands still. Returns whether there is more to do at once.
   bool refine(double now_s);
   wire::StateMark mark(bool answer) const;

@@ -90,7 +90,7 @@ TEST(PackerCore, WhatHasErrorsBecomesExact) {
   Config config = packer_config();
   config.model.compact = true;
   PackerCore exact(config, kEpoch), bounded(config, kEpoch);
-  bounded.set_tolerance({1.0 / 16, 1, 2});
+  bounded.allow_errors({1.0 / 16, 1, 2});
   test::Replica replica(config.model);
   submit_all(exact, sampled_frame({1}, camera(), 64), 1);
   const auto events = submit_all(bounded, sampled_frame({1}, camera(), 64), 1);
@@ -135,7 +135,7 @@ TEST(PackerCore, WhatHasErrorsBecomesExact) {
 
 TEST(PackerCore, WhatWasForgottenInPartStaysAsItCame) {
   PackerCore core(packer_config(), kEpoch);
-  core.set_tolerance({1.0 / 16, 1, 2});
+  core.allow_errors({1.0 / 16, 1, 2});
   submit_all(core, sampled_frame({1}, camera(), 320), 1);
   core.forget(std::vector{keys_of(core.model()).front()});
   EXPECT_FALSE(core.refine(0)) << "one tile brought it all";

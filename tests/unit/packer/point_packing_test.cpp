@@ -147,7 +147,7 @@ TEST_F(PointPackingTest, WithoutAWordErrorsAreForSlowLinks) {
   EXPECT_FALSE(decoded<wire::Patch>(sent.back()).refinable);
 }
 
-TEST(Tolerance, IsOfThePixelAndRoundedDown) {
+TEST(AllowedErrors, IsOfThePixelAndRoundedDown) {
   EXPECT_TRUE(bounds_of({}, kCamera).exact());
   std::set<uint32_t> depths;
   for (int width = 640; width < 1280; ++width) {

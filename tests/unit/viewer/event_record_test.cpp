@@ -71,7 +71,7 @@ std::vector<packer::Event> published(int width, int tile) {
     }
   };
   sample(1, {0, 0.3, 0.8}, test::kEpoch);
-  core.set_tolerance({1.0 / 8, 1, 2});
+  core.allow_errors({1.0 / 8, 1, 2});
   sample(2, {0.5, 0.3, 0.6}, test::kEpoch);
   const auto refined = core.refine(0);
   CHECK(refined.has_value());
