@@ -67,6 +67,28 @@ void expect_served(Bound& bound) {
   EXPECT_EQ(got.back().type, wire::Goodbye::kName);
 }
 
+// What it sent fills the queue, so that ZeroMQ reads no more from it; then the connection breaks, and nobody reads the
+// queue. ZeroMQ 4.3 ended the process when it was time for a heartbeat over such a connection (libzmq/issues/4841).
+TEST(HostilePeers, WhoSendsTooMuchAndBreaksOffWhileNobodyReadsEndsNobody) {
+  Bound bound(Kind::kPull, {.high_water_mark = 4, .max_message_bytes = 100000});
+  RawPeer peer(bound.endpoint);
+  ASSERT_TRUE(peer.shake_hands("PUSH"));
+  const std::string message = zmtp_frame("goodbye", true) + zmtp_frame(std::string(60000, 'x'), false);
+  ASSERT_GT(peer.send_until_full(message, 500), 4u);
+  peer.reset();
+  // Longer than two heartbeats: it is time alone that shows it.
+  std::this_thread::sleep_for(std::chrono::milliseconds(4500));
+  std::vector<Message> got;
+  EXPECT_TRUE(receive_until(
+      bound.socket, [&] { return got.size() >= 4; }, &got));
+  Context context;
+  Socket friendly(context, Kind::kPush, "friend");
+  ASSERT_TRUE(friendly.connect(bound.endpoint).ok());
+  ASSERT_TRUE(friendly.send(kGoodbye));
+  EXPECT_TRUE(receive_until(
+      bound.socket, [&] { return !got.empty() && got.back().body.size() < 1000; }, &got));
+}
+
 TEST(HostilePeers, FrameCountsAndSizesAreLimited) {
   Bound bound(Kind::kRouter, {.max_message_bytes = 1000});
   RawPeer peer(bound.endpoint);

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace telesplat::test {
 
@@ -37,6 +38,22 @@ class RawPeer {
       bytes.remove_prefix(static_cast<size_t>(n));
     }
     return true;
+  }
+  /// Sends as much as the other side takes, until it has taken nothing for `quiet_ms`. Returns how often all went.
+  size_t send_until_full(std::string_view bytes, int quiet_ms) {
+    size_t sent = 0;
+    for (pollfd p{fd_, POLLOUT, 0}; ::poll(&p, 1, quiet_ms) > 0 && p.revents == POLLOUT;) {
+      const ssize_t n = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+      if (n == static_cast<ssize_t>(bytes.size())) ++sent;
+      if (n >= 0 && n < static_cast<ssize_t>(bytes.size())) break;
+    }
+    return sent;
+  }
+  /// Both sides of the connection end at once.
+  void reset() {
+    const linger at_once{1, 0};
+    ::setsockopt(fd_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    ::close(std::exchange(fd_, -1));
   }
   /// Reads whatever comes until the other side hangs up. False: it has not within `timeout_ms`.
   bool wait_hung_up(int timeout_ms) {
