@@ -55,12 +55,12 @@ void EventSequencer::keep(ModelEvent event) {
 void EventSequencer::on_published(ModelEvent event) {
   if (event.packer() != packer_) {
     follow(event.packer());
-    // The very first event of a new packer needs no history.
-    if (event.sequence().value != 1) {
+    // The very first event of a new packer needs no history. But who has asked for everything may get an answer that
+    // leaves out what was forgotten by then, and who has gone on meanwhile would hold some of that.
+    if (waiting_ || event.sequence().value != 1) {
       keep(std::move(event));
       return ask();
     }
-    waiting_ = false;
   }
   if (waiting_) return keep(std::move(event));
   if (event.sequence() <= applied_) return;
@@ -74,8 +74,6 @@ void EventSequencer::on_published(ModelEvent event) {
 }
 
 void EventSequencer::on_replayed(const ModelEvent& event) {
-  // An answer leaves out what was forgotten by now. Who has gone on since they asked may hold some of that.
-  if (!waiting_) return;
   if (event.packer() != packer_) follow(event.packer());
   if (event.sequence() <= applied_) return;
   callbacks_.apply(event);
