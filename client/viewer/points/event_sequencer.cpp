@@ -1,5 +1,7 @@
 #include "client/viewer/points/event_sequencer.h"
 
+#include <utility>
+
 #include "common/net/socket.h"
 
 namespace telesplat::viewer {
@@ -25,22 +27,25 @@ void EventSequencer::start() {
 // Who names a packer that nobody is follows none of what the packer may still hold to be under way.
 void EventSequencer::start_anew() {
   packer_.reset();
-  waiting_ = true;
+  waiting_ = asked_everything_ = true;
+  answer_is_stale_ = threw_away_ = false;
   callbacks_.request_state(net::make_instance_id(), {});
 }
 
 void EventSequencer::ask() {
   waiting_ = true;
+  asked_everything_ |= !packer_ || applied_.value == 0;
   callbacks_.request_state(packer_.value_or(InstanceId{}), packer_ ? applied_ : Sequence{});
 }
 
 void EventSequencer::retry() {
-  if (waiting_) ask();
+  if (waiting_) threw_away_ ? start_anew() : ask();
 }
 
 void EventSequencer::follow(InstanceId packer) {
   packer_ = packer;
   applied_ = {};
+  answer_is_stale_ = threw_away_ = false;
   kept_.clear();
   kept_bytes_ = 0;
   callbacks_.begin_replica();
@@ -55,12 +60,13 @@ void EventSequencer::keep(ModelEvent event) {
 void EventSequencer::on_published(ModelEvent event) {
   if (event.packer() != packer_) {
     follow(event.packer());
-    // The very first event of a new packer needs no history. But who has asked for everything may get an answer that
-    // leaves out what was forgotten by then, and who has gone on meanwhile would hold some of that.
-    if (waiting_ || event.sequence().value != 1) {
+    // The very first event of a new packer needs no history.
+    if (event.sequence().value != 1) {
       keep(std::move(event));
       return ask();
     }
+    waiting_ = false;
+    answer_is_stale_ = asked_everything_;
   }
   if (waiting_) return keep(std::move(event));
   if (event.sequence() <= applied_) return;
@@ -75,7 +81,7 @@ void EventSequencer::on_published(ModelEvent event) {
 
 void EventSequencer::on_replayed(const ModelEvent& event) {
   if (event.packer() != packer_) follow(event.packer());
-  if (event.sequence() <= applied_) return;
+  if (answer_is_stale_ || event.sequence() <= applied_) return;
   callbacks_.apply(event);
   applied_ = event.sequence();
 }
@@ -87,7 +93,14 @@ void EventSequencer::on_mark(const wire::StateMark& mark) {
     if (!mark.answer) return ask();
   }
   if (mark.answer) {
+    asked_everything_ = false;
+    if (std::exchange(answer_is_stale_, false)) {
+      threw_away_ = mark.sequence > applied_;
+      if (threw_away_ && !waiting_) start_anew();
+      return;  // who waits, waits for the answer to a newer question
+    }
     if (!waiting_) return;
+    threw_away_ = false;
     applied_ = std::max(applied_, mark.sequence);
     waiting_ = false;
     return drain();

@@ -69,6 +69,11 @@ class EventSequencer {
   std::optional<InstanceId> packer_;  // none is followed yet
   Sequence applied_;
   bool waiting_ = false;
+  bool asked_everything_ = false;  // and no answer has ended since
+  // An answer that begins with nothing leaves out what was forgotten by then. Who has gone on since they asked may hold
+  // some of that: they do not take it.
+  bool answer_is_stale_ = false;
+  bool threw_away_ = false;  // of such an answer what is lacking here; the packer takes it for received
   std::deque<ModelEvent> kept_;  // published while an answer is awaited
   size_t kept_bytes_ = 0;
   uint64_t gaps_ = 0;
