@@ -103,7 +103,7 @@ void LinkMeter::clear() {
 double LinkMeter::slowest_bytes_s() const {
   double out = 0;
   for (const auto& [id, v] : viewers_)
-    if (v.busy_s > 0 && (out == 0 || v.busy_bytes / v.busy_s < out)) out = v.busy_bytes / v.busy_s;
+    if (v.busy_s >= kBusyEnough_s && (out == 0 || v.busy_bytes / v.busy_s < out)) out = v.busy_bytes / v.busy_s;
   return out;
 }
 

@@ -25,6 +25,7 @@ class LinkMeter {
   static constexpr double kRttWindow_s = 10;  ///< for the least round trip, and the window before
   /// Of less that waits, the time tells of delays more than of the link.
   static constexpr uint64_t kLeastBusyBytes = 16 << 10;
+  static constexpr double kBusyEnough_s = 0.4;
   static constexpr double kRateWindow_s = 1;          ///< busy time that the rate is a mean of, about
   static constexpr size_t kMostRemembered = 1 << 16;  ///< events whose publishing is remembered
   static constexpr size_t kMostViewers = 256;
@@ -45,7 +46,8 @@ class LinkMeter {
   /// nullopt: it has said nothing.
   std::optional<LinkFigures> figures(InstanceId viewer, double now_s) const;
   size_t viewers() const { return viewers_.size(); }
-  /// Of the slowest link, as far as is known; 0: of none.
+  /// Of the slowest link of those that were busy for kBusyEnough_s lately: that a viewer took long to look at one view
+  /// tells little of its link. 0: of none.
   double slowest_bytes_s() const;
   /// No link has more on its way than it carries in `most_s`, or `least` bytes; where its rate is not known, `least`.
   bool all_free(double most_s, uint64_t least, double now_s) const;
