@@ -17,8 +17,8 @@
 #include "common/core/check.h"
 #include "common/core/clock.h"
 #include "common/core/utf8.h"
+#include "common/net/connections/broken.h"
 #include "common/net/connections/connections.h"
-#include "common/net/connections/heartbeats.h"
 #include "common/net/connections/lookout.h"
 #include "common/net/connections/queued_bytes.h"
 #include "common/net/keys/doorkeeper.h"
@@ -113,10 +113,7 @@ struct Socket::Impl {
     socket.set(zmq::sockopt::linger, options.linger_ms);
     socket.set(zmq::sockopt::reconnect_ivl, 50);
     socket.set(zmq::sockopt::reconnect_ivl_max, 500);
-    // Who binds asks for no signs of life (bind()); who connects sends them, and says when to take it for gone.
-    socket.set(zmq::sockopt::heartbeat_ivl, 2000);
-    socket.set(zmq::sockopt::heartbeat_timeout, static_cast<int>(options.patience_s * 1e3));
-    socket.set(zmq::sockopt::heartbeat_ttl, static_cast<int>(options.patience_s * 1e3));
+    look_after(socket, options.patience_s);
     if (kind == Kind::kSub) socket.set(zmq::sockopt::subscribe, "");
     if (kind == Kind::kRouter) socket.set(zmq::sockopt::router_mandatory, 1);
     if (kind == Kind::kPub) socket.set(zmq::sockopt::xpub_verboser, 1);
@@ -404,7 +401,6 @@ Result<std::string> Socket::bind(const std::string& endpoint, bool insecure) {
       impl_->guarded = true;
     }
     impl_->watch_connections();
-    without_heartbeats(impl_->socket);
     impl_->socket.set(zmq::sockopt::handshake_ivl, int(kHandshake_s * 1e3));
     impl_->socket.bind(endpoint);
     return impl_->socket.get(zmq::sockopt::last_endpoint);

@@ -50,7 +50,7 @@ struct SocketOptions {
   size_t max_message_bytes =
       wire::kMaxControlBytes;     ///< larger bodies are dropped; a peer that claims over 16 MiB more is disconnected
   int linger_ms = 500;            ///< for what is still to be sent when the socket goes
-  double patience_s = 10;         ///< a connection over which not one whole message came for longer is taken for broken
+  double patience_s = 10;         ///< a connection whose other end does not answer for longer is taken for broken
   bool watch_connecting = false;  ///< count attempts to connect that fail
   /// A thread of its own reads messages as they come and sends what is given to it, so that Message::arrived_s tells
   /// the network from the time that a message waited for its reader. For DEALER, PULL and SUB. Addresses must be bound

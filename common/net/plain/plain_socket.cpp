@@ -7,7 +7,7 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "common/net/connections/heartbeats.h"
+#include "common/net/connections/broken.h"
 #include "common/net/local_endpoint.h"
 
 namespace telesplat::net {
@@ -22,9 +22,7 @@ void set_common(zmq::socket_t& socket, const PlainLimits& limits, int64_t most_b
   socket.set(zmq::sockopt::linger, 0);
   socket.set(zmq::sockopt::reconnect_ivl, 50);
   socket.set(zmq::sockopt::reconnect_ivl_max, 500);
-  socket.set(zmq::sockopt::heartbeat_ivl, 2000);
-  socket.set(zmq::sockopt::heartbeat_timeout, 10000);
-  socket.set(zmq::sockopt::heartbeat_ttl, 10000);
+  look_after(socket, 10);
 }
 
 }  // namespace
@@ -102,7 +100,6 @@ Result<std::unique_ptr<PlainPublisher>> PlainPublisher::bind(const std::string& 
   try {
     set_common(impl->socket, limits, kSubscriptionBytes);
     impl->socket.set(zmq::sockopt::xpub_verboser, 1);
-    without_heartbeats(impl->socket);
     impl->socket.bind(endpoint);
     impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
   } catch (const zmq::error_t& e) {
