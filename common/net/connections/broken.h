@@ -8,8 +8,8 @@ namespace telesplat::net {
 
 /// To be called before a socket binds or connects: TCP looks after its connections. One whose other end does not
 /// answer for about patience_s is taken for broken; a process that stands still answers, its kernel does.
-/// ZeroMQ's own heartbeats are off. ZeroMQ 4.3 ends the process if it is time for one over a connection that broke while
-/// what came over it waited to be read (libzmq/issues/4841); and what comes, and when it breaks, is up to others.
+/// ZeroMQ's own heartbeats are off. ZeroMQ 4.3 ends the process if it is time for one over a connection that broke
+/// while what came over it waited to be read (libzmq/issues/4841); and what comes, and when it breaks, is up to others.
 inline void look_after(zmq::socket_t& socket, double patience_s) {
   constexpr int kIdle_s = 5, kApart_s = 5;
   socket.set(zmq::sockopt::heartbeat_ivl, 0);

@@ -273,7 +273,7 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
 TEST(Links, BehindASlowOnePointsHaveErrorsUntilTheHeadRests) {
   for (const bool said : {false, true}) {
     std::vector<std::string> flags{"--duration", "14", "--hold", "12", "--size", "640x400", "--link"};
-    flags.push_back(said ? "20ms" : "rtt=20ms,rate=2mbit");
+    flags.push_back(said ? "20ms" : "rtt=20ms,rate=500kbit");
     if (said) flags.insert(flags.end(), {"--depth-error", "1/16", "--normal-error", "2", "--colour-error", "off"});
     PipelineRun run(flags);
     ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
