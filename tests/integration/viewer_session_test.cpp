@@ -337,7 +337,9 @@ TEST(PointSession, AReplicaThatIsNotThePackersIsMadeAnew) {
   const Shown s = show({.volume = false, .other_digest_after = 5}, CouplingMode::kAsync, 60, 60);
   expect_complete(s, 60);
   EXPECT_EQ(s.status.at("digests_different"), 1);
-  EXPECT_EQ(s.counts.began_anew, undisturbed.counts.began_anew + 1) << "everything was asked for again, once";
+  EXPECT_GE(s.counts.began_anew, undisturbed.counts.began_anew + 1) << "everything was asked for again";
+  // Who hears a packer's beginning while they ask for everything may begin anew once more.
+  EXPECT_LE(s.counts.began_anew, undisturbed.counts.began_anew + 2) << "everything was asked for again, once";
   EXPECT_GT(s.sequence.back(), 20) << "later events are shown";
 }
 
