@@ -76,7 +76,7 @@ TEST(HostilePeers, WhoSendsTooMuchAndBreaksOffWhileNobodyReadsEndsNobody) {
   const std::string message = zmtp_frame("goodbye", true) + zmtp_frame(std::string(60000, 'x'), false);
   ASSERT_GT(peer.send_until_full(message, 500), 4u);
   peer.reset();
-  // Longer than two heartbeats: it is time alone that shows it.
+  // Longer than two heartbeats of 2 s were: it is time alone that shows it.
   std::this_thread::sleep_for(std::chrono::milliseconds(4500));
   std::vector<Message> got;
   EXPECT_TRUE(receive_until(
