@@ -102,15 +102,24 @@ struct StateMark {
 
 // ---- state: viewer (DEALER) <-> packer (ROUTER) --------------------------------------------------------------------
 
-/// Bring me up to date. after = newest sequence applied, of that packer instance; 0: everything. packer = 0: none is
-/// followed yet; one that nobody is: what came over this connection was thrown away.
+/// Bring me up to date.
 struct StateRequest {
   static constexpr std::string_view kName = "state_request";
   InstanceId viewer;
+  InstanceId packer;  ///< that is followed; 0: none yet
+  Sequence after;     ///< newest that was applied; 0: everything
+  bool anew = false;  ///< what came, or comes, over this connection in answer to an earlier request is not taken
+  template <class F> static void fields(F& f, auto& m) {
+    f("viewer", m.viewer); f("packer", m.packer); f("after", m.after); f("anew", m.anew);
+  }
+};
+/// Begins an answer. It leaves out what was forgotten since `after`: only a replica that stands there may take it.
+struct StateBegin {
+  static constexpr std::string_view kName = "state_begin";
   InstanceId packer;
   Sequence after;
   template <class F> static void fields(F& f, auto& m) {
-    f("viewer", m.viewer); f("packer", m.packer); f("after", m.after);
+    f("packer", m.packer); f("after", m.after);
   }
 };
 /// Clusters drawn since the last report.

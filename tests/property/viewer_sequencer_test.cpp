@@ -39,11 +39,12 @@ struct Session {
          ++replicas;
          applied.clear();
        },
-       [this](InstanceId of, Sequence after) { asked.push_back(of == packer ? after.value : 0); }}};
+       [this](const wire::StateRequest& r) { asked.push_back(r.packer == packer ? r.after.value : 0); }}};
 
   void answer() {
     const uint64_t after = asked.front();
     asked.pop_front();
+    sequencer.on_answer({packer, {after}});
     for (uint64_t s = after + 1; s <= newest; ++s) sequencer.on_replayed(event(packer, s));
     sequencer.on_mark(mark(packer, newest, true));
   }
@@ -58,42 +59,102 @@ struct Session {
 TEST(EventSequencer, WhoHeardTheBeginningTakesNoAnswerThatBeginsThere) {
   Session s;
   s.sequencer.start();
+  s.asked.clear();
   for (uint64_t n = 1; n <= 3; ++n) s.sequencer.on_published(event(kPacker, n));
+  s.sequencer.on_answer({kPacker, {}});
   s.sequencer.on_replayed(event(kPacker, 5));
+  s.sequencer.on_mark(mark(kPacker, 6, true));
   EXPECT_EQ(s.applied, (std::vector<uint64_t>{1, 2, 3}));
-  s.sequencer.on_mark(mark(kPacker, 6, true));
-  EXPECT_TRUE(s.sequencer.waiting()) << "what was thrown away is asked for anew";
-  s.sequencer.on_replayed(event(kPacker, 5));
-  s.sequencer.on_mark(mark(kPacker, 6, true));
-  EXPECT_EQ(s.applied, (std::vector<uint64_t>{5}));
+  EXPECT_TRUE(s.asked.empty()) << "nothing is known to be lacking";
+  s.sequencer.on_mark(mark(kPacker, 6, false));
+  ASSERT_EQ(s.asked, (std::deque<uint64_t>{3}));
+  s.newest = 6;
+  s.answer();
+  s.expect_complete();
   EXPECT_TRUE(s.sequencer.synchronised());
 }
 
 TEST(EventSequencer, WhoHeardTheBeginningAndAllSinceNeedsNoAnswer) {
   Session s;
   s.sequencer.start();
+  s.asked.clear();
   for (uint64_t n = 1; n <= 6; ++n) s.sequencer.on_published(event(kPacker, n));
+  s.sequencer.on_answer({kPacker, {}});
   s.sequencer.on_replayed(event(kPacker, 5));
   s.sequencer.on_mark(mark(kPacker, 6, true));
   EXPECT_TRUE(s.sequencer.synchronised());
   EXPECT_EQ(s.applied.size(), 6u);
   EXPECT_EQ(s.replicas, 1);
+  EXPECT_TRUE(s.asked.empty());
+}
+
+// An answer to an older question is under way when a gap is asked for: it leaves out what this replica has to forget.
+TEST(EventSequencer, AnAnswerIsTakenOnlyWhereItBegins) {
+  std::vector<wire::StateRequest> asked;
+  std::vector<uint64_t> applied;
+  EventSequencer sequencer({[&](const ModelEvent& e) { applied.push_back(e.sequence().value); },
+                            [&] { applied.clear(); }, [&](const wire::StateRequest& r) { asked.push_back(r); }});
+  sequencer.start();
+  sequencer.on_published(event(kPacker, 1));
+  sequencer.on_published(event(kPacker, 2));
+  sequencer.on_published(event(kPacker, 6));
+  ASSERT_EQ(asked.size(), 2u);
+  EXPECT_EQ(asked[1].after.value, 2u);
+  EXPECT_FALSE(asked[1].anew) << "that the answer under way will not do is not known yet";
+  sequencer.on_answer({kPacker, {}});
+  ASSERT_EQ(asked.size(), 3u) << "now it is";
+  EXPECT_EQ(asked[2].after.value, 2u);
+  EXPECT_TRUE(asked[2].anew);
+  sequencer.on_replayed(event(kPacker, 5));
+  sequencer.on_mark(mark(kPacker, 6, true));
+  EXPECT_TRUE(sequencer.waiting());
+  EXPECT_EQ(applied, (std::vector<uint64_t>{1, 2}));
+  EXPECT_EQ(asked.size(), 3u) << "the newer question will be answered";
+  sequencer.on_answer({kPacker, {2}});
+  sequencer.on_replayed(event(kPacker, 5));
+  sequencer.retry();
+  EXPECT_EQ(asked.back().after.value, 5u);
+  EXPECT_FALSE(asked.back().anew) << "it goes on";
+  sequencer.on_mark(mark(kPacker, 5, true));
+  EXPECT_EQ(applied, (std::vector<uint64_t>{1, 2, 5, 6}));
+  EXPECT_TRUE(sequencer.synchronised());
 }
 
 // The packer cannot take it for the request that it is answering.
-TEST(EventSequencer, WhoBeginsAnewNamesAPackerThatNobodyIs) {
-  std::vector<std::pair<InstanceId, uint64_t>> asked;
-  EventSequencer sequencer(
-      {[](const ModelEvent&) {}, [] {}, [&](InstanceId of, Sequence after) { asked.emplace_back(of, after.value); }});
+TEST(EventSequencer, WhoBeginsAnewSaysSo) {
+  std::vector<wire::StateRequest> asked;
+  std::vector<uint64_t> applied;
+  EventSequencer sequencer({[&](const ModelEvent& e) { applied.push_back(e.sequence().value); },
+                            [&] { applied.clear(); }, [&](const wire::StateRequest& r) { asked.push_back(r); }});
   sequencer.on_published(event(kPacker, 1));
   sequencer.start_anew();
   ASSERT_EQ(asked.size(), 1u);
-  EXPECT_NE(asked[0].first, InstanceId{});
-  EXPECT_NE(asked[0].first, kPacker);
-  EXPECT_EQ(asked[0].second, 0u);
+  EXPECT_EQ(asked[0].packer, InstanceId{});
+  EXPECT_EQ(asked[0].after.value, 0u);
+  EXPECT_TRUE(asked[0].anew);
   EXPECT_TRUE(sequencer.waiting());
-  sequencer.retry();
-  EXPECT_EQ(asked.back(), std::pair(InstanceId{}, uint64_t{0})) << "what it asked for then may be under way";
+  sequencer.on_replayed(event(kPacker, 2));
+  EXPECT_EQ(applied, (std::vector<uint64_t>{1})) << "of an answer that was thrown away";
+  sequencer.on_answer({kPacker, {}});
+  sequencer.on_replayed(event(kPacker, 1));
+  sequencer.on_replayed(event(kPacker, 2));
+  sequencer.on_mark(mark(kPacker, 2, true));
+  EXPECT_EQ(applied, (std::vector<uint64_t>{1, 2}));
+  EXPECT_TRUE(sequencer.synchronised());
+}
+
+// Its first question is answered late; a packer that came since is followed already.
+TEST(EventSequencer, AnAnswerOfAPackerThatIsGoneChangesNothing) {
+  Session s;
+  s.sequencer.start();
+  s.packer = kNextPacker;
+  s.sequencer.on_published(event(kNextPacker, s.newest = 1));
+  s.sequencer.on_answer({kPacker, {}});
+  s.sequencer.on_replayed(event(kPacker, 1));
+  s.sequencer.on_mark(mark(kPacker, 7, true));
+  EXPECT_EQ(s.sequencer.packer(), kNextPacker);
+  s.expect_complete();
+  EXPECT_EQ(s.replicas, 1);
 }
 
 TEST(EventSequencer, LostAndRepeatedEventsEndInTheSameOrderEverywhere) {
@@ -167,12 +228,13 @@ TEST(EventSequencer, APackerWithTheIdZeroIsFollowedBeforeItsFirstEventIsApplied)
   for (const bool published : {false, true}) {
     bool begun = false;
     EventSequencer sequencer({[&](const ModelEvent&) { EXPECT_TRUE(begun) << "there is no replica to apply it to"; },
-                              [&] { begun = true; }, [](InstanceId, Sequence) {}});
+                              [&] { begun = true; }, [](const wire::StateRequest&) {}});
     sequencer.start();
     if (published)
       sequencer.on_published(event({0}, 1));
     else
-      sequencer.on_replayed(event({0}, 1));
+      sequencer.on_answer({});
+    sequencer.on_replayed(event({0}, 1));
     EXPECT_TRUE(begun);
   }
 }
@@ -180,6 +242,7 @@ TEST(EventSequencer, APackerWithTheIdZeroIsFollowedBeforeItsFirstEventIsApplied)
 TEST(EventSequencer, AnAnswerMaySkipWhatWasForgottenSince) {
   Session s;
   s.sequencer.start();
+  s.sequencer.on_answer({kPacker, {}});
   s.sequencer.on_replayed(event(kPacker, 4));
   s.sequencer.on_replayed(event(kPacker, 9));
   s.sequencer.on_mark(mark(kPacker, 10, true));

@@ -142,6 +142,7 @@ void FakeSession::receive_state() {
       if (!request) continue;
       const uint64_t after = request->packer == packer_ ? request->after.value : 0;
       counts_.began_anew += after == 0;
+      state_.send(wire::StateBegin{packer_, {after}}, m->peer);
       for (size_t i = after; i < log_.size(); ++i) state_.send_frames(m->peer, log_[i].first, log_[i].second);
       state_.send(wire::StateMark{packer_, {log_.size()}, epoch_, true, 0}, m->peer);
     }

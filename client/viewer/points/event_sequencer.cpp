@@ -21,34 +21,41 @@ size_t ModelEvent::bytes() const {
 
 void EventSequencer::start() {
   packer_.reset();
+  taking_ = refused_ = false;
   ask();
 }
 
-// Who names a packer that nobody is follows none of what the packer may still hold to be under way.
 void EventSequencer::start_anew() {
   packer_.reset();
-  waiting_ = asked_everything_ = true;
-  answer_is_stale_ = threw_away_ = false;
-  callbacks_.request_state(net::make_instance_id(), {});
+  taking_ = false;
+  refused_ = true;
+  ask();
 }
 
 void EventSequencer::ask() {
   waiting_ = true;
-  asked_everything_ |= !packer_ || applied_.value == 0;
-  callbacks_.request_state(packer_.value_or(InstanceId{}), packer_ ? applied_ : Sequence{});
+  callbacks_.request_state(
+      {.packer = packer_.value_or(InstanceId{}), .after = packer_ ? applied_ : Sequence{}, .anew = refused_});
 }
 
 void EventSequencer::retry() {
-  if (waiting_) threw_away_ ? start_anew() : ask();
+  if (waiting_) ask();
 }
 
 void EventSequencer::follow(InstanceId packer) {
   packer_ = packer;
   applied_ = {};
-  answer_is_stale_ = threw_away_ = false;
+  taking_ = refused_ = false;
   kept_.clear();
   kept_bytes_ = 0;
   callbacks_.begin_replica();
+}
+
+// Who has asked for everything, of whoever would answer, need not ask again.
+void EventSequencer::meet(InstanceId packer) {
+  const bool asked = waiting_ && !packer_;
+  follow(packer);
+  if (!asked) ask();
 }
 
 void EventSequencer::keep(ModelEvent event) {
@@ -59,14 +66,13 @@ void EventSequencer::keep(ModelEvent event) {
 
 void EventSequencer::on_published(ModelEvent event) {
   if (event.packer() != packer_) {
-    follow(event.packer());
     // The very first event of a new packer needs no history.
     if (event.sequence().value != 1) {
-      keep(std::move(event));
-      return ask();
+      meet(event.packer());
+      return keep(std::move(event));
     }
+    follow(event.packer());
     waiting_ = false;
-    answer_is_stale_ = asked_everything_;
   }
   if (waiting_) return keep(std::move(event));
   if (event.sequence() <= applied_) return;
@@ -79,32 +85,27 @@ void EventSequencer::on_published(ModelEvent event) {
   applied_ = event.sequence();
 }
 
+void EventSequencer::on_answer(const wire::StateBegin& begin) {
+  if (waiting_ && begin.packer != packer_) follow(begin.packer);
+  taking_ = waiting_ && begin.after == applied_;
+  refused_ = !taking_;
+  if (waiting_ && refused_) ask();
+}
+
 void EventSequencer::on_replayed(const ModelEvent& event) {
-  if (event.packer() != packer_) follow(event.packer());
-  if (answer_is_stale_ || event.sequence() <= applied_) return;
+  if (!taking_ || event.packer() != packer_ || event.sequence() <= applied_) return;
   callbacks_.apply(event);
   applied_ = event.sequence();
 }
 
 void EventSequencer::on_mark(const wire::StateMark& mark) {
-  if (mark.packer != packer_) {
-    follow(mark.packer);
-    // An answer that held no event: there is nothing yet.
-    if (!mark.answer) return ask();
-  }
   if (mark.answer) {
-    asked_everything_ = false;
-    if (std::exchange(answer_is_stale_, false)) {
-      threw_away_ = mark.sequence > applied_;
-      if (threw_away_ && !waiting_) start_anew();
-      return;  // who waits, waits for the answer to a newer question
-    }
-    if (!waiting_) return;
-    threw_away_ = false;
+    if (!taking_ || mark.packer != packer_) return;  // who waits, waits for the answer to a newer question
     applied_ = std::max(applied_, mark.sequence);
-    waiting_ = false;
+    taking_ = waiting_ = false;
     return drain();
   }
+  if (mark.packer != packer_) return meet(mark.packer);
   if (!waiting_ && mark.sequence > applied_) {  // the last events were lost
     ++gaps_;
     ask();

@@ -29,10 +29,9 @@ struct ModelEvent {
 class EventSequencer {
  public:
   struct Callbacks {
-    std::function<void(const ModelEvent&)> apply;  ///< the next event of the current packer
-    std::function<void()> begin_replica;           ///< a packer we have nothing of: start from nothing
-    /// wire::StateRequest.
-    std::function<void(InstanceId packer, Sequence after)> request_state;
+    std::function<void(const ModelEvent&)> apply;                  ///< the next event of the current packer
+    std::function<void()> begin_replica;                           ///< a packer we have nothing of: start from nothing
+    std::function<void(const wire::StateRequest&)> request_state;  ///< whose viewer is not filled in
   };
   explicit EventSequencer(Callbacks callbacks) : callbacks_(std::move(callbacks)) {}
 
@@ -43,7 +42,9 @@ class EventSequencer {
   void start_anew();
   /// An event from the publisher.
   void on_published(ModelEvent event);
-  /// An event that answers request_state; they come in order and may skip what has been forgotten since.
+  /// An answer to request_state begins. One that begins elsewhere than where the replica stands is not taken.
+  void on_answer(const wire::StateBegin& begin);
+  /// An event of that answer; they come in order and may skip what has been forgotten since.
   void on_replayed(const ModelEvent& event);
   /// The publisher's or the answer's mark.
   void on_mark(const wire::StateMark& mark);
@@ -61,6 +62,7 @@ class EventSequencer {
 
  private:
   void follow(InstanceId packer);
+  void meet(InstanceId packer);
   void ask();
   void keep(ModelEvent event);
   void drain();
@@ -69,11 +71,9 @@ class EventSequencer {
   std::optional<InstanceId> packer_;  // none is followed yet
   Sequence applied_;
   bool waiting_ = false;
-  bool asked_everything_ = false;  // and no answer has ended since
-  // An answer that begins with nothing leaves out what was forgotten by then. Who has gone on since they asked may hold
-  // some of that: they do not take it.
-  bool answer_is_stale_ = false;
-  bool threw_away_ = false;  // of such an answer what is lacking here; the packer takes it for received
+  // An answer leaves out what was forgotten since it begins. Who has gone on since they asked may hold some of that.
+  bool taking_ = false;          // the answer that comes in
+  bool refused_ = false;         // the last one that began; the packer takes it for received, unless it hears otherwise
   std::deque<ModelEvent> kept_;  // published while an answer is awaited
   size_t kept_bytes_ = 0;
   uint64_t gaps_ = 0;

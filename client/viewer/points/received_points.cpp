@@ -27,9 +27,8 @@ ReceivedPoints::ReceivedPoints(const ReceivedOptions& options, const ReceivedLin
       events_(options.events),
       receiver_({links.viewer, options.epoch_patience_s, options.events, waits_ || in_step_},
                 {[this] { return config_; },
-                 [this](InstanceId packer, Sequence after) {
-                   if (auto* state = links_.feeds.find("state"))
-                     state->send(wire::StateRequest{links_.viewer, packer, after});
+                 [this](const wire::StateRequest& request) {
+                   if (auto* state = links_.feeds.find("state")) state->send(request);
                  },
                  links.on_part, links.on_epoch, links.to_master_s},
                 cache_, fine_rays_, batches_, links.spans) {}

@@ -25,9 +25,10 @@ PointReceiver::PointReceiver(const Options& options, Links links, ModelCache& ca
                     begin_replica(links_.config(), {}, {});
                     if (options_.events) options_.events->begin_replica(config_);
                   },
-                  [this](InstanceId packer, Sequence after) {
+                  [this](wire::StateRequest request) {
                     asked_s_ = monotonic_s();
-                    links_.request_state(packer, after);
+                    request.viewer = options_.viewer;
+                    links_.request_state(request);
                   }}),
       switch_(options.epoch_patience_s) {}
 
@@ -35,12 +36,13 @@ void PointReceiver::receive_events(net::Socket& patches, int most) {
   for (int n = 0; n < most; ++n) {
     const auto message = patches.receive();
     if (!message) return;
-    net::dispatch<wire::Patch, wire::Forget, wire::Refine, wire::EpochBegin, wire::StateMark>(patches, *message, [&](auto& m) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
-        on_published_mark(m);
-      else
-        sequencer_.on_published({m, message->owner, message->arrived_s});
-    });
+    net::dispatch<wire::Patch, wire::Forget, wire::Refine, wire::EpochBegin, wire::StateMark>(
+        patches, *message, [&](auto& m) {
+          if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
+            on_published_mark(m);
+          else
+            sequencer_.on_published({m, message->owner, message->arrived_s});
+        });
   }
 }
 
@@ -67,9 +69,12 @@ void PointReceiver::receive_answers(net::Socket& state, int most) {
     const auto message = state.receive();
     if (!message) return;
     asked_s_ = monotonic_s();  // an answer that is coming in is not late
-    net::dispatch<wire::Patch, wire::Forget, wire::Refine, wire::EpochBegin, wire::StateMark>(state, *message, [&](auto& m) {
-      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, wire::StateMark>)
+    using namespace wire;
+    net::dispatch<Patch, Forget, Refine, EpochBegin, StateBegin, StateMark>(state, *message, [&](auto& m) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(m)>, StateMark>)
         sequencer_.on_mark(m);
+      else if constexpr (std::is_same_v<std::decay_t<decltype(m)>, StateBegin>)
+        sequencer_.on_answer(m);
       else
         sequencer_.on_replayed({m, message->owner, message->arrived_s});
     });

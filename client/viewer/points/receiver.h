@@ -28,10 +28,10 @@ class PointReceiver {
     bool hold = false;                ///< changes go to the batches, not to the cache
   };
   struct Links {
-    std::function<points::ModelConfig()> config;              ///< of a model that begins
-    std::function<void(InstanceId, Sequence)> request_state;  ///< EventSequencer
-    std::function<void(const ViewPart&)> on_part;             ///< a patch was applied, or is in the batches
-    std::function<void()> on_epoch;                           ///< a new epoch began
+    std::function<points::ModelConfig()> config;  ///< of a model that begins
+    std::function<void(const wire::StateRequest&)> request_state;
+    std::function<void(const ViewPart&)> on_part;  ///< a patch was applied, or is in the batches
+    std::function<void()> on_epoch;                ///< a new epoch began
     std::function<double(double)> to_master_s;
   };
   PointReceiver(const Options& options, Links links, ModelCache& cache, FineRays& rays, UpdateBatches& batches,
@@ -55,8 +55,8 @@ class PointReceiver {
     uint64_t points_received = 0, decode_errors = 0, gaps = 0, epochs_shown = 0;
     EpochId epoch;  ///< on display; only where nothing is held
     Sequence sequence;
-    InstanceId packer;                                  ///< whose sequence it is
-    uint64_t bytes_received = 0;                        ///< images of patches, and what made them exact
+    InstanceId packer;            ///< whose sequence it is
+    uint64_t bytes_received = 0;  ///< images of patches, and what made them exact
     uint64_t patches_refined = 0;
     uint64_t digests_equal = 0, digests_different = 0;  ///< ReplicaCheck
   };
@@ -85,8 +85,7 @@ class PointReceiver {
   image::DepthImage tile_;  // memory that decoding reuses
   refinement::BoundedPatches bounded_;
   double asked_s_ = 0;
-  uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0,
-           patches_refined_ = 0;
+  uint64_t points_received_ = 0, bytes_received_ = 0, decode_errors_ = 0, epochs_shown_ = 0, patches_refined_ = 0;
 };
 
 }  // namespace telesplat::viewer

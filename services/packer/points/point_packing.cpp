@@ -366,7 +366,8 @@ void PointPacking::answer(const wire::StateRequest& request, const std::string& 
     return log::info("a viewer that stopped after {} starts anew", after.value);
   }
   const bool follows = request.packer == instance_ || request.packer.value == 0;
-  if (answers_.goes_on(peer, request.viewer, after, follows)) return;
+  if (answers_.goes_on(peer, request.viewer, after, follows && !request.anew)) return;
+  if (!outlets_.send(wire::StateBegin{instance_, after}, peer)) return;
   StateAnswers::Answer answer{.viewer = request.viewer, .left = core_->replay(after), .mark = mark(true)};
   completions_.fill(answer.left.others, request.viewer, after);
   answers_.begin(peer, after, std::move(answer));
@@ -441,7 +442,7 @@ void PointPacking::choose_errors() {
   const AllowedErrors automatic = slow_ ? kSlowErrors : AllowedErrors{};
   const auto said = [](double value, auto otherwise) { return value < 0 ? otherwise : decltype(otherwise)(value); };
   core_->allow_errors({said(errors_[0], automatic.depth_pixels), said(errors_[1], automatic.normal),
-                        said(errors_[2], automatic.colour)});
+                       said(errors_[2], automatic.colour)});
 }
 
 bool PointPacking::refine(double now_s) {

@@ -101,9 +101,7 @@ class PointsPlay {
           config(play.config()),
           part(
               id, pipes(number), [this] { return config; },
-              [this](InstanceId packer, Sequence after) {
-                requests.push_back({id, packer, after});
-              }) {}
+              [this](const wire::StateRequest& request) { requests.push_back(request); }) {}
     static ViewerPart::Pipes& pipes(size_t number) {
       static net::Context context;
       static std::array<ViewerPart::Pipes, kViewers> all{ViewerPart::Pipes(context), ViewerPart::Pipes(context),

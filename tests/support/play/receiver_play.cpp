@@ -86,6 +86,8 @@ class ReceiverPlay {
         config_.compact = dice_.chance(50);
         return;
       case 8: {
+        if (dice_.chance(20))
+          return send(over_the_wire(wire::StateBegin{packer_, {dice_.chance(50) ? 0 : sequence()}}));
         wire::StateMark m{packer_, {sequence()}, epoch(), dice_.chance(60), dice_.below(100)};
         return send(over_the_wire(m));
       }
@@ -189,7 +191,7 @@ class ReceiverPlay {
   uint64_t sequence_ = 0;
   std::pair<Sequence, const Tiles::Tile*> refinable_{};
   Reached reached_;
-  ViewerPart viewer_{kViewer, pipes(), [this] { return config_; }, [](InstanceId, Sequence) {}};
+  ViewerPart viewer_{kViewer, pipes(), [this] { return config_; }, [](const wire::StateRequest&) {}};
 };
 
 }  // namespace

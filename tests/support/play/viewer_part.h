@@ -20,7 +20,7 @@ class ViewerPart {
   };
 
   ViewerPart(InstanceId id, Pipes& pipes, std::function<points::ModelConfig()> config,
-             std::function<void(InstanceId, Sequence)> request_state)
+             std::function<void(const wire::StateRequest&)> request_state)
       : pipes_(pipes),
         receiver_({.viewer = id},
                   {.config = std::move(config),

@@ -68,8 +68,9 @@ class PointPackingTest : public testing::Test {
     const auto body = std::make_shared<std::string>(wire::encode(m));
     return {peer, std::string(M::kName), std::as_bytes(std::span(*body)), body};
   }
-  void ask(Sequence after, InstanceId packer, double now_s, const std::string& peer = "peer", uint64_t viewer = 77) {
-    packing.take_state(socket, message(wire::StateRequest{{viewer}, packer, after}, peer), now_s);
+  void ask(Sequence after, InstanceId packer, double now_s, const std::string& peer = "peer", uint64_t viewer = 77,
+           bool anew = false) {
+    packing.take_state(socket, message(wire::StateRequest{{viewer}, packer, after, anew}, peer), now_s);
   }
   void receipt(Sequence newest, InstanceId packer, double now_s, const std::string& peer = "peer") {
     packing.take_state(socket, message(wire::Receipt{{77}, packer, newest, now_s}, peer), now_s);
@@ -279,16 +280,20 @@ TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
   const InstanceId packer = decoded<wire::Patch>(sent[0]).packer;
   sent.clear();
   ask({}, {}, 2);
-  ASSERT_EQ(sent.size(), 2u);
-  EXPECT_EQ(sent[0].peer, "peer");
-  EXPECT_EQ(decoded<wire::Patch>(sent[0]).sequence.value, 1u);
-  const auto mark = decoded<wire::StateMark>(sent[1]);
+  ASSERT_EQ(sent.size(), 3u);
+  for (const Sent& s : sent) EXPECT_EQ(s.peer, "peer");
+  EXPECT_EQ(decoded<wire::StateBegin>(sent[0]).packer, packer);
+  EXPECT_EQ(decoded<wire::StateBegin>(sent[0]).after.value, 0u);
+  EXPECT_EQ(decoded<wire::Patch>(sent[1]).sequence.value, 1u);
+  const auto mark = decoded<wire::StateMark>(sent[2]);
   EXPECT_TRUE(mark.answer);
   EXPECT_EQ(mark.packer, packer);
   EXPECT_GT(mark.points, 0u);
   sent.clear();
   ask({1}, packer, 2);
-  ASSERT_EQ(sent.size(), 1u) << "it has everything";
+  ASSERT_EQ(sent.size(), 2u) << "it has everything";
+  EXPECT_EQ(decoded<wire::StateBegin>(sent[0]).after.value, 1u);
+  EXPECT_TRUE(decoded<wire::StateMark>(sent[1]).answer);
   sent.clear();
   packing.tick(3);
   ASSERT_EQ(sent.size(), 1u);
@@ -349,7 +354,7 @@ TEST_F(PointPackingTest, AViewerThatMissedThatItsViewIsCompleteIsToldSo) {
     ask(after, packer, 5);
     std::vector<uint64_t> requests;
     Sequence newest = after;
-    for (size_t i = 0; i + 1 < sent.size(); ++i) {
+    for (size_t i = 1; i + 1 < sent.size(); ++i) {
       const auto patch = decoded<wire::Patch>(sent[i]);
       EXPECT_GT(patch.sequence, newest) << "in order";
       newest = patch.sequence;
@@ -498,7 +503,10 @@ class StateAnswersTest : public PointPackingTest {
     for (const Sent& s : sent) {
       if (s.peer != peer) continue;
       bytes += s.body.size();
-      if (s.type == wire::StateMark::kName) {
+      if (s.type == wire::StateBegin::kName) {
+        EXPECT_EQ(decoded<wire::StateBegin>(s).packer, packer);
+        begins.push_back(decoded<wire::StateBegin>(s).after.value);
+      } else if (s.type == wire::StateMark::kName) {
         const auto mark = decoded<wire::StateMark>(s);
         EXPECT_TRUE(mark.answer);
         EXPECT_EQ(mark.sequence.value, kFrames);
@@ -514,6 +522,7 @@ class StateAnswersTest : public PointPackingTest {
   static constexpr uint64_t kFrames = 60;
   InstanceId packer;
   uint64_t total_bytes = 0, bytes = 0;
+  std::vector<uint64_t> begins;  // after which events answers began
 };
 
 TEST_F(StateAnswersTest, AnAnswerGoesOutAsFastAsItIsReceived) {
@@ -568,8 +577,11 @@ TEST_F(StateAnswersTest, RequestsOfOneViewerAreOneAnswer) {
 TEST_F(StateAnswersTest, WhoThrewItAwayGetsItAgainOverTheSameConnection) {
   ask({}, {}, 2);
   EXPECT_EQ(to("peer").front(), 1u);
-  ask({}, InstanceId{packer.value + 1}, 2.1);
+  ask({}, {}, 2.1, "peer", 77, true);
   EXPECT_EQ(to("peer").front(), 1u);
+  ask({9}, packer, 2.2, "peer", 77, true);
+  EXPECT_EQ(to("peer").front(), 10u);
+  EXPECT_EQ(begins, (std::vector<uint64_t>{0, 0, 9}));
 }
 
 TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
@@ -592,7 +604,7 @@ TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
 }
 
 TEST_F(StateAnswersTest, AnAnswerThatCannotBeSentHasNoMark) {
-  takes = 1;
+  takes = 2;
   ask({}, {}, 2);
   for (int n = 0; n < 10; ++n) packing.tick(2.1 + n);
   const auto got = to("peer");

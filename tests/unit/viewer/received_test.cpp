@@ -107,6 +107,7 @@ TEST_F(Receiving, ABoxThatComesAfterItsPackersFirstEventCounts) {
     for (const double deadline = monotonic_s() + test::patient(20); !until() && monotonic_s() < deadline;) {
       while (const auto message = state.receive())
         if (message->type == wire::StateRequest::kName) {
+          state.send(wire::StateBegin{packer, {}}, message->peer);
           state.send(wire::EpochBegin{packer, {1}, {packer.value}}, message->peer);
           state.send(wire::StateMark{packer, {1}, {packer.value}, true, 0}, message->peer);
         }

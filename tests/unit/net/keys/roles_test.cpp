@@ -64,7 +64,7 @@ TEST(Roles, SendWhatTheProtocolSaysAndNothingElse) {
       wire::PlanRequest::kName, wire::FrameEnd::kName,   wire::ChunkList::kName,      wire::Chunk::kName,
       wire::VoxelData::kName,   wire::Patch::kName,      wire::Forget::kName,         wire::EpochBegin::kName,
       wire::StateMark::kName,   wire::SliceFrame::kName, wire::SlabAssignment::kName, wire::Swap::kName,
-      wire::Refine::kName};
+      wire::Refine::kName,      wire::StateBegin::kName};
   std::set<std::string_view> types{"nonsense"};
   const auto look_at = [&](std::string_view type) {
     types.insert(type);
