@@ -21,31 +21,35 @@ size_t ModelEvent::bytes() const {
 
 void EventSequencer::start() {
   packer_.reset();
-  taking_ = refused_ = false;
+  taking_ = answered_ = false;
   ask();
 }
 
 void EventSequencer::start_anew() {
   packer_.reset();
   taking_ = false;
-  refused_ = true;
+  answered_ = true;
   ask();
 }
 
 void EventSequencer::ask() {
   waiting_ = true;
+  const bool anew = answered_ && !taking_;
+  if (anew) answered_ = false;
   callbacks_.request_state(
-      {.packer = packer_.value_or(InstanceId{}), .after = packer_ ? applied_ : Sequence{}, .anew = refused_});
+      {.packer = packer_.value_or(InstanceId{}), .after = packer_ ? applied_ : Sequence{}, .anew = anew});
 }
 
 void EventSequencer::retry() {
-  if (waiting_) ask();
+  if (!waiting_) return;
+  answered_ |= ++retries_ > 1;  // the packer may take what never came for received
+  ask();
 }
 
 void EventSequencer::follow(InstanceId packer) {
   packer_ = packer;
   applied_ = {};
-  taking_ = refused_ = false;
+  taking_ = false;
   kept_.clear();
   kept_bytes_ = 0;
   callbacks_.begin_replica();
@@ -88,8 +92,9 @@ void EventSequencer::on_published(ModelEvent event) {
 void EventSequencer::on_answer(const wire::StateBegin& begin) {
   if (waiting_ && begin.packer != packer_) follow(begin.packer);
   taking_ = waiting_ && begin.after == applied_;
-  refused_ = !taking_;
-  if (waiting_ && refused_) ask();
+  answered_ = true;
+  retries_ = 0;
+  if (waiting_ && !taking_) ask();
 }
 
 void EventSequencer::on_replayed(const ModelEvent& event) {

@@ -73,7 +73,8 @@ class EventSequencer {
   bool waiting_ = false;
   // An answer leaves out what was forgotten since it begins. Who has gone on since they asked may hold some of that.
   bool taking_ = false;          // the answer that comes in
-  bool refused_ = false;         // the last one that began; the packer takes it for received, unless it hears otherwise
+  bool answered_ = false;        // an answer has begun since one was asked for; the packer takes it for received
+  int retries_ = 0;              // and none has begun since
   std::deque<ModelEvent> kept_;  // published while an answer is awaited
   size_t kept_bytes_ = 0;
   uint64_t gaps_ = 0;
