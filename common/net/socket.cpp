@@ -21,6 +21,7 @@
 #include "common/net/connections/connections.h"
 #include "common/net/connections/lookout.h"
 #include "common/net/connections/queued_bytes.h"
+#include "common/net/handed_over.h"
 #include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
 #include "common/net/read_ahead.h"
@@ -259,8 +260,12 @@ struct Socket::Impl {
       };
       auto* owned =
           counts_queued() ? new Owned{std::move(body), queued.add(peer, bytes)} : new Owned{std::move(body), {}};
-      zmq::message_t frame(
-          owned->body.data(), owned->body.size(), [](void*, void* hint) { delete static_cast<Owned*>(hint); }, owned);
+      const auto free = [](void* memory, void* hint) {
+        was_handed_over(memory);
+        delete static_cast<Owned*>(hint);
+      };
+      hand_over(owned->body.data());
+      zmq::message_t frame(owned->body.data(), owned->body.size(), free, owned);
       return undisturbed([&] { return socket.send(frame, send_flags::dontwait); }).has_value();
     } catch (const zmq::error_t&) {  // EHOSTUNREACH: the peer is gone
       return false;
@@ -299,14 +304,21 @@ struct Socket::Impl {
         continue;
       }
       out.type = frames[next].to_string().substr(0, kMaxTypeBytes);
-      auto body = std::make_shared<zmq::message_t>(std::move(frames[next + 1]));
-      if (guarded && !admit(out, *body)) continue;
-      if (body->size() > options.max_message_bytes) {
-        reject(out, fmt::format("{} bytes, limit {}", body->size(), options.max_message_bytes));
+      struct Received {
+        explicit Received(zmq::message_t message) : body(std::move(message)) {}
+        zmq::message_t body;
+        ~Received() { hand_over(body.data()); }  // to the thread that frees it
+      };
+      auto received = std::make_shared<Received>(std::move(frames[next + 1]));
+      zmq::message_t& body = received->body;
+      was_handed_over(body.data());
+      if (guarded && !admit(out, body)) continue;
+      if (body.size() > options.max_message_bytes) {
+        reject(out, fmt::format("{} bytes, limit {}", body.size(), options.max_message_bytes));
         continue;
       }
-      out.body = {static_cast<const std::byte*>(body->data()), body->size()};
-      out.owner = std::move(body);
+      out.body = {static_cast<const std::byte*>(body.data()), body.size()};
+      out.owner = std::move(received);
       return out;
     }
     return std::nullopt;

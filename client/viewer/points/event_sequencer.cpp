@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "common/net/socket.h"
-
 namespace telesplat::viewer {
 namespace {
 // More than this is not kept while an answer is awaited; the gap that dropping leaves is asked for afterwards.

@@ -358,8 +358,8 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
 }
 
 void PointPacking::answer(const wire::StateRequest& request, const std::string& peer) {
-  const Sequence after = request.packer == instance_ && request.after <= core_->sequence() ? request.after : Sequence{};
-  if (!core_->remembers(after)) {
+  const Sequence after = request.packer == instance_ ? request.after : Sequence{};
+  if (after > core_->sequence() || !core_->remembers(after)) {
     // A mark of a packer that the viewer does not know: it then asks for everything.
     answers_.drop(peer);
     outlets_.send(wire::StateMark{.packer = net::make_instance_id(), .epoch = core_->epoch()}, peer);

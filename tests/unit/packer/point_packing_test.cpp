@@ -584,6 +584,15 @@ TEST_F(StateAnswersTest, WhoThrewItAwayGetsItAgainOverTheSameConnection) {
   EXPECT_EQ(begins, (std::vector<uint64_t>{0, 0, 9}));
 }
 
+// An answer to everything would not be taken by a replica that stands elsewhere.
+TEST_F(StateAnswersTest, WhoStandsWhereNobodyCanStandStartsFromNothing) {
+  ask({kFrames + 1}, packer, 2);
+  ASSERT_EQ(sent.size(), 1u);
+  const auto mark = decoded<wire::StateMark>(sent[0]);
+  EXPECT_NE(mark.packer, packer);
+  EXPECT_FALSE(mark.answer);
+}
+
 TEST_F(StateAnswersTest, ALateJoinerDoesNotStallTheOthers) {
   for (int n = 0; n < 8; ++n) ask({}, {}, 2, "peer" + std::to_string(n), uint64_t(100 + n));
   double now_s = 2;

@@ -1,0 +1,26 @@
+// Tells ThreadSanitizer what it cannot see: that ZeroMQ, which is built without it, hands memory from thread to thread,
+// and orders what they do with it. Nothing without ThreadSanitizer.
+#pragma once
+
+#ifdef __has_feature
+#if __has_feature(thread_sanitizer)
+#define TELESPLAT_THREAD_SANITIZER 1
+#include <sanitizer/tsan_interface.h>
+#endif
+#endif
+
+namespace telesplat::net {
+
+/// What this thread did until now comes before what others do after was_handed_over(memory).
+inline void hand_over([[maybe_unused]] void* memory) {
+#ifdef TELESPLAT_THREAD_SANITIZER
+  __tsan_release(memory);
+#endif
+}
+inline void was_handed_over([[maybe_unused]] void* memory) {
+#ifdef TELESPLAT_THREAD_SANITIZER
+  __tsan_acquire(memory);
+#endif
+}
+
+}  // namespace telesplat::net
