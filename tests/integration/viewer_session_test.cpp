@@ -100,7 +100,7 @@ void expect_one_update_a_frame(const Shown& s) {
 }
 
 TEST(VolumeSession, AsynchronouslyFramesShowWhateverIsThere) {
-  const Shown s = show({}, CouplingMode::kAsync, 60);
+  const Shown s = show({}, CouplingMode::kAsync, 60, 100);
   expect_complete(s, 60);
   EXPECT_TRUE(std::is_sorted(s.sequence.begin(), s.sequence.end()));
   EXPECT_EQ(*std::max_element(s.wait_ms.begin(), s.wait_ms.end()), 0) << "the display never waits";

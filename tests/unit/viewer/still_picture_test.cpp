@@ -6,6 +6,7 @@
 #include "client/viewer/points/source.h"
 #include "common/core/clock.h"
 #include "common/scene/clip_order.h"
+#include "tests/support/patience.h"
 #include "tests/support/still_scene.h"
 
 namespace telesplat::viewer {
@@ -244,7 +245,7 @@ class StillSource : public testing::Test {
     for (int i = 0; i < 5000 && unchanged < 200; ++i) {
       f = frame();
       unchanged = f.changed ? 0 : unchanged + 1;
-      if (!f.changed) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      if (!f.changed) std::this_thread::sleep_for(std::chrono::duration<double>(test::patient(0.002)));
     }
     EXPECT_EQ(unchanged, 200);
     return f;
