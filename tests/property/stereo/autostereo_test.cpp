@@ -192,7 +192,7 @@ TEST(Autostereo, SlantedLensesWorkByTheSameMap) {
       wrong += shown == (eye == 0 ? Shown::kRight : Shown::kLeft);
     }
   }
-  EXPECT_GT(seen, 1000);
+  EXPECT_GT(seen, 900);
   EXPECT_EQ(wrong, 0);
   EXPECT_LT(dark, seen / 10);
 }
