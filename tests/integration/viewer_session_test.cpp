@@ -75,13 +75,13 @@ Shown show(const test::FakeSession::Options& session_options, CouplingMode mode,
   out.drawn = session.column("frames", "points_drawn");
   out.coupling = session.column("frames", "coupling");
   out.buffers = session.column("frames", "buffers");
-  out.updates = session.column("updates", "request");
   wait_until([&] {
     const auto status = session.status();
     const auto told = status.find("frames");
     return told != status.end() && told->second >= double(frames);
   });
   out.status = session.status();
+  out.updates = session.column("updates", "request");
   return out;
 }
 
