@@ -1,11 +1,12 @@
 #!/usr/bin/python3
-"""Runs test programs of a sanitized tree, each once with all its tests: a process for each test takes half a second to begin.
+"""Runs test programs of a sanitized tree, each once with all its tests: a process a test would take half a second more.
 
 usage: run_programs.py PRESET [--jobs N] [--minutes N] [--logs FOLDER] [CTEST ARGUMENTS that choose tests, as -L LABEL]
   --jobs N      programs at a time (the cores)
   --minutes N   that a program may take (20)
   --logs DIR    what they print (build/PRESET/sanitized)
-  Other tests (scripts) run as ctest runs them. Exit code: 0 all is well, 1 a test failed, a finding or a program over its time.
+  Other tests (scripts) run as ctest runs them.
+  Exit code: 0 all is well, 1 a test failed, a finding, or a program over its time, 2 no tests are chosen.
 """
 import argparse
 import concurrent.futures
@@ -22,7 +23,8 @@ FINDING = re.compile(rb"WARNING: ThreadSanitizer|ERROR: \w+Sanitizer|runtime err
 
 def programs(preset, choice):
     """{name: (command, working folder)} of what ctest would run, test programs without the filters of single tests."""
-    listed = subprocess.run(["ctest", "--preset", preset, "--show-only=json-v1", *choice], cwd=ROOT, check=True, capture_output=True)
+    listed = subprocess.run(["ctest", "--preset", preset, "--show-only=json-v1", *choice], cwd=ROOT, check=True,
+                            capture_output=True)
     out = {}
     for test in json.loads(listed.stdout)["tests"]:
         command = [a for a in test["command"] if not a.startswith("--gtest_")]
@@ -38,7 +40,8 @@ def run(name, command, folder, options):
     begin_s = time.monotonic()
     with open(log, "wb") as out:
         try:
-            code = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, timeout=60 * options.minutes).returncode
+            code = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT,
+                                  timeout=60 * options.minutes).returncode
         except subprocess.TimeoutExpired:
             code = f"over {options.minutes:g} minutes"
     with open(log, "rb") as file:
