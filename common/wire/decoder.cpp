@@ -85,7 +85,7 @@ std::optional<Error> read_map(Bytes body, size_t max_elements,
 const msgpack::object* Decoder::enter(const char* name, size_t limit) {
   if (error_) return nullptr;
   const msgpack::object* o = find(map_, name);
-  if (!o) error_ = Error{fmt::format("field {} is missing", name)};
+  if (!o && !brief_) error_ = Error{fmt::format("field {} is missing", name)};
   name_ = name;
   limit_ = limit;
   return o;
@@ -238,9 +238,24 @@ void Decoder::get(const msgpack::object& o, geometry::Camera& c) {
 }
 
 void Decoder::get(const msgpack::object& o, Moments& m) {
-  double v[std::size(kMoments)];
-  if (!numbers(o, v)) return;
-  for (size_t i = 0; i < std::size(kMoments); ++i) m.*kMoments[i] = v[i];
+  if (o.type != msgpack::type::ARRAY || o.via.array.size != std::size(kMoments))
+    return fail(fmt::format("is not a list of {} moments", std::size(kMoments)));
+  double before = 0;  // sums stay far below what f64 holds exactly: each is checked
+  for (size_t i = 0; i < std::size(kMoments); ++i) {
+    const msgpack::object& moment = entry(o, i);
+    m.*kMoments[i] = 0;
+    if (moment.type == msgpack::type::NIL) continue;
+    if (moment.type != msgpack::type::POSITIVE_INTEGER && moment.type != msgpack::type::NEGATIVE_INTEGER)
+      return fail("has a moment that is no integer");
+    const double number =
+        moment.type == msgpack::type::POSITIVE_INTEGER ? double(moment.via.u64) : double(moment.via.i64);
+    const bool duration = kMoments[i] == &Moments::fetch_s;
+    const double us = duration ? number : before + number;
+    if (!(std::abs(number) <= kMostMoment_us && std::abs(us) <= kMostMoment_us))
+      return fail(fmt::format("has a moment of {} microseconds, limit {}", us, kMostMoment_us));
+    if (!duration) before = us;
+    m.*kMoments[i] = us / 1e6;
+  }
 }
 
 void Decoder::get(const msgpack::object& o, std::vector<geometry::ChunkInfo>& chunks) {

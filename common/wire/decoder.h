@@ -18,6 +18,9 @@ class Decoder {
  public:
   explicit Decoder(const msgpack::object& map) : map_(map) {}
 
+  /// From now on fields that are missing stay as they are (kIsBrief), and are no error.
+  void be_brief() { brief_ = true; }
+
   /// Names the field and what is wrong with it.
   const std::optional<Error>& error() const { return error_; }
 
@@ -77,6 +80,7 @@ class Decoder {
   }
 
   const msgpack::object& map_;
+  bool brief_ = false;
   const char* name_ = "";
   size_t limit_ = 0;
   std::optional<Error> error_;

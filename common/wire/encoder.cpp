@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <limits>
 #include <msgpack/pack.hpp>
 
 #include "common/core/utf8.h"
@@ -61,7 +63,13 @@ void Encoder::put_text(std::string_view text) {
 
 void Encoder::put(bool v) { v ? Packer(out_).pack_true() : Packer(out_).pack_false(); }
 void Encoder::put(uint64_t v) { Packer(out_).pack_uint64(v); }
-void Encoder::put(double v) { Packer(out_).pack_double(v); }
+
+// The shortest that is exactly this number: msgpack's writers make whole numbers integers.
+void Encoder::put(double v) {
+  const bool single =
+      std::abs(v) <= std::numeric_limits<float>::max() && static_cast<double>(static_cast<float>(v)) == v;
+  single ? Packer(out_).pack_float(static_cast<float>(v)) : Packer(out_).pack_double(v);
+}
 
 void Encoder::put(const std::vector<std::string>& v) {
   begin_array(static_cast<uint32_t>(v.size()));
@@ -101,10 +109,21 @@ void Encoder::put(const geometry::Camera& c) {
            double(c.height)});
 }
 
+// Whole microseconds since the moment before that is known: most differences take three bytes, and what is not known one.
 void Encoder::put(const Moments& m) {
-  double v[std::size(kMoments)];
-  for (size_t i = 0; i < std::size(kMoments); ++i) v[i] = m.*kMoments[i];
-  numbers(v);
+  begin_array(std::size(kMoments));
+  int64_t before = 0;
+  for (const double Moments::*moment : kMoments) {
+    const double us = std::round(1e6 * (m.*moment));
+    if (us == 0 || !(std::abs(us) <= kMostMoment_us)) {
+      Packer(out_).pack_nil();
+      continue;
+    }
+    const auto now = static_cast<int64_t>(us);
+    const bool duration = moment == &Moments::fetch_s;
+    Packer(out_).pack_int64(duration ? now : now - before);
+    if (!duration) before = now;
+  }
 }
 
 void Encoder::put(const std::vector<geometry::ChunkInfo>& chunks) {

@@ -1,6 +1,7 @@
 // Writes messages as msgpack maps. Private to this library.
 #pragma once
 
+#include <concepts>
 #include <map>
 #include <string>
 
@@ -17,9 +18,16 @@ class Encoder {
   /// A whole message: "v", then its fields.
   template <Struct M>
   void versioned_map(const M& m) {
-    begin_map(count_fields(m) + 1);
+    const Blank<M> blank(m);
+    uint32_t count = 1;
+    auto counter = [&](const char*, const auto& value, size_t = 0) { count += !blank(value); };
+    M::fields(counter, m);
+    begin_map(count);
     version();
-    M::fields(*this, m);
+    auto writer = [&](const char* name, const auto& value, size_t = 0) {
+      if (!blank(value)) (*this)(name, value);
+    };
+    M::fields(writer, m);
   }
 
   template <class T>
@@ -29,6 +37,25 @@ class Encoder {
   }
 
  private:
+  /// Tells which fields of a message need not be sent: those of a brief one that hold what a new one's hold.
+  template <class M>
+  class Blank {
+   public:
+    explicit Blank(const M& m) : m_(m) {}
+    template <class T>
+    bool operator()(const T& value) const {
+      if constexpr (kIsBrief<M> && std::equality_comparable<T>) {
+        static const M kNew;
+        const auto place = reinterpret_cast<const char*>(&value) - reinterpret_cast<const char*>(&m_);
+        return value == *reinterpret_cast<const T*>(reinterpret_cast<const char*>(&kNew) + place);
+      }
+      return false;
+    }
+
+   private:
+    const M& m_;
+  };
+
   template <class M>
   static uint32_t count_fields(const M& m) {
     uint32_t count = 0;

@@ -13,7 +13,15 @@ concept Struct = requires(AnyVisitor f, M& m) {
   M::fields(f, m);
 };
 
-inline constexpr uint32_t kShearNumbers = 11;  ///< of a shear frame before its layers
-inline constexpr uint32_t kLayerNumbers = 3;   ///< of each layer
+/// Whether a message's fields that hold what a new one's hold are not sent. It says so itself:
+/// `static constexpr bool kBrief = true;`.
+template <class M>
+inline constexpr bool kIsBrief = false;
+template <class M>
+requires M::kBrief inline constexpr bool kIsBrief<M> = true;
+
+inline constexpr double kMostMoment_us = 1125899906842624;  ///< 2^50, 35 years: seconds in f64 tell microseconds
+inline constexpr uint32_t kShearNumbers = 11;               ///< of a shear frame before its layers
+inline constexpr uint32_t kLayerNumbers = 3;                ///< of each layer
 
 }  // namespace telesplat::wire

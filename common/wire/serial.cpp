@@ -27,6 +27,7 @@ void write(Encoder& encoder, const void* message) {
 template <class M>
 std::optional<Error> read(Decoder& decoder, void* message) {
   M& m = *static_cast<M*>(message);
+  if (kIsBrief<M>) decoder.be_brief();
   M::fields(decoder, m);
   return decoder.error() ? decoder.error() : check(m);
 }

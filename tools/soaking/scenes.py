@@ -6,8 +6,11 @@ import subprocess
 
 
 class Scene:
-    def __init__(self, name, arguments, change, points):
+    """trajectory: of the display that is watched; a file begins again at its end."""
+
+    def __init__(self, name, arguments, change, points, trajectory="orbit"):
         self.name, self.arguments, self.change, self.points = name, arguments, change, points
+        self.trajectory = trajectory
 
 
 def clip(chance):
@@ -90,7 +93,7 @@ def mesh(options):
     # Points have errors, and become exact when heads rest.
     errors = ["--depth-error", "1/32", "--normal-error", "1", "--colour-error", "1"]
     arguments = [path, "--colour-by", "height", "--cache", os.path.join(options.out, "cache")]
-    return Scene("mesh", [*arguments, "--trajectory", heads, "--loop", *errors], change, True)
+    return Scene("mesh", [*arguments, *errors], change, True, heads)
 
 
 def julia(options):
