@@ -109,7 +109,7 @@ void Encoder::put(const geometry::Camera& c) {
            double(c.height)});
 }
 
-// Whole microseconds since the moment before that is known: most differences take three bytes, and what is not known one.
+// Whole microseconds since the moment before that is known: most differences take three bytes, what is not known one.
 void Encoder::put(const Moments& m) {
   begin_array(std::size(kMoments));
   int64_t before = 0;
