@@ -138,7 +138,7 @@ TEST_P(ReplicaCheck, HoldsIdenticalClustersAfter2000RandomEvents) {
       auto event = core.submit(waiting.back(), now_s);
       waiting.pop_back();
       ASSERT_TRUE(event.ok()) << event.error().text;
-      if (event->has_value()) publish(**event);
+      if (event->has_value() && (*event)->is_told()) publish(**event);
       for (const auto& forget : core.forget_superseded()) publish(forget);
     }
     bring_up_to_date();
@@ -185,7 +185,7 @@ TEST_P(ReplicaResume, FromEverySequence) {
     const double now_s = static_cast<double>(frame);
     for (auto& tile :
          test::sampled_frame({frame}, test::scene_camera(test::random_eye(random), 96, 64), 48, core.epoch()))
-      events.push_back(**core.submit(std::move(tile), now_s));
+      if (const packer::Event event = **core.submit(std::move(tile), now_s); event.is_told()) events.push_back(event);
     std::vector<points::ClusterKey> seen;
     for (const auto& [key, cluster] : core.model().clusters())
       if (random() % 2) seen.push_back(key);

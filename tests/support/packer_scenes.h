@@ -41,6 +41,7 @@ class Replica {
   explicit Replica(const points::ModelConfig& config) : model_(config) {}
 
   void apply(const packer::Event& event) {
+    if (!event.is_told()) return;
     CHECK(applied_ < event.sequence);
     applied_ = event.sequence;
     if (event.kind == packer::Event::Kind::kEpoch) model_.clear(), bounded_.clear();

@@ -14,7 +14,7 @@ namespace telesplat::metrics {
 /// gives percentiles to half a percent of their value. Count, sum and greatest value are exact always.
 class Quantiles {
  public:
-  static constexpr size_t kExact = 32768;  ///< values that are kept as they are
+  static constexpr size_t kExact = 8192;  ///< values that are kept as they are
 
   /// Values that are not finite are left out.
   void add(double value);

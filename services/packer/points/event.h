@@ -15,9 +15,10 @@ inline constexpr size_t kMaxForgetKeys = 1u << 16;
 
 /// Its FramePart is a patch's; of other events only the epoch counts.
 struct Event : FramePart {
+  bool is_told() const { return sequence.value != 0; }
   enum class Kind { kPatch, kForget, kEpoch, kRefine };
 
-  Sequence sequence;
+  Sequence sequence;  ///< none: nobody need hear of it, and replicas are equal without
   Kind kind = Kind::kPatch;
 
   // kPatch
@@ -33,6 +34,7 @@ struct Event : FramePart {
   geometry::Rect missed_rect{0, 0, 1, 1};
   /// Covered pixels of this tile, before and after elimination.
   uint64_t samples = 0, kept = 0;
+  uint64_t untold_samples = 0;  ///< of its frame's tiles that nobody was told of, since the last one that was told
   /// The sums over the frame's tiles so far: elimination = 1 - kept / samples.
   uint64_t frame_samples = 0, frame_kept = 0;
 

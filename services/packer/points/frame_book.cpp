@@ -38,7 +38,7 @@ Status FrameBook::check(const FramePart& tile) const {
   return ok_status();
 }
 
-FrameBook::Frame FrameBook::add(const FramePart& tile, const splat::Elimination& elimination) {
+FrameBook::Frame FrameBook::add(const FramePart& tile, const splat::Elimination& elimination, bool missed) {
   if (!find(tile.frame)) {
     if (open_.size() == kMaxOpenFrames) open_.pop_front();
     open_.push_back({tile.frame, tile.camera, std::vector<bool>(tile.tiles_in_frame), tile.tiles_in_frame});
@@ -49,8 +49,12 @@ FrameBook::Frame FrameBook::add(const FramePart& tile, const splat::Elimination&
   if (tile.left_out > 0) at->tiles_left = 0;
   at->samples += elimination.samples;
   at->kept += elimination.kept;
+  at->untold += elimination.samples;
 
   Frame frame = *at;
+  const bool completes = frame.tiles_left == 0 && !tile.extra;
+  frame.nothing_new = elimination.kept == 0 && !missed && !completes;
+  if (!frame.nothing_new) at->untold = 0;
   if (frame.tiles_left == 0) {
     open_.erase(at);
     finished_.push_back(frame.id);

@@ -25,6 +25,9 @@ class FrameBook {
     std::vector<bool> has_tile;
     uint32_t tiles_left = 0;
     uint64_t samples = 0, kept = 0;
+    uint64_t untold = 0;  ///< samples of tiles that nobody was told of
+    /// Of add(): the tile leaves viewers nothing to do, and completes nothing that they wait for.
+    bool nothing_new = false;
   };
 
   /// Of a frame, what was not packed yet.
@@ -39,9 +42,9 @@ class FrameBook {
   /// Refuses a tile whose frame was said to have another camera or another number of tiles.
   Status check(const FramePart& tile) const;
   /// Notes the tile as packed, and its frame as finished if it leaves out others. Returns its frame as it is then;
-  /// finished and forgotten if tiles_left is 0.
+  /// finished and forgotten if tiles_left is 0. missed: viewers are to know of rays of the tile that met nothing.
   /// Preconditions: not a duplicate, checked, tile < tiles_in_frame.
-  Frame add(const FramePart& tile, const splat::Elimination& elimination);
+  Frame add(const FramePart& tile, const splat::Elimination& elimination, bool missed);
   void clear();
 
  private:

@@ -193,23 +193,46 @@ struct PackerCore::Impl {
     event.refines = of;
     event.blob = std::move(next->second.stream);
     model.commit(points::plan_refinement(
-        model, points::prepare_refinement(config.model, event.sequence, of, patch.camera, patch.rect, *bounded, *exact)));
+        model,
+        points::prepare_refinement(config.model, event.sequence, of, patch.camera, patch.rect, *bounded, *exact)));
     log.add_refinement(event);
     ++statistics.patches_refined;
     statistics.bytes_refined += event.blob->size();
     return event;
   }
 
+  // Of a tile that viewers need not hear of: more than a third of all, where most is known.
+  Event untold(const SampledTile& tile, const splat::Elimination& elimination, const FrameBook::Frame& frame) {
+    static const auto nothing = std::make_shared<const std::vector<uint8_t>>();
+    Event event;
+    static_cast<FramePart&>(event) = tile;
+    event.rect = {tile.rect.x, tile.rect.y, 1, 1};
+    event.blob = nothing;
+    event.frame_complete = frame.tiles_left == 0;
+    event.samples = elimination.samples;
+    event.frame_samples = frame.samples, event.frame_kept = frame.kept;
+    ++statistics.tiles, ++statistics.tiles_untold;
+    statistics.frames_complete += event.frame_complete;
+    statistics.samples += event.samples;
+    return event;
+  }
+
   Event pack(SampledTile& tile, double now_s, Stream stream, const std::function<void(const Event&)>& publish,
              const std::optional<KnownReference>& known) {
     const splat::Elimination elimination = eliminate(tile, known);
+    const FrameBook::Frame frame = frames.add(tile, elimination, tile.missed.width() > 0);
+    if (frame.nothing_new) {
+      Event event = untold(tile, elimination, frame);
+      if (publish) publish(event);
+      return event;
+    }
     Event event = next_event(Event::Kind::kPatch);
-    const FrameBook::Frame frame = frames.add(tile, elimination);
     if (tile.missed.width() > 0) event.missed = codec::encode_mask(tile.missed), event.missed_rect = tile.rect;
     if (!keeps()) crop_to_kept(tile);
     static_cast<FramePart&>(event) = tile;
     event.frame_complete = frame.tiles_left == 0;
     event.samples = elimination.samples, event.kept = elimination.kept;
+    event.untold_samples = frame.untold - elimination.samples;
     event.frame_samples = frame.samples, event.frame_kept = frame.kept;
     const image::DepthImage exact = code(event, tile, keeps() ? std::move(stream) : nullptr);
     if (publish) publish(event);

@@ -11,12 +11,12 @@
 #include "common/core/result.h"
 #include "common/points/point_model.h"
 #include "common/splat/reference_depth.h"
+#include "services/packer/points/errors/allowed_errors.h"
 #include "services/packer/points/event.h"
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/known_reference.h"
 #include "services/packer/points/model_watcher.h"
 #include "services/packer/points/sampled_tile.h"
-#include "services/packer/points/errors/allowed_errors.h"
 
 namespace telesplat::packer {
 
@@ -46,6 +46,7 @@ struct Config {
 
 struct Statistics {
   uint64_t tiles = 0;              ///< packed
+  uint64_t tiles_untold = 0;       ///< of these, told nobody: Event::is_told()
   uint64_t tiles_duplicate = 0;    ///< dropped: had that tile of that frame already
   uint64_t tiles_other_epoch = 0;  ///< dropped: sampled from another version of the data set
   uint64_t tiles_refused = 0;      ///< dropped: contradict themselves or their frame
@@ -76,7 +77,7 @@ class PackerCore {
   ~PackerCore();
 
   /// Packs a tile: eliminates what the model shows, inserts the rest, returns the event to publish. A tile of which
-  /// nothing is left is an event too (of no points), so that viewers can tell when a frame is complete. Nothing: the
+  /// nothing is left is an event too: it is told (of no points) if it completes a frame. Nothing: the
   /// tile was dropped and counted (duplicate, other epoch). Error: camera, rectangle, image or frame do not fit
   /// together; dropped and counted. now_s: any steady clock; the same one in all calls.
   ///   stream: codec stream of the tile's image, or null. Where everything is kept it is published as it is; otherwise,

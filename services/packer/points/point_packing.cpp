@@ -105,7 +105,7 @@ void with_message(InstanceId packer, const Event& e, const wire::Moments& moment
                               .extra = e.extra,
                               .frame_complete = e.frame_complete,
                               .left_out = e.left_out,
-                              .samples = e.samples,
+                              .samples = e.samples + e.untold_samples,
                               .kept = e.kept,
                               .camera = e.camera,
                               .rect = e.rect,
@@ -242,8 +242,11 @@ Status PointPacking::pack_block(SampledTile block, bool whole, std::shared_ptr<c
   // What a block gives is counted to the tile that completed it.
   const auto announce = [&](const Event& event) {
     // Taken before it is sent: a viewer may have it in its replica before the send returns.
-    done.moments.packed_s = done.moments.published_s = outlets_.master_now();
-    publish(event, done.moments);
+    done.moments.packed_s = outlets_.master_now();
+    if (event.is_told()) {
+      done.moments.published_s = done.moments.packed_s;
+      publish(event, done.moments);
+    }
     if (event.kept > 0) points_came_s_ = now_s;
     if (core_->redundancy() == Redundancy::kEliminate) done.kept = event.kept;
     done.depth_error_m = event.bounds.depth / 4294967296.0 * event.farthest_m;
@@ -493,6 +496,7 @@ void PointPacking::add_status(net::MasterLink::Values& values) const {
                  {"log_bytes", double(core_->log_bytes())},
                  {"sequence", double(core_->sequence().value)},
                  {"tiles", double(g.tiles)},
+                 {"tiles_untold", double(s.tiles_untold)},
                  {"tiles_duplicate", double(s.tiles_duplicate + g.tiles_duplicate + duplicates_)},
                  {"tiles_other_epoch", double(s.tiles_other_epoch + other_epoch_ + ahead_.dropped())},
                  {"tiles_refused", double(refused_)},

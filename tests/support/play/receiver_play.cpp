@@ -167,6 +167,7 @@ class ReceiverPlay {
       const auto event = core.submit(std::move(t), double(frame));
       CHECK(event.ok() && event->has_value());
       const packer::Event& e = **event;
+      if (!e.is_told()) continue;
       wire::Patch p{.packer = kHonest, .sequence = e.sequence, .epoch = e.epoch, .frame = e.frame, .tiles_in_frame = 1};
       p.frame_complete = e.frame_complete, p.camera = e.camera, p.rect = e.rect,
       p.image = std::as_bytes(std::span(*e.blob));

@@ -45,10 +45,12 @@ TEST(PackerCore, AFrameBecomesEventsOfEveryTile) {
   const auto tiles = sampled_frame({1}, camera(), 64);
   const std::vector<Event> events = submit_all(core, tiles);
   ASSERT_EQ(events.size(), tiles.size());
-  uint64_t samples = 0;
+  uint64_t samples = 0, told = 0, told_samples = 0;
   for (size_t i = 0; i < events.size(); ++i) {
     const Event& e = events[i];
-    EXPECT_EQ(e.sequence.value, i + 1);
+    EXPECT_EQ(e.is_told(), e.kept > 0 || e.frame_complete) << "who waits for points, or for the frame, hears of it";
+    if (e.is_told()) EXPECT_EQ(e.sequence.value, ++told);
+    if (e.is_told()) told_samples += e.samples + e.untold_samples;
     EXPECT_EQ(e.kind, Event::Kind::kPatch);
     EXPECT_EQ(e.tile, i);
     EXPECT_TRUE(geometry::contains(tiles[i].rect, e.rect));
@@ -68,10 +70,14 @@ TEST(PackerCore, AFrameBecomesEventsOfEveryTile) {
   uint64_t expected = 0;
   for (const auto& t : tiles) expected += covered(t);
   EXPECT_EQ(samples, expected);
+  EXPECT_EQ(told_samples, expected);
+  EXPECT_LT(told, tiles.size()) << "of this view some tiles hold nothing";
   EXPECT_GT(core.model().points(), samples * 99 / 100);
   EXPECT_EQ(core.model().points(), core.statistics().kept);
   EXPECT_EQ(core.statistics().frames_complete, 1u);
-  EXPECT_EQ(core.sequence().value, tiles.size());
+  EXPECT_EQ(core.sequence().value, told);
+  EXPECT_EQ(core.statistics().tiles, tiles.size());
+  EXPECT_EQ(core.statistics().tiles_untold, tiles.size() - told);
 }
 
 // All points, wherever they are.

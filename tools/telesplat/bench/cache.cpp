@@ -210,7 +210,7 @@ class CacheBench {
       if (!event) return event.error();
       const double packed = monotonic_s();
       minute.pack_ms += (packed - begin) * 1e3;
-      if (!*event) continue;
+      if (!*event || !(*event)->is_told()) continue;
       auto decoded = codec::decode(*(*event)->blob);
       if (!decoded) return decoded.error();
       cache_.insert(points::prepare_patch(config_, (*event)->sequence, camera, rect, *decoded, FrameId{frames_}),

@@ -210,6 +210,7 @@ void SteeredSession::note_cast(const geometry::Rect& rect, const image::PixelMas
 Status SteeredSession::insert(const packer::Event& event, ViewCost& cost) {
   cost.samples += event.samples, cost.kept += event.kept,
       cost.sent_bytes += event.blob->size() + 4 * event.missed.size();
+  if (!event.is_told()) return ok_status();
   return timed(cost.insert_cpu_ms, [&]() -> Status {
     auto decoded = codec::decode(*event.blob);
     if (!decoded) return decoded.error();
