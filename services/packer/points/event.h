@@ -15,6 +15,7 @@ inline constexpr size_t kMaxForgetKeys = 1u << 16;
 
 /// Its FramePart is a patch's; of other events only the epoch counts.
 struct Event : FramePart {
+  /// Whether it has a sequence, and viewers are to hear of it.
   bool is_told() const { return sequence.value != 0; }
   enum class Kind { kPatch, kForget, kEpoch, kRefine };
 
