@@ -16,13 +16,17 @@ bool holds(const std::string& text, const std::string& part) { return text.find(
 constexpr const char* kScript = R"(
 import fcntl, os, pty, select, signal, struct, sys, termios, time
 binary, master, ending = sys.argv[1:]
-pid, fd = pty.fork()
+fd, terminal = pty.openpty()
+def size(columns, lines):
+    fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+size(80, 30)
+before = termios.tcgetattr(terminal)
+pid = os.fork()
 if pid == 0:
+    os.login_tty(terminal)
     os.environ["TERM"] = "xterm-256color"
     os.environ["LC_ALL"] = "C.UTF-8"
     os.execv(binary, [binary, "top", "--master", master])
-def size(columns, lines):
-    fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
 seen = b""
 def until(text, seconds=20):
     global seen
@@ -35,8 +39,6 @@ def until(text, seconds=20):
             if not more: break
             seen += more
     seen = seen[seen.find(text) + len(text):] if text in seen else b""
-size(80, 30)
-before = termios.tcgetattr(fd)
 until(b"\x1b[?1049h")                      # the other screen
 until(b"terrain.ply")
 until(b"viewer-1")
@@ -50,12 +52,12 @@ elif ending == "ctrl-c": os.write(fd, b"\x03")
 else: os.system(f"{binary} ctl stop --master {master} > /dev/null")
 until(b"\x1b[?1049l")                      # the screen that was there before
 if ending == "stop": until(b"the session has ended")
-after = termios.tcgetattr(fd)
-if before[3] != after[3]: print("the terminal is not as it was"); sys.exit(100)
 end = time.monotonic() + 20
-while time.monotonic() < end:
+while time.monotonic() < end:              # its modes are set back after the screen, so they are looked at last
     done, status = os.waitpid(pid, os.WNOHANG)
-    if done: sys.exit(os.waitstatus_to_exitcode(status) % 256)
+    if done:
+        if before != termios.tcgetattr(terminal): print("the terminal is not as it was"); sys.exit(100)
+        sys.exit(os.waitstatus_to_exitcode(status) % 256)
     time.sleep(0.02)
 os.kill(pid, signal.SIGKILL)
 print("it does not end")
