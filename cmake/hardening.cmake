@@ -45,10 +45,10 @@ function(telesplat_kernels)
   endforeach()
 endfunction()
 
-# telesplat_margins(NAME)   the library's rows have pixels before the first: row[x - 1] where x, which has no sign, is 0
+# telesplat_margins(TARGET)   its rows have pixels before the first: row[x - 1] where x, which has no sign, is 0
 #   The sum is right, as numbers of the machine wrap around; AddressSanitizer sees where it leads.
-function(telesplat_margins name)
+function(telesplat_margins target)
   if(TELESPLAT_SANITIZE MATCHES undefined)
-    target_compile_options(telesplat_${name} PRIVATE -fno-sanitize=pointer-overflow)
+    target_compile_options(${target} PRIVATE -fno-sanitize=pointer-overflow)
   endif()
 endfunction()
