@@ -64,7 +64,7 @@ int channel_distance(uint32_t a, uint32_t b) {
   return d;
 }
 
-Difference compare(const DepthImage& a, const DepthImage& b) {
+Difference compare(const DepthImage& a, const DepthImage& b, int64_t codes = 8) {
   Difference d;
   for (size_t i = 0; i < a.pixels(); ++i) {
     if (a.depth[i] == 0 && b.depth[i] == 0) continue;
@@ -73,7 +73,7 @@ Difference compare(const DepthImage& a, const DepthImage& b) {
       ++d.coverage;
       continue;
     }
-    d.depth += std::abs(int64_t(a.depth[i]) - int64_t(b.depth[i])) > 8;
+    d.depth += std::abs(int64_t(a.depth[i]) - int64_t(b.depth[i])) > codes;
     d.colour += channel_distance(a.colour[i], b.colour[i]) > 1;
     d.normal += glm::dot(image::decode_normal16(a.normal[i]), image::decode_normal16(b.normal[i])) < 0.999f;
   }
@@ -92,12 +92,12 @@ class RaysAndRaster : public testing::Test {
     ASSERT_TRUE(raster_->add_chunks(chunks).ok());
   }
   // Differences summed over cameras; `allowed` is the fraction of covered pixels that may differ: those that edges
-  // cross.
-  void expect_agreement(const std::vector<Camera>& views, double allowed) {
+  // cross. codes: of depth, that make no difference.
+  void expect_agreement(const std::vector<Camera>& views, double allowed, int64_t codes = 8) {
     Difference sum;
     for (const Camera& c : views) {
       const geometry::Rect whole{0, 0, c.width, c.height};
-      const Difference d = compare(ray_->sample(c, whole), raster_->sample(c, whole));
+      const Difference d = compare(ray_->sample(c, whole), raster_->sample(c, whole), codes);
       sum.covered += d.covered, sum.coverage += d.coverage, sum.depth += d.depth, sum.colour += d.colour,
           sum.normal += d.normal;
     }
@@ -169,7 +169,8 @@ TEST_F(RaysAndRaster, AgreeInsideTheSceneWhereTheNearPlaneCuts) {
   std::vector<Camera> views;
   for (int i = 0; i < 4; ++i)
     views.push_back(geometry::make_camera(geometry::look_at({0.05 * i, 0.02, 0}, {1, 0.1 * i, 1}), 90, 320, 200, 0.05));
-  expect_agreement(views, 3e-3);
+  // A triangle that is near and seen from its edge: what is rounded counts a hundred times.
+  expect_agreement(views, 3e-3, 64);
 }
 
 TEST_F(RaysAndRaster, RasterTilesAreThePartsOfItsFrame) {

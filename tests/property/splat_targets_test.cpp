@@ -109,7 +109,9 @@ TEST(SplatTargetList, HoldsSeveral) {
   EXPECT_GE(kTargets.size(), testing::kLeastTargets) << "nothing to compare on this machine";
   for (int64_t target : kTargets) {
     const OnTarget on(target);
+#ifndef TELESPLAT_SANITIZED  // kernels alone are compiled for a newer machine then
     EXPECT_STREQ(splat::kernel_target(), hwy::TargetName(target));
+#endif
   }
 }
 
