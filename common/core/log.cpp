@@ -5,8 +5,12 @@
 
 #include <string_view>
 
+#include "common/core/utf8.h"
+
 namespace telesplat::log {
 namespace {
+
+constexpr size_t kMostOfLine = 4096;
 
 spdlog::level::level_enum library_level(Level level) {
   constexpr spdlog::level::level_enum kLevels[] = {spdlog::level::debug, spdlog::level::info, spdlog::level::warn,
@@ -28,7 +32,7 @@ void initialise(const std::string& service, const std::string& level) {
 void write(Level level, fmt::string_view format, fmt::format_args arguments) {
   spdlog::logger* logger = spdlog::default_logger_raw();
   if (!logger->should_log(library_level(level))) return;
-  const std::string line = fmt::vformat(format, arguments);
+  const std::string line = printable(fmt::vformat(format, arguments), kMostOfLine);
   logger->log(library_level(level), std::string_view(line));
 }
 

@@ -12,7 +12,8 @@ enum class Level { kDebug, kInfo, kWarn, kError };
 /// Names this process in every line. level: trace, debug, info, warn, error, off.
 void initialise(const std::string& service, const std::string& level);
 
-/// Writes one line if `level` is switched on; formats it only then. Any thread.
+/// Writes one line if `level` is switched on; formats it only then. Any thread. What others said may be in it: control
+/// characters and what is not UTF-8 become U+FFFD, and it ends after 4096 bytes.
 void write(Level level, fmt::string_view format, fmt::format_args arguments);
 
 // Formats are checked against their arguments when the caller is compiled.

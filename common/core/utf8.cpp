@@ -1,5 +1,6 @@
 #include "common/core/utf8.h"
 
+#include <algorithm>
 #include <cstddef>
 
 namespace telesplat {
@@ -70,6 +71,17 @@ std::string printable(std::string_view text, size_t most) {
     i += bytes;
   }
   return cut ? out + "..." : out;
+}
+
+std::string printable_lines(std::string_view text) {
+  std::string out;
+  for (;;) {
+    const size_t end = std::min(text.find('\n'), text.size());
+    out += printable(text.substr(0, end), text.size());
+    if (end == text.size()) return out;
+    out += '\n';
+    text.remove_prefix(end + 1);
+  }
 }
 
 }  // namespace telesplat

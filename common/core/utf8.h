@@ -19,4 +19,7 @@ std::string to_utf8(std::string_view text);
 /// most, the last of which are then "...".
 std::string printable(std::string_view text, size_t most = 256);
 
+/// The same of text of several lines, whole: line feeds stay.
+std::string printable_lines(std::string_view text);
+
 }  // namespace telesplat

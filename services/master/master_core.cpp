@@ -8,6 +8,7 @@
 
 #include "common/core/log.h"
 #include "common/core/utf8.h"
+#include "common/metrics/tables/viewer_tables.h"
 #include "common/scene/session.h"
 #include "services/master/peers/hello_check.h"
 
@@ -16,6 +17,7 @@ namespace {
 
 constexpr size_t kMaxDeparted = 1024;  // processes that left and are remembered
 constexpr size_t kMaxWalls = 64;
+constexpr size_t kMostOfTableName = 32;  // in messages
 constexpr double kCatchUp_s = 0.5;      // after this process stood still, until all that has come is read
 constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
 constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
@@ -293,6 +295,9 @@ void MasterCore::lose(Peer& p, const std::string& routing_id, const char* why, b
 Status MasterCore::on(const std::string& peer, const wire::MetricRows& m, double now_s) {
   Peer* p = known(peer, now_s);
   if (!p) return ok_status();
+  if (m.table != "spans" && (p->hello.role != "viewer" || m.columns != metrics::viewer_columns(m.table)))
+    return Error{fmt::format("table {} of a {}: its columns are not those that viewers tell",
+                             to_utf8(m.table.substr(0, kMostOfTableName)), p->hello.role)};
   Status added = record_.add_rows(p->process, m);
   if (added) live_.add_rows(p->hello.name, m);
   return added;

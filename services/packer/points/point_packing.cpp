@@ -356,20 +356,23 @@ void PointPacking::take_state(net::Socket& from, const net::Message& message, do
     else if constexpr (std::is_same_v<M, wire::AccessReport>)
       core_->accessed(m.clusters, now_s, m.frames);
     else
-      answer(m, message.peer);
+      answer(m, message.peer, now_s);
   });
 }
 
-void PointPacking::answer(const wire::StateRequest& request, const std::string& peer) {
+void PointPacking::answer(const wire::StateRequest& request, const std::string& peer, double now_s) {
   const Sequence after = request.packer == instance_ ? request.after : Sequence{};
-  if (after > core_->sequence() || !core_->remembers(after)) {
+  const bool known = after <= core_->sequence() && core_->remembers(after);
+  const bool follows = request.packer == instance_ || request.packer.value == 0;
+  if (known && answers_.goes_on(peer, request.viewer, after, follows && !request.anew)) return;
+  if (!beginnings_.admit(peer, now_s)) return;  // it takes a look at all events; whoever it is asks again
+  if (!known) {
     // A mark of a packer that the viewer does not know: it then asks for everything.
     answers_.drop(peer);
     outlets_.send(wire::StateMark{.packer = net::make_instance_id(), .epoch = core_->epoch()}, peer);
-    return log::info("a viewer that stopped after {} starts anew", after.value);
+    if (told_of_viewers_.allow(now_s)) log::info("a viewer that stopped after {} starts anew", after.value);
+    return;
   }
-  const bool follows = request.packer == instance_ || request.packer.value == 0;
-  if (answers_.goes_on(peer, request.viewer, after, follows && !request.anew)) return;
   if (!outlets_.send(wire::StateBegin{instance_, after}, peer)) return;
   StateAnswers::Answer answer{.viewer = request.viewer, .left = core_->replay(after), .mark = mark(true)};
   completions_.fill(answer.left.others, request.viewer, after);
@@ -389,7 +392,8 @@ void PointPacking::send_answers() {
                 [&](const std::string& peer, const StateAnswers::Answer& answer) {
                   if (!outlets_.send(answer.mark, peer)) return false;
                   meter_.replayed(answer.viewer);
-                  log::info("a viewer caught up: {} events up to {}", answer.events, answer.mark.sequence.value);
+                  if (told_of_viewers_.allow(monotonic_s()))
+                    log::info("a viewer caught up: {} events up to {}", answer.events, answer.mark.sequence.value);
                   return true;
                 },
                 size_on_wire);
@@ -487,6 +491,7 @@ void PointPacking::tick(double now_s) {
 
 void PointPacking::add_status(net::MasterLink::Values& values) const {
   values["bytes_sent"] += double(bytes_sent_);
+  values["messages_refused"] += double(beginnings_.refused());
   values[metrics::kRecordFailed] = double(records_failed_);
   if (!core_) return;
   const auto& s = core_->statistics();

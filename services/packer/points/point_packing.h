@@ -5,8 +5,10 @@
 #include <array>
 #include <optional>
 
+#include "common/core/log.h"
 #include "common/metrics/process.h"
 #include "common/metrics/recorder.h"
+#include "common/net/connections/peer_rates.h"
 #include "services/packer/epoch_hold.h"
 #include "services/packer/packing.h"
 #include "services/packer/points/block_gatherer.h"
@@ -26,6 +28,8 @@ class PointPacking final : public Packing {
   /// Between two marks that tell the model's digest, by which viewers see that they hold the same, at least; and how
   /// much of the time digests may take.
   static constexpr double kDigestPeriod_s = 2.0, kDigestShare = 0.002;
+  /// Answers to state requests that begin a second, of a connection; twice as many after a quiet time.
+  static constexpr double kBeginnings_s = 8;
   static constexpr double kForgetPeriod_s = 1.0;  ///< between two looks for what is obsolete
   /// Of links that carry less, --depth-error and the others are auto's; an eighth more, and they are not any more.
   static constexpr double kSlowLink_bytes_s = 5e6;
@@ -86,7 +90,7 @@ class PointPacking final : public Packing {
   /// To the master: taken in, but not published with this tile.
   void tell_taken(wire::TileDone& done);
   void record(const SampledTile& block);
-  void answer(const wire::StateRequest& request, const std::string& peer);
+  void answer(const wire::StateRequest& request, const std::string& peer, double now_s);
   void send_answers();
   void on_receipt(const wire::Receipt& receipt, const std::string& peer, double now_s);
   void publish(const Event& event, const wire::Moments& moments = {});
@@ -116,6 +120,8 @@ class PointPacking final : public Packing {
   EpochHold<Received> ahead_;
   LinkMeter meter_;  // of the viewers' links
   StateAnswers answers_;
+  net::PeerRates beginnings_{kBeginnings_s};  // of answers
+  log::RateLimiter told_of_viewers_;
   Completions completions_;
   uint64_t bytes_sent_ = 0, duplicates_ = 0, other_epoch_ = 0, refused_ = 0, unsealed_ = 0;
   uint64_t records_failed_ = 0;  // of depth images and plans

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "common/core/log.h"
+
 namespace telesplat {
 namespace {
 
@@ -97,6 +101,27 @@ TEST(Printable, HasNothingThatSteersATerminal) {
   EXPECT_EQ(printable("\xff"), gone);
   EXPECT_EQ(printable(std::string(300, 'x')), std::string(253, 'x') + "...");
   EXPECT_TRUE(valid_utf8(printable("xxxxxx\xc3\xa9xxxxxx", 10)));
+}
+
+TEST(Printable, LinesKeepTheirFeedsAndNothingThatSteersATerminal) {
+  EXPECT_EQ(printable_lines("one\ntwo\n"), "one\ntwo\n");
+  EXPECT_EQ(printable_lines(""), "");
+  EXPECT_EQ(printable_lines("\x1b[2J\r\n\tx"), "\xef\xbf\xbd[2J\xef\xbf\xbd\n\xef\xbf\xbdx");
+  const std::string longer(5000, 'a');
+  EXPECT_EQ(printable_lines(longer + "\n" + longer), longer + "\n" + longer);
+}
+
+// What peers said is in many lines of logs.
+TEST(Log, ALineIsOneLineWhateverIsInIt) {
+  testing::internal::CaptureStderr();
+  log::initialise("printable", "info");
+  log::warn("it said: {}", "\x1b[2J\n12:00:00 master error forged \xff" + std::string(10000, 'a'));
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
+  EXPECT_EQ(said.find('\x1b'), std::string::npos);
+  EXPECT_TRUE(valid_utf8(said));
+  EXPECT_NE(said.find("forged"), std::string::npos);
+  EXPECT_LT(said.size(), 4200u);
 }
 
 }  // namespace

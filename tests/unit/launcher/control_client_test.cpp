@@ -97,5 +97,14 @@ TEST(ControlClient, AStatusThatWasRequestedIsNoAnswerToAnOrder) {
   EXPECT_EQ(status->value("n", 0), 1);
 }
 
+// Refusals come from viewers and data servers, too, and are printed.
+TEST(ControlClient, AnswersDoNotSteerATerminal) {
+  SlowMaster master;
+  ControlClient client(master.endpoint);
+  const auto answer = client.ask("\x1b]0;title\x07\nmore", kLong_s);
+  ASSERT_TRUE(answer) << answer.error().text;
+  EXPECT_EQ(*answer, "\xef\xbf\xbd]0;title\xef\xbf\xbd\nmore");
+}
+
 }  // namespace
 }  // namespace telesplat::launcher

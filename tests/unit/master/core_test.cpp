@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/metrics/tables/viewer_tables.h"
 #include "services/master/master_core.h"
 
 namespace telesplat::master {
@@ -326,11 +327,17 @@ TEST_F(Master, ANewPackerStartsWithNewFrames) {
   EXPECT_EQ(core.counters().at("frames_completed"), 2);
 }
 
+// A row of a viewer's table.
+wire::MetricRows rows_of(const std::string& table, InstanceId viewer) {
+  const auto& columns = metrics::viewer_columns(table);
+  return {viewer, table, columns, std::vector<double>(columns.size(), 150)};
+}
+
 TEST_F(Master, LiveFiguresGoOnHoweverManyViewersCameAndLeft) {
   const auto name = [](uint64_t i) { return "viewer-" + std::to_string(i); };
   for (uint64_t i = 1; i <= 3 * LiveFigures::kMostNames; ++i) {
     core.on(name(i), hello("viewer", name(i), 100 + i), 1);
-    ASSERT_TRUE(core.on(name(i), wire::MetricRows{{100 + i}, "updates", {"latency_ms"}, {150}}, 1));
+    ASSERT_TRUE(core.on(name(i), rows_of("updates", {100 + i}), 1));
     ASSERT_TRUE(core.live().viewers().contains(name(i))) << i;
     EXPECT_LE(core.live().viewers().size(), LiveFigures::kMostNames);
     if (i > 1) core.on(name(i), wire::Goodbye{{100 + i}}, 1);
@@ -447,10 +454,17 @@ TEST_F(Master, RowsThatDoNotFitAreTheSendersFault) {
   join_all();
   wire::MetricRows rows{{5}, "no_such_table", {"a"}, {1}};
   EXPECT_FALSE(core.on("v", rows, 1));
-  rows.table = "frames";
-  EXPECT_TRUE(core.on("v", rows, 1));
-  rows.columns = {"a", "b"};
-  EXPECT_FALSE(core.on("v", rows, 1));
+  for (const char* table : {"frames", "updates", "stages"}) {
+    // Whoever is first would decide which columns there are: all others' rows would be refused.
+    EXPECT_FALSE(core.on("s1", rows_of(table, {2}), 1)) << "samplers display nothing";
+    rows.table = table;
+    rows.columns = {"a"}, rows.values = {1};
+    EXPECT_FALSE(core.on("v", rows, 1)) << table;
+    EXPECT_TRUE(core.on("v", rows_of(table, {5}), 1)) << table;
+    rows = rows_of(table, {5});
+    std::swap(rows.columns[0], rows.columns[1]);
+    EXPECT_FALSE(core.on("v", rows, 1)) << table;
+  }
 }
 
 TEST_F(Master, AFullHouseIsToldAndCounted) {

@@ -304,6 +304,34 @@ TEST_F(PointPackingTest, LateViewersAreBroughtUpToDate) {
   EXPECT_EQ(sent.size(), 2u);
 }
 
+// Each beginning looks at all events: who asks for everything again and again is no other's business.
+TEST_F(PointPackingTest, AnswersThatBeginAnewAreFewASecond) {
+  ASSERT_TRUE(packing.follow(welcome(), 0));
+  for (const int half : {0, 1}) sample(tile(1, half), 1);
+  const InstanceId packer = decoded<wire::Patch>(sent[0]).packer;
+  const auto begun = [&](const std::string& peer) {
+    return size_t(std::count_if(sent.begin(), sent.end(), [&](const Sent& s) {
+      return s.peer == peer && s.type == wire::StateBegin::kName;
+    }));
+  };
+  sent.clear();
+  constexpr size_t kMost = size_t(2 * PointPacking::kBeginnings_s);
+  for (int i = 0; i < 300; ++i) {
+    ask({}, {}, 2, "anew", 78, true);
+    ask({uint64_t(i % 2)}, packer, 2, "to and fro", 79);
+    ask({1}, packer, 2, "many", uint64_t(100 + i));
+    ask({1000}, packer, 2, "ahead", 80);
+  }
+  for (const char* peer : {"anew", "to and fro", "many"}) EXPECT_EQ(begun(peer), kMost) << peer;
+  EXPECT_EQ(size_t(std::count_if(sent.begin(), sent.end(), [](const Sent& s) { return s.peer == "ahead"; })), kMost);
+  EXPECT_EQ(status("messages_refused"), double(4 * (300 - kMost)));
+  sent.clear();
+  ask({}, {}, 2, "friend");
+  EXPECT_EQ(sent.size(), 3u) << "begin, patch, mark";
+  ask({}, {}, 3, "anew", 78, true);
+  EXPECT_EQ(begun("anew"), 1u);
+}
+
 TEST_F(PointPackingTest, MarksTellTheDigestNowAndThen) {
   ASSERT_TRUE(packing.follow(welcome(), 0));
   for (const int half : {0, 1}) sample(tile(1, half), 1);

@@ -8,6 +8,7 @@
 #include "client/viewer/coupling/update_table.h"
 #include "client/viewer/display/frame_table.h"
 #include "client/viewer/viewer_options.h"
+#include "common/metrics/tables/viewer_tables.h"
 #include "tests/support/files/own_folder.h"
 
 namespace telesplat::viewer {
@@ -159,64 +160,7 @@ TEST(Wall, HasNoMoreTilesThanItMay) {
 }
 
 TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
-  EXPECT_EQ(frame_columns(), (Texts{"frame",
-                                    "t_s",
-                                    "inter_frame_ms",
-                                    "construction_ms",
-                                    "select_ms",
-                                    "render_ms",
-                                    "project_cpu_ms",
-                                    "resolve_cpu_ms",
-                                    "fill_cpu_ms",
-                                    "smooth_cpu_ms",
-                                    "antialias_cpu_ms",
-                                    "points_selected",
-                                    "points_drawn",
-                                    "items",
-                                    "points_cached",
-                                    "sequence",
-                                    "update_age_ms",
-                                    "view_error_m",
-                                    "view_error_deg",
-                                    "px",
-                                    "py",
-                                    "pz",
-                                    "qw",
-                                    "qx",
-                                    "qy",
-                                    "qz",
-                                    "present_ms",
-                                    "detail",
-                                    "budget_ms",
-                                    "epoch",
-                                    "wait_ms",
-                                    "request",
-                                    "buffers_filled",
-                                    "summaries",
-                                    "splat",
-                                    "finish",
-                                    "lit",
-                                    "begin_s",
-                                    "refined",
-                                    "refine_ms",
-                                    "sub_pixels",
-                                    "coupling",
-                                    "buffers",
-                                    "head_light",
-                                    "background",
-                                    "wall_frame",
-                                    "swap_wait_ms",
-                                    "swap_skew_ms",
-                                    "stereo",
-                                    "screen_m",
-                                    "left_x",
-                                    "left_y",
-                                    "left_z",
-                                    "right_x",
-                                    "right_y",
-                                    "right_z",
-                                    "lead_ms",
-                                    "missed"}));
+  EXPECT_EQ(frame_columns(), metrics::viewer_columns("frames"));
   MeasuredFrame f{.number = 7, .start_s = 1, .previous_s = 2, .begin_s = 3, .end_s = 3.5, .presented_s = 3.75};
   f.drawn.chosen_s = 3.25;
   f.filled = 2;
@@ -246,10 +190,7 @@ TEST(ViewerTables, FramesHaveTheirColumnsInTheirOrder) {
 }
 
 TEST(ViewerTables, UpdatesHaveTheirColumnsInTheirOrder) {
-  EXPECT_EQ(update_columns(),
-            (Texts{"request", "frame", "requested_s", "first_s", "complete_s", "latency_ms", "start_up_ms", "tiles",
-                   "samples", "points", "bytes", "eliminated", "sampling_width", "sampling_height", "epoch",
-                   "extra_points", "extra_bytes", "left_out"}));
+  EXPECT_EQ(update_columns(), metrics::viewer_columns("updates"));
   ViewRequester::Update u;
   u.requested_s = 1, u.first_s = 1.25, u.complete_s = 1.5;
   u.samples = 100, u.points = 25, u.eliminated = 75;

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "common/metrics/tables/viewer_tables.h"
+
 namespace telesplat::viewer {
 namespace {
 
@@ -30,6 +32,7 @@ TEST(StageTable, RowsComeWhenAFrameHasShownTheirUpdate) {
   table.displayed({2}, 6.15);
   const auto rows = table.flush({1}, false);
   ASSERT_TRUE(rows);
+  EXPECT_EQ(rows->columns, metrics::viewer_columns("stages"));
   ASSERT_EQ(rows->values.size(), 2 * rows->columns.size());
   EXPECT_EQ(cell(*rows, 0, "request"), 1) << "a frame shows all updates before its own";
   EXPECT_NEAR(cell(*rows, 1, "display_ms"), 50, 1e-6);

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "common/core/utf8.h"
 #include "common/net/control.h"
 
 namespace telesplat::launcher {
@@ -45,6 +46,7 @@ Result<wire::ControlReply> ControlClient::order(const std::string& command, doub
   auto reply = net::reply_of_master(to.socket, endpoint_, command, timeout_s, arguments);
   unanswered_ = !reply.ok();
   if (reply) {
+    reply->text = printable_lines(reply->text);  // whoever said it, it may come to a terminal
     to.failed_before = to.socket.failed_connections();
     nobody_there_ = false;
   } else {
