@@ -18,9 +18,9 @@ namespace {
 constexpr size_t kMaxDeparted = 1024;  // processes that left and are remembered
 constexpr size_t kMaxWalls = 64;
 constexpr size_t kMostOfTableName = 32;  // in messages
-constexpr double kCatchUp_s = 0.5;      // after this process stood still, until all that has come is read
-constexpr double kProbeEvery_s = 0.25;  // of samplers that are overdue
-constexpr size_t kReports = 5;          // of a process, one a second: rates are of the time from the first to the last
+constexpr double kCatchUp_s = 0.5;       // after this process stood still, until all that has come is read
+constexpr double kProbeEvery_s = 0.25;   // of samplers that are overdue
+constexpr size_t kReports = 5;           // of a process, one a second: rates are of the time from the first to the last
 
 // Data servers of one volume: neither is the other's new life, whatever they are called.
 bool hold_different_parts(const wire::Hello& a, const wire::Hello& b) {

@@ -13,12 +13,12 @@
 #include "services/packer/packing.h"
 #include "services/packer/points/block_gatherer.h"
 #include "services/packer/points/depth_recorder.h"
+#include "services/packer/points/errors/still_heads.h"
 #include "services/packer/points/event_log.h"
 #include "services/packer/points/link_meter.h"
 #include "services/packer/points/packer_core.h"
 #include "services/packer/points/plan/planner.h"
 #include "services/packer/points/state_answers.h"
-#include "services/packer/points/errors/still_heads.h"
 
 namespace telesplat::packer {
 

@@ -310,9 +310,8 @@ TEST_F(PointPackingTest, AnswersThatBeginAnewAreFewASecond) {
   for (const int half : {0, 1}) sample(tile(1, half), 1);
   const InstanceId packer = decoded<wire::Patch>(sent[0]).packer;
   const auto begun = [&](const std::string& peer) {
-    return size_t(std::count_if(sent.begin(), sent.end(), [&](const Sent& s) {
-      return s.peer == peer && s.type == wire::StateBegin::kName;
-    }));
+    return size_t(std::count_if(sent.begin(), sent.end(),
+                                [&](const Sent& s) { return s.peer == peer && s.type == wire::StateBegin::kName; }));
   };
   sent.clear();
   constexpr size_t kMost = size_t(2 * PointPacking::kBeginnings_s);
