@@ -80,6 +80,7 @@ Result<CsvTable> CsvTable::read(const std::string& path, const Limits& limits) {
     const auto wrong = [&, n = ++number](const std::string& what) {
       return Error{fmt::format("{}:{}: {}", path, n, what)};
     };
+    const size_t place = begin;
     begin = end + 1;
     if (line.size() > limits.line_bytes) return wrong(fmt::format("a line of more than {} bytes", limits.line_bytes));
     size_t fields = 0;
@@ -92,7 +93,7 @@ Result<CsvTable> CsvTable::read(const std::string& path, const Limits& limits) {
     if (number == 1) continue;
     if (end == out.bytes_.size()) return wrong("the line is cut off");
     if (out.lines_.size() == limits.rows) return wrong(fmt::format("more than {} rows", limits.rows));
-    out.lines_.push_back(line);
+    out.lines_.push_back({place, line.size()});
   }
   return out;
 }
@@ -110,7 +111,7 @@ Result<size_t> CsvTable::column(std::string_view name) const {
 
 std::string CsvTable::text(size_t row, size_t column) const {
   std::string out;
-  each_field(lines_[row], [&, i = size_t{0}](const std::string& field) mutable {
+  each_field(line(row), [&, i = size_t{0}](const std::string& field) mutable {
     if (i++ == column) out = field;
     return i <= column;
   });

@@ -47,8 +47,11 @@ class CsvTable {
  private:
   std::string path_, bytes_;
   std::vector<std::string> header_;
-  std::vector<std::string_view> lines_;  // of bytes_, without the header
-  std::string_view line(size_t row) const;
+  struct Line {
+    size_t begin, size;
+  };
+  std::vector<Line> lines_;  // of bytes_, without the header; places, since short texts move with their table
+  std::string_view line(size_t row) const { return {bytes_.data() + lines_[row].begin, lines_[row].size}; }
 };
 
 }  // namespace telesplat::tools
