@@ -28,8 +28,10 @@ if(TELESPLAT_TESTS)
   target_link_libraries(telesplat_test_headers PUBLIC spdlog::spdlog fmt::fmt glm::glm GTest::gtest)
   target_compile_options(telesplat_test_headers PRIVATE ${TELESPLAT_TEST_FLAGS})
   if(TELESPLAT_PCH)
-    target_precompile_headers(telesplat_test_headers PRIVATE ${headers}/test_headers.h
-      $<$<BOOL:${TELESPLAT_SANITIZE}>:${headers}/json_headers.h>)
+    target_precompile_headers(telesplat_test_headers PRIVATE ${headers}/test_headers.h)
+    if(TELESPLAT_SANITIZE)
+      target_precompile_headers(telesplat_test_headers PRIVATE ${headers}/json_headers.h)
+    endif()
   endif()
 endif()
 
