@@ -7,11 +7,14 @@
 #include <atomic>
 #include <chrono>
 #include <cstring>
+#include <list>
+#include <memory>
 #include <mutex>
 #include <random>
 #include <set>
 #include <thread>
 #include <unordered_map>
+#include <utility>
 #include <zmq.hpp>
 
 #include "common/core/check.h"
@@ -22,6 +25,7 @@
 #include "common/net/connections/handed_over.h"
 #include "common/net/connections/lookout.h"
 #include "common/net/connections/queued_bytes.h"
+#include "common/net/connections/tunnel.h"
 #include "common/net/keys/doorkeeper.h"
 #include "common/net/local_endpoint.h"
 #include "common/net/read_ahead.h"
@@ -76,11 +80,13 @@ bool poll(std::vector<zmq::pollitem_t> items, int timeout_ms) {
 }  // namespace
 
 struct Context::Impl {
+  std::list<std::unique_ptr<Tunnel>> tunnels;  // they outlast the context, which still sends when sockets are closed
   zmq::context_t context{1};
   Access access;
   std::mutex mutex;                        // of what follows: sockets may be bound by several threads
   std::unique_ptr<Doorkeeper> doorkeeper;  // from the first socket on that binds with keys
   std::unique_ptr<Lookout> lookout;        // from the first socket on that binds
+  bool warned_of_clear = false;            // in one line, of the first
 
   Status let_in() {
     const std::lock_guard lock(mutex);
@@ -89,6 +95,18 @@ struct Context::Impl {
     if (!opened) return opened.error();
     doorkeeper = *std::move(opened);
     return ok_status();
+  }
+
+  Result<Tunnel*> open_tunnel(const std::string& proxy, const std::string& target) {
+    auto opened = Tunnel::open(proxy, target);
+    if (!opened) return opened.error();
+    const std::lock_guard lock(mutex);
+    std::erase_if(tunnels, [](const auto& t) { return t->over(); });
+    return tunnels.emplace_back(*std::move(opened)).get();
+  }
+  void retire(Tunnel& tunnel) {
+    const std::lock_guard lock(mutex);
+    tunnel.retire();
   }
 
   Lookout& watch() {
@@ -104,8 +122,6 @@ Context::~Context() = default;
 struct Socket::Impl {
   Impl(Context::Impl& home, Kind kind, std::string name, const SocketOptions& options)
       : home(home), kind(kind), name(std::move(name)), options(options), socket(home.context, zmq_type(kind)) {
-    const std::string proxy = home.access.via().proxy(std::string(options.toward));
-    if (!proxy.empty()) socket.set(zmq::sockopt::socks_proxy, proxy);
     socket.set(zmq::sockopt::sndhwm, options.high_water_mark);
     socket.set(zmq::sockopt::rcvhwm, options.high_water_mark);
     socket.set(zmq::sockopt::maxmsgsize, kind == Kind::kPub
@@ -123,6 +139,28 @@ struct Socket::Impl {
   ~Impl() {
     ahead.reset();
     if (connections) home.watch().remove(*connections);
+    if (tunnel) home.retire(*tunnel);
+  }
+
+  // Where this socket connects to in place of `endpoint`.
+  Result<std::string> way_to(const std::string& endpoint) {
+    constexpr std::string_view kTcp = "tcp://";
+    const std::string proxy = home.access.via().proxy(std::string(options.toward));
+    if (proxy.empty() || !endpoint.starts_with(kTcp)) return endpoint;
+    CHECK(!tunnel);  // sockets connect once
+    const auto opened = home.open_tunnel(proxy, endpoint.substr(kTcp.size()));
+    if (!opened) return opened.error();
+    tunnel = *opened;
+    return tunnel->endpoint();
+  }
+
+  // A proxy is the end of a tunnel, or of a link that is simulated on this machine.
+  void warn_of_clear(const std::string& endpoint) {
+    if (is_local(endpoint) || home.access.clear_allowed() || tunnel) return;
+    const std::lock_guard lock(home.mutex);
+    if (!std::exchange(home.warned_of_clear, true))
+      log::warn("{}: {} is spoken to in clear, and may be anybody: --keys encrypts (--insecure: so it is wanted)", name,
+                endpoint);
   }
 
   // Of a socket that connects: why it is not let in.
@@ -134,7 +172,9 @@ struct Socket::Impl {
       broken_off = 0;
     } else if (what & kHandshakeFailed) {
       ++failed_unseen;
-      if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
+      if (tunnel && tunnel->failed() != tunnel_failed)  // nobody is there, at the tunnel's other end
+        ++tunnel_failed, ++failed_connections;
+      else if (what == ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL)
         ++broken_off;
       else
         turned_away = what;
@@ -382,6 +422,8 @@ struct Socket::Impl {
   std::optional<Monitor> attempts;           // of one that connects, with watch_connecting
   Due due;                                   // what the thread that reads says by itself
   std::atomic<uint64_t> rejected{0}, failed_connections{0}, queue_refused{0};
+  Tunnel* tunnel = nullptr;    // of one that connects through a proxy; the context's
+  uint64_t tunnel_failed = 0;  // Tunnel::failed() that was heard of
   QueuedBytes queued{options.most_queued_bytes};
   bool guarded = false;                                   // bound with keys
   std::shared_ptr<const std::set<std::string>> may_stay;  // what the doorkeeper said last
@@ -431,7 +473,10 @@ Status Socket::connect(const std::string& endpoint) {
       if (!keys->own) return Error{fmt::format("{}: its keys are not for connecting", impl_->name)};
       identify(impl_->socket, *keys);
     }
-    impl_->socket.connect(endpoint);
+    const auto way = impl_->way_to(endpoint);
+    if (!way) return Error{fmt::format("{}: {}", impl_->name, way.error().text)};
+    if (!impl_->home.access.keys()) impl_->warn_of_clear(endpoint);
+    impl_->socket.connect(*way);
     return ok_status();
   } catch (const zmq::error_t& e) {
     return Error{fmt::format("{}: cannot connect to {}: {}", impl_->name, endpoint, e.what())};

@@ -332,6 +332,33 @@ TEST(Keys, AddressesOfOtherMachinesNeedKeysOrTheWord) {
   EXPECT_TRUE(with.bind("tcp://0.0.0.0:*").ok());
 }
 
+// Once: a process that looks for its master connects again and again.
+TEST(Keys, WhoSpeaksToOtherMachinesInClearIsWarned) {
+  log::initialise("keys", "warn");
+  const KeyFolder keys;
+  const char* const kFar = "tcp://192.0.2.1:9";
+  const auto said = [&](const net::Access& access, const char* endpoint) {
+    testing::internal::CaptureStderr();
+    {
+      Context context(access);
+      for (int times = 0; times < 2; ++times) {
+        Socket socket(context, Kind::kDealer, "viewer", {.linger_ms = 0, .toward = "data"});
+        EXPECT_TRUE(socket.connect(endpoint).ok());
+      }
+    }
+    const std::string text = testing::internal::GetCapturedStderr();
+    EXPECT_EQ(text.empty(), text.find(kFar) == text.npos) << text;
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  net::Access wanted;
+  wanted.allow_clear();
+  EXPECT_EQ(said({}, kFar), 1);
+  EXPECT_EQ(said({}, "tcp://127.0.0.1:9"), 0);
+  EXPECT_EQ(said(wanted, kFar), 0);
+  EXPECT_EQ(said(keys.of(Role::kViewer), kFar), 0);
+  EXPECT_EQ(said(*net::Via::parse({"data=127.0.0.1:9"}), kFar), 0) << "the proxy is this machine's";
+}
+
 TEST(Keys, ASocketThatIsForNothingIsNotBound) {
   const KeyFolder keys;
   Context keyed(keys.server()), viewers(keys.of(Role::kViewer));

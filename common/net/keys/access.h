@@ -21,12 +21,16 @@ class Access {
   static Result<Access> open(Via via, const std::string& folder, const std::vector<Role>& roles, bool binds = false);
 
   const Via& via() const { return via_; }
+  /// Without keys, others than this machine are spoken to in clear; that is warned of unless it is said to be wanted.
+  void allow_clear() { clear_allowed_ = true; }
+  bool clear_allowed() const { return clear_allowed_; }
   /// Null: none.
   const Keys* keys() const { return keys_.get(); }
 
  private:
   Via via_;
   std::shared_ptr<const Keys> keys_;
+  bool clear_allowed_ = false;
 };
 
 /// Whose keys programs take that only ask or tell a master, the most wanted first: `telesplat ctl`, a window's panel.

@@ -215,6 +215,37 @@ TEST(Links, AKilledRelayIsStartedAgainAndTheRunGoesOn) {
   EXPECT_TRUE(run.all_gone());
 }
 
+// It comes back at other ports; a viewer that gave up the old ones while they were refused died of it.
+TEST(Links, APackerThatIsStartedAgainIsFoundThroughTheLink) {
+  PipelineRun run({"--duration", "0", "--link", "rtt=20ms"});
+  ASSERT_TRUE(run.wait_showing()) << run.program().err();
+  const auto packer = [&] {
+    pid_t pid = 0;
+    run.wait_status([&](const auto& s) {
+      const auto p = process(s, "packer");
+      if (p.is_object() && p["alive"]) pid = p["pid"].template get<pid_t>();
+      return pid > 0;
+    });
+    return pid;
+  };
+  for (int times = 0; times < 2; ++times) {
+    const pid_t victim = packer();
+    ASSERT_GT(victim, 0);
+    ::kill(victim, SIGKILL);
+    EXPECT_TRUE(wait_until([&] {
+      const pid_t next = packer();
+      return next > 0 && next != victim;
+    }));
+    double updates = -1;
+    EXPECT_TRUE(run.wait_status([&](const auto& s) {
+      if (updates < 0) updates = value(s, "viewer-1", "updates");
+      return value(s, "viewer-1", "updates") > updates + 3;
+    })) << run.program().err();
+  }
+  ASSERT_EQ(run.stop(), 0) << run.program().err();
+  EXPECT_TRUE(run.all_gone());
+}
+
 TEST(Links, AViewerThatDoesNotReadHoldsUpNoOther) {
   PipelineRun run({"--duration", "0", "--viewers", "2", "--link", "rtt=20ms,rate=20mbit"});
   ASSERT_TRUE(run.wait_showing()) << run.program().err();

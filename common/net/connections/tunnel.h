@@ -1,0 +1,44 @@
+// A way through a SOCKS5 proxy (RFC 1928) for one socket that connects. ZeroMQ has one of its own, whose process dies
+// (4.3.4: "Bad file descriptor (src/epoll.cpp)") when a socket is closed whose last attempt the proxy did not take or
+// refused: a packer that is gone, or a relay, would end its viewers. Private to this library.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "common/core/result.h"
+
+namespace telesplat::net {
+
+class Tunnel {
+ public:
+  /// proxy, target: HOST:PORT; an IPv6 address in brackets. Nobody is connected to yet. Error: what this machine
+  /// refuses, or a name that is too long.
+  static Result<std::unique_ptr<Tunnel>> open(const std::string& proxy, const std::string& target);
+  /// Ends connections at once.
+  ~Tunnel();
+
+  /// Where the socket connects to instead, on this machine; only processes of this user are let in, one at a time.
+  /// Each connection to it becomes one to the target; it ends where that cannot be had.
+  const std::string& endpoint() const { return endpoint_; }
+  /// Connections to the target that could not be had. Any thread.
+  uint64_t failed() const { return failed_; }
+  /// Its socket is being closed: what it has still to say passes, and then the tunnel is over().
+  void retire();
+  bool over() const { return over_; }
+
+ private:
+  class Worker;
+  Tunnel() = default;
+
+  std::string endpoint_;
+  std::atomic<uint64_t> failed_ = 0;
+  std::atomic<bool> retired_ = false, stop_ = false, over_ = false;
+  int woken_ = -1;  // an eventfd: retired_ or stop_ have changed
+  std::thread thread_;
+};
+
+}  // namespace telesplat::net
