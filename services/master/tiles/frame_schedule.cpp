@@ -101,7 +101,9 @@ std::optional<wire::Lease> FrameSchedule::lease(const std::string& sampler, doub
 
 wire::Lease FrameSchedule::lease_tile(Frame& f, size_t tile, const std::string& sampler, double now_s) {
   const LeaseId id = next_lease();
-  f.tiles.lease(tile, id, sampler, now_s, now_s + lease_time_s(f.planned));
+  // One that has not finished a tile may have to fetch what it samples first, and to arrange it.
+  const double time_s = costs_.knows(sampler) ? lease_time_s(f.planned) : options().lease_timeout_s;
+  f.tiles.lease(tile, id, sampler, now_s, now_s + time_s);
   const auto& t = f.tiles.tile(tile);
   const auto mask = f.tiles.mask(t);
   return {.lease = id,

@@ -135,8 +135,8 @@ class FrameSchedule : public Views {
   uint64_t overtaken() const { return overtaken_views_; }  ///< views that ended early
   size_t viewers_remembered() const { return plans_.viewers(); }
   const SamplingCosts& costs() const { return costs_; }
-  /// Seconds after which a lease expires now: 25 typical tile times, within [0.3, lease_timeout_s]. planned: of a tile
-  /// of a plan.
+  /// Seconds after which a lease expires now: 25 typical tile times, within [0.3, lease_timeout_s]; one of a sampler
+  /// that has finished no tile after lease_timeout_s. planned: of a tile of a plan.
   double lease_time_s(bool planned = false) const;
   /// Seconds after which a tile that is out may be leased to another sampler too: 3 typical tile times, at least
   /// kLeastOverdue_s; never while nothing is known.

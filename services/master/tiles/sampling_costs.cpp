@@ -19,6 +19,11 @@ void SamplingCosts::learn(const std::string& sampler, double seconds, double pix
   all_.add(seconds, pixels);
 }
 
+bool SamplingCosts::knows(const std::string& sampler) const {
+  const auto found = samplers_.find(sampler);
+  return found != samplers_.end() && found->second.pixels > 0;
+}
+
 double SamplingCosts::pixel_s(const std::string& sampler) const {
   const auto found = samplers_.find(sampler);
   const Mean& mean = found != samplers_.end() && found->second.pixels > 0 ? found->second : all_;

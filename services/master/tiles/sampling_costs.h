@@ -18,6 +18,8 @@ class SamplingCosts {
   /// Seconds a pixel: mean of the sampler's last ten tiles or so, weighted by pixels; while it has none that of all; 0
   /// if nothing is known.
   double pixel_s(const std::string& sampler) const;
+  /// The sampler has finished tiles.
+  bool knows(const std::string& sampler) const;
 
  private:
   struct Mean {

@@ -127,21 +127,28 @@ Sampled MeshTiles::sample(const HeldLease& held) {
   return timed([&] { return sampler_->sample(held.lease.camera, held.lease.rect, held.pixels()); });
 }
 
+// Of a lease whose chunks are not here, unless nothing has come for long.
+void MeshTiles::extend(const HeldLease& next, double now_s) {
+  const bool patient = now_s - std::max(progress_s_, next.received_s) < std::max(kPatience_s, retry_.patience_s());
+  if (!patient || now_s - last_extend_s_ <= kExtend_s) return;
+  link_.socket().send(wire::LeaseExtend{link_.instance(), next.lease.lease});
+  last_extend_s_ = now_s;
+}
+
 // Asks for the list of chunks, then for what the next tile needs, then for the rest as far as the budget goes.
 void MeshTiles::fetch(const HeldLease* next, double now_s) {
   if (!blocks_) return;
   const uint64_t failed = blocks_->failed_connections();
   broken_ |= std::exchange(failed_before_, failed) != failed;
-  if (!cache_.known()) return fetch_list(now_s);
+  if (!cache_.known()) {
+    if (next) extend(*next, now_s);
+    return fetch_list(now_s);
+  }
   if (retry_.overdue(now_s, broken_)) begin_anew();
   std::vector<ChunkId> wanted;
   if (next) {
     wanted = cache_.missing(part(next->lease));
-    const bool patient = now_s - std::max(progress_s_, next->received_s) < std::max(kPatience_s, retry_.patience_s());
-    if (!wanted.empty() && patient && now_s - last_extend_s_ > kExtend_s) {
-      link_.socket().send(wire::LeaseExtend{link_.instance(), next->lease.lease});
-      last_extend_s_ = now_s;
-    }
+    if (!wanted.empty()) extend(*next, now_s);
   }
   if (wanted.empty() && !prefetched_) {
     wanted = cache_.prefetch();

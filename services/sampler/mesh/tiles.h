@@ -45,6 +45,7 @@ class MeshTiles final : public TileSource {
   size_t missing_count() const;
   void begin_anew();
   void fetch_list(double now_s);
+  void extend(const HeldLease& next, double now_s);
   void refuse(ChunkId id, const std::string& why);
 
   std::unique_ptr<Sampler> sampler_;

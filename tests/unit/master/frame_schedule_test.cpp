@@ -167,6 +167,30 @@ TEST(FrameSchedule, LeaseTimesFollowTileTimes) {
   EXPECT_NEAR(s.lease_time_s(), 25 * 0.02, 1e-6);
 }
 
+// It has to fetch what it samples, and to arrange it: that takes longer than a tile of those who have done so.
+TEST(FrameSchedule, WhoHasFinishedNoTileHasTheLongestTime) {
+  FrameSchedule s({.tile_size = 256, .frames_in_flight = 1, .lease_timeout_s = 2});
+  double now = 0;
+  for (uint64_t i = 1; i <= 20; ++i) {
+    s.request_view(request(1, i));
+    const auto l = next(s, "a", now);
+    ASSERT_TRUE(l);
+    wire::TileDone m{.frame = l->frame, .tile = l->tile, .lease = l->lease};
+    m.rays = 256 * 128;
+    m.moments.sample_begin_s = now, m.moments.encode_end_s = now += 0.02;
+    ASSERT_TRUE(s.tile_done(m, "a", now));
+  }
+  for (const auto& [sampler, expires_s] : {std::pair{"a", 25 * 0.02}, {"new", 2.0}}) {
+    s.request_view(request(1, 100));
+    ASSERT_TRUE(next(s, sampler, now));
+    EXPECT_EQ(s.expire(now + expires_s - 0.1, kNobody), 0) << sampler;
+    EXPECT_EQ(s.expire(now + expires_s + 0.1, kNobody), 1) << sampler;
+    s.drop_frames();
+    s.forget_viewer({1});
+    now += 10;
+  }
+}
+
 TEST(FrameSchedule, TheLatestRequestOfAViewerWins) {
   FrameSchedule s({.tile_size = 256, .frames_in_flight = 1});
   for (uint64_t i = 1; i <= 5; ++i) s.request_view(request(1, i));

@@ -81,7 +81,10 @@ TEST(SamplingCosts, AreEachSamplersOwnOnceItHasSome) {
   c.join("a");
   c.join("b");
   EXPECT_EQ(c.pixel_s("a"), 0);
+  EXPECT_FALSE(c.knows("a"));
   c.learn("a", 2, 1000);
+  EXPECT_TRUE(c.knows("a"));
+  EXPECT_FALSE(c.knows("b") || c.knows("stranger"));
   EXPECT_DOUBLE_EQ(c.pixel_s("a"), 0.002);
   EXPECT_DOUBLE_EQ(c.pixel_s("b"), 0.002) << "that of all";
   for (const double bad : {0.0, -1.0, std::nan("")}) c.learn("b", bad, 1000);

@@ -148,5 +148,34 @@ TEST_F(MeshTilesTest, SlowChunksAreAskedForOnceAndFewAtATime) {
   EXPECT_EQ(asked[2], 0u);
 }
 
+class MeshLeases : public MeshTilesTest {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(master.bind("inproc://nobody"));
+    MeshTilesTest::SetUp();
+    held.received_s = now;
+    held.lease.lease = {7};
+  }
+  // How often more time was asked for in `seconds`.
+  int extended(double seconds) {
+    for (const double end = now + seconds; now < end; now += 0.05) tiles.fetch(&held, now);
+    int times = 0;
+    while (net::wait_readable({&master}, 200))
+      while (const auto message = master.receive())
+        net::dispatch<wire::LeaseExtend>(master, *message, [&](const auto& m) { times += m.lease.value == 7; });
+    return times;
+  }
+  net::Socket master{context, net::Kind::kRouter, "master"};
+  HeldLease held;
+};
+
+// Others would get its tiles while it waits for a list that an array makes late, and the master would think it dead.
+TEST_F(MeshLeases, TheListIsWaitedForLikeChunks) { EXPECT_GE(extended(2), 10); }
+
+TEST_F(MeshLeases, WhereNothingComesNoMoreTimeIsAskedFor) {
+  EXPECT_GE(extended(RetryClock::kFirst_s + 0.2), 10 * RetryClock::kFirst_s / 2);
+  EXPECT_EQ(extended(20), 0);
+}
+
 }  // namespace
 }  // namespace telesplat::sampler
