@@ -147,7 +147,7 @@ void MasterCore::replace_namesakes(const std::string& peer, const wire::Hello& m
     const bool moved = p.hello.instance == m.instance;  // to another connection
     if (!moved && (m.role == "ctl" || p.hello.name != m.name || hold_different_parts(p.hello, m))) continue;
     if (!moved && !p.gone && (here || lives_on)) {
-      if (!here && !std::exchange(told, true))
+      if (!here && !std::exchange(told, true) && gate_.may_log(now_s))
         log::warn("two processes of the role {} are called {}: give one another --name", m.role, m.name);
       continue;
     }
@@ -222,7 +222,7 @@ void MasterCore::on(const std::string& peer, const wire::Hello& m, double now_s)
     if (const Status s = adopt_scene(peer, m, now_s); !s) {
       p.refused = true;
       if (shows_ == peer) shows_.clear();
-      log::error("the scene of {} is refused: {}", m.name, s.error().text);
+      if (gate_.may_log(now_s)) log::error("the scene of {} is refused: {}", m.name, s.error().text);
     }
   wire::Welcome w = welcome(p, now_s);
   w.hello_sent_s = m.sent_s;

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <fstream>
 #include <span>
+#include <streambuf>
+#include <string>
 
 #include "common/metrics/text_file.h"
 
@@ -18,22 +20,38 @@ double number(const std::string& cell, double none = 0) {
   return cell.empty() || *end != '\0' ? none : value;
 }
 
-/// The rows of a table, one after the other. Those that are cut off or have another number of cells are left out.
+constexpr size_t kMostOfLine = 1 << 16;  // a viewer's row of all columns has 2 KiB
+
+/// The next whole line: what follows its first kMostOfLine bytes is left out. Returns the bytes that it takes with its
+/// end; 0 where none is left that has one.
+uint64_t take_line(std::istream& in, std::string& line) {
+  line.clear();
+  uint64_t bytes = 0;
+  for (std::streambuf& buffer = *in.rdbuf();; ++bytes) {
+    const int c = buffer.sbumpc();
+    if (c == std::char_traits<char>::eof()) return 0;
+    if (c == '\n') return bytes + 1;
+    if (line.size() < kMostOfLine) line += char(c);
+  }
+}
+
+/// The rows of a table, one after the other. Those that are cut off, too long or of another number of cells are left
+/// out.
 class Rows {
  public:
   Rows(const std::string& directory, Csv csv, const std::vector<Life>& lives)
       : in_(directory + "/" + file_of(csv)), csv_(csv), lives_(lives) {
     std::string line;
-    if (!std::getline(in_, line)) return;
-    columns_ = csv_cells(line);
-    at_ = line.size() + 1;
+    at_ = take_line(in_, line);
+    if (at_ > 0) columns_ = csv_cells(line);
   }
 
   bool next() {
     std::string line;
-    while (std::getline(in_, line) && !in_.eof()) {
+    for (uint64_t bytes = take_line(in_, line); bytes > 0; bytes = take_line(in_, line)) {
       while (life_ < lives_.size() && at_ >= lives_[life_].bytes[size_t(csv_)]) ++life_;
-      at_ += line.size() + 1;
+      at_ += bytes;
+      if (bytes > kMostOfLine) continue;
       cells_ = csv_cells(line);
       if (cells_.size() == columns_.size()) return true;
     }
@@ -135,7 +153,8 @@ void read_sampled(Rows tiles, Rows plans, Measured& out) {
 std::vector<std::string> header_of(const std::string& path) {
   std::ifstream in(path);
   std::string line;
-  return std::getline(in, line) && !in.eof() ? csv_cells(line) : Cells();
+  const uint64_t bytes = take_line(in, line);
+  return bytes > 0 && bytes <= kMostOfLine ? csv_cells(line) : Cells();
 }
 
 Measured read_back(const std::string& directory, const std::vector<Life>& lives) {

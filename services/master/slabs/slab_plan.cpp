@@ -33,7 +33,7 @@ Result<Adopted> SlabPlan::adopt(const wire::Hello& data, double now_s) {
       put_aside();
       partitions_.set_slices(slices);
     }
-    log::info("{} has a part of a volume; others are still missing", data.name);
+    if (log_.take(now_s)) log::info("{} has a part of a volume; others are still missing", data.name);
     return Adopted{.whole = false};
   }
   const bool begins = !std::exchange(whole_, true);
@@ -114,10 +114,10 @@ Result<Obeyed> SlabPlan::set(std::map<std::string, std::string> arguments) {
 void SlabPlan::prepare(double now_s) {
   // Slabs cut without knowing what slices weigh would be fetched in vain.
   if (!whole_ || (!volume_.weighed() && now_s - since_s_ < kWeighPatience_s)) return;
-  if (const auto made = partitions_.update(now_s)) assign(*made);
+  if (const auto made = partitions_.update(now_s)) assign(*made, now_s);
 }
 
-void SlabPlan::assign(const Partition& partition) {
+void SlabPlan::assign(const Partition& partition, double now_s) {
   const auto transfers = assignment(partition, volume_);
   const auto tell = [&](const std::string& sampler, size_t slab, SlabRange range) {
     wire::SlabAssignment m{.partition = partition.number,
@@ -143,6 +143,7 @@ void SlabPlan::assign(const Partition& partition) {
                     .end = uint64_t(t.end),
                     .bytes = t.bytes});
   links_.record.add_assignment(rows);
+  if (!log_.take(now_s)) return;
   log::info("partition {}: {} slabs, {} spare samplers, {} transfers in {} rounds", partition.number,
             partition.slabs.size(), partition.spare.size(), transfers.size(),
             transfers.empty() ? 0 : transfers.back().round + 1);

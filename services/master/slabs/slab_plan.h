@@ -1,6 +1,7 @@
 // Scenes that travel as slice images: samplers hold slabs of the volume, and each has a part in every frame.
 #pragma once
 
+#include "common/core/token_bucket.h"
 #include "services/master/plan.h"
 #include "services/master/slabs/partition.h"
 #include "services/master/slabs/scene.h"
@@ -53,14 +54,15 @@ class SlabPlan final : public Plan {
 
  private:
   Result<Obeyed> set(std::map<std::string, std::string> arguments);
-  void assign(const Partition& partition);
+  void assign(const Partition& partition, double now_s);
 
   PlanLinks links_;
   VolumeScene volume_;
   VolumeSchedule schedule_;
   SlabPartitions partitions_;
-  bool whole_ = false;  // all of the volume is known, and partitions and schedule are of it
-  double since_s_ = 0;  // since when
+  bool whole_ = false;        // all of the volume is known, and partitions and schedule are of it
+  double since_s_ = 0;        // since when
+  TokenBucket log_{10, 200};  // lines that hellos bring about: not more often than a person reads
 };
 
 }  // namespace telesplat::master

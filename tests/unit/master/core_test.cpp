@@ -1,9 +1,12 @@
 // The master without sockets and clocks: who is told what.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/core/log.h"
 #include "common/metrics/tables/viewer_tables.h"
 #include "services/master/master_core.h"
 
@@ -102,6 +105,23 @@ TEST_F(Master, WelcomesEveryoneAndAnnouncesNewEndpoints) {
   EXPECT_EQ(welcomes[1].hello_sent_s, 0);
   EXPECT_FALSE(welcomes[1].box_room.empty());
   EXPECT_EQ(welcomes[1].facts.at("scene"), "hill");
+}
+
+// Whoever reaches the port decides how often these lines would come.
+TEST_F(Master, LinesAboutWhoComesAreNotMoreThanAPersonReads) {
+  log::initialise("master", "info");
+  testing::internal::CaptureStderr();
+  for (uint64_t i = 0; i < 400; ++i) {
+    wire::Hello bad = hello("data", fmt::format("data-{}", i), 1000 + i);
+    bad.box_room = {{0, 0, 0}, {1e30, 1, 1}};
+    core.on(fmt::format("d{}", i), bad, 1);
+    core.on(fmt::format("d{}", i), wire::Goodbye{{1000 + i}}, 1);
+  }
+  for (uint64_t i = 0; i < 400; ++i)
+    core.on(i % 2 ? "a" : "b", hello("sampler", "twin", 2000 + i % 2), 1 + double(i) * 0.01);
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("the scene of data-0 is refused"), std::string::npos) << said.substr(0, 500);
+  EXPECT_LE(std::count(said.begin(), said.end(), '\n'), 200 + 4 * 10 + 1);
 }
 
 TEST_F(Master, AsksStrangersWhoTheyAre) {

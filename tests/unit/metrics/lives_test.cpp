@@ -119,6 +119,20 @@ TEST_F(Lives, ThereMayBeManyAndTheFirstMayHaveMeasuredNothing) {
   EXPECT_TRUE(json::accept(text("trace.json")));
 }
 
+// A line without an end must not fill the memory of who goes on with the record.
+TEST_F(Lives, RowsThatAreTooLongAreLeftOut) {
+  live_and_be_killed(101);
+  const std::string rows = text("frames.csv");
+  const size_t begin = rows.find('\n') + 1;
+  const std::string row = rows.substr(begin, rows.find('\n', begin) + 1 - begin);
+  append("frames.csv", "v" + std::string(100'000, 'x') + row.substr(row.find(',')));  // as many cells
+  append("frames.csv", row);
+  auto r = RunRecord::open(run, {103, 1}, {.goes_on = true});
+  ASSERT_TRUE(r.ok()) << r.error().text;
+  ASSERT_TRUE((*r)->finish({}, {}));
+  EXPECT_EQ(json::parse(text("summary.json"))["frames"], 3);
+}
+
 TEST_F(Lives, ColumnsStayThoseOfTheFirst) {
   live_and_be_killed(101);
   auto r = RunRecord::open(run, kBegin, {.goes_on = true});
