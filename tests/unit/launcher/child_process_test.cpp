@@ -9,6 +9,7 @@
 
 #include "common/core/clock.h"
 #include "tools/telesplat/run/child_process.h"
+#include "tools/telesplat/run/children/log_limit.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -49,6 +50,41 @@ TEST_F(Child, LinesAndExitCodesComeBack) {
   EXPECT_EQ(child.exit_code(), 3);
   EXPECT_EQ(log(), "trouble\n");
   EXPECT_EQ(child.name(), "child");
+}
+
+// It goes on writing where the log begins anew, and keeps what was before once.
+TEST_F(Child, ALogBeginsAnewBeforeItIsTooLarge) {
+  auto child = ChildProcess::start("child", "/bin/sh", {"-c", "echo first >&2; echo there; read go; echo second >&2"},
+                                   folder + "/child.log", 0, true);
+  ASSERT_TRUE(child);
+  const auto text = [&](const char* name) {
+    std::ifstream in(folder + "/" + name);
+    return std::string{std::istreambuf_iterator<char>(in), {}};
+  };
+  std::ofstream(folder + "/child.before.log") << "older";
+  for (const double until = monotonic_s() + 20; child->read_lines().empty() && monotonic_s() < until;) usleep(1000);
+  limit_log(folder + "/child.log", 6);
+  EXPECT_EQ(text("child.log"), "first\n");
+  limit_log(folder + "/child.log", 5);
+  child->tell("go");
+  all_lines(*child);
+  EXPECT_EQ(text("child.before.log"), "first\n");
+  EXPECT_EQ(text("child.log"), "second\n");
+}
+
+// A file of another's choice is neither emptied nor overwritten.
+TEST_F(Child, ALogThatIsALinkIsLeftAlone) {
+  std::ofstream(folder + "/others") << "of another";
+  std::filesystem::create_symlink("others", folder + "/child.log");
+  limit_log(folder + "/child.log", 5);
+  EXPECT_EQ(std::filesystem::file_size(folder + "/others"), 10u);
+  std::filesystem::remove(folder + "/child.log");
+  std::ofstream(folder + "/child.log") << "a log";
+  std::filesystem::create_symlink("others", folder + "/child.before.log");
+  limit_log(folder + "/child.log", 4);
+  EXPECT_EQ(std::filesystem::file_size(folder + "/others"), 10u);
+  EXPECT_EQ(std::filesystem::file_size(folder + "/child.before.log"), 5u);
+  EXPECT_EQ(std::filesystem::file_size(folder + "/child.log"), 0u);
 }
 
 TEST_F(Child, MuchOutputDoesNotBlockIt) {

@@ -161,6 +161,7 @@ Pipeline::State Pipeline::supervise(std::vector<std::string>& news) {
       news.push_back(s.error().text);
       return State::kFailed;
     }
+  group_.limit_logs(monotonic_s());
   int viewing = 0;
   for (Member& m : group_.members()) {
     if (m.role == "viewer" && !m.process->ended()) ++viewing;

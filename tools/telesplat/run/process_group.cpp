@@ -14,6 +14,7 @@
 #include "common/core/utf8.h"
 #include "common/net/service.h"
 #include "tools/telesplat/control/client.h"
+#include "tools/telesplat/run/children/log_limit.h"
 
 namespace telesplat::launcher {
 namespace {
@@ -108,6 +109,12 @@ std::string ProcessGroup::last_log_line(const std::string& name) const {
   while (std::getline(in, line))
     if (!line.empty()) last = line;
   return printable(last.starts_with("telesplat: ") ? last.substr(11) : last, 1000);
+}
+
+void ProcessGroup::limit_logs(double now_s) {
+  if (now_s - looked_at_logs_s_ < 1) return;
+  looked_at_logs_s_ = now_s;
+  for (const Member& m : members_) limit_log(fmt::format("{}/{}.log", log_directory_, m.name));
 }
 
 void ProcessGroup::finish() {

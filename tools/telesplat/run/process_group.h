@@ -69,6 +69,8 @@ class ProcessGroup {
   /// The last line that a process logged, without the program's name.
   std::string last_log_line(const std::string& name) const;
   const std::string& log_directory() const { return log_directory_; }
+  /// No log stays larger than kMostLogBytes. To be called now and then; looks once a second.
+  void limit_logs(double now_s);
 
   /// Ends everything: viewers first, so that their last measurements arrive, then a "stop" to the group's own master,
   /// then all others. If this process is told to stop meanwhile, at once.
@@ -78,6 +80,7 @@ class ProcessGroup {
   std::string log_directory_, log_level_, endpoint_, keys_;
   net::Access access_;
   std::deque<Member> members_;
+  double looked_at_logs_s_ = -1e9;
 };
 
 }  // namespace telesplat::launcher
