@@ -81,7 +81,7 @@ TEST(Tunnel, ATargetThatIsNotThereIsAFailedConnection) {
   EXPECT_EQ(socket.refusal().text, "");
 }
 
-// Megabytes each way; then a server of another life at the same place, and at last a message of a socket that is closed.
+// Megabytes each way; then a server of another life at the same place, and last a message of a socket that is closed.
 TEST(Tunnel, WhatIsSentComesThroughAndConnectionsAreMadeAnew) {
   const Proxy proxy;
   Context here, there(through(proxy.address()));

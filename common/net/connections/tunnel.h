@@ -1,5 +1,5 @@
 // A way through a SOCKS5 proxy (RFC 1928) for one socket that connects. ZeroMQ has one of its own, whose process dies
-// (4.3.4: "Bad file descriptor (src/epoll.cpp)") when a socket is closed whose last attempt the proxy did not take or
+// (4.3.4: "Bad file descriptor") when a socket is closed whose last attempt the proxy did not take or
 // refused: a packer that is gone, or a relay, would end its viewers. Private to this library.
 #pragma once
 
