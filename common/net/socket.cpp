@@ -97,8 +97,8 @@ struct Context::Impl {
     return ok_status();
   }
 
-  Result<Tunnel*> open_tunnel(const std::string& proxy, const std::string& target) {
-    auto opened = Tunnel::open(proxy, target);
+  Result<Tunnel*> open_tunnel(const std::string& proxy, const std::string& target, double patience_s) {
+    auto opened = Tunnel::open(proxy, target, patience_s);
     if (!opened) return opened.error();
     const std::lock_guard lock(mutex);
     std::erase_if(tunnels, [](const auto& t) { return t->over(); });
@@ -148,7 +148,7 @@ struct Socket::Impl {
     const std::string proxy = home.access.via().proxy(std::string(options.toward));
     if (proxy.empty() || !endpoint.starts_with(kTcp)) return endpoint;
     CHECK(!tunnel);  // sockets connect once
-    const auto opened = home.open_tunnel(proxy, endpoint.substr(kTcp.size()));
+    const auto opened = home.open_tunnel(proxy, endpoint.substr(kTcp.size()), options.patience_s);
     if (!opened) return opened.error();
     tunnel = *opened;
     return tunnel->endpoint();

@@ -92,10 +92,12 @@ TEST(Tunnel, WhatIsSentComesThroughAndConnectionsAreMadeAnew) {
                                          SocketOptions{.max_message_bytes = 8 << 20, .watch_connecting = true});
   for (uint64_t life = 1; life <= 2; ++life) {
     Socket server(here, Kind::kRouter, "data", {.max_message_bytes = 8 << 20});
-    const auto bound = server.bind(endpoint);
-    ASSERT_TRUE(bound.ok()) << bound.error().text;
+    ASSERT_TRUE(until([&] {  // ZeroMQ closes the one before in its own time
+      const auto bound = server.bind(endpoint);
+      if (bound) endpoint = *bound;
+      return bound.ok();
+    }));
     if (life == 1) {
-      endpoint = *bound;
       ASSERT_TRUE(client->connect(endpoint).ok());
     }
     uint64_t heard = 0, answered = 0;

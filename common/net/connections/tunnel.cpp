@@ -29,7 +29,7 @@ namespace {
 constexpr double kDial_s = 30;     // to the proxy, and from there to the target
 constexpr double kFarewell_s = 2;  // a closed socket that has something to say connects within this time
 constexpr size_t kBuffer = 1 << 16;
-constexpr int kIdle_s = 5, kApart_s = 5, kTimes = 3;  // of the questions whether the proxy is still there
+constexpr double kNoFiles_s = 0.1;  // until one may be free
 
 class Descriptor {
  public:
@@ -77,11 +77,23 @@ std::string request_for(const Place& target) {
   return out;
 }
 
+// As look_after() does for ZeroMQ's own: who has not acknowledged anything for patience_s is gone.
+void watch_over(int fd, double patience_s) {
+  constexpr int kIdle_s = 5, kApart_s = 5;
+  const int options[][3]{{SOL_SOCKET, SO_KEEPALIVE, 1},
+                         {IPPROTO_TCP, TCP_KEEPIDLE, kIdle_s},
+                         {IPPROTO_TCP, TCP_KEEPINTVL, kApart_s},
+                         {IPPROTO_TCP, TCP_KEEPCNT, std::max(1, int(patience_s - kIdle_s) / kApart_s)},
+                         {IPPROTO_TCP, TCP_USER_TIMEOUT, int(patience_s * 1e3)}};
+  for (const auto& [level, option, value] : options) setsockopt(fd, level, option, &value, sizeof value);
+}
+
 bool again(ssize_t n) { return n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR); }
 
 /// What passes one way.
 struct Way {
-  int from, to;
+  Way(int source, int sink) : from(source), to(sink) {}
+  const int from, to;
   std::array<char, kBuffer> bytes{};
   size_t begin = 0, end = 0;
   bool ended = false;  // at its source
@@ -110,8 +122,12 @@ struct Way {
 
 class Tunnel::Worker {
  public:
-  Worker(Tunnel& tunnel, Descriptor listener, Place proxy, Place target)
-      : tunnel_(tunnel), listener_(std::move(listener)), proxy_(std::move(proxy)), target_(std::move(target)) {}
+  Worker(Tunnel& tunnel, Descriptor listener, Place proxy, Place target, double patience_s)
+      : tunnel_(tunnel),
+        listener_(std::move(listener)),
+        proxy_(std::move(proxy)),
+        target_(std::move(target)),
+        patience_s_(patience_s) {}
 
   void serve() {
     while (const Descriptor local = next()) {
@@ -152,6 +168,7 @@ class Tunnel::Worker {
       Descriptor local(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
       ucred who{};
       socklen_t size = sizeof who;
+      if (!local && errno != EAGAIN) wait(-1, 0, monotonic_s() + kNoFiles_s);
       if (local && getsockopt(local.get(), SOL_SOCKET, SO_PEERCRED, &who, &size) == 0 && who.uid == geteuid())
         return local;
     }
@@ -187,11 +204,9 @@ class Tunnel::Worker {
   Descriptor dial() {
     Descriptor remote = connected();
     if (!remote) return remote;
-    constexpr int kOptions[][3]{
-        {IPPROTO_TCP, TCP_NODELAY, 1},        {SOL_SOCKET, SO_KEEPALIVE, 1},
-        {IPPROTO_TCP, TCP_KEEPIDLE, kIdle_s}, {IPPROTO_TCP, TCP_KEEPINTVL, kApart_s},
-        {IPPROTO_TCP, TCP_KEEPCNT, kTimes},   {IPPROTO_TCP, TCP_USER_TIMEOUT, 1000 * (kIdle_s + kApart_s * kTimes)}};
-    for (const auto& [level, option, value] : kOptions) setsockopt(remote.get(), level, option, &value, sizeof value);
+    const int on = 1;
+    setsockopt(remote.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    watch_over(remote.get(), patience_s_);
     const double until_s = monotonic_s() + kDial_s;
     const auto say = [&](std::string_view bytes) {
       return ::send(remote.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) == ssize_t(bytes.size());
@@ -241,9 +256,10 @@ class Tunnel::Worker {
   Tunnel& tunnel_;
   const Descriptor listener_;
   const Place proxy_, target_;
+  const double patience_s_;
 };
 
-Result<std::unique_ptr<Tunnel>> Tunnel::open(const std::string& proxy, const std::string& target) {
+Result<std::unique_ptr<Tunnel>> Tunnel::open(const std::string& proxy, const std::string& target, double patience_s) {
   auto by = place_of(proxy), to = place_of(target);
   if (!by || !to) return Error{fmt::format("{} through {}: is not HOST:PORT", target, proxy)};
   const auto refused = [&](const char* what) {
@@ -263,8 +279,8 @@ Result<std::unique_ptr<Tunnel>> Tunnel::open(const std::string& proxy, const std
   out->endpoint_ = "ipc://@" + name;
   out->woken_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (out->woken_ < 0) return refused("no eventfd");
-  out->thread_ =
-      std::thread([worker = std::make_unique<Worker>(*out, std::move(listener), *by, *to)] { worker->serve(); });
+  out->thread_ = std::thread(
+      [worker = std::make_unique<Worker>(*out, std::move(listener), *by, *to, patience_s)] { worker->serve(); });
   return out;
 }
 

@@ -15,9 +15,10 @@ namespace telesplat::net {
 
 class Tunnel {
  public:
-  /// proxy, target: HOST:PORT; an IPv6 address in brackets. Nobody is connected to yet. Error: what this machine
+  /// proxy, target: HOST:PORT; an IPv6 address in brackets. A proxy that acknowledges nothing for patience_s is gone.
+  /// Nobody is connected to yet. Error: what this machine
   /// refuses, or a name that is too long.
-  static Result<std::unique_ptr<Tunnel>> open(const std::string& proxy, const std::string& target);
+  static Result<std::unique_ptr<Tunnel>> open(const std::string& proxy, const std::string& target, double patience_s);
   /// Ends connections at once.
   ~Tunnel();
 
