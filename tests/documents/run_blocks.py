@@ -247,9 +247,9 @@ class Page:
                     process.send_signal(signal_number)
         for text, process, output in self._background:
             try:
-                code = process.wait(timeout=20)
+                code = process.wait(timeout=120)
             except subprocess.TimeoutExpired:
-                code = "none within 20 s"
+                code = "none within 120 s"
                 process.terminate()
                 try:
                     process.wait(timeout=10)
