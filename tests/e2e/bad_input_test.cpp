@@ -1,4 +1,5 @@
 // What cannot be shown is refused: exit code 2, one line that names it, nothing left behind.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -104,6 +105,24 @@ TEST(DataServer, AFileThatIsCutOffWhileItIsReadIsNamed) {
   EXPECT_EQ(data.wait(60), 2) << data.err();
   EXPECT_NE(data.err().find("telesplat: " + path + ": was cut off while it was read\n"), std::string::npos)
       << data.err();
+}
+
+// The launcher's own commands map files, too.
+TEST(Inspect, AFileThatIsCutOffWhileItIsReadIsNamed) {
+  TemporaryFolder folder;
+  const std::string path = folder / "cut.ply";
+  write_terrain(path, 900);
+  Program inspect("telesplat", {"inspect", path}, folder / "inspect");
+  const std::string maps = fmt::format("/proc/{}/maps", inspect.pid());
+  ASSERT_TRUE(wait_until([&] {
+    std::ifstream in(maps);
+    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    return text.find("cut.ply") != text.npos;
+  }));
+  fs::resize_file(path, 10'000);
+  EXPECT_EQ(inspect.wait(60), 2) << inspect.out();
+  EXPECT_NE(inspect.err().find("telesplat: " + path + ": was cut off while it was read\n"), std::string::npos)
+      << inspect.err();
 }
 
 TEST(DataServer, ReadsWhatAFileNamesBelowItsFolderUnlessItIsTold) {
