@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "common/core/clock.h"
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 #include "tests/support/raw_peer.h"
 
@@ -304,7 +305,7 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
 TEST(Links, BehindASlowOnePointsHaveErrorsUntilTheHeadRests) {
   for (const bool said : {false, true}) {
     std::vector<std::string> flags{"--duration", "14", "--hold", "12", "--size", "640x400", "--link"};
-    flags.push_back(said ? "20ms" : "rtt=20ms,rate=500kbit");
+    flags.push_back(said ? "20ms" : test::kSlow ? "rtt=20ms,rate=100kbit" : "rtt=20ms,rate=500kbit");
     if (said) flags.insert(flags.end(), {"--depth-error", "1/16", "--normal-error", "2", "--colour-error", "off"});
     PipelineRun run(flags);
     ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
