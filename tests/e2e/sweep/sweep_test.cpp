@@ -97,7 +97,8 @@ TEST_F(Sweeps, ARunThatFailsTwiceIsToldAndTheOthersGoOn) {
   EXPECT_NE(sweep.err().find("it is tried again"), std::string::npos) << sweep.err();
   EXPECT_NE(sweep.out().find("failed: scene=broken, run 1: exit code 2: "), std::string::npos) << sweep.out();
   EXPECT_EQ(done(), 1u);
-  for (const auto& run : manifest()["runs"]) {
+  const auto told = manifest();
+  for (const auto& run : told["runs"]) {
     const bool broken = run["configuration"] == "scene-broken";
     EXPECT_EQ(run["done"], !broken);
     EXPECT_EQ(run["attempts"], broken ? 2 : 1);
