@@ -36,11 +36,10 @@ Access through(const std::string& proxy) { return *Via::parse({proxy}); }
 class Proxy {
  public:
   Proxy() {
-    wan_relay::Options o;
-    o.socks = {"127.0.0.1:0"};
-    o.link_text = "1ms";
-    EXPECT_TRUE(settle(o).ok());
-    auto opened = wan_relay::Relay::open(o);
+    options_.socks = {"127.0.0.1:0"};
+    options_.link_text = "1ms";
+    EXPECT_TRUE(settle(options_).ok());
+    auto opened = wan_relay::Relay::open(options_);
     EXPECT_TRUE(opened.ok()) << opened.error().text;
     relay_ = *std::move(opened);
     thread_ = std::thread([this] { relay_->run([](const std::string&) {}); });
@@ -52,6 +51,7 @@ class Proxy {
   std::string address() const { return relay_->addresses().at(0); }
 
  private:
+  wan_relay::Options options_;  // which the relay refers to
   std::unique_ptr<wan_relay::Relay> relay_;
   std::thread thread_;
 };

@@ -12,7 +12,7 @@ namespace telesplat::wan_relay {
 
 class Relay {
  public:
-  /// Listens at all doors. Error: which one cannot be, and why.
+  /// Listens at all doors; refers to the options. Error: which one cannot be, and why.
   static Result<std::unique_ptr<Relay>> open(const Options& options);
   ~Relay();
 
