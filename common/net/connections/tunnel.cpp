@@ -294,8 +294,8 @@ Tunnel::~Tunnel() {
 void Tunnel::retire() {
   retired_ = true;
   const uint64_t one = 1;
-  if (woken_ >= 0) [[maybe_unused]]
-    const ssize_t written = ::write(woken_, &one, sizeof one);
+  if (woken_ < 0) return;
+  [[maybe_unused]] const ssize_t written = ::write(woken_, &one, sizeof one);
 }
 
 }  // namespace telesplat::net

@@ -1,6 +1,6 @@
 // A way through a SOCKS5 proxy (RFC 1928) for one socket that connects. ZeroMQ has one of its own, whose process dies
-// (4.3.4: "Bad file descriptor") when a socket is closed whose last attempt the proxy did not take or
-// refused: a packer that is gone, or a relay, would end its viewers. Private to this library.
+// (4.3.4: "Bad file descriptor") when a socket is closed whose last attempt the proxy did not take or refused: a packer
+// that is gone, or a relay, would end its viewers. Private to this library.
 #pragma once
 
 #include <atomic>
@@ -16,8 +16,7 @@ namespace telesplat::net {
 class Tunnel {
  public:
   /// proxy, target: HOST:PORT; an IPv6 address in brackets. A proxy that acknowledges nothing for patience_s is gone.
-  /// Nobody is connected to yet. Error: what this machine
-  /// refuses, or a name that is too long.
+  /// Nobody is connected to yet. Error: what this machine refuses, or that one is no HOST:PORT.
   static Result<std::unique_ptr<Tunnel>> open(const std::string& proxy, const std::string& target, double patience_s);
   /// Ends connections at once.
   ~Tunnel();
