@@ -108,7 +108,7 @@ TEST(DataServer, AFileThatIsCutOffWhileItIsReadIsNamed) {
 }
 
 // The launcher's own commands map files, too.
-TEST(Inspect, AFileThatIsCutOffWhileItIsReadIsNamed) {
+TEST(LauncherFile, ThatIsCutOffWhileItIsReadIsNamed) {
   TemporaryFolder folder;
   const std::string path = folder / "cut.ply";
   write_terrain(path, 900);
