@@ -12,27 +12,13 @@
 #include <cstring>
 #include <utility>
 
+#include "common/core/descriptor.h"
+
 namespace telesplat {
 namespace {
 
 constexpr size_t kPiece = 64 << 10;
 constexpr int kTries = 100;  // for the name of a new file
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int get() const { return fd_; }
-  bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
-
- private:
-  int fd_;
-};
 
 Error failed(const std::string& path, const char* what) {
   return Error{fmt::format("{}: {}: {}", path, what, std::strerror(errno))};

@@ -36,6 +36,7 @@ namespace {
 // A frame that is this much over a socket's limit is still read, so that it can be dropped and counted with its peer
 // named; one that claims more ends its connection before anything is allocated for it.
 constexpr int64_t kOversizedBytes = 16 << 20;
+constexpr uint64_t kUnderWayBytes = 8 << 20;  // of a connection, which the kernel has
 constexpr int64_t kSubscriptionBytes = 4096;  // largest frame a publisher reads; handshakes fit
 constexpr size_t kMaxTypeBytes = 64;
 constexpr double kQuietPusher_s = 1.0;
@@ -124,9 +125,7 @@ struct Socket::Impl {
       : home(home), kind(kind), name(std::move(name)), options(options), socket(home.context, zmq_type(kind)) {
     socket.set(zmq::sockopt::sndhwm, options.high_water_mark);
     socket.set(zmq::sockopt::rcvhwm, options.high_water_mark);
-    socket.set(zmq::sockopt::maxmsgsize, kind == Kind::kPub
-                                             ? kSubscriptionBytes
-                                             : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes);
+    socket.set(zmq::sockopt::maxmsgsize, most_frame_bytes());
     socket.set(zmq::sockopt::linger, options.linger_ms);
     socket.set(zmq::sockopt::reconnect_ivl, 50);
     socket.set(zmq::sockopt::reconnect_ivl_max, 500);
@@ -140,6 +139,14 @@ struct Socket::Impl {
     ahead.reset();
     if (connections) home.watch().remove(*connections);
     if (tunnel) home.retire(*tunnel);
+  }
+
+  // Of what is read; what claims more ends its connection.
+  int64_t most_frame_bytes() const {
+    return kind == Kind::kPub ? kSubscriptionBytes : static_cast<int64_t>(options.max_message_bytes) + kOversizedBytes;
+  }
+  uint64_t most_unread_bytes() const {
+    return options.most_unread_bytes ? options.most_unread_bytes : kUnderWayBytes + uint64_t(most_frame_bytes());
   }
 
   // Where this socket connects to in place of `endpoint`.
@@ -194,6 +201,7 @@ struct Socket::Impl {
         std::make_unique<Connections>(home.context, socket,
                                       Connections::Options{.name = name,
                                                            .most = options.most_connections,
+                                                           .most_unread = most_unread_bytes(),
                                                            .guarded = guarded,
                                                            .publishes = kind == Kind::kPub,
                                                            .quiet_s = kind == Kind::kPull ? kQuietPusher_s : 1e300});
@@ -218,10 +226,11 @@ struct Socket::Impl {
     look_at_attempts();
   }
 
-  void note_spoken(zmq::message_t& message) {
+  // message: the last frame of one that had `bytes` on its way.
+  void note_spoken(zmq::message_t& message, uint64_t bytes) {
     if (!connections) return;
     const char* user = guarded ? zmq_msg_gets(message.handle(), "User-Id") : nullptr;
-    connections->spoke(zmq_msg_get(message.handle(), ZMQ_SRCFD), user ? user : "");
+    connections->spoke(zmq_msg_get(message.handle(), ZMQ_SRCFD), bytes, user ? user : "");
   }
 
   // A connection that ends without ever having brought a whole message counts as one rejected. To be called when there
@@ -241,10 +250,13 @@ struct Socket::Impl {
       } catch (const zmq::error_t&) {
         return;
       }
-      note_spoken(message);
+      const int from = zmq_msg_get(message.handle(), ZMQ_SRCFD);
+      if (from < 0) continue;  // ZeroMQ says it for one that is gone
+      note_spoken(message, wire_bytes(message.size()));
       const char first = message.size() ? *static_cast<const char*>(message.data()) : '?';
       if (message.size() == 1 && (first == 0 || first == 1)) continue;
       ++rejected;
+      if (connections) connections->hang_up_on(from);  // ZeroMQ keeps its wishes
       log_rejection(fmt::format("a subscription of {} bytes", message.size()), "viewers subscribe to everything");
     }
   }
@@ -321,6 +333,7 @@ struct Socket::Impl {
     // A flood of bad messages must not keep the caller from its other sockets.
     for (int bad = 0; bad < 100; ++bad) {
       std::vector<zmq::message_t> frames;
+      uint64_t bytes = 0;
       try {
         do {
           zmq::message_t frame;
@@ -328,13 +341,15 @@ struct Socket::Impl {
             end_reading();
             return std::nullopt;
           }
+          const bool is_name = kind == Kind::kRouter && frames.empty();  // which is not sent
+          if (!is_name) bytes += wire_bytes(frame.size());
           if (frames.size() < 4) frames.push_back(std::move(frame));
         } while (socket.get(zmq::sockopt::rcvmore));
       } catch (const zmq::error_t& e) {
         log::error("{}: {}", name, e.what());
         return std::nullopt;
       }
-      note_spoken(frames.back());
+      note_spoken(frames.back(), bytes);
       Message out;
       out.arrived_s = monotonic_s();
       size_t next = 0;

@@ -61,6 +61,10 @@ struct SocketOptions {
   /// keys, one that is for nothing cannot be bound.
   std::string_view serves;
   size_t most_connections = 1024;  ///< of a socket that binds, at a time; further ones are hung up on
+  /// Of a socket that binds, bytes of one connection over TCP that came and were not read yet, of whole messages and of
+  /// parts; beyond, it is hung up on, and counts as one too many. 0: 8 MiB more than a message may have before its connection
+  /// ends.
+  uint64_t most_unread_bytes = 0;
   /// Of a ROUTER or PUB, bytes that wait for one peer, who may have one message of any size all the same. What is
   /// beyond is dropped for a peer of a ROUTER, as beyond the high-water mark; a subscriber is hung up on.
   uint64_t most_queued_bytes = uint64_t(256) << 20;
@@ -121,7 +125,8 @@ class Socket {
   /// Of a socket that binds with keys: connections that were not let in, because they showed no key, another server's,
   /// or one that is not on the allow-list or is for something else.
   uint64_t keys_refused() const;
-  /// Of a socket that binds: connections that were hung up on because there were SocketOptions::most_connections.
+  /// Of a socket that binds: connections that were hung up on because there were SocketOptions::most_connections, or
+  /// more bytes of one than SocketOptions::most_unread_bytes, or because a subscriber wanted anything but all.
   uint64_t connections_refused() const;
   /// Messages dropped and subscribers hung up on because of SocketOptions::most_queued_bytes.
   uint64_t queue_refused() const;

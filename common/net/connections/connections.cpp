@@ -20,6 +20,20 @@ namespace {
 constexpr size_t kMostEnded = 4096;  // before they are judged, whatever may still come of them
 constexpr double kLatePeriod_s = 0.1;
 constexpr uint64_t kNobodyKnows = ~uint64_t(0);  // not over TCP
+
+struct Passed {
+  uint64_t taken = kNobodyKnows, came = kNobodyKnows;  // bytes that the other machine has, and that this one has
+};
+
+// Where the number is of another file, it is told nothing, or too little: who is hung up on is looked at again.
+Passed passed(int fd) {
+  tcp_info about{};
+  socklen_t size = sizeof about;
+  const bool told = getsockopt(fd, IPPROTO_TCP, TCP_INFO, &about, &size) == 0 &&
+                    size >= offsetof(tcp_info, tcpi_bytes_received) + sizeof about.tcpi_bytes_received;
+  return told ? Passed{about.tcpi_bytes_acked, about.tcpi_bytes_received} : Passed{};
+}
+
 constexpr int kFailed =
     ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH;
 
@@ -112,22 +126,53 @@ void Connections::hang_up_on_one() {
 }
 
 void Connections::hang_up(const Name& name) {
-  if (!shut_down(name)) return;
+  refuse(name, fmt::format("{} connections are open (--max-connections): one more is refused", options_.most),
+         End::kReadsOn);
+}
+
+void Connections::refuse(const Name& name, const std::string& why, End end) {
+  if (!shut_down(name, end)) return;
   ++counts_.refused;
   if (!limiter_.allow(monotonic_s())) return;
   const std::string more =
       limiter_.suppressed() ? fmt::format(" ({} more since the last such line)", limiter_.suppressed()) : "";
-  log::warn("{}: {} connections are open (--max-connections): one more is refused{}", options_.name, options_.most,
-            more);
+  log::warn("{}: {}{}", options_.name, why, more);
+}
+
+bool Connections::hang_up_on_unread() {
+  const std::lock_guard lock(mutex_);
+  drain();
+  std::vector<std::pair<Name, uint64_t>> full;
+  for (const auto& [fd, c] : open_) {
+    const uint64_t came = c.refused ? kNobodyKnows : passed(fd).came;
+    if (came != kNobodyKnows && came > c.read && came - c.read > options_.most_unread)
+      full.emplace_back(Name{fd, c.number}, came - c.read);
+  }
+  for (const auto& [name, bytes] : full)
+    refuse(name,
+           fmt::format("a connection is hung up on, because {:.0f} MB of it wait to be read, {:.0f} may",
+                       double(bytes) / 1e6, double(options_.most_unread) / 1e6),
+           End::kAtOnce);
+  return !open_.empty();
+}
+
+void Connections::hang_up_on(int fd) {
+  const std::lock_guard lock(mutex_);
+  drain();
+  if (const auto found = open_.find(fd); found != open_.end())
+    refuse({fd, found->second.number}, "a connection is hung up on for what it said", End::kAtOnce);
 }
 
 // The number may be of another file by now. ZeroMQ tells of an end before it closes the file: as long as nothing was
 // told after the number was looked at, it was the connection's.
-bool Connections::shut_down(const Name& name) {
+bool Connections::shut_down(const Name& name, End end) {
   const bool looks = looks_at(name.first);
   drain();
   const bool there = is_open(name);
-  if (there && looks) shutdown(spare_, SHUT_RDWR);
+  // Whoever sends faster than it is read is never found to have ended: all that it sent would be read first.
+  const sockaddr nobody{.sa_family = AF_UNSPEC, .sa_data = {}};
+  const bool ended = there && looks && end == End::kAtOnce && ::connect(spare_, &nobody, sizeof nobody) == 0;
+  if (there && looks && !ended) shutdown(spare_, SHUT_RDWR);
   if (there) open_.at(name.first).refused = true, ++refused_open_;
   look_away();
   return there;
@@ -135,15 +180,6 @@ bool Connections::shut_down(const Name& name) {
 
 bool Connections::looks_at(int fd) { return dup3(fd, spare_, O_CLOEXEC) >= 0; }
 void Connections::look_away() { dup3(blank_, spare_, O_CLOEXEC); }
-
-// Where the number is of another file, it is told nothing, or too little: who is hung up on is looked at again.
-uint64_t Connections::taken_by(int fd) {
-  tcp_info about{};
-  socklen_t size = sizeof about;
-  const bool told = getsockopt(fd, IPPROTO_TCP, TCP_INFO, &about, &size) == 0 &&
-                    size >= offsetof(tcp_info, tcpi_bytes_acked) + sizeof about.tcpi_bytes_acked;
-  return told ? about.tcpi_bytes_acked : kNobodyKnows;
-}
 
 void Connections::published(uint64_t bytes) {
   const std::lock_guard lock(mutex_);
@@ -158,7 +194,7 @@ size_t Connections::hang_up_on_late(uint64_t bytes) {
   drain();
   std::vector<Name> late;
   for (const auto& [fd, c] : open_) {
-    const uint64_t taken = c.has_spoken && !c.refused ? taken_by(fd) : kNobodyKnows;
+    const uint64_t taken = c.has_spoken && !c.refused ? passed(fd).taken : kNobodyKnows;
     if (taken == kNobodyKnows || c.taken == kNobodyKnows) continue;
     if (published_ - c.published > taken - c.taken + bytes) late.emplace_back(fd, c.number);
   }
@@ -169,7 +205,7 @@ size_t Connections::hang_up_on_late(uint64_t bytes) {
   return size_t(gone);
 }
 
-void Connections::spoke(int fd, std::string_view user) {
+void Connections::spoke(int fd, uint64_t bytes, std::string_view user) {
   const std::lock_guard lock(mutex_);
   drain();  // its acceptance was told before its message came
   for (auto* gone : {&to_judge_, &ended_}) {
@@ -179,11 +215,14 @@ void Connections::spoke(int fd, std::string_view user) {
     found->has_spoken = true;
     return;
   }
-  if (const auto it = open_.find(fd); it != open_.end() && !it->second.has_spoken) {
-    it->second.has_spoken = true;
-    it->second.user = user;
-    it->second.published = published_;
-    if (options_.publishes) it->second.taken = taken_by(fd);
+  if (const auto it = open_.find(fd); it != open_.end()) {
+    Connection& c = it->second;
+    c.read += bytes;
+    if (!std::exchange(c.has_spoken, true)) {
+      c.user = user;
+      c.published = published_;
+      if (options_.publishes) c.taken = passed(fd).taken;
+    }
   }
   keep_to_limit();
 }

@@ -24,15 +24,16 @@ inline constexpr double kHandshake_s = 5;
 class Connections {
  public:
   struct Options {
-    std::string name;      ///< of the socket, for the log
-    size_t most = 1024;    ///< open at a time; further ones are hung up on
-    bool guarded = false;  ///< handshakes that fail are of those who show no key that fits
+    std::string name;                     ///< of the socket, for the log
+    size_t most = 1024;                   ///< open at a time; further ones are hung up on
+    uint64_t most_unread = ~uint64_t(0);  ///< bytes of one that came and were not read; one with more is hung up on
+    bool guarded = false;                 ///< handshakes that fail are of those who show no key that fits
     bool publishes = false;
     double quiet_s = 1e30;  ///< who came longer ago and said nothing is no stranger: there was nothing to say
   };
   struct Counts {
     size_t open = 0;
-    uint64_t refused = 0;       ///< beyond `most`
+    uint64_t refused = 0;       ///< beyond `most`, most_unread, or because of what they said
     uint64_t keys_refused = 0;  ///< failed handshakes
     uint64_t silent = 0;        ///< ended without having brought one whole message, and were judged
   };
@@ -46,9 +47,15 @@ class Connections {
   void look();
   /// Becomes readable when look() has something to do.
   int descriptor();
-  /// A message of this connection was read. Of a publisher: from now on it gets what is published. user: whose key it
-  /// came by; empty: there are no keys.
-  void spoke(int fd, std::string_view user = {});
+  /// A message of this connection was read, which took `bytes` of it. Of a publisher: from now on it gets what is
+  /// published. user: whose key it came by; empty: there are no keys.
+  void spoke(int fd, uint64_t bytes, std::string_view user = {});
+  /// Hangs up on one of whom more came than Options::most_unread allows and was not read yet: many large messages that
+  /// nobody has read, or parts of one that does not end, which ZeroMQ keeps without limit. Over TCP. To be called often
+  /// against what comes meanwhile. Returns whether anybody is there to be looked at.
+  bool hang_up_on_unread();
+  /// Hangs up on this one, if it is still there.
+  void hang_up_on(int fd);
   /// Hangs up on those who came by other keys. ZeroMQ's thread hears of it as if the other side had ended them. Returns
   /// whose they were.
   std::vector<std::string> keep_only(const std::set<std::string>& users);
@@ -73,8 +80,10 @@ class Connections {
     bool has_spoken = false, refused = false;
     uint64_t published = 0,
              taken = 0;  // bytes that were published, and that its machine had taken, when it spoke first
+    uint64_t read = 0;   // bytes of it that were read
     std::string user;    // spoke()
   };
+  enum class End { kReadsOn, kAtOnce };  // what it has sent is read; is not
   using Name = std::pair<int, uint64_t>;  // file descriptor, and number: descriptors are used again
   void drain();
   void take(const Monitor::Event& event, double now_s);
@@ -84,8 +93,8 @@ class Connections {
   void keep_to_limit();
   void hang_up_on_one();
   void hang_up(const Name& name);
-  bool shut_down(const Name& name);
-  uint64_t taken_by(int fd);
+  bool shut_down(const Name& name, End end = End::kReadsOn);
+  void refuse(const Name& name, const std::string& why, End end);
   bool looks_at(int fd);
   void look_away();
   uint64_t silent_among(const std::vector<Connection>& gone);

@@ -9,6 +9,11 @@
 #include <vector>
 
 namespace telesplat::net {
+namespace {
+
+constexpr int kUnread_ms = 50;  // what a fast network brings meanwhile is read into memory, whoever sends it
+
+}  // namespace
 
 // Signals are for the threads that wait for them.
 Lookout::Lookout() : woken_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
@@ -53,14 +58,18 @@ void Lookout::wake() const {
 void Lookout::loop() {
   std::vector<pollfd> items;
   for (;;) {
+    bool anybody = false;
     {
       const std::lock_guard lock(mutex_);
       if (stop_) return;
-      for (const auto& [connections, descriptor] : watched_) connections->look();
+      for (const auto& [connections, descriptor] : watched_) {
+        connections->look();
+        anybody |= connections->hang_up_on_unread();
+      }
       items.assign(1, {woken_, POLLIN, 0});
       for (const auto& [connections, descriptor] : watched_) items.push_back({descriptor, POLLIN, 0});
     }
-    ::poll(items.data(), items.size(), -1);
+    ::poll(items.data(), items.size(), anybody ? kUnread_ms : -1);
     uint64_t count = 0;
     [[maybe_unused]] const ssize_t read = ::read(woken_, &count, sizeof count);
   }

@@ -16,7 +16,7 @@ class Lookout {
   Lookout();
   ~Lookout();
 
-  /// From now on connections.look() is called whenever something has happened.
+  /// From now on connections.look() is called whenever something has happened, and hang_up_on_unread() often.
   void add(Connections& connections);
   /// It is not called any more when this returns.
   void remove(Connections& connections);

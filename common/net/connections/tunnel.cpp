@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/descriptor.h"
 
 namespace telesplat::net {
 namespace {
@@ -30,21 +31,6 @@ constexpr double kDial_s = 30;     // to the proxy, and from there to the target
 constexpr double kFarewell_s = 2;  // a closed socket that has something to say connects within this time
 constexpr size_t kBuffer = 1 << 16;
 constexpr double kNoFiles_s = 0.1;  // until one may be free
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(Descriptor&& o) noexcept : fd_(std::exchange(o.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&&) = delete;
-  explicit operator bool() const { return fd_ >= 0; }
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 struct Place {
   std::string host, port;
@@ -130,9 +116,11 @@ class Tunnel::Worker {
         patience_s_(patience_s) {}
 
   void serve() {
-    while (const Descriptor local = next()) {
+    for (;;) {
+      const Descriptor local = next();
+      if (!local.valid()) break;
       const Descriptor remote = dial();
-      if (remote)
+      if (remote.valid())
         pass(local.get(), remote.get());
       else
         ++tunnel_.failed_;  // before the socket hears of it
@@ -168,8 +156,8 @@ class Tunnel::Worker {
       Descriptor local(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
       ucred who{};
       socklen_t size = sizeof who;
-      if (!local && errno != EAGAIN) wait(-1, 0, monotonic_s() + kNoFiles_s);
-      if (local && getsockopt(local.get(), SOL_SOCKET, SO_PEERCRED, &who, &size) == 0 && who.uid == geteuid())
+      if (!local.valid() && errno != EAGAIN) wait(-1, 0, monotonic_s() + kNoFiles_s);
+      if (local.valid() && getsockopt(local.get(), SOL_SOCKET, SO_PEERCRED, &who, &size) == 0 && who.uid == geteuid())
         return local;
     }
   }
@@ -182,7 +170,7 @@ class Tunnel::Worker {
     const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> all(found, freeaddrinfo);
     for (const addrinfo* a = found; a; a = a->ai_next) {
       Descriptor fd(::socket(a->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-      if (!fd) continue;
+      if (!fd.valid()) continue;
       if (::connect(fd.get(), a->ai_addr, a->ai_addrlen) != 0) {
         int error = errno == EINPROGRESS ? 0 : errno;
         socklen_t size = sizeof error;
@@ -203,7 +191,7 @@ class Tunnel::Worker {
   // To the target, through the proxy.
   Descriptor dial() {
     Descriptor remote = connected();
-    if (!remote) return remote;
+    if (!remote.valid()) return remote;
     const int on = 1;
     setsockopt(remote.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     watch_over(remote.get(), patience_s_);
@@ -272,7 +260,7 @@ Result<std::unique_ptr<Tunnel>> Tunnel::open(const std::string& proxy, const std
   std::memcpy(address.sun_path + 1, name.data(), name.size());  // in the namespace that has no files
   Descriptor listener(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const auto length = socklen_t(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-  if (!listener || ::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), length) != 0 ||
+  if (!listener.valid() || ::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), length) != 0 ||
       ::listen(listener.get(), 4) != 0)
     return refused("no socket");
   std::unique_ptr<Tunnel> out(new Tunnel);

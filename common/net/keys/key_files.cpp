@@ -12,6 +12,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "common/core/descriptor.h"
+
 namespace telesplat::net {
 namespace {
 
@@ -28,13 +30,6 @@ Status check_owner(const std::string& path, const struct stat& about) {
   if (about.st_uid == geteuid() || about.st_uid == 0) return ok_status();
   return Error{fmt::format("{}: belongs to user {}, not to {} or root", path, about.st_uid, geteuid())};
 }
-
-struct Descriptor {
-  int fd;
-  ~Descriptor() {
-    if (fd >= 0) close(fd);
-  }
-};
 
 std::string secret_path(const std::string& folder, std::string_view name) {
   return fmt::format("{}/{}{}", folder, name, kSecretEnd);
@@ -108,7 +103,7 @@ Result<NamedKey> parse_named_key(std::string_view text) {
 Result<std::string> read_key_file(const std::string& path, Privacy privacy) {
   const Descriptor file{::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)};
   struct stat about {};
-  if (file.fd < 0 || fstat(file.fd, &about) != 0) return failed(path, "cannot be read");
+  if (file.get() < 0 || fstat(file.get(), &about) != 0) return failed(path, "cannot be read");
   if (!S_ISREG(about.st_mode)) return Error{fmt::format("{}: is no plain file", path)};
   if (const Status s = check_owner(path, about); !s) return s.error();
   if (privacy == Privacy::kSecret && (about.st_mode & kOthers))
@@ -118,7 +113,7 @@ Result<std::string> read_key_file(const std::string& path, Privacy privacy) {
     return Error{fmt::format("{}: others may write into it (mode {:03o}); chmod go-w", path, about.st_mode & 0777)};
   std::string out;
   for (char buffer[4096];;) {
-    const ssize_t n = ::read(file.fd, buffer, sizeof buffer);
+    const ssize_t n = ::read(file.get(), buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return failed(path, "cannot be read");
     if (n == 0) return out;
@@ -153,7 +148,7 @@ std::vector<std::string> key_names(const std::string& folder) {
 Status check_key_folder(const std::string& folder) {
   const Descriptor opened{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
   struct stat about {};
-  if (opened.fd < 0 || fstat(opened.fd, &about) != 0)
+  if (opened.get() < 0 || fstat(opened.get(), &about) != 0)
     return Error{
         fmt::format("{}: cannot be opened as a folder of keys: {}; {}", folder, std::strerror(errno), remedy(folder))};
   if (about.st_mode & kOthersWrite)

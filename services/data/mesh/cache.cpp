@@ -14,7 +14,7 @@
 #include <fstream>
 #include <set>
 
-#include "services/data/base/file_lock.h"
+#include "common/core/descriptor.h"
 #include "services/data/mesh/store_file.h"
 
 namespace telesplat::data {

@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "common/core/clock.h"
+#include "common/core/descriptor.h"
 #include "common/core/log.h"
-#include "services/data/base/file_lock.h"
 #include "services/data/mesh/cache.h"
 #include "services/data/mesh/placement.h"
 #include "services/data/mesh/store_file.h"

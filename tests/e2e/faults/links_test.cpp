@@ -89,6 +89,21 @@ TEST(CutOff, AViewerWhoseConnectionsBreak) {
   fault.finish();
 }
 
+// It is found at other ports.
+TEST(CutOff, AViewerWhosePackerIsKilled) {
+  Fault fault("the packer is killed, of a viewer behind a link", {"--link", "2ms"});
+  ASSERT_TRUE(fault.showing());
+  const pid_t viewer = fault.pid_of("viewer-1");
+  fault.begins();
+  const pid_t packer = fault.signal("packer", SIGKILL);
+  ASSERT_GT(packer, 0);
+  EXPECT_TRUE(fault.wait_new_life("packer", packer));
+  fault.ends();
+  fault.expect_resynchronised();
+  EXPECT_EQ(fault.pid_of("viewer-1"), viewer);
+  fault.finish();
+}
+
 TEST(SlowLink, OfTwentyMegabitsShowsNewViews) {
   Fault fault("the viewer's link carries 20 Mbit/s", {"--link", "20mbit"});
   ASSERT_TRUE(fault.showing());

@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/data/base/file_lock.h"
+#include "common/core/descriptor.h"
 #include "services/data/open_mesh.h"
 
 namespace telesplat::data {

@@ -1,4 +1,5 @@
-// Open files and locks on them (flock). A lock ends with its descriptor, so with its process too.
+// What this process has opened: files and locks on them (flock), sockets. A lock ends with its descriptor, so with its
+// process too.
 #pragma once
 
 #include <fcntl.h>
@@ -8,14 +9,12 @@
 #include <string>
 #include <utility>
 
-namespace telesplat::data {
+namespace telesplat {
 
 class Descriptor {
  public:
   explicit Descriptor(int value = -1) : value_(value) {}
-  ~Descriptor() {
-    if (value_ >= 0) close(value_);
-  }
+  ~Descriptor() { close(); }
   Descriptor(Descriptor&& other) noexcept : value_(std::exchange(other.value_, -1)) {}
   Descriptor& operator=(Descriptor&& other) noexcept {
     std::swap(value_, other.value_);
@@ -27,6 +26,11 @@ class Descriptor {
     return Descriptor(::open(path.c_str(), flags | no_links | O_CLOEXEC, 0644));
   }
 
+  /// False: what was written into it may not have arrived.
+  bool close() {
+    const int value = std::exchange(value_, -1);
+    return value < 0 || ::close(value) == 0;
+  }
   int get() const { return value_; }
   bool valid() const { return value_ >= 0; }
   /// how: LOCK_SH or LOCK_EX, and LOCK_NB. False: somebody else holds it, or it cannot be locked.
@@ -36,4 +40,4 @@ class Descriptor {
   int value_;
 };
 
-}  // namespace telesplat::data
+}  // namespace telesplat

@@ -1,0 +1,145 @@
+// What came over a connection and was not read yet: whoever sends without end, or more than is read, is hung up on, and
+// nobody else is. ZeroMQ's own limits count whole messages.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/core/clock.h"
+#include "common/net/socket.h"
+#include "common/wire/messages.h"
+#include "tests/support/keys/key_folder.h"
+#include "tests/support/patience.h"
+#include "tests/support/raw_peer.h"
+
+namespace telesplat::net {
+namespace {
+
+using test::KeyFolder;
+using test::RawPeer;
+using test::zmtp_frame;
+
+constexpr double kDeadline_s = test::patient(20);
+constexpr uint64_t kMiB = 1 << 20;
+
+struct Bound {
+  Bound(Kind kind, SocketOptions options, Access access = {})
+      : context(std::move(access)), socket(context, kind, "bound", options) {
+    const auto bound = socket.bind("tcp://127.0.0.1:*");
+    EXPECT_TRUE(bound.ok()) << (bound ? "" : bound.error().text);
+    if (bound) endpoint = *bound;
+  }
+  template <class Done>
+  bool receive_until(Done done, std::vector<Message>* got = nullptr) {
+    for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
+      while (auto m = socket.receive())
+        if (got) got->push_back(std::move(*m));
+      if (done()) return true;
+      wait_readable({&socket}, 5);
+    }
+    return false;
+  }
+  bool serves_a_friend(Kind kind) {
+    Context theirs;
+    Socket friendly(theirs, kind, "friend");
+    std::vector<Message> got;
+    return friendly.connect(endpoint).ok() && friendly.send(wire::Goodbye{InstanceId{7}}) &&
+           receive_until([&] { return !got.empty() && got.back().type == wire::Goodbye::kName; }, &got);
+  }
+
+  Context context;
+  Socket socket;
+  std::string endpoint;
+};
+
+// Sends `bytes` again and again until the other side hangs up.
+class Flood {
+ public:
+  Flood(const std::string& endpoint, std::string_view type, std::string bytes)
+      : thread_([this, endpoint, type, bytes = std::move(bytes)] {
+          RawPeer peer(endpoint);
+          if (!peer.shake_hands(type)) return;
+          while (!stop_ && peer.send(bytes)) sent_ += bytes.size();
+          ended_ = true;
+        }) {}
+  ~Flood() {
+    stop_ = true;
+    thread_.join();
+  }
+  bool hung_up_on() const { return ended_; }
+  uint64_t sent() const { return sent_; }
+
+ private:
+  std::atomic<bool> stop_ = false, ended_ = false;
+  std::atomic<uint64_t> sent_ = 0;
+  std::thread thread_;
+};
+
+std::string parts(size_t bytes_of_one, size_t n) {
+  std::string out;
+  for (size_t i = 0; i < n; ++i) out += zmtp_frame(std::string(bytes_of_one, 'x'), true);
+  return out;
+}
+
+class MessageWithoutEnd : public ::testing::TestWithParam<size_t> {};
+
+// The bytes that may come while nobody looks are many on a fast machine; the test is that there is an end.
+TEST_P(MessageWithoutEnd, IsCutOff) {
+  Bound bound(Kind::kRouter, {.max_message_bytes = kMiB, .most_unread_bytes = 8 * kMiB});
+  const Flood flood(bound.endpoint, "DEALER", parts(GetParam(), 100000 / (GetParam() + 2) + 1));
+  EXPECT_TRUE(bound.receive_until([&] { return flood.hung_up_on(); })) << flood.sent() << " bytes";
+  EXPECT_GT(flood.sent(), 4 * kMiB);
+  EXPECT_EQ(bound.socket.connections_refused(), 1u);
+  EXPECT_TRUE(bound.serves_a_friend(Kind::kDealer));
+}
+
+INSTANTIATE_TEST_SUITE_P(PartsOfBytes, MessageWithoutEnd, ::testing::Values(0, 1000, 500000),
+                         [](const auto& info) { return std::to_string(info.param); });
+
+TEST(HostilePeers, WhoeverFillsAQueueWithLargeMessagesIsHungUpOn) {
+  Bound bound(Kind::kPull, {.high_water_mark = 1000, .max_message_bytes = kMiB, .most_unread_bytes = 16 * kMiB});
+  {
+    const Flood flood(bound.endpoint, "PUSH", zmtp_frame("rubbish", true) + zmtp_frame(std::string(kMiB, 'x'), false));
+    for (const double until = monotonic_s() + kDeadline_s; !flood.hung_up_on() && monotonic_s() < until;)
+      wait_readable({}, 5);  // nobody reads
+    EXPECT_TRUE(flood.hung_up_on()) << flood.sent() << " bytes";
+  }
+  EXPECT_EQ(bound.socket.connections_refused(), 1u);
+  std::vector<Message> got;
+  EXPECT_TRUE(bound.receive_until([&] { return got.size() >= 8; }, &got)) << "what was whole is not lost";
+  EXPECT_TRUE(bound.serves_a_friend(Kind::kPush));
+}
+
+// Twenty thousand messages of all lengths: what they have on their way is known to the byte, or it would add up.
+void expect_kept(Bound& bound, Access access) {
+  Context theirs(std::move(access));
+  Socket friendly(theirs, Kind::kDealer, "friend");
+  ASSERT_TRUE(friendly.connect(bound.endpoint).ok());
+  std::vector<Message> got;
+  for (size_t sent = 0; sent < 20000;) {
+    for (int i = 0; i < 100; ++i, ++sent)
+      ASSERT_TRUE(friendly.send_frames({}, wire::Goodbye::kName, std::string(sent % 700, 'x')));
+    got.clear();
+    ASSERT_TRUE(bound.receive_until([&] { return got.size() >= 100; }, &got)) << sent;
+    if (sent % 2000 == 0) wait_readable({}, 60);  // longer than the time between two looks
+  }
+  EXPECT_EQ(bound.socket.connections_refused(), 0u);
+}
+
+constexpr uint64_t kHundredMessages = 100000;
+
+TEST(HostilePeers, WhoIsReadIsKeptHoweverMuchItSends) {
+  Bound bound(Kind::kRouter, {.most_unread_bytes = kHundredMessages});
+  expect_kept(bound, {});
+}
+
+TEST(Keys, WhoIsReadIsKeptHoweverMuchItSends) {
+  const KeyFolder keys;
+  Bound bound(Kind::kRouter, {.serves = "control", .most_unread_bytes = kHundredMessages}, keys.server());
+  expect_kept(bound, keys.of(Role::kSampler));
+}
+
+}  // namespace
+}  // namespace telesplat::net
