@@ -62,8 +62,8 @@ struct SocketOptions {
   std::string_view serves;
   size_t most_connections = 1024;  ///< of a socket that binds, at a time; further ones are hung up on
   /// Of a socket that binds, bytes of one connection over TCP that came and were not read yet, of whole messages and of
-  /// parts; beyond, it is hung up on, and counts as one too many. 0: 8 MiB more than a message may have before its connection
-  /// ends.
+  /// parts; beyond, it is hung up on, and counts as one too many. 0: 8 MiB more than a message may have before its
+  /// connection ends.
   uint64_t most_unread_bytes = 0;
   /// Of a ROUTER or PUB, bytes that wait for one peer, who may have one message of any size all the same. What is
   /// beyond is dropped for a peer of a ROUTER, as beyond the high-water mark; a subscriber is hung up on.

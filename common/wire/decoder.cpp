@@ -14,19 +14,23 @@
 namespace telesplat::wire {
 namespace {
 
-const msgpack::object* find(const msgpack::object& map, std::string_view name) {
-  for (uint32_t i = 0; i < map.via.map.size; ++i) {
-    const auto& key = map.via.map.ptr[i].key;
-    if (key.type == msgpack::type::STR && std::string_view(key.via.str.ptr, key.via.str.size) == name)
-      return &map.via.map.ptr[i].val;
-  }
+bool is(const msgpack::object& key, std::string_view name) {
+  return key.type == msgpack::type::STR && std::string_view(key.via.str.ptr, key.via.str.size) == name;
+}
+bool is(const msgpack::object& key, uint64_t number) {
+  return key.type == msgpack::type::POSITIVE_INTEGER && key.via.u64 == number;
+}
+
+const msgpack::object* find(const msgpack::object& map, const auto& field) {
+  for (uint32_t i = 0; i < map.via.map.size; ++i)
+    if (is(map.via.map.ptr[i].key, field)) return &map.via.map.ptr[i].val;
   return nullptr;
 }
 
 bool is_integer(double v, double lo, double hi) { return v >= lo && v <= hi && v == std::floor(v); }
 
 std::optional<Error> check_version(const msgpack::object& map) {
-  const msgpack::object* version = find(map, "v");
+  const msgpack::object* version = find(map, std::string_view("v"));
   if (!version || version->type != msgpack::type::POSITIVE_INTEGER) return Error{"has no version"};
   if (version->via.u64 == kProtocolVersion) return std::nullopt;
   return Error{fmt::format("has version {} instead of {}", version->via.u64, kProtocolVersion)};
@@ -84,7 +88,7 @@ std::optional<Error> read_map(Bytes body, size_t max_elements,
 
 const msgpack::object* Decoder::enter(const char* name, size_t limit) {
   if (error_) return nullptr;
-  const msgpack::object* o = find(map_, name);
+  const msgpack::object* o = brief_ ? find(map_, number_++) : find(map_, std::string_view(name));
   if (!o && !brief_) error_ = Error{fmt::format("field {} is missing", name)};
   name_ = name;
   limit_ = limit;

@@ -18,7 +18,8 @@ class Decoder {
  public:
   explicit Decoder(const msgpack::object& map) : map_(map) {}
 
-  /// From now on fields that are missing stay as they are (kIsBrief), and are no error.
+  /// From now on fields have numbers in place of names, and those that are missing stay as they are, which is no error
+  /// (kIsBrief).
   void be_brief() { brief_ = true; }
 
   /// Names the field and what is wrong with it.
@@ -81,6 +82,7 @@ class Decoder {
 
   const msgpack::object& map_;
   bool brief_ = false;
+  uint64_t number_ = 0;  // of the next field, where it is brief
   const char* name_ = "";
   size_t limit_ = 0;
   std::optional<Error> error_;

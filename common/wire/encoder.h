@@ -15,7 +15,7 @@ class Encoder {
  public:
   explicit Encoder(std::string& out) : out_(out) {}
 
-  /// A whole message: "v", then its fields.
+  /// A whole message: "v", then its fields, those of a brief one by their numbers.
   template <Struct M>
   void versioned_map(const M& m) {
     const Blank<M> blank(m);
@@ -24,8 +24,14 @@ class Encoder {
     M::fields(counter, m);
     begin_map(count);
     version();
+    uint64_t number = 0;
     auto writer = [&](const char* name, const auto& value, size_t = 0) {
-      if (!blank(value)) (*this)(name, value);
+      const uint64_t n = number++;
+      if (blank(value)) return;
+      if constexpr (kIsBrief<M>)
+        put(n), put(value);
+      else
+        (*this)(name, value);
     };
     M::fields(writer, m);
   }

@@ -13,8 +13,8 @@ concept Struct = requires(AnyVisitor f, M& m) {
   M::fields(f, m);
 };
 
-/// Whether a message's fields that hold what a new one's hold are not sent. It says so itself:
-/// `static constexpr bool kBrief = true;`.
+/// Whether a message's fields that hold what a new one's hold are not sent, and others have their places in fields(),
+/// from 0, for names. It says so itself: `static constexpr bool kBrief = true;`.
 template <class M>
 inline constexpr bool kIsBrief = false;
 template <class M>

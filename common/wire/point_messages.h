@@ -20,7 +20,7 @@ namespace telesplat::wire {
 struct Patch {
   static constexpr std::string_view kName = "patch";
   static constexpr bool kBulk = true;
-  static constexpr bool kBrief = true;  ///< fields that hold what stands here are not sent
+  static constexpr bool kBrief = true;  ///< fields by number; those that hold what stands here are not sent
   InstanceId packer;
   Sequence sequence;
   EpochId epoch;

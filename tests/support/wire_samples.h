@@ -165,7 +165,7 @@ inline size_t value_end(const std::string& bytes, size_t at, const std::function
 }
 
 struct Field {
-  std::string name;
+  std::string name;                    // a brief message's fields: their numbers
   size_t key = 0, value = 0, end = 0;  // offsets in the body
 };
 
@@ -177,7 +177,8 @@ inline std::vector<Field> fields_of(const std::string& body) {
       first == 0xde ? static_cast<unsigned char>(body[1]) * 256u + static_cast<unsigned char>(body[2]) : first & 15;
   for (size_t i = 0, at = first == 0xde ? 3 : 1; i < count; ++i) {
     const size_t value = value_end(body, at), end = value_end(body, value);
-    out.push_back({body.substr(at + 1, value - at - 1), at, value, end});
+    const auto key = static_cast<unsigned char>(body.at(at));
+    out.push_back({key < 0x80 ? std::to_string(key) : body.substr(at + 1, value - at - 1), at, value, end});
     at = end;
   }
   return out;

@@ -23,6 +23,16 @@ constexpr double kSteeredAim = 0.5, kFastEnough = 0.6;  // of the target, of tha
 // Side of a sampled image: a multiple of 8 in range.
 int whole_side(double v) { return std::clamp(int(std::lround(v / 8)) * 8, 16, geometry::kMaxImageSide); }
 
+// Every update says its camera: single precision, far finer than a pixel, is half as long (wire: numbers are as short
+// as they are exact).
+geometry::Camera in_single_precision(geometry::Camera c) {
+  auto& p = c.pose.position_room;
+  auto& q = c.pose.orientation;
+  for (double* v : {&p.x, &p.y, &p.z, &q.w, &q.x, &q.y, &q.z, &c.left, &c.right, &c.bottom, &c.top, &c.near_m})
+    *v = static_cast<float>(*v);
+  return c;
+}
+
 }  // namespace
 
 std::pair<int, int> sampling_size(const RequestOptions& o, int width, int height) {
@@ -68,6 +78,10 @@ bool ViewRequester::rests_at(const geometry::Pose& there, const geometry::Pose& 
 }
 
 geometry::Camera ViewRequester::wanted(double now_s, bool& still, const geometry::Camera* asked) {
+  return in_single_precision(exactly_wanted(now_s, still, asked));
+}
+
+geometry::Camera ViewRequester::exactly_wanted(double now_s, bool& still, const geometry::Camera* asked) {
   const double horizon_s = this->horizon_s();
   geometry::Camera camera = asked ? *asked : *display_;
   if (!asked) {

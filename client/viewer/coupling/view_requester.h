@@ -130,6 +130,7 @@ class ViewRequester {
   geometry::Pose expected_at(double t_s) const;
   /// asked: where the head will be is known.
   geometry::Camera wanted(double now_s, bool& still, const geometry::Camera* asked = nullptr);
+  geometry::Camera exactly_wanted(double now_s, bool& still, const geometry::Camera* asked);
   wire::ViewRequest request(RequestId id, const geometry::Camera& camera, double now_s, uint64_t buffers,
                             uint64_t ask) const;
   bool rests_at(const geometry::Pose& there, const geometry::Pose& here) const;
