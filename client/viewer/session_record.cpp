@@ -60,7 +60,11 @@ Result<std::unique_ptr<SessionRecord>> SessionRecord::open(const Options& option
   return out;
 }
 
+// A folder with images/ is taken: whoever joins the session later makes one of its own.
 Status SessionRecord::open_in(const std::string& directory) {
+  std::error_code error;
+  fs::create_directories(directory + "/images", error);
+  if (error) return Error{fmt::format("{}/images: cannot be made: {}", directory, error.message())};
   auto spool = FrameSpool::open(directory + "/spool");
   if (!spool) return spool.error();
   if (options_.received_mb > 0) {

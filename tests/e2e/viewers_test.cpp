@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 
 #include "tests/support/pipeline_run.h"
 
@@ -84,6 +85,8 @@ TEST(Viewers, ALateViewerGetsThePackersPoints) {
   })) << run.status().dump(1);
   late.signal(SIGINT);
   EXPECT_EQ(late.wait(), 0) << late.err();
+  EXPECT_TRUE(std::filesystem::exists(run.out() + "/viewer-2/images")) << "what it records stands in its own folder";
+  EXPECT_TRUE(std::filesystem::exists(run.out() + "/spool")) << "and what the first records stays";
   // So does one that the launcher starts.
   Program joined("telesplat",
                  {"run", "--master", run.master(), "--trajectory", "still", "--duration", "1", "--size", "160x100",

@@ -40,6 +40,15 @@ TEST_F(JoinedRecord, TheFirstViewerTakesTheFolderOthersOneInIt) {
   EXPECT_EQ(joined(), "viewer-guest");
 }
 
+// Else it would write into the files of the first, make pictures of its frames, and take its spool away.
+TEST_F(JoinedRecord, AFolderThatAViewerWasToldIsTaken) {
+  const auto first = SessionRecord::open({.out = folder_ + "/run", .join = true, .name = "first", .received_mb = 1});
+  ASSERT_TRUE(first) << first.error().text;
+  EXPECT_EQ(joined(), "viewer-guest");
+  (*first)->follow(session_);
+  EXPECT_EQ((*first)->records_in(), ".");
+}
+
 TEST_F(JoinedRecord, NothingIsWrittenThroughLinks) {
   std::ofstream(folder_ + "/precious") << "mine";
   for (const char* name : {"images", "spool", "points.events", "slices.events"}) {
