@@ -186,7 +186,8 @@ class Flood : public ::testing::TestWithParam<const char*> {
       EXPECT_TRUE(peer.shake_hands(key == "tiles" ? "PUSH" : "DEALER")) << key;
     }
     for (const double until = monotonic_s() + kPatience_s; !peers.empty() && monotonic_s() < until; pass(0.001))
-      for (int i = 0; i < 4; ++i) std::erase_if(peers, [&](auto& p) { return !p.second.send(part); });
+      for (int i = 0; i < 4; ++i)
+        for (auto p = peers.begin(); p != peers.end();) p = p->second.send(part) ? std::next(p) : peers.erase(p);
     for (const auto& [key, peer] : peers) ADD_FAILURE() << key << " takes a message without an end";
   }
 };

@@ -204,7 +204,7 @@ TEST(BriefMessages, HaveNumbersForTheNamesOfTheirFields) {
   ASSERT_TRUE(back) << back.error().text;
   EXPECT_EQ(back->tiles_in_frame, 9u);
   EXPECT_EQ(back->left_out, 2u);
-  const auto named = decode<Patch>(bytes_of("\x82\xa1v\x0c\xa8left_out\x02"));
+  const auto named = decode<Patch>(bytes_of("\x83\xa1v\x0c\x07\x09\xa8left_out\x02"));
   ASSERT_TRUE(named) << "a field that nobody knows";
   EXPECT_EQ(named->left_out, 0u);
   const auto wrong = decode<Patch>(bytes_of("\x82\xa1v\x0c\x0b\xc0"));
