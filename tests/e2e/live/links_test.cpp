@@ -283,8 +283,8 @@ TEST(Links, OvertakenViewsEndAndTheLastOneIsComplete) {
          << ",0," << std::sin(angle / 2) << ",0\n";
   }
   file.close();
-  PipelineRun run({"--trajectory", turning, "--hold", "6", "--link", "rtt=20ms,rate=1mbit", "--size", "640x400",
-                   "--sampling-size", "640x400"});
+  PipelineRun run({"--trajectory", turning, "--hold", "6", "--link", "rtt=20ms,rate=800kbit", "--size", "640x400",
+                   "--sampling-size", "960x600"});
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   const auto s = run.summary();
