@@ -8,6 +8,7 @@
 #include "common/core/clock.h"
 #include "common/net/control.h"
 #include "common/net/master_link.h"
+#include "tests/integration/receive.h"
 #include "tests/support/keys/key_folder.h"
 #include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
@@ -16,20 +17,9 @@ namespace telesplat::net {
 namespace {
 
 using test::KeyFolder;
+using test::receive_until;
 
 constexpr double kDeadline_s = test::patient(20);
-
-// Receives until `done` holds.
-template <class Done>
-bool receive_until(Socket& socket, Done done, std::vector<Message>* got = nullptr, double deadline_s = kDeadline_s) {
-  for (const double until = monotonic_s() + deadline_s; monotonic_s() < until;) {
-    while (auto m = socket.receive())
-      if (got) got->push_back(std::move(*m));
-    if (done()) return true;
-    wait_readable({&socket}, 5);
-  }
-  return false;
-}
 
 // A socket that binds with the keys of a folder.
 struct Bound {

@@ -10,6 +10,7 @@
 #include "common/core/clock.h"
 #include "common/net/socket.h"
 #include "common/wire/messages.h"
+#include "tests/integration/receive.h"
 #include "tests/support/keys/key_folder.h"
 #include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
@@ -19,23 +20,13 @@ namespace {
 
 using test::KeyFolder;
 using test::RawPeer;
+using test::receive_until;
 using test::zmtp_frame;
 using test::zmtp_opening;
 
 constexpr double kDeadline_s = test::patient(20);
 constexpr size_t kMost = 8;
 const wire::Goodbye kGoodbye{InstanceId{7}};
-
-template <class Done>
-bool receive_until(Socket& socket, Done done, std::vector<Message>* got = nullptr, double deadline_s = kDeadline_s) {
-  for (const double until = monotonic_s() + deadline_s; monotonic_s() < until;) {
-    while (auto m = socket.receive())
-      if (got) got->push_back(std::move(*m));
-    if (done()) return true;
-    wait_readable({&socket}, 5);
-  }
-  return false;
-}
 
 // A socket that takes eight connections.
 struct Bound {

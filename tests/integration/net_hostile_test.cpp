@@ -12,6 +12,7 @@
 #include "common/core/clock.h"
 #include "common/net/dispatch.h"
 #include "common/net/service.h"
+#include "tests/integration/receive.h"
 #include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
 
@@ -19,23 +20,10 @@ namespace telesplat::net {
 namespace {
 
 using test::RawPeer;
+using test::receive_until;
 using test::zmtp_claim;
 using test::zmtp_frame;
 using test::zmtp_opening;
-
-constexpr double kDeadline_s = test::patient(20);
-
-// Receives until `done` holds; what is received goes to `got`.
-template <class Done>
-bool receive_until(Socket& socket, Done done, std::vector<Message>* got = nullptr) {
-  for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
-    while (auto m = socket.receive())
-      if (got) got->push_back(std::move(*m));
-    if (done()) return true;
-    wait_readable({&socket}, 5);
-  }
-  return false;
-}
 
 struct Bound {
   Bound(Kind kind, const SocketOptions& options = {}) : socket(context, kind, "bound", options) {

@@ -10,6 +10,7 @@
 #include "common/core/clock.h"
 #include "common/net/socket.h"
 #include "common/wire/messages.h"
+#include "tests/integration/receive.h"
 #include "tests/support/keys/key_folder.h"
 #include "tests/support/patience.h"
 #include "tests/support/raw_peer.h"
@@ -33,13 +34,7 @@ struct Bound {
   }
   template <class Done>
   bool receive_until(Done done, std::vector<Message>* got = nullptr) {
-    for (const double until = monotonic_s() + kDeadline_s; monotonic_s() < until;) {
-      while (auto m = socket.receive())
-        if (got) got->push_back(std::move(*m));
-      if (done()) return true;
-      wait_readable({&socket}, 5);
-    }
-    return false;
+    return test::receive_until(socket, done, got);
   }
   bool serves_a_friend(Kind kind) {
     Context theirs;
