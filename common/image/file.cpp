@@ -59,6 +59,13 @@ std::string name_for_reader(std::span<const std::byte> bytes, const std::string&
   return name;
 }
 
+// OpenImageIO would ask each of its readers, HEIF's and that of movies too, about a file that is not what its name says.
+// What is hostile would choose among all of them, and one takes minutes and all memory (libheif 1.15, under
+// ThreadSanitizer).
+void ask_the_reader_of_its_name_alone() {
+  [[maybe_unused]] static const bool told = OIIO::attribute("try_all_readers", 0);
+}
+
 // path: for error texts.
 Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint64_t most_pixels) {
   const OIIO::ImageSpec spec = input.spec();
@@ -101,12 +108,14 @@ Result<View> read_pixels(OIIO::ImageInput& input, const std::string& path, uint6
 }  // namespace
 
 Result<View> read_view(const std::string& path) {
+  ask_the_reader_of_its_name_alone();
   const auto input = OIIO::ImageInput::open(path);
   if (!input) return Error{fmt::format("cannot read picture {}: {}", path, first_line(OIIO::geterror()))};
   return read_pixels(*input, path, ~uint64_t{0});
 }
 
 Result<View> read_picture(std::span<const std::byte> bytes, const std::string& name, uint64_t most_pixels) {
+  ask_the_reader_of_its_name_alone();
   OIIO::ImageSpec wishes;
   wishes.attribute("oiio:UnassociatedAlpha", 1);
   OIIO::Filesystem::IOMemReader memory(const_cast<std::byte*>(bytes.data()), bytes.size());  // which only reads

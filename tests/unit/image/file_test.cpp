@@ -101,6 +101,15 @@ TEST_F(ImageFile, UnreadableFilesAreNamed) {
   }
 }
 
+// Not by each that there is, which a hostile file could choose from.
+TEST_F(ImageFile, TheReaderOfTheNameAloneIsAsked) {
+  ASSERT_TRUE(write_exr(path("a.exr"), all_values()).ok());
+  std::filesystem::rename(path("a.exr"), path("no.png"));
+  const auto read = read_view(path("no.png"));
+  ASSERT_FALSE(read.ok());
+  EXPECT_NE(read.error().text.find("no.png"), std::string::npos) << read.error().text;
+}
+
 TEST_F(ImageFile, TruncatedFilesAreRefusedAtEveryLength) {
   View v{8, 8, std::vector<uint32_t>(64), std::vector<float>(64, 1.0f)};
   for (uint32_t i = 0; i < 64; ++i) v.colour[i] = i * 0x051709;
