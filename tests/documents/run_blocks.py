@@ -42,6 +42,7 @@ SERVICES = {
 }
 OTHER_MACHINES = re.compile(r"\b192\.168\.\d+\.\d+\b")
 PATIENCE_S = 180  # for one command
+END_S = 120  # for what ran in the background and was told to end
 SECONDS, SIZE = 3, "320x240"  # of a run that does not say
 
 
@@ -86,7 +87,8 @@ class Screen:
 class Page:
     """Runs the blocks of one page in `folder`."""
 
-    def __init__(self, root, programs, folder, display):
+    def __init__(self, root, programs, folder, display, slowness):
+        self._slowness = slowness
         self._folder, self._programs, self._display = folder, programs, display
         self._files = Files(programs, folder)
         self._background = []  # (text, process, output) of services, or of a session that ctl talks to
@@ -209,9 +211,10 @@ class Page:
         try:
             done = subprocess.run(
                 ["bash", "-c", text], cwd=self._folder, env=self._environment, stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE_S)
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE_S * self._slowness)
         except subprocess.TimeoutExpired as late:
-            return self._fail(f"{where}: not done after {PATIENCE_S} s: {text}", (late.stdout or b"").decode())
+            return self._fail(f"{where}: not done after {PATIENCE_S * self._slowness:g} s: {text}",
+                              (late.stdout or b"").decode())
         if done.returncode:
             return self._fail(f"{where}: exit code {done.returncode} after {time.monotonic() - begin:.1f} s: {text}",
                               done.stdout.decode(errors="replace"))
@@ -224,7 +227,7 @@ class Page:
 
     def _wait_for_session(self, where):
         ask = [os.path.join(self._programs, "telesplat"), "ctl", "status", "--json"]
-        for _ in range(120):
+        for _ in range(int(120 * self._slowness)):
             asked = subprocess.run(ask, env=self._environment, cwd=self._folder, stdout=subprocess.PIPE,
                                    stderr=subprocess.DEVNULL)
             status = json.loads(asked.stdout) if asked.returncode == 0 else {}
@@ -232,7 +235,7 @@ class Page:
             if viewers and all(p.get("values", {}).get("frames", 0) > 0 for p in viewers):
                 return
             time.sleep(0.5)
-        self._fail(f"{where}: no viewer of the session shows anything after a minute", "")
+        self._fail(f"{where}: no viewer of the session shows anything after {60 * self._slowness:g} s", "")
 
     def _stop_session(self):
         ask = [os.path.join(self._programs, "telesplat"), "ctl", "stop"]
@@ -247,9 +250,9 @@ class Page:
                     process.send_signal(signal_number)
         for text, process, output in self._background:
             try:
-                code = process.wait(timeout=120)
+                code = process.wait(timeout=END_S * self._slowness)
             except subprocess.TimeoutExpired:
-                code = "none within 120 s"
+                code = f"none within {END_S * self._slowness:g} s"
                 process.terminate()
                 try:
                     process.wait(timeout=10)
@@ -265,7 +268,7 @@ class Page:
 def run_page(options, path, display):
     """(commands that ran, those that failed)"""
     folder = tempfile.mkdtemp(prefix="telesplat-blocks-")
-    page = Page(os.path.abspath(options.root), os.path.abspath(options.bin), folder, display)
+    page = Page(os.path.abspath(options.root), os.path.abspath(options.bin), folder, display, options.slowness)
     print(path)
     try:
         with open(path, encoding="utf-8") as file:
@@ -284,6 +287,8 @@ def main():
     parser.add_argument("pages", nargs="+", help="Markdown files")
     parser.add_argument("--root", default=os.path.join(os.path.dirname(__file__), "../.."), help="of the source tree")
     parser.add_argument("--bin", required=True, help="folder of the programs")
+    parser.add_argument("--slowness", type=float, default=1, metavar="TIMES",
+                        help="have so many times the patience: sanitized programs are slow (default: 1)")
     parser.add_argument("--keep", action="store_true", help="keep what the commands leave")
     options = parser.parse_args()
     screen = Screen()

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "tests/support/patience.h"
 #include "tests/support/pipeline_run.h"
 
 namespace telesplat::test {
@@ -45,8 +46,10 @@ TEST_P(Couplings, OneFrameForEachViewUpdate) {
   const auto requests = run.column("frames.csv", "request");
   ASSERT_EQ(requests.size(), size_t(s["frames"]));
   EXPECT_TRUE(std::is_sorted(requests.begin(), requests.end()));
-  EXPECT_EQ(std::set<double>(requests.begin(), requests.end()).size(), requests.size()) << "two frames of one update";
-  EXPECT_GE(s["updates"], s["frames"]);
+  const size_t shown = std::set<double>(requests.begin(), requests.end()).size();
+  // One that nothing follows for 2 s is drawn again; sanitized programs may take longer.
+  EXPECT_LE(requests.size() - shown, size_t(kSlow ? 4 : 0)) << "two frames of one update";
+  EXPECT_GE(s["updates"], shown);
   EXPECT_LE(s["updates"], int(s["frames"]) + buffers);
   const auto updates = run.column("updates.csv", "request");
   const std::set<double> known(updates.begin(), updates.end());

@@ -21,8 +21,9 @@ void expect_distribution(const nlohmann::json& d, const std::string& name) {
 }
 
 TEST(Record, EveryFileIsThereAndTrue) {
-  const std::string hold = kSlow ? "20" : "1";  // until what the head sees at rest is sampled
-  PipelineRun run({"--duration", "2", "--hold", hold, "--verify", "15", "--record-every", "60"});
+  // Until what the head sees at rest is sampled.
+  const std::string duration = ordinary_or_slow("2", "42"), hold = ordinary_or_slow("1", "40");
+  PipelineRun run({"--duration", duration, "--hold", hold, "--verify", "15", "--record-every", "60"});
   ASSERT_EQ(run.program().wait(90), 0) << run.program().err();
   EXPECT_TRUE(run.all_gone());
   for (const char* name : {"session.toml", "frames.csv", "updates.csv", "tiles.csv", "trace.json", "summary.json",
@@ -76,7 +77,7 @@ TEST(Record, EveryFileIsThereAndTrue) {
   EXPECT_EQ(s["data"]["file"], run.folder() / "terrain.ply");
   EXPECT_EQ(s["data"]["bytes"], fs::file_size(run.folder() / "terrain.ply"));
   EXPECT_EQ(s["data"]["hash"], hash_text(hash_of_files({run.folder() / "terrain.ply"})->hash));
-  EXPECT_EQ(s["asked"]["duration_s"], 2);
+  EXPECT_EQ(s["asked"]["duration_s"], std::stod(duration));
   EXPECT_EQ(s["asked"]["hold_s"], std::stod(hold));
   EXPECT_EQ(s["asked"]["verify_every"], 15);
   EXPECT_EQ(s["kind"], "mesh");
@@ -197,7 +198,9 @@ TEST(Record, ARealMesh) {
                     mesh = data + "/meshes/alderson-bone-718k.ply";
   if (!fs::exists(mesh)) GTEST_SKIP() << mesh << " is not there; TELESPLAT_DATA names the folder of real data sets";
   // Long enough for a busy machine to sample what the head sees where it comes to rest.
-  PipelineRun run({"--duration", "6", "--hold", "5", "--verify", "60"}, mesh);
+  PipelineRun run({"--duration", ordinary_or_slow("6", "65"), "--hold", ordinary_or_slow("5", "60"), "--verify",
+                   ordinary_or_slow("60", "400")},
+                  mesh);
   ASSERT_EQ(run.program().wait(100), 0) << run.program().err();
   const auto s = run.summary();
   EXPECT_GT(s["primitives"], 700000);
