@@ -41,7 +41,7 @@ using image::DepthImage;
 
 // stream = magic, version, flags, varint width, varint height, [bounds], tiles of TileGrid row by row (tile.h); nothing
 // after them. bounds = varint depth, u8 normal, u8 colour
-constexpr uint8_t kMagic = 0xD7, kVersion = 5, kBounded = 1, kKnownFlags = kBounded;
+constexpr uint8_t kMagic = 0xD7, kVersion = 6, kBounded = 1, kKnownFlags = kBounded;
 
 Error damaged(std::string_view what) { return Error{fmt::format("depth image stream: {}", what)}; }
 
@@ -177,7 +177,7 @@ Result<StreamInfo> inspect(std::span<const uint8_t> bytes) {
   StreamInfo info{.width = size->width, .height = size->height, .bounds = size->bounds};
   const TileGrid grid(info.width, info.height);
   if (!for_each_tile(
-          grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info.bounds, info); }))
+          grid, [&](int column, int row) { return detail::skip_tile(in, grid.rect(column, row), info); }))
     return damaged("damaged or cut off");
   if (in.left() != 0) return damaged(fmt::format("{} bytes after its end", in.left()));
   return info;

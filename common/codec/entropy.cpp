@@ -3,107 +3,25 @@
 #include <algorithm>
 #include <array>
 
+#include "common/codec/range_coder.h"
+
 namespace telesplat::codec::detail {
 namespace {
 
 // A block is varint(size << 2 | kind) and then `size` bytes.
 enum BlockKind : uint32_t { kConstant = 0, kStored = 1, kCoded = 2 };
 
-constexpr size_t kTooShort = 8;  // bytes: the coder's last ones take half of them
-
-// How likely a bit is 0, in 2^-16: the mean of what two rates of learning say, both faster at first.
-class Bit {
- public:
-  uint32_t zero() const { return (uint32_t{fast_} + slow_) >> 5; }  // in 2^-12, 1 to 4094
-  void learn(uint32_t bit) {
-    const int target = bit == 0 ? 65535 : 0;
-    const auto towards = [&](uint16_t from, int most) {
-      return static_cast<uint16_t>(std::clamp(from + (target - from) / std::min(most, seen_ + 2), 32, 65503));
-    };
-    fast_ = towards(fast_, 20), slow_ = towards(slow_, 128);
-    seen_ = static_cast<uint16_t>(seen_ + (seen_ < 128));
-  }
-
- private:
-  uint16_t fast_ = 1u << 15, slow_ = 1u << 15, seen_ = 0;
-};
+constexpr size_t kTooShort = 4;  // bytes
 
 // The bits of a byte, from the highest, by those above and by what the byte before was.
 class ByteModel {
  public:
-  std::array<Bit, 256>& bits() { return bits_[before_]; }
+  std::array<AdaptiveBit, 256>& bits() { return bits_[before_]; }
   void next(uint32_t byte) { before_ = byte == 0 ? 0 : byte == 255 ? 1 : 2; }
 
  private:
-  std::array<std::array<Bit, 256>, 3> bits_;
+  std::array<std::array<AdaptiveBit, 256>, 3> bits_;
   size_t before_ = 0;
-};
-
-// Range coding (G. Martin, 1979) of bits, with carries as in I. Pavlov's LZMA.
-class RangeEncoder {
- public:
-  explicit RangeEncoder(std::vector<uint8_t>& out) : out_(out) {}
-  void put(uint32_t bit, Bit& model) {
-    const uint32_t bound = (range_ >> 12) * model.zero();
-    if (bit == 0) {
-      range_ = bound;
-    } else {
-      low_ += bound, range_ -= bound;
-    }
-    model.learn(bit);
-    for (; range_ < 1u << 24; range_ <<= 8) shift();
-  }
-  void finish() {
-    for (int i = 0; i < 5; ++i) shift();
-  }
-
- private:
-  void shift() {
-    if (low_ < 0xFF000000u || low_ > 0xFFFFFFFFu) {
-      const auto carry = static_cast<uint8_t>(low_ >> 32);
-      if (any_) out_.push_back(static_cast<uint8_t>(cache_ + carry));
-      for (; held_ != 0; --held_) out_.push_back(static_cast<uint8_t>(0xFF + carry));
-      cache_ = static_cast<uint8_t>(low_ >> 24), any_ = true;
-    } else {
-      ++held_;
-    }
-    low_ = (low_ & 0x00FFFFFF) << 8;
-  }
-
-  std::vector<uint8_t>& out_;
-  uint64_t low_ = 0;
-  uint32_t range_ = ~0u;
-  uint8_t cache_ = 0;
-  bool any_ = false;
-  size_t held_ = 0;
-};
-
-// Past the end of its bytes it reads zeros, and finished() is false.
-class RangeDecoder {
- public:
-  explicit RangeDecoder(std::span<const uint8_t> bytes) : bytes_(bytes) {
-    for (int i = 0; i < 4; ++i) code_ = code_ << 8 | next();
-  }
-  uint32_t get(Bit& model) {
-    const uint32_t bound = (range_ >> 12) * model.zero();
-    const uint32_t bit = code_ >= bound;
-    if (bit == 0) {
-      range_ = bound;
-    } else {
-      code_ -= bound, range_ -= bound;
-    }
-    model.learn(bit);
-    for (; range_ < 1u << 24; range_ <<= 8) code_ = code_ << 8 | next();
-    return bit;
-  }
-  bool finished() const { return at_ == bytes_.size(); }
-
- private:
-  uint8_t next() { return at_ < bytes_.size() ? bytes_[at_++] : (at_ = bytes_.size() + 1, uint8_t{0}); }
-
-  std::span<const uint8_t> bytes_;
-  size_t at_ = 0;
-  uint32_t range_ = ~0u, code_ = 0;
 };
 
 struct Block {

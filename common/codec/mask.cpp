@@ -1,124 +1,89 @@
 #include "common/codec/mask.h"
 
-#include <algorithm>
+#include <array>
+#include <bit>
+#include <type_traits>
 
 #include "common/codec/dense/kernels.h"
-#include "common/codec/tokens.h"
+#include "common/codec/range_coder.h"
 
 namespace telesplat::codec::detail {
 namespace {
 
-// kRuns: lengths of the alternating runs of empty and covered pixels, rows joined: few pixels, or long runs.
-// kBytes: eight pixels a byte. kBytesAbove: the same, exclusive or with the row above, for outlines that run downwards.
-// kPeriodic: a pattern of 64 x 64 pixels that repeats, which of its pixels are covered where, and the other covered
-// pixels: three masks of the other codings. Validation rays are picked by such a pattern (blue noise).
-enum Coding : uint8_t { kRuns = 0, kBytes = 1, kBytesAbove = 2, kPeriodic = 3 };
-constexpr int kPeriod = 64;
+constexpr int kPeriod = 64;  // pixels, both ways, after which a pattern repeats
+constexpr uint32_t kPeriodic = 1;
 
 size_t bytes_per_row(const Mask& mask) { return (static_cast<size_t>(mask.width()) + 7) / 8; }
 
-// Lengths of runs in scan order, beginning with an empty one that may have length 0; the last run is left out.
-void run_lengths(const Mask& mask, std::vector<uint32_t>& lengths) {
-  lengths.clear();
-  uint64_t last = 0;
-  size_t begin = 0;
-  for (int y = 0; y < mask.height(); ++y)
-    for (size_t w = 0; w < mask.words_per_row(); ++w) {
-      const size_t first = static_cast<size_t>(y) * mask.width() + w * 64,
-                   bits = std::min<size_t>(64, mask.width() - w * 64);
-      const uint64_t word = mask.row(y)[w];
-      uint64_t changes = word ^ (word << 1 | last);
-      if (bits < 64) changes &= (uint64_t{1} << bits) - 1;
-      for (; changes != 0; changes &= changes - 1) {
-        const size_t at = first + static_cast<size_t>(std::countr_zero(changes));
-        lengths.push_back(static_cast<uint32_t>(at - begin));
-        begin = at;
+// Groups of eight pixels of a row: whether any is covered, whether all are, and else which.
+class GroupModel {
+ public:
+  // Puts a mask by coder(bit, model), or gets it into an empty one.
+  template <class Coder, class AnyMask>
+  void code(const Coder& coder, AnyMask& mask) {
+    const size_t groups = bytes_per_row(mask), words = mask.words_per_row();
+    const int last = mask.width() - 8 * static_cast<int>(groups - 1);
+    const std::vector<uint64_t> none(words);
+    const uint64_t *above = none.data(), *above_that = none.data();
+    for (int y = 0; y < mask.height(); ++y) {
+      auto* const row = mask.row(y);
+      uint32_t left = 0;
+      for (size_t group = 0; group < groups; ++group) {
+        const int pixels = group + 1 == groups ? last : 8;
+        // The rows' groups that are known: of those beside the mask no pixel is covered.
+        const uint32_t up_left = group == 0 ? 0 : byte(above, group - 1), up = byte(above, group),
+                       up_right = group + 1 == groups ? 0 : byte(above, group + 1);
+        const uint32_t all = (1u << pixels) - 1;
+        uint32_t here = byte(row, group);
+        auto& any = any_[(left != 0) | (up != 0) << 1 | (up_right != 0) << 2 | (up_left != 0) << 3 |
+                         (byte(above_that, group) != 0) << 4];
+        if (coder(here != 0, any) == 0) {
+          left = 0;
+          continue;
+        }
+        auto& full = full_[(left == 255) | (up == all) << 1 | (up_right == 255) << 2];
+        if (coder(here == all, full) != 0)
+          here = all;
+        else
+          here = some(coder, here, pixels, left, up_left >> 7 | up << 1 | (up_right & 1) << 9);
+        if constexpr (!std::is_const_v<AnyMask>) row[group / 8] |= uint64_t{here} << group % 8 * 8;
+        left = here;
       }
-      last = word >> (bits - 1) & 1;
+      above_that = above, above = row;
     }
-}
-
-void set_bits(Mask& mask, size_t begin, size_t end) {
-  const size_t width = static_cast<size_t>(mask.width());
-  while (begin < end) {
-    const size_t y = begin / width, x = begin % width, take = std::min(end - begin, std::min(width - x, 64 - x % 64));
-    const uint64_t ones = take == 64 ? ~uint64_t{0} : ((uint64_t{1} << take) - 1);
-    mask.row(static_cast<int>(y))[x / 64] |= ones << x % 64;
-    begin += take;
   }
-}
+
+ private:
+  static uint32_t byte(const uint64_t* row, size_t group) {
+    return static_cast<uint32_t>(row[group / 8] >> group % 8 * 8) & 255;
+  }
+  // left: the group to the left; above: the pixels above, from that above the one to the left of the first.
+  template <class Coder>
+  uint32_t some(const Coder& coder, uint32_t wanted, int pixels, uint32_t left, uint32_t above) {
+    uint32_t row = left >> 6, found = 0;  // the two pixels to the left; those of this group
+    for (int i = 0; i < pixels; ++i) {
+      uint32_t bit = 1;  // of the last one, if no other is
+      if (found != 0 || i + 1 < pixels)
+        bit =
+            coder(wanted >> i & 1, pixel_[found != 0 ? 8 : static_cast<size_t>(i)][(row & 3) | (above >> i & 7) << 2]);
+      found |= bit << i;
+      row = row >> 1 | bit << 1;
+    }
+    return found;
+  }
+
+  std::array<AdaptiveBit, 32> any_;
+  std::array<AdaptiveBit, 8> full_;
+  std::array<std::array<AdaptiveBit, 32>, 9> pixel_;
+};
 
 struct Scratch {
-  std::vector<uint32_t> lengths;
-  std::vector<uint8_t> tokens[2], bytes, packed;
-  BitWriter writer;
-  BitReader reader;
+  std::vector<uint8_t> packed, periodic;
   Mask pattern, repeats, others;
-  std::vector<uint8_t> periodic;
 };
 Scratch& scratch() {
   static thread_local Scratch s;
   return s;
-}
-
-void put_runs(std::vector<uint8_t>& out, const std::vector<uint32_t>& lengths, Scratch& s) {
-  for (auto& tokens : s.tokens) tokens.clear();
-  s.writer.start(lengths.size() * NumberToken::kMaxBits);
-  for (size_t i = 0; i < lengths.size(); ++i) {
-    uint8_t token;
-    NumberToken::put(lengths[i], &token, s.writer.sink);
-    s.tokens[i & 1].push_back(token);
-  }
-  put_varint(out, static_cast<uint32_t>(lengths.size()));
-  for (auto& tokens : s.tokens) put_block(out, tokens);
-  put_stored_block(out, s.writer.bytes());
-}
-
-bool get_runs(Reader& in, Mask& mask, Scratch& s) {
-  const size_t pixels = static_cast<size_t>(mask.width()) * static_cast<size_t>(mask.height());
-  const auto count = in.varint();
-  if (!count || *count > pixels) return false;
-  for (size_t parity = 0; parity < 2; ++parity) {
-    s.tokens[parity].resize((*count + 1 - parity) / 2);
-    if (!get_block(in, s.tokens[parity])) return false;
-  }
-  const auto bits = get_stored_block(in);
-  if (!bits) return false;
-  s.reader.start(*bits, 64);
-  size_t at = 0;
-  for (size_t i = 0; i < *count; ++i) {
-    const uint8_t token = s.tokens[i & 1][i / 2];
-    if (token >= NumberToken::kCount) return false;
-    const size_t end = at + NumberToken::get(token, s.reader.source);
-    if (end >= pixels || (end == at && i != 0) || s.reader.overrun()) return false;
-    if (i & 1) set_bits(mask, at, end);
-    at = end;
-  }
-  if (*count & 1) set_bits(mask, at, pixels);
-  return s.reader.finished();
-}
-
-void put_bytes(std::vector<uint8_t>& out, const Mask& mask, bool above, Scratch& s) {
-  const size_t row_bytes = bytes_per_row(mask);
-  s.bytes.resize(row_bytes * static_cast<size_t>(mask.height()));
-  for (int y = 0; y < mask.height(); ++y) std::memcpy(s.bytes.data() + row_bytes * y, mask.row(y), row_bytes);
-  if (above)
-    for (size_t i = s.bytes.size(); i-- > row_bytes;) s.bytes[i] ^= s.bytes[i - row_bytes];
-  put_block(out, s.bytes);
-}
-
-bool get_bytes(Reader& in, Mask& mask, bool above, Scratch& s) {
-  const size_t row_bytes = bytes_per_row(mask);
-  s.bytes.resize(row_bytes * static_cast<size_t>(mask.height()));
-  if (!get_block(in, s.bytes)) return false;
-  if (above)
-    for (size_t i = row_bytes; i < s.bytes.size(); ++i) s.bytes[i] ^= s.bytes[i - row_bytes];
-  const uint8_t padding = mask.width() % 8 == 0 ? 0 : static_cast<uint8_t>(0xFF << mask.width() % 8);
-  for (int y = 0; y < mask.height(); ++y) {
-    std::memcpy(mask.row(y), s.bytes.data() + row_bytes * y, row_bytes);
-    if (s.bytes[row_bytes * (y + 1) - 1] & padding) return false;
-  }
-  return true;
 }
 
 }  // namespace
@@ -128,43 +93,25 @@ void covered_bits(const uint32_t* depth, size_t count, uint64_t* words) { kernel
 namespace {
 
 void put_plain(std::vector<uint8_t>& out, const Mask& mask) {
-  // A run takes a byte or so, a byte of pixels at least a bit and few more where it is the usual one. Bench
-  // codec/patch*.
   Scratch& s = scratch();
-  run_lengths(mask, s.lengths);
-  const size_t pixels = static_cast<size_t>(mask.width()) * static_cast<size_t>(mask.height());
-  const size_t begin = out.size(), runs = s.lengths.size();
-  if (runs < pixels / 10) {
-    out.push_back(kRuns);
-    put_runs(out, s.lengths, s);
-    if (runs <= pixels / 512) return;
-  }
-  size_t plain = 0, above = 0;  // changes of pixels within rows, and of those changes from row to row
-  for (int y = 1; y < mask.height(); ++y)
-    for (size_t w = 0; w < mask.words_per_row(); ++w) {
-      const uint64_t here = mask.row(y)[w], changed = here ^ mask.row(y - 1)[w];
-      plain += static_cast<size_t>(std::popcount(here ^ here << 1));
-      above += static_cast<size_t>(std::popcount(changed ^ changed << 1));
-    }
-  s.packed.assign(1, above < plain ? kBytesAbove : kBytes);
-  put_bytes(s.packed, mask, above < plain, s);
-  if (out.size() != begin && out.size() - begin <= s.packed.size()) return;
-  out.resize(begin);
+  s.packed.clear();
+  RangeEncoder coder(s.packed);
+  GroupModel model;
+  model.code(BitCoder{coder}, mask);
+  coder.finish();
+  put_varint(out, static_cast<uint32_t>(2 * s.packed.size()));
   out.insert(out.end(), s.packed.begin(), s.packed.end());
 }
 
+// Into an empty mask.
 bool get_plain(Reader& in, Mask& mask) {
-  const auto coding = in.u8();
-  if (!coding) return false;
-  switch (*coding) {
-    case kRuns:
-      return get_runs(in, mask, scratch());
-    case kBytes:
-    case kBytesAbove:
-      return get_bytes(in, mask, *coding == kBytesAbove, scratch());
-    default:
-      return false;
-  }
+  const auto head = in.varint();
+  const auto bytes = head && *head % 2 == 0 ? in.bytes(*head / 2) : std::nullopt;
+  if (!bytes) return false;
+  RangeDecoder coder(*bytes);
+  GroupModel model;
+  model.code(BitDecoder{coder}, mask);
+  return coder.finished();
 }
 
 // Calls f(y, word index, pattern's bits inside of the mask) for all words of the mask that the pattern has bits in.
@@ -210,7 +157,7 @@ void put_periodic(std::vector<uint8_t>& out, const Mask& mask, Scratch& s) {
     for (; bits != 0; bits &= bits - 1, ++at)
       if (mask.row(y)[w] & bits & -bits) s.repeats.set(at, 0);
   });
-  out.push_back(kPeriodic);
+  put_varint(out, kPeriodic);
   for (const Mask* part : {&s.pattern, &s.repeats, &s.others}) put_plain(out, *part);
 }
 
@@ -252,7 +199,7 @@ void put_mask(std::vector<uint8_t>& out, const Mask& mask) {
 }
 
 bool get_mask(Reader& in, Mask& mask) {
-  if (in.peek() != kPeriodic) return get_plain(in, mask);
+  if (in.peek() != static_cast<int>(kPeriodic)) return get_plain(in, mask);
   (void)in.u8();
   return get_periodic(in, mask, scratch());
 }

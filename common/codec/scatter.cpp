@@ -3,6 +3,7 @@
 #include "common/codec/scatter.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -142,7 +143,7 @@ void ScatterPredictor::add(int x, int y, const Pixel& pixel, const Magnitudes& k
 }
 
 Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbours) {
-  if (neighbours.empty()) return {base_, {}, 0};
+  if (neighbours.empty()) return {.pixel = base_};
   Near near;
   near.count = neighbours.size();
   const Known* nearest = nullptr;
@@ -189,6 +190,7 @@ Guess ScatterPredictor::predict(int x, int y, std::span<const uint16_t> neighbou
   out.expected = {size(0), {size(1), size(2)}, size(3)};
   const float plain = sum[3] + nearest->plain;
   out.plain_colour = plain > 0.9f ? 3 : plain > 0.5f ? 2 : plain > 0 ? 1 : 0;
+  out.distance = std::min(static_cast<uint32_t>(std::bit_width(least)), Guess::kMostDistance);
   return out;
 }
 

@@ -81,8 +81,10 @@ struct Magnitudes {
 
 struct Guess {
   Pixel pixel;
-  Magnitudes expected;        ///< of the residuals, as those of the neighbours were
-  uint32_t plain_colour = 0;  ///< 0..3: how many neighbours had colours as predicted, from none to all
+  Magnitudes expected;                ///< of the residuals, as those of the neighbours were
+  uint32_t plain_colour = 0;          ///< 0..3: how many neighbours had colours as predicted, from none to all
+  uint32_t distance = kMostDistance;  ///< to the nearest one: bits of its square, 1..kMostDistance
+  static constexpr uint32_t kMostDistance = 7;
 };
 
 /// What is known of the pixels that were coded, in the order of the walk.

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <iterator>
 
 namespace telesplat::codec::detail {
 namespace {
 
-constexpr size_t kMostPixelBits = 6 * GolombContext::kMostBits;
+constexpr size_t kMostPixelBits = 3 * GolombContext::kMostBits;
 
 unsigned size_of(int residual) {
   return static_cast<unsigned>(std::bit_width(static_cast<unsigned>(std::abs(residual))));
@@ -37,28 +38,13 @@ void code_normal(ScatterContexts& contexts, const Guess& guess, uint16_t& normal
   normal = static_cast<uint16_t>(result);
 }
 
-template <class Code>
-void code_colour(ScatterContexts& contexts, const Guess& guess, uint32_t& colour, Magnitudes& out, Code code) {
-  unsigned before = byte_size(guess.expected.colour);
-  uint32_t result = 0, green = 0;
-  out.colour = 1;
-  for (int c = 0; c < 3; ++c) {
-    const uint32_t expected = byte_at(guess.pixel.colour, kChannels[c]) + green;
-    const int residual = code(signed_byte(byte_at(colour, kChannels[c]) - expected), contexts.colour[c][before]);
-    result |= ((expected + static_cast<uint32_t>(residual)) & 255) << 8 * kChannels[c];
-    if (c == 0) green = static_cast<uint32_t>(residual);
-    before = byte_size(size_of(residual));
-    out.colour = std::max(out.colour, static_cast<uint8_t>(before));
-  }
-  colour = result;
-}
-
 // The same within bounds, by steps of lattices. False where there is no such step.
 template <class Code>
 bool code_depth(ScatterContexts& contexts, const DepthLattice& lattice, const Guess& guess, uint32_t& depth,
                 Magnitudes& out, Code code) {
   const int expected = static_cast<int>(lattice.index(guess.pixel.depth));
-  const int residual = code(static_cast<int>(lattice.index(depth)) - expected, contexts.depth[guess.expected.depth]);
+  const int residual =
+      code(static_cast<int>(lattice.index(depth)) - expected, contexts.depth[guess.expected.depth][guess.distance]);
   out.depth = static_cast<uint8_t>(std::min<unsigned>(size_of(residual), ScatterContexts::kDepthBits));
   const int index = expected + residual;
   if (index < 1 || index > static_cast<int>(lattice.last())) return false;
@@ -85,28 +71,6 @@ bool code_normal(ScatterContexts& contexts, const NormalLattice& lattice, const 
   return true;
 }
 
-template <class Code>
-bool code_colour(ScatterContexts& contexts, const ColourLattice& lattice, const Guess& guess, uint32_t& colour,
-                 Magnitudes& out, Code code) {
-  unsigned before = byte_size(guess.expected.colour);
-  uint32_t result = 0;
-  int green = 0;
-  out.colour = 1;
-  for (int c = 0; c < 3; ++c) {
-    const int expected = lattice.index(static_cast<int>(byte_at(guess.pixel.colour, kChannels[c]))) + green;
-    const int residual =
-        code(lattice.index(static_cast<int>(byte_at(colour, kChannels[c]))) - expected, contexts.colour[c][before]);
-    const int index = expected + residual;
-    if (index < 0 || index > lattice.index(255)) return false;
-    result |= static_cast<uint32_t>(lattice.value(index)) << 8 * kChannels[c];
-    if (c == 0) green = residual;
-    before = byte_size(size_of(residual));
-    out.colour = std::max(out.colour, static_cast<uint8_t>(before));
-  }
-  colour = result;
-  return true;
-}
-
 bool is_near(uint32_t a, uint32_t b, int reach) {
   int most = 0;
   for (int c = 0; c < 3; ++c)
@@ -114,23 +78,79 @@ bool is_near(uint32_t a, uint32_t b, int reach) {
   return most <= reach;
 }
 
+// How far blue and red of `colour` are from what is expected of them where green is `green` more than predicted: 0..3.
+size_t farness(uint32_t colour, uint32_t predicted, int green) {
+  int sum = 0;
+  for (const int channel : {kChannels[1], kChannels[2]})
+    sum += std::abs(static_cast<int>(byte_at(colour, channel)) -
+                    std::clamp(static_cast<int>(byte_at(predicted, channel)) + green, 0, 255));
+  return sum == 0 ? 0 : sum < 6 ? 1 : sum < 20 ? 2 : 3;
+}
+
+size_t sign_of(int residual) { return residual < 0 ? 0 : residual == 0 ? 1 : 2; }
+
+// `colour` becomes what is decoded. False where there is no such step.
+template <class Coder>
+bool code_colour(ScatterContexts& contexts, int reach, const Guess& guess, uint32_t& colour, Magnitudes& out,
+                 const Coder& coder) {
+  const uint32_t predicted = guess.pixel.colour;
+  uint32_t result = predicted;
+  bool good = true;
+  if (coder(!is_near(colour, predicted, reach), contexts.plain[guess.plain_colour]) != 0) {
+    const ColourLattice lattice(reach);
+    const auto index = [&](uint32_t word, int c) {
+      return lattice.index(static_cast<int>(byte_at(word, kChannels[c])));
+    };
+    result = 0;
+    int residual[3];
+    const auto code_channel = [&](int c, unsigned context, size_t sign) {
+      const int expected = index(predicted, c) + (c == 0 ? 0 : residual[0]), most = lattice.index(255);
+      residual[c] = contexts.colour[c][context].code(coder, index(colour, c) - expected, sign);
+      const int step = expected + residual[c];
+      good &= step >= 0 && step <= most;
+      result |= static_cast<uint32_t>(lattice.value(std::clamp(step, 0, most))) << 8 * kChannels[c];
+    };
+    code_channel(0, byte_size(guess.expected.colour), 1);
+    const auto green = static_cast<int>(byte_at(result, kChannels[0]));
+    const int32_t last = contexts.last_of_green[static_cast<size_t>(green)];
+    const auto known = static_cast<uint32_t>(last);
+    if (last >= 0 &&
+        coder(!is_near(colour, known, reach),
+              contexts.again[farness(known, predicted, green - static_cast<int>(byte_at(predicted, kChannels[0])))]) ==
+            0) {
+      result = known;
+      for (int c = 1; c < 3; ++c) residual[c] = index(known, c) - index(predicted, c) - residual[0];
+    } else {
+      for (int c = 1; c < 3; ++c) code_channel(c, byte_size(size_of(residual[c - 1])), sign_of(residual[c - 1]));
+    }
+    out.colour = 1;
+    for (const int r : residual) out.colour = std::max(out.colour, static_cast<uint8_t>(byte_size(size_of(r))));
+  }
+  contexts.last_of_green[byte_at(result, kChannels[0])] = static_cast<int32_t>(result);
+  colour = result;
+  return good;
+}
+
 }  // namespace
 
 void ScatterContexts::start() {
-  for (uint32_t size = 0; size <= kDepthBits; ++size) depth[size].start(1u << size);
+  for (uint32_t size = 0; size <= kDepthBits; ++size)
+    for (GolombContext& context : depth[size]) context.start(1u << size);
   for (auto& component : normal)
     for (uint32_t size = 0; size <= kByteBits; ++size)
       for (GolombContext& context : component[size]) context.start(1u << size);
-  for (auto& channel : colour)
-    for (uint32_t size = 0; size <= kByteBits; ++size) channel[size].start(1u << size);
+  std::fill(std::begin(plain), std::end(plain), AdaptiveBit());
+  std::fill(std::begin(again), std::end(again), AdaptiveBit());
+  for (auto& channel : colour) std::fill(std::begin(channel), std::end(channel), SignedModel());
+  last_of_green.fill(-1);
 }
 
 void ScatterEncoder::start(size_t count, const TileBounds& bounds) {
   contexts_.start();
   bounds_ = &bounds;
-  plain_.assign((count + 7) / 8, 0);
+  colours_.clear();
+  colour_coder_ = RangeEncoder(colours_);
   bits_.start(count * kMostPixelBits);
-  done_ = 0;
 }
 
 Magnitudes ScatterEncoder::put(Pixel& pixel, const Guess& guess) {
@@ -141,40 +161,32 @@ Magnitudes ScatterEncoder::put(Pixel& pixel, const Guess& guess) {
     code_depth(contexts_, *bounds_->depth, guess, pixel.depth, out, code);
   } else {
     const int depth = static_cast<int>(pixel.depth) - static_cast<int>(guess.pixel.depth);
-    code(depth, contexts_.depth[guess.expected.depth]);
+    code(depth, contexts_.depth[guess.expected.depth][guess.distance]);
     out.depth = static_cast<uint8_t>(size_of(depth));
   }
   if (bounds_->normal != 0)
     code_normal(contexts_, NormalLattice(bounds_->normal), guess, pixel.normal, out, code);
   else
     code_normal(contexts_, guess, pixel.normal, out, code);
-  if (is_near(pixel.colour, guess.pixel.colour, bounds_->colour)) {
-    plain_[done_ / 8] |= static_cast<uint8_t>(1u << done_ % 8);
-    pixel.colour = guess.pixel.colour;
-  } else if (bounds_->colour != 0) {
-    code_colour(contexts_, ColourLattice(bounds_->colour), guess, pixel.colour, out, code);
-  } else {
-    code_colour(contexts_, guess, pixel.colour, out, code);
-  }
   bits_.sink = bits;
-  ++done_;
+  code_colour(contexts_, bounds_->colour, guess, pixel.colour, out, BitCoder{colour_coder_});
   return out;
 }
 
 void ScatterEncoder::finish(std::vector<uint8_t>& out) {
-  put_block(out, plain_);
+  colour_coder_.finish();
+  put_stored_block(out, colours_);
   put_stored_block(out, bits_.bytes());
 }
 
-bool ScatterDecoder::start(Reader& in, size_t count, const TileBounds& bounds) {
+bool ScatterDecoder::start(Reader& in, const TileBounds& bounds) {
   contexts_.start();
   bounds_ = &bounds;
-  plain_.resize((count + 7) / 8);
-  done_ = 0;
-  if (!get_block(in, plain_)) return false;
-  const auto bits = get_stored_block(in);
-  if (bits) bits_.start(*bits, 2 * kMostPixelBits);
-  return bits.has_value();
+  const auto colours = get_stored_block(in), bits = get_stored_block(in);
+  if (!colours || !bits) return false;
+  colour_coder_ = RangeDecoder(*colours);
+  bits_.start(*bits, 2 * kMostPixelBits);
+  return true;
 }
 
 std::optional<Pixel> ScatterDecoder::get(const Guess& guess, Magnitudes& out) {
@@ -186,7 +198,7 @@ std::optional<Pixel> ScatterDecoder::get(const Guess& guess, Magnitudes& out) {
   if (bounds_->depth != nullptr) {
     good = code_depth(contexts_, *bounds_->depth, guess, pixel.depth, out, code);
   } else {
-    const int residual = code(0, contexts_.depth[guess.expected.depth]);
+    const int residual = code(0, contexts_.depth[guess.expected.depth][guess.distance]);
     const int depth = static_cast<int>(guess.pixel.depth) + residual;
     out.depth = static_cast<uint8_t>(std::min<unsigned>(size_of(residual), ScatterContexts::kDepthBits));
     pixel.depth = static_cast<uint32_t>(depth);
@@ -197,13 +209,7 @@ std::optional<Pixel> ScatterDecoder::get(const Guess& guess, Magnitudes& out) {
     good = code_normal(contexts_, NormalLattice(bounds_->normal), guess, pixel.normal, out, code);
   else
     code_normal(contexts_, guess, pixel.normal, out, code);
-  if (plain_[done_ / 8] >> done_ % 8 & 1)
-    pixel.colour = guess.pixel.colour;
-  else if (bounds_->colour != 0)
-    good &= code_colour(contexts_, ColourLattice(bounds_->colour), guess, pixel.colour, out, code);
-  else
-    code_colour(contexts_, guess, pixel.colour, out, code);
-  ++done_;
+  good &= code_colour(contexts_, bounds_->colour, guess, pixel.colour, out, BitDecoder{colour_coder_});
   bits_.source = bits;
   if (bits_.overrun() || !good) return std::nullopt;
   return pixel;

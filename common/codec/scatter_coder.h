@@ -1,17 +1,21 @@
 // The residuals of scattered pixels <-> bits. How large a residual is expected to be depends on how large those of its
-// neighbours were.
-//   scatter = block of flags, one bit a pixel: its colour is as predicted; stored block of bits. These are of each
-//   pixel depth, the normal's bytes, and unless its flag is set green, blue - green, red - green.
+// neighbours were, and of depth on how far these are.
+//   scatter = u8 pole, by which normals are turned; stored block of colours, range-coded (range_coder.h); stored block
+//   of bits. These are of each pixel depth and the normal's bytes by Golomb's codes.
+//   A pixel's colour is as predicted, or has green's residual, and then is the last one of that green, or has the
+//   residuals of blue and red less that of green.
 // Within bounds (lattice.h) residuals are steps from where the prediction lies, and a colour is as predicted if it is
-// near enough. Normals are turned by a pole of the tile's, which scatter begins with.
+// near enough.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "common/codec/golomb.h"
 #include "common/codec/lattice.h"
+#include "common/codec/range_coder.h"
 #include "common/codec/scatter.h"
 
 namespace telesplat::codec::detail {
@@ -20,9 +24,12 @@ namespace telesplat::codec::detail {
 struct ScatterContexts {
   static constexpr int kDepthBits = 24, kByteBits = 8;  // the most that a residual takes
   void start();
-  GolombContext depth[kDepthBits + 1];        // [expected]
-  GolombContext normal[2][kByteBits + 1][5];  // [component][expected][of the other component]
-  GolombContext colour[3][kByteBits + 1];     // [channel][expected; of the channel before]
+  GolombContext depth[kDepthBits + 1][Guess::kMostDistance + 1];  // [expected][distance]
+  GolombContext normal[2][kByteBits + 1][5];                      // [component][expected][of the other component]
+  AdaptiveBit plain[4];                                           // [plain_colour]
+  AdaptiveBit again[4];                                           // [how far it is from what is predicted]
+  SignedModel colour[3][kByteBits + 1];                           // [channel][expected; of the channel before]
+  std::array<int32_t, 256> last_of_green;                         // a colour; -1: there was none
 };
 
 class ScatterEncoder {
@@ -36,26 +43,25 @@ class ScatterEncoder {
  private:
   ScatterContexts contexts_;
   const TileBounds* bounds_ = nullptr;
-  std::vector<uint8_t> plain_;
+  std::vector<uint8_t> colours_;
+  RangeEncoder colour_coder_{colours_};
   BitWriter bits_;
-  size_t done_ = 0;
 };
 
 class ScatterDecoder {
  public:
-  /// Reads what `count` pixels are made of; false where it is damaged.
-  [[nodiscard]] bool start(Reader& in, size_t count, const TileBounds& bounds);
+  /// Reads what pixels are made of; false where it is damaged. The bytes of `in` must outlive the last pixel.
+  [[nodiscard]] bool start(Reader& in, const TileBounds& bounds);
   /// Nothing where the stream is damaged.
   std::optional<Pixel> get(const Guess& guess, Magnitudes& magnitudes);
   /// All bits were taken.
-  [[nodiscard]] bool finished() const { return bits_.finished(); }
+  [[nodiscard]] bool finished() const { return bits_.finished() && colour_coder_.finished(); }
 
  private:
   ScatterContexts contexts_;
   const TileBounds* bounds_ = nullptr;
-  std::vector<uint8_t> plain_;
+  RangeDecoder colour_coder_;
   BitReader bits_;
-  size_t done_ = 0;
 };
 
 }  // namespace telesplat::codec::detail

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/codec/walk.h"
+#include "common/image/normal.h"
 
 namespace telesplat::codec::detail {
 namespace {
@@ -49,13 +50,17 @@ bool is_sparse(size_t covered, size_t runs, size_t pixels, bool bounded) {
   return few || (may_be_sparse(covered, pixels) && covered < runs * 4);
 }
 
-// The one of the sparse tile's normals.
-int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& mask) {
+// By which the sparse tile's normals are turned. exact: codes that are not canonical must come back.
+int pole_of(const image::DepthImage& image, const TileRect& rect, const Mask& mask, bool exact) {
   PoleChoice choice;
+  bool canonical = true;
   for (int y = 0; y < rect.height; ++y)
-    for_each_set(mask.row(y), mask.words_per_row(),
-                 [&](size_t x) { choice.add(image.normal[rect.index(static_cast<int>(x), y)]); });
-  return choice.best();
+    for_each_set(mask.row(y), mask.words_per_row(), [&](size_t x) {
+      const uint16_t code = image.normal[rect.index(static_cast<int>(x), y)];
+      choice.add(code);
+      canonical &= image::canonical_normal16(code) == code;
+    });
+  return exact && !canonical ? kRaw : choice.best();
 }
 
 }  // namespace
@@ -108,11 +113,8 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
 
   if (sparse) {
     if (bounds.depth != nullptr) base.depth = bounds.depth->code(base.depth);
-    int pole = kRaw;
-    if (bounds.normal != 0) {
-      pole = pole_of(image, rect, s.mask);
-      out.push_back(static_cast<uint8_t>(pole));
-    }
+    const int pole = pole_of(image, rect, s.mask, bounds.normal == 0);
+    out.push_back(static_cast<uint8_t>(pole));
     s.scatter_encoder.start(covered, bounds);
     encode_sparse(s, image, rect, base, pole);
     s.scatter_encoder.finish(out);
@@ -146,8 +148,8 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   }
   if (sparse) {
     if (!may_be_sparse(covered, pixels)) return std::nullopt;
-    const auto pole = bounds.normal != 0 ? in.u8() : std::optional<uint8_t>(kRaw);
-    if (!pole || (bounds.normal != 0 && *pole >= kPoles) || !s.scatter_decoder.start(in, covered, bounds))
+    const auto pole = in.u8();
+    if (!pole || *pole > (bounds.normal != 0 ? kPoles - 1 : kRaw) || !s.scatter_decoder.start(in, bounds))
       return std::nullopt;
     const Pixel first{bounds.depth != nullptr ? bounds.depth->code(base->depth) : base->depth, base->colour,
                       base->normal};
@@ -158,7 +160,7 @@ std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileR
   return covered;
 }
 
-bool skip_tile(Reader& in, const TileRect& rect, const ErrorBounds& bounds, StreamInfo& info) {
+bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info) {
   const auto kind = in.u8();
   if (kind == kEmpty) return true;
   if (!kind || *kind & ~kKnownBits || !get_base(in)) return false;
@@ -180,7 +182,7 @@ bool skip_tile(Reader& in, const TileRect& rect, const ErrorBounds& bounds, Stre
     return true;
   };
   if ((*kind & kPredictorBits) == kSparse) {
-    if (bounds.normal != 0 && !in.u8()) return false;
+    if (!in.u8()) return false;
     return skip(info.sparse_bytes, 2);
   }
   return DenseCoder::skip(in, info);

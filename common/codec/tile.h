@@ -34,6 +34,6 @@ size_t put_tile(std::vector<uint8_t>& out, const image::DepthImage& image, const
 /// Writes all pixels of `rect`; returns the number of covered ones, or nothing where the stream is damaged.
 std::optional<size_t> get_tile(Reader& in, image::DepthImage& image, const TileRect& rect, const TileBounds& bounds);
 /// Adds the covered pixels and the bytes of a tile of the size of `rect` to `info`; false where the stream is damaged.
-[[nodiscard]] bool skip_tile(Reader& in, const TileRect& rect, const ErrorBounds& bounds, StreamInfo& info);
+[[nodiscard]] bool skip_tile(Reader& in, const TileRect& rect, StreamInfo& info);
 
 }  // namespace telesplat::codec::detail

@@ -59,8 +59,8 @@ std::string name_for_reader(std::span<const std::byte> bytes, const std::string&
   return name;
 }
 
-// OpenImageIO would ask each of its readers, HEIF's and that of movies too, about a file that is not what its name says.
-// What is hostile would choose among all of them, and one takes minutes and all memory (libheif 1.15, under
+// OpenImageIO would ask each of its readers, HEIF's and that of movies too, about a file that is not what its name
+// says. What is hostile would choose among all of them, and one takes minutes and all memory (libheif 1.15, under
 // ThreadSanitizer).
 void ask_the_reader_of_its_name_alone() {
   [[maybe_unused]] static const bool told = OIIO::attribute("try_all_readers", 0);

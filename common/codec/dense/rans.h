@@ -1,7 +1,8 @@
 // Symbols <-> bits by asymmetric numeral systems (J. Duda, 2013, "range" variant, as in F. Giesen's interleaved coders,
 // 2014): 32 states that take turns, 12-bit frequencies, words of 16 bits.
 //
-// A symbol is a token (tokens.h: eight a factor of two) and its raw bits. State x in [2^15, 2^31):
+// A symbol is a token (eight a factor of two, as the hybrid integers of JPEG XL, ISO/IEC 18181-1, C.3.3) and its raw
+// bits. State x in [2^15, 2^31):
 //   token of frequency f that starts at s:  x -> x / f * 4096 + x % f + s
 //   k raw bits, k <= 15:                    x -> x * 2^k + bits
 // Before either, the lower 16 bits of a state that would become too large are written. Symbol i of a row belongs to

@@ -1,15 +1,9 @@
-// Codes of residuals: any comes back whatever was expected, and no bits take more than is promised. A sparse tile costs
-// no more than sparse tiles do.
+// Codes of residuals: any comes back whatever was expected, and no bits take more than is promised.
 #include "common/codec/golomb.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
-
-#include "common/codec/depth_codec.h"
-#include "common/codec/walk.h"
-#include "tests/support/depth_images.h"
-#include "tests/support/masks.h"
 
 namespace telesplat::codec {
 namespace {
@@ -64,40 +58,6 @@ TEST(Golomb, NoBitsTakeMoreThanIsPromised) {
         ASSERT_LT(std::abs(residual), 1 << 25);
       }
     }
-}
-
-// A tile whose pixels `mask` covers, coded as a sparse one.
-std::vector<uint8_t> as_sparse(const image::DepthImage& image, const image::PixelMask& mask) {
-  const detail::TileRect rect{0, static_cast<size_t>(image.width), image.width, image.height};
-  std::vector<uint8_t> out{0xD7, 5, 0, static_cast<uint8_t>(image.width), static_cast<uint8_t>(image.height), 2 | 4};
-  out.resize(out.size() + 8);  // the first prediction: none
-  out[6] = 1;
-  detail::put_mask(out, mask);
-  detail::TileScratch s;
-  s.mask = mask;
-  const detail::TileBounds exact({});
-  s.scatter_encoder.start(mask.count(), exact);
-  encode_sparse(s, image, rect, {1, 0, 0}, detail::kRaw);
-  s.scatter_encoder.finish(out);
-  return out;
-}
-
-TEST(Scatter, DenseTilesAreNoSparseOnes) {
-  for (const double density : {0.2, 0.3, 0.6}) {
-    const image::PixelMask mask = test::random_mask(100, 100, density, 3);
-    image::DepthImage image = test::random_pixels(100, 100, 1, 7);
-    for (int y = 0; y < 100; ++y)
-      for (int x = 0; x < 100; ++x)
-        if (!mask.at(x, y)) {
-          const auto i = static_cast<size_t>(100 * y + x);
-          image.depth[i] = 0, image.colour[i] = 0, image.normal[i] = 0;
-        }
-    const auto back = decode(as_sparse(image, mask));
-    ASSERT_EQ(back.ok(), density < 0.25) << density;
-    if (back.ok()) {
-      EXPECT_EQ(*back, image);
-    }
-  }
 }
 
 }  // namespace

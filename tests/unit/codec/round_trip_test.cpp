@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 
 #include "common/codec/depth_codec.h"
 #include "tests/support/depth_images.h"
@@ -169,18 +172,31 @@ TEST(CodecFormat, GoldenBytes) {
       image.normal[i] = static_cast<uint16_t>(0x8040 + i);
     }
   const std::vector<uint8_t> golden{
-      215, 5,   0,   4,   3,   5,   232, 3,   0,   48,  32,  16,  64,  128, 2,   13,  7,   0,   8,   1,   46,  0,   0,
-      224, 39,  252, 97,  203, 0,   0,   0,   0,   0,   0,   0,   248, 72,  240, 130, 115, 235, 53,  0,   0,   0,   0,
-      0,   0,   0,   159, 244, 200, 213, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 21,  37,  244,
-      0,   0,   240, 236, 15,  91,  62,  232, 30,  0,   0,   128, 233, 90,  13,  152, 190, 184, 40,  203, 178, 44,  203,
-      178, 44,  203, 178, 44,  7,   64,  144, 163, 106, 85,  85,  1,   25,  3,   248, 248, 227, 31,  135, 136, 65,  196,
-      32,  98,  3,   0,   192, 192, 191, 23,  116, 119, 119, 119, 119, 119, 119, 55,  0,   0,   0,   12,  132, 225, 87,
-      0,   124, 98,  5,   0,   124, 98,  5,   0,   80,  127, 6,   11,  124, 98,  5,   0,   208, 251, 50,  0,   177, 220,
-      254, 10,  124, 98,  5,   0,   124, 98,  5,   0,   114, 250, 27,  2,   0,   128, 0,   0,   0,   128, 0,   0};
+      215, 6,   0,   4,   3,   5,   232, 3,   0,   48,  32,  16,  64,  128, 4,   185, 179, 1,   46,  0,   0,   224, 39,
+      252, 97,  203, 0,   0,   0,   0,   0,   0,   0,   248, 72,  240, 130, 115, 235, 53,  0,   0,   0,   0,   0,   0,
+      0,   159, 244, 200, 213, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 149, 21,  37,  244, 0,   0,
+      240, 236, 15,  91,  62,  232, 30,  0,   0,   128, 233, 90,  13,  152, 190, 184, 40,  203, 178, 44,  203, 178, 44,
+      203, 178, 44,  7,   64,  144, 163, 106, 85,  85,  1,   25,  3,   248, 248, 227, 31,  135, 136, 65,  196, 32,  98,
+      3,   0,   192, 192, 191, 23,  116, 119, 119, 119, 119, 119, 119, 55,  0,   0,   0,   12,  132, 225, 87,  0,   124,
+      98,  5,   0,   124, 98,  5,   0,   80,  127, 6,   11,  124, 98,  5,   0,   208, 251, 50,  0,   177, 220, 254, 10,
+      124, 98,  5,   0,   124, 98,  5,   0,   114, 250, 27,  2,   0,   128, 0,   0,   0,   128, 0,   0};
   EXPECT_EQ(encode(image), golden);
   const auto back = decode(golden);
   ASSERT_TRUE(back.ok()) << back.error().text;
   EXPECT_TRUE(*back == image);
+}
+
+// Of an older version they would all be refused at their second byte.
+TEST(CodecFormat, SeedsOfTheFuzzerAreOfThisVersion) {
+  size_t seeds = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("tests/fuzz/corpus/codec")) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::vector<uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
+    const auto image = decode(bytes);
+    EXPECT_TRUE(image.ok()) << entry.path() << ": " << image.error().text;
+    ++seeds;
+  }
+  EXPECT_GE(seeds, 29u);
 }
 
 // Sparse tiles are predicted in floating point, which must be the same everywhere: these bytes, too.
@@ -192,10 +208,9 @@ TEST(CodecFormat, GoldenBytesOfASparseTile) {
     image.colour[i] = 0x405060 + static_cast<uint32_t>(x) * 0x030201;
     image.normal[i] = static_cast<uint16_t>((250 + 2 * x) % 256 | (100 - y) << 8);
   }
-  const std::vector<uint8_t> golden{215, 5,   0,   9,   8,   6,   32,  161, 7,   96,  80,  64,  250, 100, 1,
-                                    58,  16,  255, 248, 39,  136, 246, 80,  144, 0,   65,  254, 113, 170, 0,
-                                    9,   245, 1,   93,  248, 255, 215, 120, 252, 190, 223, 251, 225, 179, 136,
-                                    170, 3,   129, 94,  51,  136, 130, 11,  134, 128, 1,   0};
+  const std::vector<uint8_t> golden{215, 6,   0,   9,   8,  6,   32, 161, 7,   96, 80,  64,  250, 100, 16,  163, 15,
+                                    186, 98,  90,  36,  93, 192, 6,  21,  126, 7,  155, 192, 202, 77,  248, 255, 215,
+                                    120, 252, 190, 207, 34, 170, 14, 244, 154, 65, 20,  92,  48,  4,   12,  0};
   EXPECT_EQ(encode(image), golden);
   const auto back = decode(golden);
   ASSERT_TRUE(back.ok()) << back.error().text;
