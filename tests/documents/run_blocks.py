@@ -46,8 +46,10 @@ END_S = 120  # for what ran in the background and was told to end
 SECONDS, SIZE = 3, "320x240"  # of a run that does not say
 
 
-def shortened(text, seconds=SECONDS):
-    """A `telesplat run` or `view`, made short and small."""
+def shortened(text, seconds=SECONDS, one_ray=False):
+    """A `telesplat run` or `view`, made short and small; one_ray: views are verified with a ray a pixel, not 16."""
+    if one_ray and re.search(r"--verify[ =]", text):
+        text += " --verify-samples 1"
     if re.search(r"--duration[ =]", text):
         text = re.sub(r"--duration[ =]\S+", f"--duration {seconds}", text)
     else:
@@ -174,7 +176,7 @@ class Page:
             self._start_service(where, text, program)
         elif program == "telesplat" and verb in ("run", "view"):
             self._beside = text
-            self._foreground(where, shortened(text))
+            self._foreground(where, shortened(text, one_ray=self._slowness > 1))
         elif program == "telesplat" and verb == "sweep":
             self._foreground(where, shortened_sweep(text))
         elif program == "telesplat" and verb == "ctl":
@@ -185,7 +187,7 @@ class Page:
     def _control(self, where, text):
         if not self._background and self._beside:
             self._files.make_those_in(self._beside)
-            self._start(shortened(self._beside, 0))
+            self._start(shortened(self._beside, 0, self._slowness > 1))
             self._wait_for_session(where)
         self._foreground(where, text)
         if re.search(r"\bctl stop\b", text):
