@@ -89,7 +89,7 @@ class Screen:
 class Page:
     """Runs the blocks of one page in `folder`."""
 
-    def __init__(self, root, programs, folder, display, slowness):
+    def __init__(self, root, programs, folder, display, slowness=1):
         self._slowness = slowness
         self._folder, self._programs, self._display = folder, programs, display
         self._files = Files(programs, folder)
